@@ -1,0 +1,24 @@
+#pragma once
+
+#include "base/time_point.h"
+
+namespace emberlock {
+
+/// A source of time for wrappers (threads, drivers, command loops). Pure code takes instants as arguments instead.
+/// Thread-safe.
+class Clock {
+ public:
+  virtual ~Clock() = default;
+  [[nodiscard]] virtual TimePoint now() const = 0;
+  /// Returns once now() >= t; at once when t has passed.
+  virtual void sleep_until(TimePoint t) = 0;
+};
+
+/// The machine's monotonic clock.
+class SteadyClock final : public Clock {
+ public:
+  [[nodiscard]] TimePoint now() const override;
+  void sleep_until(TimePoint t) override;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,129 @@
+#include "base/file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "base/unique_fd.h"
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+Error system_error(const fs::path& path, const std::string& action, std::string remedy = {}) {
+  return {ErrorKind::io, action + ": " + std::generic_category().message(errno), path.string(), std::move(remedy)};
+}
+
+fs::path sibling(const fs::path& target) {
+  fs::path clean = target.lexically_normal();
+  if (clean.filename().empty()) clean = clean.parent_path();
+  return clean.parent_path() / ("." + clean.filename().string() + ".partial." + std::to_string(::getpid()));
+}
+
+Status write_all(int fd, std::string_view content, const fs::path& path) {
+  while (!content.empty()) {
+    const ssize_t n = ::write(fd, content.data(), content.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return system_error(path, "cannot write", "Free space or choose another disk");
+    content.remove_prefix(static_cast<std::size_t>(n));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> read_file(const fs::path& path, std::size_t max_bytes) {
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!fd) {
+    Error e = system_error(path, "cannot open", "Check the path and its permissions");
+    e.kind = ErrorKind::bad_input;
+    return e;
+  }
+  struct stat info {};
+  if (::fstat(fd.get(), &info) != 0) return system_error(path, "cannot stat");
+  if (!S_ISREG(info.st_mode)) return Error{ErrorKind::bad_input, "not a regular file", path.string(), "Name a file"};
+  if (static_cast<std::size_t>(info.st_size) > max_bytes) {
+    return Error{ErrorKind::bad_input, "larger than the " + std::to_string(max_bytes) + " bytes allowed here",
+                 path.string(), "Check that this is the file you mean"};
+  }
+  std::string content(static_cast<std::size_t>(info.st_size), '\0');
+  std::size_t filled = 0;
+  while (filled < content.size()) {
+    const ssize_t n = ::read(fd.get(), content.data() + filled, content.size() - filled);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return system_error(path, "cannot read");
+    if (n == 0) break;
+    filled += static_cast<std::size_t>(n);
+  }
+  content.resize(filled);
+  return content;
+}
+
+Status write_file_atomically(const fs::path& path, std::string_view content) {
+  const fs::path partial = sibling(path);
+  {
+    const UniqueFd fd(::open(partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (!fd) return system_error(path, "cannot create", "Check that the folder exists and is writable");
+    if (auto s = write_all(fd.get(), content, path); !s.ok() || ::fsync(fd.get()) != 0) {
+      const Error error = s.ok() ? system_error(path, "cannot flush") : s.error();
+      ::unlink(partial.c_str());
+      return error;
+    }
+  }
+  if (::rename(partial.c_str(), path.c_str()) != 0) {
+    const Error error = system_error(path, "cannot rename into place");
+    ::unlink(partial.c_str());
+    return error;
+  }
+  return {};
+}
+
+Result<AtomicDirectory> AtomicDirectory::create(const fs::path& target, std::string_view marker) {
+  std::error_code ec;
+  if (fs::exists(target, ec)) {
+    const bool ours = fs::is_directory(target, ec) && (fs::is_empty(target, ec) || fs::exists(target / marker, ec));
+    if (!ours) {
+      return Error{ErrorKind::bad_input, "exists and is not an earlier result (no " + std::string(marker) + " in it)",
+                   target.string(), "Name a new folder, or remove this one"};
+    }
+  }
+  const fs::path staging = sibling(fs::absolute(target));
+  fs::create_directories(staging.parent_path(), ec);
+  fs::remove_all(staging, ec);
+  if (!fs::create_directory(staging, ec)) {
+    return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), target.string(),
+                 "Check that its parent is writable"};
+  }
+  return AtomicDirectory(fs::absolute(target), staging);
+}
+
+AtomicDirectory::AtomicDirectory(AtomicDirectory&& o) noexcept
+    : target_(std::move(o.target_)), staging_(std::exchange(o.staging_, {})) {}
+
+AtomicDirectory::~AtomicDirectory() {
+  std::error_code ec;
+  if (!staging_.empty()) fs::remove_all(staging_, ec);
+}
+
+Status AtomicDirectory::commit() {
+  std::error_code ec;
+  fs::path old = staging_;
+  old += ".old";
+  const bool replaces = fs::exists(target_, ec);
+  if (replaces) fs::rename(target_, old, ec);
+  if (!ec) fs::rename(staging_, target_, ec);
+  if (ec) {
+    const std::string reason = ec.message();
+    if (replaces && !fs::exists(target_, ec)) fs::rename(old, target_, ec);
+    return Error{ErrorKind::io, "cannot move the result into place: " + reason, target_.string(),
+                 "Check that the folder's parent is writable"};
+  }
+  staging_.clear();
+  if (replaces) fs::remove_all(old, ec);
+  return {};
+}
+
+}  // namespace emberlock

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "base/progress.h"
+#include "base/result.h"
+
+namespace emberlock::cli {
+
+// Each function adds one verb; its callback does the work and ends in fail() or normally.
+void add_smear(CLI::App& app);
+void add_align(CLI::App& app);
+void add_reconstruct(CLI::App& app);
+void add_demo(CLI::App& app);
+
+/// Prints "emberlock: <message>" on stderr and leaves with exit code 2 for bad input, else 1 (as CLI::RuntimeError).
+[[noreturn]] void fail(const Error& error);
+
+/// A progress bar on stderr, redrawn in place on a terminal, a line every tenth otherwise; silent below two seconds.
+Progress progress_bar(const std::string& title);
+
+}  // namespace emberlock::cli

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+
+#include "base/frame.h"
+#include "base/quantity.h"
+#include "base/result.h"
+
+namespace emberlock {
+
+/// How a camera's shutter phase can be drawn anew.
+enum class ShutterReset {
+  none,
+  by_hand,     ///< an operator presses a button; the phase that follows is uniform over the frame period
+  on_command,  ///< the driver does it, a latency with some jitter after the moment asked for
+};
+
+struct CameraInfo {
+  std::string id;  ///< stable identity: serial number, else USB path or MAC; never an index
+  std::string model;
+  ImageLayout layout;
+  Hertz frame_rate;  ///< nominal
+  ShutterReset reset = ShutterReset::none;
+};
+
+/// A camera, opened. One owner thread; not thread-safe. Times are on the host's clock that the driver was given.
+class Camera {
+ public:
+  virtual ~Camera() = default;
+  [[nodiscard]] virtual const CameraInfo& info() const = 0;
+
+  /// Begins to film; frames queue from here on.
+  virtual Status start() = 0;
+  /// Ends filming within a bounded time and drops queued frames. Harmless when not filming.
+  virtual void stop() = 0;
+  /// The next frame in order, waiting at most `deadline`. Errors: timed_out, device (camera lost),
+  /// out_of_data (a recording has ended).
+  virtual Result<Frame> next_frame(Seconds deadline) = 0;
+  /// Draws the shutter phase anew, the action starting at `at` (at once if that has passed). Frames queued before it
+  /// are dropped: the next frame shows the new phase. Error `device` when the camera can't (ShutterReset::none).
+  virtual Status reset_shutter(TimePoint at) = 0;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "base/image.h"
+#include "base/result.h"
+
+namespace emberlock {
+
+// Conventions of recon: world in metres, right-handed; camera axes as OpenCV's (x right, y down, z forward);
+// pixel coordinates count from 0 at the corner of the top left pixel, so that its centre is (0.5, 0.5).
+
+/// Brown-Conrady distortion of normalised image coordinates, as OpenCV's first five coefficients.
+struct Distortion {
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+  [[nodiscard]] bool none() const { return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0 && k3 == 0; }
+};
+
+struct Intrinsics {
+  ImageSize size;
+  double fx = 0, fy = 0, cx = 0, cy = 0;  ///< pixels
+  Distortion distortion;
+};
+
+/// target_from_source: x_target = rotation * x_source + translation (metres).
+struct Rigid3 {
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d translation = Eigen::Vector3d::Zero();
+
+  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return rotation * p + translation; }
+  [[nodiscard]] Rigid3 inverse() const {
+    return {rotation.transpose(), -(rotation.transpose() * translation)};
+  }
+};
+
+struct Ray {
+  Eigen::Vector3d origin;
+  Eigen::Vector3d direction;  ///< unit length
+};
+
+/// A calibrated camera: pixels from world points, world rays from pixels.
+struct CameraModel {
+  Intrinsics intrinsics;
+  Rigid3 camera_from_world;
+
+  [[nodiscard]] Eigen::Vector3d center() const { return camera_from_world.inverse().translation; }
+  /// Pixel of a world point; the point must lie in front of the camera (z > 0).
+  [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& world) const;
+  /// The ray through a pixel position, from the camera's centre, distortion removed by fixed-point iteration.
+  [[nodiscard]] Ray ray(const Eigen::Vector2d& pixel) const;
+};
+
+/// A camera at `center` that looks at `target`, the world's `up` pointing up in its image.
+CameraModel look_at(const Intrinsics& intrinsics, const Eigen::Vector3d& center, const Eigen::Vector3d& target,
+                    const Eigen::Vector3d& up = Eigen::Vector3d::UnitZ());
+
+}  // namespace emberlock

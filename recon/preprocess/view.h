@@ -1,0 +1,46 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "recon/calibrate/camera_model.h"
+
+namespace emberlock {
+
+/// Linear RGB in grey levels 0..255, interleaved, row-major: rgb[3 * (y * width + x) + c].
+struct RadianceImage {
+  ImageSize size;
+  std::vector<float> rgb;
+
+  RadianceImage() = default;
+  explicit RadianceImage(ImageSize s)
+      : size(s), rgb(3 * static_cast<std::size_t>(s.width) * static_cast<std::size_t>(s.height)) {}
+};
+
+enum class ViewRole { input, held_out };
+
+/// One camera's picture of the flame.
+struct View {
+  std::string name;  ///< file or camera id, for messages
+  CameraModel camera;
+  RadianceImage image;
+  ViewRole role = ViewRole::input;
+};
+
+/// An axis-aligned box in the world: the volume to reconstruct.
+struct Box {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< metres
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();    ///< metres, every component > 0
+};
+
+/// What a reconstruction starts from.
+struct Scene {
+  std::vector<View> views;
+  Box box;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,18 @@
+#include "cli/commands.h"
+
+int main(int argc, char** argv) {
+  CLI::App app{"Emberlock: locks cameras without trigger hardware, films flames with them, reconstructs the volume.",
+               "emberlock"};
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "emberlock " EMBERLOCK_VERSION);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::RuntimeError& e) {
+    return e.get_exit_code();
+  } catch (const CLI::ParseError& e) {
+    app.exit(e);
+    return 2;
+  }
+}

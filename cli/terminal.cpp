@@ -1,0 +1,46 @@
+#include <unistd.h>
+
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include "cli/commands.h"
+
+namespace emberlock::cli {
+
+void fail(const Error& error) {
+  std::fprintf(stderr, "emberlock: %s\n", error.message().c_str());
+  throw CLI::RuntimeError(error.message(), error.kind == ErrorKind::bad_input ? 2 : 1);
+}
+
+Progress progress_bar(const std::string& title) {
+  using Clock = std::chrono::steady_clock;
+  struct State {
+    Clock::time_point start = Clock::now();
+    int tenths_shown = -1;
+    bool drawn = false;
+  };
+  const bool terminal = ::isatty(STDERR_FILENO) != 0;
+  return [title, terminal, state = std::make_shared<State>()](double fraction, std::string_view what) {
+    const double seconds = std::chrono::duration<double>(Clock::now() - state->start).count();
+    const bool done = fraction >= 1;
+    if (seconds < 2 && !(done && state->drawn)) return;
+    state->drawn = true;
+    const std::string words(what);
+    if (terminal) {
+      constexpr int kWidth = 30;
+      const int filled = static_cast<int>(fraction * kWidth);
+      const std::string bar = std::string(static_cast<std::size_t>(filled), '#') +
+                              std::string(static_cast<std::size_t>(kWidth - filled), '.');
+      std::fprintf(stderr, "\r\033[K%s [%s] %3.0f %% %s%s", title.c_str(), bar.c_str(), 100 * fraction, words.c_str(),
+                   done ? "\n" : "");
+    } else if (const int tenths = static_cast<int>(fraction * 10); tenths != state->tenths_shown) {
+      state->tenths_shown = tenths;
+      std::fprintf(stderr, "%s %3.0f %% %s\n", title.c_str(), 100 * fraction, words.c_str());
+    }
+    std::fflush(stderr);
+  };
+}
+
+}  // namespace emberlock::cli

@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Core>
-
+#include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
 
 namespace emberlock {
@@ -29,12 +28,6 @@ struct View {
   CameraModel camera;
   RadianceImage image;
   ViewRole role = ViewRole::input;
-};
-
-/// An axis-aligned box in the world: the volume to reconstruct.
-struct Box {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< metres
-  Eigen::Vector3d size = Eigen::Vector3d::Zero();    ///< metres, every component > 0
 };
 
 /// What a reconstruction starts from.

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace emberlock {
+
+/// An axis-aligned box in the world: the volume to reconstruct.
+struct Box {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< metres
+  Eigen::Vector3d size = Eigen::Vector3d::Zero();    ///< metres, every component > 0
+};
+
+}  // namespace emberlock

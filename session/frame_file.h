@@ -8,12 +8,13 @@
 
 namespace emberlock {
 
-/// Frames of a file that somebody else made: one image (PGM, PPM, PNG, JPEG, TIFF, FITS) or a video that FFmpeg reads.
-/// Grey stays grey, colour becomes rgb8 or rgb16; 10..16-bit samples keep their values (bit_depth is the file's
-/// maximum value's, e.g. a PGM with maxval 4095 is 12 bits).
+/// Frames of a file that somebody else made: one image (PGM, PPM, PNG, JPEG, TIFF, FITS) or a video that
+/// FFmpeg reads. Grey stays grey, colour becomes rgb8 or rgb16; 10..16-bit samples keep their values
+/// (bit_depth is the file's maximum value's, e.g. a PGM with maxval 4095 is 12 bits).
 class FrameFile {
  public:
-  /// Errors name the file and say what is wrong with it (absent, truncated, not an image or video, no frames).
+  /// Errors name the file and say what is wrong with it (absent, truncated, not an image or video, no
+  /// frames).
   static Result<std::unique_ptr<FrameFile>> open(const std::filesystem::path& path);
   virtual ~FrameFile() = default;
   /// The next frame; `out_of_data` after the last, `bad_input` where the file is damaged.

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/frame.h"
+#include "base/result.h"
+#include "session/writer.h"
+
+namespace emberlock {
+
+struct AsyncWriterOptions {
+  std::size_t queue_frames = 64;  ///< frames a camera that may wait for its encoder, >= 1
+};
+
+/// A SessionWriter behind one encoder thread and one bounded queue a camera. push() never waits for encoder
+/// or disk: a full queue loses the frame, counted under its cause. Frames of one camera are pushed by one
+/// thread at a time; everything else may be called from any thread.
+class AsyncWriter {
+ public:
+  AsyncWriter(SessionWriter writer, std::size_t camera_count, AsyncWriterOptions options = {});
+  AsyncWriter(const AsyncWriter&) = delete;
+  AsyncWriter& operator=(const AsyncWriter&) = delete;
+  ~AsyncWriter();  ///< without finish(): queued frames are dropped, the session stays RECORDING
+
+  /// False when the queue was full and the frame is lost.
+  bool push(std::size_t camera, Frame frame);
+  void attribute_gap(std::size_t camera, std::uint64_t frames, LossCause cause);
+  Status append(const v1::Event& event);
+  /// The first failure of an encoder or of the disk, while recording goes on.
+  [[nodiscard]] std::optional<Error> failure() const;
+
+  /// Drains the queues, ends the threads and finishes the session.
+  Result<v1::Manifest> finish();
+
+ private:
+  class Lane;
+  struct Shared;
+  std::unique_ptr<Shared> shared_;
+  std::vector<std::unique_ptr<Lane>> lanes_;
+};
+
+}  // namespace emberlock

@@ -4,8 +4,8 @@
 
 namespace emberlock {
 
-/// A source of time for wrappers (threads, drivers, command loops). Pure code takes instants as arguments instead.
-/// Thread-safe.
+/// A source of time for wrappers (threads, drivers, command loops). Pure code takes instants as arguments
+/// instead. Thread-safe.
 class Clock {
  public:
   virtual ~Clock() = default;

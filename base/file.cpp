@@ -1,11 +1,11 @@
 #include "base/file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+
+#include <fcntl.h>
+#include <sys/stat.h>
 
 #include "base/unique_fd.h"
 
@@ -14,7 +14,8 @@ namespace fs = std::filesystem;
 namespace {
 
 Error system_error(const fs::path& path, const std::string& action, std::string remedy = {}) {
-  return {ErrorKind::io, action + ": " + std::generic_category().message(errno), path.string(), std::move(remedy)};
+  return {ErrorKind::io, action + ": " + std::generic_category().message(errno), path.string(),
+          std::move(remedy)};
 }
 
 fs::path sibling(const fs::path& target) {
@@ -44,7 +45,8 @@ Result<std::string> read_file(const fs::path& path, std::size_t max_bytes) {
   }
   struct stat info {};
   if (::fstat(fd.get(), &info) != 0) return system_error(path, "cannot stat");
-  if (!S_ISREG(info.st_mode)) return Error{ErrorKind::bad_input, "not a regular file", path.string(), "Name a file"};
+  if (!S_ISREG(info.st_mode))
+    return Error{ErrorKind::bad_input, "not a regular file", path.string(), "Name a file"};
   if (static_cast<std::size_t>(info.st_size) > max_bytes) {
     return Error{ErrorKind::bad_input, "larger than the " + std::to_string(max_bytes) + " bytes allowed here",
                  path.string(), "Check that this is the file you mean"};
@@ -84,9 +86,11 @@ Status write_file_atomically(const fs::path& path, std::string_view content) {
 Result<AtomicDirectory> AtomicDirectory::create(const fs::path& target, std::string_view marker) {
   std::error_code ec;
   if (fs::exists(target, ec)) {
-    const bool ours = fs::is_directory(target, ec) && (fs::is_empty(target, ec) || fs::exists(target / marker, ec));
+    const bool ours =
+        fs::is_directory(target, ec) && (fs::is_empty(target, ec) || fs::exists(target / marker, ec));
     if (!ours) {
-      return Error{ErrorKind::bad_input, "exists and is not an earlier result (no " + std::string(marker) + " in it)",
+      return Error{ErrorKind::bad_input,
+                   "exists and is not an earlier result (no " + std::string(marker) + " in it)",
                    target.string(), "Name a new folder, or remove this one"};
     }
   }

@@ -9,9 +9,11 @@
 namespace emberlock {
 
 /// The whole file; an Error that names it otherwise. Refuses files above `max_bytes`.
-Result<std::string> read_file(const std::filesystem::path& path, std::size_t max_bytes = std::size_t{1} << 30);
+Result<std::string> read_file(const std::filesystem::path& path,
+                              std::size_t max_bytes = std::size_t{1} << 30);
 
-/// Writes beside the target, flushes to disk, then renames: a reader sees the old content or the new, never half.
+/// Writes beside the target, flushes to disk, then renames: a reader sees the old content or the new, never
+/// half.
 Status write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
 /// A directory that appears under its final name only when it is complete: fill `path()`, then `commit()`.

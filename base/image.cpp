@@ -6,12 +6,18 @@ namespace emberlock {
 
 std::string_view name(PixelFormat f) {
   switch (f) {
-    case PixelFormat::gray8: return "gray8";
-    case PixelFormat::gray16: return "gray16";
-    case PixelFormat::bayer_rggb8: return "bayer_rggb8";
-    case PixelFormat::bayer_rggb16: return "bayer_rggb16";
-    case PixelFormat::rgb8: return "rgb8";
-    case PixelFormat::rgb16: return "rgb16";
+    case PixelFormat::gray8:
+      return "gray8";
+    case PixelFormat::gray16:
+      return "gray16";
+    case PixelFormat::bayer_rggb8:
+      return "bayer_rggb8";
+    case PixelFormat::bayer_rggb16:
+      return "bayer_rggb16";
+    case PixelFormat::rgb8:
+      return "rgb8";
+    case PixelFormat::rgb16:
+      return "rgb16";
   }
   return "unknown";
 }

@@ -7,9 +7,10 @@
 
 namespace emberlock {
 
-// Conventions: row 0 is the top displayed row, column 0 the leftmost; coordinates in pixel units count from 0 at the
-// CENTRE of the top left pixel in smear_sync (readings), and from 0 at its CORNER in recon (projection, centres at
-// +0.5). Samples of 16-bit formats are native-endian and right-aligned: a 12-bit camera fills 0..4095.
+// Conventions: row 0 is the top displayed row, column 0 the leftmost; coordinates in pixel units count from 0
+// at the CENTRE of the top left pixel in smear_sync (readings), and from 0 at its CORNER in recon
+// (projection, centres at +0.5). Samples of 16-bit formats are native-endian and right-aligned: a 12-bit
+// camera fills 0..4095.
 
 enum class PixelFormat : std::uint8_t {
   gray8,

@@ -7,9 +7,9 @@
 
 namespace emberlock {
 
-/// Counter-based random numbers: a value is a pure function of (seed, stream, counter), so results don't depend on
-/// the order of evaluation or on thread counts. The mixer is SplitMix64's finaliser (Steele, Lea, Flood 2014)
-/// applied to each word in turn.
+/// Counter-based random numbers: a value is a pure function of (seed, stream, counter), so results don't
+/// depend on the order of evaluation or on thread counts. The mixer is SplitMix64's finaliser (Steele, Lea,
+/// Flood 2014) applied to each word in turn.
 HOST_DEVICE constexpr std::uint64_t mix64(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
@@ -17,7 +17,8 @@ HOST_DEVICE constexpr std::uint64_t mix64(std::uint64_t x) {
   return x ^ (x >> 31);
 }
 
-HOST_DEVICE constexpr std::uint64_t random_bits(std::uint64_t seed, std::uint64_t stream, std::uint64_t counter) {
+HOST_DEVICE constexpr std::uint64_t random_bits(std::uint64_t seed, std::uint64_t stream,
+                                                std::uint64_t counter) {
   return mix64(counter ^ mix64(stream ^ mix64(seed)));
 }
 

@@ -32,7 +32,8 @@ class [[nodiscard]] Result {
  public:
   // NOLINTNEXTLINE(google-explicit-constructor): `return value;` and `return Error{...};` are the point.
   Result(T value) : state_(std::in_place_index<0>, std::move(value)) {}
-  Result(Error error) : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT(google-explicit-constructor)
+  Result(Error error)
+      : state_(std::in_place_index<1>, std::move(error)) {}  // NOLINT(google-explicit-constructor)
 
   [[nodiscard]] bool ok() const { return state_.index() == 0; }
   explicit operator bool() const { return ok(); }
@@ -72,15 +73,15 @@ using Status = Result<void>;
 #define EMBERLOCK_CONCAT(a, b) EMBERLOCK_CONCAT_INNER(a, b)
 
 /// Returns the error of a Result<> from the enclosing function; goes on otherwise.
-#define EMBERLOCK_RETURN_IF_ERROR(expression)                                   \
-  if (auto emberlock_status = (expression); !emberlock_status.ok()) {           \
-    return emberlock_status.error();                                            \
-  }                                                                             \
+#define EMBERLOCK_RETURN_IF_ERROR(expression)                         \
+  if (auto emberlock_status = (expression); !emberlock_status.ok()) { \
+    return emberlock_status.error();                                  \
+  }                                                                   \
   static_assert(true)
 
 /// EMBERLOCK_ASSIGN_OR_RETURN(auto x, f()): x is f()'s value; its error returns from the enclosing function.
-#define EMBERLOCK_ASSIGN_OR_RETURN(declaration, expression)                       \
-  auto EMBERLOCK_CONCAT(emberlock_result_, __LINE__) = (expression);              \
-  if (!EMBERLOCK_CONCAT(emberlock_result_, __LINE__).ok())                        \
-    return EMBERLOCK_CONCAT(emberlock_result_, __LINE__).error();                 \
+#define EMBERLOCK_ASSIGN_OR_RETURN(declaration, expression)          \
+  auto EMBERLOCK_CONCAT(emberlock_result_, __LINE__) = (expression); \
+  if (!EMBERLOCK_CONCAT(emberlock_result_, __LINE__).ok())           \
+    return EMBERLOCK_CONCAT(emberlock_result_, __LINE__).error();    \
   declaration = std::move(EMBERLOCK_CONCAT(emberlock_result_, __LINE__)).value()

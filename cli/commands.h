@@ -13,10 +13,12 @@ void add_align(CLI::App& app);
 void add_reconstruct(CLI::App& app);
 void add_demo(CLI::App& app);
 
-/// Prints "emberlock: <message>" on stderr and leaves with exit code 2 for bad input, else 1 (as CLI::RuntimeError).
+/// Prints "emberlock: <message>" on stderr and leaves with exit code 2 for bad input, else 1 (as
+/// CLI::RuntimeError).
 [[noreturn]] void fail(const Error& error);
 
-/// A progress bar on stderr, redrawn in place on a terminal, a line every tenth otherwise; silent below two seconds.
+/// A progress bar on stderr, redrawn in place on a terminal, a line every tenth otherwise; silent below two
+/// seconds.
 Progress progress_bar(const std::string& title);
 
 }  // namespace emberlock::cli

@@ -1,8 +1,9 @@
 #include "cli/commands.h"
 
 int main(int argc, char** argv) {
-  CLI::App app{"Emberlock: locks cameras without trigger hardware, films flames with them, reconstructs the volume.",
-               "emberlock"};
+  CLI::App app{
+      "Emberlock: locks cameras without trigger hardware, films flames with them, reconstructs the volume.",
+      "emberlock"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "emberlock " EMBERLOCK_VERSION);
   try {

@@ -1,9 +1,9 @@
-#include <unistd.h>
-
 #include <chrono>
 #include <cstdio>
 #include <memory>
 #include <string>
+
+#include <unistd.h>
 
 #include "cli/commands.h"
 
@@ -33,8 +33,8 @@ Progress progress_bar(const std::string& title) {
       const int filled = static_cast<int>(fraction * kWidth);
       const std::string bar = std::string(static_cast<std::size_t>(filled), '#') +
                               std::string(static_cast<std::size_t>(kWidth - filled), '.');
-      std::fprintf(stderr, "\r\033[K%s [%s] %3.0f %% %s%s", title.c_str(), bar.c_str(), 100 * fraction, words.c_str(),
-                   done ? "\n" : "");
+      std::fprintf(stderr, "\r\033[K%s [%s] %3.0f %% %s%s", title.c_str(), bar.c_str(), 100 * fraction,
+                   words.c_str(), done ? "\n" : "");
     } else if (const int tenths = static_cast<int>(fraction * 10); tenths != state->tenths_shown) {
       state->tenths_shown = tenths;
       std::fprintf(stderr, "%s %3.0f %% %s\n", title.c_str(), 100 * fraction, words.c_str());

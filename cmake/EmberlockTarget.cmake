@@ -1,7 +1,7 @@
 # One library target a folder. emberlock_library(NAME [SOURCES ...] [PUBLIC ...] [PRIVATE ...]):
 # without SOURCES every .cpp below the folder belongs to it. PUBLIC and PRIVATE are what it links.
 set(EMBERLOCK_WARNINGS -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion -Werror
-  -Wno-restrict)  # GCC bug 105651: false alarms inside std::string
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)  # GCC bug 105651: false alarms inside std::string
 
 function(emberlock_compile_options target)
   target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:${EMBERLOCK_WARNINGS} -ffp-contract=off>)
@@ -9,7 +9,8 @@ function(emberlock_compile_options target)
   if(EMBERLOCK_SANITIZE)
     # Sanitizers change the inlining, and GCC 12 then reports impossible overflows inside its own containers.
     target_compile_options(${target} PRIVATE $<$<COMPILE_LANGUAGE:CXX>:-fsanitize=${EMBERLOCK_SANITIZE}
-      -fno-omit-frame-pointer -fno-sanitize-recover=all -Wno-error=maybe-uninitialized -Wno-error=stringop-overflow>)
+      -fno-omit-frame-pointer -fno-sanitize-recover=all>
+      $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized$<SEMICOLON>-Wno-stringop-overflow>)
     target_link_options(${target} PUBLIC -fsanitize=${EMBERLOCK_SANITIZE})
   endif()
   if(EMBERLOCK_FUZZ)

@@ -1,0 +1,81 @@
+#include "base/file.h"
+
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class FileTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = fs::temp_directory_path() / ("emberlock_file_test." + std::to_string(::getpid()));
+    fs::create_directories(root_);
+  }
+  void TearDown() override { fs::remove_all(root_); }
+  static void put(const fs::path& p, std::string_view text) { std::ofstream(p) << text; }
+  fs::path root_;
+};
+
+TEST_F(FileTest, WhatWasWrittenIsRead) {
+  const std::string content("two\0bytes", 9);
+  ASSERT_TRUE(write_file_atomically(root_ / "a", content).ok());
+  EXPECT_EQ(read_file(root_ / "a").value(), content);
+  EXPECT_EQ(std::distance(fs::directory_iterator(root_), {}), 1) << "no partial file stays behind";
+}
+
+TEST_F(FileTest, AbsentFileIsNamed) {
+  const auto r = read_file(root_ / "absent.json");
+  ASSERT_FALSE(r.ok());
+  EXPECT_EQ(r.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(r.error().message(), HasSubstr("absent.json"));
+}
+
+TEST_F(FileTest, DirectoryAndOversizedFileAreRefused) {
+  EXPECT_FALSE(read_file(root_).ok());
+  put(root_ / "big", "0123456789");
+  EXPECT_TRUE(read_file(root_ / "big", 10).ok());
+  EXPECT_FALSE(read_file(root_ / "big", 9).ok());
+}
+
+TEST_F(FileTest, WritingIntoAnAbsentFolderSaysSo) {
+  const auto s = write_file_atomically(root_ / "no" / "such" / "file", "x");
+  ASSERT_FALSE(s.ok());
+  EXPECT_EQ(s.error().kind, ErrorKind::io);
+}
+
+TEST_F(FileTest, AbandonedDirectoryLeavesNothing) {
+  {
+    auto d = AtomicDirectory::create(root_ / "out", "report.json");
+    ASSERT_TRUE(d.ok());
+    put(d->path() / "half", "x");
+  }
+  EXPECT_TRUE(fs::is_empty(root_));
+}
+
+TEST_F(FileTest, CommittedDirectoryReplacesAnEarlierResult) {
+  for (const char* content : {"first", "second"}) {
+    auto d = AtomicDirectory::create(root_ / "out", "report.json");
+    ASSERT_TRUE(d.ok()) << d.error().message();
+    put(d->path() / "report.json", content);
+    ASSERT_TRUE(d->commit().ok());
+    EXPECT_EQ(read_file(root_ / "out" / "report.json").value(), content);
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(root_), {}), 1);
+}
+
+TEST_F(FileTest, SomebodyElsesFolderIsNotReplaced) {
+  fs::create_directories(root_ / "photos");
+  put(root_ / "photos" / "holiday.jpg", "x");
+  const auto d = AtomicDirectory::create(root_ / "photos", "report.json");
+  ASSERT_FALSE(d.ok());
+  EXPECT_EQ(d.error().kind, ErrorKind::bad_input);
+  EXPECT_TRUE(fs::exists(root_ / "photos" / "holiday.jpg"));
+}
+
+}  // namespace
+}  // namespace emberlock

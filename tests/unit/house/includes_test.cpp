@@ -1,0 +1,116 @@
+// The layers of the house: a folder includes only what stands above it (README.md, "Folders").
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <regex>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+
+const fs::path kRoot = EMBERLOCK_SOURCE_DIR;
+
+const std::map<std::string, std::set<std::string>> kMayInclude{
+    {"base", {}},
+    {"smear_sync", {"base"}},
+    {"session", {"base", "proto"}},
+    {"drivers", {"base", "session"}},
+    {"recon", {"base", "session"}},
+    {"cli", {"base", "proto", "smear_sync", "session", "drivers", "recon"}},
+};
+
+// Inside recon a folder includes itself and the ones before it.
+const std::vector<std::string> kReconOrder{"kernels",   "compute", "calibrate", "preprocess",  "hull",
+                                           "effects",   "render",  "adjust",    "temperature", "synthetic",
+                                           "baselines", "apply",   "export",    "pipeline"};
+
+// The only headers of smear_sync that the virtual cameras may see.
+const std::set<std::string> kVirtualMayInclude{"smear_sync/ccd_model.h", "smear_sync/ccd_timing.h"};
+
+struct Include {
+  fs::path file;  // relative to the root
+  std::string header;
+};
+
+std::vector<Include> includes_below(const std::string& folder) {
+  static const std::regex pattern("^\\s*#\\s*include\\s*\"([^\"]+)\"");
+  std::vector<Include> found;
+  for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
+    const std::string extension = entry.path().extension();
+    if (extension != ".h" && extension != ".cpp" && extension != ".cu" && extension != ".cuh") continue;
+    std::ifstream in(entry.path());
+    std::smatch match;
+    for (std::string line; std::getline(in, line);) {
+      if (std::regex_search(line, match, pattern))
+        found.push_back({fs::relative(entry.path(), kRoot), match[1]});
+    }
+  }
+  return found;
+}
+
+std::string part(const fs::path& path, int index) {
+  auto it = path.begin();
+  for (int i = 0; i < index && it != path.end(); ++i) ++it;
+  return it == path.end() ? "" : it->string();
+}
+
+std::string folder_of(const std::string& header) {
+  const std::string first = part(header, 0);
+  return first == "emberlock" ? "proto" : first;  // generated from proto/emberlock/v1
+}
+
+TEST(House, AFolderIncludesOnlyWhatStandsAboveIt) {
+  for (const auto& [folder, allowed] : kMayInclude) {
+    const auto includes = includes_below(folder);
+    EXPECT_FALSE(includes.empty() && folder != "base") << folder << " was not read";
+    for (const auto& [file, header] : includes) {
+      const std::string target = folder_of(header);
+      const bool of_virtual =
+          part(file, 0) == "drivers" && part(file, 1) == "virtual" && kVirtualMayInclude.contains(header);
+      EXPECT_TRUE(target == folder || allowed.contains(target) || of_virtual)
+          << file << " includes \"" << header << "\", which " << folder << "/ may not";
+    }
+  }
+}
+
+TEST(House, ADriverNeverIncludesItsSibling) {
+  for (const auto& [file, header] : includes_below("drivers")) {
+    if (part(header, 0) != "drivers" || part(header, 2).empty()) continue;  // drivers/camera.h is everybody's
+    EXPECT_EQ(part(file, 1), part(header, 1)) << file << " includes \"" << header << '"';
+  }
+}
+
+TEST(House, InsideReconOnlyLowerFoldersAreIncluded) {
+  const auto rank = [](const std::string& folder) {
+    return std::find(kReconOrder.begin(), kReconOrder.end(), folder) - kReconOrder.begin();
+  };
+  for (const auto& [file, header] : includes_below("recon")) {
+    if (part(header, 0) != "recon") continue;
+    const auto from = rank(part(file, 1));
+    ASSERT_LT(from, static_cast<std::ptrdiff_t>(kReconOrder.size()))
+        << file << " lies in no folder of recon's list";
+    EXPECT_LE(rank(part(header, 1)), from) << file << " includes \"" << header << '"';
+  }
+}
+
+TEST(House, NothingIncludesTests) {
+  for (const auto& [folder, allowed] : kMayInclude) {
+    for (const auto& [file, header] : includes_below(folder)) {
+      EXPECT_EQ(header.find("tests/"), std::string::npos) << file << " includes \"" << header << '"';
+    }
+  }
+}
+
+TEST(House, EveryFolderExplainsItself) {
+  for (const char* folder : {"base", "proto", "smear_sync", "session", "drivers", "recon", "cli", "tests"}) {
+    EXPECT_TRUE(fs::exists(kRoot / folder / "README.md")) << folder;
+  }
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/image.h"
+
+namespace emberlock::cli {
+
+/// Text made safe between tags and in attributes.
+std::string html_escape(std::string_view text);
+
+/// An image as a `data:` URI (PNG), so that a page stands alone. gray8 and rgb8.
+std::string png_data_uri(const Image& image);
+
+struct Series {
+  std::string name;
+  std::vector<double> x;
+  std::vector<double> y;  ///< points that are not finite are gaps
+  bool dashed = false;
+};
+
+enum class Axis { linear, logarithmic };
+
+struct PlotOptions {
+  std::string title;
+  std::string x_label;
+  std::string y_label;
+  Axis x_axis = Axis::linear;
+  Axis y_axis = Axis::linear;
+  std::optional<double> band = {};  ///< shades -band..band of y: a tolerance
+  int width = 720;                  ///< pixels
+  int height = 320;
+};
+
+/// A line plot as inline SVG, colours told apart by colour-blind readers too (Okabe and Ito 2008).
+std::string svg_plot(const std::vector<Series>& series, const PlotOptions& options);
+
+/// A self-contained page: no script, no font, no picture from elsewhere.
+class HtmlPage {
+ public:
+  explicit HtmlPage(std::string title) : title_(std::move(title)) {}
+  HtmlPage& heading(std::string_view text);
+  HtmlPage& paragraph(std::string_view text);
+  /// Inner HTML as it is: plots, figures.
+  HtmlPage& raw(std::string_view html);
+  HtmlPage& table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+  /// Pictures side by side, each with its caption.
+  struct Picture {
+    std::string html;  ///< an <svg> or <img>
+    std::string caption;
+  };
+  HtmlPage& gallery(const std::vector<Picture>& pictures);
+  [[nodiscard]] std::string str() const;
+
+ private:
+  std::string title_;
+  std::string body_;
+};
+
+}  // namespace emberlock::cli

@@ -6,8 +6,9 @@
 
 namespace emberlock {
 
-/// A regular grid of key points (voxel corners): key point (i, j, k) lies at origin + edge * (i, j, k), in metres, and is
-/// stored at index i + nx * (j + ny * k). The medium lives inside the nx - 1 by ny - 1 by nz - 1 voxels.
+/// A regular grid of key points (voxel corners): key point (i, j, k) lies at origin + edge * (i, j, k), in
+/// metres, and is stored at index i + nx * (j + ny * k). The medium lives inside the nx - 1 by ny - 1 by nz -
+/// 1 voxels.
 struct Grid {
   float origin[3] = {0, 0, 0};
   float edge = 1;  ///< voxel edge, metres
@@ -18,7 +19,8 @@ struct Grid {
   }
   [[nodiscard]] HOST_DEVICE std::size_t index(int i, int j, int k) const {
     return static_cast<std::size_t>(i) +
-           static_cast<std::size_t>(nx) * (static_cast<std::size_t>(j) + static_cast<std::size_t>(ny) * static_cast<std::size_t>(k));
+           static_cast<std::size_t>(nx) *
+               (static_cast<std::size_t>(j) + static_cast<std::size_t>(ny) * static_cast<std::size_t>(k));
   }
 };
 

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "recon/adjust/solver.h"
+#include "recon/effects/effects.h"
+
+namespace emberlock {
+
+/// Decides which effects the pictures call for. With `request.fixed` it takes those and only predicts their
+/// change. Otherwise the extinction is found by a global search: cold solves on a coarse grid from a fraction
+/// of the pixels, judged on held-out pixels of the input views, then refined by a parabola; an effect whose
+/// predicted change lies below the tolerance is off.
+Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
+                                    const SolveOptions& options, const Elapsed& elapsed = {});
+
+}  // namespace emberlock

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "base/result.h"
+#include "recon/preprocess/view.h"
+
+namespace emberlock {
+
+/// Pixels [x0, x1) x [y0, y1).
+struct PixelBox {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  [[nodiscard]] bool empty() const { return x1 <= x0 || y1 <= y0; }
+};
+
+/// Which pixels show the flame: those whose brightest channel lies above the threshold.
+struct FlameMask {
+  ImageSize size;
+  double threshold = 0;             ///< grey levels
+  std::vector<std::uint8_t> flame;  ///< 1 or 0, row-major, width * height
+  PixelBox box;                     ///< the smallest that holds every flame pixel; empty without any
+  [[nodiscard]] bool at(int x, int y) const {
+    return flame[static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width) +
+                 static_cast<std::size_t>(x)] != 0;
+  }
+};
+
+/// The paper's fixed threshold. It puts a floor of some 4 grey levels under every reconstruction error.
+inline constexpr double kPaperFlameThreshold = 30;
+
+/// A threshold from the picture's own noise, grey levels: the background (median of the darker half) plus
+/// five sigma (median absolute difference of neighbouring background pixels), at least one grey level above
+/// the background.
+double noise_threshold(const RadianceImage& image);
+
+FlameMask flame_mask(const RadianceImage& image, double threshold);
+
+/// Masks of all views, in order; without a threshold each view's own noise_threshold.
+std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold = std::nullopt);
+
+/// Refuses what no later stage can use, naming the view: no views, an image whose size differs from its
+/// camera's, NaN or infinite pixels or cameras, a box without extent.
+Status check_scene(const Scene& scene);
+
+/// Root mean square of (a - b) for each channel over a box of pixels, the whole image where the box is empty;
+/// grey levels.
+std::array<double, 3> rmse(const RadianceImage& a, const RadianceImage& b, const PixelBox& box);
+
+/// The three channels as one number: the root of the mean of their squares.
+double all_channels(const std::array<double, 3>& rmse);
+
+}  // namespace emberlock

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "session/frame_file.h"
+
+// What FrameFile chooses from by the first bytes of a file.
+namespace emberlock {
+
+/// PNM, PNG, JPEG or TIFF, by their magic numbers.
+bool is_still_image(std::string_view head);
+/// `content` is the whole file; `where` names it in errors.
+Result<Image> decode_still_image(std::string_view content, const std::string& where);
+
+bool is_fits(std::string_view head);
+/// The first two-dimensional image of a FITS file. 8-bit unscaled data become gray8, everything else gray16:
+/// physical values (after BZERO and BSCALE) rounded and clamped to 0..65535, blanks 0. FITS counts rows from
+/// the bottom of the picture (Pence et al. 2010, section 3.3.2 with figure 2 of the standard's convention),
+/// so rows are turned over.
+Result<Image> decode_fits(std::string_view content, const std::string& where);
+
+/// Anything that libavformat recognises.
+Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path);
+
+/// A size that may be decoded: both sides within 1..kMaxImageSide.
+Status check_image_size(std::int64_t width, std::int64_t height, const std::string& where);
+
+}  // namespace emberlock

@@ -1,0 +1,169 @@
+extern "C" {
+#include <libavutil/pixdesc.h>
+#include <libswscale/swscale.h>
+}
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstring>
+#include <utility>
+
+#include "session/av.h"
+#include "session/frame_decoders.h"
+
+namespace emberlock {
+namespace {
+
+static_assert(std::endian::native == std::endian::little,
+              "16-bit samples are copied as libav's little-endian formats");
+
+struct SwsFree {
+  void operator()(SwsContext* c) const { sws_freeContext(c); }
+};
+
+/// What a decoded frame becomes, and libav's packed format with those bytes.
+struct Target {
+  ImageLayout layout;
+  AVPixelFormat packed = AV_PIX_FMT_NONE;
+  bool as_is =
+      false;  ///< the decoder's samples already are the target's: no conversion that could rescale them
+};
+
+Target target_of(const AVFrame& frame) {
+  const auto source = static_cast<AVPixelFormat>(frame.format);
+  const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(source);
+  const std::uint64_t flags = d->flags;
+  const bool gray = d->nb_components <= 2 && (flags & (AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_RGB)) == 0;
+  const int depth = d->comp[0].depth;
+  Target t;
+  t.layout.size = {frame.width, frame.height};
+  if (gray) {
+    const bool wide = depth > 8;
+    t.layout.format = wide ? PixelFormat::gray16 : PixelFormat::gray8;
+    t.packed = wide ? AV_PIX_FMT_GRAY16LE : AV_PIX_FMT_GRAY8;
+    const bool plain_wide = wide && d->nb_components == 1 && d->comp[0].step == 2 && d->comp[0].shift == 0 &&
+                            (flags & (AV_PIX_FMT_FLAG_BE | AV_PIX_FMT_FLAG_FLOAT)) == 0;
+    t.as_is = source == AV_PIX_FMT_GRAY8 || plain_wide;
+    t.layout.bit_depth = !wide ? 8 : plain_wide ? depth : 16;
+  } else {
+    const bool wide = depth > 8;
+    t.layout.format = wide ? PixelFormat::rgb16 : PixelFormat::rgb8;
+    t.packed = wide ? AV_PIX_FMT_RGB48LE : AV_PIX_FMT_RGB24;
+    t.as_is = source == t.packed;
+    t.layout.bit_depth = wide ? 16 : 8;
+  }
+  return t;
+}
+
+class VideoFile final : public FrameFile {
+ public:
+  VideoFile(AvInput input, std::string where)
+      : input_(std::move(input)),
+        packet_(av_packet_alloc()),
+        frame_(av_frame_alloc()),
+        where_(std::move(where)) {}
+
+  Result<Image> next() override {
+    for (;;) {
+      const int code = avcodec_receive_frame(input_.decoder.get(), frame_.get());
+      if (code == 0) return convert();
+      if (code == AVERROR_EOF) return end();
+      if (code != AVERROR(EAGAIN)) return damaged(av_message(code));
+      EMBERLOCK_RETURN_IF_ERROR(feed());
+    }
+  }
+
+ private:
+  /// Hands the decoder its next packet, or the end of the stream.
+  Status feed() {
+    for (;;) {
+      av_packet_unref(packet_.get());
+      const int code = av_read_frame(input_.format.get(), packet_.get());
+      if (code == AVERROR_EOF) {
+        avcodec_send_packet(input_.decoder.get(), nullptr);
+        return {};
+      }
+      if (code < 0) return damaged(av_message(code));
+      if (packet_->stream_index != input_.stream) continue;
+      const bool cut = (packet_->flags & AV_PKT_FLAG_CORRUPT) != 0;
+      const int sent = avcodec_send_packet(input_.decoder.get(), packet_.get());
+      if (cut) return damaged("the file is truncated");
+      if (sent < 0) return damaged(av_message(sent));
+      return {};
+    }
+  }
+
+  [[nodiscard]] Error damaged(const std::string& reason) const {
+    return {ErrorKind::bad_input, "the video is damaged: " + reason, position(), "Copy or record it again"};
+  }
+  [[nodiscard]] std::string position() const { return where_ + ", frame " + std::to_string(count_); }
+  [[nodiscard]] Error end() const {
+    if (count_ == 0)
+      return {ErrorKind::bad_input, "the video holds no frames", where_, "Copy or record it again"};
+    return {ErrorKind::out_of_data, "the video has ended", position()};
+  }
+
+  Result<Image> convert() {
+    ++count_;
+    EMBERLOCK_RETURN_IF_ERROR(check_image_size(frame_->width, frame_->height, where_));
+    if (frame_->decode_error_flags != 0 || (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
+      return damaged("its data don't decode");
+    }
+    const Target target = target_of(*frame_);
+    Image image(target.layout);
+    if (target.as_is) {
+      for (int y = 0; y < frame_->height; ++y) {
+        std::memcpy(image.row_as<std::byte>(y), frame_->data[0] + std::ptrdiff_t{y} * frame_->linesize[0],
+                    target.layout.row_bytes());
+      }
+      return image;
+    }
+    return rescale(target, std::move(image));
+  }
+
+  Result<Image> rescale(const Target& target, Image image) {
+    const int flags = SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP | SWS_BITEXACT;
+    scaler_.reset(sws_getCachedContext(scaler_.release(), frame_->width, frame_->height,
+                                       static_cast<AVPixelFormat>(frame_->format), frame_->width,
+                                       frame_->height, target.packed, flags, nullptr, nullptr, nullptr));
+    if (!scaler_) return damaged("its pixel format can't be converted");
+    const int matrix = frame_->colorspace == AVCOL_SPC_BT709 ? SWS_CS_ITU709 : SWS_CS_DEFAULT;
+    const int full_in = frame_->color_range == AVCOL_RANGE_JPEG ? 1 : 0;
+    // Refused for RGB input, where it has nothing to say.
+    sws_setColorspaceDetails(scaler_.get(), sws_getCoefficients(matrix), full_in,
+                             sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, 1 << 16, 1 << 16);
+    // libswscale may write a little past a row's end: into a row of its own, padded, then copied.
+    const std::size_t row_bytes = target.layout.row_bytes();
+    const std::size_t stride = (row_bytes + 127) / 64 * 64;
+    scratch_.resize(stride * static_cast<std::size_t>(frame_->height));
+    const std::array<std::uint8_t*, 4> planes{scratch_.data(), nullptr, nullptr, nullptr};
+    const std::array<int, 4> strides{static_cast<int>(stride), 0, 0, 0};
+    const int rows = sws_scale(scaler_.get(), frame_->data, frame_->linesize, 0, frame_->height,
+                               planes.data(), strides.data());
+    if (rows != frame_->height) return damaged("its pixel format can't be converted");
+    for (int y = 0; y < frame_->height; ++y) {
+      std::memcpy(image.row_as<std::byte>(y), scratch_.data() + static_cast<std::size_t>(y) * stride,
+                  row_bytes);
+    }
+    return image;
+  }
+
+  AvInput input_;
+  AvPtr<AVPacket> packet_;
+  AvPtr<AVFrame> frame_;
+  std::unique_ptr<SwsContext, SwsFree> scaler_;
+  std::vector<std::uint8_t> scratch_;
+  std::string where_;
+  std::uint64_t count_ = 0;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path) {
+  EMBERLOCK_ASSIGN_OR_RETURN(AvInput input, open_av_input(path, Checking::lenient));
+  EMBERLOCK_RETURN_IF_ERROR(check_image_size(input.decoder->width, input.decoder->height, path.string()));
+  return std::unique_ptr<FrameFile>(std::make_unique<VideoFile>(std::move(input), path.string()));
+}
+
+}  // namespace emberlock

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+#include "smear_sync/reading.h"
+
+namespace emberlock::cli {
+
+/// Rows [from, to] of the displayed image.
+struct RowSpan {
+  Rows from;
+  Rows to;
+};
+
+/// The lamp's column of a frame, full height and `half_width` columns to each side, as inline SVG: contrast
+/// stretched so that a faint dot shows, a circle about the lamp, ticks at the dots, and the tolerance band:
+/// the rows where the dot must lie. Without a lamp the middle column is shown.
+std::string smear_strip_svg(const ImageView& frame, const SmearReading& reading,
+                            const std::vector<RowSpan>& band, int half_width = 40);
+
+}  // namespace emberlock::cli

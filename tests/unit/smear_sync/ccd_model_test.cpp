@@ -1,0 +1,128 @@
+#include "smear_sync/ccd_model.h"
+
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+namespace emberlock {
+namespace {
+
+// Row times that binary floating point holds exactly, so that borders between row periods are exact too.
+CcdTiming timing(ReadDirection direction, int shifts = 100) {
+  return {.rows = 100,
+          .shifts = shifts,
+          .frame_period = Seconds(130.0 / 1024),
+          .row_time = SecondsPerRow(1.0 / 1024),
+          .direction = direction};
+}
+Flash at_row_time(double k, double width = 0.25) { return {Seconds(k / 1024), Seconds(width / 1024)}; }
+
+void expect_single(const std::vector<SmearDeposit>& deposits, int image, int row) {
+  ASSERT_EQ(deposits.size(), 1U);
+  EXPECT_EQ(deposits[0].image, image);
+  EXPECT_EQ(deposits[0].row, row);
+  EXPECT_DOUBLE_EQ(deposits[0].fraction, 1);
+}
+
+TEST(CcdModel, TopFirstMovesTheDotDownInTheSameImage) {
+  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(20.5)), 0, 50);
+}
+
+TEST(CcdModel, BottomFirstMovesTheDotUpInTheSameImage) {
+  expect_single(smear_deposits(timing(ReadDirection::bottom_first), 30, at_row_time(20.5)), 0, 10);
+}
+
+TEST(CcdModel, AWrappedDotIsSeenInTheNextImageOnTheOtherSide) {
+  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(80.5)), 1, 10);
+  expect_single(smear_deposits(timing(ReadDirection::bottom_first), 30, at_row_time(80.5)), 1, 50);
+}
+
+TEST(CcdModel, DummyLinesHideTheDotAndDelayTheWrap) {
+  const CcdTiming t = timing(ReadDirection::top_first, 120);
+  expect_single(smear_deposits(t, 30, at_row_time(69.5)), 0, 99);
+  EXPECT_TRUE(smear_deposits(t, 30, at_row_time(70.5)).empty());
+  EXPECT_TRUE(smear_deposits(t, 30, at_row_time(89.5)).empty());
+  expect_single(smear_deposits(t, 30, at_row_time(90.5)), 1, 0);
+}
+
+TEST(CcdModel, DuringTheRestTheChargeStaysOnTheLampOfTheNextImage) {
+  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(115)), 1, 30);
+}
+
+TEST(CcdModel, BeforeTheReadPhaseTheFlashBelongsToTheRestOfTheFrameBefore) {
+  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(-1.5)), 0, 30);
+}
+
+TEST(CcdModel, SweepOutLeavesOnlyTheSideReadAfterTheLamp) {
+  const CcdTiming t = timing(ReadDirection::top_first);
+  EXPECT_TRUE(smear_deposits(t, 30, at_row_time(80.5), SweepOut::before_transfer).empty());
+  EXPECT_TRUE(smear_deposits(t, 30, at_row_time(115), SweepOut::before_transfer).empty());
+  expect_single(smear_deposits(t, 30, at_row_time(20.5), SweepOut::before_transfer), 0, 50);
+}
+
+TEST(CcdModel, AFlashAcrossTwoRowPeriodsSplitsByTime) {
+  const auto deposits = smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(21.1, 0.4));
+  ASSERT_EQ(deposits.size(), 2U);
+  EXPECT_EQ(deposits[0].row, 50);
+  EXPECT_EQ(deposits[1].row, 51);
+  EXPECT_NEAR(deposits[0].fraction, 0.25, 1e-12);
+  EXPECT_NEAR(deposits[1].fraction, 0.75, 1e-12);
+}
+
+TEST(CcdModel, AFlashExactlyAtARowBorderCountsForTheRowThatBegins) {
+  expect_single(smear_deposits(timing(ReadDirection::top_first), 30, at_row_time(21, 0)), 0, 51);
+}
+
+TEST(CcdModel, ConstantLightGivesEveryRowOneRowTime) {
+  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+    const CcdTiming t = timing(direction, 120);
+    // Lit from the read phase of frame -1 on: image 0 then has its wrapped half too.
+    std::vector<double> column(100);
+    for (const SmearDeposit& d : smear_deposits(t, 30, {Seconds(0), t.frame_period * 2})) {
+      if (d.image == 0) column[d.row] += d.fraction;
+    }
+    for (int y = 0; y < 100; ++y) {
+      const double row_times =
+          y == 30 ? 1 + (130 - 120) : 1;  // the lamp's own row also rests under the light
+      EXPECT_NEAR(column[y] * 260, row_times, 1e-9) << "row " << y;
+    }
+  }
+}
+
+TEST(CcdModel, EqualDistancesOnOppositeSidesAreDifferentPhases) {
+  const CcdTiming t = timing(ReadDirection::top_first);
+  EXPECT_EQ(shifts_between(t, Rows(40), Rows(50)), Rows(10));
+  EXPECT_EQ(shifts_between(t, Rows(40), Rows(30)), Rows(90));
+}
+
+TEST(CcdModel, CentreOfADotAtTheImageEdgeIsWithinHalfARow) {
+  const CcdTiming t = timing(ReadDirection::top_first);
+  const auto last = smear_centre(t, Rows(30.4), {.frame = 0, .shifts = 69, .fraction = 1});
+  ASSERT_TRUE(last);
+  EXPECT_EQ(last->image, 0);
+  EXPECT_NEAR(last->row.value(), 99.4, 1e-12);
+  const auto wrapped = smear_centre(t, Rows(30.6), {.frame = 0, .shifts = 69, .fraction = 1});
+  ASSERT_TRUE(wrapped);
+  EXPECT_EQ(wrapped->image, 1);
+  EXPECT_NEAR(wrapped->row.value(), -0.4, 1e-12);
+}
+
+TEST(CcdModel, ImpossibleTimingsAreRefusedWithTheField) {
+  CcdTiming t;
+  EXPECT_TRUE(check(t).ok());
+  t.shifts = 719;
+  EXPECT_NE(check(t).error().what.find("shifts"), std::string::npos);
+  t.shifts = 773;  // T / t_row is 772.4
+  EXPECT_NE(check(t).error().remedy.find("772"), std::string::npos);
+  t = {};
+  t.row_time = SecondsPerRow(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_EQ(check(t).error().kind, ErrorKind::bad_input);
+  t = {};
+  t.rows = 0;
+  EXPECT_FALSE(check(t).ok());
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -36,14 +36,15 @@ Eigen::Vector2d CameraModel::project(const Eigen::Vector3d& world) const {
 }
 
 Ray CameraModel::ray(const Eigen::Vector2d& pixel) const {
-  Eigen::Vector2d normalised((pixel.x() - intrinsics.cx) / intrinsics.fx, (pixel.y() - intrinsics.cy) / intrinsics.fy);
+  Eigen::Vector2d normalised((pixel.x() - intrinsics.cx) / intrinsics.fx,
+                             (pixel.y() - intrinsics.cy) / intrinsics.fy);
   if (!intrinsics.distortion.none()) normalised = undistort(normalised, intrinsics.distortion);
   const Eigen::Matrix3d world_from_camera = camera_from_world.rotation.transpose();
   return {center(), (world_from_camera * normalised.homogeneous()).normalized()};
 }
 
-CameraModel look_at(const Intrinsics& intrinsics, const Eigen::Vector3d& center, const Eigen::Vector3d& target,
-                    const Eigen::Vector3d& up) {
+CameraModel look_at(const Intrinsics& intrinsics, const Eigen::Vector3d& center,
+                    const Eigen::Vector3d& target, const Eigen::Vector3d& up) {
   const Eigen::Vector3d forward = (target - center).normalized();
   const Eigen::Vector3d right = forward.cross(up).normalized();
   Rigid3 camera_from_world;

@@ -27,7 +27,9 @@ struct Rigid3 {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
 
-  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& p) const { return rotation * p + translation; }
+  [[nodiscard]] Eigen::Vector3d operator*(const Eigen::Vector3d& p) const {
+    return rotation * p + translation;
+  }
   [[nodiscard]] Rigid3 inverse() const {
     return {rotation.transpose(), -(rotation.transpose() * translation)};
   }
@@ -51,7 +53,7 @@ struct CameraModel {
 };
 
 /// A camera at `center` that looks at `target`, the world's `up` pointing up in its image.
-CameraModel look_at(const Intrinsics& intrinsics, const Eigen::Vector3d& center, const Eigen::Vector3d& target,
-                    const Eigen::Vector3d& up = Eigen::Vector3d::UnitZ());
+CameraModel look_at(const Intrinsics& intrinsics, const Eigen::Vector3d& center,
+                    const Eigen::Vector3d& target, const Eigen::Vector3d& up = Eigen::Vector3d::UnitZ());
 
 }  // namespace emberlock

@@ -1,0 +1,345 @@
+#include "recon/calibrate/transforms.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <system_error>
+
+#include <nlohmann/json.hpp>
+
+#include "base/file.h"
+#include "recon/calibrate/pose.h"
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+using nlohmann::json;
+
+// Beyond these a value is a slip, not a laboratory, and its powers would overflow downstream.
+constexpr double kLargestLength = 1e6;  // metres
+constexpr double kLargestPixels = 1e7;
+constexpr double kLargestImage = 65536;
+constexpr std::size_t kLargestFile = std::size_t{64} << 20;
+
+constexpr std::array kLensKeys = {
+    "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "p1",
+    "p2",   "k4",   "is_fisheye",     "camera_model"};
+// Written by Blender's NeRF export, instant-ngp and nerfstudio; none of them moves a ray.
+constexpr std::array kIgnoredKeys = {"aabb",
+                                     "aabb_scale",
+                                     "applied_scale",
+                                     "applied_transform",
+                                     "auto_scale_poses_override",
+                                     "colmap_im_id",
+                                     "comment",
+                                     "depth_file_path",
+                                     "depth_path",
+                                     "enable_depth_loading",
+                                     "integer_depth_scale",
+                                     "mask_path",
+                                     "n_extra_learnable_dims",
+                                     "offset",
+                                     "orientation_override",
+                                     "ply_file_path",
+                                     "render_aabb",
+                                     "rotation",
+                                     "scale",
+                                     "sharpness",
+                                     "time",
+                                     "up"};
+constexpr std::array kPinholeModels = {"OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "RADIAL", "SIMPLE_RADIAL"};
+constexpr std::array kImageExtensions = {".png", ".pgm", ".ppm", ".tif", ".tiff", ".jpg", ".jpeg", ".fits"};
+
+template <class List>
+bool contains(const List& list, std::string_view word) {
+  return std::any_of(list.begin(), list.end(), [&](const char* w) { return word == w; });
+}
+
+/// A field of the file, as messages name it: "transforms.json: frames[3].transform_matrix".
+struct Place {
+  std::string file;
+  std::string field;
+
+  [[nodiscard]] Place at(std::string_view key) const {
+    return {file, field + (field.empty() ? "" : ".") + std::string(key)};
+  }
+  [[nodiscard]] Place at(std::size_t i) const { return {file, field + "[" + std::to_string(i) + "]"}; }
+  [[nodiscard]] Error error(std::string what, std::string remedy) const {
+    return {ErrorKind::bad_input, std::move(what), field.empty() ? file : file + ": " + field,
+            std::move(remedy)};
+  }
+};
+
+Result<double> as_number(const json& value, const Place& place) {
+  if (!value.is_number())
+    return place.error(std::string("is ") + value.type_name() + ", not a number", "Give a number");
+  const auto number = value.get<double>();
+  if (!std::isfinite(number)) return place.error("is not finite", "Give a finite number");
+  return number;
+}
+
+struct Range {
+  double low, high;  // both allowed
+};
+
+/// Overwrites `out` where the key is there and in range; leaves it otherwise.
+template <class T>
+Status read(const json& object, const char* key, const Place& place, Range range, std::optional<T>& out) {
+  const auto it = object.find(key);
+  if (it == object.end()) return {};
+  EMBERLOCK_ASSIGN_OR_RETURN(const double value, as_number(*it, place.at(key)));
+  if (value < range.low || value > range.high) {
+    return place.at(key).error(
+        it->dump() + " is out of range",
+        "Give a value from " + json(range.low).dump() + " to " + json(range.high).dump());
+  }
+  if (std::is_integral_v<T> && value != std::floor(value)) {
+    return place.at(key).error(it->dump() + " is not a whole number", "Give whole pixels");
+  }
+  out = static_cast<T>(value);
+  return {};
+}
+
+Status check_keys(const json& object, const Place& place, std::initializer_list<const char*> own) {
+  for (const auto& [key, value] : object.items()) {
+    if (contains(own, key) || contains(kLensKeys, key) || contains(kIgnoredKeys, key)) continue;
+    return place.at(key).error("unknown key", "Remove it, or correct its spelling");
+  }
+  return {};
+}
+
+Status check_pinhole(const json& object, const Place& place) {
+  if (const auto it = object.find("camera_model"); it != object.end()) {
+    if (!it->is_string() || !contains(kPinholeModels, it->get_ref<const std::string&>())) {
+      return place.at("camera_model")
+          .error(it->dump() + " is no pinhole camera",
+                 "Undistort the pictures to OPENCV or PINHOLE and export again");
+    }
+  }
+  for (const char* key : {"is_fisheye", "k4"}) {
+    const auto it = object.find(key);
+    if (it != object.end() && *it != false && *it != 0) {
+      return place.at(key).error("fisheye lenses are not modelled",
+                                 "Undistort the pictures to OPENCV or PINHOLE and export again");
+    }
+  }
+  return {};
+}
+
+Status read_lens(const json& object, const Place& place, LensFields& lens) {
+  EMBERLOCK_RETURN_IF_ERROR(check_pinhole(object, place));
+  constexpr Range kFocal = {1e-3, kLargestPixels};
+  constexpr Range kAngle = {1e-6, 3.14};
+  constexpr Range kCenter = {-kLargestPixels, kLargestPixels};
+  constexpr Range kSize = {1, kLargestImage};
+  constexpr Range kCoefficient = {-1e3, 1e3};
+  // A frame's own angle stands before the focal length of the file.
+  if (object.contains("camera_angle_x")) lens.fl_x.reset();
+  if (object.contains("camera_angle_y")) lens.fl_y.reset();
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "fl_x", place, kFocal, lens.fl_x));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "fl_y", place, kFocal, lens.fl_y));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "camera_angle_x", place, kAngle, lens.camera_angle_x));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "camera_angle_y", place, kAngle, lens.camera_angle_y));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "cx", place, kCenter, lens.cx));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "cy", place, kCenter, lens.cy));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "w", place, kSize, lens.w));
+  EMBERLOCK_RETURN_IF_ERROR(read(object, "h", place, kSize, lens.h));
+  Distortion& d = lens.distortion;
+  const std::pair<const char*, double*> coefficients[] = {
+      {"k1", &d.k1}, {"k2", &d.k2}, {"p1", &d.p1}, {"p2", &d.p2}, {"k3", &d.k3}};
+  for (const auto& [key, target] : coefficients) {
+    std::optional<double> value;
+    EMBERLOCK_RETURN_IF_ERROR(read(object, key, place, kCoefficient, value));
+    if (value) *target = *value;
+  }
+  return {};
+}
+
+Result<Eigen::Vector3d> read_vector(const json& object, const char* key, const Place& place) {
+  const auto it = object.find(key);
+  if (it == object.end() || !it->is_array() || it->size() != 3) {
+    return place.at(key).error("three numbers are needed", "Give [x, y, z] in metres");
+  }
+  Eigen::Vector3d v;
+  for (std::size_t i = 0; i < 3; ++i) {
+    EMBERLOCK_ASSIGN_OR_RETURN(v[static_cast<Eigen::Index>(i)], as_number((*it)[i], place.at(key).at(i)));
+    if (std::abs(v[static_cast<Eigen::Index>(i)]) > kLargestLength) {
+      return place.at(key).at(i).error("is beyond 1000 km", "Give metres");
+    }
+  }
+  return v;
+}
+
+Result<Box> read_box(const json& object, const Place& place) {
+  if (!object.is_object()) {
+    return place.error("is no object", R"(Give {"center": [x, y, z], "size": [x, y, z]} in metres)");
+  }
+  for (const auto& [key, value] : object.items()) {
+    if (key != "center" && key != "size")
+      return place.at(key).error("unknown key", "A box has center and size");
+  }
+  Box box;
+  EMBERLOCK_ASSIGN_OR_RETURN(box.center, read_vector(object, "center", place));
+  EMBERLOCK_ASSIGN_OR_RETURN(box.size, read_vector(object, "size", place));
+  if (box.size.minCoeff() <= 0)
+    return place.at("size").error("has an edge of 0 or less", "Give edges above 0 m");
+  return box;
+}
+
+Result<Eigen::Matrix4d> read_matrix(const json& value, const Place& place) {
+  Eigen::Matrix4d m;
+  m.row(3) << 0, 0, 0, 1;
+  const Error shape = place.error("is no 4 x 4 matrix", "Give four rows of four numbers, world_from_camera");
+  if (!value.is_array() || value.size() < 3 || value.size() > 4) return shape;
+  for (std::size_t r = 0; r < value.size(); ++r) {
+    if (!value[r].is_array() || value[r].size() != 4) return shape;
+    for (std::size_t c = 0; c < 4; ++c) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const double number, as_number(value[r][c], place.at(r).at(c)));
+      if (std::abs(number) > kLargestLength)
+        return place.at(r).at(c).error("is beyond 1000 km", "Give metres");
+      m(static_cast<Eigen::Index>(r), static_cast<Eigen::Index>(c)) = number;
+    }
+  }
+  if ((m.row(3) - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > 1e-6) {
+    return place.at(3).error("is not 0 0 0 1",
+                             "Give a rigid transform, one row after the other (not transposed)");
+  }
+  return m;
+}
+
+Result<Rigid3> read_pose(const json& value, const Place& place) {
+  EMBERLOCK_ASSIGN_OR_RETURN(Eigen::Matrix4d m, read_matrix(value, place));
+  const auto rotation = nearest_rotation(m.topLeftCorner<3, 3>());
+  if (!rotation) return place.error(rotation.error().what, rotation.error().remedy);
+  m.topLeftCorner<3, 3>() = *rotation;
+  return camera_from_world_of_opengl(m);
+}
+
+/// NeRF's own data omit the extension: then the first image of that name counts.
+fs::path find_image(const fs::path& folder, const std::string& file_path) {
+  fs::path path = folder / file_path;
+  std::error_code ec;
+  if (fs::is_regular_file(path, ec)) return path;
+  for (const char* extension : kImageExtensions) {
+    fs::path candidate = path;
+    candidate += extension;
+    if (fs::is_regular_file(candidate, ec)) return candidate;
+  }
+  return path;
+}
+
+Result<TransformsFrame> read_frame(const json& object, const Place& place, const fs::path& folder,
+                                   const LensFields& shared) {
+  if (!object.is_object()) return place.error("is no object", "A frame has file_path and transform_matrix");
+  EMBERLOCK_RETURN_IF_ERROR(check_keys(object, place, {"file_path", "transform_matrix"}));
+  TransformsFrame frame;
+  frame.where = place.file + ": " + place.field;
+  frame.lens = shared;
+  EMBERLOCK_RETURN_IF_ERROR(read_lens(object, place, frame.lens));
+
+  const auto file_path = object.find("file_path");
+  if (file_path == object.end() || !file_path->is_string() ||
+      file_path->get_ref<const std::string&>().empty()) {
+    return place.at("file_path").error("no picture is named", "Give its path, relative to the json's folder");
+  }
+  const auto& text = file_path->get_ref<const std::string&>();
+  if (text.find('\0') != std::string::npos)
+    return place.at("file_path").error("holds a zero byte", "Correct the path");
+  frame.image = find_image(folder, text);
+
+  const auto matrix = object.find("transform_matrix");
+  if (matrix == object.end()) {
+    return place.at("transform_matrix")
+        .error("is missing", "Give four rows of four numbers, world_from_camera");
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(frame.camera_from_world, read_pose(*matrix, place.at("transform_matrix")));
+  return frame;
+}
+
+Result<json> parse(std::string_view text, const Place& place) {
+  try {
+    return json::parse(text);
+  } catch (const json::parse_error& e) {
+    const auto byte = std::min<std::size_t>(e.byte, text.size());
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(byte), '\n');
+    const bool cut = byte >= text.size();
+    return place.error("malformed JSON at line " + std::to_string(line) + ", byte " + std::to_string(e.byte),
+                       cut ? "The file ends too early: copy it again" : "Correct the syntax there");
+  } catch (const json::exception& e) {
+    return place.error(std::string("malformed JSON: ") + e.what(), "Correct the value");
+  }
+}
+
+}  // namespace
+
+Result<Transforms> parse_transforms(std::string_view text, const fs::path& source) {
+  const Place top{source.string(), ""};
+  EMBERLOCK_ASSIGN_OR_RETURN(const json document, parse(text, top));
+  if (!document.is_object()) return top.error("is no transforms.json", R"(Give an object with "frames")");
+  EMBERLOCK_RETURN_IF_ERROR(check_keys(document, top, {"frames", "box"}));
+  LensFields shared;
+  EMBERLOCK_RETURN_IF_ERROR(read_lens(document, top, shared));
+
+  Transforms transforms;
+  if (const auto box = document.find("box"); box != document.end()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(transforms.box, read_box(*box, top.at("box")));
+  }
+  const auto frames = document.find("frames");
+  if (frames == document.end() || !frames->is_array() || frames->empty()) {
+    return top.at("frames").error("there are no frames", "Give one entry for each picture");
+  }
+  if (frames->size() > kMaxViews) {
+    return top.at("frames").error(
+        std::to_string(frames->size()) + " frames are more than the 64 that one volume takes",
+        "Choose the best 64");
+  }
+  for (std::size_t i = 0; i < frames->size(); ++i) {
+    EMBERLOCK_ASSIGN_OR_RETURN(TransformsFrame frame, read_frame((*frames)[i], top.at("frames").at(i),
+                                                                 source.parent_path(), shared));
+    transforms.frames.push_back(std::move(frame));
+  }
+  return transforms;
+}
+
+Result<Transforms> read_transforms(const fs::path& path) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path, kLargestFile));
+  return parse_transforms(text, path);
+}
+
+Result<Intrinsics> intrinsics_of(const TransformsFrame& frame, ImageSize size) {
+  const LensFields& lens = frame.lens;
+  const auto error = [&](const char* field, std::string what, std::string remedy) {
+    return Error{ErrorKind::bad_input, std::move(what), frame.where + field, std::move(remedy)};
+  };
+  if (lens.w.value_or(size.width) != size.width || lens.h.value_or(size.height) != size.height) {
+    return error(".w, h",
+                 "the picture " + frame.image.string() + " has " + std::to_string(size.width) + " x " +
+                     std::to_string(size.height) + " pixels, the file says " +
+                     std::to_string(lens.w.value_or(size.width)) + " x " +
+                     std::to_string(lens.h.value_or(size.height)),
+                 "Use the pictures that were calibrated, or scale w, h, fl_* and c* alike");
+  }
+  const auto focal = [](std::optional<double> fl, std::optional<double> angle, int pixels) {
+    return !fl && angle ? 0.5 * pixels / std::tan(0.5 * *angle) : fl;
+  };
+  std::optional<double> fx = focal(lens.fl_x, lens.camera_angle_x, size.width);
+  std::optional<double> fy = focal(lens.fl_y, lens.camera_angle_y, size.height);
+  if (!fx && !fy) {
+    return error(".fl_x", "no focal length",
+                 "Give fl_x (pixels) or camera_angle_x (radians), for the frame or for all");
+  }
+  const Intrinsics intrinsics{size,
+                              fx ? *fx : *fy,
+                              fy ? *fy : *fx,
+                              lens.cx.value_or(0.5 * size.width),
+                              lens.cy.value_or(0.5 * size.height),
+                              lens.distortion};
+  if (!distortion_inverts(intrinsics)) {
+    return error(".k1, k2, p1, p2, k3", "the distortion folds the picture: not every pixel has one ray",
+                 "Check the coefficients (OpenCV's order) and the focal length");
+  }
+  return intrinsics;
+}
+
+}  // namespace emberlock

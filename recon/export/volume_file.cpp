@@ -1,0 +1,120 @@
+// The only file that meets OpenVDB's headers: they take half a minute to compile.
+#include "recon/export/volume_file.h"
+
+#include <cmath>
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wconversion"
+#include <openvdb/openvdb.h>
+#pragma GCC diagnostic pop
+
+namespace emberlock {
+namespace {
+
+constexpr const char* kDimensions = "emberlock_dimensions";
+constexpr int kLargestDimension = 4096;
+
+template <class GridType, class ValueAt>
+typename GridType::Ptr sparse_grid(const Grid& grid, const char* name, const char* unit, ValueAt value_at) {
+  auto out = GridType::create();
+  out->setName(name);
+  out->insertMeta("unit", openvdb::StringMetadata(unit));
+  out->insertMeta(kDimensions, openvdb::Vec3IMetadata({grid.nx, grid.ny, grid.nz}));
+  out->setTransform(openvdb::math::Transform::createLinearTransform(static_cast<double>(grid.edge)));
+  out->transform().postTranslate(openvdb::Vec3d(static_cast<double>(grid.origin[0]),
+                                                static_cast<double>(grid.origin[1]),
+                                                static_cast<double>(grid.origin[2])));
+  auto accessor = out->getAccessor();
+  const auto background = out->background();
+  for (int k = 0; k < grid.nz; ++k) {
+    for (int j = 0; j < grid.ny; ++j) {
+      for (int i = 0; i < grid.nx; ++i) {
+        const auto value = value_at(grid.index(i, j, k));
+        if (value != background) accessor.setValueOn({i, j, k}, value);
+      }
+    }
+  }
+  return out;
+}
+
+Error damaged(const std::filesystem::path& path, std::string what) {
+  return {ErrorKind::bad_input, std::move(what), path.string(),
+          "Name a volume.vdb that `emberlock reconstruct` wrote"};
+}
+
+Result<Grid> geometry(const openvdb::GridBase& from, const std::filesystem::path& path) {
+  const auto dimensions = from.getMetadata<openvdb::Vec3IMetadata>(kDimensions);
+  if (!dimensions) return damaged(path, std::string("has no ") + kDimensions);
+  const openvdb::Vec3i n = dimensions->value();
+  Grid grid;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (n[axis] < 2 || n[axis] > kLargestDimension) return damaged(path, "dimensions out of range");
+  }
+  const openvdb::Vec3d origin = from.transform().indexToWorld(openvdb::Vec3d(0, 0, 0));
+  for (int axis = 0; axis < 3; ++axis) grid.origin[axis] = static_cast<float>(origin[axis]);
+  grid.edge = static_cast<float>(from.voxelSize()[0]);
+  grid.nx = n[0];
+  grid.ny = n[1];
+  grid.nz = n[2];
+  return grid;
+}
+
+bool inside(const Grid& grid, const openvdb::Coord& c) {
+  return c.x() >= 0 && c.y() >= 0 && c.z() >= 0 && c.x() < grid.nx && c.y() < grid.ny && c.z() < grid.nz;
+}
+
+}  // namespace
+
+Status write_volume(const Volume& volume, const std::filesystem::path& path) {
+  openvdb::initialize();
+  const auto& emission = volume.emission;
+  auto emission_grid = sparse_grid<openvdb::Vec3SGrid>(
+      volume.grid, "emission", "grey levels (0..255) per metre", [&](std::size_t i) {
+        return openvdb::Vec3s(emission[3 * i], emission[3 * i + 1], emission[3 * i + 2]);
+      });
+  emission_grid->setVectorType(openvdb::VEC_INVARIANT);  // a colour: no transform rotates it
+  auto density_grid = sparse_grid<openvdb::FloatGrid>(volume.grid, "density", "1/m", [&](std::size_t i) {
+    return volume.extinction.empty() ? 0.0F : volume.extinction[i];
+  });
+  density_grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  try {
+    openvdb::io::File file(path.string());
+    file.write({emission_grid, density_grid});
+    file.close();
+  } catch (const std::exception& e) {
+    return Error{ErrorKind::io, std::string("cannot write: ") + e.what(), path.string(),
+                 "Check that the folder is writable and the disk has room"};
+  }
+  return {};
+}
+
+Result<Volume> read_volume(const std::filesystem::path& path) try {
+  openvdb::initialize();
+  openvdb::io::File file(path.string());
+  file.open();
+  if (!file.hasGrid("emission") || !file.hasGrid("density"))
+    return damaged(path, "has no emission or no density");
+  const auto emission = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file.readGrid("emission"));
+  const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("density"));
+  if (!emission || !density) return damaged(path, "emission is no Vec3SGrid or density no FloatGrid");
+  Volume volume;
+  EMBERLOCK_ASSIGN_OR_RETURN(volume.grid, geometry(*emission, path));
+  volume.emission.assign(3 * volume.grid.size(), 0.0F);
+  for (auto it = emission->cbeginValueOn(); it; ++it) {
+    const openvdb::Coord c = it.getCoord();
+    if (!it.isVoxelValue() || !inside(volume.grid, c)) return damaged(path, "emission leaves its dimensions");
+    float* rgb = &volume.emission[3 * volume.grid.index(c.x(), c.y(), c.z())];
+    for (int channel = 0; channel < 3; ++channel) rgb[channel] = (*it)[channel];
+  }
+  if (density->activeVoxelCount() > 0) volume.extinction.assign(volume.grid.size(), 0.0F);
+  for (auto it = density->cbeginValueOn(); it; ++it) {
+    const openvdb::Coord c = it.getCoord();
+    if (!it.isVoxelValue() || !inside(volume.grid, c)) return damaged(path, "density leaves its dimensions");
+    volume.extinction[volume.grid.index(c.x(), c.y(), c.z())] = *it;
+  }
+  return volume;
+} catch (const std::exception& e) {
+  return damaged(path, e.what());
+}
+
+}  // namespace emberlock

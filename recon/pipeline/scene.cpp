@@ -1,0 +1,183 @@
+#include "recon/pipeline/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <system_error>
+
+#include "recon/calibrate/pose.h"
+#include "recon/calibrate/transforms.h"
+#include "recon/preprocess/radiance.h"
+#include "session/frame_file.h"
+#include "session/reader.h"
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+Error bad(std::string where, std::string what, std::string remedy) {
+  return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
+}
+
+Result<Box> choose_box(const std::optional<Box>& asked, const std::optional<Box>& own,
+                       const fs::path& input) {
+  if (asked) return *asked;
+  if (own) return *own;
+  return bad(
+      input.string() + ": box", "the input doesn't say where the flame is",
+      R"(Add "box": {"center": [x, y, z], "size": [x, y, z]} in metres, or give --box cx,cy,cz,sx,sy,sz)");
+}
+
+Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options) {
+  if (options.frame) return bad(path.string(), "has one instant only", "Leave --frame out");
+  EMBERLOCK_ASSIGN_OR_RETURN(const Transforms transforms, read_transforms(path));
+  Scene scene;
+  EMBERLOCK_ASSIGN_OR_RETURN(scene.box, choose_box(options.box, transforms.box, path));
+  for (const TransformsFrame& frame : transforms.frames) {
+    const auto image = read_image(frame.image);
+    if (!image) {
+      return Error{image.error().kind, image.error().message(), frame.where + ".file_path",
+                   "Correct file_path, or bring the picture there"};
+    }
+    View view;
+    view.name = frame.image.filename().string();
+    EMBERLOCK_ASSIGN_OR_RETURN(view.camera.intrinsics, intrinsics_of(frame, image->layout().size));
+    view.camera.camera_from_world = frame.camera_from_world;
+    view.image = to_radiance(image->view());
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+Result<CameraModel> camera_of(const v1::CameraStream& stream, const std::string& where) {
+  const auto& c = stream.calibration();
+  if (!stream.has_calibration() || c.camera_from_world_size() != 12) {
+    return bad(
+        where + ".calibration", "camera " + stream.camera_id() + " is not calibrated",
+        "Calibrate it and add calibration (fx, fy, cx, cy, camera_from_world of 12 numbers) to the manifest");
+  }
+  CameraModel camera;
+  camera.intrinsics = {{static_cast<int>(stream.width()), static_cast<int>(stream.height())},
+                       c.fx(),
+                       c.fy(),
+                       c.cx(),
+                       c.cy(),
+                       {c.k1(), c.k2(), c.p1(), c.p2(), c.k3()}};
+  for (const double value : {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(), c.k2(), c.p1(), c.p2(), c.k3()}) {
+    if (!std::isfinite(value))
+      return bad(where + ".calibration", "is not finite", "Calibrate the camera again");
+  }
+  if (c.fx() <= 0 || c.fy() <= 0) {
+    return bad(where + ".calibration.fx, fy", "a focal length is not above 0",
+               "Give focal lengths in pixels");
+  }
+  if (!distortion_inverts(camera.intrinsics)) {
+    return bad(where + ".calibration.k1, k2, p1, p2, k3", "the distortion folds the picture",
+               "Calibrate the camera again with more of the picture covered");
+  }
+  Eigen::Matrix<double, 3, 4> pose;
+  for (int i = 0; i < 12; ++i) pose(i / 4, i % 4) = c.camera_from_world(i);
+  const auto rotation = nearest_rotation(pose.leftCols<3>());
+  if (!rotation)
+    return bad(where + ".calibration.camera_from_world", rotation.error().what, rotation.error().remedy);
+  if (!pose.allFinite()) {
+    return bad(where + ".calibration.camera_from_world", "is not finite", "Calibrate the camera again");
+  }
+  camera.camera_from_world = {*rotation, pose.col(3)};
+  return camera;
+}
+
+Result<std::optional<Box>> box_of(const v1::Manifest& manifest, const fs::path& folder) {
+  if (!manifest.has_box()) return std::optional<Box>();
+  const auto& from = manifest.box();
+  Box box;
+  const bool shaped = from.center_size() == 3 && from.size_size() == 3;
+  for (int i = 0; shaped && i < 3; ++i) {
+    box.center[i] = from.center(i);
+    box.size[i] = from.size(i);
+  }
+  if (!shaped || !box.center.allFinite() || !box.size.allFinite() || box.size.minCoeff() <= 0) {
+    return bad((folder / "manifest.json").string() + ": box",
+               "needs three finite numbers each, sizes above 0", "Correct the manifest's box");
+  }
+  return std::optional<Box>(box);
+}
+
+/// The complete frame nearest to `t`; all cameras' monotonic stamps are on one clock.
+std::optional<std::size_t> nearest_complete(const std::vector<FrameStamp>& stamps, TimePoint t) {
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    if (stamps[i].status != FrameStatus::complete) continue;
+    if (!best || abs(stamps[i].monotonic_time - t) < abs(stamps[*best].monotonic_time - t)) best = i;
+  }
+  return best;
+}
+
+Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
+  EMBERLOCK_ASSIGN_OR_RETURN(SessionReader reader, SessionReader::open(folder));
+  const v1::Manifest& manifest = reader.manifest();
+  const std::string manifest_name = (folder / "manifest.json").string();
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto own_box, box_of(manifest, folder));
+  Scene scene;
+  EMBERLOCK_ASSIGN_OR_RETURN(scene.box, choose_box(options.box, own_box, folder));
+  if (reader.camera_count() == 0 || reader.camera_count() > kMaxViews) {
+    return bad(manifest_name + ": cameras",
+               std::to_string(reader.camera_count()) + " cameras, 1 to 64 are possible",
+               "Record between 1 and 64 cameras");
+  }
+  const std::vector<FrameStamp>& first = reader.stamps(0);
+  const std::size_t frame = options.frame.value_or(first.size() / 2);
+  if (frame >= first.size()) {
+    return bad(
+        folder.string() + ": frame " + std::to_string(frame),
+        "camera " + manifest.cameras(0).camera_id() + " has " + std::to_string(first.size()) + " frames",
+        "Choose a smaller --frame");
+  }
+  const TimePoint instant = first[frame].monotonic_time;
+  for (std::size_t i = 0; i < reader.camera_count(); ++i) {
+    const v1::CameraStream& stream = manifest.cameras(static_cast<int>(i));
+    View view;
+    view.name = stream.camera_id();
+    EMBERLOCK_ASSIGN_OR_RETURN(view.camera,
+                               camera_of(stream, manifest_name + ": cameras[" + std::to_string(i) + "]"));
+    const auto nearest = nearest_complete(reader.stamps(i), instant);
+    const double limit = stream.frame_rate_hz() > 0 ? 1 / stream.frame_rate_hz() : INFINITY;
+    if (!nearest || abs(reader.stamps(i)[*nearest].monotonic_time - instant).value() > limit) {
+      return bad(folder.string() + ": camera " + stream.camera_id(),
+                 "has no complete frame within a frame period of frame " + std::to_string(frame),
+                 "Choose another --frame; the index tells which frames were lost");
+    }
+    EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(i, *nearest));
+    view.image = to_radiance(picture.image->view());
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+}  // namespace
+
+Result<Scene> load_scene(const fs::path& input, const SceneOptions& options) {
+  std::error_code ec;
+  if (!fs::is_directory(input, ec)) return load_transforms(input, options);
+  if (SessionReader::is_session(input)) return load_session(input, options);
+  return bad(input.string(), "is a folder without manifest.json, so no session",
+             "Name a session's folder, or the transforms.json itself");
+}
+
+Status hold_out(Scene& scene, const std::vector<int>& views) {
+  for (const int view : views) {
+    if (view < 0 || view >= static_cast<int>(scene.views.size())) {
+      return bad("--hold-out " + std::to_string(view), "there is no such view",
+                 "Views count from 0 to " + std::to_string(scene.views.size() - 1));
+    }
+    scene.views[static_cast<std::size_t>(view)].role = ViewRole::held_out;
+  }
+  if (std::none_of(scene.views.begin(), scene.views.end(),
+                   [](const View& v) { return v.role == ViewRole::input; })) {
+    return bad("--hold-out", "holds every view out, none is left to reconstruct from",
+               "Leave at least one view in");
+  }
+  return {};
+}
+
+}  // namespace emberlock

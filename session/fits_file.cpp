@@ -60,8 +60,8 @@ Result<FitsImage> find_image(fitsfile* file, const std::string& where) {
     if (status == 0) return image;
   }
   if (status != 0) return fits_error(status, where);
-  return Error{ErrorKind::bad_input, "the FITS file holds no two-dimensional image", where,
-               "Export a single image"};
+  return Error{ErrorKind::bad_input, "the FITS file holds no whole two-dimensional image", where,
+               "Export a single image, or copy it again"};
 }
 
 }  // namespace
@@ -95,15 +95,14 @@ Result<Image> decode_fits(std::string_view content, const std::string& where) {
     int any_blank = 0;
     fits_read_pixll(file.get(), TDOUBLE, first.data(), header.width, &blank, row.data(), &any_blank, &status);
     if (status != 0) return fits_error(status, where);
-    const int target = layout.size.height - 1 - y;
     const auto quantise = [&](double v) {
       return std::isfinite(v) ? std::clamp(std::round(v), 0.0, 65535.0) : 0.0;
     };
     if (narrow) {
-      std::transform(row.begin(), row.end(), image.row_as<std::uint8_t>(target),
+      std::transform(row.begin(), row.end(), image.row_as<std::uint8_t>(y),
                      [&](double v) { return static_cast<std::uint8_t>(quantise(v)); });
     } else {
-      std::transform(row.begin(), row.end(), image.row_as<std::uint16_t>(target),
+      std::transform(row.begin(), row.end(), image.row_as<std::uint16_t>(y),
                      [&](double v) { return static_cast<std::uint16_t>(quantise(v)); });
     }
   }

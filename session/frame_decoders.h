@@ -18,9 +18,9 @@ Result<Image> decode_still_image(std::string_view content, const std::string& wh
 
 bool is_fits(std::string_view head);
 /// The first two-dimensional image of a FITS file. 8-bit unscaled data become gray8, everything else gray16:
-/// physical values (after BZERO and BSCALE) rounded and clamped to 0..65535, blanks 0. FITS counts rows from
-/// the bottom of the picture (Pence et al. 2010, section 3.3.2 with figure 2 of the standard's convention),
-/// so rows are turned over.
+/// physical values (after BZERO and BSCALE) rounded and clamped to 0..65535, blanks 0. The file's first row
+/// becomes row 0: the order of the detector's readout, which smear is measured along, not the upward order in
+/// which FITS viewers draw.
 Result<Image> decode_fits(std::string_view content, const std::string& where);
 
 /// Anything that libavformat recognises.

@@ -8,6 +8,7 @@ extern "C" {
 #include <bit>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 #include "session/av.h"
 #include "session/frame_decoders.h"
@@ -22,38 +23,73 @@ struct SwsFree {
   void operator()(SwsContext* c) const { sws_freeContext(c); }
 };
 
-/// What a decoded frame becomes, and libav's packed format with those bytes.
+enum class Transfer {
+  rows,     ///< the decoder's rows already are the image's
+  samples,  ///< the same values in another order or byte order
+  scaler,   ///< libswscale converts; wide samples come out at 16 bits
+};
+
+/// What a decoded frame becomes, and how.
 struct Target {
   ImageLayout layout;
-  AVPixelFormat packed = AV_PIX_FMT_NONE;
-  bool as_is =
-      false;  ///< the decoder's samples already are the target's: no conversion that could rescale them
+  Transfer transfer = Transfer::scaler;
 };
 
 Target target_of(const AVFrame& frame) {
   const auto source = static_cast<AVPixelFormat>(frame.format);
   const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(source);
   const std::uint64_t flags = d->flags;
-  const bool gray = d->nb_components <= 2 && (flags & (AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_RGB)) == 0;
+  const bool rgb = (flags & AV_PIX_FMT_FLAG_RGB) != 0;
+  const bool gray = d->nb_components <= 2 && !rgb && (flags & AV_PIX_FMT_FLAG_PAL) == 0;
   const int depth = d->comp[0].depth;
+  const bool wide = depth > 8;
+  constexpr std::uint64_t kIndirect =
+      AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_FLOAT | AV_PIX_FMT_FLAG_BAYER | AV_PIX_FMT_FLAG_HWACCEL;
+  const bool direct = (gray || rgb) && (flags & kIndirect) == 0 && depth >= 8 && depth <= 16;
+
   Target t;
   t.layout.size = {frame.width, frame.height};
-  if (gray) {
-    const bool wide = depth > 8;
-    t.layout.format = wide ? PixelFormat::gray16 : PixelFormat::gray8;
-    t.packed = wide ? AV_PIX_FMT_GRAY16LE : AV_PIX_FMT_GRAY8;
-    const bool plain_wide = wide && d->nb_components == 1 && d->comp[0].step == 2 && d->comp[0].shift == 0 &&
-                            (flags & (AV_PIX_FMT_FLAG_BE | AV_PIX_FMT_FLAG_FLOAT)) == 0;
-    t.as_is = source == AV_PIX_FMT_GRAY8 || plain_wide;
-    t.layout.bit_depth = !wide ? 8 : plain_wide ? depth : 16;
-  } else {
-    const bool wide = depth > 8;
-    t.layout.format = wide ? PixelFormat::rgb16 : PixelFormat::rgb8;
-    t.packed = wide ? AV_PIX_FMT_RGB48LE : AV_PIX_FMT_RGB24;
-    t.as_is = source == t.packed;
-    t.layout.bit_depth = wide ? 16 : 8;
-  }
+  t.layout.format = gray ? (wide ? PixelFormat::gray16 : PixelFormat::gray8)
+                         : (wide ? PixelFormat::rgb16 : PixelFormat::rgb8);
+  t.layout.bit_depth = !wide ? 8 : direct ? depth : 16;
+  const bool little = (flags & AV_PIX_FMT_FLAG_BE) == 0;
+  const bool packed_gray = gray && d->nb_components == 1 && d->comp[0].shift == 0 && (!wide || little);
+  if (direct) t.transfer = packed_gray ? Transfer::rows : Transfer::samples;
   return t;
+}
+
+void copy_rows(const AVFrame& frame, Image& image) {
+  for (int y = 0; y < frame.height; ++y) {
+    std::memcpy(image.row_as<std::byte>(y), frame.data[0] + std::ptrdiff_t{y} * frame.linesize[0],
+                image.layout().row_bytes());
+  }
+}
+
+void copy_samples(const AVFrame& frame, Image& image) {
+  const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame.format));
+  const int count = channels(image.layout().format);
+  std::vector<std::uint16_t> line(static_cast<std::size_t>(frame.width));
+  std::array<const std::uint8_t*, 4> planes{};
+  std::copy_n(frame.data, planes.size(), planes.begin());
+  for (int y = 0; y < frame.height; ++y) {
+    for (int c = 0; c < count; ++c) {
+      av_read_image_line(line.data(), planes.data(), frame.linesize, d, 0, y, c, frame.width, 0);
+      for (int x = 0; x < frame.width; ++x) {
+        const int at = x * count + c;
+        if (bytes_per_sample(image.layout().format) == 2) {
+          image.row_as<std::uint16_t>(y)[at] = line[static_cast<std::size_t>(x)];
+        } else {
+          image.row_as<std::uint8_t>(y)[at] = static_cast<std::uint8_t>(line[static_cast<std::size_t>(x)]);
+        }
+      }
+    }
+  }
+}
+
+AVPixelFormat packed_format(PixelFormat format) {
+  const bool wide = bytes_per_sample(format) == 2;
+  if (channels(format) == 3) return wide ? AV_PIX_FMT_RGB48LE : AV_PIX_FMT_RGB24;
+  return wide ? AV_PIX_FMT_GRAY16LE : AV_PIX_FMT_GRAY8;
 }
 
 class VideoFile final : public FrameFile {
@@ -101,32 +137,48 @@ class VideoFile final : public FrameFile {
   [[nodiscard]] Error end() const {
     if (count_ == 0)
       return {ErrorKind::bad_input, "the video holds no frames", where_, "Copy or record it again"};
+    if (ends_early()) return damaged("the file is truncated, it promises more frames");
     return {ErrorKind::out_of_data, "the video has ended", position()};
+  }
+  /// Containers that state their duration betray a cut: many demuxers take the end of the file for the end of
+  /// the film.
+  [[nodiscard]] bool ends_early() const {
+    const AVFormatContext& format = *input_.format;
+    const AVStream& stream = *format.streams[input_.stream];
+    const double tick = av_q2d(stream.time_base);
+    const bool stated = format.duration_estimation_method == AVFMT_DURATION_FROM_STREAM;
+    if (!stated || last_pts_ == AV_NOPTS_VALUE || stream.avg_frame_rate.num <= 0) return false;
+    const double start =
+        stream.start_time == AV_NOPTS_VALUE ? 0 : static_cast<double>(stream.start_time) * tick;
+    const double seen = static_cast<double>(last_pts_) * tick - start;
+    const double promised = stream.duration == AV_NOPTS_VALUE
+                                ? static_cast<double>(format.duration) / AV_TIME_BASE
+                                : static_cast<double>(stream.duration) * tick;
+    const double other_streams = format.nb_streams > 1 ? 1 : 0;  // sound may last longer
+    return seen < 0.98 * promised - 3 * av_q2d(av_inv_q(stream.avg_frame_rate)) - other_streams;
   }
 
   Result<Image> convert() {
     ++count_;
+    if (frame_->best_effort_timestamp != AV_NOPTS_VALUE) last_pts_ = frame_->best_effort_timestamp;
     EMBERLOCK_RETURN_IF_ERROR(check_image_size(frame_->width, frame_->height, where_));
     if (frame_->decode_error_flags != 0 || (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
       return damaged("its data don't decode");
     }
     const Target target = target_of(*frame_);
     Image image(target.layout);
-    if (target.as_is) {
-      for (int y = 0; y < frame_->height; ++y) {
-        std::memcpy(image.row_as<std::byte>(y), frame_->data[0] + std::ptrdiff_t{y} * frame_->linesize[0],
-                    target.layout.row_bytes());
-      }
-      return image;
-    }
-    return rescale(target, std::move(image));
+    if (target.transfer == Transfer::rows) copy_rows(*frame_, image);
+    if (target.transfer == Transfer::samples) copy_samples(*frame_, image);
+    if (target.transfer != Transfer::scaler) return image;
+    return rescale(std::move(image));
   }
 
-  Result<Image> rescale(const Target& target, Image image) {
+  Result<Image> rescale(Image image) {
     const int flags = SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP | SWS_BITEXACT;
     scaler_.reset(sws_getCachedContext(scaler_.release(), frame_->width, frame_->height,
                                        static_cast<AVPixelFormat>(frame_->format), frame_->width,
-                                       frame_->height, target.packed, flags, nullptr, nullptr, nullptr));
+                                       frame_->height, packed_format(image.layout().format), flags, nullptr,
+                                       nullptr, nullptr));
     if (!scaler_) return damaged("its pixel format can't be converted");
     const int matrix = frame_->colorspace == AVCOL_SPC_BT709 ? SWS_CS_ITU709 : SWS_CS_DEFAULT;
     const int full_in = frame_->color_range == AVCOL_RANGE_JPEG ? 1 : 0;
@@ -134,7 +186,7 @@ class VideoFile final : public FrameFile {
     sws_setColorspaceDetails(scaler_.get(), sws_getCoefficients(matrix), full_in,
                              sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, 1 << 16, 1 << 16);
     // libswscale may write a little past a row's end: into a row of its own, padded, then copied.
-    const std::size_t row_bytes = target.layout.row_bytes();
+    const std::size_t row_bytes = image.layout().row_bytes();
     const std::size_t stride = (row_bytes + 127) / 64 * 64;
     scratch_.resize(stride * static_cast<std::size_t>(frame_->height));
     const std::array<std::uint8_t*, 4> planes{scratch_.data(), nullptr, nullptr, nullptr};
@@ -156,6 +208,7 @@ class VideoFile final : public FrameFile {
   std::vector<std::uint8_t> scratch_;
   std::string where_;
   std::uint64_t count_ = 0;
+  std::int64_t last_pts_ = AV_NOPTS_VALUE;
 };
 
 }  // namespace

@@ -1,0 +1,168 @@
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "base/clock.h"
+#include "cli/commands.h"
+#include "recon/pipeline/advice.h"
+#include "recon/pipeline/grid_choice.h"
+#include "recon/pipeline/reconstruct.h"
+#include "recon/pipeline/scene.h"
+
+namespace emberlock::cli {
+namespace {
+
+/// The command line as typed, before its words mean anything.
+struct Arguments {
+  std::string input;
+  std::string out;
+  std::string box;
+  std::string solver = "default";
+  std::string effects;
+  std::string device = "auto";
+  std::vector<int> held_out;
+  std::optional<int> voxels;
+  std::optional<std::size_t> frame;
+  std::optional<double> budget;
+  std::optional<double> target_rmse;
+  std::optional<double> threshold;
+  int iterations = 0;
+  int threads = 0;
+  std::uint64_t seed = 1;
+};
+
+/// "cx,cy,cz,sx,sy,sz" in metres.
+Result<Box> parse_box(const std::string& text) {
+  std::vector<double> numbers;
+  std::istringstream words(text);
+  for (std::string word; std::getline(words, word, ',');) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(word.c_str(), &end));
+    if (word.empty() || *end != '\0' || !std::isfinite(numbers.back())) numbers.clear();
+    if (numbers.empty()) break;
+  }
+  if (numbers.size() != 6 || text.back() == ',') {
+    return Error{ErrorKind::bad_input, "\"" + text + "\" is not six numbers", "--box",
+                 "Give cx,cy,cz,sx,sy,sz: centre and size in metres"};
+  }
+  const Box box{{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5]}};
+  if (box.size.minCoeff() <= 0) {
+    return Error{ErrorKind::bad_input, "an edge is 0 or less", "--box", "Give sizes above 0 m"};
+  }
+  return box;
+}
+
+/// Like parse_box: the words' meaning, or the first that has none.
+Result<ReconstructOptions> options_of(const Arguments& arguments) {
+  ReconstructOptions options;
+  options.voxels = arguments.voxels;
+  if (!arguments.effects.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.effects, parse_effects(arguments.effects));
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.solver, parse_solver(arguments.solver));
+  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.compute.device, parse_device(arguments.device));
+  options.solve.compute.threads = arguments.threads;
+  options.solve.iterations = arguments.iterations;
+  if (arguments.budget) options.solve.budget = Seconds(*arguments.budget);
+  options.solve.target_rmse = arguments.target_rmse;
+  options.solve.flame_threshold = arguments.threshold;
+  options.solve.seed = arguments.seed;
+  if (options.solve.target_rmse && arguments.held_out.empty()) {
+    return Error{ErrorKind::bad_input, "is judged on held-out views, and none is held out", "--target-rmse",
+                 "Hold a view out with --hold-out i"};
+  }
+  return options;
+}
+
+void print_rgb(const char* label, const ChannelRmse& rmse) {
+  std::printf("%-16s %6.2f %6.2f %6.2f  grey levels of 255 (R G B, RMS over the flame)\n", label, rmse[0],
+              rmse[1], rmse[2]);
+}
+
+void print_summary(const Report& report, const std::string& out) {
+  if (report.heldout_rmse) print_rgb("held-out error", *report.heldout_rmse);
+  print_rgb("input error", report.input_rmse);
+  std::printf("%-16s %d x %d x %d voxels of %.2f mm, %zu in the hull\n", "volume", report.voxels[0],
+              report.voxels[1], report.voxels[2], report.voxel_edge.value() * 1e3, report.hull_voxels);
+  std::printf("%-16s %.2f s: effects %.2f, hull %.2f, solve %.2f (%d iterations, solver %s, %s)\n", "time",
+              report.total_time.value(), report.effects_time.value(), report.hull_time.value(),
+              report.solve_time.value(), report.iterations, report.solver.c_str(), report.device.c_str());
+  for (const EffectReport& effect : report.effects) {
+    std::printf("%-16s %s: %s\n", effect.name.c_str(), effect.on ? "on" : "off", effect.reason.c_str());
+  }
+  for (const std::string& warning : report.warnings) std::printf("%-16s %s\n", "warning", warning.c_str());
+  if (const std::string advice = next_step(report); !advice.empty()) {
+    std::printf("%-16s %s\n", "next step", advice.c_str());
+  }
+  std::printf("%-16s %s\n", "written to", out.c_str());
+}
+
+template <class T>
+T or_fail(Result<T> result) {
+  if (!result) fail(result.error());
+  return std::move(result).value();
+}
+
+void or_fail(const Status& status) {
+  if (!status) fail(status.error());
+}
+
+void reconstruct_command(const Arguments& arguments) {
+  const ReconstructOptions options = or_fail(options_of(arguments));
+  SceneOptions scene_options;
+  scene_options.frame = arguments.frame;
+  if (!arguments.box.empty()) scene_options.box = or_fail(parse_box(arguments.box));
+  or_fail(check_output(arguments.out));
+  Scene scene = or_fail(load_scene(arguments.input, scene_options));
+  or_fail(hold_out(scene, arguments.held_out));
+  SteadyClock clock;
+  Outcome outcome = or_fail(reconstruct(scene, options, clock, progress_bar("reconstruct")));
+  outcome.report.input = arguments.input;
+  or_fail(write_outcome(outcome, arguments.out));
+  print_summary(outcome.report, arguments.out);
+}
+
+}  // namespace
+
+void add_reconstruct(CLI::App& app) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* verb = app.add_subcommand("reconstruct",
+                                      "Reconstruct the flame's volume from calibrated pictures or a session");
+  Arguments& a = *arguments;
+  verb->add_option("input", a.input,
+                   "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder")
+      ->required();
+  verb->add_option("--out", a.out, "Folder for volume.vdb, views/ and report.json")->required();
+  verb->add_option("--box", a.box,
+                   "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's box]");
+  verb->add_option("--voxels", a.voxels, "Voxels along the longest edge [two for three pixels, at most 256]")
+      ->check(CLI::Range(1, kLargestVoxels));
+  verb->add_option("--solver", a.solver, "default, or paper (equations 8 and 9 of the paper)")
+      ->capture_default_str();
+  verb->add_option("--hold-out", a.held_out, "Views, counted from 0, kept for judging the result: i,j,...")
+      ->delimiter(',');
+  verb->add_option("--effects", a.effects, "auto, none, or a list such as extinction=32.8 (1/m) [auto]");
+  verb->add_option("--iterations", a.iterations, "At most so many [the solver's own rule]")
+      ->check(CLI::Range(1, 1000000));
+  verb->add_option("--threads", a.threads, "CPU threads, 0 takes every core; the result doesn't depend on it")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  verb->add_option("--device", a.device, "auto, cpu or cuda")->capture_default_str();
+  verb->add_option("--budget", a.budget, "Stop after so many seconds, with the best so far")
+      ->check(CLI::PositiveNumber);
+  verb->add_option("--target-rmse", a.target_rmse,
+                   "Stop when the held-out error falls to this many grey levels")
+      ->check(CLI::PositiveNumber);
+  verb->add_option(
+          "--threshold", a.threshold,
+          "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
+      ->check(CLI::Range(0.0, 255.0));
+  verb->add_option("--frame", a.frame, "Of a session: the frame of its first camera [the middle one]");
+  verb->add_option("--seed", a.seed, "Of the random numbers in the paper's solver")->capture_default_str();
+  verb->callback([arguments] { reconstruct_command(*arguments); });
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,32 @@
+#include "recon/export/picture.h"
+
+#include <string_view>
+#include <vector>
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "base/file.h"
+
+namespace emberlock {
+
+Status write_png(const ImageView& image, const std::filesystem::path& path) {
+  if (image.layout.format != PixelFormat::gray8 && image.layout.format != PixelFormat::rgb8) {
+    return Error{ErrorKind::bad_input, "cannot write " + std::string(name(image.layout.format)) + " as PNG",
+                 path.string(), "Convert it to gray8 or rgb8"};
+  }
+  const bool colour = image.layout.format == PixelFormat::rgb8;
+  // OpenCV takes the pixels as writable, imencode only reads them.
+  const cv::Mat view(image.height(), image.width(), colour ? CV_8UC3 : CV_8UC1,
+                     const_cast<std::byte*>(image.data), image.stride);
+  cv::Mat ordered = view;
+  if (colour) cv::cvtColor(view, ordered, cv::COLOR_RGB2BGR);
+  std::vector<unsigned char> bytes;
+  if (!cv::imencode(".png", ordered, bytes)) {
+    return Error{ErrorKind::io, "cannot encode the picture", path.string(),
+                 "Check that the picture isn't empty"};
+  }
+  return write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+}  // namespace emberlock

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <filesystem>
+
+#include "base/image.h"
+#include "base/result.h"
+
+namespace emberlock {
+
+/// Writes an 8-bit PNG; `image` is gray8 or rgb8. Atomically.
+Status write_png(const ImageView& image, const std::filesystem::path& path);
+
+}  // namespace emberlock

@@ -1,0 +1,74 @@
+#include "recon/export/report.h"
+
+#include <nlohmann/json.hpp>
+
+namespace emberlock {
+namespace {
+
+using nlohmann::ordered_json;
+
+ordered_json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+ordered_json trace_json(const Report& report) {
+  auto trace = ordered_json::array();
+  for (const TracePoint& point : report.trace) {
+    trace.push_back(
+        {{"seconds", point.time.value()},
+         {"iteration", point.iteration},
+         {"input_rmse", point.input_rmse},
+         {"heldout_rmse", report.heldout_rmse ? ordered_json(point.heldout_rmse) : ordered_json()}});
+  }
+  return trace;
+}
+
+ordered_json effects_json(const Report& report) {
+  auto effects = ordered_json::array();
+  for (const EffectReport& effect : report.effects) {
+    effects.push_back({{"name", effect.name},
+                       {"on", effect.on},
+                       {"predicted_change", effect.predicted_change},
+                       {"seconds", effect.seconds.value()},
+                       {"reason", effect.reason}});
+  }
+  return effects;
+}
+
+ordered_json views_json(const Report& report) {
+  auto views = ordered_json::array();
+  for (const ViewReport& view : report.views) {
+    views.push_back({{"index", views.size()},
+                     {"name", view.name},
+                     {"role", view.role == ViewRole::input ? "input" : "held_out"},
+                     {"rmse", view.rmse}});
+  }
+  return views;
+}
+
+}  // namespace
+
+std::string to_json(const Report& report) {
+  ordered_json json;
+  json["heldout_rmse"] = report.heldout_rmse ? ordered_json(*report.heldout_rmse) : ordered_json();
+  json["input_rmse"] = report.input_rmse;
+  json["warnings"] = report.warnings;
+  json["input"] = report.input;
+  json["solver"] = report.solver;
+  json["device"] = report.device;
+  json["threads"] = report.threads;
+  json["seed"] = report.seed;
+  json["box"] = {{"center", vector_json(report.box.center)}, {"size", vector_json(report.box.size)}};
+  json["voxels"] = report.voxels;
+  json["voxel_edge"] = report.voxel_edge.value();
+  json["hull_voxels"] = report.hull_voxels;
+  json["iterations"] = report.iterations;
+  json["seconds"] = {{"effects", report.effects_time.value()},
+                     {"hull", report.hull_time.value()},
+                     {"solve", report.solve_time.value()},
+                     {"total", report.total_time.value()}};
+  json["effects"] = effects_json(report);
+  json["views"] = views_json(report);
+  json["trace"] = trace_json(report);
+  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace emberlock

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+
+#include "recon/export/report.h"
+
+namespace emberlock {
+
+/// What going on would cost and bring, in one sentence, from the trace alone: the held-out error (the input
+/// error where nothing is held out) fell by g1 over the run's second quarter and by g2 over its second half;
+/// if it goes on so, as many iterations again bring at most g2 * min(1, g2 / g1). Empty with fewer than four
+/// points.
+std::string next_step(const Report& report);
+
+}  // namespace emberlock

@@ -1,0 +1,56 @@
+#include "recon/pipeline/coverage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace emberlock {
+namespace {
+
+constexpr std::size_t kFewViews = 4;  // RECON.md's figures: test error 18 with 4 views, 3.1 with 10
+constexpr double kSimilarDegrees = 20;
+
+/// The largest angle between any two lines of sight, in degrees, 0..90: opposite views lie on one line.
+double spread_degrees(const std::vector<Eigen::Vector3d>& directions) {
+  double smallest_cosine = 1;
+  for (const auto& a : directions) {
+    for (const auto& b : directions) smallest_cosine = std::min(smallest_cosine, std::abs(a.dot(b)));
+  }
+  return std::acos(smallest_cosine) * 180 / std::numbers::pi;
+}
+
+}  // namespace
+
+std::vector<std::string> coverage_warnings(const Scene& scene) {
+  std::vector<std::string> warnings;
+  std::vector<Eigen::Vector3d> directions;
+  bool judged = false;
+  for (const View& view : scene.views) {
+    if (view.role == ViewRole::held_out) {
+      judged = true;
+    } else {
+      directions.emplace_back((view.camera.center() - scene.box.center).normalized());
+    }
+  }
+  if (const double spread = spread_degrees(directions); spread < kSimilarDegrees) {
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "the %zu input view%s lie within %.0f degrees of one line: depth along it is a guess, whatever the "
+        "input error says",
+        directions.size(), directions.size() == 1 ? "" : "s", std::ceil(spread));
+    warnings.emplace_back(text);
+  } else if (directions.size() <= kFewViews) {
+    warnings.emplace_back("only " + std::to_string(directions.size()) +
+                          " input views: many volumes give the same pictures, add views to tell them apart");
+  }
+  if (!judged) {
+    warnings.emplace_back(
+        "no view is held out: the input error proves nothing about the volume (--hold-out i keeps a view for "
+        "judging)");
+  }
+  return warnings;
+}
+
+}  // namespace emberlock

@@ -9,7 +9,8 @@ namespace emberlock {
 /// A reconstructed flame, at the grid's key points, trilinear between them.
 struct Volume {
   Grid grid;
-  std::vector<float> emission;    ///< source S of dL = S ds, RGB interleaved, grey levels (0..255) per metre; 3 * size
+  std::vector<float>
+      emission;  ///< source S of dL = S ds, RGB interleaved, grey levels (0..255) per metre; 3 * size
   std::vector<float> extinction;  ///< sigma_t, 1/m; size() values, or empty where nothing absorbs
 };
 

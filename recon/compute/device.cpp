@@ -1,0 +1,32 @@
+#include "recon/compute/device.h"
+
+#include <string>
+
+#include "recon/compute/cuda_device.h"
+
+namespace emberlock {
+
+Result<Device> parse_device(std::string_view name) {
+  if (name == "auto") return Device::automatic;
+  if (name == "cpu") return Device::cpu;
+  if (name == "cuda") return Device::cuda;
+  return Error{ErrorKind::bad_input, "unknown device '" + std::string(name) + "'", "device",
+               "Use auto, cpu or cuda"};
+}
+
+Result<Device> resolve(Device choice) {
+  if (choice == Device::cpu) return Device::cpu;
+  const Status cuda = cuda_status();
+  if (cuda.ok()) return Device::cuda;
+  if (choice == Device::automatic) return Device::cpu;
+  return cuda.error();
+}
+
+#ifndef EMBERLOCK_HAVE_CUDA
+Status cuda_status() {
+  return Error{ErrorKind::device, "this build has no CUDA backend", "device cuda",
+               "Build where nvcc is on PATH, or use --device cpu"};
+}
+#endif
+
+}  // namespace emberlock

@@ -1,0 +1,222 @@
+#include "recon/hull/ray_list.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+
+#include "recon/kernels/clip.h"
+
+namespace emberlock {
+namespace {
+
+std::size_t voxel_index(const Grid& g, int i, int j, int k) {
+  return static_cast<std::size_t>(i) +
+         static_cast<std::size_t>(g.nx - 1) *
+             (static_cast<std::size_t>(j) + static_cast<std::size_t>(g.ny - 1) * static_cast<std::size_t>(k));
+}
+
+/// Pixels whose rays can meet the grid's box: the rectangle around its projected corners, or the whole frame
+/// when the camera is so close that a corner lies behind it, or when distortion bends the box's edges
+/// outwards.
+PixelBox reach(const CameraModel& camera, const Grid& g) {
+  const ImageSize size = camera.intrinsics.size;
+  const PixelBox all{0, 0, size.width, size.height};
+  if (!camera.intrinsics.distortion.none()) return all;
+  Eigen::Vector2d low(1e30, 1e30);
+  Eigen::Vector2d high(-1e30, -1e30);
+  for (int corner = 0; corner < 8; ++corner) {
+    const double edge = static_cast<double>(g.edge);
+    const Eigen::Vector3d p(static_cast<double>(g.origin[0]) + (corner & 1) * (g.nx - 1) * edge,
+                            static_cast<double>(g.origin[1]) + ((corner >> 1) & 1) * (g.ny - 1) * edge,
+                            static_cast<double>(g.origin[2]) + (corner >> 2) * (g.nz - 1) * edge);
+    if ((camera.camera_from_world * p).z() < 1e-3 * edge) return all;
+    const Eigen::Vector2d pixel = camera.project(p);
+    low = low.cwiseMin(pixel);
+    high = high.cwiseMax(pixel);
+  }
+  const auto bound = [](double v, int limit) {
+    return static_cast<int>(std::clamp(v, 0.0, static_cast<double>(limit)));
+  };
+  return {bound(std::floor(low.x()) - 1, size.width), bound(std::floor(low.y()) - 1, size.height),
+          bound(std::ceil(high.x()) + 1, size.width), bound(std::ceil(high.y()) + 1, size.height)};
+}
+
+struct PixelRow {
+  std::uint32_t view;
+  int y, x0, x1;
+};
+
+/// What one row of pixels gives; runs are counted from the row's own first.
+struct RowRays {
+  std::vector<MarchRay> rays;
+  std::vector<Run> runs;
+  std::vector<std::uint32_t> pixels;
+  std::vector<int> subsets;
+};
+
+class RowClipper {
+ public:
+  RowClipper(const Hull& medium, const RayListOptions& options)
+      : mask_{medium.grid.nx - 1, medium.grid.ny - 1, medium.grid.nz - 1, medium.inside.data()},
+        options_(options) {}
+
+  RowRays operator()(const CameraModel& camera, const float* origin, const PixelRow& row) const {
+    RowRays out;
+    const Intrinsics& k = camera.intrinsics;
+    const Eigen::Matrix3d world_from_camera = camera.camera_from_world.rotation.transpose();
+    const bool straight = k.distortion.none();
+    for (int x = row.x0; x < row.x1; ++x) {
+      const int subset = options_.subset_of ? options_.subset_of(x, row.y) : 0;
+      if (subset < 0) continue;
+      const Eigen::Vector2d centre(x + 0.5, row.y + 0.5);
+      const Eigen::Vector3d d = straight
+                                    ? (world_from_camera * Eigen::Vector3d((centre.x() - k.cx) / k.fx,
+                                                                           (centre.y() - k.cy) / k.fy, 1))
+                                          .normalized()
+                                    : camera.ray(centre).direction;
+      MarchRay ray;
+      for (int a = 0; a < 3; ++a) ray.direction[a] = static_cast<float>(d[a]);
+      ray.view = row.view;
+      ray.first_run = static_cast<std::uint32_t>(out.runs.size());
+      add_runs(origin, ray, out.runs);
+      if (ray.runs == 0) continue;
+      out.rays.push_back(ray);
+      out.pixels.push_back(static_cast<std::uint32_t>(row.y) * static_cast<std::uint32_t>(k.size.width) +
+                           static_cast<std::uint32_t>(x));
+      out.subsets.push_back(subset);
+    }
+    return out;
+  }
+
+ private:
+  void add_runs(const float* origin, MarchRay& ray, std::vector<Run>& runs) const {
+    float before = 0;
+    std::uint32_t samples = 0;
+    clip_to_medium(mask_, origin, ray.direction, [&](float t0, float t1) {
+      constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
+      if (t1 - t0 < kSliver) return;
+      const int count = std::max(1, static_cast<int>(std::ceil((t1 - t0) / options_.step - 1e-3F)));
+      runs.push_back({t0, (t1 - t0) / static_cast<float>(count), before, count, samples});
+      before += t1 - t0;
+      samples += static_cast<std::uint32_t>(count);
+      ++ray.runs;
+    });
+  }
+
+  VoxelMask mask_;
+  const RayListOptions& options_;
+};
+
+/// Counting sort by subset, rows in order, so that the list doesn't depend on which thread did which row.
+void assemble(const std::vector<RowRays>& rows, int subsets, RayList& list) {
+  std::vector<std::size_t> next(static_cast<std::size_t>(subsets) + 1);
+  std::size_t run_count = 0;
+  for (const RowRays& row : rows) {
+    for (const int s : row.subsets) ++next[static_cast<std::size_t>(s) + 1];
+    run_count += row.runs.size();
+  }
+  for (std::size_t s = 1; s < next.size(); ++s) next[s] += next[s - 1];
+  list.subset_begin = next;
+  list.rays.resize(next.back());
+  list.pixels.resize(next.back());
+  list.runs.reserve(run_count);
+  for (const RowRays& row : rows) {
+    const auto first = static_cast<std::uint32_t>(list.runs.size());
+    for (std::size_t r = 0; r < row.rays.size(); ++r) {
+      const std::size_t at = next[static_cast<std::size_t>(row.subsets[r])]++;
+      list.rays[at] = row.rays[r];
+      list.rays[at].first_run += first;
+      list.pixels[at] = row.pixels[r];
+    }
+    list.runs.insert(list.runs.end(), row.runs.begin(), row.runs.end());
+  }
+}
+
+}  // namespace
+
+CroppedHull crop_to_medium(const Hull& hull) {
+  const Grid& g = hull.grid;
+  int low[3] = {g.nx, g.ny, g.nz};
+  int high[3] = {-1, -1, -1};
+  std::size_t at = 0;
+  for (int k = 0; k < g.nz - 1; ++k) {
+    for (int j = 0; j < g.ny - 1; ++j) {
+      for (int i = 0; i < g.nx - 1; ++i) {
+        if (hull.inside[at++] == 0) continue;
+        const int voxel[3] = {i, j, k};
+        for (int a = 0; a < 3; ++a) {
+          low[a] = std::min(low[a], voxel[a]);
+          high[a] = std::max(high[a], voxel[a]);
+        }
+      }
+    }
+  }
+  CroppedHull crop;
+  if (high[0] < 0) return {whole_grid(g), {0, 0, 0}};
+  Grid& c = crop.hull.grid;
+  c = g;
+  c.nx = high[0] - low[0] + 2;
+  c.ny = high[1] - low[1] + 2;
+  c.nz = high[2] - low[2] + 2;
+  for (int a = 0; a < 3; ++a) {
+    crop.offset[a] = low[a];
+    c.origin[a] = g.origin[a] + static_cast<float>(low[a]) * g.edge;
+  }
+  crop.hull.count = hull.count;
+  crop.hull.inside.reserve(voxel_index(c, 0, 0, c.nz - 1));
+  for (int k = 0; k < c.nz - 1; ++k) {
+    for (int j = 0; j < c.ny - 1; ++j) {
+      const auto row =
+          hull.inside.begin() + static_cast<std::ptrdiff_t>(voxel_index(g, low[0], low[1] + j, low[2] + k));
+      crop.hull.inside.insert(crop.hull.inside.end(), row, row + (c.nx - 1));
+    }
+  }
+  return crop;
+}
+
+Hull coarsen(const Hull& hull) {
+  const Grid& g = hull.grid;
+  Hull out;
+  out.grid = g;
+  out.grid.edge = 2 * g.edge;
+  out.grid.nx = g.nx / 2 + 1;
+  out.grid.ny = g.ny / 2 + 1;
+  out.grid.nz = g.nz / 2 + 1;
+  out.inside.resize(voxel_index(out.grid, 0, 0, out.grid.nz - 1));
+  std::size_t at = 0;
+  for (int k = 0; k < g.nz - 1; ++k)
+    for (int j = 0; j < g.ny - 1; ++j)
+      for (int i = 0; i < g.nx - 1; ++i)
+        if (hull.inside[at++] != 0) out.inside[voxel_index(out.grid, i / 2, j / 2, k / 2)] = 1;
+  out.count = static_cast<std::size_t>(std::count(out.inside.begin(), out.inside.end(), 1));
+  return out;
+}
+
+RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& medium,
+                  const RayListOptions& options, Pool& pool) {
+  RayList list;
+  list.grid = medium.grid;
+  std::vector<PixelRow> rows;
+  for (std::size_t v = 0; v < cameras.size(); ++v) {
+    const Eigen::Vector3d center = cameras[v]->center();
+    for (int a = 0; a < 3; ++a)
+      list.origins.push_back(static_cast<float>((center[a] - static_cast<double>(medium.grid.origin[a])) /
+                                                static_cast<double>(medium.grid.edge)));
+    const PixelBox box = reach(*cameras[v], medium.grid);
+    for (int y = box.y0; y < box.y1; ++y) rows.push_back({static_cast<std::uint32_t>(v), y, box.x0, box.x1});
+  }
+  std::vector<RowRays> found(rows.size());
+  constexpr int kRowsATask = 8;
+  const RowClipper clip(medium, options);
+  pool.run(static_cast<int>((rows.size() + kRowsATask - 1) / kRowsATask), [&](int task) {
+    const std::size_t begin = static_cast<std::size_t>(task) * kRowsATask;
+    for (std::size_t r = begin; r < std::min(begin + kRowsATask, rows.size()); ++r)
+      found[r] =
+          clip(*cameras[rows[r].view], &list.origins[3 * static_cast<std::size_t>(rows[r].view)], rows[r]);
+  });
+  assemble(found, options.subsets, list);
+  return list;
+}
+
+}  // namespace emberlock

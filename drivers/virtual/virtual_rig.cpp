@@ -1,0 +1,89 @@
+#include "drivers/virtual/virtual_rig.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "drivers/virtual/virtual_camera.h"
+#include "drivers/virtual/virtual_strobe.h"
+
+namespace emberlock {
+
+struct VirtualRig::Parts {
+  Parts(const VirtualRigOptions& options, const std::shared_ptr<Clock>& clock)
+      : room(std::make_shared<VirtualRoom>(clock, options.strobe.rate_error, options.scene)),
+        strobe(options.strobe, clock, room->strobe()) {
+    cameras.reserve(options.cameras.size());
+    for (const VirtualCameraOptions& camera : options.cameras) {
+      cameras.emplace_back(camera, static_cast<int>(cameras.size()), options, room);
+    }
+  }
+
+  std::shared_ptr<VirtualRoom> room;
+  VirtualStrobe strobe;
+  std::vector<VirtualCamera> cameras;
+};
+
+VirtualRig::VirtualRig(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+VirtualRig::~VirtualRig() = default;
+
+Result<std::unique_ptr<VirtualRig>> VirtualRig::create(VirtualRigOptions options,
+                                                       std::shared_ptr<Clock> clock) {
+  EMBERLOCK_RETURN_IF_ERROR(check(options));
+  return std::unique_ptr<VirtualRig>(new VirtualRig(std::make_unique<Parts>(options, clock)));
+}
+
+int VirtualRig::size() const { return static_cast<int>(parts_->cameras.size()); }
+Camera& VirtualRig::camera(int index) { return parts_->cameras.at(index); }
+Strobe& VirtualRig::strobe() { return parts_->strobe; }
+Clock& VirtualRig::clock() { return parts_->room->clock(); }
+
+Status VirtualRig::set_scene(VirtualScene scene) {
+  EMBERLOCK_RETURN_IF_ERROR(check(scene));
+  for (const VirtualCamera& camera : parts_->cameras) {
+    EMBERLOCK_RETURN_IF_ERROR(check_exposure(scene, camera.truth()));
+  }
+  parts_->room->set_scene(std::move(scene));
+  return {};
+}
+
+void VirtualRig::set_reset(ShutterReset reset) {
+  for (VirtualCamera& camera : parts_->cameras) camera.set_reset(reset);
+}
+
+const VirtualCameraOptions& VirtualRig::truth(int index) const { return parts_->cameras.at(index).truth(); }
+
+TimePoint VirtualRig::read_start(int index, std::uint64_t frame_id) const {
+  return parts_->cameras.at(index).read_start(frame_id);
+}
+
+TimePoint VirtualRig::read_start_after(int index, TimePoint after) const {
+  return parts_->cameras.at(index).read_start_after(after);
+}
+
+std::vector<TrueDot> VirtualRig::dots(int index, std::uint64_t frame_id) const {
+  const VirtualCamera& camera = parts_->cameras.at(index);
+  const VirtualCameraOptions& truth = camera.truth();
+  const auto scene = camera.scene_of(frame_id);
+  const TimePoint start = camera.read_start(frame_id);
+  std::vector<TrueDot> dots;
+  for (const LightPulse& pulse : camera.light_on(frame_id)) {
+    if (pulse.kind != StrobeOutput::flashing) continue;
+    const Seconds centre = pulse.begin + pulse.width / 2;
+    double seen = 0;
+    double brightest = 0;
+    Rows sum;
+    for (const FlashPart& part : split(truth.timing, {centre, pulse.width})) {
+      const bool rest = part.shifts >= truth.timing.shifts;
+      const auto at = smear_centre(truth.timing, truth.lamp.y, part, truth.sweep_out);
+      if (rest || !at || at->image != 0) continue;
+      seen += part.fraction;
+      brightest = std::max(brightest, part.fraction);
+      sum += at->row * part.fraction;
+    }
+    if (seen > 0)
+      dots.push_back({sum / seen, scene->flash_level * scene->smear_leak * brightest, start + centre});
+  }
+  return dots;
+}
+
+}  // namespace emberlock

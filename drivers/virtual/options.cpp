@@ -1,0 +1,144 @@
+#include "drivers/virtual/options.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <set>
+
+#include "base/random.h"
+
+namespace emberlock {
+namespace {
+
+constexpr int kMostCameras = 64;
+constexpr int kLargestSide = 16384;
+constexpr std::string_view kScheme = "virtual:";
+
+Status in_range(const std::string& where, const char* field, double value, double low, double high) {
+  if (value >= low && value <= high) return {};
+  return Error{ErrorKind::bad_input, std::string(field) + " is " + std::to_string(value), where,
+               "give a value from " + std::to_string(low) + " to " + std::to_string(high)};
+}
+
+Status check(const VirtualCameraOptions& c) {
+  const std::string where = "virtual camera " + c.id;
+  const auto [width, height] = c.layout.size;
+  const bool wide = bytes_per_sample(c.layout.format) == 2;
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "layout.size.width", width, 1, kLargestSide));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "layout.size.height", height, 1, kLargestSide));
+  EMBERLOCK_RETURN_IF_ERROR(
+      in_range(where, "layout.bit_depth", c.layout.bit_depth, wide ? 9 : 8, wide ? 16 : 8));
+  if (const Status timing = check(c.timing); !timing.ok()) {
+    Error error = timing.error();
+    error.where = where + ", " + error.where;
+    return error;
+  }
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "timing.rows", c.timing.rows, height, height));
+  EMBERLOCK_RETURN_IF_ERROR(
+      in_range(where, "timing.frame_period", c.timing.frame_period.value(), 1e-4, 3600));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "nominal_rate", c.nominal_rate.value(), 1e-3, 1e4));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "lamp.x", c.lamp.x, -1e5, 1e5));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "lamp.y", c.lamp.y.value(), -1e5, 1e5));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "lamp.radius", c.lamp.radius, 0.5, 50));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "reset_latency", c.reset_latency.value(), 0, 10));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "reset_jitter", c.reset_jitter.value(), 0, 1));
+  return in_range(where, "first_phase", c.first_phase.value_or(Seconds(0)).value(), 0, 3600);
+}
+
+CcdTiming draw_timing(const VirtualRigDraw& draw, RandomStream& random) {
+  const double crystal = 1 + random.uniform(-1, 1) * draw.crystal_spread.value() * 1e-6;
+  CcdTiming t;
+  t.rows = draw.layout.size.height;
+  t.frame_period = period(draw.rate) * crystal;
+  t.row_time = draw.row_time * crystal;
+  const int most = static_cast<int>(std::floor((t.frame_period / t.row_time).value()));
+  const int with_dummies = std::clamp(t.rows + 20, t.rows, std::max(t.rows, most));
+  const auto model = random.bits();
+  t.shifts = with_dummies;
+  if (draw.models == VirtualRigDraw::Models::mixed) {
+    const int choices[] = {t.rows, with_dummies, std::max(t.rows, most)};
+    t.shifts = choices[model % 3];
+    t.direction = (model >> 32) % 2 == 0 ? ReadDirection::top_first : ReadDirection::bottom_first;
+  }
+  return t;
+}
+
+}  // namespace
+
+std::uint64_t stream_seed(std::uint64_t seed, std::string_view camera_id) {
+  for (const char c : camera_id) seed = mix64(seed ^ static_cast<unsigned char>(c));
+  return seed;
+}
+
+Status check_exposure(const VirtualScene& scene, const VirtualCameraOptions& camera) {
+  return in_range("virtual camera " + camera.id, "the scene's exposure", scene.exposure.value(), 0,
+                  camera.timing.frame_period.value());
+}
+
+Status check(const VirtualRigOptions& options) {
+  const std::string where = "virtual rig";
+  EMBERLOCK_RETURN_IF_ERROR(
+      in_range(where, "the number of cameras", static_cast<double>(options.cameras.size()), 1, kMostCameras));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "queue_frames", options.queue_frames, 1, 4096));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "strobe.rate_step", options.strobe.rate_step.value(), 1e-6, 0.5));
+  EMBERLOCK_RETURN_IF_ERROR(
+      in_range(where, "strobe.time_step", options.strobe.time_step.value(), 1e-9, 1e-3));
+  EMBERLOCK_RETURN_IF_ERROR(
+      in_range(where, "strobe.rate_error", options.strobe.rate_error.value(), -1000, 1000));
+  EMBERLOCK_RETURN_IF_ERROR(check(options.scene));
+  std::set<std::string_view> ids;
+  for (const VirtualCameraOptions& camera : options.cameras) {
+    EMBERLOCK_RETURN_IF_ERROR(check(camera));
+    if (!ids.insert(camera.id).second) {
+      return Error{ErrorKind::bad_input, "two cameras have the id " + camera.id, where,
+                   "give each its own id"};
+    }
+    EMBERLOCK_RETURN_IF_ERROR(check_exposure(options.scene, camera));
+  }
+  return {};
+}
+
+VirtualRigOptions draw_virtual_rig(const VirtualRigDraw& draw) {
+  VirtualRigOptions rig;
+  rig.seed = draw.seed;
+  const double width = draw.layout.size.width;
+  const double height = draw.layout.size.height;
+  for (int i = 0; i < draw.cameras; ++i) {
+    VirtualCameraOptions c;
+    const std::string number = std::to_string(i);
+    c.id = "virtual-" + std::string(number.size() < 2 ? 2 - number.size() : 0, '0') + number;
+    RandomStream random(stream_seed(draw.seed, c.id), 0);
+    c.layout = draw.layout;
+    c.nominal_rate = draw.rate;
+    c.timing = draw_timing(draw, random);
+    c.lamp.x = random.uniform(0.3, 0.7) * width;
+    c.lamp.y = Rows(random.uniform(0.28, 0.72) * height);
+    c.lamp.radius = random.uniform(3, 5);
+    c.reset = draw.reset;
+    c.reset_latency = draw.reset_latency + draw.reset_latency_spread * random.uniform(-1, 1);
+    c.reset_jitter = draw.reset_jitter;
+    rig.cameras.push_back(std::move(c));
+  }
+  return rig;
+}
+
+Result<VirtualRigOptions> parse_virtual_rig(std::string_view name, std::uint64_t seed) {
+  const auto refuse = [&](std::string what) {
+    return Error{
+        ErrorKind::bad_input, std::move(what), "rig " + std::string(name),
+        "give virtual:N with 1 to " + std::to_string(kMostCameras) + " cameras, for example virtual:11"};
+  };
+  if (!name.starts_with(kScheme)) return refuse("there is no such rig");
+  const std::string_view digits = name.substr(kScheme.size());
+  int cameras = 0;
+  const auto [end, failed] = std::from_chars(digits.data(), digits.data() + digits.size(), cameras);
+  if (digits.empty() || failed == std::errc::invalid_argument || end != digits.data() + digits.size()) {
+    return refuse("the number of cameras is not a whole number");
+  }
+  if (failed != std::errc{} || cameras < 1 || cameras > kMostCameras) {
+    return refuse("the number of cameras is out of range");
+  }
+  return draw_virtual_rig({.cameras = cameras, .seed = seed});
+}
+
+}  // namespace emberlock

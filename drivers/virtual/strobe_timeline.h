@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <mutex>
+#include <vector>
+
+#include "base/quantity.h"
+#include "base/time_point.h"
+#include "drivers/strobe.h"
+
+namespace emberlock {
+
+/// Light of the strobe: one flash, or a stretch of steady light.
+struct LightPulse {
+  Seconds begin;  ///< after the origin that was asked for; may be negative
+  Seconds width;
+  StrobeOutput kind = StrobeOutput::flashing;
+};
+
+/// Everything that a strobe has been told, and so every flash it gave or will give: an exact function of the
+/// settings and of when they were applied. Flash j of a setting begins at base + phase + j / rate, j >= 0.
+/// The base is the moment of apply() when the rate changes or flashing begins, and stays otherwise, so that a
+/// changed phase moves the flashes by the difference. A code begins anew with the first flash after apply().
+/// A flash that has begun ends normally. Thread-safe.
+class StrobeTimeline {
+ public:
+  /// `rate_error`: the true rate is the settings' times (1 + rate_error).
+  explicit StrobeTimeline(PartsPerMillion rate_error) : rate_error_(rate_error) {}
+
+  /// `at` is not before that of the call before; `settings` are valid.
+  void apply(const StrobeSettings& settings, TimePoint at);
+
+  /// The light that overlaps [origin + from, origin + to), in order of time; steady light is cut to that
+  /// window.
+  [[nodiscard]] std::vector<LightPulse> light(TimePoint origin, Seconds from, Seconds to) const;
+
+ private:
+  struct Segment {
+    StrobeSettings settings;
+    TimePoint applied;
+    TimePoint base;
+    Seconds period;
+    std::int64_t first_flash;  // its number j: the code begins here
+  };
+  /// The segment's flashes that overlap [from, to) and begin before `end`; flash 0 would begin at `zero`.
+  static void add_flashes(const Segment& segment, Seconds zero, Seconds from, Seconds to, Seconds end,
+                          std::vector<LightPulse>& pulses);
+
+  PartsPerMillion rate_error_;
+  mutable std::mutex mutex_;
+  std::vector<Segment> segments_;
+};
+
+}  // namespace emberlock

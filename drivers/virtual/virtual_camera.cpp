@@ -1,0 +1,167 @@
+#include "drivers/virtual/virtual_camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "base/log.h"
+#include "base/random.h"
+
+namespace emberlock {
+namespace {
+
+enum Stream : std::uint64_t { kPhaseStream = 11, kJitterStream = 12, kDeviceClockStream = 13 };
+
+constexpr Seconds kLongestWait{1e8};  // keeps instants within 64 bits
+
+}  // namespace
+
+VirtualRoom::VirtualRoom(std::shared_ptr<Clock> clock, PartsPerMillion strobe_error, VirtualScene scene)
+    : clock_(std::move(clock)),
+      strobe_(std::make_shared<StrobeTimeline>(strobe_error)),
+      opened_(clock_->now()) {
+  set_scene(std::move(scene));
+}
+
+void VirtualRoom::set_scene(VirtualScene scene) {
+  const std::lock_guard lock(mutex_);
+  scenes_.push_back({clock_->now(), std::make_shared<const VirtualScene>(std::move(scene))});
+}
+
+std::shared_ptr<const VirtualScene> VirtualRoom::scene_at(TimePoint t) const {
+  const std::lock_guard lock(mutex_);
+  const auto after = std::upper_bound(scenes_.begin() + 1, scenes_.end(), t,
+                                      [](TimePoint v, const Change& c) { return v < c.at; });
+  return (after - 1)->scene;
+}
+
+VirtualCamera::VirtualCamera(VirtualCameraOptions options, int number, const VirtualRigOptions& rig,
+                             std::shared_ptr<const VirtualRoom> room)
+    : options_(std::move(options)),
+      room_(std::move(room)),
+      info_{options_.id, "Emberlock virtual CCD", options_.layout, options_.nominal_rate, options_.reset},
+      sensor_(options_, number, rig.seed),
+      seed_(stream_seed(rig.seed, options_.id)),
+      queue_frames_(static_cast<std::uint64_t>(rig.queue_frames)),
+      wall_at_zero_(rig.wall_at_zero),
+      device_origin_(1000 * random_uniform(seed_, kDeviceClockStream, 0)) {}
+
+Status VirtualCamera::start() {
+  if (filming_) return {};
+  Seconds phase = options_.timing.frame_period * random_uniform(seed_, kPhaseStream, draws_++);
+  if (cycles_.empty() && options_.first_phase) phase = *options_.first_phase;
+  begin_cycle(room_->clock().now() + phase, next_id_);
+  filming_ = true;
+  return {};
+}
+
+Status VirtualCamera::reset_shutter(TimePoint at) {
+  const auto refuse = [&](std::string what, std::string remedy) {
+    return Error{ErrorKind::device, std::move(what), "camera " + info_.id, std::move(remedy)};
+  };
+  if (info_.reset == ShutterReset::none) {
+    return refuse("its shutter can't be reset", "choose a camera whose reset is by_hand or on_command");
+  }
+  if (!filming_) return refuse("it does not film", "start() it before resetting its shutter");
+  at = std::max(at, room_->clock().now());
+  const std::uint64_t draw = draws_++;
+  const Seconds drawn = info_.reset == ShutterReset::by_hand
+                            ? options_.timing.frame_period * random_uniform(seed_, kPhaseStream, draw)
+                            : options_.reset_jitter * random_normal(seed_, kJitterStream, draw);
+  const Seconds latency = std::max(Seconds(0), options_.reset_latency + drawn);
+  // The old cycle runs until `at`; what it delivered or would have is counted, and dropped.
+  begin_cycle(at + latency, cycles_.back().first_id + delivered_by(at));
+  log(LogCategory::drivers).debug("{}: shutter reset {}", info_.id, draw);
+  return {};
+}
+
+void VirtualCamera::begin_cycle(TimePoint start, std::uint64_t first_id) {
+  cycles_.push_back({start, first_id});
+  next_id_ = first_id;
+}
+
+TimePoint VirtualCamera::read_start(std::uint64_t frame_id) const {
+  if (cycles_.empty()) return {};
+  const auto after = std::upper_bound(cycles_.begin() + 1, cycles_.end(), frame_id,
+                                      [](std::uint64_t id, const Cycle& c) { return id < c.first_id; });
+  const Cycle& cycle = *(after - 1);
+  return cycle.start + options_.timing.frame_period * static_cast<double>(frame_id - cycle.first_id + 1);
+}
+
+TimePoint VirtualCamera::read_start_after(TimePoint after) const {
+  if (cycles_.empty()) return {};
+  const Seconds period = options_.timing.frame_period;
+  const double frames = std::ceil((after - cycles_.back().start) / period);
+  return cycles_.back().start + period * std::max(0.0, frames);
+}
+
+TimePoint VirtualCamera::read_end(std::uint64_t frame_id) const {
+  return read_start(frame_id) + Rows(options_.timing.shifts) * options_.timing.row_time;
+}
+
+std::uint64_t VirtualCamera::delivered_by(TimePoint t) const {
+  const std::uint64_t first = cycles_.back().first_id;
+  const double periods = std::floor((t - read_end(first)) / options_.timing.frame_period);
+  auto count = static_cast<std::uint64_t>(std::max(0.0, periods));
+  while (read_end(first + count) <= t) ++count;  // instants are rounded to nanoseconds: settle the border
+  return count;
+}
+
+void VirtualCamera::drop_overflow() {
+  const std::uint64_t delivered = cycles_.back().first_id + delivered_by(room_->clock().now());
+  if (delivered <= next_id_ + queue_frames_) return;
+  const std::uint64_t oldest = delivered - queue_frames_;
+  log(LogCategory::drivers).warn("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
+  next_id_ = oldest;
+}
+
+Result<Frame> VirtualCamera::next_frame(Seconds deadline) {
+  if (!filming_) {
+    return Error{ErrorKind::device, "it does not film", "camera " + info_.id, "start() it first"};
+  }
+  const Seconds wait = std::min(std::max(Seconds(0), deadline), kLongestWait);
+  Clock& clock = room_->clock();
+  const TimePoint until = clock.now() + wait;
+  const TimePoint ready = read_end(next_id_);
+  if (ready > until) {
+    clock.sleep_until(until);
+    return Error{ErrorKind::timed_out, "no frame within " + std::to_string(wait.value()) + " s",
+                 "camera " + info_.id,
+                 "wait longer than a frame period, and after a reset longer than its latency"};
+  }
+  clock.sleep_until(ready);
+  drop_overflow();
+  return draw(next_id_++);
+}
+
+std::shared_ptr<const VirtualScene> VirtualCamera::scene_of(std::uint64_t frame_id) const {
+  return room_->scene_at(read_start(frame_id));
+}
+
+std::vector<LightPulse> VirtualCamera::light_on(std::uint64_t frame_id) const {
+  const CcdTiming& t = options_.timing;
+  return room_->strobe()->light(read_start(frame_id), -t.frame_period, Rows(t.shifts) * t.row_time);
+}
+
+Seconds VirtualCamera::exposure(const VirtualScene& scene) const {
+  return scene.exposure > Seconds(0) ? scene.exposure : options_.timing.frame_period;
+}
+
+Frame VirtualCamera::draw(std::uint64_t frame_id) {
+  const TimePoint begin = read_start(frame_id);
+  const auto scene = scene_of(frame_id);
+  const Seconds exposed = exposure(*scene);
+  Image image = sensor_.expose(*scene, light_on(frame_id), {frame_id, begin - exposed, exposed});
+
+  const TimePoint arrival = read_end(frame_id);
+  // The camera's clock runs on the crystal that also times its frames.
+  const double own_rate = 1 / (options_.nominal_rate * options_.timing.frame_period);
+  FrameStamp stamp;
+  stamp.frame_id = frame_id;
+  stamp.device_time = TimePoint{} + (device_origin_ + (begin - room_->opened()) * own_rate);
+  stamp.system_time = {wall_at_zero_.ns + arrival.ns};
+  stamp.monotonic_time = arrival;
+  return {stamp, std::make_shared<const Image>(std::move(image))};
+}
+
+}  // namespace emberlock

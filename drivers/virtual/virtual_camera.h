@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "base/clock.h"
+#include "drivers/camera.h"
+#include "drivers/virtual/options.h"
+#include "drivers/virtual/sensor.h"
+#include "drivers/virtual/strobe_timeline.h"
+
+namespace emberlock {
+
+/// What all cameras of a rig share. Thread-safe.
+class VirtualRoom {
+ public:
+  VirtualRoom(std::shared_ptr<Clock> clock, PartsPerMillion strobe_error, VirtualScene scene);
+
+  [[nodiscard]] Clock& clock() const { return *clock_; }
+  [[nodiscard]] const std::shared_ptr<StrobeTimeline>& strobe() const { return strobe_; }
+  [[nodiscard]] TimePoint opened() const { return opened_; }
+  void set_scene(VirtualScene scene);
+  /// The scene that a frame shows whose read phase begins at t.
+  [[nodiscard]] std::shared_ptr<const VirtualScene> scene_at(TimePoint t) const;
+
+ private:
+  struct Change {
+    TimePoint at;
+    std::shared_ptr<const VirtualScene> scene;
+  };
+  std::shared_ptr<Clock> clock_;
+  std::shared_ptr<StrobeTimeline> strobe_;
+  TimePoint opened_;
+  mutable std::mutex mutex_;
+  std::vector<Change> scenes_;  // in order of time, never empty
+};
+
+/// One interline CCD camera. Frames are numbered from 0 at the first start() on, through stops and resets,
+/// and drawn when they are asked for.
+class VirtualCamera final : public Camera {
+ public:
+  VirtualCamera(VirtualCameraOptions options, int number, const VirtualRigOptions& rig,
+                std::shared_ptr<const VirtualRoom> room);
+
+  [[nodiscard]] const CameraInfo& info() const override { return info_; }
+  Status start() override;
+  void stop() override { filming_ = false; }
+  Result<Frame> next_frame(Seconds deadline) override;
+  Status reset_shutter(TimePoint at) override;
+
+  void set_reset(ShutterReset reset) { info_.reset = reset; }
+  [[nodiscard]] const VirtualCameraOptions& truth() const { return options_; }
+  [[nodiscard]] TimePoint read_start(std::uint64_t frame_id) const;
+  [[nodiscard]] TimePoint read_start_after(TimePoint after) const;
+  [[nodiscard]] std::vector<LightPulse> light_on(std::uint64_t frame_id) const;
+  [[nodiscard]] std::shared_ptr<const VirtualScene> scene_of(std::uint64_t frame_id) const;
+
+ private:
+  /// Read phases at `start` + i T; the image of i = 0 is kept back, that of i >= 1 is frame first_id + i - 1.
+  struct Cycle {
+    TimePoint start;
+    std::uint64_t first_id = 0;
+  };
+
+  [[nodiscard]] TimePoint read_end(std::uint64_t frame_id) const;
+  /// How many frames the current cycle has delivered by `t`.
+  [[nodiscard]] std::uint64_t delivered_by(TimePoint t) const;
+  void begin_cycle(TimePoint start, std::uint64_t first_id);
+  void drop_overflow();
+  [[nodiscard]] Frame draw(std::uint64_t frame_id);
+  [[nodiscard]] Seconds exposure(const VirtualScene& scene) const;
+
+  VirtualCameraOptions options_;
+  std::shared_ptr<const VirtualRoom> room_;
+  CameraInfo info_;
+  VirtualSensor sensor_;
+  std::uint64_t seed_;  // of phases and latencies
+  std::uint64_t draws_ = 0;
+  std::uint64_t queue_frames_;
+  TimePoint wall_at_zero_;
+  Seconds device_origin_;  // of the camera's own clock
+  std::vector<Cycle> cycles_;
+  std::uint64_t next_id_ = 0;
+  bool filming_ = false;
+};
+
+}  // namespace emberlock

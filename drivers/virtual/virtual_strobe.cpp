@@ -1,0 +1,70 @@
+#include "drivers/virtual/virtual_strobe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "base/log.h"
+
+namespace emberlock {
+namespace {
+
+constexpr Hertz kSlowest{30.0 / 60};
+constexpr Hertz kFastest{20000.0 / 60};
+constexpr std::size_t kLongestCode = 4096;
+
+template <class... Words>
+std::string text(const Words&... words) {
+  std::ostringstream out;
+  (out << ... << words);
+  return out.str();
+}
+
+Status check(const StrobeSettings& s, const std::string& id) {
+  const auto refuse = [&](std::string what, std::string remedy) {
+    return Error{ErrorKind::bad_input, std::move(what), "strobe " + id, std::move(remedy)};
+  };
+  // Negated comparisons refuse NaN too.
+  if (!(s.rate >= kSlowest && s.rate <= kFastest)) {
+    return refuse(text("the rate is ", s.rate.value(), " flashes a second"), "give 0.5 to 333.33");
+  }
+  const Seconds longest = period(s.rate);
+  if (!(s.phase >= Seconds(0) && s.phase < longest)) {
+    return refuse(text("the phase is ", s.phase.value(), " s"),
+                  text("give at least 0 and less than ", longest.value(), " s"));
+  }
+  if (!(s.width > Seconds(0) && s.width < longest)) {
+    return refuse(text("the flash width is ", s.width.value(), " s"),
+                  text("give more than 0 and less than ", longest.value(), " s"));
+  }
+  if (s.code.size() > kLongestCode) {
+    return refuse(text("the code has ", s.code.size(), " flashes"), text("give at most ", kLongestCode));
+  }
+  return {};
+}
+
+}  // namespace
+
+VirtualStrobe::VirtualStrobe(VirtualStrobeOptions options, std::shared_ptr<Clock> clock,
+                             std::shared_ptr<StrobeTimeline> timeline)
+    : options_(std::move(options)), clock_(std::move(clock)), timeline_(std::move(timeline)) {}
+
+Status VirtualStrobe::apply(const StrobeSettings& settings) {
+  EMBERLOCK_RETURN_IF_ERROR(check(settings, options_.id));
+  StrobeSettings rounded = settings;
+  // Dividing by the steps a second, a whole number, keeps a step's multiples exact.
+  const double rate_steps = std::round(1 / options_.rate_step.value());
+  const double time_steps = std::round(1 / options_.time_step.value());
+  rounded.rate = Hertz(std::round(settings.rate.value() * rate_steps) / rate_steps);
+  const double below_period = std::ceil(time_steps / rounded.rate.value()) - 1;
+  rounded.phase =
+      Seconds(std::min(std::round(settings.phase.value() * time_steps), below_period) / time_steps);
+  rounded.width =
+      Seconds(std::clamp(std::round(settings.width.value() * time_steps), 1.0, below_period) / time_steps);
+  settings_ = std::move(rounded);
+  timeline_->apply(settings_, clock_->now());
+  log(LogCategory::drivers).debug("{}: {} flashes a second", options_.id, settings_.rate.value());
+  return {};
+}
+
+}  // namespace emberlock

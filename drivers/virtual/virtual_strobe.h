@@ -1,0 +1,30 @@
+#pragma once
+
+#include <memory>
+
+#include "base/clock.h"
+#include "drivers/strobe.h"
+#include "drivers/virtual/options.h"
+#include "drivers/virtual/strobe_timeline.h"
+
+namespace emberlock {
+
+/// A stroboscope with the paper's range (30..20000 flashes a minute) and steps; writes what it is told to a
+/// timeline.
+class VirtualStrobe final : public Strobe {
+ public:
+  VirtualStrobe(VirtualStrobeOptions options, std::shared_ptr<Clock> clock,
+                std::shared_ptr<StrobeTimeline> timeline);
+
+  [[nodiscard]] const std::string& id() const override { return options_.id; }
+  Status apply(const StrobeSettings& settings) override;
+  Result<StrobeSettings> read_back() override { return settings_; }
+
+ private:
+  VirtualStrobeOptions options_;
+  std::shared_ptr<Clock> clock_;
+  std::shared_ptr<StrobeTimeline> timeline_;
+  StrobeSettings settings_;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "smear_sync/dot_fit.h"
+#include "smear_sync/lamp.h"
+
+namespace emberlock::detail {
+
+/// What one lamp's column shows, in the coordinates of the plane.
+struct ColumnReading {
+  std::vector<DotFit> dots;  ///< top to bottom
+  bool line = false;         ///< brighter than its neighbours over the full height
+  bool clipped = false;      ///< saturated, or so nearly that a dot has no room
+  bool half_field = false;   ///< a spot that stands in every other row only: interlaced
+  int suspects = 0;        ///< spots above the noise that might be dots, but don't look enough like the lamp
+  double suspect_row = 0;  ///< the strongest one's row
+  double hidden = 0;       ///< fraction of the rows in which a dot would not be seen
+  double line_level = 0;   ///< of the line above its neighbours, samples
+};
+
+ColumnReading read_column(const Plane& plane, const Background& background, const Lamp& lamp,
+                          double saturation, const DetectOptions& options);
+
+}  // namespace emberlock::detail

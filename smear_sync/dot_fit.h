@@ -1,0 +1,44 @@
+#pragma once
+
+#include "smear_sync/plane.h"
+
+namespace emberlock::detail {
+
+/// A disk with a soft edge on a level and a slope along y:
+///   v(x, y) = level + slope (y - y0) + amplitude / (1 + exp((r - radius) / kEdge)),  r = |(x, y) - (x0,
+///   y0)|.
+struct DotFit {
+  static constexpr double kEdge = 0.5;  ///< pixels; the blur of a lens in focus and of the pixel itself
+
+  double x = 0, y = 0;  ///< in the patch
+  double radius = 0;
+  double amplitude = 0;
+  double level = 0;
+  double slope = 0;
+  double sigma_x = 0,
+         sigma_y = 0;  ///< standard errors from the curvature of the likelihood, scaled by the misfit
+  double snr = 0;      ///< matched-filter signal over noise
+  double misfit = 0;   ///< RMS residual over the noise
+  bool converged = false;
+
+  [[nodiscard]] double disk(double px, double py) const;
+};
+
+/// Rows and columns of the patch that a fit may use, ends included.
+struct FitWindow {
+  int left = 0, right = 0, top = 0, bottom = 0;
+};
+
+/// Maximum likelihood under Gaussian noise (Levenberg-Marquardt from `start`).
+DotFit fit_dot(const Patch& patch, const FitWindow& window, DotFit start, double noise);
+
+/// How evenly the dot's light is spread: what tells a lamp's copy from hot pixels and from half a field.
+struct Evenness {
+  double least_half = 1;     ///< amplitude of the weakest half (left, right, top, bottom), of the whole's
+  double least_field = 1;    ///< amplitude of the weaker of even and odd rows, of the stronger's
+  double brightest_two = 0;  ///< share of the matched signal in its two brightest pixels
+  double half_sigma = 0;     ///< standard error of least_half and least_field
+};
+Evenness evenness(const Patch& patch, const FitWindow& window, const DotFit& fit, double noise);
+
+}  // namespace emberlock::detail

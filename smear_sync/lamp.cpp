@@ -1,0 +1,284 @@
+#include "smear_sync/lamp.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "smear_sync/circle.h"
+
+namespace emberlock::detail {
+namespace {
+
+constexpr double kLow = 0.15;  // of the peak: where a lamp's outline ends and its halo begins
+constexpr double kHalf = 0.5;  // of the peak: its disk
+
+struct Span {
+  int first = 0, last = 0;
+};
+
+template <class Sample>
+void count_bright(const Plane& plane, double threshold, std::vector<std::uint16_t>& count) {
+  const auto limit = static_cast<Sample>(std::min<double>(threshold, std::numeric_limits<Sample>::max()));
+  std::uint16_t* out = count.data();
+  for (int y = 0; y < plane.size.height; ++y) {
+    const Sample* row = plane.row<Sample>(y);
+    for (int x = 0; x < plane.size.width; ++x)
+      out[x] = static_cast<std::uint16_t>(out[x] + (row[x] > limit ? 1 : 0));
+  }
+}
+
+/// Neighbouring columns with at least two bright pixels each, at least three columns wide: a hot pixel or a
+/// hot column is neither.
+std::vector<Span> bright_columns(const Plane& plane, double threshold) {
+  std::vector<std::uint16_t> count(static_cast<std::size_t>(plane.size.width));
+  if (plane.bytes == 1) {
+    count_bright<std::uint8_t>(plane, threshold, count);
+  } else {
+    count_bright<std::uint16_t>(plane, threshold, count);
+  }
+  std::vector<Span> spans;
+  for (int x = 0; x < plane.size.width; ++x) {
+    if (count[static_cast<std::size_t>(x)] < 2) continue;
+    const int first = x;
+    while (x + 1 < plane.size.width && count[static_cast<std::size_t>(x) + 1] >= 2) ++x;
+    if (x - first >= 2) spans.push_back({first, x});
+  }
+  return spans;
+}
+
+struct Blob {
+  std::vector<int> pixels;  // indices into the patch
+  int left = 0, right = 0, top = 0, bottom = 0;
+};
+
+/// Connected (8 neighbours) pixels above the threshold.
+std::vector<Blob> blobs(const Patch& patch, float threshold) {
+  std::vector<Blob> found;
+  std::vector<char> seen(patch.v.size());
+  std::vector<int> stack;
+  for (int start = 0; start < static_cast<int>(patch.v.size()); ++start) {
+    if (seen[static_cast<std::size_t>(start)] != 0 || patch.v[static_cast<std::size_t>(start)] <= threshold)
+      continue;
+    Blob blob{.pixels = {}, .left = patch.width, .right = -1, .top = patch.height, .bottom = -1};
+    stack.assign(1, start);
+    seen[static_cast<std::size_t>(start)] = 1;
+    while (!stack.empty()) {
+      const int i = stack.back();
+      stack.pop_back();
+      blob.pixels.push_back(i);
+      const int x = i % patch.width;
+      const int y = i / patch.width;
+      blob.left = std::min(blob.left, x);
+      blob.right = std::max(blob.right, x);
+      blob.top = std::min(blob.top, y);
+      blob.bottom = std::max(blob.bottom, y);
+      for (int ny = std::max(0, y - 1); ny <= std::min(patch.height - 1, y + 1); ++ny) {
+        for (int nx = std::max(0, x - 1); nx <= std::min(patch.width - 1, x + 1); ++nx) {
+          const auto n = static_cast<std::size_t>(ny) * static_cast<std::size_t>(patch.width) +
+                         static_cast<std::size_t>(nx);
+          if (seen[n] != 0 || patch.v[n] <= threshold) continue;
+          seen[n] = 1;
+          stack.push_back(static_cast<int>(n));
+        }
+      }
+    }
+    found.push_back(std::move(blob));
+  }
+  return found;
+}
+
+/// The blob's n-th brightest value: a peak that a few hot pixels can't set.
+float robust_peak(const Patch& patch, const Blob& blob, std::size_t n) {
+  std::vector<float> values;
+  values.reserve(blob.pixels.size());
+  for (const int i : blob.pixels) values.push_back(patch.v[static_cast<std::size_t>(i)]);
+  n = std::min(n, values.size()) - 1;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n), values.end(),
+                   std::greater<>());
+  return values[n];
+}
+
+/// Where the outline at `level` crosses the pixel grid inside the blob's box, to a fraction of a pixel.
+/// Crossings at the image's edge don't exist, so a cut disk just has fewer.
+std::vector<Point> outline(const Patch& patch, const Blob& blob, float level) {
+  std::vector<Point> points;
+  const auto crossing = [level](float a, float b) { return static_cast<double>((level - a) / (b - a)); };
+  const int right = std::min(blob.right + 1, patch.width - 1);
+  const int bottom = std::min(blob.bottom + 1, patch.height - 1);
+  for (int y = std::max(0, blob.top - 1); y <= bottom; ++y) {
+    for (int x = std::max(0, blob.left - 1); x <= right; ++x) {
+      const float v = patch.row(y)[x];
+      if (x < right) {
+        const float w = patch.row(y)[x + 1];
+        if ((v > level) != (w > level)) points.push_back({x + crossing(v, w), static_cast<double>(y)});
+      }
+      if (y < bottom) {
+        const float w = patch.row(y + 1)[x];
+        if ((v > level) != (w > level)) points.push_back({static_cast<double>(x), y + crossing(v, w)});
+      }
+    }
+  }
+  return points;
+}
+
+/// Centroid with weights that rise from 0 at `low` to 1 at `high`: for high at the peak the ordinary centroid
+/// of an unsaturated lamp, for high near the outline the centre of a clipped one's area.
+Point centroid(const Patch& patch, const Blob& blob, double low, double high) {
+  double sum = 0;
+  double sx = 0;
+  double sy = 0;
+  for (int y = std::max(0, blob.top - 1); y <= std::min(patch.height - 1, blob.bottom + 1); ++y) {
+    for (int x = std::max(0, blob.left - 1); x <= std::min(patch.width - 1, blob.right + 1); ++x) {
+      const double w = std::clamp((static_cast<double>(patch.row(y)[x]) - low) / (high - low), 0.0, 1.0);
+      sum += w;
+      sx += w * x;
+      sy += w * y;
+    }
+  }
+  return {sx / sum, sy / sum};
+}
+
+/// Each column's own level taken out, so that a lamp on its own bright line still stands alone.
+std::vector<float> subtract_columns(Patch& patch) {
+  std::vector<float> level(static_cast<std::size_t>(patch.width));
+  std::vector<float> samples;
+  const int step = std::max(1, patch.height / 256);
+  for (int x = 0; x < patch.width; ++x) {
+    samples.clear();
+    for (int y = 0; y < patch.height; y += step) samples.push_back(patch.row(y)[x]);
+    level[static_cast<std::size_t>(x)] = median(samples);
+  }
+  for (int y = 0; y < patch.height; ++y) {
+    float* row = patch.row(y);
+    for (int x = 0; x < patch.width; ++x) row[x] -= level[static_cast<std::size_t>(x)];
+  }
+  return level;
+}
+
+struct LampContext {
+  const Plane& plane;
+  const Background& background;
+  double saturation;
+};
+
+Lamp measure(const LampContext& context, const Patch& patch, const std::vector<float>& level,
+             const Blob& blob, double peak) {
+  Lamp lamp;
+  lamp.peak = peak;
+  double half = 0;
+  int clipped = 0;
+  for (const int i : blob.pixels) {
+    const float v = patch.v[static_cast<std::size_t>(i)];
+    if (v > kHalf * peak) ++half;
+    if (v + level[static_cast<std::size_t>(i % patch.width)] >= context.saturation) ++clipped;
+  }
+  lamp.flux = half;
+  lamp.radius = std::sqrt(half / std::numbers::pi);
+  lamp.saturated = clipped > 1;
+  const bool cut = blob.top == 0 || blob.bottom == patch.height - 1 || patch.x0 + blob.left == 0 ||
+                   patch.x0 + blob.right == context.plane.size.width - 1;
+  Point centre;
+  std::optional<Circle> circle;
+  if (lamp.saturated || cut) circle = fit_circle(outline(patch, blob, static_cast<float>(kHalf * peak)));
+  if (circle && circle->agreement >= 0.55 && circle->radius <= 2 * lamp.radius + 2) {
+    centre = {circle->x, circle->y};
+    lamp.radius = circle->radius;
+    lamp.sigma = circle->sigma;
+  } else if (lamp.saturated) {
+    // No disk (a planet's crescent, a filament): the centre of its area inside the outline.
+    centre = centroid(patch, blob, kLow * peak / 3, kLow * peak * 5 / 3);
+    lamp.sigma = 0.05 * lamp.radius;
+  } else {
+    const double low = std::max(0.02 * peak, 2 * context.background.noise);
+    centre = centroid(patch, blob, low, peak * 1.5);
+    // noise * sqrt(sum of dy^2) / flux is about half of noise / peak, whatever the radius.
+    lamp.sigma = std::hypot(0.01, context.background.noise / peak * 0.6);
+  }
+  lamp.x = patch.x0 + centre.x;
+  lamp.y = centre.y;
+  lamp.centre_outside =
+      lamp.y < 0 || lamp.y > patch.height - 1 || lamp.x < 0 || lamp.x > context.plane.size.width - 1;
+  if (lamp.centre_outside) {
+    lamp.x = std::clamp(lamp.x, 0.0, context.plane.size.width - 1.0);
+    lamp.y = std::clamp(lamp.y, 0.0, patch.height - 1.0);
+  }
+  return lamp;
+}
+
+}  // namespace
+
+double saturation_level(const Plane& plane, const Background& background) {
+  constexpr double kNearly = 0.98;
+  if (background.peak >= kNearly * plane.white || plane.white < 300) return kNearly * plane.white;
+  const double plateau = 0.998 * background.peak;
+  int count = 0;
+  for (int y = 0; y < plane.size.height; ++y) {
+    const std::uint16_t* row = plane.row<std::uint16_t>(y);
+    for (int x = 0; x < plane.size.width; ++x) count += row[x] >= plateau ? 1 : 0;
+  }
+  return count >= 12 ? kNearly * background.peak : kNearly * plane.white;
+}
+
+LampSearch find_lamps(const Plane& plane, const Background& background, const DetectOptions& options) {
+  LampSearch search;
+  // A deep container may hold a shallow signal, so contrast in units of the noise suffices too.
+  constexpr double kPlentyOfNoise = 400;
+  const double gate = std::min(options.min_lamp_contrast * plane.white, kPlentyOfNoise * background.noise);
+  const double max_radius = options.max_lamp_radius * std::max(plane.size.width, plane.size.height);
+  const double min_area = std::numbers::pi * options.min_lamp_radius * options.min_lamp_radius;
+  const LampContext context{plane, background, saturation_level(plane, background)};
+  search.why_none = "nothing in the frame is bright and compact enough to be the lamp";
+  std::vector<Span> spans = bright_columns(plane, background.level + gate);
+  constexpr std::size_t kMaxSpans = 32;
+  if (spans.size() > kMaxSpans) {
+    search.why_none = "bright spots all over the frame: this is a scene, not a lamp before a dark background";
+    return search;
+  }
+  for (const Span& span : spans) {
+    if (span.last - span.first + 1 > 2 * max_radius + 8) {
+      search.why_none =
+          "the bright area is too large to be a lamp; darken the scene or step back from the lamp";
+      continue;
+    }
+    Patch patch = columns(plane, span.first - 3, span.last + 3);
+    const std::vector<float> level = subtract_columns(patch);
+    int bright = 0;
+    int clipped = 0;
+    for (const float l : level) {
+      if (l > background.level + gate) ++bright;
+      if (l > 0.9 * context.saturation) ++clipped;
+    }
+    search.bright_line = search.bright_line || bright >= 3;
+    search.clipped_line = search.clipped_line || clipped >= 3;
+    float top = 0;
+    for (const float v : patch.v) top = std::max(top, v);
+    if (top < 0.5 * gate) continue;
+    for (Blob& blob : blobs(patch, static_cast<float>(kLow * top))) {
+      if (static_cast<double>(blob.pixels.size()) < min_area) continue;
+      const double peak = robust_peak(patch, blob, 5);
+      // On a bright line only the headroom above the line is left for the lamp.
+      if (peak < (bright >= 3 ? 0.5 : 1) * gate || blob.right - blob.left < 2 || blob.bottom - blob.top < 2)
+        continue;
+      Lamp lamp = measure(context, patch, level, blob, peak);
+      if (lamp.flux < min_area) continue;
+      if (lamp.radius > max_radius) {
+        search.why_none =
+            "the bright area is too large to be a lamp; darken the scene or step back from the lamp";
+        continue;
+      }
+      search.lamps.push_back(lamp);
+    }
+  }
+  std::stable_sort(search.lamps.begin(), search.lamps.end(),
+                   [](const Lamp& a, const Lamp& b) { return a.flux * a.peak > b.flux * b.peak; });
+  if (!search.lamps.empty()) {
+    const Lamp first = search.lamps.front();
+    std::erase_if(search.lamps,
+                  [&](const Lamp& l) { return l.peak < 0.6 * first.peak || l.flux < 0.35 * first.flux; });
+    search.why_none.clear();
+  }
+  return search;
+}
+
+}  // namespace emberlock::detail

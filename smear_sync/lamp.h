@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smear_sync/detect.h"
+#include "smear_sync/plane.h"
+
+namespace emberlock::detail {
+
+/// A bright, compact spot in the coordinates of its plane.
+struct Lamp {
+  double x = 0, y = 0;
+  double sigma = 0;   ///< standard error of y
+  double radius = 0;  ///< of its disk at half height
+  double flux = 0;    ///< pixels above half height
+  double peak = 0;    ///< above the column's own level
+  bool saturated = false;
+  bool centre_outside = false;  ///< cut by the edge so that the centre lies outside
+};
+
+struct LampSearch {
+  std::vector<Lamp> lamps;    ///< comparable ones, the largest first; none when `why_none` says why
+  bool bright_line = false;   ///< columns that are bright over the full height, with no lamp standing out
+  bool clipped_line = false;  ///< and they are saturated or nearly so
+  std::string why_none;
+};
+
+/// The sample value from which on a pixel counts as saturated. A clipped signal in a deeper container (12
+/// bits in a 16-bit file) is known by its plateau.
+double saturation_level(const Plane& plane, const Background& background);
+
+LampSearch find_lamps(const Plane& plane, const Background& background, const DetectOptions& options);
+
+}  // namespace emberlock::detail

@@ -149,22 +149,29 @@ std::string html_escape(std::string_view text) {
   return out;
 }
 
-std::string png_data_uri(const Image& image) {
+std::string png_file(const Image& image) {
   const bool rgb = image.layout().format == PixelFormat::rgb8;
-  // OpenCV takes a mutable pointer, but encodes from a copy or reads only.
-  cv::Mat mat(image.layout().size.height, image.layout().size.width, rgb ? CV_8UC3 : CV_8UC1,
-              const_cast<std::byte*>(image.bytes().data()), image.layout().row_bytes());  // NOLINT
+  // OpenCV takes a mutable pointer, but only reads here.
+  const cv::Mat mat(image.layout().size.height, image.layout().size.width, rgb ? CV_8UC3 : CV_8UC1,
+                    const_cast<std::byte*>(image.bytes().data()), image.layout().row_bytes());  // NOLINT
   cv::Mat bgr = mat;
   if (rgb) cv::cvtColor(mat, bgr, cv::COLOR_RGB2BGR);
   std::vector<unsigned char> png;
   cv::imencode(".png", bgr, png);
-  static constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  return {png.begin(), png.end()};
+}
+
+std::string png_data_uri(const Image& image) {
+  static constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  const std::string png = png_file(image);
   std::string base64;
   base64.reserve(png.size() * 4 / 3 + 4);
   for (std::size_t i = 0; i < png.size(); i += 3) {
     const std::size_t n = std::min<std::size_t>(3, png.size() - i);
     unsigned block = 0;
-    for (std::size_t k = 0; k < 3; ++k) block = block << 8 | (k < n ? png[i + k] : 0U);
+    for (std::size_t k = 0; k < 3; ++k)
+      block = block << 8 | (k < n ? static_cast<unsigned char>(png[i + k]) : 0U);
     for (std::size_t k = 0; k < 4; ++k) base64 += k <= n ? kDigits[block >> (18 - 6 * k) & 63U] : '=';
   }
   return "data:image/png;base64," + base64;

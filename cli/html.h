@@ -12,7 +12,9 @@ namespace emberlock::cli {
 /// Text made safe between tags and in attributes.
 std::string html_escape(std::string_view text);
 
-/// An image as a `data:` URI (PNG), so that a page stands alone. gray8 and rgb8.
+/// An image as a PNG file. gray8 and rgb8.
+std::string png_file(const Image& image);
+/// The same as a `data:` URI, so that a page stands alone.
 std::string png_data_uri(const Image& image);
 
 struct Series {

@@ -1,0 +1,78 @@
+#include "cli/demo_rig.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "recon/render/render.h"
+#include "session/layout.h"
+
+namespace emberlock::cli {
+
+Stage demo_stage(int cameras, ImageSize image) {
+  constexpr double kDistance = 1.0;  // metres
+  constexpr double kEdge = 0.2;      // of the volume, metres
+  constexpr double kArc = 300.0 / 180 * std::numbers::pi;
+  const double focal = 0.8 * std::min(image.width, image.height) * kDistance / kEdge;
+  const Intrinsics intrinsics{image, focal, focal, image.width / 2.0, image.height / 2.0, {}};
+  Stage stage{{Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(kEdge)}, {}};
+  for (int i = 0; i < cameras; ++i) {
+    const double azimuth = cameras > 1 ? kArc * i / (cameras - 1) : 0;
+    const double height = i % 2 == 0 ? 0.12 : -0.08;
+    const Eigen::Vector3d center(kDistance * std::cos(azimuth), kDistance * std::sin(azimuth), height);
+    stage.cameras.push_back(look_at(intrinsics, center, Eigen::Vector3d::Zero()));
+  }
+  return stage;
+}
+
+FlameLight::FlameLight(Stage stage, const FlameOptions& flame, int truth_voxels)
+    : stage_(std::move(stage)), flame_(flame), grid_(grid_over(stage_.box, truth_voxels)) {}
+
+void FlameLight::add_radiance(int camera, TimePoint exposure_start, Seconds exposure,
+                              std::span<float> rgb) const {
+  const Seconds middle = exposure_start - TimePoint{} + exposure / 2;
+  const FlameTruth truth = flame_.at(middle, grid_);
+  RenderOptions options;
+  options.compute = {Device::cpu, 1};
+  const RadianceImage image = render_view(truth.volume, truth.medium, truth.effects,
+                                          stage_.cameras[static_cast<std::size_t>(camera)], options);
+  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] += image.rgb[i];
+}
+
+v1::CameraStream describe(const CameraInfo& info, const CameraModel* calibration) {
+  v1::CameraStream stream;
+  stream.set_camera_id(info.id);
+  stream.set_model(info.model);
+  stream.set_frame_rate_hz(info.frame_rate.value());
+  set_layout(stream, info.layout);
+  if (calibration != nullptr) {
+    const Intrinsics& in = calibration->intrinsics;
+    v1::Calibration& c = *stream.mutable_calibration();
+    c.set_fx(in.fx);
+    c.set_fy(in.fy);
+    c.set_cx(in.cx);
+    c.set_cy(in.cy);
+    c.set_k1(in.distortion.k1);
+    c.set_k2(in.distortion.k2);
+    c.set_p1(in.distortion.p1);
+    c.set_p2(in.distortion.p2);
+    c.set_k3(in.distortion.k3);
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) {
+        c.add_camera_from_world(calibration->camera_from_world.rotation(row, column));
+      }
+      c.add_camera_from_world(calibration->camera_from_world.translation(row));
+    }
+  }
+  return stream;
+}
+
+v1::Box describe(const Box& box) {
+  v1::Box message;
+  for (int axis = 0; axis < 3; ++axis) {
+    message.add_center(box.center(axis));
+    message.add_size(box.size(axis));
+  }
+  return message;
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "drivers/virtual/light_field.h"
+#include "drivers/virtual/virtual_rig.h"
+#include "emberlock/v1/session.pb.h"
+#include "recon/calibrate/box.h"
+#include "recon/calibrate/camera_model.h"
+#include "recon/synthetic/flame.h"
+
+namespace emberlock::cli {
+
+/// What the demonstration films with: an arc of cameras about one metre from a flame of some 15 cm, as in the
+/// paper's section "Data Capture".
+struct Stage {
+  Box box;                           ///< the flame's volume
+  std::vector<CameraModel> cameras;  ///< by camera of the rig
+};
+
+/// Cameras on an arc of 300 degrees, alternately above and below the flame, the flame filling most of the
+/// picture.
+Stage demo_stage(int cameras, ImageSize image);
+
+/// A flame with known truth as the light that virtual cameras film. An exposure is taken as its middle
+/// instant.
+class FlameLight final : public LightField {
+ public:
+  FlameLight(Stage stage, const FlameOptions& flame, int truth_voxels);
+  void add_radiance(int camera, TimePoint exposure_start, Seconds exposure,
+                    std::span<float> rgb) const override;
+
+ private:
+  Stage stage_;
+  Flame flame_;
+  Grid grid_;
+};
+
+/// The manifest's stream of a camera: identity and layout from the driver, geometry from its calibration.
+v1::CameraStream describe(const CameraInfo& info, const CameraModel* calibration);
+v1::Box describe(const Box& box);
+
+}  // namespace emberlock::cli

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <vector>
+
+#include "base/image.h"
+#include "recon/preprocess/flame_mask.h"
+#include "recon/preprocess/view.h"
+
+namespace emberlock::cli {
+
+/// A rectangle of a picture as rgb8, values clipped to 0..255; the whole picture where the box is empty.
+Image to_rgb8(const RadianceImage& image, const PixelBox& box = {});
+
+/// |a - b| times `gain`, the same way.
+Image difference(const RadianceImage& a, const RadianceImage& b, double gain, const PixelBox& box = {});
+
+/// Pictures of equal height from left to right, `gap` black columns between them.
+Image side_by_side(const std::vector<Image>& pictures, int gap = 8);
+
+/// The box with a margin around it, inside the image.
+PixelBox with_margin(const PixelBox& box, int margin, ImageSize size);
+
+}  // namespace emberlock::cli

@@ -1,0 +1,44 @@
+#include "cli/flame_pictures.h"
+
+#include <gtest/gtest.h>
+
+namespace emberlock::cli {
+namespace {
+
+RadianceImage ramp(ImageSize size, float offset) {
+  RadianceImage image(size);
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = static_cast<float>(i) + offset;
+  return image;
+}
+
+TEST(FlamePictures, CropTakesTheBoxAndClipsWhatIsBrighterThanWhite) {
+  const Image crop = to_rgb8(ramp({12, 10}, 0), {2, 1, 4, 3});
+  EXPECT_EQ(crop.layout().size, (ImageSize{2, 2}));
+  EXPECT_EQ(crop.view().sample(0, 0, 0), 3 * (12 + 2));
+  EXPECT_EQ(to_rgb8(ramp({12, 10}, 0)).view().sample(11, 9, 2), 255);
+}
+
+TEST(FlamePictures, DifferenceHasNoSign) {
+  const Image d = difference(ramp({3, 3}, 0), ramp({3, 3}, 5), 4);
+  EXPECT_EQ(d.view().sample(1, 1, 1), 20);
+  EXPECT_EQ(d, difference(ramp({3, 3}, 5), ramp({3, 3}, 0), 4));
+}
+
+TEST(FlamePictures, SideBySideKeepsEveryPicture) {
+  const Image a = to_rgb8(ramp({2, 2}, 1));
+  const Image joined = side_by_side({a, a}, 3);
+  EXPECT_EQ(joined.layout().size, (ImageSize{7, 2}));
+  EXPECT_EQ(joined.view().sample(6, 1, 2), a.view().sample(1, 1, 2));
+  EXPECT_EQ(joined.view().sample(3, 0, 0), 0);
+}
+
+TEST(FlamePictures, MarginStaysInsideThePicture) {
+  const PixelBox box = with_margin({1, 5, 3, 9}, 4, {10, 10});
+  EXPECT_EQ(box.x0, 0);
+  EXPECT_EQ(box.y0, 1);
+  EXPECT_EQ(box.x1, 7);
+  EXPECT_EQ(box.y1, 10);
+}
+
+}  // namespace
+}  // namespace emberlock::cli

@@ -27,7 +27,8 @@ class AsyncWriter {
 
   /// False when the queue was full and the frame is lost.
   bool push(std::size_t camera, Frame frame);
-  void attribute_gap(std::size_t camera, std::uint64_t frames, LossCause cause);
+  /// As SessionWriter::count_lost.
+  void count_lost(std::size_t camera, LossCause cause, std::uint64_t frames);
   Status append(const v1::Event& event);
   /// The first failure of an encoder or of the disk, while recording goes on.
   [[nodiscard]] std::optional<Error> failure() const;

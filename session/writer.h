@@ -35,6 +35,24 @@ enum class LossCause {
   disk,       ///< no space, or the disk refused
 };
 
+/// The frames that a camera delivered, by their ids.
+class Arrivals {
+ public:
+  void add(std::uint64_t frame_id) {
+    if (delivered_++ > 0 && frame_id > last_id_) missing_ += frame_id - last_id_ - 1;
+    last_id_ = frame_id;
+  }
+  [[nodiscard]] std::uint64_t delivered() const { return delivered_; }
+  [[nodiscard]] std::uint64_t missing() const {
+    return missing_;
+  }  ///< ids skipped; none where the count starts anew
+
+ private:
+  std::uint64_t delivered_ = 0;
+  std::uint64_t missing_ = 0;
+  std::uint64_t last_id_ = 0;
+};
+
 /// Writes a session's folder. Distinct cameras may be written from distinct threads at the same time; one
 /// camera, and append(), by one thread at a time. Destroyed without finish() it leaves what a killed recorder
 /// would leave: a session in state RECORDING, for `salvage`.
@@ -50,14 +68,18 @@ class SessionWriter {
   SessionWriter& operator=(SessionWriter&&) noexcept;
   ~SessionWriter();
 
-  /// Appends a frame of camera `camera` (its place in the manifest). Frame ids rise; one that falls says that
-  /// the camera counts anew. Errors: bad_input (other layout than the manifest's), io (counted as lost to the
-  /// disk).
+  /// Appends a frame of camera `camera` (its place in the manifest). Frame ids rise; one that doesn't says
+  /// that the camera counts anew. Errors: bad_input (other layout than the manifest's), io (the frame counts
+  /// as lost to the disk; below the floor of free space the next frame may succeed, after a failed write none
+  /// of this camera will).
   Status write(std::size_t camera, const Frame& frame);
-  /// Counts a frame that will never be written, in its place in the order.
-  void count_lost(std::size_t camera, std::uint64_t frame_id, LossCause cause);
-  /// Of the ids that never arrived, `frames` were lost by the driver for `cause` rather than by the camera.
-  void attribute_gap(std::size_t camera, std::uint64_t frames, LossCause cause);
+  /// Counts frames that will never be written. For `transport` and `underrun`, `frames` of the ids that never
+  /// arrived were lost by the driver rather than by the camera; for `queue` and `disk` they arrived and were
+  /// dropped.
+  void count_lost(std::size_t camera, LossCause cause, std::uint64_t frames);
+  /// For whoever puts a queue before write(): what arrived before that queue, instead of what write() saw.
+  void set_arrivals(std::size_t camera, const Arrivals& arrivals);
+  /// Any time, in the order of happening.
   Status append(const v1::Event& event);
 
   /// Closes everything, reconciles the counts with what lies on disk and turns the manifest COMPLETE. After

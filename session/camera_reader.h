@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/frame.h"
+#include "base/result.h"
+#include "session/index.h"
+#include "session/segment.h"
+
+namespace emberlock {
+
+/// One camera's part of a SessionReader: its index, and whichever segment was read last. One thread at a
+/// time.
+class CameraReader {
+ public:
+  CameraReader(std::filesystem::path folder, std::string camera_id, ImageLayout layout,
+               std::vector<IndexRecord> records);
+
+  [[nodiscard]] const ImageLayout& layout() const { return layout_; }
+  [[nodiscard]] const std::vector<FrameStamp>& stamps() const { return stamps_; }
+  [[nodiscard]] const std::vector<IndexRecord>& records() const { return records_; }
+  Result<Frame> read(std::size_t i);
+
+ private:
+  Status open_segment(std::uint32_t number);
+
+  std::filesystem::path folder_;
+  std::string camera_id_;
+  ImageLayout layout_;
+  std::vector<IndexRecord> records_;
+  std::vector<FrameStamp> stamps_;
+  std::optional<SegmentReader> segment_;
+  std::uint32_t number_ = 0;  ///< of segment_
+};
+
+/// The records of a camera's index file, with what is wrong with it.
+Result<ParsedIndex> read_index(const std::filesystem::path& folder, const std::string& camera_id);
+
+}  // namespace emberlock

@@ -1,0 +1,191 @@
+#include "session/camera_writer.h"
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "session/files.h"
+#include "session/layout.h"
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr Seconds kSpaceCheckInterval{1};
+constexpr std::uint64_t kSpaceCheckBytes = std::uint64_t{64} << 20;
+constexpr std::uint32_t kLongestGapMs = 60'000;
+
+}  // namespace
+
+CameraWriter::CameraWriter(fs::path folder, std::string camera_id, ImageLayout layout, Hertz rate,
+                           const WriterOptions& options)
+    : folder_(std::move(folder)),
+      camera_id_(std::move(camera_id)),
+      layout_(layout),
+      rate_(rate),
+      options_(options) {}
+
+Result<std::unique_ptr<CameraWriter>> CameraWriter::create(const fs::path& folder,
+                                                           const v1::CameraStream& stream,
+                                                           const WriterOptions& options) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(stream));
+  std::error_code ec;
+  fs::create_directory(folder / stream.camera_id(), ec);
+  const fs::path path = index_path(folder, stream.camera_id());
+  UniqueFd index(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644));
+  if (!index) return errno_error(path, "cannot create");
+  EMBERLOCK_RETURN_IF_ERROR(write_fully(index.get(), encode_index_header(), path));
+  std::unique_ptr<CameraWriter> writer(
+      new CameraWriter(folder, stream.camera_id(), layout, Hertz(stream.frame_rate_hz()), options));
+  writer->index_ = std::move(index);
+  return writer;
+}
+
+Status CameraWriter::write(const Frame& frame) {
+  if (!frame.image || frame.image->layout() != layout_) {
+    return Error{ErrorKind::bad_input,
+                 "the frame's size or format isn't the one that the session was created with",
+                 "camera " + camera_id_ + ", frame " + std::to_string(frame.stamp.frame_id),
+                 "Give each layout a session of its own"};
+  }
+  arrivals_.add(frame.stamp.frame_id);
+  Status written = failed_ ? Status(*failed_) : write_pixels(frame);
+  if (!written) counts_.set_disk(counts_.disk() + 1);
+  return written;
+}
+
+Status CameraWriter::write_pixels(const Frame& frame) {
+  EMBERLOCK_RETURN_IF_ERROR(make_room(frame.stamp));
+  v1::Segment& segment = *segments_.rbegin();
+  IndexRecord record;
+  record.stamp = frame.stamp;
+  record.pixel_hash = pixel_hash(frame.image->bytes());
+  record.file_offset = segment_->bytes();
+  record.segment = static_cast<std::uint32_t>(segments_.size() - 1);
+  record.frame_in_segment = static_cast<std::uint32_t>(segment.frames());
+  record.segment_ms = next_milliseconds(frame.stamp);
+
+  Status written = segment_->write(*frame.image, record.segment_ms);
+  if (written) {
+    const auto bytes = encode(record);
+    written = write_fully(index_.get(), {bytes.data(), bytes.size()}, index_path(folder_, camera_id_));
+  }
+  if (!written) {
+    failed_ = written.error();
+    return written;
+  }
+  bytes_since_check_ += segment_->bytes() - record.file_offset;
+  last_milliseconds_ = record.segment_ms;
+  segment.set_frames(segment.frames() + 1);
+  counts_.set_recorded(counts_.recorded() + 1);
+  return {};
+}
+
+/// Sees to it that a segment is open, and that the disk has room.
+Status CameraWriter::make_room(const FrameStamp& stamp) {
+  const bool full = segment_ && (segments_.rbegin()->frames() >= options_.frames_per_segment ||
+                                 segment_->bytes() >= options_.bytes_per_segment);
+  if (full) EMBERLOCK_RETURN_IF_ERROR(close_segment());
+  EMBERLOCK_RETURN_IF_ERROR(check_free_space(stamp));
+  return segment_ ? Status{} : open_segment(stamp);
+}
+
+Status CameraWriter::check_free_space(const FrameStamp& stamp) {
+  const Seconds since = stamp.monotonic_time - space_checked_;
+  const bool due =
+      space_low_ || !segment_ || abs(since) >= kSpaceCheckInterval || bytes_since_check_ >= kSpaceCheckBytes;
+  if (!due) return {};
+  std::error_code ec;
+  const fs::space_info space = fs::space(folder_, ec);
+  if (ec) return Error{ErrorKind::io, "cannot ask for free space: " + ec.message(), folder_.string()};
+  space_checked_ = stamp.monotonic_time;
+  bytes_since_check_ = 0;
+  space_low_ = space.available < options_.min_free_bytes;
+  if (!space_low_) return {};
+  return Error{ErrorKind::io,
+               std::to_string(space.available >> 20) + " MiB free, fewer than the floor of " +
+                   std::to_string(options_.min_free_bytes >> 20) + " MiB",
+               folder_.string(), "Free space, or record to another disk"};
+}
+
+Status CameraWriter::open_segment(const FrameStamp& stamp) {
+  const auto number = static_cast<std::uint32_t>(segments_.size());
+  const std::string name = segment_name(camera_id_, number, options_.encoding);
+  EMBERLOCK_ASSIGN_OR_RETURN(segment_,
+                             SegmentWriter::create(folder_ / name, layout_, options_.encoding, rate_));
+  v1::Segment& segment = *segments_.Add();
+  segment.set_file(name);
+  segment.set_first_frame(counts_.recorded());
+  segment_start_ = stamp.monotonic_time;
+  return {};
+}
+
+Status CameraWriter::close_segment() {
+  const Status closed = segment_->close();
+  segment_.reset();
+  if (!closed) failed_ = closed.error();
+  return closed;
+}
+
+/// The frame's arrival within its segment, for players; made to rise, whatever the clock does.
+std::uint32_t CameraWriter::next_milliseconds(const FrameStamp& stamp) const {
+  if (segments_.rbegin()->frames() == 0) return 0;
+  const std::int64_t elapsed = (stamp.monotonic_time.ns - segment_start_.ns) / 1'000'000;
+  return static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+      elapsed, std::int64_t{last_milliseconds_} + 1, std::int64_t{last_milliseconds_} + kLongestGapMs));
+}
+
+void CameraWriter::count_lost(LossCause cause, std::uint64_t frames) {
+  switch (cause) {
+    case LossCause::transport:
+      return counts_.set_transport(counts_.transport() + frames);
+    case LossCause::underrun:
+      return counts_.set_underrun(counts_.underrun() + frames);
+    case LossCause::queue:
+      return counts_.set_queue(counts_.queue() + frames);
+    case LossCause::disk:
+      return counts_.set_disk(counts_.disk() + frames);
+  }
+}
+
+Result<v1::Counts> CameraWriter::reconcile() const {
+  struct stat info {};
+  if (::fstat(index_.get(), &info) != 0) return errno_error(index_path(folder_, camera_id_), "cannot stat");
+  const auto on_disk = static_cast<std::uint64_t>(info.st_size);
+  const auto mismatch = [&](const std::string& what) {
+    return Error{ErrorKind::io, what, "camera " + camera_id_,
+                 "Don't trust this recording; salvage keeps what is whole"};
+  };
+  if (on_disk != kIndexHeaderBytes + counts_.recorded() * kIndexRecordBytes) {
+    return mismatch(std::to_string(counts_.recorded()) + " frames were written, but the index has " +
+                    std::to_string(on_disk) + " bytes");
+  }
+  const std::uint64_t accounted = counts_.recorded() + counts_.queue() + counts_.disk();
+  if (arrivals_.delivered() != accounted) {
+    return mismatch(std::to_string(arrivals_.delivered()) + " frames arrived, but " +
+                    std::to_string(accounted) + " were written or counted as dropped");
+  }
+  const std::uint64_t by_driver = counts_.transport() + counts_.underrun();
+  if (by_driver > arrivals_.missing()) {
+    return mismatch("the driver lost " + std::to_string(by_driver) + " frames, but only " +
+                    std::to_string(arrivals_.missing()) + " frame ids are missing");
+  }
+  v1::Counts counts = counts_;
+  counts.set_camera_gap(arrivals_.missing() - by_driver);
+  return counts;
+}
+
+Status CameraWriter::finish(v1::CameraStream& stream) {
+  if (segment_) static_cast<void>(close_segment());
+  if (failed_) return *failed_;
+  if (::fdatasync(index_.get()) != 0) return errno_error(index_path(folder_, camera_id_), "cannot flush");
+  EMBERLOCK_ASSIGN_OR_RETURN(*stream.mutable_counts(), reconcile());
+  *stream.mutable_segments() = segments_;
+  return {};
+}
+
+}  // namespace emberlock

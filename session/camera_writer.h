@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/frame.h"
+#include "base/result.h"
+#include "base/unique_fd.h"
+#include "emberlock/v1/session.pb.h"
+#include "session/index.h"
+#include "session/segment.h"
+#include "session/writer.h"
+
+namespace emberlock {
+
+/// One camera's part of a SessionWriter: its folder, index, segments and counts. One thread at a time.
+class CameraWriter {
+ public:
+  static Result<std::unique_ptr<CameraWriter>> create(const std::filesystem::path& folder,
+                                                      const v1::CameraStream& stream,
+                                                      const WriterOptions& options);
+  Status write(const Frame& frame);
+  void count_lost(LossCause cause, std::uint64_t frames);
+  void set_arrivals(const Arrivals& arrivals) { arrivals_ = arrivals; }
+  /// Closes the last segment and fills in the stream's segments and counts, reconciled with the index on
+  /// disk.
+  Status finish(v1::CameraStream& stream);
+
+ private:
+  CameraWriter(std::filesystem::path folder, std::string camera_id, ImageLayout layout, Hertz rate,
+               const WriterOptions& options);
+  Status write_pixels(const Frame& frame);
+  Status make_room(const FrameStamp& stamp);
+  Status check_free_space(const FrameStamp& stamp);
+  Status open_segment(const FrameStamp& stamp);
+  Status close_segment();
+  [[nodiscard]] std::uint32_t next_milliseconds(const FrameStamp& stamp) const;
+  Result<v1::Counts> reconcile() const;
+
+  std::filesystem::path folder_;
+  std::string camera_id_;
+  ImageLayout layout_;
+  Hertz rate_;
+  WriterOptions options_;
+
+  UniqueFd index_;
+  std::unique_ptr<SegmentWriter> segment_;
+  google::protobuf::RepeatedPtrField<v1::Segment> segments_;  ///< the last is open while segment_ is
+  TimePoint segment_start_;
+  std::uint32_t last_milliseconds_ = 0;
+
+  TimePoint space_checked_;  ///< by the frames' clock
+  std::uint64_t bytes_since_check_ = 0;
+  bool space_low_ = true;  ///< or not yet looked
+
+  Arrivals arrivals_;
+  v1::Counts counts_;
+  std::optional<Error> failed_;  ///< a write failed: the file's end is unknown
+};
+
+}  // namespace emberlock

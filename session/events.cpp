@@ -1,0 +1,60 @@
+#include "session/events.h"
+
+#include <cerrno>
+#include <limits>
+#include <sstream>
+#include <utility>
+
+#include <fcntl.h>
+#include <google/protobuf/io/coded_stream.h>
+#include <google/protobuf/util/delimited_message_util.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include "session/files.h"
+
+namespace emberlock {
+
+ParsedEvents parse_events(std::string_view bytes) {
+  ParsedEvents parsed;
+  for (;;) {
+    const std::string_view rest = bytes.substr(parsed.valid_bytes);
+    const auto size = static_cast<int>(std::min<std::size_t>(rest.size(), std::numeric_limits<int>::max()));
+    google::protobuf::io::CodedInputStream in(reinterpret_cast<const std::uint8_t*>(rest.data()), size);
+    std::uint32_t length = 0;
+    if (!in.ReadVarint32(&length)) return parsed;
+    const auto prefix = static_cast<std::size_t>(in.CurrentPosition());
+    if (length > rest.size() - prefix) return parsed;
+    v1::Event event;
+    if (!event.ParseFromArray(rest.data() + prefix, static_cast<int>(length))) return parsed;
+    parsed.events.push_back(std::move(event));
+    parsed.valid_bytes += prefix + length;
+  }
+}
+
+std::string encode(const v1::Event& event) {
+  std::ostringstream out;
+  google::protobuf::util::SerializeDelimitedToOstream(event, &out);
+  return std::move(out).str();
+}
+
+Result<EventLog> EventLog::open(const std::filesystem::path& path, Mode mode) {
+  const int flags = O_WRONLY | O_APPEND | O_CREAT | O_CLOEXEC | (mode == Mode::create ? O_EXCL : 0);
+  UniqueFd fd(::open(path.c_str(), flags, 0644));
+  if (!fd) return errno_error(path, "cannot open for writing");
+  if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {
+    if (errno != EWOULDBLOCK) return errno_error(path, "cannot lock");
+    return Error{ErrorKind::io, "the session is still being written by another process", path.string(),
+                 "Stop that recorder, or wait for it"};
+  }
+  return EventLog(std::move(fd), path);
+}
+
+Status EventLog::append(const v1::Event& event) { return write_fully(fd_.get(), encode(event), path_); }
+
+Status EventLog::sync() {
+  if (::fdatasync(fd_.get()) != 0) return errno_error(path_, "cannot flush");
+  return {};
+}
+
+}  // namespace emberlock

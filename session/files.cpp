@@ -1,0 +1,165 @@
+#include "session/files.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <set>
+#include <system_error>
+
+#include <google/protobuf/util/json_util.h>
+#include <unistd.h>
+
+#include "base/file.h"
+#include "session/layout.h"
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::size_t kMaxManifestBytes = std::size_t{64} << 20;
+
+bool is_folder_name(const std::string& id) {
+  const auto allowed = [](unsigned char c) {
+    return std::isalnum(c) != 0 ||
+           std::string_view(" ._:-").find(static_cast<char>(c)) != std::string_view::npos;
+  };
+  return !id.empty() && id.size() <= 200 && id.front() != '.' && std::all_of(id.begin(), id.end(), allowed);
+}
+
+template <class Values>
+bool all_finite(const Values& values) {
+  return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+Status check_calibration(const v1::Calibration& c, const std::string& where) {
+  const bool whole = c.camera_from_world_size() == 0 || c.camera_from_world_size() == 12;
+  const std::initializer_list<double> intrinsics = {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(),
+                                                    c.k2(), c.p1(), c.p2(), c.k3()};
+  if (whole && all_finite(c.camera_from_world()) && all_finite(intrinsics)) return {};
+  return Error{ErrorKind::bad_input, "a number isn't finite, or camera_from_world hasn't 12 of them",
+               where + ".calibration", "Mend or remove the calibration"};
+}
+
+Status check_box(const v1::Box& box, const std::string& where) {
+  const bool positive = std::all_of(box.size().begin(), box.size().end(), [](double v) { return v > 0; });
+  if (box.center_size() == 3 && box.size_size() == 3 && all_finite(box.center()) && all_finite(box.size()) &&
+      positive) {
+    return {};
+  }
+  return Error{ErrorKind::bad_input, "center and size must be three finite numbers each, sizes above 0",
+               where + ": box", "Mend or remove the box"};
+}
+
+}  // namespace
+
+fs::path manifest_path(const fs::path& folder) { return folder / "manifest.json"; }
+fs::path events_path(const fs::path& folder) { return folder / "events.binpb"; }
+fs::path index_path(const fs::path& folder, const std::string& camera_id) {
+  return folder / camera_id / "index.bin";
+}
+
+std::string segment_name(const std::string& camera_id, std::uint32_t segment, Encoding encoding) {
+  std::string number = std::to_string(segment);
+  number.insert(0, number.size() < 6 ? 6 - number.size() : 0, '0');
+  return camera_id + "/" + number + (encoding == Encoding::ffv1 ? ".mkv" : ".nut");
+}
+
+fs::path find_segment(const fs::path& folder, const std::string& camera_id, std::uint32_t segment) {
+  for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut}) {
+    std::error_code ec;
+    fs::path path = folder / segment_name(camera_id, segment, encoding);
+    if (fs::is_regular_file(path, ec)) return path;
+  }
+  return {};
+}
+
+Result<v1::Manifest> parse_manifest(std::string_view json, const std::string& where) {
+  v1::Manifest manifest;
+  const auto status = google::protobuf::util::JsonStringToMessage(
+      google::protobuf::StringPiece(json.data(), json.size()), &manifest);
+  if (!status.ok()) {
+    return Error{ErrorKind::bad_input, "not a session's manifest: " + std::string(status.message()), where,
+                 "Mend the JSON, or use a newer Emberlock"};
+  }
+  EMBERLOCK_RETURN_IF_ERROR(check_manifest(manifest, where));
+  return manifest;
+}
+
+Status check_manifest(const v1::Manifest& manifest, const std::string& where) {
+  if (manifest.format_version() != kSessionFormatVersion) {
+    return Error{ErrorKind::bad_input,
+                 "format version " + std::to_string(manifest.format_version()) +
+                     ", this program reads version " + std::to_string(kSessionFormatVersion),
+                 where + ", field format_version", "Use the Emberlock that recorded it"};
+  }
+  if (manifest.cameras().empty()) {
+    return Error{ErrorKind::bad_input, "no cameras", where + ", field cameras", "Record at least one camera"};
+  }
+  std::set<std::string> ids;
+  for (const v1::CameraStream& camera : manifest.cameras()) {
+    const std::string field = where + ", camera " + camera.camera_id();
+    if (!is_folder_name(camera.camera_id())) {
+      return Error{ErrorKind::bad_input, "the camera id can't name a folder", field,
+                   "Use letters, digits, space and . _ : - alone, no point in front, at most 200"};
+    }
+    if (!ids.insert(camera.camera_id()).second) {
+      return Error{ErrorKind::bad_input, "the camera id is there twice", field,
+                   "Give each camera an id of its own"};
+    }
+    if (const auto layout = layout_of(camera); !layout) {
+      Error error = layout.error();
+      error.where = where + ", " + error.where;
+      return error;
+    }
+    if (!std::isfinite(camera.frame_rate_hz()) || camera.frame_rate_hz() < 0) {
+      return Error{ErrorKind::bad_input, "must be finite and not negative", field + ", field frame_rate_hz",
+                   "Mend the rate"};
+    }
+    if (camera.has_calibration()) EMBERLOCK_RETURN_IF_ERROR(check_calibration(camera.calibration(), field));
+  }
+  if (manifest.has_box()) EMBERLOCK_RETURN_IF_ERROR(check_box(manifest.box(), where));
+  return {};
+}
+
+Result<v1::Manifest> read_manifest(const fs::path& folder) {
+  const fs::path path = manifest_path(folder);
+  std::error_code ec;
+  if (!fs::exists(path, ec)) {
+    return Error{ErrorKind::bad_input, "not a session: it holds no manifest.json", folder.string(),
+                 "Name the folder that a recording made"};
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string json, read_file(path, kMaxManifestBytes));
+  return parse_manifest(json, path.string());
+}
+
+Status write_manifest(const fs::path& folder, const v1::Manifest& manifest) {
+  std::string json;
+  google::protobuf::util::JsonPrintOptions options;
+  options.add_whitespace = true;
+  options.preserve_proto_field_names = true;
+  const auto status = google::protobuf::util::MessageToJsonString(manifest, &json, options);
+  if (!status.ok()) {
+    return Error{ErrorKind::bad_input, "the manifest has no JSON form: " + std::string(status.message()),
+                 manifest_path(folder).string(), "Use UTF-8 in its texts"};
+  }
+  return write_file_atomically(manifest_path(folder), json);
+}
+
+Status write_fully(int fd, std::string_view bytes, const fs::path& path) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(fd, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return errno_error(path, "cannot write");
+    bytes.remove_prefix(static_cast<std::size_t>(n));
+  }
+  return {};
+}
+
+Error errno_error(const fs::path& path, const std::string& action) {
+  return {ErrorKind::io, action + ": " + std::generic_category().message(errno), path.string(),
+          "Check the disk's space and the folder's permissions"};
+}
+
+}  // namespace emberlock

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "emberlock/v1/session.pb.h"
+#include "session/writer.h"
+
+// Names and small files of a session's folder.
+namespace emberlock {
+
+inline constexpr std::uint32_t kSessionFormatVersion = 1;
+
+std::filesystem::path manifest_path(const std::filesystem::path& folder);
+std::filesystem::path events_path(const std::filesystem::path& folder);
+std::filesystem::path index_path(const std::filesystem::path& folder, const std::string& camera_id);
+/// Relative to the session's folder: "cam0/000003.mkv".
+std::string segment_name(const std::string& camera_id, std::uint32_t segment, Encoding encoding);
+/// The segment as it lies on disk, the FFV1 one if both are there; an empty path if neither is.
+std::filesystem::path find_segment(const std::filesystem::path& folder, const std::string& camera_id,
+                                   std::uint32_t segment);
+
+/// Parses and checks; errors name the field. `where` names the file.
+Result<v1::Manifest> parse_manifest(std::string_view json, const std::string& where);
+Result<v1::Manifest> read_manifest(const std::filesystem::path& folder);
+/// What a reader and a writer rely on: version, camera ids fit for folder names and unique, layouts, finite
+/// numbers.
+Status check_manifest(const v1::Manifest& manifest, const std::string& where);
+Status write_manifest(const std::filesystem::path& folder, const v1::Manifest& manifest);
+
+/// Writes all of `bytes`, whatever signals come.
+Status write_fully(int fd, std::string_view bytes, const std::filesystem::path& path);
+/// "PATH: ACTION: <errno's words>" as an io error.
+Error errno_error(const std::filesystem::path& path, const std::string& action);
+
+}  // namespace emberlock

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/frame.h"
+#include "base/result.h"
+
+namespace emberlock {
+
+// <camera id>/index.bin: a header of 16 bytes, then one record of 72 bytes a frame; all numbers
+// little-endian.
+//   header: "EMBRIDX\0", u32 version = 1, u32 record size = 72
+//   record: u64 frame id, i64 device ns, i64 system ns, i64 monotonic ns, u64 pixel hash, u64 file offset,
+//           u32 segment, u32 frame in segment, u32 milliseconds in segment, u32 status, u32 CRC-32 of the 68
+//           bytes before
+// The CRC makes each record stand for itself: a torn or flipped one is left out, the others stay good.
+
+struct IndexRecord {
+  FrameStamp stamp;
+  std::uint64_t pixel_hash = 0;
+  std::uint64_t file_offset =
+      0;  ///< the segment's length when the frame was handed over: its pixels lie behind it
+  std::uint32_t segment = 0;
+  std::uint32_t frame_in_segment = 0;
+  std::uint32_t segment_ms =
+      0;  ///< the frame's time stamp in the segment's container; rises within a segment
+  friend bool operator==(const IndexRecord&, const IndexRecord&) = default;
+};
+
+inline constexpr std::size_t kIndexHeaderBytes = 16;
+inline constexpr std::size_t kIndexRecordBytes = 72;
+
+std::string encode_index_header();
+std::array<char, kIndexRecordBytes> encode(const IndexRecord& record);
+
+struct ParsedIndex {
+  std::vector<IndexRecord> records;  ///< the good ones, in order
+  std::uint64_t bad_records = 0;     ///< checksum wrong, or contradicts an earlier record
+  std::size_t torn_bytes = 0;        ///< a started record at the end
+  [[nodiscard]] bool whole() const { return bad_records == 0 && torn_bytes == 0; }
+};
+
+/// Any bytes are accepted but a foreign header (bad_input). `where` names the file in errors. An index cut
+/// within its header is an empty one, torn.
+Result<ParsedIndex> parse_index(std::string_view bytes, const std::string& where);
+
+/// CRC-32 of IEEE 802.3 (zlib's).
+std::uint32_t crc32(std::span<const char> bytes);
+
+/// 64-bit hash of an image's packed bytes, as the index keeps it: four lanes of 8-byte little-endian words,
+/// lane = mix64(lane ^ word), the last word zero-padded, then the lanes and the length mixed together.
+std::uint64_t pixel_hash(std::span<const std::byte> bytes);
+
+}  // namespace emberlock

@@ -1,0 +1,217 @@
+#include "session/segment.h"
+
+extern "C" {
+#include <libavutil/opt.h>
+}
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include <unistd.h>
+
+#include "session/files.h"
+#include "session/segment_pixels.h"
+
+namespace emberlock {
+namespace {
+
+constexpr AVRational kMilliseconds{1, 1000};
+constexpr int kClusterMilliseconds = 250;
+constexpr int kClusterBytes = 4 << 20;
+
+AVRational as_rational(Hertz rate) {
+  return rate.value() > 0 ? av_d2q(rate.value(), 1'000'000) : AVRational{25, 1};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<SegmentWriter>> SegmentWriter::create(const std::filesystem::path& path,
+                                                             const ImageLayout& layout, Encoding encoding,
+                                                             Hertz frame_rate) {
+  quiet_libav();
+  std::unique_ptr<SegmentWriter> writer(new SegmentWriter(layout));
+  EMBERLOCK_RETURN_IF_ERROR(writer->open(path, encoding, frame_rate));
+  return writer;
+}
+
+SegmentWriter::~SegmentWriter() = default;
+
+Error SegmentWriter::failure(int code, const char* action) const {
+  return {ErrorKind::io, std::string(action) + ": " + av_message(code), file_->path().string(),
+          "Check the disk's space and health"};
+}
+
+Status SegmentWriter::open(const std::filesystem::path& path, Encoding encoding, Hertz frame_rate) {
+  EMBERLOCK_ASSIGN_OR_RETURN(file_, AvFile::open(path, AvFile::Mode::create));
+  const AVCodec* codec =
+      avcodec_find_encoder(encoding == Encoding::ffv1 ? AV_CODEC_ID_FFV1 : AV_CODEC_ID_RAWVIDEO);
+  if (codec == nullptr) return failure(AVERROR_ENCODER_NOT_FOUND, "cannot encode");
+  encoder_.reset(avcodec_alloc_context3(codec));
+  AVCodecContext& c = *encoder_;
+  c.width = layout_.size.width;
+  c.height = layout_.size.height;
+  c.pix_fmt = coded_format(layout_, encoding);
+  c.time_base = kMilliseconds;
+  c.framerate = as_rational(frame_rate);
+  c.gop_size = 1;  // every frame stands for itself
+  c.thread_count = 1;
+  c.flags |= AV_CODEC_FLAG_BITEXACT;
+  if (encoding == Encoding::ffv1) {
+    c.level = 3;
+    c.color_range = AVCOL_RANGE_JPEG;
+    av_opt_set_int(c.priv_data, "slicecrc", 1, 0);
+  } else {
+    c.codec_tag = avcodec_pix_fmt_to_codec_tag(c.pix_fmt);
+  }
+  if (const int code = avcodec_open2(&c, codec, nullptr); code < 0) return failure(code, "cannot encode");
+
+  frame_.reset(av_frame_alloc());
+  packet_.reset(av_packet_alloc());
+  frame_->format = c.pix_fmt;
+  frame_->width = c.width;
+  frame_->height = c.height;
+  if (const int code = av_frame_get_buffer(frame_.get(), 0); code < 0) return failure(code, "cannot encode");
+  return write_header(encoding, frame_rate);
+}
+
+Status SegmentWriter::write_header(Encoding encoding, Hertz frame_rate) {
+  AVFormatContext* format = nullptr;
+  const char* container = encoding == Encoding::ffv1 ? "matroska" : "nut";
+  int code = avformat_alloc_output_context2(&format, nullptr, container, nullptr);
+  if (code < 0) return failure(code, "cannot write");
+  format_.reset(format);
+  format->pb = file_->io();
+  format->flags |= AVFMT_FLAG_CUSTOM_IO | AVFMT_FLAG_BITEXACT | AVFMT_FLAG_FLUSH_PACKETS;
+  AVStream* stream = avformat_new_stream(format, nullptr);
+  stream->time_base = kMilliseconds;
+  stream->avg_frame_rate = as_rational(frame_rate);
+  avcodec_parameters_from_context(stream->codecpar, encoder_.get());
+  AVDictionary* options = nullptr;
+  if (encoding == Encoding::ffv1) {
+    av_dict_set_int(&options, "cluster_time_limit", kClusterMilliseconds, 0);
+    av_dict_set_int(&options, "cluster_size_limit", kClusterBytes, 0);
+  }
+  code = avformat_write_header(format, &options);
+  av_dict_free(&options);
+  if (code < 0) {
+    format_.reset();
+    return failure(code, "cannot write");
+  }
+  return {};
+}
+
+Status SegmentWriter::write(const Image& image, std::uint32_t milliseconds) {
+  if (const int code = av_frame_make_writable(frame_.get()); code < 0) return failure(code, "cannot encode");
+  to_av(image, *frame_);
+  frame_->pts = milliseconds;
+  if (const int code = avcodec_send_frame(encoder_.get(), frame_.get()); code < 0) {
+    return failure(code, "cannot encode");
+  }
+  return drain();
+}
+
+Status SegmentWriter::drain() {
+  for (;;) {
+    int code = avcodec_receive_packet(encoder_.get(), packet_.get());
+    if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return {};
+    if (code < 0) return failure(code, "cannot encode");
+    packet_->stream_index = 0;
+    packet_->flags |= AV_PKT_FLAG_KEY;
+    code = av_write_frame(format_.get(), packet_.get());
+    av_packet_unref(packet_.get());
+    if (code >= 0) code = file_->io()->error;
+    if (code < 0) return failure(code, "cannot write");
+  }
+}
+
+Status SegmentWriter::close() {
+  avcodec_send_frame(encoder_.get(), nullptr);
+  EMBERLOCK_RETURN_IF_ERROR(drain());
+  int code = av_write_trailer(format_.get());
+  avio_flush(file_->io());
+  if (code >= 0) code = file_->io()->error;
+  format_.reset();
+  if (code < 0) return failure(code, "cannot finish the segment");
+  if (::fdatasync(file_->fd()) != 0) return errno_error(file_->path(), "cannot flush");
+  return {};
+}
+
+std::uint64_t SegmentWriter::bytes() const { return static_cast<std::uint64_t>(avio_tell(file_->io())); }
+
+SegmentReader::SegmentReader(std::filesystem::path path, ImageLayout layout, AvInput input)
+    : path_(std::move(path)),
+      layout_(layout),
+      input_(std::move(input)),
+      packet_(av_packet_alloc()),
+      frame_(av_frame_alloc()) {}
+
+Result<SegmentReader> SegmentReader::open(const std::filesystem::path& path, const ImageLayout& layout) {
+  auto input = open_av_input(path, Checking::strict);
+  if (!input) {
+    return Error{input.error().kind, "the segment can't be opened: " + input.error().what, path.string(),
+                 "Its frames are lost; others stay readable"};
+  }
+  SegmentReader reader(path, layout, std::move(input).value());
+  return reader;
+}
+
+Error SegmentReader::damaged(const std::string& reason) const {
+  return {ErrorKind::bad_input, reason, path_.string(), "Leave this frame out, or restore the file"};
+}
+
+std::int64_t SegmentReader::ticks(std::uint32_t milliseconds) const {
+  return av_rescale_q(milliseconds, kMilliseconds, input_.format->streams[input_.stream]->time_base);
+}
+
+bool SegmentReader::seek(std::uint32_t milliseconds) {
+  avcodec_flush_buffers(input_.decoder.get());
+  return av_seek_frame(input_.format.get(), input_.stream, ticks(milliseconds), AVSEEK_FLAG_BACKWARD) >= 0;
+}
+
+Result<Image> SegmentReader::read(std::uint32_t milliseconds) {
+  constexpr std::uint32_t kNear = 200;  // reading on beats seeking
+  const std::int64_t target = ticks(milliseconds);
+  const bool ahead = position_ >= 0 && target >= position_ && target - position_ <= ticks(kNear);
+  if (ahead || seek(milliseconds)) {
+    auto image = scan_to(milliseconds);
+    if (image) return image;
+  }
+  // A damaged seek table must not cost a good frame: once more, from the start.
+  EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(path_, Checking::strict));
+  input_.format.reset();  // before its file
+  input_ = std::move(fresh);
+  return scan_to(milliseconds);
+}
+
+Result<Image> SegmentReader::scan_to(std::uint32_t milliseconds) {
+  const std::int64_t target = ticks(milliseconds);
+  position_ = -1;
+  for (;;) {
+    av_packet_unref(packet_.get());
+    const int code = av_read_frame(input_.format.get(), packet_.get());
+    if (code < 0) return damaged("the frame isn't in the segment, which is truncated or damaged");
+    if (packet_->stream_index != input_.stream || packet_->pts < target) continue;
+    if (packet_->pts > target) return damaged("the frame isn't in the segment, which is damaged");
+    auto image = decode();
+    if (image) position_ = target + 1;
+    return image;
+  }
+}
+
+Result<Image> SegmentReader::decode() {
+  int code = avcodec_send_packet(input_.decoder.get(), packet_.get());
+  if (code >= 0) code = avcodec_receive_frame(input_.decoder.get(), frame_.get());
+  if (code < 0) return damaged("the frame doesn't decode: " + av_message(code));
+  const bool known = frame_->format == coded_format(layout_, Encoding::ffv1) ||
+                     frame_->format == coded_format(layout_, Encoding::raw_nut);
+  if (!known || frame_->width != layout_.size.width || frame_->height != layout_.size.height) {
+    return damaged("the frame has another size or format than the manifest says");
+  }
+  Image image(layout_);
+  from_av(*frame_, image);
+  av_frame_unref(frame_.get());
+  return image;
+}
+
+}  // namespace emberlock

@@ -19,8 +19,12 @@ Status write_png(const ImageView& image, const std::filesystem::path& path) {
   // OpenCV takes the pixels as writable, imencode only reads them.
   const cv::Mat view(image.height(), image.width(), colour ? CV_8UC3 : CV_8UC1,
                      const_cast<std::byte*>(image.data), image.stride);
-  cv::Mat ordered = view;
-  if (colour) cv::cvtColor(view, ordered, cv::COLOR_RGB2BGR);
+  cv::Mat ordered;
+  if (colour) {
+    cv::cvtColor(view, ordered, cv::COLOR_RGB2BGR);
+  } else {
+    ordered = view;
+  }
   std::vector<unsigned char> bytes;
   if (!cv::imencode(".png", ordered, bytes)) {
     return Error{ErrorKind::io, "cannot encode the picture", path.string(),

@@ -13,10 +13,10 @@ enum class StrobeOutput { off, flashing, steady };
 /// What a strobe is asked to do, and what it reads back.
 struct StrobeSettings {
   StrobeOutput output = StrobeOutput::off;
-  Hertz rate{23.976};             ///< flashes a second, 0.5 .. 333.3 (30 .. 20000 a minute)
-  Seconds phase;                  ///< delay of every flash against the strobe's own time base, 0 <= phase < 1 / rate
+  Hertz rate{23.976};  ///< flashes a second, 0.5 .. 333.3 (30 .. 20000 a minute)
+  Seconds phase{};     ///< delay of every flash against the strobe's own time base, 0 <= phase < 1 / rate
   Seconds width = microseconds(20);  ///< flash duration, > 0 and < 1 / rate
-  std::vector<bool> code;         ///< repeated without end: false skips that flash; empty flashes always
+  std::vector<bool> code{};          ///< repeated without end: false skips that flash; empty flashes always
   friend bool operator==(const StrobeSettings&, const StrobeSettings&) = default;
 };
 

@@ -28,13 +28,13 @@ struct VirtualCameraOptions {
   std::string id = "virtual-00";  ///< unique in the rig
   ImageLayout layout{.size = {1280, 720}};
   Hertz nominal_rate{23.976};  ///< what the maker claims; the truth is timing.frame_period
-  CcdTiming timing;            ///< rows equal to the layout's height
+  CcdTiming timing{};          ///< rows equal to the layout's height
   SweepOut sweep_out = SweepOut::none;
-  VirtualLamp lamp;
+  VirtualLamp lamp{};
   ShutterReset reset = ShutterReset::on_command;
   Seconds reset_latency = milliseconds(180);  ///< from the action to the new read cycle, 0..10 s
   Seconds reset_jitter = milliseconds(0.2);   ///< RMS of the latency when on_command, 0..1 s
-  std::optional<Seconds> first_phase;  ///< from the first start() to the first read phase; drawn if absent
+  std::optional<Seconds> first_phase{};  ///< from the first start() to the first read phase; drawn if absent
 };
 
 struct VirtualStrobeOptions {
@@ -46,8 +46,8 @@ struct VirtualStrobeOptions {
 
 struct VirtualRigOptions {
   std::uint64_t seed = 1;
-  std::vector<VirtualCameraOptions> cameras;  ///< 1..64
-  VirtualStrobeOptions strobe;
+  std::vector<VirtualCameraOptions> cameras{};  ///< 1..64
+  VirtualStrobeOptions strobe{};
   VirtualScene scene = smear_scene();
   int queue_frames = 64;  ///< what each camera keeps for a reader that lags, 1..4096; the oldest go first
   TimePoint wall_at_zero{946684800'000'000'000};  ///< the wall clock when the rig's clock reads 0

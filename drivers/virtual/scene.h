@@ -26,13 +26,13 @@ enum class Pass {
 /// What the cameras see. Brightness is in linear grey levels on the scale 0..255 whatever the image's depth;
 /// 255 and more is white.
 struct VirtualScene {
-  std::vector<Pass> passes;
+  std::vector<Pass> passes{};
 
   /// The picture of frame i gathers light during [t_start_i - exposure, t_start_i): it ends as the read phase
   /// begins, so cameras of equal t_start and exposure film the same instants. Zero: the whole frame period,
   /// so that every flash lights the lamp in one image, whatever its phase. Otherwise > 0 and at most the
   /// shortest frame period.
-  Seconds exposure;
+  Seconds exposure{};
   double background = 6;  ///< black level and stray light, 0..255
 
   double flash_level = 4000;  ///< one flash at the lamp's centre, before saturation; independent of its width
@@ -49,7 +49,7 @@ struct VirtualScene {
   double read_noise = 0.7;          ///< grey levels RMS
   int adc_bits = 8;                 ///< of pass `quantise`; formats of fewer bits than this keep their own
 
-  std::shared_ptr<const LightField> flame;  ///< what pass `flame` draws
+  std::shared_ptr<const LightField> flame{};  ///< what pass `flame` draws
 
   [[nodiscard]] bool has(Pass pass) const;
 };

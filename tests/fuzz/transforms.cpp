@@ -1,0 +1,26 @@
+#include "recon/calibrate/transforms.h"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+/// Whatever a transforms.json holds: an error, or cameras that are finite and rigid.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace emberlock;
+  const auto transforms =
+      parse_transforms({reinterpret_cast<const char*>(data), size}, "fuzz/transforms.json");
+  if (!transforms) {
+    if (transforms.error().where.empty() || transforms.error().remedy.empty()) std::abort();
+    return 0;
+  }
+  for (const TransformsFrame& frame : transforms->frames) {
+    const auto lens = intrinsics_of(frame, {frame.lens.w.value_or(64), frame.lens.h.value_or(48)});
+    if (!lens) continue;
+    const CameraModel camera{*lens, frame.camera_from_world};
+    const Ray ray = camera.ray({0.5, 0.5});
+    if (!ray.origin.allFinite() || !(std::abs(ray.direction.norm() - 1) < 1e-9)) std::abort();
+  }
+  return 0;
+}

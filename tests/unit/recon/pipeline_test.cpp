@@ -1,0 +1,304 @@
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "recon/export/volume_file.h"
+#include "recon/pipeline/advice.h"
+#include "recon/pipeline/coverage.h"
+#include "recon/pipeline/grid_choice.h"
+#include "recon/pipeline/reconstruct.h"
+#include "recon/preprocess/flame_mask.h"
+#include "session/frame_file.h"
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// Seven cameras on a circle of 0.5 m around a Gaussian ball of light (sigma 2 cm) in a 20 cm box: every
+/// picture is known in closed form, a line integral through the ball being a Gaussian of the ray's distance
+/// from its centre.
+Scene ball(int cameras = 7) {
+  constexpr double kSigma = 0.02;
+  constexpr double kPeak = 200;
+  Scene scene;
+  scene.box.size = {0.2, 0.2, 0.2};
+  for (int i = 0; i < cameras; ++i) {
+    const double angle = 2.4 * i;
+    View view;
+    view.name = "camera " + std::to_string(i);
+    view.camera =
+        look_at({{80, 60}, 100, 100, 40, 30, {}},
+                {0.5 * std::cos(angle), 0.5 * std::sin(angle), 0.1 * std::sin(3 * angle)}, {0, 0, 0});
+    view.image = RadianceImage({80, 60});
+    for (int y = 0; y < 60; ++y) {
+      for (int x = 0; x < 80; ++x) {
+        const Ray ray = view.camera.ray({x + 0.5, y + 0.5});
+        const double closest = ray.origin.cross(ray.direction).norm();
+        const double light = kPeak * std::exp(-closest * closest / (2 * kSigma * kSigma));
+        for (int c = 0; c < 3; ++c) {
+          view.image.rgb[static_cast<std::size_t>(3 * (y * 80 + x) + c)] =
+              static_cast<float>(light / (c + 1));
+        }
+      }
+    }
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+ReconstructOptions quick() {
+  ReconstructOptions options;
+  options.voxels = 24;
+  options.effects = EffectRequest{Effects{}};
+  options.solve.compute.device = Device::cpu;
+  return options;
+}
+
+/// Time that passes by a millisecond at every look.
+class CountingClock final : public Clock {
+ public:
+  [[nodiscard]] TimePoint now() const override { return {1000000 * ++looks_}; }
+  void sleep_until(TimePoint) override {}
+
+ private:
+  mutable std::int64_t looks_ = 0;
+};
+
+TEST(GridChoice, ThePapersRuleOnAFrontalView) {
+  // An edge of 0.2 m, 0.4 m in front of the camera, covers 100 * 0.2 / 0.4 = 50 pixels: 50 / 1.5 voxels.
+  Scene scene = ball(1);
+  scene.views[0].camera = look_at({{80, 60}, 100, 100, 40, 30, {}}, {0.5, 0, 0}, {0, 0, 0});
+  EXPECT_EQ(voxels_by_the_paper(scene), 34);
+}
+
+TEST(GridChoice, AThinBoxIsSampledAlongItsThinSide) {
+  Scene scene = ball(1);
+  scene.views[0].camera = look_at({{80, 60}, 100, 100, 40, 30, {}}, {0.5, 0, 0}, {0, 0, 0});
+  scene.box.size.z() = 0.8;
+  EXPECT_GE(voxels_by_the_paper(scene), 4 * 33);
+}
+
+TEST(GridChoice, SharpPicturesAreCappedAndACameraInsideDecidesNothing) {
+  Scene scene = ball(1);
+  scene.views[0].camera.intrinsics.fx = 1e5;
+  EXPECT_EQ(voxels_by_the_paper(scene), kLargestChosenVoxels);
+  scene.views[0].camera = look_at({{80, 60}, 100, 100, 40, 30, {}}, {0.01, 0, 0}, {0, 0, 0});
+  EXPECT_LE(voxels_by_the_paper(scene), kLargestChosenVoxels);
+}
+
+TEST(Coverage, WarnsWhereTheInputErrorProvesNothing) {
+  Scene scene = ball(8);
+  scene.views[3].role = ViewRole::held_out;
+  EXPECT_TRUE(coverage_warnings(scene).empty());
+  scene.views[3].role = ViewRole::input;
+  ASSERT_EQ(coverage_warnings(scene).size(), 1U);
+  EXPECT_THAT(coverage_warnings(scene)[0], HasSubstr("no view is held out"));
+  EXPECT_THAT(coverage_warnings(ball(1))[0], HasSubstr("the 1 input view lie"));
+  EXPECT_THAT(coverage_warnings(ball(3))[0], HasSubstr("only 3 input views"));
+}
+
+TEST(Coverage, TwoOppositeViewsCountAsOne) {
+  Scene scene = ball(2);
+  const Intrinsics lens = scene.views[0].camera.intrinsics;
+  scene.views[0].camera = look_at(lens, {0.5, 0, 0}, {0, 0, 0});
+  scene.views[1].camera = look_at(lens, {-0.5, 0, 0}, {0, 0, 0});
+  EXPECT_THAT(coverage_warnings(scene)[0], HasSubstr("degrees of one line"));
+}
+
+TEST(Coverage, TenViewsWithinTenDegrees) {
+  Scene scene = ball(10);
+  for (std::size_t i = 0; i < 10; ++i) {
+    const double angle = 0.017 * static_cast<double>(i);
+    scene.views[i].camera = look_at(scene.views[i].camera.intrinsics,
+                                    {0.5 * std::cos(angle), 0.5 * std::sin(angle), 0}, {0, 0, 0});
+  }
+  EXPECT_THAT(coverage_warnings(scene)[0], HasSubstr("within 9 degrees of one line"));
+}
+
+Report report_of_errors(const std::vector<double>& errors) {
+  Report report;
+  report.heldout_rmse = ChannelRmse{};
+  report.solve_time = Seconds(2);
+  int i = 0;
+  for (const double e : errors) report.trace.push_back({Seconds(i), ++i, {0, 0, 0}, {e, e, e}});
+  return report;
+}
+
+TEST(Advice, ExtrapolatesAGeometricDecay) {
+  // Each half of the run gains half of what the half before gained: 4, then 2, so 1 is left at most.
+  const std::string advice = next_step(report_of_errors({20, 12, 8, 7, 6}));
+  EXPECT_THAT(advice, HasSubstr("about 2 s"));
+  EXPECT_THAT(advice, HasSubstr("at most about 1"));
+}
+
+TEST(Advice, SaysWhenTheErrorHasTurned) {
+  EXPECT_THAT(next_step(report_of_errors({20, 10, 5, 6, 7})), HasSubstr("lowest after iteration 3 (5.00)"));
+}
+
+TEST(Advice, SaysNothingFromAShortTrace) { EXPECT_EQ(next_step(report_of_errors({20, 10})), ""); }
+
+TEST(Reconstruct, AKnownBallOfLightIsFound) {
+  Scene scene = ball();
+  scene.views[2].role = ViewRole::held_out;
+  const auto outcome = reconstruct(scene, quick(), CountingClock());
+  ASSERT_TRUE(outcome.ok()) << outcome.error().message();
+  const Report& report = outcome->report;
+  ASSERT_TRUE(report.heldout_rmse);
+  EXPECT_LT((*report.heldout_rmse)[0], 6) << "of a peak of 200, on voxels of 8 mm";
+  EXPECT_LT((*report.heldout_rmse)[2], 2);
+  EXPECT_LT(report.input_rmse[0], 6);
+  EXPECT_EQ(report.voxels, (std::array{24, 24, 24}));
+  EXPECT_EQ(report.views.size(), 7U);
+  EXPECT_EQ(outcome->renders.size(), 7U);
+  EXPECT_GT(report.hull_voxels, 0U);
+  EXPECT_GT(report.total_time.value(), 0);
+  // The centre's emission in closed form: peak / (sigma sqrt(2 pi)) grey levels per metre.
+  const Volume& volume = outcome->reconstruction.volume;
+  const double centre = static_cast<double>(volume.emission[3 * volume.grid.index(12, 12, 12)]);
+  EXPECT_NEAR(centre, 200 / (0.02 * std::sqrt(2 * M_PI)), 0.15 * 200 / (0.02 * std::sqrt(2 * M_PI)));
+}
+
+TEST(Reconstruct, TheReportsErrorIsThatOfTheLastTracePoint) {
+  Scene scene = ball();
+  scene.views[0].role = ViewRole::held_out;
+  const auto outcome = reconstruct(scene, quick(), CountingClock());
+  ASSERT_TRUE(outcome.ok()) << outcome.error().message();
+  ASSERT_FALSE(outcome->report.trace.empty());
+  // The solver may return an earlier state than its last: the best of the trace, then.
+  double best = INFINITY;
+  for (const auto& point : outcome->report.trace) best = std::min(best, all_channels(point.heldout_rmse));
+  EXPECT_NEAR(all_channels(*outcome->report.heldout_rmse), best, 0.2 * best + 0.05);
+}
+
+TEST(Reconstruct, ThePapersSolverTakesThePapersOpacityUnlessToldOtherwise) {
+  ReconstructOptions options = quick();
+  options.solve.solver = Solver::paper;
+  options.solve.iterations = 2;
+  options.effects.reset();
+  const auto published = reconstruct(ball(), options, CountingClock());
+  ASSERT_TRUE(published.ok()) << published.error().message();
+  const double edge = published->report.voxel_edge.value();
+  EXPECT_NEAR(published->reconstruction.effects.extinction.value() * edge, -std::log(0.95), 1e-6);
+  ASSERT_FALSE(published->report.effects.empty());
+  EXPECT_THAT(published->report.effects[0].reason, HasSubstr("paper"));
+  options.effects = EffectRequest{Effects{}};
+  const auto told = reconstruct(ball(), options, CountingClock());
+  ASSERT_TRUE(told.ok()) << told.error().message();
+  EXPECT_EQ(told->reconstruction.effects.extinction.value(), 0);
+}
+
+TEST(Reconstruct, AnEmptyHullNamesTheRemedy) {
+  Scene scene = ball();
+  std::fill(scene.views[1].image.rgb.begin(), scene.views[1].image.rgb.end(), 0.0F);
+  const auto outcome = reconstruct(scene, quick(), CountingClock());
+  ASSERT_FALSE(outcome.ok());
+  EXPECT_EQ(outcome.error().kind, ErrorKind::bad_input);
+  EXPECT_FALSE(outcome.error().remedy.empty());
+  EXPECT_THAT(outcome.error().message(), HasSubstr("camera 1"));
+}
+
+TEST(Reconstruct, ATargetWithoutAHeldOutViewIsRefused) {
+  ReconstructOptions options = quick();
+  options.solve.target_rmse = 3;
+  const auto outcome = reconstruct(ball(), options, CountingClock());
+  ASSERT_FALSE(outcome.ok());
+  EXPECT_EQ(outcome.error().kind, ErrorKind::bad_input);
+}
+
+TEST(Reconstruct, ATargetOnTheHeldOutErrorEndsTheRunEarly) {
+  Scene scene = ball();
+  scene.views[0].role = ViewRole::held_out;
+  const auto full = reconstruct(scene, quick(), CountingClock());
+  ReconstructOptions options = quick();
+  options.solve.target_rmse = 40;
+  const auto early = reconstruct(scene, options, CountingClock());
+  ASSERT_TRUE(early.ok()) << early.error().message();
+  EXPECT_LE(all_channels(*early->report.heldout_rmse), 40);
+  EXPECT_LT(early->report.iterations, full->report.iterations);
+}
+
+TEST(Reconstruct, ABudgetEndsTheRunWithTheBestSoFar) {
+  ReconstructOptions options = quick();
+  options.solve.iterations = 100000;
+  options.solve.budget = Seconds(0.03);  // thirty looks at the clock
+  const auto outcome = reconstruct(ball(), options, CountingClock());
+  ASSERT_TRUE(outcome.ok()) << outcome.error().message();
+  EXPECT_LT(outcome->report.iterations, 100);
+}
+
+TEST(Reconstruct, VoxelsOutOfRangeAndNonFinitePicturesAreRefused) {
+  ReconstructOptions options = quick();
+  for (const int voxels : {0, -1, kLargestVoxels + 1}) {
+    options.voxels = voxels;
+    EXPECT_EQ(reconstruct(ball(), options, CountingClock()).error().where, "--voxels");
+  }
+  Scene scene = ball();
+  scene.views[4].image.rgb[100] = NAN;
+  EXPECT_THAT(reconstruct(scene, quick(), CountingClock()).error().message(), HasSubstr("camera 4"));
+}
+
+TEST(Reconstruct, OneVoxelIsEnough) {
+  ReconstructOptions options = quick();
+  options.voxels = 1;
+  const auto outcome = reconstruct(ball(), options, CountingClock());
+  ASSERT_TRUE(outcome.ok()) << outcome.error().message();
+  EXPECT_EQ(outcome->report.voxels, (std::array{1, 1, 1}));
+}
+
+class OutcomeTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = fs::temp_directory_path() / ("emberlock_outcome_test." + std::to_string(::getpid()));
+    fs::create_directories(root_);
+    Scene scene = ball(5);
+    scene.views[4].role = ViewRole::held_out;
+    ReconstructOptions options = quick();
+    options.voxels = 8;
+    auto result = reconstruct(scene, options, CountingClock());
+    ASSERT_TRUE(result.ok()) << result.error().message();
+    outcome_ = std::move(result).value();
+  }
+  void TearDown() override { fs::remove_all(root_); }
+  fs::path root_;
+  Outcome outcome_;
+};
+
+TEST_F(OutcomeTest, EveryViewIsWrittenHeldOutOnesToo) {
+  ASSERT_TRUE(write_outcome(outcome_, root_ / "out").ok());
+  for (const char* name : {"0000.png", "0001.png", "0002.png", "0003.png", "0004.png"}) {
+    const auto view = read_image(root_ / "out" / "views" / name);
+    ASSERT_TRUE(view.ok()) << view.error().message();
+    EXPECT_EQ(view->layout().size, (ImageSize{80, 60}));
+  }
+  const auto volume = read_volume(root_ / "out" / "volume.vdb");
+  ASSERT_TRUE(volume.ok()) << volume.error().message();
+  EXPECT_EQ(volume->emission, outcome_.reconstruction.volume.emission);
+  std::ifstream in(root_ / "out" / "report.json");
+  EXPECT_TRUE(nlohmann::json::parse(in).contains("heldout_rmse"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(root_), {}), 1) << "nothing partial stays beside it";
+}
+
+TEST_F(OutcomeTest, AnEarlierResultIsReplacedAnotherFolderIsNot) {
+  ASSERT_TRUE(write_outcome(outcome_, root_ / "out").ok());
+  EXPECT_TRUE(check_output(root_ / "out").ok());
+  EXPECT_TRUE(write_outcome(outcome_, root_ / "out").ok());
+  fs::create_directories(root_ / "thesis");
+  std::ofstream(root_ / "thesis" / "chapter.tex") << "x";
+  EXPECT_FALSE(check_output(root_ / "thesis").ok());
+  EXPECT_FALSE(write_outcome(outcome_, root_ / "thesis").ok());
+  EXPECT_TRUE(fs::exists(root_ / "thesis" / "chapter.tex"));
+}
+
+TEST_F(OutcomeTest, AFailureLeavesNothingBehind) {
+  outcome_.renders[2] = RadianceImage();  // no picture can be encoded from it
+  EXPECT_FALSE(write_outcome(outcome_, root_ / "out").ok());
+  EXPECT_TRUE(fs::is_empty(root_));
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -1,0 +1,238 @@
+#include "recon/pipeline/scene.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "session/writer.h"
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+class SceneTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = fs::temp_directory_path() / ("emberlock_scene_test." + std::to_string(::getpid()));
+    fs::create_directories(root_);
+    write_pgm("a.pgm", 255);
+    write_pgm("b.pgm", 1023);
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  /// 4 x 2 pixels, black but for a pixel at white in column 3, row 1.
+  void write_pgm(const char* name, int white) const {
+    std::ofstream out(root_ / name, std::ios::binary);
+    out << "P5\n4 2\n" << white << "\n";
+    for (int i = 0; i < 8; ++i) {
+      const int value = i == 7 ? white : 0;
+      if (white > 255) out.put(static_cast<char>(value >> 8));
+      out.put(static_cast<char>(value & 255));
+    }
+  }
+  [[nodiscard]] static json valid() {
+    return json::parse(
+        R"({"fl_x": 10, "w": 4, "h": 2, "box": {"center": [0, 0, 0], "size": [1, 1, 1]}, "frames": [
+      {"file_path": "a.pgm", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,5],[0,0,0,1]]},
+      {"file_path": "b", "transform_matrix": [[1,0,0,1],[0,1,0,0],[0,0,1,5],[0,0,0,1]]}]})");
+  }
+  [[nodiscard]] Result<Scene> load(const json& document, const SceneOptions& options = {}) const {
+    std::ofstream(root_ / "transforms.json") << document.dump();
+    return load_scene(root_ / "transforms.json", options);
+  }
+  fs::path root_;
+};
+
+TEST_F(SceneTest, PicturesOfEveryDepthBecomeRadiance) {
+  const auto scene = load(valid());
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  ASSERT_EQ(scene->views.size(), 2U);
+  EXPECT_EQ(scene->views[1].name, "b.pgm") << "the extension was found";
+  for (const View& view : scene->views) {
+    EXPECT_EQ(view.role, ViewRole::input);
+    EXPECT_EQ(view.image.size, (ImageSize{4, 2}));
+    for (std::size_t i = 0; i < 21; ++i) EXPECT_EQ(view.image.rgb[i], 0);
+    for (std::size_t i = 21; i < 24; ++i) EXPECT_FLOAT_EQ(view.image.rgb[i], 255);
+  }
+}
+
+TEST_F(SceneTest, ABoxFromTheCommandLineStandsBeforeTheFiles) {
+  const auto scene = load(valid(), {.box = Box{{1, 2, 3}, {4, 5, 6}}, .frame = {}});
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  EXPECT_EQ(scene->box.center, Eigen::Vector3d(1, 2, 3));
+}
+
+TEST_F(SceneTest, WithoutABoxTheErrorSaysHowToGiveOne) {
+  json document = valid();
+  document.erase("box");
+  EXPECT_THAT(load(document).error().message(), HasSubstr("--box"));
+  EXPECT_TRUE(load(document, {.box = Box{{0, 0, 0}, {1, 1, 1}}, .frame = {}}).ok());
+}
+
+TEST_F(SceneTest, AMissingPictureNamesItsFrame) {
+  json document = valid();
+  document["frames"][1]["file_path"] = "lost.png";
+  const auto scene = load(document);
+  ASSERT_FALSE(scene.ok());
+  EXPECT_EQ(scene.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(scene.error().message(), HasSubstr("frames[1].file_path"));
+  EXPECT_THAT(scene.error().message(), HasSubstr("lost.png"));
+}
+
+TEST_F(SceneTest, ATruncatedPictureNamesItsFrame) {
+  fs::resize_file(root_ / "a.pgm", fs::file_size(root_ / "a.pgm") - 3);
+  EXPECT_THAT(load(valid()).error().message(), HasSubstr("frames[0].file_path"));
+}
+
+TEST_F(SceneTest, PicturesOfAnotherSizeAreRefused) {
+  json document = valid();
+  document["frames"][1]["w"] = 5;
+  EXPECT_THAT(load(document).error().message(), HasSubstr("frames[1].w, h"));
+}
+
+TEST_F(SceneTest, WhatIsNeitherFileNorSessionIsNamed) {
+  EXPECT_THAT(load_scene(root_).error().message(), HasSubstr("no session"));
+  EXPECT_THAT(load_scene(root_ / "absent.json").error().message(), HasSubstr("absent.json"));
+  EXPECT_FALSE(load(valid(), {.box = {}, .frame = 3}).ok()) << "one instant has no frames to choose from";
+}
+
+TEST_F(SceneTest, HoldingOutChangesRoles) {
+  auto scene = load(valid());
+  ASSERT_TRUE(hold_out(*scene, {1}).ok());
+  EXPECT_EQ(scene->views[1].role, ViewRole::held_out);
+  EXPECT_THAT(hold_out(*scene, {2}).error().message(), HasSubstr("--hold-out 2"));
+  EXPECT_FALSE(hold_out(*scene, {-1}).ok());
+  EXPECT_THAT(hold_out(*scene, {0}).error().message(), HasSubstr("every view"));
+}
+
+/// Three cameras of a session: grey, mosaic and colour, 8 and 12 bits, five frames 10 ms apart; the second
+/// camera starts 1 ms late and lost its frame 3.
+class SessionSceneTest : public SceneTest {
+ protected:
+  static constexpr PixelFormat kFormats[] = {PixelFormat::gray16, PixelFormat::bayer_rggb8,
+                                             PixelFormat::rgb8};
+
+  [[nodiscard]] static v1::Manifest manifest() {
+    v1::Manifest m;
+    m.set_purpose("flame");
+    m.set_session_id("test");
+    for (const double v : {0.0, 0.0, 0.1}) m.mutable_box()->add_center(v);
+    for (const double v : {0.2, 0.2, 0.4}) m.mutable_box()->add_size(v);
+    const v1::CameraStream::PixelFormat formats[] = {v1::CameraStream::GRAY16, v1::CameraStream::BAYER_RGGB8,
+                                                     v1::CameraStream::RGB8};
+    for (int i = 0; i < 3; ++i) {
+      auto* camera = m.add_cameras();
+      camera->set_camera_id("cam" + std::to_string(i));
+      camera->set_format(formats[i]);
+      camera->set_width(16);
+      camera->set_height(8);
+      camera->set_bit_depth(i == 0 ? 12 : 8);
+      camera->set_frame_rate_hz(100);
+      auto* c = camera->mutable_calibration();
+      c->set_fx(20);
+      c->set_fy(21);
+      c->set_cx(8);
+      c->set_cy(4);
+      for (const double v : {1., 0., 0., 0.1 * i, 0., 1., 0., 0., 0., 0., 1., 2.})
+        c->add_camera_from_world(v);
+    }
+    return m;
+  }
+
+  /// Frame f of every camera is evenly filled with 10 + f of 255 (of 4095 in the first: 16.06 times that).
+  [[nodiscard]] fs::path record(const v1::Manifest& m) const {
+    const fs::path folder = root_ / "session";
+    fs::remove_all(folder);
+    auto writer = SessionWriter::create(folder, m, {.min_free_bytes = 0});
+    EXPECT_TRUE(writer.ok()) << writer.error().message();
+    for (std::size_t camera = 0; camera < 3; ++camera) {
+      for (std::uint64_t f = 0; f < 5; ++f) {
+        if (camera == 1 && f == 3) continue;
+        auto image = std::make_shared<Image>(ImageLayout{{16, 8}, kFormats[camera], camera == 0 ? 12 : 8});
+        if (camera == 0) {
+          for (int y = 0; y < 8; ++y) {
+            std::fill_n(image->row_as<std::uint16_t>(y), 16,
+                        static_cast<std::uint16_t>((10 + f) * 4095 / 255));
+          }
+        } else {
+          std::fill(image->bytes().begin(), image->bytes().end(), static_cast<std::byte>(10 + f));
+        }
+        Frame frame;
+        frame.stamp.frame_id = f;
+        frame.stamp.monotonic_time = {
+            static_cast<std::int64_t>(10000000 * f + 1000000 * (camera == 1 ? 1 : 0))};
+        frame.image = image;
+        EXPECT_TRUE(writer->write(camera, frame).ok());
+      }
+    }
+    const auto finished = writer->finish();
+    EXPECT_TRUE(finished.ok()) << finished.error().message();
+    return folder;
+  }
+};
+
+TEST_F(SessionSceneTest, TheFramesOfOneInstantBecomeViews) {
+  const auto scene = load_scene(record(manifest()), {.box = {}, .frame = 1});
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  ASSERT_EQ(scene->views.size(), 3U);
+  EXPECT_EQ(scene->box.size, Eigen::Vector3d(0.2, 0.2, 0.4));
+  for (const View& view : scene->views) {
+    for (const float value : view.image.rgb) EXPECT_NEAR(value, 11, 0.1) << view.name;
+    EXPECT_EQ(view.camera.intrinsics.fy, 21);
+  }
+  EXPECT_EQ(scene->views[2].camera.camera_from_world.translation, Eigen::Vector3d(0.2, 0, 2));
+}
+
+TEST_F(SessionSceneTest, ALostFramesNeighbourStandsInWithinOnePeriod) {
+  const auto scene = load_scene(record(manifest()), {.box = {}, .frame = 3});
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  EXPECT_NEAR(scene->views[1].image.rgb[0], 12, 0.1) << "frame 2, 9 ms before";
+}
+
+TEST_F(SessionSceneTest, ACameraThatIsAMillisecondTooSlowIsNamed) {
+  v1::Manifest m = manifest();
+  m.mutable_cameras(1)->set_frame_rate_hz(120);  // a period of 8.3 ms: 9 ms is too far
+  const auto scene = load_scene(record(m), {.box = {}, .frame = 3});
+  ASSERT_FALSE(scene.ok());
+  EXPECT_THAT(scene.error().message(), HasSubstr("camera cam1"));
+}
+
+TEST_F(SessionSceneTest, WithoutAFrameTheMiddleOneIsTaken) {
+  const auto scene = load_scene(record(manifest()));
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  EXPECT_NEAR(scene->views[0].image.rgb[0], 12, 0.1);
+}
+
+TEST_F(SessionSceneTest, ACameraWithoutCalibrationIsNamed) {
+  v1::Manifest m = manifest();
+  m.mutable_cameras(2)->clear_calibration();
+  const auto scene = load_scene(record(m));
+  ASSERT_FALSE(scene.ok());
+  EXPECT_THAT(scene.error().message(), HasSubstr("camera cam2 is not calibrated"));
+}
+
+TEST_F(SessionSceneTest, ASingularPoseNamesItsCamera) {
+  v1::Manifest m = manifest();
+  m.mutable_cameras(1)->mutable_calibration()->set_camera_from_world(0, 0);
+  EXPECT_THAT(load_scene(record(m)).error().message(), HasSubstr("cameras[1].calibration.camera_from_world"));
+}
+
+TEST_F(SessionSceneTest, AFrameBeyondTheRecordingIsRefused) {
+  EXPECT_THAT(load_scene(record(manifest()), {.box = {}, .frame = 5}).error().message(),
+              HasSubstr("5 frames"));
+}
+
+TEST_F(SessionSceneTest, ASessionWithoutABoxNeedsOne) {
+  v1::Manifest m = manifest();
+  m.clear_box();
+  EXPECT_THAT(load_scene(record(m)).error().message(), HasSubstr("--box"));
+}
+
+}  // namespace
+}  // namespace emberlock

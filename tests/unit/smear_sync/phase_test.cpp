@@ -1,0 +1,192 @@
+#include "smear_sync/phase.h"
+
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+#include "tests/support/shift_register.h"
+
+namespace emberlock {
+namespace {
+
+using test::reading_of;
+using test::shift_register;
+
+constexpr Seconds kShort = microseconds(1);
+
+struct Case {
+  const char* situation;
+  CcdTiming timing;
+};
+
+std::vector<Case> timings() {
+  std::vector<Case> cases;
+  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+    CcdTiming t{.rows = 72, .shifts = 72, .frame_period = Seconds(80.3e-4), .row_time = SecondsPerRow(1e-4)};
+    t.direction = direction;
+    cases.push_back({"as many shifts as rows", t});
+    t.shifts = 75;
+    cases.push_back({"dummy lines", t});
+    t.shifts = 80;
+    cases.push_back({"no rest", t});
+  }
+  return cases;
+}
+
+TEST(Phase, InvertsTheShiftRegisterForEveryRowPhaseAndLampRow) {
+  for (const auto& [situation, timing] : timings()) {
+    for (const int lamp : {3, 36, 68}) {
+      for (double tau = 0.00005; tau < timing.frame_period.value(); tau += 1e-4) {
+        const auto dot = shift_register(timing, lamp, Seconds(tau));
+        if (!dot) continue;
+        const Phase phase = phase_of(reading_of(*dot, lamp), timing, kShort);
+        ASSERT_EQ(phase.state, PhaseState::known);
+        EXPECT_NEAR(phase.tau.value(), tau, 1e-12) << situation << ", lamp at row " << lamp;
+      }
+    }
+  }
+}
+
+TEST(Phase, DotsOnOppositeSidesAreInStepWhenTheCircleSaysSo) {
+  const CcdTiming timing{.shifts = 740};
+  // The same phase, lamps at different rows: the second dot has left the image at the top and came in below.
+  const Seconds tau = Rows(400.5) * timing.row_time;
+  const auto a = shift_register(timing, 200, tau);
+  const auto b = shift_register(timing, 500, tau);
+  ASSERT_TRUE(a && b);
+  ASSERT_GT(*a, 200);
+  ASSERT_LT(*b, 500);
+  const Phase pa = phase_of(reading_of(*a, 200), timing, kShort);
+  const Phase pb = phase_of(reading_of(*b, 500), timing, kShort);
+  EXPECT_NEAR(phase_error(pa, pb, timing.frame_period).value(), 0, 1e-12);
+}
+
+TEST(Phase, EqualDistancesOnOppositeSidesAreNotInStep) {
+  const CcdTiming timing;
+  const Phase above = phase_of(reading_of(300, 360), timing, kShort);
+  const Phase below = phase_of(reading_of(420, 360), timing, kShort);
+  const Rows error = phase_error(below, above, timing.frame_period) / timing.row_time;
+  // 60 rows after the start against 660: through the rest of 52.4 rows it is 172.4.
+  EXPECT_NEAR(error.value(), 60 - 660 + 1 / 23.976 / 54e-6, 1e-6);
+}
+
+TEST(Phase, WrapsModuloTheFramePeriodNotTheRows) {
+  const CcdTiming timing;
+  Phase first;
+  Phase last;
+  first.tau = Rows(5.5) * timing.row_time;
+  last.tau = Rows(715.5) * timing.row_time;
+  EXPECT_NEAR((phase_error(first, last, timing.frame_period) / timing.row_time).value(), 62.4, 0.1);
+}
+
+TEST(Phase, BlindIsNotUnusableAndNeitherIsAnError) {
+  SmearReading reading;
+  for (const auto state : {SmearState::no_dot, SmearState::blind}) {
+    reading.state = state;
+    EXPECT_EQ(phase_of(reading, {}, kShort).state, PhaseState::blind);
+  }
+  for (const auto state : {SmearState::comb, SmearState::steady, SmearState::saturated, SmearState::ambiguous,
+                           SmearState::no_lamp, SmearState::dot}) {
+    reading.state = state;
+    reading.reason = "because";
+    EXPECT_EQ(phase_of(reading, {}, kShort).state, PhaseState::unusable);
+    EXPECT_FALSE(phase_of(reading, {}, kShort).reason.empty());
+  }
+}
+
+TEST(Phase, ShortFlashesCarryNoSubRowPhaseAndLongOnesDo) {
+  const auto row = microseconds_per_row(54);
+  EXPECT_NEAR((row_resolution(row, Seconds(0)) / row).value(), 1 / std::sqrt(12.0), 1e-12);
+  EXPECT_NEAR((row_resolution(row, microseconds(20)) / row).value(), 0.144, 0.001);
+  EXPECT_EQ(row_resolution(row, microseconds(60)).value(), 0);
+}
+
+TEST(Phase, ExpectedBeatOfThePapersStrobe) {
+  const Beat beat = expected_beat(Hertz(23.98), period(Hertz(23.976)), PartsPerMillion(1));
+  EXPECT_NEAR(beat.rate.value(), -166.8, 0.1);
+}
+
+std::vector<PhaseSample> samples_at(std::initializer_list<double> rows, double sigma_rows = 0.3) {
+  std::vector<PhaseSample> samples;
+  for (const double r : rows) {
+    const Seconds tau = wrap_positive(Rows(r) * microseconds_per_row(54), Seconds(1 / 23.976));
+    samples.push_back({TimePoint{static_cast<std::int64_t>(samples.size()) * 41'708'375},
+                       {PhaseState::known, tau, Rows(sigma_rows) * microseconds_per_row(54), {}}});
+  }
+  return samples;
+}
+
+double rows_of(const Phase& phase) { return (phase.tau / microseconds_per_row(54)).value(); }
+
+TEST(Combine, JitterAtTheWrapAveragesAcrossIt) {
+  const Phase phase = combine(samples_at({-0.4, 0.3, -0.2, 0.5, 0.3}), {}, {});
+  ASSERT_EQ(phase.state, PhaseState::known);
+  EXPECT_NEAR(wrap_symmetric(rows_of(phase), 772.39), 0.1, 0.01);
+}
+
+TEST(Combine, DropsTheFrameThatShowsAnotherDot) {
+  const Phase phase = combine(samples_at({100, 100.2, 341, 99.8, 100}), {}, {});
+  ASSERT_EQ(phase.state, PhaseState::known);
+  EXPECT_NEAR(rows_of(phase), 100, 0.01);
+}
+
+TEST(Combine, AbstainsWhenFramesDisagree) {
+  const Phase phase = combine(samples_at({100, 341}), {}, {});
+  EXPECT_EQ(phase.state, PhaseState::unusable);
+  EXPECT_FALSE(phase.reason.empty());
+}
+
+TEST(Combine, AFalseDotAmongBlindFramesStaysBlind) {
+  auto samples = samples_at({100, 0, 0, 0});
+  for (std::size_t i = 1; i < 4; ++i) samples[i].phase = {PhaseState::blind, {}, {}, "no dot"};
+  const Phase phase = combine(samples, {}, {});
+  EXPECT_EQ(phase.state, PhaseState::blind);
+  EXPECT_EQ(phase.reason, "no dot");
+}
+
+TEST(Combine, NoFramesAreUnusable) { EXPECT_EQ(combine({}, {}, {}).state, PhaseState::unusable); }
+
+TEST(Combine, MoreFramesOfOneRowDoNotBeatTheRowsOwnError) {
+  CircleOptions options;
+  options.resolution = row_resolution(microseconds_per_row(54), microseconds(20));
+  const std::vector<PhaseSample> samples(1000, samples_at({100}).front());
+  EXPECT_GE(combine(samples, {}, options).sigma, options.resolution);
+}
+
+// Cameras read one after the other, one second apart, while the strobe is off by 167 ppm: 3.1 rows a second.
+TEST(Refer, CamerasReadOneAfterTheOtherUnderABeat) {
+  const Seconds T(1 / 23.976);
+  const SecondsPerRow row = microseconds_per_row(54);
+  const double beat = -167e-6;
+  std::vector<std::vector<PhaseSample>> rig(11);
+  for (std::size_t camera = 0; camera < rig.size(); ++camera) {
+    for (int frame = 0; frame < 8; ++frame) {
+      const double t = static_cast<double>(camera) + frame * T.value();
+      const double noise = 0.3 * random_normal(5, camera, static_cast<std::uint64_t>(frame));
+      const Seconds tau = wrap_positive(Rows(700 + noise) * row + Seconds(beat * t), T);  // all in step
+      rig[camera].push_back({TimePoint{} + Seconds(t), {PhaseState::known, tau, Rows(0.3) * row, {}}});
+    }
+  }
+  CircleOptions options{.period = T, .beat = {PartsPerMillion(-160), PartsPerMillion(20)}};
+  const CommonPhases common = refer(rig, options);
+  EXPECT_NEAR(common.beat.rate.value(), -167, 3 * common.beat.sigma.value());
+  EXPECT_LT(common.beat.sigma, PartsPerMillion(20));
+  for (const Phase& phase : common.phases) {
+    EXPECT_NEAR((phase_error(phase, common.phases.front(), T) / row).value(), 0, 3.0);
+  }
+  // Left alone, the beat would pull the first and the last apart by 30 rows.
+  options.beat = {};
+  const CommonPhases pulled = refer(rig, options);
+  EXPECT_GT(std::abs((phase_error(pulled.phases.back(), pulled.phases.front(), T) / row).value()), 25);
+}
+
+TEST(Refer, WithoutAnyDotKeepsTheBeatThatWasPromised) {
+  std::vector<std::vector<PhaseSample>> rig(2);
+  rig[0].push_back({TimePoint{5}, {PhaseState::blind, {}, {}, "no dot"}});
+  const CommonPhases common = refer(rig, {.beat = {PartsPerMillion(7), PartsPerMillion(3)}});
+  EXPECT_NEAR(common.beat.rate.value(), 7, 1e-12);
+  EXPECT_EQ(common.phases[0].state, PhaseState::blind);
+  EXPECT_EQ(common.phases[1].state, PhaseState::unusable);
+}
+
+}  // namespace
+}  // namespace emberlock

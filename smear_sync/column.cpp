@@ -8,6 +8,10 @@
 namespace emberlock::detail {
 namespace {
 
+constexpr double kQuantiserNoise =
+    1.1;  // grey levels a pixel: JPEG of quality 75 on a dot of a few grey levels
+constexpr double kQuantiserGate = 1.5;  // its errors aren't Gaussian: rare blocks keep one whole coefficient
+constexpr double kQuantiserSpread = 2.3;  // and are shared by whole blocks, so that positions scatter more
 constexpr int kLanes = 5;  // the lamp's own in the middle, two empty ones on either side to compare with
 
 /// The columns around a lamp, levelled, and what is known of them.
@@ -164,7 +168,7 @@ double lane_noise(const Column& c, double noise) {
   std::vector<float> differences;
   const int reach = std::max(1, static_cast<int>(0.6 * c.radius));
   const int centre = static_cast<int>(std::lround(c.x));
-  for (int y = 0; y + 2 < c.patch.height; ++y) {
+  for (int y = 0; y + 2 < c.patch.height; y += 2) {
     if (near_lamp(c, y, 2 * c.radius + 4)) continue;
     for (int x = std::max(0, centre - reach); x <= std::min(c.patch.width - 1, centre + reach); ++x) {
       differences.push_back(c.patch.row(y + 2)[x] - c.patch.row(y)[x]);
@@ -328,6 +332,8 @@ Column level_column(const Plane& plane, const Background& background, const Lamp
   subtract_halo(c);
   hide_bloom(c);
   c.noise = lane_noise(c, background.noise) * plane.correlation;
+  // A compressor has removed the noise and left its rounding errors, which no flat area shows.
+  if (c.flat) c.noise = std::max(c.noise, kQuantiserNoise / c.sample_level);
   return c;
 }
 
@@ -407,8 +413,9 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
   reading.hidden = static_cast<double>(std::count(c.hidden.begin(), c.hidden.end(), 1)) / c.patch.height;
   find_line(c, reading);
   if (reading.clipped) return reading;
-  const Responses found = search_lanes(c, options.min_dot_snr);
-  const double min_snr = std::max(options.min_dot_snr * found.scale, 1.25 * found.extreme);
+  const double gate = options.min_dot_snr * (c.flat ? kQuantiserGate : 1);
+  const Responses found = search_lanes(c, gate);
+  const double min_snr = std::max(gate * found.scale, 1.25 * found.extreme);
   double strongest = 0;
   const auto& list = found.candidates;
   for (std::size_t i = 0; i < list.size(); ++i) {
@@ -423,8 +430,9 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
         std::max(1.0, static_cast<double>(c.patch.row(list[i].row)[static_cast<int>(std::lround(c.x))]));
     DotFit fit = fit_dot(c.patch, window, start, c.noise);
     const Verdict verdict = judge(c, fit, window, min_snr, options);
-    fit.sigma_y *= found.scale;
-    fit.sigma_x *= found.scale;
+    const double inflation = found.scale * (c.flat ? kQuantiserSpread : 1);
+    fit.sigma_y *= inflation;
+    fit.sigma_x *= inflation;
     fit.x += c.patch.x0;
     if (verdict == Verdict::dot) reading.dots.push_back(fit);
     if (verdict == Verdict::half_field) reading.half_field = true;

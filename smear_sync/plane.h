@@ -59,7 +59,7 @@ Background measure_background(const Plane& plane);
 
 float median(std::span<float> values);  ///< reorders; 0 for none
 /// Mean of the values within 4 sigma of their median.
-double clipped_mean(std::span<float> values, double sigma);
+double clipped_mean(std::span<const float> values, double sigma);
 /// 1.4826 times the median absolute value.
 double robust_scale(std::span<float> values);
 

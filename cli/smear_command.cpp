@@ -1,0 +1,97 @@
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "session/frame_file.h"
+#include "smear_sync/detect.h"
+
+namespace emberlock::cli {
+namespace {
+
+struct SmearArguments {
+  std::vector<std::string> files;
+  bool json = false;
+};
+
+/// NaN and infinity have no JSON; rounding to a millionth keeps lines readable.
+double rounded(double v) { return std::isfinite(v) ? std::round(v * 1e6) / 1e6 : 0; }
+
+std::string json_line(const std::string& file, int frame, const SmearReading& reading) {
+  nlohmann::ordered_json line;
+  line["file"] = file;
+  line["frame"] = frame;
+  line["state"] = name(reading.state);
+  line["lamp"] = nullptr;
+  if (reading.lamp) line["lamp"] = {{"x", rounded(reading.lamp->x)}, {"y", rounded(reading.lamp->y.value())}};
+  line["dots"] = nlohmann::ordered_json::array();
+  for (const DotReading& dot : reading.dots) {
+    line["dots"].push_back({{"y", rounded(dot.y.value())},
+                            {"sigma", rounded(dot.sigma.value())},
+                            {"snr", rounded(dot.snr)},
+                            {"side", name(dot.side)}});
+  }
+  line["reason"] = reading.reason;
+  // A file name need not be UTF-8.
+  return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+}
+
+std::string text_line(const std::string& file, int frame, const SmearReading& reading) {
+  std::string line = fmt::format("{} frame {}: {}", file, frame, name(reading.state));
+  if (reading.lamp)
+    line += fmt::format(", lamp at row {:.2f}, column {:.2f}", reading.lamp->y.value(), reading.lamp->x);
+  for (const DotReading& dot : reading.dots) {
+    line += fmt::format(", dot at row {:.2f} +- {:.2f} (SNR {:.0f}, {})", dot.y.value(), dot.sigma.value(),
+                        dot.snr, name(dot.side));
+  }
+  return line + ": " + reading.reason;
+}
+
+/// Reads all frames of a file; the error that ended it unless that was its end.
+Status read_frames(const std::string& path, bool json) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<FrameFile> file, FrameFile::open(path));
+  for (int frame = 0;; ++frame) {
+    const Result<Image> image = file->next();
+    if (!image.ok()) {
+      if (image.error().kind == ErrorKind::out_of_data) return {};
+      return image.error();
+    }
+    const SmearReading reading = detect(image->view());
+    const std::string line = json ? json_line(path, frame, reading) : text_line(path, frame, reading);
+    std::fprintf(stdout, "%s\n", line.c_str());
+    std::fflush(stdout);
+  }
+}
+
+/// A broken file doesn't hide the good ones: all are read, every error is told, then the exit code says that
+/// one was.
+void run_smear(const SmearArguments& arguments) {
+  bool failed = false;
+  for (const std::string& path : arguments.files) {
+    const Status status = read_frames(path, arguments.json);
+    if (status.ok()) continue;
+    std::fprintf(stderr, "emberlock: %s\n", status.error().message().c_str());
+    failed = true;
+  }
+  if (failed) throw CLI::RuntimeError("smear: not all files could be read", 2);
+}
+
+}  // namespace
+
+void add_smear(CLI::App& app) {
+  auto* verb =
+      app.add_subcommand("smear", "Finds the lamp and its smear dots in images and videos of a strobe.");
+  auto arguments = std::make_shared<SmearArguments>();
+  verb->add_option("files", arguments->files, "images (PGM, PNG, TIFF, JPEG, FITS) or videos")->required();
+  verb->add_flag(
+      "--json", arguments->json,
+      "one JSON object a line and frame; rows and columns count from 0 at the centre of the top left pixel");
+  verb->callback([arguments] { run_smear(*arguments); });
+}
+
+}  // namespace emberlock::cli

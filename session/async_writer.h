@@ -20,7 +20,7 @@ struct AsyncWriterOptions {
 /// thread at a time; everything else may be called from any thread.
 class AsyncWriter {
  public:
-  AsyncWriter(SessionWriter writer, std::size_t camera_count, AsyncWriterOptions options = {});
+  explicit AsyncWriter(SessionWriter writer, AsyncWriterOptions options = {});
   AsyncWriter(const AsyncWriter&) = delete;
   AsyncWriter& operator=(const AsyncWriter&) = delete;
   ~AsyncWriter();  ///< without finish(): queued frames are dropped, the session stays RECORDING

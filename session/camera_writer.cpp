@@ -46,12 +46,6 @@ Result<std::unique_ptr<CameraWriter>> CameraWriter::create(const fs::path& folde
 }
 
 Status CameraWriter::write(const Frame& frame) {
-  if (!frame.image || frame.image->layout() != layout_) {
-    return Error{ErrorKind::bad_input,
-                 "the frame's size or format isn't the one that the session was created with",
-                 "camera " + camera_id_ + ", frame " + std::to_string(frame.stamp.frame_id),
-                 "Give each layout a session of its own"};
-  }
   arrivals_.add(frame.stamp.frame_id);
   Status written = failed_ ? Status(*failed_) : write_pixels(frame);
   if (!written) counts_.set_disk(counts_.disk() + 1);
@@ -59,6 +53,12 @@ Status CameraWriter::write(const Frame& frame) {
 }
 
 Status CameraWriter::write_pixels(const Frame& frame) {
+  if (!frame.image || frame.image->layout() != layout_) {
+    return Error{ErrorKind::bad_input,
+                 "the frame's size or format isn't the one that the session was created with",
+                 "camera " + camera_id_ + ", frame " + std::to_string(frame.stamp.frame_id),
+                 "Give each layout a session of its own"};
+  }
   EMBERLOCK_RETURN_IF_ERROR(make_room(frame.stamp));
   v1::Segment& segment = *segments_.rbegin();
   IndexRecord record;

@@ -13,11 +13,11 @@
 
 namespace emberlock {
 
-// <camera id>/index.bin: a header of 16 bytes, then one record of 72 bytes a frame; all numbers
+// <camera id>/index.bin: a header of 16 bytes, then one record of 68 bytes a frame; all numbers
 // little-endian.
-//   header: "EMBRIDX\0", u32 version = 1, u32 record size = 72
+//   header: "EMBRIDX\0", u32 version = 1, u32 record size = 68
 //   record: u64 frame id, i64 device ns, i64 system ns, i64 monotonic ns, u64 pixel hash, u64 file offset,
-//           u32 segment, u32 frame in segment, u32 milliseconds in segment, u32 status, u32 CRC-32 of the 68
+//           u32 segment, u32 frame in segment, u32 milliseconds in segment, u32 status, u32 CRC-32 of the 64
 //           bytes before
 // The CRC makes each record stand for itself: a torn or flipped one is left out, the others stay good.
 
@@ -25,7 +25,7 @@ struct IndexRecord {
   FrameStamp stamp;
   std::uint64_t pixel_hash = 0;
   std::uint64_t file_offset =
-      0;  ///< the segment's length when the frame was handed over: its pixels lie behind it
+      0;  ///< length of the segment as first written when the frame was handed over; a hint
   std::uint32_t segment = 0;
   std::uint32_t frame_in_segment = 0;
   std::uint32_t segment_ms =
@@ -34,7 +34,7 @@ struct IndexRecord {
 };
 
 inline constexpr std::size_t kIndexHeaderBytes = 16;
-inline constexpr std::size_t kIndexRecordBytes = 72;
+inline constexpr std::size_t kIndexRecordBytes = 68;
 
 std::string encode_index_header();
 std::array<char, kIndexRecordBytes> encode(const IndexRecord& record);

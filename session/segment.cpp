@@ -19,6 +19,7 @@ namespace {
 constexpr AVRational kMilliseconds{1, 1000};
 constexpr int kClusterMilliseconds = 250;
 constexpr int kClusterBytes = 4 << 20;
+constexpr int kSmallestSliced = 16;
 
 AVRational as_rational(Hertz rate) {
   return rate.value() > 0 ? av_d2q(rate.value(), 1'000'000) : AVRational{25, 1};
@@ -59,6 +60,8 @@ Status SegmentWriter::open(const std::filesystem::path& path, Encoding encoding,
   c.flags |= AV_CODEC_FLAG_BITEXACT;
   if (encoding == Encoding::ffv1) {
     c.level = 3;
+    // libav's default of at least four slices corrupts images of a few pixels.
+    if (c.width < kSmallestSliced || c.height < kSmallestSliced) c.slices = 1;
     c.color_range = AVCOL_RANGE_JPEG;
     av_opt_set_int(c.priv_data, "slicecrc", 1, 0);
   } else {
@@ -118,6 +121,7 @@ Status SegmentWriter::drain() {
     if (code < 0) return failure(code, "cannot encode");
     packet_->stream_index = 0;
     packet_->flags |= AV_PKT_FLAG_KEY;
+    av_packet_rescale_ts(packet_.get(), kMilliseconds, format_->streams[0]->time_base);
     code = av_write_frame(format_.get(), packet_.get());
     av_packet_unref(packet_.get());
     if (code >= 0) code = file_->io()->error;

@@ -1,6 +1,8 @@
 #include "session/segment_pixels.h"
 
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 
 namespace emberlock {
@@ -16,41 +18,66 @@ AVPixelFormat coded_format(const ImageLayout& layout, Encoding encoding) {
     case PixelFormat::rgb8:
       return encoding == Encoding::ffv1 ? AV_PIX_FMT_BGR0 : AV_PIX_FMT_RGB24;
     case PixelFormat::rgb16:
-      return AV_PIX_FMT_RGB48LE;
+      return encoding == Encoding::ffv1 ? AV_PIX_FMT_GBRP16LE : AV_PIX_FMT_RGB48LE;
   }
   return AV_PIX_FMT_NONE;
 }
 
+namespace {
+
+// Where libav's GBRP keeps red, green and blue.
+constexpr std::array<std::size_t, 3> kPlaneOf{2, 0, 1};
+
+std::uint8_t* row(const AVFrame& frame, std::size_t plane, int y) {
+  return frame.data[plane] + std::ptrdiff_t{y} * frame.linesize[plane];
+}
+
+}  // namespace
+
 void to_av(const Image& image, AVFrame& frame) {
   const ImageView view = image.view();
+  const int width = view.width();
   for (int y = 0; y < view.height(); ++y) {
-    const auto* in = view.row_as<std::uint8_t>(y);
-    std::uint8_t* out = frame.data[0] + std::ptrdiff_t{y} * frame.linesize[0];
-    if (frame.format != AV_PIX_FMT_BGR0) {
-      std::memcpy(out, in, view.layout.row_bytes());
-      continue;
-    }
-    for (int x = 0; x < view.width(); ++x, in += 3, out += 4) {
-      out[0] = in[2];
-      out[1] = in[1];
-      out[2] = in[0];
-      out[3] = 0;
+    if (frame.format == AV_PIX_FMT_BGR0) {
+      const auto* in = view.row_as<std::uint8_t>(y);
+      std::uint8_t* out = row(frame, 0, y);
+      for (int x = 0; x < width; ++x, in += 3, out += 4) {
+        out[0] = in[2];
+        out[1] = in[1];
+        out[2] = in[0];
+        out[3] = 0;
+      }
+    } else if (frame.format == AV_PIX_FMT_GBRP16LE) {
+      const auto* in = view.row_as<std::uint16_t>(y);
+      for (std::size_t c = 0; c < kPlaneOf.size(); ++c) {
+        auto* out = reinterpret_cast<std::uint16_t*>(row(frame, kPlaneOf[c], y));
+        for (int x = 0; x < width; ++x) out[x] = in[static_cast<std::size_t>(x) * 3 + c];
+      }
+    } else {
+      std::memcpy(row(frame, 0, y), view.row(y), view.layout.row_bytes());
     }
   }
 }
 
 void from_av(const AVFrame& frame, Image& image) {
+  const int width = frame.width;
   for (int y = 0; y < frame.height; ++y) {
-    const std::uint8_t* in = frame.data[0] + std::ptrdiff_t{y} * frame.linesize[0];
-    auto* out = image.row_as<std::uint8_t>(y);
-    if (frame.format != AV_PIX_FMT_BGR0) {
-      std::memcpy(out, in, image.layout().row_bytes());
-      continue;
-    }
-    for (int x = 0; x < frame.width; ++x, in += 4, out += 3) {
-      out[0] = in[2];
-      out[1] = in[1];
-      out[2] = in[0];
+    if (frame.format == AV_PIX_FMT_BGR0) {
+      const std::uint8_t* in = row(frame, 0, y);
+      auto* out = image.row_as<std::uint8_t>(y);
+      for (int x = 0; x < width; ++x, in += 4, out += 3) {
+        out[0] = in[2];
+        out[1] = in[1];
+        out[2] = in[0];
+      }
+    } else if (frame.format == AV_PIX_FMT_GBRP16LE) {
+      auto* out = image.row_as<std::uint16_t>(y);
+      for (std::size_t c = 0; c < kPlaneOf.size(); ++c) {
+        const auto* in = reinterpret_cast<const std::uint16_t*>(row(frame, kPlaneOf[c], y));
+        for (int x = 0; x < width; ++x) out[static_cast<std::size_t>(x) * 3 + c] = in[x];
+      }
+    } else {
+      std::memcpy(image.row_as<std::byte>(y), row(frame, 0, y), image.layout().row_bytes());
     }
   }
 }

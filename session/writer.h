@@ -68,10 +68,12 @@ class SessionWriter {
   SessionWriter& operator=(SessionWriter&&) noexcept;
   ~SessionWriter();
 
+  [[nodiscard]] std::size_t camera_count() const { return cameras_.size(); }
+
   /// Appends a frame of camera `camera` (its place in the manifest). Frame ids rise; one that doesn't says
-  /// that the camera counts anew. Errors: bad_input (other layout than the manifest's), io (the frame counts
-  /// as lost to the disk; below the floor of free space the next frame may succeed, after a failed write none
-  /// of this camera will).
+  /// that the camera counts anew. Errors: bad_input (other layout than the manifest's), io. A frame not
+  /// written counts as lost to the disk. Below the floor of free space a later frame may succeed; after a
+  /// failed write none of the camera will.
   Status write(std::size_t camera, const Frame& frame);
   /// Counts frames that will never be written. For `transport` and `underrun`, `frames` of the ids that never
   /// arrived were lost by the driver rather than by the camera; for `queue` and `disk` they arrived and were

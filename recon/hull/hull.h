@@ -1,23 +1,14 @@
 #pragma once
 
-#include <cstdint>
 #include <vector>
 
 #include "base/result.h"
 #include "recon/compute/device.h"
-#include "recon/kernels/grid.h"
+#include "recon/hull/medium.h"
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock {
-
-/// The voxels that can hold the medium. Voxel (i, j, k) lies between key points (i, j, k) and (i + 1, j + 1,
-/// k + 1) and is stored at i + (nx - 1) * (j + (ny - 1) * k).
-struct Hull {
-  Grid grid;
-  std::vector<std::uint8_t> inside;  ///< 1 or 0; (nx - 1) * (ny - 1) * (nz - 1) values
-  std::size_t count = 0;             ///< voxels inside
-};
 
 /// A grid of cubic voxels over a box, `voxels` (>= 1) along its longest side; the shorter sides are rounded
 /// up to whole voxels, centred on the box.

@@ -5,6 +5,8 @@
 
 #include <Eigen/LU>
 
+#include "recon/calibrate/camera_model.h"
+#include "recon/hull/hull.h"
 #include "recon/kernels/clip.h"
 
 namespace emberlock {
@@ -67,7 +69,7 @@ class RowClipper {
     const Eigen::Matrix3d world_from_camera = camera.camera_from_world.rotation.transpose();
     const bool straight = k.distortion.none();
     for (int x = row.x0; x < row.x1; ++x) {
-      const int subset = options_.subset_of ? options_.subset_of(x, row.y) : 0;
+      const int subset = options_.subset_of ? options_.subset_of(row.view, x, row.y) : 0;
       if (subset < 0) continue;
       const Eigen::Vector2d centre(x + 0.5, row.y + 0.5);
       const Eigen::Vector3d d = straight

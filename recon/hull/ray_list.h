@@ -4,12 +4,13 @@
 #include <functional>
 #include <vector>
 
-#include "recon/calibrate/camera_model.h"
 #include "recon/compute/pool.h"
-#include "recon/hull/hull.h"
+#include "recon/hull/medium.h"
 #include "recon/kernels/march.h"
 
 namespace emberlock {
+
+struct CameraModel;
 
 /// The part of a hull's grid that holds all of it: its own grid, and where that starts in the whole one.
 struct CroppedHull {
@@ -40,7 +41,7 @@ struct RayListOptions {
   float step = 1;  ///< the longest step, voxel edges
   int subsets = 1;
   /// The subset of a pixel, or -1 to leave it out; all in subset 0 where empty.
-  std::function<int(int x, int y)> subset_of;
+  std::function<int(std::size_t view, int x, int y)> subset_of;
 };
 
 RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& medium,

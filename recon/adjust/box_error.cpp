@@ -1,0 +1,50 @@
+#include "recon/adjust/box_error.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace emberlock {
+
+ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
+                               const Problem& problem)
+    : weight_(problem.list.rays.size()) {
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const RadianceImage& image = views[v]->image;
+    for (int y = boxes[v].y0; y < boxes[v].y1; ++y)
+      for (int x = boxes[v].x0; x < boxes[v].x1; ++x)
+        for (std::size_t c = 0; c < 3; ++c) {
+          const double b = static_cast<double>(
+              image.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
+                             static_cast<std::size_t>(x)) +
+                        c]);
+          const double pixels = static_cast<double>(boxes[v].x1 - boxes[v].x0) * (boxes[v].y1 - boxes[v].y0);
+          unreached_[c] += b * b / (pixels * static_cast<double>(views.size()));
+        }
+  }
+  for (std::size_t r = 0; r < weight_.size(); ++r) {
+    const std::size_t v = problem.list.rays[r].view;
+    const PixelBox& box = boxes[v];
+    const int width = views[v]->image.size.width;
+    const int x = static_cast<int>(problem.list.pixels[r]) % width;
+    const int y = static_cast<int>(problem.list.pixels[r]) / width;
+    if (x < box.x0 || x >= box.x1 || y < box.y0 || y >= box.y1) continue;
+    const double pixels = static_cast<double>(box.x1 - box.x0) * (box.y1 - box.y0);
+    weight_[r] = static_cast<float>(1 / (pixels * static_cast<double>(views.size())));
+    const float* rgb = &views[v]->image.rgb[3 * static_cast<std::size_t>(problem.list.pixels[r])];
+    for (std::size_t c = 0; c < 3; ++c)
+      unreached_[c] -=
+          static_cast<double>(weight_[r]) * static_cast<double>(rgb[c]) * static_cast<double>(rgb[c]);
+  }
+}
+
+std::array<double, 3> ErrorOverBoxes::operator()(const std::vector<Rgba>& residual) const {
+  std::array<double, 3> sum = unreached_;
+  for (std::size_t r = 0; r < weight_.size(); ++r)
+    for (std::size_t c = 0; c < 3; ++c)
+      sum[c] += static_cast<double>(weight_[r]) * static_cast<double>(residual[r].c[c]) *
+                static_cast<double>(residual[r].c[c]);
+  for (double& s : sum) s = std::sqrt(std::max(0.0, s));
+  return sum;
+}
+
+}  // namespace emberlock

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "recon/adjust/problem.h"
+#include "recon/preprocess/flame_mask.h"
+
+namespace emberlock {
+
+/// Mean squared error over each view's box, from the residuals of a problem that holds all pixels of the
+/// views.
+class ErrorOverBoxes {
+ public:
+  ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
+                 const Problem& problem);
+  /// RMSE for R, G, B: the mean square over each view's box, then over the views.
+  [[nodiscard]] std::array<double, 3> operator()(const std::vector<Rgba>& residual) const;
+
+ private:
+  std::vector<float> weight_;             // of each ray: 1 / (pixels of its box * views), 0 outside
+  std::array<double, 3> unreached_ = {};  // what pixels that no ray reaches add: they stay black
+};
+
+}  // namespace emberlock

@@ -1,0 +1,86 @@
+#include "recon/adjust/solver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "recon/adjust/tracker.h"
+
+namespace emberlock {
+namespace {
+
+Status check(const Scene& scene, const Grid& grid, const Effects& effects, const SolveOptions& options,
+             const Elapsed& elapsed) {
+  EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
+  const auto refuse = [](const char* what, const char* where, const char* remedy) {
+    return Error{ErrorKind::bad_input, what, where, remedy};
+  };
+  if (grid.nx < 2 || grid.ny < 2 || grid.nz < 2 || !(grid.edge > 0) || !std::isfinite(grid.edge))
+    return refuse("the grid has no voxel", "voxels", "Give at least one voxel along each side");
+  if (!std::isfinite(effects.extinction.value()) || effects.extinction.value() < 0)
+    return refuse("the extinction is not a finite number >= 0", "effects", "Give extinction in 1/m");
+  if (options.iterations < 0)
+    return refuse("a negative number of iterations", "iterations",
+                  "Give 1 or more, or 0 for the solver's rule");
+  if (options.compute.threads < 0 || options.compute.threads > 256)
+    return refuse("the number of threads is out of range", "threads", "Give 1..256, or 0 for every core");
+  if (options.budget && !elapsed)
+    return refuse("a budget without a clock", "budget", "Pass `elapsed` to solve()");
+  if (options.budget && !(options.budget->value() > 0))
+    return refuse("the budget is not positive", "budget", "Give seconds > 0");
+  if (options.target_rmse && std::none_of(scene.views.begin(), scene.views.end(),
+                                          [](const View& v) { return v.role == ViewRole::held_out; }))
+    return refuse("a target error without a held-out view", "target-rmse",
+                  "Hold a view out, or leave the target away");
+  return {};
+}
+
+}  // namespace
+
+Result<Solver> parse_solver(std::string_view name) {
+  if (name == "default") return Solver::standard;
+  if (name == "paper") return Solver::paper;
+  return Error{ErrorKind::bad_input, "unknown solver '" + std::string(name) + "'", "solver",
+               "Use default or paper"};
+}
+
+Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects& effects,
+                             const SolveOptions& options, const Elapsed& elapsed,
+                             const std::function<void(const Preview&)>& preview) {
+  EMBERLOCK_RETURN_IF_ERROR(check(scene, grid, effects, options, elapsed));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
+  const auto now = [&] { return elapsed ? elapsed() : Seconds(0); };
+  const Seconds start = now();
+
+  const bool paper = options.solver == Solver::paper;
+  const std::vector<FlameMask> own =
+      flame_masks(scene);  // errors are counted over these boxes, whatever the threshold
+  std::optional<double> threshold = options.flame_threshold;
+  if (paper && !threshold) threshold = kPaperFlameThreshold;
+  const std::vector<FlameMask> chosen = threshold ? flame_masks(scene, threshold) : own;
+  Reconstruction result;
+  result.effects = effects;
+  EMBERLOCK_ASSIGN_OR_RETURN(result.hull, carve(scene, chosen, grid, options.compute));
+  result.hull_time = now() - start;
+
+  Pool pool(options.compute.threads);
+  SolverSetup setup{{}, {}, result.hull, effects, options, device, pool};
+  std::vector<const View*> held_out;
+  std::vector<PixelBox> held_out_boxes;
+  for (std::size_t v = 0; v < scene.views.size(); ++v) {
+    const bool input = scene.views[v].role == ViewRole::input;
+    (input ? setup.views : held_out).push_back(&scene.views[v]);
+    const ImageSize size = scene.views[v].image.size;
+    (input ? setup.boxes : held_out_boxes)
+        .push_back(own[v].box.empty() ? PixelBox{0, 0, size.width, size.height} : own[v].box);
+  }
+  Tracker tracker(setup, held_out, held_out_boxes, elapsed, preview);
+  const double longest = static_cast<double>(grid.edge) * (std::max({grid.nx, grid.ny, grid.nz}) - 1);
+  const Solution solution = paper ? solve_paper(setup, longest, tracker) : solve_standard(setup, tracker);
+  result.volume = to_volume(solution.x, solution.problem, result.hull, effects);
+  result.iterations = solution.iterations;
+  result.solve_time = tracker.time() - start - result.hull_time;
+  result.trace = tracker.take_trace();
+  return result;
+}
+
+}  // namespace emberlock

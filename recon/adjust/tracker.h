@@ -1,0 +1,72 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "recon/adjust/box_error.h"
+#include "recon/adjust/engine.h"
+#include "recon/adjust/problem.h"
+#include "recon/adjust/solver.h"
+
+namespace emberlock {
+
+/// What the solvers share: the scene's input views, the hull, the device, and the scale of extinction.
+struct SolverSetup {
+  std::vector<const View*> views;  ///< input views
+  std::vector<PixelBox> boxes;     ///< flame boxes of these, for errors
+  const Hull& hull;
+  Effects effects;
+  const SolveOptions& options;
+  Device device;
+  Pool& pool;
+
+  /// Extinction a voxel edge.
+  [[nodiscard]] float sigma(const Grid& grid) const {
+    return static_cast<float>(effects.extinction.value() * static_cast<double>(grid.edge));
+  }
+};
+
+/// Keeps the trace, evaluates the held-out views off the clock, and says when to stop.
+class Tracker {
+ public:
+  Tracker(const SolverSetup& setup, const std::vector<const View*>& held_out,
+          const std::vector<PixelBox>& boxes, const Elapsed& elapsed,
+          const std::function<void(const Preview&)>& preview);
+
+  /// Adds a point to the trace; true when the budget is spent or the target reached.
+  bool record(int iteration, const std::array<double, 3>& input_rmse, const Engine& engine,
+              const Problem& problem);
+  [[nodiscard]] bool out_of_time() const;
+  /// Time since the beginning without the held-out evaluations.
+  [[nodiscard]] Seconds time() const;
+  [[nodiscard]] std::vector<TracePoint> take_trace() { return std::move(trace_); }
+
+ private:
+  [[nodiscard]] Seconds now() const { return elapsed_ ? elapsed_() : Seconds(0); }
+
+  const SolverSetup& setup_;
+  const Elapsed& elapsed_;
+  const std::function<void(const Preview&)>& preview_;
+  std::unique_ptr<const Problem> held_out_;
+  std::unique_ptr<Engine> engine_;
+  std::unique_ptr<const ErrorOverBoxes> error_;
+  Seconds excluded_{0};
+  std::vector<TracePoint> trace_;
+};
+
+/// The volume on the whole grid from a problem's solution (emission a voxel edge at the cropped grid's key
+/// points).
+Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull& hull,
+                 const Effects& effects);
+
+/// Returns the last x through `x` and its problem; iterations done at full resolution.
+struct Solution {
+  std::vector<Rgba> x;
+  Problem problem;
+  int iterations = 0;
+};
+Solution solve_standard(const SolverSetup& setup, Tracker& tracker);
+Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker);
+
+}  // namespace emberlock

@@ -60,11 +60,11 @@ Result<ImageLayout> layout_of(const v1::CameraStream& stream) {
                  std::to_string(value) + " is outside " + std::to_string(low) + ".." + std::to_string(high),
                  "camera " + stream.camera_id() + ", field " + field, "Mend the manifest"};
   };
-  if (stream.width() < 1 || stream.width() > kMaxImageSide) {
-    return out_of_range("width", stream.width(), 1, kMaxImageSide);
+  if (stream.width() < kMinRecordedSide || stream.width() > kMaxImageSide) {
+    return out_of_range("width", stream.width(), kMinRecordedSide, kMaxImageSide);
   }
-  if (stream.height() < 1 || stream.height() > kMaxImageSide) {
-    return out_of_range("height", stream.height(), 1, kMaxImageSide);
+  if (stream.height() < kMinRecordedSide || stream.height() > kMaxImageSide) {
+    return out_of_range("height", stream.height(), kMinRecordedSide, kMaxImageSide);
   }
   const bool wide = bytes_per_sample(format) == 2;
   const int low = wide ? 9 : 8;

@@ -8,6 +8,8 @@ namespace emberlock {
 
 /// The largest image side that files may have; larger ones are refused before memory is asked for.
 inline constexpr int kMaxImageSide = 16384;
+/// The smallest side that can be recorded: FFV1 (libav 59) doesn't keep single rows or columns.
+inline constexpr int kMinRecordedSide = 2;
 
 /// Writes size, format and bit depth of `layout` into the stream's fields.
 void set_layout(v1::CameraStream& stream, const ImageLayout& layout);

@@ -23,7 +23,7 @@ using test::TempFolder;
 
 std::vector<ImageLayout> every_layout() {
   std::vector<ImageLayout> layouts;
-  for (const ImageSize size : {ImageSize{33, 17}, ImageSize{64, 48}, ImageSize{1, 1}, ImageSize{3, 200}}) {
+  for (const ImageSize size : {ImageSize{33, 17}, ImageSize{64, 48}, ImageSize{2, 2}, ImageSize{15, 200}}) {
     layouts.push_back({size, PixelFormat::gray8, 8});
     layouts.push_back({size, PixelFormat::bayer_rggb8, 8});
     layouts.push_back({size, PixelFormat::rgb8, 8});
@@ -229,6 +229,15 @@ TEST(Recording, IntoAFolderThatHoldsSomethingIsRefused) {
   ASSERT_FALSE(writer);
   EXPECT_EQ(writer.error().kind, ErrorKind::bad_input);
   EXPECT_EQ(test::bytes_of(temp / "s" / "thesis.tex"), "years of work");
+}
+
+TEST(Recording, ASingleRowOfPixelsIsRefusedBeforeAnythingIsCreated) {
+  const TempFolder temp;
+  const auto writer = SessionWriter::create(temp / "s", manifest_of({{{64, 1}, PixelFormat::gray8, 8}}),
+                                            small_disk_options());
+  ASSERT_FALSE(writer);
+  EXPECT_NE(writer.error().message().find("height"), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(temp / "s"));
 }
 
 TEST(Recording, CameraIdsThatCannotNameAFolderAreRefused) {

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "base/result.h"
+#include "drivers/camera.h"
+#include "drivers/strobe.h"
+#include "emberlock/v1/session.pb.h"
+
+// How devices are written into a session, and read back from it.
+namespace emberlock {
+
+/// The manifest's entry of a camera, ready for SessionWriter::create.
+v1::CameraStream to_proto(const CameraInfo& info);
+/// Errors: bad_input where the layout is unusable.
+Result<CameraInfo> camera_info(const v1::CameraStream& stream);
+
+/// To be appended after each Strobe::apply, with what read_back says.
+v1::Event strobe_event(TimePoint now, const StrobeSettings& read_back);
+/// To be appended after each Camera::reset_shutter that succeeded.
+v1::Event reset_event(TimePoint now, const std::string& camera_id, TimePoint at);
+
+/// Errors: bad_input where a number isn't finite or the output unknown.
+Result<StrobeSettings> strobe_settings(const v1::StrobeState& state);
+
+}  // namespace emberlock

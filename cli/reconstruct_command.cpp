@@ -160,8 +160,11 @@ void add_reconstruct(CLI::App& app) {
           "--threshold", a.threshold,
           "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
       ->check(CLI::Range(0.0, 255.0));
-  verb->add_option("--frame", a.frame, "Of a session: the frame of its first camera [the middle one]");
-  verb->add_option("--seed", a.seed, "Of the random numbers in the paper's solver")->capture_default_str();
+  verb->add_option("--frame", a.frame, "Of a session: the frame of its first camera [the middle one]")
+      ->check(CLI::NonNegativeNumber);
+  verb->add_option("--seed", a.seed, "Of the random numbers in the paper's solver")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   verb->callback([arguments] { reconstruct_command(*arguments); });
 }
 

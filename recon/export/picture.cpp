@@ -15,6 +15,9 @@ Status write_png(const ImageView& image, const std::filesystem::path& path) {
     return Error{ErrorKind::bad_input, "cannot write " + std::string(name(image.layout.format)) + " as PNG",
                  path.string(), "Convert it to gray8 or rgb8"};
   }
+  if (image.width() < 1 || image.height() < 1) {
+    return Error{ErrorKind::bad_input, "the picture is empty", path.string(), "Give at least one pixel"};
+  }
   const bool colour = image.layout.format == PixelFormat::rgb8;
   // OpenCV takes the pixels as writable, imencode only reads them.
   const cv::Mat view(image.height(), image.width(), colour ? CV_8UC3 : CV_8UC1,

@@ -2,6 +2,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>

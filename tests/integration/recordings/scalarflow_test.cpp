@@ -1,0 +1,105 @@
+// One frame of real smoke in five calibrated views (ScalarFlow, Eckert, Um, Thuerey 2019).
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+
+#include <gtest/gtest.h>
+
+#include "recon/hull/hull.h"
+#include "recon/pipeline/reconstruct.h"
+#include "recon/pipeline/scene.h"
+#include "recon/preprocess/flame_mask.h"
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr int kVoxels = 78;  // along the longest edge: 44 x 78 x 44
+constexpr double kThreshold = 15;
+
+fs::path transforms() {
+  const char* data = std::getenv("EMBERLOCK_DATA");
+  const fs::path root =
+      data != nullptr ? fs::path(data) : fs::path(EMBERLOCK_SOURCE_DIR) / ".." / "shared" / "data";
+  return root / "scalarflow" / "transforms.json";
+}
+
+class ScalarFlowTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!fs::exists(transforms())) GTEST_SKIP() << "no recording at " << transforms();
+    auto scene = load_scene(transforms());
+    ASSERT_TRUE(scene.ok()) << scene.error().message();
+    scene_ = std::move(scene).value();
+  }
+  [[nodiscard]] Report without_view(std::size_t held_out, Solver solver) const {
+    Scene scene = scene_;
+    scene.views[held_out].role = ViewRole::held_out;
+    ReconstructOptions options;
+    options.voxels = kVoxels;
+    options.solve.solver = solver;
+    options.solve.flame_threshold = kThreshold;
+    options.solve.compute.device = Device::cpu;
+    SteadyClock clock;
+    const auto outcome = reconstruct(scene, options, clock);
+    EXPECT_TRUE(outcome.ok()) << outcome.error().message();
+    return outcome.ok() ? outcome->report : Report{};
+  }
+  Scene scene_;
+};
+
+/// Whether every view sees a flame pixel where the point lies.
+bool shines_in_all(const Scene& scene, const std::vector<FlameMask>& masks, const Eigen::Vector3d& point) {
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    const Eigen::Vector2d pixel = scene.views[i].camera.project(point);
+    const int x = static_cast<int>(std::floor(pixel.x()));
+    const int y = static_cast<int>(std::floor(pixel.y()));
+    const bool seen = x >= 0 && y >= 0 && x < masks[i].size.width && y < masks[i].size.height;
+    if (!seen || !masks[i].at(x, y)) return false;
+  }
+  return true;
+}
+
+TEST_F(ScalarFlowTest, TheCellsThatShineInAllViewsAreAsManyAsTheDataStates) {
+  // 44 x 78 x 44 cells judged at their centres fill 7854: cameras, box and pictures are read as they were
+  // meant.
+  const auto masks = flame_masks(scene_, kThreshold);
+  const Eigen::Array3d cells(44, 78, 44);
+  const Eigen::Array3d edge = scene_.box.size.array() / cells;
+  const Eigen::Array3d low = scene_.box.center.array() - 0.5 * scene_.box.size.array();
+  int filled = 0;
+  for (int k = 0; k < 44; ++k) {
+    for (int j = 0; j < 78; ++j) {
+      for (int i = 0; i < 44; ++i) {
+        const Eigen::Vector3d centre = low + (Eigen::Array3d(i, j, k) + 0.5) * edge;
+        filled += shines_in_all(scene_, masks, centre) ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_NEAR(filled, 7854, 0.02 * 7854);
+}
+
+TEST_F(ScalarFlowTest, TheHullHoldsEveryVoxelThatShinesInAllViews) {
+  const auto masks = flame_masks(scene_, kThreshold);
+  const Grid grid = grid_over(scene_.box, kVoxels);
+  const auto hull = carve(scene_, masks, grid, {.device = Device::cpu});
+  ASSERT_TRUE(hull.ok()) << hull.error().message();
+  std::size_t lost = 0;
+  for (int k = 0; k + 1 < grid.nz; ++k) {
+    for (int j = 0; j + 1 < grid.ny; ++j) {
+      for (int i = 0; i + 1 < grid.nx; ++i) {
+        const Eigen::Array3d at = Eigen::Array3d(i, j, k) + 0.5;
+        const Eigen::Vector3d centre = Eigen::Array3d(grid.origin[0], grid.origin[1], grid.origin[2]) +
+                                       static_cast<double>(grid.edge) * at;
+        const auto voxel = static_cast<std::size_t>(i + (grid.nx - 1) * (j + (grid.ny - 1) * k));
+        if (hull->inside[voxel] == 0 && shines_in_all(scene_, masks, centre)) ++lost;
+      }
+    }
+  }
+  EXPECT_EQ(lost, 0U);
+  // Whole voxels reach half a voxel beyond the centres: 12163 of them.
+  EXPECT_NEAR(static_cast<double>(hull->count), 12163, 0.02 * 12163);
+}
+
+}  // namespace
+}  // namespace emberlock

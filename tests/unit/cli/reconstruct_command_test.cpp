@@ -1,0 +1,216 @@
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "cli/commands.h"
+#include "recon/calibrate/pose.h"
+#include "recon/export/picture.h"
+
+namespace emberlock::cli {
+namespace {
+namespace fs = std::filesystem;
+using nlohmann::json;
+using testing::HasSubstr;
+
+/// A ball of light, Gaussian with sigma 2 cm, filmed by five cameras of 64 x 48 pixels.
+class ReconstructCommandTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = fs::temp_directory_path() / ("emberlock_reconstruct_test." + std::to_string(::getpid()));
+    fs::create_directories(root_);
+    document_ = {
+        {"fl_x", 80}, {"box", {{"center", {0, 0, 0}}, {"size", {0.2, 0.2, 0.2}}}}, {"frames", json::array()}};
+    for (int i = 0; i < 5; ++i) add_view(i);
+    save();
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  void add_view(int i) {
+    const Eigen::Vector3d centre(0.5 * std::cos(1.3 * i), 0.5 * std::sin(1.3 * i), 0.1 * (i - 2));
+    const CameraModel camera = look_at({{64, 48}, 80, 80, 32, 24, {}}, centre, {0, 0, 0});
+    Image picture(ImageLayout{{64, 48}, PixelFormat::rgb8, 8});
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 64; ++x) {
+        const Ray ray = camera.ray({x + 0.5, y + 0.5});
+        const double distance = ray.origin.cross(ray.direction).norm();
+        const double light = 220 * std::exp(-distance * distance / (2 * 0.02 * 0.02));
+        for (int c = 0; c < 3; ++c)
+          picture.row_as<std::uint8_t>(y)[3 * x + c] = static_cast<std::uint8_t>(light / (c + 1));
+      }
+    }
+    const std::string name = "view" + std::to_string(i) + ".png";
+    ASSERT_TRUE(write_png(picture.view(), root_ / name).ok());
+    const Eigen::Matrix4d m = opengl_world_from_camera(camera.camera_from_world);
+    json matrix = json::array();
+    for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
+    document_["frames"].push_back({{"file_path", name}, {"transform_matrix", matrix}});
+  }
+  void save() const { std::ofstream(root_ / "transforms.json") << document_.dump(); }
+
+  struct Run {
+    int exit_code = 0;
+    std::string out;
+    std::string err;
+  };
+  /// `emberlock reconstruct <root>/transforms.json --out <root>/out WORDS...`, as main() runs it.
+  [[nodiscard]] Run run(std::vector<std::string> words, const std::string& input = "transforms.json") const {
+    words.insert(words.begin(), {"reconstruct", (root_ / input).string(), "--out", (root_ / "out").string()});
+    std::reverse(words.begin(), words.end());  // CLI11 takes them last first
+    CLI::App app{"", "emberlock"};
+    add_reconstruct(app);
+    Run result;
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    try {
+      app.parse(words);
+    } catch (const CLI::RuntimeError& e) {
+      result.exit_code = e.get_exit_code();
+    } catch (const CLI::ParseError& e) {
+      result.exit_code = 2;
+      result.err = e.what();
+    }
+    result.out = testing::internal::GetCapturedStdout();
+    result.err += testing::internal::GetCapturedStderr();
+    return result;
+  }
+  [[nodiscard]] json report() const {
+    std::ifstream in(root_ / "out" / "report.json");
+    return json::parse(in);
+  }
+  /// Refused with exit code 2, a message with `words`, and nothing new on disk.
+  void expect_refused(const Run& result, const std::string& words) const {
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(words));
+    for (const auto& entry : fs::directory_iterator(root_)) {
+      const std::string name = entry.path().filename();
+      EXPECT_TRUE(name == "transforms.json" || name.ends_with(".png")) << name << " was left behind";
+    }
+  }
+  fs::path root_;
+  json document_;
+};
+
+TEST_F(ReconstructCommandTest, WritesVolumeViewsAndReport) {
+  const Run result = run({"--voxels", "16", "--hold-out", "1,3", "--device", "cpu", "--effects", "none"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(fs::exists(root_ / "out" / "volume.vdb"));
+  for (int i = 0; i < 5; ++i)
+    EXPECT_TRUE(fs::exists(root_ / "out" / "views" / ("000" + std::to_string(i) + ".png")));
+  const json r = report();
+  EXPECT_EQ(r["voxels"], (json{16, 16, 16}));
+  EXPECT_EQ(r["views"][1]["role"], "held_out");
+  EXPECT_EQ(r["views"][2]["role"], "input");
+  EXPECT_LT(r["heldout_rmse"][0], 15.0);
+  EXPECT_EQ(r["solver"], "default");
+  EXPECT_GT(r["seconds"]["total"], 0.0);
+  EXPECT_GT(r["iterations"], 0);
+  EXPECT_EQ(r["device"], "cpu");
+  EXPECT_LT(result.out.find("held-out error"), result.out.find("input error"))
+      << "the error that counts comes first";
+  EXPECT_THAT(result.out, HasSubstr("only 3 input views"));
+}
+
+TEST_F(ReconstructCommandTest, WithNothingHeldOutItSaysThatTheInputErrorProvesNothing) {
+  const Run result = run({"--voxels", "8", "--device", "cpu", "--effects", "none"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("the input error proves nothing"));
+  EXPECT_TRUE(report()["heldout_rmse"].is_null());
+}
+
+TEST_F(ReconstructCommandTest, AnEarlierResultIsReplaced) {
+  ASSERT_EQ(run({"--voxels", "8", "--device", "cpu", "--effects", "none"}).exit_code, 0);
+  ASSERT_EQ(run({"--voxels", "9", "--device", "cpu", "--effects", "none"}).exit_code, 0);
+  EXPECT_EQ(report()["voxels"][0], 9);
+}
+
+TEST_F(ReconstructCommandTest, TheBoxOfTheCommandLineCounts) {
+  const Run result =
+      run({"--box", "0,0,-0.01,0.2,0.1,0.1", "--voxels", "20", "--device", "cpu", "--effects", "none"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(report()["voxels"], (json{20, 10, 10}));
+  EXPECT_EQ(report()["box"]["center"][2], -0.01);
+}
+
+TEST_F(ReconstructCommandTest, UnknownNamesAreAnsweredWithTheValidOnes) {
+  expect_refused(run({"--solver", "magic"}), "paper");
+  expect_refused(run({"--effects", "smoke"}), "extinction");
+  expect_refused(run({"--device", "tpu"}), "cuda");
+  expect_refused(run({"--polish"}), "--polish");
+}
+
+TEST_F(ReconstructCommandTest, NumbersOutOfRangeAreRefused) {
+  expect_refused(run({"--voxels", "0"}), "--voxels");
+  expect_refused(run({"--voxels", "many"}), "--voxels");
+  expect_refused(run({"--threads", "-1"}), "--threads");
+  expect_refused(run({"--budget", "0"}), "--budget");
+  expect_refused(run({"--target-rmse", "-3", "--hold-out", "0"}), "--target-rmse");
+  expect_refused(run({"--threshold", "256"}), "--threshold");
+  expect_refused(run({"--seed", "-1"}), "--seed");
+}
+
+TEST_F(ReconstructCommandTest, ABoxThatIsNoneIsRefused) {
+  for (const char* box :
+       {"0,0,0,1,1", "0,0,0,1,1,1,1", "0,0,0,1,1,", "0,0,0,1,1,x", "0,0,0,1,1,nan", "0,0,0,1,-1,1", ","}) {
+    expect_refused(run({"--box", box}), "--box");
+  }
+}
+
+TEST_F(ReconstructCommandTest, HoldOutOutOfRangeOrEverythingIsRefused) {
+  expect_refused(run({"--hold-out", "5"}), "0 to 4");
+  expect_refused(run({"--hold-out", "0,1,2,3,4"}), "every view");
+}
+
+TEST_F(ReconstructCommandTest, ATargetNeedsAHeldOutView) {
+  expect_refused(run({"--target-rmse", "3"}), "--hold-out");
+}
+
+TEST_F(ReconstructCommandTest, AMissingInputIsNamed) {
+  expect_refused(run({}, "absent.json"), "absent.json");
+}
+
+TEST_F(ReconstructCommandTest, ASingularMatrixIsNamed) {
+  document_["frames"][3]["transform_matrix"][0] = {0, 0, 0, 0};
+  save();
+  expect_refused(run({}), "frames[3].transform_matrix");
+}
+
+TEST_F(ReconstructCommandTest, AnUnknownKeyIsNamed) {
+  document_["frames"][2]["exposure"] = 3;
+  save();
+  expect_refused(run({}), "frames[2].exposure");
+}
+
+TEST_F(ReconstructCommandTest, ATruncatedPictureIsNamed) {
+  fs::resize_file(root_ / "view2.png", 100);
+  expect_refused(run({}), "view2.png");
+}
+
+TEST_F(ReconstructCommandTest, PicturesOfTwoSizesAreRefused) {
+  document_["frames"][4]["h"] = 47;
+  save();
+  expect_refused(run({}), "frames[4].w, h");
+}
+
+TEST_F(ReconstructCommandTest, AnEmptyHullLeavesNothingBehind) {
+  expect_refused(run({"--threshold", "254", "--device", "cpu", "--effects", "none"}), "threshold");
+}
+
+TEST_F(ReconstructCommandTest, AFolderOfSomebodyElsesIsNotTouched) {
+  fs::create_directories(root_ / "out");
+  std::ofstream(root_ / "out" / "thesis.tex") << "x";
+  const Run result = run({"--voxels", "8"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("report.json"));
+  EXPECT_TRUE(fs::exists(root_ / "out" / "thesis.tex"));
+}
+
+}  // namespace
+}  // namespace emberlock::cli

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include <Eigen/Dense>
 
@@ -42,23 +43,38 @@ bool refine(const std::vector<Point>& outline, Circle& circle) {
   return true;
 }
 
-void judge(const std::vector<Point>& outline, Circle& circle) {
+void judge(const std::vector<Point>& outline, ImageSize image, Circle& circle) {
+  constexpr std::size_t kSectors = 24;
+  std::array<bool, kSectors> seen{};
   double squares = 0;
   int on = 0;
   for (const Point& p : outline) {
     const double residual = std::hypot(p.x - circle.x, p.y - circle.y) - circle.radius;
     if (std::abs(residual) > tolerance(circle.radius)) continue;
+    const double turn = std::atan2(p.y - circle.y, p.x - circle.x) / (2 * std::numbers::pi) + 0.5;
+    seen[std::min(kSectors - 1, static_cast<std::size_t>(turn * kSectors))] = true;
     squares += residual * residual;
     ++on;
   }
-  circle.agreement = static_cast<double>(on) / static_cast<double>(outline.size());
+  int inside = 0;
+  int on_outline = 0;
+  for (std::size_t i = 0; i < kSectors; ++i) {
+    const double turn = ((static_cast<double>(i) + 0.5) / kSectors - 0.5) * 2 * std::numbers::pi;
+    const double x = circle.x + circle.radius * std::cos(turn);
+    const double y = circle.y + circle.radius * std::sin(turn);
+    if (x < 0 || x > image.width - 1 || y < 0 || y > image.height - 1) continue;
+    ++inside;
+    if (seen[i]) ++on_outline;
+  }
+  constexpr int kEnough = 5;  // an arc of fewer sectors fits any circle
+  circle.agreement = inside < kEnough ? 0 : static_cast<double>(on_outline) / inside;
   constexpr double kSystematic = 0.02;  // pixels: what sampling leaves even without noise
   circle.sigma = std::hypot(kSystematic, on > 3 ? std::sqrt(squares / (on - 3) * 2 / on) : circle.radius);
 }
 
 }  // namespace
 
-std::optional<Circle> fit_circle(const std::vector<Point>& outline) {
+std::optional<Circle> fit_circle(const std::vector<Point>& outline, ImageSize image) {
   if (outline.size() < 8) return std::nullopt;
   const auto [left, right] = std::minmax_element(outline.begin(), outline.end(),
                                                  [](const Point& a, const Point& b) { return a.x < b.x; });
@@ -71,7 +87,7 @@ std::optional<Circle> fit_circle(const std::vector<Point>& outline) {
   for (double y = top->y; y <= bottom->y + step / 2; y += step) {
     Circle circle{.x = middle, .y = y, .radius = radius};
     if (!refine(outline, circle)) continue;
-    judge(outline, circle);
+    judge(outline, image, circle);
     if (!best || circle.agreement > best->agreement) best = circle;
   }
   return best;

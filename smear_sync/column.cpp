@@ -70,7 +70,9 @@ void mend_hot_pixels(Column& c) {
   for (int y = 1; y + 1 < c.patch.height; ++y) {
     for (int x = 1; x + 1 < c.patch.width; ++x) {
       const float v = c.patch.row(y)[x];
-      if (v <= threshold) continue;
+      // Bright to the left and right: perhaps a row of a dot that only one field of an interlaced frame
+      // holds.
+      if (v <= threshold || v < 2.5F * std::min(c.patch.row(y)[x - 1], c.patch.row(y)[x + 1])) continue;
       std::array<float, 9> around{};
       for (int i = 0; i < 9; ++i)
         around[static_cast<std::size_t>(i)] = c.patch.row(y + i / 3 - 1)[x + i % 3 - 1];
@@ -314,7 +316,7 @@ Verdict judge(const Column& c, const DotFit& f, const FitWindow& w, double min_s
   return Verdict::dot;
 }
 
-Column level_column(const Plane& plane, const Background& background, const Lamp& lamp, double saturation) {
+Column level_column(const Plane& plane, const Background& background, const Lamp& lamp) {
   Column c;
   c.radius = std::max(1.0, lamp.radius);
   c.half_width = static_cast<int>(std::ceil(0.9 * c.radius)) + 2;
@@ -323,7 +325,7 @@ Column level_column(const Plane& plane, const Background& background, const Lamp
   c.patch = columns(plane, centre - reach, centre + reach);
   c.x = lamp.x - c.patch.x0;
   c.y = lamp.y;
-  c.saturation = saturation;
+  c.saturation = background.saturation;
   c.sample_level = plane.level;
   c.flat = background.flat;
   c.noise = background.noise;
@@ -407,9 +409,9 @@ FitWindow window_around(const Column& c, const Candidate& candidate, int above, 
 }  // namespace
 
 ColumnReading read_column(const Plane& plane, const Background& background, const Lamp& lamp,
-                          double saturation, const DetectOptions& options) {
+                          const DetectOptions& options) {
   ColumnReading reading;
-  const Column c = level_column(plane, background, lamp, saturation);
+  const Column c = level_column(plane, background, lamp);
   reading.hidden = static_cast<double>(std::count(c.hidden.begin(), c.hidden.end(), 1)) / c.patch.height;
   find_line(c, reading);
   if (reading.clipped) return reading;

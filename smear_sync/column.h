@@ -20,6 +20,6 @@ struct ColumnReading {
 };
 
 ColumnReading read_column(const Plane& plane, const Background& background, const Lamp& lamp,
-                          double saturation, const DetectOptions& options);
+                          const DetectOptions& options);
 
 }  // namespace emberlock::detail

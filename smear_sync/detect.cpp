@@ -203,11 +203,9 @@ SmearReading detect(const ImageView& frame, const DetectOptions& options) {
                       search.lamps[i].y, search.lamps[j].y));
     }
   }
-  const double saturation = detail::saturation_level(plane, background);
   std::vector<SmearReading> readings;
   for (const Lamp& lamp : search.lamps) {
-    readings.push_back(
-        judge(plane, lamp, detail::read_column(plane, background, lamp, saturation, options), options));
+    readings.push_back(judge(plane, lamp, detail::read_column(plane, background, lamp, options), options));
   }
   return readings.size() == 1 ? readings.front() : choose(std::move(readings));
 }

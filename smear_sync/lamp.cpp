@@ -156,14 +156,25 @@ std::vector<float> subtract_columns(Patch& patch) {
   return level;
 }
 
-struct LampContext {
-  const Plane& plane;
-  const Background& background;
-  double saturation;
-};
+/// A lamp's disk is bright all over; an outline with gaps and holes inside is something else's.
+bool solid(const Patch& patch, const Circle& circle, double level) {
+  int inside = 0;
+  int bright = 0;
+  const int reach = static_cast<int>(std::ceil(circle.radius));
+  const int x0 = static_cast<int>(std::lround(circle.x));
+  const int y0 = static_cast<int>(std::lround(circle.y));
+  for (int y = std::max(0, y0 - reach); y <= std::min(patch.height - 1, y0 + reach); ++y) {
+    for (int x = std::max(0, x0 - reach); x <= std::min(patch.width - 1, x0 + reach); ++x) {
+      if (std::hypot(x - circle.x, y - circle.y) > circle.radius) continue;
+      ++inside;
+      if (static_cast<double>(patch.row(y)[x]) > level) ++bright;
+    }
+  }
+  return bright >= 0.85 * inside;
+}
 
-Lamp measure(const LampContext& context, const Patch& patch, const std::vector<float>& level,
-             const Blob& blob, double peak) {
+Lamp measure(const Plane& plane, const Background& background, const Patch& patch,
+             const std::vector<float>& level, const Blob& blob, double peak) {
   Lamp lamp;
   lamp.peak = peak;
   double half = 0;
@@ -171,17 +182,19 @@ Lamp measure(const LampContext& context, const Patch& patch, const std::vector<f
   for (const int i : blob.pixels) {
     const float v = patch.v[static_cast<std::size_t>(i)];
     if (v > kHalf * peak) ++half;
-    if (v + level[static_cast<std::size_t>(i % patch.width)] >= context.saturation) ++clipped;
+    if (v + level[static_cast<std::size_t>(i % patch.width)] >= background.saturation) ++clipped;
   }
   lamp.flux = half;
   lamp.radius = std::sqrt(half / std::numbers::pi);
   lamp.saturated = clipped > 1;
   const bool cut = blob.top == 0 || blob.bottom == patch.height - 1 || patch.x0 + blob.left == 0 ||
-                   patch.x0 + blob.right == context.plane.size.width - 1;
+                   patch.x0 + blob.right == plane.size.width - 1;
   Point centre;
   std::optional<Circle> circle;
-  if (lamp.saturated || cut) circle = fit_circle(outline(patch, blob, static_cast<float>(kHalf * peak)));
-  if (circle && circle->agreement >= 0.55 && circle->radius <= 2 * lamp.radius + 2) {
+  if (lamp.saturated || cut) {
+    circle = fit_circle(outline(patch, blob, static_cast<float>(kHalf * peak)), {patch.width, patch.height});
+  }
+  if (circle && circle->agreement >= 0.6 && solid(patch, *circle, kHalf * peak)) {
     centre = {circle->x, circle->y};
     lamp.radius = circle->radius;
     lamp.sigma = circle->sigma;
@@ -190,17 +203,17 @@ Lamp measure(const LampContext& context, const Patch& patch, const std::vector<f
     centre = centroid(patch, blob, kLow * peak / 3, kLow * peak * 5 / 3);
     lamp.sigma = 0.05 * lamp.radius;
   } else {
-    const double low = std::max(0.02 * peak, 2 * context.background.noise);
+    const double low = std::max(0.02 * peak, 2 * background.noise);
     centre = centroid(patch, blob, low, peak * 1.5);
     // noise * sqrt(sum of dy^2) / flux is about half of noise / peak, whatever the radius.
-    lamp.sigma = std::hypot(0.01, context.background.noise / peak * 0.6);
+    lamp.sigma = std::hypot(0.01, background.noise / peak * 0.6);
   }
   lamp.x = patch.x0 + centre.x;
   lamp.y = centre.y;
   lamp.centre_outside =
-      lamp.y < 0 || lamp.y > patch.height - 1 || lamp.x < 0 || lamp.x > context.plane.size.width - 1;
+      lamp.y < 0 || lamp.y > patch.height - 1 || lamp.x < 0 || lamp.x > plane.size.width - 1;
   if (lamp.centre_outside) {
-    lamp.x = std::clamp(lamp.x, 0.0, context.plane.size.width - 1.0);
+    lamp.x = std::clamp(lamp.x, 0.0, plane.size.width - 1.0);
     lamp.y = std::clamp(lamp.y, 0.0, patch.height - 1.0);
   }
   return lamp;
@@ -208,26 +221,14 @@ Lamp measure(const LampContext& context, const Patch& patch, const std::vector<f
 
 }  // namespace
 
-double saturation_level(const Plane& plane, const Background& background) {
-  constexpr double kNearly = 0.98;
-  if (background.peak >= kNearly * plane.white || plane.white < 300) return kNearly * plane.white;
-  const double plateau = 0.998 * background.peak;
-  int count = 0;
-  for (int y = 0; y < plane.size.height; ++y) {
-    const std::uint16_t* row = plane.row<std::uint16_t>(y);
-    for (int x = 0; x < plane.size.width; ++x) count += row[x] >= plateau ? 1 : 0;
-  }
-  return count >= 12 ? kNearly * background.peak : kNearly * plane.white;
-}
-
 LampSearch find_lamps(const Plane& plane, const Background& background, const DetectOptions& options) {
   LampSearch search;
-  // A deep container may hold a shallow signal, so contrast in units of the noise suffices too.
-  constexpr double kPlentyOfNoise = 400;
-  const double gate = std::min(options.min_lamp_contrast * plane.white, kPlentyOfNoise * background.noise);
+  // In a frame of little noise less contrast suffices, in one of much noise more is needed.
+  const double gate =
+      std::max(std::min(options.min_lamp_contrast * background.saturation, 400 * background.noise),
+               15 * background.noise);
   const double max_radius = options.max_lamp_radius * std::max(plane.size.width, plane.size.height);
   const double min_area = std::numbers::pi * options.min_lamp_radius * options.min_lamp_radius;
-  const LampContext context{plane, background, saturation_level(plane, background)};
   search.why_none = "nothing in the frame is bright and compact enough to be the lamp";
   std::vector<Span> spans = bright_columns(plane, background.level + gate);
   constexpr std::size_t kMaxSpans = 32;
@@ -247,7 +248,7 @@ LampSearch find_lamps(const Plane& plane, const Background& background, const De
     int clipped = 0;
     for (const float l : level) {
       if (l > background.level + gate) ++bright;
-      if (l > 0.9 * context.saturation) ++clipped;
+      if (l > 0.9 * background.saturation) ++clipped;
     }
     search.bright_line = search.bright_line || bright >= 3;
     search.clipped_line = search.clipped_line || clipped >= 3;
@@ -260,7 +261,7 @@ LampSearch find_lamps(const Plane& plane, const Background& background, const De
       // On a bright line only the headroom above the line is left for the lamp.
       if (peak < (bright >= 3 ? 0.5 : 1) * gate || blob.right - blob.left < 2 || blob.bottom - blob.top < 2)
         continue;
-      Lamp lamp = measure(context, patch, level, blob, peak);
+      Lamp lamp = measure(plane, background, patch, level, blob, peak);
       if (lamp.flux < min_area) continue;
       if (lamp.radius > max_radius) {
         search.why_none =

@@ -26,10 +26,6 @@ struct LampSearch {
   std::string why_none;
 };
 
-/// The sample value from which on a pixel counts as saturated. A clipped signal in a deeper container (12
-/// bits in a 16-bit file) is known by its plateau.
-double saturation_level(const Plane& plane, const Background& background);
-
 LampSearch find_lamps(const Plane& plane, const Background& background, const DetectOptions& options);
 
 }  // namespace emberlock::detail

@@ -56,6 +56,18 @@ double peak_of(const Plane& plane) {
   return peak;
 }
 
+double saturation_level(const Plane& plane, double peak) {
+  constexpr double kNearly = 0.98;
+  if (peak >= kNearly * plane.white || plane.white < 300) return kNearly * plane.white;
+  const double plateau = 0.998 * peak;
+  int count = 0;
+  for (int y = 0; y < plane.size.height; ++y) {
+    const std::uint16_t* row = plane.row<std::uint16_t>(y);
+    for (int x = 0; x < plane.size.width; ++x) count += row[x] >= plateau ? 1 : 0;
+  }
+  return count >= 12 ? kNearly * peak : kNearly * plane.white;
+}
+
 }  // namespace
 
 Plane to_plane(const ImageView& view) {
@@ -133,6 +145,7 @@ Background measure_background(const Plane& plane) {
   Background background;
   background.level = median(values);
   background.peak = plane.bytes == 1 ? peak_of<std::uint8_t>(plane) : peak_of<std::uint16_t>(plane);
+  background.saturation = saturation_level(plane, background.peak);
   const double rough = std::max(0.5, robust_scale(differences));
   double sum = 0;
   std::size_t count = 0;

@@ -50,8 +50,11 @@ Patch columns(const Plane& plane, int first, int last);
 /// What the frame looks like away from lamp and dots, in samples of the plane.
 struct Background {
   double level = 0;
-  double noise = 0;   ///< standard deviation a pixel, at least that of rounding to integers
-  double peak = 0;    ///< the largest sample
+  double noise = 0;  ///< standard deviation a pixel, at least that of rounding to integers
+  double peak = 0;   ///< the largest sample
+  double saturation =
+      0;  ///< from here on a pixel counts as saturated: just below white, or below the plateau of a
+          ///< signal that is clipped in a deeper container (12 bits in a 16-bit file)
   bool flat = false;  ///< most neighbours are equal: compressed (or noiseless), so that noise says little
                       ///< about artefacts
 };

@@ -1,0 +1,460 @@
+#include "smear_sync/detect.h"
+
+#include <cstring>
+
+#include <gtest/gtest.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "tests/support/smear_frames.h"
+
+namespace emberlock {
+namespace {
+
+using test::SmearScene;
+
+constexpr double kLampX = 81.3;
+constexpr double kLampY = 340.4;
+constexpr double kRadius = 4;
+constexpr double kBright = 3000;  // a lamp overexposed tenfold: saturated
+
+SmearScene lamp_scene(double peak = kBright) {
+  return SmearScene(160, 720).disk(kLampX, kLampY, kRadius, peak);
+}
+
+/// What an 8-bit JPEG file of this quality brings back.
+Image through_jpeg(const Image& image, int quality) {
+  const ImageSize size = image.layout().size;
+  cv::Mat pixels(size.height, size.width, CV_8U);
+  std::memcpy(pixels.data, image.bytes().data(), image.bytes().size());
+  std::vector<unsigned char> file;
+  cv::imencode(".jpg", pixels, file, {cv::IMWRITE_JPEG_QUALITY, quality});
+  const cv::Mat decoded = cv::imdecode(file, cv::IMREAD_GRAYSCALE);
+  Image out(image.layout());
+  std::memcpy(out.bytes().data(), decoded.data, out.bytes().size());
+  return out;
+}
+
+testing::AssertionResult reads(const SmearReading& reading, SmearState state) {
+  if (reading.state == state) return testing::AssertionSuccess() << reading.reason;
+  return testing::AssertionFailure() << "state " << name(reading.state) << ": " << reading.reason;
+}
+
+void expect_lamp(const SmearReading& reading, double x, double y, double tolerance) {
+  ASSERT_TRUE(reading.lamp) << reading.reason;
+  EXPECT_NEAR(reading.lamp->x, x, tolerance);
+  EXPECT_NEAR(reading.lamp->y.value(), y, tolerance);
+}
+
+void expect_one_dot(const SmearReading& reading, double y, double tolerance) {
+  ASSERT_TRUE(reads(reading, SmearState::dot));
+  ASSERT_EQ(reading.dots.size(), 1U);
+  EXPECT_NEAR(reading.dots[0].y.value(), y, tolerance);
+  EXPECT_FALSE(reading.reason.empty());
+}
+
+TEST(Detect, OneDotBelowTheLamp) {
+  const Image image = lamp_scene().disk(kLampX, kLampY + 120, kRadius, 20).image({});
+  const SmearReading r = detect(image.view());
+  expect_one_dot(r, kLampY + 120, 0.1);
+  expect_lamp(r, kLampX, kLampY, 0.1);
+  EXPECT_EQ(r.dots[0].side, Side::below);
+  EXPECT_NEAR(r.dots[0].amplitude, 20, 2);
+  EXPECT_GT(r.dots[0].snr, 40);
+  EXPECT_LT(r.dots[0].sigma.value(), 0.1);
+  EXPECT_TRUE(r.lamp->saturated);
+}
+
+TEST(Detect, OneDotAboveTheLamp) {
+  const Image image = lamp_scene().disk(kLampX, kLampY - 200, kRadius, 20).image({});
+  const SmearReading r = detect(image.view());
+  expect_one_dot(r, kLampY - 200, 0.1);
+  EXPECT_EQ(r.dots[0].side, Side::above);
+}
+
+TEST(Detect, NoDot) {
+  const Image image = lamp_scene().image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::no_dot));
+  expect_lamp(r, kLampX, kLampY, 0.1);
+  EXPECT_TRUE(r.dots.empty());
+}
+
+TEST(Detect, TwoDotsOnOppositeSides) {
+  const Image image =
+      lamp_scene().disk(kLampX, kLampY - 150, kRadius, 15).disk(kLampX, kLampY + 201, kRadius, 15).image({});
+  const SmearReading r = detect(image.view());
+  ASSERT_TRUE(reads(r, SmearState::comb));
+  ASSERT_EQ(r.dots.size(), 2U);
+  EXPECT_NEAR(r.dots[0].y.value(), kLampY - 150, 0.2);
+  EXPECT_NEAR(r.dots[1].y.value(), kLampY + 201, 0.2);
+}
+
+TEST(Detect, ManyDotsOfAFastStrobe) {
+  SmearScene scene = lamp_scene();
+  std::vector<double> truth;
+  for (int k = -5; k <= 6; ++k) {
+    const double y = kLampY + std::floor(61.7 * k + 20);
+    if (std::abs(y - kLampY) < 16 || y < 0 || y > 719) continue;
+    truth.push_back(y);
+    scene.disk(kLampX, y, kRadius, 12);
+  }
+  const SmearReading r = detect(scene.image({}).view());
+  ASSERT_TRUE(reads(r, SmearState::comb));
+  ASSERT_EQ(r.dots.size(), truth.size());
+  for (std::size_t i = 0; i < truth.size(); ++i) EXPECT_NEAR(r.dots[i].y.value(), truth[i], 0.3);
+}
+
+TEST(Detect, DenseComb) {
+  SmearScene scene = lamp_scene();
+  int dots = 0;
+  for (double y = kLampY + 24; y < 715; y += 18, ++dots) scene.disk(kLampX, y, kRadius, 20);
+  const SmearReading r = detect(scene.image({}).view());
+  ASSERT_TRUE(reads(r, SmearState::comb));
+  EXPECT_NEAR(static_cast<double>(r.dots.size()), dots, 1);
+}
+
+TEST(Detect, SpotsOfUnevenSpacingAreNoComb) {
+  const Image image = lamp_scene()
+                          .disk(kLampX, 40, kRadius, 15)
+                          .disk(kLampX, 104, kRadius, 15)
+                          .disk(kLampX, 194, kRadius, 15)
+                          .image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::ambiguous));
+  EXPECT_TRUE(r.dots.empty());
+}
+
+TEST(Detect, LampNotLit) {
+  EXPECT_TRUE(reads(detect(SmearScene(160, 720).image({}).view()), SmearState::no_lamp));
+}
+
+TEST(Detect, LampNotLitButADotOfTheLastFlash) {
+  const SmearReading r = detect(SmearScene(160, 720).disk(kLampX, 300, kRadius, 25).image({}).view());
+  EXPECT_TRUE(reads(r, SmearState::no_lamp));
+  EXPECT_FALSE(r.lamp);
+}
+
+TEST(Detect, UnsaturatedLamp) {
+  const Image image = lamp_scene(190).disk(kLampX, 500.4, kRadius, 10).image({});
+  const SmearReading r = detect(image.view());
+  expect_one_dot(r, 500.4, 0.2);
+  expect_lamp(r, kLampX, kLampY, 0.03);
+  EXPECT_FALSE(r.lamp->saturated);
+}
+
+TEST(Detect, DotJustOutsideTheBloom) {
+  const Image image =
+      lamp_scene().bloom(kLampX, kLampY, 2, 30, 30, 400).disk(kLampX, kLampY + 45, kRadius, 20).image({});
+  expect_one_dot(detect(image.view()), kLampY + 45, 0.2);
+}
+
+TEST(Detect, DotOnTheFlankOfTheHalo) {
+  const Image image =
+      lamp_scene().halo(kLampX, kLampY, 120, 8).disk(kLampX, kLampY - 32, kRadius, 25).image({});
+  expect_one_dot(detect(image.view()), kLampY - 32, 0.3);
+}
+
+TEST(Detect, DotInsideTheBloomIsNotGuessed) {
+  const Image image =
+      lamp_scene().bloom(kLampX, kLampY, 3, 60, 60, 900).disk(kLampX, kLampY + 20, kRadius, 20).image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::no_dot));
+  EXPECT_TRUE(r.dots.empty());
+}
+
+TEST(Detect, AsymmetricBloomDoesNotMoveTheLamp) {
+  const Image image =
+      lamp_scene().bloom(kLampX, kLampY, 2.5, 0, 60, 800).disk(kLampX, kLampY - 100, kRadius, 20).image({});
+  const SmearReading r = detect(image.view());
+  expect_one_dot(r, kLampY - 100, 0.1);
+  expect_lamp(r, kLampX, kLampY, 0.35);
+}
+
+TEST(Detect, LampDiskCutByTheTopEdge) {
+  const Image image = SmearScene(160, 720).disk(kLampX, 1.2, 6, kBright).disk(kLampX, 301.2, 6, 20).image({});
+  const SmearReading r = detect(image.view());
+  expect_one_dot(r, 301.2, 0.1);
+  expect_lamp(r, kLampX, 1.2, 0.3);
+}
+
+TEST(Detect, LampDiskCutByTheLeftEdge) {
+  const Image image = SmearScene(160, 720).disk(2.1, 300.4, 6, kBright).disk(2.1, 500.4, 6, 20).image({});
+  const SmearReading r = detect(image.view());
+  expect_one_dot(r, 500.4, 0.2);
+  expect_lamp(r, 2.1, 300.4, 0.3);
+}
+
+TEST(Detect, LampCentreOutsideTheFrameIsBlind) {
+  const Image image = SmearScene(160, 720).disk(kLampX, -2.5, 6, kBright).image({});
+  EXPECT_TRUE(reads(detect(image.view()), SmearState::blind));
+}
+
+TEST(Detect, BloomOverMostOfTheColumnIsBlind) {
+  const Image image = lamp_scene().bloom(kLampX, kLampY, 3, 330, 330, 180).image({});
+  EXPECT_TRUE(reads(detect(image.view()), SmearState::blind));
+}
+
+TEST(Detect, ConstantLamp) {
+  const Image image = lamp_scene().line(kLampX, kRadius, 9).image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::steady));
+  EXPECT_TRUE(r.dots.empty());
+  expect_lamp(r, kLampX, kLampY, 0.15);
+}
+
+TEST(Detect, ConstantLampWithPhotonNoise) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Image image = lamp_scene().line(kLampX, kRadius, 60).image({.shot = 0.3, .seed = seed});
+    const SmearReading r = detect(image.view());
+    EXPECT_TRUE(reads(r, SmearState::steady));
+  }
+}
+
+TEST(Detect, DotOnTheFaintLineOfAGlowingLamp) {
+  const Image image = lamp_scene().line(kLampX, kRadius, 3).disk(kLampX, kLampY + 150, kRadius, 20).image({});
+  expect_one_dot(detect(image.view()), kLampY + 150, 0.2);
+}
+
+TEST(Detect, SaturatedLine) {
+  const Image image = lamp_scene().line(kLampX, kRadius + 2, 2000).image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::saturated));
+  EXPECT_TRUE(r.dots.empty());
+}
+
+TEST(Detect, NearlySaturatedLine) {
+  const Image image = lamp_scene().line(kLampX, 3 * kRadius, 228).image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::saturated));
+  EXPECT_TRUE(r.dots.empty());
+}
+
+TEST(Detect, SecondLampInAnotherColumnWithTheSameShift) {
+  const Image image = SmearScene(320, 720)
+                          .disk(81.3, kLampY, kRadius, kBright)
+                          .disk(240.6, 300.2, kRadius, kBright)
+                          .disk(81.3, kLampY + 120, kRadius, 20)
+                          .disk(240.6, 420.2, kRadius, 20)
+                          .image({});
+  const SmearReading r = detect(image.view());
+  ASSERT_TRUE(reads(r, SmearState::dot));
+  EXPECT_NEAR((r.dots[0].y - r.lamp->y).value(), 120, 0.2);
+}
+
+TEST(Detect, SecondLampInAnotherColumnThatIsConstant) {
+  const Image image = SmearScene(320, 720)
+                          .disk(81.3, kLampY, kRadius + 1, kBright)
+                          .line(81.3, kRadius, 9)
+                          .disk(240.6, 300.2, kRadius, kBright)
+                          .disk(240.6, 420.2, kRadius, 20)
+                          .image({});
+  const SmearReading r = detect(image.view());
+  expect_one_dot(r, 420.2, 0.2);
+  expect_lamp(r, 240.6, 300.2, 0.2);
+}
+
+TEST(Detect, SecondLampInAnotherColumnWithAnotherShift) {
+  const Image image = SmearScene(320, 720)
+                          .disk(81.3, kLampY, kRadius, kBright)
+                          .disk(240.6, 300.2, kRadius, kBright)
+                          .disk(81.3, kLampY + 120, kRadius, 20)
+                          .disk(240.6, 480.2, kRadius, 20)
+                          .image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::ambiguous));
+  EXPECT_TRUE(r.dots.empty());
+}
+
+TEST(Detect, ReflectionOfEqualSizeInTheSameColumn) {
+  const Image image = lamp_scene()
+                          .disk(kLampX + 1, kLampY + 140, kRadius, kBright)
+                          .disk(kLampX, kLampY - 100, kRadius, 20)
+                          .disk(kLampX + 1, kLampY + 40, kRadius, 20)
+                          .image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::ambiguous));
+  EXPECT_TRUE(r.dots.empty());
+}
+
+TEST(Detect, HotPixelClustersInTheLampsColumn) {
+  RandomStream random(3, 1);
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    SmearScene scene = lamp_scene();
+    for (int cluster = 0; cluster < 4; ++cluster) {
+      const int x = static_cast<int>(kLampX + random.uniform(-3, 3));
+      const int y = static_cast<int>(random.uniform(10, 300));
+      const int shape = static_cast<int>(random.uniform(0, 5));
+      const double value = random.uniform(8, 220);
+      for (int i = 0; i < 4; ++i) {  // one, two upright, two across, an L of three, a square
+        const bool lit = shape == 0   ? i == 0
+                         : shape == 1 ? i % 2 == 0
+                         : shape == 2 ? i < 2
+                         : shape == 3 ? i < 3
+                                      : true;
+        if (lit) scene.at(x + i % 2, y + i / 2) += value;
+      }
+    }
+    const SmearReading r = detect(scene.image({.seed = seed}).view());
+    EXPECT_TRUE(r.dots.empty()) << "seed " << seed << ": " << r.reason;
+  }
+}
+
+TEST(Detect, DotBesideHotPixelClusters) {
+  SmearScene scene = lamp_scene().disk(kLampX, kLampY + 130, kRadius, 15);
+  scene.at(80, 100) += 200;
+  scene.at(81, 100) += 150;
+  scene.at(82, 101) += 120;
+  scene.at(82, static_cast<int>(kLampY) + 131) += 90;  // in the dot itself
+  expect_one_dot(detect(scene.image({}).view()), kLampY + 130, 0.3);
+}
+
+TEST(Detect, HotColumnThroughTheLamp) {
+  SmearScene scene = lamp_scene();
+  for (int y = 0; y < scene.height(); ++y) scene.at(79, y) += 25;
+  EXPECT_TRUE(detect(scene.image({}).view()).dots.empty());
+}
+
+TEST(Detect, JpegOfQuality75WithoutADot) {
+  for (std::uint64_t seed = 0; seed < 60; ++seed) {
+    RandomStream random(seed, 2);
+    const SmearScene scene = SmearScene(160, 720).disk(random.uniform(60, 100), random.uniform(200, 500),
+                                                       random.uniform(2.5, 5), kBright);
+    const Image image = through_jpeg(scene.image({.noise = random.uniform(0.8, 1.8), .seed = seed}), 75);
+    const SmearReading r = detect(image.view());
+    EXPECT_TRUE(r.dots.empty()) << "seed " << seed << ": " << r.reason;
+  }
+}
+
+TEST(Detect, JpegOfQuality75WithADot) {
+  const Image image = through_jpeg(lamp_scene().disk(kLampX, kLampY + 99, kRadius, 20).image({}), 75);
+  const SmearReading r = detect(image.view());
+  expect_one_dot(r, kLampY + 99, 0.3);
+  EXPECT_GT(r.dots[0].sigma.value(), 0.03) << "the rounding of a compressor is part of the error";
+}
+
+TEST(Detect, Gamma) {
+  const Image image = lamp_scene().disk(kLampX, kLampY + 99, kRadius, 12).image({.noise = 0.8, .gamma = 2.2});
+  expect_one_dot(detect(image.view()), kLampY + 99, 0.25);
+}
+
+TEST(Detect, TenAndTwelveBits) {
+  for (const int depth : {10, 12, 16}) {
+    const Image image = lamp_scene()
+                            .disk(kLampX, kLampY + 99, kRadius, 12)
+                            .image({.bit_depth = depth, .format = PixelFormat::gray16});
+    const SmearReading r = detect(image.view());
+    expect_one_dot(r, kLampY + 99, 0.2);
+    EXPECT_NEAR(r.dots[0].amplitude, 12.0 / 255 * image.layout().white(),
+                0.15 * 12 / 255 * image.layout().white());
+    EXPECT_TRUE(r.lamp->saturated);
+  }
+}
+
+TEST(Detect, TwelveBitsInASixteenBitContainer) {
+  const Image twelve = lamp_scene().image({.bit_depth = 12, .format = PixelFormat::gray16});
+  Image image(ImageLayout{twelve.layout().size, PixelFormat::gray16, 16});
+  image.bytes() = twelve.bytes();
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(reads(r, SmearState::no_dot));
+  ASSERT_TRUE(r.lamp);
+  EXPECT_TRUE(r.lamp->saturated);
+}
+
+TEST(Detect, BayerMosaic) {
+  for (const PixelFormat format : {PixelFormat::bayer_rggb8, PixelFormat::bayer_rggb16}) {
+    const Image image =
+        lamp_scene()
+            .disk(kLampX, kLampY + 99, kRadius, 20)
+            .image({.bit_depth = format == PixelFormat::bayer_rggb8 ? 8 : 12, .format = format});
+    const SmearReading r = detect(image.view());
+    expect_one_dot(r, kLampY + 99, 0.25);
+    expect_lamp(r, kLampX, kLampY, 0.2);
+  }
+}
+
+TEST(Detect, BayerMosaicWithoutADot) {
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    const Image image = lamp_scene(400).image({.seed = seed, .format = PixelFormat::bayer_rggb8});
+    EXPECT_TRUE(reads(detect(image.view()), SmearState::no_dot));
+  }
+}
+
+TEST(Detect, Colour) {
+  for (const PixelFormat format : {PixelFormat::rgb8, PixelFormat::rgb16}) {
+    const Image image = lamp_scene()
+                            .disk(kLampX, kLampY + 99, kRadius, 20)
+                            .image({.bit_depth = format == PixelFormat::rgb8 ? 8 : 12, .format = format});
+    expect_one_dot(detect(image.view()), kLampY + 99, 0.2);
+  }
+}
+
+TEST(Detect, FieldsOfDifferentOffset) {
+  SmearScene scene = lamp_scene().disk(kLampX, kLampY + 99, kRadius, 12);
+  for (int y = 0; y < scene.height(); y += 2) {
+    for (int x = 0; x < scene.width(); ++x) scene.at(x, y) += 4;
+  }
+  expect_one_dot(detect(scene.image({}).view()), kLampY + 99, 0.25);
+}
+
+TEST(Detect, DotInOneFieldOfAnInterlacedFrame) {
+  SmearScene scene = lamp_scene();
+  SmearScene dot = SmearScene(160, 720, 0).disk(kLampX, kLampY + 99, kRadius, 25);
+  for (int y = 0; y < scene.height(); y += 2) {
+    for (int x = 0; x < scene.width(); ++x) scene.at(x, y) += dot.at(x, y);
+  }
+  const SmearReading r = detect(scene.image({}).view());
+  EXPECT_TRUE(reads(r, SmearState::ambiguous));
+  EXPECT_NE(r.reason.find("interlaced"), std::string::npos) << r.reason;
+  EXPECT_TRUE(r.dots.empty());
+}
+
+TEST(Detect, StridesAreHonoured) {
+  const Image image = lamp_scene().disk(kLampX, kLampY + 99, kRadius, 20).image({});
+  const std::size_t stride = 160 + 37;
+  std::vector<std::byte> padded(stride * 720, std::byte{255});
+  for (int y = 0; y < 720; ++y) {
+    std::memcpy(padded.data() + static_cast<std::size_t>(y) * stride, image.view().row(y), 160);
+  }
+  const SmearReading a = detect(image.view());
+  const SmearReading b = detect({image.layout(), padded.data(), stride});
+  expect_one_dot(b, kLampY + 99, 0.1);
+  EXPECT_EQ(a.dots[0].y, b.dots[0].y);
+}
+
+TEST(Detect, AFlameIsNotALamp) {
+  SmearScene scene(320, 240);
+  scene.disk(160, 120, 70, 300, 20);
+  EXPECT_TRUE(reads(detect(scene.image({}).view()), SmearState::no_lamp));
+}
+
+TEST(Detect, OverexposedFrame) {
+  const Image image = SmearScene(160, 120, 300).image({});
+  const SmearReading r = detect(image.view());
+  EXPECT_TRUE(r.dots.empty());
+  EXPECT_FALSE(r.reason.empty());
+}
+
+TEST(Detect, EmptyMalformedAndTinyFrames) {
+  EXPECT_TRUE(reads(detect(ImageView{}), SmearState::no_lamp));
+  for (const PixelFormat format : {PixelFormat::gray8, PixelFormat::gray16, PixelFormat::bayer_rggb8,
+                                   PixelFormat::bayer_rggb16, PixelFormat::rgb8, PixelFormat::rgb16}) {
+    for (int width = 1; width < 24; ++width) {
+      for (const int height : {1, 2, 3, 5, 8, 9, 13, 24}) {
+        const int depth = bytes_per_sample(format) == 1 ? 8 : 12;
+        Image image({{width, height}, format, depth});
+        EXPECT_TRUE(detect(image.view()).dots.empty());
+        SmearScene scene(width, height);
+        scene.disk(width / 2.0, height / 2.0, 2.2, kBright);
+        const Image lit = scene.image({.bit_depth = depth, .format = format});
+        EXPECT_FALSE(detect(lit.view()).reason.empty());
+      }
+    }
+  }
+  Image image({{32, 32}, PixelFormat::gray8, 8});
+  ImageView bad = image.view();
+  bad.stride = 3;
+  EXPECT_TRUE(reads(detect(bad), SmearState::no_lamp));
+}
+
+}  // namespace
+}  // namespace emberlock

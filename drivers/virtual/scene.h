@@ -36,8 +36,8 @@ struct VirtualScene {
   double background = 6;  ///< black level and stray light, 0..255
 
   double flash_level = 4000;  ///< one flash at the lamp's centre, before saturation; independent of its width
-  double steady_rate = 7.4e7;  ///< steady light at the lamp's centre, grey levels a second
-  double smear_leak = 0.01;    ///< share of the light that leaks into the register: dots of 40 grey levels
+  double steady_rate = 1e7;   ///< steady light at the lamp's centre, grey levels a second: a line of about 45
+  double smear_leak = 0.01;   ///< share of the light that leaks into the register: dots of 40 grey levels
 
   double halo_level = 60;    ///< glare at the rim of the lamp's disk
   double halo_length = 4;    ///< pixels over which glare falls to 1 / e

@@ -207,12 +207,14 @@ void VirtualSensor::store_row(const VirtualScene& scene, int y, Image& image) co
   const auto adc_white = static_cast<float>((1 << bits) - 1);
   const float scale = adc_white / static_cast<float>(kWhite);
   const auto widen = static_cast<float>(layout_.white()) / adc_white;
+  const auto to_nearest = [half = 0.5F](float v) {
+    return static_cast<int>(v + half);
+  };  // v >= 0; lround is slow
   const auto convert = [&](auto* to) {
     using Sample = std::remove_pointer_t<decltype(to)>;
     for (std::size_t i = 0; i < row_.size(); ++i) {
-      const float v = std::min(std::max(0.0F, row_[i] * scale), adc_white);
-      const auto code = static_cast<int>(v + 0.5F);
-      to[i] = static_cast<Sample>(static_cast<int>(static_cast<float>(code) * widen + 0.5F));
+      const int code = to_nearest(std::min(std::max(0.0F, row_[i] * scale), adc_white));
+      to[i] = static_cast<Sample>(to_nearest(static_cast<float>(code) * widen));
     }
   };
   bytes_per_sample(layout_.format) == 1 ? convert(image.row_as<std::uint8_t>(y))

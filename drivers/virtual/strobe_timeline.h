@@ -40,7 +40,7 @@ class StrobeTimeline {
     TimePoint applied;
     TimePoint base;
     Seconds period;
-    std::int64_t first_flash;  // its number j: the code begins here
+    std::int64_t first_flash = 0;  // its number j: the code begins here
   };
   /// The segment's flashes that overlap [from, to) and begin before `end`; flash 0 would begin at `zero`.
   static void add_flashes(const Segment& segment, Seconds zero, Seconds from, Seconds to, Seconds end,

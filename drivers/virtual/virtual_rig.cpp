@@ -26,8 +26,8 @@ struct VirtualRig::Parts {
 VirtualRig::VirtualRig(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 VirtualRig::~VirtualRig() = default;
 
-Result<std::unique_ptr<VirtualRig>> VirtualRig::create(VirtualRigOptions options,
-                                                       std::shared_ptr<Clock> clock) {
+Result<std::unique_ptr<VirtualRig>> VirtualRig::create(const VirtualRigOptions& options,
+                                                       const std::shared_ptr<Clock>& clock) {
   EMBERLOCK_RETURN_IF_ERROR(check(options));
   return std::unique_ptr<VirtualRig>(new VirtualRig(std::make_unique<Parts>(options, clock)));
 }

@@ -37,7 +37,8 @@ struct TrueDot {
 class VirtualRig {
  public:
   /// Errors: bad_input, naming camera and field.
-  static Result<std::unique_ptr<VirtualRig>> create(VirtualRigOptions options, std::shared_ptr<Clock> clock);
+  static Result<std::unique_ptr<VirtualRig>> create(const VirtualRigOptions& options,
+                                                    const std::shared_ptr<Clock>& clock);
   ~VirtualRig();
   VirtualRig(const VirtualRig&) = delete;
   VirtualRig& operator=(const VirtualRig&) = delete;

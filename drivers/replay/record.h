@@ -13,9 +13,9 @@ v1::CameraStream to_proto(const CameraInfo& info);
 /// Errors: bad_input where the layout is unusable.
 Result<CameraInfo> camera_info(const v1::CameraStream& stream);
 
-/// To be appended after each Strobe::apply, with what read_back says.
+/// To be appended after each Strobe::read_back, with what it said and `now` asked after it.
 v1::Event strobe_event(TimePoint now, const StrobeSettings& read_back);
-/// To be appended after each Camera::reset_shutter that succeeded.
+/// To be appended after each Camera::reset_shutter that succeeded, with `now` asked before it.
 v1::Event reset_event(TimePoint now, const std::string& camera_id, TimePoint at);
 
 /// Errors: bad_input where a number isn't finite or the output unknown.

@@ -25,10 +25,38 @@ Error off_course(std::string what, std::string where) {
 
 }  // namespace
 
-void ReplayClock::advance_to(TimePoint t) {
-  std::int64_t seen = ns_.load();
-  while (seen < t.ns && !ns_.compare_exchange_weak(seen, t.ns)) {
+ReplayClock::ReplayClock(const SessionReader& session) : latest_(first_instant(session)) {
+  for (const v1::Event& event : session.events()) {
+    instants_.push_back({event.monotonic_ns()});
+    done_.push_back(!event.has_strobe() && !event.has_reset());
   }
+  next_ = static_cast<std::size_t>(std::find(done_.begin(), done_.end(), false) - done_.begin());
+}
+
+TimePoint ReplayClock::now() const {
+  const std::scoped_lock lock(mutex_);
+  if (own_) return *own_;
+  return next_ < instants_.size() ? instants_[next_] : latest_;
+}
+
+void ReplayClock::sleep_until(TimePoint t) {
+  const std::scoped_lock lock(mutex_);
+  latest_ = std::max(latest_, t);
+}
+
+void ReplayClock::frame_replayed(TimePoint arrival) {
+  const std::scoped_lock lock(mutex_);
+  latest_ = std::max(latest_, arrival);
+  own_.reset();
+}
+
+void ReplayClock::event_replayed(std::size_t event, After after) {
+  const std::scoped_lock lock(mutex_);
+  latest_ = std::max(latest_, instants_[event]);
+  own_.reset();
+  if (after == After::own_instant) own_ = instants_[event];
+  done_[event] = true;
+  while (next_ < done_.size() && done_[next_]) ++next_;
 }
 
 ReplayCamera::ReplayCamera(std::shared_ptr<SessionReader> session, std::size_t camera,
@@ -50,52 +78,61 @@ Result<Frame> ReplayCamera::next_frame(Seconds /*deadline*/) {
   const std::size_t i = next_frame_;
   if (i < session_->stamps(camera_).size()) {
     ++next_frame_;
-    clock_->advance_to(session_->stamps(camera_)[i].monotonic_time);
+    clock_->frame_replayed(session_->stamps(camera_)[i].monotonic_time);
   }
   return session_->read(camera_, i);
 }
 
-Status ReplayCamera::reset_shutter(TimePoint /*at*/) {
+Status ReplayCamera::reset_shutter(TimePoint at) {
   const auto& events = session_->events();
   const auto mine = [&](const v1::Event& e) { return e.has_reset() && e.reset().camera_id() == info_.id; };
   const auto found =
       std::find_if(events.begin() + static_cast<std::ptrdiff_t>(next_event_), events.end(), mine);
   if (found == events.end()) return off_course("the recording shows no further reset", "camera " + info_.id);
-  next_event_ = static_cast<std::size_t>(found - events.begin()) + 1;
-  clock_->advance_to({found->monotonic_ns()});
+  if (found->reset().at_ns() != at.ns) {
+    return off_course("the recorded reset was ordered for " + std::to_string(found->reset().at_ns()) +
+                          " ns, not for " + std::to_string(at.ns) + " ns",
+                      "camera " + info_.id);
+  }
+  const auto index = static_cast<std::size_t>(found - events.begin());
+  next_event_ = index + 1;
+  clock_->event_replayed(index, ReplayClock::After::next_event);
   return {};
 }
 
 ReplayStrobe::ReplayStrobe(std::shared_ptr<const SessionReader> session, std::shared_ptr<ReplayClock> clock)
     : session_(std::move(session)), clock_(std::move(clock)) {}
 
-Status ReplayStrobe::apply(const StrobeSettings& settings) {
+Result<std::size_t> ReplayStrobe::next_state() const {
   const auto& events = session_->events();
   const auto found = std::find_if(events.begin() + static_cast<std::ptrdiff_t>(next_event_), events.end(),
                                   [](const v1::Event& e) { return e.has_strobe(); });
   if (found == events.end())
-    return off_course("the recording shows no further setting of the strobe", "strobe");
-  EMBERLOCK_ASSIGN_OR_RETURN(StrobeSettings recorded, strobe_settings(found->strobe()));
-  if (recorded.output != settings.output) {
-    return off_course("the recorded strobe was switched to another output here", "strobe");
-  }
-  state_ = std::move(recorded);
-  applied_ = true;
-  next_event_ = static_cast<std::size_t>(found - events.begin()) + 1;
-  clock_->advance_to({found->monotonic_ns()});
-  return {};
+    return off_course("the recording shows no further state of the strobe", "strobe");
+  return static_cast<std::size_t>(found - events.begin());
+}
+
+Status ReplayStrobe::apply(const StrobeSettings& settings) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t index, next_state());
+  EMBERLOCK_ASSIGN_OR_RETURN(const StrobeSettings recorded,
+                             strobe_settings(session_->events()[index].strobe()));
+  if (recorded.output == settings.output) return {};
+  return off_course("the recorded strobe was switched to another output here", "strobe");
 }
 
 Result<StrobeSettings> ReplayStrobe::read_back() {
-  if (!applied_) return off_course("the strobe's state before its first setting wasn't recorded", "strobe");
-  return state_;
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t index, next_state());
+  EMBERLOCK_ASSIGN_OR_RETURN(StrobeSettings recorded, strobe_settings(session_->events()[index].strobe()));
+  next_event_ = index + 1;
+  clock_->event_replayed(index, ReplayClock::After::own_instant);
+  return recorded;
 }
 
 Result<ReplayRig> ReplayRig::open(const std::filesystem::path& folder) {
   EMBERLOCK_ASSIGN_OR_RETURN(SessionReader reader, SessionReader::open(folder));
   ReplayRig rig;
   rig.session = std::make_shared<SessionReader>(std::move(reader));
-  rig.clock = std::make_shared<ReplayClock>(first_instant(*rig.session));
+  rig.clock = std::make_shared<ReplayClock>(*rig.session);
   for (std::size_t i = 0; i < rig.session->camera_count(); ++i) {
     rig.cameras.push_back(std::make_unique<ReplayCamera>(rig.session, i, rig.clock));
   }

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <atomic>
 #include <cstddef>
-#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,25 +17,40 @@
 // A recorded session behind the interfaces of live devices, so that what ran live runs again on the same
 // frames.
 //
-// What must be called in the order of the recording: for each camera its frames (next_frame gives the
-// recorded frames one after the other) and its resets (the n-th reset_shutter of a camera meets its n-th
-// ShutterResetEvent); for the strobe its settings (the n-th apply meets the n-th StrobeState). Between
-// devices the order is free: nothing but the clock connects them. A call that the recording doesn't show is
-// an Error of kind device: the replay has left the recorded course. Frames that the live run never took from
-// a camera aren't in the recording, so a reset skips none.
+// What must be called in the order of the recording:
+// - of each camera, frames and resets: next_frame gives the recorded frames one after the other, and the n-th
+//   reset_shutter meets the n-th ShutterResetEvent. Frames that the live run never took aren't in the
+//   recording, so a reset skips none.
+// - of the strobe, read_back: the n-th meets the n-th StrobeState, and says what that says.
+// - of the clock: nothing, if what the live run asked it were the instants that events carry, each asked once
+// the
+//   event before was done (a reset's before the call, a strobe state's after read_back). See ReplayClock.
+// Between the devices the order is free. A call that the recording doesn't show is an Error of kind device:
+// the replay has left the recorded course.
 namespace emberlock {
 
-/// Shows the monotonic time of the latest frame or event that was replayed, and never goes back. Sleeping is
-/// passing the time at once.
+/// Answers with the instants that the live run got for its events, bit for bit: directly after a read_back
+/// that strobe state's own; otherwise that of the next strobe state or reset to come; behind the last one the
+/// latest instant replayed. Sleeping is passing the time at once. Thread-safe.
 class ReplayClock final : public Clock {
  public:
-  explicit ReplayClock(TimePoint start) : ns_(start.ns) {}
-  [[nodiscard]] TimePoint now() const override { return {ns_.load()}; }
-  void sleep_until(TimePoint t) override { advance_to(t); }
-  void advance_to(TimePoint t);
+  explicit ReplayClock(const SessionReader& session);
+  [[nodiscard]] TimePoint now() const override;
+  void sleep_until(TimePoint t) override;
 
  private:
-  std::atomic<std::int64_t> ns_;
+  friend class ReplayCamera;
+  friend class ReplayStrobe;
+  enum class After { next_event, own_instant };
+  void frame_replayed(TimePoint arrival);
+  void event_replayed(std::size_t event, After after);
+
+  mutable std::mutex mutex_;
+  std::vector<TimePoint> instants_;  ///< of the session's events
+  std::vector<bool> done_;           ///< replayed, or of no device
+  std::size_t next_ = 0;             ///< the first event not done
+  TimePoint latest_;
+  std::optional<TimePoint> own_;
 };
 
 /// One camera of a session. Deadlines don't matter: a recorded frame is there at once. A frame that the
@@ -49,6 +64,7 @@ class ReplayCamera final : public Camera {
   Status start() override;
   void stop() override { filming_ = false; }
   Result<Frame> next_frame(Seconds deadline) override;
+  /// Error device also where the recorded reset was ordered for another instant.
   Status reset_shutter(TimePoint at) override;
 
  private:
@@ -61,23 +77,23 @@ class ReplayCamera final : public Camera {
   std::size_t next_event_ = 0;
 };
 
-/// The session's strobe: says what the recorded one said after each setting.
+/// The session's strobe.
 class ReplayStrobe final : public Strobe {
  public:
   ReplayStrobe(std::shared_ptr<const SessionReader> session, std::shared_ptr<ReplayClock> clock);
   [[nodiscard]] const std::string& id() const override { return id_; }
-  /// Error device also where the recorded strobe was switched to another output (off, flashing, steady).
+  /// Accepts what the next StrobeState can be the answer to: error device where its output is another one.
   Status apply(const StrobeSettings& settings) override;
-  /// Error device before the first apply.
   Result<StrobeSettings> read_back() override;
 
  private:
+  /// Where the next StrobeState stands among the events.
+  [[nodiscard]] Result<std::size_t> next_state() const;
+
   std::shared_ptr<const SessionReader> session_;
   std::shared_ptr<ReplayClock> clock_;
   std::string id_ = "replay";
   std::size_t next_event_ = 0;
-  StrobeSettings state_;
-  bool applied_ = false;
 };
 
 /// All devices of a session on one clock, which starts at the first recorded instant.

@@ -1,0 +1,232 @@
+#include <csignal>
+#include <cstddef>
+#include <string>
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "session/events.h"
+#include "session/files.h"
+#include "session/index.h"
+#include "session/reader.h"
+#include "session/salvage.h"
+#include "session/writer.h"
+#include "tests/support/recording.h"
+
+namespace emberlock {
+namespace {
+
+using test::bytes_of;
+using test::manifest_of;
+using test::noise_frame;
+using test::put_bytes;
+using test::record;
+using test::small_disk_options;
+using test::TempFolder;
+
+const ImageLayout kLayout{{48, 32}, PixelFormat::gray8, 8};
+
+/// Reads every frame: those that come must be those recorded. Returns how many came.
+std::size_t count_good(SessionReader& reader, const ImageLayout& layout) {
+  std::size_t good = 0;
+  for (std::size_t i = 0; i < reader.stamps(0).size(); ++i) {
+    const auto frame = reader.read(0, i);
+    if (!frame) {
+      EXPECT_NE(frame.error().message().find("frame " + std::to_string(i)), std::string::npos);
+      continue;
+    }
+    EXPECT_EQ(*frame->image, *noise_frame(layout, reader.stamps(0)[i].frame_id).image);
+    ++good;
+  }
+  return good;
+}
+
+TEST(DamagedSession, AMissingSegmentCostsItsOwnFramesAlone) {
+  const TempFolder temp;
+  WriterOptions options = small_disk_options();
+  options.frames_per_segment = 3;
+  record(temp / "s", kLayout, 9, options);
+  std::filesystem::remove(temp / "s/cam0/000001.mkv");
+  auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(count_good(*reader, kLayout), 6U);
+  const auto lost = reader->read(0, 4);
+  ASSERT_FALSE(lost);
+  EXPECT_NE(lost.error().message().find("000001.mkv"), std::string::npos);
+}
+
+class FlippedBytes : public testing::TestWithParam<Encoding> {};
+
+TEST_P(FlippedBytes, InASegmentAreReportedAndNeverHandedOnAsGood) {
+  const TempFolder temp;
+  record(temp / "s", kLayout, 6, small_disk_options(GetParam()));
+  const auto path = find_segment(temp / "s", "cam0", 0);
+  const std::string whole = bytes_of(path);
+  std::size_t worst = 6;
+  for (std::size_t at = 0; at < whole.size(); at += 1 + whole.size() / 97) {
+    std::string bytes = whole;
+    bytes[at] = static_cast<char>(bytes[at] ^ 0x41);
+    put_bytes(path, bytes);
+    auto reader = SessionReader::open(temp / "s");
+    ASSERT_TRUE(reader);
+    worst = std::min(worst, count_good(*reader, kLayout));
+  }
+  EXPECT_LT(worst, 6U) << "no flip was noticed at all";
+}
+
+TEST_P(FlippedBytes, InPixelDataCostOneFrame) {
+  const TempFolder temp;
+  record(temp / "s", kLayout, 6, small_disk_options(GetParam()));
+  const auto path = find_segment(temp / "s", "cam0", 0);
+  std::string bytes = bytes_of(path);
+  const std::size_t middle = bytes.size() / 2;  // noise doesn't compress: far from any header
+  bytes[middle] = static_cast<char>(bytes[middle] ^ 0x41);
+  put_bytes(path, bytes);
+  auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(count_good(*reader, kLayout), 5U);
+}
+
+INSTANTIATE_TEST_SUITE_P(DamagedSession, FlippedBytes, testing::Values(Encoding::ffv1, Encoding::raw_nut));
+
+TEST(DamagedSession, ATruncatedSegmentKeepsTheFramesBeforeTheCut) {
+  const TempFolder temp;
+  record(temp / "s", kLayout, 8, small_disk_options(Encoding::raw_nut));
+  const auto path = find_segment(temp / "s", "cam0", 0);
+  std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
+  auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader);
+  const std::size_t good = count_good(*reader, kLayout);
+  EXPECT_GE(good, 3U);
+  EXPECT_LE(good, 4U);
+}
+
+TEST(DamagedSession, ASegmentOfAnotherCameraIsNotTakenForThisOne) {
+  const TempFolder temp;
+  record(temp / "a", kLayout, 3, small_disk_options());
+  record(temp / "b", {{32, 48}, PixelFormat::gray8, 8}, 3, small_disk_options());
+  std::filesystem::copy_file(temp / "b/cam0/000000.mkv", temp / "a/cam0/000000.mkv",
+                             std::filesystem::copy_options::overwrite_existing);
+  auto reader = SessionReader::open(temp / "a");
+  ASSERT_TRUE(reader);
+  EXPECT_EQ(count_good(*reader, kLayout), 0U);
+}
+
+TEST(DamagedSession, AnIndexWithABadRecordIsRefusedUntilSalvaged) {
+  const TempFolder temp;
+  record(temp / "s", kLayout, 5, small_disk_options());
+  const auto path = index_path(temp / "s", "cam0");
+  std::string bytes = bytes_of(path);
+  bytes[kIndexHeaderBytes + 2 * kIndexRecordBytes] ^= 1;
+  put_bytes(path, bytes);
+  const auto damaged = SessionReader::open(temp / "s");
+  ASSERT_FALSE(damaged);
+  EXPECT_NE(damaged.error().message().find("index.bin"), std::string::npos);
+  const auto report = salvage(temp / "s");
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->cameras.at(0).kept, 4U);
+  EXPECT_EQ(report->cameras.at(0).lost, 1U);
+  auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader) << reader.error().message();
+  EXPECT_EQ(reader->manifest().state(), v1::Manifest::SALVAGED);
+  EXPECT_EQ(count_good(*reader, kLayout), 4U);
+}
+
+TEST(DamagedSession, TornEventsAreRefusedUntilSalvaged) {
+  const TempFolder temp;
+  auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options());
+  ASSERT_TRUE(writer);
+  v1::Event event;
+  event.set_note("kept");
+  ASSERT_TRUE(writer->append(event));
+  ASSERT_TRUE(writer->append(event));
+  ASSERT_TRUE(writer->finish());
+  writer = Error{};  // lets go of the lock
+  std::filesystem::resize_file(events_path(temp / "s"),
+                               std::filesystem::file_size(events_path(temp / "s")) - 1);
+  ASSERT_FALSE(SessionReader::open(temp / "s"));
+  const auto report = salvage(temp / "s");
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_EQ(report->events_kept, 1U);
+  const auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader) << reader.error().message();
+  EXPECT_EQ(reader->manifest().state(), v1::Manifest::COMPLETE);  // no frame was lost
+}
+
+TEST(Salvage, LeavesAFinishedSessionAlone) {
+  const TempFolder temp;
+  record(temp / "s", kLayout, 5, small_disk_options());
+  const std::string before = bytes_of(manifest_path(temp / "s"));
+  const auto report = salvage(temp / "s");
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->cameras.at(0).kept, 5U);
+  EXPECT_EQ(bytes_of(manifest_path(temp / "s")), before);
+}
+
+TEST(Salvage, OfASessionThatIsStillRecordedIsRefused) {
+  const TempFolder temp;
+  auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options());
+  ASSERT_TRUE(writer);
+  const auto report = salvage(temp / "s");
+  ASSERT_FALSE(report);
+  EXPECT_NE(report.error().message().find("still being written"), std::string::npos);
+}
+
+TEST(Salvage, OfAWriterThatWentAwayBeforeItsFirstFrame) {
+  const TempFolder temp;
+  { ASSERT_TRUE(SessionWriter::create(temp / "s", manifest_of({kLayout, kLayout}), small_disk_options())); }
+  std::filesystem::remove_all(temp / "s/cam1");
+  const auto report = salvage(temp / "s");
+  ASSERT_TRUE(report) << report.error().message();
+  const auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader) << reader.error().message();
+  EXPECT_TRUE(reader->stamps(1).empty());
+}
+
+class KilledRecorder : public testing::TestWithParam<Encoding> {};
+
+// The child records frames of 100 Hz until it's killed in the midst of it; at most half a second of them may
+// be gone.
+TEST_P(KilledRecorder, LosesAtMostHalfASecond) {
+  const TempFolder temp;
+  int progress[2];
+  ASSERT_EQ(::pipe(progress), 0);
+  const pid_t child = ::fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    WriterOptions options = small_disk_options(GetParam());
+    options.frames_per_segment = 150;
+    auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), options);
+    for (std::uint64_t i = 0; writer.ok(); ++i) {
+      if (!writer->write(0, noise_frame(kLayout, i)).ok()) break;
+      if (::write(progress[1], "x", 1) != 1) break;
+    }
+    ::_exit(1);
+  }
+  std::size_t written = 0;
+  for (char c = 0; written < 377 && ::read(progress[0], &c, 1) == 1; ++written) {
+  }
+  ::kill(child, SIGKILL);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  ::close(progress[0]);
+  ::close(progress[1]);
+  ASSERT_TRUE(WIFSIGNALED(status)) << "the recorder failed by itself";
+
+  ASSERT_FALSE(SessionReader::open(temp / "s"));
+  const auto report = salvage(temp / "s");
+  ASSERT_TRUE(report) << report.error().message();
+  auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader) << reader.error().message();
+  EXPECT_EQ(reader->manifest().state(), v1::Manifest::SALVAGED);
+  EXPECT_GE(reader->stamps(0).size() + 50, written);
+  EXPECT_EQ(reader->stamps(0).size(), report->cameras.at(0).kept);
+  EXPECT_EQ(count_good(*reader, kLayout), reader->stamps(0).size());
+  EXPECT_EQ(reader->manifest().cameras(0).segments_size(), 3);
+}
+
+INSTANTIATE_TEST_SUITE_P(Salvage, KilledRecorder, testing::Values(Encoding::ffv1, Encoding::raw_nut));
+
+}  // namespace
+}  // namespace emberlock

@@ -7,7 +7,9 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.set_version_flag("--version", "emberlock " EMBERLOCK_VERSION);
   emberlock::cli::add_smear(app);
+  emberlock::cli::add_align(app);
   emberlock::cli::add_reconstruct(app);
+  emberlock::cli::add_demo(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {

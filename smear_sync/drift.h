@@ -11,7 +11,7 @@ namespace emberlock {
 
 struct DriftOptions {
   Seconds period{1 / 23.976};  ///< T
-  Seconds resolution{};          ///< of row_resolution()
+  Seconds resolution{};        ///< of row_resolution()
   PartsPerMillion fastest{
       500};  ///< rates are looked for within +- this, > 0; must stay below T / 2 between samples
 };

@@ -45,4 +45,12 @@ std::optional<ResetDelay> expected_delay(const AlignState& state, const std::vec
                     Seconds(std::sqrt(1 / weights + square(options.delay_spread.value())))};
 }
 
+std::optional<TimePoint> common_stamp(std::span<const TimePoint> stamps, TimePoint near, Seconds period) {
+  if (stamps.empty()) return std::nullopt;
+  Seconds sum;
+  for (const TimePoint stamp : stamps) sum += wrap_symmetric(stamp - stamps.front(), period);
+  const Seconds mean = stamps.front() - near + sum / static_cast<double>(stamps.size());
+  return near + wrap_symmetric(mean, period);
+}
+
 }  // namespace emberlock

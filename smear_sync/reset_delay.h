@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "smear_sync/align.h"
@@ -18,5 +19,9 @@ ResetDelay learn_delay(const std::optional<ResetDelay>& expected, Seconds observ
 /// of its model that have been taught, else what was known before; absent when nothing is known.
 std::optional<ResetDelay> expected_delay(const AlignState& state, const std::vector<AlignCamera>& cameras,
                                          const AlignOptions& options, std::size_t camera);
+
+/// The instant within T / 2 of `near` at which a camera's frames are stamped, modulo T: the circular mean of
+/// their stamps. Absent without stamps.
+std::optional<TimePoint> common_stamp(std::span<const TimePoint> stamps, TimePoint near, Seconds period);
 
 }  // namespace emberlock

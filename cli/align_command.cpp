@@ -1,0 +1,157 @@
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "base/file.h"
+#include "cli/align_json.h"
+#include "cli/align_record.h"
+#include "cli/align_run.h"
+#include "cli/commands.h"
+#include "drivers/virtual/virtual_clock.h"
+#include "drivers/virtual/virtual_rig.h"
+
+namespace emberlock::cli {
+namespace {
+
+struct AlignArguments {
+  std::string rig = "virtual:11";
+  std::string tolerance = "100rows";
+  std::string policy = "densest";
+  std::uint64_t seed = 1;
+  bool json = false;
+  double latency_jitter_ms = 0.2;
+  int max_rounds = 500;
+  std::string record;
+  std::string replay;
+  std::string delays;
+};
+
+void print_table(const AlignRoundReport& report) {
+  const SecondsPerRow row = report.options.row_time;
+  std::printf("round %d: %s; %d resets so far", report.decision.round, report.decision.reason.c_str(),
+              report.decision.resets_so_far);
+  if (report.decision.worst_pair) {
+    std::printf("; worst pair %.1f rows (%.3f ms)", (*report.decision.worst_pair / row).value(),
+                in_milliseconds(*report.decision.worst_pair));
+  }
+  std::printf("\n");
+  for (std::size_t i = 0; i < report.cameras.size(); ++i) {
+    const CameraDecision& camera = report.decision.cameras[i];
+    const char mark = camera.reset ? '*' : report.decision.reference == i ? '=' : ' ';
+    std::printf("  %c %-12s ", mark, report.cameras[i].id.c_str());
+    if (camera.error) {
+      std::printf("%+8.1f rows %+8.3f ms", (*camera.error / row).value(), in_milliseconds(*camera.error));
+    } else {
+      std::printf("%25s", std::string(name(camera.state)).c_str());
+    }
+    std::printf("  %s\n", camera.reason.c_str());
+  }
+  std::fflush(stdout);
+}
+
+void print_summary(const AlignRunResult& result) {
+  const AlignDecision& last = result.last;
+  const SecondsPerRow row = result.options.row_time;
+  std::printf("%s after %d rounds and %d resets (policy %s, tolerance %.1f rows, t_row %.4f us): %s\n",
+              last.verdict == AlignVerdict::aligned ? "aligned" : "NOT aligned", last.round, result.resets,
+              std::string(name(result.options.policy)).c_str(), result.options.tolerance.in_rows(row).value(),
+              row.value() * 1e6, last.reason.c_str());
+}
+
+/// Where the rounds go: JSON lines or tables on stdout.
+AlignObserver printer(bool json) {
+  return [json](const AlignRoundReport& report) {
+    if (!json) return print_table(report);
+    std::printf("%s\n", round_json(report).dump().c_str());
+    std::fflush(stdout);
+  };
+}
+
+Result<AlignRunOptions> options_from(const AlignArguments& arguments) {
+  AlignRunOptions options;
+  EMBERLOCK_ASSIGN_OR_RETURN(options.align.policy, parse_align_policy(arguments.policy));
+  EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, parse_tolerance(arguments.tolerance));
+  options.align.max_rounds = arguments.max_rounds;
+  options.align.delay_jitter = std::max(milliseconds(arguments.latency_jitter_ms), microseconds(1));
+  options.seed = arguments.seed;
+  return options;
+}
+
+Result<AlignRunResult> align_live(const AlignArguments& arguments, const AlignObserver& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(AlignRunOptions options, options_from(arguments));
+  EMBERLOCK_ASSIGN_OR_RETURN(VirtualRigOptions setup, parse_virtual_rig(arguments.rig, arguments.seed));
+  for (VirtualCameraOptions& camera : setup.cameras) {
+    camera.reset_jitter = milliseconds(arguments.latency_jitter_ms);
+    // What a data sheet says of the model: the direction, the rows and the shifts. t_row is measured.
+    options.timing.push_back(
+        {.rows = camera.timing.rows, .shifts = camera.timing.shifts, .direction = camera.timing.direction});
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto virtual_rig,
+                             VirtualRig::create(setup, std::make_shared<VirtualClock>()));
+  AlignRig rig{{}, &virtual_rig->strobe(), &virtual_rig->clock(), nullptr};
+  for (int i = 0; i < virtual_rig->size(); ++i) rig.cameras.push_back(&virtual_rig->camera(i));
+
+  if (!arguments.delays.empty() && std::filesystem::exists(arguments.delays)) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.delays, read_delays(arguments.delays, rig));
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      AlignRunResult result,
+      arguments.record.empty()
+          ? run_align(rig, options, observer, progress_bar("align"))
+          : record_align(arguments.record, rig, options, observer, progress_bar("align")));
+  if (!arguments.delays.empty())
+    EMBERLOCK_RETURN_IF_ERROR(write_delays(arguments.delays, rig, result.delays));
+  return result;
+}
+
+void align(const AlignArguments& arguments) {
+  const AlignObserver observer = printer(arguments.json);
+  std::uint64_t seed = arguments.seed;
+  const auto result = [&]() -> Result<AlignRunResult> {
+    if (arguments.replay.empty()) return align_live(arguments, observer);
+    return replay_align(arguments.replay, observer, progress_bar("replay"), &seed);
+  }();
+  if (!result.ok()) fail(result.error());
+  if (arguments.json) {
+    std::printf("%s\n", summary_json(*result, seed).dump().c_str());
+  } else {
+    print_summary(*result);
+  }
+  if (result->last.verdict != AlignVerdict::aligned) throw CLI::RuntimeError(1);
+}
+
+}  // namespace
+
+void add_align(CLI::App& app) {
+  auto arguments = std::make_shared<AlignArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "align",
+      "Films the strobe and resets the cameras' shutters until all read within a tolerance of one another.");
+  verb->add_option("--rig", arguments->rig, "cameras and strobe: virtual:N")->capture_default_str();
+  verb->add_option("--tolerance", arguments->tolerance,
+                   "to the reference, to either side: 100rows, 5.4ms or 500us")
+      ->capture_default_str();
+  verb->add_option("--policy", arguments->policy, "fixed-reference (the paper's), densest or timed")
+      ->capture_default_str();
+  verb->add_option("--seed", arguments->seed, "of the virtual rig and of the moments of untimed resets")
+      ->capture_default_str();
+  verb->add_flag("--json", arguments->json, "one JSON object a round on stdout, and one at the end");
+  verb->add_option("--latency-jitter", arguments->latency_jitter_ms, "RMS of a reset's latency, ms")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  verb->add_option("--max-rounds", arguments->max_rounds, "give up after so many")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  verb->add_option(
+      "--delays", arguments->delays,
+      "file of what is known of the cameras' reset delays: read if it exists, written at the end");
+  auto* record = verb->add_option("--record", arguments->record,
+                                  "record frames, strobe, resets and decisions to this folder");
+  verb->add_option("--replay", arguments->replay,
+                   "instead of filming, run a recorded alignment again, with its own settings")
+      ->excludes(record);
+  verb->callback([arguments] { align(*arguments); });
+}
+
+}  // namespace emberlock::cli

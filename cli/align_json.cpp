@@ -1,0 +1,171 @@
+#include "cli/align_json.h"
+
+#include <stdexcept>
+#include <string>
+
+namespace emberlock::cli {
+namespace {
+
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+ordered_json delay_json(const std::optional<ResetDelay>& delay) {
+  if (!delay) return nullptr;
+  return {{"mean_s", delay->mean.value()}, {"sigma_s", delay->sigma.value()}};
+}
+
+double number(const json& object, const char* key) { return object.at(key).get<double>(); }
+int integer(const json& object, const char* key) { return object.at(key).get<int>(); }
+
+CcdTiming timing_from(const json& object) {
+  CcdTiming timing;
+  timing.rows = integer(object, "rows");
+  timing.shifts = integer(object, "shifts");
+  timing.frame_period = Seconds(number(object, "frame_period_s"));
+  timing.row_time = SecondsPerRow(number(object, "row_time_s"));
+  timing.direction =
+      integer(object, "direction") > 0 ? ReadDirection::top_first : ReadDirection::bottom_first;
+  return timing;
+}
+
+AlignRunOptions options_from(const json& object) {
+  AlignRunOptions options;
+  const auto policy = parse_align_policy(object.at("policy").get<std::string>());
+  if (!policy.ok()) throw std::invalid_argument(policy.error().message());
+  options.align.policy = *policy;
+  const double tolerance = number(object, "tolerance");
+  if (object.at("tolerance_unit").get<std::string>() == "rows") {
+    options.align.tolerance.amount = Rows(tolerance);
+  } else {
+    options.align.tolerance.amount = Seconds(tolerance);
+  }
+  if (!(tolerance > 0)) throw std::invalid_argument("the tolerance is not positive");
+  options.align.reference = object.at("reference").get<std::size_t>();
+  options.align.row_time = SecondsPerRow(number(object, "row_time_s"));
+  options.align.delay_jitter = Seconds(number(object, "delay_jitter_s"));
+  options.align.delay_spread = Seconds(number(object, "delay_spread_s"));
+  options.align.rate_spread = PartsPerMillion(number(object, "rate_spread_ppm"));
+  options.align.max_rounds = integer(object, "max_rounds");
+  options.align.max_looks = integer(object, "max_looks");
+  options.measure_row_time = object.at("measure_row_time").get<bool>();
+  options.comb_rate = Hertz(number(object, "comb_rate_hz"));
+  options.comb_frames = integer(object, "comb_frames");
+  options.frames_per_round = integer(object, "frames_per_round");
+  options.flash_width = Seconds(number(object, "flash_width_s"));
+  options.frame_deadline = Seconds(number(object, "frame_deadline_s"));
+  options.reset_lead = Seconds(number(object, "reset_lead_s"));
+  options.rate_error = PartsPerMillion(number(object, "rate_error_ppm"));
+  options.seed = object.at("seed").get<std::uint64_t>();
+  for (const json& camera : object.at("cameras")) {
+    options.timing.push_back(timing_from(camera));
+    const json& delay = camera.at("delay");
+    options.delays.emplace_back();
+    if (delay.is_null()) continue;
+    options.delays.back() = ResetDelay{Seconds(number(delay, "mean_s")), Seconds(number(delay, "sigma_s"))};
+  }
+  return options;
+}
+
+}  // namespace
+
+ordered_json round_json(const AlignRoundReport& report) {
+  const AlignDecision& decision = report.decision;
+  const SecondsPerRow row = report.options.row_time;
+  ordered_json cameras = ordered_json::array();
+  for (std::size_t i = 0; i < report.cameras.size(); ++i) {
+    const CameraDecision& camera = decision.cameras[i];
+    const Phase& phase = report.round.cameras[i].phase;
+    ordered_json error_rows;
+    ordered_json error_ms;
+    ordered_json sigma_rows;
+    if (camera.error) {
+      error_rows = (*camera.error / row).value();
+      error_ms = in_milliseconds(*camera.error);
+      sigma_rows = (camera.sigma / row).value();
+    }
+    cameras.push_back(
+        {{"id", report.cameras[i].id},
+         {"state", name(camera.state)},
+         {"tau_ms", phase.state == PhaseState::known ? ordered_json(in_milliseconds(phase.tau)) : nullptr},
+         {"error_rows", error_rows},
+         {"error_ms", error_ms},
+         {"sigma_rows", sigma_rows},
+         {"reset", camera.reset},
+         {"reason", camera.reason}});
+  }
+  ordered_json line;
+  line["round"] = decision.round;
+  line["reference"] = decision.reference ? ordered_json(report.cameras[*decision.reference].id) : nullptr;
+  line["cameras"] = std::move(cameras);
+  line["worst_pair_rows"] =
+      decision.worst_pair ? ordered_json((*decision.worst_pair / row).value()) : nullptr;
+  line["beat_ppm"] = report.round.beat.rate.value();
+  line["strobe_phase_ms"] = in_milliseconds(report.strobe.phase);
+  line["resets_so_far"] = decision.resets_so_far;
+  line["aligned"] = decision.verdict == AlignVerdict::aligned;
+  line["reason"] = decision.reason;
+  return line;
+}
+
+ordered_json summary_json(const AlignRunResult& result, std::uint64_t seed) {
+  const AlignDecision& last = result.last;
+  const SecondsPerRow row = result.options.row_time;
+  ordered_json line;
+  line["aligned"] = last.verdict == AlignVerdict::aligned;
+  line["rounds"] = last.round;
+  line["resets"] = result.resets;
+  line["t_row_us"] = row.value() * 1e6;
+  line["worst_pair_rows"] = last.worst_pair ? ordered_json((*last.worst_pair / row).value()) : nullptr;
+  line["worst_pair_ms"] = last.worst_pair ? ordered_json(in_milliseconds(*last.worst_pair)) : nullptr;
+  line["tolerance_rows"] = result.options.tolerance.in_rows(row).value();
+  line["policy"] = name(result.options.policy);
+  line["seed"] = seed;
+  line["reason"] = last.reason;
+  return line;
+}
+
+ordered_json options_json(const AlignRunOptions& options) {
+  const AlignOptions& align = options.align;
+  const auto* rows = std::get_if<Rows>(&align.tolerance.amount);
+  ordered_json cameras = ordered_json::array();
+  for (std::size_t i = 0; i < options.timing.size(); ++i) {
+    const CcdTiming& timing = options.timing[i];
+    cameras.push_back({{"rows", timing.rows},
+                       {"shifts", timing.shifts},
+                       {"frame_period_s", timing.frame_period.value()},
+                       {"row_time_s", timing.row_time.value()},
+                       {"direction", static_cast<int>(timing.direction)},
+                       {"delay", delay_json(options.delays.empty() ? std::nullopt : options.delays[i])}});
+  }
+  return {{"policy", name(align.policy)},
+          {"tolerance", rows ? rows->value() : std::get<Seconds>(align.tolerance.amount).value()},
+          {"tolerance_unit", rows ? "rows" : "s"},
+          {"reference", align.reference},
+          {"row_time_s", align.row_time.value()},
+          {"delay_jitter_s", align.delay_jitter.value()},
+          {"delay_spread_s", align.delay_spread.value()},
+          {"rate_spread_ppm", align.rate_spread.value()},
+          {"max_rounds", align.max_rounds},
+          {"max_looks", align.max_looks},
+          {"measure_row_time", options.measure_row_time},
+          {"comb_rate_hz", options.comb_rate.value()},
+          {"comb_frames", options.comb_frames},
+          {"frames_per_round", options.frames_per_round},
+          {"flash_width_s", options.flash_width.value()},
+          {"frame_deadline_s", options.frame_deadline.value()},
+          {"reset_lead_s", options.reset_lead.value()},
+          {"rate_error_ppm", options.rate_error.value()},
+          {"seed", options.seed},
+          {"cameras", cameras}};
+}
+
+Result<AlignRunOptions> options_from_json(const json& object) {
+  try {
+    return options_from(object);
+  } catch (const std::exception& e) {
+    return Error{ErrorKind::bad_input, std::string("its alignment settings can't be read: ") + e.what(),
+                 "recording", "replay a recording that `emberlock align --record` made"};
+  }
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "base/clock.h"
+#include "base/frame.h"
+#include "base/progress.h"
+#include "base/result.h"
+#include "drivers/camera.h"
+#include "drivers/strobe.h"
+#include "session/writer.h"
+#include "smear_sync/align.h"
+#include "smear_sync/ccd_timing.h"
+#include "smear_sync/detect.h"
+#include "smear_sync/row_clock.h"
+
+namespace emberlock::cli {
+
+/// What an alignment acts on. Cameras go by their index everywhere.
+struct AlignRig {
+  std::vector<Camera*> cameras;
+  Strobe* strobe = nullptr;
+  Clock* clock = nullptr;
+  SessionWriter* recorder =
+      nullptr;  ///< takes every frame, strobe setting, reset and decision, if there is one
+};
+
+struct AlignRunOptions {
+  /// period, row_time, rows: of the rig's cameras; the run sets period to the cameras' own and, once
+  /// measured, row_time.
+  AlignOptions align;
+  /// By camera: n, K and d must be right (a wrong d reverses every correction); row_time is used where it
+  /// isn't measured.
+  std::vector<CcdTiming> timing;
+  /// By camera, or empty: what is known of the resets' delay from an earlier run.
+  std::vector<std::optional<ResetDelay>> delays;
+  bool measure_row_time = true;  ///< from a comb, before the first round
+  Hertz comb_rate{300};
+  int comb_frames = 24;      ///< of each camera
+  int frames_per_round = 4;  ///< of each camera, > 0
+  Seconds flash_width = microseconds(20);
+  Seconds frame_deadline{3};              ///< longest wait for a frame, a reset's latency included
+  Seconds reset_lead = milliseconds(20);  ///< between ordering a reset and its earliest moment
+  PartsPerMillion rate_error{20};         ///< standard error of the cameras' common rate against the strobe's
+  std::uint64_t seed = 1;                 ///< of the moments of resets that aren't timed
+};
+
+/// One round, as an observer sees it. References are good for the length of the call.
+struct AlignRoundReport {
+  const AlignRound& round;
+  const AlignDecision& decision;
+  const std::vector<AlignCamera>& cameras;
+  const AlignOptions& options;
+  const StrobeSettings& strobe;
+  const std::vector<std::vector<Frame>>& frames;           ///< [camera][frame]
+  const std::vector<std::vector<SmearReading>>& readings;  ///< of those
+};
+using AlignObserver = std::function<void(const AlignRoundReport&)>;
+
+struct AlignRunResult {
+  AlignDecision last;
+  AlignOptions options;                             ///< with period and row_time as used
+  std::vector<CcdTiming> timing;                    ///< with the row times measured
+  std::vector<std::optional<RowClock>> row_clocks;  ///< by camera, where one was measured
+  std::vector<std::optional<ResetDelay>> delays;  ///< by camera, what is known now: options for the next run
+  int resets = 0;
+};
+
+/// Films the strobe, measures t_row from a comb, then films, decides and resets until the cameras are aligned
+/// or align_step gives up. Starts the cameras and leaves them filming. The decisions are align_step's; all
+/// that is taken from the clock are instants that are recorded with what they were taken for, so a recording
+/// replays to the same bits through this function. Errors: bad_input (frame rates that differ, sizes of the
+/// lists), and the devices'.
+Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& options,
+                                 const AlignObserver& observer = {}, const Progress& progress = {});
+
+}  // namespace emberlock::cli

@@ -17,6 +17,16 @@ void add_demo(CLI::App& app);
 /// CLI::RuntimeError).
 [[noreturn]] void fail(const Error& error);
 
+/// The value, or fail().
+template <class T>
+T or_fail(Result<T> result) {
+  if (!result) fail(result.error());
+  return std::move(result).value();
+}
+inline void or_fail(const Status& status) {
+  if (!status) fail(status.error());
+}
+
 /// A progress bar on stderr, redrawn in place on a terminal, a line every tenth otherwise; silent below two
 /// seconds.
 Progress progress_bar(const std::string& title);

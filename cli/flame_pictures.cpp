@@ -5,32 +5,23 @@
 #include <cstring>
 
 namespace emberlock::cli {
-namespace {
 
-template <class Value>  // Value(index of a sample) -> grey level
-Image render(ImageSize size, PixelBox box, const Value& value) {
-  if (box.empty()) box = {0, 0, size.width, size.height};
-  Image image({{box.x1 - box.x0, box.y1 - box.y0}, PixelFormat::rgb8, 8});
+Image crop(const Image& image, const PixelBox& box) {
+  if (box.empty()) return image;
+  Image part({{box.x1 - box.x0, box.y1 - box.y0}, PixelFormat::rgb8, 8});
   for (int y = box.y0; y < box.y1; ++y) {
-    auto* out = image.row_as<std::uint8_t>(y - box.y0);
-    const std::size_t first =
-        3 * (static_cast<std::size_t>(y) * size.width + static_cast<std::size_t>(box.x0));
-    for (std::size_t i = 0; i < 3 * static_cast<std::size_t>(box.x1 - box.x0); ++i) {
-      out[i] = static_cast<std::uint8_t>(
-          std::lround(std::clamp(static_cast<double>(value(first + i)), 0.0, 255.0)));
-    }
+    std::memcpy(part.row_as<std::byte>(y - box.y0),
+                image.view().row(y) + static_cast<std::ptrdiff_t>(3) * box.x0, part.layout().row_bytes());
   }
-  return image;
+  return part;
 }
 
-}  // namespace
-
-Image to_rgb8(const RadianceImage& image, const PixelBox& box) {
-  return render(image.size, box, [&](std::size_t i) { return image.rgb[i]; });
-}
-
-Image difference(const RadianceImage& a, const RadianceImage& b, double gain, const PixelBox& box) {
-  return render(a.size, box, [&](std::size_t i) { return gain * std::abs(a.rgb[i] - b.rgb[i]); });
+RadianceImage difference(const RadianceImage& a, const RadianceImage& b, double gain) {
+  RadianceImage result(a.size);
+  for (std::size_t i = 0; i < result.rgb.size(); ++i) {
+    result.rgb[i] = static_cast<float>(gain * std::abs(a.rgb[i] - b.rgb[i]));
+  }
+  return result;
 }
 
 Image side_by_side(const std::vector<Image>& pictures, int gap) {

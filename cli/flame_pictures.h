@@ -8,11 +8,11 @@
 
 namespace emberlock::cli {
 
-/// A rectangle of a picture as rgb8, values clipped to 0..255; the whole picture where the box is empty.
-Image to_rgb8(const RadianceImage& image, const PixelBox& box = {});
+/// A rectangle of an 8-bit colour picture; all of it where the box is empty.
+Image crop(const Image& image, const PixelBox& box);
 
-/// |a - b| times `gain`, the same way.
-Image difference(const RadianceImage& a, const RadianceImage& b, double gain, const PixelBox& box = {});
+/// |a - b| times `gain`; the two have one size.
+RadianceImage difference(const RadianceImage& a, const RadianceImage& b, double gain);
 
 /// Pictures of equal height from left to right, `gap` black columns between them.
 Image side_by_side(const std::vector<Image>& pictures, int gap = 8);

@@ -100,16 +100,6 @@ void print_summary(const Report& report, const std::string& out) {
   std::printf("%-16s %s\n", "written to", out.c_str());
 }
 
-template <class T>
-T or_fail(Result<T> result) {
-  if (!result) fail(result.error());
-  return std::move(result).value();
-}
-
-void or_fail(const Status& status) {
-  if (!status) fail(status.error());
-}
-
 void reconstruct_command(const Arguments& arguments) {
   const ReconstructOptions options = or_fail(options_of(arguments));
   SceneOptions scene_options;

@@ -60,6 +60,24 @@ Image stretch(const Strip& strip, const SmearReading& reading) {
 
 }  // namespace
 
+std::vector<RowSpan> tolerance_band(const CcdTiming& timing, Rows lamp, Seconds tau, Rows tolerance) {
+  // In the order of reading: row 0 leaves the chip first, whichever way it is displayed.
+  const bool top_first = timing.direction == ReadDirection::top_first;
+  const double last = timing.rows - 1;
+  const double start = top_first ? lamp.value() : last - lamp.value();
+  const double center = (tau / timing.row_time).value() - 0.5;
+  const double low = std::max(center - tolerance.value(), 0.0);
+  const double high = std::min(center + tolerance.value(), static_cast<double>(timing.shifts));
+  std::vector<RowSpan> spans;
+  for (const double turn : {0.0, static_cast<double>(timing.shifts)}) {
+    const double from = std::max(start + low - turn, 0.0);
+    const double to = std::min(start + high - turn, last);
+    if (to <= from) continue;
+    spans.push_back(top_first ? RowSpan{Rows(from), Rows(to)} : RowSpan{Rows(last - to), Rows(last - from)});
+  }
+  return spans;
+}
+
 std::string smear_strip_svg(const ImageView& frame, const SmearReading& reading,
                             const std::vector<RowSpan>& band, int half_width) {
   const int center = reading.lamp ? static_cast<int>(std::lround(reading.lamp->x)) : frame.width() / 2;

@@ -1,0 +1,245 @@
+#include "cli/demo.h"
+
+#include <algorithm>
+#include <cmath>
+#include <thread>
+
+#include "base/clock.h"
+#include "drivers/virtual/virtual_clock.h"
+#include "recon/pipeline/scene.h"
+#include "session/async_writer.h"
+
+namespace emberlock::cli {
+namespace {
+
+constexpr Rows kByHandTolerance{100};
+constexpr Rows kTimedTolerance{10};
+constexpr int kPaperIterations = 70;  // where the paper's figures end
+
+Seconds since(TimePoint start) { return SteadyClock{}.now() - start; }
+
+Status check(const DemoOptions& o) {
+  const auto out_of_range = [](const char* option, const char* range) {
+    return Error{ErrorKind::bad_input, std::string("out of range"), option, std::string("Choose ") + range};
+  };
+  if (o.cameras < 3 || o.cameras > 64) return out_of_range("--cameras", "3 to 64");
+  if (o.image.width < 160 || o.image.width > 4096 || o.image.height < 160 || o.image.height > 730) {
+    return out_of_range("--image", "160x160 to 4096x730: a frame must be read within its period");
+  }
+  if (o.flame_frames < 1 || o.flame_frames > 60) return out_of_range("--frames", "1 to 60");
+  if (o.voxels < 8 || o.voxels > 512) return out_of_range("--voxels", "8 to 512");
+  return {};
+}
+
+/// The rig, opened, as an alignment sees it.
+struct Rig {
+  std::shared_ptr<VirtualClock> clock = std::make_shared<VirtualClock>();
+  std::unique_ptr<VirtualRig> rig;
+  std::vector<CcdTiming> timing;  // n, K, T, d as configured; t_row is measured
+
+  [[nodiscard]] AlignRig align(SessionWriter* recorder) const {
+    AlignRig view{{}, &rig->strobe(), clock.get(), recorder};
+    for (int i = 0; i < rig->size(); ++i) view.cameras.push_back(&rig->camera(i));
+    return view;
+  }
+};
+
+Result<Rig> open_rig(const DemoOptions& options) {
+  VirtualRigDraw draw;
+  draw.cameras = options.cameras;
+  draw.seed = options.seed;
+  draw.layout = {options.image, PixelFormat::rgb8, 8};
+  Rig opened;
+  EMBERLOCK_ASSIGN_OR_RETURN(opened.rig, VirtualRig::create(draw_virtual_rig(draw), opened.clock));
+  for (int i = 0; i < opened.rig->size(); ++i) {
+    // A datasheet's figures: what differs from camera to camera is for the alignment to find out.
+    CcdTiming timing = opened.rig->truth(i).timing;
+    timing.frame_period = period(draw.rate);
+    timing.row_time = draw.row_time;
+    opened.timing.push_back(timing);
+  }
+  return opened;
+}
+
+SmearSnapshot snapshot(const AlignRoundReport& report) {
+  SmearSnapshot shot;
+  for (std::size_t i = 0; i < report.cameras.size(); ++i) {
+    SmearSnapshot::Camera camera{report.cameras[i].id, report.frames[i].back(), report.readings[i].back(),
+                                 report.round.cameras[i].phase, std::nullopt};
+    if (const auto error = report.decision.cameras[i].error) camera.error = *error / report.options.row_time;
+    shot.cameras.push_back(std::move(camera));
+  }
+  if (const auto reference = report.decision.reference) {
+    const Phase& phase = report.round.cameras[*reference].phase;
+    if (phase.state == PhaseState::known) shot.reference_tau = phase.tau;
+  }
+  return shot;
+}
+
+Result<AlignStage> align(const Rig& rig, AlignStage stage, AlignRunOptions options, SessionWriter* recorder,
+                         const Progress& progress) {
+  options.align.policy = stage.policy;
+  options.align.tolerance.amount = stage.tolerance;
+  options.timing = rig.timing;
+  const TimePoint start = SteadyClock{}.now();
+  const auto observe = [&](const AlignRoundReport& report) {
+    stage.last = snapshot(report);
+    if (stage.errors.empty()) stage.first = stage.last;
+    std::vector<std::optional<Rows>> errors;
+    for (const auto& camera : stage.last.cameras) errors.push_back(camera.error);
+    stage.errors.push_back(std::move(errors));
+  };
+  EMBERLOCK_ASSIGN_OR_RETURN(stage.result, run_align(rig.align(recorder), options, observe, progress));
+  stage.seconds = since(start);
+  if (stage.result.last.verdict != AlignVerdict::aligned) {
+    return Error{ErrorKind::device, "not aligned: " + stage.result.last.reason, stage.title,
+                 "Try another --seed"};
+  }
+  return stage;
+}
+
+/// Within 100 rows as an operator does it, then within 10 rows by timed resets; the latter is recorded.
+Status align_twice(Rig& rig, DemoResult& result, const std::filesystem::path& folder,
+                   const ProgressFactory& progress) {
+  AlignRunOptions options;
+  options.seed = result.options.seed;
+  rig.rig->set_reset(ShutterReset::by_hand);
+  EMBERLOCK_ASSIGN_OR_RETURN(AlignStage by_hand,
+                             align(rig,
+                                   {.title = "within 100 rows, buttons pressed by hand",
+                                    .policy = AlignPolicy::densest,
+                                    .tolerance = kByHandTolerance},
+                                   options, nullptr, progress("align by hand, 100 rows")));
+  for (const auto& clock : by_hand.result.row_clocks) {
+    if (!clock)
+      return Error{ErrorKind::device, "a camera's row time was not measured", "comb", "Try another --seed"};
+    result.row_clocks.push_back(*clock);
+  }
+  rig.rig->set_reset(ShutterReset::on_command);
+  rig.timing = by_hand.result.timing;
+  options.measure_row_time = false;
+  options.delays = by_hand.result.delays;
+  v1::Manifest manifest;
+  manifest.set_session_id("demo-alignment");
+  manifest.set_purpose("alignment");
+  for (int i = 0; i < rig.rig->size(); ++i)
+    *manifest.add_cameras() = describe(rig.rig->camera(i).info(), nullptr);
+  EMBERLOCK_ASSIGN_OR_RETURN(SessionWriter recorder, SessionWriter::create(folder / "alignment", manifest));
+  EMBERLOCK_ASSIGN_OR_RETURN(AlignStage timed,
+                             align(rig,
+                                   {.title = "within 10 rows, timed resets",
+                                    .policy = AlignPolicy::timed,
+                                    .tolerance = kTimedTolerance},
+                                   options, &recorder, progress("align by timed resets, 10 rows")));
+  EMBERLOCK_RETURN_IF_ERROR(recorder.finish());
+  result.stages = {std::move(by_hand), std::move(timed)};
+  return {};
+}
+
+/// The largest difference between two cameras' starts of read, as the rig knows it.
+Seconds true_worst_pair(const Rig& rig) {
+  const TimePoint now = rig.clock->now();
+  Seconds worst;
+  for (int a = 0; a < rig.rig->size(); ++a) {
+    for (int b = 0; b < a; ++b) {
+      const Seconds apart = rig.rig->read_start_after(a, now) - rig.rig->read_start_after(b, now);
+      worst = std::max(worst, abs(wrap_symmetric(apart, rig.timing[0].frame_period)));
+    }
+  }
+  return worst;
+}
+
+/// Films one camera: `count` frames that were exposed after `from`.
+Status film(Camera& camera, std::size_t index, TimePoint from, int count, AsyncWriter& writer) {
+  for (int recorded = 0; recorded < count;) {
+    EMBERLOCK_ASSIGN_OR_RETURN(Frame frame, camera.next_frame(Seconds(3)));
+    if (frame.stamp.monotonic_time < from) continue;
+    if (!writer.push(index, std::move(frame))) {
+      return Error{ErrorKind::io, "the recorder's queue is full", camera.info().id, "Use a faster disk"};
+    }
+    ++recorded;
+  }
+  return {};
+}
+
+/// The strobe goes out, the flame is lit, every camera films it on a thread of its own (a few at a time).
+Status record_flame(Rig& rig, const Stage& stage, DemoResult& result, const std::filesystem::path& folder,
+                    const Progress& progress) {
+  EMBERLOCK_RETURN_IF_ERROR(rig.rig->strobe().apply({.output = StrobeOutput::off}));
+  FlameOptions flame;
+  flame.seed = result.options.seed;
+  EMBERLOCK_RETURN_IF_ERROR(rig.rig->set_scene(
+      flame_scene(std::make_shared<FlameLight>(stage, flame, result.options.truth_voxels))));
+  v1::Manifest manifest;
+  manifest.set_session_id("demo-flame");
+  manifest.set_purpose("flame");
+  *manifest.mutable_box() = describe(stage.box);
+  const auto cameras = static_cast<std::size_t>(rig.rig->size());
+  for (std::size_t i = 0; i < cameras; ++i) {
+    *manifest.add_cameras() = describe(rig.rig->camera(static_cast<int>(i)).info(), &stage.cameras[i]);
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(SessionWriter session, SessionWriter::create(folder / "flame", manifest));
+  AsyncWriter writer(std::move(session));
+  const TimePoint from = rig.clock->now() + 3 * rig.timing[0].frame_period;
+  const std::size_t workers =
+      std::max(1U, result.options.threads > 0 ? static_cast<unsigned>(result.options.threads)
+                                              : std::thread::hardware_concurrency());
+  std::vector<Status> status(cameras);
+  for (std::size_t first = 0; first < cameras; first += workers) {
+    report(progress, static_cast<double>(first) / static_cast<double>(cameras), "filming the flame");
+    std::vector<std::jthread> threads;
+    for (std::size_t i = first; i < std::min(first + workers, cameras); ++i) {
+      threads.emplace_back([&, i] {
+        status[i] = film(rig.rig->camera(static_cast<int>(i)), i, from, result.options.flame_frames, writer);
+      });
+    }
+  }
+  for (const Status& s : status) EMBERLOCK_RETURN_IF_ERROR(s);
+  EMBERLOCK_ASSIGN_OR_RETURN(result.flame_session, writer.finish());
+  report(progress, 1, "recorded");
+  return {};
+}
+
+Status reconstruct_flame(DemoResult& result, const std::filesystem::path& folder,
+                         const ProgressFactory& progress) {
+  EMBERLOCK_ASSIGN_OR_RETURN(result.scene, load_scene(folder / "flame"));
+  result.held_out = result.options.cameras / 2;
+  EMBERLOCK_RETURN_IF_ERROR(hold_out(result.scene, {result.held_out}));
+  ReconstructOptions options;
+  options.voxels = result.options.voxels;
+  options.solve.compute.threads = result.options.threads;
+  SteadyClock clock;
+  EMBERLOCK_ASSIGN_OR_RETURN(result.outcome,
+                             reconstruct(result.scene, options, clock, progress("reconstruct")));
+  result.outcome.report.input = "flame";
+  EMBERLOCK_RETURN_IF_ERROR(write_outcome(result.outcome, folder / "reconstruction"));
+  options.solve.solver = Solver::paper;
+  options.solve.iterations = kPaperIterations;
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      result.paper, reconstruct(result.scene, options, clock, progress("the paper's solver beside it")));
+  return {};
+}
+
+}  // namespace
+
+Result<DemoResult> run_demo(const DemoOptions& options, const std::filesystem::path& folder,
+                            const ProgressFactory& progress) {
+  EMBERLOCK_RETURN_IF_ERROR(check(options));
+  const TimePoint start = SteadyClock{}.now();
+  DemoResult result;
+  result.options = options;
+  EMBERLOCK_ASSIGN_OR_RETURN(Rig rig, open_rig(options));
+  for (int i = 0; i < rig.rig->size(); ++i)
+    result.true_row_times.push_back(rig.rig->truth(i).timing.row_time);
+  EMBERLOCK_RETURN_IF_ERROR(align_twice(rig, result, folder, progress));
+  result.true_worst_pair = true_worst_pair(rig);
+  const TimePoint recording = SteadyClock{}.now();
+  const Stage stage = demo_stage(options.cameras, options.image);
+  EMBERLOCK_RETURN_IF_ERROR(record_flame(rig, stage, result, folder, progress("record the flame")));
+  result.record_seconds = since(recording);
+  EMBERLOCK_RETURN_IF_ERROR(reconstruct_flame(result, folder, progress));
+  result.total_seconds = since(start);
+  return result;
+}
+
+}  // namespace emberlock::cli

@@ -26,6 +26,18 @@ struct Column {
   double sample_level = 1;  // grey levels a sample
   bool flat = false;
   std::vector<char> hidden;  // rows in which a dot can't be seen
+  std::vector<double> halo;  // around the lamp, by whole pixels of radius
+  double halo_end = 0;       // at the last of them
+  double halo_power = 6;     // with which it falls beyond
+
+  [[nodiscard]] double halo_at(double r) const {
+    if (halo.size() < 2) return 0;
+    const double last = static_cast<double>(halo.size() - 1);
+    if (r >= last - 0.5) return halo_end * std::pow((last - 0.5) / r, halo_power);
+    const auto i = static_cast<std::size_t>(r);
+    const double f = r - static_cast<double>(i);
+    return halo[i] * (1 - f) + halo[i + 1] * f;
+  }
 
   [[nodiscard]] int lane_centre(int lane) const {
     const int pitch = 2 * half_width + 3;
@@ -83,32 +95,36 @@ void mend_hot_pixels(Column& c) {
   for (const Mend& m : mends) c.patch.row(m.y)[m.x] = m.value;
 }
 
-/// The lamp's round halo (glare) is the same to the sides, where there is no smear: taken out of the column.
+/// The lamp's round halo (glare) is the same to the sides, where there is no smear: measured there in rings
+/// and taken out. Beyond the patch's sides it goes on as the power of r with which it falls there.
 void subtract_halo(Column& c) {
-  const int reach = std::min<int>(static_cast<int>(std::min(c.x, c.patch.width - 1 - c.x)),
-                                  static_cast<int>(4 * c.radius) + 12);
-  if (reach < c.radius + 4) return;
+  const int reach = static_cast<int>(std::min(c.x, c.patch.width - 1 - c.x));
+  if (reach < c.radius + 6) return;
   std::vector<std::vector<float>> rings(static_cast<std::size_t>(reach) + 1);
-  const int top = std::max(0, static_cast<int>(c.y) - reach);
-  const int bottom = std::min(c.patch.height - 1, static_cast<int>(c.y) + reach);
-  const int left = static_cast<int>(c.x) - reach;
-  const int right = static_cast<int>(c.x) + reach;
-  for (int y = top; y <= bottom; ++y) {
-    for (int x = std::max(0, left); x <= std::min(c.patch.width - 1, right); ++x) {
+  for (int y = std::max(0, static_cast<int>(c.y) - reach);
+       y <= std::min(c.patch.height - 1, static_cast<int>(c.y) + reach); ++y) {
+    for (int x = 0; x < c.patch.width; ++x) {
       if (std::abs(x - c.x) < 1.2 * std::abs(y - c.y)) continue;
       const auto ring = static_cast<std::size_t>(std::lround(std::hypot(x - c.x, y - c.y)));
       if (ring < rings.size()) rings[ring].push_back(c.patch.row(y)[x]);
     }
   }
-  std::vector<float> halo(rings.size());
-  for (std::size_t i = 0; i < rings.size(); ++i) halo[i] = std::max(0.0F, median(rings[i]));
-  for (int y = top; y <= bottom; ++y) {
-    for (int x = std::max(0, left); x <= std::min(c.patch.width - 1, right); ++x) {
+  c.halo.resize(rings.size());
+  for (std::size_t i = 0; i < rings.size(); ++i)
+    c.halo[i] = std::max(0.0, clipped_mean(rings[i], 2 * c.noise));
+  const auto last = static_cast<std::size_t>(reach);
+  const double far = (c.halo[last] + c.halo[last - 1]) / 2;
+  const double near = (c.halo[last / 2] + c.halo[last / 2 + 1]) / 2;
+  c.halo_power = far > 0 ? std::clamp(std::log2(std::max(near, far) / far), 0.5, 6.0) : 6;
+  c.halo_end = far;
+  // Far out it is less than a tenth of the noise.
+  int extent = reach;
+  while (extent < c.patch.height && c.halo_at(extent) > 0.1 * c.noise) ++extent;
+  for (int y = std::max(0, static_cast<int>(c.y) - extent);
+       y <= std::min(c.patch.height - 1, static_cast<int>(c.y) + extent); ++y) {
+    for (int x = 0; x < c.patch.width; ++x) {
       const double r = std::hypot(x - c.x, y - c.y);
-      if (r >= reach || r <= c.radius + 1) continue;
-      const auto i = static_cast<std::size_t>(r);
-      const auto f = static_cast<float>(r - static_cast<double>(i));
-      c.patch.row(y)[x] -= halo[i] * (1 - f) + halo[i + 1] * f;
+      if (r > c.radius + 1) c.patch.row(y)[x] -= static_cast<float>(c.halo_at(r));
     }
   }
 }
@@ -303,6 +319,8 @@ Verdict judge(const Column& c, const DotFit& f, const FitWindow& w, double min_s
   if (f.y < -0.5 || f.y > c.patch.height - 0.5 || f.radius > 2.2 * c.radius + 2) return Verdict::nothing;
   if (!c.visible(std::clamp(static_cast<int>(std::lround(f.y)), 0, c.patch.height - 1)))
     return Verdict::nothing;
+  // What is left of a halo whose shape isn't quite round looks like a dot of a part of it.
+  if (f.amplitude < 0.3 * c.halo_at(std::abs(f.y - c.y))) return Verdict::nothing;
   const Evenness e = evenness(c.patch, w, f, c.noise);
   // Hot pixels: much smaller than the lamp, or nearly all of the light in a pixel or two.
   const double smallest = std::max(0.7, 0.33 * c.radius);

@@ -15,7 +15,7 @@ constexpr int kCoarsePasses = 4;  // over the pixels of a coarse level
 constexpr int kMostPasses = 12;   // at full resolution, unless the user asks for more
 constexpr double kLeastGain =
     0.02;  // a pass that lowers the held-out pixels' error by a smaller share is the last
-constexpr float kSmoothing = 0.02F;  // the Laplacian's weight over the mean of A^T A 1
+constexpr float kSmoothing = 0.006F;  // the Laplacian's weight over the mean of A^T A 1
 constexpr float kMostMomentum =
     0.93F;                         // ordered subsets are noisy: full Nesterov momentum would amplify that
 constexpr int kHoldOutOneIn = 32;  // pixels kept from the fit, to know when to stop

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kTable = 64;          // noise samples a period, along each axis
 constexpr double kPeriod = 0.5;     // of the noise, in flame heights
-constexpr float kFaintest = 0.02F;  // of the densest: less is no flame
+constexpr float kFaintest = 0.02F;  // of the densest: less is outside the medium
 
 float smooth_step(float low, float high, float x) {
   const float t = std::clamp((x - low) / (high - low), 0.F, 1.F);
@@ -72,15 +72,15 @@ struct Flame::Noise {
     return static_cast<std::size_t>(((z & kMask) * kTable + (y & kMask)) * kTable + (x & kMask));
   }
 
-  /// Periodic value noise, four octaves.
+  /// Periodic value noise, three octaves.
   static float fractal(std::uint64_t seed, int x, int y, int z) {
     float sum = 0;
     float amplitude = 1;
-    for (int cells = 4; cells <= 32; cells *= 2) {
+    for (int cells = 4; cells <= 16; cells *= 2) {
       sum += amplitude * lattice(seed + static_cast<std::uint64_t>(cells), cells, x, y, z);
-      amplitude *= 0.55F;
+      amplitude *= 0.5F;
     }
-    return sum / 1.2F;
+    return sum / 1.1F;
   }
 
   static float lattice(std::uint64_t seed, int cells, int x, int y, int z) {
@@ -106,15 +106,16 @@ struct Flame::Noise {
 
 namespace {
 
-/// Density and heat of the flame at a point, in units of its height.
+/// How much medium there is at a point, how strongly it emits and how hot it is, all 0..1; lengths in flame
+/// heights. The hollow root and the dark pockets are medium that hardly emits: cool soot.
 struct Field {
   const std::vector<Plume>& plumes;
   float carried;  ///< how far the turbulence has risen, flame heights
 
   template <class Noise>
-  void at(const Noise& noise, float x, float y, float z, float& density, float& heat) const {
+  void at(const Noise& noise, float x, float y, float z, float& medium, float& emission, float& heat) const {
     constexpr float kScale = static_cast<float>(1 / kPeriod);
-    density = heat = 0;
+    medium = emission = heat = 0;
     const float rise = (z - carried) * kScale;
     for (const Plume& plume : plumes) {
       const float h = z / plume.height;
@@ -126,14 +127,16 @@ struct Field {
       const float r = std::sqrt(dx * dx + dy * dy);
       if (r > 1.7F * radius) continue;
       const float turbulence = noise(x * kScale, y * kScale, rise);
-      const float q = r / radius + (0.25F + 0.55F * h) * turbulence;
+      const float q = r / radius + (0.15F + 0.35F * h) * turbulence;
       const float body = smooth_step(1.0F, 0.55F, q);
       const float hollow = 1 - 0.85F * smooth_step(0.75F, 0.15F, q) * smooth_step(0.45F, 0.1F, h);
       const float holes =
           smooth_step(-0.62F, -0.3F, noise(1.7F * x * kScale + 0.3F, 1.7F * y * kScale, 1.1F * rise));
-      const float d = body * hollow * holes * (0.35F + 0.65F * smooth_step(1, 0.5F, h));
-      if (d <= density) continue;
-      density = d;
+      const float tip = 0.35F + 0.65F * smooth_step(1, 0.5F, h);
+      const float here = body * tip;
+      if (here <= medium) continue;
+      medium = here;
+      emission = here * hollow * holes;
       heat = std::clamp(body * (1.15F - 0.75F * h) + 0.2F * turbulence, 0.F, 1.F);
     }
   }
@@ -201,14 +204,15 @@ FlameTruth Flame::at(Seconds time, const Grid& grid) const {
       for (int i = 0; i < grid.nx; ++i) {
         const float x = (grid.origin[0] + static_cast<float>(i) * grid.edge) * scale;
         if (x * x + y * y > 0.25F) continue;
-        float density = 0;
+        float medium = 0;
+        float emission = 0;
         float heat = 0;
-        field.at(*noise_, x, y, z, density, heat);
-        if (density < kFaintest) continue;
+        field.at(*noise_, x, y, z, medium, emission, heat);
+        if (medium < kFaintest) continue;
         const std::size_t at = grid.index(i, j, k);
         burning[at] = 1;
         const std::array<float, 3> c = colour(heat);
-        for (std::size_t a = 0; a < 3; ++a) truth.volume.emission[3 * at + a] = gain * 1000 * density * c[a];
+        for (std::size_t a = 0; a < 3; ++a) truth.volume.emission[3 * at + a] = gain * 1000 * emission * c[a];
       }
     }
   });

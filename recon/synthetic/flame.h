@@ -22,7 +22,7 @@ struct FlameOptions {
   std::uint64_t seed = 1;
   Meters height{0.16};        ///< of the envelope, centred on the origin
   double rise_speed = 1.0;    ///< m/s, of the turbulence
-  double peak = 250;          ///< grey level of the brightest pixel from the side, about
+  double peak = 230;          ///< grey level of the brightest pixel from the side, about
   PerMeter extinction{32.8};  ///< inside the flame; the default is the paper's 0.05 a step of 20 cm / 128
 };
 

@@ -8,8 +8,8 @@ namespace emberlock {
 
 /// What going on would cost and bring, in one sentence, from the trace alone: the held-out error (the input
 /// error where nothing is held out) fell by g1 over the run's second quarter and by g2 over its second half;
-/// if it goes on so, as many iterations again bring at most g2 * min(1, g2 / g1). Empty with fewer than four
-/// points.
+/// if it goes on so, as many iterations again bring at most g2 * min(1, g2 / g1). From fewer than four
+/// points, one more iteration brings at most what the last one brought. Empty with fewer than two.
 std::string next_step(const Report& report);
 
 }  // namespace emberlock

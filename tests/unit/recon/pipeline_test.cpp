@@ -141,7 +141,12 @@ TEST(Advice, SaysWhenTheErrorHasTurned) {
   EXPECT_THAT(next_step(report_of_errors({20, 10, 5, 6, 7})), HasSubstr("lowest after iteration 3 (5.00)"));
 }
 
-TEST(Advice, SaysNothingFromAShortTrace) { EXPECT_EQ(next_step(report_of_errors({20, 10})), ""); }
+TEST(Advice, FromAShortTraceTheLastIterationIsTheBound) {
+  const std::string advice = next_step(report_of_errors({20, 19}));
+  EXPECT_THAT(advice, HasSubstr("one more iteration costs about 1 s"));
+  EXPECT_THAT(advice, HasSubstr("(19.00) by at most about 1"));
+  EXPECT_EQ(next_step(report_of_errors({20})), "");
+}
 
 TEST(Reconstruct, AKnownBallOfLightIsFound) {
   Scene scene = ball();

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <memory>
 #include <vector>
@@ -64,6 +65,21 @@ Result<FitsImage> find_image(fitsfile* file, const std::string& where) {
                "Export a single image, or copy it again"};
 }
 
+/// cfitsio reads zeros behind a file's end.
+Status check_whole(fitsfile* file, const FitsImage& image, std::size_t size, const std::string& where) {
+  int status = 0;
+  LONGLONG header_start = 0;
+  LONGLONG data_start = 0;
+  LONGLONG data_end = 0;
+  fits_get_hduaddrll(file, &header_start, &data_start, &data_end, &status);
+  const bool compressed = fits_is_compressed_image(file, &status) != 0;
+  if (status != 0) return fits_error(status, where);
+  // Some writers leave out the padding behind the last pixel.
+  const LONGLONG pixels_end = data_start + image.width * image.height * (std::abs(image.bitpix) / 8);
+  if ((compressed ? data_end : pixels_end) <= static_cast<LONGLONG>(size)) return {};
+  return Error{ErrorKind::bad_input, "the FITS file is truncated", where, "Copy or record it again"};
+}
+
 }  // namespace
 
 bool is_fits(std::string_view head) { return head.starts_with("SIMPLE  ="); }
@@ -80,6 +96,7 @@ Result<Image> decode_fits(std::string_view content, const std::string& where) {
   EMBERLOCK_ASSIGN_OR_RETURN(const FitsImage header, find_image(file.get(), where));
   EMBERLOCK_RETURN_IF_ERROR(check_image_size(header.width, header.height, where));
 
+  EMBERLOCK_RETURN_IF_ERROR(check_whole(file.get(), header, content.size(), where));
   const bool narrow = header.bitpix == BYTE_IMG && header.scale == 1 && header.zero == 0;
   ImageLayout layout{
       {static_cast<int>(header.width), static_cast<int>(header.height)}, PixelFormat::gray8, 8};

@@ -1,0 +1,20 @@
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string_view>
+
+#include "session/events.h"
+#include "session/files.h"
+#include "session/layout.h"
+
+// The two protobuf files of a session: the manifest as JSON, and the events on the wire.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string_view bytes(reinterpret_cast<const char*>(data), size);
+  if (const auto manifest = emberlock::parse_manifest(bytes, "input"); manifest.ok()) {
+    for (const auto& camera : manifest->cameras()) {
+      if (!emberlock::layout_of(camera).ok()) std::abort();
+    }
+  }
+  if (emberlock::parse_events(bytes).valid_bytes > size) std::abort();
+  return 0;
+}

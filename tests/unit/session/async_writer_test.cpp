@@ -1,0 +1,136 @@
+#include "session/async_writer.h"
+
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "session/reader.h"
+#include "tests/support/recording.h"
+
+namespace emberlock {
+namespace {
+
+using test::manifest_of;
+using test::noise_frame;
+using test::small_disk_options;
+using test::TempFolder;
+
+const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
+
+SessionWriter writer_for(const std::filesystem::path& folder, std::size_t cameras) {
+  return SessionWriter::create(folder, manifest_of(std::vector<ImageLayout>(cameras, kLayout)),
+                               small_disk_options())
+      .value();
+}
+
+std::uint64_t accounted(const v1::Counts& c) { return c.recorded() + c.camera_gap() + c.queue() + c.disk(); }
+
+TEST(AsyncWriter, CamerasPushAtOnceAndEveryFrameIsWritten) {
+  const TempFolder temp;
+  AsyncWriter writer(writer_for(temp / "s", 3), {.queue_frames = 1000});
+  std::vector<std::thread> cameras;
+  for (std::size_t c = 0; c < 3; ++c) {
+    cameras.emplace_back([&writer, c] {
+      v1::Event event;
+      event.set_note("camera " + std::to_string(c));
+      EXPECT_TRUE(writer.append(event));
+      for (std::uint64_t i = 0; i < 40; ++i) EXPECT_TRUE(writer.push(c, noise_frame(kLayout, i, c)));
+    });
+  }
+  for (std::thread& camera : cameras) camera.join();
+  const auto manifest = writer.finish();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  auto reader = SessionReader::open(temp / "s");
+  ASSERT_TRUE(reader) << reader.error().message();
+  EXPECT_EQ(reader->events().size(), 3U);
+  for (std::size_t c = 0; c < 3; ++c) {
+    ASSERT_EQ(reader->stamps(c).size(), 40U);
+    EXPECT_EQ(*reader->read(c, 39)->image, *noise_frame(kLayout, 39, c).image);
+  }
+}
+
+TEST(AsyncWriter, AFullQueueLosesFramesCountedAsTheQueues) {
+  const TempFolder temp;
+  const ImageLayout large{{1280, 720}, PixelFormat::gray8, 8};
+  auto writer = SessionWriter::create(temp / "s", manifest_of({large}), small_disk_options());
+  ASSERT_TRUE(writer);
+  AsyncWriter async(std::move(writer).value(), {.queue_frames = 2});
+  const Frame frame = noise_frame(large, 0);
+  std::uint64_t refused = 0;
+  std::uint64_t id = 0;
+  for (int i = 0; i < 60; ++i) {
+    id += i % 10 == 9 ? 3 : 1;  // the camera itself skips two now and then
+    Frame next = frame;
+    next.stamp.frame_id = id;
+    if (!async.push(0, next)) ++refused;
+  }
+  ASSERT_GT(refused, 0U) << "the encoder outran a loop that does nothing";
+  const auto manifest = async.finish();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  const v1::Counts& counts = manifest->cameras(0).counts();
+  EXPECT_EQ(counts.queue(), refused);
+  EXPECT_EQ(counts.recorded(), 60 - refused);
+  EXPECT_EQ(counts.camera_gap(), 12U);
+  EXPECT_EQ(accounted(counts), id);
+}
+
+TEST(AsyncWriter, LossesOfTheDriverAreTakenFromTheCamerasGaps) {
+  const TempFolder temp;
+  AsyncWriter writer(writer_for(temp / "s", 1));
+  for (const std::uint64_t id : {0, 1, 6}) writer.push(0, noise_frame(kLayout, id));
+  writer.count_lost(0, LossCause::transport, 1);
+  writer.count_lost(0, LossCause::underrun, 2);
+  const auto manifest = writer.finish();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  EXPECT_EQ(manifest->cameras(0).counts().camera_gap(), 1U);
+  EXPECT_EQ(manifest->cameras(0).counts().transport(), 1U);
+  EXPECT_EQ(manifest->cameras(0).counts().underrun(), 2U);
+}
+
+TEST(AsyncWriter, NoSpaceIsToldWhileRecordingAndCountedAsTheDisks) {
+  const TempFolder temp;
+  WriterOptions options;
+  options.min_free_bytes = std::uint64_t{1} << 60;
+  auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), options);
+  ASSERT_TRUE(writer);
+  AsyncWriter async(std::move(writer).value());
+  for (std::uint64_t i = 0; i < 5; ++i) EXPECT_TRUE(async.push(0, noise_frame(kLayout, i)));
+  const auto manifest = async.finish();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  EXPECT_EQ(manifest->cameras(0).counts().disk(), 5U);
+  ASSERT_TRUE(async.failure());
+  EXPECT_EQ(async.failure()->kind, ErrorKind::io);
+}
+
+TEST(AsyncWriter, AFrameOfAnotherLayoutIsToldAndCounted) {
+  const TempFolder temp;
+  AsyncWriter writer(writer_for(temp / "s", 1));
+  writer.push(0, noise_frame({{48, 64}, PixelFormat::gray8, 8}, 0));
+  writer.push(0, noise_frame(kLayout, 1));
+  const auto manifest = writer.finish();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  EXPECT_EQ(manifest->cameras(0).counts().disk(), 1U);
+  EXPECT_EQ(manifest->cameras(0).counts().recorded(), 1U);
+  EXPECT_EQ(writer.failure()->kind, ErrorKind::bad_input);
+}
+
+TEST(AsyncWriter, PushesAfterTheEndAreRefused) {
+  const TempFolder temp;
+  AsyncWriter writer(writer_for(temp / "s", 1));
+  ASSERT_TRUE(writer.push(0, noise_frame(kLayout, 0)));
+  ASSERT_TRUE(writer.finish());
+  EXPECT_FALSE(writer.push(0, noise_frame(kLayout, 1)));
+}
+
+TEST(AsyncWriter, ThrownAwayUnfinishedLeavesASessionToSalvage) {
+  const TempFolder temp;
+  {
+    AsyncWriter writer(writer_for(temp / "s", 2));
+    for (std::uint64_t i = 0; i < 10; ++i) writer.push(0, noise_frame(kLayout, i));
+  }
+  EXPECT_FALSE(SessionReader::open(temp / "s"));
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <numbers>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -132,6 +134,39 @@ Eigen::Vector2d solve(Eigen::Matrix2d matrix, const Eigen::Vector2d& right) {
   return matrix.ldlt().solve(right);
 }
 
+/// How far the rounding to whole rows may shift the pitch because the dots sample the row grid unevenly: the
+/// two lowest harmonics of the sawtooth x - floor(x), sin(2 pi k x) / (pi k), pushed through the least
+/// squares.
+double rounding_error(const std::vector<Comb>& all, const Eigen::Matrix2d& covariance, double pitch,
+                      double offset) {
+  double worst = 0;
+  for (const int harmonic : {1, 2}) {
+    std::complex<double> sum = 0;
+    for (const Comb& comb : all) {
+      Eigen::Vector3d mean = Eigen::Vector3d::Zero();  // pitches, lower side, phase
+      int count = 0;
+      const auto each = [&](auto&& visit) {
+        for (const Dot& d : comb.above) {
+          if (d.used) visit(Eigen::Vector3d(d.pitches, 0, d.row - d.pitches * pitch));
+        }
+        for (const Dot& d : comb.below) {
+          if (d.used) visit(Eigen::Vector3d(d.pitches, 1, d.row - d.pitches * pitch - offset));
+        }
+      };
+      each([&](const Eigen::Vector3d& v) { mean += v, ++count; });
+      if (count == 0) continue;
+      mean /= count;
+      each([&](const Eigen::Vector3d& v) {
+        const double influence = covariance.row(0).dot((v - mean).head<2>());
+        const double row = mean.z() + v.x() * pitch + v.y() * offset;
+        sum += influence * std::polar(1.0, 2 * std::numbers::pi * harmonic * row);
+      });
+    }
+    worst += std::abs(sum) / (std::numbers::pi * harmonic);
+  }
+  return worst;
+}
+
 Fit least_squares(const std::vector<Comb>& all) {
   std::vector<FrameNormal> frames;
   FrameNormal sum;
@@ -144,13 +179,14 @@ Fit least_squares(const std::vector<Comb>& all) {
   }
   const Eigen::Vector2d best = solve(sum.matrix, sum.right);
   Fit fit{.pitch = best.x(), .offset = best.y(), .dots = sum.dots, .frames = static_cast<int>(all.size())};
-  fit.both_sides = sum.matrix(1, 1) > 0;
+  fit.both_sides = sum.matrix(1, 1) > 0.1;  // rounding leaves less than that where no frame has dots on both
   const double residual = std::max(0.0, sum.squares - best.dot(sum.right));
   const int freedom = std::max(1, sum.dots - fit.frames - (fit.both_sides ? 2 : 1));
   const Eigen::Matrix2d covariance = (sum.matrix + 1e-12 * Eigen::Matrix2d::Identity()).inverse();
   fit.sigma = std::sqrt(residual / freedom * covariance(0, 0));
-  // The rounding to whole rows isn't random within a frame: the scatter between frames is the honest error.
+  fit.sigma = std::hypot(fit.sigma, rounding_error(all, covariance, fit.pitch, fit.offset));
   if (frames.size() < 4) return fit;
+  // What changes from frame to frame (a strobe that jitters) shows in the scatter between frames.
   double scatter = 0;
   for (const FrameNormal& f : frames) {
     const double without = solve(sum.matrix - f.matrix, sum.right - f.right).x();

@@ -11,7 +11,7 @@ namespace emberlock {
 /// What a comb of dots says about the sensor's clock.
 struct RowClock {
   SecondsPerRow row_time;  ///< t_row
-  SecondsPerRow sigma;     ///< its standard error: of the fit or from frame to frame, whichever is larger
+  SecondsPerRow sigma;     ///< its standard error, with what rounding to whole rows may do to this pitch
   Rows pitch;              ///< p = 1 / (f t_row), between neighbouring dots
   int dots = 0;            ///< used; outliers are left out
   int frames = 0;          ///< that had two dots or more on one side of the lamp

@@ -93,11 +93,11 @@ void expect_good(const Statistics& s) {
 }
 
 TEST(DetectProperty, FaintDotsAreReadNearTheCramerRaoBound) { expect_good(run(4, 5, 1000, 11)); }
-TEST(DetectProperty, DotsAreReadNearTheCramerRaoBound) { expect_good(run(5, 40, 600, 12)); }
+TEST(DetectProperty, DotsAreReadNearTheCramerRaoBound) { expect_good(run(5, 40, 300, 12)); }
 
 TEST(DetectProperty, FramesWithoutADotShowNone) {
   int dots = 0;
-  constexpr int kFrames = 500;
+  constexpr int kFrames = 400;
   for (std::uint64_t i = 0; i < kFrames; ++i) {
     RandomStream random(13, i);
     const double x = random.uniform(58, 70);

@@ -20,7 +20,7 @@ Result<Eigen::Matrix3d> nearest_rotation(const Eigen::Matrix3d& matrix) {
   };
   if (!matrix.allFinite()) return error("is not finite", "Give finite numbers");
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d scales = svd.singularValues();
+  const Eigen::Vector3d scales = svd.singularValues().cwiseAbs();
   const double largest = scales.maxCoeff();
   const double smallest = scales.minCoeff();
   if (largest < 1e-9 || smallest < 1e-6 * largest) {

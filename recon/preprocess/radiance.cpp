@@ -47,7 +47,7 @@ RadianceImage to_radiance(const ImageView& image) {
 
 Image to_rgb8(const RadianceImage& image) {
   Image out(ImageLayout{image.size, PixelFormat::rgb8, 8});
-  const auto row_samples = static_cast<std::size_t>(3 * image.size.width);
+  const auto row_samples = std::size_t{3} * static_cast<std::size_t>(image.size.width);
   for (int y = 0; y < image.size.height; ++y) {
     const float* from = image.rgb.data() + static_cast<std::size_t>(y) * row_samples;
     auto* to = out.row_as<std::uint8_t>(y);

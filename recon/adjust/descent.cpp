@@ -1,0 +1,123 @@
+#include "recon/adjust/descent.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/random.h"
+
+namespace emberlock {
+namespace {
+
+constexpr float kSmoothing = 0.006F;      // the Laplacian's weight over the mean of A^T A 1
+constexpr float kMostMomentum = 0.93F;    // subsets are noisy: the full momentum would amplify that
+constexpr int kHoldOutOneIn = 32;         // pixels kept from the fit
+constexpr std::size_t kFewestRays = 256;  // of a subset
+
+/// Pixel subsets whose successive ones lie as far apart as can be: Bayer's order (1973).
+int bayer(int x, int y) {
+  static constexpr int kOrder[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
+  return kOrder[y & 3][x & 3];
+}
+
+bool held_out(int x, int y) {
+  return random_bits(0, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % kHoldOutOneIn == 0;
+}
+
+/// Subsets that a medium allows: light from deep inside a thick one reaches few pixels, and a step from some of the rays alone can
+/// then overshoot; the full gradient can't.
+int subsets_for(float sigma, std::size_t pixels, int most) {
+  int subsets = std::min(most, sigma < 0.11F ? 16 : (sigma < 0.22F ? 4 : 1));
+  while (subsets > 1 && pixels / static_cast<std::size_t>(subsets) < kFewestRays) subsets /= 4;
+  return subsets;
+}
+
+std::size_t flame_pixels(const SolverSetup& setup, int stride) {
+  std::size_t pixels = 0;
+  for (const PixelBox& b : setup.boxes) pixels += static_cast<std::size_t>(b.x1 - b.x0) * static_cast<std::size_t>(b.y1 - b.y0);
+  return pixels / static_cast<std::size_t>(stride * stride);
+}
+
+}  // namespace
+
+Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets) {
+  Level level;
+  level.subsets = subsets_for(setup.sigma(hull.grid), flame_pixels(setup, stride), most_subsets);
+  ProblemOptions options;
+  options.subsets = level.subsets + 1;
+  options.subset_of = [subsets = level.subsets, stride](std::size_t, int x, int y) {
+    if (x % stride != 0 || y % stride != 0) return -1;
+    if (held_out(x, y)) return subsets;
+    return bayer(x / stride, y / stride) % subsets;
+  };
+  level.problem = pose(setup.views, hull, options, setup.pool);
+  return level;
+}
+
+Descent::Descent(const Level& level, float sigma, Device device, Pool& pool)
+    : level_(level),
+      engine_(make_engine(level.problem, sigma, device, pool)),
+      fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]) {
+  find_weights();
+}
+
+std::size_t Descent::rays_of(int subset) const {
+  const auto s = static_cast<std::size_t>(subset);
+  return level_.problem.list.subset_begin[s + 1] - level_.problem.list.subset_begin[s];
+}
+
+void Descent::start_from(const std::vector<Rgba>& x) {
+  engine_->set(x);
+  momentum_time_ = 1;
+}
+
+void Descent::pass() {
+  for (int s = 0; s < level_.subsets; ++s) {
+    const std::size_t rays = rays_of(s);
+    if (rays == 0) continue;
+    engine_->residual(s);
+    engine_->backproject(s);
+    const double next_time = 0.5 * (1 + std::sqrt(1 + 4 * momentum_time_ * momentum_time_));
+    const auto momentum = std::min(kMostMomentum, static_cast<float>((momentum_time_ - 1) / next_time));
+    momentum_time_ = next_time;
+    engine_->descend({static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)), smoothing_, momentum});
+  }
+}
+
+double Descent::validation_error() {
+  const int subset = rays_of(level_.subsets) > 0 ? level_.subsets : 0;
+  engine_->residual(subset);
+  const std::vector<Rgba> r = engine_->residuals();
+  const std::size_t first = level_.problem.list.subset_begin[static_cast<std::size_t>(subset)];
+  double sum = 0;
+  for (std::size_t i = first; i < first + rays_of(subset); ++i)
+    for (std::size_t c = 0; c < 3; ++c) sum += static_cast<double>(r[i].c[c]) * static_cast<double>(r[i].c[c]);
+  return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(rays_of(subset)))));
+}
+
+/// A^T A 1 over the fitted rays; 1 only at the hull's key points.
+void Descent::find_weights() {
+  const std::vector<std::uint8_t>& active = level_.problem.active;
+  std::vector<Rgba> ones(active.size());
+  for (std::size_t p = 0; p < ones.size(); ++p)
+    if (active[p] != 0) ones[p] = {{1, 1, 1, 1}};
+  engine_->set(ones);
+  for (int s = 0; s < level_.subsets; ++s) {
+    engine_->project(s);
+    engine_->backproject(s);
+  }
+  const std::vector<Rgba> gradient = engine_->gradient();
+  std::vector<float> weights(gradient.size());
+  double sum = 0;
+  std::size_t reached = 0;
+  for (std::size_t p = 0; p < weights.size(); ++p) {
+    if (active[p] == 0 || gradient[p].c[0] <= 0) continue;
+    weights[p] = gradient[p].c[0];
+    sum += static_cast<double>(weights[p]);
+    ++reached;
+  }
+  smoothing_ = reached > 0 ? kSmoothing * static_cast<float>(sum / static_cast<double>(reached)) : 0;
+  engine_->set_weights(weights);
+  engine_->set(std::vector<Rgba>(active.size()));
+}
+
+}  // namespace emberlock

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "recon/adjust/engine.h"
+#include "recon/adjust/problem.h"
+#include "recon/adjust/tracker.h"
+
+namespace emberlock {
+
+/// The pixels of one level of resolution, in interleaved subsets, with one more subset that is held out of the fit.
+struct Level {
+  Problem problem;
+  int subsets = 1;  ///< that are fitted; subset number `subsets` is held out
+};
+
+/// Every `stride`-th pixel along both axes. `most_subsets` is 1, 4 or 16; a thick medium or few pixels take fewer.
+Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets = 16);
+
+/// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Laplacian over x >= 0, by preconditioned
+/// ordered-subset steps with Nesterov's momentum.
+class Descent {
+ public:
+  /// The level and the pool must outlive it; `sigma` is the extinction a voxel edge. Starts from zero.
+  Descent(const Level& level, float sigma, Device device, Pool& pool);
+
+  void start_from(const std::vector<Rgba>& x);
+  /// One pass over all subsets.
+  void pass();
+  /// RMS over the held-out pixels, or over the first subset where there are none; grey levels.
+  [[nodiscard]] double validation_error();
+  [[nodiscard]] Engine& engine() { return *engine_; }
+
+ private:
+  [[nodiscard]] std::size_t rays_of(int subset) const;
+  void find_weights();
+
+  const Level& level_;
+  std::unique_ptr<Engine> engine_;
+  std::size_t fitted_ = 0;
+  float smoothing_ = 0;
+  double momentum_time_ = 1;
+};
+
+}  // namespace emberlock

@@ -1,9 +1,11 @@
 // The rig's time, queues, resets, names and options.
 #include "drivers/virtual/virtual_rig.h"
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
-#include <numeric>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -237,6 +239,36 @@ TEST(VirtualRig, RunsInRealTimeWithASteadyClock) {
     EXPECT_GE(clock->now(), frame->stamp.monotonic_time);
   }
   EXPECT_GT(clock->now() - begin, milliseconds(45));
+}
+
+TEST(VirtualRig, EachCameraMayHaveAThreadOfItsOwn) {
+  std::vector<VirtualCameraOptions> all = cameras(3);
+  for (VirtualCameraOptions& c : all) {
+    c.timing.frame_period = milliseconds(5);
+    c.timing.row_time = microseconds_per_row(30);
+    c.nominal_rate = Hertz(200);
+    c.reset_latency = milliseconds(2);
+  }
+  const auto rig =
+      small_rig(all, {Pass::lamp, Pass::smear, Pass::read_noise}, std::make_shared<SteadyClock>());
+  std::vector<std::thread> threads;
+  for (int c = 0; c < rig->size(); ++c) {
+    threads.emplace_back([&, c] {
+      ASSERT_TRUE(rig->camera(c).start().ok());
+      for (int i = 0; i < 20; ++i) {
+        EXPECT_TRUE(rig->camera(c).next_frame(Seconds(10)).ok());
+        if (i % 5 == 4) EXPECT_TRUE(rig->camera(c).reset_shutter({}).ok());
+      }
+    });
+  }
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_TRUE(rig->strobe().apply({.output = StrobeOutput::flashing, .rate = Hertz(100 + i)}).ok());
+    VirtualScene scene = smear_scene();
+    scene.background = i;
+    EXPECT_TRUE(rig->set_scene(scene).ok());
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  for (std::thread& t : threads) t.join();
 }
 
 TEST(VirtualRigName, ElevenCamerasByDefault) {

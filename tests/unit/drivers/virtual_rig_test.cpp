@@ -257,7 +257,9 @@ TEST(VirtualRig, EachCameraMayHaveAThreadOfItsOwn) {
       ASSERT_TRUE(rig->camera(c).start().ok());
       for (int i = 0; i < 20; ++i) {
         EXPECT_TRUE(rig->camera(c).next_frame(Seconds(10)).ok());
-        if (i % 5 == 4) EXPECT_TRUE(rig->camera(c).reset_shutter({}).ok());
+        if (i % 5 == 4) {
+          EXPECT_TRUE(rig->camera(c).reset_shutter({}).ok());
+        }
       }
     });
   }

@@ -123,7 +123,8 @@ TEST(VirtualPicture, CodedSkipsShowInTheirFramesAndTheLampAnImageLater) {
                           .code = code})
                   .ok());
   for (std::size_t id = 0; id < 20; ++id) {
-    const ImageView v = next(*rig).image->view();
+    const Frame f = next(*rig);
+    const ImageView v = f.image->view();
     // Frame 0 is read one period after the start; flash 1 falls into its read phase.
     EXPECT_EQ(v.sample(30, 90) > 500, code[(id + 1) % code.size()]) << "dot of frame " << id;
     EXPECT_EQ(v.sample(30, 50) == 4095, code[id % code.size()]) << "lamp of frame " << id;

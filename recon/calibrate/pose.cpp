@@ -20,7 +20,8 @@ Result<Eigen::Matrix3d> nearest_rotation(const Eigen::Matrix3d& matrix) {
   };
   if (!matrix.allFinite()) return error("is not finite", "Give finite numbers");
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Vector3d scales = svd.singularValues().cwiseAbs();
+  // A copy: through a reference GCC 12 thinks that the values may be unset.
+  const Eigen::Vector3d scales = svd.singularValues();  // NOLINT(performance-unnecessary-copy-initialization)
   const double largest = scales.maxCoeff();
   const double smallest = scales.minCoeff();
   if (largest < 1e-9 || smallest < 1e-6 * largest) {

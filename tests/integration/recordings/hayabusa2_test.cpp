@@ -42,8 +42,8 @@ TEST_P(Hayabusa2, TheEarthIsASteadyLampAndTheTrapIsNoDot) {
 INSTANTIATE_TEST_SUITE_P(Files, Hayabusa2,
                          testing::Values("hyb2_onc_w2_earth_smear_1024.pgm",
                                          "hyb2_onc_20151203_000006_w2f_l2a.fit"),
-                         [](const auto& info) {
-                           return std::string(info.param).ends_with("pgm") ? "Pgm" : "Fits";
+                         [](const auto& file) {
+                           return std::string(file.param).ends_with("pgm") ? "Pgm" : "Fits";
                          });
 
 }  // namespace

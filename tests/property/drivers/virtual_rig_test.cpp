@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "tests/support/small_rig.h"
+#include "tests/support/virtual_cameras.h"
 
 namespace emberlock {
 namespace {

@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/small_rig.h"
+#include "tests/support/virtual_cameras.h"
 
 namespace emberlock {
 namespace {

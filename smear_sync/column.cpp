@@ -55,7 +55,8 @@ bool near_lamp(const Column& c, int row, double margin) { return std::abs(row - 
 /// Takes each column's level out, even and odd rows apart (interlaced fields differ), lamp and dots ignored.
 void subtract_level(Column& c, double noise) {
   std::vector<float> values;
-  c.level.assign(static_cast<std::size_t>(2 * c.patch.width), 0);
+  const auto width = static_cast<std::size_t>(c.patch.width);
+  c.level.assign(2 * width, 0);
   const double margin = 4 + c.radius;
   for (int parity = 0; parity < 2; ++parity) {
     for (int x = 0; x < c.patch.width; ++x) {
@@ -65,7 +66,8 @@ void subtract_level(Column& c, double noise) {
         if (!across || !near_lamp(c, y, margin)) values.push_back(c.patch.row(y)[x]);
       }
       const double level = clipped_mean(values, noise);
-      c.level[static_cast<std::size_t>(parity * c.patch.width + x)] = static_cast<float>(level);
+      c.level[static_cast<std::size_t>(parity) * width + static_cast<std::size_t>(x)] =
+          static_cast<float>(level);
       for (int y = parity; y < c.patch.height; y += 2) c.patch.row(y)[x] -= static_cast<float>(level);
     }
   }

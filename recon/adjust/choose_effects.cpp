@@ -10,9 +10,9 @@
 namespace emberlock {
 namespace {
 
-constexpr int kCoarse = 40;          // voxels along the longest side, at most
-constexpr int kPasses = 8;           // of a cold solve
-constexpr std::size_t kRays = 30000; // about as many as a cold solve is given
+constexpr int kCoarse = 64;          // voxels along the longest side, at most
+constexpr int kPasses = 6;           // of a cold solve
+constexpr std::size_t kRays = 20000; // about as many as a cold solve is given
 constexpr int kRefinements = 3;
 
 /// Cold solves of one coarse problem under different extinctions.
@@ -64,7 +64,7 @@ class Probe {
   static int stride(const SolverSetup& setup, const Hull&) {
     double pixels = 0;
     for (const PixelBox& b : setup.boxes) pixels += static_cast<double>(b.x1 - b.x0) * (b.y1 - b.y0);
-    return std::max(1, static_cast<int>(std::sqrt(pixels / kRays)));
+    return std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / kRays))));
   }
   [[nodiscard]] std::vector<Rgba> pictures(PerMeter extinction, const std::vector<Rgba>& x) const {
     const auto engine = make_engine(level_.problem, sigma(extinction), setup_.device, setup_.pool);
@@ -107,7 +107,7 @@ Candidate search(const Probe& probe) {
                                      [](const Candidate& a, const Candidate& b) { return a.extinction < b.extinction; });
     tried.insert(at, std::move(c));
   };
-  for (const double depth : {0.0, 0.25, 0.5, 1.0, 2.0, 4.0}) try_one(PerMeter(depth / probe.mean_chord().value()));
+  for (const double depth : {0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0}) try_one(PerMeter(depth / probe.mean_chord().value()));
   const auto best = [&] {
     return std::min_element(tried.begin(), tried.end(), [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
   };

@@ -125,7 +125,7 @@ Status CameraWriter::open_segment(const FrameStamp& stamp) {
 }
 
 Status CameraWriter::close_segment() {
-  const Status closed = segment_->close();
+  Status closed = segment_->close();
   segment_.reset();
   if (!closed) failed_ = closed.error();
   return closed;

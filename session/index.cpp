@@ -134,8 +134,7 @@ std::uint64_t pixel_hash(std::span<const std::byte> bytes) {
   std::array<std::uint64_t, 4> lanes{1, 2, 3, 4};
   std::size_t at = 0;
   for (; at + 32 <= bytes.size(); at += 32) {
-    std::array<std::uint64_t, 4>
-        words;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled on the next line
+    std::array<std::uint64_t, 4> words{};
     std::memcpy(words.data(), bytes.data() + at, sizeof(words));
     for (std::size_t i = 0; i < lanes.size(); ++i) lanes[i] = mix64(lanes[i] ^ words[i]);
   }

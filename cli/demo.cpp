@@ -49,6 +49,8 @@ Result<Rig> open_rig(const DemoOptions& options) {
   draw.cameras = options.cameras;
   draw.seed = options.seed;
   draw.layout = {options.image, PixelFormat::rgb8, 8};
+  // A sensor of fewer rows is read as long, row by row more slowly.
+  draw.row_time = microseconds_per_row(54) * (720.0 / options.image.height);
   Rig opened;
   EMBERLOCK_ASSIGN_OR_RETURN(opened.rig, VirtualRig::create(draw_virtual_rig(draw), opened.clock));
   for (int i = 0; i < opened.rig->size(); ++i) {

@@ -1,0 +1,109 @@
+// The demonstration with a small rig: strobe, alignment, recording, reconstruction and report, through the
+// code that ships.
+#include "cli/demo.h"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "base/file.h"
+#include "recon/preprocess/flame_mask.h"
+#include "session/reader.h"
+
+namespace emberlock::cli {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+
+class DemoTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = fs::temp_directory_path() / ("emberlock_demo_test." + std::to_string(::getpid()));
+    fs::create_directories(folder_);
+    DemoOptions options;
+    options.cameras = 6;
+    options.image = {240, 200};
+    options.flame_frames = 3;
+    options.voxels = 40;
+    options.truth_voxels = 40;
+    result_ =
+        new Result<DemoResult>(run_demo(options, folder_, [](const std::string&) { return Progress{}; }));
+  }
+  static void TearDownTestSuite() {
+    delete result_;
+    fs::remove_all(folder_);
+  }
+  void SetUp() override { ASSERT_TRUE(result_->ok()) << result_->error().message(); }
+  static const DemoResult& result() { return **result_; }
+
+  static fs::path folder_;
+  static Result<DemoResult>* result_;
+};
+fs::path DemoTest::folder_;
+Result<DemoResult>* DemoTest::result_ = nullptr;
+
+TEST_F(DemoTest, EveryCameraEndsWithinTheToleranceInTruth) {
+  for (const AlignStage& stage : result().stages) {
+    for (const auto& error : stage.errors.back()) {
+      ASSERT_TRUE(error.has_value());
+      EXPECT_LE(std::abs(error->value()), stage.tolerance.value()) << stage.title;
+    }
+  }
+  // Ten rows to either side of the reference, and a row for what measuring leaves open.
+  EXPECT_LE(result().true_worst_pair, Rows(21) * result().true_row_times[0]);
+}
+
+TEST_F(DemoTest, RowTimesAreMeasuredNotAssumed) {
+  ASSERT_EQ(result().row_clocks.size(), 6U);
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double off = (result().row_clocks[i].row_time - result().true_row_times[i]).value();
+    // Rows take 3.6 times as long as those of a full picture, which is measured to 5 ns.
+    EXPECT_LE(std::abs(off), 3.6 * 5e-9) << i;
+  }
+}
+
+TEST_F(DemoTest, EveryFrameOfTheFlameIsRecordedAndReadable) {
+  auto session = SessionReader::open(folder_ / "flame");
+  ASSERT_TRUE(session.ok()) << session.error().message();
+  ASSERT_EQ(session->camera_count(), 6U);
+  for (std::size_t camera = 0; camera < 6; ++camera) {
+    ASSERT_EQ(session->stamps(camera).size(), 3U);
+    EXPECT_TRUE(session->read(camera, 2).ok());
+  }
+}
+
+TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
+  const auto held_out = result().outcome.report.heldout_rmse;
+  ASSERT_TRUE(held_out.has_value());
+  EXPECT_LT(all_channels(*held_out), all_channels(*result().paper.report.heldout_rmse));
+  const View& view = result().scene.views[static_cast<std::size_t>(result().held_out)];
+  const PixelBox box = flame_mask(view.image, noise_threshold(view.image)).box;
+  EXPECT_LT(all_channels(*held_out),
+            0.5 * all_channels(rmse(view.image, RadianceImage(view.image.size), box)))
+      << "less than half the error of a black picture";
+}
+
+TEST_F(DemoTest, TheReportStandsAlone) {
+  ASSERT_TRUE(write_demo_report(result(), folder_).ok());
+  const std::string page = read_file(folder_ / "report.html").value();
+  EXPECT_THAT(page, HasSubstr("held out"));
+  EXPECT_THAT(page, Not(HasSubstr("http")));
+  EXPECT_THAT(page, Not(HasSubstr("nan")));
+  EXPECT_TRUE(fs::exists(folder_ / "summary.png"));
+  EXPECT_TRUE(fs::exists(folder_ / "reconstruction" / "volume.vdb"));
+}
+
+TEST(Demo, OptionsOutOfRangeAreNamed) {
+  DemoOptions options;
+  options.cameras = 2;
+  const auto r = run_demo(options, fs::temp_directory_path() / "emberlock_never", {});
+  ASSERT_FALSE(r.ok());
+  EXPECT_EQ(r.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(r.error().message(), HasSubstr("--cameras"));
+}
+
+}  // namespace
+}  // namespace emberlock::cli

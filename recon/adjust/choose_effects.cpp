@@ -10,9 +10,9 @@
 namespace emberlock {
 namespace {
 
-constexpr int kCoarse = 64;          // voxels along the longest side, at most
-constexpr int kPasses = 6;           // of a cold solve
-constexpr std::size_t kRays = 20000; // about as many as a cold solve is given
+constexpr int kCoarse = 64;           // voxels along the longest side, at most
+constexpr int kPasses = 6;            // of a cold solve
+constexpr std::size_t kRays = 20000;  // about as many as a cold solve is given
 constexpr int kRefinements = 3;
 
 /// Cold solves of one coarse problem under different extinctions.
@@ -96,20 +96,23 @@ PerMeter vertex(const Candidate& a, const Candidate& b, const Candidate& c) {
   return PerMeter(std::clamp(0.5 * (xa + xb) - 0.5 * ab / curvature, xa, xc));
 }
 
-/// A global search: descent from a wrong scale stays wrong, so candidates are cold solves over the whole range, then a
-/// parabola around the best.
+/// A global search: descent from a wrong scale stays wrong, so candidates are cold solves over the whole
+/// range, then a parabola around the best.
 Candidate search(const Probe& probe) {
   std::vector<Candidate> tried;
   const auto try_one = [&](PerMeter extinction) {
     Candidate c{extinction, 0, {}};
     c.error = probe.solve(extinction, c.x);
-    const auto at = std::lower_bound(tried.begin(), tried.end(), c,
-                                     [](const Candidate& a, const Candidate& b) { return a.extinction < b.extinction; });
+    const auto at =
+        std::lower_bound(tried.begin(), tried.end(), c,
+                         [](const Candidate& a, const Candidate& b) { return a.extinction < b.extinction; });
     tried.insert(at, std::move(c));
   };
-  for (const double depth : {0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0}) try_one(PerMeter(depth / probe.mean_chord().value()));
+  for (const double depth : {0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0})
+    try_one(PerMeter(depth / probe.mean_chord().value()));
   const auto best = [&] {
-    return std::min_element(tried.begin(), tried.end(), [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
+    return std::min_element(tried.begin(), tried.end(),
+                            [](const Candidate& a, const Candidate& b) { return a.error < b.error; });
   };
   for (int i = 0; i < kRefinements; ++i) {
     const auto b = best();
@@ -132,8 +135,8 @@ std::string text(const char* format, double a, double b) {
 
 }  // namespace
 
-Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request, const SolveOptions& options,
-                                    const Elapsed& elapsed) {
+Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
+                                    const SolveOptions& options, const Elapsed& elapsed) {
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   const Seconds start = elapsed ? elapsed() : Seconds(0);
@@ -163,8 +166,11 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   if (chosen.extinction.value() > 0) report.predicted_change = probe.change(chosen.extinction, chosen.x);
   if (!request.fixed) {
     report.on = report.predicted_change >= request.tolerance;
-    report.reason = report.on ? text("%.3g / m fits the pictures best, to %.3g grey levels on a coarse grid", chosen.extinction.value(), chosen.error)
-                              : text("the best fit, %.3g / m, changes the pictures by less than %.2g grey levels", chosen.extinction.value(), request.tolerance);
+    report.reason = report.on
+                        ? text("%.3g / m fits the pictures best, to %.3g grey levels on a coarse grid",
+                               chosen.extinction.value(), chosen.error)
+                        : text("the best fit, %.3g / m, changes the pictures by less than %.2g grey levels",
+                               chosen.extinction.value(), request.tolerance);
   }
   report.seconds = (elapsed ? elapsed() : Seconds(0)) - start;
   EffectChoice choice;

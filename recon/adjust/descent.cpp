@@ -23,8 +23,8 @@ bool held_out(int x, int y) {
   return random_bits(0, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % kHoldOutOneIn == 0;
 }
 
-/// Subsets that a medium allows: light from deep inside a thick one reaches few pixels, and a step from some of the rays alone can
-/// then overshoot; the full gradient can't.
+/// Subsets that a medium allows: light from deep inside a thick one reaches few pixels, and a step from some
+/// of the rays alone can then overshoot; the full gradient can't.
 int subsets_for(float sigma, std::size_t pixels, int most) {
   int subsets = std::min(most, sigma < 0.11F ? 16 : (sigma < 0.22F ? 4 : 1));
   while (subsets > 1 && pixels / static_cast<std::size_t>(subsets) < kFewestRays) subsets /= 4;
@@ -33,7 +33,8 @@ int subsets_for(float sigma, std::size_t pixels, int most) {
 
 std::size_t flame_pixels(const SolverSetup& setup, int stride) {
   std::size_t pixels = 0;
-  for (const PixelBox& b : setup.boxes) pixels += static_cast<std::size_t>(b.x1 - b.x0) * static_cast<std::size_t>(b.y1 - b.y0);
+  for (const PixelBox& b : setup.boxes)
+    pixels += static_cast<std::size_t>(b.x1 - b.x0) * static_cast<std::size_t>(b.y1 - b.y0);
   return pixels / static_cast<std::size_t>(stride * stride);
 }
 
@@ -79,7 +80,8 @@ void Descent::pass() {
     const double next_time = 0.5 * (1 + std::sqrt(1 + 4 * momentum_time_ * momentum_time_));
     const auto momentum = std::min(kMostMomentum, static_cast<float>((momentum_time_ - 1) / next_time));
     momentum_time_ = next_time;
-    engine_->descend({static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)), smoothing_, momentum});
+    engine_->descend(
+        {static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)), smoothing_, momentum});
   }
 }
 
@@ -90,7 +92,8 @@ double Descent::validation_error() {
   const std::size_t first = level_.problem.list.subset_begin[static_cast<std::size_t>(subset)];
   double sum = 0;
   for (std::size_t i = first; i < first + rays_of(subset); ++i)
-    for (std::size_t c = 0; c < 3; ++c) sum += static_cast<double>(r[i].c[c]) * static_cast<double>(r[i].c[c]);
+    for (std::size_t c = 0; c < 3; ++c)
+      sum += static_cast<double>(r[i].c[c]) * static_cast<double>(r[i].c[c]);
   return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(rays_of(subset)))));
 }
 

@@ -9,17 +9,19 @@
 
 namespace emberlock {
 
-/// The pixels of one level of resolution, in interleaved subsets, with one more subset that is held out of the fit.
+/// The pixels of one level of resolution, in interleaved subsets, with one more subset that is held out of
+/// the fit.
 struct Level {
   Problem problem;
   int subsets = 1;  ///< that are fitted; subset number `subsets` is held out
 };
 
-/// Every `stride`-th pixel along both axes. `most_subsets` is 1, 4 or 16; a thick medium or few pixels take fewer.
+/// Every `stride`-th pixel along both axes. `most_subsets` is 1, 4 or 16; a thick medium or few pixels take
+/// fewer.
 Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets = 16);
 
-/// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Laplacian over x >= 0, by preconditioned
-/// ordered-subset steps with Nesterov's momentum.
+/// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Laplacian over x >= 0,
+/// by preconditioned ordered-subset steps with Nesterov's momentum.
 class Descent {
  public:
   /// The level and the pool must outlive it; `sigma` is the extinction a voxel edge. Starts from zero.

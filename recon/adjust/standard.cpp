@@ -8,10 +8,11 @@
 namespace emberlock {
 namespace {
 
-constexpr int kCoarsest = 24;        // no level has fewer voxels along its longest side, unless the grid itself has
-constexpr int kCoarsePasses = 4;     // over the pixels of a coarse level
-constexpr int kMostPasses = 12;      // at full resolution, unless the user asks for more
-constexpr double kLeastGain = 0.05;  // a pass that lowers the held-out pixels' error by a smaller share is the last
+constexpr int kCoarsest = 24;  // no level has fewer voxels along its longest side, unless the grid itself has
+constexpr int kCoarsePasses = 4;  // over the pixels of a coarse level
+constexpr int kMostPasses = 12;   // at full resolution, unless the user asks for more
+constexpr double kLeastGain =
+    0.05;  // a pass that lowers the held-out pixels' error by a smaller share is the last
 
 int longest(const Grid& g) { return std::max({g.nx, g.ny, g.nz}) - 1; }
 
@@ -40,7 +41,8 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
     descent->pass();
     ++iteration;
     const double validation = descent->validation_error();
-    if (tracker.record(iteration, error(descent->engine().residuals()), descent->engine(), level->problem)) break;
+    if (tracker.record(iteration, error(descent->engine().residuals()), descent->engine(), level->problem))
+      break;
     if (setup.options.iterations == 0 && validation > (1 - kLeastGain) * last) break;
     last = validation;
   }

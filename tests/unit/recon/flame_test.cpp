@@ -1,0 +1,70 @@
+#include "recon/synthetic/flame.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+namespace emberlock {
+namespace {
+
+const Grid kGrid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 40);
+
+TEST(Flame, IsDeterministicBySeed) {
+  FlameOptions other;
+  other.seed = 2;
+  const FlameTruth a = Flame().at(Seconds(0.1), kGrid);
+  EXPECT_EQ(a.volume.emission, Flame().at(Seconds(0.1), kGrid).volume.emission);
+  EXPECT_NE(a.volume.emission, Flame(other).at(Seconds(0.1), kGrid).volume.emission);
+}
+
+TEST(Flame, EmitsOnlyInsideItsMediumAndClearOfTheBox) {
+  for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
+    FlameOptions options;
+    options.shape = shape;
+    const FlameTruth truth = Flame(options).at(Seconds(0), kGrid);
+    EXPECT_GT(truth.medium.count, 300u);
+    for (int k = 0; k < kGrid.nz; ++k)
+      for (int j = 0; j < kGrid.ny; ++j)
+        for (int i = 0; i < kGrid.nx; ++i) {
+          if (truth.volume.emission[3 * kGrid.index(i, j, k)] <= 0) continue;
+          ASSERT_TRUE(i > 0 && j > 0 && k > 0 && i < kGrid.nx - 1 && j < kGrid.ny - 1 && k < kGrid.nz - 1);
+          const auto voxel = static_cast<std::size_t>(i + (kGrid.nx - 1) * (j + (kGrid.ny - 1) * k));
+          ASSERT_EQ(truth.medium.inside[voxel], 1);
+        }
+  }
+}
+
+TEST(Flame, ChangesSmoothlyAsItRises) {
+  const Flame flame;
+  const auto difference = [&](double dt) {
+    const FlameTruth a = flame.at(Seconds(0.5), kGrid);
+    const FlameTruth b = flame.at(Seconds(0.5 + dt), kGrid);
+    double sum = 0;
+    for (std::size_t i = 0; i < a.volume.emission.size(); ++i)
+      sum += std::abs(static_cast<double>(a.volume.emission[i] - b.volume.emission[i]));
+    return sum;
+  };
+  const double short_time = difference(0.0005);
+  EXPECT_GT(short_time, 0);
+  EXPECT_LT(short_time, 0.5 * difference(0.005));
+}
+
+TEST(PaperScene, IsTheTenPlusOneViewsOfThePaper) {
+  PaperSceneOptions options;
+  options.image = {64, 48};
+  options.truth_voxels = 32;
+  const Scene scene = paper_scene(options);
+  ASSERT_EQ(scene.views.size(), 11u);
+  EXPECT_EQ(std::count_if(scene.views.begin(), scene.views.end(),
+                          [](const View& v) { return v.role == ViewRole::held_out; }),
+            1);
+  for (const View& view : scene.views) {
+    EXPECT_NEAR(view.camera.center().norm(), 0.3, 1e-9);
+    const float brightest = *std::max_element(view.image.rgb.begin(), view.image.rgb.end());
+    EXPECT_GT(brightest, 120);
+    EXPECT_LT(brightest, 256);
+  }
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -1,0 +1,132 @@
+#include "recon/hull/hull.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/small_flame.h"
+
+namespace emberlock {
+namespace {
+
+/// Projects the corners of one voxel in double and looks at every pixel of their bounding rectangle.
+bool stays(const Scene& scene, const std::vector<FlameMask>& masks, const Grid& g, int i, int j, int k) {
+  for (std::size_t v = 0; v < scene.views.size(); ++v) {
+    if (scene.views[v].role != ViewRole::input) continue;
+    Eigen::Vector2d low(1e9, 1e9);
+    Eigen::Vector2d high(-1e9, -1e9);
+    for (int c = 0; c < 8; ++c) {
+      const Eigen::Vector3d p =
+          Eigen::Vector3d(g.origin[0], g.origin[1], g.origin[2]) +
+          static_cast<double>(g.edge) * Eigen::Vector3d(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+      const Eigen::Vector2d pixel = scene.views[v].camera.project(p);
+      low = low.cwiseMin(pixel);
+      high = high.cwiseMax(pixel);
+    }
+    const ImageSize size = masks[v].size;
+    if (low.x() < 0 || low.y() < 0 || high.x() >= size.width || high.y() >= size.height) continue;
+    bool flame = false;
+    for (int y = static_cast<int>(low.y()); y <= static_cast<int>(high.y()); ++y)
+      for (int x = static_cast<int>(low.x()); x <= static_cast<int>(high.x()); ++x)
+        flame = flame || masks[v].at(x, y);
+    if (!flame) return false;
+  }
+  return true;
+}
+
+TEST(Hull, EqualsTheBruteForceProjectionOfEveryVoxel) {
+  const Scene scene = small_flame_scene();
+  const std::vector<FlameMask> masks = flame_masks(scene);
+  const Grid grid = grid_over(scene.box, 37);
+  const auto hull = carve(scene, masks, grid, {});
+  ASSERT_TRUE(hull.ok());
+  std::size_t voxel = 0;
+  std::size_t different = 0;
+  for (int k = 0; k < grid.nz - 1; ++k)
+    for (int j = 0; j < grid.ny - 1; ++j)
+      for (int i = 0; i < grid.nx - 1; ++i)
+        different += stays(scene, masks, grid, i, j, k) != (hull->inside[voxel++] != 0);
+  EXPECT_GT(hull->count, 500u);
+  EXPECT_LT(hull->count, voxel / 4);
+  EXPECT_LE(different, 2u) << "float against double may differ where a corner meets a pixel's border";
+}
+
+TEST(Hull, HoldsTheTrueMediumThatIsBrightEnoughToBeSeen) {
+  const Scene scene = small_flame_scene();
+  const Grid grid = grid_over(scene.box, 48);
+  const FlameTruth truth = Flame().at(Seconds(0), grid);
+  const auto hull = carve(scene, flame_masks(scene), grid, {});
+  ASSERT_TRUE(hull.ok());
+  std::size_t lost = 0;
+  for (std::size_t v = 0; v < hull->inside.size(); ++v)
+    lost += truth.medium.inside[v] != 0 && hull->inside[v] == 0;
+  EXPECT_LT(static_cast<double>(lost), 0.05 * static_cast<double>(truth.medium.count));
+}
+
+TEST(Hull, ThresholdAboveEverythingIsAnErrorThatNamesViewAndThreshold) {
+  const Scene scene = small_flame_scene();
+  const auto hull = carve(scene, flame_masks(scene, 1000), grid_over(scene.box, 32), {});
+  ASSERT_FALSE(hull.ok());
+  EXPECT_EQ(hull.error().where, "camera 0");
+  EXPECT_NE(hull.error().what.find("1e+03"), std::string::npos) << hull.error().message();
+}
+
+TEST(Hull, ABlackViewIsNamed) {
+  Scene scene = small_flame_scene();
+  std::fill(scene.views[3].image.rgb.begin(), scene.views[3].image.rgb.end(), 0.F);
+  const auto hull = carve(scene, flame_masks(scene), grid_over(scene.box, 32), {});
+  ASSERT_FALSE(hull.ok());
+  EXPECT_EQ(hull.error().where, "camera 3");
+}
+
+TEST(Hull, HeldOutViewsDoNotCarve) {
+  Scene scene = small_flame_scene();
+  const Grid grid = grid_over(scene.box, 32);
+  const auto before = carve(scene, flame_masks(scene), grid, {});
+  std::fill(scene.views[10].image.rgb.begin(), scene.views[10].image.rgb.end(), 0.F);
+  const auto after = carve(scene, flame_masks(scene), grid, {});
+  ASSERT_TRUE(before.ok() && after.ok());
+  EXPECT_EQ(before->inside, after->inside);
+}
+
+TEST(Hull, AVoxelThatAViewCannotSeeIsNotCarvedByIt) {
+  Scene scene = small_flame_scene();
+  scene.views.resize(1);
+  scene.views[0].camera.intrinsics.cx += 100000;  // the box is far out of the frame
+  const auto hull = carve(scene, flame_masks(scene), grid_over(scene.box, 8), {});
+  ASSERT_TRUE(hull.ok());
+  EXPECT_EQ(hull->count, hull->inside.size());
+}
+
+TEST(Hull, SixtyFiveViewsAreRefused) {
+  Scene scene = small_flame_scene();
+  scene.views.resize(1);
+  while (scene.views.size() < 65) scene.views.push_back(scene.views[0]);
+  EXPECT_FALSE(carve(scene, flame_masks(scene), grid_over(scene.box, 8), {}).ok());
+  scene.views.pop_back();
+  EXPECT_TRUE(carve(scene, flame_masks(scene), grid_over(scene.box, 8), {}).ok());
+}
+
+TEST(FlameMask, ThresholdComesFromTheNoise) {
+  PaperSceneOptions options;
+  options.image = {160, 120};
+  options.truth_voxels = 48;
+  EXPECT_DOUBLE_EQ(noise_threshold(paper_scene(options).views[0].image), 1);
+  options.noise = 2;
+  const double threshold = noise_threshold(paper_scene(options).views[0].image);
+  EXPECT_GT(threshold, 4);
+  EXPECT_LT(threshold, 14);
+}
+
+TEST(FlameMask, NanAndInfiniteInputIsRefusedByName) {
+  Scene scene = small_flame_scene();
+  scene.views[2].image.rgb[3 * (5 * 160 + 7) + 1] = std::nanf("");
+  EXPECT_EQ(check_scene(scene).error().where, "camera 2");
+  EXPECT_NE(check_scene(scene).error().what.find("(7, 5)"), std::string::npos);
+  scene.views[2].image.rgb[3 * (5 * 160 + 7) + 1] = 0;
+  scene.views[4].camera.camera_from_world.translation.x() = INFINITY;
+  EXPECT_EQ(check_scene(scene).error().where, "camera 4");
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -1,0 +1,203 @@
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+#include "recon/adjust/engine.h"
+#include "recon/adjust/problem.h"
+#include "recon/hull/hull.h"
+#include "recon/kernels/clip.h"
+#include "recon/render/render.h"
+
+namespace emberlock {
+namespace {
+
+CameraModel camera_at(const Eigen::Vector3d& center, const Eigen::Vector3d& target, ImageSize size,
+                      double focal) {
+  const Eigen::Vector3d up = std::abs((target - center).normalized().z()) > 0.9 ? Eigen::Vector3d::UnitY()
+                                                                                : Eigen::Vector3d::UnitZ();
+  return look_at({size, focal, focal, size.width / 2.0, size.height / 2.0, {}}, center, target, up);
+}
+
+Volume filled(const Grid& grid, float emission) {
+  return {grid, std::vector<float>(3 * grid.size(), emission), {}};
+}
+
+Volume random_volume(const Grid& grid) {
+  Volume v = filled(grid, 0);
+  for (std::size_t i = 0; i < v.emission.size(); ++i)
+    v.emission[i] = static_cast<float>(1000 * random_uniform(3, 0, i));
+  return v;
+}
+
+Hull random_medium(const Grid& grid, double share) {
+  Hull h = whole_grid(grid);
+  h.count = 0;
+  for (std::size_t i = 0; i < h.inside.size(); ++i) {
+    h.inside[i] = random_uniform(4, 0, i) < share ? 1 : 0;
+    h.count += h.inside[i];
+  }
+  return h;
+}
+
+/// The model by brute force in double: thousands of tiny steps from the camera, no lists, no clipping.
+double brute_force(const Volume& volume, const Hull& medium, double sigma, const Ray& ray, int channel) {
+  const Grid& g = volume.grid;
+  const double step = static_cast<double>(g.edge) / 200;
+  double radiance = 0;
+  double transmittance = 1;
+  for (double t = step / 2; t < 3; t += step) {
+    double f[3];
+    int cell[3];
+    const int size[3] = {g.nx - 1, g.ny - 1, g.nz - 1};
+    bool inside = true;
+    for (int a = 0; a < 3; ++a) {
+      const double p = (ray.origin[a] + t * ray.direction[a] - static_cast<double>(g.origin[a])) /
+                       static_cast<double>(g.edge);
+      cell[a] = static_cast<int>(std::floor(p));
+      inside = inside && cell[a] >= 0 && cell[a] < size[a];
+      f[a] = p - cell[a];
+    }
+    if (!inside ||
+        medium.inside[static_cast<std::size_t>(cell[0] + size[0] * (cell[1] + size[1] * cell[2]))] == 0)
+      continue;
+    double s = 0;
+    for (int c = 0; c < 8; ++c) {
+      const double w = (c & 1 ? f[0] : 1 - f[0]) * (c & 2 ? f[1] : 1 - f[1]) * (c & 4 ? f[2] : 1 - f[2]);
+      const std::size_t at = g.index(cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2));
+      s += w * static_cast<double>(volume.emission[3 * at + static_cast<std::size_t>(channel)]);
+    }
+    radiance += transmittance * s * step;
+    transmittance *= std::exp(-sigma * step);
+  }
+  return radiance;
+}
+
+float pixel(const RadianceImage& image, int x, int y, int c = 0) {
+  return image.rgb[static_cast<std::size_t>(3 * (y * image.size.width + x) + c)];
+}
+
+TEST(March, AgreesWithBruteForceInDoubleThroughAMediumWithHoles) {
+  const Grid grid = grid_over({Eigen::Vector3d::Zero(), {0.2, 0.15, 0.1}}, 8);
+  const Volume volume = random_volume(grid);
+  const Hull medium = random_medium(grid, 0.6);
+  const CameraModel camera = camera_at({0.25, -0.13, 0.08}, {0, 0, 0}, {12, 10}, 14);
+  for (const double sigma : {0.0, 5.0, 32.8}) {
+    RenderOptions fine;
+    fine.step = 0.02;
+    const RadianceImage image = render_view(volume, medium, {PerMeter(sigma)}, camera, fine);
+    const RadianceImage coarse = render_view(volume, medium, {PerMeter(sigma)}, camera);
+    double brightest = 0;
+    for (int y = 0; y < 10; ++y) {
+      for (int x = 0; x < 12; ++x) {
+        const double truth = brute_force(volume, medium, sigma, camera.ray({x + 0.5, y + 0.5}), 1);
+        brightest = std::max(brightest, truth);
+        EXPECT_NEAR(pixel(image, x, y, 1), truth, 0.15) << sigma << " at " << x << ", " << y;
+        EXPECT_NEAR(pixel(coarse, x, y, 1), truth, 2.5) << sigma << " at " << x << ", " << y;
+      }
+    }
+    EXPECT_GT(brightest, 20);
+  }
+}
+
+TEST(March, SlabHasTheClosedFormForAnyExtinction) {
+  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 16);
+  const CameraModel camera = camera_at({0.5, 0, 0}, {0, 0, 0}, {3, 3}, 300);
+  for (const double sigma : {0.0, 1e-6, 1e-3, 1.0, 32.8, 1e3, 1e6}) {
+    const RadianceImage image = render_view(filled(grid, 1000), whole_grid(grid), {PerMeter(sigma)}, camera);
+    const double expected = sigma == 0 ? 1000 * 0.2 : -1000 * std::expm1(-sigma * 0.2) / sigma;
+    EXPECT_NEAR(pixel(image, 1, 1) / expected, 1, 1e-5) << sigma;
+  }
+}
+
+TEST(March, GaussianBlobIntegratesToItsClosedForm) {
+  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 64);
+  Volume volume = filled(grid, 0);
+  const double width = 0.02;
+  for (int k = 0; k < grid.nz; ++k)
+    for (int j = 0; j < grid.ny; ++j)
+      for (int i = 0; i < grid.nx; ++i) {
+        const Eigen::Vector3d p =
+            Eigen::Vector3d(i, j, k) * static_cast<double>(grid.edge) - Eigen::Vector3d::Constant(0.1);
+        volume.emission[3 * grid.index(i, j, k)] =
+            static_cast<float>(1000 * std::exp(-p.squaredNorm() / (2 * width * width)));
+      }
+  const CameraModel camera = camera_at({0.4, 0.1, 0.05}, {0, 0, 0}, {21, 21}, 100);
+  const RadianceImage image = render_view(volume, whole_grid(grid), {}, camera);
+  for (const auto& [x, y] : {std::pair(10, 10), std::pair(12, 9), std::pair(8, 11)}) {
+    const Ray ray = camera.ray({x + 0.5, y + 0.5});
+    const double miss = ray.origin.cross(ray.direction).norm();
+    // The cube cuts the tails at five widths or more: erf(5 / sqrt 2) differs from 1 by less than 1e-6.
+    const double expected =
+        1000 * std::exp(-miss * miss / (2 * width * width)) * width * std::sqrt(2 * std::numbers::pi);
+    EXPECT_NEAR(pixel(image, x, y) / expected, 1, 6e-3);
+  }
+}
+
+TEST(March, AxisParallelRaysOnFacesAndEdgesLoseNothing) {
+  // Two by two voxels around the axis: the central ray runs along an edge, its neighbours along faces.
+  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 2);
+  for (const Eigen::Vector3d& axis :
+       {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(0, 0, 1)}) {
+    CameraModel camera = camera_at(0.5 * axis, {0, 0, 0}, {3, 3}, 1e4);
+    camera.intrinsics.cx = camera.intrinsics.cy = 1.5;
+    const RadianceImage image = render_view(filled(grid, 100), whole_grid(grid), {}, camera);
+    for (int y = 0; y < 3; ++y)
+      for (int x = 0; x < 3; ++x) EXPECT_NEAR(pixel(image, x, y), 20, 1e-3) << axis.transpose();
+  }
+  // A ray that runs exactly along an outer face belongs to the closed box.
+  const float origin[3] = {-3, 0, 1};
+  const float direction[3] = {1, 0, 0};
+  const std::uint8_t inside[8] = {1, 1, 1, 1, 1, 1, 1, 1};
+  float length = 0;
+  clip_to_medium({2, 2, 2, inside}, origin, direction, [&](float a, float b) { length += b - a; });
+  EXPECT_FLOAT_EQ(length, 2);
+}
+
+TEST(March, CameraInsideTheMediumSeesOnlyWhatLiesAhead) {
+  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 10);
+  const CameraModel camera = camera_at({0.05, 0, 0}, {-1, 0, 0}, {3, 3}, 1000);
+  EXPECT_NEAR(pixel(render_view(filled(grid, 100), whole_grid(grid), {}, camera), 1, 1), 15, 1e-3);
+}
+
+TEST(March, CameraThatLooksAwaySeesNothing) {
+  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 4);
+  const RadianceImage image =
+      render_view(filled(grid, 100), whole_grid(grid), {}, camera_at({0.5, 0, 0}, {1, 0, 0}, {8, 6}, 8));
+  for (const float v : image.rgb) EXPECT_EQ(v, 0);
+}
+
+TEST(March, AdjointIsTheTranspose) {
+  const Grid grid = grid_over({Eigen::Vector3d::Zero(), {0.2, 0.12, 0.16}}, 20);
+  const Hull medium = random_medium(grid, 0.7);
+  View a;
+  a.camera = camera_at({0.3, 0.1, 0.05}, {0, 0, 0}, {40, 30}, 35);
+  a.image = RadianceImage({40, 30});
+  View b = a;
+  b.camera = camera_at({0.02, -0.03, 0.35}, {0, 0, 0}, {40, 30}, 35);
+  Pool pool(2);
+  const Problem problem = pose({&a, &b}, medium, {}, pool);
+  for (const float sigma : {0.F, 0.05F, 1.F, 5.F}) {
+    const auto engine = make_engine(problem, sigma, Device::cpu, pool);
+    std::vector<Rgba> x(problem.grid().size());
+    for (std::size_t p = 0; p < x.size(); ++p)
+      if (problem.active[p] != 0) x[p].c[0] = static_cast<float>(random_uniform(1, 0, p));
+    engine->set(x);
+    engine->project(0);
+    const std::vector<Rgba> ax = engine->residuals();
+    engine->backproject(0);  // y = A x
+    const std::vector<Rgba> aty = engine->gradient();
+    double left = 0;
+    double right = 0;
+    for (const Rgba& r : ax) left += static_cast<double>(r.c[0]) * static_cast<double>(r.c[0]);
+    for (std::size_t p = 0; p < x.size(); ++p)
+      right += static_cast<double>(x[p].c[0]) * static_cast<double>(aty[p].c[0]);
+    ASSERT_GT(left, 0);
+    EXPECT_NEAR(right / left, 1, 1e-6) << sigma;
+  }
+}
+
+}  // namespace
+}  // namespace emberlock

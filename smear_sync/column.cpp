@@ -177,7 +177,8 @@ void hide_bloom(Column& c) {
   const int centre = static_cast<int>(std::lround(c.x));
   for (int row = 0; row < c.patch.height; ++row) {
     // `level` was taken out: put it back to see what the sensor saw.
-    const float level = c.level[static_cast<std::size_t>((row % 2) * c.patch.width + centre)];
+    const float level = c.level[static_cast<std::size_t>(row % 2) * static_cast<std::size_t>(c.patch.width) +
+                                static_cast<std::size_t>(centre)];
     if (static_cast<double>(c.patch.row(row)[centre] + level) >= c.saturation)
       c.hidden[static_cast<std::size_t>(row)] = 1;
   }
@@ -213,13 +214,16 @@ std::vector<float> response(const Column& c, int lane, double radius) {
   };
   std::vector<double> across;
   double across_power = 0;
-  for (int dx = -c.half_width; dx <= c.half_width; ++dx) {
-    across.push_back(profile(dx - shift));
+  // The lane of a lamp at the image's edge is cut by it.
+  const int first = std::max(0, centre - c.half_width);
+  const int last = std::min(c.patch.width - 1, centre + c.half_width);
+  for (int x = first; x <= last; ++x) {
+    across.push_back(profile(x - centre - shift));
     across_power += across.back() * across.back();
   }
   std::vector<double> collapsed(static_cast<std::size_t>(height));
   for (int y = 0; y < height; ++y) {
-    const float* row = c.patch.row(y) + centre - c.half_width;
+    const float* row = c.patch.row(y) + first;
     double sum = 0;
     for (std::size_t i = 0; i < across.size(); ++i) sum += across[i] * static_cast<double>(row[i]);
     collapsed[static_cast<std::size_t>(y)] = sum;
@@ -368,8 +372,9 @@ void find_line(const Column& c, ColumnReading& reading) {
   int columns_inside = 0;
   int clipped = 0;
   for (int x = 0; x < c.patch.width; ++x) {
-    const float level =
-        (c.level[static_cast<std::size_t>(x)] + c.level[static_cast<std::size_t>(c.patch.width + x)]) / 2;
+    const float level = (c.level[static_cast<std::size_t>(x)] +
+                         c.level[static_cast<std::size_t>(c.patch.width) + static_cast<std::size_t>(x)]) /
+                        2;
     if (std::abs(x - centre) <= core) {
       inside += static_cast<double>(level);
       ++columns_inside;

@@ -56,6 +56,7 @@ AlignRunOptions options_from(const json& object) {
   options.reset_lead = Seconds(number(object, "reset_lead_s"));
   options.rate_error = PartsPerMillion(number(object, "rate_error_ppm"));
   options.seed = object.at("seed").get<std::uint64_t>();
+  if (!object.at("cameras").is_array()) throw std::invalid_argument("cameras is not a list");
   for (const json& camera : object.at("cameras")) {
     options.timing.push_back(timing_from(camera));
     const json& delay = camera.at("delay");

@@ -247,11 +247,11 @@ Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& opt
       .output = StrobeOutput::flashing, .rate = rate(period), .width = options.flash_width};
   AlignState state;
   std::vector<ResetDone> done;
+  double reached = 0.2;  // of the progress; the rest is the part of the cameras within tolerance
   do {
     EMBERLOCK_RETURN_IF_ERROR(bench.set_strobe(flashes));
     const std::string words =
         "round " + std::to_string(state.rounds + 1) + ", " + std::to_string(state.resets) + " resets";
-    const double reached = 0.2 + 0.8 * (state.rounds > 0 ? part_within(result.last, result.options) : 0);
     EMBERLOCK_ASSIGN_OR_RETURN(
         const Film film, bench.film(options.frames_per_round, progress, reached, reached, words.c_str()));
     AlignRound round = to_round(film, result, options, bench.strobe());
@@ -260,6 +260,7 @@ Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& opt
     AlignStep step = align_step(state, round, cameras, result.options);
     state = std::move(step.state);
     result.last = std::move(step.decision);
+    if (result.last.reference) reached = 0.2 + 0.8 * part_within(result.last, result.options);
 
     const AlignRoundReport seen{round,          result.last, cameras,      result.options,
                                 bench.strobe(), film.frames, film.readings};

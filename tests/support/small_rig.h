@@ -1,70 +1,56 @@
 #pragma once
 
-#include <cmath>
+#include <algorithm>
 #include <memory>
-#include <utility>
 #include <vector>
 
+#include "cli/align_run.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
 
-namespace emberlock::testing_support {
+namespace emberlock::test {
 
-/// A camera of 64 x 120 pixels, 12 bits, that reads 250 us a row and 24 frames a second; its lamp is at (30,
-/// 50).
-inline VirtualCameraOptions small_camera(ReadDirection direction = ReadDirection::top_first,
-                                         int shifts = 120) {
-  VirtualCameraOptions c;
-  c.layout = {.size = {64, 120}, .format = PixelFormat::gray16, .bit_depth = 12};
-  c.timing = {.rows = 120,
-              .shifts = shifts,
-              .frame_period = Seconds(1.0 / 24),
-              .row_time = microseconds_per_row(250),
-              .direction = direction};
-  c.nominal_rate = Hertz(24);
-  c.lamp = {.x = 30, .y = Rows(50), .radius = 3};
-  c.first_phase = Seconds(0);
-  return c;
+/// Four cameras of 320 x 240 whose 240 rows take most of the frame period, so that few phases are blind.
+inline VirtualRigOptions small_rig(std::uint64_t seed, int cameras = 4) {
+  VirtualRigDraw draw;
+  draw.cameras = cameras;
+  draw.seed = seed;
+  draw.layout.size = {320, 240};
+  draw.row_time = microseconds_per_row(150);
+  return draw_virtual_rig(draw);
 }
 
-/// A rig of such cameras that draws the passes named and nothing else.
-inline std::unique_ptr<VirtualRig> small_rig(
-    std::vector<VirtualCameraOptions> cameras, std::vector<Pass> passes,
-    std::shared_ptr<Clock> clock = std::make_shared<VirtualClock>()) {
-  VirtualRigOptions options;
-  options.cameras = std::move(cameras);
-  options.scene.passes = std::move(passes);
-  return VirtualRig::create(std::move(options), std::move(clock)).value();
-}
-
-/// Grey levels (0..255) above the background, summed over the lamp's columns, by row.
-inline std::vector<double> column_light(const Frame& frame, double x, int half_width = 7) {
-  const ImageView v = frame.image->view();
-  const double scale = 255.0 / v.layout.white();
-  const double background = std::round(VirtualScene{}.background / scale);
-  std::vector<double> rows(v.height());
-  for (int y = 0; y < v.height(); ++y) {
-    for (int i = static_cast<int>(x) - half_width; i <= static_cast<int>(x) + half_width; ++i) {
-      if (i >= 0 && i < v.width()) rows[y] += (v.sample(i, y) - background) * scale;
+/// The rig, opened on a virtual clock, and what a data sheet says of it.
+struct SmallBench {
+  explicit SmallBench(const VirtualRigOptions& setup)
+      : rig(VirtualRig::create(setup, std::make_shared<VirtualClock>()).value()) {
+    align.strobe = &rig->strobe();
+    align.clock = &rig->clock();
+    for (int i = 0; i < rig->size(); ++i) align.cameras.push_back(&rig->camera(i));
+    options.align.tolerance.amount = Rows(30);
+    options.comb_frames = 12;
+    for (const VirtualCameraOptions& camera : setup.cameras) {
+      const CcdTiming& t = camera.timing;
+      options.timing.push_back({.rows = t.rows, .shifts = t.shifts, .direction = t.direction});
     }
   }
-  return rows;
-}
 
-/// The light's centre within `reach` rows of `about`, and how much there is.
-struct Blob {
-  double centre = 0;
-  double sum = 0;
-};
-inline Blob blob(const std::vector<double>& rows, double about, int reach = 6) {
-  Blob b;
-  for (int y = static_cast<int>(about + 0.5) - reach; y <= static_cast<int>(about + 0.5) + reach; ++y) {
-    if (y < 0 || y >= static_cast<int>(rows.size())) continue;
-    b.sum += rows[y];
-    b.centre += y * rows[y];
+  /// The largest true difference of a read phase's start from the reference's.
+  [[nodiscard]] Rows true_error(std::size_t reference, SecondsPerRow row_time) const {
+    const Seconds period = rig->truth(0).timing.frame_period;
+    const TimePoint now = rig->clock().now();
+    Seconds worst;
+    for (int i = 0; i < rig->size(); ++i) {
+      const Seconds apart =
+          rig->read_start_after(i, now) - rig->read_start_after(static_cast<int>(reference), now);
+      worst = std::max(worst, abs(wrap_symmetric(apart, period)));
+    }
+    return worst / row_time;
   }
-  b.centre /= b.sum;
-  return b;
-}
 
-}  // namespace emberlock::testing_support
+  std::unique_ptr<VirtualRig> rig;
+  cli::AlignRig align;
+  cli::AlignRunOptions options;
+};
+
+}  // namespace emberlock::test

@@ -1,0 +1,116 @@
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/align_json.h"
+#include "cli/align_record.h"
+#include "session/reader.h"
+#include "tests/support/small_rig.h"
+
+namespace emberlock::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using test::small_rig;
+using test::SmallBench;
+using testing::HasSubstr;
+
+class AlignReplay : public testing::Test {
+ protected:
+  AlignReplay()
+      : folder_(fs::path(testing::TempDir()) /
+                (std::string("align_") + testing::UnitTest::GetInstance()->current_test_info()->name())) {
+    fs::remove_all(folder_);
+  }
+  ~AlignReplay() override { fs::remove_all(folder_); }
+
+  /// Everything of a round that could differ: the line printed, and the readings to the last bit.
+  static AlignObserver into(std::vector<std::string>& lines) {
+    return [&lines](const AlignRoundReport& report) {
+      lines.push_back(round_json(report).dump());
+      for (const auto& camera : report.readings) {
+        for (const SmearReading& r : camera) {
+          char text[120];
+          std::snprintf(text, sizeof text, "%d %a %a", static_cast<int>(r.state),
+                        r.lamp ? r.lamp->y.value() : 0, r.dots.empty() ? 0 : r.dots.front().y.value());
+          lines.emplace_back(text);
+        }
+      }
+    };
+  }
+
+  fs::path folder_;
+};
+
+TEST_F(AlignReplay, GivesTheSameReadingsAndDecisionsToTheBit) {
+  SmallBench bench(small_rig(4));
+  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.align.tolerance.amount = milliseconds(1.5);
+  std::vector<std::string> live;
+  const auto recorded = record_align(folder_, bench.align, bench.options, into(live));
+  ASSERT_TRUE(recorded.ok()) << recorded.error().message();
+  ASSERT_GT(recorded->resets, 0);
+
+  std::vector<std::string> again;
+  std::uint64_t seed = 0;
+  const auto replayed = replay_align(folder_, into(again), {}, &seed);
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(live, again);
+  EXPECT_EQ(summary_json(*recorded, bench.options.seed).dump(), summary_json(*replayed, seed).dump());
+}
+
+TEST_F(AlignReplay, EveryFrameOfTheRunIsInTheRecording) {
+  SmallBench bench(small_rig(4));
+  ASSERT_TRUE(record_align(folder_, bench.align, bench.options).ok());
+  const auto session = SessionReader::open(folder_);
+  ASSERT_TRUE(session.ok());
+  for (const v1::CameraStream& camera : session->manifest().cameras()) {
+    EXPECT_GT(camera.counts().recorded(), 12u);
+    EXPECT_EQ(camera.counts().transport() + camera.counts().queue() + camera.counts().disk(), 0u);
+  }
+}
+
+TEST_F(AlignReplay, ADecisionThatDiffersFromTheRecordedOneIsAnError) {
+  SmallBench bench(small_rig(4));
+  ASSERT_TRUE(record_align(folder_, bench.align, bench.options).ok());
+  // One digit of a recorded decision, changed in place.
+  const fs::path events = folder_ / "events.binpb";
+  std::string bytes;
+  {
+    std::ifstream in(events, std::ios::binary);
+    bytes.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  const auto at = bytes.find("\"beat_ppm\":");
+  ASSERT_NE(at, std::string::npos);
+  char& digit = bytes[at + 13];
+  digit = digit == '3' ? '4' : '3';
+  std::ofstream(events, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  const auto replayed = replay_align(folder_);
+  ASSERT_FALSE(replayed.ok());
+  EXPECT_THAT(replayed.error().message(), HasSubstr("round 1"));
+}
+
+TEST_F(AlignReplay, ASessionOfAnythingElseIsRefused) {
+  v1::Manifest manifest;
+  manifest.set_purpose("flame");
+  SmallBench bench(small_rig(1, 1));
+  auto& camera = *manifest.add_cameras();
+  camera.set_camera_id("a");
+  camera.set_format(v1::CameraStream::GRAY8);
+  camera.set_width(320);
+  camera.set_height(240);
+  camera.set_bit_depth(8);
+  camera.set_frame_rate_hz(23.976);
+  auto writer = SessionWriter::create(folder_, manifest);
+  ASSERT_TRUE(writer.ok()) << writer.error().message();
+  ASSERT_TRUE(writer->finish().ok());
+  const auto replayed = replay_align(folder_);
+  ASSERT_FALSE(replayed.ok());
+  EXPECT_EQ(replayed.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(replayed.error().message(), HasSubstr("emberlock align --record"));
+}
+
+}  // namespace
+}  // namespace emberlock::cli

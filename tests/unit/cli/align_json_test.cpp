@@ -1,0 +1,94 @@
+#include "cli/align_json.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/file.h"
+#include "cli/align_record.h"
+#include "tests/support/small_rig.h"
+
+namespace emberlock::cli {
+namespace {
+
+using testing::HasSubstr;
+
+AlignRunOptions some_options() {
+  AlignRunOptions options;
+  options.align.policy = AlignPolicy::timed;
+  options.align.tolerance.amount = milliseconds(1.1);
+  options.align.max_rounds = 7;
+  options.seed = 18446744073709551615u;
+  options.timing = {{.rows = 480, .shifts = 500, .direction = ReadDirection::bottom_first}, {}};
+  options.delays = {std::nullopt, ResetDelay{milliseconds(12.3), milliseconds(0.1)}};
+  return options;
+}
+
+TEST(AlignJson, OptionsComeBackAsTheyWere) {
+  const auto json = options_json(some_options());
+  const auto back = options_from_json(nlohmann::json::parse(json.dump()));
+  ASSERT_TRUE(back.ok()) << back.error().message();
+  EXPECT_EQ(options_json(*back).dump(), json.dump());
+  EXPECT_EQ(back->timing[0].direction, ReadDirection::bottom_first);
+  EXPECT_EQ(back->delays[1]->mean, milliseconds(12.3));
+  EXPECT_EQ(back->seed, 18446744073709551615u);
+}
+
+TEST(AlignJson, EveryMissingOrMistypedFieldIsAnErrorNotACrash) {
+  const auto whole = nlohmann::json::parse(options_json(some_options()).dump());
+  for (const auto& [key, value] : whole.items()) {
+    auto missing = whole;
+    missing.erase(key);
+    EXPECT_FALSE(options_from_json(missing).ok()) << key;
+    auto mistyped = whole;
+    mistyped[key] = nlohmann::json::object();
+    EXPECT_FALSE(options_from_json(mistyped).ok()) << key;
+  }
+  EXPECT_FALSE(options_from_json(nullptr).ok());
+}
+
+TEST(AlignJson, WhatIsNotKnownIsNull) {
+  AlignRound round;
+  round.cameras.push_back({{PhaseState::blind, {}, {}, "no dot"}, {}});
+  const std::vector<AlignCamera> cameras{{.id = "a", .model = "m", .expected_delay = {}}};
+  const AlignOptions options;
+  const auto step = align_step({}, round, cameras, options);
+  const auto json = round_json({round, step.decision, cameras, options, {}, {}, {}});
+  EXPECT_TRUE(json["reference"].is_null());
+  EXPECT_TRUE(json["worst_pair_rows"].is_null());
+  EXPECT_TRUE(json["cameras"][0]["tau_ms"].is_null());
+  EXPECT_TRUE(json["cameras"][0]["error_rows"].is_null());
+  EXPECT_EQ(json["cameras"][0]["state"], "blind");
+  EXPECT_FALSE(json["aligned"].get<bool>());
+}
+
+TEST(AlignDelays, AreWrittenAndReadBackByCameraId) {
+  const test::SmallBench bench(test::small_rig(1, 3));
+  const auto file = std::filesystem::path(testing::TempDir()) / "align_delays.json";
+  const std::vector<std::optional<ResetDelay>> delays{ResetDelay{milliseconds(5), milliseconds(0.2)},
+                                                      std::nullopt,
+                                                      ResetDelay{milliseconds(7), milliseconds(0.1)}};
+  ASSERT_TRUE(write_delays(file, bench.align, delays).ok());
+  const auto back = read_delays(file, bench.align);
+  ASSERT_TRUE(back.ok()) << back.error().message();
+  EXPECT_EQ((*back)[0]->mean, milliseconds(5));
+  EXPECT_FALSE((*back)[1]);
+  EXPECT_EQ((*back)[2]->sigma, milliseconds(0.1));
+}
+
+TEST(AlignDelays, ADamagedFileIsNamedWithTheCamera) {
+  const test::SmallBench bench(test::small_rig(1, 3));
+  const auto file = std::filesystem::path(testing::TempDir()) / "align_delays_damaged.json";
+  for (const char* text :
+       {"", "[]", "{", "{\"virtual-01\": 3}", "{\"virtual-01\": {\"mean_s\": -1, \"sigma_s\": 1}}",
+        "{\"virtual-01\": {\"mean_s\": \"soon\"}}"}) {
+    ASSERT_TRUE(write_file_atomically(file, text).ok());
+    const auto back = read_delays(file, bench.align);
+    ASSERT_FALSE(back.ok()) << text;
+    EXPECT_EQ(back.error().kind, ErrorKind::bad_input);
+    EXPECT_THAT(back.error().message(), HasSubstr("align_delays_damaged.json"));
+  }
+  EXPECT_FALSE(read_delays("/nonexistent/delays.json", bench.align).ok());
+}
+
+}  // namespace
+}  // namespace emberlock::cli

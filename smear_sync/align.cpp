@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <tuple>
 
 #include "smear_sync/reset_delay.h"
 
@@ -39,7 +40,9 @@ struct Merit {
   int stuck;    ///< minus the cameras that would have to move and can't
   int within;   ///< cameras within tolerance
   double near;  ///< minus the mean square error of those within tolerance: a tight group leaves room for more
-  friend auto operator<=>(const Merit&, const Merit&) = default;
+  friend bool operator>(const Merit& a, const Merit& b) {
+    return std::tie(a.stuck, a.within, a.near) > std::tie(b.stuck, b.within, b.near);
+  }
 };
 
 Merit merit(const Scene& scene, std::size_t candidate) {

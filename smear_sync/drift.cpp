@@ -89,14 +89,15 @@ double median(std::vector<double> v) {
 
 /// Iteratively reweighted least squares. The scatter may be wider than the sigmas say, never narrower.
 Line robust_line(const std::vector<Point>& points) {
-  std::vector<double> weights;
-  for (const Point& p : points) weights.push_back(1 / square(p.sigma));
+  std::vector<double> weights(points.size());
+  std::vector<double> deviations(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) weights[i] = 1 / square(points[i].sigma);
   Line line = weighted_line(points, weights);
   double scale = 1;
   for (int round = 0; round < kRobustRounds; ++round) {
-    std::vector<double> deviations;
-    for (const Point& p : points) {
-      deviations.push_back(std::abs(p.tau - line.level - line.rate * (p.t - line.middle)) / p.sigma);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Point& p = points[i];
+      deviations[i] = std::abs(p.tau - line.level - line.rate * (p.t - line.middle)) / p.sigma;
     }
     scale = std::max(1.0, 1.4826 * median(deviations));
     for (std::size_t i = 0; i < points.size(); ++i) {

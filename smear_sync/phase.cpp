@@ -71,7 +71,8 @@ std::optional<Slope> slope_of(std::span<const PhaseSample> samples, TimePoint at
   std::vector<Point> points = points_at(samples, at, options);
   if (points.size() < 3) return std::nullopt;
   const double period = options.period.value();
-  points = offsets_that_agree(std::move(points), circular_median(points, period), period);
+  const double centre = circular_median(points, period);
+  points = offsets_that_agree(std::move(points), centre, period);
   if (points.size() < 3) return std::nullopt;
   double w = 0;
   double wx = 0;

@@ -35,9 +35,8 @@ void shrink(View& view) {
   for (int y = 0; y < kShrink * lens.size.height; ++y) {
     for (int x = 0; x < kShrink * lens.size.width; ++x) {
       for (int c = 0; c < 3; ++c) {
-        small.rgb[static_cast<std::size_t>(3 * (y / kShrink * lens.size.width + x / kShrink) + c)] +=
-            view.image.rgb[static_cast<std::size_t>(3 * (y * view.image.size.width + x) + c)] /
-            (kShrink * kShrink);
+        small.rgb[3 * (y / kShrink * lens.size.width + x / kShrink) + c] +=
+            view.image.rgb[3 * (y * view.image.size.width + x) + c] / (kShrink * kShrink);
       }
     }
   }
@@ -113,7 +112,7 @@ TEST_F(ScalarFlowTest, TheHullHoldsEveryVoxelThatShinesInAllViews) {
         const Eigen::Array3d at = Eigen::Array3d(i, j, k) + 0.5;
         const Eigen::Vector3d centre = Eigen::Array3d(grid.origin[0], grid.origin[1], grid.origin[2]) +
                                        static_cast<double>(grid.edge) * at;
-        const auto voxel = static_cast<std::size_t>(i + (grid.nx - 1) * (j + (grid.ny - 1) * k));
+        const std::size_t voxel = i + (grid.nx - 1) * (j + (grid.ny - 1) * k);
         if (hull->inside[voxel] == 0 && shines_in_all(scene_, masks, centre)) ++lost;
       }
     }

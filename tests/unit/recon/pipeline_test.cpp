@@ -42,8 +42,7 @@ Scene ball(int cameras = 7) {
         const double closest = ray.origin.cross(ray.direction).norm();
         const double light = kPeak * std::exp(-closest * closest / (2 * kSigma * kSigma));
         for (int c = 0; c < 3; ++c) {
-          view.image.rgb[static_cast<std::size_t>(3 * (y * 80 + x) + c)] =
-              static_cast<float>(light / (c + 1));
+          view.image.rgb[3 * (y * 80 + x) + c] = static_cast<float>(light / (c + 1));
         }
       }
     }

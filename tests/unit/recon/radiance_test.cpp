@@ -8,7 +8,7 @@ namespace emberlock {
 namespace {
 
 float at(const RadianceImage& image, int x, int y, int c) {
-  return image.rgb[static_cast<std::size_t>(3 * (y * image.size.width + x) + c)];
+  return image.rgb[3 * (y * image.size.width + x) + c];
 }
 
 TEST(Radiance, WhiteIs255WhateverTheBitDepth) {

@@ -147,7 +147,7 @@ class SessionSceneTest : public SceneTest {
 
   /// Frame f of every camera is evenly filled with 10 + f of 255 (of 4095 in the first: 16.06 times that).
   [[nodiscard]] fs::path record(const v1::Manifest& m) const {
-    const fs::path folder = root_ / "session";
+    fs::path folder = root_ / "session";
     fs::remove_all(folder);
     auto writer = SessionWriter::create(folder, m, {.min_free_bytes = 0});
     EXPECT_TRUE(writer.ok()) << writer.error().message();

@@ -64,6 +64,7 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
   Problem problem;
   problem.crop = crop_to_medium(hull);
   std::vector<const CameraModel*> cameras;
+  cameras.reserve(views.size());
   for (const View* view : views) cameras.push_back(&view->camera);
   RayListOptions clip;
   clip.subsets = options.subsets;

@@ -129,7 +129,7 @@ HOST_DEVICE inline Rgba trilinear(const Rgba* v, const Cell& c, int nx, int ny) 
 template <class Extinction>
 struct Forward {
   RayTable table;
-  const Rgba* volume;
+  const Rgba* volume = nullptr;
   Extinction extinction;
 
   HOST_DEVICE Rgba operator()(std::size_t index) const {
@@ -180,8 +180,8 @@ struct AddDirectly {
 template <class Extinction, class Add = AddDirectly>
 struct Adjoint {
   RayTable table;
-  const Rgba* residual;  ///< one a ray
-  Rgba* gradient;
+  const Rgba* residual = nullptr;  ///< one a ray
+  Rgba* gradient = nullptr;
   Extinction extinction;
   Add add = {};
 

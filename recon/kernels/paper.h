@@ -35,8 +35,8 @@ HOST_DEVICE inline float gaussian_weight(std::uint64_t bits, float deviation) {
 template <class Extinction, class Add = AddDirectly>
 struct PaperAdjust {
   RayTable table;
-  const Rgba* residual;  ///< rendered - captured, one a ray
-  Rgba* volume;
+  const Rgba* residual = nullptr;  ///< rendered - captured, one a ray
+  Rgba* volume = nullptr;
   Extinction extinction;
   float gain = 0.001F;       ///< alpha_l, times what turns the paper's colour intensity into emission
   float decay = 1;           ///< alpha_d, a voxel edge

@@ -69,7 +69,8 @@ struct Flame::Noise {
  private:
   static std::size_t index(int x, int y, int z) {
     constexpr int kMask = kTable - 1;
-    return static_cast<std::size_t>(((z & kMask) * kTable + (y & kMask)) * kTable + (x & kMask));
+    const int at = ((z & kMask) * kTable + (y & kMask)) * kTable + (x & kMask);
+    return static_cast<std::size_t>(at);
   }
 
   /// Periodic value noise, three octaves.
@@ -87,8 +88,8 @@ struct Flame::Noise {
     const int width = kTable / cells;
     const auto corner = [&](int cx, int cy, int cz) {
       const int wrap = cells - 1;
-      const auto at = static_cast<std::uint64_t>(((cz & wrap) * cells + (cy & wrap)) * cells + (cx & wrap));
-      return static_cast<float>(2 * random_uniform(seed, 0, at) - 1);
+      const int at = ((cz & wrap) * cells + (cy & wrap)) * cells + (cx & wrap);
+      return static_cast<float>(2 * random_uniform(seed, 0, static_cast<std::uint64_t>(at)) - 1);
     };
     const auto fade = [&](int v) {
       return smooth_step(0, 1, static_cast<float>(v % width) / static_cast<float>(width));

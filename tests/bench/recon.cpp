@@ -2,6 +2,7 @@
 // CPU.
 #include <chrono>
 #include <cstdio>
+#include <ctime>
 #include <thread>
 
 #include "recon/adjust/choose_effects.h"
@@ -40,9 +41,12 @@ void run(const Scene& scene, const Grid& grid) {
       "| solver   | iter | seconds | input | held-out R / G / B  |  all  |\n|---|---|---|---|---|---|\n");
   const Effects paper_medium = {extinction_of_opacity(0.05, Meters(static_cast<double>(grid.edge)))};
   double best = 1e9;
+  double cpu = 1e9;  // of all threads together: what a busy machine can't blur
   for (int repeat = 0; repeat < 3; ++repeat) {
+    const std::clock_t cpu_start = std::clock();
     const auto r = solve(scene, grid, paper_medium, options, stopwatch());
     if (!r.ok()) return;
+    cpu = std::min(cpu, static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC);
     best = std::min(best, (r->hull_time + r->solve_time).value());
     if (repeat == 2) print("default", r->trace.back());
   }
@@ -53,8 +57,10 @@ void run(const Scene& scene, const Grid& grid) {
   const auto paper = solve(scene, grid, paper_medium, options, stopwatch());
   if (!paper.ok()) return;
   for (const std::size_t n : {10, 30, 70, 200}) print("paper", paper->trace[n - 1]);
-  std::printf("\ndefault: hull + solve %.3f s (best of 3); paper: %.1f ms an iteration\n", best,
-              1e3 * paper->solve_time.value() / paper->iterations);
+  std::printf(
+      "\ndefault: hull + solve %.3f s (best of 3; %.3f core seconds with the held-out view's evaluation); "
+      "paper: %.1f ms an iteration\n",
+      best, cpu, 1e3 * paper->solve_time.value() / paper->iterations);
 }
 
 }  // namespace

@@ -194,7 +194,7 @@ Lamp measure(const Plane& plane, const Background& background, const Patch& patc
   if (lamp.saturated || cut) {
     circle = fit_circle(outline(patch, blob, static_cast<float>(kHalf * peak)), {patch.width, patch.height});
   }
-  if (circle && circle->agreement >= 0.6 && solid(patch, *circle, kHalf * peak)) {
+  if (circle && circle->agreement >= 0.75 && solid(patch, *circle, kHalf * peak)) {
     centre = {circle->x, circle->y};
     lamp.radius = circle->radius;
     lamp.sigma = circle->sigma;

@@ -13,7 +13,7 @@ using test::SmallBench;
 using testing::HasSubstr;
 
 // What a lamp's row may be off by in these pictures.
-constexpr Rows kReadingError{6};
+constexpr Rows kReadingError{1};
 
 void expect_aligned_in_truth(SmallBench& bench) {
   const auto result = run_align(bench.align, bench.options);

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "smear_sync/circle.h"
+#include "smear_sync/glare.h"
 
 namespace emberlock::detail {
 namespace {
@@ -173,6 +174,18 @@ bool solid(const Patch& patch, const Circle& circle, double level) {
   return bright >= 0.85 * inside;
 }
 
+/// What overflows up and down a saturated lamp's columns draws its outline out into a capsule, unevenly if it
+/// likes. The glare beside the lamp doesn't move.
+void place_by_glare(const Plane& plane, const Background& background, const Patch& patch, const Blob& blob,
+                    double& y, double& sigma) {
+  if (blob.bottom - blob.top <= blob.right - blob.left + 1) return;
+  const auto glare =
+      glare_centre(plane, background, {patch.x0 + blob.left, patch.x0 + blob.right, blob.top, blob.bottom});
+  if (!glare || std::abs(glare->y - y) <= 0.5 + 3 * std::hypot(glare->sigma, sigma)) return;
+  y = glare->y;
+  sigma = glare->sigma;
+}
+
 Lamp measure(const Plane& plane, const Background& background, const Patch& patch,
              const std::vector<float>& level, const Blob& blob, double peak) {
   Lamp lamp;
@@ -208,6 +221,7 @@ Lamp measure(const Plane& plane, const Background& background, const Patch& patc
     // noise * sqrt(sum of dy^2) / flux is about half of noise / peak, whatever the radius.
     lamp.sigma = std::hypot(0.01, background.noise / peak * 0.6);
   }
+  if (lamp.saturated && !cut) place_by_glare(plane, background, patch, blob, centre.y, lamp.sigma);
   lamp.x = patch.x0 + centre.x;
   lamp.y = centre.y;
   lamp.centre_outside =

@@ -170,6 +170,28 @@ TEST(Detect, AsymmetricBloomDoesNotMoveTheLamp) {
   expect_lamp(r, kLampX, kLampY, 0.35);
 }
 
+/// A saturated lamp whose columns overflow `above` and `below`, each as far as the disk's own rim and no
+/// less.
+SmearScene capsule(double above, double below) {
+  SmearScene scene(160, 720);
+  scene.disk(kLampX, kLampY, kRadius, kBright).disk(kLampX, kLampY - 100, kRadius, 20);
+  for (double shift = -above; shift <= below; shift += 0.5)
+    scene.disk(kLampX, kLampY + shift, kRadius - 0.5, kBright, 0.1);
+  return scene;
+}
+
+TEST(Detect, BloomUpAndDownByWholeColumnsDoesNotMoveTheLamp) {
+  const SmearReading r = detect(capsule(4, 4).image({}).view());
+  expect_one_dot(r, kLampY - 100, 0.1);
+  expect_lamp(r, kLampX, kLampY, 0.35);
+}
+
+TEST(Detect, GlareTellsTheLampInsideAnUnevenBloom) {
+  const SmearReading r = detect(capsule(3, 9).halo(kLampX, kLampY, 40, 8).image({}).view());
+  expect_one_dot(r, kLampY - 100, 0.1);
+  expect_lamp(r, kLampX, kLampY, 0.35);
+}
+
 TEST(Detect, LampDiskCutByTheTopEdge) {
   const Image image = SmearScene(160, 720).disk(kLampX, 1.2, 6, kBright).disk(kLampX, 301.2, 6, 20).image({});
   const SmearReading r = detect(image.view());

@@ -48,7 +48,7 @@ Result<Rig> open_rig(const DemoOptions& options) {
   VirtualRigDraw draw;
   draw.cameras = options.cameras;
   draw.seed = options.seed;
-  draw.layout = {options.image, PixelFormat::rgb8, 8};
+  draw.layout = {options.image, PixelFormat::bayer_rggb8, 8};
   // A sensor of fewer rows is read as long, row by row more slowly.
   draw.row_time = microseconds_per_row(54) * (720.0 / options.image.height);
   Rig opened;

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kDifferenceGain = 4;
 constexpr int kShownViews = 3;
+constexpr int kPanelWidth = 300;  // pixels
 
 std::string rgb(const ChannelRmse& e) { return fmt::format("{:.2f} / {:.2f} / {:.2f}", e[0], e[1], e[2]); }
 std::string rgb(const std::optional<ChannelRmse>& e) { return e ? rgb(*e) : "none held out"; }
@@ -114,8 +115,10 @@ void alignment(HtmlPage& page, const DemoResult& r) {
 std::vector<Image> triptych(const View& view, const RadianceImage& rendered) {
   const FlameMask mask = flame_mask(view.image, noise_threshold(view.image));
   const PixelBox box = with_margin(mask.box, 12, view.image.size);
-  return {crop(to_rgb8(view.image), box), crop(to_rgb8(rendered), box),
-          crop(to_rgb8(difference(view.image, rendered, kDifferenceGain)), box)};
+  const auto panel = [&](const RadianceImage& image) {
+    return scaled(crop(to_rgb8(image), box), kPanelWidth);
+  };
+  return {panel(view.image), panel(rendered), panel(difference(view.image, rendered, kDifferenceGain))};
 }
 
 void pictures(HtmlPage& page, const DemoResult& r) {
@@ -138,7 +141,7 @@ void pictures(HtmlPage& page, const DemoResult& r) {
                                             "rendered from the volume",
                                             "difference, RMS " + rgb(report.rmse)};
     for (std::size_t k = 0; k < images.size(); ++k) {
-      row.push_back({"<img width=\"300\" src=\"" + png_data_uri(images[k]) + "\" alt=\"\">", captions[k]});
+      row.push_back({"<img src=\"" + png_data_uri(images[k]) + "\" alt=\"\">", captions[k]});
     }
     page.gallery(row);
   }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include <opencv2/imgproc.hpp>
+
 namespace emberlock::cli {
 
 Image crop(const Image& image, const PixelBox& box) {
@@ -21,6 +23,17 @@ RadianceImage difference(const RadianceImage& a, const RadianceImage& b, double 
   for (std::size_t i = 0; i < result.rgb.size(); ++i) {
     result.rgb[i] = static_cast<float>(gain * std::abs(a.rgb[i] - b.rgb[i]));
   }
+  return result;
+}
+
+Image scaled(const Image& image, int width) {
+  const ImageSize from = image.layout().size;
+  Image result({{width, std::max(1, from.height * width / from.width)}, PixelFormat::rgb8, 8});
+  // OpenCV takes mutable pointers, but only reads its source.
+  const cv::Mat source(from.height, from.width, CV_8UC3,
+                       const_cast<std::byte*>(image.bytes().data()));  // NOLINT
+  cv::Mat target(result.layout().size.height, width, CV_8UC3, result.bytes().data());
+  cv::resize(source, target, target.size(), 0, 0, cv::INTER_AREA);
   return result;
 }
 

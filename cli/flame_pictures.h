@@ -14,6 +14,9 @@ Image crop(const Image& image, const PixelBox& box);
 /// |a - b| times `gain`; the two have one size.
 RadianceImage difference(const RadianceImage& a, const RadianceImage& b, double gain);
 
+/// The picture at another width, its shape kept; each pixel is the mean of those that it covers.
+Image scaled(const Image& image, int width);
+
 /// Pictures of equal height from left to right, `gap` black columns between them.
 Image side_by_side(const std::vector<Image>& pictures, int gap = 8);
 

@@ -36,6 +36,16 @@ TEST(FlamePictures, SideBySideKeepsEveryPicture) {
   EXPECT_EQ(joined.view().sample(3, 0, 0), 0);
 }
 
+TEST(FlamePictures, ScalingDownKeepsShapeAndMean) {
+  RadianceImage image({4, 2});
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = i / 3 % 4 < 2 ? 40.0F : 80.0F;
+  const Image half = scaled(to_rgb8(image), 2);
+  EXPECT_EQ(half.layout().size, (ImageSize{2, 1}));
+  EXPECT_EQ(half.view().sample(0, 0, 1), 40);
+  EXPECT_EQ(half.view().sample(1, 0, 1), 80);
+  EXPECT_EQ(scaled(to_rgb8(image), 1).view().sample(0, 0, 2), 60);
+}
+
 TEST(FlamePictures, MarginStaysInsideThePicture) {
   const PixelBox box = with_margin({1, 5, 3, 9}, 4, {10, 10});
   EXPECT_EQ(box.x0, 0);

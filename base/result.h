@@ -84,4 +84,4 @@ using Status = Result<void>;
   auto EMBERLOCK_CONCAT(emberlock_result_, __LINE__) = (expression); \
   if (!EMBERLOCK_CONCAT(emberlock_result_, __LINE__).ok())           \
     return EMBERLOCK_CONCAT(emberlock_result_, __LINE__).error();    \
-  declaration = std::move(EMBERLOCK_CONCAT(emberlock_result_, __LINE__)).value()
+  declaration = std::move(EMBERLOCK_CONCAT(emberlock_result_, __LINE__)).value()  // NOLINT(*-parentheses)

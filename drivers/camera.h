@@ -23,7 +23,7 @@ struct CameraInfo {
   ShutterReset reset = ShutterReset::none;
 };
 
-/// A camera, opened. One owner thread; not thread-safe. Times are on the host's clock that the driver was given.
+/// A camera, opened. One owner thread; not thread-safe. Times are on the host's clock given to the driver.
 class Camera {
  public:
   virtual ~Camera() = default;
@@ -36,8 +36,9 @@ class Camera {
   /// The next frame in order, waiting at most `deadline`. Errors: timed_out, device (camera lost),
   /// out_of_data (a recording has ended).
   virtual Result<Frame> next_frame(Seconds deadline) = 0;
-  /// Draws the shutter phase anew, the action starting at `at` (at once if that has passed). Frames queued before it
-  /// are dropped: the next frame shows the new phase. Error `device` when the camera can't (ShutterReset::none).
+  /// Draws the shutter phase anew, the action starting at `at` (at once if that has passed). Frames queued
+  /// before it are dropped: the next frame shows the new phase. Error `device` when the camera can't
+  /// (ShutterReset::none).
   virtual Status reset_shutter(TimePoint at) = 0;
 };
 

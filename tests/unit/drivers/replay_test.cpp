@@ -1,8 +1,8 @@
 #include "drivers/replay/replay.h"
 
-#include <gtest/gtest.h>
-
 #include <limits>
+
+#include <gtest/gtest.h>
 
 #include "drivers/replay/record.h"
 #include "tests/support/recording.h"

@@ -86,7 +86,7 @@ Result<AlignStage> align(const Rig& rig, AlignStage stage, AlignRunOptions optio
   const TimePoint start = SteadyClock{}.now();
   const auto observe = [&](const AlignRoundReport& report) {
     stage.last = snapshot(report);
-    if (stage.errors.empty()) stage.first = stage.last;
+    if (!stage.first.reference_tau) stage.first = stage.last;
     std::vector<std::optional<Rows>> errors;
     for (const auto& camera : stage.last.cameras) errors.push_back(camera.error);
     stage.errors.push_back(std::move(errors));

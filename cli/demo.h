@@ -45,7 +45,8 @@ struct AlignStage {
   AlignPolicy policy = AlignPolicy::densest;
   Rows tolerance = {};
   std::vector<std::vector<std::optional<Rows>>> errors = {};  ///< [round][camera], to the round's reference
-  SmearSnapshot first = {}, last = {};
+  SmearSnapshot first = {};  ///< the first round in which a reference stood: nothing had been reset by then
+  SmearSnapshot last = {};
   AlignRunResult result = {};
   Seconds seconds = {};  ///< by the wall clock
 };

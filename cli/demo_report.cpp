@@ -113,7 +113,7 @@ void alignment(HtmlPage& page, const DemoResult& r) {
 
 /// Captured, rendered, and their difference, cut to the flame.
 std::vector<Image> triptych(const View& view, const RadianceImage& rendered) {
-  const FlameMask mask = flame_mask(view.image, noise_threshold(view.image));
+  const FlameMask mask = noise_mask(view.image);
   const PixelBox box = with_margin(mask.box, 12, view.image.size);
   const auto panel = [&](const RadianceImage& image) {
     return scaled(crop(to_rgb8(image), box), kPanelWidth);

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/replay/record.h"
 #include "recon/render/render.h"
-#include "session/layout.h"
 
 namespace emberlock::cli {
 
@@ -39,11 +39,7 @@ void FlameLight::add_radiance(int camera, TimePoint exposure_start, Seconds expo
 }
 
 v1::CameraStream describe(const CameraInfo& info, const CameraModel* calibration) {
-  v1::CameraStream stream;
-  stream.set_camera_id(info.id);
-  stream.set_model(info.model);
-  stream.set_frame_rate_hz(info.frame_rate.value());
-  set_layout(stream, info.layout);
+  v1::CameraStream stream = to_proto(info);
   if (calibration != nullptr) {
     const Intrinsics& in = calibration->intrinsics;
     v1::Calibration& c = *stream.mutable_calibration();

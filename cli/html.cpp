@@ -23,7 +23,7 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; border-bo
 table { border-collapse: collapse; margin: 1rem 0; } th, td { padding: .25rem .8rem; text-align: right; }
 th:first-child, td:first-child { text-align: left; } tr:nth-child(even) td { background: var(--soft); }
 .gallery { display: flex; flex-wrap: wrap; gap: .8rem; } figure { margin: 0; } img, svg { max-width: 100%; }
-figcaption { font-size: .85rem; } .scroll { overflow-x: auto; }
+figcaption { font-size: .85rem; width: 0; min-width: 100%; } .scroll { overflow-x: auto; }
 svg text { fill: var(--ink); font: 12px system-ui, sans-serif; } svg .grid { stroke: var(--line); }
 )";
 
@@ -82,7 +82,7 @@ struct Range {
   }
 };
 
-std::string polyline(const Series& s, const Scale& x, const Scale& y, const char* colour) {
+std::string polyline(const Series& s, const Scale& x, const Scale& y, const char* colour, bool dashed) {
   std::string path;
   std::string dots;
   bool pen_down = false;
@@ -99,7 +99,7 @@ std::string polyline(const Series& s, const Scale& x, const Scale& y, const char
     }
   }
   return fmt::format(R"(<path d="{}" fill="none" stroke="{}" stroke-width="1.6"{}/>)", path, colour,
-                     s.dashed ? R"( stroke-dasharray="6 4")" : "") +
+                     dashed ? R"( stroke-dasharray="6 4")" : "") +
          dots;
 }
 
@@ -207,10 +207,12 @@ std::string svg_plot(const std::vector<Series>& series, const PlotOptions& o) {
   svg += axes(x, y, o, left, right, top, bottom);
   for (std::size_t i = 0; i < series.size(); ++i) {
     const char* colour = kColours[i % kColours.size()];
-    svg += polyline(series[i], x, y, colour);
+    const bool dashed = series[i].dashed || i >= kColours.size();  // the colours begin anew
+    svg += polyline(series[i], x, y, colour, dashed);
     const double line = top + 10 + 17 * static_cast<double>(i);
-    svg += fmt::format(R"(<line x1="{}" x2="{}" y1="{:.1f}" y2="{:.1f}" stroke="{}" stroke-width="3"/>)",
-                       right + 12, right + 28, line, line, colour);
+    svg +=
+        fmt::format(R"(<line x1="{}" x2="{}" y1="{:.1f}" y2="{:.1f}" stroke="{}" stroke-width="3"{}/>)",
+                    right + 12, right + 28, line, line, colour, dashed ? R"( stroke-dasharray="6 4")" : "");
     svg += fmt::format(R"(<text x="{}" y="{:.1f}">{}</text>)", right + 34, line + 4,
                        html_escape(series[i].name));
   }

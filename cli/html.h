@@ -27,9 +27,9 @@ struct Series {
 enum class Axis { linear, logarithmic };
 
 struct PlotOptions {
-  std::string title;
-  std::string x_label;
-  std::string y_label;
+  std::string title = {};
+  std::string x_label = {};
+  std::string y_label = {};
   Axis x_axis = Axis::linear;
   Axis y_axis = Axis::linear;
   std::optional<double> band = {};  ///< shades -band..band of y: a tolerance

@@ -24,6 +24,6 @@ std::vector<RowSpan> tolerance_band(const CcdTiming& timing, Rows lamp, Seconds 
 /// stretched so that a faint dot shows, a circle about the lamp, ticks at the dots, and the tolerance band:
 /// the rows where the dot must lie. Without a lamp the middle column is shown.
 std::string smear_strip_svg(const ImageView& frame, const SmearReading& reading,
-                            const std::vector<RowSpan>& band, int half_width = 40);
+                            const std::vector<RowSpan>& band, int half_width = 80);
 
 }  // namespace emberlock::cli

@@ -46,6 +46,31 @@ double asymmetry(const Profile& p, double c, double s) {
   return sum;
 }
 
+/// P at a fractional row, or nothing outside.
+std::optional<double> value(const Profile& p, double y) {
+  const double at = y - p.first;
+  const auto i = static_cast<std::ptrdiff_t>(std::floor(at));
+  if (i < 0 || i + 1 >= static_cast<std::ptrdiff_t>(p.v.size())) return std::nullopt;
+  const double fraction = at - static_cast<double>(i);
+  const auto k = static_cast<std::size_t>(i);
+  return p.v[k] + fraction * (p.v[k + 1] - p.v[k]);
+}
+
+/// Whether P and its mirror image about c differ by no more than noise and a fifth of their own height: what
+/// is brighter on one side is no glare of a lamp alone.
+bool symmetric(const Profile& p, double c) {
+  double peak = 0;
+  for (const double v : p.v) peak = std::max(peak, v);
+  const double allowed = std::hypot(4 * p.noise, 0.2 * peak);
+  for (double t = 1; t < static_cast<double>(p.v.size()); ++t) {
+    const auto above = value(p, c - t);
+    const auto below = value(p, c + t);
+    if (!above || !below) break;
+    if (std::abs(*above - *below) > allowed) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::optional<GlareCentre> glare_centre(const Plane& plane, const Background& background,
@@ -68,6 +93,7 @@ std::optional<GlareCentre> glare_centre(const Plane& plane, const Background& ba
     const double middle = (low + high) / 2;
     (asymmetry(p, middle, s) > 0 ? low : high) = middle;
   }
+  if (!symmetric(p, (low + high) / 2)) return std::nullopt;
   return GlareCentre{(low + high) / 2, noise / std::abs(slope)};
 }
 

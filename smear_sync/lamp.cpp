@@ -175,7 +175,8 @@ bool solid(const Patch& patch, const Circle& circle, double level) {
 }
 
 /// What overflows up and down a saturated lamp's columns draws its outline out into a capsule, unevenly if it
-/// likes. The glare beside the lamp doesn't move.
+/// likes. The glare beside the lamp doesn't move. A source whose columns are bright over their full height
+/// shines steadily: its glare is that of a scene, and no phase hangs on its row.
 void place_by_glare(const Plane& plane, const Background& background, const Patch& patch, const Blob& blob,
                     double& y, double& sigma) {
   if (blob.bottom - blob.top <= blob.right - blob.left + 1) return;
@@ -221,7 +222,11 @@ Lamp measure(const Plane& plane, const Background& background, const Patch& patc
     // noise * sqrt(sum of dy^2) / flux is about half of noise / peak, whatever the radius.
     lamp.sigma = std::hypot(0.01, background.noise / peak * 0.6);
   }
-  if (lamp.saturated && !cut) place_by_glare(plane, background, patch, blob, centre.y, lamp.sigma);
+  const auto flash = [&] {
+    std::vector<float> own(level.begin() + blob.left, level.begin() + blob.right + 1);
+    return static_cast<double>(median(own)) < background.level + 5 * background.noise;
+  };
+  if (lamp.saturated && !cut && flash()) place_by_glare(plane, background, patch, blob, centre.y, lamp.sigma);
   lamp.x = patch.x0 + centre.x;
   lamp.y = centre.y;
   lamp.centre_outside =

@@ -3,7 +3,7 @@
 #include "base/result.h"
 #include "drivers/camera.h"
 #include "drivers/strobe.h"
-#include "emberlock/v1/session.pb.h"
+#include "session/reader.h"
 
 // How devices are written into a session, and read back from it.
 namespace emberlock {

@@ -11,15 +11,16 @@ namespace emberlock {
 namespace {
 
 constexpr int kCoarse = 64;           // voxels along the longest side, at most
-constexpr int kPasses = 6;            // of a cold solve
-constexpr std::size_t kRays = 20000;  // about as many as a cold solve is given
+constexpr int kPasses = 24;           // of a cold solve
+constexpr std::size_t kRays = 60000;  // about as many as a cold solve is given
 constexpr int kRefinements = 3;
 
-/// Cold solves of one coarse problem under different extinctions.
+/// Cold solves of one coarse problem under different extinctions, each by as many full gradients: candidates
+/// must differ in the extinction alone, not in how far they got.
 class Probe {
  public:
   Probe(const SolverSetup& setup, const Hull& hull)
-      : setup_(setup), hull_(hull), level_(pose_level(setup, hull, stride(setup, hull), 4)) {}
+      : setup_(setup), hull_(hull), level_(pose_level(setup, hull, stride(setup, hull), 1)) {}
 
   /// Held-out pixels' RMS after a cold solve, and the solution.
   double solve(PerMeter extinction, std::vector<Rgba>& x) const {
@@ -64,7 +65,7 @@ class Probe {
   static int stride(const SolverSetup& setup, const Hull&) {
     double pixels = 0;
     for (const PixelBox& b : setup.boxes) pixels += static_cast<double>(b.x1 - b.x0) * (b.y1 - b.y0);
-    return std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / kRays))));
+    return std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / static_cast<double>(kRays)))));
   }
   [[nodiscard]] std::vector<Rgba> pictures(PerMeter extinction, const std::vector<Rgba>& x) const {
     const auto engine = make_engine(level_.problem, sigma(extinction), setup_.device, setup_.pool);
@@ -108,7 +109,7 @@ Candidate search(const Probe& probe) {
                          [](const Candidate& a, const Candidate& b) { return a.extinction < b.extinction; });
     tried.insert(at, std::move(c));
   };
-  for (const double depth : {0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0})
+  for (const double depth : {0.0, 0.2, 0.5, 1.0, 3.0})
     try_one(PerMeter(depth / probe.mean_chord().value()));
   const auto best = [&] {
     return std::min_element(tried.begin(), tried.end(),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/random.h"
 
@@ -23,11 +24,29 @@ bool held_out(int x, int y) {
   return random_bits(0, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % kHoldOutOneIn == 0;
 }
 
-/// Subsets that a medium allows: light from deep inside a thick one reaches few pixels, and a step from some
-/// of the rays alone can then overshoot; the full gradient can't.
-int subsets_for(float sigma, std::size_t pixels, int most) {
+/// Pixels across a voxel in the middle of the grid, in the view that shows it smallest.
+double pixels_per_voxel(const SolverSetup& setup, const Grid& g) {
+  const Eigen::Vector3d half =
+      0.5 * static_cast<double>(g.edge) * Eigen::Vector3d(g.nx - 1, g.ny - 1, g.nz - 1);
+  const Eigen::Vector3d middle = Eigen::Vector3f(g.origin[0], g.origin[1], g.origin[2]).cast<double>() + half;
+  double least = std::numeric_limits<double>::infinity();
+  for (const View* view : setup.views) {
+    const double distance = std::max(half.norm(), (view->camera.center() - middle).norm());
+    least = std::min(least, std::abs(view->camera.intrinsics.fx) * static_cast<double>(g.edge) / distance);
+  }
+  return least;
+}
+
+/// Subsets that medium and pixels allow. Light from deep inside a thick medium reaches few pixels, and where
+/// a subset's rays pass farther apart than the voxels, some voxels hang on none of them: a step from some of
+/// the rays alone can then overshoot. The full gradient can't.
+int subsets_for(float sigma, double rays_per_voxel, std::size_t pixels, int most) {
+  constexpr double kWidestGap = 2;  // voxels between a subset's neighbouring rays
   int subsets = std::min(most, sigma < 0.11F ? 16 : (sigma < 0.22F ? 4 : 1));
-  while (subsets > 1 && pixels / static_cast<std::size_t>(subsets) < kFewestRays) subsets /= 4;
+  while (subsets > 1 && (pixels / static_cast<std::size_t>(subsets) < kFewestRays ||
+                         std::sqrt(subsets) > kWidestGap * rays_per_voxel)) {
+    subsets /= 4;
+  }
   return subsets;
 }
 
@@ -42,7 +61,8 @@ std::size_t flame_pixels(const SolverSetup& setup, int stride) {
 
 Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets) {
   Level level;
-  level.subsets = subsets_for(setup.sigma(hull.grid), flame_pixels(setup, stride), most_subsets);
+  level.subsets = subsets_for(setup.sigma(hull.grid), pixels_per_voxel(setup, hull.grid) / stride,
+                              flame_pixels(setup, stride), most_subsets);
   ProblemOptions options;
   options.subsets = level.subsets + 1;
   options.subset_of = [subsets = level.subsets, stride](std::size_t, int x, int y) {

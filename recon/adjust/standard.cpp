@@ -9,10 +9,10 @@ namespace emberlock {
 namespace {
 
 constexpr int kCoarsest = 24;  // no level has fewer voxels along its longest side, unless the grid itself has
-constexpr int kCoarsePasses = 4;  // over the pixels of a coarse level
-constexpr int kMostPasses = 12;   // at full resolution, unless the user asks for more
-constexpr double kLeastGain =
-    0.05;  // a pass that lowers the held-out pixels' error by a smaller share is the last
+constexpr int kCoarseSteps = 64;     // of a coarse level
+constexpr int kMostSteps = 192;      // at full resolution, unless the user asks for more
+constexpr int kRound = 16;           // steps between two looks at the held-out pixels' error
+constexpr double kLeastGain = 0.05;  // a round that lowers it by a smaller share is the last
 
 int longest(const Grid& g) { return std::max({g.nx, g.ny, g.nz}) - 1; }
 
@@ -30,11 +30,11 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
     if (descent) next->start_from(refine(descent->engine().get(), level->problem, finer->problem));
     descent = std::move(next);
     level = std::move(finer);
-    for (int p = 0; l > 0 && p < kCoarsePasses && !tracker.out_of_time(); ++p) descent->pass();
+    for (int s = 0; l > 0 && s < kCoarseSteps && !tracker.out_of_time(); s += level->subsets) descent->pass();
   }
 
   const ErrorOverBoxes error(setup.views, setup.boxes, level->problem);
-  const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostPasses;
+  const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;
   double last = std::numeric_limits<double>::infinity();
   int iteration = 0;
   while (iteration < most) {
@@ -43,6 +43,7 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
     const double validation = descent->validation_error();
     if (tracker.record(iteration, error(descent->engine().residuals()), descent->engine(), level->problem))
       break;
+    if (iteration * level->subsets % kRound != 0) continue;
     if (setup.options.iterations == 0 && validation > (1 - kLeastGain) * last) break;
     last = validation;
   }

@@ -102,10 +102,7 @@ Result<Outcome> run(const Scene& scene, const ReconstructOptions& options, const
   const TimePoint start = clock.now();
   const Elapsed elapsed = [&] { return clock.now() - start; };
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
-  SolveOptions solve_options = options.solve;
-  if (solve_options.solver == Solver::paper && !solve_options.flame_threshold) {
-    solve_options.flame_threshold = kPaperFlameThreshold;
-  }
+  const SolveOptions& solve_options = options.solve;
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(solve_options.compute.device));
   EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, choose_grid(scene, options.voxels));
 
@@ -142,7 +139,7 @@ Result<Outcome> run(const Scene& scene, const ReconstructOptions& options, const
   outcome.report = describe(scene, grid, solve_options, device);
   Report& result = outcome.report;
   result.hull_voxels = done.hull.count;
-  result.views = judge(scene, flame_masks(scene, solve_options.flame_threshold), outcome.renders);
+  result.views = judge(scene, flame_masks(scene), outcome.renders);
   result.input_rmse = over_views(result.views, ViewRole::input).value_or(ChannelRmse{});
   result.heldout_rmse = over_views(result.views, ViewRole::held_out);
   result.effects_time = effects_time;

@@ -149,6 +149,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
     }
     EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(i, *nearest));
     view.image = to_radiance(picture.image->view());
+    subtract_background(view.image);  // a camera's own frames; whoever writes a transforms.json has done it
     scene.views.push_back(std::move(view));
   }
   return scene;

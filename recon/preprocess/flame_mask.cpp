@@ -53,31 +53,64 @@ Status check_view(const View& view) {
 
 }  // namespace
 
-double noise_threshold(const RadianceImage& image) {
-  const auto width = static_cast<std::size_t>(image.size.width);
-  const auto height = static_cast<std::size_t>(image.size.height);
-  if (width * height == 0) return 1;
-  // Every pixel is not needed for a median: rows are skipped until some 100 000 are left.
-  const std::size_t row_step = 1 + width * height / 100000;
-  std::vector<float> levels;
-  for (std::size_t y = 0; y < height; y += row_step)
-    for (std::size_t x = 0; x < width; ++x) levels.push_back(brightness(&image.rgb[3 * (y * width + x)]));
+namespace {
+
+/// The values of every n-th pixel, so many that a median is good.
+template <class Value>
+std::vector<float> sample(const RadianceImage& image, const Value& value) {
+  const std::size_t pixels = image.rgb.size() / 3;
+  const std::size_t step = 1 + pixels / 100000;
+  std::vector<float> values;
+  for (std::size_t p = 0; p < pixels; p += step) values.push_back(value(p));
+  return values;
+}
+
+/// One channel's background plus six sigma, from the spread of the pixels below the background's median,
+/// which no flame touches. A picture clipped at black has none.
+double threshold_from_below(const RadianceImage& image, std::size_t channel) {
+  std::vector<float> levels = sample(image, [&](std::size_t p) { return image.rgb[3 * p + channel]; });
   const double middle = median(levels);
-  std::vector<float> dark;
-  for (const float v : levels)
-    if (v <= middle) dark.push_back(v);
-  const double background = median(dark);
-  std::vector<float> steps;
-  for (std::size_t y = 0; y < height; y += row_step) {
-    for (std::size_t x = 1; x < width; ++x) {
-      const float a = brightness(&image.rgb[3 * (y * width + x - 1)]);
-      const float b = brightness(&image.rgb[3 * (y * width + x)]);
-      if (a <= middle && b <= middle) steps.push_back(std::abs(a - b));
-    }
+  std::erase_if(levels, [&](float v) { return static_cast<double>(v) > middle; });
+  const double background = median(levels);
+  double squares = 0;
+  double count = 0;
+  for (const float v : levels) {
+    const double below = background - static_cast<double>(v);
+    if (below <= 0) continue;
+    squares += below * below;
+    ++count;
   }
+  // Of a normal distribution's lower quarter the RMS distance to the quartile is 0.773 sigma.
+  const double sigma = count > 0 ? std::sqrt(squares / count) / 0.773 : 0;
+  return background + 6 * sigma;
+}
+
+/// The background's brightest channel plus five sigma, from the differences of neighbours. A demosaiced
+/// picture's neighbours share their noise: it has too little of them.
+double threshold_from_differences(const RadianceImage& image) {
+  const auto at = [&](std::size_t p) { return brightness(&image.rgb[3 * p]); };
+  std::vector<float> levels = sample(image, at);
+  const double middle = median(levels);
+  std::erase_if(levels, [&](float v) { return static_cast<double>(v) > middle; });
+  const double background = median(levels);
+  const std::size_t last = image.rgb.size() / 3 - 1;
+  std::vector<float> steps = sample(image, [&](std::size_t p) {
+    const float a = at(p);
+    const float b = at(std::min(p + 1, last));
+    return static_cast<double>(std::max(a, b)) <= middle ? std::abs(a - b) : -1.0F;
+  });
+  std::erase_if(steps, [](float v) { return v < 0; });
   // Median absolute difference of two normal variables: sqrt(2) * 0.6745 sigma.
-  const double sigma = median(steps) / 0.9539;
-  return background + std::max(1.0, 5 * sigma);
+  return background + std::max(1.0, 5 * median(steps) / 0.9539);
+}
+
+}  // namespace
+
+double noise_threshold(const RadianceImage& image) {
+  if (image.rgb.empty()) return 1;
+  double threshold = threshold_from_differences(image);
+  for (std::size_t c = 0; c < 3; ++c) threshold = std::max(threshold, threshold_from_below(image, c));
+  return threshold;
 }
 
 FlameMask flame_mask(const RadianceImage& image, double threshold) {
@@ -99,11 +132,35 @@ FlameMask flame_mask(const RadianceImage& image, double threshold) {
   return mask;
 }
 
+FlameMask noise_mask(const RadianceImage& image) {
+  const FlameMask raw = flame_mask(image, noise_threshold(image));
+  constexpr int kNeighbours = 3;
+  const auto lit = [&](int x, int y) {
+    return x >= 0 && y >= 0 && x < raw.size.width && y < raw.size.height && raw.at(x, y);
+  };
+  FlameMask mask{raw.size, raw.threshold, std::vector<std::uint8_t>(raw.flame.size()), {}};
+  PixelBox box{raw.size.width, raw.size.height, 0, 0};
+  for (int y = raw.box.y0; y < raw.box.y1; ++y) {
+    for (int x = raw.box.x0; x < raw.box.x1; ++x) {
+      if (!raw.at(x, y)) continue;
+      int around = -1;
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) around += lit(x + dx, y + dy) ? 1 : 0;
+      if (around < kNeighbours) continue;
+      mask.flame[static_cast<std::size_t>(y) * static_cast<std::size_t>(raw.size.width) +
+                 static_cast<std::size_t>(x)] = 1;
+      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
+    }
+  }
+  mask.box = box.empty() ? PixelBox{} : box;
+  return mask;
+}
+
 std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold) {
   std::vector<FlameMask> masks;
   masks.reserve(scene.views.size());
   for (const View& view : scene.views)
-    masks.push_back(flame_mask(view.image, threshold ? *threshold : noise_threshold(view.image)));
+    masks.push_back(threshold ? flame_mask(view.image, *threshold) : noise_mask(view.image));
   return masks;
 }
 

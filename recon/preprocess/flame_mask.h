@@ -32,13 +32,16 @@ struct FlameMask {
 inline constexpr double kPaperFlameThreshold = 30;
 
 /// A threshold from the picture's own noise, grey levels: the background (median of the darker half) plus
-/// five sigma (median absolute difference of neighbouring background pixels), at least one grey level above
-/// the background.
+/// five to six sigma and at least one grey level. At least half of the picture must be background.
 double noise_threshold(const RadianceImage& image);
 
 FlameMask flame_mask(const RadianceImage& image, double threshold);
 
-/// Masks of all views, in order; without a threshold each view's own noise_threshold.
+/// The mask at the picture's own noise_threshold, without specks: a flame pixel has at least three others
+/// among its eight neighbours. A hot pixel or the tail of the noise would stretch the box and grow the hull.
+FlameMask noise_mask(const RadianceImage& image);
+
+/// Masks of all views, in order; without a threshold each view's own noise_mask.
 std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold = std::nullopt);
 
 /// Refuses what no later stage can use, naming the view: no views, an image whose size differs from its

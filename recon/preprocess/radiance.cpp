@@ -1,6 +1,7 @@
 #include "recon/preprocess/radiance.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace emberlock {
@@ -43,6 +44,30 @@ RadianceImage to_radiance(const ImageView& image) {
     }
   }
   return radiance;
+}
+
+void subtract_background(RadianceImage& image) {
+  const std::size_t pixels = image.rgb.size() / 3;
+  if (pixels == 0) return;
+  const auto brightness = [&](std::size_t p) {
+    return std::max({image.rgb[3 * p], image.rgb[3 * p + 1], image.rgb[3 * p + 2]});
+  };
+  const auto median = [](std::vector<float>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  std::vector<float> values(pixels);
+  for (std::size_t p = 0; p < pixels; ++p) values[p] = brightness(p);
+  const float limit = median(values);
+  std::array<float, 3> level = {};
+  for (std::size_t c = 0; c < 3; ++c) {
+    values.clear();
+    for (std::size_t p = 0; p < pixels; ++p)
+      if (brightness(p) <= limit) values.push_back(image.rgb[3 * p + c]);
+    level[c] = median(values);
+  }
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] -= level[i % 3];
 }
 
 Image to_rgb8(const RadianceImage& image) {

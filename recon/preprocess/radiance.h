@@ -10,6 +10,11 @@ namespace emberlock {
 /// linear). The samples must be linear in light: a gamma-coded file (most JPEGs) has to be linearised before.
 RadianceImage to_radiance(const ImageView& image);
 
+/// Takes the camera's black level and even stray light out: each channel's median over the darker half of the
+/// pixels. Noise is left on both sides of 0, so that sums stay unbiased. At least half of the picture must be
+/// background.
+void subtract_background(RadianceImage& image);
+
 /// Back to 8 bits a channel: rounded, clamped to 0..255; not-a-number becomes 0.
 Image to_rgb8(const RadianceImage& image);
 

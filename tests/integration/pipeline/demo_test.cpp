@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <regex>
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -25,7 +26,7 @@ class DemoTest : public testing::Test {
     fs::create_directories(folder_);
     DemoOptions options;
     options.cameras = 6;
-    options.image = {240, 200};
+    options.image = {320, 240};
     options.flame_frames = 3;
     options.voxels = 40;
     options.truth_voxels = 40;
@@ -59,9 +60,10 @@ TEST_F(DemoTest, EveryCameraEndsWithinTheToleranceInTruth) {
 TEST_F(DemoTest, RowTimesAreMeasuredNotAssumed) {
   ASSERT_EQ(result().row_clocks.size(), 6U);
   for (std::size_t i = 0; i < 6; ++i) {
-    const double off = (result().row_clocks[i].row_time - result().true_row_times[i]).value();
-    // Rows take 3.6 times as long as those of a full picture, which is measured to 5 ns.
-    EXPECT_LE(std::abs(off), 3.6 * 5e-9) << i;
+    const RowClock& clock = result().row_clocks[i];
+    // So few rows hold few dots; what is stated must cover what is true.
+    EXPECT_LE(abs(clock.row_time - result().true_row_times[i]), 3 * clock.sigma) << i;
+    EXPECT_LE(clock.sigma / clock.row_time, 0.005) << i;
   }
 }
 
@@ -80,7 +82,7 @@ TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
   ASSERT_TRUE(held_out.has_value());
   EXPECT_LT(all_channels(*held_out), all_channels(*result().paper.report.heldout_rmse));
   const View& view = result().scene.views[static_cast<std::size_t>(result().held_out)];
-  const PixelBox box = flame_mask(view.image, noise_threshold(view.image)).box;
+  const PixelBox box = noise_mask(view.image).box;
   EXPECT_LT(all_channels(*held_out),
             0.5 * all_channels(rmse(view.image, RadianceImage(view.image.size), box)))
       << "less than half the error of a black picture";
@@ -88,7 +90,8 @@ TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
 
 TEST_F(DemoTest, TheReportStandsAlone) {
   ASSERT_TRUE(write_demo_report(result(), folder_).ok());
-  const std::string page = read_file(folder_ / "report.html").value();
+  const std::string page = std::regex_replace(read_file(folder_ / "report.html").value(),
+                                              std::regex("base64,[A-Za-z0-9+/=]*"), "picture");
   EXPECT_THAT(page, HasSubstr("held out"));
   EXPECT_THAT(page, Not(HasSubstr("http")));
   EXPECT_THAT(page, Not(HasSubstr("nan")));

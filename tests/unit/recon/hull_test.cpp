@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "base/random.h"
+#include "recon/preprocess/radiance.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock {
@@ -116,6 +118,31 @@ TEST(FlameMask, ThresholdComesFromTheNoise) {
   const double threshold = noise_threshold(paper_scene(options).views[0].image);
   EXPECT_GT(threshold, 4);
   EXPECT_LT(threshold, 14);
+}
+
+TEST(FlameMask, ThresholdOfADemosaicedPictureLiesAboveItsNoise) {
+  // Interpolated samples share their neighbours' noise: differences of neighbours would see half of it.
+  Image mosaic({{320, 240}, PixelFormat::bayer_rggb8, 8});
+  for (int y = 0; y < 240; ++y)
+    for (int x = 0; x < 320; ++x)
+      mosaic.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(
+          std::lround(20 + 2 * random_normal(1, 0, static_cast<std::uint64_t>(y * 320 + x))));
+  const RadianceImage image = to_radiance(mosaic.view());
+  EXPECT_GT(noise_threshold(image), 20 + 4 * 2);
+  EXPECT_TRUE(noise_mask(image).box.empty());
+}
+
+TEST(FlameMask, HotPixelsAreNoFlame) {
+  RadianceImage image({40, 30});
+  const auto light = [&](int x, int y) { image.rgb[3 * static_cast<std::size_t>(y * 40 + x)] = 200; };
+  light(3, 4);
+  light(30, 20);
+  light(31, 20);
+  EXPECT_TRUE(noise_mask(image).box.empty());
+  light(30, 21);
+  light(31, 21);
+  EXPECT_EQ(noise_mask(image).box.x0, 30);
+  EXPECT_EQ(noise_mask(image).box.y1, 22);
 }
 
 TEST(FlameMask, NanAndInfiniteInputIsRefusedByName) {

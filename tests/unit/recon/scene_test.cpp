@@ -155,13 +155,15 @@ class SessionSceneTest : public SceneTest {
       for (std::uint64_t f = 0; f < 5; ++f) {
         if (camera == 1 && f == 3) continue;
         auto image = std::make_shared<Image>(ImageLayout{{16, 8}, kFormats[camera], camera == 0 ? 12 : 8});
-        if (camera == 0) {
-          for (int y = 0; y < 8; ++y) {
-            std::fill_n(image->row_as<std::uint16_t>(y), 16,
-                        static_cast<std::uint16_t>((10 + f) * 4095 / 255));
+        // Three rows of light above a black level of 4.
+        for (int y = 0; y < 8; ++y) {
+          const std::uint64_t level = y < 3 ? 10 + f : 4;
+          if (camera == 0) {
+            std::fill_n(image->row_as<std::uint16_t>(y), 16, static_cast<std::uint16_t>(level * 4095 / 255));
+          } else {
+            std::fill_n(image->row_as<std::byte>(y), image->layout().row_bytes(),
+                        static_cast<std::byte>(level));
           }
-        } else {
-          std::fill(image->bytes().begin(), image->bytes().end(), static_cast<std::byte>(10 + f));
         }
         Frame frame;
         frame.stamp.frame_id = f;
@@ -183,7 +185,8 @@ TEST_F(SessionSceneTest, TheFramesOfOneInstantBecomeViews) {
   ASSERT_EQ(scene->views.size(), 3U);
   EXPECT_EQ(scene->box.size, Eigen::Vector3d(0.2, 0.2, 0.4));
   for (const View& view : scene->views) {
-    for (const float value : view.image.rgb) EXPECT_NEAR(value, 11, 0.1) << view.name;
+    for (std::size_t i = 0; i < 3 * 16; ++i) EXPECT_NEAR(view.image.rgb[i], 11 - 4, 0.1) << view.name;
+    EXPECT_NEAR(view.image.rgb.back(), 0, 0.1) << "the black level is taken out";
     EXPECT_EQ(view.camera.intrinsics.fy, 21);
   }
   EXPECT_EQ(scene->views[2].camera.camera_from_world.translation, Eigen::Vector3d(0.2, 0, 2));
@@ -192,7 +195,7 @@ TEST_F(SessionSceneTest, TheFramesOfOneInstantBecomeViews) {
 TEST_F(SessionSceneTest, ALostFramesNeighbourStandsInWithinOnePeriod) {
   const auto scene = load_scene(record(manifest()), {.box = {}, .frame = 3});
   ASSERT_TRUE(scene.ok()) << scene.error().message();
-  EXPECT_NEAR(scene->views[1].image.rgb[0], 12, 0.1) << "frame 2, 9 ms before";
+  EXPECT_NEAR(scene->views[1].image.rgb[0], 12 - 4, 0.1) << "frame 2, 9 ms before";
 }
 
 TEST_F(SessionSceneTest, ACameraThatIsAMillisecondTooSlowIsNamed) {
@@ -206,7 +209,7 @@ TEST_F(SessionSceneTest, ACameraThatIsAMillisecondTooSlowIsNamed) {
 TEST_F(SessionSceneTest, WithoutAFrameTheMiddleOneIsTaken) {
   const auto scene = load_scene(record(manifest()));
   ASSERT_TRUE(scene.ok()) << scene.error().message();
-  EXPECT_NEAR(scene->views[0].image.rgb[0], 12, 0.1);
+  EXPECT_NEAR(scene->views[0].image.rgb[0], 12 - 4, 0.1);
 }
 
 TEST_F(SessionSceneTest, ACameraWithoutCalibrationIsNamed) {

@@ -10,8 +10,8 @@ int main(int argc, char** argv) {
   using namespace emberlock;
   const int seeds = argc > 1 ? std::max(1, std::atoi(argv[1])) : 1000;
   struct Row {
-    const char* name;
-    AlignPolicy policy;
+    const char* name = nullptr;
+    AlignPolicy policy{};
     bool delay_known = false;
     Seconds latency_spread{};                // of the cameras' mean latencies, in truth
     Seconds told_spread = milliseconds(10);  // and as the policy is told

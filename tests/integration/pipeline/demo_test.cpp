@@ -4,7 +4,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <regex>
 
 #include <gmock/gmock.h>
 #include <unistd.h>
@@ -90,8 +89,10 @@ TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
 
 TEST_F(DemoTest, TheReportStandsAlone) {
   ASSERT_TRUE(write_demo_report(result(), folder_).ok());
-  const std::string page = std::regex_replace(read_file(folder_ / "report.html").value(),
-                                              std::regex("base64,[A-Za-z0-9+/=]*"), "picture");
+  std::string page = read_file(folder_ / "report.html").value();
+  for (std::size_t at = 0; (at = page.find("base64,", at)) != std::string::npos; ++at) {
+    page.erase(at, page.find('"', at) - at);  // a picture's letters may spell anything
+  }
   EXPECT_THAT(page, HasSubstr("held out"));
   EXPECT_THAT(page, Not(HasSubstr("http")));
   EXPECT_THAT(page, Not(HasSubstr("nan")));

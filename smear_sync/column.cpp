@@ -241,7 +241,8 @@ std::vector<float> response(const Column& c, int lane, double radius) {
     double shc = 0;
     for (int r = std::max(0, y - reach); r <= std::min(height - 1, y + reach); ++r) {
       if (!c.visible(r)) continue;
-      const double h = along[static_cast<std::size_t>(r + reach) - static_cast<std::size_t>(y)];
+      const int step = r - y + reach;
+      const double h = along[static_cast<std::size_t>(step)];
       const double v = collapsed[static_cast<std::size_t>(r)];
       n += 1;
       sh += h;

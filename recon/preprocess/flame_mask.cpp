@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 namespace emberlock {
@@ -53,64 +54,33 @@ Status check_view(const View& view) {
 
 }  // namespace
 
-namespace {
-
-/// The values of every n-th pixel, so many that a median is good.
-template <class Value>
-std::vector<float> sample(const RadianceImage& image, const Value& value) {
-  const std::size_t pixels = image.rgb.size() / 3;
-  const std::size_t step = 1 + pixels / 100000;
-  std::vector<float> values;
-  for (std::size_t p = 0; p < pixels; p += step) values.push_back(value(p));
-  return values;
-}
-
-/// One channel's background plus six sigma, from the spread of the pixels below the background's median,
-/// which no flame touches. A picture clipped at black has none.
-double threshold_from_below(const RadianceImage& image, std::size_t channel) {
-  std::vector<float> levels = sample(image, [&](std::size_t p) { return image.rgb[3 * p + channel]; });
-  const double middle = median(levels);
-  std::erase_if(levels, [&](float v) { return static_cast<double>(v) > middle; });
-  const double background = median(levels);
-  double squares = 0;
-  double count = 0;
-  for (const float v : levels) {
-    const double below = background - static_cast<double>(v);
-    if (below <= 0) continue;
-    squares += below * below;
-    ++count;
-  }
-  // Of a normal distribution's lower quarter the RMS distance to the quartile is 0.773 sigma.
-  const double sigma = count > 0 ? std::sqrt(squares / count) / 0.773 : 0;
-  return background + 6 * sigma;
-}
-
-/// The background's brightest channel plus five sigma, from the differences of neighbours. A demosaiced
-/// picture's neighbours share their noise: it has too little of them.
-double threshold_from_differences(const RadianceImage& image) {
-  const auto at = [&](std::size_t p) { return brightness(&image.rgb[3 * p]); };
-  std::vector<float> levels = sample(image, at);
-  const double middle = median(levels);
-  std::erase_if(levels, [&](float v) { return static_cast<double>(v) > middle; });
-  const double background = median(levels);
-  const std::size_t last = image.rgb.size() / 3 - 1;
-  std::vector<float> steps = sample(image, [&](std::size_t p) {
-    const float a = at(p);
-    const float b = at(std::min(p + 1, last));
-    return static_cast<double>(std::max(a, b)) <= middle ? std::abs(a - b) : -1.0F;
-  });
-  std::erase_if(steps, [](float v) { return v < 0; });
-  // Median absolute difference of two normal variables: sqrt(2) * 0.6745 sigma.
-  return background + std::max(1.0, 5 * median(steps) / 0.9539);
-}
-
-}  // namespace
-
 double noise_threshold(const RadianceImage& image) {
-  if (image.rgb.empty()) return 1;
-  double threshold = threshold_from_differences(image);
-  for (std::size_t c = 0; c < 3; ++c) threshold = std::max(threshold, threshold_from_below(image, c));
-  return threshold;
+  constexpr int kBlocks = 12;  // along the shorter side, where pixels allow
+  const int edge = std::clamp(std::min(image.size.width, image.size.height) / kBlocks, 4, 16);
+  std::vector<double> means;
+  std::vector<double> peaks;
+  for (int y = 0; y + edge <= image.size.height; y += edge) {
+    for (int x = 0; x + edge <= image.size.width; x += edge) {
+      double sum = 0;
+      double peak = -std::numeric_limits<double>::infinity();
+      for (int i = 0; i < edge * edge; ++i) {
+        const std::size_t p =
+            static_cast<std::size_t>(y + i / edge) * static_cast<std::size_t>(image.size.width) +
+            static_cast<std::size_t>(x + i % edge);
+        const auto v = static_cast<double>(brightness(&image.rgb[3 * p]));
+        sum += v;
+        peak = std::max(peak, v);
+      }
+      means.push_back(sum / (edge * edge));
+      peaks.push_back(peak);
+    }
+  }
+  if (means.empty()) return 1;
+  // The brightest of n normal pixels lies about sqrt(2 ln n) - 1/2 sigma above their mean. Looking at the
+  // brightest ones needs no model of what clipping at black, quantisation and demosaicing do to the rest.
+  const double background = median(means);
+  const double above = std::sqrt(2 * std::log(edge * edge)) - 0.5;
+  return background + std::max(1.0, 6 / above * (median(peaks) - background));
 }
 
 FlameMask flame_mask(const RadianceImage& image, double threshold) {

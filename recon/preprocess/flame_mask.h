@@ -31,8 +31,9 @@ struct FlameMask {
 /// The paper's fixed threshold. It puts a floor of some 4 grey levels under every reconstruction error.
 inline constexpr double kPaperFlameThreshold = 30;
 
-/// A threshold from the picture's own noise, grey levels: the background (median of the darker half) plus
-/// five to six sigma and at least one grey level. At least half of the picture must be background.
+/// A threshold from the picture's own noise, grey levels: the background plus about six sigma, and at least
+/// one grey level, from the mean and the brightest pixel of small blocks, their medians over the picture. At
+/// least half of the blocks must show background; a picture smaller than 4 x 4 has a threshold of 1.
 double noise_threshold(const RadianceImage& image);
 
 FlameMask flame_mask(const RadianceImage& image, double threshold);

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kCoarse = 64;           // voxels along the longest side, at most
 constexpr int kPasses = 24;           // of a cold solve
-constexpr std::size_t kRays = 60000;  // about as many as a cold solve is given
+constexpr std::size_t kRays = 20000;  // about as many as a cold solve is given
 constexpr int kRefinements = 3;
 
 /// Cold solves of one coarse problem under different extinctions, each by as many full gradients: candidates

@@ -27,6 +27,11 @@ TEST(Result, ErrorsPassThroughWithTheirWords) {
   EXPECT_FALSE(check(2).ok());
 }
 
+TEST(Result, TheRemedyIsASentence) {
+  const Error error{ErrorKind::bad_input, "has no unit", "tolerance '5'", "give a number with its unit"};
+  EXPECT_EQ(error.message(), "tolerance '5': has no unit. Give a number with its unit");
+}
+
 TEST(Result, TheAbsentValueIsALogicError) {
   EXPECT_THROW((void)half(3).value(), std::bad_variant_access);
   EXPECT_THROW((void)half(2).error(), std::bad_variant_access);

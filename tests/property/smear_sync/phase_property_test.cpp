@@ -82,6 +82,7 @@ TEST(PhaseLaws, CombineTurnsWithTheCircle) {
     const Seconds shift = any_tau();
     const auto mean_at = [&](Seconds where) {
       std::vector<PhaseSample> samples;
+      samples.reserve(offsets.size());
       for (const int o : offsets) samples.push_back({{}, known(where + microseconds(o * 0.5))});
       return combine(samples, {}, {});
     };

@@ -322,8 +322,9 @@ class Ramp final : public LightField {
                     std::span<float> rgb) const override {
     windows.push_back({camera, exposure_start, exposure});
     for (std::size_t i = 0; i < rgb.size() / 3; ++i) {
+      const std::size_t row = i / width_;
       rgb[3 * i] += static_cast<float>(i % width_);
-      rgb[3 * i + 1] += static_cast<float>(i / width_);
+      rgb[3 * i + 1] += static_cast<float>(row);
       rgb[3 * i + 2] += 200;
     }
   }

@@ -252,6 +252,7 @@ TEST(VirtualRig, EachCameraMayHaveAThreadOfItsOwn) {
   const auto rig =
       small_rig(all, {Pass::lamp, Pass::smear, Pass::read_noise}, std::make_shared<SteadyClock>());
   std::vector<std::thread> threads;
+  threads.reserve(static_cast<std::size_t>(rig->size()));
   for (int c = 0; c < rig->size(); ++c) {
     threads.emplace_back([&, c] {
       ASSERT_TRUE(rig->camera(c).start().ok());

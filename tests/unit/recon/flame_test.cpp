@@ -28,8 +28,8 @@ TEST(Flame, EmitsOnlyInsideItsMediumAndClearOfTheBox) {
         for (int i = 0; i < kGrid.nx; ++i) {
           if (truth.volume.emission[3 * kGrid.index(i, j, k)] <= 0) continue;
           ASSERT_TRUE(i > 0 && j > 0 && k > 0 && i < kGrid.nx - 1 && j < kGrid.ny - 1 && k < kGrid.nz - 1);
-          const auto voxel = static_cast<std::size_t>(i + (kGrid.nx - 1) * (j + (kGrid.ny - 1) * k));
-          ASSERT_EQ(truth.medium.inside[voxel], 1);
+          const int voxel = i + (kGrid.nx - 1) * (j + (kGrid.ny - 1) * k);
+          ASSERT_EQ(truth.medium.inside[static_cast<std::size_t>(voxel)], 1);
         }
   }
 }

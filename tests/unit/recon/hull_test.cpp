@@ -124,9 +124,11 @@ TEST(FlameMask, ThresholdOfADemosaicedPictureLiesAboveItsNoise) {
   // Interpolated samples share their neighbours' noise: differences of neighbours would see half of it.
   Image mosaic({{320, 240}, PixelFormat::bayer_rggb8, 8});
   for (int y = 0; y < 240; ++y)
-    for (int x = 0; x < 320; ++x)
+    for (int x = 0; x < 320; ++x) {
+      const int pixel = y * 320 + x;
       mosaic.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(
-          std::lround(20 + 2 * random_normal(1, 0, static_cast<std::uint64_t>(y * 320 + x))));
+          std::lround(20 + 2 * random_normal(1, 0, static_cast<std::uint64_t>(pixel))));
+    }
   const RadianceImage image = to_radiance(mosaic.view());
   EXPECT_GT(noise_threshold(image), 20 + 4 * 2);
   EXPECT_TRUE(noise_mask(image).box.empty());

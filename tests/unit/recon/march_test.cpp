@@ -60,9 +60,8 @@ double brute_force(const Volume& volume, const Hull& medium, double sigma, const
       inside = inside && cell[a] >= 0 && cell[a] < size[a];
       f[a] = p - cell[a];
     }
-    if (!inside ||
-        medium.inside[static_cast<std::size_t>(cell[0] + size[0] * (cell[1] + size[1] * cell[2]))] == 0)
-      continue;
+    const int voxel = cell[0] + size[0] * (cell[1] + size[1] * cell[2]);
+    if (!inside || medium.inside[static_cast<std::size_t>(voxel)] == 0) continue;
     double s = 0;
     for (int c = 0; c < 8; ++c) {
       const double w = (c & 1 ? f[0] : 1 - f[0]) * (c & 2 ? f[1] : 1 - f[1]) * (c & 4 ? f[2] : 1 - f[2]);
@@ -76,7 +75,8 @@ double brute_force(const Volume& volume, const Hull& medium, double sigma, const
 }
 
 float pixel(const RadianceImage& image, int x, int y, int c = 0) {
-  return image.rgb[static_cast<std::size_t>(3 * (y * image.size.width + x) + c)];
+  const int at = 3 * (y * image.size.width + x) + c;
+  return image.rgb[static_cast<std::size_t>(at)];
 }
 
 TEST(March, AgreesWithBruteForceInDoubleThroughAMediumWithHoles) {

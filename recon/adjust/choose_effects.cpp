@@ -109,8 +109,7 @@ Candidate search(const Probe& probe) {
                          [](const Candidate& a, const Candidate& b) { return a.extinction < b.extinction; });
     tried.insert(at, std::move(c));
   };
-  for (const double depth : {0.0, 0.2, 0.5, 1.0, 3.0})
-    try_one(PerMeter(depth / probe.mean_chord().value()));
+  for (const double depth : {0.0, 0.2, 0.5, 1.0, 3.0}) try_one(PerMeter(depth / probe.mean_chord().value()));
   const auto best = [&] {
     return std::min_element(tried.begin(), tried.end(),
                             [](const Candidate& a, const Candidate& b) { return a.error < b.error; });

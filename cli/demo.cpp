@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "base/clock.h"
+#include "cli/align_record.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "recon/pipeline/scene.h"
 #include "session/async_writer.h"
@@ -37,8 +38,8 @@ struct Rig {
   std::unique_ptr<VirtualRig> rig;
   std::vector<CcdTiming> timing;  // n, K, T, d as configured; t_row is measured
 
-  [[nodiscard]] AlignRig align(SessionWriter* recorder) const {
-    AlignRig view{{}, &rig->strobe(), clock.get(), recorder};
+  [[nodiscard]] AlignRig devices() const {
+    AlignRig view{{}, &rig->strobe(), clock.get()};
     for (int i = 0; i < rig->size(); ++i) view.cameras.push_back(&rig->camera(i));
     return view;
   }
@@ -78,8 +79,9 @@ SmearSnapshot snapshot(const AlignRoundReport& report) {
   return shot;
 }
 
-Result<AlignStage> align(const Rig& rig, AlignStage stage, AlignRunOptions options, SessionWriter* recorder,
-                         const Progress& progress) {
+/// Recorded in `record`, if one is named: `emberlock align --replay` then shows the same decisions.
+Result<AlignStage> align(const Rig& rig, AlignStage stage, AlignRunOptions options,
+                         const std::optional<std::filesystem::path>& record, const Progress& progress) {
   options.align.policy = stage.policy;
   options.align.tolerance.amount = stage.tolerance;
   options.timing = rig.timing;
@@ -91,7 +93,9 @@ Result<AlignStage> align(const Rig& rig, AlignStage stage, AlignRunOptions optio
     for (const auto& camera : stage.last.cameras) errors.push_back(camera.error);
     stage.errors.push_back(std::move(errors));
   };
-  EMBERLOCK_ASSIGN_OR_RETURN(stage.result, run_align(rig.align(recorder), options, observe, progress));
+  EMBERLOCK_ASSIGN_OR_RETURN(stage.result,
+                             record ? record_align(*record, rig.devices(), options, observe, progress)
+                                    : run_align(rig.devices(), options, observe, progress));
   stage.seconds = since(start);
   if (stage.result.last.verdict != AlignVerdict::aligned) {
     return Error{ErrorKind::device, "not aligned: " + stage.result.last.reason, stage.title,
@@ -111,7 +115,7 @@ Status align_twice(Rig& rig, DemoResult& result, const std::filesystem::path& fo
                                    {.title = "within 100 rows, buttons pressed by hand",
                                     .policy = AlignPolicy::densest,
                                     .tolerance = kByHandTolerance},
-                                   options, nullptr, progress("align by hand, 100 rows")));
+                                   options, std::nullopt, progress("align by hand, 100 rows")));
   for (const auto& clock : by_hand.result.row_clocks) {
     if (!clock)
       return Error{ErrorKind::device, "a camera's row time was not measured", "comb", "Try another --seed"};
@@ -121,19 +125,12 @@ Status align_twice(Rig& rig, DemoResult& result, const std::filesystem::path& fo
   rig.timing = by_hand.result.timing;
   options.measure_row_time = false;
   options.delays = by_hand.result.delays;
-  v1::Manifest manifest;
-  manifest.set_session_id("demo-alignment");
-  manifest.set_purpose("alignment");
-  for (int i = 0; i < rig.rig->size(); ++i)
-    *manifest.add_cameras() = describe(rig.rig->camera(i).info(), nullptr);
-  EMBERLOCK_ASSIGN_OR_RETURN(SessionWriter recorder, SessionWriter::create(folder / "alignment", manifest));
-  EMBERLOCK_ASSIGN_OR_RETURN(AlignStage timed,
-                             align(rig,
-                                   {.title = "within 10 rows, timed resets",
-                                    .policy = AlignPolicy::timed,
-                                    .tolerance = kTimedTolerance},
-                                   options, &recorder, progress("align by timed resets, 10 rows")));
-  EMBERLOCK_RETURN_IF_ERROR(recorder.finish());
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      AlignStage timed, align(rig,
+                              {.title = "within 10 rows, timed resets",
+                               .policy = AlignPolicy::timed,
+                               .tolerance = kTimedTolerance},
+                              options, folder / "alignment", progress("align by timed resets, 10 rows")));
   result.stages = {std::move(by_hand), std::move(timed)};
   return {};
 }
@@ -178,7 +175,7 @@ Status record_flame(Rig& rig, const Stage& stage, DemoResult& result, const std:
   *manifest.mutable_box() = describe(stage.box);
   const auto cameras = static_cast<std::size_t>(rig.rig->size());
   for (std::size_t i = 0; i < cameras; ++i) {
-    *manifest.add_cameras() = describe(rig.rig->camera(static_cast<int>(i)).info(), &stage.cameras[i]);
+    *manifest.add_cameras() = describe(rig.rig->camera(static_cast<int>(i)).info(), stage.cameras[i]);
   }
   EMBERLOCK_ASSIGN_OR_RETURN(SessionWriter session, SessionWriter::create(folder / "flame", manifest));
   AsyncWriter writer(std::move(session));

@@ -38,26 +38,24 @@ void FlameLight::add_radiance(int camera, TimePoint exposure_start, Seconds expo
   for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] += image.rgb[i];
 }
 
-v1::CameraStream describe(const CameraInfo& info, const CameraModel* calibration) {
+v1::CameraStream describe(const CameraInfo& info, const CameraModel& calibration) {
   v1::CameraStream stream = to_proto(info);
-  if (calibration != nullptr) {
-    const Intrinsics& in = calibration->intrinsics;
-    v1::Calibration& c = *stream.mutable_calibration();
-    c.set_fx(in.fx);
-    c.set_fy(in.fy);
-    c.set_cx(in.cx);
-    c.set_cy(in.cy);
-    c.set_k1(in.distortion.k1);
-    c.set_k2(in.distortion.k2);
-    c.set_p1(in.distortion.p1);
-    c.set_p2(in.distortion.p2);
-    c.set_k3(in.distortion.k3);
-    for (int row = 0; row < 3; ++row) {
-      for (int column = 0; column < 3; ++column) {
-        c.add_camera_from_world(calibration->camera_from_world.rotation(row, column));
-      }
-      c.add_camera_from_world(calibration->camera_from_world.translation(row));
+  const Intrinsics& in = calibration.intrinsics;
+  v1::Calibration& c = *stream.mutable_calibration();
+  c.set_fx(in.fx);
+  c.set_fy(in.fy);
+  c.set_cx(in.cx);
+  c.set_cy(in.cy);
+  c.set_k1(in.distortion.k1);
+  c.set_k2(in.distortion.k2);
+  c.set_p1(in.distortion.p1);
+  c.set_p2(in.distortion.p2);
+  c.set_k3(in.distortion.k3);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      c.add_camera_from_world(calibration.camera_from_world.rotation(row, column));
     }
+    c.add_camera_from_world(calibration.camera_from_world.translation(row));
   }
   return stream;
 }

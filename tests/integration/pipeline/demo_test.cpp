@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "cli/align_record.h"
 #include "recon/preprocess/flame_mask.h"
 #include "session/reader.h"
 
@@ -64,6 +65,13 @@ TEST_F(DemoTest, RowTimesAreMeasuredNotAssumed) {
     EXPECT_LE(abs(clock.row_time - result().true_row_times[i]), 3 * clock.sigma) << i;
     EXPECT_LE(clock.sigma / clock.row_time, 0.005) << i;
   }
+}
+
+TEST_F(DemoTest, TheRecordedAlignmentReplaysToTheSameEnd) {
+  const auto replayed = replay_align(folder_ / "alignment");
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(replayed->resets, result().stages.back().result.resets);
+  EXPECT_EQ(replayed->last.worst_pair, result().stages.back().result.last.worst_pair);
 }
 
 TEST_F(DemoTest, EveryFrameOfTheFlameIsRecordedAndReadable) {

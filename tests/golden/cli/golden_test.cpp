@@ -1,0 +1,81 @@
+// Whole outputs against what they were when somebody last looked at them. After a wanted change:
+//   EMBERLOCK_UPDATE_GOLDEN=1 build/release/bin/golden_cli
+// remakes the files beside this one; their diff is the review.
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "base/file.h"
+#include "cli/align_json.h"
+#include "recon/export/report.h"
+#include "recon/pipeline/reconstruct.h"
+#include "recon/synthetic/flame.h"
+#include "tests/support/small_rig.h"
+
+namespace emberlock::cli {
+namespace {
+
+/// Numbers to five significant digits: more depends on the machine's mathematical library.
+nlohmann::ordered_json rounded(const nlohmann::ordered_json& json) {
+  if (json.is_number_float()) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.5g", json.get<double>());
+    return std::strtod(text, nullptr);
+  }
+  nlohmann::ordered_json result = json;
+  if (json.is_structured()) {
+    for (auto& item : result.items()) item.value() = rounded(item.value());
+  }
+  return result;
+}
+
+void expect_golden(const std::string& name, const std::string& text) {
+  const std::filesystem::path file = std::filesystem::path(EMBERLOCK_SOURCE_DIR) / "tests/golden/cli" / name;
+  if (std::getenv("EMBERLOCK_UPDATE_GOLDEN") != nullptr) {  // NOLINT(concurrency-mt-unsafe): one thread
+    ASSERT_TRUE(write_file_atomically(file, text).ok());
+  }
+  const auto golden = read_file(file);
+  ASSERT_TRUE(golden.ok()) << golden.error().message();
+  EXPECT_EQ(text, *golden);
+}
+
+TEST(Golden, AlignmentOfASmallRig) {
+  test::SmallBench bench(test::small_rig(7));
+  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.seed = 7;
+  std::string lines;
+  const auto result = run_align(bench.align, bench.options, [&](const AlignRoundReport& report) {
+    lines += rounded(round_json(report)).dump() + "\n";
+  });
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  lines += rounded(summary_json(*result, 7)).dump() + "\n";
+  expect_golden("align_small_rig.jsonl", lines);
+}
+
+/// A clock that stands still, so that a report holds no times.
+class StoppedClock final : public Clock {
+ public:
+  [[nodiscard]] TimePoint now() const override { return {}; }
+  void sleep_until(TimePoint) override {}
+};
+
+TEST(Golden, ReportOfASmallReconstruction) {
+  PaperSceneOptions scene;
+  scene.image = {96, 72};
+  scene.truth_voxels = 32;
+  ReconstructOptions options;
+  options.voxels = 24;
+  options.solve.compute = {Device::cpu, 2};
+  options.solve.iterations = 4;
+  const StoppedClock clock;
+  auto outcome = reconstruct(paper_scene(scene), options, clock);
+  ASSERT_TRUE(outcome.ok()) << outcome.error().message();
+  outcome->report.input = "paper_scene";
+  expect_golden("report_small_reconstruction.json",
+                rounded(nlohmann::ordered_json::parse(to_json(outcome->report))).dump(1) + "\n");
+}
+
+}  // namespace
+}  // namespace emberlock::cli

@@ -201,6 +201,7 @@ TEST_P(KilledRecorder, LosesAtMostHalfASecond) {
     for (std::uint64_t i = 0; writer.ok(); ++i) {
       if (!writer->write(0, noise_frame(kLayout, i)).ok()) break;
       if (::write(progress[1], "x", 1) != 1) break;
+      if (i == 400) ::pause();  // however late the parent's signal comes, the fourth segment is not begun
     }
     ::_exit(1);
   }

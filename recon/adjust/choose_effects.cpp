@@ -156,7 +156,7 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   Candidate chosen;
   EffectReport report{"extinction", false, 0, {}, {}};
   if (request.fixed) {
-    chosen.extinction = request.fixed->extinction;
+    chosen.extinction = request.fixed->extinction.value;
     if (chosen.extinction.value() > 0) chosen.error = probe.solve(chosen.extinction, chosen.x);
     report.on = chosen.extinction.value() > 0;
     report.reason = "set by hand";
@@ -174,7 +174,7 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   }
   report.seconds = (elapsed ? elapsed() : Seconds(0)) - start;
   EffectChoice choice;
-  if (report.on) choice.effects.extinction = chosen.extinction;
+  if (report.on) choice.effects.extinction = constant_extinction(chosen.extinction);
   choice.reports.push_back(std::move(report));
   return choice;
 }

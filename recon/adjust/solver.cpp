@@ -16,7 +16,7 @@ Status check(const Scene& scene, const Grid& grid, const Effects& effects, const
   };
   if (grid.nx < 2 || grid.ny < 2 || grid.nz < 2 || !(grid.edge > 0) || !std::isfinite(grid.edge))
     return refuse("the grid has no voxel", "voxels", "Give at least one voxel along each side");
-  if (!std::isfinite(effects.extinction.value()) || effects.extinction.value() < 0)
+  if (!std::isfinite(effects.extinction.value.value()) || effects.extinction.value.value() < 0)
     return refuse("the extinction is not a finite number >= 0", "effects", "Give extinction in 1/m");
   if (options.iterations < 0)
     return refuse("a negative number of iterations", "iterations",

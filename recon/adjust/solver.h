@@ -25,8 +25,13 @@ enum class Solver {
 /// "default" or "paper"; an Error that lists them otherwise.
 Result<Solver> parse_solver(std::string_view name);
 
+/// Of the march and of all that is stored at key points.
+enum class Precision { float32, float64 };
+
 struct SolveOptions {
   Solver solver = Solver::standard;
+  Precision precision = Precision::float32;
+  double step = 1;     ///< the longest step of the march, voxel edges, 0.05..4
   int iterations = 0;  ///< passes over the pictures at full resolution, at most; 0: the solver's own rule
   std::optional<Seconds> budget;      ///< stop when `elapsed` reaches it
   std::optional<double> target_rmse;  ///< stop when the held-out views' error (all channels) is at most this

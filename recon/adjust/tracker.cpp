@@ -52,10 +52,10 @@ Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull&
             whole.index(i + problem.crop.offset[0], j + problem.crop.offset[1], k + problem.crop.offset[2]);
         for (std::size_t c = 0; c < 3; ++c) volume.emission[3 * to + c] = per_meter * from.c[c];
       }
-  if (effects.extinction.value() <= 0) return volume;
+  if (effects.extinction.value.value() <= 0) return volume;
   // The medium is a set of voxels; a key point gets the share of its eight voxels that belong to it.
   volume.extinction.resize(whole.size());
-  const auto share = static_cast<float>(effects.extinction.value() / 8);
+  const auto share = static_cast<float>(effects.extinction.value.value() / 8);
   std::size_t voxel = 0;
   for (int k = 0; k < whole.nz - 1; ++k)
     for (int j = 0; j < whole.ny - 1; ++j)

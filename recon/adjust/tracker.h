@@ -23,7 +23,7 @@ struct SolverSetup {
 
   /// Extinction a voxel edge.
   [[nodiscard]] float sigma(const Grid& grid) const {
-    return static_cast<float>(effects.extinction.value() * static_cast<double>(grid.edge));
+    return static_cast<float>(effects.extinction.value.value() * static_cast<double>(grid.edge));
   }
 };
 

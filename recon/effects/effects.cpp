@@ -24,7 +24,7 @@ Result<Effects> parse_list(std::string_view text) {
     const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
     if (error != std::errc() || end != number.data() + number.size() || !std::isfinite(value) || value < 0)
       return unknown(item);
-    effects.extinction = PerMeter(value);
+    effects.extinction = constant_extinction(PerMeter(value));
     seen = true;
     if (comma == std::string_view::npos) return effects;
     text.remove_prefix(comma + 1);
@@ -32,6 +32,17 @@ Result<Effects> parse_list(std::string_view text) {
 }
 
 }  // namespace
+
+Extinction constant_extinction(PerMeter value) {
+  if (value.value() <= 0) return {};
+  return {Extinction::Model::constant, value};
+}
+
+Effects absorbing(PerMeter extinction) {
+  Effects effects;
+  effects.extinction = constant_extinction(extinction);
+  return effects;
+}
 
 PerMeter extinction_of_opacity(double tau, Meters voxel_edge) {
   return PerMeter(-std::log1p(-tau) / voxel_edge.value());

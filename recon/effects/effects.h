@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,15 +11,79 @@
 
 namespace emberlock {
 
-/// What light does on its way, beside being emitted. A zero coefficient is an effect that doesn't run.
-struct Effects {
-  PerMeter extinction{0};  ///< sigma_t, constant inside the medium, 0 outside
+// The table of effects: what light does on its way, beside being emitted. Each one's first choice is to be
+// left out, and then nothing of it runs.
+
+/// sigma_t, the light lost a metre.
+struct Extinction {
+  enum class Model {
+    none,
+    constant,  ///< `value` inside the medium, 0 outside
+    field,  ///< Volume::extinction, trilinear between key points (soot-proportional, or found from pictures)
+  };
+  Model model = Model::none;
+  PerMeter value{0};  ///< of `constant`
 };
+/// None where the value is 0.
+Extinction constant_extinction(PerMeter value);
+
+/// Light that the medium scatters towards the camera: sigma_s = albedo * sigma_t, phase function of Henyey
+/// and Greenstein (1941); asymmetry > 0 scatters forwards.
+struct Scattering {
+  enum class Order { none, single, multiple };
+  Order order = Order::none;
+  double albedo = 0;     ///< 0..1
+  double asymmetry = 0;  ///< g, -1..1; 0 is isotropic
+};
+
+/// Rays bent by the hot gas: n - 1 = (n_air - 1) T_air / T (Gladstone and Dale 1863).
+struct Refraction {
+  enum class Rays { straight, curved };
+  Rays rays = Rays::straight;
+};
+
+/// What lies behind the flame. `image` takes each View's own background picture.
+struct Background {
+  enum class Kind { black, constant, image };
+  Kind kind = Kind::black;
+  std::array<double, 3> radiance = {};  ///< of `constant`, grey levels
+};
+
+/// How long the shutter is open on a flame that rises meanwhile.
+struct Exposure {
+  enum class Shutter { instant, integrated };
+  Shutter shutter = Shutter::instant;
+  Seconds time{0};
+  double rise_speed = 0;  ///< m/s along +z
+};
+
+/// From radiance to pixel values: value = white * (radiance / white)^(1 / gamma), clipped at white. A clipped
+/// pixel bounds the radiance from below and says no more.
+struct Sensor {
+  enum class Response { linear, gamma };
+  enum class Clipping { none, at_white };
+  Response response = Response::linear;
+  Clipping clipping = Clipping::none;
+  double gamma = 1;    ///< of `gamma`
+  double white = 255;  ///< grey levels
+};
+
+struct Effects {
+  Extinction extinction;
+  Scattering scattering;
+  Refraction refraction;
+  Background background;
+  Exposure exposure;
+  Sensor sensor;
+};
+
+/// Constant extinction and nothing else.
+Effects absorbing(PerMeter extinction);
 
 /// The paper's opacity a sample (0.05) as extinction: sigma = -ln(1 - tau) / edge.
 PerMeter extinction_of_opacity(double tau, Meters voxel_edge);
 
-/// What the user asks for: `--effects auto|none|extinction=VALUE`.
+/// What the user asks for: `--effects auto|none|LIST`.
 struct EffectRequest {
   std::optional<Effects> fixed;  ///< set by hand; otherwise found out from the pictures
   double tolerance = 0.5;        ///< grey levels: an effect that changes the pictures by less stays off

@@ -48,7 +48,7 @@ Result<EffectChoice> decide_effects(const Scene& scene, const Grid& grid, const 
   EffectRequest request = options.effects.value_or(EffectRequest{});
   const bool as_published = !options.effects && options.solve.solver == Solver::paper;
   if (as_published) {
-    request.fixed = Effects{extinction_of_opacity(kPaperOpacity, Meters(static_cast<double>(grid.edge)))};
+    request.fixed = absorbing(extinction_of_opacity(kPaperOpacity, Meters(static_cast<double>(grid.edge))));
   }
   EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
                              choose_effects(scene, grid, request, solve_options, elapsed));

@@ -50,7 +50,8 @@ RadianceImage render_view(const Volume& volume, const Hull& medium, const Effect
   clip.step = static_cast<float>(options.step);
   const RayList list = clip_rays({&camera}, crop.hull, clip, pool);
   const std::vector<Rgba> emission = crop_emission(volume, crop);
-  const auto sigma = static_cast<float>(effects.extinction.value() * static_cast<double>(volume.grid.edge));
+  const auto sigma =
+      static_cast<float>(effects.extinction.value.value() * static_cast<double>(volume.grid.edge));
   if (sigma > 0)
     render_rays(list, emission, ConstantExtinction{sigma}, pool, image);
   else

@@ -189,7 +189,8 @@ Flame::~Flame() = default;
 const FlameOptions& Flame::options() const { return options_; }
 
 FlameTruth Flame::at(Seconds time, const Grid& grid) const {
-  FlameTruth truth{{grid, std::vector<float>(3 * grid.size()), {}}, whole_grid(grid), {options_.extinction}};
+  FlameTruth truth{{grid, std::vector<float>(3 * grid.size()), {}}, whole_grid(grid), {}};
+  truth.effects.extinction = constant_extinction(options_.extinction);
   const double height = options_.height.value();
   const std::vector<Plume> shapes = plumes(options_.shape);
   const Field field{

@@ -39,7 +39,7 @@ void run(const Scene& scene, const Grid& grid) {
   }
   std::printf(
       "| solver   | iter | seconds | input | held-out R / G / B  |  all  |\n|---|---|---|---|---|---|\n");
-  const Effects paper_medium = {extinction_of_opacity(0.05, Meters(static_cast<double>(grid.edge)))};
+  const Effects paper_medium = absorbing(extinction_of_opacity(0.05, Meters(static_cast<double>(grid.edge))));
   double best = 1e9;
   double cpu = 1e9;  // of all threads together: what a busy machine can't blur
   for (int repeat = 0; repeat < 3; ++repeat) {

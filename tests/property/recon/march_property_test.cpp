@@ -17,7 +17,7 @@ TEST(MarchLaw, BeerLambertAndStepsOfAnySizeAgreeInAUniformMedium) {
     const Grid grid =
         grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, *rc::gen::inRange(1, 20));
     const Volume volume{grid, std::vector<float>(3 * grid.size(), 500), {}};
-    const Effects effects = {PerMeter(number(0, 200))};
+    const Effects effects = absorbing(PerMeter(number(0, 200)));
     const CameraModel camera =
         look_at({{5, 5}, 20, 20, 2.5, 2.5, {}}, {0.3 + number(0, 1), number(-1, 1), number(-1, 1)},
                 Eigen::Vector3d::Zero());

@@ -21,7 +21,7 @@ TEST(Effects, EmissionOnlyFlameIsFoundAsSuch) {
     const EffectChoice choice = found(small_flame_scene(PerMeter(0), shape));
     ASSERT_EQ(choice.reports.size(), 1u);
     EXPECT_FALSE(choice.reports[0].on) << choice.reports[0].reason;
-    EXPECT_EQ(choice.effects.extinction, PerMeter(0));
+    EXPECT_EQ(choice.effects.extinction.value, PerMeter(0));
   }
 }
 
@@ -31,8 +31,8 @@ TEST(Effects, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
     EXPECT_TRUE(choice.reports[0].on);
     EXPECT_GT(choice.reports[0].predicted_change, 2);
     // The hull is larger than the medium, so the extinction that fits best is less than the truth.
-    EXPECT_GT(choice.effects.extinction.value(), 14);
-    EXPECT_LT(choice.effects.extinction.value(), 45);
+    EXPECT_GT(choice.effects.extinction.value.value(), 14);
+    EXPECT_LT(choice.effects.extinction.value.value(), 45);
   }
 }
 
@@ -44,14 +44,14 @@ TEST(Effects, SetByHandIsTakenAndItsChangePredicted) {
   options.compute.device = Device::cpu;
   const auto choice = choose_effects(scene, grid_over(scene.box, 64), *request, options);
   ASSERT_TRUE(choice.ok());
-  EXPECT_EQ(choice->effects.extinction, PerMeter(32.8));
+  EXPECT_EQ(choice->effects.extinction.value, PerMeter(32.8));
   EXPECT_GT(choice->reports[0].predicted_change, 2);
   EXPECT_EQ(choice->reports[0].reason, "set by hand");
 }
 
 TEST(Effects, ListsAreParsedAndBadOnesRefused) {
   EXPECT_FALSE(parse_effects("auto")->fixed.has_value());
-  EXPECT_EQ(parse_effects("none")->fixed->extinction, PerMeter(0));
+  EXPECT_EQ(parse_effects("none")->fixed->extinction.value, PerMeter(0));
   for (const char* bad :
        {"", "extinction", "extinction=", "extinction=-1", "extinction=nan", "extinction=1e999",
         "extinction=3x", "fog=3", "extinction=1,extinction=2", "extinction=1,"}) {

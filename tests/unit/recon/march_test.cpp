@@ -87,8 +87,8 @@ TEST(March, AgreesWithBruteForceInDoubleThroughAMediumWithHoles) {
   for (const double sigma : {0.0, 5.0, 32.8}) {
     RenderOptions fine;
     fine.step = 0.02;
-    const RadianceImage image = render_view(volume, medium, {PerMeter(sigma)}, camera, fine);
-    const RadianceImage coarse = render_view(volume, medium, {PerMeter(sigma)}, camera);
+    const RadianceImage image = render_view(volume, medium, absorbing(PerMeter(sigma)), camera, fine);
+    const RadianceImage coarse = render_view(volume, medium, absorbing(PerMeter(sigma)), camera);
     double brightest = 0;
     for (int y = 0; y < 10; ++y) {
       for (int x = 0; x < 12; ++x) {
@@ -106,7 +106,8 @@ TEST(March, SlabHasTheClosedFormForAnyExtinction) {
   const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 16);
   const CameraModel camera = camera_at({0.5, 0, 0}, {0, 0, 0}, {3, 3}, 300);
   for (const double sigma : {0.0, 1e-6, 1e-3, 1.0, 32.8, 1e3, 1e6}) {
-    const RadianceImage image = render_view(filled(grid, 1000), whole_grid(grid), {PerMeter(sigma)}, camera);
+    const RadianceImage image =
+        render_view(filled(grid, 1000), whole_grid(grid), absorbing(PerMeter(sigma)), camera);
     const double expected = sigma == 0 ? 1000 * 0.2 : -1000 * std::expm1(-sigma * 0.2) / sigma;
     EXPECT_NEAR(pixel(image, 1, 1) / expected, 1, 1e-5) << sigma;
   }

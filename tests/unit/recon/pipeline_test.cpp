@@ -188,13 +188,13 @@ TEST(Reconstruct, ThePapersSolverTakesThePapersOpacityUnlessToldOtherwise) {
   const auto published = reconstruct(ball(), options, CountingClock());
   ASSERT_TRUE(published.ok()) << published.error().message();
   const double edge = published->report.voxel_edge.value();
-  EXPECT_NEAR(published->reconstruction.effects.extinction.value() * edge, -std::log(0.95), 1e-6);
+  EXPECT_NEAR(published->reconstruction.effects.extinction.value.value() * edge, -std::log(0.95), 1e-6);
   ASSERT_FALSE(published->report.effects.empty());
   EXPECT_THAT(published->report.effects[0].reason, HasSubstr("paper"));
   options.effects = EffectRequest{Effects{}};
   const auto told = reconstruct(ball(), options, CountingClock());
   ASSERT_TRUE(told.ok()) << told.error().message();
-  EXPECT_EQ(told->reconstruction.effects.extinction.value(), 0);
+  EXPECT_EQ(told->reconstruction.effects.extinction.value.value(), 0);
 }
 
 TEST(Reconstruct, AnEmptyHullNamesTheRemedy) {

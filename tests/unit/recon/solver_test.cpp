@@ -10,7 +10,7 @@
 namespace emberlock {
 namespace {
 
-constexpr Effects kPaperMedium = {PerMeter(32.8)};
+const Effects kPaperMedium = absorbing(PerMeter(32.8));
 
 SolveOptions on_cpu(int iterations = 0) {
   SolveOptions options;
@@ -124,7 +124,7 @@ TEST(Solver, ThickMediaAndExtremeExtinctionStayStable) {
   const Scene scene = small_flame_scene();
   const Grid grid = grid_over(scene.box, 32);
   for (const double depth : {0.05, 0.2, 0.5, 1.0, 5.0, 1e4}) {  // a voxel edge
-    const Effects thick = {PerMeter(depth / static_cast<double>(grid.edge))};
+    const Effects thick = absorbing(PerMeter(depth / static_cast<double>(grid.edge)));
     const auto r = solve(scene, grid, thick, on_cpu(30));
     ASSERT_TRUE(r.ok());
     EXPECT_TRUE(finite(*r)) << depth;

@@ -1,37 +1,202 @@
 #include "recon/effects/effects.h"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 
 namespace emberlock {
 namespace {
 
-Error unknown(std::string_view text) {
-  return {ErrorKind::bad_input, "can't read '" + std::string(text) + "'", "effects",
-          "Use auto, none, or a list of extinction=VALUE with VALUE in 1/m, 0 or more"};
+Error bad(std::string what) {
+  return {ErrorKind::bad_input, std::move(what), "effects",
+          "Use auto, none, or a comma separated list of extinction=none|field|VALUE (1/m), "
+          "scattering=none|single|multiple[:albedo=VALUE][:g=VALUE], "
+          "refraction=straight|curved[:flame=KELVIN][:ambient=KELVIN], "
+          "background=black|image|LEVEL|RED/GREEN/BLUE, exposure=instant|SECONDS[:rise=M/S], gamma=VALUE, "
+          "saturation=none|LEVEL"};
 }
+
+Error unknown(std::string_view text) { return bad("can't read '" + std::string(text) + "'"); }
+
+/// Takes what stands before the first `mark` off the front of `text`, and the mark; all of it without one.
+std::string_view take(std::string_view& text, char mark) {
+  const std::size_t at = text.find(mark);
+  const std::string_view head = text.substr(0, at);
+  text = at == std::string_view::npos ? std::string_view{} : text.substr(at + 1);
+  return head;
+}
+
+bool read(std::string_view text, double& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
+}
+
+/// One effect of the list, name=choice:key=value:key=value. Parameters are taken out as they are understood.
+class Item {
+ public:
+  explicit Item(std::string_view text) : text_(text) {
+    std::string_view first = take(text, ':');
+    name_ = take(first, '=');
+    choice_ = first;
+    while (!text.empty()) {
+      std::string_view rest = take(text, ':');
+      const std::string_view key = take(rest, '=');
+      parameters_.emplace_back(key, rest);
+    }
+    if (text_.ends_with(':')) understood_ = false;
+  }
+
+  [[nodiscard]] std::string_view text() const { return text_; }
+  [[nodiscard]] std::string_view name() const { return name_; }
+  [[nodiscard]] std::string_view choice() const { return choice_; }
+  [[nodiscard]] bool is(std::string_view choice) const { return choice_ == choice; }
+  bool number(double& value) const { return read(choice_, value); }
+
+  /// Reads the parameter where it is given; its absence leaves the default.
+  void parameter(std::string_view key, double& value) {
+    const auto at = std::find_if(parameters_.begin(), parameters_.end(),
+                                 [&](const auto& parameter) { return parameter.first == key; });
+    if (at == parameters_.end()) return;
+    understood_ = understood_ && read(at->second, value);
+    parameters_.erase(at);
+  }
+  /// No parameter is left over, and those that were asked for were numbers.
+  [[nodiscard]] bool understood() const { return understood_ && parameters_.empty(); }
+
+ private:
+  std::string_view text_, name_, choice_;
+  std::vector<std::pair<std::string_view, std::string_view>> parameters_;
+  bool understood_ = true;
+};
+
+bool read_extinction(Item& item, Effects& effects) {
+  double value = 0;
+  if (item.is("none")) return true;
+  if (item.is("field")) {
+    effects.extinction.model = Extinction::Model::field;
+    return true;
+  }
+  if (!item.number(value) || value < 0) return false;
+  effects.extinction = constant_extinction(PerMeter(value));
+  return true;
+}
+
+bool read_scattering(Item& item, Effects& effects) {
+  using Order = Scattering::Order;
+  if (item.is("none")) return true;
+  if (!item.is("single") && !item.is("multiple")) return false;
+  effects.scattering.order = item.is("single") ? Order::single : Order::multiple;
+  effects.scattering.albedo = 0.5;
+  item.parameter("albedo", effects.scattering.albedo);
+  item.parameter("g", effects.scattering.asymmetry);
+  return true;
+}
+
+bool read_refraction(Item& item, Effects& effects) {
+  if (item.is("straight")) return true;
+  if (!item.is("curved")) return false;
+  double flame = effects.refraction.flame.value();
+  double ambient = effects.refraction.ambient.value();
+  item.parameter("flame", flame);
+  item.parameter("ambient", ambient);
+  effects.refraction = {Refraction::Rays::curved, Kelvin(flame), Kelvin(ambient)};
+  return true;
+}
+
+bool read_background(Item& item, Effects& effects) {
+  Background& background = effects.background;
+  if (item.is("black")) return true;
+  if (item.is("image")) {
+    background.kind = Background::Kind::image;
+    return true;
+  }
+  background.kind = Background::Kind::constant;
+  double grey = 0;
+  if (item.number(grey)) {
+    background.radiance.fill(grey);
+    return true;
+  }
+  std::string_view rest = item.choice();
+  if (std::count(rest.begin(), rest.end(), '/') != 2) return false;
+  return std::all_of(background.radiance.begin(), background.radiance.end(),
+                     [&](double& level) { return read(take(rest, '/'), level); });
+}
+
+bool read_exposure(Item& item, Effects& effects) {
+  double time = 0;
+  if (item.is("instant")) return true;
+  if (!item.number(time)) return false;
+  effects.exposure.shutter = Exposure::Shutter::integrated;
+  effects.exposure.time = Seconds(time);
+  item.parameter("rise", effects.exposure.rise_speed);
+  return true;
+}
+
+bool read_gamma(Item& item, Effects& effects) {
+  if (!item.number(effects.sensor.gamma)) return false;
+  if (effects.sensor.gamma != 1) effects.sensor.response = Sensor::Response::gamma;
+  return true;
+}
+
+bool read_saturation(Item& item, Effects& effects) {
+  if (item.is("none")) return true;
+  if (!item.number(effects.sensor.white)) return false;
+  effects.sensor.clipping = Sensor::Clipping::at_white;
+  return true;
+}
+
+struct Reader {
+  std::string_view name;
+  bool (*read)(Item&, Effects&);
+};
+constexpr Reader kTable[] = {
+    {"extinction", read_extinction}, {"scattering", read_scattering}, {"refraction", read_refraction},
+    {"background", read_background}, {"exposure", read_exposure},     {"gamma", read_gamma},
+    {"saturation", read_saturation},
+};
 
 Result<Effects> parse_list(std::string_view text) {
   Effects effects;
-  bool seen = false;
-  while (true) {
-    const std::size_t comma = text.find(',');
-    const std::string_view item = text.substr(0, comma);
-    constexpr std::string_view kExtinction = "extinction=";
-    if (seen || !item.starts_with(kExtinction)) return unknown(item);
-    const std::string_view number = item.substr(kExtinction.size());
-    double value = 0;
-    const auto [end, error] = std::from_chars(number.data(), number.data() + number.size(), value);
-    if (error != std::errc() || end != number.data() + number.size() || !std::isfinite(value) || value < 0)
-      return unknown(item);
-    effects.extinction = constant_extinction(PerMeter(value));
-    seen = true;
-    if (comma == std::string_view::npos) return effects;
-    text.remove_prefix(comma + 1);
+  std::vector<std::string_view> seen;
+  if (text.empty() || text.ends_with(',')) return unknown(text);
+  while (!text.empty()) {
+    Item item(take(text, ','));
+    const Reader* reader = std::find_if(std::begin(kTable), std::end(kTable),
+                                        [&](const Reader& r) { return r.name == item.name(); });
+    if (reader == std::end(kTable)) return unknown(item.text());
+    if (std::find(seen.begin(), seen.end(), item.name()) != seen.end())
+      return bad(std::string(item.name()) + " is given twice");
+    if (!reader->read(item, effects) || !item.understood()) return unknown(item.text());
+    seen.push_back(item.name());
   }
+  EMBERLOCK_RETURN_IF_ERROR(check(effects));
+  return effects;
 }
 
+bool within(double value, double low, double high) { return value >= low && value <= high; }
+
 }  // namespace
+
+Status check(const Effects& effects) {
+  const auto& [extinction, scattering, refraction, background, exposure, sensor] = effects;
+  constexpr double kMost = 1e30;  // what a float holds with room to spare; also refuses infinity
+  constexpr double kColdest = 100;
+  constexpr double kHottest = 1e5;
+  if (!within(extinction.value.value(), 0, kMost)) return bad("extinction must be 0 or more");
+  if (!within(scattering.albedo, 0, 1)) return bad("albedo must lie in 0..1");
+  if (!within(scattering.asymmetry, -1, 1)) return bad("g must lie in -1..1");
+  if (scattering.order != Scattering::Order::none && extinction.model == Extinction::Model::none)
+    return bad("scattering needs extinction, whose part it is");
+  for (const Kelvin t : {refraction.flame, refraction.ambient})
+    if (!within(t.value(), kColdest, kHottest)) return bad("the gas must have 100 to 100000 K");
+  for (const double level : background.radiance)
+    if (!within(level, 0, kMost)) return bad("background must be 0 or more");
+  if (!within(exposure.time.value(), 0, 10)) return bad("exposure must lie in 0..10 s");
+  if (!within(exposure.rise_speed, -20, 20)) return bad("rise must lie in -20..20 m/s");
+  if (!within(sensor.gamma, 0.1, 10)) return bad("gamma must lie in 0.1..10");
+  if (!within(sensor.white, 1e-6, kMost)) return bad("saturation must be a level above 0");
+  return {};
+}
 
 Extinction constant_extinction(PerMeter value) {
   if (value.value() <= 0) return {};

@@ -36,13 +36,16 @@ struct Scattering {
   double asymmetry = 0;  ///< g, -1..1; 0 is isotropic
 };
 
-/// Rays bent by the hot gas: n - 1 = (n_air - 1) T_air / T (Gladstone and Dale 1863).
+/// Rays bent by the hot gas: n - 1 = (n_air - 1) T_air / T (Gladstone and Dale 1863). The program can't
+/// measure the gas: refraction.h says what it assumes between these two temperatures.
 struct Refraction {
   enum class Rays { straight, curved };
   Rays rays = Rays::straight;
+  Kelvin flame{1800};   ///< of the gas in the middle of the flame
+  Kelvin ambient{293};  ///< of the air around it
 };
 
-/// What lies behind the flame. `image` takes each View's own background picture.
+/// What lies behind the flame. `image` takes each View's own background picture, black where it has none.
 struct Background {
   enum class Kind { black, constant, image };
   Kind kind = Kind::black;
@@ -54,7 +57,7 @@ struct Exposure {
   enum class Shutter { instant, integrated };
   Shutter shutter = Shutter::instant;
   Seconds time{0};
-  double rise_speed = 0;  ///< m/s along +z
+  double rise_speed = 1;  ///< m/s along +z; about 1 in candles and small fires
 };
 
 /// From radiance to pixel values: value = white * (radiance / white)^(1 / gamma), clipped at white. A clipped
@@ -77,6 +80,9 @@ struct Effects {
   Sensor sensor;
 };
 
+/// An Error that names the first value out of its range, as parse_effects states them.
+Status check(const Effects& effects);
+
 /// Constant extinction and nothing else.
 Effects absorbing(PerMeter extinction);
 
@@ -89,8 +95,16 @@ struct EffectRequest {
   double tolerance = 0.5;        ///< grey levels: an effect that changes the pictures by less stays off
 };
 
-/// "auto", "none", "extinction=32.8" (1/m), or a comma separated list of effects; an Error that lists the
-/// table's names otherwise.
+/// "auto", "none", or a comma separated list of effects by name, each once; what isn't named is left out.
+/// A choice may bring parameters, `:name=value`; numbers in SI units and grey levels:
+///   extinction=none|field|SIGMA                 SIGMA >= 0, 1/m
+///   scattering=none|single|multiple             with extinction; :albedo=0.5 (0..1), :g=0 (-1..1)
+///   refraction=straight|curved                  :flame=1800, :ambient=293 (K, 100..100000)
+///   background=black|image|LEVEL|RED/GREEN/BLUE >= 0
+///   exposure=instant|SECONDS                    0..10 s; :rise=1 (m/s, -20..20)
+///   gamma=GAMMA                                 0.1..10; 1 is linear
+///   saturation=none|LEVEL                       > 0; also gamma's white, 255 otherwise
+/// An Error that says what can't be read and lists these names otherwise.
 Result<EffectRequest> parse_effects(std::string_view text);
 
 /// One line of the report: what an effect does to this scene and why it is on or off.

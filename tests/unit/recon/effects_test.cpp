@@ -49,15 +49,119 @@ TEST(Effects, SetByHandIsTakenAndItsChangePredicted) {
   EXPECT_EQ(choice->reports[0].reason, "set by hand");
 }
 
-TEST(Effects, ListsAreParsedAndBadOnesRefused) {
+TEST(Effects, WholeTableIsParsedByName) {
+  const auto request = parse_effects(
+      "extinction=32.8,scattering=single:albedo=0.25:g=-0.3,background=10/11.5/12,exposure=0.004:rise=0.8,"
+      "refraction=curved:flame=1500:ambient=300,gamma=2.2,saturation=250");
+  ASSERT_TRUE(request.ok()) << request.error().message();
+  const auto& [extinction, scattering, refraction, background, exposure, sensor] = *request->fixed;
+  EXPECT_EQ(extinction.model, Extinction::Model::constant);
+  EXPECT_EQ(extinction.value, PerMeter(32.8));
+  EXPECT_EQ(scattering.order, Scattering::Order::single);
+  EXPECT_EQ(scattering.albedo, 0.25);
+  EXPECT_EQ(scattering.asymmetry, -0.3);
+  EXPECT_EQ(background.kind, Background::Kind::constant);
+  EXPECT_EQ(background.radiance, (std::array<double, 3>{10, 11.5, 12}));
+  EXPECT_EQ(exposure.shutter, Exposure::Shutter::integrated);
+  EXPECT_EQ(exposure.time, Seconds(0.004));
+  EXPECT_EQ(exposure.rise_speed, 0.8);
+  EXPECT_EQ(refraction.rays, Refraction::Rays::curved);
+  EXPECT_EQ(refraction.flame, Kelvin(1500));
+  EXPECT_EQ(refraction.ambient, Kelvin(300));
+  EXPECT_EQ(sensor.response, Sensor::Response::gamma);
+  EXPECT_EQ(sensor.gamma, 2.2);
+  EXPECT_EQ(sensor.clipping, Sensor::Clipping::at_white);
+  EXPECT_EQ(sensor.white, 250);
+}
+
+TEST(Effects, ChoicesWithoutParametersTakeTheirDefaults) {
+  const auto fixed = [](const char* text) {
+    const auto request = parse_effects(text);
+    EXPECT_TRUE(request.ok()) << request.error().message();
+    return *request->fixed;
+  };
+  EXPECT_EQ(fixed("extinction=field").extinction.model, Extinction::Model::field);
+  EXPECT_EQ(fixed("scattering=multiple,extinction=9").scattering.order, Scattering::Order::multiple);
+  EXPECT_EQ(fixed("background=image").background.kind, Background::Kind::image);
+  EXPECT_EQ(fixed("background=7").background.radiance, (std::array<double, 3>{7, 7, 7}));
+  EXPECT_EQ(fixed("exposure=0.01").exposure.rise_speed, Exposure{}.rise_speed);
+  EXPECT_EQ(fixed("refraction=curved").refraction.flame, Kelvin(1800));
+  EXPECT_EQ(fixed("gamma=2.2").sensor.white, 255);
+  EXPECT_EQ(fixed("gamma=2.2").sensor.clipping, Sensor::Clipping::none);
+}
+
+TEST(Effects, LeavingEveryEffectOutByNameIsNone) {
+  const Effects effects = *parse_effects(
+                               "extinction=none,scattering=none,refraction=straight,background=black,"
+                               "exposure=instant,gamma=1,saturation=none")
+                               ->fixed;
   EXPECT_FALSE(parse_effects("auto")->fixed.has_value());
-  EXPECT_EQ(parse_effects("none")->fixed->extinction.value, PerMeter(0));
-  for (const char* bad :
-       {"", "extinction", "extinction=", "extinction=-1", "extinction=nan", "extinction=1e999",
-        "extinction=3x", "fog=3", "extinction=1,extinction=2", "extinction=1,"}) {
+  for (const Effects& e : {effects, *parse_effects("none")->fixed}) {
+    EXPECT_EQ(e.extinction.model, Extinction::Model::none);
+    EXPECT_EQ(e.scattering.order, Scattering::Order::none);
+    EXPECT_EQ(e.refraction.rays, Refraction::Rays::straight);
+    EXPECT_EQ(e.background.kind, Background::Kind::black);
+    EXPECT_EQ(e.exposure.shutter, Exposure::Shutter::instant);
+    EXPECT_EQ(e.sensor.response, Sensor::Response::linear);
+    EXPECT_EQ(e.sensor.clipping, Sensor::Clipping::none);
+  }
+}
+
+TEST(Effects, BadListsAreRefusedWithTheTablesNames) {
+  for (const char* bad : {"",
+                          "extinction",
+                          "extinction=",
+                          "extinction=-1",
+                          "extinction=nan",
+                          "extinction=1e999",
+                          "extinction=3x",
+                          "extinction=inf",
+                          "fog=3",
+                          "extinction=1,extinction=2",
+                          "extinction=1,",
+                          ",",
+                          "extinction=1,,gamma=2",
+                          "extinction=1:albedo=1",
+                          "extinction=1:",
+                          "none,gamma=2",
+                          "auto,gamma=2",
+                          "scattering=single",
+                          "scattering=some,extinction=1",
+                          "scattering=single:albedo=1.1,extinction=1",
+                          "scattering=single:g=1.1,extinction=1",
+                          "scattering=single:g=,extinction=1",
+                          "scattering=single:g,extinction=1",
+                          "scattering=single:g=0:g=0,extinction=1",
+                          "scattering=none:g=0.1",
+                          "refraction=1",
+                          "refraction=curved:flame=10",
+                          "refraction=curved:flame=nan",
+                          "refraction=straight:flame=1800",
+                          "background=1/2",
+                          "background=1/2/3/4",
+                          "background=1//3",
+                          "background=1/2/",
+                          "background=-1",
+                          "background=red",
+                          "exposure=-1",
+                          "exposure=11",
+                          "exposure=",
+                          "exposure=0.01:rise=101",
+                          "exposure=0.01:speed=1",
+                          "gamma=0",
+                          "gamma=-2.2",
+                          "gamma=nan",
+                          "gamma=none",
+                          "saturation=0",
+                          "saturation=-1",
+                          "saturation=nan",
+                          "saturation=inf"}) {
     const auto request = parse_effects(bad);
     ASSERT_FALSE(request.ok()) << bad;
     EXPECT_EQ(request.error().where, "effects");
+    for (const char* name :
+         {"extinction=", "scattering=", "refraction=", "background=", "exposure=", "gamma=", "saturation="})
+      EXPECT_NE(request.error().remedy.find(name), std::string::npos) << bad;
   }
 }
 

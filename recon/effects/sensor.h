@@ -1,0 +1,20 @@
+#pragma once
+
+#include "recon/effects/effects.h"
+#include "recon/preprocess/view.h"
+
+namespace emberlock {
+
+// The camera's response, channel by channel: value = white * (radiance / white)^(1 / gamma), clipped at
+// white. Both ways are odd functions, so that noise around black stays unbiased. A solver works on linearised
+// pictures, and where white clips, compares by BoundedResidual{white} (kernels/sensor.h).
+
+/// From pixel values to radiance, in place; a clipped sensor's values above white become white. `sensor` must
+/// pass `check`.
+void linearise(RadianceImage& image, const Sensor& sensor);
+
+/// From radiance to pixel values, in place; the inverse of `linearise` below white. `sensor` must pass
+/// `check`.
+void respond(RadianceImage& image, const Sensor& sensor);
+
+}  // namespace emberlock

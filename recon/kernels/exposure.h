@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstddef>
+
+#include "base/host_device.h"
+#include "recon/kernels/rgba.h"
+
+namespace emberlock {
+
+/// One key point of a column average along z: out(k) = sum of weight(m) * in(k - m) over m = -reach..reach,
+/// nothing outside the grid. With `direction` -1 it reads in(k + m): the transpose.
+struct AverageAlongZ {
+  const Rgba* in = nullptr;
+  Rgba* out = nullptr;
+  std::size_t plane = 0;  ///< key points of a layer
+  int nz = 0;
+  const float* weights = nullptr;  ///< 2 * reach + 1, that of m = -reach first
+  int reach = 0;
+  int direction = 1;
+
+  HOST_DEVICE void operator()(std::size_t in_layer, int k) const {
+    Rgba sum;
+    for (int m = -reach; m <= reach; ++m) {
+      const int from = k - direction * m;
+      if (from < 0 || from >= nz) continue;
+      sum = sum + weights[m + reach] * in[in_layer + plane * static_cast<std::size_t>(from)];
+    }
+    out[in_layer + plane * static_cast<std::size_t>(k)] = sum;
+  }
+};
+
+}  // namespace emberlock

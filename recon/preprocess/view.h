@@ -28,6 +28,8 @@ struct View {
   CameraModel camera;
   RadianceImage image;
   ViewRole role = ViewRole::input;
+  /// What lies behind the flame, of the image's size; absent is black.
+  std::optional<RadianceImage> background = {};
 };
 
 /// What a reconstruction starts from.

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "recon/effects/effects.h"
+#include "recon/preprocess/view.h"
+
+namespace emberlock {
+
+// A background is what a pixel shows where nothing is in front of it. Its distance isn't known, so rays that
+// the gas bends see it at their own pixel.
+
+/// An Error, with the view's name, where its own background picture isn't of its image's size.
+Status check(const Background& background, const View& view);
+
+/// The background as a camera with pictures of `size` sees it, in linear grey levels; `own` is the view's own
+/// picture, for Kind::image, or null.
+RadianceImage backdrop(const Background& background, ImageSize size, const RadianceImage* own);
+
+}  // namespace emberlock

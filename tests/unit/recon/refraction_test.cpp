@@ -1,0 +1,188 @@
+#include "recon/effects/refraction.h"
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "recon/hull/hull.h"
+
+namespace emberlock {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+struct Stretch {
+  Vector3f origin, direction;
+  double length;
+};
+
+std::vector<Stretch> chain(const IndexField& field, const Vector3f& origin, const Vector3f& direction) {
+  std::vector<Stretch> out;
+  trace(field, origin.data(), direction.data(), [&](const float* o, const float* d, float length) {
+    out.push_back({Vector3f(o), Vector3f(d), static_cast<double>(length)});
+  });
+  return out;
+}
+
+/// n - 1 as a function of the position, on a cube of `cells` cells of edge 1 centred on the origin.
+RefractiveIndex sampled(int cells, const std::function<double(const Vector3d&)>& excess) {
+  Grid grid;
+  grid.nx = grid.ny = grid.nz = cells + 1;
+  for (float& o : grid.origin) o = -0.5F * static_cast<float>(cells);
+  std::vector<float> values(grid.size());
+  for (int k = 0; k <= cells; ++k)
+    for (int j = 0; j <= cells; ++j)
+      for (int i = 0; i <= cells; ++i)
+        values[grid.index(i, j, k)] =
+            static_cast<float>(excess(Vector3d(i, j, k) - Vector3d::Constant(0.5 * cells)));
+  return {grid, values};
+}
+
+Vector3d bend(const std::vector<Stretch>& path) {
+  return (path.back().direction - path.front().direction).cast<double>();
+}
+
+TEST(Refraction, EvenGasOfAnyIndexLeavesTheRayItsBits) {
+  const Vector3f origin(-40.3F, 3.7F, 1.9F);
+  for (const double excess : {0.0, -2e-4, 0.3}) {
+    const RefractiveIndex index = sampled(32, [&](const Vector3d&) { return excess; });
+    for (const Vector3f& to : {Vector3f(0, 0, 0), Vector3f(7, -3, 5), Vector3f(0, 90, 0)}) {
+      const Vector3f direction = (to - origin).normalized();
+      const auto path = chain(index.field(Grid{}), origin, direction);
+      ASSERT_EQ(path.size(), 1u);
+      EXPECT_EQ(path[0].origin, origin);
+      EXPECT_EQ(path[0].direction, direction);
+      EXPECT_EQ(path[0].length, static_cast<double>(kEndless));
+    }
+  }
+}
+
+// Bouguer: in n(r) every ray keeps n r sin(phi) = |n r x d|.
+TEST(Refraction, BouguersInvariantHoldsInARadialField) {
+  const auto excess = [](const Vector3d& r) { return 0.2 * std::exp(-r.squaredNorm() / 60); };
+  const RefractiveIndex index = sampled(64, excess);
+  for (const float off : {1.F, 4.F, 9.F}) {
+    const auto path = chain(index.field(Grid{}), {-50, off, 0.3F}, {1, 0, 0});
+    ASSERT_GT(path.size(), 8u);
+    const double expected = std::hypot(static_cast<double>(off), 0.3);
+    double turned = 0;
+    for (const Stretch& s : path) {
+      const Vector3d r = s.origin.cast<double>();
+      const Vector3d d = s.direction.cast<double>();
+      EXPECT_NEAR((1 + excess(r)) * r.cross(d).norm(), expected, 0.03) << off << " at " << r.transpose();
+      turned = std::max(turned, (1 - d.x()));
+    }
+    EXPECT_GT(turned, 0.002) << off;
+  }
+}
+
+// n = 1 + g x, entered along y where n = 1: the catenary x = (cosh(g y) - 1) / g, which is the parabola
+// g y^2 / 2 to first order.
+TEST(Refraction, LinearIndexBendsTheRayIntoACatenary) {
+  const double g = 0.01;
+  const RefractiveIndex index = sampled(64, [&](const Vector3d& r) { return g * r.x(); });
+  const auto path = chain(index.field(Grid{}), {0, -31.999F, 0}, {0, 1, 0});
+  ASSERT_GT(path.size(), 10u);
+  for (const Stretch& s : path) {
+    const double y = static_cast<double>(s.origin.y()) + 32;
+    if (y > 63) break;
+    EXPECT_NEAR(static_cast<double>(s.origin.x()), (std::cosh(g * y) - 1) / g, 0.02) << y;
+    EXPECT_NEAR(static_cast<double>(s.origin.z()), 0, 1e-6);
+  }
+  EXPECT_GT(static_cast<double>(path.back().origin.x()), 20);
+}
+
+// Small angles (Abel): n - 1 = -h exp(-r^2 / w^2) turns a ray that passes the axis at b by
+// 2 h b sqrt(pi) / w exp(-b^2 / w^2), away from it.
+TEST(Refraction, HotColumnTurnsRaysByAbelsIntegral) {
+  const double h = 2.2e-4;
+  for (const double w : {4.0, 8.0, 16.0}) {  // cells; central differences err by about 1 / w^2
+    const RefractiveIndex index = sampled(w > 8 ? 96 : 64, [&](const Vector3d& r) {
+      return -h * std::exp(-(r.x() * r.x() + r.y() * r.y()) / (w * w));
+    });
+    for (const double b : {-6.0, 2.5, 5.0, 8.0}) {
+      const auto path = chain(index.field(Grid{}), {-100, static_cast<float>(b), 0.5F}, {1, 0, 0});
+      const double expected = 2 * h * b * std::sqrt(std::numbers::pi) / w * std::exp(-b * b / (w * w));
+      const double largest = h * std::sqrt(2 * std::numbers::pi / std::numbers::e);
+      EXPECT_NEAR(bend(path).y(), expected, 1.3 / (w * w) * largest) << w << ", " << b;
+      EXPECT_EQ(bend(path).z(), 0);
+    }
+  }
+}
+
+TEST(Refraction, StretchesJoinWithinTheirTolerance) {
+  const RefractiveIndex index =
+      sampled(64, [](const Vector3d& r) { return -0.01 * std::exp(-r.squaredNorm() / 100); });
+  const auto path = chain(index.field(Grid{}), {-50, 6, 3}, Vector3f(1, 0.05F, -0.1F).normalized());
+  ASSERT_GT(path.size(), 4u);
+  for (std::size_t i = 0; i + 1 < path.size(); ++i) {
+    const Vector3f end = path[i].origin + static_cast<float>(path[i].length) * path[i].direction;
+    EXPECT_LT((path[i + 1].origin - end).norm(), 1.1 * kLargestDeparture) << i;
+    EXPECT_NEAR(path[i].direction.norm(), 1, 1e-6);
+  }
+}
+
+TEST(Refraction, RaysThatMissTheGasOrStartInsideIt) {
+  const RefractiveIndex index =
+      sampled(16, [](const Vector3d& r) { return 0.01 * std::exp(-r.squaredNorm() / 9); });
+  EXPECT_EQ(chain(index.field(Grid{}), {-50, 9, 0}, {1, 0, 0}).size(), 1u);  // along a face, outside
+  EXPECT_EQ(chain(index.field(Grid{}), {50, 2, 0}, {1, 0, 0}).size(), 1u);   // behind the camera
+  EXPECT_GT(chain(index.field(Grid{}), {-4, 2, 0}, {1, 0, 0}).size(), 1u);   // a camera in the gas
+  EXPECT_GE(chain(index.field(Grid{}), {0, -50, 8}, {0, 1, 0}).size(), 1u);  // along a face
+}
+
+TEST(Refraction, CoarserGridsOfTheMediumSeeTheSameRay) {
+  const RefractiveIndex index =
+      sampled(32, [](const Vector3d& r) { return -0.01 * std::exp(-r.squaredNorm() / 30); });
+  Grid coarse;
+  coarse.edge = 2;
+  coarse.origin[0] = -3;
+  const auto fine = chain(index.field(Grid{}), {-50, 3, 2}, {1, 0, 0});
+  const auto same = chain(index.field(coarse), {-23.5F, 1.5F, 1}, {1, 0, 0});
+  EXPECT_NEAR(bend(fine).y(), bend(same).y(), 1e-6);
+  EXPECT_GT(std::abs(bend(fine).y()), 1e-3);
+}
+
+TEST(Refraction, IndexOfAirByGladstoneAndDale) {
+  EXPECT_NEAR(index_excess(Kelvin(293)), 2.7e-4, 1e-9);
+  EXPECT_NEAR(index_excess(Kelvin(1800)), 2.7e-4 * 293 / 1800, 1e-9);
+}
+
+TEST(Refraction, AssumedGasIsHotInTheMediumAndAmbientAroundIt) {
+  const Grid grid = grid_over({Vector3d::Zero(), Vector3d::Constant(0.2)}, 64);
+  const Hull medium = whole_grid(grid);
+  const Refraction refraction{Refraction::Rays::curved, Kelvin(1500), Kelvin(300)};
+  const GasTemperature gas = assume_temperature(medium, {}, refraction);
+  const Grid& g = gas.grid;
+  EXPECT_NEAR(gas.kelvin[g.index(g.nx / 2, g.ny / 2, g.nz / 2)], 1500, 0.1);
+  for (int j = 0; j < g.ny; ++j)
+    for (int i = 0; i < g.nx; ++i) {
+      for (const int layer : {0, 1}) {  // two layers all around, so that the gradient starts at 0
+        EXPECT_EQ(gas.kelvin[g.index(i, j, layer)], 300.F);
+        EXPECT_EQ(gas.kelvin[g.index(i, layer, j)], 300.F);
+        EXPECT_EQ(gas.kelvin[g.index(layer, i, j)], 300.F);
+        EXPECT_EQ(gas.kelvin[g.index(i, j, g.nz - 1 - layer)], 300.F);
+      }
+    }
+}
+
+TEST(Refraction, DarkGasIsAssumedCooler) {
+  const Grid grid = grid_over({Vector3d::Zero(), Vector3d::Constant(0.2)}, 32);
+  const Hull medium = whole_grid(grid);
+  std::vector<Rgba> emission(grid.size());
+  for (std::size_t p = 0; p < emission.size(); ++p)
+    emission[p] = p % 33 > 16 ? Rgba{{9, 9, 9, 0}} : Rgba{{1, 1, 1, 0}};  // bright where x > 0; the mean is 5
+  const GasTemperature gas = assume_temperature(medium, emission, {});
+  const Grid& g = gas.grid;
+  const float bright = gas.kelvin[g.index(3 * g.nx / 4 - 2, g.ny / 2, g.nz / 2)];
+  const float dark = gas.kelvin[g.index(g.nx / 4 + 2, g.ny / 2, g.nz / 2)];
+  EXPECT_NEAR(bright, 1800, 1);
+  EXPECT_NEAR(dark, 293 + 1507 / 5.0, 10);
+}
+
+}  // namespace
+}  // namespace emberlock

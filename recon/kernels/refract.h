@@ -80,9 +80,9 @@ HOST_DEVICE inline bool enter_field(const IndexField& field, const float* origin
 
 /// A straight stretch in the making: its start, and the momentum there.
 struct Stretch {
-  float origin[3];
-  float direction[3];
-  double momentum[3];
+  float origin[3] = {};
+  float direction[3] = {};
+  double momentum[3] = {};
 
   HOST_DEVICE Stretch(const double* r, const double* p) {
     const double n = sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2]);

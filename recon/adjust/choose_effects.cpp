@@ -24,7 +24,8 @@ class Probe {
 
   /// Held-out pixels' RMS after a cold solve, and the solution.
   double solve(PerMeter extinction, std::vector<Rgba>& x) const {
-    Descent descent(level_, sigma(extinction), setup_.device, setup_.pool);
+    Descent descent(level_, absorbing_optics(sigma(extinction)), Precision::float32, setup_.device,
+                    setup_.pool);
     for (int p = 0; p < kPasses; ++p) descent.pass();
     x = descent.engine().get();
     return descent.validation_error();
@@ -68,7 +69,8 @@ class Probe {
     return std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / static_cast<double>(kRays)))));
   }
   [[nodiscard]] std::vector<Rgba> pictures(PerMeter extinction, const std::vector<Rgba>& x) const {
-    const auto engine = make_engine(level_.problem, sigma(extinction), setup_.device, setup_.pool);
+    const auto engine = make_engine(level_.problem, absorbing_optics(sigma(extinction)), Precision::float32,
+                                    setup_.device, setup_.pool);
     engine->set(x);
     for (int s = 0; s < level_.problem.list.subsets(); ++s) engine->project(s);
     return engine->residuals();

@@ -64,6 +64,7 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
   level.subsets = subsets_for(setup.sigma(hull.grid), pixels_per_voxel(setup, hull.grid) / stride,
                               flame_pixels(setup, stride), most_subsets);
   ProblemOptions options;
+  options.step = setup.options.step;
   options.subsets = level.subsets + 1;
   options.subset_of = [subsets = level.subsets, stride](std::size_t, int x, int y) {
     if (x % stride != 0 || y % stride != 0) return -1;
@@ -74,9 +75,9 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
   return level;
 }
 
-Descent::Descent(const Level& level, float sigma, Device device, Pool& pool)
+Descent::Descent(const Level& level, const Optics& optics, Precision precision, Device device, Pool& pool)
     : level_(level),
-      engine_(make_engine(level.problem, sigma, device, pool)),
+      engine_(make_engine(level.problem, optics, precision, device, pool)),
       fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]) {
   find_weights();
 }
@@ -122,7 +123,7 @@ void Descent::find_weights() {
   const std::vector<std::uint8_t>& active = level_.problem.active;
   std::vector<Rgba> ones(active.size());
   for (std::size_t p = 0; p < ones.size(); ++p)
-    if (active[p] != 0) ones[p] = {{1, 1, 1, 1}};
+    if (active[p] != 0) ones[p] = Rgba{{1, 1, 1, 1}};
   engine_->set(ones);
   for (int s = 0; s < level_.subsets; ++s) {
     engine_->project(s);

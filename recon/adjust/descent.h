@@ -24,8 +24,8 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
 /// by preconditioned ordered-subset steps with Nesterov's momentum.
 class Descent {
  public:
-  /// The level and the pool must outlive it; `sigma` is the extinction a voxel edge. Starts from zero.
-  Descent(const Level& level, float sigma, Device device, Pool& pool);
+  /// The level and the pool must outlive it. Starts from zero.
+  Descent(const Level& level, const Optics& optics, Precision precision, Device device, Pool& pool);
 
   void start_from(const std::vector<Rgba>& x);
   /// One pass over all subsets.

@@ -6,6 +6,7 @@
 
 #include "recon/adjust/problem.h"
 #include "recon/compute/device.h"
+#include "recon/render/march_table.h"
 
 namespace emberlock {
 
@@ -35,7 +36,8 @@ class Engine {
   /// residual = A y.
   virtual void project(int subset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> residuals() const = 0;
-  /// gradient += A^T residual.
+  /// gradient += A^T residual; under Absorb::field lane 3 is the slope by extinction, and residual() must
+  /// have come last.
   virtual void backproject(int subset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> gradient() const = 0;
   /// The weights of descend(): one a key point, 0 for those that take no part. Clears the gradient.
@@ -45,12 +47,22 @@ class Engine {
   virtual void adjust(int subset, const PaperStep& step) = 0;
 };
 
-/// `device` is resolved (cpu or cuda); `sigma` is the extinction a voxel edge. The problem and the pool must
-/// outlive the engine.
-std::unique_ptr<Engine> make_engine(const Problem& problem, float sigma, Device device, Pool& pool);
+/// What light does on its way through a problem's medium, as the engine needs it.
+struct Optics {
+  Absorb absorb = Absorb::nothing;
+  float sigma = 0;  ///< of constant extinction, a voxel edge; with Absorb::field it is lane 3 of x
+  float white = 0;  ///< captured values from here on are bounds; 0: none are
+};
+/// Constant extinction of sigma a voxel edge, or none where it is 0.
+Optics absorbing_optics(float sigma);
+
+/// `device` is resolved (cpu or cuda). The problem and the pool must outlive the engine. float64 runs on the
+/// CPU alone.
+std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
+                                    Device device, Pool& pool);
 
 #ifdef EMBERLOCK_HAVE_CUDA
-std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, float sigma);
+std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics);
 #endif
 
 }  // namespace emberlock

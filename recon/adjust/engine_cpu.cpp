@@ -1,118 +1,178 @@
 #include <algorithm>
 
 #include "recon/adjust/engine.h"
-#include "recon/kernels/march.h"
 #include "recon/kernels/paper.h"
-#include "recon/kernels/update.h"
 
 namespace emberlock {
 namespace {
 
-template <class Extinction>
+template <class To, class From>
+std::vector<Quad<To>> converted(const std::vector<Quad<From>>& from) {
+  if constexpr (std::is_same_v<To, From>) {
+    return from;
+  } else {
+    std::vector<Quad<To>> to(from.size());
+    for (std::size_t i = 0; i < from.size(); ++i)
+      for (int c = 0; c < 4; ++c) to[i].c[c] = static_cast<To>(from[i].c[c]);
+    return to;
+  }
+}
+
+template <class Real>
 class CpuEngine final : public Engine {
  public:
-  CpuEngine(const Problem& problem, Extinction extinction, Pool& pool)
+  CpuEngine(const Problem& problem, const Optics& optics, Pool& pool)
       : problem_(problem),
-        extinction_(extinction),
+        optics_(optics),
+        travel_(problem.list.bends.empty() ? Travel::straight : Travel::curved),
         pool_(pool),
         x_(problem.grid().size()),
         y_(x_.size()),
         next_y_(x_.size()),
         gradient_(x_.size()),
         weight_(x_.size()),
-        residual_(problem.list.rays.size()) {}
+        residual_(problem.list.rays.size()) {
+    if (optics.absorb == Absorb::field) samples_.resize(problem.most_samples());
+  }
 
-  void set(const std::vector<Rgba>& x) override { x_ = y_ = next_y_ = x; }
-  [[nodiscard]] std::vector<Rgba> get() const override { return x_; }
-  [[nodiscard]] std::vector<Rgba> residuals() const override { return residual_; }
-  [[nodiscard]] std::vector<Rgba> gradient() const override { return gradient_; }
+  void set(const std::vector<Rgba>& x) override { x_ = y_ = next_y_ = converted<Real>(x); }
+  [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_); }
+  [[nodiscard]] std::vector<Rgba> residuals() const override { return converted<float>(residual_); }
+  [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
   void residual(int subset) override {
-    each_ray(subset,
-             [&](std::size_t r, const Rgba& radiance) { residual_[r] = radiance - problem_.seen[r]; });
+    const Judge<Real> judge = problem_.judge<Real>(optics_.white);
+    if (optics_.absorb == Absorb::field) {
+      const auto march = table_.field_forward[static_cast<int>(travel_)];
+      each_slice(subset, [&](std::size_t begin, std::size_t end) { march(work(subset), judge, begin, end); });
+      return;
+    }
+    const auto march = table_.forward_of(optics_.absorb, travel_);
+    each_slice(subset, [&](std::size_t begin, std::size_t end) {
+      march(work(subset), begin, end);
+      for (std::size_t r = begin; r < end; ++r) residual_[r] = judge(r, residual_[r]);
+    });
   }
   void project(int subset) override {
-    each_ray(subset, [&](std::size_t r, const Rgba& radiance) { residual_[r] = radiance; });
+    const auto march = table_.forward_of(optics_.absorb, travel_);
+    each_slice(subset, [&](std::size_t begin, std::size_t end) { march(work(subset), begin, end); });
   }
 
   void backproject(int subset) override {
-    each_slab(subset,
-              Adjoint<Extinction>{problem_.list.table(), residual_.data(), gradient_.data(), extinction_});
+    const auto march = table_.adjoint_of(optics_.absorb, travel_);
+    each_slab(subset, [&](const std::uint32_t* runs, std::size_t count, Layers layers) {
+      march(work(subset), runs, count, layers);
+    });
   }
 
   void set_weights(const std::vector<float>& weights) override {
-    weight_ = weights;
-    std::fill(gradient_.begin(), gradient_.end(), Rgba{});
+    weight_.assign(weights.begin(), weights.end());
+    std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{});
   }
 
   void descend(const Step& step) override {
     const Grid& g = problem_.grid();
-    const Descend update{g.nx,       g.ny,           g.nz,           weight_.data(),
-                         x_.data(),  y_.data(),      next_y_.data(), gradient_.data(),
-                         step.scale, step.smoothing, step.momentum};
+    const Descend<Real> update{g.nx,
+                               g.ny,
+                               g.nz,
+                               weight_.data(),
+                               x_.data(),
+                               y_.data(),
+                               next_y_.data(),
+                               gradient_.data(),
+                               Real(step.scale),
+                               Real(step.smoothing),
+                               Real(step.momentum)};
     pool_.run(g.nz, [&](int k) {
       for (int j = 0; j < g.ny; ++j) {
         const Slice span = problem_.row_span[static_cast<std::size_t>(j) +
                                              static_cast<std::size_t>(g.ny) * static_cast<std::size_t>(k)];
-        for (std::size_t i = span.begin; i < span.end; ++i) update(static_cast<int>(i), j, k);
+        table_.update(update, static_cast<int>(span.begin), static_cast<int>(span.end), j, k);
       }
     });
     y_.swap(next_y_);
   }
 
   void adjust(int subset, const PaperStep& step) override {
-    each_slab(subset, PaperAdjust<Extinction>{problem_.list.table(), residual_.data(), x_.data(), extinction_,
-                                              step.gain, step.decay, step.deviation, step.stream});
-    y_ = x_;
+    if constexpr (std::is_same_v<Real, float>) {
+      if (optics_.absorb == Absorb::constant)
+        adjust_by(subset, step, ConstantExtinction<float>{optics_.sigma});
+      else
+        adjust_by(subset, step, NoExtinction<float>{});
+    }
   }
 
  private:
-  template <class Store>
-  void each_ray(int subset, const Store& store) {
+  [[nodiscard]] MarchWork<Real> work(int subset) {
+    const std::size_t first =
+        problem_.list.first_sample(problem_.list.subset_begin[static_cast<std::size_t>(subset)]);
+    return {problem_.list.table(), y_.data(), Real(optics_.sigma), residual_.data(), gradient_.data(),
+            samples_.data(),       first};
+  }
+  template <class Do>
+  void each_slice(int subset, const Do& act) {
     const auto s = static_cast<std::size_t>(subset);
     const std::size_t first = problem_.list.subset_begin[s];
     const std::size_t size = problem_.list.subset_begin[s + 1] - first;
-    const Forward<Extinction> forward{problem_.list.table(), y_.data(), extinction_};
     constexpr int kTasks = 64;
     pool_.run(kTasks, [&](int task) {
       const Slice rays = slice(size, kTasks, task);
-      for (std::size_t r = first + rays.begin; r < first + rays.end; ++r) store(r, forward(r));
+      if (rays.begin < rays.end) act(first + rays.begin, first + rays.end);
     });
   }
 
   /// Even slabs, then odd ones: no two that run at the same time share a key point.
-  template <class Scatter>
-  void each_slab(int subset, const Scatter& scatter) {
-    const SlabRays& slabs = problem_.slabs[static_cast<std::size_t>(subset)];
+  template <class Do>
+  void each_slab(int subset, const Do& act) {
+    const SlabRuns& slabs = problem_.slabs[static_cast<std::size_t>(subset)];
     const int count = problem_.slab_count();
     for (int parity = 0; parity < 2; ++parity) {
       pool_.run((count + 1 - parity) / 2, [&](int task) {
         const int slab = 2 * task + parity;
         const auto s = static_cast<std::size_t>(slab);
-        for (std::size_t n = slabs.begin[s]; n < slabs.begin[s + 1]; ++n)
-          scatter(slabs.ray[n], slab * Problem::kSlab, (slab + 1) * Problem::kSlab);
+        const std::size_t size = slabs.begin[s + 1] - slabs.begin[s];
+        if (size > 0) act(&slabs.run[slabs.begin[s]], size, Layers{slab * kSlab, (slab + 1) * kSlab});
       });
     }
   }
 
+  template <class Extinction>
+  void adjust_by(int subset, const PaperStep& step, const Extinction& extinction) {
+    const PaperAdjust<Extinction> adjustment{
+        problem_.list.table(), residual_.data(), x_.data(), extinction, step.gain, step.decay,
+        step.deviation,        step.stream};
+    each_slab(subset, [&](const std::uint32_t* runs, std::size_t count, Layers layers) {
+      for (std::size_t n = 0; n < count; ++n) adjustment(runs[n], layers);
+    });
+    y_ = x_;
+  }
+
   const Problem& problem_;
-  Extinction extinction_;
+  Optics optics_;
+  Travel travel_;
   Pool& pool_;
-  std::vector<Rgba> x_, y_, next_y_, gradient_;
-  std::vector<float> weight_;
-  std::vector<Rgba> residual_;
+  const MarchTable<Real>& table_ = march_table<Real>();
+  std::vector<Quad<Real>> x_, y_, next_y_, gradient_;
+  std::vector<Real> weight_;
+  std::vector<Quad<Real>> residual_;
+  std::vector<Quad<Real>> samples_;  // of one subset
 };
 
 }  // namespace
 
-std::unique_ptr<Engine> make_engine(const Problem& problem, float sigma, [[maybe_unused]] Device device,
-                                    Pool& pool) {
+Optics absorbing_optics(float sigma) {
+  Optics optics;
+  if (sigma > 0) optics = {Absorb::constant, sigma, 0};
+  return optics;
+}
+
+std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
+                                    [[maybe_unused]] Device device, Pool& pool) {
+  if (precision == Precision::float64) return std::make_unique<CpuEngine<double>>(problem, optics, pool);
 #ifdef EMBERLOCK_HAVE_CUDA
-  if (device == Device::cuda) return make_cuda_engine(problem, sigma);
+  if (device == Device::cuda) return make_cuda_engine(problem, optics);
 #endif
-  if (sigma > 0)
-    return std::make_unique<CpuEngine<ConstantExtinction>>(problem, ConstantExtinction{sigma}, pool);
-  return std::make_unique<CpuEngine<NoExtinction>>(problem, NoExtinction{}, pool);
+  return std::make_unique<CpuEngine<float>>(problem, optics, pool);
 }
 
 }  // namespace emberlock

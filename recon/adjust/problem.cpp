@@ -28,36 +28,43 @@ void find_active(const Hull& hull, std::vector<std::uint8_t>& active, std::vecto
   }
 }
 
-SlabRays sort_into_slabs(const Problem& problem, const RayTable& table, int subset) {
+SlabRuns sort_into_slabs(const Problem& problem, int subset) {
+  const RayList& list = problem.list;
   const auto s = static_cast<std::size_t>(subset);
-  const std::size_t first = problem.list.subset_begin[s];
-  const std::size_t last = problem.list.subset_begin[s + 1];
-  struct Reach {
-    int low, high;
-  };
-  std::vector<Reach> reach(last - first);
-  SlabRays slabs;
+  const std::size_t first = list.first_run(list.subset_begin[s]);
+  const std::size_t last = list.first_run(list.subset_begin[s + 1]);
+  const RayTable table = list.table();
+  std::vector<std::uint16_t> slab_of(last - first);
+  SlabRuns slabs;
   slabs.begin.assign(static_cast<std::size_t>(problem.slab_count()) + 1, 0);
-  for (std::size_t r = first; r < last; ++r) {
-    const Marcher march(table, r);
-    const Run& front = table.runs[march.ray.first_run];
-    const Run& back = table.runs[march.ray.first_run + march.ray.runs - 1];
-    const int a = march.layer(front, 0) / Problem::kSlab;
-    const int b = march.layer(back, back.count - 1) / Problem::kSlab;
-    reach[r - first] = {std::min(a, b), std::max(a, b)};
-    for (int slab = std::min(a, b); slab <= std::max(a, b); ++slab)
-      ++slabs.begin[static_cast<std::size_t>(slab) + 1];
+  for (std::size_t n = first; n < last; ++n) {
+    const Run& run = list.runs[n];
+    const Line<float> line =
+        table.bends == nullptr ? StraightPath::line<float>(table, n) : CurvedPath::line<float>(table, n);
+    // The middle sample tells: the first may have been rounded across the border that the run was cut at.
+    const float middle = run.start + (static_cast<float>(run.count / 2) + 0.5F) * run.step;
+    const float z = line.origin[2] + line.direction[2] * middle;
+    const int slab = clamp_cell(z, problem.grid().nz) / kSlab;
+    slab_of[n - first] = static_cast<std::uint16_t>(slab);
+    ++slabs.begin[static_cast<std::size_t>(slab) + 1];
   }
   for (std::size_t i = 1; i < slabs.begin.size(); ++i) slabs.begin[i] += slabs.begin[i - 1];
-  slabs.ray.resize(slabs.begin.back());
+  slabs.run.resize(last - first);
   std::vector<std::size_t> next = slabs.begin;
-  for (std::size_t r = first; r < last; ++r)
-    for (int slab = reach[r - first].low; slab <= reach[r - first].high; ++slab)
-      slabs.ray[next[static_cast<std::size_t>(slab)]++] = static_cast<std::uint32_t>(r);
+  for (std::size_t n = first; n < last; ++n)
+    slabs.run[next[slab_of[n - first]]++] = static_cast<std::uint32_t>(n);
   return slabs;
 }
 
 }  // namespace
+
+std::size_t Problem::most_samples() const {
+  std::size_t most = 0;
+  for (std::size_t s = 0; s + 1 < list.subset_begin.size(); ++s)
+    most =
+        std::max(most, list.first_sample(list.subset_begin[s + 1]) - list.first_sample(list.subset_begin[s]));
+  return most;
+}
 
 Problem pose(const std::vector<const View*>& views, const Hull& hull, const ProblemOptions& options,
              Pool& pool) {
@@ -67,6 +74,7 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
   cameras.reserve(views.size());
   for (const View* view : views) cameras.push_back(&view->camera);
   RayListOptions clip;
+  clip.step = static_cast<float>(options.step);
   clip.subsets = options.subsets;
   clip.subset_of = options.subset_of;
   problem.list = clip_rays(cameras, problem.crop.hull, clip, pool);
@@ -76,11 +84,11 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
     const float* rgb =
         &views[problem.list.rays[r].view]->image.rgb[3 * static_cast<std::size_t>(problem.list.pixels[r])];
     if (static_cast<double>(std::max({rgb[0], rgb[1], rgb[2]})) > options.black_below)
-      problem.seen[r] = {{rgb[0], rgb[1], rgb[2], 0}};
+      problem.seen[r] = Rgba{{rgb[0], rgb[1], rgb[2], 0}};
   }
   problem.slabs.resize(static_cast<std::size_t>(options.subsets));
   pool.run(options.subsets, [&](int subset) {
-    problem.slabs[static_cast<std::size_t>(subset)] = sort_into_slabs(problem, problem.list.table(), subset);
+    problem.slabs[static_cast<std::size_t>(subset)] = sort_into_slabs(problem, subset);
   });
   return problem;
 }
@@ -105,7 +113,9 @@ std::vector<Rgba> refine(const std::vector<Rgba>& coarse, const Problem& from, c
         if (to.active[p] == 0) continue;
         const auto [ci, fx] = place(static_cast<int>(i) + to.crop.offset[0] - 2 * from.crop.offset[0], f.nx);
         // Emission is kept a voxel edge, and the fine edge is half as long.
-        fine[p] = 0.5F * trilinear(coarse.data(), {f.index(ci, cj, ck), fx, fy, fz}, f.nx, f.ny);
+        fine[p] =
+            0.5F * trilinear(coarse.data() + f.index(ci, cj, ck), static_cast<std::size_t>(f.nx),
+                             static_cast<std::size_t>(f.nx) * static_cast<std::size_t>(f.ny), fx, fy, fz);
       }
     }
   }

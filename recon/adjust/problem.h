@@ -5,36 +5,44 @@
 
 #include "recon/compute/pool.h"
 #include "recon/hull/ray_list.h"
+#include "recon/kernels/judge.h"
 #include "recon/kernels/rgba.h"
 
 namespace emberlock {
 
 struct View;
 
-/// Rays that meet a slab of voxels along z. Slabs that have one between them share no key point, so even
-/// slabs can be written at the same time, then odd ones, without atomics and in an order that no thread count
-/// changes.
-struct SlabRays {
-  std::vector<std::size_t> begin;  ///< slabs + 1 values into `ray`
-  std::vector<std::uint32_t> ray;
+/// The runs in each slab of voxels along z. Even slabs share no key point and can be written at the same
+/// time, then odd ones, without atomics and in an order that no thread count changes.
+struct SlabRuns {
+  std::vector<std::size_t> begin;  ///< slabs + 1 values into `run`
+  std::vector<std::uint32_t> run;
 };
 
 /// What a solver works on: the rays of some views through a hull, what was seen along each, and which key
 /// points take part.
 struct Problem {
-  static constexpr int kSlab = 4;  ///< voxels
-
   CroppedHull crop;
   RayList list;
-  std::vector<Rgba> seen;            ///< the pixel of each ray, grey levels
+  std::vector<Rgba> seen;        ///< the pixel of each ray, grey levels
+  std::vector<Rgba> background;  ///< behind each ray, grey levels; empty where it is black
+  std::vector<Rgba> offset;  ///< of each ray: what another pass adds to what is rendered; empty for nothing
   std::vector<std::uint8_t> active;  ///< key points of the hull's voxels, 1 or 0
   std::vector<Slice> row_span;       ///< for each row (j, k) of key points: first active i, last + 1
-  std::vector<SlabRays> slabs;       ///< one for each subset
+  std::vector<SlabRuns> slabs;       ///< one for each subset
   [[nodiscard]] const Grid& grid() const { return crop.hull.grid; }
+  template <class Real>
+  [[nodiscard]] Judge<Real> judge(float white) const {
+    return {seen.data(), background.empty() ? nullptr : background.data(),
+            offset.empty() ? nullptr : offset.data(), Real(white)};
+  }
+  /// Of the subset that has most.
+  [[nodiscard]] std::size_t most_samples() const;
   [[nodiscard]] int slab_count() const { return (grid().nz - 2) / kSlab + 1; }
 };
 
 struct ProblemOptions {
+  double step = 1;  ///< the march's longest, voxel edges
   int subsets = 1;
   std::function<int(std::size_t view, int x, int y)>
       subset_of;            ///< -1 leaves a pixel out; all in subset 0 where empty

@@ -21,6 +21,8 @@ Status check(const Scene& scene, const Grid& grid, const Effects& effects, const
   if (options.iterations < 0)
     return refuse("a negative number of iterations", "iterations",
                   "Give 1 or more, or 0 for the solver's rule");
+  if (!(options.step >= 0.05 && options.step <= 4))
+    return refuse("the step is out of range", "step", "Give 0.05..4 voxel edges");
   if (options.compute.threads < 0 || options.compute.threads > 256)
     return refuse("the number of threads is out of range", "threads", "Give 1..256, or 0 for every core");
   if (options.budget && !elapsed)

@@ -25,9 +25,6 @@ enum class Solver {
 /// "default" or "paper"; an Error that lists them otherwise.
 Result<Solver> parse_solver(std::string_view name);
 
-/// Of the march and of all that is stored at key points.
-enum class Precision { float32, float64 };
-
 struct SolveOptions {
   Solver solver = Solver::standard;
   Precision precision = Precision::float32;

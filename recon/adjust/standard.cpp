@@ -26,7 +26,8 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
   std::unique_ptr<Descent> descent;
   for (std::size_t l = hulls.size(); l-- > 0;) {
     auto finer = std::make_unique<const Level>(pose_level(setup, hulls[l], 1 << l));
-    auto next = std::make_unique<Descent>(*finer, setup.sigma(hulls[l].grid), setup.device, setup.pool);
+    auto next = std::make_unique<Descent>(*finer, absorbing_optics(setup.sigma(hulls[l].grid)),
+                                          setup.options.precision, setup.device, setup.pool);
     if (descent) next->start_from(refine(descent->engine().get(), level->problem, finer->problem));
     descent = std::move(next);
     level = std::move(finer);

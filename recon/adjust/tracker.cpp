@@ -9,7 +9,8 @@ Tracker::Tracker(const SolverSetup& setup, const std::vector<const View*>& held_
   if (held_out.empty()) return;
   const Seconds start = now();
   held_out_ = std::make_unique<const Problem>(pose(held_out, setup.hull, {}, setup.pool));
-  engine_ = make_engine(*held_out_, setup.sigma(held_out_->grid()), setup.device, setup.pool);
+  engine_ = make_engine(*held_out_, absorbing_optics(setup.sigma(held_out_->grid())), setup.options.precision,
+                        setup.device, setup.pool);
   error_ = std::make_unique<const ErrorOverBoxes>(held_out, boxes, *held_out_);
   excluded_ += now() - start;
 }

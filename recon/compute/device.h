@@ -12,6 +12,9 @@ enum class Device {
   cuda,
 };
 
+/// Of the march and of all that is stored at key points.
+enum class Precision { float32, float64 };
+
 /// Where and how wide to compute. Results are bit-identical for every number of threads on the CPU.
 struct ComputeOptions {
   Device device = Device::automatic;

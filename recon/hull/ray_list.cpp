@@ -49,12 +49,18 @@ struct PixelRow {
   int y, x0, x1;
 };
 
+struct Counts {
+  std::uint32_t rays = 0, runs = 0, samples = 0;
+};
+
 /// What one row of pixels gives; runs are counted from the row's own first.
 struct RowRays {
   std::vector<MarchRay> rays;
   std::vector<Run> runs;
   std::vector<std::uint32_t> pixels;
   std::vector<int> subsets;
+  std::uint32_t samples = 0;
+  std::vector<Counts> counts;  // of each subset
 };
 
 class RowClipper {
@@ -65,6 +71,7 @@ class RowClipper {
 
   RowRays operator()(const CameraModel& camera, const float* origin, const PixelRow& row) const {
     RowRays out;
+    out.counts.resize(static_cast<std::size_t>(options_.subsets));
     const Intrinsics& k = camera.intrinsics;
     const Eigen::Matrix3d world_from_camera = camera.camera_from_world.rotation.transpose();
     const bool straight = k.distortion.none();
@@ -81,28 +88,36 @@ class RowClipper {
       for (int a = 0; a < 3; ++a) ray.direction[a] = static_cast<float>(d[a]);
       ray.view = row.view;
       ray.first_run = static_cast<std::uint32_t>(out.runs.size());
-      add_runs(origin, ray, out.runs);
+      const std::uint32_t before = out.samples;
+      add_runs(origin, ray, out);
       if (ray.runs == 0) continue;
       out.rays.push_back(ray);
       out.pixels.push_back(static_cast<std::uint32_t>(row.y) * static_cast<std::uint32_t>(k.size.width) +
                            static_cast<std::uint32_t>(x));
       out.subsets.push_back(subset);
+      Counts& counts = out.counts[static_cast<std::size_t>(subset)];
+      ++counts.rays;
+      counts.runs += ray.runs;
+      counts.samples += out.samples - before;
     }
     return out;
   }
 
  private:
-  void add_runs(const float* origin, MarchRay& ray, std::vector<Run>& runs) const {
+  void add_runs(const float* origin, MarchRay& ray, RowRays& out) const {
     float before = 0;
-    std::uint32_t samples = 0;
     clip_to_medium(mask_, origin, ray.direction, [&](float t0, float t1) {
       constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
       if (t1 - t0 < kSliver) return;
       const int count = std::max(1, static_cast<int>(std::ceil((t1 - t0) / options_.step - 1e-3F)));
-      runs.push_back({t0, (t1 - t0) / static_cast<float>(count), before, count, samples});
+      const float step = (t1 - t0) / static_cast<float>(count);
+      cut_at_slabs(origin[2], ray.direction[2], t0, step, count, mask_.mz, [&](int first, int size) {
+        const float ahead = static_cast<float>(first) * step;
+        out.runs.push_back({t0 + ahead, step, before + ahead, 0, out.samples, size});
+        out.samples += static_cast<std::uint32_t>(size);
+        ++ray.runs;
+      });
       before += t1 - t0;
-      samples += static_cast<std::uint32_t>(count);
-      ++ray.runs;
     });
   }
 
@@ -110,32 +125,55 @@ class RowClipper {
   const RayListOptions& options_;
 };
 
-/// Counting sort by subset, rows in order, so that the list doesn't depend on which thread did which row.
-void assemble(const std::vector<RowRays>& rows, int subsets, RayList& list) {
-  std::vector<std::size_t> next(static_cast<std::size_t>(subsets) + 1);
-  std::size_t run_count = 0;
-  for (const RowRays& row : rows) {
-    for (const int s : row.subsets) ++next[static_cast<std::size_t>(s) + 1];
-    run_count += row.runs.size();
-  }
-  for (std::size_t s = 1; s < next.size(); ++s) next[s] += next[s - 1];
-  list.subset_begin = next;
-  list.rays.resize(next.back());
-  list.pixels.resize(next.back());
-  list.runs.reserve(run_count);
-  for (const RowRays& row : rows) {
-    const auto first = static_cast<std::uint32_t>(list.runs.size());
-    for (std::size_t r = 0; r < row.rays.size(); ++r) {
-      const std::size_t at = next[static_cast<std::size_t>(row.subsets[r])]++;
-      list.rays[at] = row.rays[r];
-      list.rays[at].first_run += first;
-      list.pixels[at] = row.pixels[r];
+/// Sorts by subset, rows in order, so that the list doesn't depend on which thread did which row.
+void assemble(std::vector<RowRays>& rows, int subsets, RayList& list, Pool& pool) {
+  Counts next;
+  list.subset_begin.push_back(0);
+  for (int s = 0; s < subsets; ++s) {
+    for (RowRays& row : rows) {
+      Counts& counts = row.counts[static_cast<std::size_t>(s)];
+      std::swap(counts, next);  // from how many there are to where they go
+      next.rays += counts.rays;
+      next.runs += counts.runs;
+      next.samples += counts.samples;
     }
-    list.runs.insert(list.runs.end(), row.runs.begin(), row.runs.end());
+    list.subset_begin.push_back(next.rays);
   }
+  list.rays.resize(next.rays);
+  list.pixels.resize(next.rays);
+  list.runs.resize(next.runs);
+  constexpr int kTasks = 64;
+  pool.run(kTasks, [&](int task) {
+    const Slice mine = slice(rows.size(), kTasks, task);
+    for (std::size_t n = mine.begin; n < mine.end; ++n) {
+      RowRays& row = rows[n];
+      for (std::size_t r = 0; r < row.rays.size(); ++r) {
+        Counts& to = row.counts[static_cast<std::size_t>(row.subsets[r])];
+        MarchRay ray = row.rays[r];
+        const Run* from = &row.runs[ray.first_run];
+        ray.first_run = to.runs;
+        list.pixels[to.rays] = row.pixels[r];
+        for (std::uint32_t i = 0; i < ray.runs; ++i) {
+          Run run = from[i];
+          run.ray = to.rays;
+          run.first_sample = to.samples;
+          to.samples += static_cast<std::uint32_t>(run.count);
+          list.runs[to.runs++] = run;
+        }
+        list.rays[to.rays++] = ray;
+      }
+    }
+  });
 }
 
 }  // namespace
+
+std::size_t RayList::first_sample(std::size_t ray) const {
+  if (runs.empty()) return 0;
+  const std::size_t run = first_run(ray);
+  return run < runs.size() ? runs[run].first_sample
+                           : runs.back().first_sample + static_cast<std::size_t>(runs.back().count);
+}
 
 CroppedHull crop_to_medium(const Hull& hull) {
   const Grid& g = hull.grid;
@@ -217,7 +255,7 @@ RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& me
       found[r] =
           clip(*cameras[rows[r].view], &list.origins[3 * static_cast<std::size_t>(rows[r].view)], rows[r]);
   });
-  assemble(found, options.subsets, list);
+  assemble(found, options.subsets, list, pool);
   return list;
 }
 

@@ -37,8 +37,8 @@ HOST_DEVICE inline bool clip_to_box(const VoxelMask& mask, const float* origin, 
 /// Walks the voxels that a ray crosses (Amanatides and Woo 1987) and emits every stretch [t0, t1] inside the
 /// medium, front to back; t counts voxel edges from the origin (direction of unit length), 0 at least.
 template <class Emit>
-HOST_DEVICE void clip_to_medium(const VoxelMask& mask, const float* origin, const float* direction,
-                                const Emit& emit) {
+HOST_DEVICE inline void clip_to_medium(const VoxelMask& mask, const float* origin, const float* direction,
+                                       const Emit& emit) {
   constexpr float kNever = 1e30F;
   float t = 0;
   float leave = kNever;

@@ -1,25 +1,27 @@
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
 #include "base/host_device.h"
+#include "recon/kernels/extinction.h"
 #include "recon/kernels/rgba.h"
 
 namespace emberlock {
 
-// One source for the march, on the CPU and on the GPU. Coordinates count voxel edges from key point (0, 0,
-// 0).
+// One source for the march, on the CPU and on the GPU, in single and in double precision. Coordinates count
+// voxel edges from key point (0, 0, 0). Policies: what extinguishes (extinction.h) and how rays run
+// (StraightPath, CurvedPath).
 
-/// A stretch inside the medium, cut into equal steps; sample i lies at start + (i + 0.5) * step along the
-/// ray.
+/// A stretch of a ray inside the medium, cut into equal steps; sample i lies at start + (i + 0.5) * step. Its
+/// samples' voxels all lie in one slab of layers along z.
 struct Run {
   float start = 0;
   float step = 0;
   float before = 0;  ///< length inside the medium in front of this run
+  std::uint32_t ray = 0;
+  std::uint32_t first_sample = 0;  ///< samples of the whole list in front of this run
   int count = 0;
-  std::uint32_t first_sample = 0;  ///< samples on the ray in front of this run
 };
 
 struct MarchRay {
@@ -29,185 +31,232 @@ struct MarchRay {
   std::uint32_t runs = 0;
 };
 
+/// Where a run of a curved ray starts to count, and where it heads (unit length).
+struct Bend {
+  float origin[3] = {0, 0, 0};
+  float direction[3] = {0, 0, 1};
+};
+
 /// Rays and the key points that they march through; plain pointers, so that it lives on either side.
 struct RayTable {
   const float* origins = nullptr;  ///< 3 a view
   const MarchRay* rays = nullptr;
   const Run* runs = nullptr;
-  int nx = 2, ny = 2, nz = 2;  ///< key points
+  const Bend* bends = nullptr;  ///< one a run; null where rays are straight
+  int nx = 2, ny = 2, nz = 2;   ///< key points
 };
 
-/// No extinction: nothing of the transmittance is ever computed.
-struct NoExtinction {
-  [[nodiscard]] HOST_DEVICE float at(float /*length*/) const { return 1; }
-  [[nodiscard]] HOST_DEVICE float over(float /*step*/) const { return 1; }
-  [[nodiscard]] HOST_DEVICE float weight(float step) const { return step; }
+template <class Real>
+struct Line {
+  Real origin[3];
+  Real direction[3];
+  HOST_DEVICE Line(const float* o, const float* d)
+      : origin{Real(o[0]), Real(o[1]), Real(o[2])}, direction{Real(d[0]), Real(d[1]), Real(d[2])} {}
 };
 
-/// Constant extinction inside the medium, `sigma` a voxel edge.
-struct ConstantExtinction {
-  float sigma = 0;
-  [[nodiscard]] HOST_DEVICE float at(float length) const { return expf(-sigma * length); }
-  [[nodiscard]] HOST_DEVICE float over(float step) const { return expf(-sigma * step); }
-  /// ds * phi(sigma ds), phi(x) = (1 - exp(-x)) / x
-  [[nodiscard]] HOST_DEVICE float weight(float step) const {
-    const float x = sigma * step;
-    return x > 1e-6F ? -expm1f(-x) / sigma : step * (1 - 0.5F * x);
+struct StraightPath {
+  template <class Real>
+  HOST_DEVICE static Line<Real> line(const RayTable& t, std::size_t run) {
+    const MarchRay& ray = t.rays[t.runs[run].ray];
+    return {t.origins + 3 * static_cast<std::size_t>(ray.view), ray.direction};
+  }
+};
+/// The adjoint on curved paths is that of the fixed path: what the medium does to the path itself is not
+/// followed.
+struct CurvedPath {
+  template <class Real>
+  HOST_DEVICE static Line<Real> line(const RayTable& t, std::size_t run) {
+    return {t.bends[run].origin, t.bends[run].direction};
   }
 };
 
-/// The voxel of a sample: index of its lowest key point and the position inside.
-struct Cell {
-  std::size_t base;
-  float fx, fy, fz;
+/// Samples that are located at once: on the CPU the loop over them becomes vector code.
+#ifdef __CUDA_ARCH__
+inline constexpr int kBatch = 1;
+#else
+inline constexpr int kBatch = 16;
+#endif
+
+/// The voxels of consecutive samples: index of each one's lowest key point, and the position inside.
+template <class Real>
+struct Batch {
+  alignas(64) Real fx[kBatch];
+  alignas(64) Real fy[kBatch];
+  alignas(64) Real fz[kBatch];
+  alignas(64) std::int32_t base[kBatch];
 };
+
+/// A whole number of layers along z, [low, high).
+struct Layers {
+  int low = 0;
+  int high = 1 << 30;
+};
+
+/// `low` for what is not a number.
+template <class T>
+HOST_DEVICE inline T clamp_to(T i, T low, T high) {
+  const T above = i > low ? i : low;
+  return above < high ? above : high;
+}
 
 HOST_DEVICE inline int clamp_cell(float p, int key_points) {
-  const int i = static_cast<int>(p);
-  return i < 0 ? 0 : (i > key_points - 2 ? key_points - 2 : i);
+  return clamp_to(static_cast<int>(p), 0, key_points - 2);
 }
 
-/// A ray's samples as the march meets them.
-struct Marcher {
-  const RayTable& table;
-  const MarchRay& ray;
-  const float* origin;
-
-  HOST_DEVICE Marcher(const RayTable& t, std::size_t index)
-      : table(t), ray(t.rays[index]), origin(t.origins + 3 * static_cast<std::size_t>(t.rays[index].view)) {}
-
-  [[nodiscard]] HOST_DEVICE static float distance(const Run& run, int i) {
-    return run.start + (static_cast<float>(i) + 0.5F) * run.step;
+/// Samples `first` .. first + kBatch - 1 of a run; those beyond its end are places nearby that nobody asks
+/// for.
+template <class Real>
+HOST_DEVICE inline void locate(const RayTable& table, const Line<Real>& line, const Run& run, int first,
+                               const Layers& layers, Batch<Real>& batch) {
+  const Real ox = line.origin[0], oy = line.origin[1], oz = line.origin[2];
+  const Real dx = line.direction[0], dy = line.direction[1], dz = line.direction[2];
+  const Real start = Real(run.start), step = Real(run.step);
+  const Real last_x = Real(table.nx - 2), last_y = Real(table.ny - 2);
+  const Real low_z = Real(layers.low),
+             last_z = Real(layers.high < table.nz - 1 ? layers.high - 1 : table.nz - 2);
+  const int row = table.nx, plane = table.nx * table.ny;
+  for (int i = 0; i < kBatch; ++i) {
+    const Real t = start + (Real(first + i) + Real(0.5)) * step;
+    const Real x = ox + dx * t;
+    const Real y = oy + dy * t;
+    const Real z = oz + dz * t;
+    const int ix = static_cast<int>(clamp_to(x, Real(0), last_x));
+    const int iy = static_cast<int>(clamp_to(y, Real(0), last_y));
+    const int iz = static_cast<int>(clamp_to(z, low_z, last_z));
+    batch.base[i] = ix + row * iy + plane * iz;
+    batch.fx[i] = x - Real(ix);
+    batch.fy[i] = y - Real(iy);
+    batch.fz[i] = z - Real(iz);
   }
-  [[nodiscard]] HOST_DEVICE int layer(const Run& run, int i) const {
-    return clamp_cell(origin[2] + ray.direction[2] * distance(run, i), table.nz);
-  }
-  [[nodiscard]] HOST_DEVICE Cell cell(const Run& run, int i) const {
-    const float t = distance(run, i);
-    const float x = origin[0] + ray.direction[0] * t;
-    const float y = origin[1] + ray.direction[1] * t;
-    const float z = origin[2] + ray.direction[2] * t;
-    const int ix = clamp_cell(x, table.nx);
-    const int iy = clamp_cell(y, table.ny);
-    const int iz = clamp_cell(z, table.nz);
-    const auto base = static_cast<std::size_t>(ix) +
-                      static_cast<std::size_t>(table.nx) *
-                          (static_cast<std::size_t>(iy) +
-                           static_cast<std::size_t>(table.ny) * static_cast<std::size_t>(iz));
-    return {base, x - static_cast<float>(ix), y - static_cast<float>(iy), z - static_cast<float>(iz)};
-  }
-
-  /// The first sample of the run whose layer is on the far side of `bound`, count if none: layer >= bound on
-  /// a rising ray, layer < bound on a falling one. The estimate is mended by the samples' own arithmetic, so
-  /// that neighbouring slabs share no sample and miss none.
-  [[nodiscard]] HOST_DEVICE int first_beyond(const Run& run, int bound) const {
-    const bool rising = ray.direction[2] >= 0;
-    const float z0 = origin[2] + ray.direction[2] * distance(run, 0);
-    const float guess = (static_cast<float>(bound) - z0) / (ray.direction[2] * run.step);
-    int i = guess > 0 ? (guess < static_cast<float>(run.count) ? static_cast<int>(guess) : run.count) : 0;
-    while (i < run.count && (layer(run, i) >= bound) != rising) ++i;
-    while (i > 0 && (layer(run, i - 1) >= bound) == rising) --i;
-    return i;
-  }
-};
-
-HOST_DEVICE inline Rgba trilinear(const Rgba* v, const Cell& c, int nx, int ny) {
-  const std::size_t row = static_cast<std::size_t>(nx);
-  const std::size_t plane = row * static_cast<std::size_t>(ny);
-  const Rgba* p = v + c.base;
-  const Rgba a = p[0] + c.fx * (p[1] - p[0]);
-  const Rgba b = p[row] + c.fx * (p[row + 1] - p[row]);
-  const Rgba d = p[plane] + c.fx * (p[plane + 1] - p[plane]);
-  const Rgba e = p[plane + row] + c.fx * (p[plane + row + 1] - p[plane + row]);
-  const Rgba low = a + c.fy * (b - a);
-  const Rgba high = d + c.fy * (e - d);
-  return low + c.fz * (high - low);
 }
 
-/// L of one ray: L += T S ds phi(sigma ds), T *= exp(-sigma ds). Lengths in voxel edges, so S is per voxel
-/// edge here.
-template <class Extinction>
+template <class Real>
+HOST_DEVICE inline Quad<Real> trilinear(const Quad<Real>* p, std::size_t row, std::size_t plane,
+                                        std::type_identity_t<Real> fx, std::type_identity_t<Real> fy,
+                                        std::type_identity_t<Real> fz) {
+  const Pair<Real> near = mix(fy, load_pair(p), load_pair(p + row));
+  const Pair<Real> far = mix(fy, load_pair(p + plane), load_pair(p + plane + row));
+  const Pair<Real> both = mix(fz, near, far);
+  return mix(fx, low(both), high(both));
+}
+
+/// Adds w to the eight key points with the weights that trilinear() reads them with.
+template <class Real, class Add>
+HOST_DEVICE inline void scatter(Quad<Real>* p, std::size_t row, std::size_t plane, Real fx, Real fy, Real fz,
+                                const Quad<Real>& w, const Add& add) {
+  const Quad<Real> x1 = fx * w;
+  const Quad<Real> x0 = w - x1;
+  const Real y1z1 = fy * fz;
+  const Real y1z0 = fy - y1z1;
+  const Real y0z1 = fz - y1z1;
+  const Real y0z0 = (1 - fy) - y0z1;
+  add(p[0], y0z0 * x0);
+  add(p[1], y0z0 * x1);
+  add(p[row], y1z0 * x0);
+  add(p[row + 1], y1z0 * x1);
+  add(p[plane], y0z1 * x0);
+  add(p[plane + 1], y0z1 * x1);
+  add(p[plane + row], y1z1 * x0);
+  add(p[plane + row + 1], y1z1 * x1);
+}
+
+/// Radiance of one ray in lanes 0..2, its transmittance to the far end in lane 3:
+///   L += T S ds phi(sigma ds), T *= exp(-sigma ds)
+/// Lengths in voxel edges, so S is per voxel edge here.
+template <class Real, class Extinction, class Path>
 struct Forward {
   RayTable table;
-  const Rgba* volume = nullptr;
+  const Quad<Real>* volume = nullptr;
   Extinction extinction;
 
-  HOST_DEVICE Rgba operator()(std::size_t index) const {
-    const Marcher march(table, index);
-    Rgba radiance;
-    for (std::uint32_t r = 0; r < march.ray.runs; ++r) {
-      const Run run = table.runs[march.ray.first_run + r];
-      const float pass = extinction.over(run.step);
-      float weight = extinction.at(run.before) * extinction.weight(run.step);
-      for (int i = 0; i < run.count; ++i) {
-        radiance = radiance + weight * trilinear(volume, march.cell(run, i), table.nx, table.ny);
-        weight *= pass;
+  HOST_DEVICE Quad<Real> operator()(std::size_t ray) const {
+    const MarchRay& r = table.rays[ray];
+    const std::size_t row = static_cast<std::size_t>(table.nx);
+    const std::size_t plane = row * static_cast<std::size_t>(table.ny);
+    Quad<Real> radiance;
+    Real transmittance = 1;
+    Batch<Real> batch;
+    for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
+      const Run run = table.runs[n];
+      const Line<Real> line = Path::template line<Real>(table, n);
+      if constexpr (!Extinction::kField) transmittance = extinction.at(Real(run.before));
+      const Real pass = extinction_over(run);
+      Real weight = extinction_weight(run, transmittance);
+      for (int first = 0; first < run.count; first += kBatch) {
+        locate(table, line, run, first, Layers{}, batch);
+        const int here = run.count - first < kBatch ? run.count - first : kBatch;
+        for (int i = 0; i < here; ++i) {
+          const Quad<Real> value =
+              trilinear(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i]);
+          if constexpr (Extinction::kField) {
+            const Real x = value.c[3] * Real(run.step);
+            const Real mean = phi(x);
+            radiance = radiance + (transmittance * Real(run.step) * mean) * value;
+            transmittance *= 1 - x * mean;
+          } else {
+            radiance = radiance + weight * value;
+            weight *= pass;
+          }
+        }
       }
     }
+    if constexpr (!Extinction::kField) {
+      const Run& last = table.runs[r.first_run + r.runs - 1];
+      transmittance = extinction.at(Real(last.before) + Real(last.step) * Real(last.count));
+    }
+    radiance.c[3] = transmittance;
     return radiance;
   }
-};
 
-/// Visits the samples of a ray whose voxels lie in layers [low, high) along z, front to back: visit(cell,
-/// transmittance in front of the sample, its weight ds phi(sigma ds), the number of the sample on its ray).
-template <class Extinction, class Visit>
-HOST_DEVICE void visit_layers(const RayTable& table, std::size_t index, const Extinction& extinction, int low,
-                              int high, const Visit& visit) {
-  const Marcher march(table, index);
-  const bool rising = march.ray.direction[2] >= 0;
-  for (std::uint32_t r = 0; r < march.ray.runs; ++r) {
-    const Run run = table.runs[march.ray.first_run + r];
-    const int begin = march.first_beyond(run, rising ? low : high);
-    const int end = march.first_beyond(run, rising ? high : low);
-    if (begin >= end) continue;
-    const float pass = extinction.over(run.step);
-    const float weight = extinction.weight(run.step);
-    float transmittance = extinction.at(run.before + static_cast<float>(begin) * run.step);
-    for (int i = begin; i < end; ++i) {
-      visit(march.cell(run, i), transmittance, weight, run.first_sample + static_cast<std::uint32_t>(i));
-      transmittance *= pass;
-    }
+ private:
+  HOST_DEVICE Real extinction_over(const Run& run) const {
+    if constexpr (Extinction::kField)
+      return 1;
+    else
+      return extinction.over(Real(run.step));
   }
-}
+  HOST_DEVICE Real extinction_weight(const Run& run, Real transmittance) const {
+    if constexpr (Extinction::kField)
+      return 1;
+    else
+      return transmittance * extinction.weight(Real(run.step));
+  }
+};
 
 /// Plain addition, for callers that own the key points they write to.
 struct AddDirectly {
-  HOST_DEVICE void operator()(Rgba& target, const Rgba& value) const { target = target + value; }
+  template <class Real>
+  HOST_DEVICE void operator()(Quad<Real>& target, const Quad<Real>& value) const {
+    target = target + value;
+  }
 };
 
-/// The exact transpose of Forward, restricted to layers [low, high): adds the ray's residual to the 8 key
-/// points of each sample with the weights that Forward reads them with.
-template <class Extinction, class Add = AddDirectly>
+/// The exact transpose of Forward's lanes 0..2 under no or constant extinction, for one run: adds its ray's
+/// residual to the eight key points of each sample with the weights that Forward reads them with.
+template <class Real, class Extinction, class Path, class Add = AddDirectly>
 struct Adjoint {
   RayTable table;
-  const Rgba* residual = nullptr;  ///< one a ray
-  Rgba* gradient = nullptr;
+  const Quad<Real>* residual = nullptr;  ///< one a ray
+  Quad<Real>* gradient = nullptr;
   Extinction extinction;
   Add add = {};
 
-  HOST_DEVICE void operator()(std::size_t index, int low, int high) const {
+  HOST_DEVICE void operator()(std::size_t n, const Layers& layers) const {
+    const Run run = table.runs[n];
     const std::size_t row = static_cast<std::size_t>(table.nx);
     const std::size_t plane = row * static_cast<std::size_t>(table.ny);
-    const Rgba r = residual[index];
-    visit_layers(table, index, extinction, low, high,
-                 [&](const Cell& c, float transmittance, float weight, std::uint32_t) {
-                   const Rgba w = (transmittance * weight) * r;
-                   Rgba* p = gradient + c.base;
-                   const Rgba x1 = c.fx * w;
-                   const Rgba x0 = w - x1;
-                   const Rgba x0y1 = c.fy * x0;
-                   const Rgba x0y0 = x0 - x0y1;
-                   const Rgba x1y1 = c.fy * x1;
-                   const Rgba x1y0 = x1 - x1y1;
-                   add(p[0], (1 - c.fz) * x0y0);
-                   add(p[1], (1 - c.fz) * x1y0);
-                   add(p[row], (1 - c.fz) * x0y1);
-                   add(p[row + 1], (1 - c.fz) * x1y1);
-                   add(p[plane], c.fz * x0y0);
-                   add(p[plane + 1], c.fz * x1y0);
-                   add(p[plane + row], c.fz * x0y1);
-                   add(p[plane + row + 1], c.fz * x1y1);
-                 });
+    const Line<Real> line = Path::template line<Real>(table, n);
+    const Real pass = extinction.over(Real(run.step));
+    Quad<Real> w = (extinction.at(Real(run.before)) * extinction.weight(Real(run.step))) * residual[run.ray];
+    Batch<Real> batch;
+    for (int first = 0; first < run.count; first += kBatch) {
+      locate(table, line, run, first, layers, batch);
+      const int here = run.count - first < kBatch ? run.count - first : kBatch;
+      for (int i = 0; i < here; ++i) {
+        scatter(gradient + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i], w, add);
+        w = pass * w;
+      }
+    }
   }
 };
 

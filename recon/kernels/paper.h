@@ -1,8 +1,9 @@
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
+
+#include <math.h>
 
 #include "base/host_device.h"
 #include "base/random.h"
@@ -44,31 +45,44 @@ struct PaperAdjust {
   std::uint64_t stream = 0;  ///< hash of seed and iteration
   Add add = {};
 
-  HOST_DEVICE void operator()(std::size_t index, int low, int high) const {
+  HOST_DEVICE void operator()(std::size_t n, const Layers& layers) const {
+    const Run run = table.runs[n];
     const std::size_t row = static_cast<std::size_t>(table.nx);
     const std::size_t plane = row * static_cast<std::size_t>(table.ny);
-    const std::uint64_t ray_stream = mix64(stream ^ index);
-    const Rgba change = -gain * residual[index];
-    visit_layers(table, index, extinction, low, high,
-                 [&](const Cell& c, float transmittance, float, std::uint32_t sample) {
-                   const Rgba a =
-                       (transmittance * gaussian_weight(mix64(ray_stream ^ sample), deviation)) * change;
-                   const float x[2] = {c.fx * c.fx, (1 - c.fx) * (1 - c.fx)};
-                   const float y[2] = {c.fy * c.fy, (1 - c.fy) * (1 - c.fy)};
-                   const float z[2] = {c.fz * c.fz, (1 - c.fz) * (1 - c.fz)};
-                   float near[8];
-                   for (int n = 0; n < 8; ++n) near[n] = x[n & 1] + y[n >> 1 & 1] + z[n >> 2];
-                   for (int n = 0; n < 8; ++n) near[n] = exp_of_distance(-decay * sqrtf(near[n]));
-                   Rgba* p = volume + c.base;
-                   add(p[0], near[0] * a);
-                   add(p[1], near[1] * a);
-                   add(p[row], near[2] * a);
-                   add(p[row + 1], near[3] * a);
-                   add(p[plane], near[4] * a);
-                   add(p[plane + 1], near[5] * a);
-                   add(p[plane + row], near[6] * a);
-                   add(p[plane + row + 1], near[7] * a);
-                 });
+    const Line<float> line = StraightPath::line<float>(table, n);
+    const Rgba change = -gain * residual[run.ray];
+    const float pass = extinction.over(run.step);
+    float transmittance = extinction.at(run.before);
+    Batch<float> batch;
+    for (int first = 0; first < run.count; first += kBatch) {
+      locate(table, line, run, first, layers, batch);
+      const int here = run.count - first < kBatch ? run.count - first : kBatch;
+      for (int i = 0; i < here; ++i) {
+        const std::uint64_t sample = run.first_sample + static_cast<std::uint32_t>(first + i);
+        spread(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i],
+               (transmittance * gaussian_weight(mix64(stream ^ sample), deviation)) * change);
+        transmittance *= pass;
+      }
+    }
+  }
+
+ private:
+  HOST_DEVICE void spread(Rgba* p, std::size_t row, std::size_t plane, float fx, float fy, float fz,
+                          const Rgba& a) const {
+    const float x[2] = {fx * fx, (1 - fx) * (1 - fx)};
+    const float y[2] = {fy * fy, (1 - fy) * (1 - fy)};
+    const float z[2] = {fz * fz, (1 - fz) * (1 - fz)};
+    float near[8];
+    for (int n = 0; n < 8; ++n) near[n] = x[n & 1] + y[n >> 1 & 1] + z[n >> 2];
+    for (int n = 0; n < 8; ++n) near[n] = exp_of_distance(-decay * sqrtf(near[n]));
+    add(p[0], near[0] * a);
+    add(p[1], near[1] * a);
+    add(p[row], near[2] * a);
+    add(p[row + 1], near[3] * a);
+    add(p[plane], near[4] * a);
+    add(p[plane + 1], near[5] * a);
+    add(p[plane + row], near[6] * a);
+    add(p[plane + row + 1], near[7] * a);
   }
 };
 

@@ -1,62 +1,137 @@
 #pragma once
 
 #include <cstring>
+#include <type_traits>
 
 #include "base/host_device.h"
 
 namespace emberlock {
 
-/// Four floats that move together: R, G, B and a spare lane. One SSE register on the CPU.
-struct alignas(16) Rgba {
-  float c[4] = {0, 0, 0, 0};
+// Four numbers that move together: R, G, B and a fourth lane, extinction or transmittance where one is called
+// for. nvcc sees arrays, other compilers vector registers; both look the same in memory, and c[i] is lane i.
+
+#ifdef __CUDACC__
+
+template <class Real>
+struct alignas(4 * sizeof(Real)) Quad {
+  Real c[4] = {0, 0, 0, 0};
+};
+/// Two quads side by side.
+template <class Real>
+struct Pair {
+  Quad<Real> low, high;
 };
 
-#ifndef __CUDA_ARCH__
-namespace detail {
-using Lanes = float __attribute__((vector_size(16)));
-inline Lanes lanes(const Rgba& a) {
-  Lanes v;
-  std::memcpy(&v, a.c, sizeof v);
-  return v;
-}
-inline Rgba rgba(Lanes v) {
-  Rgba a;
-  std::memcpy(a.c, &v, sizeof v);
-  return a;
-}
-}  // namespace detail
-#endif
-
-HOST_DEVICE inline Rgba operator+(const Rgba& a, const Rgba& b) {
-#ifdef __CUDA_ARCH__
+template <class Real>
+HOST_DEVICE inline Quad<Real> operator+(const Quad<Real>& a, const Quad<Real>& b) {
   return {{a.c[0] + b.c[0], a.c[1] + b.c[1], a.c[2] + b.c[2], a.c[3] + b.c[3]}};
-#else
-  return detail::rgba(detail::lanes(a) + detail::lanes(b));
-#endif
 }
-HOST_DEVICE inline Rgba operator-(const Rgba& a, const Rgba& b) {
-#ifdef __CUDA_ARCH__
+template <class Real>
+HOST_DEVICE inline Quad<Real> operator-(const Quad<Real>& a, const Quad<Real>& b) {
   return {{a.c[0] - b.c[0], a.c[1] - b.c[1], a.c[2] - b.c[2], a.c[3] - b.c[3]}};
-#else
-  return detail::rgba(detail::lanes(a) - detail::lanes(b));
-#endif
 }
-HOST_DEVICE inline Rgba operator*(float s, const Rgba& a) {
-#ifdef __CUDA_ARCH__
+template <class Real>
+HOST_DEVICE inline Quad<Real> operator*(std::type_identity_t<Real> s, const Quad<Real>& a) {
   return {{s * a.c[0], s * a.c[1], s * a.c[2], s * a.c[3]}};
-#else
-  return detail::rgba(detail::Lanes{s, s, s, s} * detail::lanes(a));
-#endif
 }
 /// Negative lanes become 0.
-HOST_DEVICE inline Rgba non_negative(const Rgba& a) {
-#ifdef __CUDA_ARCH__
-  return {{fmaxf(a.c[0], 0.F), fmaxf(a.c[1], 0.F), fmaxf(a.c[2], 0.F), fmaxf(a.c[3], 0.F)}};
-#else
-  const detail::Lanes v = detail::lanes(a);
-  const detail::Lanes zero = {0, 0, 0, 0};
-  return detail::rgba(v > zero ? v : zero);
-#endif
+template <class Real>
+HOST_DEVICE inline Quad<Real> non_negative(const Quad<Real>& a) {
+  Quad<Real> b;
+  for (int i = 0; i < 4; ++i) b.c[i] = a.c[i] > 0 ? a.c[i] : Real(0);
+  return b;
 }
+/// The quads p[0] and p[1].
+template <class Real>
+HOST_DEVICE inline Pair<Real> load_pair(const Quad<Real>* p) {
+  return {p[0], p[1]};
+}
+template <class Real>
+HOST_DEVICE inline Quad<Real> low(const Pair<Real>& a) {
+  return a.low;
+}
+template <class Real>
+HOST_DEVICE inline Quad<Real> high(const Pair<Real>& a) {
+  return a.high;
+}
+/// a + t * (b - a)
+template <class Real>
+HOST_DEVICE inline Pair<Real> mix(std::type_identity_t<Real> t, const Pair<Real>& a, const Pair<Real>& b) {
+  return {a.low + t * (b.low - a.low), a.high + t * (b.high - a.high)};
+}
+
+#else
+
+namespace detail {
+template <class Real>
+struct Lanes;
+template <>
+struct Lanes<float> {
+  using Four = float __attribute__((vector_size(16)));
+  using Eight = float __attribute__((vector_size(32)));
+};
+template <>
+struct Lanes<double> {
+  using Four = double __attribute__((vector_size(32)));
+  using Eight = double __attribute__((vector_size(64)));
+};
+}  // namespace detail
+
+template <class Real>
+struct Quad {
+  typename detail::Lanes<Real>::Four c = {0, 0, 0, 0};
+};
+template <class Real>
+struct Pair {
+  typename detail::Lanes<Real>::Eight c;
+};
+
+template <class Real>
+HOST_DEVICE inline Quad<Real> operator+(const Quad<Real>& a, const Quad<Real>& b) {
+  return {a.c + b.c};
+}
+template <class Real>
+HOST_DEVICE inline Quad<Real> operator-(const Quad<Real>& a, const Quad<Real>& b) {
+  return {a.c - b.c};
+}
+template <class Real>
+HOST_DEVICE inline Quad<Real> operator*(std::type_identity_t<Real> s, const Quad<Real>& a) {
+  return {s * a.c};
+}
+template <class Real>
+HOST_DEVICE inline Quad<Real> non_negative(const Quad<Real>& a) {
+  const typename detail::Lanes<Real>::Four zero = {0, 0, 0, 0};
+  return {a.c > zero ? a.c : zero};
+}
+/// By one wide load.
+template <class Real>
+HOST_DEVICE inline Pair<Real> load_pair(const Quad<Real>* p) {
+  Pair<Real> a;
+  std::memcpy(&a.c, p, sizeof a.c);
+  return a;
+}
+template <class Real>
+HOST_DEVICE inline Quad<Real> low(const Pair<Real>& a) {
+  return {__builtin_shufflevector(a.c, a.c, 0, 1, 2, 3)};
+}
+template <class Real>
+HOST_DEVICE inline Quad<Real> high(const Pair<Real>& a) {
+  return {__builtin_shufflevector(a.c, a.c, 4, 5, 6, 7)};
+}
+template <class Real>
+HOST_DEVICE inline Pair<Real> mix(std::type_identity_t<Real> t, const Pair<Real>& a, const Pair<Real>& b) {
+  return {a.c + t * (b.c - a.c)};
+}
+
+#endif
+
+/// a + t * (b - a)
+template <class Real>
+HOST_DEVICE inline Quad<Real> mix(std::type_identity_t<Real> t, const Quad<Real>& a, const Quad<Real>& b) {
+  return a + t * (b - a);
+}
+
+using Rgba = Quad<float>;
+using Rgba64 = Quad<double>;
 
 }  // namespace emberlock

@@ -12,8 +12,8 @@ namespace emberlock {
 // "Rendering Model"):
 //   L += T S ds phi(sigma ds),  T *= exp(-sigma ds),  phi(x) = (1 - exp(-x)) / x,  phi(0) = 1
 // S is the volume's emission in grey levels per metre, trilinear between key points; sigma is
-// Effects::extinction, constant inside the medium (the hull's voxels) and 0 outside, so T counts only what
-// lies inside. Every stretch inside the medium is cut into equal steps of at most one voxel edge and S is
+// Effects::extinction, constant or a field inside the medium (the hull's voxels) and 0 outside, so T counts only
+// what lies inside. Every stretch inside the medium is cut into equal steps of at most one voxel edge and S is
 // taken at their middles. The paper's opacity tau a step of one edge is sigma = -ln(1 - tau) / edge.
 
 struct RenderOptions {

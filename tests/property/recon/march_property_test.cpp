@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include "recon/hull/ray_list.h"
 #include "recon/kernels/clip.h"
 #include "recon/kernels/march.h"
 #include "recon/render/render.h"
@@ -67,26 +68,30 @@ TEST(MarchLaw, RunsCoverExactlyTheVoxelsInsideTheMedium) {
   }));
 }
 
-TEST(MarchLaw, SlabsShareNoSampleAndMissNone) {
-  EXPECT_TRUE(rc::check("layers [0, n) cut anywhere visit every sample of a ray once", [] {
-    const float origin[3] = {-5, static_cast<float>(number(0, 3)), static_cast<float>(number(-3, 12))};
-    MarchRay ray;
-    ray.direction[0] = 1;
-    ray.direction[2] = static_cast<float>(number(-2, 2));
-    const float norm = std::hypot(ray.direction[0], ray.direction[2]);
-    ray.direction[0] /= norm;
-    ray.direction[2] /= norm;
-    ray.direction[1] = 0;
-    ray.runs = 1;
-    const emberlock::Run run{static_cast<float>(number(0, 5)), static_cast<float>(number(0, 1)) + 0.01F, 0,
-                             *rc::gen::inRange(1, 40), 0};
-    const RayTable table{origin, &ray, &run, 9, 9, 11};
-    int visits = 0;
-    const int cut = *rc::gen::inRange(1, 10);
-    const auto count = [&](const Cell&, float, float, std::uint32_t) { ++visits; };
-    visit_layers(table, 0, NoExtinction{}, 0, cut, count);
-    visit_layers(table, 0, NoExtinction{}, cut, 10, count);
-    RC_ASSERT(visits == run.count);
+TEST(MarchLaw, PiecesOfAStretchShareNoSampleMissNoneAndKeepToTheirSlab) {
+  EXPECT_TRUE(rc::check("a stretch cut at the slabs' borders", [] {
+    constexpr int kLayers = 5 * kSlab - 3;
+    const auto z = static_cast<float>(number(-3, kLayers + 3));
+    const auto dz = static_cast<float>(number(-1, 1));
+    const auto start = static_cast<float>(number(0, 5));
+    const auto step = static_cast<float>(number(0, 1)) + 0.01F;
+    const int count = *rc::gen::inRange(1, 60);
+    int next = 0;
+    cut_at_slabs(z, dz, start, step, count, kLayers, [&](int first, int size) {
+      RC_ASSERT(first == next);
+      RC_ASSERT(size > 0);
+      next = first + size;
+      int low = kLayers;
+      int high = -1;
+      for (int i = first; i < next; ++i) {
+        const float at = z + dz * (start + (static_cast<float>(i) + 0.5F) * step);
+        const int slab = std::clamp(static_cast<int>(at), 0, kLayers - 1) / kSlab;
+        low = std::min(low, slab);
+        high = std::max(high, slab);
+      }
+      RC_ASSERT(low == high);
+    });
+    RC_ASSERT(next == count);
   }));
 }
 

@@ -181,7 +181,7 @@ TEST(March, AdjointIsTheTranspose) {
   Pool pool(2);
   const Problem problem = pose({&a, &b}, medium, {}, pool);
   for (const float sigma : {0.F, 0.05F, 1.F, 5.F}) {
-    const auto engine = make_engine(problem, sigma, Device::cpu, pool);
+    const auto engine = make_engine(problem, absorbing_optics(sigma), Precision::float32, Device::cpu, pool);
     std::vector<Rgba> x(problem.grid().size());
     for (std::size_t p = 0; p < x.size(); ++p)
       if (problem.active[p] != 0) x[p].c[0] = static_cast<float>(random_uniform(1, 0, p));

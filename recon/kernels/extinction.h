@@ -1,0 +1,75 @@
+#pragma once
+
+#include <math.h>
+
+#include "base/host_device.h"
+
+namespace emberlock {
+
+/// Named functions of the C library: unlike <cmath>'s overloads they are no inline functions of ours.
+HOST_DEVICE inline float exp_of(float x) { return expf(x); }
+HOST_DEVICE inline double exp_of(double x) { return exp(x); }
+HOST_DEVICE inline float expm1_of(float x) { return expm1f(x); }
+HOST_DEVICE inline double expm1_of(double x) { return expm1(x); }
+
+// What the medium takes from the light, as policies of the march: chosen once on the host, so that the code
+// of the others isn't there at all. x is the optical depth of a step, sigma ds; phi(x) = (1 - exp(-x)) / x.
+
+/// phi(x) and its derivative by their series, to single precision for 0 <= x <= 0.5, to double for x <= 1e-3:
+/// no branch and no call, so that loops over it become vector code.
+template <class Real>
+HOST_DEVICE inline Real phi_series(Real x) {
+  return 1 -
+         x * (Real(1) / 2 -
+              x * (Real(1) / 6 - x * (Real(1) / 24 - x * (Real(1) / 120 - x * (Real(1) / 720 - x / 5040)))));
+}
+template <class Real>
+HOST_DEVICE inline Real phi_slope_series(Real x) {
+  return -Real(1) / 2 +
+         x * (Real(1) / 3 -
+              x * (Real(1) / 8 - x * (Real(1) / 30 - x * (Real(1) / 144 - x * (Real(1) / 840 - x / 5760)))));
+}
+/// Up to which depth the series serve.
+template <class Real>
+HOST_DEVICE constexpr Real series_limit() {
+  return sizeof(Real) == sizeof(float) ? Real(0.5) : Real(0.01);
+}
+
+template <class Real>
+HOST_DEVICE inline Real phi(Real x) {
+  if (x < series_limit<Real>()) return phi_series(x);
+  return -expm1_of(-x) / x;
+}
+template <class Real>
+HOST_DEVICE inline Real phi_slope(Real x) {
+  if (x < series_limit<Real>()) return phi_slope_series(x);
+  return (exp_of(-x) * (1 + x) - 1) / (x * x);
+}
+
+/// Nothing of the transmittance is ever computed.
+template <class Real>
+struct NoExtinction {
+  static constexpr bool kField = false;
+  [[nodiscard]] HOST_DEVICE Real at(Real /*length*/) const { return 1; }
+  [[nodiscard]] HOST_DEVICE Real over(Real /*step*/) const { return 1; }
+  [[nodiscard]] HOST_DEVICE Real weight(Real step) const { return step; }
+};
+
+/// Constant inside the medium, `sigma` a voxel edge.
+template <class Real>
+struct ConstantExtinction {
+  static constexpr bool kField = false;
+  Real sigma = 0;
+  [[nodiscard]] HOST_DEVICE Real at(Real length) const { return exp_of(-sigma * length); }
+  [[nodiscard]] HOST_DEVICE Real over(Real step) const { return 1 - sigma * step * phi(sigma * step); }
+  /// ds * phi(sigma ds)
+  [[nodiscard]] HOST_DEVICE Real weight(Real step) const { return step * phi(sigma * step); }
+};
+
+/// Lane 3 of the volume, a voxel edge, trilinear between key points.
+template <class Real>
+struct FieldExtinction {
+  static constexpr bool kField = true;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,110 @@
+#pragma once
+
+#include "recon/kernels/march.h"
+
+namespace emberlock {
+
+// Emission and extinction both unknown at key points (lanes 0..2 and 3 of the volume). With x_k = sigma_k ds
+// the step k of a ray gives
+//   dL/dj_k     = T_k ds phi(x_k)
+//   dL/dsigma_k = T_k j_k ds^2 phi'(x_k) - ds (L - A_k)
+// where A_k is the radiance up to and through step k, and L includes what lies behind the medium.
+
+/// What a ray leaves at each of its samples for the adjoint: the radiance's weight of the emission, and the
+/// residual's derivative by the extinction.
+///
+/// Marches a ray, takes its residual by `judge(ray, radiance with the transmittance in lane 3)`, and fills
+/// `samples` from the first sample of the ray on: lane 0 the emission's weight, lane 1 the slope by
+/// extinction.
+template <class Real, class Path>
+struct FieldForward {
+  RayTable table;
+  const Quad<Real>* volume = nullptr;
+  Quad<Real>* samples = nullptr;  ///< first_sample counts from `first_sample` on
+  std::size_t first_sample = 0;
+
+  template <class Judge>
+  HOST_DEVICE void operator()(std::size_t ray, const Judge& judge) const {
+    const MarchRay& r = table.rays[ray];
+    const std::size_t row = static_cast<std::size_t>(table.nx);
+    const std::size_t plane = row * static_cast<std::size_t>(table.ny);
+    Quad<Real> radiance;
+    Real transmittance = 1;
+    Batch<Real> batch;
+    Quad<Real>* const values = samples + (table.runs[r.first_run].first_sample - first_sample);
+    Quad<Real>* next = values;
+    for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
+      const Run run = table.runs[n];
+      const Line<Real> line = Path::template line<Real>(table, n);
+      const Real step = Real(run.step);
+      for (int first = 0; first < run.count; first += kBatch) {
+        locate(table, line, run, first, Layers{}, batch);
+        const int here = run.count - first < kBatch ? run.count - first : kBatch;
+        for (int i = 0; i < here; ++i) {
+          const Quad<Real> value =
+              trilinear(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i]);
+          *next++ = value;
+          const Real x = value.c[3] * step;
+          const Real mean = phi(x);
+          radiance = radiance + (transmittance * step * mean) * value;
+          transmittance *= 1 - x * mean;
+        }
+      }
+    }
+    radiance.c[3] = transmittance;
+    const Quad<Real> residual = judge(ray, radiance);
+    // `behind` is R . (L - A): lane 3 carries what the medium's far end passes on, judged by the caller.
+    Real behind = residual.c[0] * radiance.c[0] + residual.c[1] * radiance.c[1] +
+                  residual.c[2] * radiance.c[2] + residual.c[3] * transmittance;
+    transmittance = 1;
+    next = values;
+    for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
+      const Real step = Real(table.runs[n].step);
+      for (int i = 0; i < table.runs[n].count; ++i, ++next) {
+        const Quad<Real> value = *next;
+        const Real x = value.c[3] * step;
+        const Real mean = phi(x);
+        const Real weight = transmittance * step * mean;
+        const Real along =
+            residual.c[0] * value.c[0] + residual.c[1] * value.c[1] + residual.c[2] * value.c[2];
+        behind -= weight * along;
+        next->c[0] = weight;
+        next->c[1] = transmittance * step * step * phi_slope(x) * along - step * behind;
+        transmittance *= 1 - x * mean;
+      }
+    }
+  }
+};
+
+/// The transpose: adds to the eight key points of each sample of a run the residual times the emission's
+/// weight, and the slope by extinction in lane 3.
+template <class Real, class Path, class Add = AddDirectly>
+struct FieldAdjoint {
+  RayTable table;
+  const Quad<Real>* residual = nullptr;  ///< one a ray
+  const Quad<Real>* samples = nullptr;
+  std::size_t first_sample = 0;
+  Quad<Real>* gradient = nullptr;
+  Add add = {};
+
+  HOST_DEVICE void operator()(std::size_t n, const Layers& layers) const {
+    const Run run = table.runs[n];
+    const std::size_t row = static_cast<std::size_t>(table.nx);
+    const std::size_t plane = row * static_cast<std::size_t>(table.ny);
+    const Line<Real> line = Path::template line<Real>(table, n);
+    const Quad<Real> seen = residual[run.ray];
+    const Quad<Real>* sample = samples + (run.first_sample - first_sample);
+    Batch<Real> batch;
+    for (int first = 0; first < run.count; first += kBatch) {
+      locate(table, line, run, first, layers, batch);
+      const int here = run.count - first < kBatch ? run.count - first : kBatch;
+      for (int i = 0; i < here; ++i, ++sample) {
+        Quad<Real> w = sample->c[0] * seen;
+        w.c[3] = sample->c[1];
+        scatter(gradient + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i], w, add);
+      }
+    }
+  }
+};
+
+}  // namespace emberlock

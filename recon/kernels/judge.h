@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+
+#include "recon/kernels/rgba.h"
+
+namespace emberlock {
+
+/// What a ray's radiance is held against. A background, an offset and a sensor's white are each there or not,
+/// for all rays.
+template <class Real>
+struct Judge {
+  const Rgba* seen = nullptr;        ///< captured radiance, one a ray
+  const Rgba* background = nullptr;  ///< radiance behind the medium, one a ray
+  const Rgba* offset = nullptr;  ///< added to the rendered radiance: what another pass has found, one a ray
+  Real white = 0;  ///< captured values from here on are bounds: more light explains them; 0: none are
+
+  /// The residual in lanes 0..2 and its product with the background in lane 3, from radiance and
+  /// transmittance.
+  HOST_DEVICE Quad<Real> operator()(std::size_t ray, const Quad<Real>& radiance) const {
+    Quad<Real> residual;
+    for (int c = 0; c < 3; ++c) residual.c[c] = radiance.c[c] - Real(seen[ray].c[c]);
+    if (background != nullptr)
+      for (int c = 0; c < 3; ++c) residual.c[c] += radiance.c[3] * Real(background[ray].c[c]);
+    if (offset != nullptr)
+      for (int c = 0; c < 3; ++c) residual.c[c] += Real(offset[ray].c[c]);
+    if (white > 0)
+      for (int c = 0; c < 3; ++c)
+        if (Real(seen[ray].c[c]) >= white && residual.c[c] > 0) residual.c[c] = 0;
+    if (background != nullptr)
+      for (int c = 0; c < 3; ++c) residual.c[3] += residual.c[c] * Real(background[ray].c[c]);
+    return residual;
+  }
+};
+
+}  // namespace emberlock

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "recon/kernels/judge.h"
+#include "recon/kernels/march.h"
+#include "recon/kernels/update.h"
+
+namespace emberlock {
+
+/// What a march works on; which members it takes is said at each entry of MarchTable.
+template <class Real>
+struct MarchWork {
+  RayTable rays;
+  const Quad<Real>* volume = nullptr;
+  Real sigma = 0;                  ///< of constant extinction, a voxel edge
+  Quad<Real>* residual = nullptr;  ///< one a ray
+  Quad<Real>* gradient = nullptr;  ///< one a key point
+  Quad<Real>* samples = nullptr;   ///< of a field's march, see FieldForward
+  std::size_t first_sample = 0;
+};
+
+/// The shipped combinations of what extinguishes and how rays run.
+enum class Absorb { nothing, constant, field };
+enum class Travel { straight, curved };
+
+/// The kernels as machine code for one level of vector instructions. Entries do their slice of the work on
+/// the calling thread.
+template <class Real>
+struct MarchTable {
+  /// residual = radiance and transmittance of rays [begin, end).
+  using ForwardEntry = void (*)(const MarchWork<Real>&, std::size_t begin, std::size_t end);
+  /// gradient += transpose, over the listed runs of one slab. Nothing and constant alone.
+  using AdjointEntry = void (*)(const MarchWork<Real>&, const std::uint32_t* runs, std::size_t count, Layers);
+  /// residual as judged, and samples, of rays [begin, end).
+  using FieldEntry = void (*)(const MarchWork<Real>&, const Judge<Real>&, std::size_t begin, std::size_t end);
+  /// One row of key points [begin, end) x {j} x {k}.
+  using UpdateEntry = void (*)(const Descend<Real>&, int begin, int end, int j, int k);
+
+  ForwardEntry forward[3][2];
+  AdjointEntry adjoint[3][2];  ///< of a field: from `samples`
+  FieldEntry field_forward[2];
+  UpdateEntry update;
+
+  [[nodiscard]] ForwardEntry forward_of(Absorb a, Travel t) const {
+    return forward[static_cast<int>(a)][static_cast<int>(t)];
+  }
+  [[nodiscard]] AdjointEntry adjoint_of(Absorb a, Travel t) const {
+    return adjoint[static_cast<int>(a)][static_cast<int>(t)];
+  }
+};
+
+/// The best that this CPU runs: SSE2, SSE4.2, AVX2 with FMA, or AVX-512. EMBERLOCK_ISA=baseline|v2|v3|v4 in
+/// the environment caps it, for tests and comparisons.
+template <class Real>
+const MarchTable<Real>& march_table();
+/// "baseline", "v2", "v3" or "v4" (x86-64's microarchitecture levels).
+const char* march_table_name();
+
+}  // namespace emberlock

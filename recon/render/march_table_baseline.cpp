@@ -1,0 +1,2 @@
+#define EMBERLOCK_ISA baseline
+#include "recon/render/march_table.inc"

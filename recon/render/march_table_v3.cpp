@@ -1,0 +1,4 @@
+#if defined(__x86_64__)
+#define EMBERLOCK_ISA v3
+#include "recon/render/march_table.inc"
+#endif

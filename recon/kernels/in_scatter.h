@@ -1,0 +1,174 @@
+#pragma once
+
+#include <cstddef>
+
+#include <math.h>
+
+#include "base/host_device.h"
+#include "recon/kernels/extinction.h"
+#include "recon/kernels/march.h"
+#include "recon/kernels/phase_function.h"
+#include "recon/kernels/rgba.h"
+
+namespace emberlock {
+
+// Light that arrives at coarse key points, by long characteristics: from a key point against the direction of
+// travel to the face of the grid's box. Coordinates and lengths count coarse edges.
+
+/// One direction of the discrete ordinates.
+struct Ordinate {
+  float travel[3] = {0, 0, 1};  ///< where light goes, unit length
+  float weight = 0;             ///< its solid angle, sr; all sum to 4 pi
+};
+
+/// What shines at a coarse grid's key points, trilinear between them: lanes 0..2 the source an edge, lane 3
+/// sigma_t an edge.
+struct ShiningGrid {
+  int nx = 2, ny = 2, nz = 2;
+  const Rgba* shine = nullptr;
+
+  /// In the voxel whose lowest key point is p; four lanes at a time, for code without wider ones.
+  [[nodiscard]] HOST_DEVICE Rgba inside(const Rgba* p, float fx, float fy, float fz) const {
+    const auto row = static_cast<std::size_t>(nx);
+    const std::size_t plane = row * static_cast<std::size_t>(ny);
+    const Rgba a = p[0] + fx * (p[1] - p[0]);
+    const Rgba b = p[row] + fx * (p[row + 1] - p[row]);
+    const Rgba c = p[plane] + fx * (p[plane + 1] - p[plane]);
+    const Rgba d = p[plane + row] + fx * (p[plane + row + 1] - p[plane + row]);
+    const Rgba low = a + fy * (b - a);
+    const Rgba high = c + fy * (d - c);
+    return low + fz * (high - low);
+  }
+
+  [[nodiscard]] HOST_DEVICE Rgba at(float x, float y, float z) const {
+    const int i = clamp_cell(x, nx);
+    const int j = clamp_cell(y, ny);
+    const int k = clamp_cell(z, nz);
+    const auto row = static_cast<std::size_t>(nx);
+    const std::size_t plane = row * static_cast<std::size_t>(ny);
+    const std::size_t base =
+        static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + plane * static_cast<std::size_t>(k);
+    return inside(shine + base, x - static_cast<float>(i), y - static_cast<float>(j),
+                  z - static_cast<float>(k));
+  }
+
+  /// From p against `travel` to the box's face; 0 where p lies on a face that the light enters by.
+  [[nodiscard]] HOST_DEVICE float way_out(const float* p, const float* travel) const {
+    const int last[3] = {nx - 1, ny - 1, nz - 1};
+    float length = 1e30F;
+    for (int a = 0; a < 3; ++a) {
+      if (travel[a] == 0) continue;
+      const float room = travel[a] < 0 ? static_cast<float>(last[a]) - p[a] : p[a];
+      length = fminf(length, room / fabsf(travel[a]));
+    }
+    return fmaxf(length, 0);
+  }
+};
+
+/// L += T S ds phi(sigma ds), T *= exp(-sigma ds), phi(x) = (1 - exp(-x)) / x, from an eye outwards.
+struct Radiance {
+  Rgba sum;
+  float transmittance = 1;
+
+  HOST_DEVICE void add(const Rgba& shine, float ds) {
+    const float x = shine.c[3] * ds;
+    const float mean = phi(x);
+    sum = sum + (transmittance * ds * mean) * shine;
+    transmittance *= 1 - x * mean;
+  }
+  /// Less than this gets through: nothing beyond it is looked at.
+  [[nodiscard]] HOST_DEVICE bool opaque() const { return transmittance < 1e-5F; }
+  /// Lanes 0..2 the radiance, lane 3 the share of light that the way takes away, 1 - T.
+  [[nodiscard]] HOST_DEVICE Rgba arrived() const {
+    Rgba all = sum;
+    all.c[3] = 1 - transmittance;
+    return all;
+  }
+};
+
+/// The middle of a step of one edge along an ordinate: how far its voxel lies from the eye's key point (an
+/// index), and the position inside. The same for every eye, because key points have whole coordinates. No
+/// ordinate runs along a face, so a step that ends inside the box has its middle's voxel inside too.
+struct Footstep {
+  std::ptrdiff_t voxel = 0;
+  float fx = 0, fy = 0, fz = 0;
+};
+
+HOST_DEVICE inline Footstep footstep(const ShiningGrid& grid, const float* travel, int step) {
+  const float t = static_cast<float>(step) + 0.5F;
+  const float x = -t * travel[0];
+  const float y = -t * travel[1];
+  const float z = -t * travel[2];
+  const float i = floorf(x);
+  const float j = floorf(y);
+  const float k = floorf(z);
+  const auto row = static_cast<std::ptrdiff_t>(grid.nx);
+  const std::ptrdiff_t plane = row * grid.ny;
+  return {static_cast<std::ptrdiff_t>(i) + row * static_cast<std::ptrdiff_t>(j) +
+              plane * static_cast<std::ptrdiff_t>(k),
+          x - i, y - j, z - k};
+}
+
+/// The radiance that arrives at the key point p, of index `eye`, travelling along `travel`: S and sigma at
+/// the middles of steps of one edge and of the rest up to the face. `footsteps` are those of an ordinate, as
+/// many as the grid's diagonal is long; null for other directions.
+struct ArrivingRadiance {
+  ShiningGrid grid;
+  const Footstep* footsteps = nullptr;
+
+  HOST_DEVICE Rgba operator()(const float* p, std::size_t eye, const float* travel) const {
+    constexpr float kTouch = 1e-4F;  // shorter rests are rounding on a face
+    const float length = grid.way_out(p, travel);
+    const int whole = static_cast<int>(length);
+    Radiance radiance;
+    for (int i = 0; i < whole; ++i) {
+      if (footsteps != nullptr) {
+        const Footstep& f = footsteps[i];
+        radiance.add(grid.inside(grid.shine + (static_cast<std::ptrdiff_t>(eye) + f.voxel), f.fx, f.fy, f.fz),
+                     1);
+      } else {
+        radiance.add(seen(p, travel, static_cast<float>(i) + 0.5F), 1);
+      }
+      if (radiance.opaque()) return radiance.arrived();
+    }
+    const float rest = length - static_cast<float>(whole);
+    if (rest > kTouch) radiance.add(seen(p, travel, length - 0.5F * rest), rest);
+    return radiance.arrived();
+  }
+
+ private:
+  [[nodiscard]] HOST_DEVICE Rgba seen(const float* p, const float* travel, float t) const {
+    return grid.at(p[0] - t * travel[0], p[1] - t * travel[1], p[2] - t * travel[2]);
+  }
+};
+
+/// The in-scatter integral, Int p L dw', towards one of the ordinates or, with one row of equal values, of
+/// isotropic scattering: a row of the discrete phase matrix times the radiances.
+HOST_DEVICE inline Rgba scattered(const float* row, const Rgba* radiance, std::size_t stride, int ordinates) {
+  Rgba sum;
+  for (int m = 0; m < ordinates; ++m) sum = sum + row[m] * radiance[static_cast<std::size_t>(m) * stride];
+  return sum;
+}
+
+/// The same integral towards any direction: the phase function's values at the ordinates, scaled to integrate
+/// to 1.
+struct ScatteredTowards {
+  HenyeyGreenstein<float> phase;
+  const Ordinate* ordinates = nullptr;
+  int count = 0;
+
+  HOST_DEVICE Rgba operator()(const float* direction, const Rgba* radiance, std::size_t stride) const {
+    Rgba sum;
+    float norm = 0;
+    for (int m = 0; m < count; ++m) {
+      const Ordinate& o = ordinates[m];
+      const float weight = o.weight * phase(o.travel[0] * direction[0] + o.travel[1] * direction[1] +
+                                            o.travel[2] * direction[2]);
+      norm += weight;
+      sum = sum + weight * radiance[static_cast<std::size_t>(m) * stride];
+    }
+    return (1 / norm) * sum;
+  }
+};
+
+}  // namespace emberlock

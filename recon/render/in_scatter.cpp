@@ -1,0 +1,326 @@
+#include "recon/render/in_scatter.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace emberlock {
+namespace {
+
+/// In coarse edges.
+std::array<float, 3> position(const Grid& grid, std::size_t at) {
+  const auto nx = static_cast<std::size_t>(grid.nx);
+  const auto ny = static_cast<std::size_t>(grid.ny);
+  const std::size_t layer = at / (nx * ny);
+  return {static_cast<float>(at % nx), static_cast<float>(at / nx % ny), static_cast<float>(layer)};
+}
+
+using Lights = std::vector<Rgba>;  ///< [row of the phase matrix][active point]
+using Channels = std::array<double, 3>;
+
+class Transport {
+ public:
+  Transport(const ScatterField& field, Pool& pool)
+      : field_(field),
+        pool_(pool),
+        phase_(phase_matrix(field.phase, field.ordinates)),
+        ordinates_(field.ordinates.size()),
+        rows_(phase_.size() / ordinates_) {
+    const Grid& g = field.medium.grid;
+    reach_ = 1 + static_cast<std::size_t>(std::hypot(g.nx - 1, g.ny - 1, g.nz - 1));
+    for (const Ordinate& o : field.ordinates)
+      for (std::size_t i = 0; i < reach_; ++i)
+        footsteps_.push_back(footstep({g.nx, g.ny, g.nz, nullptr}, o.travel, static_cast<int>(i)));
+  }
+
+  [[nodiscard]] std::size_t size() const { return rows_ * field_.medium.active.size(); }
+
+  /// The in-scatter of the emission alone.
+  Lights from_emission(Lights* radiance = nullptr) { return sweep(field_.medium.shine.data(), 0, radiance); }
+  /// K g: the in-scatter of what scatters from g.
+  Lights from_scattered(const Lights& g) {
+    set_shine(g, 0);
+    return sweep(shine_.data(), field_.medium.shine.size(), nullptr);
+  }
+  /// Of both.
+  Lights from_all(const Lights& g, Lights* radiance) {
+    set_shine(g, 1);
+    return sweep(shine_.data(), field_.medium.shine.size(), radiance);
+  }
+
+  /// y += a x, each channel with its own a.
+  void add(Lights& y, const Channels& a, const Lights& x) const {
+    pool_.run(kSlices, [&](int task) {
+      const Slice s = slice(y.size(), kSlices, task);
+      for (std::size_t e = s.begin; e < s.end; ++e)
+        for (std::size_t c = 0; c < 3; ++c) y[e].c[c] += static_cast<float>(a[c]) * x[e].c[c];
+    });
+  }
+  /// Sums over the medium (weight sigma_t, in which isotropic K is its own transpose), in an order that no
+  /// thread changes.
+  [[nodiscard]] Channels dot(const Lights& x, const Lights& y) const {
+    std::array<Channels, kSlices> part{};
+    pool_.run(kSlices, [&](int task) {
+      const Slice s = slice(field_.medium.active.size(), kSlices, task);
+      Channels& sum = part[static_cast<std::size_t>(task)];
+      for (std::size_t r = 0; r < rows_; ++r) {
+        for (std::size_t n = s.begin; n < s.end; ++n) {
+          const std::size_t e = r * field_.medium.active.size() + n;
+          const double w = static_cast<double>(field_.medium.shine[field_.medium.active[n]].c[3]);
+          for (std::size_t c = 0; c < 3; ++c)
+            sum[c] += w * static_cast<double>(x[e].c[c]) * static_cast<double>(y[e].c[c]);
+        }
+      }
+    });
+    Channels sum{};
+    for (const Channels& p : part)
+      for (std::size_t c = 0; c < 3; ++c) sum[c] += p[c];
+    return sum;
+  }
+
+ private:
+  static constexpr int kSlices = 64;
+
+  void set_shine(const Lights& g, float emission) {
+    const std::size_t points = field_.medium.shine.size();
+    const std::size_t active = field_.medium.active.size();
+    shine_.resize(rows_ * points);
+    pool_.run(static_cast<int>(rows_), [&](int task) {
+      const auto row = static_cast<std::size_t>(task);
+      for (std::size_t n = 0; n < active; ++n) {
+        const Rgba& m = field_.medium.shine[field_.medium.active[n]];
+        Rgba s = emission * m + (static_cast<float>(field_.albedo) * m.c[3]) * g[row * active + n];
+        s.c[3] = m.c[3];
+        shine_[row * points + field_.medium.active[n]] = s;
+      }
+    });
+  }
+
+  /// One march for each active point and ordinate; ordinate m sees shine + m * stride.
+  Lights sweep(const Rgba* shine, std::size_t stride, Lights* keep) {
+    constexpr std::size_t kBlock = 32;
+    const Grid& grid = field_.medium.grid;
+    const std::size_t active = field_.medium.active.size();
+    if (rows_ == 1) stride = 0;
+    Lights out(size());
+    if (keep != nullptr) keep->resize(ordinates_ * active);
+    pool_.run(static_cast<int>((active + kBlock - 1) / kBlock), [&](int task) {
+      const std::size_t begin = kBlock * static_cast<std::size_t>(task);
+      const std::size_t count = std::min(kBlock, active - begin);
+      std::vector<Rgba> radiance(ordinates_ * kBlock);
+      for (std::size_t m = 0; m < ordinates_; ++m) {
+        const ArrivingRadiance arriving{{grid.nx, grid.ny, grid.nz, shine + m * stride},
+                                        &footsteps_[m * reach_]};
+        for (std::size_t n = 0; n < count; ++n) {
+          const std::size_t eye = field_.medium.active[begin + n];
+          const std::array<float, 3> p = position(grid, eye);
+          radiance[m * kBlock + n] = arriving(p.data(), eye, field_.ordinates[m].travel);
+        }
+        if (keep != nullptr) std::copy_n(&radiance[m * kBlock], count, &(*keep)[m * active + begin]);
+      }
+      for (std::size_t r = 0; r < rows_; ++r)
+        for (std::size_t n = 0; n < count; ++n)
+          out[r * active + begin + n] =
+              scattered(&phase_[r * ordinates_], &radiance[n], kBlock, static_cast<int>(ordinates_));
+    });
+    return out;
+  }
+
+  const ScatterField& field_;
+  Pool& pool_;
+  std::vector<float> phase_;
+  std::size_t ordinates_;
+  std::size_t rows_;
+  std::size_t reach_;                ///< steps along the longest way
+  std::vector<Footstep> footsteps_;  ///< [ordinate][step]
+  std::vector<Rgba> shine_;          ///< [row][key point]
+};
+
+Channels largest(const Lights& x) {
+  Channels high{};
+  for (const Rgba& v : x)
+    for (std::size_t c = 0; c < 3; ++c) high[c] = std::max(high[c], std::abs(static_cast<double>(v.c[c])));
+  return high;
+}
+
+/// Bound on the error of g whose next iterate differs by `change`, of the brightest g: |K| is at most
+/// `contraction` in the maximum norm, so what is left of the geometric series is c / (1 - c) times the last
+/// change.
+double relative_error(const Lights& change, const Lights& g, double contraction) {
+  const Channels d = largest(change);
+  const Channels high = largest(g);
+  double worst = 0;
+  for (std::size_t c = 0; c < 3; ++c)
+    if (high[c] > 0) worst = std::max(worst, d[c] / high[c]);
+  return worst * contraction / (1 - contraction);
+}
+
+Channels ratio(const Channels& a, const Channels& b, double sign) {
+  Channels out{};
+  for (std::size_t c = 0; c < 3; ++c) out[c] = b[c] > 0 ? sign * a[c] / b[c] : 0;
+  return out;
+}
+
+/// (1 - K) q = p of Orthomin(1): the change of the residual along r, made orthogonal to the one before.
+Lights through_medium(Transport& transport, const Lights& r) {
+  Lights q = transport.from_scattered(r);
+  for (std::size_t e = 0; e < q.size(); ++e) q[e] = r[e] - q[e];
+  return q;
+}
+
+/// g = s + K g from g = s on; returns the number of iterations.
+int iterate(Transport& transport, double contraction, const InScatterOptions& options, Lights& g) {
+  Lights r = transport.from_scattered(g);
+  Lights p = r;
+  Lights q = through_medium(transport, r);
+  int iteration = 1;
+  for (;; ++iteration) {
+    const Channels length = transport.dot(q, q);
+    const Channels step = ratio(transport.dot(r, q), length, 1);
+    transport.add(g, step, p);
+    transport.add(r, ratio(transport.dot(r, q), length, -1), q);
+    if (iteration >= options.max_iterations || relative_error(r, g, contraction) <= options.tolerance) break;
+    const Lights image = through_medium(transport, r);
+    const Channels back = ratio(transport.dot(image, q), length, -1);
+    Lights next_p = r;
+    transport.add(next_p, back, p);
+    p = std::move(next_p);
+    Lights next_q = image;
+    transport.add(next_q, back, q);
+    q = std::move(next_q);
+  }
+  return iteration;
+}
+
+void solve_multiple(Transport& transport, const InScatterOptions& options, Lights g, ScatterField& field) {
+  // Lane 3 of the first sweep is the mean share 1 - T that ends on its way: albedo times it is K 1.
+  double ends = 0;
+  for (const Rgba& v : g) ends = std::max(ends, static_cast<double>(v.c[3]));
+  const double contraction = std::min(field.albedo * ends, 1 - 1e-6);
+  field.iterations = iterate(transport, contraction, options, g);
+  // One plain iteration more: G of a non-negative light is non-negative, and its change is the true residual.
+  for (Rgba& v : g) v = non_negative(v);
+  Lights radiance;
+  Lights final_g = transport.from_all(g, field.phase.isotropic() ? nullptr : &radiance);
+  for (std::size_t e = 0; e < g.size(); ++e) g[e] = final_g[e] - g[e];
+  field.error_bound = relative_error(g, final_g, contraction);
+  field.light = field.phase.isotropic() ? std::move(final_g) : std::move(radiance);
+}
+
+}  // namespace
+
+ScatterField find_in_scatter(const Volume& volume, const Hull& medium, const Effects& effects,
+                             const InScatterOptions& options, Pool& pool) {
+  ScatterField field;
+  const Scattering& scattering = effects.scattering;
+  if (scattering.order == Scattering::Order::none || scattering.albedo <= 0) return field;
+  field.medium = coarse_medium(volume, medium, effects.extinction, options.voxels, pool);
+  if (field.empty()) return field;
+  field.order = scattering.order;
+  field.albedo = scattering.albedo;
+  const int levels = std::clamp(options.octant_levels, 1, 8);
+  field.phase = split_phase(scattering.asymmetry, levels);
+  field.ordinates = product_ordinates(levels);
+
+  Transport transport(field, pool);
+  Lights radiance;
+  const bool keep = field.order == Scattering::Order::single && !field.phase.isotropic();
+  Lights g0 = transport.from_emission(keep ? &radiance : nullptr);
+  if (field.order == Scattering::Order::multiple)
+    solve_multiple(transport, options, std::move(g0), field);
+  else
+    field.light = keep ? std::move(radiance) : std::move(g0);
+  return field;
+}
+
+namespace {
+
+/// Anisotropic G towards a camera.
+class Towards {
+ public:
+  Towards(const ScatterField& field, const Eigen::Vector3d& camera_center)
+      : field_(field), center_(camera_center) {
+    for (int a = 0; a < 3; ++a)
+      center_[a] = (center_[a] - static_cast<double>(field.medium.grid.origin[a])) /
+                   static_cast<double>(field.medium.grid.edge);
+  }
+
+  /// Of what the ordinates resolve.
+  [[nodiscard]] Rgba blunt(std::size_t n) const {
+    const Ray ray(*this, field_.medium.active[n]);
+    const ScatteredTowards towards{field_.phase.blunt, field_.ordinates.data(),
+                                   static_cast<int>(field_.ordinates.size())};
+    return towards(ray.direction, &field_.light[n], field_.medium.active.size());
+  }
+  /// Of the peak: the light that comes from straight behind the point, or from the camera's side.
+  [[nodiscard]] Rgba peak(std::size_t n, const std::vector<Rgba>& shine) const {
+    Ray ray(*this, field_.medium.active[n]);
+    if (field_.phase.blunt.g < 0)
+      for (float& d : ray.direction) d = -d;
+    const Grid& g = field_.medium.grid;
+    return ArrivingRadiance{{g.nx, g.ny, g.nz, shine.data()}}(ray.point.data(), field_.medium.active[n],
+                                                              ray.direction);
+  }
+
+ private:
+  struct Ray {
+    std::array<float, 3> point;
+    float direction[3] = {0, 0, 1};
+    Ray(const Towards& t, std::size_t at) : point(position(t.field_.medium.grid, at)) {
+      const Eigen::Vector3d p(point[0], point[1], point[2]);
+      const Eigen::Vector3d away = t.center_ - p;
+      const Eigen::Vector3d d = away.norm() > 0 ? away.normalized() : Eigen::Vector3d::UnitZ();
+      for (int a = 0; a < 3; ++a) direction[a] = static_cast<float>(d[a]);
+    }
+  };
+
+  const ScatterField& field_;
+  Eigen::Vector3d center_;  ///< in coarse edges
+};
+
+/// What shines along the peak: the emission, and of multiple scattering what the blunt part scatters. What
+/// the peak itself scatters stays on its way, so it isn't lost: sigma_t falls by as much. (Behind, light
+/// turned back twice is taken for light that was never turned.)
+std::vector<Rgba> shine_along_peak(const ScatterField& field, const std::vector<Rgba>& blunt) {
+  std::vector<Rgba> shine = field.medium.shine;
+  if (field.order == Scattering::Order::single) return shine;
+  const auto back = static_cast<float>(field.albedo * (1 - field.phase.peak));
+  for (const std::size_t at : field.medium.active) {
+    const float sigma = field.medium.shine[at].c[3];
+    shine[at] = shine[at] + (back * sigma) * blunt[at];
+    shine[at].c[3] = sigma * static_cast<float>(1 - field.albedo * field.phase.peak);
+  }
+  return shine;
+}
+
+}  // namespace
+
+std::vector<Rgba> in_scattered(const ScatterField& field, const Eigen::Vector3d& camera_center, Pool& pool) {
+  std::vector<Rgba> out(field.medium.grid.size());
+  const std::size_t active = field.medium.active.size();
+  const auto at_active = [&](const auto& value) {
+    constexpr std::size_t kBlock = 256;
+    pool.run(static_cast<int>((active + kBlock - 1) / kBlock), [&](int task) {
+      const std::size_t begin = kBlock * static_cast<std::size_t>(task);
+      for (std::size_t n = begin; n < std::min(active, begin + kBlock); ++n) {
+        Rgba& to = out[field.medium.active[n]];
+        to = value(n, to);
+        to.c[3] = 0;
+      }
+    });
+  };
+  if (field.phase.isotropic()) {
+    at_active([&](std::size_t n, const Rgba&) { return field.light[n]; });
+    return out;
+  }
+  const Towards towards(field, camera_center);
+  at_active([&](std::size_t n, const Rgba&) { return towards.blunt(n); });
+  if (field.phase.peak <= 0) return out;
+  const std::vector<Rgba> shine = shine_along_peak(field, out);
+  const auto peak = static_cast<float>(field.phase.peak);
+  at_active(
+      [&](std::size_t n, const Rgba& blunt) { return (1 - peak) * blunt + peak * towards.peak(n, shine); });
+  return out;
+}
+
+}  // namespace emberlock

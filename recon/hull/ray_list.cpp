@@ -57,6 +57,7 @@ struct Counts {
 struct RowRays {
   std::vector<MarchRay> rays;
   std::vector<Run> runs;
+  std::vector<Bend> bends;  // of curved rays, one a run
   std::vector<std::uint32_t> pixels;
   std::vector<int> subsets;
   std::uint32_t samples = 0;
@@ -106,12 +107,29 @@ class RowClipper {
  private:
   void add_runs(const float* origin, MarchRay& ray, RowRays& out) const {
     float before = 0;
-    clip_to_medium(mask_, origin, ray.direction, [&](float t0, float t1) {
+    if (options_.gas == nullptr) {
+      add_stretch(origin, ray.direction, kEndless, before, ray, out);
+      return;
+    }
+    trace(*options_.gas, origin, ray.direction, [&](const float* from, const float* direction, float length) {
+      const std::uint32_t runs = ray.runs;
+      add_stretch(from, direction, length, before, ray, out);
+      const Bend bend{{from[0], from[1], from[2]}, {direction[0], direction[1], direction[2]}};
+      out.bends.insert(out.bends.end(), ray.runs - runs, bend);
+    });
+  }
+
+  /// The runs of a straight line's first `length` edges; `before` is what lies inside the medium in front of
+  /// it.
+  void add_stretch(const float* origin, const float* direction, float length, float& before, MarchRay& ray,
+                   RowRays& out) const {
+    clip_to_medium(mask_, origin, direction, [&](float t0, float t1) {
       constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
+      t1 = std::min(t1, length);
       if (t1 - t0 < kSliver) return;
       const int count = std::max(1, static_cast<int>(std::ceil((t1 - t0) / options_.step - 1e-3F)));
       const float step = (t1 - t0) / static_cast<float>(count);
-      cut_at_slabs(origin[2], ray.direction[2], t0, step, count, mask_.mz, [&](int first, int size) {
+      cut_at_slabs(origin[2], direction[2], t0, step, count, mask_.mz, [&](int first, int size) {
         const float ahead = static_cast<float>(first) * step;
         out.runs.push_back({t0 + ahead, step, before + ahead, 0, out.samples, size});
         out.samples += static_cast<std::uint32_t>(size);
@@ -126,7 +144,7 @@ class RowClipper {
 };
 
 /// Sorts by subset, rows in order, so that the list doesn't depend on which thread did which row.
-void assemble(std::vector<RowRays>& rows, int subsets, RayList& list, Pool& pool) {
+void assemble(std::vector<RowRays>& rows, int subsets, bool curved, RayList& list, Pool& pool) {
   Counts next;
   list.subset_begin.push_back(0);
   for (int s = 0; s < subsets; ++s) {
@@ -142,6 +160,7 @@ void assemble(std::vector<RowRays>& rows, int subsets, RayList& list, Pool& pool
   list.rays.resize(next.rays);
   list.pixels.resize(next.rays);
   list.runs.resize(next.runs);
+  if (curved) list.bends.resize(next.runs);
   constexpr int kTasks = 64;
   pool.run(kTasks, [&](int task) {
     const Slice mine = slice(rows.size(), kTasks, task);
@@ -150,14 +169,15 @@ void assemble(std::vector<RowRays>& rows, int subsets, RayList& list, Pool& pool
       for (std::size_t r = 0; r < row.rays.size(); ++r) {
         Counts& to = row.counts[static_cast<std::size_t>(row.subsets[r])];
         MarchRay ray = row.rays[r];
-        const Run* from = &row.runs[ray.first_run];
+        const std::size_t from = ray.first_run;
         ray.first_run = to.runs;
         list.pixels[to.rays] = row.pixels[r];
         for (std::uint32_t i = 0; i < ray.runs; ++i) {
-          Run run = from[i];
+          Run run = row.runs[from + i];
           run.ray = to.rays;
           run.first_sample = to.samples;
           to.samples += static_cast<std::uint32_t>(run.count);
+          if (curved) list.bends[to.runs] = row.bends[from + i];
           list.runs[to.runs++] = run;
         }
         list.rays[to.rays++] = ray;
@@ -255,7 +275,7 @@ RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& me
       found[r] =
           clip(*cameras[rows[r].view], &list.origins[3 * static_cast<std::size_t>(rows[r].view)], rows[r]);
   });
-  assemble(found, options.subsets, list, pool);
+  assemble(found, options.subsets, options.gas != nullptr, list, pool);
   return list;
 }
 

@@ -7,6 +7,7 @@
 #include "recon/compute/pool.h"
 #include "recon/hull/medium.h"
 #include "recon/kernels/march.h"
+#include "recon/kernels/refract.h"
 
 namespace emberlock {
 
@@ -53,6 +54,8 @@ struct RayListOptions {
   int subsets = 1;
   /// The subset of a pixel, or -1 to leave it out; all in subset 0 where empty.
   std::function<int(std::size_t view, int x, int y)> subset_of;
+  /// Gas that bends the rays, in the medium's voxel edges; the list then has bends. Straight where null.
+  const IndexField* gas = nullptr;
 };
 
 RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& medium,

@@ -24,7 +24,7 @@ struct IndexField {
 inline constexpr float kEndless = 1e30F;
 
 /// How far a ray's straight stretches may lie from its true path, voxel edges.
-inline constexpr double kLargestDeparture = 0.01;
+inline constexpr double kLargestDeparture = 0.0025;
 
 namespace detail {
 

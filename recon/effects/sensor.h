@@ -7,7 +7,7 @@ namespace emberlock {
 
 // The camera's response, channel by channel: value = white * (radiance / white)^(1 / gamma), clipped at
 // white. Both ways are odd functions, so that noise around black stays unbiased. A solver works on linearised
-// pictures, and where white clips, compares by BoundedResidual{white} (kernels/sensor.h).
+// pictures, and where white clips, compares by Judge::white (kernels/judge.h).
 
 /// From pixel values to radiance, in place; a clipped sensor's values above white become white. `sensor` must
 /// pass `check`.

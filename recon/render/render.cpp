@@ -3,6 +3,9 @@
 #include <algorithm>
 
 #include "recon/compute/pool.h"
+#include "recon/effects/background.h"
+#include "recon/effects/exposure.h"
+#include "recon/effects/sensor.h"
 #include "recon/hull/ray_list.h"
 #include "recon/render/march_table.h"
 
@@ -39,33 +42,94 @@ constexpr Absorb absorb_of(Extinction::Model model) {
   return Absorb::nothing;
 }
 
+/// source += sigma_s G at the cropped grid's key points, G trilinear between the coarse ones.
+void add_in_scatter(const ScatterField& field, const Eigen::Vector3d& camera_center, const Grid& grid,
+                    const Extinction& extinction, Pool& pool, std::vector<Rgba>& source) {
+  const std::vector<Rgba> g = in_scattered(field, camera_center, pool);
+  const Grid& coarse_grid = field.medium.grid;
+  const ShiningGrid coarse{coarse_grid.nx, coarse_grid.ny, coarse_grid.nz, g.data()};
+  const bool varies = extinction.model == Extinction::Model::field;
+  const auto albedo = static_cast<float>(field.albedo);
+  const auto sigma = static_cast<float>(extinction.value.value() * static_cast<double>(grid.edge));
+  const float scale = grid.edge / coarse_grid.edge;
+  float shift[3];
+  for (int a = 0; a < 3; ++a) shift[a] = (grid.origin[a] - coarse_grid.origin[a]) / coarse_grid.edge;
+  pool.run(grid.nz, [&](int k) {
+    const float z = shift[2] + scale * static_cast<float>(k);
+    for (int j = 0; j < grid.ny; ++j) {
+      const float y = shift[1] + scale * static_cast<float>(j);
+      Rgba* row = &source[grid.index(0, j, k)];
+      for (int i = 0; i < grid.nx; ++i) {
+        const float sigma_s = albedo * (varies ? row[i].c[3] : sigma);
+        row[i] = row[i] + sigma_s * coarse.at(shift[0] + scale * static_cast<float>(i), y, z);
+      }
+    }
+  });
+}
+
+/// The rays of one camera, and what bends them.
+RayList rays_of(const CameraModel& camera, const Hull& medium, const std::vector<Rgba>& source,
+                const Refraction& refraction, const RenderOptions& options, Pool& pool) {
+  RayListOptions clip;
+  clip.step = static_cast<float>(options.step);
+  if (refraction.rays == Refraction::Rays::straight) return clip_rays({&camera}, medium, clip, pool);
+  const RefractiveIndex index(
+      options.gas != nullptr ? *options.gas : assume_temperature(medium, source, refraction),
+      refraction.ambient);
+  const IndexField gas = index.field(medium.grid);
+  clip.gas = &gas;
+  return clip_rays({&camera}, medium, clip, pool);
+}
+
+/// Radiance and transmittance of rays, in front of what the image shows already.
+void put_in_front(const Rgba* seen, const std::uint32_t* pixels, std::size_t count, RadianceImage& image) {
+  for (std::size_t r = 0; r < count; ++r) {
+    float* pixel = &image.rgb[3 * static_cast<std::size_t>(pixels[r])];
+    for (int c = 0; c < 3; ++c) pixel[c] = seen[r].c[c] + seen[r].c[3] * pixel[c];
+  }
+}
+
+void march(const MarchWork<float>& work, Absorb absorb, const RayList& list, Pool& pool,
+           RadianceImage& image) {
+  const Travel travel = list.bends.empty() ? Travel::straight : Travel::curved;
+  const auto forward = march_table<float>().forward_of(absorb, travel);
+  constexpr int kTasks = 128;
+  pool.run(kTasks, [&](int task) {
+    const Slice rays = slice(list.rays.size(), kTasks, task);
+    forward(work, rays.begin, rays.end);
+    put_in_front(work.residual + rays.begin, &list.pixels[rays.begin], rays.end - rays.begin, image);
+  });
+}
+
 }  // namespace
 
 RadianceImage render_view(const Volume& volume, const Hull& medium, const Effects& effects,
                           const CameraModel& camera, const RenderOptions& options) {
-  RadianceImage image(camera.intrinsics.size);
-  if (medium.count == 0) return image;
-  Pool pool(options.compute.threads);
-  const CroppedHull crop = crop_to_medium(medium);
-  RayListOptions clip;
-  clip.step = static_cast<float>(options.step);
-  const RayList list = clip_rays({&camera}, crop.hull, clip, pool);
-  const std::vector<Rgba> source = crop_volume(volume, crop, effects.extinction.model);
-  std::vector<Rgba> seen(list.rays.size());
-  MarchWork<float> work;
-  work.rays = list.table();
-  work.volume = source.data();
-  work.sigma = static_cast<float>(effects.extinction.value.value() * static_cast<double>(volume.grid.edge));
-  work.residual = seen.data();
-  const auto march = march_table<float>().forward_of(absorb_of(effects.extinction.model), Travel::straight);
-  constexpr int kTasks = 128;
-  pool.run(kTasks, [&](int task) {
-    const Slice rays = slice(seen.size(), kTasks, task);
-    march(work, rays.begin, rays.end);
-    for (std::size_t r = rays.begin; r < rays.end; ++r)
-      for (std::size_t c = 0; c < 3; ++c)
-        image.rgb[3 * static_cast<std::size_t>(list.pixels[r]) + c] = seen[r].c[c];
-  });
+  RadianceImage image = backdrop(effects.background, camera.intrinsics.size, options.background);
+  if (medium.count > 0) {
+    Pool pool(options.compute.threads);
+    const CroppedHull crop = crop_to_medium(medium);
+    std::vector<Rgba> source = crop_volume(volume, crop, effects.extinction.model);
+    if (effects.scattering.order != Scattering::Order::none) {
+      const ScatterField found = options.scattered != nullptr
+                                     ? ScatterField{}
+                                     : find_in_scatter(volume, medium, effects, options.in_scatter, pool);
+      const ScatterField& field = options.scattered != nullptr ? *options.scattered : found;
+      if (!field.empty())
+        add_in_scatter(field, camera.center(), crop.hull.grid, effects.extinction, pool, source);
+    }
+    const ExposureBlur exposure(effects.exposure, crop.hull.grid);
+    if (!exposure.identity()) source = exposure.forward(source, pool);
+    const RayList list = rays_of(camera, crop.hull, source, effects.refraction, options, pool);
+    std::vector<Rgba> seen(list.rays.size());
+    MarchWork<float> work;
+    work.rays = list.table();
+    work.volume = source.data();
+    work.sigma = static_cast<float>(effects.extinction.value.value() * static_cast<double>(volume.grid.edge));
+    work.residual = seen.data();
+    march(work, absorb_of(effects.extinction.model), list, pool, image);
+  }
+  respond(image, effects.sensor);
   return image;
 }
 

@@ -129,10 +129,12 @@ Hull ellipsoid(const Grid& grid) {
 Volume exposed_volume(const Volume& volume, const Exposure& exposure) {
   Pool pool(2);
   std::vector<Rgba> x(volume.grid.size());
-  for (std::size_t p = 0; p < x.size(); ++p) std::copy_n(&volume.emission[3 * p], 3, x[p].c);
+  for (std::size_t p = 0; p < x.size(); ++p)
+    for (std::size_t c = 0; c < 3; ++c) x[p].c[c] = volume.emission[3 * p + c];
   x = ExposureBlur(exposure, volume.grid).forward(x, pool);
   Volume out = volume;
-  for (std::size_t p = 0; p < x.size(); ++p) std::copy_n(x[p].c, 3, &out.emission[3 * p]);
+  for (std::size_t p = 0; p < x.size(); ++p)
+    for (std::size_t c = 0; c < 3; ++c) out.emission[3 * p + c] = x[p].c[c];
   return out;
 }
 
@@ -174,6 +176,24 @@ TEST(Exposure, PictureIsTheMeanOfTheInstantsWhereNothingAbsorbs) {
     EXPECT_GT(c.change, 0.9) << way;
     EXPECT_LT(c.deviation, 0.06 * c.change) << way << ": " << c.deviation;
   }
+}
+
+TEST(Exposure, RenderingAveragesTheVolumeFirst) {
+  const Grid grid = box_grid(20);
+  const CameraModel camera =
+      look_at({{40, 60}, 60, 60, 20, 30, {}}, Eigen::Vector3d(0.3, 0.05, 0.06), Eigen::Vector3d(0, 0, 0));
+  const Volume still = blob(grid, 0.05, 0);
+  Effects effects = absorbing(PerMeter(10));
+  const auto by_hand =
+      render_view(exposed_volume(still, moving(2.5, grid)), whole_grid(grid), effects, camera).rgb;
+  effects.exposure = moving(2.5, grid);
+  const auto rendered = render_view(still, whole_grid(grid), effects, camera).rgb;
+  float brightest = 0;
+  for (std::size_t p = 0; p < rendered.size(); ++p) {
+    EXPECT_NEAR(rendered[p], by_hand[p], 1e-3F);
+    brightest = std::max(brightest, rendered[p]);
+  }
+  EXPECT_GT(brightest, 20);
 }
 
 // The true medium moves with the flame and the model's stands still: RMS 0.27 of a change of 1.8 grey levels.

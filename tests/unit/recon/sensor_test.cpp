@@ -5,7 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "recon/kernels/sensor.h"
+#include "recon/kernels/judge.h"
 
 namespace emberlock {
 namespace {
@@ -88,17 +88,17 @@ TEST(Sensor, ImpossibleOnesAreRefused) {
 }
 
 TEST(Sensor, SaturatedPixelIsABoundAndTheOthersAreValues) {
-  const BoundedResidual bounded{200};
-  const LinearResidual linear;
-  const Rgba rendered{{150, 250, 250, 0.4F}};
   const Rgba seen{{200, 200, 199, 0}};
-  const Rgba r = bounded(rendered, seen);
+  const Rgba rendered{{150, 250, 250, 0.4F}};
+  Judge<float> judge;
+  judge.seen = &seen;
+  EXPECT_EQ(judge(0, rendered).c[1], 50.F);
+  judge.white = 200;
+  const Rgba r = judge(0, rendered);
   EXPECT_EQ(r.c[0], -50.F);  // saturated, and rendered darker
   EXPECT_EQ(r.c[1], 0.F);    // saturated, and rendered brighter
   EXPECT_EQ(r.c[2], 51.F);   // a value
   EXPECT_EQ(r.c[3], 0.F);
-  EXPECT_EQ(linear(rendered, seen).c[1], 50.F);
-  EXPECT_EQ(linear(rendered, seen).c[3], 0.F);
 }
 
 // x * 1 seen as min(x, white) for three pixels of one unknown: least squares would settle between the values,
@@ -106,13 +106,16 @@ TEST(Sensor, SaturatedPixelIsABoundAndTheOthersAreValues) {
 TEST(Sensor, DescentOnTheBoundFindsWhatTheClippedPixelsHide) {
   const float gain[3] = {0.5F, 1, 2};
   const float truth = 300;
-  const BoundedResidual bounded{200};
   float x = 0;
   for (int i = 0; i < 200; ++i) {
     float slope = 0;
     for (const float g : gain) {
       const float seen = std::min(g * truth, 200.F);
-      slope += g * bounded(Rgba{{g * x, 0, 0, 0}}, Rgba{{seen, 0, 0, 0}}).c[0];
+      const Rgba pixel{{seen, 0, 0, 0}};
+      Judge<float> judge;
+      judge.seen = &pixel;
+      judge.white = 200;
+      slope += g * judge(0, Rgba{{g * x, 0, 0, 0}}).c[0];
     }
     x -= slope / 5.25F;
   }

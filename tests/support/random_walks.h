@@ -70,9 +70,12 @@ inline Volume cloud(int voxels, double thickest) {
   return v;
 }
 
-/// A volume's fields in double at any point, straight from the key points.
+/// A volume's fields in double at any point, straight from the key points; with a medium, 0 outside it and of
+/// constant extinction inside.
 struct Fields {
   const Volume& volume;
+  const Hull* medium = nullptr;
+  double constant = 0;  ///< 1/m
   double emission = 0;  ///< green
   double extinction = 0;
 
@@ -88,11 +91,16 @@ struct Fields {
       f[a] = x - cell[a];
     }
     emission = extinction = 0;
+    if (medium != nullptr) {
+      const int voxel = cell[0] + voxels[0] * (cell[1] + voxels[1] * cell[2]);
+      if (medium->inside[static_cast<std::size_t>(voxel)] == 0) return true;
+      extinction = constant;
+    }
     for (int c = 0; c < 8; ++c) {
       const double w = (c & 1 ? f[0] : 1 - f[0]) * (c & 2 ? f[1] : 1 - f[1]) * (c & 4 ? f[2] : 1 - f[2]);
       const std::size_t at = g.index(cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2));
       emission += w * static_cast<double>(volume.emission[3 * at + 1]);
-      extinction += w * static_cast<double>(volume.extinction[at]);
+      if (medium == nullptr) extinction += w * static_cast<double>(volume.extinction[at]);
     }
     return true;
   }
@@ -116,6 +124,7 @@ struct RandomWalks {
   const Volume& volume;
   double majorant = 0;
   Scattering scattering;
+  const Hull* medium = nullptr;  ///< of constant extinction, the majorant's; the volume's field where null
 
   /// G at a point, towards a direction.
   [[nodiscard]] Estimate in_scatter(const Eigen::Vector3d& from, const Eigen::Vector3d& towards,
@@ -145,7 +154,7 @@ struct RandomWalks {
   }
 
   double walk(Eigen::Vector3d at, Eigen::Vector3d travel, int turns, RandomStream& random) const {
-    Fields fields{volume};
+    Fields fields{volume, medium, majorant};
     double weight = 1;
     double light = 0;
     while (true) {

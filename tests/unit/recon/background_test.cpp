@@ -25,7 +25,8 @@ CameraModel camera_at(const Eigen::Vector3d& center, ImageSize size, double foca
 }
 
 double pixel(const RadianceImage& image, int x, int y, int c) {
-  return static_cast<double>(image.rgb[static_cast<std::size_t>(3 * (y * image.size.width + x) + c)]);
+  const int at = 3 * (y * image.size.width + x) + c;
+  return static_cast<double>(image.rgb[static_cast<std::size_t>(at)]);
 }
 
 RadianceImage noise(ImageSize size) {

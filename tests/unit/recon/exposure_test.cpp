@@ -49,7 +49,7 @@ TEST(Exposure, WeightsKeepTheLightAndSpreadItAsTheMotionDoes) {
     double mean = 0;
     double square = 0;
     for (std::size_t i = 0; i < weights.size(); ++i) {
-      const double m = static_cast<double>(i) - static_cast<double>(weights.size() / 2);
+      const double m = static_cast<double>(i) - 0.5 * static_cast<double>(weights.size() - 1);
       sum += static_cast<double>(weights[i]);
       mean += m * static_cast<double>(weights[i]);
       square += m * m * static_cast<double>(weights[i]);

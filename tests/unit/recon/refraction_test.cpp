@@ -235,7 +235,8 @@ struct Setting {
       if (cell[a] < 0 || cell[a] > 15) return -1;
       f[a] = p - cell[a];
     }
-    if (medium.inside[static_cast<std::size_t>(cell[0] + 16 * (cell[1] + 16 * cell[2]))] == 0) return -1;
+    const int voxel = cell[0] + 16 * (cell[1] + 16 * cell[2]);
+    if (medium.inside[static_cast<std::size_t>(voxel)] == 0) return -1;
     double sum = 0;
     for (int c = 0; c < 8; ++c) {
       const double w = (c & 1 ? f[0] : 1 - f[0]) * (c & 2 ? f[1] : 1 - f[1]) * (c & 4 ? f[2] : 1 - f[2]);
@@ -292,7 +293,8 @@ TEST(Refraction, CurvedPicturesAgreeWithBruteForceInDouble) {
     double change = 0;
     for (int y = 0; y < 12; ++y)
       for (int x = 0; x < 16; ++x) {
-        const auto at = static_cast<std::size_t>(3 * (16 * y + x) + 1);
+        const int green = 3 * (16 * y + x) + 1;
+        const auto at = static_cast<std::size_t>(green);
         const double truth = setting.brute_force(sigma, setting.camera.ray({x + 0.5, y + 0.5}), 1);
         error += std::pow(static_cast<double>(image.rgb[at]) - truth, 2);
         change += std::pow(static_cast<double>(straight.rgb[at]) - truth, 2);
@@ -311,6 +313,21 @@ TEST(Refraction, GasAtTheSurroundingsTemperatureGivesTheStraightPicturesBits) {
     EXPECT_EQ(render_view(setting.volume, setting.medium, effects, setting.camera).rgb,
               render_view(setting.volume, setting.medium, absorbing(PerMeter(sigma)), setting.camera).rgb);
   }
+}
+
+TEST(Refraction, SameBitsForAnyNumberOfThreads) {
+  const Setting setting;
+  RenderOptions options;
+  std::vector<std::vector<float>> pictures;
+  for (const int threads : {1, 2, 16}) {
+    options.compute.threads = threads;
+    pictures.push_back(
+        render_view(setting.volume, setting.medium, curved(PerMeter(10)), setting.camera, options).rgb);
+  }
+  EXPECT_EQ(pictures[0], pictures[1]);
+  EXPECT_EQ(pictures[0], pictures[2]);
+  EXPECT_NE(pictures[0],
+            render_view(setting.volume, setting.medium, absorbing(PerMeter(10)), setting.camera).rgb);
 }
 
 TEST(Refraction, AdjointOnCurvedPathsIsTheTranspose) {

@@ -24,6 +24,11 @@ namespace emberlock {
 // scattering is one sweep over the emission. Multiple scattering is the fixed point G = s + K G, solved by
 // source iteration with conjugate residuals (Orthomin(1), Vinsome 1976): each iteration is one sweep, and the
 // residual never grows, because |K| < 1.
+//
+// Measured: 3 to 4 iterations for the flame where plain source iteration takes 10 to 12 (tolerance 1e-3), 11
+// to 24 where it takes 34 to 118 in a cloud of 60 / m, 20 cm wide, albedo 0.999 (1e-4). On 32 voxels the
+// flame's G differs by 2.7 % RMS (multiple) and 3.8 % (single) from 72 voxels' and 128 directions', its mean
+// by 0.1 %.
 
 struct InScatterOptions {
   int voxels = 32;  ///< coarse voxels along the medium's longest side, >= 1; never more than the volume's

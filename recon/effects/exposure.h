@@ -25,7 +25,8 @@ class ExposureBlur {
   /// Of x shifted by m = -reach..reach edges: 2 * reach + 1, none negative; they sum to 1.
   [[nodiscard]] const std::vector<float>& weights() const { return weights_; }
 
-  /// B x and its transpose B^T y, at the grid's key points. The same bits for any number of threads.
+  /// B x and its transpose B^T y, at the grid's key points, all four lanes. The same bits for any number of
+  /// threads.
   [[nodiscard]] std::vector<Rgba> forward(const std::vector<Rgba>& x, Pool& pool) const;
   [[nodiscard]] std::vector<Rgba> adjoint(const std::vector<Rgba>& y, Pool& pool) const;
 

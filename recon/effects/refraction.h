@@ -24,7 +24,8 @@ struct GasTemperature {
 /// coarse cells (a coarse cell is a 32nd of the medium's longest side, at least one voxel). `emission` at the
 /// medium's key points, if not empty, says where the medium is hot: gas below the mean luminance is
 /// proportionally cooler. The plume above the medium is left out. Known temperatures beat this: any
-/// GasTemperature will do.
+/// GasTemperature will do. Solvers hold the paths fixed: how a change of the medium would move them is left
+/// out, from the adjoint too.
 GasTemperature assume_temperature(const Hull& medium, const std::vector<Rgba>& emission,
                                   const Refraction& refraction);
 

@@ -6,6 +6,7 @@
 
 #include "base/random.h"
 #include "recon/hull/hull.h"
+#include "recon/hull/ray_list.h"
 #include "recon/render/render.h"
 
 namespace emberlock {
@@ -136,6 +137,33 @@ TEST(Background, BlackIsTheDefaultAndWhatAnAbsentPictureMeans) {
       render_view(holes.volume, holes.medium, before(Background::Kind::image, PerMeter(15)), holes.camera)
           .rgb,
       black.rgb);
+}
+
+TEST(Background, EveryRayFindsItsOwnPixelInItsOwnViewsPicture) {
+  const Holes holes;
+  View with;
+  with.camera = holes.camera;
+  with.background = noise({24, 20});
+  View without;
+  without.camera = camera_at({0, 0.3, 0.1}, {24, 20}, 18);
+  Pool pool(1);
+  const RayList list = clip_rays({&without.camera, &with.camera}, holes.medium, {}, pool);
+  const std::vector<const View*> views = {&without, &with};
+  EXPECT_TRUE(behind_rays({}, list, views).empty());
+  const auto image = behind_rays({Background::Kind::image, {}}, list, views);
+  const auto constant = behind_rays({Background::Kind::constant, {10, 60, 200}}, list, views);
+  int lit = 0;
+  for (std::size_t r = 0; r < list.rays.size(); ++r) {
+    const bool has = list.rays[r].view == 1;
+    const std::size_t at = 3 * static_cast<std::size_t>(list.pixels[r]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      EXPECT_EQ(image[r].c[c], has ? with.background->rgb[at + c] : 0.F);
+      EXPECT_EQ(static_cast<double>(constant[r].c[c]), kBack[c]);
+    }
+    lit += has ? 1 : 0;
+  }
+  EXPECT_GT(lit, 100);
+  EXPECT_GT(static_cast<int>(list.rays.size()), lit + 100);
 }
 
 TEST(Background, PictureOfAnotherSizeIsRefusedByItsViewsName) {

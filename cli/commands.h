@@ -11,6 +11,7 @@ namespace emberlock::cli {
 void add_smear(CLI::App& app);
 void add_align(CLI::App& app);
 void add_reconstruct(CLI::App& app);
+void add_tradeoff(CLI::App& app);
 void add_demo(CLI::App& app);
 
 /// Prints "emberlock: <message>" on stderr and leaves with exit code 2 for bad input, else 1 (as

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -7,10 +8,13 @@
 
 #include "base/clock.h"
 #include "cli/commands.h"
+#include "cli/scene_options.h"
 #include "recon/pipeline/advice.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/pipeline/scene.h"
+#include "recon/pipeline/sweep.h"
+#include "recon/pipeline/work_precision.h"
 
 namespace emberlock::cli {
 namespace {
@@ -23,7 +27,10 @@ struct Arguments {
   std::string solver = "default";
   std::string effects;
   std::string device = "auto";
+  std::string precision = "float32";
   std::vector<int> held_out;
+  int views = 0;
+  double step = 1;
   std::optional<int> voxels;
   std::optional<std::size_t> frame;
   std::optional<double> budget;
@@ -34,7 +41,8 @@ struct Arguments {
   std::uint64_t seed = 1;
 };
 
-/// "cx,cy,cz,sx,sy,sz" in metres.
+}  // namespace
+
 Result<Box> parse_box(const std::string& text) {
   std::vector<double> numbers;
   std::istringstream words(text);
@@ -55,6 +63,8 @@ Result<Box> parse_box(const std::string& text) {
   return box;
 }
 
+namespace {
+
 /// Like parse_box: the words' meaning, or the first that has none.
 Result<ReconstructOptions> options_of(const Arguments& arguments) {
   ReconstructOptions options;
@@ -64,6 +74,8 @@ Result<ReconstructOptions> options_of(const Arguments& arguments) {
   }
   EMBERLOCK_ASSIGN_OR_RETURN(options.solve.solver, parse_solver(arguments.solver));
   EMBERLOCK_ASSIGN_OR_RETURN(options.solve.compute.device, parse_device(arguments.device));
+  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.precision, parse_precision(arguments.precision));
+  options.solve.step = arguments.step;
   options.solve.compute.threads = arguments.threads;
   options.solve.iterations = arguments.iterations;
   if (arguments.budget) options.solve.budget = Seconds(*arguments.budget);
@@ -75,6 +87,17 @@ Result<ReconstructOptions> options_of(const Arguments& arguments) {
                  "Hold a view out with --hold-out i"};
   }
   return options;
+}
+
+/// with_views(), or the reason why not.
+Result<Scene> choose_views(const Scene& scene, int views) {
+  const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
+                                    [](const View& v) { return v.role == ViewRole::input; });
+  if (views > inputs) {
+    return Error{ErrorKind::bad_input, "there are " + std::to_string(inputs) + " input views", "--views",
+                 "Give at most so many"};
+  }
+  return with_views(scene, views);
 }
 
 void print_rgb(const char* label, const ChannelRmse& rmse) {
@@ -94,7 +117,10 @@ void print_summary(const Report& report, const std::string& out) {
     std::printf("%-16s %s: %s\n", effect.name.c_str(), effect.on ? "on" : "off", effect.reason.c_str());
   }
   for (const std::string& warning : report.warnings) std::printf("%-16s %s\n", "warning", warning.c_str());
-  if (const std::string advice = next_step(report); !advice.empty()) {
+  if (report.plan) {
+    for (const std::string& words : report.plan->words) std::printf("%-16s %s\n", "plan", words.c_str());
+  }
+  for (const std::string& advice : next_steps(report)) {
     std::printf("%-16s %s\n", "next step", advice.c_str());
   }
   std::printf("%-16s %s\n", "written to", out.c_str());
@@ -108,6 +134,7 @@ void reconstruct_command(const Arguments& arguments) {
   or_fail(check_output(arguments.out));
   Scene scene = or_fail(load_scene(arguments.input, scene_options));
   or_fail(hold_out(scene, arguments.held_out));
+  scene = or_fail(choose_views(scene, arguments.views));
   SteadyClock clock;
   Outcome outcome = or_fail(reconstruct(scene, options, clock, progress_bar("reconstruct")));
   outcome.report.input = arguments.input;
@@ -137,14 +164,21 @@ void add_reconstruct(CLI::App& app) {
   verb->add_option("--effects", a.effects, "auto, none, or a list such as extinction=32.8 (1/m) [auto]");
   verb->add_option("--iterations", a.iterations, "At most so many [the solver's own rule]")
       ->check(CLI::Range(1, 1000000));
+  verb->add_option("--views", a.views, "Use so many of the input views, spread as far as possible [all]")
+      ->check(CLI::Range(1, 64));
+  verb->add_option("--step", a.step, "Longest step along a ray, in voxel edges")
+      ->check(CLI::Range(0.05, 4.0))
+      ->capture_default_str();
+  verb->add_option("--precision", a.precision, "float32 or float64")->capture_default_str();
   verb->add_option("--threads", a.threads, "CPU threads, 0 takes every core; the result doesn't depend on it")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
   verb->add_option("--device", a.device, "auto, cpu or cuda")->capture_default_str();
-  verb->add_option("--budget", a.budget, "Stop after so many seconds, with the best so far")
+  verb->add_option("--budget", a.budget,
+                   "Be done within so many seconds, loading and writing aside; chooses what is left open")
       ->check(CLI::PositiveNumber);
   verb->add_option("--target-rmse", a.target_rmse,
-                   "Stop when the held-out error falls to this many grey levels")
+                   "Bring the held-out error to this many grey levels; chooses what is left open")
       ->check(CLI::PositiveNumber);
   verb->add_option(
           "--threshold", a.threshold,

@@ -44,11 +44,32 @@ ordered_json views_json(const Report& report) {
   return views;
 }
 
+template <class T>
+ordered_json or_null(const std::optional<T>& value) {
+  return value ? ordered_json(*value) : ordered_json();
+}
+
+ordered_json plan_json(const std::optional<PlanReport>& plan) {
+  if (!plan) return {};
+  return {{"budget", plan->budget ? ordered_json(plan->budget->value()) : ordered_json()},
+          {"target_rmse", or_null(plan->target_rmse)},
+          {"reference_seconds", plan->reference_time.value()},
+          {"attempts", plan->attempts},
+          {"voxels", plan->voxels},
+          {"iterations", plan->iterations},
+          {"effects_searched", plan->effects_searched},
+          {"predicted_seconds", plan->predicted_time.value()},
+          {"predicted_rmse", or_null(plan->predicted_rmse)},
+          {"over_budget", plan->over_budget.value()},
+          {"missed_by", plan->missed_by},
+          {"words", plan->words}};
+}
+
 }  // namespace
 
 std::string to_json(const Report& report) {
   ordered_json json;
-  json["heldout_rmse"] = report.heldout_rmse ? ordered_json(*report.heldout_rmse) : ordered_json();
+  json["heldout_rmse"] = or_null(report.heldout_rmse);
   json["input_rmse"] = report.input_rmse;
   json["warnings"] = report.warnings;
   json["input"] = report.input;
@@ -56,15 +77,20 @@ std::string to_json(const Report& report) {
   json["device"] = report.device;
   json["threads"] = report.threads;
   json["seed"] = report.seed;
+  json["step"] = report.step;
+  json["precision"] = report.precision == Precision::float32 ? "float32" : "float64";
   json["box"] = {{"center", vector_json(report.box.center)}, {"size", vector_json(report.box.size)}};
   json["voxels"] = report.voxels;
   json["voxel_edge"] = report.voxel_edge.value();
+  json["finest_voxels"] = report.finest_voxels;
   json["hull_voxels"] = report.hull_voxels;
   json["iterations"] = report.iterations;
   json["seconds"] = {{"effects", report.effects_time.value()},
                      {"hull", report.hull_time.value()},
                      {"solve", report.solve_time.value()},
+                     {"render", report.render_time.value()},
                      {"total", report.total_time.value()}};
+  json["plan"] = plan_json(report.plan);
   json["effects"] = effects_json(report);
   json["views"] = views_json(report);
   json["trace"] = trace_json(report);

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <limits>
 
+#include "recon/pipeline/shipped_front.h"
 #include "recon/preprocess/flame_mask.h"
 
 namespace emberlock {
 namespace {
+
+constexpr double kNoGain = 0.98;  // a smaller gain than 2 % is none
 
 /// What going on for `seconds` more is worth, and the words for how long that is.
 struct Step {
@@ -25,6 +29,20 @@ Step next_half(const Report& report, ErrorAt error) {
   const double later = std::max(0.0, at(0.5) - at(1));
   const double gain = earlier > 0 ? later * std::min(1.0, later / earlier) : later;
   return {"as many iterations again cost", report.solve_time.value(), gain};
+}
+
+/// What the second half of the run bought.
+template <class ErrorAt>
+std::string bought(const Report& report, ErrorAt error) {
+  const auto& trace = report.trace;
+  if (trace.size() < 4) return {};
+  const TracePoint& half = trace[(trace.size() - 1) / 2];
+  const TracePoint& last = trace.back();
+  char text[200];
+  std::snprintf(
+      text, sizeof text, "iterations %d to %d (%.2f s to %.2f s) lowered the error from %.2f to %.2f; ",
+      half.iteration, last.iteration, half.time.value(), last.time.value(), error(half), error(last));
+  return text;
 }
 
 }  // namespace
@@ -56,7 +74,50 @@ std::string next_step(const Report& report) {
   std::snprintf(text, sizeof text,
                 "%s about %.2g s and would lower the %s error (%.2f) by at most about %.2g", step.length,
                 step.seconds, which, last, step.gain);
+  return bought(report, error) + text;
+}
+
+std::string more_voxels(const Report& report) {
+  const int voxels = *std::max_element(report.voxels.begin(), report.voxels.end());
+  const int finest = report.finest_voxels;
+  if (!report.heldout_rmse || report.solver != "default" || finest < 1 || voxels < 1) return {};
+  char text[240];
+  if (voxels >= finest) {
+    std::snprintf(text, sizeof text,
+                  "more voxels bring little: %d are what the pictures can show (two for three pixels)",
+                  finest);
+    return text;
+  }
+  const int more = std::min(finest, voxels + (voxels + 1) / 2);
+  const std::vector<WorkPoint> front = scaled(shipped_front(), finest, 1, 1);
+  const auto end_of = [&](int v) {
+    const std::vector<WorkPoint> points = at_voxels(front, v);
+    return *best_within(points, std::numeric_limits<double>::infinity());
+  };
+  const WorkPoint now = end_of(voxels);
+  const WorkPoint then = end_of(more);
+  const double error = all_channels(*report.heldout_rmse);
+  const double seconds = report.total_time.value() * std::max(1.0, then.seconds / now.seconds);
+  if (then.error > kNoGain * now.error) {
+    std::snprintf(text, sizeof text,
+                  "by the shipped front, %d voxels instead of %d don't lower the held-out error", more,
+                  voxels);
+    return text;
+  }
+  std::snprintf(
+      text, sizeof text,
+      "by the shipped front, %d voxels instead of %d would take about %.2g s instead of %.2g and bring "
+      "the held-out error from %.2f to about %.2f",
+      more, voxels, seconds, report.total_time.value(), error, error * then.error / now.error);
   return text;
+}
+
+std::vector<std::string> next_steps(const Report& report) {
+  std::vector<std::string> steps;
+  for (std::string step : {next_step(report), more_voxels(report)}) {
+    if (!step.empty()) steps.push_back(std::move(step));
+  }
+  return steps;
 }
 
 }  // namespace emberlock

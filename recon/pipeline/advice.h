@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "recon/export/report.h"
 
@@ -11,5 +12,12 @@ namespace emberlock {
 /// if it goes on so, as many iterations again bring at most g2 * min(1, g2 / g1). From fewer than four
 /// points, one more iteration brings at most what the last one brought. Empty with fewer than two.
 std::string next_step(const Report& report);
+
+/// What half as many voxels again would cost and bring by the shipped front, scaled by this run; empty where
+/// the front can't tell: nothing held out, or the paper's solver.
+std::string more_voxels(const Report& report);
+
+/// Both, as far as there is something to say.
+std::vector<std::string> next_steps(const Report& report);
 
 }  // namespace emberlock

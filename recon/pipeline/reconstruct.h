@@ -21,9 +21,14 @@ struct ReconstructOptions {
       voxels;  ///< along the box's longest edge, 1..kLargestVoxels; otherwise voxels_by_the_paper()
   /// Otherwise found out from the pictures; for the paper's solver its constant opacity of 0.05 a step.
   std::optional<EffectRequest> effects;
-  /// A budget counts from the start of reconstruct(), so it covers the choice of effects and the hull too.
-  /// Without a flame_threshold the paper's solver takes the paper's 30 grey levels.
+  /// A budget counts from the start of reconstruct() to its end, so it covers the choice of effects, the hull
+  /// and the rendering too. Without a flame_threshold the paper's solver takes the paper's 30 grey levels.
   SolveOptions solve;
+  /// Given a budget or a target, whatever of voxels, effects and iterations is left open is chosen by the
+  /// shipped front, in units of a reference run of the scene at hand (planned_run.h). The paper's solver,
+  /// which the front doesn't know, takes the budget and the target as limits alone, as every solver does if
+  /// false.
+  bool choose_by_front = true;
 };
 
 /// A reconstruction with everything that is written about it.

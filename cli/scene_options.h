@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "base/result.h"
+#include "recon/calibrate/box.h"
+
+namespace emberlock::cli {
+
+/// "cx,cy,cz,sx,sy,sz" in metres.
+Result<Box> parse_box(const std::string& text);
+
+}  // namespace emberlock::cli

@@ -1,0 +1,199 @@
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/clock.h"
+#include "base/file.h"
+#include "cli/commands.h"
+#include "cli/scene_options.h"
+#include "cli/tradeoff_report.h"
+#include "recon/pipeline/scene.h"
+#include "recon/pipeline/shipped_front.h"
+#include "recon/pipeline/sweep.h"
+
+namespace emberlock::cli {
+namespace {
+
+/// The command line as typed, before its words mean anything.
+struct Arguments {
+  std::string input;
+  std::string out;
+  std::string ship;
+  std::string box;
+  std::string device = "auto";
+  std::vector<int> held_out;
+  std::optional<std::size_t> frame;
+  std::optional<double> budget;
+  int threads = 0;
+  std::vector<int> voxels;
+  std::vector<int> views;
+  std::vector<int> iterations;
+  std::vector<double> steps;
+  std::vector<std::string> precisions;
+  std::vector<std::string> effects;
+  std::vector<std::string> solvers;
+};
+
+/// "auto" and "none" stand for themselves; a word's other parts are one list of effects.
+std::vector<std::string> split_effects(const std::vector<std::string>& words) {
+  std::vector<std::string> result;
+  for (const std::string& word : words) {
+    std::string list;
+    for (std::size_t from = 0; from <= word.size();) {
+      const std::size_t to = std::min(word.find(',', from), word.size());
+      const std::string part = word.substr(from, to - from);
+      if (part == "auto" || part == "none") {
+        result.push_back(part);
+      } else {
+        list += (list.empty() ? "" : ",") + part;
+      }
+      from = to + 1;
+    }
+    if (!list.empty()) result.push_back(list);
+  }
+  return result;
+}
+
+Result<SweepOptions> options_of(const Arguments& arguments) {
+  SweepOptions options;
+  options.voxels = arguments.voxels;
+  options.views = arguments.views;
+  options.iterations = arguments.iterations;
+  options.steps = arguments.steps;
+  for (const std::string& word : arguments.precisions) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const Precision precision, parse_precision(word));
+    options.precisions.push_back(precision);
+  }
+  options.effects = split_effects(arguments.effects);
+  for (const std::string& word : arguments.solvers) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const Solver solver, parse_solver(word));
+    options.solvers.push_back(solver);
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(options.compute.device, parse_device(arguments.device));
+  options.compute.threads = arguments.threads;
+  if (arguments.budget) options.budget = Seconds(*arguments.budget);
+  return options;
+}
+
+/// What every point's command has in common.
+std::string common_options(const Arguments& arguments) {
+  std::string words = "--hold-out ";
+  for (std::size_t i = 0; i < arguments.held_out.size(); ++i)
+    words += (i > 0 ? "," : "") + std::to_string(arguments.held_out[i]);
+  if (!arguments.box.empty()) words += " --box " + arguments.box;
+  if (arguments.frame) words += " --frame " + std::to_string(*arguments.frame);
+  if (arguments.device != "auto") words += " --device " + arguments.device;
+  if (arguments.threads != 0) words += " --threads " + std::to_string(arguments.threads);
+  return words;
+}
+
+/// The processor and how many threads run on it.
+std::string machine(const Arguments& arguments) {
+  std::ifstream in("/proc/cpuinfo");
+  std::string model = "this machine";
+  for (std::string line; std::getline(in, line);) {
+    if (line.starts_with("model name") && line.find(": ") != std::string::npos) {
+      model = line.substr(line.find(": ") + 2);
+      break;
+    }
+  }
+  const int threads =
+      arguments.threads > 0 ? arguments.threads : static_cast<int>(std::thread::hardware_concurrency());
+  return fmt::format("{}, {} threads, device {}", model, threads, arguments.device);
+}
+
+void print_summary(const Tradeoff& tradeoff, const std::string& out) {
+  std::printf("%s\n", what_a_second_buys(tradeoff.sweep.points).c_str());
+  for (const WorkPoint& p : pareto_front(tradeoff.sweep.points)) {
+    std::printf("%8.3f s  %6.2f grey levels  %s\n", p.seconds, p.error, command_options(p.settings).c_str());
+  }
+  for (const std::string& skipped : tradeoff.sweep.skipped) std::printf("left out  %s\n", skipped.c_str());
+  std::printf("written to %s\n", (std::filesystem::path(out) / "index.html").c_str());
+}
+
+void ship(const Arguments& arguments, const ComputeOptions& compute) {
+  SteadyClock clock;
+  const std::string source = or_fail(measure_shipped_source(compute, clock, progress_bar("tradeoff")));
+  or_fail(write_file_atomically(arguments.ship, source));
+  std::printf("written to %s; build again to ship it\n", arguments.ship.c_str());
+}
+
+void tradeoff_recon(const Arguments& arguments) {
+  const SweepOptions options = or_fail(options_of(arguments));
+  if (!arguments.ship.empty()) {
+    ship(arguments, options.compute);
+    return;
+  }
+  if (arguments.input.empty() || arguments.out.empty()) {
+    fail({ErrorKind::bad_input, "needs an input and a folder for the result", "tradeoff recon",
+          "Give a transforms.json or a session, and --out DIR"});
+  }
+  SceneOptions scene_options;
+  scene_options.frame = arguments.frame;
+  if (!arguments.box.empty()) scene_options.box = or_fail(parse_box(arguments.box));
+  or_fail(check_tradeoff_output(arguments.out));
+  Scene scene = or_fail(load_scene(arguments.input, scene_options));
+  or_fail(hold_out(scene, arguments.held_out));
+  SteadyClock clock;
+  Tradeoff tradeoff{arguments.input, common_options(arguments), machine(arguments), {}};
+  tradeoff.sweep = or_fail(sweep(scene, options, clock, progress_bar("tradeoff")));
+  or_fail(write_tradeoff(tradeoff, arguments.out));
+  print_summary(tradeoff, arguments.out);
+}
+
+void add_recon(CLI::App& parent) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* verb = parent.add_subcommand(
+      "recon", "Held-out error against seconds over settings of `reconstruct`, with the Pareto front");
+  Arguments& a = *arguments;
+  verb->add_option("input", a.input, "transforms.json, or a recorded session's folder");
+  verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html");
+  verb->add_option("--hold-out", a.held_out, "Views, counted from 0, that judge every point: i,j,...")
+      ->delimiter(',');
+  verb->add_option("--voxels", a.voxels,
+                   "Of each list the first value is the base [eighths of what the pictures can show: "
+                   "4,1,2,3,6,8]")
+      ->delimiter(',');
+  verb->add_option("--views", a.views, "Numbers of input views, 0 for all [0, half, three quarters]")
+      ->delimiter(',');
+  verb->add_option("--iterations", a.iterations,
+                   "Points of each run; the largest is as far as it goes, eight times so far for the paper's "
+                   "solver [1,2,3,4,6,8,12]")
+      ->delimiter(',');
+  verb->add_option("--step", a.steps, "Longest steps along a ray, in voxel edges [1,0.5,2]")->delimiter(',');
+  verb->add_option("--precision", a.precisions, "[float32,float64]")->delimiter(',');
+  verb->add_option("--effects", a.effects,
+                   "auto, none, or a list of effects as `reconstruct` takes it; give the option again for "
+                   "another list [auto,none]")
+      ->allow_extra_args(false);
+  verb->add_option("--solver", a.solvers, "[default,paper]")->delimiter(',');
+  verb->add_option("--budget", a.budget, "Stop the sweep after so many seconds, with what there is")
+      ->check(CLI::PositiveNumber);
+  verb->add_option("--box", a.box, "As in `reconstruct`");
+  verb->add_option("--frame", a.frame, "As in `reconstruct`")->check(CLI::NonNegativeNumber);
+  verb->add_option("--device", a.device, "auto, cpu or cuda")->capture_default_str();
+  verb->add_option("--threads", a.threads, "CPU threads, 0 takes every core")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  verb->add_option(
+      "--ship", a.ship,
+      "Instead: measure the front that --budget and --target-rmse of `reconstruct` choose by, on "
+      "simulated flames, and write it to this file (recon/pipeline/shipped_front.inc)");
+  verb->callback([arguments] { tradeoff_recon(*arguments); });
+}
+
+}  // namespace
+
+void add_tradeoff(CLI::App& app) {
+  CLI::App* verb = app.add_subcommand("tradeoff", "What accuracy costs: work-precision diagrams");
+  verb->require_subcommand(1);
+  add_recon(*verb);
+}
+
+}  // namespace emberlock::cli

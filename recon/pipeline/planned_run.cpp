@@ -1,0 +1,299 @@
+#include "recon/pipeline/planned_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+
+#include "recon/pipeline/grid_choice.h"
+#include "recon/pipeline/reference_run.h"
+#include "recon/pipeline/shipped_front.h"
+#include "recon/preprocess/flame_mask.h"
+
+namespace emberlock {
+namespace {
+
+constexpr double kShareOfBudget = 0.9;  // a prediction errs; the guard inside the solver does the rest
+constexpr double kRenderReserve = 1.2;  // the same for the rendering, which nothing guards
+constexpr int kMostAttempts = 3;
+constexpr double kWorthTrying = 0.97;  // of the error reached: a smaller gain is not worth another attempt
+constexpr double kLargestCorrection = 4;
+
+template <class... Numbers>
+std::string text(const char* format, Numbers... numbers) {
+  char buffer[300];
+  std::snprintf(buffer, sizeof buffer, format, numbers...);
+  return buffer;
+}
+
+double heldout_error(const Outcome& outcome) {
+  return all_channels(outcome.report.trace.back().heldout_rmse);
+}
+
+/// The front for the scene at hand, and what the user left open of it.
+class Choices {
+ public:
+  Choices(const Scene& scene, const ReconstructOptions& asked, const Reference& reference)
+      : all_(scaled(shipped_front(), voxels_by_the_paper(scene), std::max(1e-9, reference.seconds.value()),
+                    std::max(1e-9, reference.error))) {
+    std::erase_if(all_, [&](const WorkPoint& p) { return !choose_grid(scene, p.settings.voxels).ok(); });
+    if (asked.effects) {
+      const char* kept = asked.effects->fixed ? "none" : "auto";
+      std::erase_if(all_, [&](const WorkPoint& p) { return p.settings.effects != kept; });
+    }
+    keep_iterations(asked.solve.iterations);
+    open_ = asked.voxels ? at_voxels(all_, *asked.voxels) : all_;
+  }
+
+  [[nodiscard]] const WorkPoint* next(const Goal& goal) const { return choose(open_, goal); }
+
+  /// Up to the front's lowest error with these settings; more iterations may raise it.
+  [[nodiscard]] int iterations(const Settings& settings) const {
+    const WorkPoint* best = nullptr;
+    for (const WorkPoint& p : open_) {
+      if (p.settings.voxels != settings.voxels || p.settings.effects != settings.effects) continue;
+      if (best == nullptr || p.error < best->error) best = &p;
+    }
+    return best == nullptr ? settings.iterations : best->settings.iterations;
+  }
+
+  /// Makes the front agree with a run of these settings.
+  void correct(const Settings& settings, int iterations, double seconds, double error) {
+    const WorkPoint* nearest = nullptr;
+    for (const WorkPoint& p : open_) {
+      if (p.settings.voxels != settings.voxels || p.settings.effects != settings.effects) continue;
+      if (nearest == nullptr ||
+          std::abs(p.settings.iterations - iterations) < std::abs(nearest->settings.iterations - iterations))
+        nearest = &p;
+    }
+    if (nearest == nullptr) return;
+    const auto ratio = [](double measured, double promised) {
+      return std::clamp(measured / promised, 1 / kLargestCorrection, kLargestCorrection);
+    };
+    const double slower = ratio(seconds, nearest->seconds);
+    const double worse = ratio(error, nearest->error);
+    for (auto* points : {&all_, &open_}) {
+      for (WorkPoint& p : *points) {
+        p.seconds *= slower;
+        p.error *= worse;
+      }
+    }
+  }
+
+  void only_above(int voxels) {
+    std::erase_if(open_, [&](const WorkPoint& p) { return p.settings.voxels <= voxels; });
+  }
+
+  /// What it would take to reach an error, were every setting open.
+  [[nodiscard]] std::string needed(double error) const {
+    if (const WorkPoint* p = quickest_reaching(all_, error)) {
+      return text("by the front, about %.2g s with %d voxels and effects %s would reach it", p->seconds,
+                  p->settings.voxels, p->settings.effects.c_str());
+    }
+    const WorkPoint* best = best_within(all_, INFINITY);
+    return text(
+        "the front ends at about %.2f grey levels (%d voxels, %.2g s): more views or a better model "
+        "would be needed, time alone doesn't reach it",
+        best->error, best->settings.voxels, best->seconds);
+  }
+
+ private:
+  /// Keeps the points nearest to the iterations that the user asked for.
+  void keep_iterations(int asked) {
+    if (asked == 0 || all_.empty()) return;
+    const auto distance = [&](const WorkPoint& p) { return std::abs(p.settings.iterations - asked); };
+    const int nearest =
+        distance(*std::min_element(all_.begin(), all_.end(), [&](const WorkPoint& a, const WorkPoint& b) {
+          return distance(a) < distance(b);
+        }));
+    std::erase_if(all_, [&](const WorkPoint& p) { return distance(p) != nearest; });
+  }
+
+  std::vector<WorkPoint> all_;
+  std::vector<WorkPoint> open_;
+};
+
+class PlannedRun {
+ public:
+  PlannedRun(const Task& task, const ReconstructOptions& asked, const Progress& progress)
+      : task_(task), asked_(asked), progress_(progress) {}
+
+  Result<Outcome> run() {
+    EMBERLOCK_RETURN_IF_ERROR(measure());
+    Choices choices(task_.scene, asked_, reference_);
+    const WorkPoint* point = choices.next(goal());
+    if (point == nullptr) return run_settled(task_, asked_, progress_);
+    std::optional<Outcome> best;
+    if (!fits(*point)) best = from_reference();
+    while (!best || (missed(*best) > 0 && plan_.attempts < kMostAttempts && another(*best, choices, point))) {
+      const Seconds begin = task_.elapsed();
+      EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, attempt(*point, choices));
+      const double error = heldout_error(outcome);
+      const Settings tried = point->settings;
+      if (best || missed(outcome) > 0) {
+        choices.correct(tried, outcome.report.iterations, (task_.elapsed() - begin).value(), error);
+        choices.only_above(tried.voxels);
+      }
+      if (!best || error < heldout_error(*best)) best = std::move(outcome);
+    }
+    conclude(*best, choices);
+    return std::move(*best);
+  }
+
+ private:
+  Status measure() {
+    plan_.budget = asked_.solve.budget;
+    plan_.target_rmse = asked_.solve.target_rmse;
+    report(progress_, 0, "measuring this machine on a coarse grid");
+    if (asked_.voxels) EMBERLOCK_RETURN_IF_ERROR(as_status(choose_grid(task_.scene, asked_.voxels)));
+    const int voxels = reference_voxels(voxels_by_the_paper(task_.scene));
+    EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
+                               choose_grid(task_.scene, std::min(voxels, asked_.voxels.value_or(voxels))));
+    const Effects effects = asked_.effects && asked_.effects->fixed ? *asked_.effects->fixed : Effects{};
+    EMBERLOCK_ASSIGN_OR_RETURN(reference_,
+                               measure_reference(task_.scene, grid, effects, asked_.solve, task_.elapsed));
+    plan_.reference_time = reference_.seconds;
+    return {};
+  }
+
+  static Status as_status(const Result<Grid>& result) { return result ? Status() : Status(result.error()); }
+
+  [[nodiscard]] bool judged() const {
+    return std::any_of(task_.scene.views.begin(), task_.scene.views.end(),
+                       [](const View& v) { return v.role == ViewRole::held_out; });
+  }
+
+  [[nodiscard]] double seconds_left() const {
+    return asked_.solve.budget ? (*asked_.solve.budget - task_.elapsed()).value() : INFINITY;
+  }
+
+  [[nodiscard]] Goal goal() const {
+    Goal goal;
+    if (asked_.solve.budget) goal.seconds = kShareOfBudget * seconds_left();
+    goal.error = asked_.solve.target_rmse;
+    return goal;
+  }
+
+  /// Where voxels are the user's, there is nothing to fall back on.
+  [[nodiscard]] bool fits(const WorkPoint& point) const {
+    return asked_.voxels || asked_.solve.iterations > 0 || point.seconds <= seconds_left();
+  }
+
+  Outcome from_reference() {
+    plan_.words.push_back(
+        text("%.3g s left no time for more than the reference run", asked_.solve.budget->value()));
+    const Grid& grid = reference_.reconstruction.hull.grid;
+    plan_.voxels = std::max({grid.nx, grid.ny, grid.nz}) - 1;
+    plan_.iterations = reference_.reconstruction.iterations;
+    return finish(task_, asked_.solve, reference_.reconstruction, progress_);
+  }
+
+  Result<Outcome> attempt(const WorkPoint& point, const Choices& choices) {
+    ReconstructOptions options = asked_;
+    options.voxels = point.settings.voxels;
+    if (!asked_.effects && point.settings.effects == "none") options.effects = EffectRequest{Effects{}};
+    // On the way to a target the solver's own rule says when there is no more to gain.
+    if (options.solve.iterations == 0 && !asked_.solve.target_rmse)
+      options.solve.iterations = choices.iterations(point.settings);
+    if (asked_.solve.budget)
+      options.solve.budget = Seconds(std::max(1e-6, asked_.solve.budget->value() - rendering(point)));
+    describe(point, options);
+    const double from = progress_from(plan_.attempts++);
+    const double to = progress_from(plan_.attempts);
+    return run_settled(task_, options, [&](double fraction, std::string_view words) {
+      report(progress_, from + (to - from) * std::min(fraction, 0.999), words);
+    });
+  }
+
+  /// Predicted seconds for rendering every view, from one view of the reference.
+  [[nodiscard]] double rendering(const WorkPoint& point) const {
+    const Grid& grid = reference_.reconstruction.hull.grid;
+    const double finer = point.settings.voxels / (std::max({grid.nx, grid.ny, grid.nz}) - 1.0);
+    return kRenderReserve * reference_.seconds_to_render.value() * finer *
+           static_cast<double>(task_.scene.views.size());
+  }
+
+  /// Later attempts may follow only where there is a target; each gets half of what is left of the bar.
+  [[nodiscard]] double progress_from(int attempts) const {
+    if (attempts == 0) return 0.05;
+    return asked_.solve.target_rmse ? 1 - 0.95 * std::pow(0.5, attempts) : 1;
+  }
+
+  void describe(const WorkPoint& point, const ReconstructOptions& options) {
+    plan_.voxels = point.settings.voxels;
+    plan_.iterations = options.solve.iterations;
+    plan_.effects_searched = !options.effects || !options.effects->fixed;
+    plan_.predicted_time = Seconds(point.seconds);
+    const std::string iterations = plan_.iterations > 0 ? text("at most %d iteration%s", plan_.iterations,
+                                                               plan_.iterations == 1 ? "" : "s")
+                                                        : "iterations by the solver's rule";
+    const char* effects =
+        plan_.effects_searched ? "searched for" : (asked_.effects ? "set by hand" : "left out");
+    std::string words = text("%d voxels, %s, effects %s: by the front about %.2g s", plan_.voxels,
+                             iterations.c_str(), effects, point.seconds);
+    if (judged()) {
+      plan_.predicted_rmse = point.error;
+      words += text(" and %.2g grey levels", point.error);
+    }
+    plan_.words.push_back(words + text(" (reference run: %.2g s)", reference_.seconds.value()));
+  }
+
+  /// Grey levels above the target.
+  [[nodiscard]] double missed(const Outcome& outcome) const {
+    if (!asked_.solve.target_rmse || outcome.report.trace.empty()) return 0;
+    return std::max(0.0, heldout_error(outcome) - *asked_.solve.target_rmse);
+  }
+
+  /// Whether another point promises enough; `point` is it.
+  bool another(const Outcome& best, const Choices& choices, const WorkPoint*& point) const {
+    if (asked_.voxels) return false;
+    point = choices.next(goal());
+    return point != nullptr && point->seconds <= seconds_left() &&
+           point->error < kWorthTrying * heldout_error(best);
+  }
+
+  void conclude(Outcome& best, const Choices& choices) {
+    Report& result = best.report;
+    result.total_time = task_.elapsed();
+    if (plan_.target_rmse) {
+      plan_.missed_by = missed(best);
+      if (plan_.missed_by > 0) {
+        plan_.words.push_back(
+            text("the target of %.3g grey levels was missed by %.2f: ", *plan_.target_rmse, plan_.missed_by) +
+            choices.needed(*plan_.target_rmse));
+      } else {
+        plan_.words.push_back(text("the target of %.3g grey levels was reached after %.2g s",
+                                   *plan_.target_rmse,
+                                   result.trace.empty() ? 0.0 : result.trace.back().time.value()));
+      }
+    }
+    if (plan_.budget) {
+      plan_.over_budget = std::max(Seconds(0), result.total_time - *plan_.budget);
+      if (plan_.over_budget.value() > 0) {
+        plan_.words.push_back(text("the budget of %.3g s was exceeded by %.2g s", plan_.budget->value(),
+                                   plan_.over_budget.value()));
+      }
+    }
+    result.plan = plan_;
+    report(progress_, 1, "done");
+  }
+
+  const Task& task_;
+  const ReconstructOptions& asked_;
+  const Progress& progress_;
+  Reference reference_;
+  PlanReport plan_;
+};
+
+}  // namespace
+
+bool has_goal(const ReconstructOptions& options) {
+  return options.choose_by_front && options.solve.solver == Solver::standard &&
+         (options.solve.budget || options.solve.target_rmse);
+}
+
+Result<Outcome> run_planned(const Task& task, const ReconstructOptions& options, const Progress& progress) {
+  return PlannedRun(task, options, progress).run();
+}
+
+}  // namespace emberlock

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "recon/pipeline/settled_run.h"
+
+namespace emberlock {
+
+/// Whether a budget or a target is to choose settings.
+bool has_goal(const ReconstructOptions& options);
+
+/// Chooses what is left open, runs, and says in Report::plan what was promised and what came of it:
+/// - a reference run (reference_run.h) scales the shipped front to this machine and scene;
+/// - choose() takes a point that fits into nine tenths of what is left of the budget; effects are searched
+/// for
+///   only if that fits too; iterations go on to the front's lowest error for these voxels (on the way to a
+///   target by the solver's rule), and the solver stops when the budget, less the predicted rendering, is
+///   spent. So the end comes at most one iteration and the error of that prediction after the budget;
+/// - where not even the quickest point fits, the reference run itself is the result;
+/// - a target that was missed is tried again, at most twice, with more voxels, by the front as rescaled by
+/// what
+///   the run itself took and reached; the best run is the result.
+Result<Outcome> run_planned(const Task& task, const ReconstructOptions& options, const Progress& progress);
+
+}  // namespace emberlock

@@ -1,0 +1,24 @@
+#pragma once
+
+#include "base/result.h"
+#include "recon/adjust/solver.h"
+
+namespace emberlock {
+
+/// The yardstick of shipped fronts: a coarse solve of the scene at hand, which takes in the machine's speed,
+/// the pictures' size and how hard the flame is.
+struct Reference {
+  Reconstruction reconstruction;
+  Seconds seconds{0};            ///< hull and solve
+  Seconds seconds_to_render{0};  ///< one view
+  double error = 0;  ///< of the held-out views, of the input views where none is held out; all channels
+};
+
+/// Voxels of a reference on a scene whose pictures call for `finest` (voxels_by_the_paper()).
+int reference_voxels(int finest);
+
+/// Takes step, precision, device, threads, threshold and budget from `options`. Errors: those of solve().
+Result<Reference> measure_reference(const Scene& scene, const Grid& grid, const Effects& effects,
+                                    const SolveOptions& options, const Elapsed& elapsed);
+
+}  // namespace emberlock

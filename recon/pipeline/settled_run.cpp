@@ -1,0 +1,157 @@
+#include "recon/pipeline/settled_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+#include <unistd.h>
+
+#include "recon/adjust/choose_effects.h"
+#include "recon/pipeline/coverage.h"
+#include "recon/pipeline/grid_choice.h"
+#include "recon/preprocess/flame_mask.h"
+#include "recon/preprocess/radiance.h"
+#include "recon/render/render.h"
+
+namespace emberlock {
+namespace {
+
+constexpr double kPaperOpacity = 0.05;
+// Emission, gradient, momentum, preconditioner and previous state: RGB and padding in single precision.
+constexpr std::size_t kBytesPerKeyPoint = 80;
+
+Result<EffectChoice> decide_effects(const Scene& scene, const Grid& grid, const ReconstructOptions& options,
+                                    const SolveOptions& solve_options, const Elapsed& elapsed) {
+  EffectRequest request = options.effects.value_or(EffectRequest{});
+  const bool as_published = !options.effects && options.solve.solver == Solver::paper;
+  if (as_published) {
+    request.fixed = absorbing(extinction_of_opacity(kPaperOpacity, Meters(static_cast<double>(grid.edge))));
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
+                             choose_effects(scene, grid, request, solve_options, elapsed));
+  if (as_published) {
+    for (EffectReport& report : choice.reports) {
+      if (report.name == "extinction") report.reason = "the paper's constant opacity of 0.05 a step";
+    }
+  }
+  return choice;
+}
+
+/// Root of the mean over the views of the squared error, one role at a time; nothing without such a view.
+std::optional<ChannelRmse> over_views(const std::vector<ViewReport>& views, ViewRole role) {
+  ChannelRmse sum = {};
+  int count = 0;
+  for (const ViewReport& view : views) {
+    if (view.role != role) continue;
+    ++count;
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += view.rmse[c] * view.rmse[c];
+  }
+  if (count == 0) return std::nullopt;
+  for (double& value : sum) value = std::sqrt(value / count);
+  return sum;
+}
+
+std::vector<ViewReport> judge(const Scene& scene, const std::vector<FlameMask>& masks,
+                              const std::vector<RadianceImage>& renders) {
+  std::vector<ViewReport> reports;
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    const View& view = scene.views[i];
+    reports.push_back({view.name, view.role, rmse(view.image, renders[i], masks[i].box)});
+  }
+  return reports;
+}
+
+Report describe(const Scene& scene, const Grid& grid, const SolveOptions& options, Device device) {
+  Report report;
+  report.solver = options.solver == Solver::paper ? "paper" : "default";
+  report.device = device == Device::cuda ? "cuda" : "cpu";
+  report.threads = options.compute.threads;
+  report.seed = options.seed;
+  report.step = options.step;
+  report.precision = options.precision;
+  report.box = scene.box;
+  report.voxels = {grid.nx - 1, grid.ny - 1, grid.nz - 1};
+  report.voxel_edge = Meters(static_cast<double>(grid.edge));
+  report.finest_voxels = voxels_by_the_paper(scene);
+  report.warnings = coverage_warnings(scene);
+  return report;
+}
+
+constexpr double kSolveFrom = 0.3;  // shares of the progress
+constexpr double kSolveTo = 0.9;
+
+}  // namespace
+
+Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels) {
+  if (voxels && (*voxels < 1 || *voxels > kLargestVoxels)) {
+    return Error{ErrorKind::bad_input, std::to_string(*voxels) + " voxels are out of range", "--voxels",
+                 "Give 1 to " + std::to_string(kLargestVoxels)};
+  }
+  const Grid grid = grid_over(scene.box, voxels.value_or(voxels_by_the_paper(scene)));
+  const auto memory =
+      static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
+  if (static_cast<double>(grid.size()) * kBytesPerKeyPoint > memory) {
+    return Error{ErrorKind::bad_input,
+                 "a grid of " + std::to_string(grid.size()) + " points exceeds the memory", "--voxels",
+                 "Give fewer voxels, or a smaller box"};
+  }
+  return grid;
+}
+
+Outcome finish(const Task& task, const SolveOptions& options, Reconstruction done, const Progress& progress) {
+  const Scene& scene = task.scene;
+  Outcome outcome;
+  const Seconds start = task.elapsed();
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    report(progress,
+           kSolveTo + (1 - kSolveTo) * static_cast<double>(i) / static_cast<double>(scene.views.size()),
+           "rendering the views");
+    outcome.renders.push_back(render_view(done.volume, done.hull, done.effects, scene.views[i].camera,
+                                          RenderOptions{.compute = options.compute}));
+  }
+  outcome.report = describe(scene, done.hull.grid, options, task.device);
+  Report& result = outcome.report;
+  result.hull_voxels = done.hull.count;
+  result.views = judge(scene, flame_masks(scene), outcome.renders);
+  result.input_rmse = over_views(result.views, ViewRole::input).value_or(ChannelRmse{});
+  result.heldout_rmse = over_views(result.views, ViewRole::held_out);
+  result.hull_time = done.hull_time;
+  result.solve_time = done.solve_time;
+  result.total_time = task.elapsed();
+  result.render_time = result.total_time - start;
+  result.iterations = done.iterations;
+  result.trace = done.trace;
+  outcome.reconstruction = std::move(done);
+  report(progress, 1, "done");
+  return outcome;
+}
+
+Result<Outcome> run_settled(const Task& task, const ReconstructOptions& options, const Progress& progress) {
+  const SolveOptions& solve_options = options.solve;
+  const Seconds start = task.elapsed();
+  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, choose_grid(task.scene, options.voxels));
+  report(progress, 0, "finding out which effects matter");
+  EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
+                             decide_effects(task.scene, grid, options, solve_options, task.elapsed));
+  const Seconds effects_time = task.elapsed() - start;
+
+  const auto watch = [&](const Preview& state) {
+    char words[80];
+    std::snprintf(words, sizeof words, "iteration %d", state.point.iteration);
+    // Without a limit the count of iterations is the solver's secret: approach the end without reaching it.
+    const double share = solve_options.iterations > 0
+                             ? static_cast<double>(state.point.iteration) / solve_options.iterations
+                             : state.point.iteration / (state.point.iteration + 10.0);
+    report(progress, kSolveFrom + (kSolveTo - kSolveFrom) * std::min(share, 1.0), words);
+    if (task.preview) task.preview(state);
+  };
+  report(progress, kSolveFrom, "carving the hull");
+  EMBERLOCK_ASSIGN_OR_RETURN(Reconstruction done,
+                             solve(task.scene, grid, choice.effects, solve_options, task.elapsed, watch));
+  Outcome outcome = finish(task, solve_options, std::move(done), progress);
+  outcome.report.effects_time = effects_time;
+  outcome.report.effects = std::move(choice.reports);
+  return outcome;
+}
+
+}  // namespace emberlock

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "recon/adjust/solver.h"
+
+namespace emberlock {
+
+// Work-precision diagrams: what accuracy costs. Work is seconds, from the scene in memory to the views
+// rendered; precision is the held-out views' RMS error over all channels, in grey levels.
+
+/// Everything that trades seconds against error. With these `emberlock reconstruct` repeats the run.
+struct Settings {
+  int voxels = 0;      ///< along the box's longest edge
+  int views = 0;       ///< input views used; 0: all
+  int iterations = 0;  ///< at full resolution; 0: the solver's own rule
+  double step = 1;     ///< voxel edges
+  Precision precision = Precision::float32;
+  std::string effects = "auto";  ///< as parse_effects() takes them
+  Solver solver = Solver::standard;
+
+  friend bool operator==(const Settings&, const Settings&) = default;
+};
+
+/// Both above 0 and finite; in other units where a function says so.
+struct WorkPoint {
+  Settings settings;
+  double seconds = 0;
+  double error = 0;
+};
+
+/// The points that no other one beats in both (Pareto), by rising seconds and strictly falling error. Of
+/// equal ones the first stays.
+std::vector<WorkPoint> pareto_front(std::vector<WorkPoint> points);
+
+/// The error that a front reaches within so many seconds: linear between its points on logarithmic axes, and
+/// so monotone; nothing before its first point, its last error beyond it.
+std::optional<double> error_within(const std::vector<WorkPoint>& front, double seconds);
+
+/// The inverse: seconds until the error is at most this; nothing below the front's last error.
+std::optional<double> seconds_until(const std::vector<WorkPoint>& front, double error);
+
+/// The lowest error among the points within so many seconds, the quicker of equal ones; nullptr without any.
+const WorkPoint* best_within(const std::vector<WorkPoint>& points, double seconds);
+
+/// The quickest point whose error is at most this; nullptr without any.
+const WorkPoint* quickest_reaching(const std::vector<WorkPoint>& points, double error);
+
+/// What a reconstruction is asked for; at least one of the two.
+struct Goal {
+  std::optional<double> seconds;  ///< that are left
+  std::optional<double> error;
+};
+
+/// The point to try: the quickest that reaches the error within the seconds, otherwise the lowest error
+/// within the seconds, otherwise the quickest of all. More seconds never choose a higher error, and a lower
+/// error never fewer seconds. nullptr without points.
+const WorkPoint* choose(const std::vector<WorkPoint>& points, const Goal& goal);
+
+/// Points at a number of voxels that need not be among those measured: between the two nearest numbers (or
+/// from the two last ones on) seconds and error follow a power of the voxels, for each combination of other
+/// settings that both have. From one number alone: as measured.
+std::vector<WorkPoint> at_voxels(const std::vector<WorkPoint>& points, int voxels);
+
+/// One line a point: seconds, heldout_rmse, the settings, and whether it lies on the front.
+std::string to_csv(const std::vector<WorkPoint>& points);
+/// The inverse, to the last bit. Errors name the line.
+Result<std::vector<WorkPoint>> parse_csv(std::string_view text);
+
+/// "float32" or "float64"; an Error that lists them otherwise.
+Result<Precision> parse_precision(std::string_view name);
+std::string_view name(Precision precision);
+std::string_view name(Solver solver);
+
+/// The options of `emberlock reconstruct` that mean these settings.
+std::string command_options(const Settings& settings);
+
+}  // namespace emberlock

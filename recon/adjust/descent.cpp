@@ -79,7 +79,7 @@ Descent::Descent(const Level& level, const Optics& optics, Precision precision, 
     : level_(level),
       engine_(make_engine(level.problem, optics, precision, device, pool)),
       fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]) {
-  find_weights();
+  start_from(std::vector<Rgba>(level.problem.active.size()));
 }
 
 std::size_t Descent::rays_of(int subset) const {
@@ -88,6 +88,7 @@ std::size_t Descent::rays_of(int subset) const {
 }
 
 void Descent::start_from(const std::vector<Rgba>& x) {
+  find_weights(x);
   engine_->set(x);
   momentum_time_ = 1;
 }
@@ -118,15 +119,16 @@ double Descent::validation_error() {
   return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(rays_of(subset)))));
 }
 
-/// A^T A 1 over the fitted rays; 1 only at the hull's key points.
-void Descent::find_weights() {
+/// A^T A 1 over the fitted rays; 1 only at the hull's key points, lane 3 (a field's extinction) as in x.
+void Descent::find_weights(const std::vector<Rgba>& x) {
   const std::vector<std::uint8_t>& active = level_.problem.active;
   std::vector<Rgba> ones(active.size());
   for (std::size_t p = 0; p < ones.size(); ++p)
-    if (active[p] != 0) ones[p] = Rgba{{1, 1, 1, 1}};
+    if (active[p] != 0) ones[p] = Rgba{{1, 1, 1, x[p].c[3]}};
   engine_->set(ones);
+  const std::vector<Rgba> dark(level_.problem.list.rays.size());
   for (int s = 0; s < level_.subsets; ++s) {
-    engine_->project(s);
+    engine_->residual_against(dark, s);
     engine_->backproject(s);
   }
   const std::vector<Rgba> gradient = engine_->gradient();
@@ -141,7 +143,6 @@ void Descent::find_weights() {
   }
   smoothing_ = reached > 0 ? kSmoothing * static_cast<float>(sum / static_cast<double>(reached)) : 0;
   engine_->set_weights(weights);
-  engine_->set(std::vector<Rgba>(active.size()));
 }
 
 }  // namespace emberlock

@@ -36,7 +36,7 @@ class Descent {
 
  private:
   [[nodiscard]] std::size_t rays_of(int subset) const;
-  void find_weights();
+  void find_weights(const std::vector<Rgba>& x);
 
   const Level& level_;
   std::unique_ptr<Engine> engine_;

@@ -43,6 +43,19 @@ class Engine {
   /// The weights of descend(): one a key point, 0 for those that take no part. Clears the gradient.
   virtual void set_weights(const std::vector<float>& weights) = 0;
   virtual void descend(const Step& step) = 0;
+
+  struct FieldStep {
+    Step emission;
+    float variation;  ///< of the extinction's total variation
+    float soft;       ///< differences below it count quadratically, a voxel edge
+    float most;       ///< extinction, a voxel edge
+  };
+  /// Where the extinction is unknown too: curvature of the residual by it, and what it is thought to be, one
+  /// a key point.
+  virtual void set_field(const std::vector<float>& weights, const std::vector<float>& reference) = 0;
+  virtual void descend_field(const FieldStep& step) = 0;
+  /// residual = A y - target, for targets other than what was seen.
+  virtual void residual_against(const std::vector<Rgba>& target, int subset) = 0;
   /// x and y += the paper's adjustment from the subset's residuals.
   virtual void adjust(int subset, const PaperStep& step) = 0;
 };

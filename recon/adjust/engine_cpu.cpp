@@ -40,8 +40,11 @@ class CpuEngine final : public Engine {
   [[nodiscard]] std::vector<Rgba> residuals() const override { return converted<float>(residual_); }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
-  void residual(int subset) override {
-    const Judge<Real> judge = problem_.judge<Real>(optics_.white);
+  void residual(int subset) override { residual(subset, problem_.judge<Real>(optics_.white)); }
+  void residual_against(const std::vector<Rgba>& target, int subset) override {
+    residual(subset, Judge<Real>{target.data(), nullptr, nullptr, 0});
+  }
+  void residual(int subset, const Judge<Real>& judge) {
     if (optics_.absorb == Absorb::field) {
       const auto march = table_.field_forward[static_cast<int>(travel_)];
       each_slice(subset, [&](std::size_t begin, std::size_t end) { march(work(subset), judge, begin, end); });
@@ -70,27 +73,17 @@ class CpuEngine final : public Engine {
     std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{});
   }
 
-  void descend(const Step& step) override {
-    const Grid& g = problem_.grid();
-    const Descend<Real> update{g.nx,
-                               g.ny,
-                               g.nz,
-                               weight_.data(),
-                               x_.data(),
-                               y_.data(),
-                               next_y_.data(),
-                               gradient_.data(),
-                               Real(step.scale),
-                               Real(step.smoothing),
-                               Real(step.momentum)};
-    pool_.run(g.nz, [&](int k) {
-      for (int j = 0; j < g.ny; ++j) {
-        const Slice span = problem_.row_span[static_cast<std::size_t>(j) +
-                                             static_cast<std::size_t>(g.ny) * static_cast<std::size_t>(k)];
-        table_.update(update, static_cast<int>(span.begin), static_cast<int>(span.end), j, k);
-      }
-    });
-    y_.swap(next_y_);
+  void descend(const Step& step) override { each_row(table_.update, emission_step(step)); }
+
+  void set_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
+    field_weight_.assign(weights.begin(), weights.end());
+    reference_.assign(reference.begin(), reference.end());
+    std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{});
+  }
+  void descend_field(const FieldStep& step) override {
+    each_row(table_.field_update,
+             DescendField<Real>{emission_step(step.emission), field_weight_.data(), reference_.data(),
+                                Real(step.variation), Real(step.soft), Real(step.most)});
   }
 
   void adjust(int subset, const PaperStep& step) override {
@@ -103,6 +96,32 @@ class CpuEngine final : public Engine {
   }
 
  private:
+  [[nodiscard]] Descend<Real> emission_step(const Step& step) {
+    const Grid& g = problem_.grid();
+    return {g.nx,
+            g.ny,
+            g.nz,
+            weight_.data(),
+            x_.data(),
+            y_.data(),
+            next_y_.data(),
+            gradient_.data(),
+            Real(step.scale),
+            Real(step.smoothing),
+            Real(step.momentum)};
+  }
+  template <class Entry, class Update>
+  void each_row(Entry entry, const Update& update) {
+    const Grid& g = problem_.grid();
+    pool_.run(g.nz, [&](int k) {
+      for (int j = 0; j < g.ny; ++j) {
+        const Slice span = problem_.row_span[static_cast<std::size_t>(j) +
+                                             static_cast<std::size_t>(g.ny) * static_cast<std::size_t>(k)];
+        entry(update, static_cast<int>(span.begin), static_cast<int>(span.end), j, k);
+      }
+    });
+    y_.swap(next_y_);
+  }
   [[nodiscard]] MarchWork<Real> work(int subset) {
     const std::size_t first =
         problem_.list.first_sample(problem_.list.subset_begin[static_cast<std::size_t>(subset)]);
@@ -153,7 +172,7 @@ class CpuEngine final : public Engine {
   Pool& pool_;
   const MarchTable<Real>& table_ = march_table<Real>();
   std::vector<Quad<Real>> x_, y_, next_y_, gradient_;
-  std::vector<Real> weight_;
+  std::vector<Real> weight_, field_weight_, reference_;
   std::vector<Quad<Real>> residual_;
   std::vector<Quad<Real>> samples_;  // of one subset
 };

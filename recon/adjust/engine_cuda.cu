@@ -53,9 +53,10 @@ __global__ void scatter_runs(Scatter scatter, std::size_t first, std::size_t las
   if (run < last) scatter(run, Layers{});
 }
 
-__global__ void update_keys(Descend<float> descend) {
+template <class Update>
+__global__ void update_keys(Update update, int nx) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (i < descend.nx) descend(i, static_cast<int>(blockIdx.y), static_cast<int>(blockIdx.z));
+  if (i < nx) update(i, static_cast<int>(blockIdx.y), static_cast<int>(blockIdx.z));
 }
 
 /// One combination of the shipped ones.
@@ -78,7 +79,10 @@ class CudaEngine final : public Engine {
         next_y_(problem.grid().size()),
         gradient_(problem.grid().size()),
         weight_(problem.grid().size()),
+        field_weight_(problem.grid().size()),
+        reference_(problem.grid().size()),
         residual_(problem.list.rays.size()),
+        target_(problem.list.rays.size()),
         samples_(Extinction::kField ? problem.most_samples() : 0) {}
 
   void set(const std::vector<Rgba>& x) override {
@@ -91,12 +95,19 @@ class CudaEngine final : public Engine {
   [[nodiscard]] std::vector<Rgba> gradient() const override { return gradient_.download(); }
 
   void residual(int subset) override {
-    const auto [begin, end] = rays_of(subset);
-    if (begin == end) return;
     Judge<float> judge = problem_.judge<float>(optics_.white);
     judge.seen = seen_.data();
     if (judge.background != nullptr) judge.background = background_.data();
     if (judge.offset != nullptr) judge.offset = offset_.data();
+    residual(subset, judge);
+  }
+  void residual_against(const std::vector<Rgba>& target, int subset) override {
+    target_.upload(target);
+    residual(subset, Judge<float>{target_.data(), nullptr, nullptr, 0});
+  }
+  void residual(int subset, const Judge<float>& judge) {
+    const auto [begin, end] = rays_of(subset);
+    if (begin == end) return;
     if constexpr (Extinction::kField) {
       march_field<<<blocks_for(end - begin), kBlock>>>(
           FieldForward<float, Path>{table(), y_.data(), samples_.data(), first_sample(subset)},
@@ -129,16 +140,16 @@ class CudaEngine final : public Engine {
     gradient_.clear();
   }
 
-  void descend(const Step& step) override {
-    const Grid& g = problem_.grid();
-    const Descend<float> update{g.nx,       g.ny,           g.nz,           weight_.data(),
-                                x_.data(),  y_.data(),      next_y_.data(), gradient_.data(),
-                                step.scale, step.smoothing, step.momentum};
-    const dim3 blocks((static_cast<unsigned>(g.nx) + kBlock - 1) / kBlock, static_cast<unsigned>(g.ny),
-                      static_cast<unsigned>(g.nz));
-    update_keys<<<blocks, kBlock>>>(update);
-    check_cuda(cudaGetLastError(), "update_keys");
-    y_.swap(next_y_);
+  void descend(const Step& step) override { update(emission_step(step)); }
+
+  void set_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
+    field_weight_.upload(weights);
+    reference_.upload(reference);
+    gradient_.clear();
+  }
+  void descend_field(const FieldStep& step) override {
+    update(DescendField<float>{emission_step(step.emission), field_weight_.data(), reference_.data(),
+                               step.variation, step.soft, step.most});
   }
 
   void adjust([[maybe_unused]] int subset, [[maybe_unused]] const PaperStep& step) override {
@@ -151,6 +162,21 @@ class CudaEngine final : public Engine {
   }
 
  private:
+  [[nodiscard]] Descend<float> emission_step(const Step& step) {
+    const Grid& g = problem_.grid();
+    return {g.nx,           g.ny,          g.nz,           weight_.data(),
+            x_.data(),      y_.data(),     next_y_.data(), gradient_.data(),
+            step.scale,     step.smoothing, step.momentum};
+  }
+  template <class Update>
+  void update(const Update& step) {
+    const Grid& g = problem_.grid();
+    const dim3 blocks((static_cast<unsigned>(g.nx) + kBlock - 1) / kBlock, static_cast<unsigned>(g.ny),
+                      static_cast<unsigned>(g.nz));
+    update_keys<<<blocks, kBlock>>>(step, g.nx);
+    check_cuda(cudaGetLastError(), "update_keys");
+    y_.swap(next_y_);
+  }
   [[nodiscard]] RayTable table() const {
     const Grid& g = problem_.grid();
     return {origins_.data(), rays_.data(), runs_.data(), problem_.list.bends.empty() ? nullptr : bends_.data(),
@@ -184,8 +210,8 @@ class CudaEngine final : public Engine {
   CudaBuffer<Run> runs_;
   CudaBuffer<Bend> bends_;
   CudaBuffer<Rgba> seen_, background_, offset_, x_, y_, next_y_, gradient_;
-  CudaBuffer<float> weight_;
-  CudaBuffer<Rgba> residual_, samples_;
+  CudaBuffer<float> weight_, field_weight_, reference_;
+  CudaBuffer<Rgba> residual_, target_, samples_;
 };
 
 template <class Extinction>

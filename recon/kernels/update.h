@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "base/host_device.h"
+#include "recon/kernels/march.h"
 #include "recon/kernels/rgba.h"
 
 namespace emberlock {
@@ -54,6 +55,54 @@ struct Descend {
     if (k > 0) around = around + y[p - plane];
     if (k < nz - 1) around = around + y[p + plane];
     return Real(6) * y[p] - around;
+  }
+};
+
+/// The step where the extinction is unknown too. Lanes 0..2 as in Descend. Lane 3 descends the residual and a
+/// Huber total variation of u = lane 3 - reference over the medium, each term majorised by its own parabola
+/// (lagged diffusivity: Vogel and Oman 1996), and is kept within 0 .. most.
+template <class Real>
+struct DescendField {
+  Descend<Real> emission;
+  const Real* weight =
+      nullptr;  ///< curvature of the residual by lane 3; <= 0 where the extinction stays as it is
+  const Real* reference = nullptr;  ///< what the extinction is thought to be, a voxel edge
+  Real variation = 0;               ///< weight of the total variation
+  Real soft = 1;                    ///< differences below it count quadratically, a voxel edge
+  Real most = 0;
+
+  HOST_DEVICE void operator()(int i, int j, int k) const {
+    const Descend<Real>& e = emission;
+    const std::size_t row = static_cast<std::size_t>(e.nx);
+    const std::size_t plane = row * static_cast<std::size_t>(e.ny);
+    const std::size_t p =
+        static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + plane * static_cast<std::size_t>(k);
+    const Real slope_of_residual = e.scale * e.gradient[p].c[3];
+    const Real before = e.x[p].c[3];
+    e(i, j, k);
+    if (e.weight[p] <= 0 || weight[p] <= 0) return;
+    Real slope = slope_of_residual;
+    Real curvature = weight[p];
+    const Real u = e.y[p].c[3] - reference[p];
+    if (i > 0) vary(u, p - 1, slope, curvature);
+    if (i < e.nx - 1) vary(u, p + 1, slope, curvature);
+    if (j > 0) vary(u, p - row, slope, curvature);
+    if (j < e.ny - 1) vary(u, p + row, slope, curvature);
+    if (k > 0) vary(u, p - plane, slope, curvature);
+    if (k < e.nz - 1) vary(u, p + plane, slope, curvature);
+    const Real after = clamp_to(e.y[p].c[3] - slope / curvature, Real(0), most);
+    e.x[p].c[3] = after;
+    e.next_y[p].c[3] = clamp_to(after + e.momentum * (after - before), Real(0), most);
+  }
+
+ private:
+  HOST_DEVICE void vary(Real u, std::size_t q, Real& slope, Real& curvature) const {
+    if (emission.weight[q] <= 0) return;
+    const Real d = u - (emission.y[q].c[3] - reference[q]);
+    const Real size = d < 0 ? -d : d;
+    const Real stiffness = variation / (size > soft ? size : soft);
+    slope += stiffness * d;
+    curvature += 2 * stiffness;
   }
 };
 

@@ -37,11 +37,13 @@ struct MarchTable {
   using FieldEntry = void (*)(const MarchWork<Real>&, const Judge<Real>&, std::size_t begin, std::size_t end);
   /// One row of key points [begin, end) x {j} x {k}.
   using UpdateEntry = void (*)(const Descend<Real>&, int begin, int end, int j, int k);
+  using FieldUpdateEntry = void (*)(const DescendField<Real>&, int begin, int end, int j, int k);
 
   ForwardEntry forward[3][2];
   AdjointEntry adjoint[3][2];  ///< of a field: from `samples`
   FieldEntry field_forward[2];
   UpdateEntry update;
+  FieldUpdateEntry field_update;
 
   [[nodiscard]] ForwardEntry forward_of(Absorb a, Travel t) const {
     return forward[static_cast<int>(a)][static_cast<int>(t)];

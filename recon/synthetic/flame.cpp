@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include "base/random.h"
 #include "recon/compute/pool.h"
@@ -160,6 +161,15 @@ Eigen::Vector3d on_sphere(double radius, double azimuth, double elevation) {
   return radius * Eigen::Vector3d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
 }
 
+/// Scales values so that their mean over the burning key points is `mean`.
+void scale_mean(std::vector<float>& values, const std::vector<std::uint8_t>& burning, PerMeter mean) {
+  const double sum = std::accumulate(values.begin(), values.end(), 0.0);
+  const auto count = static_cast<double>(std::count(burning.begin(), burning.end(), 1));
+  if (sum <= 0) return;
+  const auto scale = static_cast<float>(mean.value() * count / sum);
+  for (float& v : values) v *= scale;
+}
+
 void add_noise(RadianceImage& image, double sigma, std::uint64_t seed, std::uint64_t view) {
   for (std::size_t i = 0; i < image.rgb.size(); ++i)
     image.rgb[i] = std::max(0.F, image.rgb[i] + static_cast<float>(sigma * random_normal(seed, view, i)));
@@ -191,6 +201,12 @@ const FlameOptions& Flame::options() const { return options_; }
 FlameTruth Flame::at(Seconds time, const Grid& grid) const {
   FlameTruth truth{{grid, std::vector<float>(3 * grid.size()), {}}, whole_grid(grid), {}};
   truth.effects.extinction = constant_extinction(options_.extinction);
+  truth.effects.scattering = options_.scattering;
+  const bool soot = options_.absorber == Absorber::soot && options_.extinction.value() > 0;
+  if (soot) {
+    truth.effects.extinction.model = Extinction::Model::field;
+    truth.volume.extinction.resize(grid.size());
+  }
   const double height = options_.height.value();
   const std::vector<Plume> shapes = plumes(options_.shape);
   const Field field{
@@ -213,11 +229,13 @@ FlameTruth Flame::at(Seconds time, const Grid& grid) const {
         if (medium < kFaintest) continue;
         const std::size_t at = grid.index(i, j, k);
         burning[at] = 1;
+        if (soot) truth.volume.extinction[at] = medium;
         const std::array<float, 3> c = colour(heat);
         for (std::size_t a = 0; a < 3; ++a) truth.volume.emission[3 * at + a] = gain * 1000 * emission * c[a];
       }
     }
   });
+  if (soot) scale_mean(truth.volume.extinction, burning, options_.extinction);
   Hull& medium = truth.medium;
   std::size_t voxel = 0;
   medium.count = 0;

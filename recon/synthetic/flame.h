@@ -17,6 +17,12 @@ enum class FlameShape {
   two_plumes,  ///< a tall one and a small one beside it, with a dark gap between them
 };
 
+/// How the flame's extinction is spread.
+enum class Absorber {
+  medium,  ///< the same everywhere inside
+  soot,    ///< proportional to the medium's density, with the same mean inside
+};
+
 struct FlameOptions {
   FlameShape shape = FlameShape::plume;
   std::uint64_t seed = 1;
@@ -24,6 +30,8 @@ struct FlameOptions {
   double rise_speed = 1.0;    ///< m/s, of the turbulence
   double peak = 230;          ///< grey level of the brightest pixel from the side, about
   PerMeter extinction{32.8};  ///< inside the flame; the default is the paper's 0.05 a step of 20 cm / 128
+  Absorber absorber = Absorber::medium;
+  Scattering scattering;  ///< needs extinction
 };
 
 /// A flame with known truth on a grid.

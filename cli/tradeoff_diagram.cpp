@@ -68,9 +68,9 @@ std::string axes(const LogScale& x, const LogScale& y) {
   svg +=
       fmt::format(R"(<text x="{}" y="{}" text-anchor="middle">seconds until the views are rendered</text>)",
                   (kLeft + kRight) / 2, kBottom + 40);
-  svg += fmt::format(
-      R"svg(<text transform="translate(16 {}) rotate(-90)" text-anchor="middle">held-out RMS error, grey levels of 255</text>)svg",
-      (kTop + kBottom) / 2);
+  svg += fmt::format(R"svg(<text transform="translate(16 {}) rotate(-90)" text-anchor="middle">)svg"
+                     "held-out RMS error, grey levels of 255</text>",
+                     (kTop + kBottom) / 2);
   return svg;
 }
 
@@ -102,14 +102,14 @@ std::string runs(const std::vector<WorkPoint>& points, const LogScale& x, const 
     Settings same = p.settings;
     if (i > 0) same.iterations = points[i - 1].settings.iterations;
     if (i > 0 && same == points[i - 1].settings && p.settings.iterations > same.iterations) {
-      lines += fmt::format(
-          R"(<line x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}" stroke="{}" stroke-width="1.2" opacity=".55"/>)",
-          x(points[i - 1].seconds), y(points[i - 1].error), x(p.seconds), y(p.error), colour);
+      lines +=
+          fmt::format(R"(<line x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}" stroke="{}" class="run"/>)",
+                      x(points[i - 1].seconds), y(points[i - 1].error), x(p.seconds), y(p.error), colour);
     }
     marks +=
         p.settings.solver == Solver::paper
             ? fmt::format(
-                  R"(<rect x="{:.1f}" y="{:.1f}" width="7" height="7" fill="none" stroke="{}" stroke-width="1.5">{}</rect>)",
+                  R"(<rect x="{:.1f}" y="{:.1f}" width="7" height="7" class="paper" stroke="{}">{}</rect>)",
                   x(p.seconds) - 3.5, y(p.error) - 3.5, colour, tooltip(p))
             : fmt::format(R"(<circle cx="{:.1f}" cy="{:.1f}" r="3.5" fill="{}">{}</circle>)", x(p.seconds),
                           y(p.error), colour, tooltip(p));
@@ -147,9 +147,8 @@ std::string front(const std::vector<WorkPoint>& points, const LogScale& x, const
     const double px = x(best[i].seconds);
     const double py = y(best[i].error);
     path += i == 0 ? fmt::format("M{:.1f} {:.1f}", px, py) : fmt::format("H{:.1f}V{:.1f}", px, py);
-    rings += fmt::format(
-        R"(<circle class="front" cx="{:.1f}" cy="{:.1f}" r="6" fill="none" stroke="{}" stroke-width="2">{}</circle>)",
-        px, py, kFront, tooltip(best[i]));
+    rings += fmt::format(R"(<circle class="front" cx="{:.1f}" cy="{:.1f}" r="6" stroke="{}">{}</circle>)", px,
+                         py, kFront, tooltip(best[i]));
     const std::string words = html_escape(label_text(best[i]));
     const double width = kPerCharacter * static_cast<double>(words.size());
     const Label label{std::clamp(px - 10 - width, kLeft + 4, kRight - width), py + 17, width};
@@ -161,17 +160,15 @@ std::string front(const std::vector<WorkPoint>& points, const LogScale& x, const
     rings += fmt::format(R"(<text class="label" x="{:.1f}" y="{:.1f}">{}</text>)", label.x, label.y, words);
   }
   path += fmt::format("H{}", kRight);
-  return fmt::format(R"(<path class="front" d="{}" fill="none" stroke="{}" stroke-width="2.5"/>)", path,
-                     kFront) +
-         rings;
+  return fmt::format(R"(<path class="front" d="{}" stroke="{}"/>)", path, kFront) + rings;
 }
 
 std::string legend(const std::vector<WorkPoint>& points) {
   double line = kTop + 10;
   const double x = kRight + 24;
-  std::string svg = fmt::format(
-      R"(<line x1="{}" x2="{}" y1="{}" y2="{}" stroke="{}" stroke-width="2.5"/><text x="{}" y="{}">Pareto front: best so far</text>)",
-      x - 8, x + 8, line, line, kFront, x + 16, line + 4);
+  std::string svg = fmt::format(R"(<line class="front" x1="{}" x2="{}" y1="{}" y2="{}" stroke="{}"/>)"
+                                R"(<text x="{}" y="{}">Pareto front: best so far</text>)",
+                                x - 8, x + 8, line, line, kFront, x + 16, line + 4);
   for (const auto& [voxels, shade] : shades(points)) {
     line += 22;
     svg += fmt::format(R"(<circle cx="{}" cy="{}" r="4.5" fill="{}"/><text x="{}" y="{}">{} voxels</text>)",
@@ -180,19 +177,22 @@ std::string legend(const std::vector<WorkPoint>& points) {
   if (std::any_of(points.begin(), points.end(),
                   [](const WorkPoint& p) { return p.settings.solver == Solver::paper; })) {
     line += 22;
-    svg += fmt::format(
-        R"(<rect x="{}" y="{}" width="8" height="8" fill="none" stroke="{}" stroke-width="1.5"/><text x="{}" y="{}">the paper's solver</text>)",
-        x - 4, line - 4, kShades[3], x + 16, line + 4);
+    svg += fmt::format(R"(<rect x="{}" y="{}" width="8" height="8" class="paper" stroke="{}"/>)"
+                       R"(<text x="{}" y="{}">the paper's solver</text>)",
+                       x - 4, line - 4, kShades[3], x + 16, line + 4);
   }
   return svg;
 }
 
-constexpr const char* kStyle =
-    "<style>.work{--ink:#222;--line:#ddd;--paper:#fff}@media "
-    "(prefers-color-scheme:dark){.work{--ink:#ddd;--line:#444;--paper:#151515}}"
-    ".work text{fill:var(--ink);font:13px system-ui,sans-serif}.work .title{font-weight:bold;font-size:15px}"
-    ".work .label{font-size:11.5px;paint-order:stroke;stroke:var(--paper);stroke-width:4px}.work "
-    ".grid{stroke:var(--line)}</style>";
+constexpr const char* kStyle = R"(<style>
+.work { --ink: #222; --line: #ddd; --paper: #fff; }
+@media (prefers-color-scheme: dark) { .work { --ink: #ddd; --line: #444; --paper: #151515; } }
+.work text { fill: var(--ink); font: 13px system-ui, sans-serif; }
+.work .title { font-weight: bold; font-size: 15px; }
+.work .label { font-size: 11.5px; paint-order: stroke; stroke: var(--paper); stroke-width: 4px; }
+.work .grid { stroke: var(--line); } .work .run { stroke-width: 1.2; opacity: .55; }
+.work .paper { fill: none; stroke-width: 1.5; } .work .front { fill: none; stroke-width: 2.5; }
+</style>)";
 
 }  // namespace
 
@@ -205,7 +205,8 @@ std::string tradeoff_svg(const std::vector<WorkPoint>& points) {
   const LogScale x(seconds.first->seconds, seconds.second->seconds, kLeft, kRight);
   const LogScale y(error.first->error, error.second->error, kBottom, kTop);
   return fmt::format(
-             R"(<svg xmlns="http://www.w3.org/2000/svg" class="work" viewBox="0 0 {0} {1}" width="{0}" height="{1}" role="img" aria-label="Held-out error against seconds">)",
+             R"(<svg xmlns="http://www.w3.org/2000/svg" class="work" viewBox="0 0 {0} {1}" width="{0}" )"
+             R"(height="{1}" role="img" aria-label="Held-out error against seconds">)",
              kWidth, kHeight) +
          kStyle + axes(x, y) + runs(points, x, y) + front(points, x, y) + legend(points) + "</svg>";
 }

@@ -16,9 +16,8 @@ constexpr double kLeastGain = 0.02;  // of the error; a doubling that buys less 
 
 std::string views_text(int views) { return views == 0 ? "all" : std::to_string(views); }
 
-std::string command(const Tradeoff& t, const Settings& settings) {
-  return "emberlock reconstruct " + t.input + " --out result" + (t.options.empty() ? "" : " " + t.options) +
-         " " + command_options(settings);
+std::string command_start(const Tradeoff& t) {
+  return "emberlock reconstruct " + t.input + " --out result" + (t.options.empty() ? "" : " " + t.options);
 }
 
 /// Held-out error at each doubling of time, along the front.
@@ -47,7 +46,7 @@ std::string command_table(const std::vector<std::string>& header,
                           const std::vector<std::vector<std::string>>& rows) {
   std::string html = "<div class=\"scroll\"><table><tr>";
   for (const std::string& cell : header) html += "<th>" + html_escape(cell) + "</th>";
-  html += "<th style=\"text-align:left\">to repeat it</th>";
+  html += "<th style=\"text-align:left\">options</th>";
   for (const auto& row : rows) {
     html += "</tr>\n<tr>";
     for (std::size_t i = 0; i + 1 < row.size(); ++i) html += "<td>" + html_escape(row[i]) + "</td>";
@@ -67,8 +66,9 @@ void front_table(HtmlPage& page, const Tradeoff& t, const std::vector<WorkPoint>
                : fmt::format("{:.2g}", (front[i - 1].error - p.error) / (p.seconds - front[i - 1].seconds));
     rows.push_back({fmt::format("{:.3f}", p.seconds), fmt::format("{:.2f}", p.error), price,
                     std::to_string(s.voxels), std::to_string(s.iterations), views_text(s.views), s.effects,
-                    command(t, s)});
+                    command_options(s)});
   }
+  page.raw("<p>To repeat a point, add its options to <code>" + html_escape(command_start(t)) + "</code></p>");
   page.raw(command_table(
       {"seconds", "held-out error", "levels a second", "voxels", "iterations", "views", "effects"}, rows));
 }
@@ -108,8 +108,8 @@ void all_points(HtmlPage& page, const Tradeoff& t) {
   page.heading("All points");
   std::vector<std::vector<std::string>> rows;
   for (const WorkPoint& p : t.sweep.points) {
-    rows.push_back(
-        {fmt::format("{:.3f}", p.seconds), fmt::format("{:.2f}", p.error), command(t, p.settings)});
+    rows.push_back({fmt::format("{:.3f}", p.seconds), fmt::format("{:.2f}", p.error),
+                    command_start(t) + " " + command_options(p.settings)});
   }
   page.raw("<details><summary>" + std::to_string(rows.size()) +
            " points, each with the command that repeats it</summary>" +

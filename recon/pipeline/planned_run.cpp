@@ -98,15 +98,10 @@ class Choices {
   }
 
  private:
-  /// Keeps the points nearest to the iterations that the user asked for.
-  void keep_iterations(int asked) {
-    if (asked == 0 || all_.empty()) return;
-    const auto distance = [&](const WorkPoint& p) { return std::abs(p.settings.iterations - asked); };
-    const int nearest =
-        distance(*std::min_element(all_.begin(), all_.end(), [&](const WorkPoint& a, const WorkPoint& b) {
-          return distance(a) < distance(b);
-        }));
-    std::erase_if(all_, [&](const WorkPoint& p) { return distance(p) != nearest; });
+  /// Keeps the points of at most so many iterations.
+  void keep_iterations(int most) {
+    if (most == 0) return;
+    std::erase_if(all_, [&](const WorkPoint& p) { return p.settings.iterations > most; });
   }
 
   std::vector<WorkPoint> all_;
@@ -176,7 +171,7 @@ class PlannedRun {
 
   /// Where voxels are the user's, there is nothing to fall back on.
   [[nodiscard]] bool fits(const WorkPoint& point) const {
-    return asked_.voxels || asked_.solve.iterations > 0 || point.seconds <= seconds_left();
+    return asked_.voxels || point.seconds <= seconds_left();
   }
 
   Outcome from_reference() {
@@ -191,7 +186,8 @@ class PlannedRun {
   Result<Outcome> attempt(const WorkPoint& point, const Choices& choices) {
     ReconstructOptions options = asked_;
     options.voxels = point.settings.voxels;
-    if (!asked_.effects && point.settings.effects == "none") options.effects = EffectRequest{Effects{}};
+    const bool searchable = point.settings.effects == "auto" && point.seconds <= seconds_left();
+    if (!asked_.effects && !searchable) options.effects = EffectRequest{Effects{}};
     // On the way to a target the solver's own rule says when there is no more to gain.
     if (options.solve.iterations == 0 && !asked_.solve.target_rmse)
       options.solve.iterations = choices.iterations(point.settings);

@@ -21,7 +21,7 @@ Result<Reference> measure_reference(const Scene& scene, const Grid& grid, const 
                                     const SolveOptions& options, const Elapsed& elapsed) {
   SolveOptions coarse = options;
   coarse.solver = Solver::standard;
-  coarse.iterations = kIterations;
+  coarse.iterations = options.iterations > 0 ? std::min(options.iterations, kIterations) : kIterations;
   coarse.target_rmse.reset();
   Reference reference;
   EMBERLOCK_ASSIGN_OR_RETURN(reference.reconstruction, solve(scene, grid, effects, coarse, elapsed));

@@ -17,7 +17,8 @@ struct Reference {
 /// Voxels of a reference on a scene whose pictures call for `finest` (voxels_by_the_paper()).
 int reference_voxels(int finest);
 
-/// Takes step, precision, device, threads, threshold and budget from `options`. Errors: those of solve().
+/// Takes step, precision, device, threads, threshold, budget and a limit of iterations from `options`.
+/// Errors: those of solve().
 Result<Reference> measure_reference(const Scene& scene, const Grid& grid, const Effects& effects,
                                     const SolveOptions& options, const Elapsed& elapsed);
 

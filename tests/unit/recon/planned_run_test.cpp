@@ -89,6 +89,16 @@ TEST(Budget, TooSmallForAnythingElseGivesTheReferenceRun) {
   EXPECT_GT(outcome.report.plan->over_budget.value(), 0);
 }
 
+TEST(Budget, LeavesNoTimeForEffectsWhereTheUsersVoxelsTakeIt) {
+  ReconstructOptions options = with_budget(1e-4);
+  options.effects.reset();
+  options.voxels = 40;
+  const Outcome outcome = run(options);
+  EXPECT_EQ(outcome.report.voxels[0], 40);
+  EXPECT_FALSE(outcome.report.plan->effects_searched);
+  EXPECT_EQ(outcome.report.iterations, 1);
+}
+
 TEST(Budget, WhatTheUserSetStays) {
   ReconstructOptions options = with_budget(10);
   options.voxels = 20;

@@ -22,7 +22,10 @@ struct Extinction {
     field,  ///< Volume::extinction, trilinear between key points (soot-proportional, or found from pictures)
   };
   Model model = Model::none;
-  PerMeter value{0};  ///< of `constant`
+  /// Of `constant`; of `field`, what a solver thinks at first to be even inside the medium.
+  PerMeter value{0};
+  /// Of `field`: what a solver thinks at first to be proportional to the emission's luminance, its mean.
+  PerMeter soot{0};
 };
 /// None where the value is 0.
 Extinction constant_extinction(PerMeter value);

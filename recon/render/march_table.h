@@ -53,11 +53,19 @@ struct MarchTable {
   }
 };
 
-/// The best that this CPU runs: SSE2, SSE4.2, AVX2 with FMA, or AVX-512. EMBERLOCK_ISA=baseline|v2|v3|v4 in
-/// the environment caps it, for tests and comparisons.
+/// Levels of vector instructions (x86-64's microarchitecture levels): SSE2, SSE4.2, AVX2 with FMA, AVX-512.
+/// Other processors have the baseline alone.
+enum class Isa { baseline, v2, v3, v4 };
+/// The highest that this CPU runs.
+Isa best_isa();
+
+/// That of best_isa(). EMBERLOCK_ISA=baseline|v2|v3|v4 in the environment caps it, for tests and comparisons.
 template <class Real>
 const MarchTable<Real>& march_table();
-/// "baseline", "v2", "v3" or "v4" (x86-64's microarchitecture levels).
+/// That of a level, best_isa() at most.
+template <class Real>
+const MarchTable<Real>& march_table(Isa level);
+/// "baseline", "v2", "v3" or "v4": what march_table() gives.
 const char* march_table_name();
 
 }  // namespace emberlock

@@ -50,7 +50,7 @@ __global__ void march_field(March march, JudgeAndKeep judge, std::size_t first, 
 template <class Scatter>
 __global__ void scatter_runs(Scatter scatter, std::size_t first, std::size_t last) {
   const std::size_t run = first + blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
-  if (run < last) scatter(run, Layers{});
+  if (run < last) scatter(run, layers_of(scatter.table.runs[run]));
 }
 
 template <class Update>

@@ -33,18 +33,11 @@ SlabRuns sort_into_slabs(const Problem& problem, int subset) {
   const auto s = static_cast<std::size_t>(subset);
   const std::size_t first = list.first_run(list.subset_begin[s]);
   const std::size_t last = list.first_run(list.subset_begin[s + 1]);
-  const RayTable table = list.table();
   std::vector<std::uint16_t> slab_of(last - first);
   SlabRuns slabs;
   slabs.begin.assign(static_cast<std::size_t>(problem.slab_count()) + 1, 0);
   for (std::size_t n = first; n < last; ++n) {
-    const Run& run = list.runs[n];
-    const Line<float> line =
-        table.bends == nullptr ? StraightPath::line<float>(table, n) : CurvedPath::line<float>(table, n);
-    // The middle sample tells: the first may have been rounded across the border that the run was cut at.
-    const float middle = run.start + (static_cast<float>(run.count / 2) + 0.5F) * run.step;
-    const float z = line.origin[2] + line.direction[2] * middle;
-    const int slab = clamp_cell(z, problem.grid().nz) / kSlab;
+    const int slab = list.runs[n].slab;
     slab_of[n - first] = static_cast<std::uint16_t>(slab);
     ++slabs.begin[static_cast<std::size_t>(slab) + 1];
   }

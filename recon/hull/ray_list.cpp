@@ -131,7 +131,10 @@ class RowClipper {
       const float step = (t1 - t0) / static_cast<float>(count);
       cut_at_slabs(origin[2], direction[2], t0, step, count, mask_.mz, [&](int first, int size) {
         const float ahead = static_cast<float>(first) * step;
-        out.runs.push_back({t0 + ahead, step, before + ahead, 0, out.samples, size});
+        // The middle sample tells the slab: the first may have been rounded across the border.
+        const float middle = t0 + ahead + (static_cast<float>(size / 2) + 0.5F) * step;
+        const int slab = clamp_cell(origin[2] + direction[2] * middle, mask_.mz + 1) / kSlab;
+        out.runs.push_back({t0 + ahead, step, before + ahead, 0, out.samples, size, slab});
         out.samples += static_cast<std::uint32_t>(size);
         ++ray.runs;
       });

@@ -24,9 +24,6 @@ CroppedHull crop_to_medium(const Hull& hull);
 /// (2i, 2j, 2k).
 Hull coarsen(const Hull& hull);
 
-/// Layers of voxels along z that one run may touch. Slabs that have one between them share no key point.
-inline constexpr int kSlab = 8;
-
 /// Every pixel ray that crosses a medium, clipped to it and cut where it enters another slab. Rays are sorted
 /// by (subset, view, row, column), runs and samples by ray.
 struct RayList {

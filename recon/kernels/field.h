@@ -38,7 +38,7 @@ struct FieldForward {
       const Line<Real> line = Path::template line<Real>(table, n);
       const Real step = Real(run.step);
       for (int first = 0; first < run.count; first += kBatch) {
-        locate(table, line, run, first, Layers{}, batch);
+        locate(table, line, run, first, layers_of(run), batch);
         const int here = run.count - first < kBatch ? run.count - first : kBatch;
         for (int i = 0; i < here; ++i) {
           const Quad<Real> value =

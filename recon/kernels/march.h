@@ -13,6 +13,9 @@ namespace emberlock {
 // voxel edges from key point (0, 0, 0). Policies: what extinguishes (extinction.h) and how rays run
 // (StraightPath, CurvedPath).
 
+/// Layers of voxels along z that one run may touch. Slabs that have one between them share no key point.
+inline constexpr int kSlab = 8;
+
 /// A stretch of a ray inside the medium, cut into equal steps; sample i lies at start + (i + 0.5) * step. Its
 /// samples' voxels all lie in one slab of layers along z.
 struct Run {
@@ -22,6 +25,7 @@ struct Run {
   std::uint32_t ray = 0;
   std::uint32_t first_sample = 0;  ///< samples of the whole list in front of this run
   int count = 0;
+  int slab = 0;
 };
 
 struct MarchRay {
@@ -91,6 +95,9 @@ struct Layers {
   int low = 0;
   int high = 1 << 30;
 };
+/// A sample that rounding puts across the border of its run's slab is counted to the slab by the march and
+/// its transpose alike.
+HOST_DEVICE inline Layers layers_of(const Run& run) { return {run.slab * kSlab, (run.slab + 1) * kSlab}; }
 
 /// `low` for what is not a number.
 template <class T>
@@ -183,7 +190,7 @@ struct Forward {
       const Real pass = extinction_over(run);
       Real weight = extinction_weight(run, transmittance);
       for (int first = 0; first < run.count; first += kBatch) {
-        locate(table, line, run, first, Layers{}, batch);
+        locate(table, line, run, first, layers_of(run), batch);
         const int here = run.count - first < kBatch ? run.count - first : kBatch;
         for (int i = 0; i < here; ++i) {
           const Quad<Real> value =

@@ -9,10 +9,35 @@
 namespace emberlock {
 namespace {
 
-constexpr float kSmoothing = 0.006F;      // the Laplacian's weight over the mean of A^T A 1
-constexpr float kMostMomentum = 0.93F;    // subsets are noisy: the full momentum would amplify that
-constexpr int kHoldOutOneIn = 32;         // pixels kept from the fit
-constexpr std::size_t kFewestRays = 256;  // of a subset
+constexpr float kSmoothing = 0.006F;        // the Laplacian's weight over the mean of A^T A 1
+constexpr float kMostMomentum = 0.93F;      // subsets are noisy: the full momentum would amplify that
+constexpr float kMostJointMomentum = 0.8F;  // of emission and extinction together, whose problem isn't convex
+constexpr float kVariation =
+    0.01F;  // the extinction's total variation, over its expected mean and its mean curvature
+constexpr float kSoft = 0.02F;  // differences below this share of the expected mean count quadratically
+// Where the extinction falls, more light comes through and A^T A 1 grows: it is taken for a thinner medium,
+// so that it still majorises then.
+constexpr float kThinned = 0.5F;
+constexpr float kLeastCurvature = 0.05F;      // over the mean: bounds the steps where few rays come
+constexpr float kMostExtinction = 0.3F;       // a voxel edge, unless more is expected
+constexpr float kFaintestExtinction = 1e-4F;  // a voxel edge: the scale of a medium thought to take nothing
+constexpr int kHoldOutOneIn = 32;             // pixels kept from the fit
+constexpr std::size_t kFewestRays = 256;      // of a subset
+
+class Mean {
+ public:
+  void add(float value) {
+    sum_ += static_cast<double>(value);
+    ++count_;
+  }
+  [[nodiscard]] float operator()() const {
+    return count_ > 0 ? static_cast<float>(sum_ / static_cast<double>(count_)) : 0;
+  }
+
+ private:
+  double sum_ = 0;
+  std::size_t count_ = 0;
+};
 
 /// Pixel subsets whose successive ones lie as far apart as can be: Bayer's order (1973).
 int bayer(int x, int y) {
@@ -75,22 +100,18 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
   return level;
 }
 
-Descent::Descent(const Level& level, const Optics& optics, Precision precision, Device device, Pool& pool)
+Descent::Descent(const Level& level, const Optics& optics, const SolverSetup& setup,
+                 const std::vector<Rgba>& x)
     : level_(level),
-      engine_(make_engine(level.problem, optics, precision, device, pool)),
+      engine_(make_engine(level.problem, optics, setup.options.precision, setup.device, setup.pool)),
       fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]) {
-  start_from(std::vector<Rgba>(level.problem.active.size()));
+  find_weights(x);
+  engine_->set(x);
 }
 
 std::size_t Descent::rays_of(int subset) const {
   const auto s = static_cast<std::size_t>(subset);
   return level_.problem.list.subset_begin[s + 1] - level_.problem.list.subset_begin[s];
-}
-
-void Descent::start_from(const std::vector<Rgba>& x) {
-  find_weights(x);
-  engine_->set(x);
-  momentum_time_ = 1;
 }
 
 void Descent::pass() {
@@ -100,10 +121,17 @@ void Descent::pass() {
     engine_->residual(s);
     engine_->backproject(s);
     const double next_time = 0.5 * (1 + std::sqrt(1 + 4 * momentum_time_ * momentum_time_));
-    const auto momentum = std::min(kMostMomentum, static_cast<float>((momentum_time_ - 1) / next_time));
+    const auto momentum = std::min(field_ ? kMostJointMomentum : kMostMomentum,
+                                   static_cast<float>((momentum_time_ - 1) / next_time));
     momentum_time_ = next_time;
-    engine_->descend(
-        {static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)), smoothing_, momentum});
+    const Engine::Step step{static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)),
+                            smoothing_, momentum};
+    if (field_) {
+      field_->emission = step;
+      engine_->descend_field(*field_);
+    } else {
+      engine_->descend(step);
+    }
   }
 }
 
@@ -119,30 +147,79 @@ double Descent::validation_error() {
   return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(rays_of(subset)))));
 }
 
-/// A^T A 1 over the fitted rays; 1 only at the hull's key points, lane 3 (a field's extinction) as in x.
+/// Every fourth subset lies about as densely as the voxels: enough for curvatures, which are smooth.
+Descent::Sample Descent::sample() const {
+  const int subsets = (level_.subsets + 3) / 4;
+  std::size_t rays = 0;
+  for (int s = 0; s < subsets; ++s) rays += rays_of(s);
+  return {subsets,
+          rays > 0 ? static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)) : 1.F};
+}
+
+/// A^T A 1 over the fitted rays; 1 only at the hull's key points. A field's extinction is lane 3 of x,
+/// thinned.
 void Descent::find_weights(const std::vector<Rgba>& x) {
   const std::vector<std::uint8_t>& active = level_.problem.active;
   std::vector<Rgba> ones(active.size());
   for (std::size_t p = 0; p < ones.size(); ++p)
-    if (active[p] != 0) ones[p] = Rgba{{1, 1, 1, x[p].c[3]}};
+    if (active[p] != 0) ones[p] = Rgba{{1, 1, 1, kThinned * x[p].c[3]}};
   engine_->set(ones);
   const std::vector<Rgba> dark(level_.problem.list.rays.size());
-  for (int s = 0; s < level_.subsets; ++s) {
+  const Sample taken = sample();
+  for (int s = 0; s < taken.subsets; ++s) {
     engine_->residual_against(dark, s);
     engine_->backproject(s);
   }
   const std::vector<Rgba> gradient = engine_->gradient();
   std::vector<float> weights(gradient.size());
-  double sum = 0;
-  std::size_t reached = 0;
-  for (std::size_t p = 0; p < weights.size(); ++p) {
-    if (active[p] == 0 || gradient[p].c[0] <= 0) continue;
-    weights[p] = gradient[p].c[0];
-    sum += static_cast<double>(weights[p]);
-    ++reached;
-  }
-  smoothing_ = reached > 0 ? kSmoothing * static_cast<float>(sum / static_cast<double>(reached)) : 0;
+  Mean mean;
+  for (std::size_t p = 0; p < weights.size(); ++p)
+    if (active[p] != 0 && gradient[p].c[0] > 0) mean.add(weights[p] = taken.times * gradient[p].c[0]);
+  smoothing_ = kSmoothing * mean();
   engine_->set_weights(weights);
+}
+
+/// J^T J 1, J being the derivative of the rays' radiance by the extinction: all of its entries have one sign,
+/// because extinction only takes light away, so this majorises J^T J. J 1 is a difference along (0, 0, 0, 1).
+void Descent::release_extinction() {
+  const std::vector<std::uint8_t>& active = level_.problem.active;
+  const std::vector<Rgba> x = engine_->get();
+  std::vector<float> expected(x.size());
+  Mean extinction;
+  for (std::size_t p = 0; p < x.size(); ++p)
+    if (active[p] != 0) extinction.add(expected[p] = x[p].c[3]);
+  const float scale = std::max(extinction(), kFaintestExtinction);
+  const float difference = 0.02F * scale;
+  const Sample taken = sample();
+  const auto radiance = [&](const std::vector<Rgba>& volume) {
+    engine_->set(volume);
+    for (int s = 0; s < taken.subsets; ++s) engine_->project(s);
+    return engine_->residuals();
+  };
+  std::vector<Rgba> denser = x;
+  for (std::size_t p = 0; p < x.size(); ++p)
+    if (active[p] != 0) denser[p].c[3] += difference;
+  const std::vector<Rgba> after = radiance(denser);
+  const std::vector<Rgba> before = radiance(x);
+  std::vector<Rgba> target(before.size());  // so that the residual is J 1
+  for (std::size_t r = 0; r < target.size(); ++r)
+    target[r] = before[r] - (1 / difference) * (after[r] - before[r]);
+  engine_->clear_gradient();
+  for (int s = 0; s < taken.subsets; ++s) {
+    engine_->residual_against(target, s);
+    engine_->backproject(s);
+  }
+  const std::vector<Rgba> gradient = engine_->gradient();
+  std::vector<float> weights(gradient.size());
+  Mean mean;
+  for (std::size_t p = 0; p < weights.size(); ++p)
+    if (active[p] != 0 && gradient[p].c[3] > 0) mean.add(weights[p] = taken.times * gradient[p].c[3]);
+  for (float& w : weights)
+    if (w > 0) w += kLeastCurvature * mean();
+  engine_->set_field(weights, expected);
+  engine_->set(x);
+  field_ = {{}, kVariation * scale * mean(), kSoft * scale, std::max(kMostExtinction, 4 * scale)};
+  momentum_time_ = 1;
 }
 
 }  // namespace emberlock

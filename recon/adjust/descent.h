@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "recon/adjust/engine.h"
@@ -24,10 +25,13 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
 /// by preconditioned ordered-subset steps with Nesterov's momentum.
 class Descent {
  public:
-  /// The level and the pool must outlive it. Starts from zero.
-  Descent(const Level& level, const Optics& optics, Precision precision, Device device, Pool& pool);
+  /// The level and the pool must outlive it. Starts from x: emission, and in lane 3 extinction where the
+  /// optics take a field.
+  Descent(const Level& level, const Optics& optics, const SolverSetup& setup, const std::vector<Rgba>& x);
 
-  void start_from(const std::vector<Rgba>& x);
+  /// From here on the extinction moves too, held to what it is now by the total variation of their
+  /// difference. Absorb::field alone.
+  void release_extinction();
   /// One pass over all subsets.
   void pass();
   /// RMS over the held-out pixels, or over the first subset where there are none; grey levels.
@@ -36,6 +40,12 @@ class Descent {
 
  private:
   [[nodiscard]] std::size_t rays_of(int subset) const;
+  /// The subsets that curvatures are taken from, and how many times more rays there are in all.
+  struct Sample {
+    int subsets;
+    float times;
+  };
+  [[nodiscard]] Sample sample() const;
   void find_weights(const std::vector<Rgba>& x);
 
   const Level& level_;
@@ -43,6 +53,7 @@ class Descent {
   std::size_t fitted_ = 0;
   float smoothing_ = 0;
   double momentum_time_ = 1;
+  std::optional<Engine::FieldStep> field_;  // once the extinction is released
 };
 
 }  // namespace emberlock

@@ -40,6 +40,7 @@ class Engine {
   /// have come last.
   virtual void backproject(int subset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> gradient() const = 0;
+  virtual void clear_gradient() = 0;
   /// The weights of descend(): one a key point, 0 for those that take no part. Clears the gradient.
   virtual void set_weights(const std::vector<float>& weights) = 0;
   virtual void descend(const Step& step) = 0;
@@ -52,6 +53,7 @@ class Engine {
   };
   /// Where the extinction is unknown too: curvature of the residual by it, and what it is thought to be, one
   /// a key point.
+  /// Clears the gradient.
   virtual void set_field(const std::vector<float>& weights, const std::vector<float>& reference) = 0;
   virtual void descend_field(const FieldStep& step) = 0;
   /// residual = A y - target, for targets other than what was seen.

@@ -68,9 +68,10 @@ class CpuEngine final : public Engine {
     });
   }
 
+  void clear_gradient() override { std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{}); }
   void set_weights(const std::vector<float>& weights) override {
     weight_.assign(weights.begin(), weights.end());
-    std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{});
+    clear_gradient();
   }
 
   void descend(const Step& step) override { each_row(table_.update, emission_step(step)); }
@@ -78,7 +79,7 @@ class CpuEngine final : public Engine {
   void set_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
     field_weight_.assign(weights.begin(), weights.end());
     reference_.assign(reference.begin(), reference.end());
-    std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{});
+    clear_gradient();
   }
   void descend_field(const FieldStep& step) override {
     each_row(table_.field_update,

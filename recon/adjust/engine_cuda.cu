@@ -135,6 +135,7 @@ class CudaEngine final : public Engine {
     }
   }
 
+  void clear_gradient() override { gradient_.clear(); }
   void set_weights(const std::vector<float>& weights) override {
     weight_.upload(weights);
     gradient_.clear();

@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "recon/adjust/descent.h"
+#include "recon/adjust/extinction_field.h"
 #include "recon/adjust/tracker.h"
 
 namespace emberlock {
@@ -12,9 +13,17 @@ constexpr int kCoarsest = 24;  // no level has fewer voxels along its longest si
 constexpr int kCoarseSteps = 64;     // of a coarse level
 constexpr int kMostSteps = 192;      // at full resolution, unless the user asks for more
 constexpr int kRound = 16;           // steps between two looks at the held-out pixels' error
-constexpr double kLeastGain = 0.05;  // a round that lowers it by a smaller share is the last
+constexpr double kLeastGain = 0.02;  // a round that lowers it by a smaller share is the last
 
 int longest(const Grid& g) { return std::max({g.nx, g.ny, g.nz}) - 1; }
+
+/// Starts a level from the coarser one's light; the extinction as it is expected under that light.
+std::unique_ptr<Descent> begin(const Level& level, const SolverSetup& setup, std::vector<Rgba> x) {
+  const Problem& problem = level.problem;
+  if (setup.effects.extinction.model == Extinction::Model::field)
+    x = with_extinction(x, expected_extinction(problem, setup.effects.extinction, x));
+  return std::make_unique<Descent>(level, setup.optics(problem.grid()), setup, x);
+}
 
 }  // namespace
 
@@ -26,13 +35,13 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
   std::unique_ptr<Descent> descent;
   for (std::size_t l = hulls.size(); l-- > 0;) {
     auto finer = std::make_unique<const Level>(pose_level(setup, hulls[l], 1 << l));
-    auto next = std::make_unique<Descent>(*finer, absorbing_optics(setup.sigma(hulls[l].grid)),
-                                          setup.options.precision, setup.device, setup.pool);
-    if (descent) next->start_from(refine(descent->engine().get(), level->problem, finer->problem));
-    descent = std::move(next);
+    std::vector<Rgba> x = descent ? refine(descent->engine().get(), level->problem, finer->problem)
+                                  : std::vector<Rgba>(finer->problem.active.size());
+    descent = begin(*finer, setup, std::move(x));
     level = std::move(finer);
     for (int s = 0; l > 0 && s < kCoarseSteps && !tracker.out_of_time(); s += level->subsets) descent->pass();
   }
+  if (setup.effects.extinction.model == Extinction::Model::field) descent->release_extinction();
 
   const ErrorOverBoxes error(setup.views, setup.boxes, level->problem);
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;

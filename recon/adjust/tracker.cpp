@@ -9,8 +9,8 @@ Tracker::Tracker(const SolverSetup& setup, const std::vector<const View*>& held_
   if (held_out.empty()) return;
   const Seconds start = now();
   held_out_ = std::make_unique<const Problem>(pose(held_out, setup.hull, {}, setup.pool));
-  engine_ = make_engine(*held_out_, absorbing_optics(setup.sigma(held_out_->grid())), setup.options.precision,
-                        setup.device, setup.pool);
+  engine_ = make_engine(*held_out_, setup.optics(held_out_->grid()), setup.options.precision, setup.device,
+                        setup.pool);
   error_ = std::make_unique<const ErrorOverBoxes>(held_out, boxes, *held_out_);
   excluded_ += now() - start;
 }
@@ -45,6 +45,8 @@ Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull&
   const Grid& part = problem.grid();
   Volume volume{whole, std::vector<float>(3 * whole.size()), {}};
   const float per_meter = 1 / whole.edge;
+  const bool field = effects.extinction.model == Extinction::Model::field;
+  if (field) volume.extinction.resize(whole.size());
   for (int k = 0; k < part.nz; ++k)
     for (int j = 0; j < part.ny; ++j)
       for (int i = 0; i < part.nx; ++i) {
@@ -52,8 +54,9 @@ Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull&
         const std::size_t to =
             whole.index(i + problem.crop.offset[0], j + problem.crop.offset[1], k + problem.crop.offset[2]);
         for (std::size_t c = 0; c < 3; ++c) volume.emission[3 * to + c] = per_meter * from.c[c];
+        if (field) volume.extinction[to] = per_meter * from.c[3];
       }
-  if (effects.extinction.value.value() <= 0) return volume;
+  if (effects.extinction.model != Extinction::Model::constant) return volume;
   // The medium is a set of voxels; a key point gets the share of its eight voxels that belong to it.
   volume.extinction.resize(whole.size());
   const auto share = static_cast<float>(effects.extinction.value.value() / 8);

@@ -21,9 +21,14 @@ struct SolverSetup {
   Device device;
   Pool& pool;
 
-  /// Extinction a voxel edge.
+  /// Extinction a voxel edge: all of it, or its mean where it is a field.
   [[nodiscard]] float sigma(const Grid& grid) const {
-    return static_cast<float>(effects.extinction.value.value() * static_cast<double>(grid.edge));
+    const Extinction& e = effects.extinction;
+    return static_cast<float>((e.value.value() + e.soot.value()) * static_cast<double>(grid.edge));
+  }
+  [[nodiscard]] Optics optics(const Grid& grid) const {
+    if (effects.extinction.model == Extinction::Model::field) return {Absorb::field, 0, 0};
+    return absorbing_optics(sigma(grid));
   }
 };
 

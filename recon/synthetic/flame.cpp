@@ -258,7 +258,7 @@ Scene paper_scene(const PaperSceneOptions& options) {
   const FlameTruth truth = flame.at(options.time, grid_over(scene.box, options.truth_voxels));
   const Intrinsics intrinsics = pinhole(options.image, 60);
   RenderOptions finer;
-  finer.step = 0.5;
+  finer.step = options.truth_step;
   const auto film = [&](const std::string& name, double azimuth, double elevation, ViewRole role) {
     View view{
         name, look_at(intrinsics, on_sphere(0.3, azimuth, elevation), Eigen::Vector3d::Zero()), {}, role};

@@ -65,8 +65,9 @@ struct PaperSceneOptions {
   FlameOptions flame;
   Seconds time{0};
   ImageSize image{640, 480};
-  int truth_voxels = 192;  ///< the truth's own grid, unlike any solver's
-  double noise = 0;        ///< standard deviation of the pixels, grey levels
+  int truth_voxels = 192;   ///< the truth's own grid, unlike any solver's
+  double truth_step = 0.5;  ///< of the march that films it, in its voxel edges
+  double noise = 0;         ///< standard deviation of the pixels, grey levels
 };
 
 /// The paper's set-up: ten input views at intervals of 36 degrees, 30 cm from the origin, alternately

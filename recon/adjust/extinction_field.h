@@ -1,0 +1,19 @@
+#pragma once
+
+#include <vector>
+
+#include "recon/adjust/problem.h"
+#include "recon/effects/effects.h"
+
+namespace emberlock {
+
+/// What a field of extinction is thought to be at the problem's key points, a voxel edge: `value` times the
+/// share of each key point's eight voxels that belong to the medium, and `soot` spread like the luminance of
+/// x (evenly where x is dark).
+std::vector<float> expected_extinction(const Problem& problem, const Extinction& extinction,
+                                       const std::vector<Rgba>& x);
+
+/// x with lane 3 replaced.
+std::vector<Rgba> with_extinction(std::vector<Rgba> x, const std::vector<float>& extinction);
+
+}  // namespace emberlock

@@ -1,0 +1,141 @@
+#include "recon/adjust/find_extinction.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "recon/adjust/descent.h"
+#include "recon/adjust/extinction_field.h"
+
+namespace emberlock {
+namespace {
+
+constexpr int kCoarse = 64;           // voxels along the longest side, at most
+constexpr std::size_t kRays = 30000;  // about as many pixels of the flames' boxes are looked at
+constexpr int kEmissionPasses = 2;
+constexpr int kJointPasses = 4;
+
+struct Candidate {
+  Extinction extinction;
+  double error = 0;
+  std::vector<Rgba> x;
+};
+
+Extinction guess(PerMeter even, PerMeter soot) {
+  if (even.value() + soot.value() <= 0) return {};
+  return {Extinction::Model::field, even, soot};
+}
+
+Hull coarse_hull(const Hull& hull) {
+  Hull coarse = hull;
+  while (std::max({coarse.grid.nx, coarse.grid.ny, coarse.grid.nz}) - 1 > kCoarse) coarse = coarsen(coarse);
+  return coarse;
+}
+
+int stride(const SolverSetup& setup) {
+  double pixels = 0;
+  for (const PixelBox& b : setup.boxes) pixels += static_cast<double>(b.x1 - b.x0) * (b.y1 - b.y0);
+  return std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / static_cast<double>(kRays)))));
+}
+
+/// Cold solves of one coarse problem, all by as many steps: candidates must differ in the extinction alone.
+class Probe {
+ public:
+  explicit Probe(const SolverSetup& setup)
+      : setup_(setup), hull_(coarse_hull(setup.hull)), level_(pose_level(setup, hull_, stride(setup), 4)) {}
+
+  [[nodiscard]] Candidate solve(const Extinction& extinction) const {
+    const Problem& problem = level_.problem;
+    std::vector<Rgba> x(problem.active.size());
+    if (extinction.model == Extinction::Model::none) {
+      Descent descent(level_, {}, setup_, x);
+      return finish(descent, extinction, kEmissionPasses + kJointPasses);
+    }
+    const Optics optics{Absorb::field, 0, 0};
+    if (extinction.soot.value() > 0) {  // is spread by the light that there is
+      Descent even(level_, optics, setup_, with_extinction(x, expected_extinction(problem, extinction, x)));
+      for (int p = 0; p < kEmissionPasses; ++p) even.pass();
+      x = even.engine().get();
+    }
+    Descent descent(level_, optics, setup_, with_extinction(x, expected_extinction(problem, extinction, x)));
+    for (int p = 0; p < kEmissionPasses; ++p) descent.pass();
+    descent.release_extinction();
+    return finish(descent, extinction, kJointPasses);
+  }
+
+  /// Mean length of a ray inside the hull.
+  [[nodiscard]] Meters mean_chord() const {
+    double sum = 0;
+    for (const Run& run : level_.problem.list.runs) sum += static_cast<double>(run.step) * run.count;
+    const double rays = std::max(1.0, static_cast<double>(level_.problem.list.rays.size()));
+    return Meters(sum / rays * static_cast<double>(hull_.grid.edge));
+  }
+
+  [[nodiscard]] FoundExtinction result(const Candidate& c) const {
+    Effects effects;
+    effects.extinction = c.extinction;
+    return {c.extinction, c.error, to_volume(c.x, level_.problem, hull_, effects), hull_};
+  }
+
+ private:
+  static Candidate finish(Descent& descent, const Extinction& extinction, int passes) {
+    for (int p = 0; p < passes; ++p) descent.pass();
+    return {extinction, descent.validation_error(), descent.engine().get()};
+  }
+
+  const SolverSetup& setup_;
+  Hull hull_;
+  Level level_;
+};
+
+/// The lowest of the parabola through three points (place, squared error), kept inside their range.
+double vertex(const std::array<double, 3>& x, const std::array<double, 3>& error) {
+  const double ab = (error[1] * error[1] - error[0] * error[0]) / (x[1] - x[0]);
+  const double bc = (error[2] * error[2] - error[1] * error[1]) / (x[2] - x[1]);
+  const double curvature = (bc - ab) / (x[2] - x[0]);
+  if (!(curvature > 0)) return x[1];
+  return std::clamp(0.5 * (x[0] + x[1]) - 0.5 * ab / curvature, x[0], x[2]);
+}
+
+/// Tries places along a line, then the vertex of the parabola around the best.
+template <class Try>
+Candidate search_line(const std::vector<double>& places, const Try& attempt) {
+  std::vector<Candidate> tried;
+  tried.reserve(places.size());
+  for (const double place : places) tried.push_back(attempt(place));
+  const auto better = [](const Candidate& a, const Candidate& b) { return a.error < b.error; };
+  const auto best = std::min_element(tried.begin(), tried.end(), better);
+  const auto at = static_cast<std::size_t>(best - tried.begin());
+  if (at == 0 || at + 1 == tried.size()) return *best;
+  const double next = vertex({places[at - 1], places[at], places[at + 1]},
+                             {tried[at - 1].error, tried[at].error, tried[at + 1].error});
+  if (std::abs(next - places[at]) <= 0.05 * (places[at + 1] - places[at - 1])) return *best;
+  Candidate refined = attempt(next);
+  return better(refined, *best) ? refined : *best;
+}
+
+}  // namespace
+
+FoundExtinction find_extinction(const SolverSetup& setup) {
+  const Probe probe(setup);
+  const double chord = probe.mean_chord().value();
+  const Candidate even = search_line({0.0, 0.3, 0.7, 1.2, 3.0}, [&](double depth) {
+    return probe.solve(guess(PerMeter(depth / chord), PerMeter(0)));
+  });
+  const double total = even.extinction.value.value();
+  if (total <= 0) return probe.result(even);
+  // The same mean, from all even to all like soot.
+  const Candidate mixed = search_line({0.0, 0.5, 1.0}, [&](double share) {
+    return share == 0 ? even : probe.solve(guess(PerMeter((1 - share) * total), PerMeter(share * total)));
+  });
+  return probe.result(mixed);
+}
+
+FoundExtinction try_extinction(const SolverSetup& setup, const Extinction& extinction) {
+  const Probe probe(setup);
+  Extinction field = extinction;
+  if (field.model == Extinction::Model::constant) field.model = Extinction::Model::field;
+  return probe.result(probe.solve(field));
+}
+
+}  // namespace emberlock

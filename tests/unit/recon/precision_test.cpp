@@ -1,0 +1,127 @@
+// Single against double precision: the functions of the extinction, the marches, whole reconstructions.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "recon/adjust/solver.h"
+#include "tests/support/march_case.h"
+#include "tests/support/small_flame.h"
+
+namespace emberlock {
+namespace {
+
+/// The largest difference of two lists over the largest value of the second, lanes 0..lanes - 1.
+double relative_difference(const std::vector<Rgba>& a, const Marcher<double>::Values& b, int lanes) {
+  double difference = 0;
+  double largest = 0;
+  for (std::size_t i = 0; i < b.size(); ++i)
+    for (int c = 0; c < lanes; ++c) {
+      difference = std::max(difference, std::abs(static_cast<double>(a[i].c[c]) - b[i].c[c]));
+      largest = std::max(largest, std::abs(b[i].c[c]));
+    }
+  return difference / largest;
+}
+
+Marcher<double>::Values widened(const std::vector<Rgba>& from) {
+  Marcher<double>::Values to(from.size());
+  for (std::size_t i = 0; i < from.size(); ++i)
+    for (int c = 0; c < 4; ++c) to[i].c[c] = static_cast<double>(from[i].c[c]);
+  return to;
+}
+
+TEST(Precision, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
+  for (double x = 1e-12; x < 1e30; x *= 1.1) {
+    const auto wide = static_cast<long double>(x);
+    const long double phi_true = -std::expm1(-wide) / wide;
+    // Below 0.1 the closed form of the slope cancels even here; its series has converged by the 12th term.
+    long double slope_true = (std::exp(-wide) * (1 + wide) - 1) / (wide * wide);
+    if (x < 0.1) {
+      slope_true = 0;
+      long double term = -1.0L / 2;  // n (-1)^n x^(n - 1) / (n + 1)!
+      for (int n = 1; n < 13; ++n) {
+        slope_true += term;
+        term *= -wide * static_cast<long double>(n + 1) / static_cast<long double>(n * (n + 2));
+      }
+    }
+    const auto error = [](double a, long double truth) {
+      return std::abs(static_cast<double>((static_cast<long double>(a) - truth) / truth));
+    };
+    const auto narrow = static_cast<float>(x);
+    EXPECT_LT(error(phi(x), phi_true), 1e-15) << x;
+    EXPECT_LT(error(static_cast<double>(phi(narrow)), phi_true), 4e-7) << x;
+    if (x > 1e15) continue;  // the slope has fallen to 1e-30
+    EXPECT_LT(error(phi_slope(x), slope_true), 1e-11) << x;
+    EXPECT_LT(error(static_cast<double>(phi_slope(narrow)), slope_true), 3e-6) << x;
+  }
+  EXPECT_EQ(phi(0.0), 1);
+  EXPECT_EQ(phi(0.F), 1);
+  EXPECT_EQ(phi_slope(0.0), -0.5);
+}
+
+TEST(Precision, MarchesDifferByAHundredThousandthOfTheBrightest) {
+  for (const bool curved : {false, true}) {
+    const MarchCase c = march_case({.curved = curved});
+    const Marcher<float> narrow(c.list);
+    const Marcher<double> wide(c.list);
+    for (const double sigma : {0.0, 1e-4, 0.05, 1.0, 20.0}) {
+      const auto x = random_quads<float>(c.list.grid.size(), 1, 1, 2 * sigma);
+      const Absorb known = sigma > 0 ? Absorb::constant : Absorb::nothing;
+      for (const Absorb absorb : {known, Absorb::field})
+        EXPECT_LT(relative_difference(narrow.forward(absorb, x, static_cast<float>(sigma)),
+                                      wide.forward(absorb, widened(x), sigma), 3),
+                  1e-5)
+            << sigma;
+      const auto y = random_quads<float>(c.list.rays.size(), 2);
+      EXPECT_LT(relative_difference(narrow.adjoint(known, y, static_cast<float>(sigma)),
+                                    wide.adjoint(known, widened(y), sigma), 3),
+                1e-5)
+          << sigma;
+    }
+  }
+}
+
+TEST(Precision, TransmittanceIsRightToAMillionthHoweverThickTheMedium) {
+  const MarchCase c = march_case();
+  for (double sigma = 1e-6; sigma < 1e9; sigma *= 10) {
+    const auto x = random_quads<float>(c.list.grid.size(), 1, 1, 2 * sigma);
+    const auto narrow = Marcher<float>(c.list).forward(Absorb::field, x);
+    const auto wide = Marcher<double>(c.list).forward(Absorb::field, widened(x));
+    for (std::size_t r = 0; r < wide.size(); ++r)
+      EXPECT_NEAR(static_cast<double>(narrow[r].c[3]), wide[r].c[3], 1e-6) << sigma;
+  }
+}
+
+TEST(Precision, GradientsByEmissionAndExtinctionDifferByAHundredThousandthOfTheLargest) {
+  const MarchCase c = march_case();
+  const auto seen = random_quads<float>(c.list.rays.size(), 1, 2);
+  const auto background = random_quads<float>(c.list.rays.size(), 2);
+  for (const double sigma : {0.0, 1e-4, 0.05, 1.0, 20.0}) {
+    const auto x = random_quads<float>(c.list.grid.size(), 3, 1, 2 * sigma);
+    const Marcher<float> narrow(c.list);
+    const Marcher<double> wide(c.list);
+    const auto a =
+        narrow.field_adjoint(narrow.field_forward(x, {seen.data(), background.data(), nullptr, 0}));
+    const auto b =
+        wide.field_adjoint(wide.field_forward(widened(x), {seen.data(), background.data(), nullptr, 0}));
+    EXPECT_LT(relative_difference(a, b, 4), 1e-5) << sigma;
+  }
+}
+
+TEST(Precision, ReconstructionsDifferByLessThanAHundredthOfAGreyLevelOnTheHeldOutView) {
+  const Scene scene = small_flame_scene();
+  SolveOptions options;
+  options.compute.device = Device::cpu;
+  for (const double sigma : {0.0, 32.8}) {
+    double error[2] = {};
+    for (const Precision precision : {Precision::float32, Precision::float64}) {
+      options.precision = precision;
+      const auto r = solve(scene, grid_over(scene.box, 32), absorbing(PerMeter(sigma)), options);
+      ASSERT_TRUE(r.ok());
+      error[precision == Precision::float64 ? 1 : 0] = all_channels(r->trace.back().heldout_rmse);
+    }
+    EXPECT_NEAR(error[0], error[1], 0.01) << sigma;
+  }
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -94,7 +94,7 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
   options.subset_of = [subsets = level.subsets, stride](std::size_t, int x, int y) {
     if (x % stride != 0 || y % stride != 0) return -1;
     if (held_out(x, y)) return subsets;
-    return bayer(x / stride, y / stride) % subsets;
+    return bayer(x / stride, y / stride) * subsets / 16;
   };
   level.problem = pose(setup.views, hull, options, setup.pool);
   return level;

@@ -66,7 +66,7 @@ double pixels_per_voxel(const SolverSetup& setup, const Grid& g) {
 /// a subset's rays pass farther apart than the voxels, some voxels hang on none of them: a step from some of
 /// the rays alone can then overshoot. The full gradient can't.
 int subsets_for(float sigma, double rays_per_voxel, std::size_t pixels, int most) {
-  constexpr double kWidestGap = 2;  // voxels between a subset's neighbouring rays
+  constexpr double kWidestGap = 1.5;  // voxels between a subset's neighbouring rays
   int subsets = std::min(most, sigma < 0.11F ? 16 : (sigma < 0.22F ? 4 : 1));
   while (subsets > 1 && (pixels / static_cast<std::size_t>(subsets) < kFewestRays ||
                          std::sqrt(subsets) > kWidestGap * rays_per_voxel)) {

@@ -32,7 +32,7 @@ class CpuEngine final : public Engine {
         gradient_(x_.size()),
         weight_(x_.size()),
         residual_(problem.list.rays.size()) {
-    if (optics.absorb == Absorb::field) samples_.resize(problem.most_samples());
+    if (optics.absorb == Absorb::field) samples_.resize(problem.most_samples() + kBatch);
   }
 
   void set(const std::vector<Rgba>& x) override { x_ = y_ = next_y_ = converted<Real>(x); }

@@ -66,9 +66,24 @@ struct RowRays {
 
 class RowClipper {
  public:
-  RowClipper(const Hull& medium, const RayListOptions& options)
-      : mask_{medium.grid.nx - 1, medium.grid.ny - 1, medium.grid.nz - 1, medium.inside.data()},
-        options_(options) {}
+  RowClipper(const Hull& medium, const RayListOptions& options) : options_(options) {
+    const Grid& g = medium.grid;
+    voxels_ = {g.nx - 1, g.ny - 1, g.nz - 1, nullptr};
+    const auto blocks = [](int voxels) { return (voxels + kBlock - 1) / kBlock; };
+    blocks_ = {blocks(voxels_.mx), blocks(voxels_.my), blocks(voxels_.mz), nullptr};
+    inside_.resize(voxels_.size());
+    occupied_.resize(blocks_.size());
+    std::size_t voxel = 0;
+    for (int k = 0; k < voxels_.mz; ++k)
+      for (int j = 0; j < voxels_.my; ++j)
+        for (int i = 0; i < voxels_.mx; ++i)
+          if (medium.inside[voxel++] != 0) {
+            inside_[voxels_.index(i, j, k)] = 1;
+            occupied_[blocks_.index(i / kBlock, j / kBlock, k / kBlock)] = 1;
+          }
+    voxels_.inside = inside_.data();
+    blocks_.inside = occupied_.data();
+  }
 
   RowRays operator()(const CameraModel& camera, const float* origin, const PixelRow& row) const {
     RowRays out;
@@ -123,17 +138,17 @@ class RowClipper {
   /// it.
   void add_stretch(const float* origin, const float* direction, float length, float& before, MarchRay& ray,
                    RowRays& out) const {
-    clip_to_medium(mask_, origin, direction, [&](float t0, float t1) {
+    clip_to_medium(voxels_, blocks_, origin, direction, [&](float t0, float t1) {
       constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
       t1 = std::min(t1, length);
       if (t1 - t0 < kSliver) return;
       const int count = std::max(1, static_cast<int>(std::ceil((t1 - t0) / options_.step - 1e-3F)));
       const float step = (t1 - t0) / static_cast<float>(count);
-      cut_at_slabs(origin[2], direction[2], t0, step, count, mask_.mz, [&](int first, int size) {
+      cut_at_slabs(origin[2], direction[2], t0, step, count, voxels_.mz, [&](int first, int size) {
         const float ahead = static_cast<float>(first) * step;
         // The middle sample tells the slab: the first may have been rounded across the border.
         const float middle = t0 + ahead + (static_cast<float>(size / 2) + 0.5F) * step;
-        const int slab = clamp_cell(origin[2] + direction[2] * middle, mask_.mz + 1) / kSlab;
+        const int slab = clamp_cell(origin[2] + direction[2] * middle, voxels_.mz + 1) / kSlab;
         out.runs.push_back({t0 + ahead, step, before + ahead, 0, out.samples, size, slab});
         out.samples += static_cast<std::uint32_t>(size);
         ++ray.runs;
@@ -142,7 +157,8 @@ class RowClipper {
     });
   }
 
-  VoxelMask mask_;
+  std::vector<std::uint8_t> inside_, occupied_;
+  VoxelMask voxels_, blocks_;
   const RayListOptions& options_;
 };
 

@@ -10,12 +10,38 @@ namespace emberlock {
 //   dL/dsigma_k = T_k j_k ds^2 phi'(x_k) - ds (L - A_k)
 // where A_k is the radiance up to and through step k, and L includes what lies behind the medium.
 
+/// What a batch of samples does to the light, from their optical depths.
+template <class Real>
+struct Steps {
+  Real depth[kBatch];
+  Real mean[kBatch];   ///< phi(depth)
+  Real slope[kBatch];  ///< phi'(depth)
+
+  /// Depths of the samples whose extinction is lane 3 of `values`; the rest of the batch, from `here` on, has
+  /// none.
+  HOST_DEVICE void take(const Quad<Real>* values, int here, Real step) {
+    Real deepest = 0;
+    for (int i = 0; i < kBatch; ++i) {
+      const Real x = values[i].c[3] * step;
+      depth[i] = i < here ? x : Real(0);
+      deepest = deepest > depth[i] ? deepest : depth[i];
+    }
+    if (deepest < series_limit<Real>()) {  // no call, no branch: vector code
+      for (int i = 0; i < kBatch; ++i) mean[i] = phi_series(depth[i]);
+      for (int i = 0; i < kBatch; ++i) slope[i] = phi_slope_series(depth[i]);
+    } else {
+      for (int i = 0; i < here; ++i) mean[i] = phi(depth[i]);
+      for (int i = 0; i < here; ++i) slope[i] = phi_slope(depth[i]);
+    }
+  }
+};
+
 /// What a ray leaves at each of its samples for the adjoint: the radiance's weight of the emission, and the
 /// residual's derivative by the extinction.
 ///
 /// Marches a ray, takes its residual by `judge(ray, radiance with the transmittance in lane 3)`, and fills
 /// `samples` from the first sample of the ray on: lane 0 the emission's weight, lane 1 the slope by
-/// extinction.
+/// extinction. kBatch more samples than there are must fit.
 template <class Real, class Path>
 struct FieldForward {
   RayTable table;
@@ -31,8 +57,8 @@ struct FieldForward {
     Quad<Real> radiance;
     Real transmittance = 1;
     Batch<Real> batch;
-    Quad<Real>* const values = samples + (table.runs[r.first_run].first_sample - first_sample);
-    Quad<Real>* next = values;
+    Steps<Real> steps;
+    Quad<Real>* values = samples + (table.runs[r.first_run].first_sample - first_sample);
     for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
       const Run run = table.runs[n];
       const Line<Real> line = Path::template line<Real>(table, n);
@@ -40,15 +66,14 @@ struct FieldForward {
       for (int first = 0; first < run.count; first += kBatch) {
         locate(table, line, run, first, layers_of(run), batch);
         const int here = run.count - first < kBatch ? run.count - first : kBatch;
+        for (int i = 0; i < here; ++i)
+          values[i] = trilinear(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i]);
+        steps.take(values, here, step);
         for (int i = 0; i < here; ++i) {
-          const Quad<Real> value =
-              trilinear(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i]);
-          *next++ = value;
-          const Real x = value.c[3] * step;
-          const Real mean = phi(x);
-          radiance = radiance + (transmittance * step * mean) * value;
-          transmittance *= 1 - x * mean;
+          radiance = radiance + (transmittance * step * steps.mean[i]) * values[i];
+          transmittance *= 1 - steps.depth[i] * steps.mean[i];
         }
+        values += here;
       }
     }
     radiance.c[3] = transmittance;
@@ -57,20 +82,24 @@ struct FieldForward {
     Real behind = residual.c[0] * radiance.c[0] + residual.c[1] * radiance.c[1] +
                   residual.c[2] * radiance.c[2] + residual.c[3] * transmittance;
     transmittance = 1;
-    next = values;
+    values = samples + (table.runs[r.first_run].first_sample - first_sample);
     for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
+      const int count = table.runs[n].count;
       const Real step = Real(table.runs[n].step);
-      for (int i = 0; i < table.runs[n].count; ++i, ++next) {
-        const Quad<Real> value = *next;
-        const Real x = value.c[3] * step;
-        const Real mean = phi(x);
-        const Real weight = transmittance * step * mean;
-        const Real along =
-            residual.c[0] * value.c[0] + residual.c[1] * value.c[1] + residual.c[2] * value.c[2];
-        behind -= weight * along;
-        next->c[0] = weight;
-        next->c[1] = transmittance * step * step * phi_slope(x) * along - step * behind;
-        transmittance *= 1 - x * mean;
+      for (int first = 0; first < count; first += kBatch) {
+        const int here = count - first < kBatch ? count - first : kBatch;
+        steps.take(values, here, step);
+        for (int i = 0; i < here; ++i) {
+          const Quad<Real> value = values[i];
+          const Real weight = transmittance * step * steps.mean[i];
+          const Real along =
+              residual.c[0] * value.c[0] + residual.c[1] * value.c[1] + residual.c[2] * value.c[2];
+          behind -= weight * along;
+          values[i].c[0] = weight;
+          values[i].c[1] = step * (transmittance * step * steps.slope[i] * along - behind);
+          transmittance *= 1 - steps.depth[i] * steps.mean[i];
+        }
+        values += here;
       }
     }
   }

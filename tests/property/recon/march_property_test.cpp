@@ -32,10 +32,20 @@ TEST(MarchLaw, BeerLambertAndStepsOfAnySizeAgreeInAUniformMedium) {
 
 TEST(MarchLaw, RunsCoverExactlyTheVoxelsInsideTheMedium) {
   EXPECT_TRUE(rc::check("clipped length equals the sum over voxels of each voxel's own chord", [] {
-    std::uint8_t inside[27];
-    for (std::uint8_t& v : inside) v = *rc::gen::inRange<std::uint8_t>(0, 2);
-    const float origin[3] = {static_cast<float>(number(-4, 4)), static_cast<float>(number(-4, 4)),
-                             static_cast<float>(number(-4, 4))};
+    // Six voxels a side, a few of them inside: whole blocks stay empty.
+    std::uint8_t inside[216] = {};
+    std::uint8_t padded[512] = {};
+    std::uint8_t occupied[64] = {};
+    const VoxelMask voxels{6, 6, 6, padded};
+    const VoxelMask blocks{2, 2, 2, occupied};
+    for (int n = *rc::gen::inRange(1, 12); n > 0; --n) {
+      const int v = *rc::gen::inRange(0, 216);
+      inside[v] = 1;
+      padded[voxels.index(v % 6, v / 6 % 6, v / 36)] = 1;
+      occupied[blocks.index(v % 6 / kBlock, v / 6 % 6 / kBlock, v / 36 / kBlock)] = 1;
+    }
+    const float origin[3] = {static_cast<float>(number(-5, 11)), static_cast<float>(number(-5, 11)),
+                             static_cast<float>(number(-5, 11))};
     float direction[3] = {static_cast<float>(number(-1, 1)), static_cast<float>(number(-1, 1)),
                           static_cast<float>(number(-1, 1))};
     if (*rc::gen::inRange(0, 3) == 0) direction[*rc::gen::inRange(0, 3)] = 0;
@@ -43,12 +53,12 @@ TEST(MarchLaw, RunsCoverExactlyTheVoxelsInsideTheMedium) {
     RC_PRE(norm > 0.1F);
     for (float& d : direction) d /= norm;
     double length = 0;
-    clip_to_medium({3, 3, 3, inside}, origin, direction,
+    clip_to_medium(voxels, blocks, origin, direction,
                    [&](float a, float b) { length += static_cast<double>(b) - static_cast<double>(a); });
     double expected = 0;
-    for (int v = 0; v < 27; ++v) {
+    for (int v = 0; v < 216; ++v) {
       if (inside[v] == 0) continue;
-      const int low[3] = {v % 3, v / 3 % 3, v / 9};
+      const int low[3] = {v % 6, v / 6 % 6, v / 36};
       double enter = 0;
       double leave = 1e9;
       for (int a = 0; a < 3; ++a) {
@@ -63,7 +73,7 @@ TEST(MarchLaw, RunsCoverExactlyTheVoxelsInsideTheMedium) {
       }
       expected += std::max(0.0, leave - enter);
     }
-    RC_PRE(origin[0] != 3.F && origin[1] != 3.F && origin[2] != 3.F);
+    RC_PRE(origin[0] != 6.F && origin[1] != 6.F && origin[2] != 6.F);
     RC_ASSERT(std::abs(length - expected) < 1e-3);
   }));
 }

@@ -151,9 +151,14 @@ TEST(March, AxisParallelRaysOnFacesAndEdgesLoseNothing) {
   // A ray that runs exactly along an outer face belongs to the closed box.
   const float origin[3] = {-3, 0, 1};
   const float direction[3] = {1, 0, 0};
-  const std::uint8_t inside[8] = {1, 1, 1, 1, 1, 1, 1, 1};
+  std::uint8_t inside[64] = {};
+  std::uint8_t occupied[27] = {};
+  const VoxelMask voxels{2, 2, 2, inside};
+  const VoxelMask blocks{1, 1, 1, occupied};
+  for (int v = 0; v < 8; ++v) inside[voxels.index(v & 1, v >> 1 & 1, v >> 2)] = 1;
+  occupied[blocks.index(0, 0, 0)] = 1;
   float length = 0;
-  clip_to_medium({2, 2, 2, inside}, origin, direction, [&](float a, float b) { length += b - a; });
+  clip_to_medium(voxels, blocks, origin, direction, [&](float a, float b) { length += b - a; });
   EXPECT_FLOAT_EQ(length, 2);
 }
 

@@ -9,7 +9,9 @@ namespace {
 
 Error bad(std::string what) {
   return {ErrorKind::bad_input, std::move(what), "effects",
-          "Use auto, none, or a comma separated list of extinction=none|field|VALUE (1/m), "
+          "Use auto[:albedo=VALUE][:g=VALUE][:flame=KELVIN][:ambient=KELVIN][:exposure=SECONDS][:rise=M/S]"
+          "[:gamma=VALUE][:white=LEVEL][:tolerance=LEVELS], none, or a comma separated list of "
+          "extinction=none|field|VALUE (1/m), "
           "scattering=none|single|multiple[:albedo=VALUE][:g=VALUE], "
           "refraction=straight|curved[:flame=KELVIN][:ambient=KELVIN], "
           "background=black|image|LEVEL|RED/GREEN/BLUE, exposure=instant|SECONDS[:rise=M/S], gamma=VALUE, "
@@ -175,6 +177,32 @@ Result<Effects> parse_list(std::string_view text) {
 
 bool within(double value, double low, double high) { return value >= low && value <= high; }
 
+/// auto:name=value:name=value
+Result<EffectRequest> parse_auto(std::string_view text) {
+  EffectRequest request;
+  Effects& assumed = request.assumed;
+  Item item(text);
+  double flame = assumed.refraction.flame.value();
+  double ambient = assumed.refraction.ambient.value();
+  double exposure = assumed.exposure.time.value();
+  item.parameter("albedo", assumed.scattering.albedo);
+  item.parameter("g", assumed.scattering.asymmetry);
+  item.parameter("flame", flame);
+  item.parameter("ambient", ambient);
+  item.parameter("exposure", exposure);
+  item.parameter("rise", assumed.exposure.rise_speed);
+  item.parameter("gamma", assumed.sensor.gamma);
+  item.parameter("white", assumed.sensor.white);
+  item.parameter("tolerance", request.tolerance);
+  if (!item.understood()) return unknown(text);
+  assumed.refraction.flame = Kelvin(flame);
+  assumed.refraction.ambient = Kelvin(ambient);
+  assumed.exposure.time = Seconds(exposure);
+  if (!within(request.tolerance, 0, 255)) return bad("tolerance must lie in 0..255 grey levels");
+  EMBERLOCK_RETURN_IF_ERROR(check(assumed));
+  return request;
+}
+
 }  // namespace
 
 Status check(const Effects& effects) {
@@ -213,9 +241,16 @@ PerMeter extinction_of_opacity(double tau, Meters voxel_edge) {
   return PerMeter(-std::log1p(-tau) / voxel_edge.value());
 }
 
+Effects assumed_effects() {
+  Effects effects;
+  effects.scattering.albedo = 0.2;
+  effects.scattering.asymmetry = 0.6;
+  return effects;
+}
+
 Result<EffectRequest> parse_effects(std::string_view text) {
+  if (text == "auto" || text.starts_with("auto:")) return parse_auto(text);
   EffectRequest request;
-  if (text == "auto") return request;
   if (text == "none") {
     request.fixed = Effects{};
     return request;

@@ -92,14 +92,26 @@ Effects absorbing(PerMeter extinction);
 /// The paper's opacity a sample (0.05) as extinction: sigma = -ln(1 - tau) / edge.
 PerMeter extinction_of_opacity(double tau, Meters voxel_edge);
 
+/// What no picture of a glowing flame tells, for soot in visible light. At 514.5 nm Koylu and Faeth (J. Heat
+/// Transfer 116, 1994) measured scattering to absorption 0.22..0.41 above flames of four fuels, an albedo of
+/// 0.18..0.29, and forward scattering some 100 times that to the side, which Henyey and Greenstein's function
+/// has at g = 0.73. Soot inside the flame is younger and its aggregates smaller: albedo 0.2, g = 0.6 (25
+/// times). Refraction has its own defaults; no exposure time, a linear sensor, white at 255.
+Effects assumed_effects();
+
 /// What the user asks for: `--effects auto|none|LIST`.
 struct EffectRequest {
   std::optional<Effects> fixed;  ///< set by hand; otherwise found out from the pictures
   double tolerance = 0.5;        ///< grey levels: an effect that changes the pictures by less stays off
+  /// What auto takes an effect to be like where the pictures can't tell: albedo and g, the gas, exposure time
+  /// (0: not known) and rise, gamma, white. Which effects are on in it doesn't matter.
+  Effects assumed = assumed_effects();
 };
 
 /// "auto", "none", or a comma separated list of effects by name, each once; what isn't named is left out.
 /// A choice may bring parameters, `:name=value`; numbers in SI units and grey levels:
+///   auto           :albedo=0.2, :g=0.6, :flame=1800, :ambient=293, :exposure=0 (s; 0: not known), :rise=1,
+///                  :gamma=1, :white=255, :tolerance=0.5 (grey levels, >= 0)
 ///   extinction=none|field|SIGMA                 SIGMA >= 0, 1/m
 ///   scattering=none|single|multiple             with extinction; :albedo=0.5 (0..1), :g=0 (-1..1)
 ///   refraction=straight|curved                  :flame=1800, :ambient=293 (K, 100..100000)
@@ -117,6 +129,8 @@ struct EffectReport {
   double predicted_change = 0;  ///< RMS of the input pictures' change in grey levels, after the best gain
   Seconds seconds{0};           ///< what finding out cost
   std::string reason;
+  /// What the effect adds to rendering all input views once, about; 0 where it wasn't measured.
+  Seconds cost{0};
 };
 
 struct EffectChoice {

@@ -28,6 +28,7 @@ ordered_json effects_json(const Report& report) {
                        {"on", effect.on},
                        {"predicted_change", effect.predicted_change},
                        {"seconds", effect.seconds.value()},
+                       {"cost", effect.cost.value()},
                        {"reason", effect.reason}});
   }
   return effects;

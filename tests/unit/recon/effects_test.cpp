@@ -107,6 +107,35 @@ TEST(Effects, LeavingEveryEffectOutByNameIsNone) {
   }
 }
 
+TEST(Effects, AutoTakesWhatThePicturesCannotTell) {
+  const auto request = parse_effects(
+      "auto:albedo=0.3:g=-0.2:flame=1500:ambient=300:exposure=0.008:rise=2:gamma=2.2:white=250:tolerance=0.1");
+  ASSERT_TRUE(request.ok()) << request.error().message();
+  EXPECT_FALSE(request->fixed.has_value());
+  EXPECT_EQ(request->tolerance, 0.1);
+  const Effects& assumed = request->assumed;
+  EXPECT_EQ(assumed.scattering.albedo, 0.3);
+  EXPECT_EQ(assumed.scattering.asymmetry, -0.2);
+  EXPECT_EQ(assumed.refraction.flame, Kelvin(1500));
+  EXPECT_EQ(assumed.refraction.ambient, Kelvin(300));
+  EXPECT_EQ(assumed.exposure.time, Seconds(0.008));
+  EXPECT_EQ(assumed.exposure.rise_speed, 2);
+  EXPECT_EQ(assumed.sensor.gamma, 2.2);
+  EXPECT_EQ(assumed.sensor.white, 250);
+}
+
+TEST(Effects, WithNothingToldAutoAssumesYoungSootAndALinearSensor) {
+  const auto request = parse_effects("auto");
+  ASSERT_TRUE(request.ok());
+  EXPECT_EQ(request->tolerance, 0.5);
+  EXPECT_EQ(request->assumed.scattering.albedo, 0.2);
+  EXPECT_EQ(request->assumed.scattering.asymmetry, 0.6);
+  EXPECT_EQ(request->assumed.refraction.flame, Kelvin(1800));
+  EXPECT_EQ(request->assumed.exposure.time, Seconds(0));
+  EXPECT_EQ(request->assumed.sensor.gamma, 1);
+  EXPECT_EQ(request->assumed.sensor.white, 255);
+}
+
 TEST(Effects, BadListsAreRefusedWithTheTablesNames) {
   for (const char* bad : {"",
                           "extinction",
@@ -125,6 +154,18 @@ TEST(Effects, BadListsAreRefusedWithTheTablesNames) {
                           "extinction=1:",
                           "none,gamma=2",
                           "auto,gamma=2",
+                          "auto:",
+                          "auto:fog=3",
+                          "auto:albedo",
+                          "auto:albedo=1.1",
+                          "auto:albedo=0.1:albedo=0.2",
+                          "auto:g=-2",
+                          "auto:exposure=-1",
+                          "auto:gamma=0",
+                          "auto:tolerance=-1",
+                          "auto:tolerance=nan",
+                          "auto=1",
+                          "automatic",
                           "scattering=single",
                           "scattering=some,extinction=1",
                           "scattering=single:albedo=1.1,extinction=1",

@@ -110,7 +110,7 @@ Report some_report() {
   report.views = {{"a", ViewRole::input, {1, 2, 3}}, {"b", ViewRole::held_out, {4, 5, 6}}};
   report.hull_time = Seconds(0.25);
   report.trace = {{Seconds(0.5), 7, {9, 9, 9}, {8, 8, 8}}};
-  report.effects = {{"extinction", true, 3.5, Seconds(0.125), "found"}};
+  report.effects = {{"extinction", true, 3.5, Seconds(0.125), "found", Seconds(0.5)}};
   return report;
 }
 
@@ -125,6 +125,8 @@ TEST_F(ExportTest, TheReportCarriesWhatOthersRead) {
   EXPECT_EQ(json["trace"][0]["heldout_rmse"][0], 8);
   EXPECT_EQ(json["effects"][0]["name"], "extinction");
   EXPECT_EQ(json["effects"][0]["predicted_change"], 3.5);
+  EXPECT_EQ(json["effects"][0]["seconds"], 0.125);
+  EXPECT_EQ(json["effects"][0]["cost"], 0.5);
   EXPECT_EQ(json["views"][1]["role"], "held_out");
   EXPECT_EQ(json["views"][1]["index"], 1);
 }

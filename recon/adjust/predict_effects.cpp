@@ -88,9 +88,9 @@ class Predictor {
   [[nodiscard]] static double change(const Shot& with, const Shot& without) {
     return emberlock::change(with.pictures, without.pictures);
   }
-  /// Of what grows with the rays, seen at every stride-th pixel, and their samples.
-  [[nodiscard]] Seconds ray_cost(const Shot& with, const Shot& without, int stride) const {
-    return std::max(Seconds(0), stride * stride * flame_.finer * (with.time - without.time));
+  /// Of what grows with the pixels, seen at every stride-th.
+  [[nodiscard]] static Seconds pixel_cost(const Shot& with, const Shot& without, int stride) {
+    return std::max(Seconds(0), stride * stride * (with.time - without.time));
   }
   /// Of what is done at every key point, once a picture.
   [[nodiscard]] Seconds volume_cost(const Shot& with, const Shot& without) const {
@@ -105,11 +105,13 @@ class Predictor {
   void leave_out(const char* name, const char* reason) {
     report(name, false, 0, Seconds(0), by_hand() ? "left out by hand" : reason);
   }
+  [[nodiscard]] const char* assumed() const { return by_hand() ? "" : " (assumed)"; }
   /// On or off by the change, and the report.
-  bool decide(const char* name, double change, Seconds cost, const std::string& what) {
+  bool decide(const char* name, double change, Seconds cost, const std::string& what,
+              const char* if_off = "") {
     const bool on = by_hand() || calls_for(change);
     std::string does = what + text(" changes the pictures by %.2g grey levels", change);
-    if (!on) does += text(", less than %.2g", request_.tolerance);
+    if (!on) does += text(", less than %.2g%s", request_.tolerance, if_off);
     report(name, on, change, cost, by_hand() ? "set by hand: " + does : does);
     return on;
   }
@@ -137,11 +139,12 @@ Predictor::Shot Predictor::scatter(const Scattering& scattering) {
   RenderOptions options;
   options.scattered = &field;
   Shot shot = shoot(effects, options);
-  // Sweeps take (voxels along)^4 * ordinates, and the latter grow with their levels' square.
+  // A sweep marches from each key point along each ordinate, whose number grows with their levels' square;
+  // that the way is longer on a finer grid shows little beside what it takes to begin one.
   const InScatterOptions full;
   const double voxels = static_cast<double>(full.voxels) / kProbe.voxels;
   const double levels = static_cast<double>(full.octant_levels) / kProbe.octant_levels;
-  shot.preparation = std::pow(voxels, 4) * std::pow(levels, 2) * (found - start);
+  shot.preparation = std::pow(voxels, 3) * std::pow(levels, 2) * (found - start);
   return shot;
 }
 
@@ -170,9 +173,9 @@ void Predictor::choose_scattering() {
     }
   }
   const char* order = scattering.order == Order::single ? "single" : "multiple";
-  std::string what = text("%s scattering with an albedo of %.2g (assumed)", order, scattering.albedo);
+  std::string what = text("%s scattering with an albedo of %.2g%s", order, scattering.albedo, assumed());
   if (scattering.asymmetry == 0)
-    what += ", which only tells scattered from emitted light, as it looks the same from all sides,";
+    what += ", which looks the same from all sides and only tells scattered from emitted light,";
   const Seconds cost = shot.preparation + volume_cost(shot, without_);
   if (!decide("scattering", changed, cost, what)) return leave_out("phase function", "scattering is off");
   choose_phase_function(shot, scattering);
@@ -180,13 +183,15 @@ void Predictor::choose_scattering() {
 }
 
 void Predictor::choose_phase_function(const Shot& shot, Scattering& scattering) {
-  if (scattering.asymmetry == 0) return leave_out("phase function", "g is 0 (assumed): isotropic");
+  if (scattering.asymmetry == 0) return leave_out("phase function", "g is 0: isotropic");
   Scattering isotropic = scattering;
   isotropic.asymmetry = 0;
   const Shot even = scatter(isotropic);
   const Seconds cost = std::max(Seconds(0), shot.preparation - even.preparation) + volume_cost(shot, even);
-  const std::string what = text("g = %.2g (assumed)", scattering.asymmetry);
-  if (!decide("phase function", change(shot, even), cost, what)) scattering = isotropic;
+  const std::string what = text("g = %.2g%s", scattering.asymmetry, assumed());
+  const char* isotropic_then =
+      ": scattering looks the same from all sides and only tells scattered from emitted light";
+  if (!decide("phase function", change(shot, even), cost, what, isotropic_then)) scattering = isotropic;
 }
 
 void Predictor::choose_refraction() {
@@ -211,9 +216,9 @@ void Predictor::choose_refraction() {
   const Shot without = shoot(few, plain_);
   const Shot with = shoot(few, probe, options);
   const double changed = change(with, without) / kColder;
-  const std::string what = text("gas of %.4g K in air of %.4g K (assumed)", bent.refraction.flame.value(),
-                                bent.refraction.ambient.value());
-  if (decide("refraction", changed, ray_cost(with, without, few.stride()), what))
+  const std::string what = text("gas of %.4g K in air of %.4g K%s", bent.refraction.flame.value(),
+                                bent.refraction.ambient.value(), assumed());
+  if (decide("refraction", changed, pixel_cost(with, without, few.stride()), what))
     choice_.effects.refraction = bent.refraction;
 }
 
@@ -239,7 +244,7 @@ void Predictor::choose_background() {
       what += text(" (uneven by %.1f: pictures of the background would tell more)", border->unevenness);
   }
   const Shot with = shoot(lit);
-  if (decide("background", change(with, without_), ray_cost(with, without_, pictures_.stride()), what))
+  if (decide("background", change(with, without_), pixel_cost(with, without_, pictures_.stride()), what))
     choice_.effects.background = lit.background;
 }
 
@@ -275,8 +280,7 @@ void Predictor::choose_gamma() {
   bent.sensor.response = Sensor::Response::gamma;
   bent.sensor.clipping = Sensor::Clipping::none;
   const Shot with = shoot(bent);
-  const double pixels = std::pow(pictures_.stride(), 2);
-  const Seconds cost = std::max(Seconds(0), pixels * (with.time - without_.time));
+  const Seconds cost = pixel_cost(with, without_, pictures_.stride());
   if (decide("gamma", change(with, without_), cost, text("gamma %.3g", bent.sensor.gamma)))
     choice_.effects.sensor = bent.sensor;
 }

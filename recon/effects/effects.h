@@ -129,7 +129,7 @@ struct EffectReport {
   double predicted_change = 0;  ///< RMS of the input pictures' change in grey levels, after the best gain
   Seconds seconds{0};           ///< what finding out cost
   std::string reason;
-  /// What the effect adds to rendering all input views once, about; 0 where it wasn't measured.
+  /// What the effect adds to rendering all input views once, within a factor of three; 0: not measured.
   Seconds cost{0};
 };
 

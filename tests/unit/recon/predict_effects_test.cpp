@@ -298,7 +298,7 @@ TEST(PredictEffects, OnIsWhatChangesThePicturesByTheToleranceAtLeast) {
 TEST(PredictEffects, ScatteringIsSingleWhereMoreWouldNotShow) {
   const EffectChoice weak = sooty().predict("auto:albedo=0.2:g=0");
   EXPECT_EQ(weak.effects.scattering.order, Scattering::Order::single);
-  EXPECT_NE(report_of(weak, "scattering").reason.find("same from all sides"), std::string::npos);
+  EXPECT_NE(report_of(weak, "scattering").reason.find("the same from all sides"), std::string::npos);
   EXPECT_EQ(sooty().predict("auto:albedo=0.8").effects.scattering.order, Scattering::Order::multiple);
 }
 

@@ -1,0 +1,72 @@
+// An effect that is off costs no instructions: the library's marches under no extinction against marches
+// written down for emission alone, compiled alike, counted by valgrind's callgrind.
+#include <cmath>
+#include <cstdlib>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "recon/render/march_table.h"
+#include "tests/support/shell.h"
+
+namespace emberlock {
+namespace {
+
+struct Level {
+  Isa isa;
+  const char* name;
+  const char* program;  ///< compiled for this level
+};
+constexpr Level kLevels[] = {{Isa::baseline, "baseline", EMBERLOCK_COST_MARCH},
+#if defined(__x86_64__)
+                             {Isa::v3, "v3", EMBERLOCK_COST_MARCH_V3}
+#endif
+};
+
+class Cost : public testing::TestWithParam<Level> {
+ protected:
+  void SetUp() override {
+    ASSERT_EQ(shell("valgrind --version").status, 0) << "valgrind is missing: run scripts/setup";
+    if (GetParam().isa > best_isa()) GTEST_SKIP() << "this CPU hasn't got " << GetParam().name;
+  }
+
+  /// Executed by the case's work.
+  [[nodiscard]] static double instructions(const std::string& name) {
+    const Level& level = GetParam();
+    const Shell run = shell(std::string("EMBERLOCK_ISA=") + level.name +
+                            " valgrind --tool=callgrind --toggle-collect='emberlock::measured*' "
+                            "--callgrind-out-file=/dev/null " +
+                            level.program + " " + name);
+    const std::size_t at = run.output.find("Collected : ");
+    EXPECT_EQ(run.status, 0) << run.output;
+    EXPECT_NE(run.output.find(std::string("\n") + level.name + " "), std::string::npos) << run.output;
+    if (at == std::string::npos) return NAN;
+    return std::strtod(run.output.c_str() + at + sizeof("Collected :"), nullptr);
+  }
+};
+
+TEST_P(Cost, MarchWithoutExtinctionIsAMarchOfEmissionAlone) {
+  const double by_hand = instructions("forward_by_hand");
+  EXPECT_GT(by_hand, 1e5);
+  EXPECT_NEAR(instructions("forward_none") / by_hand, 1, 0.01);
+  EXPECT_GT(instructions("forward_constant") / by_hand, 1.05) << "what is on is seen to cost";
+}
+
+TEST_P(Cost, TransposeWithoutExtinctionIsThatOfEmissionAlone) {
+  const double by_hand = instructions("adjoint_by_hand");
+  EXPECT_GT(by_hand, 1e5);
+  EXPECT_NEAR(instructions("adjoint_none") / by_hand, 1, 0.01);
+  EXPECT_GT(instructions("adjoint_constant") / by_hand, 1.05) << "what is on is seen to cost";
+}
+
+TEST_P(Cost, PictureWithoutEffectsIsAMarchAndNoMore) {
+  const double by_hand = instructions("picture_by_hand");
+  EXPECT_LE(instructions("picture") / by_hand, 1.01);
+  EXPECT_GT(instructions("picture_of_effects") / by_hand, 1.05) << "what is on is seen to cost";
+}
+
+INSTANTIATE_TEST_SUITE_P(Levels, Cost, testing::ValuesIn(kLevels),
+                         [](const auto& level) { return std::string(level.param.name); });
+
+}  // namespace
+}  // namespace emberlock

@@ -147,8 +147,9 @@ class RowClipper {
       cut_at_slabs(origin[2], direction[2], t0, step, count, voxels_.mz, [&](int first, int size) {
         const float ahead = static_cast<float>(first) * step;
         // The middle sample tells the slab: the first may have been rounded across the border.
-        const float middle = t0 + ahead + (static_cast<float>(size / 2) + 0.5F) * step;
-        const int slab = clamp_cell(origin[2] + direction[2] * middle, voxels_.mz + 1) / kSlab;
+        const int middle = first + size / 2;
+        const float t = t0 + (static_cast<float>(middle) + 0.5F) * step;
+        const int slab = clamp_cell(origin[2] + direction[2] * t, voxels_.mz + 1) / kSlab;
         out.runs.push_back({t0 + ahead, step, before + ahead, 0, out.samples, size, slab});
         out.samples += static_cast<std::uint32_t>(size);
         ++ray.runs;

@@ -26,6 +26,18 @@ bool finite(const CameraModel& camera) {
          i.fy != 0;
 }
 
+Status check_pixels(const RadianceImage& image, const char* what, const std::string& view) {
+  const auto bad =
+      std::find_if(image.rgb.begin(), image.rgb.end(), [](float v) { return !std::isfinite(v); });
+  if (bad == image.rgb.end()) return {};
+  const auto pixel = (bad - image.rgb.begin()) / 3;
+  const int width = std::max(1, image.size.width);
+  return Error{ErrorKind::bad_input,
+               std::string(what) + " (" + std::to_string(pixel % width) + ", " +
+                   std::to_string(pixel / width) + ") is not a finite number",
+               view, "Replace this frame, or leave the view out"};
+}
+
 Status check_view(const View& view) {
   const ImageSize size = view.camera.intrinsics.size;
   if (size.width <= 0 || size.height <= 0 || view.image.size != size ||
@@ -40,15 +52,8 @@ Status check_view(const View& view) {
   if (!finite(view.camera))
     return Error{ErrorKind::bad_input, "the camera has a NaN, an infinite or a zero coefficient", view.name,
                  "Calibrate this camera again"};
-  const auto bad =
-      std::find_if(view.image.rgb.begin(), view.image.rgb.end(), [](float v) { return !std::isfinite(v); });
-  if (bad != view.image.rgb.end()) {
-    const auto pixel = (bad - view.image.rgb.begin()) / 3;
-    return Error{ErrorKind::bad_input,
-                 "pixel (" + std::to_string(pixel % size.width) + ", " + std::to_string(pixel / size.width) +
-                     ") is not a finite number",
-                 view.name, "Replace this frame, or leave the view out"};
-  }
+  EMBERLOCK_RETURN_IF_ERROR(check_pixels(view.image, "pixel", view.name));
+  if (view.background) return check_pixels(*view.background, "the background's pixel", view.name);
   return {};
 }
 

@@ -144,6 +144,10 @@ TEST_P(HardScene, NanAndInfiniteInputIsAnErrorThatNamesItsView) {
   const float nan = std::nanf("");
   EXPECT_TRUE(refused([&](View& v) { v.image.rgb[100] = nan; }));
   EXPECT_TRUE(refused([](View& v) { v.image.rgb.back() = -INFINITY; }));
+  EXPECT_TRUE(refused([&](View& v) {
+    v.background = RadianceImage(v.image.size);
+    v.background->rgb[7] = nan;
+  }));
   EXPECT_TRUE(refused([](View& v) { v.camera.camera_from_world.translation.x() = INFINITY; }));
   EXPECT_TRUE(refused([](View& v) { v.camera.camera_from_world.rotation(2, 2) = NAN; }));
   EXPECT_TRUE(refused([](View& v) { v.camera.intrinsics.fy = NAN; }));

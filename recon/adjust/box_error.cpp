@@ -4,19 +4,29 @@
 #include <cmath>
 
 namespace emberlock {
+namespace {
+
+float value(const RadianceImage& behind, std::size_t at) { return behind.rgb.empty() ? 0.F : behind.rgb[at]; }
+
+}  // namespace
 
 ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
-                               const Problem& problem)
+                               const Problem& problem, const Background& background)
     : weight_(problem.list.rays.size()) {
+  std::vector<RadianceImage> behind;
   for (std::size_t v = 0; v < views.size(); ++v) {
     const RadianceImage& image = views[v]->image;
+    const RadianceImage* own = views[v]->background ? &*views[v]->background : nullptr;
+    behind.push_back(background.kind == Background::Kind::black ? RadianceImage{}
+                                                                : backdrop(background, image.size, own));
     for (int y = boxes[v].y0; y < boxes[v].y1; ++y)
       for (int x = boxes[v].x0; x < boxes[v].x1; ++x)
         for (std::size_t c = 0; c < 3; ++c) {
-          const double b = static_cast<double>(
-              image.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
-                             static_cast<std::size_t>(x)) +
-                        c]);
+          const std::size_t at =
+              3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
+                   static_cast<std::size_t>(x)) +
+              c;
+          const double b = static_cast<double>(image.rgb[at] - value(behind.back(), at));
           const double pixels = static_cast<double>(boxes[v].x1 - boxes[v].x0) * (boxes[v].y1 - boxes[v].y0);
           unreached_[c] += b * b / (pixels * static_cast<double>(views.size()));
         }
@@ -30,10 +40,11 @@ ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std:
     if (x < box.x0 || x >= box.x1 || y < box.y0 || y >= box.y1) continue;
     const double pixels = static_cast<double>(box.x1 - box.x0) * (box.y1 - box.y0);
     weight_[r] = static_cast<float>(1 / (pixels * static_cast<double>(views.size())));
-    const float* rgb = &views[v]->image.rgb[3 * static_cast<std::size_t>(problem.list.pixels[r])];
-    for (std::size_t c = 0; c < 3; ++c)
-      unreached_[c] -=
-          static_cast<double>(weight_[r]) * static_cast<double>(rgb[c]) * static_cast<double>(rgb[c]);
+    const std::size_t at = 3 * static_cast<std::size_t>(problem.list.pixels[r]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double b = static_cast<double>(views[v]->image.rgb[at + c] - value(behind[v], at + c));
+      unreached_[c] -= static_cast<double>(weight_[r]) * b * b;
+    }
   }
 }
 

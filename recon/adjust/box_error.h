@@ -13,13 +13,13 @@ namespace emberlock {
 class ErrorOverBoxes {
  public:
   ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
-                 const Problem& problem);
+                 const Problem& problem, const Background& background);
   /// RMSE for R, G, B: the mean square over each view's box, then over the views.
   [[nodiscard]] std::array<double, 3> operator()(const std::vector<Rgba>& residual) const;
 
  private:
   std::vector<float> weight_;             // of each ray: 1 / (pixels of its box * views), 0 outside
-  std::array<double, 3> unreached_ = {};  // what pixels that no ray reaches add: they stay black
+  std::array<double, 3> unreached_ = {};  // what pixels that no ray reaches add: they show the background
 };
 
 }  // namespace emberlock

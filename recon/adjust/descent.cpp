@@ -88,8 +88,7 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
   Level level;
   level.subsets = subsets_for(setup.sigma(hull.grid), pixels_per_voxel(setup, hull.grid) / stride,
                               flame_pixels(setup, stride), most_subsets);
-  ProblemOptions options;
-  options.step = setup.options.step;
+  ProblemOptions options = setup.problem_options();
   options.subsets = level.subsets + 1;
   options.subset_of = [subsets = level.subsets, stride](std::size_t, int x, int y) {
     if (x % stride != 0 || y % stride != 0) return -1;

@@ -33,6 +33,8 @@ class Engine {
   [[nodiscard]] virtual std::vector<Rgba> get() const = 0;
   /// residual = A y - seen for the subset's rays.
   virtual void residual(int subset) = 0;
+  /// What another pass adds to the radiance of each ray; part of residual() from here on.
+  virtual void set_offset(const std::vector<Rgba>& offset) = 0;
   /// residual = A y.
   virtual void project(int subset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> residuals() const = 0;
@@ -67,6 +69,7 @@ struct Optics {
   Absorb absorb = Absorb::nothing;
   float sigma = 0;  ///< of constant extinction, a voxel edge; with Absorb::field it is lane 3 of x
   float white = 0;  ///< captured values from here on are bounds; 0: none are
+  Exposure exposure;
 };
 /// Constant extinction of sigma a voxel edge, or none where it is 0.
 Optics absorbing_optics(float sigma);

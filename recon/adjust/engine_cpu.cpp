@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <optional>
 
 #include "recon/adjust/engine.h"
+#include "recon/effects/exposure.h"
 #include "recon/kernels/paper.h"
 
 namespace emberlock {
@@ -32,6 +34,8 @@ class CpuEngine final : public Engine {
         gradient_(x_.size()),
         weight_(x_.size()),
         residual_(problem.list.rays.size()) {
+    const ExposureBlur blur(optics.exposure, problem.grid());
+    if (!blur.identity()) blur_ = blur;
     if (optics.absorb == Absorb::field) samples_.resize(problem.most_samples() + kBatch);
   }
 
@@ -40,11 +44,13 @@ class CpuEngine final : public Engine {
   [[nodiscard]] std::vector<Rgba> residuals() const override { return converted<float>(residual_); }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
-  void residual(int subset) override { residual(subset, problem_.judge<Real>(optics_.white)); }
+  void residual(int subset) override { residual(subset, problem_.judge<Real>(offset_, optics_.white)); }
+  void set_offset(const std::vector<Rgba>& offset) override { offset_ = offset; }
   void residual_against(const std::vector<Rgba>& target, int subset) override {
     residual(subset, Judge<Real>{target.data(), nullptr, nullptr, 0});
   }
   void residual(int subset, const Judge<Real>& judge) {
+    expose();
     if (optics_.absorb == Absorb::field) {
       const auto march = table_.field_forward[static_cast<int>(travel_)];
       each_slice(subset, [&](std::size_t begin, std::size_t end) { march(work(subset), judge, begin, end); });
@@ -57,15 +63,25 @@ class CpuEngine final : public Engine {
     });
   }
   void project(int subset) override {
+    expose();
     const auto march = table_.forward_of(optics_.absorb, travel_);
     each_slice(subset, [&](std::size_t begin, std::size_t end) { march(work(subset), begin, end); });
   }
 
   void backproject(int subset) override {
     const auto march = table_.adjoint_of(optics_.absorb, travel_);
+    std::vector<Quad<Real>>
+        before;  // with an exposure: what the gradient was, before the transpose of B adds to it
+    if (blur_) {
+      before.resize(gradient_.size());
+      before.swap(gradient_);
+    }
     each_slab(subset, [&](const std::uint32_t* runs, std::size_t count, Layers layers) {
       march(work(subset), runs, count, layers);
     });
+    if (!blur_) return;
+    gradient_ = converted<Real>(blur_->adjoint(converted<float>(gradient_), pool_));
+    for (std::size_t p = 0; p < before.size(); ++p) gradient_[p] = gradient_[p] + before[p];
   }
 
   void clear_gradient() override { std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{}); }
@@ -97,6 +113,10 @@ class CpuEngine final : public Engine {
   }
 
  private:
+  /// B y, where the exposure is long enough to matter.
+  void expose() {
+    if (blur_) blurred_ = converted<Real>(blur_->forward(converted<float>(y_), pool_));
+  }
   [[nodiscard]] Descend<Real> emission_step(const Step& step) {
     const Grid& g = problem_.grid();
     return {g.nx,
@@ -126,8 +146,13 @@ class CpuEngine final : public Engine {
   [[nodiscard]] MarchWork<Real> work(int subset) {
     const std::size_t first =
         problem_.list.first_sample(problem_.list.subset_begin[static_cast<std::size_t>(subset)]);
-    return {problem_.list.table(), y_.data(), Real(optics_.sigma), residual_.data(), gradient_.data(),
-            samples_.data(),       first};
+    return {problem_.list.table(),
+            blur_ ? blurred_.data() : y_.data(),
+            Real(optics_.sigma),
+            residual_.data(),
+            gradient_.data(),
+            samples_.data(),
+            first};
   }
   template <class Do>
   void each_slice(int subset, const Do& act) {
@@ -176,13 +201,19 @@ class CpuEngine final : public Engine {
   std::vector<Real> weight_, field_weight_, reference_;
   std::vector<Quad<Real>> residual_;
   std::vector<Quad<Real>> samples_;  // of one subset
+  std::vector<Rgba> offset_;
+  std::optional<ExposureBlur> blur_;  // where the exposure is long enough to matter
+  std::vector<Quad<Real>> blurred_;   // B y
 };
 
 }  // namespace
 
 Optics absorbing_optics(float sigma) {
   Optics optics;
-  if (sigma > 0) optics = {Absorb::constant, sigma, 0};
+  if (sigma > 0) {
+    optics.absorb = Absorb::constant;
+    optics.sigma = sigma;
+  }
   return optics;
 }
 
@@ -190,7 +221,9 @@ std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics
                                     [[maybe_unused]] Device device, Pool& pool) {
   if (precision == Precision::float64) return std::make_unique<CpuEngine<double>>(problem, optics, pool);
 #ifdef EMBERLOCK_HAVE_CUDA
-  if (device == Device::cuda) return make_cuda_engine(problem, optics);
+  // An exposure's blur runs on the CPU alone, and so does the march that goes with it.
+  if (device == Device::cuda && optics.exposure.shutter == Exposure::Shutter::instant)
+    return make_cuda_engine(problem, optics);
 #endif
   return std::make_unique<CpuEngine<float>>(problem, optics, pool);
 }

@@ -73,7 +73,7 @@ class CudaEngine final : public Engine {
         bends_(problem.list.bends),
         seen_(problem.seen),
         background_(problem.background),
-        offset_(problem.offset),
+        offset_(problem.list.rays.size()),
         x_(problem.grid().size()),
         y_(problem.grid().size()),
         next_y_(problem.grid().size()),
@@ -95,11 +95,15 @@ class CudaEngine final : public Engine {
   [[nodiscard]] std::vector<Rgba> gradient() const override { return gradient_.download(); }
 
   void residual(int subset) override {
-    Judge<float> judge = problem_.judge<float>(optics_.white);
+    Judge<float> judge = problem_.judge<float>(offset_host_, optics_.white);
     judge.seen = seen_.data();
     if (judge.background != nullptr) judge.background = background_.data();
     if (judge.offset != nullptr) judge.offset = offset_.data();
     residual(subset, judge);
+  }
+  void set_offset(const std::vector<Rgba>& offset) override {
+    offset_host_ = offset;
+    if (!offset.empty()) offset_.upload(offset);
   }
   void residual_against(const std::vector<Rgba>& target, int subset) override {
     target_.upload(target);
@@ -211,6 +215,7 @@ class CudaEngine final : public Engine {
   CudaBuffer<Run> runs_;
   CudaBuffer<Bend> bends_;
   CudaBuffer<Rgba> seen_, background_, offset_, x_, y_, next_y_, gradient_;
+  std::vector<Rgba> offset_host_;
   CudaBuffer<float> weight_, field_weight_, reference_;
   CudaBuffer<Rgba> residual_, target_, samples_;
 };

@@ -51,7 +51,8 @@ class Probe {
       Descent descent(level_, {}, setup_, x);
       return finish(descent, extinction, kEmissionPasses + kJointPasses);
     }
-    const Optics optics{Absorb::field, 0, 0};
+    Optics optics;
+    optics.absorb = Absorb::field;
     if (extinction.soot.value() > 0) {  // is spread by the light that there is
       Descent even(level_, optics, setup_, with_extinction(x, expected_extinction(problem, extinction, x)));
       for (int p = 0; p < kEmissionPasses; ++p) even.pass();

@@ -20,7 +20,7 @@ constexpr float kDeviation = 0.05F;    // of G(s); the paper gives the mean alon
 
 Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker) {
   const double threshold = setup.options.flame_threshold.value_or(kPaperFlameThreshold);
-  ProblemOptions options;
+  ProblemOptions options = setup.problem_options();
   options.subsets = 2;  // flame rays, which adjust, and the rest, which are only rendered
   options.black_below = threshold;
   options.subset_of = [&](std::size_t view, int x, int y) {
@@ -36,7 +36,7 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
   const auto engine =
       make_engine(problem, absorbing_optics(sigma), Precision::float32, setup.device, setup.pool);
   engine->set(std::vector<Rgba>(problem.grid().size()));
-  const ErrorOverBoxes error(setup.views, setup.boxes, problem);
+  const ErrorOverBoxes error(setup.views, setup.boxes, problem, setup.effects.background);
 
   // The paper's volume holds colour intensity V with L += T tau V; here L += T S (1 - exp(-sigma)) / sigma a
   // voxel edge, so S = V sigma, and without extinction S = V tau.

@@ -70,6 +70,11 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
   clip.step = static_cast<float>(options.step);
   clip.subsets = options.subsets;
   clip.subset_of = options.subset_of;
+  IndexField gas;
+  if (options.gas != nullptr) {
+    gas = options.gas->field(problem.crop.hull.grid);
+    clip.gas = &gas;
+  }
   problem.list = clip_rays(cameras, problem.crop.hull, clip, pool);
   find_active(problem.crop.hull, problem.active, problem.row_span);
   problem.seen.resize(problem.list.rays.size());
@@ -79,6 +84,7 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
     if (static_cast<double>(std::max({rgb[0], rgb[1], rgb[2]})) > options.black_below)
       problem.seen[r] = Rgba{{rgb[0], rgb[1], rgb[2], 0}};
   }
+  problem.background = behind_rays(options.background, problem.list, views);
   problem.slabs.resize(static_cast<std::size_t>(options.subsets));
   pool.run(options.subsets, [&](int subset) {
     problem.slabs[static_cast<std::size_t>(subset)] = sort_into_slabs(problem, subset);

@@ -4,6 +4,8 @@
 #include <vector>
 
 #include "recon/compute/pool.h"
+#include "recon/effects/background.h"
+#include "recon/effects/refraction.h"
 #include "recon/hull/ray_list.h"
 #include "recon/kernels/judge.h"
 #include "recon/kernels/rgba.h"
@@ -24,15 +26,15 @@ struct SlabRuns {
 struct Problem {
   CroppedHull crop;
   RayList list;
-  std::vector<Rgba> seen;        ///< the pixel of each ray, grey levels
-  std::vector<Rgba> background;  ///< behind each ray, grey levels; empty where it is black
-  std::vector<Rgba> offset;  ///< of each ray: what another pass adds to what is rendered; empty for nothing
+  std::vector<Rgba> seen;            ///< the pixel of each ray, grey levels
+  std::vector<Rgba> background;      ///< behind each ray, grey levels; empty where it is black
   std::vector<std::uint8_t> active;  ///< key points of the hull's voxels, 1 or 0
   std::vector<Slice> row_span;       ///< for each row (j, k) of key points: first active i, last + 1
   std::vector<SlabRuns> slabs;       ///< one for each subset
   [[nodiscard]] const Grid& grid() const { return crop.hull.grid; }
+  /// `offset` is what another pass adds to each ray's radiance; empty for nothing.
   template <class Real>
-  [[nodiscard]] Judge<Real> judge(float white) const {
+  [[nodiscard]] Judge<Real> judge(const std::vector<Rgba>& offset, float white) const {
     return {seen.data(), background.empty() ? nullptr : background.data(),
             offset.empty() ? nullptr : offset.data(), Real(white)};
   }
@@ -42,7 +44,9 @@ struct Problem {
 };
 
 struct ProblemOptions {
-  double step = 1;  ///< the march's longest, voxel edges
+  Background background;
+  const RefractiveIndex* gas = nullptr;  ///< bends the rays where it is given
+  double step = 1;                       ///< the march's longest, voxel edges
   int subsets = 1;
   std::function<int(std::size_t view, int x, int y)>
       subset_of;            ///< -1 leaves a pixel out; all in subset 0 where empty

@@ -3,21 +3,27 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/tracker.h"
+#include "recon/render/scattered_source.h"
 
 namespace emberlock {
 namespace {
 
-Status check(const Scene& scene, const Grid& grid, const Effects& effects, const SolveOptions& options,
-             const Elapsed& elapsed) {
+Status check_request(const Scene& scene, const Grid& grid, const Effects& effects,
+                     const SolveOptions& options, const Elapsed& elapsed) {
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
   const auto refuse = [](const char* what, const char* where, const char* remedy) {
     return Error{ErrorKind::bad_input, what, where, remedy};
   };
   if (grid.nx < 2 || grid.ny < 2 || grid.nz < 2 || !(grid.edge > 0) || !std::isfinite(grid.edge))
     return refuse("the grid has no voxel", "voxels", "Give at least one voxel along each side");
-  if (!std::isfinite(effects.extinction.value.value()) || effects.extinction.value.value() < 0)
-    return refuse("the extinction is not a finite number >= 0", "effects", "Give extinction in 1/m");
+  EMBERLOCK_RETURN_IF_ERROR(check(effects));
+  for (const View& view : scene.views) EMBERLOCK_RETURN_IF_ERROR(check(effects.background, view));
+  if (options.solver == Solver::paper && (effects.extinction.model == Extinction::Model::field ||
+                                          effects.refraction.rays == Refraction::Rays::curved))
+    return refuse("the paper's solver knows constant extinction and straight rays alone", "effects",
+                  "Use --solver default, or extinction=VALUE");
   if (options.iterations < 0)
     return refuse("a negative number of iterations", "iterations",
                   "Give 1 or more, or 0 for the solver's rule");
@@ -48,37 +54,47 @@ Result<Solver> parse_solver(std::string_view name) {
 Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects& effects,
                              const SolveOptions& options, const Elapsed& elapsed,
                              const std::function<void(const Preview&)>& preview) {
-  EMBERLOCK_RETURN_IF_ERROR(check(scene, grid, effects, options, elapsed));
+  EMBERLOCK_RETURN_IF_ERROR(check_request(scene, grid, effects, options, elapsed));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   const auto now = [&] { return elapsed ? elapsed() : Seconds(0); };
   const Seconds start = now();
 
   const bool paper = options.solver == Solver::paper;
-  const std::vector<FlameMask> own =
-      flame_masks(scene);  // errors are counted over these boxes, whatever the threshold
+  const PreparedScene prepared(scene, effects.sensor);
+  const Scene& linear = prepared.scene();
+  // Errors are counted over these boxes, whatever the threshold.
+  const std::vector<FlameMask> own = masks_before(linear, effects.background);
   std::optional<double> threshold = options.flame_threshold;
   if (paper && !threshold) threshold = kPaperFlameThreshold;
-  const std::vector<FlameMask> chosen = threshold ? flame_masks(scene, threshold) : own;
+  const std::vector<FlameMask> chosen = threshold ? masks_before(linear, effects.background, threshold) : own;
   Reconstruction result;
   result.effects = effects;
-  EMBERLOCK_ASSIGN_OR_RETURN(result.hull, carve(scene, chosen, grid, options.compute));
+  EMBERLOCK_ASSIGN_OR_RETURN(result.hull, carve(linear, chosen, grid, options.compute));
   result.hull_time = now() - start;
 
   Pool pool(options.compute.threads);
   SolverSetup setup{{}, {}, result.hull, effects, options, device, pool};
   std::vector<const View*> held_out;
   std::vector<PixelBox> held_out_boxes;
-  for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    const bool input = scene.views[v].role == ViewRole::input;
-    (input ? setup.views : held_out).push_back(&scene.views[v]);
-    const ImageSize size = scene.views[v].image.size;
+  for (std::size_t v = 0; v < linear.views.size(); ++v) {
+    const bool input = linear.views[v].role == ViewRole::input;
+    (input ? setup.views : held_out).push_back(&linear.views[v]);
+    const ImageSize size = linear.views[v].image.size;
     (input ? setup.boxes : held_out_boxes)
         .push_back(own[v].box.empty() ? PixelBox{0, 0, size.width, size.height} : own[v].box);
+  }
+  std::optional<RefractiveIndex> index;
+  if (effects.refraction.rays == Refraction::Rays::curved) {
+    // The light isn't known yet: the gas is taken as hot wherever the medium is.
+    index.emplace(assume_temperature(result.hull, {}, effects.refraction), effects.refraction.ambient);
+    setup.gas = &*index;
   }
   Tracker tracker(setup, held_out, held_out_boxes, elapsed, preview);
   const double longest = static_cast<double>(grid.edge) * (std::max({grid.nx, grid.ny, grid.nz}) - 1);
   const Solution solution = paper ? solve_paper(setup, longest, tracker) : solve_standard(setup, tracker);
   result.volume = to_volume(solution.x, solution.problem, result.hull, effects);
+  if (effects.scattering.order != Scattering::Order::none)
+    take_out_in_scatter(result.volume, result.hull, effects, pool);
   result.iterations = solution.iterations;
   result.solve_time = tracker.time() - start - result.hull_time;
   result.trace = tracker.take_trace();

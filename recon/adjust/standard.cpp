@@ -5,6 +5,7 @@
 #include "recon/adjust/descent.h"
 #include "recon/adjust/extinction_field.h"
 #include "recon/adjust/tracker.h"
+#include "recon/adjust/uneven_light.h"
 
 namespace emberlock {
 namespace {
@@ -43,11 +44,19 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
   }
   if (setup.effects.extinction.model == Extinction::Model::field) descent->release_extinction();
 
-  const ErrorOverBoxes error(setup.views, setup.boxes, level->problem);
+  const bool uneven =
+      setup.effects.scattering.order != Scattering::Order::none && setup.effects.scattering.asymmetry != 0;
+  const ErrorOverBoxes error(setup.views, setup.boxes, level->problem, setup.effects.background);
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;
   double last = std::numeric_limits<double>::infinity();
   int iteration = 0;
   while (iteration < most) {
+    if (uneven && iteration > 0) {  // the light is known well enough to be scattered
+      const UnevenLight light(setup,
+                              to_volume(descent->engine().get(), level->problem, setup.hull, setup.effects));
+      descent->engine().set_offset(light(setup.views, level->problem));
+      tracker.add_offset(light);
+    }
     descent->pass();
     ++iteration;
     const double validation = descent->validation_error();

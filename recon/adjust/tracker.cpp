@@ -5,13 +5,14 @@ namespace emberlock {
 Tracker::Tracker(const SolverSetup& setup, const std::vector<const View*>& held_out,
                  const std::vector<PixelBox>& boxes, const Elapsed& elapsed,
                  const std::function<void(const Preview&)>& preview)
-    : setup_(setup), elapsed_(elapsed), preview_(preview) {
+    : setup_(setup), elapsed_(elapsed), preview_(preview), views_(held_out) {
   if (held_out.empty()) return;
   const Seconds start = now();
-  held_out_ = std::make_unique<const Problem>(pose(held_out, setup.hull, {}, setup.pool));
+  held_out_ =
+      std::make_unique<const Problem>(pose(held_out, setup.hull, setup.problem_options(), setup.pool));
   engine_ = make_engine(*held_out_, setup.optics(held_out_->grid()), setup.options.precision, setup.device,
                         setup.pool);
-  error_ = std::make_unique<const ErrorOverBoxes>(held_out, boxes, *held_out_);
+  error_ = std::make_unique<const ErrorOverBoxes>(held_out, boxes, *held_out_, setup.effects.background);
   excluded_ += now() - start;
 }
 

@@ -20,6 +20,7 @@ struct SolverSetup {
   const SolveOptions& options;
   Device device;
   Pool& pool;
+  const RefractiveIndex* gas = nullptr;  ///< of curved rays
 
   /// Extinction a voxel edge: all of it, or its mean where it is a field.
   [[nodiscard]] float sigma(const Grid& grid) const {
@@ -27,8 +28,21 @@ struct SolverSetup {
     return static_cast<float>((e.value.value() + e.soot.value()) * static_cast<double>(grid.edge));
   }
   [[nodiscard]] Optics optics(const Grid& grid) const {
-    if (effects.extinction.model == Extinction::Model::field) return {Absorb::field, 0, 0};
-    return absorbing_optics(sigma(grid));
+    const bool field = effects.extinction.model == Extinction::Model::field;
+    Optics optics = absorbing_optics(field ? 0 : sigma(grid));
+    if (field) optics.absorb = Absorb::field;
+    if (effects.sensor.clipping == Sensor::Clipping::at_white)
+      optics.white = static_cast<float>(effects.sensor.white);
+    optics.exposure = effects.exposure;
+    return optics;
+  }
+  /// What every problem of this scene shares.
+  [[nodiscard]] ProblemOptions problem_options() const {
+    ProblemOptions problem;
+    problem.background = effects.background;
+    problem.gas = gas;
+    problem.step = options.step;
+    return problem;
   }
 };
 
@@ -39,6 +53,12 @@ class Tracker {
           const std::vector<PixelBox>& boxes, const Elapsed& elapsed,
           const std::function<void(const Preview&)>& preview);
 
+  /// What `offset(views, problem)` gives for the held-out views belongs to what is rendered of them from here
+  /// on.
+  template <class Offset>
+  void add_offset(const Offset& offset) {
+    if (held_out_) engine_->set_offset(offset(views_, *held_out_));
+  }
   /// Adds a point to the trace; true when the budget is spent or the target reached.
   bool record(int iteration, const std::array<double, 3>& input_rmse, const Engine& engine,
               const Problem& problem);
@@ -53,6 +73,7 @@ class Tracker {
   const SolverSetup& setup_;
   const Elapsed& elapsed_;
   const std::function<void(const Preview&)>& preview_;
+  std::vector<const View*> views_;
   std::unique_ptr<const Problem> held_out_;
   std::unique_ptr<Engine> engine_;
   std::unique_ptr<const ErrorOverBoxes> error_;

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "recon/adjust/choose_effects.h"
+#include "recon/adjust/prepared_scene.h"
 #include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/preprocess/flame_mask.h"
@@ -112,7 +113,8 @@ Outcome finish(const Task& task, const SolveOptions& options, Reconstruction don
   outcome.report = describe(scene, done.hull.grid, options, task.device);
   Report& result = outcome.report;
   result.hull_voxels = done.hull.count;
-  result.views = judge(scene, flame_masks(scene), outcome.renders);
+  result.views = judge(scene, masks_before(PreparedScene(scene, done.effects.sensor).scene(), done.effects.background),
+                       outcome.renders);
   result.input_rmse = over_views(result.views, ViewRole::input).value_or(ChannelRmse{});
   result.heldout_rmse = over_views(result.views, ViewRole::held_out);
   result.hull_time = done.hull_time;

@@ -8,6 +8,7 @@
 #include "recon/effects/sensor.h"
 #include "recon/hull/ray_list.h"
 #include "recon/render/march_table.h"
+#include "recon/render/scattered_source.h"
 
 namespace emberlock {
 namespace {
@@ -40,31 +41,6 @@ constexpr Absorb absorb_of(Extinction::Model model) {
       break;
   }
   return Absorb::nothing;
-}
-
-/// source += sigma_s G at the cropped grid's key points, G trilinear between the coarse ones.
-void add_in_scatter(const ScatterField& field, const Eigen::Vector3d& camera_center, const Grid& grid,
-                    const Extinction& extinction, Pool& pool, std::vector<Rgba>& source) {
-  const std::vector<Rgba> g = in_scattered(field, camera_center, pool);
-  const Grid& coarse_grid = field.medium.grid;
-  const ShiningGrid coarse{coarse_grid.nx, coarse_grid.ny, coarse_grid.nz, g.data()};
-  const bool varies = extinction.model == Extinction::Model::field;
-  const auto albedo = static_cast<float>(field.albedo);
-  const auto sigma = static_cast<float>(extinction.value.value() * static_cast<double>(grid.edge));
-  const float scale = grid.edge / coarse_grid.edge;
-  float shift[3];
-  for (int a = 0; a < 3; ++a) shift[a] = (grid.origin[a] - coarse_grid.origin[a]) / coarse_grid.edge;
-  pool.run(grid.nz, [&](int k) {
-    const float z = shift[2] + scale * static_cast<float>(k);
-    for (int j = 0; j < grid.ny; ++j) {
-      const float y = shift[1] + scale * static_cast<float>(j);
-      Rgba* row = &source[grid.index(0, j, k)];
-      for (int i = 0; i < grid.nx; ++i) {
-        const float sigma_s = albedo * (varies ? row[i].c[3] : sigma);
-        row[i] = row[i] + sigma_s * coarse.at(shift[0] + scale * static_cast<float>(i), y, z);
-      }
-    }
-  });
 }
 
 /// The rays of one camera, and what bends them.

@@ -1,0 +1,53 @@
+#include "recon/render/scattered_source.h"
+
+#include <algorithm>
+
+namespace emberlock {
+
+void add_in_scatter(const ScatterField& field, const Eigen::Vector3d& camera_center, const Grid& grid,
+                    const Extinction& extinction, Pool& pool, std::vector<Rgba>& source) {
+  const std::vector<Rgba> g = in_scattered(field, camera_center, pool);
+  const Grid& coarse_grid = field.medium.grid;
+  const ShiningGrid coarse{coarse_grid.nx, coarse_grid.ny, coarse_grid.nz, g.data()};
+  const bool varies = extinction.model == Extinction::Model::field;
+  const auto albedo = static_cast<float>(field.albedo);
+  const auto sigma = static_cast<float>(extinction.value.value() * static_cast<double>(grid.edge));
+  const float scale = grid.edge / coarse_grid.edge;
+  float shift[3];
+  for (int a = 0; a < 3; ++a) shift[a] = (grid.origin[a] - coarse_grid.origin[a]) / coarse_grid.edge;
+  pool.run(grid.nz, [&](int k) {
+    const float z = shift[2] + scale * static_cast<float>(k);
+    for (int j = 0; j < grid.ny; ++j) {
+      const float y = shift[1] + scale * static_cast<float>(j);
+      Rgba* row = &source[grid.index(0, j, k)];
+      for (int i = 0; i < grid.nx; ++i) {
+        const float sigma_s = albedo * (varies ? row[i].c[3] : sigma);
+        row[i] = row[i] + sigma_s * coarse.at(shift[0] + scale * static_cast<float>(i), y, z);
+      }
+    }
+  });
+}
+
+void take_out_in_scatter(Volume& volume, const Hull& medium, const Effects& effects, Pool& pool) {
+  Effects once = effects;  // light from all of the source, straight to where it is scattered
+  once.scattering.order = Scattering::Order::single;
+  once.scattering.asymmetry = 0;
+  const std::vector<float> all = volume.emission;
+  const float per_meter = 1 / volume.grid.edge;
+  // Scattered once: what is scattered came from the emission, which the next round knows better.
+  const int rounds = effects.scattering.order == Scattering::Order::single ? 6 : 1;
+  for (int round = 0; round < rounds; ++round) {
+    const ScatterField field = find_in_scatter(volume, medium, once, {}, pool);
+    if (field.empty()) return;
+    std::vector<Rgba> scattered(volume.grid.size());
+    if (effects.extinction.model == Extinction::Model::field)
+      for (std::size_t p = 0; p < scattered.size(); ++p)
+        scattered[p].c[3] = volume.grid.edge * volume.extinction[p];
+    add_in_scatter(field, Eigen::Vector3d::Zero(), volume.grid, effects.extinction, pool, scattered);
+    for (std::size_t p = 0; p < scattered.size(); ++p)
+      for (std::size_t c = 0; c < 3; ++c)
+        volume.emission[3 * p + c] = std::max(0.F, all[3 * p + c] - per_meter * scattered[p].c[c]);
+  }
+}
+
+}  // namespace emberlock

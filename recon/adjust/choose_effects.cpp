@@ -5,7 +5,9 @@
 #include <cstdio>
 
 #include "recon/adjust/find_extinction.h"
-#include "recon/render/render.h"
+#include "recon/adjust/predict_effects.h"
+#include "recon/adjust/prepared_scene.h"
+#include "recon/preprocess/picture_clues.h"
 
 namespace emberlock {
 namespace {
@@ -14,35 +16,6 @@ std::string text(const char* format, double a, double b) {
   char buffer[160];
   std::snprintf(buffer, sizeof buffer, format, a, b);
   return buffer;
-}
-
-/// RMS difference over the flames' boxes between the pictures of a volume with and without extinction, after
-/// the best gain on the latter.
-double change_by_extinction(const SolverSetup& setup, const FoundExtinction& found) {
-  Effects with;
-  with.extinction = found.extinction;
-  RenderOptions options;
-  options.compute = setup.options.compute;
-  double ww = 0;
-  double wo = 0;
-  double oo = 0;
-  double values = 0;
-  for (std::size_t v = 0; v < setup.views.size(); ++v) {
-    const CameraModel& camera = setup.views[v]->camera;
-    const RadianceImage a = render_view(found.volume, found.hull, with, camera, options);
-    const RadianceImage b = render_view(found.volume, found.hull, {}, camera, options);
-    const PixelBox& box = setup.boxes[v];
-    for (int y = box.y0; y < box.y1; ++y)
-      for (int i = 3 * (y * a.size.width + box.x0); i < 3 * (y * a.size.width + box.x1); ++i) {
-        const auto p = static_cast<double>(a.rgb[static_cast<std::size_t>(i)]);
-        const auto q = static_cast<double>(b.rgb[static_cast<std::size_t>(i)]);
-        ww += p * p;
-        wo += p * q;
-        oo += q * q;
-        ++values;
-      }
-  }
-  return oo > 0 ? std::sqrt(std::max(0.0, ww - wo * wo / oo) / values) : 0;
 }
 
 std::string explain(const FoundExtinction& found) {
@@ -57,6 +30,29 @@ std::string explain(const FoundExtinction& found) {
   return text("%.3g / m even and %.3g / m like soot fit the pictures best", even, soot);
 }
 
+/// The background and the clipped pixels: before the flame can be looked at, these must be known.
+Effects told_by_the_pictures(const Scene& scene, const EffectRequest& request) {
+  Effects known;
+  const std::vector<FlameMask> masks = flame_masks(scene);
+  const bool pictured = std::any_of(scene.views.begin(), scene.views.end(), [](const View& view) {
+    return view.role == ViewRole::input && view.background;
+  });
+  const std::optional<BorderLevel> border = border_level(scene, masks);
+  if (pictured)
+    known.background.kind = Background::Kind::image;
+  else if (border && *std::max_element(border->level.begin(), border->level.end()) >= request.tolerance)
+    known.background = {Background::Kind::constant, border->level};
+  known.sensor = request.assumed.sensor;
+  if (known.sensor.gamma != 1) known.sensor.response = Sensor::Response::gamma;
+  const std::vector<PixelBox> boxes = flame_boxes(scene, masks);
+  const double white = clip_level(scene, boxes, known.sensor.white);
+  if (white > 0 && clipped_pixels(scene, boxes, white).excess >= request.tolerance) {
+    known.sensor.clipping = Sensor::Clipping::at_white;
+    known.sensor.white = white;
+  }
+  return known;
+}
+
 }  // namespace
 
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
@@ -64,38 +60,52 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   const Seconds start = elapsed ? elapsed() : Seconds(0);
-  const std::vector<FlameMask> masks = flame_masks(scene, options.flame_threshold);
-  EMBERLOCK_ASSIGN_OR_RETURN(const Hull hull, carve(scene, masks, grid, options.compute));
+  Effects known;
+  if (request.fixed)
+    known = *request.fixed;
+  else
+    known = told_by_the_pictures(scene, request);
+  const PreparedScene prepared(scene, known.sensor);
+  const Scene& linear = prepared.scene();
+  const std::vector<FlameMask> masks = masks_before(linear, known.background, options.flame_threshold);
+  EMBERLOCK_ASSIGN_OR_RETURN(const Hull hull, carve(linear, masks, grid, options.compute));
   Pool pool(options.compute.threads);
-  SolverSetup setup{{}, {}, hull, {}, options, device, pool};
-  for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    if (scene.views[v].role != ViewRole::input) continue;
-    setup.views.push_back(&scene.views[v]);
-    const ImageSize size = scene.views[v].image.size;
-    setup.boxes.push_back(masks[v].box.empty() ? PixelBox{0, 0, size.width, size.height} : masks[v].box);
+  SolverSetup setup{{}, {}, hull, known, options, device, pool};
+  const std::vector<PixelBox> boxes = flame_boxes(linear, masks);
+  for (std::size_t v = 0; v < linear.views.size(); ++v) {
+    if (linear.views[v].role != ViewRole::input) continue;
+    setup.views.push_back(&linear.views[v]);
+    setup.boxes.push_back(boxes[v]);
   }
 
+  const FoundExtinction found =
+      request.fixed ? try_extinction(setup, known.extinction) : find_extinction(setup, elapsed);
+  const double finer = static_cast<double>(found.hull.grid.edge) / static_cast<double>(grid.edge);
+  const CoarseFlame flame{linear, masks, found.volume, found.hull, finer};
   EffectReport report{"extinction", false, 0, {}, {}};
-  EffectChoice choice;
+  if (found.extinction.model != Extinction::Model::none) {
+    Effects absorbing;
+    absorbing.extinction.model = Extinction::Model::field;
+    const CoarsePictures pictures(flame, options.compute);
+    report.predicted_change = change(pictures(absorbing), pictures({}));
+  }
+  Effects decided = known;
   if (request.fixed) {
-    choice.effects = *request.fixed;
-    report.on = choice.effects.extinction.model != Extinction::Model::none;
+    report.on = known.extinction.model != Extinction::Model::none;
     report.reason = "set by hand";
-    if (report.on)
-      report.predicted_change = change_by_extinction(setup, try_extinction(setup, choice.effects.extinction));
   } else {
-    const FoundExtinction found = find_extinction(setup);
-    if (found.extinction.model != Extinction::Model::none)
-      report.predicted_change = change_by_extinction(setup, found);
     report.on = report.predicted_change >= request.tolerance;
     report.reason =
         report.on ? explain(found)
                   : text("the best fit, %.3g / m, changes the pictures by less than %.2g grey levels",
                          found.extinction.value.value() + found.extinction.soot.value(), request.tolerance);
-    if (report.on) choice.effects.extinction = found.extinction;
+    decided.extinction = report.on ? found.extinction : Extinction{};
   }
   report.seconds = (elapsed ? elapsed() : Seconds(0)) - start;
-  choice.reports.push_back(std::move(report));
+
+  EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
+                             predict_effects(flame, decided, request, options.compute, elapsed));
+  choice.reports.insert(choice.reports.begin(), std::move(report));
   return choice;
 }
 

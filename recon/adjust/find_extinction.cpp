@@ -48,10 +48,12 @@ class Probe {
     const Problem& problem = level_.problem;
     std::vector<Rgba> x(problem.active.size());
     if (extinction.model == Extinction::Model::none) {
-      Descent descent(level_, {}, setup_, x);
+      Optics clear = setup_.optics(hull_.grid);
+      clear.absorb = Absorb::nothing;
+      Descent descent(level_, clear, setup_, x);
       return finish(descent, extinction, kEmissionPasses + kJointPasses);
     }
-    Optics optics;
+    Optics optics = setup_.optics(hull_.grid);
     optics.absorb = Absorb::field;
     if (extinction.soot.value() > 0) {  // is spread by the light that there is
       Descent even(level_, optics, setup_, with_extinction(x, expected_extinction(problem, extinction, x)));
@@ -99,15 +101,16 @@ double vertex(const std::array<double, 3>& x, const std::array<double, 3>& error
 }
 
 /// Tries places along a line, then the vertex of the parabola around the best.
-template <class Try>
-Candidate search_line(const std::vector<double>& places, const Try& attempt) {
+template <class Try, class Late>
+Candidate search_line(const std::vector<double>& places, const Try& attempt, const Late& late) {
   std::vector<Candidate> tried;
   tried.reserve(places.size());
-  for (const double place : places) tried.push_back(attempt(place));
+  for (const double place : places)
+    if (tried.empty() || !late()) tried.push_back(attempt(place));
   const auto better = [](const Candidate& a, const Candidate& b) { return a.error < b.error; };
   const auto best = std::min_element(tried.begin(), tried.end(), better);
   const auto at = static_cast<std::size_t>(best - tried.begin());
-  if (at == 0 || at + 1 == tried.size()) return *best;
+  if (at == 0 || at + 1 == tried.size() || late()) return *best;
   const double next = vertex({places[at - 1], places[at], places[at + 1]},
                              {tried[at - 1].error, tried[at].error, tried[at + 1].error});
   if (std::abs(next - places[at]) <= 0.05 * (places[at + 1] - places[at - 1])) return *best;
@@ -117,18 +120,25 @@ Candidate search_line(const std::vector<double>& places, const Try& attempt) {
 
 }  // namespace
 
-FoundExtinction find_extinction(const SolverSetup& setup) {
+FoundExtinction find_extinction(const SolverSetup& setup, const Elapsed& elapsed) {
+  const auto late = [&] {
+    constexpr double kShare = 1.0 / 3;
+    return setup.options.budget && elapsed && elapsed().value() >= kShare * setup.options.budget->value();
+  };
   const Probe probe(setup);
   const double chord = probe.mean_chord().value();
-  const Candidate even = search_line({0.0, 0.3, 0.7, 1.2, 3.0}, [&](double depth) {
-    return probe.solve(guess(PerMeter(depth / chord), PerMeter(0)));
-  });
+  const Candidate even = search_line(
+      {0.0, 0.3, 0.7, 1.2, 3.0},
+      [&](double depth) { return probe.solve(guess(PerMeter(depth / chord), PerMeter(0))); }, late);
   const double total = even.extinction.value.value();
-  if (total <= 0) return probe.result(even);
+  if (total <= 0 || late()) return probe.result(even);
   // The same mean, from all even to all like soot.
-  const Candidate mixed = search_line({0.0, 0.5, 1.0}, [&](double share) {
-    return share == 0 ? even : probe.solve(guess(PerMeter((1 - share) * total), PerMeter(share * total)));
-  });
+  const Candidate mixed = search_line(
+      {0.0, 0.5, 1.0},
+      [&](double share) {
+        return share == 0 ? even : probe.solve(guess(PerMeter((1 - share) * total), PerMeter(share * total)));
+      },
+      late);
   return probe.result(mixed);
 }
 

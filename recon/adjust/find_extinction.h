@@ -16,7 +16,9 @@ struct FoundExtinction {
 /// stays wrong, so this is a global search: cold solves for emission and extinction together from a fraction
 /// of the pixels, each expecting another extinction, judged on held-out pixels of the input views.
 /// `setup.hull` is the hull of the fine grid.
-FoundExtinction find_extinction(const SolverSetup& setup);
+///
+/// Under a budget the search ends once it has taken a third of it.
+FoundExtinction find_extinction(const SolverSetup& setup, const Elapsed& elapsed = {});
 
 /// The same solve for an extinction that is given.
 FoundExtinction try_extinction(const SolverSetup& setup, const Extinction& extinction);

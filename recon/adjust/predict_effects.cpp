@@ -156,6 +156,13 @@ void Predictor::choose_scattering() {
     return leave_out("phase function", "nothing scatters");
   }
   Scattering scattering = asked_.scattering;
+  if (!by_hand() && scattering.albedo == 0) {
+    leave_out("scattering",
+              "pictures can't tell evenly scattered light from emitted light: auto:albedo=0.2, soot's, takes "
+              "it out");
+    leave_out("phase function", "scattering is off");
+    return;
+  }
   if (!by_hand()) scattering.order = Order::single;
   Shot shot = scatter(scattering);
   double changed = change(shot, without_);

@@ -243,7 +243,6 @@ PerMeter extinction_of_opacity(double tau, Meters voxel_edge) {
 
 Effects assumed_effects() {
   Effects effects;
-  effects.scattering.albedo = 0.2;
   effects.scattering.asymmetry = 0.6;
   return effects;
 }

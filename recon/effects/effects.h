@@ -95,22 +95,25 @@ PerMeter extinction_of_opacity(double tau, Meters voxel_edge);
 /// What no picture of a glowing flame tells, for soot in visible light. At 514.5 nm Koylu and Faeth (J. Heat
 /// Transfer 116, 1994) measured scattering to absorption 0.22..0.41 above flames of four fuels, an albedo of
 /// 0.18..0.29, and forward scattering some 100 times that to the side, which Henyey and Greenstein's function
-/// has at g = 0.73. Soot inside the flame is younger and its aggregates smaller: albedo 0.2, g = 0.6 (25
-/// times). Refraction has its own defaults; no exposure time, a linear sensor, white at 255.
+/// has at g = 0.73. Soot inside the flame is younger and its aggregates smaller: g = 0.6 (25 times), and an
+/// albedo of about 0.2. But pictures can't tell light that is scattered evenly from light that is emitted, so
+/// the albedo is 0, not known, until the user tells it. Refraction has its own defaults; no exposure time, a
+/// linear sensor, white at 255.
 Effects assumed_effects();
 
 /// What the user asks for: `--effects auto|none|LIST`.
 struct EffectRequest {
   std::optional<Effects> fixed;  ///< set by hand; otherwise found out from the pictures
   double tolerance = 0.5;        ///< grey levels: an effect that changes the pictures by less stays off
-  /// What auto takes an effect to be like where the pictures can't tell: albedo and g, the gas, exposure time
-  /// (0: not known) and rise, gamma, white. Which effects are on in it doesn't matter.
+  /// What auto takes an effect to be like where the pictures can't tell: albedo (0: not known) and g, the
+  /// gas, exposure time (0: not known) and rise, gamma, white. Which effects are on in it doesn't matter.
   Effects assumed = assumed_effects();
 };
 
 /// "auto", "none", or a comma separated list of effects by name, each once; what isn't named is left out.
 /// A choice may bring parameters, `:name=value`; numbers in SI units and grey levels:
-///   auto           :albedo=0.2, :g=0.6, :flame=1800, :ambient=293, :exposure=0 (s; 0: not known), :rise=1,
+///   auto           :albedo=0 (0: not known; soot 0.2), :g=0.6, :flame=1800, :ambient=293, :exposure=0 (s; 0:
+///   not known), :rise=1,
 ///                  :gamma=1, :white=255, :tolerance=0.5 (grey levels, >= 0)
 ///   extinction=none|field|SIGMA                 SIGMA >= 0, 1/m
 ///   scattering=none|single|multiple             with extinction; :albedo=0.5 (0..1), :g=0 (-1..1)

@@ -39,7 +39,7 @@ class MarchHardCase : public testing::TestWithParam<Device> {
                            Absorb absorb = Absorb::nothing) {
     View view{"camera", camera, RadianceImage(camera.intrinsics.size)};
     const Problem problem = pose({&view}, medium, {}, pool_);
-    const auto engine = make_engine(problem, {absorb, sigma, 0}, Precision::float32, GetParam(), pool_);
+    const auto engine = make_engine(problem, {absorb, sigma, 0, {}}, Precision::float32, GetParam(), pool_);
     engine->set(std::vector<Rgba>(problem.grid().size(), Rgba{{1, 1, 1, sigma}}));
     Seen seen;
     engine->residual(0);

@@ -339,7 +339,7 @@ TEST(PredictEffects, SameChoiceForAnyNumberOfThreads) {
 
 TEST(PredictEffects, FindingOutIsTimedAndCostsAreReported) {
   double clock = 0;
-  const auto request = parse_effects("auto");
+  const auto request = parse_effects("auto:albedo=0.2");
   const auto choice =
       predict_effects({sooty().scene, sooty().masks, sooty().coarse.volume, sooty().coarse.medium, 2},
                       sooty().coarse.effects, *request, on_threads(1), [&] {

@@ -36,7 +36,7 @@ class CpuEngine final : public Engine {
         residual_(problem.list.rays.size()) {
     const ExposureBlur blur(optics.exposure, problem.grid());
     if (!blur.identity()) blur_ = blur;
-    if (optics.absorb == Absorb::field) samples_.resize(problem.most_samples() + kBatch);
+    if (optics.absorb == Absorb::field) samples_.resize(problem.most_samples());
   }
 
   void set(const std::vector<Rgba>& x) override { x_ = y_ = next_y_ = converted<Real>(x); }

@@ -83,7 +83,7 @@ class CudaEngine final : public Engine {
         reference_(problem.grid().size()),
         residual_(problem.list.rays.size()),
         target_(problem.list.rays.size()),
-        samples_(Extinction::kField ? problem.most_samples() + kBatch : 0) {}
+        samples_(Extinction::kField ? problem.most_samples() : 0) {}
 
   void set(const std::vector<Rgba>& x) override {
     x_.upload(x);

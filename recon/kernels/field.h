@@ -20,12 +20,10 @@ struct Steps {
   /// Depths of the samples whose extinction is lane 3 of `values`; the rest of the batch, from `here` on, has
   /// none.
   HOST_DEVICE void take(const Quad<Real>* values, int here, Real step) {
+    for (int i = 0; i < here; ++i) depth[i] = values[i].c[3] * step;
+    for (int i = here; i < kBatch; ++i) depth[i] = 0;  // what comes next may be another thread's
     Real deepest = 0;
-    for (int i = 0; i < kBatch; ++i) {
-      const Real x = values[i].c[3] * step;
-      depth[i] = i < here ? x : Real(0);
-      deepest = deepest > depth[i] ? deepest : depth[i];
-    }
+    for (int i = 0; i < kBatch; ++i) deepest = deepest > depth[i] ? deepest : depth[i];
     if (deepest < series_limit<Real>()) {  // no call, no branch: vector code
       for (int i = 0; i < kBatch; ++i) mean[i] = phi_series(depth[i]);
       for (int i = 0; i < kBatch; ++i) slope[i] = phi_slope_series(depth[i]);
@@ -41,7 +39,7 @@ struct Steps {
 ///
 /// Marches a ray, takes its residual by `judge(ray, radiance with the transmittance in lane 3)`, and fills
 /// `samples` from the first sample of the ray on: lane 0 the emission's weight, lane 1 the slope by
-/// extinction. kBatch more samples than there are must fit.
+/// extinction.
 template <class Real, class Path>
 struct FieldForward {
   RayTable table;

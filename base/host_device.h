@@ -8,3 +8,10 @@
 #else
 #define HOST_DEVICE __attribute__((always_inline))
 #endif
+
+/// In front of a short loop that shall become vector code: GCC would unroll it to single numbers first.
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__CUDACC__)
+#define VECTOR_LOOP _Pragma("GCC unroll 1")
+#else
+#define VECTOR_LOOP
+#endif

@@ -44,17 +44,19 @@ PixelBox reach(const CameraModel& camera, const Grid& g) {
           bound(std::ceil(high.x()) + 1, size.width), bound(std::ceil(high.y()) + 1, size.height)};
 }
 
-struct PixelRow {
+/// Neighbouring rays read the same key points: what a tile's rays read stays in the nearest cache.
+constexpr int kTile = 16;
+struct PixelTile {
   std::uint32_t view;
-  int y, x0, x1;
+  int x0, y0, x1, y1;
 };
 
 struct Counts {
   std::uint32_t rays = 0, runs = 0, samples = 0;
 };
 
-/// What one row of pixels gives; runs are counted from the row's own first.
-struct RowRays {
+/// What one tile of pixels gives; runs are counted from the tile's own first.
+struct TileRays {
   std::vector<MarchRay> rays;
   std::vector<Run> runs;
   std::vector<Bend> bends;  // of curved rays, one a run
@@ -64,9 +66,9 @@ struct RowRays {
   std::vector<Counts> counts;  // of each subset
 };
 
-class RowClipper {
+class TileClipper {
  public:
-  RowClipper(const Hull& medium, const RayListOptions& options) : options_(options) {
+  TileClipper(const Hull& medium, const RayListOptions& options) : options_(options) {
     const Grid& g = medium.grid;
     voxels_ = {g.nx - 1, g.ny - 1, g.nz - 1, nullptr};
     const auto blocks = [](int voxels) { return (voxels + kBlock - 1) / kBlock; };
@@ -85,42 +87,43 @@ class RowClipper {
     blocks_.inside = occupied_.data();
   }
 
-  RowRays operator()(const CameraModel& camera, const float* origin, const PixelRow& row) const {
-    RowRays out;
+  TileRays operator()(const CameraModel& camera, const float* origin, const PixelTile& tile) const {
+    TileRays out;
     out.counts.resize(static_cast<std::size_t>(options_.subsets));
     const Intrinsics& k = camera.intrinsics;
     const Eigen::Matrix3d world_from_camera = camera.camera_from_world.rotation.transpose();
     const bool straight = k.distortion.none();
-    for (int x = row.x0; x < row.x1; ++x) {
-      const int subset = options_.subset_of ? options_.subset_of(row.view, x, row.y) : 0;
-      if (subset < 0) continue;
-      const Eigen::Vector2d centre(x + 0.5, row.y + 0.5);
-      const Eigen::Vector3d d = straight
-                                    ? (world_from_camera * Eigen::Vector3d((centre.x() - k.cx) / k.fx,
-                                                                           (centre.y() - k.cy) / k.fy, 1))
-                                          .normalized()
-                                    : camera.ray(centre).direction;
-      MarchRay ray;
-      for (int a = 0; a < 3; ++a) ray.direction[a] = static_cast<float>(d[a]);
-      ray.view = row.view;
-      ray.first_run = static_cast<std::uint32_t>(out.runs.size());
-      const std::uint32_t before = out.samples;
-      add_runs(origin, ray, out);
-      if (ray.runs == 0) continue;
-      out.rays.push_back(ray);
-      out.pixels.push_back(static_cast<std::uint32_t>(row.y) * static_cast<std::uint32_t>(k.size.width) +
-                           static_cast<std::uint32_t>(x));
-      out.subsets.push_back(subset);
-      Counts& counts = out.counts[static_cast<std::size_t>(subset)];
-      ++counts.rays;
-      counts.runs += ray.runs;
-      counts.samples += out.samples - before;
-    }
+    for (int y = tile.y0; y < tile.y1; ++y)
+      for (int x = tile.x0; x < tile.x1; ++x) {
+        const int subset = options_.subset_of ? options_.subset_of(tile.view, x, y) : 0;
+        if (subset < 0) continue;
+        const Eigen::Vector2d centre(x + 0.5, y + 0.5);
+        const Eigen::Vector3d d = straight
+                                      ? (world_from_camera * Eigen::Vector3d((centre.x() - k.cx) / k.fx,
+                                                                             (centre.y() - k.cy) / k.fy, 1))
+                                            .normalized()
+                                      : camera.ray(centre).direction;
+        MarchRay ray;
+        for (int a = 0; a < 3; ++a) ray.direction[a] = static_cast<float>(d[a]);
+        ray.view = tile.view;
+        ray.first_run = static_cast<std::uint32_t>(out.runs.size());
+        const std::uint32_t before = out.samples;
+        add_runs(origin, ray, out);
+        if (ray.runs == 0) continue;
+        out.rays.push_back(ray);
+        out.pixels.push_back(static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(k.size.width) +
+                             static_cast<std::uint32_t>(x));
+        out.subsets.push_back(subset);
+        Counts& counts = out.counts[static_cast<std::size_t>(subset)];
+        ++counts.rays;
+        counts.runs += ray.runs;
+        counts.samples += out.samples - before;
+      }
     return out;
   }
 
  private:
-  void add_runs(const float* origin, MarchRay& ray, RowRays& out) const {
+  void add_runs(const float* origin, MarchRay& ray, TileRays& out) const {
     float before = 0;
     if (options_.gas == nullptr) {
       add_stretch(origin, ray.direction, kEndless, before, ray, out);
@@ -137,7 +140,7 @@ class RowClipper {
   /// The runs of a straight line's first `length` edges; `before` is what lies inside the medium in front of
   /// it.
   void add_stretch(const float* origin, const float* direction, float length, float& before, MarchRay& ray,
-                   RowRays& out) const {
+                   TileRays& out) const {
     clip_to_medium(voxels_, blocks_, origin, direction, [&](float t0, float t1) {
       constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
       t1 = std::min(t1, length);
@@ -163,13 +166,13 @@ class RowClipper {
   const RayListOptions& options_;
 };
 
-/// Sorts by subset, rows in order, so that the list doesn't depend on which thread did which row.
-void assemble(std::vector<RowRays>& rows, int subsets, bool curved, RayList& list, Pool& pool) {
+/// Sorts by subset, tiles in order, so that the list doesn't depend on which thread did which tile.
+void assemble(std::vector<TileRays>& tiles, int subsets, bool curved, RayList& list, Pool& pool) {
   Counts next;
   list.subset_begin.push_back(0);
   for (int s = 0; s < subsets; ++s) {
-    for (RowRays& row : rows) {
-      Counts& counts = row.counts[static_cast<std::size_t>(s)];
+    for (TileRays& tile : tiles) {
+      Counts& counts = tile.counts[static_cast<std::size_t>(s)];
       std::swap(counts, next);  // from how many there are to where they go
       next.rays += counts.rays;
       next.runs += counts.runs;
@@ -183,21 +186,21 @@ void assemble(std::vector<RowRays>& rows, int subsets, bool curved, RayList& lis
   if (curved) list.bends.resize(next.runs);
   constexpr int kTasks = 64;
   pool.run(kTasks, [&](int task) {
-    const Slice mine = slice(rows.size(), kTasks, task);
+    const Slice mine = slice(tiles.size(), kTasks, task);
     for (std::size_t n = mine.begin; n < mine.end; ++n) {
-      RowRays& row = rows[n];
-      for (std::size_t r = 0; r < row.rays.size(); ++r) {
-        Counts& to = row.counts[static_cast<std::size_t>(row.subsets[r])];
-        MarchRay ray = row.rays[r];
+      TileRays& tile = tiles[n];
+      for (std::size_t r = 0; r < tile.rays.size(); ++r) {
+        Counts& to = tile.counts[static_cast<std::size_t>(tile.subsets[r])];
+        MarchRay ray = tile.rays[r];
         const std::size_t from = ray.first_run;
         ray.first_run = to.runs;
-        list.pixels[to.rays] = row.pixels[r];
+        list.pixels[to.rays] = tile.pixels[r];
         for (std::uint32_t i = 0; i < ray.runs; ++i) {
-          Run run = row.runs[from + i];
+          Run run = tile.runs[from + i];
           run.ray = to.rays;
           run.first_sample = to.samples;
           to.samples += static_cast<std::uint32_t>(run.count);
-          if (curved) list.bends[to.runs] = row.bends[from + i];
+          if (curved) list.bends[to.runs] = tile.bends[from + i];
           list.runs[to.runs++] = run;
         }
         list.rays[to.rays++] = ray;
@@ -277,23 +280,24 @@ RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& me
                   const RayListOptions& options, Pool& pool) {
   RayList list;
   list.grid = medium.grid;
-  std::vector<PixelRow> rows;
+  std::vector<PixelTile> tiles;
   for (std::size_t v = 0; v < cameras.size(); ++v) {
     const Eigen::Vector3d center = cameras[v]->center();
     for (int a = 0; a < 3; ++a)
       list.origins.push_back(static_cast<float>((center[a] - static_cast<double>(medium.grid.origin[a])) /
                                                 static_cast<double>(medium.grid.edge)));
     const PixelBox box = reach(*cameras[v], medium.grid);
-    for (int y = box.y0; y < box.y1; ++y) rows.push_back({static_cast<std::uint32_t>(v), y, box.x0, box.x1});
+    for (int y = box.y0; y < box.y1; y += kTile)
+      for (int x = box.x0; x < box.x1; x += kTile)
+        tiles.push_back(
+            {static_cast<std::uint32_t>(v), x, y, std::min(x + kTile, box.x1), std::min(y + kTile, box.y1)});
   }
-  std::vector<RowRays> found(rows.size());
-  constexpr int kRowsATask = 8;
-  const RowClipper clip(medium, options);
-  pool.run(static_cast<int>((rows.size() + kRowsATask - 1) / kRowsATask), [&](int task) {
-    const std::size_t begin = static_cast<std::size_t>(task) * kRowsATask;
-    for (std::size_t r = begin; r < std::min(begin + kRowsATask, rows.size()); ++r)
-      found[r] =
-          clip(*cameras[rows[r].view], &list.origins[3 * static_cast<std::size_t>(rows[r].view)], rows[r]);
+  std::vector<TileRays> found(tiles.size());
+  const TileClipper clip(medium, options);
+  pool.run(static_cast<int>(tiles.size()), [&](int t) {
+    const PixelTile& tile = tiles[static_cast<std::size_t>(t)];
+    found[static_cast<std::size_t>(t)] =
+        clip(*cameras[tile.view], &list.origins[3 * static_cast<std::size_t>(tile.view)], tile);
   });
   assemble(found, options.subsets, options.gas != nullptr, list, pool);
   return list;

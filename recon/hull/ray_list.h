@@ -25,7 +25,7 @@ CroppedHull crop_to_medium(const Hull& hull);
 Hull coarsen(const Hull& hull);
 
 /// Every pixel ray that crosses a medium, clipped to it and cut where it enters another slab. Rays are sorted
-/// by (subset, view, row, column), runs and samples by ray.
+/// by (subset, view, tile of pixels, row, column), runs and samples by ray.
 struct RayList {
   Grid grid;
   std::vector<float> origins;  ///< 3 a view, in voxel edges from the grid's origin

@@ -19,15 +19,15 @@ HOST_DEVICE inline double expm1_of(double x) { return expm1(x); }
 /// no branch and no call, so that loops over it become vector code.
 template <class Real>
 HOST_DEVICE inline Real phi_series(Real x) {
-  return 1 -
-         x * (Real(1) / 2 -
-              x * (Real(1) / 6 - x * (Real(1) / 24 - x * (Real(1) / 120 - x * (Real(1) / 720 - x / 5040)))));
+  constexpr Real c2 = Real(1.0 / 2), c3 = Real(1.0 / 6), c4 = Real(1.0 / 24), c5 = Real(1.0 / 120),
+                 c6 = Real(1.0 / 720), c7 = Real(1.0 / 5040);
+  return 1 - x * (c2 - x * (c3 - x * (c4 - x * (c5 - x * (c6 - x * c7)))));
 }
 template <class Real>
 HOST_DEVICE inline Real phi_slope_series(Real x) {
-  return -Real(1) / 2 +
-         x * (Real(1) / 3 -
-              x * (Real(1) / 8 - x * (Real(1) / 30 - x * (Real(1) / 144 - x * (Real(1) / 840 - x / 5760)))));
+  constexpr Real c2 = Real(1.0 / 2), c3 = Real(1.0 / 3), c4 = Real(1.0 / 8), c5 = Real(1.0 / 30),
+                 c6 = Real(1.0 / 144), c7 = Real(1.0 / 840), c8 = Real(1.0 / 5760);
+  return -c2 + x * (c3 - x * (c4 - x * (c5 - x * (c6 - x * (c7 - x * c8)))));
 }
 /// Up to which depth the series serve.
 template <class Real>

@@ -8,28 +8,34 @@ namespace {
 
 float value(const RadianceImage& behind, std::size_t at) { return behind.rgb.empty() ? 0.F : behind.rgb[at]; }
 
+/// The first multiple of the stride from x on.
+int first_of(int x, int stride) { return (x + stride - 1) / stride * stride; }
+
 }  // namespace
 
 ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
-                               const Problem& problem, const Background& background)
+                               const Problem& problem, const Background& background, int stride)
     : weight_(problem.list.rays.size()) {
   std::vector<RadianceImage> behind;
+  std::vector<double> pixels(views.size());
   for (std::size_t v = 0; v < views.size(); ++v) {
     const RadianceImage& image = views[v]->image;
     const RadianceImage* own = views[v]->background ? &*views[v]->background : nullptr;
     behind.push_back(background.kind == Background::Kind::black ? RadianceImage{}
                                                                 : backdrop(background, image.size, own));
-    for (int y = boxes[v].y0; y < boxes[v].y1; ++y)
-      for (int x = boxes[v].x0; x < boxes[v].x1; ++x)
+    std::array<double, 3> sum = {};
+    for (int y = first_of(boxes[v].y0, stride); y < boxes[v].y1; y += stride)
+      for (int x = first_of(boxes[v].x0, stride); x < boxes[v].x1; x += stride) {
+        const std::size_t at = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
+                                    static_cast<std::size_t>(x));
         for (std::size_t c = 0; c < 3; ++c) {
-          const std::size_t at =
-              3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
-                   static_cast<std::size_t>(x)) +
-              c;
-          const double b = static_cast<double>(image.rgb[at] - value(behind.back(), at));
-          const double pixels = static_cast<double>(boxes[v].x1 - boxes[v].x0) * (boxes[v].y1 - boxes[v].y0);
-          unreached_[c] += b * b / (pixels * static_cast<double>(views.size()));
+          const double b = static_cast<double>(image.rgb[at + c] - value(behind.back(), at + c));
+          sum[c] += b * b;
         }
+        pixels[v] += 1;
+      }
+    for (std::size_t c = 0; c < 3; ++c)
+      unreached_[c] += sum[c] / (std::max(1.0, pixels[v]) * static_cast<double>(views.size()));
   }
   for (std::size_t r = 0; r < weight_.size(); ++r) {
     const std::size_t v = problem.list.rays[r].view;
@@ -38,8 +44,7 @@ ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std:
     const int x = static_cast<int>(problem.list.pixels[r]) % width;
     const int y = static_cast<int>(problem.list.pixels[r]) / width;
     if (x < box.x0 || x >= box.x1 || y < box.y0 || y >= box.y1) continue;
-    const double pixels = static_cast<double>(box.x1 - box.x0) * (box.y1 - box.y0);
-    weight_[r] = static_cast<float>(1 / (pixels * static_cast<double>(views.size())));
+    weight_[r] = static_cast<float>(1 / (std::max(1.0, pixels[v]) * static_cast<double>(views.size())));
     const std::size_t at = 3 * static_cast<std::size_t>(problem.list.pixels[r]);
     for (std::size_t c = 0; c < 3; ++c) {
       const double b = static_cast<double>(views[v]->image.rgb[at + c] - value(behind[v], at + c));

@@ -8,12 +8,12 @@
 
 namespace emberlock {
 
-/// Mean squared error over each view's box, from the residuals of a problem that holds all pixels of the
-/// views.
+/// Mean squared error over each view's box, from the residuals of a problem that holds every stride-th pixel
+/// of the views along both axes.
 class ErrorOverBoxes {
  public:
   ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
-                 const Problem& problem, const Background& background);
+                 const Problem& problem, const Background& background, int stride = 1);
   /// RMSE for R, G, B: the mean square over each view's box, then over the views.
   [[nodiscard]] std::array<double, 3> operator()(const std::vector<Rgba>& residual) const;
 

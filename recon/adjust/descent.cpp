@@ -84,6 +84,11 @@ std::size_t flame_pixels(const SolverSetup& setup, int stride) {
 
 }  // namespace
 
+int stride_for(const SolverSetup& setup, const Grid& grid) {
+  constexpr double kPixelsPerVoxel = 1.4;
+  return std::max(1, static_cast<int>(std::min(1024.0, pixels_per_voxel(setup, grid) / kPixelsPerVoxel)));
+}
+
 Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets) {
   Level level;
   level.subsets = subsets_for(setup.sigma(hull.grid), pixels_per_voxel(setup, hull.grid) / stride,

@@ -17,6 +17,10 @@ struct Level {
   int subsets = 1;  ///< that are fitted; subset number `subsets` is held out
 };
 
+/// Every how manieth pixel along both axes a grid calls for: about one and a half of them across a voxel.
+/// More say no more of the volume: what a step costs falls with the square, what it reaches doesn't.
+int stride_for(const SolverSetup& setup, const Grid& grid);
+
 /// Every `stride`-th pixel along both axes. `most_subsets` is 1, 4 or 16; a thick medium or few pixels take
 /// fewer.
 Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets = 16);

@@ -35,7 +35,7 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
   std::unique_ptr<const Level> level;
   std::unique_ptr<Descent> descent;
   for (std::size_t l = hulls.size(); l-- > 0;) {
-    auto finer = std::make_unique<const Level>(pose_level(setup, hulls[l], 1 << l));
+    auto finer = std::make_unique<const Level>(pose_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
     std::vector<Rgba> x = descent ? refine(descent->engine().get(), level->problem, finer->problem)
                                   : std::vector<Rgba>(finer->problem.active.size());
     descent = begin(*finer, setup, std::move(x));
@@ -46,7 +46,8 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
 
   const bool uneven =
       setup.effects.scattering.order != Scattering::Order::none && setup.effects.scattering.asymmetry != 0;
-  const ErrorOverBoxes error(setup.views, setup.boxes, level->problem, setup.effects.background);
+  const ErrorOverBoxes error(setup.views, setup.boxes, level->problem, setup.effects.background,
+                             stride_for(setup, setup.hull.grid));
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;
   double last = std::numeric_limits<double>::infinity();
   int iteration = 0;

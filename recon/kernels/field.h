@@ -24,8 +24,10 @@ struct Steps {
     for (int i = here; i < kBatch; ++i) depth[i] = 0;  // what comes next may be another thread's
     Real deepest = 0;
     for (int i = 0; i < kBatch; ++i) deepest = deepest > depth[i] ? deepest : depth[i];
-    if (deepest < series_limit<Real>()) {  // no call, no branch: vector code
+    if (deepest < series_limit<Real>()) {
+      VECTOR_LOOP
       for (int i = 0; i < kBatch; ++i) mean[i] = phi_series(depth[i]);
+      VECTOR_LOOP
       for (int i = 0; i < kBatch; ++i) slope[i] = phi_slope_series(depth[i]);
     } else {
       for (int i = 0; i < here; ++i) mean[i] = phi(depth[i]);

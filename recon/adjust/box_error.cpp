@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/effects/background.h"
+
 namespace emberlock {
 namespace {
 

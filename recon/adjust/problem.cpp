@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "recon/effects/background.h"
+#include "recon/effects/refraction.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock {

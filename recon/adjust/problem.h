@@ -4,8 +4,7 @@
 #include <vector>
 
 #include "recon/compute/pool.h"
-#include "recon/effects/background.h"
-#include "recon/effects/refraction.h"
+#include "recon/effects/effects.h"
 #include "recon/hull/ray_list.h"
 #include "recon/kernels/judge.h"
 #include "recon/kernels/rgba.h"
@@ -13,6 +12,7 @@
 namespace emberlock {
 
 struct View;
+class RefractiveIndex;
 
 /// The runs in each slab of voxels along z. Even slabs share no key point and can be written at the same
 /// time, then odd ones, without atomics and in an order that no thread count changes.

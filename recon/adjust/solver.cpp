@@ -5,6 +5,8 @@
 
 #include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/tracker.h"
+#include "recon/effects/background.h"
+#include "recon/effects/refraction.h"
 #include "recon/render/scattered_source.h"
 
 namespace emberlock {

@@ -2,6 +2,9 @@
 #include "recon/export/volume_file.h"
 
 #include <cmath>
+#include <fstream>
+#include <string>
+#include <string_view>
 
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
@@ -59,6 +62,18 @@ Result<Grid> geometry(const openvdb::GridBase& from, const std::filesystem::path
   return grid;
 }
 
+/// OpenVDB's readers go by offsets and never come here. Of a file that was cut short they would take any
+/// bytes for sizes, and ask for as much memory.
+constexpr std::string_view kEnd = "emberlock: end of volume";
+
+bool is_whole(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::string end(kEnd.size(), '\0');
+  file.seekg(-static_cast<std::streamoff>(kEnd.size()), std::ios::end);
+  file.read(end.data(), static_cast<std::streamsize>(end.size()));
+  return file.good() && end == kEnd;
+}
+
 bool inside(const Grid& grid, const openvdb::Coord& c) {
   return c.x() >= 0 && c.y() >= 0 && c.z() >= 0 && c.x() < grid.nx && c.y() < grid.ny && c.z() < grid.nz;
 }
@@ -81,6 +96,10 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path) {
     openvdb::io::File file(path.string());
     file.write({emission_grid, density_grid});
     file.close();
+    std::ofstream end(path, std::ios::binary | std::ios::app);
+    end.exceptions(std::ios::failbit | std::ios::badbit);
+    end << kEnd;
+    end.close();
   } catch (const std::exception& e) {
     return Error{ErrorKind::io, std::string("cannot write: ") + e.what(), path.string(),
                  "Check that the folder is writable and the disk has room"};
@@ -89,6 +108,7 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path) {
 }
 
 Result<Volume> read_volume(const std::filesystem::path& path) try {
+  if (!is_whole(path)) return damaged(path, "is cut short, or Emberlock hasn't written it");
   openvdb::initialize();
   openvdb::io::File file(path.string());
   file.open();

@@ -26,6 +26,8 @@ Status check_request(const Scene& scene, const Grid& grid, const Effects& effect
                                           effects.refraction.rays == Refraction::Rays::curved))
     return refuse("the paper's solver knows constant extinction and straight rays alone", "effects",
                   "Use --solver default, or extinction=VALUE");
+  if (options.solver == Solver::paper && options.precision == Precision::float64)
+    return refuse("the paper's solver runs in single precision alone", "precision", "Leave --precision away");
   if (options.iterations < 0)
     return refuse("a negative number of iterations", "iterations",
                   "Give 1 or more, or 0 for the solver's rule");

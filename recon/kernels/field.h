@@ -16,6 +16,7 @@ struct Steps {
   Real depth[kBatch];
   Real mean[kBatch];   ///< phi(depth)
   Real slope[kBatch];  ///< phi'(depth)
+  bool thin = false;   ///< the series serve for all of them
 
   /// Depths of the samples whose extinction is lane 3 of `values`; the rest of the batch, from `here` on, has
   /// none.
@@ -24,13 +25,20 @@ struct Steps {
     for (int i = here; i < kBatch; ++i) depth[i] = 0;  // what comes next may be another thread's
     Real deepest = 0;
     for (int i = 0; i < kBatch; ++i) deepest = deepest > depth[i] ? deepest : depth[i];
-    if (deepest < series_limit<Real>()) {
+    thin = deepest < series_limit<Real>();
+    if (thin) {
       VECTOR_LOOP
       for (int i = 0; i < kBatch; ++i) mean[i] = phi_series(depth[i]);
+    } else {
+      for (int i = 0; i < here; ++i) mean[i] = phi(depth[i]);
+    }
+  }
+  /// After take().
+  HOST_DEVICE void take_slopes(int here) {
+    if (thin) {
       VECTOR_LOOP
       for (int i = 0; i < kBatch; ++i) slope[i] = phi_slope_series(depth[i]);
     } else {
-      for (int i = 0; i < here; ++i) mean[i] = phi(depth[i]);
       for (int i = 0; i < here; ++i) slope[i] = phi_slope(depth[i]);
     }
   }
@@ -89,6 +97,7 @@ struct FieldForward {
       for (int first = 0; first < count; first += kBatch) {
         const int here = count - first < kBatch ? count - first : kBatch;
         steps.take(values, here, step);
+        steps.take_slopes(here);
         for (int i = 0; i < here; ++i) {
           const Quad<Real> value = values[i];
           const Real weight = transmittance * step * steps.mean[i];

@@ -196,7 +196,7 @@ TEST(MarchHardCase, TheFarCornerOf512CubedVoxelsLooksAsInAGridOfItsOwn) {
   const auto expected = Marcher<float>(near).forward(Absorb::nothing, values);
   ASSERT_GT(expected.size(), 100U);
 
-  const std::size_t before = resident_bytes();
+  [[maybe_unused]] const std::size_t before = resident_bytes();
   const SparseVolume volume(large.grid.size());
   const SparseVolume gradient(large.grid.size());
   ASSERT_TRUE(volume.ok() && gradient.ok());

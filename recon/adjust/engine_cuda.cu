@@ -134,8 +134,8 @@ class CudaEngine final : public Engine {
       scatter(subset, FieldAdjoint<float, Path, AddAtomically>{table(), residual_.data(), samples_.data(),
                                                                first_sample(subset), gradient_.data()});
     } else {
-      scatter(subset, Adjoint<float, Extinction, Path, AddAtomically>{table(), residual_.data(), gradient_.data(),
-                                                                      extinction_});
+      scatter(subset, Adjoint<float, Extinction, Path, AddAtomically>{table(), residual_.data(),
+                                                                      gradient_.data(), extinction_});
     }
   }
 
@@ -160,8 +160,8 @@ class CudaEngine final : public Engine {
   void adjust([[maybe_unused]] int subset, [[maybe_unused]] const PaperStep& step) override {
     if constexpr (!Extinction::kField && std::is_same_v<Path, StraightPath>) {
       scatter(subset,
-              PaperAdjust<Extinction, AddAtomically>{table(), residual_.data(), x_.data(), extinction_, step.gain,
-                                                     step.decay, step.deviation, step.stream});
+              PaperAdjust<Extinction, AddAtomically>{table(), residual_.data(), x_.data(), extinction_,
+                                                     step.gain, step.decay, step.deviation, step.stream});
       y_.copy_from(x_);
     }
   }
@@ -169,9 +169,9 @@ class CudaEngine final : public Engine {
  private:
   [[nodiscard]] Descend<float> emission_step(const Step& step) {
     const Grid& g = problem_.grid();
-    return {g.nx,           g.ny,          g.nz,           weight_.data(),
-            x_.data(),      y_.data(),     next_y_.data(), gradient_.data(),
-            step.scale,     step.smoothing, step.momentum};
+    return {g.nx,       g.ny,           g.nz,           weight_.data(),
+            x_.data(),  y_.data(),      next_y_.data(), gradient_.data(),
+            step.scale, step.smoothing, step.momentum};
   }
   template <class Update>
   void update(const Update& step) {
@@ -184,8 +184,13 @@ class CudaEngine final : public Engine {
   }
   [[nodiscard]] RayTable table() const {
     const Grid& g = problem_.grid();
-    return {origins_.data(), rays_.data(), runs_.data(), problem_.list.bends.empty() ? nullptr : bends_.data(),
-            g.nx,            g.ny,         g.nz};
+    return {origins_.data(),
+            rays_.data(),
+            runs_.data(),
+            problem_.list.bends.empty() ? nullptr : bends_.data(),
+            g.nx,
+            g.ny,
+            g.nz};
   }
   [[nodiscard]] Forward<float, Extinction, Path> forward() const { return {table(), y_.data(), extinction_}; }
   [[nodiscard]] Slice rays_of(int subset) const {
@@ -231,9 +236,12 @@ std::unique_ptr<Engine> make_with(const Problem& problem, const Optics& optics, 
 
 std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics) {
   switch (optics.absorb) {
-    case Absorb::field: return make_with(problem, optics, FieldExtinction<float>{});
-    case Absorb::constant: return make_with(problem, optics, ConstantExtinction<float>{optics.sigma});
-    case Absorb::nothing: break;
+    case Absorb::field:
+      return make_with(problem, optics, FieldExtinction<float>{});
+    case Absorb::constant:
+      return make_with(problem, optics, ConstantExtinction<float>{optics.sigma});
+    case Absorb::nothing:
+      break;
   }
   return make_with(problem, optics, NoExtinction<float>{});
 }

@@ -113,8 +113,9 @@ Outcome finish(const Task& task, const SolveOptions& options, Reconstruction don
   outcome.report = describe(scene, done.hull.grid, options, task.device);
   Report& result = outcome.report;
   result.hull_voxels = done.hull.count;
-  result.views = judge(scene, masks_before(PreparedScene(scene, done.effects.sensor).scene(), done.effects.background),
-                       outcome.renders);
+  result.views =
+      judge(scene, masks_before(PreparedScene(scene, done.effects.sensor).scene(), done.effects.background),
+            outcome.renders);
   result.input_rmse = over_views(result.views, ViewRole::input).value_or(ChannelRmse{});
   result.heldout_rmse = over_views(result.views, ViewRole::held_out);
   result.hull_time = done.hull_time;

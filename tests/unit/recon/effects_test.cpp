@@ -109,7 +109,8 @@ TEST(Effects, LeavingEveryEffectOutByNameIsNone) {
 
 TEST(Effects, AutoTakesWhatThePicturesCannotTell) {
   const auto request = parse_effects(
-      "auto:albedo=0.3:g=-0.2:flame=1500:ambient=300:exposure=0.008:rise=2:gamma=2.2:white=250:tolerance=0.1");
+      "auto:albedo=0.3:g=-0.2:flame=1500:ambient=300:exposure=0.008:rise=2:gamma=2.2:white=250:tolerance=0."
+      "1");
   ASSERT_TRUE(request.ok()) << request.error().message();
   EXPECT_FALSE(request->fixed.has_value());
   EXPECT_EQ(request->tolerance, 0.1);

@@ -12,7 +12,7 @@ namespace emberlock {
 
 /// What a batch of samples does to the light, from their optical depths.
 template <class Real>
-struct Steps {
+struct Steps {  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
   Real depth[kBatch];
   Real mean[kBatch];   ///< phi(depth)
   Real slope[kBatch];  ///< phi'(depth)
@@ -64,8 +64,8 @@ struct FieldForward {
     const std::size_t plane = row * static_cast<std::size_t>(table.ny);
     Quad<Real> radiance;
     Real transmittance = 1;
-    Batch<Real> batch;
-    Steps<Real> steps;
+    Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
+    Steps<Real> steps;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
     Quad<Real>* values = samples + (table.runs[r.first_run].first_sample - first_sample);
     for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
       const Run run = table.runs[n];
@@ -132,7 +132,7 @@ struct FieldAdjoint {
     const Line<Real> line = Path::template line<Real>(table, n);
     const Quad<Real> seen = residual[run.ray];
     const Quad<Real>* sample = samples + (run.first_sample - first_sample);
-    Batch<Real> batch;
+    Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
     for (int first = 0; first < run.count; first += kBatch) {
       locate(table, line, run, first, layers, batch);
       const int here = run.count - first < kBatch ? run.count - first : kBatch;

@@ -182,7 +182,7 @@ struct Forward {
     const std::size_t plane = row * static_cast<std::size_t>(table.ny);
     Quad<Real> radiance;
     Real transmittance = 1;
-    Batch<Real> batch;
+    Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
     for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
       const Run run = table.runs[n];
       const Line<Real> line = Path::template line<Real>(table, n);
@@ -255,7 +255,7 @@ struct Adjoint {
     const Line<Real> line = Path::template line<Real>(table, n);
     const Real pass = extinction.over(Real(run.step));
     Quad<Real> w = (extinction.at(Real(run.before)) * extinction.weight(Real(run.step))) * residual[run.ray];
-    Batch<Real> batch;
+    Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
     for (int first = 0; first < run.count; first += kBatch) {
       locate(table, line, run, first, layers, batch);
       const int here = run.count - first < kBatch ? run.count - first : kBatch;

@@ -53,7 +53,7 @@ struct PaperAdjust {
     const Rgba change = -gain * residual[run.ray];
     const float pass = extinction.over(run.step);
     float transmittance = extinction.at(run.before);
-    Batch<float> batch;
+    Batch<float> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
     for (int first = 0; first < run.count; first += kBatch) {
       locate(table, line, run, first, layers, batch);
       const int here = run.count - first < kBatch ? run.count - first : kBatch;

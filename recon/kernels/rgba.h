@@ -108,7 +108,7 @@ HOST_DEVICE inline Quad<Real> non_negative(const Quad<Real>& a) {
 /// By one wide load.
 template <class Real>
 HOST_DEVICE inline Pair<Real> load_pair(const Quad<Real>* p) {
-  Pair<Real> a;
+  Pair<Real> a;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
   std::memcpy(&a.c, p, sizeof a.c);
   return a;
 }

@@ -73,7 +73,7 @@ void march(const MarchWork<float>& work, Absorb absorb, const RayList& list, Poo
   pool.run(kTasks, [&](int task) {
     const Slice rays = slice(list.rays.size(), kTasks, task);
     forward(work, rays.begin, rays.end);
-    put_in_front(work.residual + rays.begin, &list.pixels[rays.begin], rays.end - rays.begin, image);
+    put_in_front(work.residual + rays.begin, list.pixels.data() + rays.begin, rays.end - rays.begin, image);
   });
 }
 

@@ -25,6 +25,22 @@ TEST(Effects, EmissionOnlyFlameIsFoundAsSuch) {
   }
 }
 
+TEST(Effects, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs) {
+  for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
+    const Scene scene = small_flame_scene(PerMeter(32.8), shape);
+    const auto heldout = [&](const Effects& effects) {
+      SolveOptions options;
+      options.compute.device = Device::cpu;
+      const auto r = solve(scene, grid_over(scene.box, 64), effects, options);
+      EXPECT_TRUE(r.ok());
+      return all_channels(r->trace.back().heldout_rmse);
+    };
+    const double by_itself = heldout(found(scene).effects);
+    EXPECT_LT(by_itself, heldout(absorbing(PerMeter(32.8))));
+    EXPECT_LT(by_itself, 0.8 * heldout({}));
+  }
+}
+
 TEST(Effects, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const EffectChoice choice = found(small_flame_scene(PerMeter(32.8), shape));

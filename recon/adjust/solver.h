@@ -28,8 +28,8 @@ Result<Solver> parse_solver(std::string_view name);
 struct SolveOptions {
   Solver solver = Solver::standard;
   Precision precision = Precision::float32;
-  double step = 1;     ///< the longest step of the march, voxel edges, 0.05..4
-  int iterations = 0;  ///< passes over the pictures at full resolution, at most; 0: the solver's own rule
+  double step = 1;                    ///< the longest step of the march, voxel edges, 0.05..4
+  int iterations = 0;                 ///< passes on the finest grid, at most; 0: the solver's own rule
   std::optional<Seconds> budget;      ///< stop when `elapsed` reaches it
   std::optional<double> target_rmse;  ///< stop when the held-out views' error (all channels) is at most this
   std::optional<double> flame_threshold;  ///< grey levels; without it each view's noise_threshold

@@ -58,8 +58,29 @@ double bloom_at(const VirtualScene& scene, const VirtualLamp& lamp, double dx, d
   return level;
 }
 
+/// Where a saturated lamp's glare and overflow reach.
+Stamp bloom_shape(const VirtualScene& scene, const VirtualLamp& lamp, ImageSize size) {
+  const double glare = lamp.radius + halo_reach(scene);
+  const double tail = lamp.radius + std::log(kOverflowLevel / kFaintest);
+  Stamp s = stamp_about(lamp, glare, std::max(glare, tail + scene.overflow_up),
+                        std::max(glare, tail + scene.overflow_down), size);
+  for (int y = s.y0; y < s.y1(); ++y) {
+    for (int i = 0; i < s.width; ++i) {
+      s.row(y)[i] = static_cast<float>(bloom_at(scene, lamp, s.x0 + i - lamp.x, y - lamp.y.value()));
+    }
+  }
+  return s;
+}
+
 void add_scaled(const float* from, int count, float scale, float* to) {
   for (int i = 0; i < count; ++i) to[i] += scale * from[i];
+}
+
+/// `to` spans the columns of `stamp` and every row of the image.
+void add_stamp(const Stamp& stamp, float scale, Stamp& to) {
+  for (int y = stamp.y0; y < stamp.y1(); ++y) {
+    add_scaled(stamp.row(y), stamp.width, scale, to.row(y) + (stamp.x0 - to.x0));
+  }
 }
 
 /// Grey levels that a pulse leaves at the lamp's centre in all.
@@ -84,62 +105,146 @@ VirtualSensor::VirtualSensor(const VirtualCameraOptions& options, int number, st
   normal_.resize(samples + 2);  // noise comes three at a time
 }
 
-Image VirtualSensor::expose(const VirtualScene& scene, std::span<const LightPulse> pulses,
-                            const Exposure& exposure) {
-  draw_lamp_light(scene, pulses, exposure.duration);
-  draw_flame(scene, exposure);
-  const int hot = scene.has(Pass::hot_pixels) ? scene.hot_pixels : 0;
-  if (hot_.size() != static_cast<std::size_t>(hot)) hot_ = draw_hot_pixels(hot);
+template <class Variance>
+void VirtualSensor::add_noise(const Shot& shot, int y, Variance variance) {
+  const NormalTable& normal = NormalTable::instance();
+  const std::size_t samples = row_.size();
+  std::uint64_t counter = static_cast<std::uint64_t>(y) << 32;
+  for (std::size_t i = 0; i < samples; i += 3) {
+    const std::uint64_t bits = mix64(counter++ ^ shot.noise_key);
+    normal_[i] = normal(bits);
+    normal_[i + 1] = normal(bits >> NormalTable::kBitsEach);
+    normal_[i + 2] = normal(bits >> (2 * NormalTable::kBitsEach));
+  }
+  for (std::size_t i = 0; i < samples; ++i) row_[i] += normal_[i] * std::sqrt(variance(row_[i]));
+}
 
-  const std::uint64_t key = random_bits(seed_, kNoiseStream, exposure.frame_id);
-  const bool noisy = scene.has(Pass::shot_noise) || scene.has(Pass::read_noise);
+template <class Sample, class Convert>
+void VirtualSensor::store(int y, Image& image, Convert convert) const {
+  Sample* to = image.row_as<Sample>(y);
+  for (std::size_t i = 0; i < row_.size(); ++i) to[i] = static_cast<Sample>(convert(row_[i]));
+}
+
+Image VirtualSensor::expose(const std::shared_ptr<const VirtualScene>& scene,
+                            std::span<const LightPulse> pulses, const Exposure& exposure) {
+  if (scene != scene_) {
+    scene_ = scene;
+    choose_passes();
+  }
+  const Shot shot{pulses, exposure, random_bits(seed_, kNoiseStream, exposure.frame_id)};
+  for (const auto& pass : frame_passes_) pass(*this, shot);
+  const std::vector<float> dark(row_.size(), static_cast<float>(scene->background));
   Image image(layout_);
   for (int y = 0; y < layout_.size.height; ++y) {
-    compose_row(scene, y);
-    if (noisy) add_noise(scene, y, key);
-    store_row(scene, y, image);
+    std::copy(dark.begin(), dark.end(), row_.begin());
+    for (const auto& pass : row_passes_) pass(*this, shot, y);
+    convert_(*this, y, image);
   }
   return image;
 }
 
-void VirtualSensor::draw_lamp_light(const VirtualScene& scene, std::span<const LightPulse> pulses,
-                                    Seconds exposure) {
-  const double image_height = layout_.size.height;
-  const bool bloom = scene.has(Pass::bloom);
-  const double reach = lamp_.radius + std::max(5 * kEdgeSigma, bloom ? halo_reach(scene) : 0);
-  light_ = stamp_about({lamp_.x, Rows(image_height / 2), lamp_.radius}, reach, image_height, image_height,
-                       layout_.size);
-
-  double level = 0;
-  for (const LightPulse& p : pulses) {
-    const Seconds lit = std::min(p.begin + p.width, Seconds(0)) - std::max(p.begin, -exposure);
-    if (lit > Seconds(0)) level += charge(scene, p) * (lit / p.width);
+void VirtualSensor::choose_passes() {
+  frame_passes_.clear();
+  row_passes_.clear();
+  const auto listed = [this](Pass pass) { return scene_->has(pass); };
+  if (listed(Pass::flame)) {
+    frame_passes_.emplace_back(&VirtualSensor::draw_flame);
+    row_passes_.emplace_back(&VirtualSensor::add_flame);
   }
-  const int margin = lamp_shape_.x0 - light_.x0;
-  if (scene.has(Pass::lamp) && level > 0) {
-    for (int y = lamp_shape_.y0; y < lamp_shape_.y1(); ++y) {
-      add_scaled(lamp_shape_.row(y), lamp_shape_.width, static_cast<float>(level), light_.row(y) + margin);
-    }
+  if (listed(Pass::lamp) || listed(Pass::bloom) || listed(Pass::smear)) choose_strobe_light();
+  if (listed(Pass::hot_pixels)) {
+    hot_ = draw_hot_pixels(scene_->hot_pixels);
+    row_passes_.emplace_back(&VirtualSensor::add_hot_pixels);
   }
-  if (bloom && level > kWhite) {
-    const double glare = lamp_.radius + halo_reach(scene);
-    const double tail = lamp_.radius + std::log(kOverflowLevel / kFaintest);
-    const Stamp area = stamp_about(lamp_, glare, std::max(glare, tail + scene.overflow_up),
-                                   std::max(glare, tail + scene.overflow_down), layout_.size);
-    for (int y = area.y0; y < area.y1(); ++y) {
-      float* to = light_.row(y) + (area.x0 - light_.x0);
-      for (int i = 0; i < area.width; ++i) {
-        to[i] += static_cast<float>(bloom_at(scene, lamp_, area.x0 + i - lamp_.x, y - lamp_.y.value()));
-      }
-    }
-  }
-  if (scene.has(Pass::smear)) add_smear(scene, pulses);
+  if (listed(Pass::shot_noise) || listed(Pass::read_noise)) choose_noise();
+  choose_converter();
 }
 
-void VirtualSensor::add_smear(const VirtualScene& scene, std::span<const LightPulse> pulses) {
+void VirtualSensor::choose_strobe_light() {
+  const double image_height = layout_.size.height;
+  const bool bloom = scene_->has(Pass::bloom);
+  const double reach = lamp_.radius + std::max(5 * kEdgeSigma, bloom ? halo_reach(*scene_) : 0);
+  light_ = stamp_about({lamp_.x, Rows(image_height / 2), lamp_.radius}, reach, image_height, image_height,
+                       layout_.size);
+  frame_passes_.emplace_back(&VirtualSensor::clear_light);
+  if (scene_->has(Pass::lamp)) frame_passes_.emplace_back(&VirtualSensor::draw_lamp);
+  if (bloom) {
+    bloom_shape_ = bloom_shape(*scene_, lamp_, layout_.size);
+    frame_passes_.emplace_back(&VirtualSensor::draw_bloom);
+  }
+  if (scene_->has(Pass::smear)) frame_passes_.emplace_back(&VirtualSensor::draw_smear);
+  row_passes_.emplace_back(&VirtualSensor::add_strobe_light);
+}
+
+void VirtualSensor::choose_noise() {
+  // The sum of two independent normal numbers is one of the summed variance: both passes share a draw.
+  const auto read = static_cast<float>(scene_->read_noise * scene_->read_noise);
+  const auto gain = static_cast<float>(1 / scene_->electrons_per_level);
+  const auto add = [this](auto variance) {
+    row_passes_.emplace_back(
+        [variance](VirtualSensor& sensor, const Shot& shot, int y) { sensor.add_noise(shot, y, variance); });
+  };
+  if (!scene_->has(Pass::shot_noise)) return add([read](float) { return read; });
+  if (!scene_->has(Pass::read_noise)) return add([gain](float v) { return gain * std::max(0.0F, v); });
+  add([read, gain](float v) { return read + gain * std::max(0.0F, v); });
+}
+
+void VirtualSensor::choose_converter() {
+  const auto to_nearest = [half = 0.5F](float v) {
+    return static_cast<int>(v + half);
+  };  // v >= 0; lround is slow
+  const bool coarse = scene_->has(Pass::quantise) && scene_->adc_bits < layout_.bit_depth;
+  const auto white = static_cast<float>(layout_.white());
+  const auto adc_white = coarse ? static_cast<float>((1 << scene_->adc_bits) - 1) : white;
+  const auto code = [=, scale = adc_white / static_cast<float>(kWhite)](float v) {
+    return to_nearest(std::min(std::max(0.0F, v * scale), adc_white));
+  };
+  const auto choose = [this](auto convert) {
+    if (bytes_per_sample(layout_.format) == 1) {
+      convert_ = [convert](const VirtualSensor& s, int y, Image& to) {
+        s.store<std::uint8_t>(y, to, convert);
+      };
+    } else {
+      convert_ = [convert](const VirtualSensor& s, int y, Image& to) {
+        s.store<std::uint16_t>(y, to, convert);
+      };
+    }
+  };
+  if (!coarse) return choose(code);
+  choose([=, widen = white / adc_white](float v) { return to_nearest(static_cast<float>(code(v)) * widen); });
+}
+
+void VirtualSensor::draw_flame(const Shot& shot) {
+  flame_.assign(3 * static_cast<std::size_t>(layout_.size.width) * layout_.size.height, 0.0F);
+  scene_->flame->add_radiance(number_, shot.exposure.begin, shot.exposure.duration, flame_);
+}
+
+void VirtualSensor::clear_light(const Shot& /*shot*/) {
+  std::fill(light_.values.begin(), light_.values.end(), 0.0F);
+}
+
+double VirtualSensor::lamp_level(const Shot& shot) const {
+  double level = 0;
+  for (const LightPulse& p : shot.pulses) {
+    const Seconds lit = std::min(p.begin + p.width, Seconds(0)) - std::max(p.begin, -shot.exposure.duration);
+    if (lit > Seconds(0)) level += charge(*scene_, p) * (lit / p.width);
+  }
+  return level;
+}
+
+void VirtualSensor::draw_lamp(const Shot& shot) {
+  const double level = lamp_level(shot);
+  if (level > 0) add_stamp(lamp_shape_, static_cast<float>(level), light_);
+}
+
+void VirtualSensor::draw_bloom(const Shot& shot) {
+  if (lamp_level(shot) > kWhite) add_stamp(bloom_shape_, 1, light_);
+}
+
+void VirtualSensor::draw_smear(const Shot& shot) {
   const int margin = lamp_shape_.x0 - light_.x0;
-  for (const LightPulse& p : pulses) {
-    const double leak = charge(scene, p) * scene.smear_leak;
+  for (const LightPulse& p : shot.pulses) {
+    const double leak = charge(*scene_, p) * scene_->smear_leak;
     for (const FlashPart& part : split(timing_, {p.begin + p.width / 2, p.width})) {
       // Every lit row of the lamp leaks into the packet that stands under it.
       for (int y = lamp_shape_.y0; y < lamp_shape_.y1(); ++y) {
@@ -152,73 +257,30 @@ void VirtualSensor::add_smear(const VirtualScene& scene, std::span<const LightPu
   }
 }
 
-void VirtualSensor::draw_flame(const VirtualScene& scene, const Exposure& exposure) {
-  flame_.clear();
-  if (!scene.has(Pass::flame)) return;
-  flame_.resize(3 * static_cast<std::size_t>(layout_.size.width) * layout_.size.height);
-  scene.flame->add_radiance(number_, exposure.begin, exposure.duration, flame_);
+void VirtualSensor::add_flame(const Shot& /*shot*/, int y) {
+  const int width = layout_.size.width;
+  const float* rgb = flame_.data() + 3 * static_cast<std::size_t>(width) * y;
+  if (channels(layout_.format) == 3) {
+    add_scaled(rgb, 3 * width, 1, row_.data());
+  } else if (is_bayer(layout_.format)) {
+    for (int x = 0; x < width; ++x) row_[x] += rgb[3 * x + (x & 1) + (y & 1)];  // R G / G B
+  } else {
+    for (int x = 0; x < width; ++x) row_[x] += luminance(rgb + 3 * x);
+  }
 }
 
-void VirtualSensor::compose_row(const VirtualScene& scene, int y) {
-  const int width = layout_.size.width;
+void VirtualSensor::add_strobe_light(const Shot& /*shot*/, int y) {
   const int n = channels(layout_.format);
-  std::fill(row_.begin(), row_.end(), static_cast<float>(scene.background));
-  if (!flame_.empty()) {
-    const float* rgb = flame_.data() + 3 * static_cast<std::size_t>(width) * y;
-    if (n == 3) {
-      add_scaled(rgb, 3 * width, 1, row_.data());
-    } else if (is_bayer(layout_.format)) {
-      for (int x = 0; x < width; ++x) row_[x] += rgb[3 * x + (x & 1) + (y & 1)];  // R G / G B
-    } else {
-      for (int x = 0; x < width; ++x) row_[x] += luminance(rgb + 3 * x);
-    }
-  }
   const float* white = light_.row(y);  // the strobe is white: the same for every colour
   for (int i = 0; i < light_.width; ++i) {
     for (int c = 0; c < n; ++c) row_[(light_.x0 + i) * n + c] += white[i];
   }
+}
+
+void VirtualSensor::add_hot_pixels(const Shot& /*shot*/, int y) {
   const auto first =
       std::lower_bound(hot_.begin(), hot_.end(), y, [](const Point& p, int v) { return p.y < v; });
   for (auto p = first; p != hot_.end() && p->y == y; ++p) row_[p->sample] += p->level;
-}
-
-void VirtualSensor::add_noise(const VirtualScene& scene, int y, std::uint64_t key) {
-  // The sum of two independent normal numbers is one of the summed variance: both passes share a draw.
-  const double read = scene.has(Pass::read_noise) ? scene.read_noise * scene.read_noise : 0;
-  const double shot = scene.has(Pass::shot_noise) ? 1 / scene.electrons_per_level : 0;
-  const NormalTable& normal = NormalTable::instance();
-  const std::size_t samples = row_.size();
-  std::uint64_t counter = static_cast<std::uint64_t>(y) << 32;
-  for (std::size_t i = 0; i < samples; i += 3) {
-    const std::uint64_t bits = mix64(counter++ ^ key);
-    normal_[i] = normal(bits);
-    normal_[i + 1] = normal(bits >> NormalTable::kBitsEach);
-    normal_[i + 2] = normal(bits >> (2 * NormalTable::kBitsEach));
-  }
-  const auto r = static_cast<float>(read);
-  const auto s = static_cast<float>(shot);
-  for (std::size_t i = 0; i < samples; ++i)
-    row_[i] += normal_[i] * std::sqrt(r + s * std::max(0.0F, row_[i]));
-}
-
-void VirtualSensor::store_row(const VirtualScene& scene, int y, Image& image) const {
-  const int bits =
-      scene.has(Pass::quantise) ? std::min(scene.adc_bits, layout_.bit_depth) : layout_.bit_depth;
-  const auto adc_white = static_cast<float>((1 << bits) - 1);
-  const float scale = adc_white / static_cast<float>(kWhite);
-  const auto widen = static_cast<float>(layout_.white()) / adc_white;
-  const auto to_nearest = [half = 0.5F](float v) {
-    return static_cast<int>(v + half);
-  };  // v >= 0; lround is slow
-  const auto convert = [&](auto* to) {
-    using Sample = std::remove_pointer_t<decltype(to)>;
-    for (std::size_t i = 0; i < row_.size(); ++i) {
-      const int code = to_nearest(std::min(std::max(0.0F, row_[i] * scale), adc_white));
-      to[i] = static_cast<Sample>(to_nearest(static_cast<float>(code) * widen));
-    }
-  };
-  bytes_per_sample(layout_.format) == 1 ? convert(image.row_as<std::uint8_t>(y))
-                                        : convert(image.row_as<std::uint16_t>(y));
 }
 
 std::vector<VirtualSensor::Point> VirtualSensor::draw_hot_pixels(int count) const {

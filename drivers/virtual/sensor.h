@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -40,22 +42,42 @@ class VirtualSensor {
   /// `number` is the camera's in the rig, as the scene's LightField counts. `options` are valid.
   VirtualSensor(const VirtualCameraOptions& options, int number, std::uint64_t seed);
 
-  /// `pulses`: the strobe's light during [-T, K t_row) about the start of this frame's read phase.
-  Image expose(const VirtualScene& scene, std::span<const LightPulse> pulses, const Exposure& exposure);
+  /// `pulses`: the strobe's light during [-T, K t_row) about the start of this frame's read phase. The passes
+  /// are chosen once, when `scene` isn't that of the call before: what it doesn't list is not asked after in
+  /// a frame, a row or a pixel.
+  Image expose(const std::shared_ptr<const VirtualScene>& scene, std::span<const LightPulse> pulses,
+               const Exposure& exposure);
 
  private:
+  struct Shot {
+    std::span<const LightPulse> pulses;
+    Exposure exposure;
+    std::uint64_t noise_key = 0;
+  };
   struct Point {
     int sample;  // within the row
     int y;
     float level;
   };
 
-  void draw_lamp_light(const VirtualScene& scene, std::span<const LightPulse> pulses, Seconds exposure);
-  void add_smear(const VirtualScene& scene, std::span<const LightPulse> pulses);
-  void draw_flame(const VirtualScene& scene, const Exposure& exposure);
-  void compose_row(const VirtualScene& scene, int y);
-  void add_noise(const VirtualScene& scene, int y, std::uint64_t key);
-  void store_row(const VirtualScene& scene, int y, Image& image) const;
+  void choose_passes();
+  void choose_strobe_light();
+  void choose_noise();
+  void choose_converter();
+
+  void draw_flame(const Shot& shot);
+  void clear_light(const Shot& shot);
+  void draw_lamp(const Shot& shot);
+  void draw_bloom(const Shot& shot);
+  void draw_smear(const Shot& shot);
+  void add_flame(const Shot& shot, int y);
+  void add_strobe_light(const Shot& shot, int y);
+  void add_hot_pixels(const Shot& shot, int y);
+  template <class Variance>
+  void add_noise(const Shot& shot, int y, Variance variance);
+  template <class Sample, class Convert>
+  void store(int y, Image& image, Convert convert) const;
+  [[nodiscard]] double lamp_level(const Shot& shot) const;
   [[nodiscard]] std::vector<Point> draw_hot_pixels(int count) const;
 
   ImageLayout layout_;
@@ -65,10 +87,17 @@ class VirtualSensor {
   int number_;
   std::uint64_t seed_;  // of this camera
 
+  // What the scene calls for, in the order of the work.
+  std::shared_ptr<const VirtualScene> scene_;
+  std::vector<std::function<void(VirtualSensor&, const Shot&)>> frame_passes_;
+  std::vector<std::function<void(VirtualSensor&, const Shot&, int y)>> row_passes_;
+  std::function<void(const VirtualSensor&, int y, Image&)> convert_;
+
   Stamp lamp_shape_;           // 1 at the lamp's centre
+  Stamp bloom_shape_;          // grey levels about a lamp that saturates
   Stamp light_;                // of lamp, bloom and smear: the full height of the columns about the lamp
   std::vector<Point> hot_;     // by row
-  std::vector<float> flame_;   // 3 w h, empty when the scene has none
+  std::vector<float> flame_;   // 3 w h
   std::vector<float> row_;     // samples of the row in work, grey levels 0..255
   std::vector<float> normal_;  // and its noise, standard normal
 };

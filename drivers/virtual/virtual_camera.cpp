@@ -151,7 +151,7 @@ Frame VirtualCamera::draw(std::uint64_t frame_id) {
   const TimePoint begin = read_start(frame_id);
   const auto scene = scene_of(frame_id);
   const Seconds exposed = exposure(*scene);
-  Image image = sensor_.expose(*scene, light_on(frame_id), {frame_id, begin - exposed, exposed});
+  Image image = sensor_.expose(scene, light_on(frame_id), {frame_id, begin - exposed, exposed});
 
   const TimePoint arrival = read_end(frame_id);
   // The camera's clock runs on the crystal that also times its frames.

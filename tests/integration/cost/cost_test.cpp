@@ -1,13 +1,11 @@
 // An effect that is off costs no instructions: the library's marches under no extinction against marches
 // written down for emission alone, compiled alike, counted by valgrind's callgrind.
-#include <cmath>
-#include <cstdlib>
 #include <string>
 
 #include <gtest/gtest.h>
 
 #include "recon/render/march_table.h"
-#include "tests/support/shell.h"
+#include "tests/integration/cost/callgrind.h"
 
 namespace emberlock {
 namespace {
@@ -33,15 +31,9 @@ class Cost : public testing::TestWithParam<Level> {
   /// Executed by the case's work.
   [[nodiscard]] static double instructions(const std::string& name) {
     const Level& level = GetParam();
-    const Shell run = shell(std::string("EMBERLOCK_ISA=") + level.name +
-                            " valgrind --tool=callgrind --toggle-collect='emberlock::measured*' "
-                            "--callgrind-out-file=/dev/null " +
-                            level.program + " " + name);
-    const std::size_t at = run.output.find("Collected : ");
-    EXPECT_EQ(run.status, 0) << run.output;
+    const Counted run = count_instructions(level.program, name, std::string("EMBERLOCK_ISA=") + level.name);
     EXPECT_NE(run.output.find(std::string("\n") + level.name + " "), std::string::npos) << run.output;
-    if (at == std::string::npos) return NAN;
-    return std::strtod(run.output.c_str() + at + sizeof("Collected :"), nullptr);
+    return run.instructions;
   }
 };
 

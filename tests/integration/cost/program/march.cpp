@@ -6,17 +6,12 @@
 
 #include "recon/render/render.h"
 #include "tests/integration/cost/program/by_hand.h"
+#include "tests/integration/cost/program/measured.h"
 #include "tests/support/march_case.h"
 
 namespace emberlock {
 
 using Cases = std::map<std::string, std::function<void()>>;
-
-/// Where callgrind starts and stops to count.
-__attribute__((noinline)) void measured(const std::function<void()>& work) {
-  work();
-  asm volatile("" ::: "memory");
-}
 
 // With the table's signatures.
 __attribute__((noinline)) void forward_by_hand(const MarchWork<float>& w, std::size_t begin,

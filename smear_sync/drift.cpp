@@ -5,7 +5,10 @@
 #include <complex>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <vector>
+
+#include "smear_sync/staircase.h"
 
 namespace emberlock {
 namespace {
@@ -44,10 +47,11 @@ double gathering_rate(const std::vector<Point>& points, double span, const Drift
     }
     return best;
   };
+  const double expected = options.expected.value() * 1e-6;
   const double fastest = options.fastest.value() * 1e-6;
   // Half a lobe of the resultant is period / span wide; an eighth of it can't miss the top.
   const double step = std::min(period / span / 8, fastest / 8);
-  const double coarse = best_of(-fastest, fastest, step);
+  const double coarse = best_of(expected - fastest, expected + fastest, step);
   return best_of(coarse - step, coarse + step, step / 8);
 }
 
@@ -111,10 +115,14 @@ Line robust_line(const std::vector<Point>& points) {
   return line;
 }
 
-/// When |error + rate t| reaches the tolerance, from |error| <= tolerance on.
-double crossing(double error, double rate, double tolerance) {
-  if (rate == 0) return std::numeric_limits<double>::infinity();
-  return (tolerance - std::copysign(1.0, rate) * error) / std::abs(rate);
+/// Leaves the tolerance upwards: the first t >= 0 with error + rate t + curve t^2 / 2 = tolerance.
+double first_reached(double error, double rate, double curve, double tolerance) {
+  const double gap = tolerance - error;
+  if (gap <= 0) return 0;
+  const double root = square(rate) + 2 * curve * gap;
+  if (root < 0) return std::numeric_limits<double>::infinity();
+  const double down = rate + std::sqrt(root);  // 2 gap / down is the nearer root, without a difference
+  return down > 0 ? 2 * gap / down : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace
@@ -147,44 +155,109 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
     sum += std::polar(1 / square(p.sigma), 2 * std::numbers::pi * (p.tau - gathered * p.t) / period);
   const double centre = std::arg(sum) / (2 * std::numbers::pi) * period;
   for (Point& p : points) p.tau = wrap_symmetric(p.tau - gathered * p.t - centre, period);
-  const Line line = robust_line(points);
+  Line line = robust_line(points);
+  line.level += centre + gathered * line.middle;
+  line.rate += gathered;
 
+  const double row_time = options.row_time.value();
+  const Seconds resolution =
+      row_time > 0 ? row_resolution(options.row_time, options.flash_width) : Seconds(0);
+  line.level_variance += square(resolution.value());
+  line.rate_variance += square(staircase_rate_error(resolution, Seconds(span)));
+  std::optional<StairFit> stairs;
+  if (resolution > Seconds(0)) {
+    std::vector<StairPoint> seen;
+    for (const PhaseSample& s : samples) {
+      if (s.phase.state != PhaseState::known) continue;
+      const double read =
+          std::sqrt(std::max(0.0, square(s.phase.sigma.value()) - square(resolution.value())));
+      seen.push_back(
+          {(s.at - first).value() - line.middle, s.phase.tau.value() / row_time - 0.5, read / row_time});
+    }
+    stairs = fit_stairs(seen, {.level = line.level / row_time,
+                               .rate = line.rate / row_time,
+                               .span = span,
+                               .turn = period / row_time,
+                               .width = (options.flash_width / options.row_time).value()});
+  }
   Drift drift;
   drift.at = first + Seconds(line.middle);
-  drift.tau = Seconds(wrap_positive(line.level + centre + gathered * line.middle, period));
-  drift.tau_sigma = Seconds(std::sqrt(line.level_variance + square(options.resolution.value())));
-  drift.rate = PartsPerMillion((line.rate + gathered) * 1e6);
-  drift.rate_sigma = PartsPerMillion(
-      1e6 * std::sqrt(line.rate_variance + square(staircase_rate_error(options.resolution, Seconds(span)))));
   drift.samples = static_cast<int>(points.size());
+  double level = line.level;
+  double level_sigma = std::sqrt(line.level_variance);
+  double rate = line.rate;
+  double rate_sigma = std::sqrt(line.rate_variance);
+  if (stairs) {
+    level = stairs->level * row_time;
+    level_sigma = stairs->level_sigma * row_time;
+    rate = stairs->rate * row_time;
+    rate_sigma = stairs->rate_sigma * row_time;
+  }
+  drift.tau = wrap_positive(Seconds(level), options.period);
+  const Rows shifted = row_time > 0 ? drift.tau / options.row_time : Rows(0);
+  drift.tau_sigma = Seconds(std::hypot(level_sigma, (shifted * options.row_time_sigma).value()));
+  drift.rate = PartsPerMillion(rate * 1e6);
+  drift.rate_sigma = PartsPerMillion(rate_sigma * 1e6);
   return drift;
 }
 
-TimeLeft time_left(const Drift& error, TimePoint now, Seconds tolerance, Seconds period) {
+Phase phase_at(const Drift& line, TimePoint at, Seconds period) {
+  const double elapsed = (at - line.at).value();
+  return {PhaseState::known,
+          wrap_positive(line.tau + Seconds(line.rate.value() * 1e-6 * elapsed), period),
+          Seconds(std::hypot(line.tau_sigma.value(), line.rate_sigma.value() * 1e-6 * elapsed)),
+          {}};
+}
+
+Drift difference(const Drift& a, const Drift& b, Seconds period) {
+  // Between the two middles both phases are known best.
+  const double wa = 1 / std::max(square(a.rate_sigma.value()), 1e-18);
+  const double wb = 1 / std::max(square(b.rate_sigma.value()), 1e-18);
+  const TimePoint at = a.at + (b.at - a.at) * (wb / (wa + wb));
+  const Phase pa = phase_at(a, at, period);
+  const Phase pb = phase_at(b, at, period);
+  return {.at = at,
+          .tau = wrap_positive(pa.tau - pb.tau, period),
+          .tau_sigma = Seconds(std::hypot(pa.sigma.value(), pb.sigma.value())),
+          .rate = a.rate - b.rate,
+          .rate_sigma = PartsPerMillion(std::hypot(a.rate_sigma.value(), b.rate_sigma.value())),
+          .samples = std::min(a.samples, b.samples)};
+}
+
+Hertz frame_rate(const Drift& line, Hertz flash_rate) { return flash_rate * (1 + line.rate.value() * 1e-6); }
+
+TimeLeft time_left(const Drift& error, TimePoint now, const TimeLeftOptions& options) {
   const double elapsed = (now - error.at).value();
   const double rate = error.rate.value() * 1e-6;
-  const double rate_spread = 2 * error.rate_sigma.value() * 1e-6;
-  const double level = wrap_symmetric(error.tau.value() + rate * elapsed, period.value());
+  const double curve = options.wander_per_minute.value() * 1e-6 / 60;
+  // What wandered between the fit's middle and now is unknown as well.
+  const double wandered = curve * std::abs(elapsed);
+  const double rate_spread = options.sigmas * error.rate_sigma.value() * 1e-6 + wandered;
+  const double level = wrap_symmetric(error.tau.value() + rate * elapsed, options.period.value());
   const double level_spread =
-      2 * std::hypot(error.tau_sigma.value(), error.rate_sigma.value() * 1e-6 * elapsed);
-  const double bound = tolerance.value();
+      options.sigmas * std::hypot(error.tau_sigma.value(), error.rate_sigma.value() * 1e-6 * elapsed) +
+      wandered * std::abs(elapsed) / 2;
+  const double bound = options.tolerance.value();
   if (std::abs(level) > bound) return {};
 
   TimeLeft left;
-  left.expected = Seconds(crossing(level, rate, bound));
+  const auto leaves = [&](double e, double r, double c) {
+    return std::min(first_reached(e, r, c, bound), first_reached(-e, -r, c, bound));
+  };
+  left.expected = Seconds(leaves(level, rate, 0));
   double earliest = left.expected.value();
-  double latest = left.expected.value();
-  for (const double r : {rate - rate_spread, rate + rate_spread}) {
-    for (const double e : {level - level_spread, level + level_spread}) {
-      const double t = crossing(std::clamp(e, -bound, bound), r, bound);
-      earliest = std::min(earliest, t);
-      latest = std::max(latest, t);
-    }
+  for (const double e : {level - level_spread, level + level_spread}) {
+    for (const double r : {rate - rate_spread, rate + rate_spread})
+      earliest = std::min(earliest, leaves(e, r, curve));
   }
-  // A rate of zero lies in between: it may stay for ever.
-  if (std::abs(rate) <= rate_spread) latest = std::numeric_limits<double>::infinity();
   left.earliest = Seconds(earliest);
-  left.latest = Seconds(latest);
+  // The slowest way out starts as far from the bound as may be, and brakes; one that may stand still stays
+  // for ever.
+  const double sign = std::copysign(1.0, rate);
+  const double slowest = std::abs(rate) - rate_spread;
+  const double start = std::max(sign * level - level_spread, -bound);
+  left.latest = Seconds(slowest > 0 ? first_reached(start, slowest, -curve, bound)
+                                    : std::numeric_limits<double>::infinity());
   return left;
 }
 

@@ -75,7 +75,8 @@ TEST(Drift, StaircaseOfASlowDrift) {
       s.phase.sigma = Rows(0.05) * kRow;
     }
     auto with = options();
-    with.resolution = row_resolution(kRow, Seconds(0));
+    with.row_time = kRow;
+    with.flash_width = Seconds(0);
     const auto drift = fit_drift(samples, with);
     ASSERT_TRUE(drift.ok());
     EXPECT_GT(drift->rate_sigma, PartsPerMillion(1));
@@ -113,36 +114,38 @@ Drift drift_of(double rows, double ppm, double ppm_sigma) {
   return drift;
 }
 
+const TimeLeftOptions kTolerance{.tolerance = Rows(100) * kRow, .period = kPeriod};
+
 TEST(TimeLeft, ClosedForm) {
   // 54 ppm is one row a second: from +30 rows to +100 in 70 s, from -30 in 130 s.
-  const auto ahead = time_left(drift_of(30, 54, 0), {}, Rows(100) * kRow, kPeriod);
+  const auto ahead = time_left(drift_of(30, 54, 0), {}, kTolerance);
   EXPECT_NEAR(ahead.expected.value(), 70, 1e-6);
   EXPECT_NEAR(ahead.earliest.value(), 70, 1e-6);
   EXPECT_NEAR(ahead.latest.value(), 70, 1e-6);
-  EXPECT_NEAR(time_left(drift_of(-30, 54, 0), {}, Rows(100) * kRow, kPeriod).expected.value(), 130, 1e-6);
-  EXPECT_NEAR(time_left(drift_of(-30, -54, 0), {}, Rows(100) * kRow, kPeriod).expected.value(), 70, 1e-6);
+  EXPECT_NEAR(time_left(drift_of(-30, 54, 0), {}, kTolerance).expected.value(), 130, 1e-6);
+  EXPECT_NEAR(time_left(drift_of(-30, -54, 0), {}, kTolerance).expected.value(), 70, 1e-6);
 }
 
 TEST(TimeLeft, CountsFromNow) {
   const TimePoint later = TimePoint{} + Seconds(20);
-  EXPECT_NEAR(time_left(drift_of(30, 54, 0), later, Rows(100) * kRow, kPeriod).expected.value(), 50, 1e-6);
+  EXPECT_NEAR(time_left(drift_of(30, 54, 0), later, kTolerance).expected.value(), 50, 1e-6);
 }
 
 TEST(TimeLeft, UncertainRateGivesAnInterval) {
-  const auto left = time_left(drift_of(0, 54, 5.4), {}, Rows(100) * kRow, kPeriod);
+  const auto left = time_left(drift_of(0, 54, 5.4), {}, kTolerance);
   EXPECT_NEAR(left.earliest.value(), 100 / 1.2, 0.01);
   EXPECT_NEAR(left.latest.value(), 100 / 0.8, 0.01);
 }
 
 TEST(TimeLeft, ARateThatMayBeZeroMayLastForEver) {
-  const auto left = time_left(drift_of(0, 1, 5), {}, Rows(100) * kRow, kPeriod);
+  const auto left = time_left(drift_of(0, 1, 5), {}, kTolerance);
   EXPECT_TRUE(std::isfinite(left.expected.value()));
   EXPECT_TRUE(std::isinf(left.latest.value()));
-  EXPECT_TRUE(std::isinf(time_left(drift_of(0, 0, 0), {}, Rows(100) * kRow, kPeriod).expected.value()));
+  EXPECT_TRUE(std::isinf(time_left(drift_of(0, 0, 0), {}, kTolerance).expected.value()));
 }
 
 TEST(TimeLeft, OutsideIsNoTimeAtAll) {
-  EXPECT_EQ(time_left(drift_of(120, -54, 1), {}, Rows(100) * kRow, kPeriod).latest.value(), 0);
+  EXPECT_EQ(time_left(drift_of(120, -54, 1), {}, kTolerance).latest.value(), 0);
 }
 
 }  // namespace

@@ -157,7 +157,9 @@ std::optional<StairFit> fit_stairs(std::span<const StairPoint> points, const Sta
     if (heat == 1 && stride == 1 && zoom >= 2) break;
     grid.centre = m.mean;
     const Eigen::Matrix2d shape = m.covariance + 0.05 * grid.steps * grid.steps.transpose();
-    grid.steps = shape.llt().matrixL().toDenseMatrix() * (kReach / kHalf);
+    const Eigen::Matrix2d narrower = shape.llt().matrixL().toDenseMatrix() * (kReach / kHalf);
+    // What the points leave open is bounded by where the start may be at all.
+    if (std::abs(narrower.determinant()) < std::abs(grid.steps.determinant())) grid.steps = narrower;
   }
   return StairFit{m.mean.x(), std::sqrt(m.covariance(0, 0)), m.mean.y(), std::sqrt(m.covariance(1, 1))};
 }

@@ -13,11 +13,13 @@
 namespace emberlock {
 
 // A dot fixes a camera's phase modulo the frame period; which frames belong together is told by flashes that
-// the strobe skips. The code is a cycle of words, `spacing` flashes from one to the next; all flashes between
-// words are given. A word is 31 flashes of a maximum-length sequence (x^5 + x^2 + 1: 16 given, 15 skipped,
-// never more than 4 skipped in a row), and word w is that sequence turned by w places: two different words,
-// and a word and itself out of place by up to its length, differ in about half of their flashes. So one word
-// numbers a frame among all `flashes()` of the cycle, and a few frames misread do no harm.
+// the strobe skips. The code is a cycle of words, `spacing` flashes from the start of one to that of the
+// next; all flashes between words are given. Word w is a Gold sequence (R. Gold, 1967) of 31 flashes: the
+// exclusive or of the maximum-length sequences of x^5 + x^2 + 1 and, turned by w places, of x^5 + x^4 + x^3 +
+// x^2 + 1, of which all words and all their turns differ from one another in at least 11 flashes. In the
+// default cycle any two windows of one spacing and a word differ in at least 12 frames: so many must be
+// misread, or nearly, before a number is wrong. A word skips 11 to 19 flashes, at most 9 in a row, so one
+// flash in eight is skipped in all.
 //
 // Flashes are numbered from 0 at the start of the first word (StrobeSettings::code[0] plays first when the
 // settings are applied), modulo flashes().

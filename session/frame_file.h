@@ -1,12 +1,21 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "base/image.h"
+#include "base/quantity.h"
 #include "base/result.h"
 
 namespace emberlock {
+
+/// What a video says of itself: claims, not measurements.
+struct VideoClaims {
+  std::optional<Hertz> frame_rate{};
+  std::optional<std::int64_t> frames{};
+};
 
 /// Frames of a file that somebody else made: one image (PGM, PPM, PNG, JPEG, TIFF, FITS) or a video that
 /// FFmpeg reads. Grey stays grey, colour becomes rgb8 or rgb16; 10..16-bit samples keep their values
@@ -19,6 +28,7 @@ class FrameFile {
   virtual ~FrameFile() = default;
   /// The next frame; `out_of_data` after the last, `bad_input` where the file is damaged.
   virtual Result<Image> next() = 0;
+  [[nodiscard]] virtual VideoClaims claims() const { return {}; }
 };
 
 /// The only frame of an image file.

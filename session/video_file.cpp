@@ -6,6 +6,7 @@ extern "C" {
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <utility>
 #include <vector>
@@ -108,6 +109,22 @@ class VideoFile final : public FrameFile {
       if (code != AVERROR(EAGAIN)) return damaged(av_message(code));
       EMBERLOCK_RETURN_IF_ERROR(feed());
     }
+  }
+
+  [[nodiscard]] VideoClaims claims() const override {
+    const AVStream& stream = *input_.format->streams[input_.stream];
+    VideoClaims claims;
+    const double rate = stream.avg_frame_rate.den > 0 ? av_q2d(stream.avg_frame_rate) : 0;
+    if (rate > 0) claims.frame_rate = Hertz(rate);
+    const double seconds = stream.duration != AV_NOPTS_VALUE
+                               ? static_cast<double>(stream.duration) * av_q2d(stream.time_base)
+                               : static_cast<double>(input_.format->duration) / AV_TIME_BASE;
+    if (stream.nb_frames > 0) {
+      claims.frames = stream.nb_frames;
+    } else if (rate > 0 && seconds > 0) {
+      claims.frames = std::llround(seconds * rate);
+    }
+    return claims;
   }
 
  private:

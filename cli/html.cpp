@@ -93,11 +93,12 @@ std::string polyline(const Series& s, const Scale& x, const Scale& y, const char
     }
     path += fmt::format("{}{:.1f} {:.1f}", pen_down ? "L" : "M", x(s.x[i]), y(s.y[i]));
     pen_down = true;
-    if (s.x.size() <= 60) {
+    if (s.x.size() <= 60 || s.mark == Mark::points) {
       dots +=
           fmt::format(R"(<circle cx="{:.1f}" cy="{:.1f}" r="2.5" fill="{}"/>)", x(s.x[i]), y(s.y[i]), colour);
     }
   }
+  if (s.mark == Mark::points) return dots;
   return fmt::format(R"(<path d="{}" fill="none" stroke="{}" stroke-width="1.6"{}/>)", path, colour,
                      dashed ? R"( stroke-dasharray="6 4")" : "") +
          dots;

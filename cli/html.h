@@ -17,11 +17,17 @@ std::string png_file(const Image& image);
 /// The same as a `data:` URI, so that a page stands alone.
 std::string png_data_uri(const Image& image);
 
+enum class Mark {
+  line,    ///< and points where there are few
+  points,  ///< alone
+};
+
 struct Series {
   std::string name;
   std::vector<double> x;
   std::vector<double> y;  ///< points that are not finite are gaps
   bool dashed = false;
+  Mark mark = Mark::line;
 };
 
 enum class Axis { linear, logarithmic };

@@ -11,6 +11,7 @@ namespace emberlock::cli {
 void add_smear(CLI::App& app);
 void add_align(CLI::App& app);
 void add_reconstruct(CLI::App& app);
+void add_verify(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 void add_demo(CLI::App& app);
 

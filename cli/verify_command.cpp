@@ -1,0 +1,149 @@
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "cli/verify_run.h"
+
+namespace emberlock::cli {
+namespace {
+
+struct VerifyArguments {
+  std::vector<std::string> clips;
+  double flash_rate = 0;
+  double row_time_us = 0;
+  std::string comb;
+  double comb_rate = 0;
+  std::string tolerance = "100rows";
+  double frame_rate = 0;
+  std::string direction;
+  int shifts = 0;
+  FrameCode code{};
+  double flash_width_us = 20;
+  bool json = false;
+  std::string out;
+};
+
+VerifyRunOptions options_from(const VerifyArguments& a) {
+  VerifyRunOptions options;
+  options.clips = a.clips;
+  options.comb = a.comb;
+  options.comb_rate = Hertz(a.comb_rate);
+  if (a.row_time_us > 0) options.row_time = microseconds_per_row(a.row_time_us);
+  options.verify.tolerance = or_fail(parse_tolerance(a.tolerance));
+  ClipOptions& clip = options.verify.clip;
+  clip.flash_rate = Hertz(a.flash_rate);
+  clip.flash_width = microseconds(a.flash_width_us);
+  if (a.frame_rate > 0) clip.frame_rate = Hertz(a.frame_rate);
+  if (!a.direction.empty())
+    clip.direction = a.direction == "top-first" ? ReadDirection::top_first : ReadDirection::bottom_first;
+  if (a.shifts > 0) clip.shifts = a.shifts;
+  clip.code = a.code;
+  return options;
+}
+
+void print_table(const VerifyRunResult& run) {
+  const VerifyResult& result = run.result;
+  const SecondsPerRow row = result.options.clip.row_time;
+  std::printf("%s\n", result.summary.c_str());
+  std::printf("reference %s, frame %lld; t_row %.4f us", result.cameras[result.reference].name.c_str(),
+              static_cast<long long>(result.middle), row.value() * 1e6);
+  if (run.row_clock) std::printf(" +- %.1f ns", run.row_clock->sigma.value() * 1e9);
+  if (result.worst_pair) {
+    std::printf("; worst pair %.3f ms (%.1f rows)", in_milliseconds(*result.worst_pair),
+                (*result.worst_pair / row).value());
+  }
+  std::printf("\n");
+  for (const CameraVerdict& c : result.cameras) {
+    std::printf("  %-24s %-17s", c.name.c_str(), std::string(name(c.state)).c_str());
+    if (c.error) {
+      std::printf(" %+8.3f ms +- %.3f", in_milliseconds(*c.error), in_milliseconds(c.sigma));
+    }
+    if (c.frame_offset) std::printf("  frame %+lld", static_cast<long long>(*c.frame_offset));
+    if (c.drift) std::printf("  %+.2f ppm", c.drift->value());
+    std::printf("\n    %s\n", c.reason.c_str());
+  }
+  for (const std::string& line : result.to_do) std::printf("- %s\n", line.c_str());
+}
+
+/// What the JSON has no room for.
+void print_notes(const VerifyRunResult& run) {
+  for (const std::string& note : run.notes) std::fprintf(stderr, "emberlock: %s\n", note.c_str());
+  for (const CameraVerdict& c : run.result.cameras) {
+    if (c.state != ClipState::in_sync)
+      std::fprintf(stderr, "emberlock: %s: %s\n", c.file.c_str(), c.reason.c_str());
+    if (!c.frame_offset)
+      std::fprintf(stderr, "emberlock: %s: no frame offset: %s\n", c.file.c_str(), c.offset_reason.c_str());
+  }
+}
+
+void verify(const VerifyArguments& arguments) {
+  const VerifyRunResult run = or_fail(run_verify(options_from(arguments), progress_bar("verify")));
+  if (arguments.json) {
+    std::printf("%s\n", verify_json(run.result)
+                            .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
+                            .c_str());
+    print_notes(run);
+  } else {
+    print_table(run);
+    for (const std::string& note : run.notes) std::printf("- %s\n", note.c_str());
+  }
+  if (!arguments.out.empty()) {
+    or_fail(write_verify_report(run, arguments.out));
+    std::fprintf(stderr, "emberlock: the report is %s\n",
+                 (std::filesystem::path(arguments.out) / "report.html").c_str());
+  }
+  if (run.result.verdict != ClipsVerdict::in_sync) throw CLI::RuntimeError(1);
+}
+
+}  // namespace
+
+void add_verify(CLI::App& app) {
+  auto a = std::make_shared<VerifyArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "verify",
+      "Judges video files of cameras that filmed one strobe: in sync, by how much, which frames belong "
+      "together.");
+  const auto positive = CLI::PositiveNumber;
+  verb->add_option("clips", a->clips, "one video a camera, the reference first")->required();
+  verb->add_option("--flash-rate", a->flash_rate, "of the strobe, flashes a second: about one a frame")
+      ->required()
+      ->check(positive);
+  auto* row_time =
+      verb->add_option("--row-time-us", a->row_time_us, "t_row, the time to shift one row")->check(positive);
+  auto* comb =
+      verb->add_option("--comb", a->comb, "a clip of one of the cameras under a fast strobe: tells t_row")
+          ->excludes(row_time);
+  verb->add_option("--comb-rate", a->comb_rate, "of the strobe in that clip, flashes a second: about 300")
+      ->check(positive)
+      ->needs(comb);
+  verb->add_option("--tolerance", a->tolerance, "to the reference, to either side: 100rows, 5.4ms or 500us")
+      ->capture_default_str();
+  verb->add_option("--frame-rate", a->frame_rate, "of the cameras, where the files claim a wrong one")
+      ->check(positive);
+  verb->add_option("--direction", a->direction,
+                   "the row that is read first, where the dots' walk doesn't tell")
+      ->check(CLI::IsMember({"top-first", "bottom-first"}));
+  verb->add_option("--shifts", a->shifts,
+                   "K, row shifts a read phase, where the walk doesn't tell; else the rows")
+      ->check(CLI::Range(1, 100000));
+  verb->add_option("--code-words", a->code.words, "of the code in which the strobe skips flashes")
+      ->check(CLI::Range(1, 31))
+      ->capture_default_str();
+  verb->add_option("--code-spacing", a->code.spacing, "flashes from one word of it to the next")
+      ->check(CLI::Range(32, 100000))
+      ->capture_default_str();
+  verb->add_option("--flash-width-us", a->flash_width_us, "duration of a flash")
+      ->check(positive)
+      ->capture_default_str();
+  verb->add_flag("--json", a->json, "the verdict as JSON on stdout");
+  verb->add_option("--out", a->out, "write report.html, with frames, fits and residuals, to this folder");
+  verb->callback([a] { verify(*a); });
+}
+
+}  // namespace emberlock::cli

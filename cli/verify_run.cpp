@@ -1,0 +1,107 @@
+#include "cli/verify_run.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace emberlock::cli {
+namespace {
+
+constexpr SecondsPerRow kRowTimeAsTold(20e-9);  // standard error of a row time given by hand
+
+Status check(const VerifyRunOptions& options) {
+  if (options.clips.size() < 2) {
+    return Error{ErrorKind::bad_input, "one clip alone is in sync with nothing", options.clips.front(),
+                 "give the clips of two cameras or more that filmed the same strobe"};
+  }
+  if (options.comb.empty() && !options.row_time) {
+    return Error{ErrorKind::bad_input, "the time that the sensor takes to shift a row isn't known", "verify",
+                 "film the strobe at about 300 flashes a second and add --comb CLIP --comb-rate HZ, or give "
+                 "--row-time-us"};
+  }
+  if (!options.comb.empty() && !(options.comb_rate > Hertz(0))) {
+    return Error{ErrorKind::bad_input, "the comb's flash rate isn't known", options.comb,
+                 "give --comb-rate, the strobe's flashes a second while it was filmed"};
+  }
+  return {};
+}
+
+/// The row time from the comb, and the direction and K that it tells of cameras whose own walk doesn't.
+Status learn_from_comb(const VerifyRunOptions& options, VerifyRunResult& run, VerifyOptions& verify) {
+  const ClipReading& comb = run.comb->reading;
+  const auto clock = fit_row_clock(comb.frames, options.comb_rate);
+  if (!clock.ok()) {
+    Error error = clock.error();
+    error.where = options.comb;
+    return error;
+  }
+  run.row_clock = *clock;
+  verify.clip.row_time = clock->row_time;
+  verify.clip.row_time_sigma = clock->sigma;
+  if (clock->near_integer_pitch) {
+    run.notes.push_back(
+        fmt::format("The comb's dots stand nearly whole rows apart ({:.3f}): t_row may be off by more than "
+                    "it says. Film the "
+                    "comb again at a rate that differs by a percent.",
+                    clock->pitch.value()));
+  }
+  if (!comb.claimed_rate) return {};
+  std::vector<FrameReading> frames;
+  for (std::size_t i = 0; i < comb.frames.size(); ++i)
+    frames.push_back({static_cast<std::int64_t>(i), comb.frames[i]});
+  const auto mode = find_read_mode(frames, {.flash_rate = options.comb_rate,
+                                            .frame_rate = verify.clip.frame_rate.value_or(*comb.claimed_rate),
+                                            .row_time = clock->row_time,
+                                            .row_time_sigma = clock->sigma,
+                                            .rows = comb.rows});
+  if (!mode.ok()) return mode.error();
+  if (!verify.clip.direction) verify.clip.direction = mode->direction;
+  if (!verify.clip.shifts) verify.clip.shifts = mode->shifts;
+  return {};
+}
+
+}  // namespace
+
+Result<VerifyRunResult> run_verify(const VerifyRunOptions& options, const Progress& progress) {
+  EMBERLOCK_RETURN_IF_ERROR(check(options));
+  std::vector<std::string> files = options.clips;
+  if (!options.comb.empty()) files.push_back(options.comb);
+  VerifyRunResult run;
+  EMBERLOCK_ASSIGN_OR_RETURN(run.clips, read_clips(files, progress));
+  VerifyOptions verify = options.verify;
+  if (!options.comb.empty()) {
+    run.comb = std::move(run.clips.back());
+    run.clips.pop_back();
+    EMBERLOCK_RETURN_IF_ERROR(learn_from_comb(options, run, verify));
+  } else {
+    verify.clip.row_time = *options.row_time;
+    verify.clip.row_time_sigma = kRowTimeAsTold;
+  }
+  std::vector<ClipReading> readings;
+  for (const FilmedClip& clip : run.clips) readings.push_back(clip.reading);
+  EMBERLOCK_ASSIGN_OR_RETURN(run.result, verify_clips(readings, verify));
+  return run;
+}
+
+nlohmann::ordered_json verify_json(const VerifyResult& result) {
+  using nlohmann::ordered_json;
+  ordered_json cameras = ordered_json::array();
+  for (const CameraVerdict& c : result.cameras) {
+    ordered_json camera;
+    camera["file"] = c.file;
+    camera["error_ms"] = c.error ? ordered_json(in_milliseconds(*c.error)) : nullptr;
+    camera["sigma_ms"] = c.error ? ordered_json(in_milliseconds(c.sigma)) : nullptr;
+    camera["frame_offset"] = c.frame_offset ? ordered_json(*c.frame_offset) : nullptr;
+    camera["drift_ppm"] = c.drift ? ordered_json(c.drift->value()) : nullptr;
+    camera["state"] = name(c.state);
+    cameras.push_back(std::move(camera));
+  }
+  ordered_json json;
+  json["reference"] = result.cameras[result.reference].file;
+  json["cameras"] = std::move(cameras);
+  json["worst_pair_ms"] = result.worst_pair ? ordered_json(in_milliseconds(*result.worst_pair)) : nullptr;
+  json["verdict"] = name(result.verdict);
+  return json;
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,200 @@
+// `emberlock verify` on video files that virtual cameras made: H.264 and others, of several models, started
+// at odd times; and on what people give it by mistake.
+#include <fstream>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/commands.h"
+#include "cli/verify_run.h"
+#include "tests/support/recording.h"
+#include "tests/support/strobe_clips.h"
+
+namespace emberlock::cli {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// Cameras of 240 rows that read for as long as ones of 720: a ninth of the pixels to code.
+VirtualRigDraw small_model() {
+  VirtualRigDraw draw;
+  draw.layout.size = {320, 240};
+  draw.row_time = microseconds_per_row(160);
+  return draw;
+}
+
+const FrameCode kShortCode{.words = 8, .spacing = 60};
+
+struct Outcome {
+  int exit_code = 0;
+  std::string out, err;
+};
+Outcome run(std::vector<std::string> arguments) {
+  CLI::App app;
+  add_verify(app);
+  arguments.insert(arguments.begin(), "verify");
+  std::reverse(arguments.begin(), arguments.end());
+  Outcome outcome;
+  testing::internal::CaptureStdout();
+  testing::internal::CaptureStderr();
+  try {
+    app.parse(arguments);
+  } catch (const CLI::RuntimeError& e) {
+    outcome.exit_code = e.get_exit_code();
+  } catch (const CLI::ParseError& e) {
+    outcome.exit_code = 2;
+    outcome.err = e.what();
+  }
+  outcome.out = testing::internal::GetCapturedStdout();
+  outcome.err += testing::internal::GetCapturedStderr();
+  return outcome;
+}
+
+class VerifyClips : public testing::Test {
+ protected:
+  /// Films a rig and its comb; the arguments of the verb for them.
+  std::vector<std::string> film(const test::StrobeFilm& film) {
+    truths_ = test::film_strobe(film, folder_.path());
+    std::filesystem::create_directories(folder_ / "comb");
+    const auto comb = test::film_strobe(test::comb_of(film, 0, 36), folder_ / "comb");
+    std::vector<std::string> arguments;
+    for (const auto& truth : truths_) arguments.push_back(truth.file);
+    for (const std::string& a :
+         {std::string("--flash-rate"), fmt::format("{}", film.strobe.rate.value()), std::string("--comb"),
+          comb[0].file, std::string("--comb-rate"), std::string("300"), std::string("--code-words"),
+          std::string("8"), std::string("--code-spacing"), std::string("60")})
+      arguments.push_back(a);
+    return arguments;
+  }
+  static void expect_truth(const nlohmann::json& camera, const test::ClipTruth& truth) {
+    EXPECT_NEAR(
+        wrap_symmetric(camera.at("error_ms").get<double>() - in_milliseconds(truth.error), 1000 / 23.976), 0,
+        0.02)
+        << truth.file;
+    EXPECT_EQ(camera.at("frame_offset").get<int>(), truth.frame_offset) << truth.file;
+    EXPECT_NEAR(camera.at("drift_ppm").get<double>(), truth.drift_ppm, 3) << truth.file;
+  }
+
+  test::TempFolder folder_;
+  std::vector<test::ClipTruth> truths_;
+};
+
+TEST_F(VerifyClips, OfEveryCodecAreToldToTwentyMicrosecondsAndToTheFrame) {
+  struct Case {
+    std::uint64_t seed;
+    AVCodecID codec;
+    int crf;
+    const char* suffix;
+  };
+  for (const Case& c : {Case{41, AV_CODEC_ID_H264, 18, ".mp4"}, Case{42, AV_CODEC_ID_H264, 28, ".mkv"},
+                        Case{43, AV_CODEC_ID_MJPEG, 0, ".avi"}}) {
+    test::StrobeFilm with = test::random_film(c.seed, 2, small_model(), kShortCode);
+    with.format.codec = c.codec;
+    with.format.crf = c.crf;
+    with.suffix = c.suffix;
+    with.frames = 240;
+    const Outcome outcome = run([&] {
+      std::vector<std::string> arguments = film(with);
+      arguments.emplace_back("--json");
+      return arguments;
+    }());
+    const nlohmann::json json = nlohmann::json::parse(outcome.out);
+    ASSERT_EQ(json.at("cameras").size(), truths_.size());
+    for (std::size_t i = 0; i < truths_.size(); ++i) expect_truth(json.at("cameras")[i], truths_[i]);
+  }
+}
+
+TEST_F(VerifyClips, GiveTheJsonOfTheManualAndAReportThatStandsAlone) {
+  test::StrobeFilm with = test::random_film(44, 2, small_model(), kShortCode);
+  with.format = {};
+  with.suffix = ".mp4";
+  with.frames = 120;
+  with.rig.cameras[0].first_phase = with.rig.cameras[1].first_phase = Seconds(0);
+  with.starts = {0.5, 0.5 + 0.001};
+  std::vector<std::string> arguments = film(with);
+  for (const char* a : {"--json", "--out"}) arguments.emplace_back(a);
+  arguments.push_back((folder_ / "report").string());
+  const Outcome outcome = run(arguments);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
+  const auto json = nlohmann::ordered_json::parse(outcome.out);
+  std::vector<std::string> keys;
+  for (const auto& [key, value] : json.items()) keys.push_back(key);
+  EXPECT_THAT(keys, ElementsAre("reference", "cameras", "worst_pair_ms", "verdict"));
+  keys.clear();
+  for (const auto& [key, value] : json.at("cameras")[1].items()) keys.push_back(key);
+  EXPECT_THAT(keys, ElementsAre("file", "error_ms", "sigma_ms", "frame_offset", "drift_ppm", "state"));
+  EXPECT_EQ(json.at("reference"), truths_[0].file);
+  EXPECT_EQ(json.at("verdict"), "in sync");
+  EXPECT_EQ(json.at("cameras")[1].at("state"), "in sync");
+  EXPECT_NEAR(json.at("worst_pair_ms").get<double>(), std::abs(in_milliseconds(truths_[1].error)), 0.02);
+
+  std::stringstream file;
+  file << std::ifstream(folder_ / "report/report.html").rdbuf();
+  const std::string report = file.str();
+  for (const char* evidence : {"In sync: all 2 cameras", "Where the dot stands", "What the fit leaves",
+                               "data:image/png", "The row time"})
+    EXPECT_NE(report.find(evidence), std::string::npos) << evidence;
+  for (const char* wrong : {"http://", "https://", "<script", "\"nan", "Lnan", "Mnan", "{}"})
+    EXPECT_EQ(report.find(wrong), std::string::npos) << wrong;
+}
+
+TEST_F(VerifyClips, ALostFrameIsToldAndTheOthersStayPaired) {
+  test::StrobeFilm with = test::random_film(45, 2, small_model(), kShortCode);
+  with.format = {};
+  with.suffix = ".mp4";
+  with.frames = 200;
+  with.drops = {{1, {30}}};
+  const Outcome outcome = run([&] {
+    std::vector<std::string> arguments = film(with);
+    arguments.emplace_back("--json");
+    return arguments;
+  }());
+  const nlohmann::json json = nlohmann::json::parse(outcome.out);
+  expect_truth(json.at("cameras")[1], truths_[1]);
+}
+
+TEST_F(VerifyClips, WrongInputSaysWhatToDo) {
+  const auto say = [&](const std::string& name, const std::string& content) {
+    std::ofstream(folder_ / name) << content;
+    return (folder_ / name).string();
+  };
+  test::StrobeFilm with = test::random_film(46, 2, small_model(), kShortCode);
+  with.format = {};
+  with.suffix = ".mp4";
+  with.frames = 30;
+  with.strobe.code.clear();
+  truths_ = test::film_strobe(with, folder_.path());
+  const std::string a = truths_[0].file;
+  const std::string b = truths_[1].file;
+  const std::string text = say("notes.txt", "not a video at all, but quite a long text");
+  const std::string picture = say("still.pgm", "P5\n2 2\n255\nabcd");
+  const std::string rate = fmt::format("{}", with.strobe.rate.value());
+
+  const auto expect_refused = [](const std::vector<std::string>& arguments, const std::string& remedy) {
+    const Outcome outcome = run(arguments);
+    EXPECT_EQ(outcome.exit_code, 2) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(remedy));
+    EXPECT_THAT(outcome.out, testing::IsEmpty());
+  };
+  expect_refused({a, "--flash-rate", rate, "--row-time-us", "160"}, "two cameras or more");
+  expect_refused({a, b, "--flash-rate", rate}, "--comb CLIP --comb-rate HZ");
+  expect_refused({a, b}, "--flash-rate is required");
+  expect_refused({a, b, "--flash-rate", "-3", "--row-time-us", "160"}, "--flash-rate");
+  expect_refused({a, text, "--flash-rate", rate, "--row-time-us", "160"}, "notes.txt");
+  expect_refused({a, picture, "--flash-rate", rate, "--row-time-us", "160"}, "single picture");
+  expect_refused({a, "absent.mp4", "--flash-rate", rate, "--row-time-us", "160"}, "absent.mp4");
+  expect_refused({a, b, "--flash-rate", rate, "--comb", b}, "--comb-rate");
+  expect_refused({a, b, "--flash-rate", rate, "--comb", b, "--comb-rate", "300"}, "ten flashes a frame");
+  expect_refused({a, b, "--flash-rate", rate, "--row-time-us", "160", "--tolerance", "3 apples"}, "100rows");
+
+  // Too little film isn't an error, but no proof.
+  const Outcome short_clips = run({a, b, "--flash-rate", rate, "--row-time-us", "160", "--json"});
+  EXPECT_EQ(short_clips.exit_code, 1);
+  EXPECT_EQ(nlohmann::json::parse(short_clips.out).at("verdict"), "not proven");
+  EXPECT_THAT(short_clips.err, HasSubstr("no frame offset"));
+}
+
+}  // namespace
+}  // namespace emberlock::cli

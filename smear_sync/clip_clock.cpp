@@ -108,6 +108,7 @@ Result<Walk> read_walk(const std::vector<FrameReading>& frames, const ClipReadin
 
 std::vector<CodeFrame> flashes_seen(const std::vector<FrameReading>& frames) {
   std::vector<CodeFrame> seen;
+  seen.reserve(frames.size());
   for (const FrameReading& f : frames) seen.push_back({f.frame, flash_seen(f.reading)});
   return seen;
 }

@@ -10,6 +10,7 @@
 #include "cli/verify_run.h"
 #include "tests/support/recording.h"
 #include "tests/support/strobe_clips.h"
+#include "tests/support/verb.h"
 
 namespace emberlock::cli {
 namespace {
@@ -27,29 +28,10 @@ VirtualRigDraw small_model() {
 
 const FrameCode kShortCode{.words = 8, .spacing = 60};
 
-struct Outcome {
-  int exit_code = 0;
-  std::string out, err;
-};
+using Outcome = test::VerbRun;
 Outcome run(std::vector<std::string> arguments) {
-  CLI::App app;
-  add_verify(app);
   arguments.insert(arguments.begin(), "verify");
-  std::reverse(arguments.begin(), arguments.end());
-  Outcome outcome;
-  testing::internal::CaptureStdout();
-  testing::internal::CaptureStderr();
-  try {
-    app.parse(arguments);
-  } catch (const CLI::RuntimeError& e) {
-    outcome.exit_code = e.get_exit_code();
-  } catch (const CLI::ParseError& e) {
-    outcome.exit_code = 2;
-    outcome.err = e.what();
-  }
-  outcome.out = testing::internal::GetCapturedStdout();
-  outcome.err += testing::internal::GetCapturedStderr();
-  return outcome;
+  return test::run_verb(add_verify, std::move(arguments));
 }
 
 class VerifyClips : public testing::Test {

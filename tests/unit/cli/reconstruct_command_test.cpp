@@ -13,6 +13,7 @@
 #include "cli/commands.h"
 #include "recon/calibrate/pose.h"
 #include "recon/export/picture.h"
+#include "tests/support/verb.h"
 
 namespace emberlock::cli {
 namespace {
@@ -55,31 +56,11 @@ class ReconstructCommandTest : public testing::Test {
   }
   void save() const { std::ofstream(root_ / "transforms.json") << document_.dump(); }
 
-  struct Run {
-    int exit_code = 0;
-    std::string out;
-    std::string err;
-  };
+  using Run = test::VerbRun;
   /// `emberlock reconstruct <root>/transforms.json --out <root>/out WORDS...`, as main() runs it.
   [[nodiscard]] Run run(std::vector<std::string> words, const std::string& input = "transforms.json") const {
     words.insert(words.begin(), {"reconstruct", (root_ / input).string(), "--out", (root_ / "out").string()});
-    std::reverse(words.begin(), words.end());  // CLI11 takes them last first
-    CLI::App app{"", "emberlock"};
-    add_reconstruct(app);
-    Run result;
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    try {
-      app.parse(words);
-    } catch (const CLI::RuntimeError& e) {
-      result.exit_code = e.get_exit_code();
-    } catch (const CLI::ParseError& e) {
-      result.exit_code = 2;
-      result.err = e.what();
-    }
-    result.out = testing::internal::GetCapturedStdout();
-    result.err += testing::internal::GetCapturedStderr();
-    return result;
+    return test::run_verb(add_reconstruct, std::move(words));
   }
   [[nodiscard]] json report() const {
     std::ifstream in(root_ / "out" / "report.json");

@@ -11,6 +11,7 @@
 
 #include "cli/commands.h"
 #include "tests/support/smear_frames.h"
+#include "tests/support/verb.h"
 
 namespace emberlock::cli {
 namespace {
@@ -33,26 +34,10 @@ class SmearCommand : public testing::Test {
     return (folder_ / name).string();
   }
 
-  struct Outcome {
-    int exit_code = 0;
-    std::string out, err;
-  };
+  using Outcome = test::VerbRun;
   static Outcome run(std::vector<std::string> arguments) {
-    CLI::App app;
-    add_smear(app);
     arguments.insert(arguments.begin(), "smear");
-    std::reverse(arguments.begin(), arguments.end());
-    Outcome outcome;
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    try {
-      app.parse(arguments);
-    } catch (const CLI::RuntimeError& e) {
-      outcome.exit_code = e.get_exit_code();
-    }
-    outcome.out = testing::internal::GetCapturedStdout();
-    outcome.err = testing::internal::GetCapturedStderr();
-    return outcome;
+    return test::run_verb(add_smear, std::move(arguments));
   }
 
   std::filesystem::path folder_ =

@@ -76,7 +76,8 @@ class StripKeeper {
 using Advanced = std::function<void(double fraction)>;
 
 Result<FilmedClip> read_clip(const std::string& file, const Advanced& advanced) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<FrameFile> video, FrameFile::open(file));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<FrameFile> video,
+                             FrameFile::open(file, Colours::brightness));
   const VideoClaims claims = video->claims();
   if (!claims.frames && !claims.frame_rate) {
     return Error{ErrorKind::bad_input, "is a single picture, not a video", file,

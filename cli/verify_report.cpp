@@ -229,6 +229,11 @@ void code_diagram(HtmlPage& page, const CameraVerdict& c, const ClipReading& cli
     bar(i, 25, !agrees ? "#d55e00" : given ? "#e69f00" : "#444");
   }
   page.raw("<div class=\"scroll\">" + svg + "</svg></div>");
+  page.paragraph(
+      fmt::format("Which of the first {} frames the strobe lit (orange) and which it skipped (black), above "
+                  "its code as it was "
+                  "told; red where the two disagree.",
+                  shown));
 }
 
 void strips(HtmlPage& page, const CameraVerdict& c, const FilmedClip& clip) {

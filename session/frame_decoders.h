@@ -24,7 +24,7 @@ bool is_fits(std::string_view head);
 Result<Image> decode_fits(std::string_view content, const std::string& where);
 
 /// Anything that libavformat recognises.
-Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path);
+Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours);
 
 /// A size that may be decoded: both sides within 1..kMaxImageSide.
 Status check_image_size(std::int64_t width, std::int64_t height, const std::string& where);

@@ -66,9 +66,9 @@ Status check_image_size(std::int64_t width, std::int64_t height, const std::stri
                where, "Crop it, or check that the file isn't damaged"};
 }
 
-Result<std::unique_ptr<FrameFile>> FrameFile::open(const std::filesystem::path& path) {
+Result<std::unique_ptr<FrameFile>> FrameFile::open(const std::filesystem::path& path, Colours colours) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string head, read_head(path));
-  if (!is_fits(head) && !is_still_image(head)) return open_video(path);
+  if (!is_fits(head) && !is_still_image(head)) return open_video(path, colours);
   EMBERLOCK_ASSIGN_OR_RETURN(Image image, decode_image(head, path));
   return std::unique_ptr<FrameFile>(std::make_unique<ImageFile>(std::move(image), path.string()));
 }

@@ -17,6 +17,12 @@ struct VideoClaims {
   std::optional<std::int64_t> frames{};
 };
 
+/// What becomes of a video's colours. A codec stores brightness at full resolution, and colours at less.
+enum class Colours {
+  keep,
+  brightness,  ///< of a video stored as brightness and colour differences, the former alone: faster
+};
+
 /// Frames of a file that somebody else made: one image (PGM, PPM, PNG, JPEG, TIFF, FITS) or a video that
 /// FFmpeg reads. Grey stays grey, colour becomes rgb8 or rgb16; 10..16-bit samples keep their values
 /// (bit_depth is the file's maximum value's, e.g. a PGM with maxval 4095 is 12 bits).
@@ -24,7 +30,8 @@ class FrameFile {
  public:
   /// Errors name the file and say what is wrong with it (absent, truncated, not an image or video, no
   /// frames).
-  static Result<std::unique_ptr<FrameFile>> open(const std::filesystem::path& path);
+  static Result<std::unique_ptr<FrameFile>> open(const std::filesystem::path& path,
+                                                 Colours colours = Colours::keep);
   virtual ~FrameFile() = default;
   /// The next frame; `out_of_data` after the last, `bad_input` where the file is damaged.
   virtual Result<Image> next() = 0;

@@ -36,17 +36,19 @@ struct Target {
   Transfer transfer = Transfer::scaler;
 };
 
-Target target_of(const AVFrame& frame) {
+Target target_of(const AVFrame& frame, Colours colours) {
   const auto source = static_cast<AVPixelFormat>(frame.format);
   const AVPixFmtDescriptor* d = av_pix_fmt_desc_get(source);
   const std::uint64_t flags = d->flags;
   const bool rgb = (flags & AV_PIX_FMT_FLAG_RGB) != 0;
-  const bool gray = d->nb_components <= 2 && !rgb && (flags & AV_PIX_FMT_FLAG_PAL) == 0;
+  const bool without_colour = d->nb_components <= 2 || colours == Colours::brightness;
+  const bool gray = without_colour && !rgb && (flags & AV_PIX_FMT_FLAG_PAL) == 0;
   const int depth = d->comp[0].depth;
   const bool wide = depth > 8;
   constexpr std::uint64_t kIndirect =
       AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_FLOAT | AV_PIX_FMT_FLAG_BAYER | AV_PIX_FMT_FLAG_HWACCEL;
-  const bool direct = (gray || rgb) && (flags & kIndirect) == 0 && depth >= 8 && depth <= 16;
+  const bool limited = d->nb_components > 2 && !rgb;  // brightness may stand for 16..235
+  const bool direct = (gray || rgb) && !limited && (flags & kIndirect) == 0 && depth >= 8 && depth <= 16;
 
   Target t;
   t.layout.size = {frame.width, frame.height};
@@ -95,11 +97,12 @@ AVPixelFormat packed_format(PixelFormat format) {
 
 class VideoFile final : public FrameFile {
  public:
-  VideoFile(AvInput input, std::string where)
+  VideoFile(AvInput input, std::string where, Colours colours)
       : input_(std::move(input)),
         packet_(av_packet_alloc()),
         frame_(av_frame_alloc()),
-        where_(std::move(where)) {}
+        where_(std::move(where)),
+        colours_(colours) {}
 
   Result<Image> next() override {
     for (;;) {
@@ -182,7 +185,7 @@ class VideoFile final : public FrameFile {
     if (frame_->decode_error_flags != 0 || (frame_->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
       return damaged("its data don't decode");
     }
-    const Target target = target_of(*frame_);
+    const Target target = target_of(*frame_, colours_);
     Image image(target.layout);
     if (target.transfer == Transfer::rows) copy_rows(*frame_, image);
     if (target.transfer == Transfer::samples) copy_samples(*frame_, image);
@@ -224,16 +227,17 @@ class VideoFile final : public FrameFile {
   std::unique_ptr<SwsContext, SwsFree> scaler_;
   std::vector<std::uint8_t> scratch_;
   std::string where_;
+  Colours colours_;
   std::uint64_t count_ = 0;
   std::int64_t last_pts_ = AV_NOPTS_VALUE;
 };
 
 }  // namespace
 
-Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path) {
+Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours) {
   EMBERLOCK_ASSIGN_OR_RETURN(AvInput input, open_av_input(path, Checking::lenient));
   EMBERLOCK_RETURN_IF_ERROR(check_image_size(input.decoder->width, input.decoder->height, path.string()));
-  return std::unique_ptr<FrameFile>(std::make_unique<VideoFile>(std::move(input), path.string()));
+  return std::unique_ptr<FrameFile>(std::make_unique<VideoFile>(std::move(input), path.string(), colours));
 }
 
 }  // namespace emberlock

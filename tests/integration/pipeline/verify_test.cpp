@@ -8,6 +8,7 @@
 
 #include "cli/commands.h"
 #include "cli/verify_run.h"
+#include "session/frame_file.h"
 #include "tests/support/recording.h"
 #include "tests/support/strobe_clips.h"
 #include "tests/support/verb.h"
@@ -62,6 +63,33 @@ class VerifyClips : public testing::Test {
   test::TempFolder folder_;
   std::vector<test::ClipTruth> truths_;
 };
+
+TEST(VideoFile, BrightnessAloneIsWhatTheColoursMeanAndTheFileSaysItsRateAndLength) {
+  const test::TempFolder folder;
+  Image picture({.size = {64, 48}});
+  for (std::size_t i = 0; i < picture.bytes().size(); ++i)
+    picture.bytes()[i] = static_cast<std::byte>(i % 64 < 20 ? 0 : i % 64 < 40 ? 120 : 255);
+  for (const auto& [codec, name] : {std::pair{AV_CODEC_ID_H264, "a.mp4"}, {AV_CODEC_ID_MJPEG, "a.avi"}}) {
+    test::VideoFormat format;
+    format.codec = codec;
+    format.crf = 10;
+    test::VideoWriter writer(folder / name, {64, 48}, format);
+    for (int i = 0; i < 7; ++i) writer.write(picture);
+    writer.close();
+    const auto coloured = FrameFile::open(folder / name).value();
+    const auto bright = FrameFile::open(folder / name, Colours::brightness).value();
+    EXPECT_NEAR(bright->claims().frame_rate->value(), 24000.0 / 1001, 1e-3) << name;
+    EXPECT_EQ(bright->claims().frames, 7) << name;
+    const Image rgb = coloured->next().value();
+    const Image gray = bright->next().value();
+    ASSERT_EQ(rgb.layout().format, PixelFormat::rgb8);
+    ASSERT_EQ(gray.layout().format, PixelFormat::gray8);
+    for (const int x : {8, 30, 52}) {
+      EXPECT_NEAR(gray.view().sample(x, 24), rgb.view().sample(x, 24, 1), 2) << name << " at " << x;
+      EXPECT_NEAR(gray.view().sample(x, 24), picture.view().sample(x, 24), 6) << name << " at " << x;
+    }
+  }
+}
 
 TEST_F(VerifyClips, OfEveryCodecAreToldToTwentyMicrosecondsAndToTheFrame) {
   struct Case {

@@ -56,7 +56,7 @@ Effects told_by_the_pictures(const Scene& scene, const EffectRequest& request) {
 }  // namespace
 
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
-                                    const SolveOptions& options, const Elapsed& elapsed) {
+                                    const SolveOptions& options, const Elapsed& elapsed) try {
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   const Seconds start = elapsed ? elapsed() : Seconds(0);
@@ -69,8 +69,8 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   const Scene& linear = prepared.scene();
   const std::vector<FlameMask> masks = masks_before(linear, known.background, options.flame_threshold);
   EMBERLOCK_ASSIGN_OR_RETURN(const Hull hull, carve(linear, masks, grid, options.compute));
-  Pool pool(options.compute.threads);
-  SolverSetup setup{{}, {}, hull, known, options, device, pool};
+  Pool pool(options.compute.threads, device);
+  SolverSetup setup{{}, {}, hull, known, options, pool};
   const std::vector<PixelBox> boxes = flame_boxes(linear, masks);
   for (std::size_t v = 0; v < linear.views.size(); ++v) {
     if (linear.views[v].role != ViewRole::input) continue;
@@ -107,6 +107,8 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
                              predict_effects(flame, decided, request, options.compute, elapsed));
   choice.reports.insert(choice.reports.begin(), std::move(report));
   return choice;
+} catch (const DeviceError& e) {
+  return e.error();
 }
 
 }  // namespace emberlock

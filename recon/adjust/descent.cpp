@@ -107,7 +107,7 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
 Descent::Descent(const Level& level, const Optics& optics, const SolverSetup& setup,
                  const std::vector<Rgba>& x)
     : level_(level),
-      engine_(make_engine(level.problem, optics, setup.options.precision, setup.device, setup.pool)),
+      engine_(make_engine(level.problem, optics, setup.options.precision, setup.pool)),
       fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]) {
   find_weights(x);
   engine_->set(x);

@@ -31,6 +31,9 @@ class Engine {
 
   virtual void set(const std::vector<Rgba>& x) = 0;  ///< x and y
   [[nodiscard]] virtual std::vector<Rgba> get() const = 0;
+  /// x for whoever watches: never makes the device wait. Each call starts a copy and gives the last that has
+  /// arrived, so x as it was some calls ago; empty before the first has.
+  [[nodiscard]] virtual std::vector<Rgba> recent() = 0;
   /// residual = A y - seen for the subset's rays.
   virtual void residual(int subset) = 0;
   /// What another pass adds to the radiance of each ray; part of residual() from here on.
@@ -74,13 +77,22 @@ struct Optics {
 /// Constant extinction of sigma a voxel edge, or none where it is 0.
 Optics absorbing_optics(float sigma);
 
-/// `device` is resolved (cpu or cuda). The problem and the pool must outlive the engine. float64 runs on the
-/// CPU alone.
+/// On the pool's device. The problem and the pool must outlive the engine. Throws a DeviceError.
 std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
-                                    Device device, Pool& pool);
+                                    Pool& pool);
+std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics, Precision precision);
 
-#ifdef EMBERLOCK_HAVE_CUDA
-std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics);
-#endif
+/// In another precision.
+template <class To, class From>
+std::vector<Quad<To>> converted(const std::vector<Quad<From>>& from) {
+  if constexpr (std::is_same_v<To, From>) {
+    return from;
+  } else {
+    std::vector<Quad<To>> to(from.size());
+    for (std::size_t i = 0; i < from.size(); ++i)
+      for (int c = 0; c < 4; ++c) to[i].c[c] = static_cast<To>(from[i].c[c]);
+    return to;
+  }
+}
 
 }  // namespace emberlock

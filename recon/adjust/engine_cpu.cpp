@@ -8,18 +8,6 @@
 namespace emberlock {
 namespace {
 
-template <class To, class From>
-std::vector<Quad<To>> converted(const std::vector<Quad<From>>& from) {
-  if constexpr (std::is_same_v<To, From>) {
-    return from;
-  } else {
-    std::vector<Quad<To>> to(from.size());
-    for (std::size_t i = 0; i < from.size(); ++i)
-      for (int c = 0; c < 4; ++c) to[i].c[c] = static_cast<To>(from[i].c[c]);
-    return to;
-  }
-}
-
 template <class Real>
 class CpuEngine final : public Engine {
  public:
@@ -41,6 +29,7 @@ class CpuEngine final : public Engine {
 
   void set(const std::vector<Rgba>& x) override { x_ = y_ = next_y_ = converted<Real>(x); }
   [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_); }
+  [[nodiscard]] std::vector<Rgba> recent() override { return get(); }
   [[nodiscard]] std::vector<Rgba> residuals() const override { return converted<float>(residual_); }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
@@ -76,9 +65,8 @@ class CpuEngine final : public Engine {
       before.resize(gradient_.size());
       before.swap(gradient_);
     }
-    each_slab(subset, [&](const std::uint32_t* runs, std::size_t count, Layers layers) {
-      march(work(subset), runs, count, layers);
-    });
+    each_slab(subset,
+              [&](const std::uint32_t* runs, std::size_t count) { march(work(subset), runs, count); });
     if (!blur_) return;
     gradient_ = converted<Real>(blur_->adjoint(converted<float>(gradient_), pool_));
     for (std::size_t p = 0; p < before.size(); ++p) gradient_[p] = gradient_[p] + before[p];
@@ -176,18 +164,23 @@ class CpuEngine final : public Engine {
         const int slab = 2 * task + parity;
         const auto s = static_cast<std::size_t>(slab);
         const std::size_t size = slabs.begin[s + 1] - slabs.begin[s];
-        if (size > 0) act(&slabs.run[slabs.begin[s]], size, Layers{slab * kSlab, (slab + 1) * kSlab});
+        if (size > 0) act(&slabs.run[slabs.begin[s]], size);
       });
     }
   }
 
   template <class Extinction>
   void adjust_by(int subset, const PaperStep& step, const Extinction& extinction) {
-    const PaperAdjust<Extinction> adjustment{
-        problem_.list.table(), residual_.data(), x_.data(), extinction, step.gain, step.decay,
-        step.deviation,        step.stream};
-    each_slab(subset, [&](const std::uint32_t* runs, std::size_t count, Layers layers) {
-      for (std::size_t n = 0; n < count; ++n) adjustment(runs[n], layers);
+    const RayTable table = problem_.list.table();
+    const PaperAdjust<Extinction> adjustment{table,
+                                             residual_.data(),
+                                             extinction,
+                                             step.gain,
+                                             step.deviation,
+                                             step.stream,
+                                             {table, x_.data(), {step.decay}}};
+    each_slab(subset, [&](const std::uint32_t* runs, std::size_t count) {
+      for (std::size_t n = 0; n < count; ++n) adjustment(runs[n]);
     });
     y_ = x_;
   }
@@ -218,13 +211,11 @@ Optics absorbing_optics(float sigma) {
 }
 
 std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
-                                    [[maybe_unused]] Device device, Pool& pool) {
+                                    Pool& pool) {
+  if constexpr (kCudaBuilt) {
+    if (pool.device() == Device::cuda) return make_cuda_engine(problem, optics, precision);
+  }
   if (precision == Precision::float64) return std::make_unique<CpuEngine<double>>(problem, optics, pool);
-#ifdef EMBERLOCK_HAVE_CUDA
-  // An exposure's blur runs on the CPU alone, and so does the march that goes with it.
-  if (device == Device::cuda && optics.exposure.shutter == Exposure::Shutter::instant)
-    return make_cuda_engine(problem, optics);
-#endif
   return std::make_unique<CpuEngine<float>>(problem, optics, pool);
 }
 

@@ -1,249 +1,258 @@
-// The engine's launches on a GPU. The functors are those of the CPU; sums into key points are atomic, so
-// their order, and the last bits of a result, differ from run to run.
+// The engine's launches on a GPU, of the functors that the CPU runs. Sums into key points are gathered, so
+// results have the same bits on every run.
+#include <optional>
+
 #include "recon/adjust/engine.h"
-#include "recon/compute/cuda_buffer.h"
+#include "recon/adjust/sort_cuda.h"
+#include "recon/compute/cuda_launch.h"
+#include "recon/compute/cuda_snapshot.h"
+#include "recon/effects/exposure.h"
+#include "recon/hull/device_ray_list.h"
+#include "recon/kernels/exposure.h"
 #include "recon/kernels/field.h"
-#include "recon/kernels/march.h"
+#include "recon/kernels/gather.h"
 #include "recon/kernels/paper.h"
 #include "recon/kernels/update.h"
 
 namespace emberlock {
 namespace {
 
-constexpr unsigned kBlock = 128;
+/// B and its transpose.
+template <class Real>
+class DeviceBlur {
+ public:
+  DeviceBlur(const ExposureBlur& blur, const Grid& grid)
+      : grid_(grid), weights_(blur.weights()), blurred_(CudaBuffer<Quad<Real>>::unfilled(grid.size())) {}
 
-struct AddAtomically {
-  HOST_DEVICE void operator()([[maybe_unused]] Rgba& target, [[maybe_unused]] const Rgba& value) const {
-#ifdef __CUDA_ARCH__
-    for (int c = 0; c < 4; ++c) atomicAdd(&target.c[c], value.c[c]);
-#endif
+  [[nodiscard]] const Quad<Real>* forward(const CudaBuffer<Quad<Real>>& x) { return average(x, 1); }
+  [[nodiscard]] const Quad<Real>* adjoint(const CudaBuffer<Quad<Real>>& y) { return average(y, -1); }
+
+ private:
+  const Quad<Real>* average(const CudaBuffer<Quad<Real>>& in, int direction) {
+    launch(grid_.size(),
+           AverageAlongZ<Real>{in.data(), blurred_.data(), grid_.index(0, 0, 1), grid_.nz, weights_.data(),
+                               static_cast<int>(weights_.size() / 2), direction},
+           "exposing");
+    return blurred_.data();
   }
+
+  Grid grid_;
+  CudaBuffer<float> weights_;
+  CudaBuffer<Quad<Real>> blurred_;
 };
-
-template <class March>
-__global__ void march_rays(March march, Rgba* radiance, std::size_t first, std::size_t last) {
-  const std::size_t ray = first + blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
-  if (ray < last) radiance[ray] = march(ray);
-}
-
-template <class March>
-__global__ void march_and_judge(March march, Judge<float> judge, Rgba* residual, std::size_t first,
-                                std::size_t last) {
-  const std::size_t ray = first + blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
-  if (ray < last) residual[ray] = judge(ray, march(ray));
-}
-
-struct JudgeAndKeep {
-  Judge<float> judge;
-  Rgba* residual;
-  HOST_DEVICE Rgba operator()(std::size_t ray, const Rgba& radiance) const {
-    return residual[ray] = judge(ray, radiance);
-  }
-};
-
-template <class March>
-__global__ void march_field(March march, JudgeAndKeep judge, std::size_t first, std::size_t last) {
-  const std::size_t ray = first + blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
-  if (ray < last) march(ray, judge);
-}
-
-template <class Scatter>
-__global__ void scatter_runs(Scatter scatter, std::size_t first, std::size_t last) {
-  const std::size_t run = first + blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
-  if (run < last) scatter(run, layers_of(scatter.table.runs[run]));
-}
-
-template <class Update>
-__global__ void update_keys(Update update, int nx) {
-  const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (i < nx) update(i, static_cast<int>(blockIdx.y), static_cast<int>(blockIdx.z));
-}
 
 /// One combination of the shipped ones.
-template <class Extinction, class Path>
+template <class Real, class Extinction, class Path>
 class CudaEngine final : public Engine {
  public:
   CudaEngine(const Problem& problem, const Optics& optics, Extinction extinction)
       : problem_(problem),
         optics_(optics),
         extinction_(extinction),
-        origins_(problem.list.origins),
-        rays_(problem.list.rays),
-        runs_(problem.list.runs),
-        bends_(problem.list.bends),
+        lists_(problem.list),
         seen_(problem.seen),
         background_(problem.background),
-        offset_(problem.list.rays.size()),
-        x_(problem.grid().size()),
-        y_(problem.grid().size()),
-        next_y_(problem.grid().size()),
-        gradient_(problem.grid().size()),
-        weight_(problem.grid().size()),
-        field_weight_(problem.grid().size()),
-        reference_(problem.grid().size()),
+        x_(size()),
+        y_(size()),
+        next_y_(size()),
+        gradient_(size()),
+        weight_(size()),
         residual_(problem.list.rays.size()),
-        target_(problem.list.rays.size()),
-        samples_(Extinction::kField ? problem.most_samples() : 0) {}
+        samples_(CudaBuffer<Quad<Real>>::unfilled(Extinction::kField ? problem.most_samples() : 0)),
+        deposits_(CudaBuffer<Deposit<Real>>::unfilled(problem.most_samples())) {
+    const ExposureBlur blur(optics.exposure, problem.grid());
+    if (!blur.identity()) {
+      blur_.emplace(blur, problem.grid());
+      exposed_gradient_ = CudaBuffer<Quad<Real>>(size());
+    }
+    for (int s = 0; s < problem.list.subsets(); ++s) {
+      const auto voxels = CudaBuffer<std::uint32_t>::unfilled(first_sample(s + 1) - first_sample(s));
+      each_run(s, NameVoxels<Real, Path>{lists_.table(), voxels.data(), first_sample(s)}, "naming voxels");
+      by_voxel_.push_back(sort_by_voxel(voxels, size()));
+    }
+  }
 
   void set(const std::vector<Rgba>& x) override {
-    x_.upload(x);
+    x_.upload(converted<Real>(x));
     y_.copy_from(x_);
     next_y_.copy_from(x_);
   }
-  [[nodiscard]] std::vector<Rgba> get() const override { return x_.download(); }
-  [[nodiscard]] std::vector<Rgba> residuals() const override { return residual_.download(); }
-  [[nodiscard]] std::vector<Rgba> gradient() const override { return gradient_.download(); }
+  [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_.download()); }
+  [[nodiscard]] std::vector<Rgba> recent() override {
+    if (!snapshot_) snapshot_.emplace(size());
+    const Quad<Real>* arrived = snapshot_->latest();
+    std::vector<Rgba> x;
+    if (arrived != nullptr) x = converted<float>(std::vector<Quad<Real>>(arrived, arrived + size()));
+    snapshot_->start(x_);
+    return x;
+  }
+  [[nodiscard]] std::vector<Rgba> residuals() const override {
+    return converted<float>(residual_.download());
+  }
+  [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_.download()); }
 
   void residual(int subset) override {
-    Judge<float> judge = problem_.judge<float>(offset_host_, optics_.white);
-    judge.seen = seen_.data();
-    if (judge.background != nullptr) judge.background = background_.data();
-    if (judge.offset != nullptr) judge.offset = offset_.data();
-    residual(subset, judge);
+    residual(subset, Judge<Real>{seen_.data(), background_.data(), offset_.data(), Real(optics_.white)});
   }
-  void set_offset(const std::vector<Rgba>& offset) override {
-    offset_host_ = offset;
-    if (!offset.empty()) offset_.upload(offset);
-  }
+  void set_offset(const std::vector<Rgba>& offset) override { offset_.upload(offset); }
   void residual_against(const std::vector<Rgba>& target, int subset) override {
     target_.upload(target);
-    residual(subset, Judge<float>{target_.data(), nullptr, nullptr, 0});
+    residual(subset, Judge<Real>{target_.data(), nullptr, nullptr, 0});
   }
-  void residual(int subset, const Judge<float>& judge) {
-    const auto [begin, end] = rays_of(subset);
-    if (begin == end) return;
+  void residual(int subset, const Judge<Real>& judge) {
+    const JudgeAndKeep<Real> keep{judge, residual_.data()};
     if constexpr (Extinction::kField) {
-      march_field<<<blocks_for(end - begin), kBlock>>>(
-          FieldForward<float, Path>{table(), y_.data(), samples_.data(), first_sample(subset)},
-          JudgeAndKeep{judge, residual_.data()}, begin, end);
+      const FieldForward<Real, Path> march{lists_.table(), exposed(), samples_.data(), first_sample(subset)};
+      each_ray(subset, MarchJudged<FieldForward<Real, Path>, JudgeAndKeep<Real>>{march, keep});
     } else {
-      march_and_judge<<<blocks_for(end - begin), kBlock>>>(forward(), judge, residual_.data(), begin, end);
+      each_ray(subset, MarchAndKeep<Radiance, JudgeAndKeep<Real>>{radiance(), keep});
     }
-    check_cuda(cudaGetLastError(), "residual");
   }
-
   void project(int subset) override {
-    const auto [begin, end] = rays_of(subset);
-    if (begin == end) return;
-    march_rays<<<blocks_for(end - begin), kBlock>>>(forward(), residual_.data(), begin, end);
-    check_cuda(cudaGetLastError(), "project");
+    each_ray(subset, MarchAndKeep<Radiance, KeepRadiance<Real>>{radiance(), {residual_.data()}});
   }
 
   void backproject(int subset) override {
+    const LayAside<Real> aside{deposits_.data(), first_sample(subset)};
     if constexpr (Extinction::kField) {
-      scatter(subset, FieldAdjoint<float, Path, AddAtomically>{table(), residual_.data(), samples_.data(),
-                                                               first_sample(subset), gradient_.data()});
+      each_run(subset,
+               FieldAdjoint<Real, Path, LayAside<Real>>{lists_.table(), residual_.data(), samples_.data(),
+                                                        first_sample(subset), aside},
+               "weighing samples");
     } else {
-      scatter(subset, Adjoint<float, Extinction, Path, AddAtomically>{table(), residual_.data(),
-                                                                      gradient_.data(), extinction_});
+      each_run(subset,
+               Adjoint<Real, Extinction, Path, LayAside<Real>>{lists_.table(), residual_.data(), extinction_,
+                                                               aside},
+               "weighing samples");
     }
+    if (!blur_) return gather(subset, gradient_, Trilinear{});
+    exposed_gradient_.clear();
+    gather(subset, exposed_gradient_, Trilinear{});
+    launch(size(), AddAt<Real>{blur_->adjoint(exposed_gradient_), gradient_.data()}, "adding up");
   }
 
   void clear_gradient() override { gradient_.clear(); }
   void set_weights(const std::vector<float>& weights) override {
-    weight_.upload(weights);
+    weight_.upload({weights.begin(), weights.end()});
     gradient_.clear();
   }
 
   void descend(const Step& step) override { update(emission_step(step)); }
 
   void set_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
-    field_weight_.upload(weights);
-    reference_.upload(reference);
+    field_weight_.upload({weights.begin(), weights.end()});
+    reference_.upload({reference.begin(), reference.end()});
     gradient_.clear();
   }
   void descend_field(const FieldStep& step) override {
-    update(DescendField<float>{emission_step(step.emission), field_weight_.data(), reference_.data(),
-                               step.variation, step.soft, step.most});
+    update(DescendField<Real>{emission_step(step.emission), field_weight_.data(), reference_.data(),
+                              Real(step.variation), Real(step.soft), Real(step.most)});
   }
 
   void adjust([[maybe_unused]] int subset, [[maybe_unused]] const PaperStep& step) override {
-    if constexpr (!Extinction::kField && std::is_same_v<Path, StraightPath>) {
-      scatter(subset,
-              PaperAdjust<Extinction, AddAtomically>{table(), residual_.data(), x_.data(), extinction_,
-                                                     step.gain, step.decay, step.deviation, step.stream});
+    if constexpr (std::is_same_v<Real, float> && !Extinction::kField && std::is_same_v<Path, StraightPath>) {
+      each_run(subset,
+               PaperAdjust<Extinction, LayAside<float>>{lists_.table(),
+                                                        residual_.data(),
+                                                        extinction_,
+                                                        step.gain,
+                                                        step.deviation,
+                                                        step.stream,
+                                                        {deposits_.data(), first_sample(subset)}},
+               "weighing samples");
+      gather(subset, x_, Fade{step.decay});
       y_.copy_from(x_);
     }
   }
 
  private:
-  [[nodiscard]] Descend<float> emission_step(const Step& step) {
+  using Radiance = Forward<Real, Extinction, Path>;
+
+  [[nodiscard]] std::size_t size() const { return problem_.grid().size(); }
+  /// y, or B y where the exposure is long enough to matter.
+  [[nodiscard]] const Quad<Real>* exposed() { return blur_ ? blur_->forward(y_) : y_.data(); }
+  [[nodiscard]] Radiance radiance() { return {lists_.table(), exposed(), extinction_}; }
+  [[nodiscard]] Descend<Real> emission_step(const Step& step) {
     const Grid& g = problem_.grid();
-    return {g.nx,       g.ny,           g.nz,           weight_.data(),
-            x_.data(),  y_.data(),      next_y_.data(), gradient_.data(),
-            step.scale, step.smoothing, step.momentum};
+    const Real scale(step.scale);
+    const Real smoothing(step.smoothing);
+    const Real momentum(step.momentum);
+    return {g.nx,  g.ny,      g.nz,    weight_.data(), x_.data(), y_.data(), next_y_.data(), gradient_.data(),
+            scale, smoothing, momentum};
   }
   template <class Update>
   void update(const Update& step) {
-    const Grid& g = problem_.grid();
-    const dim3 blocks((static_cast<unsigned>(g.nx) + kBlock - 1) / kBlock, static_cast<unsigned>(g.ny),
-                      static_cast<unsigned>(g.nz));
-    update_keys<<<blocks, kBlock>>>(step, g.nx);
-    check_cuda(cudaGetLastError(), "update_keys");
+    launch(size(), StepAt<Update>{step, problem_.grid().nx, problem_.grid().ny}, "stepping");
     y_.swap(next_y_);
   }
-  [[nodiscard]] RayTable table() const {
-    const Grid& g = problem_.grid();
-    return {origins_.data(),
-            rays_.data(),
-            runs_.data(),
-            problem_.list.bends.empty() ? nullptr : bends_.data(),
-            g.nx,
-            g.ny,
-            g.nz};
-  }
-  [[nodiscard]] Forward<float, Extinction, Path> forward() const { return {table(), y_.data(), extinction_}; }
-  [[nodiscard]] Slice rays_of(int subset) const {
-    const auto s = static_cast<std::size_t>(subset);
-    return {problem_.list.subset_begin[s], problem_.list.subset_begin[s + 1]};
+
+  /// The first ray or sample of a subset.
+  [[nodiscard]] std::size_t first_ray(int subset) const {
+    return problem_.list.subset_begin[static_cast<std::size_t>(subset)];
   }
   [[nodiscard]] std::size_t first_sample(int subset) const {
-    return problem_.list.first_sample(rays_of(subset).begin);
+    return problem_.list.first_sample(first_ray(subset));
   }
-  static unsigned blocks_for(std::size_t rays) { return static_cast<unsigned>((rays + kBlock - 1) / kBlock); }
-
-  template <class Scatter>
-  void scatter(int subset, const Scatter& functor) {
-    const Slice rays = rays_of(subset);
-    const std::size_t begin = problem_.list.first_run(rays.begin);
-    const std::size_t end = problem_.list.first_run(rays.end);
-    if (begin == end) return;
-    scatter_runs<<<blocks_for(end - begin), kBlock>>>(functor, begin, end);
-    check_cuda(cudaGetLastError(), "scatter_runs");
+  template <class Act>
+  void each_ray(int subset, const Act& act) {
+    launch(first_ray(subset), first_ray(subset + 1), act, "marching");
+  }
+  template <class Act>
+  void each_run(int subset, const Act& act, const char* what) {
+    launch(problem_.list.first_run(first_ray(subset)), problem_.list.first_run(first_ray(subset + 1)), act,
+           what);
+  }
+  template <class Spread>
+  void gather(int subset, const CudaBuffer<Quad<Real>>& target, const Spread& spread) {
+    const Grid& g = problem_.grid();
+    const SortedSamples& sorted = by_voxel_[static_cast<std::size_t>(subset)];
+    if (sorted.order.size() == 0) return;
+    launch(
+        size(),
+        GatherDeposits<Real, Spread>{
+            g.nx, g.ny, {sorted.order.data(), sorted.begin.data()}, deposits_.data(), target.data(), spread},
+        "gathering");
   }
 
   const Problem& problem_;
   Optics optics_;
   Extinction extinction_;
-  CudaBuffer<float> origins_;
-  CudaBuffer<MarchRay> rays_;
-  CudaBuffer<Run> runs_;
-  CudaBuffer<Bend> bends_;
-  CudaBuffer<Rgba> seen_, background_, offset_, x_, y_, next_y_, gradient_;
-  std::vector<Rgba> offset_host_;
-  CudaBuffer<float> weight_, field_weight_, reference_;
-  CudaBuffer<Rgba> residual_, target_, samples_;
+  DeviceRayList lists_;
+  CudaBuffer<Rgba> seen_, background_, offset_, target_;  // null where there is none
+  CudaBuffer<Quad<Real>> x_, y_, next_y_, gradient_;
+  CudaBuffer<Real> weight_, field_weight_, reference_;
+  CudaBuffer<Quad<Real>> residual_, samples_;  // samples of one subset
+  CudaBuffer<Deposit<Real>> deposits_;         // of one subset
+  std::vector<SortedSamples> by_voxel_;        // one a subset
+  std::optional<DeviceBlur<Real>> blur_;       // where the exposure is long enough to matter
+  CudaBuffer<Quad<Real>> exposed_gradient_;
+  std::optional<CudaSnapshot<Quad<Real>>> snapshot_;
 };
 
-template <class Extinction>
+template <class Real, class Extinction>
 std::unique_ptr<Engine> make_with(const Problem& problem, const Optics& optics, Extinction extinction) {
   if (problem.list.bends.empty())
-    return std::make_unique<CudaEngine<Extinction, StraightPath>>(problem, optics, extinction);
-  return std::make_unique<CudaEngine<Extinction, CurvedPath>>(problem, optics, extinction);
+    return std::make_unique<CudaEngine<Real, Extinction, StraightPath>>(problem, optics, extinction);
+  return std::make_unique<CudaEngine<Real, Extinction, CurvedPath>>(problem, optics, extinction);
+}
+
+template <class Real>
+std::unique_ptr<Engine> make_in(const Problem& problem, const Optics& optics) {
+  switch (optics.absorb) {
+    case Absorb::field:
+      return make_with<Real>(problem, optics, FieldExtinction<Real>{});
+    case Absorb::constant:
+      return make_with<Real>(problem, optics, ConstantExtinction<Real>{Real(optics.sigma)});
+    case Absorb::nothing:
+      break;
+  }
+  return make_with<Real>(problem, optics, NoExtinction<Real>{});
 }
 
 }  // namespace
 
-std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics) {
-  switch (optics.absorb) {
-    case Absorb::field:
-      return make_with(problem, optics, FieldExtinction<float>{});
-    case Absorb::constant:
-      return make_with(problem, optics, ConstantExtinction<float>{optics.sigma});
-    case Absorb::nothing:
-      break;
-  }
-  return make_with(problem, optics, NoExtinction<float>{});
+std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics, Precision precision) {
+  return precision == Precision::float64 ? make_in<double>(problem, optics) : make_in<float>(problem, optics);
 }
 
 }  // namespace emberlock

@@ -33,8 +33,7 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
   Solution solution{{}, pose(setup.views, setup.hull, options, setup.pool), 0};
   const Problem& problem = solution.problem;
   const float sigma = setup.sigma(problem.grid());
-  const auto engine =
-      make_engine(problem, absorbing_optics(sigma), Precision::float32, setup.device, setup.pool);
+  const auto engine = make_engine(problem, absorbing_optics(sigma), Precision::float32, setup.pool);
   engine->set(std::vector<Rgba>(problem.grid().size()));
   const ErrorOverBoxes error(setup.views, setup.boxes, problem, setup.effects.background);
 

@@ -35,7 +35,7 @@ class Predictor {
         asked_(request.fixed ? *request.fixed : request.assumed),
         elapsed_(elapsed),
         compute_(compute),
-        pool_(compute.threads),
+        pool_(compute),
         boxes_(flame_boxes(flame.scene, flame.masks)),
         pictures_(flame, compute),
         plain_(extinction_of(found)) {

@@ -57,7 +57,7 @@ Result<Solver> parse_solver(std::string_view name) {
 
 Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects& effects,
                              const SolveOptions& options, const Elapsed& elapsed,
-                             const std::function<void(const Preview&)>& preview) {
+                             const std::function<void(const Preview&)>& preview) try {
   EMBERLOCK_RETURN_IF_ERROR(check_request(scene, grid, effects, options, elapsed));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   const auto now = [&] { return elapsed ? elapsed() : Seconds(0); };
@@ -76,8 +76,8 @@ Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects
   EMBERLOCK_ASSIGN_OR_RETURN(result.hull, carve(linear, chosen, grid, options.compute));
   result.hull_time = now() - start;
 
-  Pool pool(options.compute.threads);
-  SolverSetup setup{{}, {}, result.hull, effects, options, device, pool};
+  Pool pool(options.compute.threads, device);
+  SolverSetup setup{{}, {}, result.hull, effects, options, pool};
   std::vector<const View*> held_out;
   std::vector<PixelBox> held_out_boxes;
   for (std::size_t v = 0; v < linear.views.size(); ++v) {
@@ -103,6 +103,8 @@ Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects
   result.solve_time = tracker.time() - start - result.hull_time;
   result.trace = tracker.take_trace();
   return result;
+} catch (const DeviceError& e) {
+  return e.error();
 }
 
 }  // namespace emberlock

@@ -56,10 +56,13 @@ struct Reconstruction {
   Seconds solve_time{0};  ///< all the rest but the held-out views' evaluation for the trace
 };
 
-/// The state after an iteration; `volume` makes a copy when asked for.
+/// The state after an iteration; both functions make a copy when asked for.
 struct Preview {
   const TracePoint& point;
-  std::function<Volume()> volume;
+  std::function<Volume()> volume;  ///< waits for the device
+  /// Never makes the device wait: each call starts a copy and gives the last that has arrived, which is that
+  /// of an earlier call on a GPU; nothing before the first has.
+  std::function<std::optional<Volume>()> recent;
 };
 
 /// Time since the solve began, as the caller measures it.

@@ -10,8 +10,7 @@ Tracker::Tracker(const SolverSetup& setup, const std::vector<const View*>& held_
   const Seconds start = now();
   held_out_ =
       std::make_unique<const Problem>(pose(held_out, setup.hull, setup.problem_options(), setup.pool));
-  engine_ = make_engine(*held_out_, setup.optics(held_out_->grid()), setup.options.precision, setup.device,
-                        setup.pool);
+  engine_ = make_engine(*held_out_, setup.optics(held_out_->grid()), setup.options.precision, setup.pool);
   error_ = std::make_unique<const ErrorOverBoxes>(held_out, boxes, *held_out_, setup.effects.background);
   excluded_ += now() - start;
 }
@@ -20,7 +19,7 @@ Seconds Tracker::time() const { return now() - excluded_; }
 
 bool Tracker::out_of_time() const { return setup_.options.budget && now() >= *setup_.options.budget; }
 
-bool Tracker::record(int iteration, const std::array<double, 3>& input_rmse, const Engine& engine,
+bool Tracker::record(int iteration, const std::array<double, 3>& input_rmse, Engine& engine,
                      const Problem& problem) {
   TracePoint point{time(), iteration, input_rmse, {}};
   if (held_out_) {
@@ -32,7 +31,14 @@ bool Tracker::record(int iteration, const std::array<double, 3>& input_rmse, con
   }
   trace_.push_back(point);
   if (preview_) {
-    preview_({trace_.back(), [&] { return to_volume(engine.get(), problem, setup_.hull, setup_.effects); }});
+    const auto volume = [&](const std::vector<Rgba>& x) {
+      return to_volume(x, problem, setup_.hull, setup_.effects);
+    };
+    preview_({trace_.back(), [&] { return volume(engine.get()); },
+              [&] {
+                const std::vector<Rgba> x = engine.recent();
+                return x.empty() ? std::optional<Volume>() : volume(x);
+              }});
   }
   if (held_out_ && setup_.options.target_rmse &&
       all_channels(point.heldout_rmse) <= *setup_.options.target_rmse)

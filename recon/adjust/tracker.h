@@ -11,14 +11,13 @@
 
 namespace emberlock {
 
-/// What the solvers share: the scene's input views, the hull, the device, and the scale of extinction.
+/// What the solvers share: the scene's input views, the hull, the pool, and the scale of extinction.
 struct SolverSetup {
   std::vector<const View*> views;  ///< input views
   std::vector<PixelBox> boxes;     ///< flame boxes of these, for errors
   const Hull& hull;
   Effects effects;
   const SolveOptions& options;
-  Device device;
   Pool& pool;
   const RefractiveIndex* gas = nullptr;  ///< of curved rays
 
@@ -60,8 +59,7 @@ class Tracker {
     if (held_out_) engine_->set_offset(offset(views_, *held_out_));
   }
   /// Adds a point to the trace; true when the budget is spent or the target reached.
-  bool record(int iteration, const std::array<double, 3>& input_rmse, const Engine& engine,
-              const Problem& problem);
+  bool record(int iteration, const std::array<double, 3>& input_rmse, Engine& engine, const Problem& problem);
   [[nodiscard]] bool out_of_time() const;
   /// Time since the beginning without the held-out evaluations.
   [[nodiscard]] Seconds time() const;

@@ -4,17 +4,12 @@
 
 #include "base/image.h"
 #include "base/result.h"
+#include "recon/kernels/lens.h"
 
 namespace emberlock {
 
 // Conventions of recon: world in metres, right-handed; camera axes as OpenCV's (x right, y down, z forward);
 // pixel coordinates count from 0 at the corner of the top left pixel, so that its centre is (0.5, 0.5).
-
-/// Brown-Conrady distortion of normalised image coordinates, as OpenCV's first five coefficients.
-struct Distortion {
-  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
-  [[nodiscard]] bool none() const { return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0 && k3 == 0; }
-};
 
 struct Intrinsics {
   ImageSize size;

@@ -1,47 +1,86 @@
 #pragma once
 
-#include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <cuda_runtime.h>
 
+#include "recon/compute/device.h"
+
 namespace emberlock {
 
-/// Throws on a CUDA error: after cuda_status() has answered, one is a failing device or a defect of ours.
-inline void check_cuda(cudaError_t code, const char* what) {
-  if (code != cudaSuccess) throw std::runtime_error(std::string(what) + ": " + cudaGetErrorString(code));
-}
+/// Throws a DeviceError: after cuda_status() has answered, it tells of a failing device or a defect of ours.
+void check_cuda(cudaError_t code, const char* what);
 
-/// Owns an array in the GPU's memory.
+/// Memory on the GPU, in order with the launches and copies of the default stream, so that nobody waits for
+/// it; a DeviceError that says how much was asked for and how much there is. What is freed stays with the
+/// process for the next to ask.
+void* cuda_allocate(std::size_t bytes);
+void cuda_free(void* data) noexcept;
+
+/// Owns an array in the GPU's memory. Its launches and copies run in order with all others of the default
+/// stream.
 template <class T>
 class CudaBuffer {
  public:
-  explicit CudaBuffer(std::size_t size) : size_(size) {
-    check_cuda(cudaMalloc(&data_, (size == 0 ? 1 : size) * sizeof(T)), "cudaMalloc");
-    clear();
+  CudaBuffer() = default;
+  /// Filled with zero bytes.
+  explicit CudaBuffer(std::size_t size) : CudaBuffer(size, Unfilled{}) { clear(); }
+  explicit CudaBuffer(const std::vector<T>& from) : CudaBuffer(from.data(), from.size()) {}
+  CudaBuffer(const T* from, std::size_t size) : CudaBuffer(size, Unfilled{}) {
+    copy(data_, from, cudaMemcpyHostToDevice);
   }
-  explicit CudaBuffer(const std::vector<T>& from) : CudaBuffer(from.size()) { upload(from); }
-  CudaBuffer(const CudaBuffer&) = delete;
-  CudaBuffer& operator=(const CudaBuffer&) = delete;
-  ~CudaBuffer() { cudaFree(data_); }
+  CudaBuffer(CudaBuffer&& o) noexcept { swap(o); }
+  CudaBuffer& operator=(CudaBuffer&& o) noexcept {
+    swap(o);
+    return *this;
+  }
+  ~CudaBuffer() { cuda_free(data_); }
+
+  /// Contents undefined: for what a kernel writes before any other reads it.
+  static CudaBuffer unfilled(std::size_t size) { return CudaBuffer(size, Unfilled{}); }
 
   [[nodiscard]] T* data() const { return data_; }
-  void swap(CudaBuffer& o) { std::swap(data_, o.data_); }
-  void clear() { check_cuda(cudaMemset(data_, 0, size_ * sizeof(T)), "cudaMemset"); }
-  void upload(const std::vector<T>& from) {
-    check_cuda(cudaMemcpy(data_, from.data(), size_ * sizeof(T), cudaMemcpyHostToDevice), "copy to the GPU");
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] std::size_t bytes() const { return size_ * sizeof(T); }
+  void swap(CudaBuffer& o) noexcept {
+    std::swap(data_, o.data_);
+    std::swap(size_, o.size_);
   }
-  void copy_from(const CudaBuffer& o) {
-    check_cuda(cudaMemcpy(data_, o.data_, size_ * sizeof(T), cudaMemcpyDeviceToDevice), "copy on the GPU");
+  void clear() {
+    if (size_ > 0) check_cuda(cudaMemsetAsync(data_, 0, bytes()), "clearing memory of the GPU");
+  }
+  /// As large as `from` from here on.
+  void upload(const std::vector<T>& from) {
+    if (from.size() != size_) *this = CudaBuffer(from.size(), Unfilled{});
+    copy(data_, from.data(), cudaMemcpyHostToDevice);
+  }
+  /// Of the same size.
+  void copy_from(const CudaBuffer& o) { copy(data_, o.data_, cudaMemcpyDeviceToDevice); }
+  void download(T* to) const { copy(to, data_, cudaMemcpyDeviceToHost); }
+  [[nodiscard]] T download_one(std::size_t at) const {
+    T to;
+    check_cuda(cudaMemcpy(&to, data_ + at, sizeof(T), cudaMemcpyDeviceToHost), "copying from the GPU");
+    return to;
   }
   [[nodiscard]] std::vector<T> download() const {
     std::vector<T> to(size_);
-    check_cuda(cudaMemcpy(to.data(), data_, size_ * sizeof(T), cudaMemcpyDeviceToHost), "copy from the GPU");
+    download(to.data());
     return to;
   }
 
  private:
+  struct Unfilled {};
+  CudaBuffer(std::size_t size, Unfilled) : size_(size) {
+    if (size > 0) data_ = static_cast<T*>(cuda_allocate(bytes()));
+  }
+
+  /// Waits for copies from and to the CPU's memory.
+  void copy(T* to, const T* from, cudaMemcpyKind kind) const {
+    if (size_ > 0) check_cuda(cudaMemcpy(to, from, bytes(), kind), "copying memory");
+  }
+
   T* data_ = nullptr;
   std::size_t size_ = 0;
 };

@@ -1,5 +1,6 @@
 #include "recon/compute/device.h"
 
+#include <cstdlib>
 #include <string>
 
 #include "recon/compute/cuda_device.h"
@@ -15,6 +16,10 @@ Result<Device> parse_device(std::string_view name) {
 }
 
 Result<Device> resolve(Device choice) {
+  const char* named = choice == Device::automatic ? std::getenv("EMBERLOCK_DEVICE") : nullptr;
+  if (named != nullptr) {
+    EMBERLOCK_ASSIGN_OR_RETURN(choice, parse_device(named));
+  }
   if (choice == Device::cpu) return Device::cpu;
   const Status cuda = cuda_status();
   if (cuda.ok()) return Device::cuda;

@@ -32,6 +32,12 @@ std::size_t thread_count(int threads) {
                      : std::max<std::size_t>(1, std::thread::hardware_concurrency());
 }
 
+Device resolved(Device choice) {
+  const Result<Device> device = resolve(choice);
+  if (!device.ok()) throw DeviceError(device.error());
+  return *device;
+}
+
 }  // namespace
 
 struct Pool::Arena {
@@ -43,7 +49,9 @@ struct Pool::Arena {
   char ended = 0;
 };
 
-Pool::Pool(int threads) : arena_(std::make_unique<Arena>(thread_count(threads))) {}
+Pool::Pool(int threads, Device device)
+    : arena_(std::make_unique<Arena>(thread_count(threads))), device_(device) {}
+Pool::Pool(const ComputeOptions& compute) : Pool(compute.threads, resolved(compute.device)) {}
 Pool::~Pool() = default;
 
 void Pool::run(int tasks, const std::function<void(int)>& task) {

@@ -3,18 +3,24 @@
 #include <functional>
 #include <memory>
 
+#include "recon/compute/device.h"
+
 namespace emberlock {
 
-/// A pool of CPU threads. The work is cut into tasks by the caller, never by the number of threads, so
-/// results whose tasks write to separate places, or are combined in the order of the tasks, have the same
-/// bits for any number of threads. One caller at a time.
+/// A pool of CPU threads, and the device that heavy passes run on beside them. The work is cut into tasks by
+/// the caller, never by the number of threads, so results whose tasks write to separate places, or are
+/// combined in the order of the tasks, have the same bits for any number of threads. One caller at a time.
 class Pool {
  public:
-  /// 0 threads takes every core.
-  explicit Pool(int threads);
+  /// 0 threads takes every core. The device is resolved: cpu, or cuda where resolve() gave it.
+  explicit Pool(int threads, Device device = Device::cpu);
+  /// Throws a DeviceError where resolve() has one.
+  explicit Pool(const ComputeOptions& compute);
   ~Pool();
   Pool(Pool&&) = delete;
   Pool& operator=(Pool&&) = delete;
+
+  [[nodiscard]] Device device() const { return device_; }
 
   /// Calls task(0) .. task(tasks - 1), each once, in any order and at the same time; returns when all have
   /// ended.
@@ -23,6 +29,7 @@ class Pool {
  private:
   struct Arena;
   std::unique_ptr<Arena> arena_;
+  Device device_;
 };
 
 /// Element range of task `task` out of `tasks` nearly equal ones.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/effects/exposure_cuda.h"
 #include "recon/kernels/exposure.h"
 
 namespace emberlock {
@@ -48,11 +49,14 @@ std::vector<Rgba> ExposureBlur::adjoint(const std::vector<Rgba>& y, Pool& pool) 
 }
 
 std::vector<Rgba> ExposureBlur::average(const std::vector<Rgba>& in, int direction, Pool& pool) const {
+  if constexpr (kCudaBuilt) {
+    if (pool.device() == Device::cuda) return average_on_cuda(in, grid_, weights_, direction);
+  }
   std::vector<Rgba> out(in.size());
   const std::size_t plane = grid_.index(0, 0, 1);
-  const AverageAlongZ column{in.data(), out.data(),      plane,
-                             grid_.nz,  weights_.data(), static_cast<int>(weights_.size() / 2),
-                             direction};
+  const AverageAlongZ<float> column{in.data(), out.data(),      plane,
+                                    grid_.nz,  weights_.data(), static_cast<int>(weights_.size() / 2),
+                                    direction};
   pool.run(grid_.nz, [&](int k) {
     for (std::size_t p = 0; p < plane; ++p) column(p, k);
   });

@@ -20,7 +20,8 @@ Hull whole_grid(const Grid& grid);
 /// The visual hull (Laurentini 1994) of the input views (held-out ones don't carve; at most 64): a voxel
 /// stays unless some view sees it wholly and no pixel that its projection's bounding rectangle touches is a
 /// flame pixel. A voxel that reaches out of a view's frame, or behind its camera, is not carved by that view.
-/// Errors: no input view, more than 64, an empty hull (naming the view that carved most and its threshold).
+/// The same voxels on every device. Errors: no input view, more than 64, an empty hull (naming the view that
+/// carved most and its threshold), a device that can't run.
 Result<Hull> carve(const Scene& scene, const std::vector<FlameMask>& masks, const Grid& grid,
                    const ComputeOptions& compute);
 

@@ -7,7 +7,9 @@
 
 #include "recon/calibrate/camera_model.h"
 #include "recon/hull/hull.h"
-#include "recon/kernels/clip.h"
+#include "recon/hull/kernel_views.h"
+#include "recon/hull/ray_list_cuda.h"
+#include "recon/kernels/cut.h"
 
 namespace emberlock {
 namespace {
@@ -51,10 +53,6 @@ struct PixelTile {
   int x0, y0, x1, y1;
 };
 
-struct Counts {
-  std::uint32_t rays = 0, runs = 0, samples = 0;
-};
-
 /// What one tile of pixels gives; runs are counted from the tile's own first.
 struct TileRays {
   std::vector<MarchRay> rays;
@@ -63,120 +61,58 @@ struct TileRays {
   std::vector<std::uint32_t> pixels;
   std::vector<int> subsets;
   std::uint32_t samples = 0;
-  std::vector<Counts> counts;  // of each subset
+  std::vector<RayCounts> counts;  // of each subset
 };
 
-class TileClipper {
- public:
-  TileClipper(const Hull& medium, const RayListOptions& options) : options_(options) {
-    const Grid& g = medium.grid;
-    voxels_ = {g.nx - 1, g.ny - 1, g.nz - 1, nullptr};
-    const auto blocks = [](int voxels) { return (voxels + kBlock - 1) / kBlock; };
-    blocks_ = {blocks(voxels_.mx), blocks(voxels_.my), blocks(voxels_.mz), nullptr};
-    inside_.resize(voxels_.size());
-    occupied_.resize(blocks_.size());
-    std::size_t voxel = 0;
-    for (int k = 0; k < voxels_.mz; ++k)
-      for (int j = 0; j < voxels_.my; ++j)
-        for (int i = 0; i < voxels_.mx; ++i)
-          if (medium.inside[voxel++] != 0) {
-            inside_[voxels_.index(i, j, k)] = 1;
-            occupied_[blocks_.index(i / kBlock, j / kBlock, k / kBlock)] = 1;
-          }
-    voxels_.inside = inside_.data();
-    blocks_.inside = occupied_.data();
-  }
-
-  TileRays operator()(const CameraModel& camera, const float* origin, const PixelTile& tile) const {
-    TileRays out;
-    out.counts.resize(static_cast<std::size_t>(options_.subsets));
-    const Intrinsics& k = camera.intrinsics;
-    const Eigen::Matrix3d world_from_camera = camera.camera_from_world.rotation.transpose();
-    const bool straight = k.distortion.none();
-    for (int y = tile.y0; y < tile.y1; ++y)
-      for (int x = tile.x0; x < tile.x1; ++x) {
-        const int subset = options_.subset_of ? options_.subset_of(tile.view, x, y) : 0;
-        if (subset < 0) continue;
-        const Eigen::Vector2d centre(x + 0.5, y + 0.5);
-        const Eigen::Vector3d d = straight
-                                      ? (world_from_camera * Eigen::Vector3d((centre.x() - k.cx) / k.fx,
-                                                                             (centre.y() - k.cy) / k.fy, 1))
-                                            .normalized()
-                                      : camera.ray(centre).direction;
-        MarchRay ray;
-        for (int a = 0; a < 3; ++a) ray.direction[a] = static_cast<float>(d[a]);
-        ray.view = tile.view;
-        ray.first_run = static_cast<std::uint32_t>(out.runs.size());
-        const std::uint32_t before = out.samples;
-        add_runs(origin, ray, out);
-        if (ray.runs == 0) continue;
-        out.rays.push_back(ray);
-        out.pixels.push_back(static_cast<std::uint32_t>(y) * static_cast<std::uint32_t>(k.size.width) +
-                             static_cast<std::uint32_t>(x));
-        out.subsets.push_back(subset);
-        Counts& counts = out.counts[static_cast<std::size_t>(subset)];
-        ++counts.rays;
-        counts.runs += ray.runs;
-        counts.samples += out.samples - before;
-      }
-    return out;
-  }
-
- private:
-  void add_runs(const float* origin, MarchRay& ray, TileRays& out) const {
-    float before = 0;
-    if (options_.gas == nullptr) {
-      add_stretch(origin, ray.direction, kEndless, before, ray, out);
-      return;
+/// act(subset, pixel of the view) for all of a tile's pixels that belong to one.
+template <class Act>
+void each_pixel(const PixelTile& tile, const PixelRays& camera, const RayListOptions& options,
+                const Act& act) {
+  for (int y = tile.y0; y < tile.y1; ++y)
+    for (int x = tile.x0; x < tile.x1; ++x) {
+      const int subset = options.subset_of ? options.subset_of(tile.view, x, y) : 0;
+      if (subset >= 0)
+        act(subset, static_cast<std::uint32_t>(y) * camera.width + static_cast<std::uint32_t>(x));
     }
-    trace(*options_.gas, origin, ray.direction, [&](const float* from, const float* direction, float length) {
-      const std::uint32_t runs = ray.runs;
-      add_stretch(from, direction, length, before, ray, out);
-      const Bend bend{{from[0], from[1], from[2]}, {direction[0], direction[1], direction[2]}};
-      out.bends.insert(out.bends.end(), ray.runs - runs, bend);
-    });
-  }
+}
 
-  /// The runs of a straight line's first `length` edges; `before` is what lies inside the medium in front of
-  /// it.
-  void add_stretch(const float* origin, const float* direction, float length, float& before, MarchRay& ray,
-                   TileRays& out) const {
-    clip_to_medium(voxels_, blocks_, origin, direction, [&](float t0, float t1) {
-      constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
-      t1 = std::min(t1, length);
-      if (t1 - t0 < kSliver) return;
-      const int count = std::max(1, static_cast<int>(std::ceil((t1 - t0) / options_.step - 1e-3F)));
-      const float step = (t1 - t0) / static_cast<float>(count);
-      cut_at_slabs(origin[2], direction[2], t0, step, count, voxels_.mz, [&](int first, int size) {
-        const float ahead = static_cast<float>(first) * step;
-        // The middle sample tells the slab: the first may have been rounded across the border.
-        const int middle = first + size / 2;
-        const float t = t0 + (static_cast<float>(middle) + 0.5F) * step;
-        const int slab = clamp_cell(origin[2] + direction[2] * t, voxels_.mz + 1) / kSlab;
-        out.runs.push_back({t0 + ahead, step, before + ahead, 0, out.samples, size, slab});
-        out.samples += static_cast<std::uint32_t>(size);
-        ++ray.runs;
-      });
-      before += t1 - t0;
+TileRays clip_tile(const CutRay& cut, const PixelRays& camera, const float* origin, const PixelTile& tile,
+                   const RayListOptions& options) {
+  TileRays out;
+  out.counts.resize(static_cast<std::size_t>(options.subsets));
+  each_pixel(tile, camera, options, [&](int subset, std::uint32_t pixel) {
+    MarchRay ray;
+    camera(pixel, ray.direction);
+    ray.view = tile.view;
+    ray.first_run = static_cast<std::uint32_t>(out.runs.size());
+    const std::uint32_t before = out.samples;
+    cut(origin, ray.direction, [&](Run run, const float* from, const float* along) {
+      run.first_sample = out.samples;
+      out.samples += static_cast<std::uint32_t>(run.count);
+      out.runs.push_back(run);
+      if (options.gas != nullptr)
+        out.bends.push_back({{from[0], from[1], from[2]}, {along[0], along[1], along[2]}});
     });
-  }
-
-  std::vector<std::uint8_t> inside_, occupied_;
-  VoxelMask voxels_, blocks_;
-  const RayListOptions& options_;
-};
+    ray.runs = static_cast<std::uint32_t>(out.runs.size()) - ray.first_run;
+    if (ray.runs == 0) return;
+    out.rays.push_back(ray);
+    out.pixels.push_back(pixel);
+    out.subsets.push_back(subset);
+    RayCounts& counts = out.counts[static_cast<std::size_t>(subset)];
+    counts = counts + RayCounts{1, ray.runs, out.samples - before};
+  });
+  return out;
+}
 
 /// Sorts by subset, tiles in order, so that the list doesn't depend on which thread did which tile.
 void assemble(std::vector<TileRays>& tiles, int subsets, bool curved, RayList& list, Pool& pool) {
-  Counts next;
+  RayCounts next;
   list.subset_begin.push_back(0);
   for (int s = 0; s < subsets; ++s) {
     for (TileRays& tile : tiles) {
-      Counts& counts = tile.counts[static_cast<std::size_t>(s)];
+      RayCounts& counts = tile.counts[static_cast<std::size_t>(s)];
       std::swap(counts, next);  // from how many there are to where they go
-      next.rays += counts.rays;
-      next.runs += counts.runs;
-      next.samples += counts.samples;
+      next = next + counts;
     }
     list.subset_begin.push_back(next.rays);
   }
@@ -190,7 +126,7 @@ void assemble(std::vector<TileRays>& tiles, int subsets, bool curved, RayList& l
     for (std::size_t n = mine.begin; n < mine.end; ++n) {
       TileRays& tile = tiles[n];
       for (std::size_t r = 0; r < tile.rays.size(); ++r) {
-        Counts& to = tile.counts[static_cast<std::size_t>(tile.subsets[r])];
+        RayCounts& to = tile.counts[static_cast<std::size_t>(tile.subsets[r])];
         MarchRay ray = tile.rays[r];
         const std::size_t from = ray.first_run;
         ray.first_run = to.runs;
@@ -207,6 +143,25 @@ void assemble(std::vector<TileRays>& tiles, int subsets, bool curved, RayList& l
       }
     }
   });
+}
+
+std::vector<PixelTile> tiles_of(const std::vector<const CameraModel*>& cameras, const Grid& grid) {
+  std::vector<PixelTile> tiles;
+  for (std::size_t v = 0; v < cameras.size(); ++v) {
+    const PixelBox box = reach(*cameras[v], grid);
+    for (int y = box.y0; y < box.y1; y += kTile)
+      for (int x = box.x0; x < box.x1; x += kTile)
+        tiles.push_back(
+            {static_cast<std::uint32_t>(v), x, y, std::min(x + kTile, box.x1), std::min(y + kTile, box.y1)});
+  }
+  return tiles;
+}
+
+std::vector<PixelRays> rays_of(const std::vector<const CameraModel*>& cameras) {
+  std::vector<PixelRays> rays;
+  rays.reserve(cameras.size());
+  for (const CameraModel* camera : cameras) rays.push_back(pixel_rays(*camera));
+  return rays;
 }
 
 }  // namespace
@@ -276,28 +231,60 @@ Hull coarsen(const Hull& hull) {
   return out;
 }
 
+PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, const Grid& grid,
+                              const RayListOptions& options, Pool& pool) {
+  const auto subsets = static_cast<std::size_t>(options.subsets);
+  const std::vector<PixelTile> tiles = tiles_of(cameras, grid);
+  const std::vector<PixelRays> rays = rays_of(cameras);
+  std::vector<std::vector<std::size_t>> place(tiles.size(), std::vector<std::size_t>(subsets));
+  const auto each_tile = [&](const auto& act) {
+    pool.run(static_cast<int>(tiles.size()), [&](int task) {
+      const auto t = static_cast<std::size_t>(task);
+      each_pixel(tiles[t], rays[tiles[t].view], options, [&](int subset, std::uint32_t pixel) {
+        act(place[t][static_cast<std::size_t>(subset)]++, PixelOfView{tiles[t].view, pixel});
+      });
+    });
+  };
+  each_tile([](std::size_t, const PixelOfView&) {});
+  PixelsInOrder out;
+  std::size_t next = 0;
+  for (std::size_t s = 0; s < subsets; ++s) {
+    out.subset_begin.push_back(next);
+    for (auto& tile : place) {
+      std::swap(tile[s], next);  // from how many there are to where they go
+      next += tile[s];
+    }
+  }
+  out.subset_begin.push_back(next);
+  out.pixels.resize(next);
+  each_tile([&](std::size_t at, const PixelOfView& pixel) { out.pixels[at] = pixel; });
+  return out;
+}
+
 RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& medium,
                   const RayListOptions& options, Pool& pool) {
   RayList list;
   list.grid = medium.grid;
-  std::vector<PixelTile> tiles;
-  for (std::size_t v = 0; v < cameras.size(); ++v) {
-    const Eigen::Vector3d center = cameras[v]->center();
+  for (const CameraModel* camera : cameras) {
+    const Eigen::Vector3d center = camera->center();
     for (int a = 0; a < 3; ++a)
       list.origins.push_back(static_cast<float>((center[a] - static_cast<double>(medium.grid.origin[a])) /
                                                 static_cast<double>(medium.grid.edge)));
-    const PixelBox box = reach(*cameras[v], medium.grid);
-    for (int y = box.y0; y < box.y1; y += kTile)
-      for (int x = box.x0; x < box.x1; x += kTile)
-        tiles.push_back(
-            {static_cast<std::uint32_t>(v), x, y, std::min(x + kTile, box.x1), std::min(y + kTile, box.y1)});
   }
+  const std::vector<PixelRays> rays = rays_of(cameras);
+  const Cutter cutter(medium, options);
+  if constexpr (kCudaBuilt) {
+    if (pool.device() == Device::cuda) {
+      cut_on_cuda(cutter.cut(), rays, pixels_in_order(cameras, medium.grid, options, pool), list);
+      return list;
+    }
+  }
+  const std::vector<PixelTile> tiles = tiles_of(cameras, medium.grid);
   std::vector<TileRays> found(tiles.size());
-  const TileClipper clip(medium, options);
   pool.run(static_cast<int>(tiles.size()), [&](int t) {
     const PixelTile& tile = tiles[static_cast<std::size_t>(t)];
-    found[static_cast<std::size_t>(t)] =
-        clip(*cameras[tile.view], &list.origins[3 * static_cast<std::size_t>(tile.view)], tile);
+    found[static_cast<std::size_t>(t)] = clip_tile(
+        cutter.cut(), rays[tile.view], &list.origins[3 * static_cast<std::size_t>(tile.view)], tile, options);
   });
   assemble(found, options.subsets, options.gas != nullptr, list, pool);
   return list;

@@ -58,28 +58,4 @@ struct RayListOptions {
 RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& medium,
                   const RayListOptions& options, Pool& pool);
 
-/// Cuts samples [0, count) of a stretch at the slabs' borders: piece(first, size), front to back. `z` is
-/// where the line starts and `dz` its direction along z.
-template <class Piece>
-void cut_at_slabs(float z, float dz, float start, float step, int count, int layers, const Piece& piece) {
-  const auto slab_of = [&](int i) {
-    const float at = z + dz * (start + (static_cast<float>(i) + 0.5F) * step);
-    return clamp_to(static_cast<int>(at), 0, layers - 1) / kSlab;
-  };
-  int first = 0;
-  while (first < count) {
-    const int slab = slab_of(first);
-    int end = count;
-    if (slab_of(count - 1) != slab) {
-      const float border = static_cast<float>((dz > 0 ? slab + 1 : slab) * kSlab);
-      const float guess = ((border - z) / dz - start) / step;
-      end = clamp_to(static_cast<int>(guess), first + 1, count);
-      while (end > first + 1 && slab_of(end - 1) != slab) --end;
-      while (end < count && slab_of(end) == slab) ++end;
-    }
-    piece(first, end - first);
-    first = end;
-  }
-}
-
 }  // namespace emberlock

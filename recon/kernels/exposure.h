@@ -9,9 +9,10 @@ namespace emberlock {
 
 /// One key point of a column average along z: out(k) = sum of weight(m) * in(k - m) over m = -reach..reach,
 /// nothing outside the grid. With `direction` -1 it reads in(k + m): the transpose.
+template <class Real>
 struct AverageAlongZ {
-  const Rgba* in = nullptr;
-  Rgba* out = nullptr;
+  const Quad<Real>* in = nullptr;
+  Quad<Real>* out = nullptr;
   std::size_t plane = 0;  ///< key points of a layer
   int nz = 0;
   const float* weights = nullptr;  ///< 2 * reach + 1, that of m = -reach first
@@ -19,14 +20,24 @@ struct AverageAlongZ {
   int direction = 1;
 
   HOST_DEVICE void operator()(std::size_t in_layer, int k) const {
-    Rgba sum;
+    Quad<Real> sum;
     for (int m = -reach; m <= reach; ++m) {
       const int from = k - direction * m;
       if (from < 0 || from >= nz) continue;
-      sum = sum + weights[m + reach] * in[in_layer + plane * static_cast<std::size_t>(from)];
+      sum = sum + Real(weights[m + reach]) * in[in_layer + plane * static_cast<std::size_t>(from)];
     }
     out[in_layer + plane * static_cast<std::size_t>(k)] = sum;
   }
+  /// At the key point of an index.
+  HOST_DEVICE void operator()(std::size_t p) const { (*this)(p % plane, static_cast<int>(p / plane)); }
+};
+
+template <class Real>
+struct AddAt {
+  const Quad<Real>* from = nullptr;
+  Quad<Real>* to = nullptr;
+
+  HOST_DEVICE void operator()(std::size_t p) const { to[p] = to[p] + from[p]; }
 };
 
 }  // namespace emberlock

@@ -72,7 +72,7 @@ struct FieldForward {
       const Line<Real> line = Path::template line<Real>(table, n);
       const Real step = Real(run.step);
       for (int first = 0; first < run.count; first += kBatch) {
-        locate(table, line, run, first, layers_of(run), batch);
+        locate(table, line, run, first, batch);
         const int here = run.count - first < kBatch ? run.count - first : kBatch;
         for (int i = 0; i < here; ++i)
           values[i] = trilinear(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i]);
@@ -114,35 +114,35 @@ struct FieldForward {
   }
 };
 
-/// The transpose: adds to the eight key points of each sample of a run the residual times the emission's
-/// weight, and the slope by extinction in lane 3.
-template <class Real, class Path, class Add = AddDirectly>
+/// The transpose, for one run: puts where its samples lie the residual times the emission's weight, and the
+/// slope by extinction in lane 3.
+template <class Real, class Path, class Put = IntoKeyPoints<Real>>
 struct FieldAdjoint {
   RayTable table;
   const Quad<Real>* residual = nullptr;  ///< one a ray
-  const Quad<Real>* samples = nullptr;
+  const Quad<Real>* samples = nullptr;   ///< as FieldForward left them
   std::size_t first_sample = 0;
-  Quad<Real>* gradient = nullptr;
-  Add add = {};
+  Put put;
 
-  HOST_DEVICE void operator()(std::size_t n, const Layers& layers) const {
+  HOST_DEVICE void operator()(std::size_t n) const {
     const Run run = table.runs[n];
-    const std::size_t row = static_cast<std::size_t>(table.nx);
-    const std::size_t plane = row * static_cast<std::size_t>(table.ny);
-    const Line<Real> line = Path::template line<Real>(table, n);
-    const Quad<Real> seen = residual[run.ray];
-    const Quad<Real>* sample = samples + (run.first_sample - first_sample);
-    Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
-    for (int first = 0; first < run.count; first += kBatch) {
-      locate(table, line, run, first, layers, batch);
-      const int here = run.count - first < kBatch ? run.count - first : kBatch;
-      for (int i = 0; i < here; ++i, ++sample) {
-        Quad<Real> w = sample->c[0] * seen;
-        w.c[3] = sample->c[1];
-        scatter(gradient + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i], w, add);
-      }
-    }
+    Weigh weigh{put, samples + (run.first_sample - first_sample), run.first_sample, residual[run.ray]};
+    each_sample(table, Path::template line<Real>(table, n), run, weigh);
   }
+
+ private:
+  struct Weigh {
+    const Put& put;
+    const Quad<Real>* samples;
+    std::size_t first_sample;
+    Quad<Real> seen;
+    HOST_DEVICE void operator()(int sample, std::int32_t base, Real fx, Real fy, Real fz) const {
+      const Quad<Real>& left = samples[sample];
+      Quad<Real> w = left.c[0] * seen;
+      w.c[3] = left.c[1];
+      put(first_sample + static_cast<std::size_t>(sample), base, fx, fy, fz, w);
+    }
+  };
 };
 
 }  // namespace emberlock

@@ -142,6 +142,41 @@ struct ArrivingRadiance {
   }
 };
 
+/// Key point of an index, in coarse edges.
+HOST_DEVICE inline void key_point(int nx, int ny, std::size_t at, float* p) {
+  const auto row = static_cast<std::size_t>(nx);
+  const auto rows = static_cast<std::size_t>(ny);
+  p[0] = static_cast<float>(at % row);
+  p[1] = static_cast<float>(at / row % rows);
+  p[2] = static_cast<float>(at / (row * rows));  // NOLINT(bugprone-integer-division): a whole row or layer
+}
+
+/// What arrives at the n-th active key point along ordinate m.
+struct ArriveAt {
+  ShiningGrid grid;        ///< of ordinate 0
+  std::size_t stride = 0;  ///< ordinate m sees grid.shine + m * stride
+  const Ordinate* ordinates = nullptr;
+  const Footstep* footsteps = nullptr;  ///< `reach` an ordinate
+  std::size_t reach = 0;
+  const std::size_t* active = nullptr;
+
+  [[nodiscard]] HOST_DEVICE Rgba operator()(std::size_t n, std::size_t m) const {
+    float p[3];
+    key_point(grid.nx, grid.ny, active[n], p);
+    const ArrivingRadiance arriving{{grid.nx, grid.ny, grid.nz, grid.shine + m * stride},
+                                    footsteps + m * reach};
+    return arriving(p, active[n], ordinates[m].travel);
+  }
+};
+/// All of them, [ordinate][active point].
+struct Arrive {
+  ArriveAt at;
+  std::size_t count = 0;  ///< active points
+  Rgba* radiance = nullptr;
+
+  HOST_DEVICE void operator()(std::size_t i) const { radiance[i] = at(i % count, i / count); }
+};
+
 /// The in-scatter integral, Int p L dw', towards one of the ordinates or, with one row of equal values, of
 /// isotropic scattering: a row of the discrete phase matrix times the radiances.
 HOST_DEVICE inline Rgba scattered(const float* row, const Rgba* radiance, std::size_t stride, int ordinates) {
@@ -149,6 +184,20 @@ HOST_DEVICE inline Rgba scattered(const float* row, const Rgba* radiance, std::s
   for (int m = 0; m < ordinates; ++m) sum = sum + row[m] * radiance[static_cast<std::size_t>(m) * stride];
   return sum;
 }
+
+/// All of them, [row][active point].
+struct Scatter {
+  const float* phase = nullptr;  ///< [row][ordinate]
+  int ordinates = 0;
+  std::size_t count = 0;  ///< active points
+  const Rgba* radiance = nullptr;
+  Rgba* out = nullptr;
+
+  HOST_DEVICE void operator()(std::size_t i) const {
+    out[i] = scattered(phase + i / count * static_cast<std::size_t>(ordinates), radiance + i % count, count,
+                       ordinates);
+  }
+};
 
 /// The same integral towards any direction: the phase function's values at the ordinates, scaled to integrate
 /// to 1.
@@ -168,6 +217,63 @@ struct ScatteredTowards {
       sum = sum + weight * radiance[static_cast<std::size_t>(m) * stride];
     }
     return (1 / norm) * sum;
+  }
+};
+
+/// From a key point to a camera's centre.
+struct WayToCamera {
+  int nx = 2, ny = 2;
+  double center[3] = {0, 0, 0};  ///< in coarse edges
+
+  /// `direction` of unit length; up where the camera is the point.
+  HOST_DEVICE void operator()(std::size_t at, float* point, float* direction) const {
+    key_point(nx, ny, at, point);
+    double d[3];
+    for (int a = 0; a < 3; ++a) d[a] = center[a] - static_cast<double>(point[a]);
+    const double norm = sqrt(d[0] * d[0] + (d[1] * d[1] + d[2] * d[2]));
+    for (int a = 0; a < 3; ++a)
+      direction[a] = norm > 0 ? static_cast<float>(d[a] / norm) : (a == 2 ? 1.F : 0.F);
+  }
+};
+
+/// Anisotropic G of what the ordinates resolve, from the n-th active point towards a camera.
+struct BluntTowards {
+  WayToCamera way;
+  ScatteredTowards towards;
+  const std::size_t* active = nullptr;
+  std::size_t count = 0;           ///< active points
+  const Rgba* radiance = nullptr;  ///< [ordinate][active point]
+  Rgba* out = nullptr;             ///< one a key point
+
+  HOST_DEVICE void operator()(std::size_t n) const {
+    float point[3];
+    float direction[3];
+    way(active[n], point, direction);
+    Rgba g = towards(direction, radiance + n, count);
+    g.c[3] = 0;
+    out[active[n]] = g;
+  }
+};
+
+/// Mixes the peak's light into it: what comes from straight behind the point, or from the camera's side.
+struct MixPeak {
+  WayToCamera way;
+  ShiningGrid grid;
+  const std::size_t* active = nullptr;
+  std::size_t count = 0;  ///< active points
+  float peak = 0;         ///< its share
+  bool back = false;
+  Rgba* out = nullptr;  ///< one a key point
+
+  HOST_DEVICE void operator()(std::size_t n) const {
+    float point[3];
+    float direction[3];
+    way(active[n], point, direction);
+    if (back)
+      for (float& d : direction) d = -d;
+    Rgba& to = out[active[n]];
+    to = (1 - peak) * to + peak * ArrivingRadiance{grid}(point, active[n], direction);
+    to.c[3] = 0;
   }
 };
 

@@ -33,4 +33,40 @@ struct Judge {
   }
 };
 
+/// The same, and the ray keeps it.
+template <class Real>
+struct JudgeAndKeep {
+  Judge<Real> judge;
+  Quad<Real>* residual = nullptr;  ///< one a ray
+
+  HOST_DEVICE Quad<Real> operator()(std::size_t ray, const Quad<Real>& radiance) const {
+    return residual[ray] = judge(ray, radiance);
+  }
+};
+
+/// The ray keeps what was marched.
+template <class Real>
+struct KeepRadiance {
+  Quad<Real>* radiance = nullptr;  ///< one a ray
+
+  HOST_DEVICE void operator()(std::size_t ray, const Quad<Real>& marched) const { radiance[ray] = marched; }
+};
+
+/// A march of one ray and what becomes of its radiance.
+template <class March, class Keep>
+struct MarchAndKeep {
+  March march;
+  Keep keep;
+
+  HOST_DEVICE void operator()(std::size_t ray) const { keep(ray, march(ray)); }
+};
+/// The same for marches that need it themselves.
+template <class March, class Keep>
+struct MarchJudged {
+  March march;
+  Keep keep;
+
+  HOST_DEVICE void operator()(std::size_t ray) const { march(ray, keep); }
+};
+
 }  // namespace emberlock

@@ -90,15 +90,6 @@ struct Batch {
   alignas(64) std::int32_t base[kBatch];
 };
 
-/// A whole number of layers along z, [low, high).
-struct Layers {
-  int low = 0;
-  int high = 1 << 30;
-};
-/// A sample that rounding puts across the border of its run's slab is counted to the slab by the march and
-/// its transpose alike.
-HOST_DEVICE inline Layers layers_of(const Run& run) { return {run.slab * kSlab, (run.slab + 1) * kSlab}; }
-
 /// `low` for what is not a number.
 template <class T>
 HOST_DEVICE inline T clamp_to(T i, T low, T high) {
@@ -111,16 +102,18 @@ HOST_DEVICE inline int clamp_cell(float p, int key_points) {
 }
 
 /// Samples `first` .. first + kBatch - 1 of a run; those beyond its end are places nearby that nobody asks
-/// for.
+/// for. A sample that rounding puts across the border of its run's slab is counted to the slab by the march
+/// and its transpose alike.
 template <class Real>
 HOST_DEVICE inline void locate(const RayTable& table, const Line<Real>& line, const Run& run, int first,
-                               const Layers& layers, Batch<Real>& batch) {
+                               Batch<Real>& batch) {
   const Real ox = line.origin[0], oy = line.origin[1], oz = line.origin[2];
   const Real dx = line.direction[0], dy = line.direction[1], dz = line.direction[2];
   const Real start = Real(run.start), step = Real(run.step);
   const Real last_x = Real(table.nx - 2), last_y = Real(table.ny - 2);
-  const Real low_z = Real(layers.low),
-             last_z = Real(layers.high < table.nz - 1 ? layers.high - 1 : table.nz - 2);
+  const int low = run.slab * kSlab;
+  const int high = low + kSlab;
+  const Real low_z = Real(low), last_z = Real(high < table.nz - 1 ? high - 1 : table.nz - 2);
   const int row = table.nx, plane = table.nx * table.ny;
   for (int i = 0; i < kBatch; ++i) {
     const Real t = start + (Real(first + i) + Real(0.5)) * step;
@@ -147,25 +140,57 @@ HOST_DEVICE inline Quad<Real> trilinear(const Quad<Real>* p, std::size_t row, st
   return mix(fx, low(both), high(both));
 }
 
-/// Adds w to the eight key points with the weights that trilinear() reads them with.
-template <class Real, class Add>
-HOST_DEVICE inline void scatter(Quad<Real>* p, std::size_t row, std::size_t plane, Real fx, Real fy, Real fz,
-                                const Quad<Real>& w, const Add& add) {
-  const Quad<Real> x1 = fx * w;
-  const Quad<Real> x0 = w - x1;
-  const Real y1z1 = fy * fz;
-  const Real y1z0 = fy - y1z1;
-  const Real y0z1 = fz - y1z1;
-  const Real y0z0 = (1 - fy) - y0z1;
-  add(p[0], y0z0 * x0);
-  add(p[1], y0z0 * x1);
-  add(p[row], y1z0 * x0);
-  add(p[row + 1], y1z0 * x1);
-  add(p[plane], y0z1 * x0);
-  add(p[plane + 1], y0z1 * x1);
-  add(p[plane + row], y1z1 * x0);
-  add(p[plane + row + 1], y1z1 * x1);
+/// Calls act(sample, lowest key point of its voxel, fx, fy, fz) for every sample of a run, counted within it.
+template <class Real, class Act>
+HOST_DEVICE inline void each_sample(const RayTable& table, const Line<Real>& line, const Run& run, Act& act) {
+  Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
+  for (int first = 0; first < run.count; first += kBatch) {
+    locate(table, line, run, first, batch);
+    const int here = run.count - first < kBatch ? run.count - first : kBatch;
+    for (int i = 0; i < here; ++i) act(first + i, batch.base[i], batch.fx[i], batch.fy[i], batch.fz[i]);
+  }
 }
+
+/// Adds w to the eight key points of a voxel, p the lowest, with the weights that trilinear() reads them
+/// with.
+struct Trilinear {
+  template <class Real>
+  HOST_DEVICE void operator()(Quad<Real>* p, std::size_t row, std::size_t plane, Real fx, Real fy, Real fz,
+                              const Quad<Real>& w) const {
+    const Quad<Real> x1 = fx * w;
+    const Quad<Real> x0 = w - x1;
+    const Real y1z1 = fy * fz;
+    const Real y1z0 = fy - y1z1;
+    const Real y0z1 = fz - y1z1;
+    const Real y0z0 = (1 - fy) - y0z1;
+    p[0] = p[0] + y0z0 * x0;
+    p[1] = p[1] + y0z0 * x1;
+    p[row] = p[row] + y1z0 * x0;
+    p[row + 1] = p[row + 1] + y1z0 * x1;
+    p[plane] = p[plane] + y0z1 * x0;
+    p[plane + 1] = p[plane + 1] + y0z1 * x1;
+    p[plane + row] = p[plane + row] + y1z1 * x0;
+    p[plane + row + 1] = p[plane + row + 1] + y1z1 * x1;
+  }
+};
+
+/// Where a transpose puts what its samples give: at once into their key points. For callers that own them.
+template <class Real, class Spread = Trilinear>
+struct IntoKeyPoints {
+  Quad<Real>* target = nullptr;
+  std::size_t row = 0, plane = 0;
+  Spread spread = {};
+
+  HOST_DEVICE IntoKeyPoints(const RayTable& table, Quad<Real>* to, Spread by = {})
+      : target(to),
+        row(static_cast<std::size_t>(table.nx)),
+        plane(row * static_cast<std::size_t>(table.ny)),
+        spread(by) {}
+  HOST_DEVICE void operator()(std::size_t /*sample*/, std::int32_t base, Real fx, Real fy, Real fz,
+                              const Quad<Real>& w) const {
+    spread(target + base, row, plane, fx, fy, fz, w);
+  }
+};
 
 /// Radiance of one ray in lanes 0..2, its transmittance to the far end in lane 3:
 ///   L += T S ds phi(sigma ds), T *= exp(-sigma ds)
@@ -190,7 +215,7 @@ struct Forward {
       const Real pass = extinction_over(run);
       Real weight = extinction_weight(run, transmittance);
       for (int first = 0; first < run.count; first += kBatch) {
-        locate(table, line, run, first, layers_of(run), batch);
+        locate(table, line, run, first, batch);
         const int here = run.count - first < kBatch ? run.count - first : kBatch;
         for (int i = 0; i < here; ++i) {
           const Quad<Real> value =
@@ -230,41 +255,34 @@ struct Forward {
   }
 };
 
-/// Plain addition, for callers that own the key points they write to.
-struct AddDirectly {
-  template <class Real>
-  HOST_DEVICE void operator()(Quad<Real>& target, const Quad<Real>& value) const {
-    target = target + value;
-  }
-};
-
-/// The exact transpose of Forward's lanes 0..2 under no or constant extinction, for one run: adds its ray's
-/// residual to the eight key points of each sample with the weights that Forward reads them with.
-template <class Real, class Extinction, class Path, class Add = AddDirectly>
+/// The exact transpose of Forward's lanes 0..2 under no or constant extinction, for one run: puts its ray's
+/// residual where its samples lie, weighted as Forward weights them.
+template <class Real, class Extinction, class Path, class Put = IntoKeyPoints<Real>>
 struct Adjoint {
   RayTable table;
   const Quad<Real>* residual = nullptr;  ///< one a ray
-  Quad<Real>* gradient = nullptr;
   Extinction extinction;
-  Add add = {};
+  Put put;
 
-  HOST_DEVICE void operator()(std::size_t n, const Layers& layers) const {
+  HOST_DEVICE void operator()(std::size_t n) const {
     const Run run = table.runs[n];
-    const std::size_t row = static_cast<std::size_t>(table.nx);
-    const std::size_t plane = row * static_cast<std::size_t>(table.ny);
-    const Line<Real> line = Path::template line<Real>(table, n);
-    const Real pass = extinction.over(Real(run.step));
-    Quad<Real> w = (extinction.at(Real(run.before)) * extinction.weight(Real(run.step))) * residual[run.ray];
-    Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
-    for (int first = 0; first < run.count; first += kBatch) {
-      locate(table, line, run, first, layers, batch);
-      const int here = run.count - first < kBatch ? run.count - first : kBatch;
-      for (int i = 0; i < here; ++i) {
-        scatter(gradient + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i], w, add);
-        w = pass * w;
-      }
-    }
+    const Quad<Real> w =
+        (extinction.at(Real(run.before)) * extinction.weight(Real(run.step))) * residual[run.ray];
+    Weigh weigh{put, run.first_sample, extinction.over(Real(run.step)), w};
+    each_sample(table, Path::template line<Real>(table, n), run, weigh);
   }
+
+ private:
+  struct Weigh {
+    const Put& put;
+    std::size_t first_sample;
+    Real pass;
+    Quad<Real> w;
+    HOST_DEVICE void operator()(int sample, std::int32_t base, Real fx, Real fy, Real fz) {
+      put(first_sample + static_cast<std::size_t>(sample), base, fx, fy, fz, w);
+      w = pass * w;
+    }
+  };
 };
 
 }  // namespace emberlock

@@ -31,59 +31,63 @@ HOST_DEVICE inline float gaussian_weight(std::uint64_t bits, float deviation) {
   return 1 + deviation * (sum - 131070.F) * (1.F / 37837.2F);
 }
 
-/// The paper's equations (8) and (9) for one ray: every sample adds G(s) alpha_l dL T(s, s_e) exp(-alpha_d
-/// D(j, s)) to each of its eight key points, D in voxel edges.
-template <class Extinction, class Add = AddDirectly>
-struct PaperAdjust {
-  RayTable table;
-  const Rgba* residual = nullptr;  ///< rendered - captured, one a ray
-  Rgba* volume = nullptr;
-  Extinction extinction;
-  float gain = 0.001F;       ///< alpha_l, times what turns the paper's colour intensity into emission
-  float decay = 1;           ///< alpha_d, a voxel edge
-  float deviation = 0.05F;   ///< of G(s)
-  std::uint64_t stream = 0;  ///< hash of seed and iteration
-  Add add = {};
+/// Adds a exp(-decay D) to each of the eight key points of a voxel, p the lowest; D is its distance, voxel
+/// edges.
+struct Fade {
+  float decay = 1;
 
-  HOST_DEVICE void operator()(std::size_t n, const Layers& layers) const {
-    const Run run = table.runs[n];
-    const std::size_t row = static_cast<std::size_t>(table.nx);
-    const std::size_t plane = row * static_cast<std::size_t>(table.ny);
-    const Line<float> line = StraightPath::line<float>(table, n);
-    const Rgba change = -gain * residual[run.ray];
-    const float pass = extinction.over(run.step);
-    float transmittance = extinction.at(run.before);
-    Batch<float> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
-    for (int first = 0; first < run.count; first += kBatch) {
-      locate(table, line, run, first, layers, batch);
-      const int here = run.count - first < kBatch ? run.count - first : kBatch;
-      for (int i = 0; i < here; ++i) {
-        const std::uint64_t sample = run.first_sample + static_cast<std::uint32_t>(first + i);
-        spread(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i],
-               (transmittance * gaussian_weight(mix64(stream ^ sample), deviation)) * change);
-        transmittance *= pass;
-      }
-    }
-  }
-
- private:
-  HOST_DEVICE void spread(Rgba* p, std::size_t row, std::size_t plane, float fx, float fy, float fz,
-                          const Rgba& a) const {
+  HOST_DEVICE void operator()(Rgba* p, std::size_t row, std::size_t plane, float fx, float fy, float fz,
+                              const Rgba& a) const {
     const float x[2] = {fx * fx, (1 - fx) * (1 - fx)};
     const float y[2] = {fy * fy, (1 - fy) * (1 - fy)};
     const float z[2] = {fz * fz, (1 - fz) * (1 - fz)};
     float near[8];
     for (int n = 0; n < 8; ++n) near[n] = x[n & 1] + y[n >> 1 & 1] + z[n >> 2];
     for (int n = 0; n < 8; ++n) near[n] = exp_of_distance(-decay * sqrtf(near[n]));
-    add(p[0], near[0] * a);
-    add(p[1], near[1] * a);
-    add(p[row], near[2] * a);
-    add(p[row + 1], near[3] * a);
-    add(p[plane], near[4] * a);
-    add(p[plane + 1], near[5] * a);
-    add(p[plane + row], near[6] * a);
-    add(p[plane + row + 1], near[7] * a);
+    p[0] = p[0] + near[0] * a;
+    p[1] = p[1] + near[1] * a;
+    p[row] = p[row] + near[2] * a;
+    p[row + 1] = p[row + 1] + near[3] * a;
+    p[plane] = p[plane] + near[4] * a;
+    p[plane + 1] = p[plane + 1] + near[5] * a;
+    p[plane + row] = p[plane + row] + near[6] * a;
+    p[plane + row + 1] = p[plane + row + 1] + near[7] * a;
   }
+};
+
+/// The paper's equations (8) and (9) for one run: every sample gives G(s) alpha_l dL T(s, s_e) to its eight
+/// key points, which `put` multiplies by exp(-alpha_d D(j, s)), D in voxel edges (Fade).
+template <class Extinction, class Put = IntoKeyPoints<float, Fade>>
+struct PaperAdjust {
+  RayTable table;
+  const Rgba* residual = nullptr;  ///< rendered - captured, one a ray
+  Extinction extinction;
+  float gain = 0.001F;       ///< alpha_l, times what turns the paper's colour intensity into emission
+  float deviation = 0.05F;   ///< of G(s)
+  std::uint64_t stream = 0;  ///< hash of seed and iteration
+  Put put;
+
+  HOST_DEVICE void operator()(std::size_t n) const {
+    const Run run = table.runs[n];
+    Weigh weigh{*this, run.first_sample, extinction.over(run.step), extinction.at(run.before),
+                -gain * residual[run.ray]};
+    each_sample(table, StraightPath::line<float>(table, n), run, weigh);
+  }
+
+ private:
+  struct Weigh {
+    const PaperAdjust& by;
+    std::uint32_t first_sample = 0;
+    float pass = 0;
+    float transmittance = 0;
+    Rgba change;
+    HOST_DEVICE void operator()(int i, std::int32_t base, float fx, float fy, float fz) {
+      const std::uint64_t sample = first_sample + static_cast<std::uint32_t>(i);
+      by.put(sample, base, fx, fy, fz,
+             (transmittance * gaussian_weight(mix64(by.stream ^ sample), by.deviation)) * change);
+      transmittance *= pass;
+    }
+  };
 };
 
 }  // namespace emberlock

@@ -19,6 +19,10 @@ struct IndexField {
   float edge = 1;               ///< between its key points
   int nx = 2, ny = 2, nz = 2;
   const Rgba* values = nullptr;  ///< lanes 0..2: grad n, per `edge`; lane 3: n - 1
+
+  [[nodiscard]] HOST_DEVICE std::size_t size() const {
+    return static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz);
+  }
 };
 
 inline constexpr float kEndless = 1e30F;

@@ -106,4 +106,17 @@ struct DescendField {
   }
 };
 
+/// A step at the key point of an index.
+template <class Step>
+struct StepAt {
+  Step step;
+  int nx = 2, ny = 2;
+
+  HOST_DEVICE void operator()(std::size_t p) const {
+    const std::size_t row = static_cast<std::size_t>(nx);
+    const std::size_t plane = row * static_cast<std::size_t>(ny);
+    step(static_cast<int>(p % row), static_cast<int>(p % plane / row), static_cast<int>(p / plane));
+  }
+};
+
 }  // namespace emberlock

@@ -26,6 +26,8 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const Task task{scene, device, [&] { return clock.now() - start; }, preview};
   return has_goal(options) ? run_planned(task, options, progress) : run_settled(task, options, progress);
+} catch (const DeviceError& e) {
+  return e.error();
 } catch (const std::bad_alloc&) {
   return Error{ErrorKind::bad_input, "not enough memory", "--voxels", "Give fewer voxels, or a smaller box"};
 }

@@ -4,16 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "recon/render/in_scatter_cuda.h"
+
 namespace emberlock {
 namespace {
-
-/// In coarse edges.
-std::array<float, 3> position(const Grid& grid, std::size_t at) {
-  const auto nx = static_cast<std::size_t>(grid.nx);
-  const auto ny = static_cast<std::size_t>(grid.ny);
-  const std::size_t layer = at / (nx * ny);
-  return {static_cast<float>(at % nx), static_cast<float>(at / nx % ny), static_cast<float>(layer)};
-}
 
 using Lights = std::vector<Rgba>;  ///< [row of the phase matrix][active point]
 using Channels = std::array<double, 3>;
@@ -98,24 +92,29 @@ class Transport {
 
   /// One march for each active point and ordinate; ordinate m sees shine + m * stride.
   Lights sweep(const Rgba* shine, std::size_t stride, Lights* keep) {
-    constexpr std::size_t kBlock = 32;
     const Grid& grid = field_.medium.grid;
     const std::size_t active = field_.medium.active.size();
     if (rows_ == 1) stride = 0;
     Lights out(size());
     if (keep != nullptr) keep->resize(ordinates_ * active);
+    const ArriveAt arrive{
+        {grid.nx, grid.ny, grid.nz, shine}, stride, field_.ordinates.data(), footsteps_.data(), reach_,
+        field_.medium.active.data()};
+    if constexpr (kCudaBuilt) {
+      if (pool_.device() == Device::cuda) {
+        sweep_on_cuda(
+            {arrive, stride * (rows_ - 1) + field_.medium.shine.size(), ordinates_, active, &phase_}, out,
+            keep);
+        return out;
+      }
+    }
+    constexpr std::size_t kBlock = 32;
     pool_.run(static_cast<int>((active + kBlock - 1) / kBlock), [&](int task) {
       const std::size_t begin = kBlock * static_cast<std::size_t>(task);
       const std::size_t count = std::min(kBlock, active - begin);
       std::vector<Rgba> radiance(ordinates_ * kBlock);
       for (std::size_t m = 0; m < ordinates_; ++m) {
-        const ArrivingRadiance arriving{{grid.nx, grid.ny, grid.nz, shine + m * stride},
-                                        &footsteps_[m * reach_]};
-        for (std::size_t n = 0; n < count; ++n) {
-          const std::size_t eye = field_.medium.active[begin + n];
-          const std::array<float, 3> p = position(grid, eye);
-          radiance[m * kBlock + n] = arriving(p.data(), eye, field_.ordinates[m].travel);
-        }
+        for (std::size_t n = 0; n < count; ++n) radiance[m * kBlock + n] = arrive(begin + n, m);
         if (keep != nullptr) std::copy_n(&radiance[m * kBlock], count, &(*keep)[m * active + begin]);
       }
       for (std::size_t r = 0; r < rows_; ++r)
@@ -235,48 +234,12 @@ ScatterField find_in_scatter(const Volume& volume, const Hull& medium, const Eff
 
 namespace {
 
-/// Anisotropic G towards a camera.
-class Towards {
- public:
-  Towards(const ScatterField& field, const Eigen::Vector3d& camera_center)
-      : field_(field), center_(camera_center) {
-    for (int a = 0; a < 3; ++a)
-      center_[a] = (center_[a] - static_cast<double>(field.medium.grid.origin[a])) /
-                   static_cast<double>(field.medium.grid.edge);
-  }
-
-  /// Of what the ordinates resolve.
-  [[nodiscard]] Rgba blunt(std::size_t n) const {
-    const Ray ray(*this, field_.medium.active[n]);
-    const ScatteredTowards towards{field_.phase.blunt, field_.ordinates.data(),
-                                   static_cast<int>(field_.ordinates.size())};
-    return towards(ray.direction, &field_.light[n], field_.medium.active.size());
-  }
-  /// Of the peak: the light that comes from straight behind the point, or from the camera's side.
-  [[nodiscard]] Rgba peak(std::size_t n, const std::vector<Rgba>& shine) const {
-    Ray ray(*this, field_.medium.active[n]);
-    if (field_.phase.blunt.g < 0)
-      for (float& d : ray.direction) d = -d;
-    const Grid& g = field_.medium.grid;
-    return ArrivingRadiance{{g.nx, g.ny, g.nz, shine.data()}}(ray.point.data(), field_.medium.active[n],
-                                                              ray.direction);
-  }
-
- private:
-  struct Ray {
-    std::array<float, 3> point;
-    float direction[3] = {0, 0, 1};
-    Ray(const Towards& t, std::size_t at) : point(position(t.field_.medium.grid, at)) {
-      const Eigen::Vector3d p(point[0], point[1], point[2]);
-      const Eigen::Vector3d away = t.center_ - p;
-      const Eigen::Vector3d d = away.norm() > 0 ? away.normalized() : Eigen::Vector3d::UnitZ();
-      for (int a = 0; a < 3; ++a) direction[a] = static_cast<float>(d[a]);
-    }
-  };
-
-  const ScatterField& field_;
-  Eigen::Vector3d center_;  ///< in coarse edges
-};
+WayToCamera way_to(const Eigen::Vector3d& camera_center, const Grid& grid) {
+  WayToCamera way{grid.nx, grid.ny};
+  for (int a = 0; a < 3; ++a)
+    way.center[a] = (camera_center[a] - static_cast<double>(grid.origin[a])) / static_cast<double>(grid.edge);
+  return way;
+}
 
 /// What shines along the peak: the emission, and of multiple scattering what the blunt part scatters. What
 /// the peak itself scatters stays on its way, so it isn't lost: sigma_t falls by as much. (Behind, light
@@ -296,30 +259,39 @@ std::vector<Rgba> shine_along_peak(const ScatterField& field, const std::vector<
 }  // namespace
 
 std::vector<Rgba> in_scattered(const ScatterField& field, const Eigen::Vector3d& camera_center, Pool& pool) {
-  std::vector<Rgba> out(field.medium.grid.size());
-  const std::size_t active = field.medium.active.size();
-  const auto at_active = [&](const auto& value) {
-    constexpr std::size_t kBlock = 256;
-    pool.run(static_cast<int>((active + kBlock - 1) / kBlock), [&](int task) {
-      const std::size_t begin = kBlock * static_cast<std::size_t>(task);
-      for (std::size_t n = begin; n < std::min(active, begin + kBlock); ++n) {
-        Rgba& to = out[field.medium.active[n]];
-        to = value(n, to);
-        to.c[3] = 0;
-      }
-    });
-  };
+  const Grid& grid = field.medium.grid;
+  const std::vector<std::size_t>& active = field.medium.active;
+  std::vector<Rgba> out(grid.size());
   if (field.phase.isotropic()) {
-    at_active([&](std::size_t n, const Rgba&) { return field.light[n]; });
+    for (std::size_t n = 0; n < active.size(); ++n) {
+      out[active[n]] = field.light[n];
+      out[active[n]].c[3] = 0;
+    }
     return out;
   }
-  const Towards towards(field, camera_center);
-  at_active([&](std::size_t n, const Rgba&) { return towards.blunt(n); });
+  const auto at_active = [&](const auto& act) {
+    if constexpr (kCudaBuilt) {
+      if (pool.device() == Device::cuda) return at_active_on_cuda(act, field.light.size(), out);
+    }
+    constexpr std::size_t kBlock = 256;
+    pool.run(static_cast<int>((active.size() + kBlock - 1) / kBlock), [&](int task) {
+      const std::size_t begin = kBlock * static_cast<std::size_t>(task);
+      for (std::size_t n = begin; n < std::min(active.size(), begin + kBlock); ++n) act(n);
+    });
+  };
+  const WayToCamera way = way_to(camera_center, grid);
+  const ScatteredTowards towards{field.phase.blunt, field.ordinates.data(),
+                                 static_cast<int>(field.ordinates.size())};
+  at_active(BluntTowards{way, towards, active.data(), active.size(), field.light.data(), out.data()});
   if (field.phase.peak <= 0) return out;
   const std::vector<Rgba> shine = shine_along_peak(field, out);
-  const auto peak = static_cast<float>(field.phase.peak);
-  at_active(
-      [&](std::size_t n, const Rgba& blunt) { return (1 - peak) * blunt + peak * towards.peak(n, shine); });
+  at_active(MixPeak{way,
+                    {grid.nx, grid.ny, grid.nz, shine.data()},
+                    active.data(),
+                    active.size(),
+                    static_cast<float>(field.phase.peak),
+                    field.phase.blunt.g < 0,
+                    out.data()});
   return out;
 }
 

@@ -32,7 +32,7 @@ struct MarchTable {
   /// residual = radiance and transmittance of rays [begin, end).
   using ForwardEntry = void (*)(const MarchWork<Real>&, std::size_t begin, std::size_t end);
   /// gradient += transpose, over the listed runs of one slab. Nothing and constant alone.
-  using AdjointEntry = void (*)(const MarchWork<Real>&, const std::uint32_t* runs, std::size_t count, Layers);
+  using AdjointEntry = void (*)(const MarchWork<Real>&, const std::uint32_t* runs, std::size_t count);
   /// residual as judged, and samples, of rays [begin, end).
   using FieldEntry = void (*)(const MarchWork<Real>&, const Judge<Real>&, std::size_t begin, std::size_t end);
   /// One row of key points [begin, end) x {j} x {k}.

@@ -8,6 +8,7 @@
 #include "recon/effects/sensor.h"
 #include "recon/hull/ray_list.h"
 #include "recon/render/march_table.h"
+#include "recon/render/render_cuda.h"
 #include "recon/render/scattered_source.h"
 
 namespace emberlock {
@@ -65,15 +66,27 @@ void put_in_front(const Rgba* seen, const std::uint32_t* pixels, std::size_t cou
   }
 }
 
-void march(const MarchWork<float>& work, Absorb absorb, const RayList& list, Pool& pool,
+void march(const RayList& list, const std::vector<Rgba>& source, Absorb absorb, float sigma, Pool& pool,
            RadianceImage& image) {
+  if constexpr (kCudaBuilt) {
+    if (pool.device() == Device::cuda) {
+      const std::vector<Rgba> seen = march_on_cuda(list, source, absorb, sigma);
+      return put_in_front(seen.data(), list.pixels.data(), seen.size(), image);
+    }
+  }
+  std::vector<Rgba> seen(list.rays.size());
+  MarchWork<float> work;
+  work.rays = list.table();
+  work.volume = source.data();
+  work.sigma = sigma;
+  work.residual = seen.data();
   const Travel travel = list.bends.empty() ? Travel::straight : Travel::curved;
   const auto forward = march_table<float>().forward_of(absorb, travel);
   constexpr int kTasks = 128;
   pool.run(kTasks, [&](int task) {
     const Slice rays = slice(list.rays.size(), kTasks, task);
     forward(work, rays.begin, rays.end);
-    put_in_front(work.residual + rays.begin, list.pixels.data() + rays.begin, rays.end - rays.begin, image);
+    put_in_front(seen.data() + rays.begin, list.pixels.data() + rays.begin, rays.end - rays.begin, image);
   });
 }
 
@@ -83,7 +96,7 @@ RadianceImage render_view(const Volume& volume, const Hull& medium, const Effect
                           const CameraModel& camera, const RenderOptions& options) {
   RadianceImage image = backdrop(effects.background, camera.intrinsics.size, options.background);
   if (medium.count > 0) {
-    Pool pool(options.compute.threads);
+    Pool pool(options.compute);
     const CroppedHull crop = crop_to_medium(medium);
     std::vector<Rgba> source = crop_volume(volume, crop, effects.extinction.model);
     if (effects.scattering.order != Scattering::Order::none) {
@@ -97,13 +110,9 @@ RadianceImage render_view(const Volume& volume, const Hull& medium, const Effect
     const ExposureBlur exposure(effects.exposure, crop.hull.grid);
     if (!exposure.identity()) source = exposure.forward(source, pool);
     const RayList list = rays_of(camera, crop.hull, source, effects.refraction, options, pool);
-    std::vector<Rgba> seen(list.rays.size());
-    MarchWork<float> work;
-    work.rays = list.table();
-    work.volume = source.data();
-    work.sigma = static_cast<float>(effects.extinction.value.value() * static_cast<double>(volume.grid.edge));
-    work.residual = seen.data();
-    march(work, absorb_of(effects.extinction.model), list, pool, image);
+    const auto sigma =
+        static_cast<float>(effects.extinction.value.value() * static_cast<double>(volume.grid.edge));
+    march(list, source, absorb_of(effects.extinction.model), sigma, pool, image);
   }
   respond(image, effects.sensor);
   return image;

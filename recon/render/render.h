@@ -36,7 +36,8 @@ struct RenderOptions {
 };
 
 /// What a camera sees of the volume inside the medium, in grey levels: linear and not clipped unless the
-/// sensor's effects are on. `effects` must pass `check`.
+/// sensor's effects are on. `effects` must pass `check`. Throws a DeviceError where options.compute.device
+/// can't run.
 RadianceImage render_view(const Volume& volume, const Hull& medium, const Effects& effects,
                           const CameraModel& camera, const RenderOptions& options = {});
 

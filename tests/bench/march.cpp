@@ -238,7 +238,7 @@ std::unique_ptr<Engine> engine_for(const Case& c, const Problem& problem, Pool& 
   const auto sigma = static_cast<float>(kSigma) * problem.grid().edge;
   Optics optics = absorbing_optics(c.absorb == Absorb::constant ? sigma : 0);
   optics.absorb = c.absorb;
-  auto engine = make_engine(problem, optics, Precision::float32, Device::cpu, pool);
+  auto engine = make_engine(problem, optics, Precision::float32, pool);
   engine->set(std::vector<Rgba>(problem.grid().size(), Rgba{{3, 2, 1, sigma}}));
   const std::vector<float> weights(problem.active.begin(), problem.active.end());
   engine->set_weights(weights);

@@ -15,6 +15,7 @@ namespace emberlock {
 /// Rays through a medium with holes: two cameras, one of them close above.
 struct MarchCase {
   Hull medium;
+  std::vector<CameraModel> cameras;
   RayList list;
 };
 
@@ -48,16 +49,15 @@ inline MarchCase march_case(const MarchCaseOptions& options = {}) {
     medium.count += medium.inside[v];
   }
   const Intrinsics lens{{40, 30}, 35, 35, 20, 15, {}};
-  const std::vector<CameraModel> cameras = {
-      look_at(lens, {0.3, 0.1, 0.05}, Eigen::Vector3d::Zero()),
-      look_at(lens, {0.02, -0.03, 0.35}, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitY())};
+  out.cameras = {look_at(lens, {0.3, 0.1, 0.05}, Eigen::Vector3d::Zero()),
+                 look_at(lens, {0.02, -0.03, 0.35}, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitY())};
   const RefractiveIndex index = lens_of_gas();
   const IndexField gas = index.field(medium.grid);
   RayListOptions clip;
   clip.step = options.step;
   if (options.curved) clip.gas = &gas;
   Pool pool(1);
-  out.list = clip_rays({&cameras[0], &cameras[1]}, medium, clip, pool);
+  out.list = clip_rays({&out.cameras[0], &out.cameras[1]}, medium, clip, pool);
   return out;
 }
 
@@ -120,8 +120,7 @@ class Marcher {
     return work;
   }
   void scatter(Absorb absorb, const MarchWork<Real>& work) const {
-    for (std::uint32_t n = 0; n < list_.runs.size(); ++n)
-      table_.adjoint_of(absorb, travel_)(work, &n, 1, layers_of(list_.runs[n]));
+    for (std::uint32_t n = 0; n < list_.runs.size(); ++n) table_.adjoint_of(absorb, travel_)(work, &n, 1);
   }
 
   const RayList& list_;

@@ -4,16 +4,19 @@
 #include <rapidcheck.h>
 
 #include "recon/hull/ray_list.h"
-#include "recon/kernels/clip.h"
+#include "recon/kernels/cut.h"
 #include "recon/kernels/march.h"
 #include "recon/render/render.h"
+#include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
 
+ON_EACH_DEVICE(MarchLaw);
+
 double number(int low, int high) { return *rc::gen::inRange(low * 1000, high * 1000) / 1000.0; }
 
-TEST(MarchLaw, BeerLambertAndStepsOfAnySizeAgreeInAUniformMedium) {
+TEST_P(MarchLaw, BeerLambertAndStepsOfAnySizeAgreeInAUniformMedium) {
   EXPECT_TRUE(rc::check("a uniform medium looks the same however it is cut into steps", [] {
     const Grid grid =
         grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, *rc::gen::inRange(1, 20));

@@ -2,6 +2,8 @@
 // |R|^2 where it is not.
 #include <gtest/gtest.h>
 
+#include "recon/adjust/engine.h"
+#include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 
 namespace emberlock {
@@ -65,6 +67,70 @@ TEST(Adjoint, OfStraightRaysIsTheTransposeInSinglePrecision) { expect_transposes
 TEST(Adjoint, OfStraightRaysIsTheTransposeInDoublePrecision) { expect_transposes<double>(false); }
 TEST(Adjoint, OfCurvedRaysIsTheTransposeInSinglePrecision) { expect_transposes<float>(true); }
 TEST(Adjoint, OfCurvedRaysIsTheTransposeInDoublePrecision) { expect_transposes<double>(true); }
+
+ON_EACH_DEVICE(EngineAdjoint);
+
+/// Two views of a medium with holes, through even gas or a lens of it.
+Problem problem_of(const RefractiveIndex* gas, Pool& pool) {
+  const MarchCase c = march_case();
+  const View a{"a", c.cameras[0], RadianceImage(c.cameras[0].intrinsics.size)};
+  const View b{"b", c.cameras[1], RadianceImage(c.cameras[1].intrinsics.size)};
+  ProblemOptions options;
+  options.gas = gas;
+  options.subsets = 3;
+  options.subset_of = [](std::size_t view, int x, int y) { return (x + y + static_cast<int>(view)) % 4 - 1; };
+  return pose({&a, &b}, c.medium, options, pool);
+}
+
+/// <A x, A x> = <x, A^T A x>, over every subset, of what the engine itself gives back.
+void expect_transpose(const Problem& problem, const Optics& optics, Precision precision, Pool& pool) {
+  const auto engine = make_engine(problem, optics, precision, pool);
+  const float extinction = optics.absorb == Absorb::field ? 0.1F : 0;
+  const auto x = random_quads<float>(problem.grid().size(), 5, 1, static_cast<double>(extinction));
+  const std::vector<Rgba> black(problem.list.rays.size());
+  engine->set(x);
+  for (int s = 0; s < problem.list.subsets(); ++s) {
+    engine->residual_against(black, s);  // A x
+    engine->backproject(s);
+  }
+  const std::vector<Rgba> seen = engine->residuals();
+  const double left = dot(seen, seen);
+  const double right = dot(x, engine->gradient());
+  ASSERT_GT(left, 10);
+  EXPECT_NEAR(left / right, 1, 1e-6) << "sigma " << optics.sigma;
+}
+
+TEST_P(EngineAdjoint, IsTheTransposeUnderEveryExtinctionPathExposureAndPrecision) {
+  Pool pool(2, device_here());
+  const RefractiveIndex lens = lens_of_gas();
+  Exposure long_one{Exposure::Shutter::integrated, Seconds(0.025), 1};
+  for (const RefractiveIndex* gas : {static_cast<const RefractiveIndex*>(nullptr), &lens}) {
+    const Problem problem = problem_of(gas, pool);
+    for (const Precision precision : {Precision::float32, Precision::float64})
+      for (const Exposure& exposure : {Exposure{}, long_one}) {
+        expect_transpose(problem, {Absorb::nothing, 0, 0, exposure}, precision, pool);
+        for (const float sigma : {0.05F, 1.F, 5.F})
+          expect_transpose(problem, {Absorb::constant, sigma, 0, exposure}, precision, pool);
+        expect_transpose(problem, {Absorb::field, 0, 0, exposure}, precision, pool);
+      }
+  }
+}
+
+TEST_P(EngineAdjoint, HasTheSameBitsOnEveryRun) {
+  Pool pool(2, device_here());
+  const Problem problem = problem_of(nullptr, pool);
+  std::vector<Rgba> first;
+  for (int run = 0; run < 3; ++run) {
+    const auto engine = make_engine(problem, {Absorb::field, 0, 0, {}}, Precision::float32, pool);
+    engine->set(random_quads<float>(problem.grid().size(), 5, 1, 0.1));
+    engine->residual(0);
+    engine->backproject(0);
+    const std::vector<Rgba> gradient = engine->gradient();
+    if (run == 0) first = gradient;
+    for (std::size_t p = 0; p < first.size(); ++p)
+      for (int c = 0; c < 4; ++c) ASSERT_EQ(gradient[p].c[c], first[p].c[c]) << p;
+  }
+}
 
 }  // namespace
 }  // namespace emberlock

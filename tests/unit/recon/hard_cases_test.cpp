@@ -26,7 +26,7 @@ Hull cube(int voxels) {
   return whole_grid(grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, voxels));
 }
 
-class MarchHardCase : public testing::TestWithParam<Device> {
+class MarchHardCase : public OnEachDevice {
  protected:
   /// Radiance and transmittance of the rays of one camera that meet the medium, and what the transpose makes
   /// of them.
@@ -39,7 +39,7 @@ class MarchHardCase : public testing::TestWithParam<Device> {
                            Absorb absorb = Absorb::nothing) {
     View view{"camera", camera, RadianceImage(camera.intrinsics.size)};
     const Problem problem = pose({&view}, medium, {}, pool_);
-    const auto engine = make_engine(problem, {absorb, sigma, 0, {}}, Precision::float32, GetParam(), pool_);
+    const auto engine = make_engine(problem, {absorb, sigma, 0, {}}, Precision::float32, pool_);
     engine->set(std::vector<Rgba>(problem.grid().size(), Rgba{{1, 1, 1, sigma}}));
     Seen seen;
     engine->residual(0);
@@ -49,7 +49,7 @@ class MarchHardCase : public testing::TestWithParam<Device> {
     seen.rays = engine->residuals();
     return seen;
   }
-  Pool pool_{2};
+  Pool pool_{2, GetParam()};
 };
 
 bool finite(const std::vector<Rgba>& values) {
@@ -140,7 +140,7 @@ TEST_P(MarchHardCase, VolumesOfOneVoxelOneRowAndOnePlate) {
 INSTANTIATE_TEST_SUITE_P(Devices, MarchHardCase, testing::ValuesIn(devices()),
                          [](const auto& device) { return device_name(device.param); });
 
-TEST(MarchHardCase, AnEmptyMediumLeavesTheBackgroundAlone) {
+TEST_P(MarchHardCase, AnEmptyMediumLeavesTheBackgroundAlone) {
   Hull nothing = cube(4);
   std::fill(nothing.inside.begin(), nothing.inside.end(), std::uint8_t{0});
   nothing.count = 0;
@@ -223,8 +223,7 @@ TEST(MarchHardCase, TheFarCornerOf512CubedVoxelsLooksAsInAGridOfItsOwn) {
     left += static_cast<double>(seen[r].c[1]) * static_cast<double>(seen[r].c[1]);
   }
   for (std::uint32_t run = 0; run < list.runs.size(); ++run)
-    march_table<float>().adjoint_of(Absorb::nothing, Travel::straight)(work, &run, 1,
-                                                                       layers_of(list.runs[run]));
+    march_table<float>().adjoint_of(Absorb::nothing, Travel::straight)(work, &run, 1);
   for (int k = 0; k < g.nz; ++k)
     for (int j = 0; j < g.ny; ++j)
       for (int i = 0; i < g.nx; ++i)

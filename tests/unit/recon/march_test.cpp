@@ -5,14 +5,15 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
-#include "recon/adjust/engine.h"
-#include "recon/adjust/problem.h"
 #include "recon/hull/hull.h"
 #include "recon/kernels/clip.h"
 #include "recon/render/render.h"
+#include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(March);
 
 CameraModel camera_at(const Eigen::Vector3d& center, const Eigen::Vector3d& target, ImageSize size,
                       double focal) {
@@ -79,7 +80,7 @@ float pixel(const RadianceImage& image, int x, int y, int c = 0) {
   return image.rgb[static_cast<std::size_t>(at)];
 }
 
-TEST(March, AgreesWithBruteForceInDoubleThroughAMediumWithHoles) {
+TEST_P(March, AgreesWithBruteForceInDoubleThroughAMediumWithHoles) {
   const Grid grid = grid_over({Eigen::Vector3d::Zero(), {0.2, 0.15, 0.1}}, 8);
   const Volume volume = random_volume(grid);
   const Hull medium = random_medium(grid, 0.6);
@@ -102,18 +103,7 @@ TEST(March, AgreesWithBruteForceInDoubleThroughAMediumWithHoles) {
   }
 }
 
-TEST(March, SlabHasTheClosedFormForAnyExtinction) {
-  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 16);
-  const CameraModel camera = camera_at({0.5, 0, 0}, {0, 0, 0}, {3, 3}, 300);
-  for (const double sigma : {0.0, 1e-6, 1e-3, 1.0, 32.8, 1e3, 1e6}) {
-    const RadianceImage image =
-        render_view(filled(grid, 1000), whole_grid(grid), absorbing(PerMeter(sigma)), camera);
-    const double expected = sigma == 0 ? 1000 * 0.2 : -1000 * std::expm1(-sigma * 0.2) / sigma;
-    EXPECT_NEAR(pixel(image, 1, 1) / expected, 1, 1e-5) << sigma;
-  }
-}
-
-TEST(March, GaussianBlobIntegratesToItsClosedForm) {
+TEST_P(March, GaussianBlobIntegratesToItsClosedForm) {
   const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 64);
   Volume volume = filled(grid, 0);
   const double width = 0.02;
@@ -137,18 +127,7 @@ TEST(March, GaussianBlobIntegratesToItsClosedForm) {
   }
 }
 
-TEST(March, AxisParallelRaysOnFacesAndEdgesLoseNothing) {
-  // Two by two voxels around the axis: the central ray runs along an edge, its neighbours along faces.
-  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 2);
-  for (const Eigen::Vector3d& axis :
-       {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, -1, 0), Eigen::Vector3d(0, 0, 1)}) {
-    CameraModel camera = camera_at(0.5 * axis, {0, 0, 0}, {3, 3}, 1e4);
-    camera.intrinsics.cx = camera.intrinsics.cy = 1.5;
-    const RadianceImage image = render_view(filled(grid, 100), whole_grid(grid), {}, camera);
-    for (int y = 0; y < 3; ++y)
-      for (int x = 0; x < 3; ++x) EXPECT_NEAR(pixel(image, x, y), 20, 1e-3) << axis.transpose();
-  }
-  // A ray that runs exactly along an outer face belongs to the closed box.
+TEST(Clip, ARayExactlyAlongAnOuterFaceBelongsToTheClosedBox) {
   const float origin[3] = {-3, 0, 1};
   const float direction[3] = {1, 0, 0};
   std::uint8_t inside[64] = {};
@@ -160,49 +139,6 @@ TEST(March, AxisParallelRaysOnFacesAndEdgesLoseNothing) {
   float length = 0;
   clip_to_medium(voxels, blocks, origin, direction, [&](float a, float b) { length += b - a; });
   EXPECT_FLOAT_EQ(length, 2);
-}
-
-TEST(March, CameraInsideTheMediumSeesOnlyWhatLiesAhead) {
-  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 10);
-  const CameraModel camera = camera_at({0.05, 0, 0}, {-1, 0, 0}, {3, 3}, 1000);
-  EXPECT_NEAR(pixel(render_view(filled(grid, 100), whole_grid(grid), {}, camera), 1, 1), 15, 1e-3);
-}
-
-TEST(March, CameraThatLooksAwaySeesNothing) {
-  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 4);
-  const RadianceImage image =
-      render_view(filled(grid, 100), whole_grid(grid), {}, camera_at({0.5, 0, 0}, {1, 0, 0}, {8, 6}, 8));
-  for (const float v : image.rgb) EXPECT_EQ(v, 0);
-}
-
-TEST(March, AdjointIsTheTranspose) {
-  const Grid grid = grid_over({Eigen::Vector3d::Zero(), {0.2, 0.12, 0.16}}, 20);
-  const Hull medium = random_medium(grid, 0.7);
-  View a;
-  a.camera = camera_at({0.3, 0.1, 0.05}, {0, 0, 0}, {40, 30}, 35);
-  a.image = RadianceImage({40, 30});
-  View b = a;
-  b.camera = camera_at({0.02, -0.03, 0.35}, {0, 0, 0}, {40, 30}, 35);
-  Pool pool(2);
-  const Problem problem = pose({&a, &b}, medium, {}, pool);
-  for (const float sigma : {0.F, 0.05F, 1.F, 5.F}) {
-    const auto engine = make_engine(problem, absorbing_optics(sigma), Precision::float32, Device::cpu, pool);
-    std::vector<Rgba> x(problem.grid().size());
-    for (std::size_t p = 0; p < x.size(); ++p)
-      if (problem.active[p] != 0) x[p].c[0] = static_cast<float>(random_uniform(1, 0, p));
-    engine->set(x);
-    engine->project(0);
-    const std::vector<Rgba> ax = engine->residuals();
-    engine->backproject(0);  // y = A x
-    const std::vector<Rgba> aty = engine->gradient();
-    double left = 0;
-    double right = 0;
-    for (const Rgba& r : ax) left += static_cast<double>(r.c[0]) * static_cast<double>(r.c[0]);
-    for (std::size_t p = 0; p < x.size(); ++p)
-      right += static_cast<double>(x[p].c[0]) * static_cast<double>(aty[p].c[0]);
-    ASSERT_GT(left, 0);
-    EXPECT_NEAR(right / left, 1, 1e-6) << sigma;
-  }
 }
 
 }  // namespace

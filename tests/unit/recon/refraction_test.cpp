@@ -10,12 +10,13 @@
 
 #include "base/random.h"
 #include "recon/hull/hull.h"
-#include "recon/hull/ray_list.h"
-#include "recon/render/march_table.h"
 #include "recon/render/render.h"
+#include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(RefractionTest);
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
@@ -278,7 +279,7 @@ Effects curved(PerMeter extinction) {
   return effects;
 }
 
-TEST(Refraction, CurvedPicturesAgreeWithBruteForceInDouble) {
+TEST_P(RefractionTest, CurvedPicturesAgreeWithBruteForceInDouble) {
   const Setting setting;
   const GasTemperature gas = lens_gas();
   RenderOptions options;
@@ -305,7 +306,7 @@ TEST(Refraction, CurvedPicturesAgreeWithBruteForceInDouble) {
   }
 }
 
-TEST(Refraction, GasAtTheSurroundingsTemperatureGivesTheStraightPicturesBits) {
+TEST_P(RefractionTest, GasAtTheSurroundingsTemperatureGivesTheStraightPicturesBits) {
   const Setting setting;
   for (const double sigma : {0.0, 10.0}) {
     Effects effects = curved(PerMeter(sigma));
@@ -315,7 +316,7 @@ TEST(Refraction, GasAtTheSurroundingsTemperatureGivesTheStraightPicturesBits) {
   }
 }
 
-TEST(Refraction, SameBitsForAnyNumberOfThreads) {
+TEST_P(RefractionTest, SameBitsForAnyNumberOfThreads) {
   const Setting setting;
   RenderOptions options;
   std::vector<std::vector<float>> pictures;
@@ -328,45 +329,6 @@ TEST(Refraction, SameBitsForAnyNumberOfThreads) {
   EXPECT_EQ(pictures[0], pictures[2]);
   EXPECT_NE(pictures[0],
             render_view(setting.volume, setting.medium, absorbing(PerMeter(10)), setting.camera).rgb);
-}
-
-TEST(Refraction, AdjointOnCurvedPathsIsTheTranspose) {
-  const Setting setting;
-  Pool pool(2);
-  const RefractiveIndex index(lens_gas(), kAmbient);
-  const IndexField gas = index.field(setting.grid);
-  RayListOptions options;
-  options.gas = &gas;
-  const RayList list = clip_rays({&setting.camera}, setting.medium, options, pool);
-  ASSERT_EQ(list.bends.size(), list.runs.size());
-  std::vector<Rgba> x(setting.grid.size());
-  std::vector<Rgba> y(list.rays.size());
-  for (std::size_t i = 0; i < x.size(); ++i) x[i].c[1] = static_cast<float>(random_uniform(5, 0, i));
-  for (std::size_t i = 0; i < y.size(); ++i) y[i].c[1] = static_cast<float>(random_uniform(6, 0, i));
-  std::vector<Rgba> ax(y.size());
-  std::vector<Rgba> aty(x.size());
-  MarchWork<float> work;
-  work.rays = list.table();
-  work.sigma = 0.1F;
-  work.volume = x.data();
-  work.residual = ax.data();
-  march_table<float>().forward_of(Absorb::constant, Travel::curved)(work, 0, y.size());
-  work.residual = y.data();
-  work.gradient = aty.data();
-  for (std::uint32_t run = 0; run < list.runs.size(); ++run) {
-    const Line<float> line = CurvedPath::line<float>(work.rays, run);
-    const float z = line.origin[2] + line.direction[2] * (list.runs[run].start + 0.5F * list.runs[run].step);
-    const int low = clamp_cell(z, setting.grid.nz) / kSlab * kSlab;
-    march_table<float>().adjoint_of(Absorb::constant, Travel::curved)(work, &run, 1, {low, low + kSlab});
-  }
-  double left = 0;
-  double right = 0;
-  for (std::size_t i = 0; i < y.size(); ++i)
-    left += static_cast<double>(ax[i].c[1]) * static_cast<double>(y[i].c[1]);
-  for (std::size_t i = 0; i < x.size(); ++i)
-    right += static_cast<double>(x[i].c[1]) * static_cast<double>(aty[i].c[1]);
-  EXPECT_GT(left, 100);
-  EXPECT_NEAR(left / right, 1, 1e-6);
 }
 
 }  // namespace

@@ -8,10 +8,13 @@
 #include "recon/adjust/engine.h"
 #include "recon/adjust/solver.h"
 #include "recon/render/render.h"
+#include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(Threads);
 
 template <class T>
 void expect_same_bits(const std::function<std::vector<T>(int threads)>& result) {
@@ -24,11 +27,11 @@ void expect_same_bits(const std::function<std::vector<T>(int threads)>& result) 
   }
 }
 
-TEST(Threads, SolveTheSameBitsInDoublePrecision) {
+TEST_P(Threads, SolveTheSameBitsInDoublePrecision) {
   const Scene scene = small_flame_scene();
   expect_same_bits<float>([&](int threads) {
     SolveOptions options;
-    options.compute = {Device::cpu, threads};
+    options.compute = {device_here(), threads};
     options.precision = Precision::float64;
     options.iterations = 2;
     const auto r = solve(scene, grid_over(scene.box, 32), absorbing(PerMeter(32.8)), options);
@@ -37,7 +40,7 @@ TEST(Threads, SolveTheSameBitsInDoublePrecision) {
 }
 
 /// Emission and extinction descend together, by two subsets.
-TEST(Threads, DescendTheSameBitsByEmissionAndExtinction) {
+TEST_P(Threads, DescendTheSameBitsByEmissionAndExtinction) {
   const Scene scene = small_flame_scene();
   const Hull hull = *carve(scene, flame_masks(scene), grid_over(scene.box, 40), {});
   std::vector<const View*> views;
@@ -46,11 +49,11 @@ TEST(Threads, DescendTheSameBitsByEmissionAndExtinction) {
   posing.subsets = 2;
   posing.subset_of = [](std::size_t, int x, int y) { return (x + y) % 2; };
   expect_same_bits<Rgba>([&](int threads) {
-    Pool pool(threads);
+    Pool pool(threads, device_here());
     const Problem problem = pose(views, hull, posing, pool);
     Optics optics;
     optics.absorb = Absorb::field;
-    const auto engine = make_engine(problem, optics, Precision::float32, Device::cpu, pool);
+    const auto engine = make_engine(problem, optics, Precision::float32, pool);
     const std::size_t points = problem.grid().size();
     std::vector<Rgba> start(points);
     std::vector<float> weights(points);
@@ -76,7 +79,7 @@ TEST(Threads, DescendTheSameBitsByEmissionAndExtinction) {
   });
 }
 
-TEST(Threads, RenderTheSameBitsUnderEveryEffect) {
+TEST_P(Threads, RenderTheSameBitsUnderEveryEffect) {
   FlameTruth flame =
       Flame().at(Seconds(0), grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 32));
   flame.volume.extinction.assign(flame.volume.grid.size(), 30);
@@ -92,7 +95,7 @@ TEST(Threads, RenderTheSameBitsUnderEveryEffect) {
   for (const Effects& effects : {Effects{}, absorbing(PerMeter(30)), field, all}) {
     expect_same_bits<float>([&](int threads) {
       RenderOptions options;
-      options.compute = {Device::cpu, threads};
+      options.compute = {device_here(), threads};
       return render_view(flame.volume, flame.medium, effects, camera, options).rgb;
     });
   }

@@ -23,7 +23,7 @@ struct ForwardByHand {
                              table.rays[run.ray].direction);
       const float step = run.step;
       for (int first = 0; first < run.count; first += kBatch) {
-        locate(table, line, run, first, layers_of(run), batch);
+        locate(table, line, run, first, batch);
         const int here = run.count - first < kBatch ? run.count - first : kBatch;
         for (int i = 0; i < here; ++i)
           radiance = radiance + step * trilinear(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i],
@@ -35,26 +35,24 @@ struct ForwardByHand {
   }
 };
 
-template <class Add = AddDirectly>
+template <class Put = IntoKeyPoints<float>>
 struct AdjointByHand {
   RayTable table;
   const Rgba* residual = nullptr;
-  Rgba* gradient = nullptr;
-  Add add = {};
+  Put put;
 
-  HOST_DEVICE void operator()(std::size_t n, const Layers& layers) const {
+  HOST_DEVICE void operator()(std::size_t n) const {
     const Run run = table.runs[n];
-    const std::size_t row = static_cast<std::size_t>(table.nx);
-    const std::size_t plane = row * static_cast<std::size_t>(table.ny);
     const Line<float> line(table.origins + 3 * static_cast<std::size_t>(table.rays[run.ray].view),
                            table.rays[run.ray].direction);
     const Rgba w = run.step * residual[run.ray];
     Batch<float> batch;
     for (int first = 0; first < run.count; first += kBatch) {
-      locate(table, line, run, first, layers, batch);
+      locate(table, line, run, first, batch);
       const int here = run.count - first < kBatch ? run.count - first : kBatch;
       for (int i = 0; i < here; ++i)
-        scatter(gradient + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i], w, add);
+        put(run.first_sample + static_cast<std::size_t>(first + i), batch.base[i], batch.fx[i], batch.fy[i],
+            batch.fz[i], w);
     }
   }
 };

@@ -20,9 +20,9 @@ __attribute__((noinline)) void forward_by_hand(const MarchWork<float>& w, std::s
   for (std::size_t ray = begin; ray < end; ++ray) w.residual[ray] = march(ray);
 }
 __attribute__((noinline)) void adjoint_by_hand(const MarchWork<float>& w, const std::uint32_t* runs,
-                                               std::size_t count, Layers layers) {
-  const AdjointByHand<> march{w.rays, w.residual, w.gradient};
-  for (std::size_t n = 0; n < count; ++n) march(runs[n], layers);
+                                               std::size_t count) {
+  const AdjointByHand<> march{w.rays, w.residual, {w.rays, w.gradient}};
+  for (std::size_t n = 0; n < count; ++n) march(runs[n]);
 }
 
 /// What render_view has to do where every effect is off, and no more.
@@ -75,9 +75,8 @@ int run(const std::string& name) {
   const auto forward = [&](Absorb absorb) {
     march_table<float>().forward_of(absorb, Travel::straight)(work, 0, rays.size());
   };
-  // Entries of the table take a slab's runs at once; these layers hold all.
   const auto adjoint = [&](Absorb absorb) {
-    march_table<float>().adjoint_of(absorb, Travel::straight)(work, runs.data(), runs.size(), Layers{});
+    march_table<float>().adjoint_of(absorb, Travel::straight)(work, runs.data(), runs.size());
   };
   const Cases cases = {
       {"forward_none", [&] { forward(Absorb::nothing); }},
@@ -85,7 +84,7 @@ int run(const std::string& name) {
       {"forward_by_hand", [&] { forward_by_hand(work, 0, rays.size()); }},
       {"adjoint_none", [&] { adjoint(Absorb::nothing); }},
       {"adjoint_constant", [&] { adjoint(Absorb::constant); }},
-      {"adjoint_by_hand", [&] { adjoint_by_hand(work, runs.data(), runs.size(), Layers{}); }},
+      {"adjoint_by_hand", [&] { adjoint_by_hand(work, runs.data(), runs.size()); }},
       {"picture", [&] { rays[0].c[0] += render_view(emission, c.medium, {}, camera, one_thread).rgb[0]; }},
       {"picture_of_effects",
        [&] { rays[0].c[0] += render_view(emission, c.medium, some_effects(), camera, one_thread).rgb[0]; }},

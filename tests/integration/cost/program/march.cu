@@ -3,12 +3,6 @@
 
 namespace emberlock {
 
-struct AddAtomically {
-  __device__ void operator()(Rgba& target, const Rgba& value) const {
-    for (int c = 0; c < 4; ++c) atomicAdd(&target.c[c], value.c[c]);
-  }
-};
-
 template <class March>
 __device__ void each_ray(const March& march, Rgba* radiance, std::size_t rays) {
   const std::size_t ray = blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
@@ -17,7 +11,7 @@ __device__ void each_ray(const March& march, Rgba* radiance, std::size_t rays) {
 template <class March>
 __device__ void each_run(const March& march, std::size_t runs) {
   const std::size_t run = blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
-  if (run < runs) march(run, layers_of(march.table.runs[run]));
+  if (run < runs) march(run);
 }
 
 extern "C" {
@@ -33,14 +27,11 @@ __global__ void forward_constant(Forward<float, ConstantExtinction<float>, Strai
                                  Rgba* radiance, std::size_t rays) {
   each_ray(march, radiance, rays);
 }
-__global__ void adjoint_none(Adjoint<float, NoExtinction<float>, StraightPath, AddAtomically> march,
-                             std::size_t runs) {
+__global__ void adjoint_none(Adjoint<float, NoExtinction<float>, StraightPath> march, std::size_t runs) {
   each_run(march, runs);
 }
-__global__ void adjoint_by_hand(AdjointByHand<AddAtomically> march, std::size_t runs) {
-  each_run(march, runs);
-}
-__global__ void adjoint_constant(Adjoint<float, ConstantExtinction<float>, StraightPath, AddAtomically> march,
+__global__ void adjoint_by_hand(AdjointByHand<> march, std::size_t runs) { each_run(march, runs); }
+__global__ void adjoint_constant(Adjoint<float, ConstantExtinction<float>, StraightPath> march,
                                  std::size_t runs) {
   each_run(march, runs);
 }

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstddef>
+
+#include "recon/compute/cuda_buffer.h"
+
+namespace emberlock {
+
+// For .cu files: how functors of recon/kernels run on the GPU, one thread for each call.
+
+inline constexpr unsigned kThreadsABlock = 128;
+
+template <class Act>
+__global__ void call_each(const Act act, std::size_t first, std::size_t last) {
+  const std::size_t i = first + blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
+  if (i < last) act(i);
+}
+
+/// act(first) .. act(last - 1), in any order and at the same time, on the default stream. `what` names them
+/// in errors.
+template <class Act>
+void launch(std::size_t first, std::size_t last, const Act& act, const char* what) {
+  if (first >= last) return;
+  const std::size_t blocks = (last - first + kThreadsABlock - 1) / kThreadsABlock;
+  call_each<<<static_cast<unsigned>(blocks), kThreadsABlock>>>(act, first, last);
+  check_cuda(cudaGetLastError(), what);
+}
+template <class Act>
+void launch(std::size_t count, const Act& act, const char* what) {
+  launch(0, count, act, what);
+}
+
+}  // namespace emberlock

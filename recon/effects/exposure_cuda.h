@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "recon/kernels/exposure.h"
+#include "recon/kernels/grid.h"
+
+namespace emberlock {
+
+/// AverageAlongZ at all key points of a grid, on the GPU; weights as ExposureBlur has them. Throws a
+/// DeviceError.
+std::vector<Rgba> average_on_cuda(const std::vector<Rgba>& in, const Grid& grid,
+                                  const std::vector<float>& weights, int direction);
+
+}  // namespace emberlock

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <vector>
+
+#include "recon/hull/ray_list.h"
+#include "recon/kernels/cut.h"
+
+namespace emberlock {
+
+/// Pixels of some views, sorted by subset; subsets + 1 values in subset_begin.
+struct PixelsInOrder {
+  std::vector<PixelOfView> pixels;
+  std::vector<std::size_t> subset_begin;
+};
+
+/// Those that may have a ray, in the order of the list that their rays make.
+PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, const Grid& grid,
+                              const RayListOptions& options, Pool& pool);
+
+/// Cuts the pixels' rays on the GPU; `cut` points to the CPU's memory. `list` has its grid and origins, and
+/// gets all the rest. Throws a DeviceError.
+void cut_on_cuda(const CutRay& cut, const std::vector<PixelRays>& cameras, const PixelsInOrder& pixels,
+                 RayList& list);
+
+}  // namespace emberlock

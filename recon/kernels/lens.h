@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "base/host_device.h"
+
+namespace emberlock {
+
+/// Brown-Conrady distortion of normalised image coordinates, as OpenCV's first five coefficients.
+struct Distortion {
+  double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
+
+  [[nodiscard]] HOST_DEVICE inline bool none() const {
+    return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0 && k3 == 0;
+  }
+  /// Arguments by value: the target may be the source.
+  HOST_DEVICE inline void distort(double x, double y, double& to_x, double& to_y) const {
+    const double r2 = x * x + y * y;
+    const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    to_x = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
+    to_y = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
+  }
+  /// By fixed-point iteration.
+  HOST_DEVICE inline void undistort(double& x, double& y) const {
+    const double from_x = x;
+    const double from_y = y;
+    for (int i = 0; i < 50; ++i) {
+      double dx = 0;
+      double dy = 0;
+      distort(x, y, dx, dy);
+      dx -= from_x;
+      dy -= from_y;
+      x -= dx;
+      y -= dy;
+      if (dx * dx + dy * dy < 1e-24) break;
+    }
+  }
+};
+
+/// A camera's rays as a kernel needs them: the direction, of unit length, through the centre of a pixel.
+struct PixelRays {
+  double world_from_camera[9] = {};  ///< row-major
+  double fx = 1, fy = 1, cx = 0, cy = 0;
+  Distortion distortion;
+  std::uint32_t width = 0;  ///< of the picture
+  bool distorted = false;
+
+  HOST_DEVICE inline void operator()(std::uint32_t pixel, float* direction) const {
+    double x = (pixel % width + 0.5 - cx) / fx;
+    double y = (pixel / width + 0.5 - cy) / fy;  // NOLINT(bugprone-integer-division): whole rows
+    if (distorted) distortion.undistort(x, y);
+    double d[3];
+    for (int r = 0; r < 3; ++r) {
+      const double* row = world_from_camera + 3 * r;
+      d[r] = row[0] * x + (row[1] * y + row[2]);
+    }
+    const double norm = sqrt(d[0] * d[0] + (d[1] * d[1] + d[2] * d[2]));
+    for (int a = 0; a < 3; ++a) direction[a] = static_cast<float>(d[a] / norm);
+  }
+};
+
+}  // namespace emberlock

@@ -1,0 +1,41 @@
+#include "recon/compute/cuda_launch.h"
+#include "recon/hull/device_ray_list.h"
+#include "recon/render/render_cuda.h"
+
+namespace emberlock {
+namespace {
+
+template <class Path, class Extinction>
+std::vector<Rgba> march(const RayList& list, const std::vector<Rgba>& source, const Extinction& extinction) {
+  using March = Forward<float, Extinction, Path>;
+  const DeviceRayList rays(list);
+  const CudaBuffer<Rgba> volume(source);
+  const auto seen = CudaBuffer<Rgba>::unfilled(list.rays.size());
+  launch(list.rays.size(),
+         MarchAndKeep<March, KeepRadiance<float>>{{rays.table(), volume.data(), extinction}, {seen.data()}},
+         "marching");
+  return seen.download();
+}
+
+template <class Extinction>
+std::vector<Rgba> march(const RayList& list, const std::vector<Rgba>& source, const Extinction& extinction) {
+  return list.bends.empty() ? march<StraightPath>(list, source, extinction)
+                            : march<CurvedPath>(list, source, extinction);
+}
+
+}  // namespace
+
+std::vector<Rgba> march_on_cuda(const RayList& list, const std::vector<Rgba>& source, Absorb absorb,
+                                float sigma) {
+  switch (absorb) {
+    case Absorb::field:
+      return march(list, source, FieldExtinction<float>{});
+    case Absorb::constant:
+      return march(list, source, ConstantExtinction<float>{sigma});
+    case Absorb::nothing:
+      break;
+  }
+  return march(list, source, NoExtinction<float>{});
+}
+
+}  // namespace emberlock

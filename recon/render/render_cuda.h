@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "recon/hull/ray_list.h"
+#include "recon/render/march_table.h"
+
+namespace emberlock {
+
+/// Radiance and transmittance of a list's rays through `source`, at its grid's key points, on the GPU; sigma
+/// of constant extinction, a voxel edge. Throws a DeviceError.
+std::vector<Rgba> march_on_cuda(const RayList& list, const std::vector<Rgba>& source, Absorb absorb,
+                                float sigma);
+
+}  // namespace emberlock

@@ -4,12 +4,15 @@
 
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/devices.h"
 #include "tests/support/random_walks.h"
 
 namespace emberlock {
 namespace {
 
-TEST(InScatter, PicturesOfAScatteringCloudAgreeWithRandomWalks) {
+ON_EACH_DEVICE(InScatterPicture);
+
+TEST_P(InScatterPicture, PicturesOfAScatteringCloudAgreeWithRandomWalks) {
   const Volume volume = cloud(24, 30);
   const Hull medium = whole_grid(volume.grid);
   const CameraModel camera =
@@ -38,7 +41,7 @@ TEST(InScatter, PicturesOfAScatteringCloudAgreeWithRandomWalks) {
   }
 }
 
-TEST(InScatter, PictureOfAFlameOfWhiteSootAgreesWithRandomWalks) {
+TEST_P(InScatterPicture, PictureOfAFlameOfWhiteSootAgreesWithRandomWalks) {
   const Flame flame;
   const double sigma = flame.options().extinction.value();
   FlameTruth truth = flame.at(Seconds(0), cube(96));

@@ -6,10 +6,13 @@
 
 #include "recon/hull/hull.h"
 #include "recon/render/in_scatter.h"
+#include "tests/support/devices.h"
 #include "tests/support/random_walks.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(InScatterSlab);
 
 // ---- Slabs
 
@@ -77,7 +80,7 @@ SlabResult wide_box(int cells, int width, double cell, double albedo, double asy
   InScatterOptions options;
   options.voxels = width;
   options.octant_levels = 3;
-  Pool pool(0);
+  Pool pool(0, device_here());
   const ScatterField field = find_in_scatter(
       volume, whole_grid(grid), scattering(sigma, Order::multiple, albedo, asymmetry), options, pool);
   const std::vector<Rgba> g = in_scattered(field, {0.3, 0.2, 5}, pool);
@@ -85,7 +88,7 @@ SlabResult wide_box(int cells, int width, double cell, double albedo, double asy
           green(g, grid.index(width / 2, width / 2, cells / 2))};
 }
 
-TEST(InScatter, SurfaceOfAThickIsothermalSlabObeysTheSquareRootLaw) {
+TEST_P(InScatterSlab, SurfaceOfAThickIsothermalSlabObeysTheSquareRootLaw) {
   // S(0) = sqrt(1 - albedo) B of a half space that scatters isotropically (Chandrasekhar 1950; Rybicki and
   // Lightman 1979, section 1.8; exact): with S = (1 - a) B + a J and a = 0.5, J = (sqrt(2) - 1) B at the
   // surface.
@@ -96,14 +99,14 @@ TEST(InScatter, SurfaceOfAThickIsothermalSlabObeysTheSquareRootLaw) {
   EXPECT_NEAR(slab.middle, exact.at(0.5), 0.01);
 }
 
-TEST(InScatter, ThinSlabAgreesWithTheIntegralEquationInDouble) {
+TEST_P(InScatterSlab, ThinSlabAgreesWithTheIntegralEquationInDouble) {
   const SlabResult slab = wide_box(8, 36, 0.25, 0.6, 0);
   const OneDimensionalSlab exact(2, 0.6);
   EXPECT_NEAR(slab.face / exact.at(0), 1, 0.02);
   EXPECT_NEAR(slab.middle / exact.at(0.5), 1, 0.02);
 }
 
-TEST(InScatter, DeepInsideAnIsothermalMediumEveryPhaseFunctionSeesTheSourceFunction) {
+TEST_P(InScatterSlab, DeepInsideAnIsothermalMediumEveryPhaseFunctionSeesTheSourceFunction) {
   for (const double g : {0.0, 0.6, -0.6, 0.99, -0.99})
     EXPECT_NEAR(wide_box(10, 10, 2, 0.5, g).middle, 1, 0.01) << g;
 }
@@ -134,12 +137,12 @@ double leaving(const ScatterField& field, const std::vector<Rgba>& g, Eigen::Vec
   return radiance;
 }
 
-TEST(InScatter, WhatABoxOfAlmostWhiteMediumEmitsLeavesIt) {
+TEST_P(InScatterSlab, WhatABoxOfAlmostWhiteMediumEmitsLeavesIt) {
   const Volume volume = cloud(12, 30);
   Effects effects;
   effects.extinction.model = Extinction::Model::field;
   effects.scattering = {Order::multiple, 0.999, 0};
-  Pool pool(0);
+  Pool pool(0, device_here());
   const ScatterField field = find_in_scatter(volume, whole_grid(volume.grid), effects, {}, pool);
   const std::vector<Rgba> g = in_scattered(field, {1, 0, 0}, pool);
   const int n = field.medium.grid.nx - 1;
@@ -174,14 +177,14 @@ TEST(InScatter, WhatABoxOfAlmostWhiteMediumEmitsLeavesIt) {
   EXPECT_NEAR((left + absorbed) / emitted, 1, 0.02);
 }
 
-TEST(InScatter, CoarseningKeepsTheEmissionAndTheOpticalMass) {
+TEST_P(InScatterSlab, CoarseningKeepsTheEmissionAndTheOpticalMass) {
   const Volume volume = cloud(23, 30);
   Effects effects;
   effects.extinction.model = Extinction::Model::field;
   effects.scattering = {Order::single, 0.5, 0};
   InScatterOptions options;
   options.voxels = 7;
-  Pool pool(0);
+  Pool pool(0, device_here());
   const ScatterField field = find_in_scatter(volume, whole_grid(volume.grid), effects, options, pool);
   const auto total = [](const Grid& g, const auto& value) {
     double sum = 0;

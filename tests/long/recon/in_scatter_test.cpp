@@ -6,12 +6,15 @@
 #include <gtest/gtest.h>
 
 #include "recon/hull/hull.h"
+#include "tests/support/devices.h"
 #include "tests/support/random_walks.h"
 
 namespace emberlock {
 namespace {
 
-TEST(InScatter, AgreesWithRandomWalksThroughACloud) {
+ON_EACH_DEVICE(InScatter);
+
+TEST_P(InScatter, AgreesWithRandomWalksThroughACloud) {
   // Four deviations of the walks, and what 12 voxels make of blobs of less than two voxels' width.
   constexpr double kDiscretisation = 0.045;
   constexpr double kThickest = 30;
@@ -21,7 +24,7 @@ TEST(InScatter, AgreesWithRandomWalksThroughACloud) {
   const Eigen::Vector3d camera(0.28, 0.1, 0.05);
   InScatterOptions options;
   options.voxels = 12;
-  Pool pool(0);
+  Pool pool(0, device_here());
   const Scattering cases[] = {{Order::single, 0.9, 0},      {Order::multiple, 0.9, 0},
                               {Order::single, 0.9, 0.6},    {Order::multiple, 0.9, 0.6},
                               {Order::multiple, 0.9, -0.4}, {Order::multiple, 0.9, 0.9}};
@@ -43,7 +46,7 @@ TEST(InScatter, AgreesWithRandomWalksThroughACloud) {
   }
 }
 
-TEST(InScatter, FinerGridsComeCloserToRandomWalks) {
+TEST_P(InScatter, FinerGridsComeCloserToRandomWalks) {
   const Volume volume = cloud(24, 30);
   Effects effects;
   effects.extinction.model = Extinction::Model::field;
@@ -52,7 +55,7 @@ TEST(InScatter, FinerGridsComeCloserToRandomWalks) {
                            -0.0333333333333333333);  // key point (9, 4, 4) of 12
   const Estimate truth =
       RandomWalks{volume, 30, effects.scattering}.in_scatter(at, Eigen::Vector3d::UnitX(), 100000);
-  Pool pool(0);
+  Pool pool(0, device_here());
   double error[2];
   for (const int voxels : {12, 24}) {
     InScatterOptions options;
@@ -69,13 +72,13 @@ TEST(InScatter, FinerGridsComeCloserToRandomWalks) {
 
 // ---- What is left out, limits, hard cases
 
-TEST(InScatter, NothingRunsWhereNothingScatters) {
+TEST_P(InScatter, NothingRunsWhereNothingScatters) {
   const Grid grid = cube(4);
   const Volume volume = uniform_volume(grid, 100);
   Hull nothing = whole_grid(grid);
   nothing.inside.assign(nothing.inside.size(), 0);
   nothing.count = 0;
-  Pool pool(0);
+  Pool pool(0, device_here());
   const Effects on = scattering(PerMeter(30), Order::multiple, 0.5);
   EXPECT_FALSE(find_in_scatter(volume, whole_grid(grid), on, {}, pool).empty());
   EXPECT_TRUE(find_in_scatter(volume, nothing, on, {}, pool).empty());
@@ -89,11 +92,11 @@ TEST(InScatter, NothingRunsWhereNothingScatters) {
   }
 }
 
-TEST(InScatter, MultipleScatteringTendsToSingleAsTheAlbedoVanishes) {
+TEST_P(InScatter, MultipleScatteringTendsToSingleAsTheAlbedoVanishes) {
   const Volume volume = cloud(8, 30);
   Effects effects;
   effects.extinction.model = Extinction::Model::field;
-  Pool pool(0);
+  Pool pool(0, device_here());
   for (const double g : {0.0, 0.5}) {
     const auto found = [&](Order order, double albedo) {
       effects.scattering = {order, albedo, g};
@@ -109,11 +112,11 @@ TEST(InScatter, MultipleScatteringTendsToSingleAsTheAlbedoVanishes) {
   }
 }
 
-TEST(InScatter, ErrorBoundHoldsAndAlmostWhiteThickMediaConverge) {
+TEST_P(InScatter, ErrorBoundHoldsAndAlmostWhiteThickMediaConverge) {
   const Volume volume = cloud(10, 60);
   Effects effects;
   effects.extinction.model = Extinction::Model::field;
-  Pool pool(0);
+  Pool pool(0, device_here());
   for (const double asymmetry : {0.0, 0.8, -0.8}) {
     effects.scattering = {Order::multiple, 0.999, asymmetry};
     InScatterOptions options;
@@ -133,8 +136,8 @@ TEST(InScatter, ErrorBoundHoldsAndAlmostWhiteThickMediaConverge) {
   }
 }
 
-TEST(InScatter, HardCasesStayFiniteAndNonNegative) {
-  Pool pool(0);
+TEST_P(InScatter, HardCasesStayFiniteAndNonNegative) {
+  Pool pool(0, device_here());
   const Box needle{Eigen::Vector3d::Zero(), {0.02, 0.2, 0.02}};
   for (const Grid& grid : {cube(1), cube(6), grid_over(needle, 10)}) {
     const Volume volume = uniform_volume(grid, 1000);
@@ -160,7 +163,7 @@ TEST(InScatter, HardCasesStayFiniteAndNonNegative) {
   }
 }
 
-TEST(InScatter, SameBitsForAnyNumberOfThreads) {
+TEST_P(InScatter, SameBitsForAnyNumberOfThreads) {
   const Volume volume = cloud(7, 30);
   Effects effects;
   effects.extinction.model = Extinction::Model::field;
@@ -168,7 +171,7 @@ TEST(InScatter, SameBitsForAnyNumberOfThreads) {
     effects.scattering = {Order::multiple, 0.9, g};
     std::vector<Rgba> first;
     for (const int threads : {1, 2, 16}) {
-      Pool pool(threads);
+      Pool pool(threads, device_here());
       const std::vector<Rgba> found = in_scattered(
           find_in_scatter(volume, whole_grid(volume.grid), effects, {}, pool), {0.3, 0.1, 0}, pool);
       if (first.empty()) first = found;

@@ -7,13 +7,16 @@
 
 #include "recon/effects/sensor.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
 
+ON_EACH_DEVICE(PredictEffects);
+
 using Pictures = std::vector<RadianceImage>;
 
-ComputeOptions on_threads(int threads) { return {Device::cpu, threads}; }
+ComputeOptions on_threads(int threads) { return {device_here(), threads}; }
 
 /// A flame filmed finely, and the same flame on a coarse grid.
 struct Filmed {
@@ -50,7 +53,7 @@ struct Filmed {
   [[nodiscard]] Pictures full(const char* words, double rise = 0) const {
     Effects effects = *parse_effects(words)->fixed;
     effects.extinction = fine.effects.extinction;
-    Pool pool(0);
+    Pool pool(0, device_here());
     RenderOptions render;
     render.step = 0.5;
     const ScatterField scattered = find_in_scatter(fine.volume, fine.medium, effects, {}, pool);
@@ -115,7 +118,7 @@ void expect_within(double factor, double predicted, double full, const char* wha
   EXPECT_GT(predicted, full / factor) << what;
 }
 
-TEST(PredictEffects, InScatterIsTheFullSimulationsWithinTwoFifths) {
+TEST_P(PredictEffects, InScatterIsTheFullSimulationsWithinTwoFifths) {
   const auto compare = [](const Filmed& filmed, const Pictures& plain, const std::string& parameters) {
     const EffectReport report =
         report_of(filmed.predict(("auto:tolerance=0.01:" + parameters).c_str()), "scattering");
@@ -130,7 +133,7 @@ TEST(PredictEffects, InScatterIsTheFullSimulationsWithinTwoFifths) {
   compare(two_even_plumes(), two_even_plumes().full("none"), "albedo=0.5:g=0");
 }
 
-TEST(PredictEffects, PhaseFunctionIsTheFullSimulationsWithinAFifth) {
+TEST_P(PredictEffects, PhaseFunctionIsTheFullSimulationsWithinAFifth) {
   const Pictures isotropic = sooty().full("extinction=1,scattering=multiple:albedo=0.5");
   for (const char* g : {"0.6", "-0.5"}) {
     const std::string asked = std::string("auto:albedo=0.5:tolerance=0.01:g=") + g;
@@ -140,7 +143,7 @@ TEST(PredictEffects, PhaseFunctionIsTheFullSimulationsWithinAFifth) {
   }
 }
 
-TEST(PredictEffects, RefractionIsTheFullSimulationsWithinTwoFifths) {
+TEST_P(PredictEffects, RefractionIsTheFullSimulationsWithinTwoFifths) {
   for (const Filmed* filmed : {&sooty(), &two_even_plumes()}) {
     const Pictures plain = filmed->full("none");
     for (const char* ambient : {"293", "100"}) {  // 100 K bends three times more
@@ -153,7 +156,7 @@ TEST(PredictEffects, RefractionIsTheFullSimulationsWithinTwoFifths) {
   }
 }
 
-TEST(PredictEffects, ExposureIsTheMeanOfInstantsWithinAFactorOfTwo) {
+TEST_P(PredictEffects, ExposureIsTheMeanOfInstantsWithinAFactorOfTwo) {
   const Pictures plain = sooty().full("none");
   for (const double time : {0.002, 0.004, 0.008, 0.016}) {
     constexpr int kInstants = 8;
@@ -171,7 +174,7 @@ TEST(PredictEffects, ExposureIsTheMeanOfInstantsWithinAFactorOfTwo) {
   }
 }
 
-TEST(PredictEffects, GammaIsTheFullSimulationsWithinATenth) {
+TEST_P(PredictEffects, GammaIsTheFullSimulationsWithinATenth) {
   const Pictures plain = sooty().full("none");
   for (const char* gamma : {"1.05", "2.2"}) {
     const std::string asked = std::string("auto:gamma=") + gamma;
@@ -181,7 +184,7 @@ TEST(PredictEffects, GammaIsTheFullSimulationsWithinATenth) {
   }
 }
 
-TEST(PredictEffects, AnEvenBackgroundIsFoundAtTheBordersAndItsChangePredicted) {
+TEST_P(PredictEffects, AnEvenBackgroundIsFoundAtTheBordersAndItsChangePredicted) {
   Filmed filmed = sooty();
   const Pictures lit = filmed.full("background=8/5/3");
   const double full = filmed.change_over_boxes(lit, filmed.full("none"));
@@ -195,7 +198,7 @@ TEST(PredictEffects, AnEvenBackgroundIsFoundAtTheBordersAndItsChangePredicted) {
   expect_within(1.2, report_of(choice, "background").predicted_change, full, "background");
 }
 
-TEST(PredictEffects, ViewsWithBackgroundPicturesUseThem) {
+TEST_P(PredictEffects, ViewsWithBackgroundPicturesUseThem) {
   Filmed filmed = sooty();
   for (View& view : filmed.scene.views) {
     view.background = RadianceImage(view.image.size);
@@ -214,7 +217,7 @@ TEST(PredictEffects, ViewsWithBackgroundPicturesUseThem) {
   EXPECT_EQ(refused.error().where, "camera 2");
 }
 
-TEST(PredictEffects, NoisyDarkPicturesHaveNoBackground) {
+TEST_P(PredictEffects, NoisyDarkPicturesHaveNoBackground) {
   Filmed filmed = sooty();
   filmed.options.noise = 1;
   filmed.scene = paper_scene(filmed.options);
@@ -239,7 +242,7 @@ double overexpose(Filmed& filmed, float gain, float white) {
   return std::sqrt(sum);
 }
 
-TEST(PredictEffects, WhatSaturatedPixelsLackIsPredictedWithinAHalf) {
+TEST_P(PredictEffects, WhatSaturatedPixelsLackIsPredictedWithinAHalf) {
   for (const float gain : {1.3F, 1.6F, 2.0F}) {
     for (const float white : {255.0F, 247.5F}) {  // the latter after a black level was taken out
       Filmed filmed = sooty();
@@ -253,13 +256,13 @@ TEST(PredictEffects, WhatSaturatedPixelsLackIsPredictedWithinAHalf) {
   }
 }
 
-TEST(PredictEffects, BrightPicturesThatDoNotEndAtWhiteAreNotSaturated) {
+TEST_P(PredictEffects, BrightPicturesThatDoNotEndAtWhiteAreNotSaturated) {
   Filmed filmed = sooty();
   overexpose(filmed, 2, 1e6F);
   EXPECT_EQ(names_of_those_on(filmed.predict("auto:albedo=0")), "");
 }
 
-TEST(PredictEffects, EightMillisecondsOfExposureAreCalledForAndOneIsNot) {
+TEST_P(PredictEffects, EightMillisecondsOfExposureAreCalledForAndOneIsNot) {
   const EffectChoice eight = sooty().predict("auto:albedo=0:exposure=0.008:rise=-1");
   EXPECT_EQ(names_of_those_on(eight), "exposure");
   EXPECT_EQ(eight.effects.exposure.shutter, Exposure::Shutter::integrated);
@@ -270,7 +273,7 @@ TEST(PredictEffects, EightMillisecondsOfExposureAreCalledForAndOneIsNot) {
   EXPECT_EQ(one.effects.exposure.shutter, Exposure::Shutter::instant);
 }
 
-TEST(PredictEffects, WhereNothingIsCalledForNothingIsOn) {
+TEST_P(PredictEffects, WhereNothingIsCalledForNothingIsOn) {
   const Filmed glowing(Absorber::medium, PerMeter(0));
   for (const EffectChoice& choice : {glowing.predict("auto"), sooty().predict("auto:albedo=0.01")}) {
     EXPECT_EQ(names_of_those_on(choice), "");
@@ -284,7 +287,7 @@ TEST(PredictEffects, WhereNothingIsCalledForNothingIsOn) {
   }
 }
 
-TEST(PredictEffects, OnIsWhatChangesThePicturesByTheToleranceAtLeast) {
+TEST_P(PredictEffects, OnIsWhatChangesThePicturesByTheToleranceAtLeast) {
   const std::string words = "auto:albedo=0.2:g=0.6:exposure=0.004:gamma=1.1";
   const EffectChoice all = sooty().predict((words + ":tolerance=0").c_str());
   for (const double tolerance : {0.02, 0.4, 0.9, 100.0}) {
@@ -295,14 +298,14 @@ TEST(PredictEffects, OnIsWhatChangesThePicturesByTheToleranceAtLeast) {
   }
 }
 
-TEST(PredictEffects, ScatteringIsSingleWhereMoreWouldNotShow) {
+TEST_P(PredictEffects, ScatteringIsSingleWhereMoreWouldNotShow) {
   const EffectChoice weak = sooty().predict("auto:albedo=0.2:g=0");
   EXPECT_EQ(weak.effects.scattering.order, Scattering::Order::single);
   EXPECT_NE(report_of(weak, "scattering").reason.find("the same from all sides"), std::string::npos);
   EXPECT_EQ(sooty().predict("auto:albedo=0.8").effects.scattering.order, Scattering::Order::multiple);
 }
 
-TEST(PredictEffects, ByHandIsTakenAsItIsAndPredicted) {
+TEST_P(PredictEffects, ByHandIsTakenAsItIsAndPredicted) {
   const char* words = "extinction=1,scattering=single:albedo=0.01:g=0.5,exposure=0.001,saturation=250";
   const EffectChoice choice = sooty().predict(words);
   EXPECT_EQ(names_of_those_on(choice), "scattering, phase function, exposure, saturation");
@@ -315,14 +318,14 @@ TEST(PredictEffects, ByHandIsTakenAsItIsAndPredicted) {
   EXPECT_EQ(report_of(choice, "refraction").reason, "left out by hand");
 }
 
-TEST(PredictEffects, AnEmptyMediumCallsForNothing) {
+TEST_P(PredictEffects, AnEmptyMediumCallsForNothing) {
   Filmed filmed = sooty();
   std::fill(filmed.coarse.medium.inside.begin(), filmed.coarse.medium.inside.end(), std::uint8_t{0});
   filmed.coarse.medium.count = 0;
   EXPECT_EQ(names_of_those_on(filmed.predict("auto:exposure=0.008")), "");
 }
 
-TEST(PredictEffects, SameChoiceForAnyNumberOfThreads) {
+TEST_P(PredictEffects, SameChoiceForAnyNumberOfThreads) {
   const char* words = "auto:albedo=0.5:exposure=0.008:gamma=1.1";
   const EffectChoice one = sooty().predict(words, 1);
   for (const int threads : {2, 16}) {
@@ -337,7 +340,7 @@ TEST(PredictEffects, SameChoiceForAnyNumberOfThreads) {
   }
 }
 
-TEST(PredictEffects, FindingOutIsTimedAndCostsAreReported) {
+TEST_P(PredictEffects, FindingOutIsTimedAndCostsAreReported) {
   double clock = 0;
   const auto request = parse_effects("auto:albedo=0.2");
   const auto choice =

@@ -8,9 +8,12 @@
 #include "recon/hull/hull.h"
 #include "recon/hull/ray_list.h"
 #include "recon/render/render.h"
+#include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(BackgroundTest);
 
 constexpr double kBack[3] = {10, 60, 200};
 
@@ -37,7 +40,7 @@ RadianceImage noise(ImageSize size) {
   return image;
 }
 
-TEST(Background, SlabHasTheClosedFormForAnyExtinction) {
+TEST_P(BackgroundTest, SlabHasTheClosedFormForAnyExtinction) {
   const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 16);
   const CameraModel camera = camera_at({0.5, 0, 0}, {3, 3}, 300);
   const Volume volume{grid, std::vector<float>(3 * grid.size(), 1000), {}};
@@ -87,7 +90,7 @@ struct Holes {
   }
 };
 
-TEST(Background, ImageBehindAMediumWithHolesAgreesWithBruteForceInDouble) {
+TEST_P(BackgroundTest, ImageBehindAMediumWithHolesAgreesWithBruteForceInDouble) {
   const Holes holes;
   const RadianceImage back = noise({24, 20});
   RenderOptions options;
@@ -116,7 +119,7 @@ TEST(Background, ImageBehindAMediumWithHolesAgreesWithBruteForceInDouble) {
   }
 }
 
-TEST(Background, ShowsUnchangedWhereNoMediumIsInFront) {
+TEST_P(BackgroundTest, ShowsUnchangedWhereNoMediumIsInFront) {
   Holes holes;
   const RadianceImage back = noise({24, 20});
   RenderOptions options;
@@ -129,7 +132,7 @@ TEST(Background, ShowsUnchangedWhereNoMediumIsInFront) {
   EXPECT_EQ(render_view(holes.volume, holes.medium, effects, holes.camera, options).rgb, back.rgb);
 }
 
-TEST(Background, BlackIsTheDefaultAndWhatAnAbsentPictureMeans) {
+TEST_P(BackgroundTest, BlackIsTheDefaultAndWhatAnAbsentPictureMeans) {
   const Holes holes;
   const RadianceImage black = render_view(holes.volume, holes.medium, absorbing(PerMeter(15)), holes.camera);
   EXPECT_EQ(pixel(black, 0, 0, 0), 0);
@@ -139,14 +142,14 @@ TEST(Background, BlackIsTheDefaultAndWhatAnAbsentPictureMeans) {
       black.rgb);
 }
 
-TEST(Background, EveryRayFindsItsOwnPixelInItsOwnViewsPicture) {
+TEST_P(BackgroundTest, EveryRayFindsItsOwnPixelInItsOwnViewsPicture) {
   const Holes holes;
   View with;
   with.camera = holes.camera;
   with.background = noise({24, 20});
   View without;
   without.camera = camera_at({0, 0.3, 0.1}, {24, 20}, 18);
-  Pool pool(1);
+  Pool pool(1, device_here());
   const RayList list = clip_rays({&without.camera, &with.camera}, holes.medium, {}, pool);
   const std::vector<const View*> views = {&without, &with};
   EXPECT_TRUE(behind_rays({}, list, views).empty());

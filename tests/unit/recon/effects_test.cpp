@@ -3,20 +3,23 @@
 #include <gtest/gtest.h>
 
 #include "recon/adjust/choose_effects.h"
+#include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock {
 namespace {
 
+ON_EACH_DEVICE(EffectsTest);
+
 EffectChoice found(const Scene& scene) {
   SolveOptions options;
-  options.compute.device = Device::cpu;
+  options.compute.device = device_here();
   auto choice = choose_effects(scene, grid_over(scene.box, 64), {}, options);
   EXPECT_TRUE(choice.ok());
   return *choice;
 }
 
-TEST(Effects, EmissionOnlyFlameIsFoundAsSuch) {
+TEST_P(EffectsTest, EmissionOnlyFlameIsFoundAsSuch) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const EffectChoice choice = found(small_flame_scene(PerMeter(0), shape));
     ASSERT_EQ(choice.reports.size(), 8u);
@@ -25,12 +28,12 @@ TEST(Effects, EmissionOnlyFlameIsFoundAsSuch) {
   }
 }
 
-TEST(Effects, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs) {
+TEST_P(EffectsTest, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const Scene scene = small_flame_scene(PerMeter(32.8), shape);
     const auto heldout = [&](const Effects& effects) {
       SolveOptions options;
-      options.compute.device = Device::cpu;
+      options.compute.device = device_here();
       const auto r = solve(scene, grid_over(scene.box, 64), effects, options);
       EXPECT_TRUE(r.ok());
       return all_channels(r->trace.back().heldout_rmse);
@@ -41,7 +44,7 @@ TEST(Effects, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs) {
   }
 }
 
-TEST(Effects, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
+TEST_P(EffectsTest, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const EffectChoice choice = found(small_flame_scene(PerMeter(32.8), shape));
     EXPECT_TRUE(choice.reports[0].on);
@@ -52,12 +55,12 @@ TEST(Effects, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
   }
 }
 
-TEST(Effects, SetByHandIsTakenAndItsChangePredicted) {
+TEST_P(EffectsTest, SetByHandIsTakenAndItsChangePredicted) {
   const Scene scene = small_flame_scene();
   const auto request = parse_effects("extinction=32.8");
   ASSERT_TRUE(request.ok());
   SolveOptions options;
-  options.compute.device = Device::cpu;
+  options.compute.device = device_here();
   const auto choice = choose_effects(scene, grid_over(scene.box, 64), *request, options);
   ASSERT_TRUE(choice.ok());
   EXPECT_EQ(choice->effects.extinction.value, PerMeter(32.8));

@@ -9,9 +9,12 @@
 #include "base/random.h"
 #include "recon/hull/hull.h"
 #include "recon/render/render.h"
+#include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(ExposureTest);
 
 Exposure moving(double way, const Grid& grid) {  // voxel edges
   return {Exposure::Shutter::integrated, Seconds(way * static_cast<double>(grid.edge)), 1};
@@ -61,9 +64,9 @@ TEST(Exposure, WeightsKeepTheLightAndSpreadItAsTheMotionDoes) {
   }
 }
 
-TEST(Exposure, AdjointIsTheTranspose) {
+TEST_P(ExposureTest, AdjointIsTheTranspose) {
   const Grid grid = box_grid(20);
-  Pool pool(2);
+  Pool pool(2, device_here());
   const auto x = random_field(grid.size(), 1);
   const auto y = random_field(grid.size(), 2);
   for (const double way : {0.6, 2.0, 3.7, 100.0}) {
@@ -74,13 +77,13 @@ TEST(Exposure, AdjointIsTheTranspose) {
   }
 }
 
-TEST(Exposure, SameBitsForAnyNumberOfThreads) {
+TEST_P(ExposureTest, SameBitsForAnyNumberOfThreads) {
   const Grid grid = box_grid(20);
   const ExposureBlur blur(moving(3.7, grid), grid);
   const auto x = random_field(grid.size(), 1);
   std::vector<std::vector<Rgba>> results;
   for (const int threads : {1, 2, 16}) {
-    Pool pool(threads);
+    Pool pool(threads, device_here());
     results.push_back(blur.forward(x, pool));
   }
   for (std::size_t i = 0; i < x.size(); ++i)
@@ -127,7 +130,7 @@ Hull ellipsoid(const Grid& grid) {
 }
 
 Volume exposed_volume(const Volume& volume, const Exposure& exposure) {
-  Pool pool(2);
+  Pool pool(2, device_here());
   std::vector<Rgba> x(volume.grid.size());
   for (std::size_t p = 0; p < x.size(); ++p)
     for (std::size_t c = 0; c < 3; ++c) x[p].c[c] = volume.emission[3 * p + c];
@@ -170,7 +173,7 @@ Comparison compare(double way, PerMeter extinction, Hull (*medium_of)(const Grid
   return {std::sqrt(change / pixels), std::sqrt(deviation / pixels)};
 }
 
-TEST(Exposure, PictureIsTheMeanOfTheInstantsWhereNothingAbsorbs) {
+TEST_P(ExposureTest, PictureIsTheMeanOfTheInstantsWhereNothingAbsorbs) {
   for (const double way : {2.0, 4.5}) {
     const Comparison c = compare(way, PerMeter(0), whole_grid);
     EXPECT_GT(c.change, 0.9) << way;
@@ -178,7 +181,7 @@ TEST(Exposure, PictureIsTheMeanOfTheInstantsWhereNothingAbsorbs) {
   }
 }
 
-TEST(Exposure, RenderingAveragesTheVolumeFirst) {
+TEST_P(ExposureTest, RenderingAveragesTheVolumeFirst) {
   const Grid grid = box_grid(20);
   const CameraModel camera =
       look_at({{40, 60}, 60, 60, 20, 30, {}}, Eigen::Vector3d(0.3, 0.05, 0.06), Eigen::Vector3d(0, 0, 0));
@@ -197,7 +200,7 @@ TEST(Exposure, RenderingAveragesTheVolumeFirst) {
 }
 
 // The true medium moves with the flame and the model's stands still: RMS 0.27 of a change of 1.8 grey levels.
-TEST(Exposure, DeviationWithExtinctionIsSmallBesideTheMotion) {
+TEST_P(ExposureTest, DeviationWithExtinctionIsSmallBesideTheMotion) {
   const Comparison c = compare(4.5, PerMeter(32.8), ellipsoid);
   EXPECT_GT(c.change, 1.5);
   EXPECT_LT(c.deviation, 0.17 * c.change) << c.deviation;

@@ -6,10 +6,13 @@
 
 #include "base/random.h"
 #include "recon/preprocess/radiance.h"
+#include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(HullTest);
 
 /// Projects the corners of one voxel in double and looks at every pixel of their bounding rectangle.
 bool stays(const Scene& scene, const std::vector<FlameMask>& masks, const Grid& g, int i, int j, int k) {
@@ -36,7 +39,7 @@ bool stays(const Scene& scene, const std::vector<FlameMask>& masks, const Grid& 
   return true;
 }
 
-TEST(Hull, EqualsTheBruteForceProjectionOfEveryVoxel) {
+TEST_P(HullTest, EqualsTheBruteForceProjectionOfEveryVoxel) {
   const Scene scene = small_flame_scene();
   const std::vector<FlameMask> masks = flame_masks(scene);
   const Grid grid = grid_over(scene.box, 37);
@@ -53,7 +56,7 @@ TEST(Hull, EqualsTheBruteForceProjectionOfEveryVoxel) {
   EXPECT_LE(different, 2u) << "float against double may differ where a corner meets a pixel's border";
 }
 
-TEST(Hull, HoldsTheTrueMediumThatIsBrightEnoughToBeSeen) {
+TEST_P(HullTest, HoldsTheTrueMediumThatIsBrightEnoughToBeSeen) {
   const Scene scene = small_flame_scene();
   const Grid grid = grid_over(scene.box, 48);
   const FlameTruth truth = Flame().at(Seconds(0), grid);
@@ -65,7 +68,7 @@ TEST(Hull, HoldsTheTrueMediumThatIsBrightEnoughToBeSeen) {
   EXPECT_LT(static_cast<double>(lost), 0.05 * static_cast<double>(truth.medium.count));
 }
 
-TEST(Hull, ThresholdAboveEverythingIsAnErrorThatNamesViewAndThreshold) {
+TEST_P(HullTest, ThresholdAboveEverythingIsAnErrorThatNamesViewAndThreshold) {
   const Scene scene = small_flame_scene();
   const auto hull = carve(scene, flame_masks(scene, 1000), grid_over(scene.box, 32), {});
   ASSERT_FALSE(hull.ok());
@@ -73,7 +76,7 @@ TEST(Hull, ThresholdAboveEverythingIsAnErrorThatNamesViewAndThreshold) {
   EXPECT_NE(hull.error().what.find("1e+03"), std::string::npos) << hull.error().message();
 }
 
-TEST(Hull, ABlackViewIsNamed) {
+TEST_P(HullTest, ABlackViewIsNamed) {
   Scene scene = small_flame_scene();
   std::fill(scene.views[3].image.rgb.begin(), scene.views[3].image.rgb.end(), 0.F);
   const auto hull = carve(scene, flame_masks(scene), grid_over(scene.box, 32), {});
@@ -81,7 +84,7 @@ TEST(Hull, ABlackViewIsNamed) {
   EXPECT_EQ(hull.error().where, "camera 3");
 }
 
-TEST(Hull, HeldOutViewsDoNotCarve) {
+TEST_P(HullTest, HeldOutViewsDoNotCarve) {
   Scene scene = small_flame_scene();
   const Grid grid = grid_over(scene.box, 32);
   const auto before = carve(scene, flame_masks(scene), grid, {});
@@ -91,7 +94,7 @@ TEST(Hull, HeldOutViewsDoNotCarve) {
   EXPECT_EQ(before->inside, after->inside);
 }
 
-TEST(Hull, AVoxelThatAViewCannotSeeIsNotCarvedByIt) {
+TEST_P(HullTest, AVoxelThatAViewCannotSeeIsNotCarvedByIt) {
   Scene scene = small_flame_scene();
   scene.views.resize(1);
   scene.views[0].camera.intrinsics.cx += 100000;  // the box is far out of the frame
@@ -100,7 +103,7 @@ TEST(Hull, AVoxelThatAViewCannotSeeIsNotCarvedByIt) {
   EXPECT_EQ(hull->count, hull->inside.size());
 }
 
-TEST(Hull, SixtyFiveViewsAreRefused) {
+TEST_P(HullTest, SixtyFiveViewsAreRefused) {
   Scene scene = small_flame_scene();
   scene.views.resize(1);
   while (scene.views.size() < 65) scene.views.push_back(scene.views[0]);

@@ -14,9 +14,12 @@
 #include "recon/pipeline/reconstruct.h"
 #include "recon/preprocess/flame_mask.h"
 #include "session/frame_file.h"
+#include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(Reconstruct);
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
@@ -55,7 +58,7 @@ ReconstructOptions quick() {
   ReconstructOptions options;
   options.voxels = 24;
   options.effects = EffectRequest{Effects{}};
-  options.solve.compute.device = Device::cpu;
+  options.solve.compute.device = device_here();
   return options;
 }
 
@@ -147,7 +150,7 @@ TEST(Advice, FromAShortTraceTheLastIterationIsTheBound) {
   EXPECT_EQ(next_step(report_of_errors({20})), "");
 }
 
-TEST(Reconstruct, AKnownBallOfLightIsFound) {
+TEST_P(Reconstruct, AKnownBallOfLightIsFound) {
   Scene scene = ball();
   scene.views[2].role = ViewRole::held_out;
   const auto outcome = reconstruct(scene, quick(), CountingClock());
@@ -168,7 +171,7 @@ TEST(Reconstruct, AKnownBallOfLightIsFound) {
   EXPECT_NEAR(centre, 200 / (0.02 * std::sqrt(2 * M_PI)), 0.15 * 200 / (0.02 * std::sqrt(2 * M_PI)));
 }
 
-TEST(Reconstruct, TheReportsErrorIsThatOfTheLastTracePoint) {
+TEST_P(Reconstruct, TheReportsErrorIsThatOfTheLastTracePoint) {
   Scene scene = ball();
   scene.views[0].role = ViewRole::held_out;
   const auto outcome = reconstruct(scene, quick(), CountingClock());
@@ -180,7 +183,7 @@ TEST(Reconstruct, TheReportsErrorIsThatOfTheLastTracePoint) {
   EXPECT_NEAR(all_channels(*outcome->report.heldout_rmse), best, 0.2 * best + 0.05);
 }
 
-TEST(Reconstruct, ThePapersSolverTakesThePapersOpacityUnlessToldOtherwise) {
+TEST_P(Reconstruct, ThePapersSolverTakesThePapersOpacityUnlessToldOtherwise) {
   ReconstructOptions options = quick();
   options.solve.solver = Solver::paper;
   options.solve.iterations = 2;
@@ -197,7 +200,7 @@ TEST(Reconstruct, ThePapersSolverTakesThePapersOpacityUnlessToldOtherwise) {
   EXPECT_EQ(told->reconstruction.effects.extinction.value.value(), 0);
 }
 
-TEST(Reconstruct, AnEmptyHullNamesTheRemedy) {
+TEST_P(Reconstruct, AnEmptyHullNamesTheRemedy) {
   Scene scene = ball();
   std::fill(scene.views[1].image.rgb.begin(), scene.views[1].image.rgb.end(), 0.0F);
   const auto outcome = reconstruct(scene, quick(), CountingClock());
@@ -207,7 +210,7 @@ TEST(Reconstruct, AnEmptyHullNamesTheRemedy) {
   EXPECT_THAT(outcome.error().message(), HasSubstr("camera 1"));
 }
 
-TEST(Reconstruct, ATargetWithoutAHeldOutViewIsRefused) {
+TEST_P(Reconstruct, ATargetWithoutAHeldOutViewIsRefused) {
   ReconstructOptions options = quick();
   options.solve.target_rmse = 3;
   const auto outcome = reconstruct(ball(), options, CountingClock());
@@ -215,7 +218,7 @@ TEST(Reconstruct, ATargetWithoutAHeldOutViewIsRefused) {
   EXPECT_EQ(outcome.error().kind, ErrorKind::bad_input);
 }
 
-TEST(Reconstruct, ATargetOnTheHeldOutErrorEndsTheRunEarly) {
+TEST_P(Reconstruct, ATargetOnTheHeldOutErrorEndsTheRunEarly) {
   Scene scene = ball();
   scene.views[0].role = ViewRole::held_out;
   const auto full = reconstruct(scene, quick(), CountingClock());
@@ -227,7 +230,7 @@ TEST(Reconstruct, ATargetOnTheHeldOutErrorEndsTheRunEarly) {
   EXPECT_LT(early->report.iterations, full->report.iterations);
 }
 
-TEST(Reconstruct, ABudgetEndsTheRunWithTheBestSoFar) {
+TEST_P(Reconstruct, ABudgetEndsTheRunWithTheBestSoFar) {
   ReconstructOptions options = quick();
   options.solve.iterations = 100000;
   options.solve.budget = Seconds(0.03);  // thirty looks at the clock
@@ -236,7 +239,7 @@ TEST(Reconstruct, ABudgetEndsTheRunWithTheBestSoFar) {
   EXPECT_LT(outcome->report.iterations, 100);
 }
 
-TEST(Reconstruct, VoxelsOutOfRangeAndNonFinitePicturesAreRefused) {
+TEST_P(Reconstruct, VoxelsOutOfRangeAndNonFinitePicturesAreRefused) {
   ReconstructOptions options = quick();
   for (const int voxels : {0, -1, kLargestVoxels + 1}) {
     options.voxels = voxels;
@@ -247,7 +250,7 @@ TEST(Reconstruct, VoxelsOutOfRangeAndNonFinitePicturesAreRefused) {
   EXPECT_THAT(reconstruct(scene, quick(), CountingClock()).error().message(), HasSubstr("camera 4"));
 }
 
-TEST(Reconstruct, OneVoxelIsEnough) {
+TEST_P(Reconstruct, OneVoxelIsEnough) {
   ReconstructOptions options = quick();
   options.voxels = 1;
   const auto outcome = reconstruct(ball(), options, CountingClock());
@@ -255,7 +258,7 @@ TEST(Reconstruct, OneVoxelIsEnough) {
   EXPECT_EQ(outcome->report.voxels, (std::array{1, 1, 1}));
 }
 
-class OutcomeTest : public testing::Test {
+class OutcomeTest : public OnEachDevice {
  protected:
   void SetUp() override {
     root_ = fs::temp_directory_path() / ("emberlock_outcome_test." + std::to_string(::getpid()));
@@ -273,7 +276,10 @@ class OutcomeTest : public testing::Test {
   Outcome outcome_;
 };
 
-TEST_F(OutcomeTest, EveryViewIsWrittenHeldOutOnesToo) {
+INSTANTIATE_TEST_SUITE_P(Devices, OutcomeTest, testing::ValuesIn(devices()),
+                         [](const auto& on) { return device_name(on.param); });
+
+TEST_P(OutcomeTest, EveryViewIsWrittenHeldOutOnesToo) {
   ASSERT_TRUE(write_outcome(outcome_, root_ / "out").ok());
   for (const char* name : {"0000.png", "0001.png", "0002.png", "0003.png", "0004.png"}) {
     const auto view = read_image(root_ / "out" / "views" / name);
@@ -288,7 +294,7 @@ TEST_F(OutcomeTest, EveryViewIsWrittenHeldOutOnesToo) {
   EXPECT_EQ(std::distance(fs::directory_iterator(root_), {}), 1) << "nothing partial stays beside it";
 }
 
-TEST_F(OutcomeTest, AnEarlierResultIsReplacedAnotherFolderIsNot) {
+TEST_P(OutcomeTest, AnEarlierResultIsReplacedAnotherFolderIsNot) {
   ASSERT_TRUE(write_outcome(outcome_, root_ / "out").ok());
   EXPECT_TRUE(check_output(root_ / "out").ok());
   EXPECT_TRUE(write_outcome(outcome_, root_ / "out").ok());
@@ -299,7 +305,7 @@ TEST_F(OutcomeTest, AnEarlierResultIsReplacedAnotherFolderIsNot) {
   EXPECT_TRUE(fs::exists(root_ / "thesis" / "chapter.tex"));
 }
 
-TEST_F(OutcomeTest, AFailureLeavesNothingBehind) {
+TEST_P(OutcomeTest, AFailureLeavesNothingBehind) {
   outcome_.renders[2] = RadianceImage();  // no picture can be encoded from it
   EXPECT_FALSE(write_outcome(outcome_, root_ / "out").ok());
   EXPECT_TRUE(fs::is_empty(root_));

@@ -9,10 +9,19 @@
 #include "recon/pipeline/advice.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/preprocess/flame_mask.h"
+#include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(Advice);
+
+ON_EACH_DEVICE(Plan);
+
+ON_EACH_DEVICE(Target);
+
+ON_EACH_DEVICE(Budget);
 using testing::Contains;
 using testing::HasSubstr;
 
@@ -38,7 +47,7 @@ ReconstructOptions with_budget(double seconds) {
   ReconstructOptions options;
   options.effects = EffectRequest{Effects{}};
   options.solve.budget = Seconds(seconds);
-  options.solve.compute = {Device::cpu, 2};
+  options.solve.compute = {device_here(), 2};
   return options;
 }
 
@@ -50,7 +59,7 @@ Outcome run(const ReconstructOptions& options, Seconds iteration = Seconds(0)) {
   return outcome ? std::move(*outcome) : Outcome{};
 }
 
-TEST(Budget, IsKeptToAnIterationWhateverTheMachine) {
+TEST_P(Budget, IsKeptToAnIterationWhateverTheMachine) {
   for (const double budget : {0.02, 0.1}) {
     for (const double iteration : {0.001, 0.03, 0.2}) {
       ReconstructOptions options = with_budget(budget);
@@ -69,7 +78,7 @@ TEST(Budget, IsKeptToAnIterationWhateverTheMachine) {
   }
 }
 
-TEST(Budget, ALargerOneChoosesMoreVoxels) {
+TEST_P(Budget, ALargerOneChoosesMoreVoxels) {
   int before = 0;
   int first = 0;
   for (const double budget : {0.004, 0.01, 0.03, 0.1}) {
@@ -82,14 +91,14 @@ TEST(Budget, ALargerOneChoosesMoreVoxels) {
   EXPECT_LE(before, voxels_by_the_paper(flame()));
 }
 
-TEST(Budget, TooSmallForAnythingElseGivesTheReferenceRun) {
+TEST_P(Budget, TooSmallForAnythingElseGivesTheReferenceRun) {
   const Outcome outcome = run(with_budget(1e-4));
   EXPECT_THAT(outcome.report.plan->words, Contains(HasSubstr("no time for more than the reference run")));
   EXPECT_EQ(outcome.renders.size(), flame().views.size());
   EXPECT_GT(outcome.report.plan->over_budget.value(), 0);
 }
 
-TEST(Budget, LeavesNoTimeForEffectsWhereTheUsersVoxelsTakeIt) {
+TEST_P(Budget, LeavesNoTimeForEffectsWhereTheUsersVoxelsTakeIt) {
   ReconstructOptions options = with_budget(1e-4);
   options.effects.reset();
   options.voxels = 40;
@@ -99,7 +108,7 @@ TEST(Budget, LeavesNoTimeForEffectsWhereTheUsersVoxelsTakeIt) {
   EXPECT_EQ(outcome.report.iterations, 1);
 }
 
-TEST(Budget, WhatTheUserSetStays) {
+TEST_P(Budget, WhatTheUserSetStays) {
   ReconstructOptions options = with_budget(10);
   options.voxels = 20;
   options.solve.iterations = 2;
@@ -110,7 +119,7 @@ TEST(Budget, WhatTheUserSetStays) {
   EXPECT_FALSE(run(options).report.plan);
 }
 
-TEST(Budget, WithoutAHeldOutViewPromisesNoError) {
+TEST_P(Budget, WithoutAHeldOutViewPromisesNoError) {
   Scene scene = flame();
   scene.views.resize(10);
   const auto outcome = reconstruct(scene, with_budget(0.01), SimulatedClock());
@@ -125,7 +134,7 @@ ReconstructOptions with_target(double rmse) {
   return options;
 }
 
-TEST(Target, IsReachedAndNoMoreIsDone) {
+TEST_P(Target, IsReachedAndNoMoreIsDone) {
   const Outcome far = run(with_target(14));
   EXPECT_EQ(far.report.plan->missed_by, 0);
   EXPECT_LE(all_channels(far.report.trace.back().heldout_rmse), 14);
@@ -133,7 +142,7 @@ TEST(Target, IsReachedAndNoMoreIsDone) {
   EXPECT_LT(far.report.plan->voxels, voxels_by_the_paper(flame()));
 }
 
-TEST(Target, MissedItSaysByHowMuchAndWhatWouldBeNeeded) {
+TEST_P(Target, MissedItSaysByHowMuchAndWhatWouldBeNeeded) {
   const Outcome outcome = run(with_target(0.01));
   const PlanReport& plan = *outcome.report.plan;
   EXPECT_NEAR(plan.missed_by, all_channels(outcome.report.trace.back().heldout_rmse) - 0.01, 1e-9);
@@ -142,7 +151,7 @@ TEST(Target, MissedItSaysByHowMuchAndWhatWouldBeNeeded) {
   EXPECT_LE(plan.attempts, 3);
 }
 
-TEST(Target, WithVoxelsOfTheUsersItSaysWhatOthersWouldDo) {
+TEST_P(Target, WithVoxelsOfTheUsersItSaysWhatOthersWouldDo) {
   const double within_reach = all_channels(run(with_target(0.01)).report.trace.back().heldout_rmse) * 1.3;
   ReconstructOptions options = with_target(within_reach);
   options.voxels = 8;
@@ -153,7 +162,7 @@ TEST(Target, WithVoxelsOfTheUsersItSaysWhatOthersWouldDo) {
   EXPECT_THAT(outcome.report.plan->words.back(), HasSubstr("would"));
 }
 
-TEST(Target, WithABudgetTheBudgetStaysHard) {
+TEST_P(Target, WithABudgetTheBudgetStaysHard) {
   ReconstructOptions options = with_budget(0.05);
   options.solve.target_rmse = 0.01;
   const Outcome outcome = run(options, Seconds(0.004));
@@ -161,13 +170,13 @@ TEST(Target, WithABudgetTheBudgetStaysHard) {
   EXPECT_GT(outcome.report.plan->missed_by, 0);
 }
 
-TEST(Target, NeedsAHeldOutView) {
+TEST_P(Target, NeedsAHeldOutView) {
   Scene scene = flame();
   scene.views.resize(10);
   EXPECT_FALSE(reconstruct(scene, with_target(5), SimulatedClock()).ok());
 }
 
-TEST(Plan, StandsInTheReport) {
+TEST_P(Plan, StandsInTheReport) {
   const auto json = nlohmann::json::parse(to_json(run(with_budget(0.02)).report));
   EXPECT_EQ(json["plan"]["budget"], 0.02);
   EXPECT_TRUE(json["plan"]["target_rmse"].is_null());
@@ -175,7 +184,7 @@ TEST(Plan, StandsInTheReport) {
   EXPECT_TRUE(nlohmann::json::parse(to_json(Report{}))["plan"].is_null());
 }
 
-TEST(Advice, SaysWhatTheLastIterationsBoughtAndWhatVoxelsWouldBring) {
+TEST_P(Advice, SaysWhatTheLastIterationsBoughtAndWhatVoxelsWouldBring) {
   ReconstructOptions options = with_budget(1);
   options.solve.budget.reset();
   options.voxels = 16;

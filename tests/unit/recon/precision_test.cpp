@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 
 #include "recon/adjust/solver.h"
+#include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(PrecisionTest);
 
 /// The largest difference of two lists over the largest value of the second, lanes 0..lanes - 1.
 double relative_difference(const std::vector<Rgba>& a, const Marcher<double>::Values& b, int lanes) {
@@ -107,10 +110,10 @@ TEST(Precision, GradientsByEmissionAndExtinctionDifferByAHundredThousandthOfTheL
   }
 }
 
-TEST(Precision, ReconstructionsDifferByLessThanAHundredthOfAGreyLevelOnTheHeldOutView) {
+TEST_P(PrecisionTest, ReconstructionsDifferByLessThanAHundredthOfAGreyLevelOnTheHeldOutView) {
   const Scene scene = small_flame_scene();
   SolveOptions options;
-  options.compute.device = Device::cpu;
+  options.compute.device = device_here();
   for (const double sigma : {0.0, 32.8}) {
     double error[2] = {};
     for (const Precision precision : {Precision::float32, Precision::float64}) {

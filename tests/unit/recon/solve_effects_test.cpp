@@ -7,9 +7,12 @@
 #include "recon/adjust/solver.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(SolveEffects);
 
 constexpr PerMeter kExtinction{32.8};
 
@@ -34,7 +37,7 @@ Scene filmed(Effects effects, const std::optional<RadianceImage>& background = s
 double heldout(const Scene& scene, Effects effects) {
   effects.extinction = constant_extinction(kExtinction);
   SolveOptions options;
-  options.compute.device = Device::cpu;
+  options.compute.device = device_here();
   const auto r = solve(scene, grid_over(scene.box, 48), effects, options);
   EXPECT_TRUE(r.ok());
   return r.ok() ? all_channels(r->trace.back().heldout_rmse) : 1e9;
@@ -45,7 +48,7 @@ double undisturbed() {
   return error;
 }
 
-TEST(SolveEffects, AnEvenBackgroundIsSeenThroughTheFlame) {
+TEST_P(SolveEffects, AnEvenBackgroundIsSeenThroughTheFlame) {
   Effects effects;
   effects.background = {Background::Kind::constant, {60, 50, 40}};
   const Scene scene = filmed(effects);
@@ -54,7 +57,7 @@ TEST(SolveEffects, AnEvenBackgroundIsSeenThroughTheFlame) {
   EXPECT_GT(heldout(scene, {}), 2 * known);
 }
 
-TEST(SolveEffects, APictureOfTheBackgroundIsSeenThroughTheFlame) {
+TEST_P(SolveEffects, APictureOfTheBackgroundIsSeenThroughTheFlame) {
   RadianceImage wall({160, 120});
   for (std::size_t i = 0; i < wall.rgb.size(); ++i) wall.rgb[i] = 20 + 0.4F * static_cast<float>(i / 3 % 160);
   Effects effects;
@@ -65,7 +68,7 @@ TEST(SolveEffects, APictureOfTheBackgroundIsSeenThroughTheFlame) {
   EXPECT_GT(heldout(scene, {}), 2 * known);
 }
 
-TEST(SolveEffects, GammaCodedPicturesAreMadeLinear) {
+TEST_P(SolveEffects, GammaCodedPicturesAreMadeLinear) {
   Effects effects;
   effects.sensor.response = Sensor::Response::gamma;
   effects.sensor.gamma = 2.2;
@@ -75,7 +78,7 @@ TEST(SolveEffects, GammaCodedPicturesAreMadeLinear) {
   EXPECT_GT(heldout(scene, {}), 1.3 * known);
 }
 
-TEST(SolveEffects, SaturatedPixelsBoundTheLightFromBelow) {
+TEST_P(SolveEffects, SaturatedPixelsBoundTheLightFromBelow) {
   Effects effects;
   effects.sensor.clipping = Sensor::Clipping::at_white;
   effects.sensor.white = 120;
@@ -86,7 +89,7 @@ TEST(SolveEffects, SaturatedPixelsBoundTheLightFromBelow) {
   EXPECT_LT(as_bounds, 0.8 * heldout(scene, {}));
 }
 
-TEST(SolveEffects, ARisingFlameIsSharpenedAgain) {
+TEST_P(SolveEffects, ARisingFlameIsSharpenedAgain) {
   Effects effects;
   effects.exposure = {Exposure::Shutter::integrated, Seconds(0.012), 1.0};
   const Scene scene = filmed(effects);
@@ -95,7 +98,7 @@ TEST(SolveEffects, ARisingFlameIsSharpenedAgain) {
   // Judged on a picture taken in an instant: the volume itself, not its blur.
   const double blurred = heldout(instant, {});
   SolveOptions options;
-  options.compute.device = Device::cpu;
+  options.compute.device = device_here();
   effects.extinction = constant_extinction(kExtinction);
   const auto r = solve(scene, grid_over(scene.box, 48), effects, options);
   ASSERT_TRUE(r.ok());
@@ -107,21 +110,21 @@ TEST(SolveEffects, ARisingFlameIsSharpenedAgain) {
   EXPECT_LT(sharp, 0.95 * blurred);
 }
 
-TEST(SolveEffects, CurvedRaysOfAFlameGiveTheSameVolumeAsStraightOnes) {
+TEST_P(SolveEffects, CurvedRaysOfAFlameGiveTheSameVolumeAsStraightOnes) {
   const Scene scene = filmed({});
   Effects effects;
   effects.refraction.rays = Refraction::Rays::curved;
   EXPECT_NEAR(heldout(scene, effects), undisturbed(), 0.15);  // 1800 K bend rays by a hundredth of a voxel
 }
 
-TEST(SolveEffects, LightThatTheMediumScattersIsTakenOutOfTheEmission) {
+TEST_P(SolveEffects, LightThatTheMediumScattersIsTakenOutOfTheEmission) {
   Effects effects;
   effects.extinction = constant_extinction(kExtinction);
   effects.scattering = {Scattering::Order::multiple, 0.6, 0};
   const Scene scene = filmed(effects);
   effects.extinction = {Extinction::Model::field, kExtinction, PerMeter(0)};
   SolveOptions options;
-  options.compute.device = Device::cpu;
+  options.compute.device = device_here();
   const auto r = solve(scene, grid_over(scene.box, 48), effects, options);
   ASSERT_TRUE(r.ok());
   const double error = all_channels(r->trace.back().heldout_rmse);
@@ -139,7 +142,7 @@ TEST(SolveEffects, LightThatTheMediumScattersIsTakenOutOfTheEmission) {
   EXPECT_GT(without, 2 * again);
 }
 
-TEST(SolveEffects, LightScatteredForwardsIsToldFromLightThatShinesEvenly) {
+TEST_P(SolveEffects, LightScatteredForwardsIsToldFromLightThatShinesEvenly) {
   Effects effects;
   effects.scattering = {Scattering::Order::single, 0.8, 0.8};
   const Scene scene = filmed(effects);
@@ -149,7 +152,7 @@ TEST(SolveEffects, LightScatteredForwardsIsToldFromLightThatShinesEvenly) {
     assumed.scattering = {Scattering::Order::single, 0.8, asymmetry};
     SolveOptions options;
     options.iterations = 6;
-    options.compute.device = Device::cpu;
+    options.compute.device = device_here();
     const auto r = solve(scene, grid_over(scene.box, 32), assumed, options);
     EXPECT_TRUE(r.ok());
     return all_channels(r->trace.back().heldout_rmse);
@@ -157,7 +160,7 @@ TEST(SolveEffects, LightScatteredForwardsIsToldFromLightThatShinesEvenly) {
   EXPECT_LT(error(0.8), error(0));
 }
 
-TEST(SolveEffects, ThePapersSolverRefusesWhatItDoesNotKnow) {
+TEST_P(SolveEffects, ThePapersSolverRefusesWhatItDoesNotKnow) {
   const Scene scene = filmed({});
   SolveOptions options;
   options.solver = Solver::paper;

@@ -12,10 +12,13 @@
 #include "recon/pipeline/shipped_front.h"
 #include "recon/pipeline/sweep.h"
 #include "recon/preprocess/flame_mask.h"
+#include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(Sweep);
 using testing::HasSubstr;
 
 WorkPoint point(double seconds, double error, int voxels = 64) {
@@ -227,11 +230,11 @@ SweepOptions small_sweep() {
   options.precisions = {Precision::float32};
   options.effects = {"none", "extinction=32.8"};
   options.solvers = {Solver::standard};
-  options.compute = {Device::cpu, 2};
+  options.compute = {device_here(), 2};
   return options;
 }
 
-TEST(Sweep, APointIsRepeatedByItsSettings) {
+TEST_P(Sweep, APointIsRepeatedByItsSettings) {
   const Scene scene = small_flame_scene();
   const auto result = sweep(scene, small_sweep(), CountingClock());
   ASSERT_TRUE(result.ok()) << result.error().message();
@@ -242,14 +245,14 @@ TEST(Sweep, APointIsRepeatedByItsSettings) {
   options.voxels = p.settings.voxels;
   options.effects = *parse_effects(p.settings.effects);
   options.solve.iterations = p.settings.iterations;
-  options.solve.compute = {Device::cpu, 1};
+  options.solve.compute = {device_here(), 1};
   const auto again = reconstruct(scene, options, CountingClock());
   ASSERT_TRUE(again.ok());
   ASSERT_EQ(p.settings.iterations, 1);
   EXPECT_NEAR(all_channels(again->report.trace.back().heldout_rmse), p.error, 1e-9);
 }
 
-TEST(Sweep, FewerViewsAndFewerVoxelsAreWorse) {
+TEST_P(Sweep, FewerViewsAndFewerVoxelsAreWorse) {
   SweepOptions options = small_sweep();
   options.effects = {"none"};
   const auto result = sweep(small_flame_scene(), options, CountingClock());
@@ -266,7 +269,7 @@ TEST(Sweep, FewerViewsAndFewerVoxelsAreWorse) {
   EXPECT_GT(error(5, 24), error(0, 24));
 }
 
-TEST(Sweep, ABudgetLeavesRunsOutAndSaysSo) {
+TEST_P(Sweep, ABudgetLeavesRunsOutAndSaysSo) {
   SweepOptions options = small_sweep();
   options.budget = Seconds(0.04);  // forty looks at the clock
   const auto result = sweep(small_flame_scene(), options, CountingClock());
@@ -276,7 +279,7 @@ TEST(Sweep, ABudgetLeavesRunsOutAndSaysSo) {
   EXPECT_THAT(result->skipped.back(), HasSubstr("the budget was spent"));
 }
 
-TEST(Sweep, BadListsAreRefusedBeforeAnythingRuns) {
+TEST_P(Sweep, BadListsAreRefusedBeforeAnythingRuns) {
   const Scene scene = small_flame_scene();
   const auto where = [&](auto change) {
     SweepOptions options = small_sweep();

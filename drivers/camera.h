@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "base/frame.h"
@@ -15,12 +16,20 @@ enum class ShutterReset {
   on_command,  ///< the driver does it, a latency with some jitter after the moment asked for
 };
 
+/// How a camera's frame rate can be trimmed while it films.
+struct FrameRateTrim {
+  PartsPerMillion range;  ///< to either side of its own rate, > 0
+  PartsPerMillion step;   ///< between two settings, > 0
+  Seconds latency;        ///< from the order to the first frame at the new rate, on average, >= 0
+};
+
 struct CameraInfo {
   std::string id;  ///< stable identity: serial number, else USB path or MAC; never an index
   std::string model;
   ImageLayout layout;
   Hertz frame_rate;  ///< nominal
   ShutterReset reset = ShutterReset::none;
+  std::optional<FrameRateTrim> trim = {};  ///< absent: it films at its own rate alone
 };
 
 /// A camera, opened. One owner thread; not thread-safe. Times are on the host's clock given to the driver.
@@ -40,6 +49,9 @@ class Camera {
   /// before it are dropped: the next frame shows the new phase. Error `device` when the camera can't
   /// (ShutterReset::none).
   virtual Status reset_shutter(TimePoint at) = 0;
+  /// Films faster than its own rate by `trim` from soon on, resets of the shutter notwithstanding; no frame
+  /// is lost. What is asked for is rounded to a step. Error `device` when the camera can't, or not so far.
+  virtual Status trim_rate(PartsPerMillion trim) = 0;
 };
 
 }  // namespace emberlock

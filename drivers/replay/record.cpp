@@ -23,6 +23,11 @@ v1::CameraStream to_proto(const CameraInfo& info) {
       stream.set_shutter_reset(v1::CameraStream::ON_COMMAND);
       break;
   }
+  if (info.trim) {
+    stream.set_trim_range_ppm(info.trim->range.value());
+    stream.set_trim_step_ppm(info.trim->step.value());
+    stream.set_trim_latency_s(info.trim->latency.value());
+  }
   return stream;
 }
 
@@ -34,6 +39,10 @@ Result<CameraInfo> camera_info(const v1::CameraStream& stream) {
   info.frame_rate = Hertz(stream.frame_rate_hz());
   if (stream.shutter_reset() == v1::CameraStream::BY_HAND) info.reset = ShutterReset::by_hand;
   if (stream.shutter_reset() == v1::CameraStream::ON_COMMAND) info.reset = ShutterReset::on_command;
+  if (stream.trim_range_ppm() > 0 && stream.trim_step_ppm() > 0) {
+    info.trim = FrameRateTrim{PartsPerMillion(stream.trim_range_ppm()),
+                              PartsPerMillion(stream.trim_step_ppm()), Seconds(stream.trim_latency_s())};
+  }
   return info;
 }
 
@@ -64,6 +73,14 @@ v1::Event reset_event(TimePoint now, const std::string& camera_id, TimePoint at)
   event.set_monotonic_ns(now.ns);
   event.mutable_reset()->set_camera_id(camera_id);
   event.mutable_reset()->set_at_ns(at.ns);
+  return event;
+}
+
+v1::Event trim_event(TimePoint now, const std::string& camera_id, PartsPerMillion trim) {
+  v1::Event event;
+  event.set_monotonic_ns(now.ns);
+  event.mutable_trim()->set_camera_id(camera_id);
+  event.mutable_trim()->set_trim_ppm(trim.value());
   return event;
 }
 

@@ -18,6 +18,9 @@ v1::Event strobe_event(TimePoint now, const StrobeSettings& read_back);
 /// To be appended after each Camera::reset_shutter that succeeded, with `now` asked before it.
 v1::Event reset_event(TimePoint now, const std::string& camera_id, TimePoint at);
 
+/// To be appended after each Camera::trim_rate that succeeded, with `now` asked before it.
+v1::Event trim_event(TimePoint now, const std::string& camera_id, PartsPerMillion trim);
+
 /// Errors: bad_input where a number isn't finite or the output unknown.
 Result<StrobeSettings> strobe_settings(const v1::StrobeState& state);
 

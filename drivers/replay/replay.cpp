@@ -28,7 +28,7 @@ Error off_course(std::string what, std::string where) {
 ReplayClock::ReplayClock(const SessionReader& session) : latest_(first_instant(session)) {
   for (const v1::Event& event : session.events()) {
     instants_.push_back({event.monotonic_ns()});
-    done_.push_back(!event.has_strobe() && !event.has_reset());
+    done_.push_back(!event.has_strobe() && !event.has_reset() && !event.has_trim());
   }
   next_ = static_cast<std::size_t>(std::find(done_.begin(), done_.end(), false) - done_.begin());
 }
@@ -83,20 +83,43 @@ Result<Frame> ReplayCamera::next_frame(Seconds /*deadline*/) {
   return session_->read(camera_, i);
 }
 
-Status ReplayCamera::reset_shutter(TimePoint at) {
+std::optional<std::size_t> ReplayCamera::next_order() const {
   const auto& events = session_->events();
-  const auto mine = [&](const v1::Event& e) { return e.has_reset() && e.reset().camera_id() == info_.id; };
-  const auto found =
-      std::find_if(events.begin() + static_cast<std::ptrdiff_t>(next_event_), events.end(), mine);
-  if (found == events.end()) return off_course("the recording shows no further reset", "camera " + info_.id);
-  if (found->reset().at_ns() != at.ns) {
-    return off_course("the recorded reset was ordered for " + std::to_string(found->reset().at_ns()) +
-                          " ns, not for " + std::to_string(at.ns) + " ns",
+  for (std::size_t i = next_event_; i < events.size(); ++i) {
+    const v1::Event& e = events[i];
+    if (e.has_reset() && e.reset().camera_id() == info_.id) return i;
+    if (e.has_trim() && e.trim().camera_id() == info_.id) return i;
+  }
+  return std::nullopt;
+}
+
+Status ReplayCamera::reset_shutter(TimePoint at) {
+  const auto index = next_order();
+  if (!index || !session_->events()[*index].has_reset())
+    return off_course("the recording shows no further reset", "camera " + info_.id);
+  const std::int64_t recorded = session_->events()[*index].reset().at_ns();
+  if (recorded != at.ns) {
+    return off_course("the recorded reset was ordered for " + std::to_string(recorded) + " ns, not for " +
+                          std::to_string(at.ns) + " ns",
                       "camera " + info_.id);
   }
-  const auto index = static_cast<std::size_t>(found - events.begin());
-  next_event_ = index + 1;
-  clock_->event_replayed(index, ReplayClock::After::next_event);
+  next_event_ = *index + 1;
+  clock_->event_replayed(*index, ReplayClock::After::next_event);
+  return {};
+}
+
+Status ReplayCamera::trim_rate(PartsPerMillion trim) {
+  const auto index = next_order();
+  if (!index || !session_->events()[*index].has_trim())
+    return off_course("the recording shows no further trim", "camera " + info_.id);
+  const double recorded = session_->events()[*index].trim().trim_ppm();
+  if (recorded != trim.value()) {
+    return off_course("the recorded trim was " + std::to_string(recorded) + " ppm, not " +
+                          std::to_string(trim.value()) + " ppm",
+                      "camera " + info_.id);
+  }
+  next_event_ = *index + 1;
+  clock_->event_replayed(*index, ReplayClock::After::next_event);
   return {};
 }
 

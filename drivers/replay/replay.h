@@ -18,9 +18,9 @@
 // frames.
 //
 // What must be called in the order of the recording:
-// - of each camera, frames and resets: next_frame gives the recorded frames one after the other, and the n-th
-//   reset_shutter meets the n-th ShutterResetEvent. Frames that the live run never took aren't in the
-//   recording, so a reset skips none.
+// - of each camera, frames, resets and trims: next_frame gives the recorded frames one after the other, and
+//   the n-th reset_shutter or trim_rate meets the camera's n-th event. Frames that the live run never took
+//   aren't in the recording, so a reset skips none.
 // - of the strobe, read_back: the n-th meets the n-th StrobeState, and says what that says.
 // - of the clock: nothing, if what the live run asked it were the instants that events carry, each asked once
 // the
@@ -30,8 +30,8 @@
 namespace emberlock {
 
 /// Answers with the instants that the live run got for its events, bit for bit: directly after a read_back
-/// that strobe state's own; otherwise that of the next strobe state or reset to come; behind the last one the
-/// latest instant replayed. Sleeping is passing the time at once. Thread-safe.
+/// that strobe state's own; otherwise that of the next strobe state, reset or trim to come; behind the last
+/// one the latest instant replayed. Sleeping is passing the time at once. Thread-safe.
 class ReplayClock final : public Clock {
  public:
   explicit ReplayClock(const SessionReader& session);
@@ -66,8 +66,13 @@ class ReplayCamera final : public Camera {
   Result<Frame> next_frame(Seconds deadline) override;
   /// Error device also where the recorded reset was ordered for another instant.
   Status reset_shutter(TimePoint at) override;
+  /// Error device also where the recorded trim was another one.
+  Status trim_rate(PartsPerMillion trim) override;
 
  private:
+  /// The camera's next reset or trim among the events, from next_event_ on; none where there is no other.
+  [[nodiscard]] std::optional<std::size_t> next_order() const;
+
   std::shared_ptr<SessionReader> session_;
   std::size_t camera_;
   std::shared_ptr<ReplayClock> clock_;

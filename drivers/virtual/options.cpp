@@ -42,6 +42,12 @@ Status check(const VirtualCameraOptions& c) {
   EMBERLOCK_RETURN_IF_ERROR(in_range(where, "lamp.radius", c.lamp.radius, 0.5, 50));
   EMBERLOCK_RETURN_IF_ERROR(in_range(where, "reset_latency", c.reset_latency.value(), 0, 10));
   EMBERLOCK_RETURN_IF_ERROR(in_range(where, "reset_jitter", c.reset_jitter.value(), 0, 1));
+  if (c.trim) {
+    EMBERLOCK_RETURN_IF_ERROR(in_range(where, "trim.range", c.trim->range.value(), 1e-3, 1000));
+    EMBERLOCK_RETURN_IF_ERROR(
+        in_range(where, "trim.step", c.trim->step.value(), 1e-6, c.trim->range.value()));
+    EMBERLOCK_RETURN_IF_ERROR(in_range(where, "trim.latency", c.trim->latency.value(), 0, 10));
+  }
   return in_range(where, "first_phase", c.first_phase.value_or(Seconds(0)).value(), 0, 3600);
 }
 
@@ -117,6 +123,7 @@ VirtualRigOptions draw_virtual_rig(const VirtualRigDraw& draw) {
     c.reset = draw.reset;
     c.reset_latency = draw.reset_latency + draw.reset_latency_spread * random.uniform(-1, 1);
     c.reset_jitter = draw.reset_jitter;
+    c.trim = draw.trim;
     rig.cameras.push_back(std::move(c));
   }
   return rig;

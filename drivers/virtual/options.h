@@ -34,6 +34,8 @@ struct VirtualCameraOptions {
   ShutterReset reset = ShutterReset::on_command;
   Seconds reset_latency = milliseconds(180);  ///< from the action to the new read cycle, 0..10 s
   Seconds reset_jitter = milliseconds(0.2);   ///< RMS of the latency when on_command, 0..1 s
+  std::optional<FrameRateTrim> trim{};  ///< range up to 1000 ppm; in force from the read phase nearest to its
+                                        ///< latency after the order
   std::optional<Seconds> first_phase{};  ///< from the first start() to the first read phase; drawn if absent
 };
 
@@ -68,6 +70,7 @@ struct VirtualRigDraw {
   Seconds reset_latency = milliseconds(180);        ///< mean over cameras
   Seconds reset_latency_spread = milliseconds(15);  ///< each camera is off by up to this
   Seconds reset_jitter = milliseconds(0.2);
+  std::optional<FrameRateTrim> trim{};
 };
 
 /// Cameras "virtual-00"...: crystals, lamps (rows 0.28 n..0.72 n, radius 3..5), latencies and models by the

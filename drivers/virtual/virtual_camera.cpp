@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string>
 
 #include "base/log.h"
@@ -39,12 +40,14 @@ VirtualCamera::VirtualCamera(VirtualCameraOptions options, int number, const Vir
                              std::shared_ptr<const VirtualRoom> room)
     : options_(std::move(options)),
       room_(std::move(room)),
-      info_{options_.id, "Emberlock virtual CCD", options_.layout, options_.nominal_rate, options_.reset},
+      info_{options_.id,           "Emberlock virtual CCD", options_.layout,
+            options_.nominal_rate, options_.reset,          options_.trim},
       sensor_(options_, number, rig.seed),
       seed_(stream_seed(rig.seed, options_.id)),
       queue_frames_(static_cast<std::uint64_t>(rig.queue_frames)),
       wall_at_zero_(rig.wall_at_zero),
-      device_origin_(1000 * random_uniform(seed_, kDeviceClockStream, 0)) {}
+      device_origin_(1000 * random_uniform(seed_, kDeviceClockStream, 0)),
+      period_(options_.timing.frame_period) {}
 
 Status VirtualCamera::start() {
   if (filming_) return {};
@@ -70,13 +73,34 @@ Status VirtualCamera::reset_shutter(TimePoint at) {
                             : options_.reset_jitter * random_normal(seed_, kJitterStream, draw);
   const Seconds latency = std::max(Seconds(0), options_.reset_latency + drawn);
   // The old cycle runs until `at`; what it delivered or would have is counted, and dropped.
-  begin_cycle(at + latency, cycles_.back().first_id + delivered_by(at));
+  begin_cycle(at + latency, delivered_by(at));
   log(LogCategory::drivers).debug("{}: shutter reset {}", info_.id, draw);
   return {};
 }
 
+Status VirtualCamera::trim_rate(PartsPerMillion trim) {
+  const auto refuse = [&](std::string what, std::string remedy) {
+    return Error{ErrorKind::device, std::move(what), "camera " + info_.id, std::move(remedy)};
+  };
+  if (!info_.trim) return refuse("its frame rate can't be trimmed", "choose a camera whose rate can be");
+  if (!(abs(trim) <= info_.trim->range)) {
+    return refuse("its frame rate can't be trimmed by " + std::to_string(trim.value()) + " ppm",
+                  "stay within +-" + std::to_string(info_.trim->range.value()) + " ppm");
+  }
+  const double rounded = std::round(trim / info_.trim->step) * info_.trim->step.value();
+  period_ = options_.timing.frame_period / (1 + rounded * 1e-6);
+  if (cycles_.empty()) return {};
+  const Cycle now = cycles_.back();
+  const TimePoint from = room_->clock().now() + info_.trim->latency - now.period / 2;
+  const double reads = std::max(0.0, std::ceil((from - now.start) / now.period));
+  cycles_.push_back(
+      {now.start + now.period * reads, now.first_id + static_cast<std::uint64_t>(reads), period_});
+  log(LogCategory::drivers).debug("{}: trimmed by {} ppm", info_.id, rounded);
+  return {};
+}
+
 void VirtualCamera::begin_cycle(TimePoint start, std::uint64_t first_id) {
-  cycles_.push_back({start, first_id});
+  cycles_.push_back({start, first_id, period_});
   next_id_ = first_id;
 }
 
@@ -84,31 +108,34 @@ TimePoint VirtualCamera::read_start(std::uint64_t frame_id) const {
   if (cycles_.empty()) return {};
   const auto after = std::upper_bound(cycles_.begin() + 1, cycles_.end(), frame_id,
                                       [](std::uint64_t id, const Cycle& c) { return id < c.first_id; });
-  const Cycle& cycle = *(after - 1);
-  return cycle.start + options_.timing.frame_period * static_cast<double>(frame_id - cycle.first_id + 1);
+  return read_start(*(after - 1), frame_id);
 }
 
 TimePoint VirtualCamera::read_start_after(TimePoint after) const {
   if (cycles_.empty()) return {};
-  const Seconds period = options_.timing.frame_period;
+  const Seconds period = cycles_.back().period;
   const double frames = std::ceil((after - cycles_.back().start) / period);
   return cycles_.back().start + period * std::max(0.0, frames);
 }
 
-TimePoint VirtualCamera::read_end(std::uint64_t frame_id) const {
-  return read_start(frame_id) + Rows(options_.timing.shifts) * options_.timing.row_time;
-}
+TimePoint VirtualCamera::read_end(std::uint64_t frame_id) const { return read_start(frame_id) + shifting(); }
 
 std::uint64_t VirtualCamera::delivered_by(TimePoint t) const {
-  const std::uint64_t first = cycles_.back().first_id;
-  const double periods = std::floor((t - read_end(first)) / options_.timing.frame_period);
-  auto count = static_cast<std::uint64_t>(std::max(0.0, periods));
-  while (read_end(first + count) <= t) ++count;  // instants are rounded to nanoseconds: settle the border
-  return count;
+  // A cycle ends where the next one begins, whatever it would have delivered since.
+  std::uint64_t end = std::numeric_limits<std::uint64_t>::max();
+  for (auto cycle = cycles_.rbegin(); cycle != cycles_.rend(); ++cycle) {
+    const auto read_end = [&](std::uint64_t id) { return read_start(*cycle, id) + shifting(); };
+    const double periods = std::floor((t - read_end(cycle->first_id)) / cycle->period);
+    auto next = cycle->first_id + static_cast<std::uint64_t>(std::max(0.0, periods));
+    while (read_end(next) <= t) ++next;  // instants are rounded to nanoseconds: settle the border
+    if (next > cycle->first_id) return std::min(next, end);
+    end = cycle->first_id;
+  }
+  return end;
 }
 
 void VirtualCamera::drop_overflow() {
-  const std::uint64_t delivered = cycles_.back().first_id + delivered_by(room_->clock().now());
+  const std::uint64_t delivered = delivered_by(room_->clock().now());
   if (delivered <= next_id_ + queue_frames_) return;
   const std::uint64_t oldest = delivered - queue_frames_;
   log(LogCategory::drivers).warn("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);

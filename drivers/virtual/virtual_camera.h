@@ -50,6 +50,7 @@ class VirtualCamera final : public Camera {
   void stop() override { filming_ = false; }
   Result<Frame> next_frame(Seconds deadline) override;
   Status reset_shutter(TimePoint at) override;
+  Status trim_rate(PartsPerMillion trim) override;
 
   void set_reset(ShutterReset reset) { info_.reset = reset; }
   [[nodiscard]] const VirtualCameraOptions& truth() const { return options_; }
@@ -59,15 +60,21 @@ class VirtualCamera final : public Camera {
   [[nodiscard]] std::shared_ptr<const VirtualScene> scene_of(std::uint64_t frame_id) const;
 
  private:
-  /// Read phases at `start` + i T; the image of i = 0 is kept back, that of i >= 1 is frame first_id + i - 1.
+  /// Read phases at `start` + i `period`; that of i >= 1 delivers frame first_id + i - 1. The image of i = 0
+  /// is kept back after a reset, and the last of the cycle before after a trim.
   struct Cycle {
     TimePoint start;
     std::uint64_t first_id = 0;
+    Seconds period;
   };
 
   [[nodiscard]] TimePoint read_end(std::uint64_t frame_id) const;
-  /// How many frames the current cycle has delivered by `t`.
+  /// The first frame that hasn't been delivered by `t`.
   [[nodiscard]] std::uint64_t delivered_by(TimePoint t) const;
+  [[nodiscard]] TimePoint read_start(const Cycle& cycle, std::uint64_t frame_id) const {
+    return cycle.start + cycle.period * static_cast<double>(frame_id - cycle.first_id + 1);
+  }
+  [[nodiscard]] Seconds shifting() const { return Rows(options_.timing.shifts) * options_.timing.row_time; }
   void begin_cycle(TimePoint start, std::uint64_t first_id);
   void drop_overflow();
   [[nodiscard]] Frame draw(std::uint64_t frame_id);
@@ -84,6 +91,7 @@ class VirtualCamera final : public Camera {
   Seconds device_origin_;  // of the camera's own clock
   std::vector<Cycle> cycles_;
   std::uint64_t next_id_ = 0;
+  Seconds period_;  ///< as trimmed
   bool filming_ = false;
 };
 

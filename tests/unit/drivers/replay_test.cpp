@@ -16,7 +16,12 @@ using test::TempFolder;
 const ImageLayout kLayout{{32, 24}, PixelFormat::gray16, 12};
 
 CameraInfo info_of(const std::string& id) {
-  return {id, "a model", kLayout, Hertz(23.976), ShutterReset::on_command};
+  return {id,
+          "a model",
+          kLayout,
+          Hertz(23.976),
+          ShutterReset::on_command,
+          FrameRateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)}};
 }
 
 StrobeSettings flashing(double phase_ms) {
@@ -45,6 +50,7 @@ void record_run(const std::filesystem::path& folder) {
   ASSERT_TRUE(writer->append(decision));
   ASSERT_TRUE(writer->append(reset_event({1'015'000'007}, "right", {1'020'000'000})));
   ASSERT_TRUE(writer->append(reset_event({1'015'000'900}, "left", {1'021'000'000})));
+  ASSERT_TRUE(writer->append(trim_event({1'015'500'000}, "left", PartsPerMillion(-12.5))));
   ASSERT_TRUE(writer->append(strobe_event({1'016'000'000}, flashing(2))));
   film(2);
   ASSERT_TRUE(writer->finish());
@@ -81,6 +87,8 @@ TEST_F(Replay, CamerasAreDescribedAsTheyWereRecorded) {
   EXPECT_EQ(info.layout, kLayout);
   EXPECT_EQ(info.frame_rate, Hertz(23.976));
   EXPECT_EQ(info.reset, ShutterReset::on_command);
+  ASSERT_TRUE(info.trim);
+  EXPECT_EQ(info.trim->step, PartsPerMillion(0.5));
 }
 
 TEST_F(Replay, TheRecordedCourseComesBackWithTheInstantsThatTheLiveRunSaw) {
@@ -94,6 +102,8 @@ TEST_F(Replay, TheRecordedCourseComesBackWithTheInstantsThatTheLiveRunSaw) {
   ASSERT_TRUE(rig_.cameras[1]->reset_shutter({1'020'000'000}));
   EXPECT_EQ(rig_.clock->now().ns, 1'015'000'900);
   ASSERT_TRUE(rig_.cameras[0]->reset_shutter({1'021'000'000}));
+  EXPECT_EQ(rig_.clock->now().ns, 1'015'500'000);
+  ASSERT_TRUE(rig_.cameras[0]->trim_rate(PartsPerMillion(-12.5)));
   ASSERT_TRUE(rig_.strobe->apply(flashing(2)));
   EXPECT_EQ(rig_.strobe->read_back()->phase, milliseconds(2));
   EXPECT_EQ(rig_.clock->now().ns, 1'016'000'000);
@@ -117,6 +127,17 @@ TEST_F(Replay, AResetForAnotherInstantIsADeviceErrorThatSaysBoth) {
   EXPECT_EQ(status.error().kind, ErrorKind::device);
   EXPECT_NE(status.error().message().find("1021000000"), std::string::npos);
   EXPECT_NE(status.error().message().find("1021000001"), std::string::npos);
+}
+
+TEST_F(Replay, ATrimThatWasRecordedOtherwiseIsADeviceError) {
+  EXPECT_EQ(rig_.cameras[0]->trim_rate(PartsPerMillion(-12.5)).error().kind,
+            ErrorKind::device);  // a reset is due
+  ASSERT_TRUE(rig_.cameras[0]->reset_shutter({1'021'000'000}));
+  const Status other = rig_.cameras[0]->trim_rate(PartsPerMillion(12.5));
+  ASSERT_FALSE(other);
+  EXPECT_NE(other.error().message().find("-12.5"), std::string::npos);
+  EXPECT_TRUE(rig_.cameras[0]->trim_rate(PartsPerMillion(-12.5)));
+  EXPECT_FALSE(rig_.cameras[0]->trim_rate(PartsPerMillion(-12.5)));
 }
 
 TEST_F(Replay, AStrobeSwitchedOtherwiseOrTooOftenIsADeviceError) {

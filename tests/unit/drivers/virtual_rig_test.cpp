@@ -185,6 +185,48 @@ TEST(VirtualRig, AResetTakesEffectAtOnceWhenItsMomentHasPassed) {
   EXPECT_GT(rig->read_start(0, f.stamp.frame_id), (TimePoint{1'170'000'000}));
 }
 
+VirtualCameraOptions trimmable_camera() {
+  VirtualCameraOptions c = small_camera();
+  c.trim = FrameRateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
+  return c;
+}
+
+TEST(VirtualRig, ATrimmedCameraReadsEarlierAndLosesNoFrame) {
+  const auto rig = small_rig({trimmable_camera()}, {});
+  Camera& camera = rig->camera(0);
+  ASSERT_TRUE(camera.start().ok());
+  ASSERT_EQ(camera.next_frame(Seconds(1)).value().stamp.frame_id, 0U);
+  const TimePoint told = rig->clock().now();
+  ASSERT_TRUE(camera.trim_rate(PartsPerMillion(99.9)).ok());  // rounded to a step: 100
+  for (std::uint64_t id = 1; id < 240; ++id)
+    ASSERT_EQ(camera.next_frame(Seconds(1)).value().stamp.frame_id, id);
+  const Seconds filmed = rig->read_start(0, 239) - rig->read_start(0, 0);
+  const Seconds untrimmed(239.0 / 24);
+  const Seconds in_force = rig->read_start(0, 239) - told - milliseconds(80);
+  // Half a frame of the latency is chance.
+  EXPECT_NEAR(in_microseconds(untrimmed - filmed), 100 * in_force.value(), 100 * 0.6 / 24);
+}
+
+TEST(VirtualRig, ATrimOutlastsAReset) {
+  const auto rig = small_rig({trimmable_camera()}, {});
+  Camera& camera = rig->camera(0);
+  ASSERT_TRUE(camera.start().ok());
+  ASSERT_TRUE(camera.trim_rate(PartsPerMillion(-50)).ok());
+  ASSERT_TRUE(camera.reset_shutter(rig->clock().now() + Seconds(1)).ok());
+  const std::uint64_t first = camera.next_frame(Seconds(5)).value().stamp.frame_id;
+  const Seconds period = (rig->read_start(0, first + 100) - rig->read_start(0, first)) / 100;
+  EXPECT_NEAR((period * 24 / Seconds(1) - 1) * 1e6, 50, 0.01);
+}
+
+TEST(VirtualRig, ATrimOutOfRangeOrOfACameraWithoutOneIsRefused) {
+  const auto rig = small_rig({trimmable_camera()}, {});
+  EXPECT_EQ(rig->camera(0).trim_rate(PartsPerMillion(101)).error().kind, ErrorKind::device);
+  EXPECT_EQ(rig->camera(0).trim_rate(PartsPerMillion(std::nan(""))).error().kind, ErrorKind::device);
+  const auto plain = small_rig({small_camera()}, {});
+  EXPECT_FALSE(plain->camera(0).info().trim);
+  EXPECT_EQ(plain->camera(0).trim_rate(PartsPerMillion(1)).error().kind, ErrorKind::device);
+}
+
 TEST(VirtualRig, WhoResetsTheShutterCanBeChangedOrForbidden) {
   const auto rig = small_rig({small_camera()}, {});
   EXPECT_EQ(rig->camera(0).info().reset, ShutterReset::on_command);

@@ -14,6 +14,9 @@
 namespace emberlock::cli {
 namespace {
 
+/// Of virtual cameras: an order waits for the frame after next.
+constexpr Seconds kTrimLatency = milliseconds(80);
+
 struct AlignArguments {
   std::string rig = "virtual:11";
   std::string tolerance = "100rows";
@@ -22,6 +25,12 @@ struct AlignArguments {
   bool json = false;
   double latency_jitter_ms = 0.2;
   int max_rounds = 500;
+  int max_resets = 1000;
+  double max_minutes = 60;
+  double probability = 0.9;
+  double reset_seconds = 0;
+  double trim_range_ppm = 0;
+  double trim_step_ppm = 0.5;
   std::string record;
   std::string replay;
   std::string delays;
@@ -38,7 +47,7 @@ void print_table(const AlignRoundReport& report) {
   std::printf("\n");
   for (std::size_t i = 0; i < report.cameras.size(); ++i) {
     const CameraDecision& camera = report.decision.cameras[i];
-    const char mark = camera.reset ? '*' : report.decision.reference == i ? '=' : ' ';
+    const char mark = camera.reset ? '*' : camera.trim ? '~' : report.decision.reference == i ? '=' : ' ';
     std::printf("  %c %-12s ", mark, report.cameras[i].id.c_str());
     if (camera.error) {
       std::printf("%+8.1f rows %+8.3f ms", (*camera.error / row).value(), in_milliseconds(*camera.error));
@@ -54,9 +63,11 @@ void print_summary(const AlignRunResult& result) {
   const AlignDecision& last = result.last;
   const SecondsPerRow row = result.options.row_time;
   std::printf("%s after %d rounds and %d resets (policy %s, tolerance %.1f rows, t_row %.4f us): %s\n",
-              last.verdict == AlignVerdict::aligned ? "aligned" : "NOT aligned", last.round, result.resets,
-              std::string(name(result.options.policy)).c_str(), result.options.tolerance.in_rows(row).value(),
-              row.value() * 1e6, last.reason.c_str());
+              last.verdict == AlignVerdict::aligned   ? "aligned"
+              : last.verdict == AlignVerdict::refused ? "REFUSED"
+                                                      : "NOT aligned",
+              last.round, result.resets, std::string(name(result.options.policy)).c_str(),
+              result.options.tolerance.in_rows(row).value(), row.value() * 1e6, last.reason.c_str());
 }
 
 /// Where the rounds go: JSON lines or tables on stdout.
@@ -74,6 +85,9 @@ Result<AlignRunOptions> options_from(const AlignArguments& arguments) {
   EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, parse_tolerance(arguments.tolerance));
   options.align.max_rounds = arguments.max_rounds;
   options.align.delay_jitter = std::max(milliseconds(arguments.latency_jitter_ms), microseconds(1));
+  options.align.reset_time = Seconds(arguments.reset_seconds);
+  options.align.limits =
+      AlignLimits{arguments.max_resets, Seconds(60 * arguments.max_minutes), arguments.probability};
   options.seed = arguments.seed;
   return options;
 }
@@ -83,6 +97,10 @@ Result<AlignRunResult> align_live(const AlignArguments& arguments, const AlignOb
   EMBERLOCK_ASSIGN_OR_RETURN(VirtualRigOptions setup, parse_virtual_rig(arguments.rig, arguments.seed));
   for (VirtualCameraOptions& camera : setup.cameras) {
     camera.reset_jitter = milliseconds(arguments.latency_jitter_ms);
+    if (arguments.trim_range_ppm > 0) {
+      camera.trim = FrameRateTrim{PartsPerMillion(arguments.trim_range_ppm),
+                                  PartsPerMillion(arguments.trim_step_ppm), kTrimLatency};
+    }
     // What a data sheet says of the model: the direction, the rows and the shifts. t_row is measured.
     options.timing.push_back(
         {.rows = camera.timing.rows, .shifts = camera.timing.shifts, .direction = camera.timing.direction});
@@ -130,9 +148,9 @@ void add_align(CLI::App& app) {
       "Films the strobe and resets the cameras' shutters until all read within a tolerance of one another.");
   verb->add_option("--rig", arguments->rig, "cameras and strobe: virtual:N")->capture_default_str();
   verb->add_option("--tolerance", arguments->tolerance,
-                   "to the reference, to either side: 100rows, 5.4ms or 500us")
+                   "to the common target, to either side: 100rows, 5.4ms or 500us")
       ->capture_default_str();
-  verb->add_option("--policy", arguments->policy, "fixed-reference (the paper's), densest or timed")
+  verb->add_option("--policy", arguments->policy, "fixed-reference (the paper's), densest, timed or trimmed")
       ->capture_default_str();
   verb->add_option("--seed", arguments->seed, "of the virtual rig and of the moments of untimed resets")
       ->capture_default_str();
@@ -142,6 +160,27 @@ void add_align(CLI::App& app) {
       ->capture_default_str();
   verb->add_option("--max-rounds", arguments->max_rounds, "give up after so many")
       ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  verb->add_option("--max-resets", arguments->max_resets,
+                   "refuse a tolerance that would take more, and say what could be met")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  verb->add_option("--max-minutes", arguments->max_minutes, "refuse what would take longer")
+      ->check(CLI::Range(0.01, 1e6))
+      ->capture_default_str();
+  verb->add_option("--probability", arguments->probability, "with which the limits must suffice")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
+  verb->add_option("--reset-seconds", arguments->reset_seconds,
+                   "of one reset, where an operator does it: what is foretold counts them")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
+  verb->add_option("--trim-range", arguments->trim_range_ppm,
+                   "by how much virtual cameras can trim their frame rates, ppm; 0: not at all")
+      ->check(CLI::Range(0.0, 1000.0))
+      ->capture_default_str();
+  verb->add_option("--trim-step", arguments->trim_step_ppm, "of these trims, ppm")
+      ->check(CLI::Range(0.001, 1000.0))
       ->capture_default_str();
   verb->add_option(
       "--delays", arguments->delays,

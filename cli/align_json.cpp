@@ -1,5 +1,6 @@
 #include "cli/align_json.h"
 
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -12,6 +13,42 @@ using nlohmann::ordered_json;
 ordered_json delay_json(const std::optional<ResetDelay>& delay) {
   if (!delay) return nullptr;
   return {{"mean_s", delay->mean.value()}, {"sigma_s", delay->sigma.value()}};
+}
+
+ordered_json limits_json(const std::optional<AlignLimits>& limits) {
+  if (!limits) return nullptr;
+  return {{"resets", limits->resets}, {"time_s", limits->time.value()}, {"probability", limits->probability}};
+}
+
+ordered_json effort_json(const AlignEffort& effort) {
+  return {{"resets", effort.resets},
+          {"resets_p95", effort.resets_p95},
+          {"time_s", effort.time.value()},
+          {"time_p95_s", effort.time_p95.value()},
+          {"probability", effort.within}};
+}
+
+ordered_json offers_json(const std::vector<AlignOffer>& offers, SecondsPerRow row) {
+  ordered_json list = ordered_json::array();
+  for (const AlignOffer& offer : offers) {
+    list.push_back({{"policy", name(offer.policy)},
+                    {"tolerance_rows", offer.tolerance.in_rows(row).value()},
+                    {"effort", effort_json(offer.effort)}});
+  }
+  return list;
+}
+
+/// Seconds, or null: of a time that isn't known, or that never comes.
+ordered_json seconds_json(std::optional<Seconds> time) {
+  if (!time || !std::isfinite(time->value())) return nullptr;
+  return time->value();
+}
+
+ordered_json time_left_json(const std::optional<TimeLeft>& left) {
+  if (!left) return nullptr;
+  return {{"expected_s", seconds_json(left->expected)},
+          {"earliest_s", seconds_json(left->earliest)},
+          {"latest_s", seconds_json(left->latest)}};
 }
 
 double number(const json& object, const char* key) { return object.at(key).get<double>(); }
@@ -43,8 +80,14 @@ AlignRunOptions options_from(const json& object) {
   options.align.reference = object.at("reference").get<std::size_t>();
   options.align.row_time = SecondsPerRow(number(object, "row_time_s"));
   options.align.delay_jitter = Seconds(number(object, "delay_jitter_s"));
-  options.align.delay_spread = Seconds(number(object, "delay_spread_s"));
   options.align.rate_spread = PartsPerMillion(number(object, "rate_spread_ppm"));
+  options.align.rate_wander = PartsPerMillion(number(object, "rate_wander_ppm"));
+  options.align.trim_time = Seconds(number(object, "trim_time_s"));
+  options.align.reset_time = Seconds(number(object, "reset_time_s"));
+  if (const json& limits = object.at("limits"); !limits.is_null()) {
+    options.align.limits = AlignLimits{integer(limits, "resets"), Seconds(number(limits, "time_s")),
+                                       number(limits, "probability")};
+  }
   options.align.max_rounds = integer(object, "max_rounds");
   options.align.max_looks = integer(object, "max_looks");
   options.measure_row_time = object.at("measure_row_time").get<bool>();
@@ -92,6 +135,9 @@ ordered_json round_json(const AlignRoundReport& report) {
          {"error_ms", error_ms},
          {"sigma_rows", sigma_rows},
          {"reset", camera.reset},
+         {"trim_ppm", camera.trim ? ordered_json(camera.trim->value()) : nullptr},
+         {"servo", camera.servo ? ordered_json(name(*camera.servo)) : nullptr},
+         {"time_left", time_left_json(camera.time_left)},
          {"reason", camera.reason}});
   }
   ordered_json line;
@@ -104,6 +150,11 @@ ordered_json round_json(const AlignRoundReport& report) {
   line["strobe_phase_ms"] = in_milliseconds(report.strobe.phase);
   line["resets_so_far"] = decision.resets_so_far;
   line["aligned"] = decision.verdict == AlignVerdict::aligned;
+  line["verdict"] = name(decision.verdict);
+  line["target_ms"] = decision.target ? ordered_json(in_milliseconds(*decision.target)) : nullptr;
+  line["next_check_s"] = seconds_json(decision.next_check);
+  line["effort"] = decision.effort ? effort_json(*decision.effort) : nullptr;
+  line["offers"] = offers_json(decision.offers, row);
   line["reason"] = decision.reason;
   return line;
 }
@@ -119,6 +170,9 @@ ordered_json summary_json(const AlignRunResult& result, std::uint64_t seed) {
   line["worst_pair_rows"] = last.worst_pair ? ordered_json((*last.worst_pair / row).value()) : nullptr;
   line["worst_pair_ms"] = last.worst_pair ? ordered_json(in_milliseconds(*last.worst_pair)) : nullptr;
   line["tolerance_rows"] = result.options.tolerance.in_rows(row).value();
+  line["verdict"] = name(last.verdict);
+  line["next_check_s"] = seconds_json(last.next_check);
+  line["offers"] = offers_json(last.offers, row);
   line["policy"] = name(result.options.policy);
   line["seed"] = seed;
   line["reason"] = last.reason;
@@ -144,8 +198,11 @@ ordered_json options_json(const AlignRunOptions& options) {
           {"reference", align.reference},
           {"row_time_s", align.row_time.value()},
           {"delay_jitter_s", align.delay_jitter.value()},
-          {"delay_spread_s", align.delay_spread.value()},
           {"rate_spread_ppm", align.rate_spread.value()},
+          {"rate_wander_ppm", align.rate_wander.value()},
+          {"trim_time_s", align.trim_time.value()},
+          {"reset_time_s", align.reset_time.value()},
+          {"limits", limits_json(align.limits)},
           {"max_rounds", align.max_rounds},
           {"max_looks", align.max_looks},
           {"measure_row_time", options.measure_row_time},

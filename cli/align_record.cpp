@@ -13,12 +13,13 @@
 namespace emberlock::cli {
 namespace {
 
-/// Answers as the clock of the recorded run did: once for each change of the strobe and each reset.
+/// Answers as the clock of the recorded run did: once for each change of the strobe, reset and trim.
 class RecordedAnswers final : public Clock {
  public:
   explicit RecordedAnswers(const std::vector<v1::Event>& events) {
     for (const v1::Event& event : events) {
-      if (event.has_strobe() || event.has_reset()) answers_.push_back({event.monotonic_ns()});
+      if (event.has_strobe() || event.has_reset() || event.has_trim())
+        answers_.push_back({event.monotonic_ns()});
     }
   }
   /// Behind the last answer the replay has left the recorded course, which the devices report.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "base/log.h"
 #include "base/random.h"
@@ -32,6 +33,11 @@ ResetMethod method_of(ShutterReset reset) {
       return ResetMethod::on_command;
   }
   return ResetMethod::none;
+}
+
+std::optional<RateTrim> trim_of(const CameraInfo& info) {
+  if (!info.trim) return std::nullopt;
+  return RateTrim{info.trim->range, info.trim->step, info.trim->latency};
 }
 
 /// What was filmed of every camera between two changes.
@@ -73,6 +79,14 @@ class Bench {
     fresh_ = std::max(fresh_, now);
     EMBERLOCK_RETURN_IF_ERROR(record(reset_event(now, rig_.cameras[camera]->info().id, at)));
     return at;
+  }
+
+  /// Trims the camera's frame rate. Returns when it was told.
+  Result<TimePoint> trim(std::size_t camera, PartsPerMillion trim) {
+    const TimePoint now = rig_.clock->now();
+    EMBERLOCK_RETURN_IF_ERROR(rig_.cameras[camera]->trim_rate(trim));
+    EMBERLOCK_RETURN_IF_ERROR(record(trim_event(now, rig_.cameras[camera]->info().id, trim)));
+    return now;
   }
 
   /// `count` frames of every camera, one of each in turn, and what they show.
@@ -197,7 +211,7 @@ AlignRound to_round(const Film& film, const AlignRunResult& rig, const AlignRunO
   CommonPhases common = refer(samples, {.period = period,
                                         .resolution = row_resolution(rig.options.row_time, strobe.width),
                                         .beat = expected_beat(strobe.rate, period, options.rate_error)});
-  AlignRound round{common.at, common.beat, strobe.phase, {}, {}};
+  AlignRound round{common.at, common.beat, strobe.phase, {}, {}, {}};
   for (std::size_t i = 0; i < samples.size(); ++i) {
     std::vector<TimePoint> stamps;
     for (const Frame& frame : film.frames[i]) stamps.push_back(frame.stamp.monotonic_time);
@@ -211,7 +225,7 @@ std::vector<AlignCamera> describe(const AlignRig& rig, const AlignRunOptions& op
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const CameraInfo& info = rig.cameras[i]->info();
     cameras.push_back({info.id, info.model, method_of(info.reset),
-                       options.delays.empty() ? std::nullopt : options.delays[i]});
+                       options.delays.empty() ? std::nullopt : options.delays[i], trim_of(info)});
   }
   return cameras;
 }
@@ -233,6 +247,7 @@ Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& opt
   AlignRunResult result;
   result.options = options.align;
   result.options.period = period;
+  result.options.round_time = period * (options.frames_per_round + kSettlingPeriods);
   result.timing = options.timing;
   for (CcdTiming& timing : result.timing) timing.frame_period = period;
   result.row_clocks.resize(rig.cameras.size());
@@ -246,7 +261,8 @@ Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& opt
   StrobeSettings flashes{
       .output = StrobeOutput::flashing, .rate = rate(period), .width = options.flash_width};
   AlignState state;
-  std::vector<ResetDone> done;
+  std::vector<ResetDone> resets;
+  std::vector<TrimDone> trims;
   double reached = 0.2;  // of the progress; the rest is the part of the cameras within tolerance
   do {
     EMBERLOCK_RETURN_IF_ERROR(bench.set_strobe(flashes));
@@ -255,8 +271,8 @@ Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& opt
     EMBERLOCK_ASSIGN_OR_RETURN(
         const Film film, bench.film(options.frames_per_round, progress, reached, reached, words.c_str()));
     AlignRound round = to_round(film, result, options, bench.strobe());
-    round.resets = std::move(done);
-    done.clear();
+    round.resets = std::exchange(resets, {});
+    round.trims = std::exchange(trims, {});
     AlignStep step = align_step(state, round, cameras, result.options);
     state = std::move(step.state);
     result.last = std::move(step.decision);
@@ -274,13 +290,17 @@ Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& opt
     if (result.last.strobe_phase) flashes.phase = *result.last.strobe_phase;
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       const CameraDecision& camera = result.last.cameras[i];
+      if (camera.trim) {
+        EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at, bench.trim(i, *camera.trim));
+        trims.push_back({i, at, *camera.trim});
+      }
       if (!camera.reset) continue;
       EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at, bench.reset(i, camera.moment, state.cameras[i].resets));
       const bool told = cameras[i].method == ResetMethod::on_command;
-      done.push_back({i, told ? std::optional(at) : std::nullopt});
+      resets.push_back({i, told ? std::optional(at) : std::nullopt});
     }
   } while (result.last.verdict == AlignVerdict::go_on);
-  report(progress, 1, result.last.verdict == AlignVerdict::aligned ? "aligned" : "given up");
+  report(progress, 1, result.last.verdict == AlignVerdict::aligned ? "aligned" : "not aligned");
 
   result.resets = state.resets;
   for (std::size_t i = 0; i < cameras.size(); ++i) {

@@ -25,12 +25,12 @@ struct AlignRig {
   Strobe* strobe = nullptr;
   Clock* clock = nullptr;
   SessionWriter* recorder =
-      nullptr;  ///< takes every frame, strobe setting, reset and decision, if there is one
+      nullptr;  ///< takes every frame, strobe setting, reset, trim and decision, if there is one
 };
 
 struct AlignRunOptions {
-  /// period, row_time, rows: of the rig's cameras; the run sets period to the cameras' own and, once
-  /// measured, row_time.
+  /// period, row_time, rows: of the rig's cameras; the run sets period and round_time to the cameras' own
+  /// and, once measured, row_time.
   AlignOptions align;
   /// By camera: n, K and d must be right (a wrong d reverses every correction); row_time is used where it
   /// isn't measured.

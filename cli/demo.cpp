@@ -72,10 +72,7 @@ SmearSnapshot snapshot(const AlignRoundReport& report) {
     if (const auto error = report.decision.cameras[i].error) camera.error = *error / report.options.row_time;
     shot.cameras.push_back(std::move(camera));
   }
-  if (const auto reference = report.decision.reference) {
-    const Phase& phase = report.round.cameras[*reference].phase;
-    if (phase.state == PhaseState::known) shot.reference_tau = phase.tau;
-  }
+  shot.target_tau = report.decision.target;
   return shot;
 }
 
@@ -88,7 +85,7 @@ Result<AlignStage> align(const Rig& rig, AlignStage stage, AlignRunOptions optio
   const TimePoint start = SteadyClock{}.now();
   const auto observe = [&](const AlignRoundReport& report) {
     stage.last = snapshot(report);
-    if (!stage.first.reference_tau) stage.first = stage.last;
+    if (!stage.first.target_tau) stage.first = stage.last;
     std::vector<std::optional<Rows>> errors;
     for (const auto& camera : stage.last.cameras) errors.push_back(camera.error);
     stage.errors.push_back(std::move(errors));

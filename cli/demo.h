@@ -33,10 +33,10 @@ struct SmearSnapshot {
     Frame frame;
     SmearReading reading;
     Phase phase;
-    std::optional<Rows> error;  ///< to the reference
+    std::optional<Rows> error;  ///< to the target
   };
   std::vector<Camera> cameras;
-  std::optional<Seconds> reference_tau;
+  std::optional<Seconds> target_tau;
 };
 
 /// One alignment from its first round to its last.
@@ -44,8 +44,8 @@ struct AlignStage {
   std::string title = {};
   AlignPolicy policy = AlignPolicy::densest;
   Rows tolerance = {};
-  std::vector<std::vector<std::optional<Rows>>> errors = {};  ///< [round][camera], to the round's reference
-  SmearSnapshot first = {};  ///< the first round in which a reference stood: nothing had been reset by then
+  std::vector<std::vector<std::optional<Rows>>> errors = {};  ///< [round][camera], to the round's target
+  SmearSnapshot first = {};  ///< the first round in which a target stood: nothing had been reset by then
   SmearSnapshot last = {};
   AlignRunResult result = {};
   Seconds seconds = {};  ///< by the wall clock

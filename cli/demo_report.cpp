@@ -68,9 +68,9 @@ void strips(HtmlPage& page, const SmearSnapshot& shot, const AlignStage& stage) 
   for (std::size_t i = 0; i < shot.cameras.size(); ++i) {
     const auto& camera = shot.cameras[i];
     std::vector<RowSpan> band;
-    if (shot.reference_tau && camera.reading.lamp) {
-      band = tolerance_band(stage.result.timing[i], camera.reading.lamp->y, *shot.reference_tau,
-                            stage.tolerance);
+    if (shot.target_tau && camera.reading.lamp) {
+      band =
+          tolerance_band(stage.result.timing[i], camera.reading.lamp->y, *shot.target_tau, stage.tolerance);
     }
     const std::string error =
         camera.error ? fmt::format("{:+.1f} rows", camera.error->value()) : "not known yet";
@@ -87,7 +87,7 @@ void alignment(HtmlPage& page, const DemoResult& r) {
       "ticks: the smear dot "
       "of one flash. Its distance from the lamp, times the row time, is the shutter's phase. Green: where "
       "the dot must "
-      "lie to be within 100 rows of the reference camera.");
+      "lie to be within 100 rows of their common target.");
   strips(page, r.stages.front().first, r.stages.front());
   page.heading("After: within 10 rows");
   strips(page, r.stages.back().last, r.stages.back());
@@ -104,7 +104,7 @@ void alignment(HtmlPage& page, const DemoResult& r) {
     }
     page.raw(svg_plot(series, {.title = stage.title,
                                .x_label = "round",
-                               .y_label = "rows from the reference",
+                               .y_label = "rows from the target",
                                .band = stage.tolerance.value()}));
     page.paragraph(fmt::format("{}: {} resets, {:.1f} s. {}", stage.title, stage.result.resets,
                                stage.seconds.value(), stage.result.last.reason));

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <tuple>
+#include <limits>
 
+#include "smear_sync/align_choice.h"
+#include "smear_sync/align_forecast.h"
+#include "smear_sync/align_trim.h"
+#include "smear_sync/align_words.h"
 #include "smear_sync/reset_delay.h"
 
 namespace emberlock {
@@ -16,138 +19,99 @@ constexpr double kLookRange = 0.95;
 /// Successive delays step by this part of the period: however the blind phases lie, no two looks are alike.
 constexpr double kLookStep = 0.381966011250105 * kLookRange;  // 1 - 1 / golden ratio
 
-/// A phase seen earlier counts until it may have walked by this part of the tolerance (one standard error).
+/// A phase seen earlier counts until it may have walked by this part of the tolerance (one standard error);
+/// of the trims' reach, which is far more, while trims bring the cameras together.
 constexpr double kMemoryPart = 0.25;
+constexpr double kMemoryPartOfReach = 0.05;
 
-/// Cameras of which all phases are known, at one instant.
-struct Scene {
+/// Shifts by hand that are remembered of a camera.
+constexpr std::size_t kShifts = 16;
+
+/// A tolerance of fewer standard errors of a phase can't be told.
+constexpr double kTellable = 2;
+
+/// The next check comes before any of the cameras leaves by so many standard errors.
+constexpr double kScheduleSigmas = 3;
+
+/// What is the same for all of a round's steps.
+struct Context {
+  const AlignRound& round;
   const std::vector<AlignCamera>& cameras;
   const AlignOptions& options;
-  std::vector<Phase> phases;
+  TrackOptions track;
   Seconds tolerance;
+  Seconds reach;  ///< of trims; zero where the policy doesn't trim
 
-  [[nodiscard]] Seconds error(std::size_t camera, std::size_t reference) const {
-    return phase_error(phases[camera], phases[reference], options.period);
-  }
-  [[nodiscard]] bool within(std::size_t camera, std::size_t reference) const {
-    return abs(error(camera, reference)) <= tolerance;
-  }
-  [[nodiscard]] bool movable(std::size_t camera) const { return cameras[camera].method != ResetMethod::none; }
-};
-
-/// How well a camera would do as the reference; larger is better.
-struct Merit {
-  int stuck;    ///< minus the cameras that would have to move and can't
-  int within;   ///< cameras within tolerance
-  double near;  ///< minus the mean square error of those within tolerance: a tight group leaves room for more
-  friend bool operator>(const Merit& a, const Merit& b) {
-    return std::tie(a.stuck, a.within, a.near) > std::tie(b.stuck, b.within, b.near);
+  [[nodiscard]] Seconds remembered() const {
+    return std::max(kMemoryPart * tolerance, kMemoryPartOfReach * reach);
   }
 };
 
-Merit merit(const Scene& scene, std::size_t candidate) {
-  Merit m{0, 0, 0};
-  for (std::size_t i = 0; i < scene.phases.size(); ++i) {
-    if (scene.within(i, candidate)) {
-      ++m.within;
-      const double e = scene.error(i, candidate).value();
-      m.near -= e * e;
-    } else if (!scene.movable(i)) {
-      --m.stuck;
-    }
+std::vector<std::optional<RateTrim>> trims_of(const std::vector<AlignCamera>& cameras) {
+  std::vector<std::optional<RateTrim>> trims;
+  trims.reserve(cameras.size());
+  for (const AlignCamera& camera : cameras) trims.push_back(camera.trim);
+  return trims;
+}
+
+/// Takes over what the round showed: delays and shifts of resets, trims ordered, phases of the cameras seen.
+void remember(AlignState& state, const Context& c) {
+  const AlignRound& round = c.round;
+  for (const TrimDone& done : round.trims) {
+    const auto& trim = c.cameras[done.camera].trim;
+    state.cameras[done.camera].phase.order_trim(done.at + (trim ? trim->latency : Seconds(0)), done.trim,
+                                                c.track);
   }
-  m.near /= m.within;
-  return m;
-}
-
-std::size_t choose_reference(const Scene& scene) {
-  if (scene.options.policy == AlignPolicy::fixed_reference) return scene.options.reference;
-  std::size_t best = 0;
-  for (std::size_t i = 1; i < scene.phases.size(); ++i) {
-    if (merit(scene, i) > merit(scene, best)) best = i;
-  }
-  return best;
-}
-
-Seconds worst_pair(const Scene& scene) {
-  Seconds worst;
-  for (std::size_t a = 0; a < scene.phases.size(); ++a) {
-    for (std::size_t b = a + 1; b < scene.phases.size(); ++b) worst = std::max(worst, abs(scene.error(a, b)));
-  }
-  return worst;
-}
-
-std::string format(const char* pattern, auto... values) {
-  char text[200];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
-
-/// "reads 34.2 rows (1.847 ms) before the reference"
-std::string standing(Seconds error, SecondsPerRow row_time) {
-  return format("reads %.1f rows (%.3f ms) %s the reference", std::abs((error / row_time).value()),
-                std::abs(in_milliseconds(error)), error.value() >= 0 ? "before" : "after");
-}
-
-std::string plural(std::size_t count, const std::string& one) {
-  return std::to_string(count) + " " + one + (count == 1 ? "" : "s");
-}
-
-/// Takes over what the round showed: delays of resets, phases of the cameras seen, older phases moved on by
-/// the beat.
-void remember(AlignState& state, const AlignRound& round, const std::vector<AlignCamera>& cameras,
-              const AlignOptions& options) {
   for (const ResetDone& done : round.resets) {
     CameraTrack& track = state.cameras[done.camera];
-    track.phase.reset();
     ++track.resets;
     ++state.resets;
+    track.before_hand.reset();
+    if (!done.at && track.phase.phase_known()) track.before_hand = track.phase.at(round.at, c.track);
+    track.phase.forget_phase();
     const auto& stamp = round.cameras[done.camera].stamp;
     if (!done.at || !stamp) continue;
-    const Seconds observed = wrap_positive(*stamp - *done.at, options.period);
-    track.delay = learn_delay(expected_delay(state, cameras, options, done.camera), observed, options);
-    ++track.taught;
+    learn_delay(state, c.cameras, c.options, done.camera, wrap_positive(*stamp - *done.at, c.options.period));
   }
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const Phase& now = round.cameras[i].phase;
-    if (now.state != PhaseState::known) continue;
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    Phase phase = round.cameras[i].phase;
+    if (phase.state != PhaseState::known) continue;
+    phase.tau = wrap_positive(phase.tau - round.strobe_phase, c.options.period);
     CameraTrack& track = state.cameras[i];
-    track.seen = round.at;
-    track.phase = now;
-    track.phase->tau = wrap_positive(now.tau - round.strobe_phase, options.period);
+    track.phase.observe(round.at, phase, round.beat, c.track);
+    if (!track.before_hand) continue;
+    const Drift& before = *track.before_hand;
+    const Seconds moved = (round.at - before.at) * (before.rate.value() * 1e-6);
+    track.hand_shifts.push_back(wrap_positive(phase.tau - before.tau - moved, c.options.period));
+    if (track.hand_shifts.size() > kShifts) track.hand_shifts.erase(track.hand_shifts.begin());
+    track.before_hand.reset();
   }
 }
 
-/// A camera's phase at the round's instant, strobe_phase taken out: seen now, or seen earlier, moved on by
-/// the beat and sure enough still.
-std::optional<Phase> phase_now(const CameraTrack& track, const AlignRound& round,
-                               const AlignOptions& options) {
-  if (!track.phase) return std::nullopt;
-  Phase phase = *track.phase;
-  const Seconds elapsed = round.at - track.seen;
-  const double aging = std::hypot(round.beat.sigma.value(), options.rate_spread.value()) * 1e-6;
-  phase.tau = wrap_positive(phase.tau + elapsed * (round.beat.rate.value() * 1e-6), options.period);
-  const Seconds walked = elapsed * aging;
-  phase.sigma = Seconds(std::hypot(phase.sigma.value(), walked.value()));
-  if (walked > kMemoryPart * options.tolerance.in_time(options.row_time)) return std::nullopt;
-  return phase;
+/// Where a camera stands at the round's instant: seen now, or earlier and sure enough still.
+std::optional<Drift> where(const CameraTrack& track, const Context& c) {
+  if (!track.phase.phase_known() || track.phase.aged(c.round.at) > c.remembered()) return std::nullopt;
+  return track.phase.at(c.round.at, c.track);
+}
+
+Seconds next_look(const Context& c) {
+  return wrap_positive(c.round.strobe_phase + kLookStep * c.options.period, kLookRange * c.options.period);
 }
 
 /// Some phases are missing: nobody is reset on half a view. Blind cameras are brought out by moving the
 /// strobe.
-void look_again(AlignState& state, AlignDecision& decision, const AlignRound& round,
-                const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
+void look_again(AlignState& state, AlignDecision& decision, const Context& c) {
   ++state.looks;
   std::string missing;
   bool blind = false;
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
-    const Phase& phase = round.cameras[i].phase;
-    if (phase_now(state.cameras[i], round, options)) {
+    const Phase& phase = c.round.cameras[i].phase;
+    if (where(state.cameras[i], c)) {
       camera.reason = "its phase is known: waits for the cameras whose phase isn't";
       continue;
     }
-    missing += (missing.empty() ? "" : ", ") + cameras[i].id;
+    missing += (missing.empty() ? "" : ", ") + c.cameras[i].id;
     if (phase.state == PhaseState::blind) {
       blind = true;
       camera.reason = "shows no dot: the strobe's phase is moved to bring it out (" + phase.reason + ")";
@@ -155,7 +119,7 @@ void look_again(AlignState& state, AlignDecision& decision, const AlignRound& ro
       camera.reason = "can't be read: see to its view of the lamp and to the strobe (" + phase.reason + ")";
     }
   }
-  if (state.looks > options.max_looks) {
+  if (state.looks > c.options.max_looks) {
     decision.verdict = AlignVerdict::given_up;
     decision.reason = "no phase of " + missing + " after " +
                       plural(static_cast<std::size_t>(state.looks), "look") +
@@ -163,147 +127,258 @@ void look_again(AlignState& state, AlignDecision& decision, const AlignRound& ro
                       "and flashes once a frame";
     return;
   }
-  if (blind)
-    decision.strobe_phase =
-        wrap_positive(round.strobe_phase + kLookStep * options.period, kLookRange * options.period);
+  if (blind) decision.strobe_phase = next_look(c);
   decision.reason = "looks again for " + missing;
 }
 
-/// Which of the cameras out of tolerance are reset this round.
-std::vector<bool> choose_resets(const Scene& scene, std::size_t reference) {
-  const AlignOptions& options = scene.options;
-  std::vector<std::size_t> out;
-  for (std::size_t i = 0; i < scene.phases.size(); ++i) {
-    if (!scene.within(i, reference) && scene.movable(i)) out.push_back(i);
+AlignScene scene_of(const AlignState& state, const std::vector<Drift>& drifts, const Context& c) {
+  AlignScene scene{
+      c.options.policy, c.options.period, std::max(c.tolerance, c.reach), c.options.reference, {}, {}};
+  const Seconds jitter = learnt_jitter(state, c.options);
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    scene.tau.push_back(drifts[i].tau);
+    Landing landing{c.cameras[i].method, std::nullopt, state.cameras[i].hand_shifts};
+    if (const auto delay = expected_delay(state, c.cameras, c.options, i))
+      landing.aim = Seconds(std::hypot(delay->sigma.value(), jitter.value()));
+    scene.landings.push_back(landing);
   }
-  if (options.policy == AlignPolicy::densest) {
-    // A phase drawn at random lands within tolerance with probability 2 tolerance / T, and each that lands
-    // may move the reference to where a camera that waits is within tolerance already. So the farthest go
-    // first, no more of them at once than land half a camera.
-    const auto at_once = static_cast<std::size_t>(std::max(1.0, options.period / scene.tolerance / 4));
-    std::stable_sort(out.begin(), out.end(), [&](std::size_t a, std::size_t b) {
-      return abs(scene.error(a, reference)) > abs(scene.error(b, reference));
-    });
-    out.resize(std::min(out.size(), at_once));
-  }
-  std::vector<bool> chosen(scene.phases.size(), false);
-  for (const std::size_t i : out) chosen[i] = true;
-  return chosen;
+  return scene;
 }
 
-/// Timed resets: each at its moment where the delay is known; else untimed, to teach it. A model whose
-/// cameras share one delay is taught by one of them, and the others wait.
-void time_resets(const AlignState& state, AlignDecision& decision, const AlignRound& round,
-                 const Scene& scene) {
-  const AlignOptions& options = scene.options;
-  const bool models_share = options.delay_spread <= scene.tolerance;
+/// Timed resets: each at its moment where the delay is known; else untimed, to teach it. A model is taught by
+/// one of its cameras, and the others wait.
+void time_resets(const AlignState& state, AlignDecision& decision, const Context& c,
+                 const AlignScene& scene) {
   std::vector<std::string> teaching;
-  for (std::size_t i = 0; i < scene.phases.size(); ++i) {
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
-    const AlignCamera& who = scene.cameras[i];
-    if (!camera.reset || who.method != ResetMethod::on_command || !round.cameras[i].stamp) continue;
-    if (const auto delay = expected_delay(state, scene.cameras, options, i)) {
-      // t_start shall move by tau - tau_reference, and the stamps move with it.
-      camera.moment = *round.cameras[i].stamp + *camera.error - delay->mean;
-      camera.reason += " at the moment that lands it on the reference";
-    } else if (!models_share || std::find(teaching.begin(), teaching.end(), who.model) == teaching.end()) {
+    const AlignCamera& who = c.cameras[i];
+    if (!camera.reset || !scene.timed(i) || !c.round.cameras[i].stamp) continue;
+    if (const auto delay = expected_delay(state, c.cameras, c.options, i)) {
+      // t_start shall move by tau - tau_target, and the stamps move with it.
+      camera.moment = *c.round.cameras[i].stamp + *camera.error - delay->mean;
+      camera.reason += " at the moment that lands it on the target";
+    } else if (std::find(teaching.begin(), teaching.end(), who.model) == teaching.end()) {
       teaching.push_back(who.model);
       camera.reason += ", which teaches how long its reset takes";
     } else {
       camera.reset = false;
-      camera.reason = standing(*camera.error, options.row_time) + ", out of tolerance: waits until another " +
-                      who.model + " has taught how long a reset takes";
+      camera.reason = standing(*camera.error, c.options.row_time) +
+                      ", out of tolerance: waits until another " + who.model +
+                      " has taught how long a reset takes";
     }
   }
 }
 
 /// Orders for the cameras out of tolerance, and a sentence for every camera.
-void order_resets(const AlignState& state, AlignDecision& decision, const AlignRound& round,
-                  const Scene& scene) {
-  const std::size_t reference = *decision.reference;
-  const std::vector<bool> chosen = choose_resets(scene, reference);
-  for (std::size_t i = 0; i < scene.phases.size(); ++i) {
+void order_resets(AlignDecision& decision, const Context& c, const AlignScene& scene, Seconds target) {
+  const std::vector<bool> chosen = choose_resets(scene, target);
+  const std::string out = c.reach > Seconds(0) ? ", further than trims reach" : ", out of tolerance";
+  for (std::size_t i = 0; i < scene.tau.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
-    const std::string stands = standing(*camera.error, scene.options.row_time);
+    const std::string stands = standing(*camera.error, c.options.row_time);
     camera.reset = chosen[i];
-    if (i == reference) {
+    if (c.options.policy == AlignPolicy::fixed_reference && i == scene.reference) {
       camera.reason = "is the reference: the others are brought to its phase";
-    } else if (scene.within(i, reference)) {
-      camera.reason = stands + ", within tolerance: leave it";
+    } else if (scene.within(i, target)) {
+      camera.reason = stands + (c.reach > Seconds(0) ? ", within reach of its trim" : ", within tolerance") +
+                      ": leave it";
     } else if (!scene.movable(i)) {
-      camera.reason = stands + ", out of tolerance, and can't be reset";
+      camera.reason = stands + out + ", and can't be reset";
     } else if (!chosen[i]) {
-      camera.reason = stands + ", out of tolerance: waits, the reference may yet come to it";
-    } else if (scene.cameras[i].method == ResetMethod::by_hand) {
-      camera.reason = stands + ", out of tolerance: reset its shutter by hand";
+      camera.reason = stands + out + ": waits, the target may yet come to it";
+    } else if (scene.landings[i].method == ResetMethod::by_hand) {
+      camera.reason = stands + out + ": reset its shutter by hand";
     } else {
-      camera.reason = stands + ", out of tolerance: its shutter is reset";
+      camera.reason = stands + out + ": its shutter is reset";
     }
   }
-  if (scene.options.policy == AlignPolicy::timed) time_resets(state, decision, round, scene);
 }
 
-void judge(AlignState& state, AlignDecision& decision, const AlignRound& round, const Scene& scene) {
+/// Whether the tolerance can be told from the noise, and is met within the limits. Asked once.
+bool affordable(AlignState& state, AlignDecision& decision, const Context& c, const AlignScene& scene,
+                const std::vector<Drift>& drifts) {
+  if (!c.options.limits || state.affordable) return true;
+  const Prospect prospect{scene, drifts, trims_of(c.cameras), learnt_jitter(state, c.options)};
+  decision.effort = foretell(prospect, c.options.policy, c.tolerance, c.options);
+  Seconds noise;
+  for (const Drift& drift : drifts) noise = std::max(noise, drift.tau_sigma);
+  const double rows = c.options.tolerance.in_rows(c.options.row_time).value();
+  if (c.tolerance < kTellable * noise) {
+    decision.verdict = AlignVerdict::refused;
+    decision.reason = format("%.2g rows can't be told: phases are known to %.2g rows. Ask for %.2g rows",
+                             rows, (noise / c.options.row_time).value(),
+                             std::ceil(10 * kTellable * (noise / c.options.row_time).value()) / 10) +
+                      " or more, or let the flash be about a row long";
+    return false;
+  }
+  if (decision.effort->within >= c.options.limits->probability) {
+    state.affordable = true;
+    return true;
+  }
+  decision.verdict = AlignVerdict::refused;
+  decision.offers = find_offers(prospect, c.options);
+  decision.reason = refusal(*decision.effort, decision.offers, c.options);
+  return false;
+}
+
+/// How long every camera stays in tolerance of a target that moves as the middle of them does, or as the
+/// reference does; and when to film again.
+void foresee(const AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
+             const Context& c) {
+  std::vector<double> rates;
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    const PhaseTrack& phase = state.cameras[i].phase;
+    const TimePoint later = c.round.at + Seconds(1e6);  // when all that was ordered is in force
+    rates.push_back((drifts[i].rate + decision.cameras[i].trim.value_or(phase.trim(later))).value());
+  }
+  const auto [slowest, fastest] = std::minmax_element(rates.begin(), rates.end());
+  const bool fixed = c.options.policy == AlignPolicy::fixed_reference;
+  const double common = state.target ? state.target->rate.value()
+                        : fixed      ? rates[c.options.reference]
+                                     : (*slowest + *fastest) / 2;
+  const double common_sigma = fixed ? drifts[c.options.reference].rate_sigma.value() : 0;
+  Seconds soonest(std::numeric_limits<double>::infinity());
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    Drift error = drifts[i];
+    error.tau = wrap_positive(*decision.cameras[i].error, c.options.period);
+    error.rate = PartsPerMillion(rates[i] - common);
+    error.rate_sigma = PartsPerMillion(std::hypot(drifts[i].rate_sigma.value(), common_sigma));
+    if (fixed && i == c.options.reference) error.rate_sigma = PartsPerMillion(0);
+    TimeLeftOptions left{
+        .tolerance = c.tolerance, .period = c.options.period, .wander_per_minute = c.options.rate_wander};
+    decision.cameras[i].time_left = time_left(error, c.round.at, left);
+    left.sigmas = kScheduleSigmas;
+    const Seconds sure = time_left(error, c.round.at, left).earliest;
+    if (sure >= soonest) continue;
+    soonest = sure;
+    first = i;
+  }
+  if (decision.verdict != AlignVerdict::aligned) return;
+  decision.next_check = soonest;
+  if (std::isfinite(soonest.value())) {
+    decision.reason += "; film the strobe again within " + words(soonest) + ", before " +
+                       c.cameras[first].id + " may have drifted out";
+  }
+}
+
+/// The camera that stands for the target.
+std::size_t nearest(const AlignDecision& decision, const AlignOptions& options) {
+  if (options.policy == AlignPolicy::fixed_reference) return options.reference;
+  const auto closer = [](const CameraDecision& a, const CameraDecision& b) {
+    return in_picoseconds(abs(*a.error)) < in_picoseconds(abs(*b.error));
+  };
+  const auto& cameras = decision.cameras;
+  return static_cast<std::size_t>(std::min_element(cameras.begin(), cameras.end(), closer) - cameras.begin());
+}
+
+void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts, const Context& c) {
   state.looks = 0;
-  state.reference = decision.reference = choose_reference(scene);
-  decision.worst_pair = worst_pair(scene);
+  const AlignScene scene = scene_of(state, drifts, c);
+  const auto far = [&](Seconds target) {
+    for (std::size_t i = 0; i < drifts.size(); ++i) {
+      if (!scene.within(i, target)) return true;
+    }
+    return false;
+  };
+  Seconds target = choose_target(scene);
+  if (state.target && !far(target_at(*state.target, c.round.at, c.options.period))) {
+    target = target_at(*state.target, c.round.at, c.options.period);
+  } else {
+    state.target.reset();
+  }
+  decision.target = wrap_positive(target + c.round.strobe_phase, c.options.period);
+  decision.worst_pair = Seconds(0);
   std::size_t out = 0;
   std::string stuck;
-  for (std::size_t i = 0; i < scene.phases.size(); ++i) {
-    decision.cameras[i].error = scene.error(i, *decision.reference);
-    decision.cameras[i].sigma = scene.phases[i].sigma;
-    if (scene.within(i, *decision.reference)) continue;
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    CameraDecision& camera = decision.cameras[i];
+    camera.error = scene.error(i, target);
+    camera.sigma = drifts[i].tau_sigma;
+    camera.reason = standing(*camera.error, c.options.row_time);
+    for (std::size_t k = 0; k < i; ++k)
+      decision.worst_pair = std::max(*decision.worst_pair, abs(scene.error(i, scene.tau[k])));
+    if (scene.within(i, target)) continue;
     ++out;
-    if (!scene.movable(i)) stuck += (stuck.empty() ? "" : ", ") + scene.cameras[i].id;
+    if (!scene.movable(i)) stuck += (stuck.empty() ? "" : ", ") + c.cameras[i].id;
   }
-  order_resets(state, decision, round, scene);
-  if (out == 0) {
-    decision.verdict = AlignVerdict::aligned;
-    decision.reason = "every camera lies within tolerance of the reference";
-  } else if (!stuck.empty()) {
+  decision.reference = nearest(decision, c.options);
+  if (!affordable(state, decision, c, scene, drifts)) return;
+  order_resets(decision, c, scene, target);
+  time_resets(state, decision, c, scene);
+
+  if (!stuck.empty()) {
     decision.verdict = AlignVerdict::given_up;
     decision.reason =
         stuck + " can't be reset and lies out of tolerance: make it the reference, or widen the tolerance";
+  } else if (out > 0) {
+    decision.reason = plural(out, "camera") + (c.reach > Seconds(0) ? " out of reach" : " out of tolerance");
+  } else if (c.reach == Seconds(0)) {
+    decision.verdict = AlignVerdict::aligned;
+    decision.reason = "every camera lies within tolerance of the target";
+  } else if (trim_rates(state, decision, c.round, c.cameras, c.options)) {
+    decision.verdict = AlignVerdict::aligned;
+    decision.reason = "every camera is locked within tolerance of the target";
   } else {
-    decision.reason = plural(out, "camera") + " out of tolerance";
+    decision.reason = "trims bring the cameras to the target";
+    // Where a dot is missing trims go by what was foretold; that ages.
+    for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+      const bool blind = c.round.cameras[i].phase.state == PhaseState::blind;
+      if (blind && state.cameras[i].phase.aged(c.round.at) > kMemoryPart * c.tolerance)
+        decision.strobe_phase = next_look(c);
+    }
   }
+  decision.reference = nearest(decision, c.options);
+  foresee(state, decision, drifts, c);
+}
+
+/// A policy that trims needs cameras that can be.
+std::optional<std::string> untrimmable(const Context& c) {
+  if (c.options.policy != AlignPolicy::trimmed) return std::nullopt;
+  for (const AlignCamera& camera : c.cameras) {
+    if (!camera.trim)
+      return "the frame rate of " + camera.id +
+             " can't be trimmed: use the timed policy, whose resets reach " +
+             "as far as their latency is steady";
+  }
+  return std::nullopt;
 }
 
 }  // namespace
-
-std::string_view name(AlignPolicy policy) {
-  switch (policy) {
-    case AlignPolicy::fixed_reference:
-      return "fixed-reference";
-    case AlignPolicy::densest:
-      return "densest";
-    case AlignPolicy::timed:
-      return "timed";
-  }
-  return "unknown";
-}
 
 AlignStep align_step(const AlignState& before, const AlignRound& round,
                      const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
   AlignState state = before;
   state.cameras.resize(cameras.size());
   ++state.rounds;
-  remember(state, round, cameras, options);
+  const bool trims = options.policy == AlignPolicy::trimmed;
+  const Context c{round,
+                  cameras,
+                  options,
+                  track_options(options),
+                  options.tolerance.in_time(options.row_time),
+                  trims ? trim_reach(trims_of(cameras), options) : Seconds(0)};
+  remember(state, c);
 
   AlignDecision decision;
   decision.round = state.rounds;
   decision.resets_so_far = state.resets;
   decision.cameras.resize(cameras.size());
-  Scene scene{cameras, options, {}, options.tolerance.in_time(options.row_time)};
+  std::vector<Drift> drifts;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     decision.cameras[i].state = round.cameras[i].phase.state;
-    if (auto phase = phase_now(state.cameras[i], round, options)) scene.phases.push_back(std::move(*phase));
+    if (const auto drift = where(state.cameras[i], c)) drifts.push_back(*drift);
   }
-  if (scene.phases.size() < cameras.size()) {
-    look_again(state, decision, round, cameras, options);
+  if (const auto reason = untrimmable(c)) {
+    decision.verdict = AlignVerdict::refused;
+    decision.reason = *reason;
+  } else if (drifts.size() < cameras.size()) {
+    look_again(state, decision, c);
   } else {
-    judge(state, decision, round, scene);
+    judge(state, decision, drifts, c);
   }
+  state.last_round = round.at;
 
   if (decision.verdict == AlignVerdict::go_on && state.rounds >= options.max_rounds) {
     decision.verdict = AlignVerdict::given_up;

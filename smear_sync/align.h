@@ -10,7 +10,10 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "base/time_point.h"
+#include "smear_sync/drift.h"
 #include "smear_sync/phase.h"
+#include "smear_sync/phase_track.h"
+#include "smear_sync/rate_servo.h"
 
 namespace emberlock {
 
@@ -21,14 +24,16 @@ namespace emberlock {
 /// Which cameras are reset, and towards what.
 enum class AlignPolicy {
   fixed_reference,  ///< the paper's: one camera stays, the others are reset until each lies within tolerance
-  densest,  ///< the reference is chosen anew each round where most cameras already lie within tolerance
-  timed,    ///< as densest, and each reset is ordered for the moment that lands it on the reference
+  densest,  ///< the target is chosen anew each round: the middle of the cameras that take the fewest resets
+  timed,    ///< as densest, and each reset is ordered for the moment that lands it on the target
+  trimmed,  ///< as timed until all are within reach of their trims; then frame rates are trimmed (a
+            ///< phase-locked loop), towards the phase that the last camera reaches soonest
 };
 std::string_view name(AlignPolicy policy);
-/// From "fixed-reference", "densest" or "timed"; the error lists them.
+/// From "fixed-reference", "densest", "timed" or "trimmed"; the error lists them.
 Result<AlignPolicy> parse_align_policy(std::string_view text);
 
-/// How far a camera may lie from the reference, to either side; two cameras may differ by twice as much.
+/// How far a camera may lie from the target, to either side; two cameras may differ by twice as much.
 struct Tolerance {
   std::variant<Rows, Seconds> amount = Rows(100);
   [[nodiscard]] Seconds in_time(SecondsPerRow row_time) const;
@@ -54,6 +59,32 @@ struct AlignCamera {
   ResetMethod method = ResetMethod::on_command;
   std::optional<ResetDelay>
       expected_delay;  ///< known before (from an earlier session, or the model's data); else learnt
+  std::optional<RateTrim> trim = {};  ///< where its frame rate can be trimmed
+};
+
+/// What an operator will spend on an alignment. One that can't be had for it is refused before anything is
+/// reset.
+struct AlignLimits {
+  int resets = 1000;
+  Seconds time{3600};
+  double probability = 0.9;  ///< with which it must be had, 0..1
+};
+
+/// What bringing the cameras within a tolerance takes.
+struct AlignEffort {
+  double resets = 0;   ///< expected
+  int resets_p95 = 0;  ///< 95th percentile
+  Seconds time;        ///< expected
+  Seconds time_p95;    ///< 95th percentile
+  double within = 1;   ///< probability of being done within the limits; those that aren't count as their
+                       ///< limits above
+};
+
+/// A tolerance that could be met, and how.
+struct AlignOffer {
+  AlignPolicy policy = AlignPolicy::densest;
+  Tolerance tolerance;
+  AlignEffort effort;
 };
 
 struct AlignOptions {
@@ -64,12 +95,15 @@ struct AlignOptions {
   std::size_t reference = 0;                          ///< of fixed_reference
   Seconds delay_jitter =
       milliseconds(0.2);  ///< standard deviation of one reset's delay about its camera's mean, > 0
-  Seconds delay_spread = milliseconds(
-      10);  ///< standard deviation of the means within one model, > 0; large: they teach each other nothing
   PartsPerMillion rate_spread{
-      20};               ///< of the cameras' rates about the common beat: how fast a phase seen earlier ages
-  int max_rounds = 500;  ///< > 0
-  int max_looks = 6;     ///< strobe phases tried in a row for cameras that show no dot, > 0
+      20};  ///< of the cameras' rates about the common beat, before they were seen: how fast a phase ages
+  PartsPerMillion rate_wander{0.2};  ///< of a rate in a minute, as cameras warm up
+  Seconds trim_time{60};    ///< of trimmed, > 0: what trimming doesn't bring to the target by then is reset
+  Seconds round_time{0.6};  ///< of one round of filming, for what is foretold, > 0
+  Seconds reset_time{0};    ///< of one reset more in a round: an operator's way to the button
+  std::optional<AlignLimits> limits = {};  ///< absent: nothing is refused for what it takes
+  int max_rounds = 500;                    ///< > 0
+  int max_looks = 6;                       ///< strobe phases tried in a row for cameras that show no dot, > 0
 };
 
 /// One camera in one round.
@@ -85,55 +119,89 @@ struct ResetDone {
       at;  ///< the moment that the camera was told; absent when an operator pressed a button
 };
 
+struct TrimDone {
+  std::size_t camera = 0;
+  TimePoint at;  ///< the moment that the camera was told
+  PartsPerMillion trim;
+};
+
 /// What a round of filming showed, and what was done since the one before.
 struct AlignRound {
   TimePoint at;  ///< the instant to which all phases refer
   Beat beat;
   Seconds strobe_phase;  ///< the delay of the flashes during the round; tau grows by as much as it does
   std::vector<CameraView> cameras;
-  std::vector<ResetDone> resets;  ///< carried out since the round before
+  std::vector<ResetDone> resets;     ///< carried out since the round before
+  std::vector<TrimDone> trims = {};  ///< likewise
 };
 
 /// What is remembered of a camera from round to round.
 struct CameraTrack {
-  std::optional<Phase> phase;  ///< as last seen since its last reset, strobe_phase taken out
-  TimePoint seen;              ///< when
+  PhaseTrack phase;  ///< strobe_phase taken out
   int resets = 0;
-  int taught = 0;                   ///< resets whose delay was observed
-  std::optional<ResetDelay> delay;  ///< its own, once taught
+  int taught = 0;                    ///< resets whose delay was observed
+  std::optional<ResetDelay> delay;   ///< its own, once taught
+  std::optional<Drift> before_hand;  ///< where it stood before a reset by hand that hasn't been seen yet
+  std::vector<Seconds> hand_shifts;  ///< by which resets by hand moved its tau, modulo T; the newest last
+};
+
+/// The phase to which cameras are brought, strobe_phase taken out: it moves as a camera of this rate would.
+struct AlignTarget {
+  TimePoint at;
+  Seconds tau;
+  PartsPerMillion rate;
+  bool settled = false;  ///< trims are near it: it stays as it is
 };
 
 struct AlignState {
   int rounds = 0;
   int resets = 0;
-  int looks = 0;  ///< rounds in a row that ended with a camera whose phase isn't known
-  std::optional<std::size_t> reference;
+  int looks = 0;           ///< rounds in a row that ended with a camera whose phase isn't known
+  double jitter_seen = 0;  ///< s^2: sum over resets of a delay's squared deviation from its camera's mean
+  int jitter_samples = 0;
+  bool affordable = false;  ///< the limits have been looked at, and hold
+  std::optional<TimePoint> last_round;
+  std::optional<AlignTarget> target;  ///< of trims, once they have begun
   std::vector<CameraTrack> cameras;
 };
 
 struct CameraDecision {
   PhaseState state = PhaseState::unusable;  ///< in this round
   std::optional<Seconds>
-      error;      ///< to the reference; positive when it reads earlier. From an earlier round if blind now
-  Seconds sigma;  ///< standard error of its own phase
-  bool reset = false;               ///< reset it now
+      error;           ///< to the target; positive when it reads earlier. From an earlier round if blind now
+  Seconds sigma;       ///< standard error of its own phase
+  bool reset = false;  ///< reset it now
   std::optional<TimePoint> moment;  ///< order the reset for this instant or any that differs by whole periods
-  std::string reason;               ///< a sentence that an operator can act on
+  std::optional<PartsPerMillion> trim;  ///< trim its frame rate to this from now on, aligned or not
+  std::optional<ServoState> servo;      ///< of a camera that is trimmed
+  std::optional<TimeLeft> time_left;    ///< in tolerance, as it drifts now
+  std::string reason;                   ///< a sentence that an operator can act on
 };
 
-enum class AlignVerdict { go_on, aligned, given_up };
+enum class AlignVerdict {
+  go_on,
+  aligned,
+  refused,   ///< the tolerance can't be met within the limits; `offers` says what could be
+  given_up,  ///< somebody must see to the rig
+};
+std::string_view name(AlignVerdict verdict);
 
 struct AlignDecision {
   int round = 0;  ///< from 1
   AlignVerdict verdict = AlignVerdict::go_on;
-  std::optional<std::size_t> reference;  ///< absent while phases are missing
+  std::optional<Seconds> target;         ///< tau of the target in this round; absent while phases are missing
+  std::optional<std::size_t> reference;  ///< the camera nearest to the target; of fixed_reference that one
   std::vector<CameraDecision> cameras;
   std::optional<Seconds>
       worst_pair;  ///< largest difference between two cameras; absent while phases are missing
   std::optional<Seconds>
       strobe_phase;  ///< the delay to which the strobe shall be moved, in [0, T), to bring blind cameras out
-  int resets_so_far = 0;  ///< before this decision's
-  std::string reason;     ///< of the verdict, or what the rig waits for
+  int resets_so_far = 0;              ///< before this decision's
+  std::optional<Seconds> next_check;  ///< once aligned: film again by then, before the drift may have led a
+                                      ///< camera out (three standard errors)
+  std::optional<AlignEffort> effort;  ///< foretold in the first round that has all phases, given limits
+  std::vector<AlignOffer> offers;     ///< of a refusal
+  std::string reason;                 ///< of the verdict, or what the rig waits for
 };
 
 struct AlignStep {

@@ -33,11 +33,12 @@ Result<Tolerance> parse_tolerance(std::string_view text) {
 }
 
 Result<AlignPolicy> parse_align_policy(std::string_view text) {
-  for (const auto policy : {AlignPolicy::fixed_reference, AlignPolicy::densest, AlignPolicy::timed}) {
+  for (const auto policy :
+       {AlignPolicy::fixed_reference, AlignPolicy::densest, AlignPolicy::timed, AlignPolicy::trimmed}) {
     if (text == name(policy)) return policy;
   }
   return Error{ErrorKind::bad_input, "is no policy", "policy '" + std::string(text) + "'",
-               "use fixed-reference, densest or timed"};
+               "use fixed-reference, densest, timed or trimmed"};
 }
 
 }  // namespace emberlock

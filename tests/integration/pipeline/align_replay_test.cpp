@@ -44,6 +44,26 @@ class AlignReplay : public testing::Test {
   fs::path folder_;
 };
 
+TEST_F(AlignReplay, GivesTheSameTrimsToTheBit) {
+  VirtualRigOptions setup = small_rig(4, 2);
+  for (VirtualCameraOptions& camera : setup.cameras) {
+    camera.trim = FrameRateTrim{PartsPerMillion(500), PartsPerMillion(0.5), milliseconds(80)};
+    camera.reset_jitter = milliseconds(1.5);  // ten rows, which leaves trims something to do
+  }
+  SmallBench bench(setup);
+  bench.options.align.policy = AlignPolicy::trimmed;
+  bench.options.align.tolerance.amount = Rows(3);
+  bench.options.align.trim_time = Seconds(5);
+  std::vector<std::string> live;
+  const auto recorded = record_align(folder_, bench.align, bench.options, into(live));
+  ASSERT_TRUE(recorded.ok()) << recorded.error().message();
+  EXPECT_THAT(live, testing::Contains(HasSubstr("\"servo\":\"slewing\"")));
+  std::vector<std::string> again;
+  const auto replayed = replay_align(folder_, into(again));
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(live, again);
+}
+
 TEST_F(AlignReplay, GivesTheSameReadingsAndDecisionsToTheBit) {
   SmallBench bench(small_rig(4));
   bench.options.align.policy = AlignPolicy::timed;

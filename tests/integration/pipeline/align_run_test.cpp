@@ -20,8 +20,7 @@ void expect_aligned_in_truth(SmallBench& bench) {
   ASSERT_TRUE(result.ok()) << result.error().message();
   ASSERT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
   const SecondsPerRow row = result->options.row_time;
-  EXPECT_LT(bench.true_error(*result->last.reference, row),
-            result->options.tolerance.in_rows(row) + kReadingError);
+  EXPECT_LT(bench.true_error(row), result->options.tolerance.in_rows(row) + kReadingError);
 }
 
 class EveryPolicy : public testing::TestWithParam<AlignPolicy> {};
@@ -35,6 +34,38 @@ TEST_P(EveryPolicy, BringsVirtualCamerasWithinToleranceInTruth) {
 INSTANTIATE_TEST_SUITE_P(AlignRun, EveryPolicy,
                          testing::Values(AlignPolicy::fixed_reference, AlignPolicy::densest,
                                          AlignPolicy::timed));
+
+VirtualRigOptions trimmable_rig(std::uint64_t seed) {
+  VirtualRigOptions setup = small_rig(seed);
+  for (VirtualCameraOptions& camera : setup.cameras)
+    camera.trim = FrameRateTrim{PartsPerMillion(200), PartsPerMillion(0.5), milliseconds(80)};
+  return setup;
+}
+
+TEST(AlignRun, TrimsBringVirtualCamerasWithinARowInTruth) {
+  SmallBench bench(trimmable_rig(7));
+  bench.options.align.policy = AlignPolicy::trimmed;
+  bench.options.align.tolerance.amount = Rows(1);
+  bench.options.align.trim_time = Seconds(15);
+  bench.options.frames_per_round = 8;
+  const auto result = run_align(bench.align, bench.options);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  ASSERT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
+  EXPECT_LT(bench.true_error(result->options.row_time), Rows(1) + kReadingError);
+  ASSERT_TRUE(result->last.next_check);
+}
+
+TEST(AlignRun, WhatTheLimitsDontAllowIsRefusedBeforeAnythingIsReset) {
+  SmallBench bench(small_rig(7));
+  bench.options.align.policy = AlignPolicy::densest;
+  bench.options.align.tolerance.amount = Rows(2);
+  bench.options.align.limits = AlignLimits{5, Seconds(600), 0.9};
+  const auto result = run_align(bench.align, bench.options);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_EQ(result->last.verdict, AlignVerdict::refused);
+  EXPECT_EQ(result->resets, 0);
+  EXPECT_THAT(result->last.reason, HasSubstr("What could be met"));
+}
 
 // One second of a comb at the size of the paper's videos.
 TEST(AlignRun, MeasuresTheRowTimeWithin5ns) {

@@ -17,6 +17,7 @@ AlignRunOptions some_options() {
   options.align.policy = AlignPolicy::timed;
   options.align.tolerance.amount = milliseconds(1.1);
   options.align.max_rounds = 7;
+  options.align.limits = AlignLimits{60, Seconds(600), 0.95};
   options.seed = 18446744073709551615u;
   options.timing = {{.rows = 480, .shifts = 500, .direction = ReadDirection::bottom_first}, {}};
   options.delays = {std::nullopt, ResetDelay{milliseconds(12.3), milliseconds(0.1)}};
@@ -31,6 +32,7 @@ TEST(AlignJson, OptionsComeBackAsTheyWere) {
   EXPECT_EQ(back->timing[0].direction, ReadDirection::bottom_first);
   EXPECT_EQ(back->delays[1]->mean, milliseconds(12.3));
   EXPECT_EQ(back->seed, 18446744073709551615u);
+  EXPECT_EQ(back->align.limits->resets, 60);
 }
 
 TEST(AlignJson, EveryMissingOrMistypedFieldIsAnErrorNotACrash) {

@@ -13,6 +13,8 @@ void add_align(CLI::App& app);
 void add_reconstruct(CLI::App& app);
 void add_verify(CLI::App& app);
 void add_tradeoff(CLI::App& app);
+/// `tradeoff sync`; `parent` is the verb tradeoff.
+void add_tradeoff_sync(CLI::App& parent);
 void add_demo(CLI::App& app);
 
 /// Prints "emberlock: <message>" on stderr and leaves with exit code 2 for bad input, else 1 (as

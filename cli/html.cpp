@@ -94,8 +94,9 @@ std::string polyline(const Series& s, const Scale& x, const Scale& y, const char
     path += fmt::format("{}{:.1f} {:.1f}", pen_down ? "L" : "M", x(s.x[i]), y(s.y[i]));
     pen_down = true;
     if (s.x.size() <= 60 || s.mark == Mark::points) {
-      dots +=
-          fmt::format(R"(<circle cx="{:.1f}" cy="{:.1f}" r="2.5" fill="{}"/>)", x(s.x[i]), y(s.y[i]), colour);
+      dots += fmt::format(R"(<circle cx="{:.1f}" cy="{:.1f}" r="{}" fill="{}">{}</circle>)", x(s.x[i]),
+                          y(s.y[i]), s.notes.empty() ? 2.5 : 3.5, colour,
+                          i < s.notes.size() ? "<title>" + html_escape(s.notes[i]) + "</title>" : "");
     }
   }
   if (s.mark == Mark::points) return dots;
@@ -189,11 +190,14 @@ std::string svg_plot(const std::vector<Series>& series, const PlotOptions& o) {
     ys.include(-*o.band, o.y_axis);
     ys.include(*o.band, o.y_axis);
   }
+  if (o.mark) xs.include(*o.mark, o.x_axis);
   xs.widen();
   ys.widen();
   if (o.y_axis == Axis::linear && ys.low > 0 && ys.low < 0.5 * ys.high) ys.low = 0;
   const double left = 62;
-  const double right = o.width - 150;
+  std::size_t longest = 0;
+  for (const Series& s : series) longest = std::max(longest, s.name.size());
+  const double right = o.width - std::max(150.0, 40 + 6.7 * static_cast<double>(longest));
   const double top = 24;
   const double bottom = o.height - 42;
   const Scale x(xs.low, xs.high, o.x_axis, left, right);
@@ -205,9 +209,14 @@ std::string svg_plot(const std::vector<Series>& series, const PlotOptions& o) {
     svg += fmt::format(R"(<rect x="{}" y="{:.1f}" width="{}" height="{:.1f}" fill="#009e73" opacity=".15"/>)",
                        left, y(*o.band), right - left, y(-*o.band) - y(*o.band));
   }
+  if (o.mark) {
+    svg += fmt::format(R"(<line x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}" stroke="#009e73" )"
+                       R"(stroke-width="9" opacity=".25"/>)",
+                       x(*o.mark), top, bottom);
+  }
   svg += axes(x, y, o, left, right, top, bottom);
   for (std::size_t i = 0; i < series.size(); ++i) {
-    const char* colour = kColours[i % kColours.size()];
+    const char* colour = kColours[series[i].colour.value_or(i) % kColours.size()];
     const bool dashed = series[i].dashed || i >= kColours.size();  // the colours begin anew
     svg += polyline(series[i], x, y, colour, dashed);
     const double line = top + 10 + 17 * static_cast<double>(i);

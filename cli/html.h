@@ -28,6 +28,8 @@ struct Series {
   std::vector<double> y;  ///< points that are not finite are gaps
   bool dashed = false;
   Mark mark = Mark::line;
+  std::optional<std::size_t> colour = {};  ///< of the palette; the series' own place otherwise
+  std::vector<std::string> notes = {};     ///< shown when a point is pointed at; none, or one a point
 };
 
 enum class Axis { linear, logarithmic };
@@ -39,6 +41,7 @@ struct PlotOptions {
   Axis x_axis = Axis::linear;
   Axis y_axis = Axis::linear;
   std::optional<double> band = {};  ///< shades -band..band of y: a tolerance
+  std::optional<double> mark = {};  ///< an upright line at this x: a choice
   int width = 720;                  ///< pixels
   int height = 320;
 };

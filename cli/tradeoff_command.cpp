@@ -194,6 +194,7 @@ void add_tradeoff(CLI::App& app) {
   CLI::App* verb = app.add_subcommand("tradeoff", "What accuracy costs: work-precision diagrams");
   verb->require_subcommand(1);
   add_recon(*verb);
+  add_tradeoff_sync(*verb);
 }
 
 }  // namespace emberlock::cli

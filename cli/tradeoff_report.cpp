@@ -41,21 +41,6 @@ void doublings(HtmlPage& page, const std::vector<WorkPoint>& front) {
   page.table({"within", "held-out error", "the doubling bought", "with"}, rows);
 }
 
-/// A table whose last column is a command, to be copied whole.
-std::string command_table(const std::vector<std::string>& header,
-                          const std::vector<std::vector<std::string>>& rows) {
-  std::string html = "<div class=\"scroll\"><table><tr>";
-  for (const std::string& cell : header) html += "<th>" + html_escape(cell) + "</th>";
-  html += "<th style=\"text-align:left\">options</th>";
-  for (const auto& row : rows) {
-    html += "</tr>\n<tr>";
-    for (std::size_t i = 0; i + 1 < row.size(); ++i) html += "<td>" + html_escape(row[i]) + "</td>";
-    html +=
-        "<td style=\"text-align:left;white-space:nowrap\"><code>" + html_escape(row.back()) + "</code></td>";
-  }
-  return html + "</tr></table></div>\n";
-}
-
 void front_table(HtmlPage& page, const Tradeoff& t, const std::vector<WorkPoint>& front) {
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < front.size(); ++i) {
@@ -118,6 +103,20 @@ void all_points(HtmlPage& page, const Tradeoff& t) {
 
 }  // namespace
 
+std::string command_table(const std::vector<std::string>& header,
+                          const std::vector<std::vector<std::string>>& rows) {
+  std::string html = "<div class=\"scroll\"><table><tr>";
+  for (const std::string& cell : header) html += "<th>" + html_escape(cell) + "</th>";
+  html += "<th style=\"text-align:left\">options</th>";
+  for (const auto& row : rows) {
+    html += "</tr>\n<tr>";
+    for (std::size_t i = 0; i + 1 < row.size(); ++i) html += "<td>" + html_escape(row[i]) + "</td>";
+    html +=
+        "<td style=\"text-align:left;white-space:nowrap\"><code>" + html_escape(row.back()) + "</code></td>";
+  }
+  return html + "</tr></table></div>\n";
+}
+
 std::string what_a_second_buys(const std::vector<WorkPoint>& points) {
   const std::vector<WorkPoint> front = pareto_front(points);
   if (front.empty()) return {};
@@ -170,13 +169,17 @@ Status check_tradeoff_output(const std::filesystem::path& folder) {
   return probe ? Status() : Status(probe.error());
 }
 
-Status write_tradeoff(const Tradeoff& tradeoff, const std::filesystem::path& folder) {
+Status write_tradeoff_files(const TradeoffFiles& files, const std::filesystem::path& folder) {
   EMBERLOCK_ASSIGN_OR_RETURN(AtomicDirectory staging, AtomicDirectory::create(folder, kMarker));
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / kMarker, to_csv(tradeoff.sweep.points)));
-  EMBERLOCK_RETURN_IF_ERROR(
-      write_file_atomically(staging.path() / "diagram.svg", tradeoff_svg(tradeoff.sweep.points)));
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "index.html", tradeoff_html(tradeoff)));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / kMarker, files.csv));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "diagram.svg", files.svg));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "index.html", files.html));
   return staging.commit();
+}
+
+Status write_tradeoff(const Tradeoff& tradeoff, const std::filesystem::path& folder) {
+  return write_tradeoff_files(
+      {to_csv(tradeoff.sweep.points), tradeoff_svg(tradeoff.sweep.points), tradeoff_html(tradeoff)}, folder);
 }
 
 }  // namespace emberlock::cli

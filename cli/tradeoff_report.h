@@ -24,10 +24,20 @@ std::string what_a_second_buys(const std::vector<WorkPoint>& points);
 
 std::string tradeoff_html(const Tradeoff& tradeoff);
 
+/// A table whose last column is a command, to be copied whole; `header` names the others.
+std::string command_table(const std::vector<std::string>& header,
+                          const std::vector<std::vector<std::string>>& rows);
+
+/// A tradeoff's files.
+struct TradeoffFiles {
+  std::string csv, svg, html;
+};
+/// Writes points.csv, diagram.svg and index.html; the folder appears whole, or not at all.
+Status write_tradeoff_files(const TradeoffFiles& files, const std::filesystem::path& folder);
+
 /// Whether write_tradeoff() may write to `folder`: it is absent, empty, or holds an earlier points.csv.
 Status check_tradeoff_output(const std::filesystem::path& folder);
 
-/// Writes points.csv, diagram.svg and index.html; the folder appears whole, or not at all.
 Status write_tradeoff(const Tradeoff& tradeoff, const std::filesystem::path& folder);
 
 }  // namespace emberlock::cli

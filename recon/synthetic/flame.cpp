@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "base/random.h"
 #include "recon/compute/pool.h"
@@ -255,13 +256,19 @@ Scene paper_scene(const PaperSceneOptions& options) {
   Scene scene;
   scene.box = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)};
   const Flame flame(options.flame);
-  const FlameTruth truth = flame.at(options.time, grid_over(scene.box, options.truth_voxels));
+  const Grid grid = grid_over(scene.box, options.truth_voxels);
+  const FlameTruth in_time = flame.at(options.time, grid);
   const Intrinsics intrinsics = pinhole(options.image, 60);
   RenderOptions finer;
   finer.step = options.truth_step;
   const auto film = [&](const std::string& name, double azimuth, double elevation, ViewRole role) {
     View view{
         name, look_at(intrinsics, on_sphere(0.3, azimuth, elevation), Eigen::Vector3d::Zero()), {}, role};
+    const std::size_t i = scene.views.size();
+    const Seconds late = i < options.lateness.size() ? options.lateness[i] : Seconds(0);
+    std::optional<FlameTruth> moved;
+    if (late != Seconds(0)) moved = flame.at(options.time + late, grid);
+    const FlameTruth& truth = moved ? *moved : in_time;
     view.image = render_view(truth.volume, truth.medium, truth.effects, view.camera, finer);
     if (options.noise > 0) add_noise(view.image, options.noise, options.flame.seed, scene.views.size());
     scene.views.push_back(std::move(view));

@@ -64,6 +64,7 @@ class Flame {
 struct PaperSceneOptions {
   FlameOptions flame;
   Seconds time{0};
+  std::vector<Seconds> lateness = {};  ///< by view: by how much it is filmed after `time`; none: all at once
   ImageSize image{640, 480};
   int truth_voxels = 192;   ///< the truth's own grid, unlike any solver's
   double truth_step = 0.5;  ///< of the march that films it, in its voxel edges

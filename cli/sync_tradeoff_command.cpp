@@ -1,0 +1,109 @@
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli/commands.h"
+#include "cli/sync_tradeoff.h"
+#include "cli/tradeoff_report.h"
+
+namespace emberlock::cli {
+namespace {
+
+/// The command line as typed.
+struct Arguments {
+  SyncTradeoffOptions options;
+  std::vector<double> tolerances;
+  std::vector<std::string> policies;
+  double frame_rate = 23.976;
+  double row_time_us = 54;
+  double latency_jitter_ms = 0.2;
+  double latency_spread_ms = 10;
+  double crystal_spread_ppm = 10;
+  double reset_seconds = 10;
+  double round_seconds = 0.5;
+  double trim_range_ppm = 100;
+  double trim_step_ppm = 0.5;
+  std::string out;
+  bool json = false;
+};
+
+Result<SyncTradeoffOptions> options_of(const Arguments& a) {
+  SyncTradeoffOptions options = a.options;
+  for (const double rows : a.tolerances) options.tolerances.emplace_back(rows);
+  for (const std::string& word : a.policies) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const AlignPolicy policy, parse_align_policy(word));
+    options.policies.push_back(policy);
+  }
+  options.frame_rate = Hertz(a.frame_rate);
+  options.row_time = microseconds_per_row(a.row_time_us);
+  options.latency_jitter = milliseconds(a.latency_jitter_ms);
+  options.latency_spread = milliseconds(a.latency_spread_ms);
+  options.crystal_spread = PartsPerMillion(a.crystal_spread_ppm);
+  options.reset_time = Seconds(a.reset_seconds);
+  options.round_time = Seconds(a.round_seconds);
+  options.trim_range = PartsPerMillion(a.trim_range_ppm);
+  options.trim_step = PartsPerMillion(a.trim_step_ppm);
+  return options;
+}
+
+void tradeoff_sync(const Arguments& arguments) {
+  const SyncTradeoffOptions options = or_fail(options_of(arguments));
+  or_fail(check_tradeoff_output(arguments.out));
+  const SyncTradeoff tradeoff = or_fail(measure_sync_tradeoff(options, progress_bar("tradeoff")));
+  or_fail(write_sync_tradeoff(tradeoff, arguments.out));
+  if (arguments.json) {
+    std::printf("%s\n", sync_tradeoff_json(tradeoff).dump().c_str());
+    return;
+  }
+  std::printf("%s\n%s\nwritten to %s\n", tradeoff.why.c_str(), tradeoff.next_step.c_str(),
+              (std::filesystem::path(arguments.out) / "index.html").c_str());
+}
+
+}  // namespace
+
+void add_tradeoff_sync(CLI::App& parent) {
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* verb = parent.add_subcommand(
+      "sync", "Resets and minutes against the cameras' tolerance, and what it does to a rising flame");
+  Arguments& a = *arguments;
+  SyncTradeoffOptions& o = a.options;
+  verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html")->required();
+  verb->add_option("--cameras", o.cameras, "Cameras of the rig")->capture_default_str();
+  verb->add_option("--tolerances", a.tolerances, "Rows to either side: i,j,... [1,2,5,10,20,50,100,200]")
+      ->delimiter(',');
+  verb->add_option("--policies", a.policies, "[fixed-reference,densest,timed,trimmed]")->delimiter(',');
+  verb->add_option("--frame-rate", a.frame_rate, "Frames a second")->capture_default_str();
+  verb->add_option("--row-time-us", a.row_time_us, "Time to shift one row")->capture_default_str();
+  verb->add_option("--latency-jitter", a.latency_jitter_ms, "RMS of one reset's latency on command, ms")
+      ->capture_default_str();
+  verb->add_option("--latency-spread", a.latency_spread_ms,
+                   "RMS of the cameras' mean latencies, which are learnt from scratch, ms")
+      ->capture_default_str();
+  verb->add_option("--crystal-spread", a.crystal_spread_ppm, "RMS of the cameras' frame rates, ppm")
+      ->capture_default_str();
+  verb->add_option("--reset-seconds", a.reset_seconds,
+                   "Of a reset by hand: fixed-reference and densest take those")
+      ->capture_default_str();
+  verb->add_option("--round-seconds", a.round_seconds, "Of filming between resets")->capture_default_str();
+  verb->add_option("--trim-range", a.trim_range_ppm, "By how much trimmed changes frame rates, ppm")
+      ->capture_default_str();
+  verb->add_option("--trim-step", a.trim_step_ppm, "Of these, ppm")->capture_default_str();
+  verb->add_option("--rigs", o.rigs, "Simulated for a point")->capture_default_str();
+  verb->add_option("--seed", o.seed, "Of rigs, flame and draws")->capture_default_str();
+  verb->add_option("--flame-speed", o.flame_speed, "Upwards, m/s; 0 leaves the flame out")
+      ->capture_default_str();
+  verb->add_option("--voxels", o.voxels, "Of its reconstruction, along an edge")->capture_default_str();
+  verb->add_option("--draws", o.draws, "Of the cameras' times within each tolerance")->capture_default_str();
+  verb->add_option("--added-error", o.added_error,
+                   "Percent that the recommended tolerance may add to the error in perfect step")
+      ->capture_default_str();
+  verb->add_option("--threads", o.threads, "CPU threads, 0 takes every core")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  verb->add_flag("--json", a.json, "All points as one JSON object on stdout");
+  verb->callback([arguments] { tradeoff_sync(*arguments); });
+}
+
+}  // namespace emberlock::cli

@@ -211,7 +211,7 @@ void recommend(SyncTradeoff& t) {
     return;
   }
   t.recommended = static_cast<std::size_t>(cost - t.costs.data());
-  t.why += ". The quickest policy, " + effort_text(*cost) + ".";
+  t.why += ". Quickest: " + effort_text(*cost) + ".";
   if (!by_hand(cost->policy)) t.why += by_hand_text(t);
 }
 

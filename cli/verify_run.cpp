@@ -1,6 +1,6 @@
 #include "cli/verify_run.h"
 
-#include <cmath>
+#include <algorithm>
 
 #include <fmt/format.h>
 
@@ -26,7 +26,7 @@ Status check(const VerifyRunOptions& options) {
   return {};
 }
 
-/// The row time from the comb, and the direction and K that it tells of cameras whose own walk doesn't.
+/// The row time from the comb.
 Status learn_from_comb(const VerifyRunOptions& options, VerifyRunResult& run, VerifyOptions& verify) {
   const ClipReading& comb = run.comb->reading;
   const auto clock = fit_row_clock(comb.frames, options.comb_rate);
@@ -45,18 +45,25 @@ Status learn_from_comb(const VerifyRunOptions& options, VerifyRunResult& run, Ve
                     "comb again at a rate that differs by a percent.",
                     clock->pitch.value()));
   }
-  if (!comb.claimed_rate) return {};
-  std::vector<FrameReading> frames;
-  for (std::size_t i = 0; i < comb.frames.size(); ++i)
-    frames.push_back({static_cast<std::int64_t>(i), comb.frames[i]});
-  const auto mode = find_read_mode(frames, {.flash_rate = options.comb_rate,
-                                            .frame_rate = verify.clip.frame_rate.value_or(*comb.claimed_rate),
-                                            .row_time = clock->row_time,
-                                            .row_time_sigma = clock->sigma,
-                                            .rows = comb.rows});
-  if (!mode.ok()) return mode.error();
-  if (!verify.clip.direction) verify.clip.direction = mode->direction;
-  if (!verify.clip.shifts) verify.clip.shifts = mode->shifts;
+  return {};
+}
+
+/// What the comb says of its own camera's direction, for an operator who knows that the others are of its
+/// model.
+Status hint_from_comb(const VerifyRunOptions& options, VerifyRunResult& run) {
+  const auto& cameras = run.result.cameras;
+  const bool wanted = std::any_of(cameras.begin(), cameras.end(), [](const CameraVerdict& c) {
+    return c.state == ClipState::direction_unknown;
+  });
+  if (!wanted || !run.comb) return {};
+  ClipOptions fast = run.result.options.clip;
+  fast.flash_rate = options.comb_rate;
+  EMBERLOCK_ASSIGN_OR_RETURN(const ClipWalk walk, read_walk(run.comb->reading, fast));
+  if (!walk.mode.direction) return {};
+  run.notes.push_back(fmt::format(
+      "The camera of {0} reads the {1} row first: where all cameras are of its model, add "
+      "--direction {1}-first.",
+      run.comb->reading.name, walk.mode.direction == ReadDirection::top_first ? "top" : "bottom"));
   return {};
 }
 
@@ -80,6 +87,7 @@ Result<VerifyRunResult> run_verify(const VerifyRunOptions& options, const Progre
   std::vector<ClipReading> readings;
   for (const FilmedClip& clip : run.clips) readings.push_back(clip.reading);
   EMBERLOCK_ASSIGN_OR_RETURN(run.result, verify_clips(readings, verify));
+  EMBERLOCK_RETURN_IF_ERROR(hint_from_comb(options, run));
   return run;
 }
 

@@ -53,6 +53,18 @@ std::vector<FrameReading> with_one_lamp(const ClipReading& clip, Rows& lamp) {
   return frames;
 }
 
+/// A walk that wants a frame rate which no crystal has tells nothing.
+void doubt(ReadMode& mode, Hertz rate) {
+  if (!mode.frame_rate_error || abs(*mode.frame_rate_error) <= kRateSigma * 3) return;
+  mode.direction_reason =
+      fmt::format("the dots' walk wants a frame rate {:.0f} ppm off {:.4f}: check both rates",
+                  mode.frame_rate_error->value(), rate.value());
+  mode.direction.reset();
+  mode.shifts.reset();
+  mode.shifts_measured = Rows(0);
+  mode.frame_rate_error.reset();
+}
+
 /// The frame rates that a file's claim may stand for: itself, and the ones in use that are often rounded to
 /// it.
 std::vector<Hertz> rates_to_try(const ClipReading& clip, const ClipOptions& options) {
@@ -81,29 +93,6 @@ std::vector<Hertz> rates_to_try(const ClipReading& clip, const ClipOptions& opti
   }
   if (rates.empty()) rates.push_back(options.flash_rate);
   return rates;
-}
-
-struct Walk {
-  Hertz frame_rate;  // believed
-  ReadMode mode;
-};
-
-/// The first rate under which one direction explains the walk; else what the first rate says.
-Result<Walk> read_walk(const std::vector<FrameReading>& frames, const ClipReading& clip,
-                       const ClipOptions& options) {
-  std::optional<Walk> first;
-  for (const Hertz rate : rates_to_try(clip, options)) {
-    const ReadModeOptions with{.flash_rate = options.flash_rate,
-                               .frame_rate = rate,
-                               .rate_sigma = kRateSigma,
-                               .row_time = options.row_time,
-                               .row_time_sigma = options.row_time_sigma,
-                               .rows = clip.rows};
-    EMBERLOCK_ASSIGN_OR_RETURN(ReadMode mode, find_read_mode(frames, with));
-    if (mode.direction) return Walk{rate, std::move(mode)};
-    if (!first) first = Walk{rate, std::move(mode)};
-  }
-  return std::move(*first);
 }
 
 std::vector<CodeFrame> flashes_seen(const std::vector<FrameReading>& frames) {
@@ -266,6 +255,26 @@ const NumberedRun* ClipClock::run_at(std::int64_t i) const {
   return nearest;
 }
 
+Result<ClipWalk> read_walk(const ClipReading& clip, const ClipOptions& options) {
+  std::vector<FrameReading> frames;
+  for (std::size_t i = 0; i < clip.frames.size(); ++i)
+    frames.push_back({static_cast<std::int64_t>(i), clip.frames[i]});
+  std::optional<ClipWalk> first;
+  for (const Hertz rate : rates_to_try(clip, options)) {
+    const ReadModeOptions with{.flash_rate = options.flash_rate,
+                               .frame_rate = rate,
+                               .rate_sigma = kRateSigma,
+                               .row_time = options.row_time,
+                               .row_time_sigma = options.row_time_sigma,
+                               .rows = clip.rows};
+    EMBERLOCK_ASSIGN_OR_RETURN(ReadMode mode, find_read_mode(frames, with));
+    doubt(mode, rate);
+    if (mode.direction) return ClipWalk{rate, std::move(mode)};
+    if (!first) first = ClipWalk{rate, std::move(mode)};
+  }
+  return std::move(*first);
+}
+
 Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& options) {
   EMBERLOCK_RETURN_IF_ERROR(check(options));
   ClipClock clock;
@@ -279,7 +288,7 @@ Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& op
         clip.claimed_rate->value());
     return clock;
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(Walk walk, read_walk(frames, clip, options));
+  EMBERLOCK_ASSIGN_OR_RETURN(ClipWalk walk, read_walk(clip, options));
   clock.mode = std::move(walk.mode);
   clock.believed_period = period(walk.frame_rate);
   const double off = clock.mode.frame_rate_error.value_or(PartsPerMillion(0)).value() * 1e-6;

@@ -73,6 +73,17 @@ struct ClipClock {
   [[nodiscard]] const NumberedRun* run_at(std::int64_t i) const;
 };
 
+/// What the walk of a clip's dots tells, and the frame rate under which it does: the file's claim, or one in
+/// use that is often rounded to it.
+struct ClipWalk {
+  Hertz frame_rate;
+  ReadMode mode;
+};
+
+/// d and K of the camera, of a clip under one flash a frame or under a comb (options.flash_rate). A walk that
+/// wants a frame rate more than 120 ppm off tells nothing. Errors: those of find_read_mode.
+Result<ClipWalk> read_walk(const ClipReading& clip, const ClipOptions& options);
+
 /// Puts a clip on the strobe's time: the lamp's place from all frames; d, K and T from the dots' walk; lost
 /// frames and flash numbers from the code; tau from the line through all dots. Errors (bad_input): options
 /// that aren't positive and finite.

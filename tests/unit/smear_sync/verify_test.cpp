@@ -208,6 +208,17 @@ TEST(Verify, AStrobeInTuneLeavesTheDirectionOpenAndSaysHowToTellIt) {
   EXPECT_THAT(result.to_do, testing::Contains(HasSubstr("Detune the strobe")));
 }
 
+TEST(Verify, AStrobeInTuneTellsNoDirectionByWayOfAFrameRateNearby) {
+  // 24 frames a second would read this walk the other way around, were the claim only rounded.
+  for (const int direction : {-1, +1}) {
+    for (const double rate : {23.9775, 23.974}) {
+      std::vector<Camera> cameras(2, {.start = 1 - 0.012, .direction = direction});
+      for (const CameraVerdict& c : verify(cameras, {.rate = rate}).cameras)
+        EXPECT_FALSE(c.clock.mode.direction) << c.clock.mode.direction_reason;
+    }
+  }
+}
+
 TEST(Verify, ABlindCameraIsNoErrorAndNoSync) {
   const Strobe tuned{.rate = 23.976};
   VerifyOptions options = options_of(tuned);

@@ -118,9 +118,11 @@ std::vector<PhaseSample> samples_of(const std::vector<FrameReading>& frames, con
                     [&](const DroppedFrames& d) { return f.frame > d.after && f.frame < d.before; });
     const auto read_phase =
         static_cast<double>(clock.count_of(f.frame) - (wrapped(f.reading, clock.timing) ? 1 : 0));
-    samples.push_back({TimePoint{} + clock.believed_period * read_phase,
-                       between_runs ? Phase{PhaseState::unusable, {}, {}, "a frame was lost near it"}
-                                    : phase_of(f.reading, clock.timing, flash_width)});
+    const TimePoint start = TimePoint{} + clock.believed_period * read_phase;
+    samples.push_back(between_runs
+                          ? PhaseSample{start, {PhaseState::unusable, {}, {}, "a frame was lost near it"}}
+                          : sample_of(f.reading, clock.timing, flash_width, start));
+    samples.back().at = start;  // modulo P phases are straight against the read phases' starts
   }
   return samples;
 }

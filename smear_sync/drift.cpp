@@ -168,17 +168,16 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
   if (resolution > Seconds(0)) {
     std::vector<StairPoint> seen;
     for (const PhaseSample& s : samples) {
-      if (s.phase.state != PhaseState::known) continue;
-      const double read =
-          std::sqrt(std::max(0.0, square(s.phase.sigma.value()) - square(resolution.value())));
-      seen.push_back(
-          {(s.at - first).value() - line.middle, s.phase.tau.value() / row_time - 0.5, read / row_time});
+      if (!s.shifted || s.phase.state != PhaseState::known) continue;
+      seen.push_back({Eigen::Vector2d(1, (s.at - first).value() - line.middle), s.shifted->rows.value(),
+                      s.shifted->sigma.value()});
     }
-    stairs = fit_stairs(seen, {.level = line.level / row_time,
-                               .rate = line.rate / row_time,
-                               .span = span,
-                               .turn = period / row_time,
-                               .width = (options.flash_width / options.row_time).value()});
+    if (seen.size() >= 3) {
+      stairs = fit_stairs(seen, {.line = Eigen::Vector2d(line.level / row_time, line.rate / row_time),
+                                 .covariance = Eigen::Vector2d(square(0.5), square(1 / span)).asDiagonal(),
+                                 .turn = period / row_time,
+                                 .width = (options.flash_width / options.row_time).value()});
+    }
   }
   Drift drift;
   drift.at = first + Seconds(line.middle);
@@ -188,10 +187,10 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
   double rate = line.rate;
   double rate_sigma = std::sqrt(line.rate_variance);
   if (stairs) {
-    level = stairs->level * row_time;
-    level_sigma = stairs->level_sigma * row_time;
-    rate = stairs->rate * row_time;
-    rate_sigma = stairs->rate_sigma * row_time;
+    level = stairs->line(0) * row_time;
+    level_sigma = stairs->sigma(0) * row_time;
+    rate = stairs->line(1) * row_time;
+    rate_sigma = stairs->sigma(1) * row_time;
   }
   drift.tau = wrap_positive(Seconds(level), options.period);
   const Rows shifted = row_time > 0 ? drift.tau / options.row_time : Rows(0);
@@ -224,7 +223,9 @@ Drift difference(const Drift& a, const Drift& b, Seconds period) {
           .samples = std::min(a.samples, b.samples)};
 }
 
-Hertz frame_rate(const Drift& line, Hertz flash_rate) { return flash_rate * (1 + line.rate.value() * 1e-6); }
+Hertz frame_rate(const Drift& line, Hertz flash_rate) {
+  return flash_rate * (1 / (1 - line.rate.value() * 1e-6));
+}
 
 TimeLeft time_left(const Drift& error, TimePoint now, const TimeLeftOptions& options) {
   const double elapsed = (now - error.at).value();

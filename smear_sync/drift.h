@@ -22,8 +22,9 @@ struct DriftOptions {
 };
 
 /// A straight line through phases on the circle: tau(t) = tau + rate (t - at), modulo T. A rate of 1 ppm is 1
-/// us of phase a second; that of a camera against the strobe is P / T - 1, that of b's period against a's is
-/// the rate of tau_a - tau_b.
+/// us of phase a second; that of a camera against the strobe is 1 - T / P, that of b's period against a's is
+/// the rate of tau_a - tau_b. t is when the flash came, not the frame: only so is tau straight across the
+/// wrap.
 struct Drift {
   TimePoint at;       ///< the middle of the samples, where tau and rate err independently
   Seconds tau;        ///< in [0, T)
@@ -33,15 +34,15 @@ struct Drift {
   int samples = 0;             ///< that the fit rests on
 };
 
-/// Fits the line: the rate under which the samples gather best on the circle, then a robust straight line
-/// (Huber's weights) through what is left. Where the dots' scatter lets single rows be told, the line is then
-/// taken through the staircase that whole-row shifts make of it: a phase is seen to lie in the row period
-/// that its dot names, and each frame in which the flash changes rows pins the line down. The lamp's own
-/// constant error, which no straight line can tell from phase, falls out, since dots stand whole rows from
-/// their lamp. tau, rate and their errors are means and deviations of what the staircase leaves possible, so
-/// a walk of less than a row says so by its sigma; a strobe detuned by a few rows a second gets below .02
-/// row. Samples that are not known are passed over. Error bad_input with fewer than three known samples or
-/// all at one instant.
+/// Fits the line to samples whose `at` is the flash's (sample_of() makes such): the rate under which the
+/// samples gather best on the circle, then a robust straight line (Huber's weights) through what is left.
+/// Where the dots' scatter lets single rows be told, the line is then taken through the staircase that
+/// whole-row shifts make of it: a phase is seen to lie in the row period that its dot names, and each frame
+/// in which the flash changes rows pins the line down. The lamp's own constant error, which no straight line
+/// can tell from phase, falls out, since dots stand whole rows from their lamp. tau, rate and their errors
+/// are means and deviations of what the staircase leaves possible, so a walk of less than a row says so by
+/// its sigma; a strobe detuned by a few rows a second gets below .02 row. Samples that are not known are
+/// passed over. Error bad_input with fewer than three known samples or all at one instant.
 Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions& options);
 
 /// The phase of the line at an instant, with the error that the rate adds by then.
@@ -52,7 +53,7 @@ Phase phase_at(const Drift& line, TimePoint at, Seconds period);
 Drift difference(const Drift& a, const Drift& b, Seconds period);
 
 /// A camera's frame rate, from its line against a strobe of `flash_rate` flashes a second, one a frame:
-/// flash_rate (1 + rate). As good as the strobe's own clock.
+/// flash_rate / (1 - rate). As good as the strobe's own clock.
 Hertz frame_rate(const Drift& line, Hertz flash_rate);
 
 /// How long an error stays within a tolerance, from `now` on.

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <optional>
 
+#include "smear_sync/staircase.h"
+
 namespace emberlock {
 namespace {
 
@@ -118,6 +120,14 @@ Phase majority_of_unknown(std::span<const PhaseSample> samples) {
   return phase;
 }
 
+/// Of a reading with a lamp and one dot.
+ShiftedRows shifted_rows(const SmearReading& reading, const CcdTiming& timing) {
+  const DotReading& dot = reading.dots.front();
+  const Rows below = static_cast<double>(timing.direction) * (dot.y - reading.lamp->y);
+  return {wrap_positive(below, Rows(timing.shifts)),
+          Rows(std::hypot(dot.sigma.value(), reading.lamp->sigma.value()))};
+}
+
 }  // namespace
 
 std::string_view name(PhaseState state) {
@@ -163,16 +173,25 @@ Phase phase_of(const SmearReading& reading, const CcdTiming& timing, Seconds fla
     phase.reason = "a dot without its lamp";
     return phase;
   }
-  const DotReading& dot = reading.dots.front();
-  const Rows shifted = static_cast<double>(timing.direction) * (dot.y - reading.lamp->y);
-  const Rows k = wrap_positive(shifted, Rows(timing.shifts));
+  const ShiftedRows shifted = shifted_rows(reading, timing);
+  const double width = (flash_width / timing.row_time).value();
+  const StairMoments x = invert_stair(shifted.rows.value(), shifted.sigma.value(), width);
   phase.state = PhaseState::known;
   phase.reason.clear();
-  phase.tau = wrap_positive((k + Rows(0.5)) * timing.row_time, timing.frame_period);
-  const Rows read_error(std::hypot(dot.sigma.value(), reading.lamp->sigma.value()));
-  phase.sigma = Seconds(std::hypot((read_error * timing.row_time).value(),
-                                   row_resolution(timing.row_time, flash_width).value()));
+  phase.tau = wrap_positive(Rows(x.mean) * timing.row_time, timing.frame_period);
+  phase.sigma = Rows(x.sigma) * timing.row_time;
   return phase;
+}
+
+PhaseSample sample_of(const SmearReading& reading, const CcdTiming& timing, Seconds flash_width,
+                      TimePoint read_start) {
+  PhaseSample sample{read_start, phase_of(reading, timing, flash_width)};
+  if (sample.phase.state != PhaseState::known) return sample;
+  sample.shifted = shifted_rows(reading, timing);
+  const Rows below = static_cast<double>(timing.direction) * (reading.dots.front().y - reading.lamp->y);
+  sample.at = read_start + sample.phase.tau;
+  if (below < Rows(0)) sample.at = sample.at - timing.frame_period;
+  return sample;
 }
 
 Beat expected_beat(Hertz strobe_rate, Seconds period, PartsPerMillion sigma) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -34,10 +35,17 @@ struct Phase {
   std::string reason;  ///< one sentence when not known, else empty
 };
 
+/// What was read of a sensor that moves in whole rows, before it was made a phase.
+struct ShiftedRows {
+  Rows rows;   ///< k, with the fraction that it was read to
+  Rows sigma;  ///< of dot and lamp
+};
+
 /// A phase read off the frame that came at `at` (host's monotonic clock).
 struct PhaseSample {
   TimePoint at;
   Phase phase;
+  std::optional<ShiftedRows> shifted{};  ///< where it is known, fits over many frames see the rows
 };
 
 /// The RMS error that whole-row shifts leave in tau: (1 - w)^1.5 / sqrt(12) rows for a flash of w < 1 rows at
@@ -50,10 +58,17 @@ Seconds row_resolution(SecondsPerRow row_time, Seconds flash_width);
 /// their RMS of 1 / sqrt(12).
 double staircase_rate_error(Seconds resolution, Seconds span);
 
-/// The phase that one frame shows: k = d (y_dot - y_s) mod K rows had been shifted out when the flash came,
-/// and tau is the middle of that row's time, (k + 1/2) t_row. Sigma holds the dot's, the lamp's and the row's
-/// own error.
+/// The phase that one frame shows: k = d (y_dot - y_s) mod K rows had been shifted out when the flash came.
+/// tau and sigma are mean and deviation of all instants that may have put the dot there: the middle of the
+/// row's time, (k + 1/2) t_row, for a dot at a whole k; nearer to the border between two rows for one that
+/// stands between, because its flash fell into both.
 Phase phase_of(const SmearReading& reading, const CcdTiming& timing, Seconds flash_width);
+
+/// The same as a sample at the instant of the flash: tau after the start of the read phase that moved it,
+/// which for a wrapped dot is the one before the frame's own. Where the strobe is detuned, phases of many
+/// frames are straight against these instants alone.
+PhaseSample sample_of(const SmearReading& reading, const CcdTiming& timing, Seconds flash_width,
+                      TimePoint read_start);
 
 /// tau_a - tau_b in [-T/2, T/2): positive when a's read phase starts before b's. Both must be known.
 inline Seconds phase_error(const Phase& a, const Phase& b, Seconds period) {

@@ -59,7 +59,8 @@ std::vector<Dot> dots_of(std::span<const FrameReading> frames) {
   // The lamp stands still: its median errs less than each frame's.
   const auto middle = lamps.begin() + static_cast<std::ptrdiff_t>(lamps.size() / 2);
   std::nth_element(lamps.begin(), middle, lamps.end());
-  const auto centre = static_cast<double>(frames[frames.size() / 2].frame);
+  const std::size_t half = frames.size() / 2;
+  const auto centre = static_cast<double>(frames[half].frame);
   for (const FrameReading& f : frames) {
     const bool readable = f.reading.state == SmearState::dot || f.reading.state == SmearState::comb;
     if (!readable) continue;

@@ -8,6 +8,8 @@
 
 #include <Eigen/Dense>
 
+#include "smear_sync/staircase.h"
+
 namespace emberlock {
 namespace {
 
@@ -16,21 +18,32 @@ constexpr double kOutlier = 1.5;
 
 struct Dot {
   double row = 0;
+  double sigma = 0;
   double pitches = 0;  ///< whole number of pitches from its side's anchor
   bool used = false;
 };
 
 struct Comb {
+  double frame = 0;  ///< which of all readings
   std::vector<Dot> above, below;
 };
 
 std::vector<Comb> combs(std::span<const SmearReading> frames) {
   std::vector<Comb> result;
+  std::vector<double> lamps;
   for (const SmearReading& frame : frames) {
-    if (frame.state != SmearState::comb) continue;
+    if (frame.state == SmearState::comb && frame.lamp) lamps.push_back(frame.lamp->y.value());
+  }
+  const auto middle = lamps.begin() + static_cast<std::ptrdiff_t>(lamps.size() / 2);
+  if (!lamps.empty()) std::nth_element(lamps.begin(), middle, lamps.end());
+  const double lamp = lamps.empty() ? 0 : *middle;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (frames[i].state != SmearState::comb) continue;
     Comb comb;
-    for (const DotReading& dot : frame.dots) {
-      (dot.side == Side::above ? comb.above : comb.below).push_back({.row = dot.y.value()});
+    comb.frame = static_cast<double>(i) - static_cast<double>(frames.size()) / 2;
+    for (const DotReading& dot : frames[i].dots) {
+      (dot.side == Side::above ? comb.above : comb.below)
+          .push_back({.row = dot.y.value() - lamp, .sigma = dot.sigma.value()});
     }
     if (comb.above.size() >= 2 || comb.below.size() >= 2) result.push_back(std::move(comb));
   }
@@ -217,6 +230,99 @@ Fit fit_pitch(std::vector<Comb>& all, double pitch) {
   return fit;
 }
 
+/// Where the comb's dot of no pitches stands, above the lamp.
+double phase_of_comb(const Comb& comb, const Fit& fit) {
+  double sum = 0;
+  double count = 0;
+  const auto add = [&](const std::vector<Dot>& side, double offset) {
+    for (const Dot& d : side) {
+      if (!d.used) continue;
+      sum += d.row - d.pitches * fit.pitch - offset;
+      ++count;
+    }
+  };
+  add(comb.above, 0);
+  add(comb.below, fit.offset);
+  return count > 0 ? sum / count : std::nan("");
+}
+
+/// How far the comb walks from frame to frame, modulo the pitch: the walk under which all combs gather.
+double gathering_walk(const std::vector<Comb>& all, const Fit& fit) {
+  const double frames = all.back().frame - all.front().frame + 1;
+  const int steps = static_cast<int>(8 * frames);
+  double best = 0;
+  double most = -1;
+  for (int i = 0; i < steps; ++i) {
+    const double walk = fit.pitch * i / steps;
+    std::complex<double> sum = 0;
+    for (const Comb& comb : all) {
+      const double phase = phase_of_comb(comb, fit);
+      if (std::isnan(phase)) continue;
+      sum += std::polar(1.0, 2 * std::numbers::pi * (phase - comb.frame * walk) / fit.pitch);
+    }
+    if (std::abs(sum) <= most) continue;
+    most = std::abs(sum);
+    best = walk;
+  }
+  return best;
+}
+
+/// All combs as one: row = place . (phase above, phase below, pitch, walk).
+std::vector<StairPoint> one_comb(const std::vector<Comb>& all, const Fit& fit) {
+  const double walk = gathering_walk(all, fit);
+  std::complex<double> sum = 0;
+  for (const Comb& comb : all) {
+    const double phase = phase_of_comb(comb, fit);
+    if (!std::isnan(phase))
+      sum += std::polar(1.0, 2 * std::numbers::pi * (phase - comb.frame * walk) / fit.pitch);
+  }
+  const double first = std::arg(sum) / (2 * std::numbers::pi) * fit.pitch;
+  std::vector<StairPoint> points;
+  for (const Comb& comb : all) {
+    const double phase = phase_of_comb(comb, fit);
+    if (std::isnan(phase)) continue;
+    const double whole = std::round((phase - comb.frame * walk - first) / fit.pitch);
+    for (const auto* side : {&comb.above, &comb.below}) {
+      const double below = side == &comb.below ? 1 : 0;
+      for (const Dot& d : *side) {
+        if (!d.used) continue;
+        points.push_back({Eigen::Vector4d(1 - below, below, d.pitches + whole, comb.frame), d.row, d.sigma});
+      }
+    }
+  }
+  return points;
+}
+
+/// The same least squares over all frames as one walk, then through the stairs of whole rows: no phase is
+/// free but one. Nothing where the frames don't make one walk (frames were lost, the strobe drifts) or stairs
+/// can't be seen.
+std::optional<StairFit> fit_as_one(const std::vector<Comb>& all, const Fit& fit, double width) {
+  constexpr double kCoherent = 0.5;  // RMS, rows
+  if (all.size() < 3 || !fit.both_sides) return std::nullopt;
+  const std::vector<StairPoint> points = one_comb(all, fit);
+  Eigen::Matrix4d matrix = 1e-9 * Eigen::Matrix4d::Identity();
+  Eigen::Vector4d right = Eigen::Vector4d::Zero();
+  for (const StairPoint& p : points) {
+    matrix += p.place * p.place.transpose();
+    right += p.place * p.u;
+  }
+  const Eigen::Vector4d line = matrix.ldlt().solve(right);
+  double squares = 0;
+  for (const StairPoint& p : points) squares += std::pow(p.u - p.place.dot(line), 2);
+  if (squares > kCoherent * kCoherent * static_cast<double>(points.size())) return std::nullopt;
+  // Three times what rows leave open, and what a lamp may err by, which moves both phases.
+  Eigen::Matrix4d covariance = kOutlier * kOutlier * matrix.inverse();
+  covariance.topLeftCorner<2, 2>().array() += 0.04;
+  // Dots stand half a row before the middle of their row's time.
+  auto one = fit_stairs(
+      points, {.line = line + Eigen::Vector4d(0.5, 0.5, 0, 0), .covariance = covariance, .width = width});
+  // Stairs of another width than the flash's lead astray; the straight line doesn't know of any.
+  const double straight_sigma =
+      std::sqrt(squares / static_cast<double>(points.size()) * matrix.inverse()(2, 2));
+  if (one && std::abs(one->line(2) - line(2)) > 3 * straight_sigma) one.reset();
+  return one;
+}
+
 double longest_span(const std::vector<Comb>& all) {
   double span = 0;
   for (const Comb& comb : all) {
@@ -230,7 +336,7 @@ double longest_span(const std::vector<Comb>& all) {
 }  // namespace
 
 Result<RowClock> fit_row_clock(std::span<const SmearReading> frames, Hertz flash_rate,
-                               std::optional<Seconds> frame_period) {
+                               std::optional<Seconds> frame_period, Seconds flash_width) {
   if (!std::isfinite(flash_rate.value()) || flash_rate.value() <= 0) {
     return Error{ErrorKind::bad_input, "the flash rate isn't a positive number", "flash_rate",
                  "give the strobe's rate in flashes a second"};
@@ -247,9 +353,17 @@ Result<RowClock> fit_row_clock(std::span<const SmearReading> frames, Hertz flash
     return Error{ErrorKind::bad_input, "the dots stand in no regular pitch", "comb",
                  "keep the strobe's rate constant and other lights off"};
   }
-  const Fit fit = fit_pitch(all, start);
+  Fit fit = fit_pitch(all, start);
   if (!std::isfinite(fit.pitch) || fit.pitch <= 0) {
     return Error{ErrorKind::bad_input, "the dots don't determine a pitch", "comb", "record more frames"};
+  }
+  bool near_integer = std::abs(wrap_symmetric(fit.pitch, 1)) * longest_span(all) < 1;
+  const double width = flash_width.value() * flash_rate.value() * fit.pitch;
+  if (const auto one = fit_as_one(all, fit, width)) {
+    fit.pitch = one->line(2);
+    fit.sigma = one->sigma(2);
+    fit.offset = one->line(1) - one->line(0);
+    near_integer = near_integer && fit.sigma * longest_span(all) > 0.1;
   }
   RowClock clock;
   clock.pitch = Rows(fit.pitch);
@@ -257,7 +371,7 @@ Result<RowClock> fit_row_clock(std::span<const SmearReading> frames, Hertz flash
   clock.sigma = clock.row_time * (fit.sigma / fit.pitch);
   clock.dots = fit.dots;
   clock.frames = fit.frames;
-  clock.near_integer_pitch = std::abs(wrap_symmetric(fit.pitch, 1)) * longest_span(all) < 1;
+  clock.near_integer_pitch = near_integer;
   if (frame_period && fit.both_sides) {
     // Dots on the later side of the wrap were shifted one read phase earlier: offset = K - T / t_row, modulo
     // p.

@@ -27,11 +27,14 @@ struct RowClock {
 /// t_row = 1 / (p f): least squares for the pitch over all dots of all frames whose state is `comb` (the
 /// paper's equation for t_per_row, over more than two dots). Each frame has its own phase and the two sides
 /// of the lamp their own offset, common to all frames: nothing is assumed about K. Gaps of several pitches
-/// (missed dots) and outliers are allowed; flash_rate is the strobe's, in flashes a second.
+/// (missed dots) and outliers are allowed; flash_rate is the strobe's, in flashes a second. Where the frames
+/// prove to be one walk of the comb (none was lost, the strobe is even), they are fitted as one, through the
+/// stairs that whole rows make of flashes of `flash_width`: four times as exact.
 ///
 /// Errors (bad_input): a flash rate that isn't positive and finite; fewer than three dots on one side of the
 /// lamp in every frame, or dots that stand in no regular pitch.
 Result<RowClock> fit_row_clock(std::span<const SmearReading> frames, Hertz flash_rate,
-                               std::optional<Seconds> frame_period = std::nullopt);
+                               std::optional<Seconds> frame_period = std::nullopt,
+                               Seconds flash_width = microseconds(20));
 
 }  // namespace emberlock

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstdint>
 #include <numbers>
 #include <vector>
 
-#include <Eigen/Dense>
-
 #include "base/quantity.h"
+#include "base/random.h"
 
 namespace emberlock {
 namespace {
@@ -17,27 +17,20 @@ constexpr double kLeastOrder =
     0.3;                         // resultant of the dots' fractions of a row below which no stairs are seen
 constexpr double kStray = 3.5;   // a dot further off its step, in its own sigmas, is of no use
 constexpr double kFloor = 0.01;  // no dot is placed better than this, rows
-constexpr int kHalf = 9;         // of the grid, in cells
-constexpr int kMostZooms = 12;
-constexpr double kLeastCells = 25;
-constexpr double kReach = 3.5;  // deviations that a grid covers
-constexpr double kWide = 0.75;  // rows about the start: the straight line's error and the lamp's
-constexpr std::size_t kCoarsePoints = 600;
+constexpr double kFirstBlur = 0.5;  // rows
+constexpr double kSharpen = 0.6;    // from round to round
+constexpr int kRounds = 32;
+constexpr int kDraws = 150;  // for each number of the line
+constexpr int kLastDraws = 600;
+constexpr double kLeastShare = 12;  // of the draws, for each number of the line, that must carry the weight
+constexpr double kReach = 3.5;      // deviations about the mean that are drawn from, evenly
 
 double square(double x) { return x * x; }
 
 class Stairs {
  public:
-  Stairs(std::span<const StairPoint> points, const StairStart& start) : start_(start) {
-    points_.assign(points.begin(), points.end());
-  }
-
-  /// What a dot misses its step by, on the line.
-  [[nodiscard]] double miss(const StairPoint& p, double level, double rate) const {
-    double x = level + rate * p.t;
-    x -= start_.turn * std::floor(x / start_.turn);
-    return wrap_symmetric(p.u - stair(x, start_.width) - lamp_, start_.turn);
-  }
+  Stairs(std::span<const StairPoint> points, const StairStart& start)
+      : points_(points), start_(start), precision_(start.covariance.inverse()) {}
 
   /// The lamp's error from the fractions of a row at which dots stand; false when they show no stairs.
   bool find_lamp() {
@@ -48,78 +41,118 @@ class Stairs {
     return std::abs(sum) >= kLeastOrder;
   }
 
-  /// The lamp's error and the scatter of the dots once a line is known.
-  void refine(double level, double rate) {
-    double sum = 0, weights = 0;
+  /// The lamp's error and the scatter of the dots, once a line is known; and the stairs a little sharper.
+  /// Blurred ones lead to the line from afar, where sharp ones are a needle in a haystack. Whether they are
+  /// sharp now.
+  bool refine(const StairLine& line, double heat) {
+    double sum = 0;
+    double weights = 0;
     std::vector<double> deviations;
     for (const StairPoint& p : points_) {
-      const double z = miss(p, level, rate) / scale(p);
-      deviations.push_back(std::abs(z));
-      if (std::abs(z) > kStray) continue;
-      sum += z / scale(p);
+      const double off = miss(p, line);
+      deviations.push_back(std::abs(off) / own(p));
+      if (std::abs(off) > kStray * scale(p)) continue;
+      sum += off / square(scale(p));
       weights += 1 / square(scale(p));
     }
     if (weights > 0) lamp_ += sum / weights;
     const auto middle = deviations.begin() + static_cast<std::ptrdiff_t>(deviations.size() / 2);
     std::nth_element(deviations.begin(), middle, deviations.end());
-    widen_ *= std::max(1 / widen_, 1.4826 * *middle);
+    const double before = widen_;
+    widen_ = std::max(1.0, 1.4826 * *middle);
+    const bool sharp = blur_ < kFloor && widen_ > 0.8 * before && widen_ < 1.25 * before;
+    if (heat == 1) blur_ *= kSharpen;  // not before the draws cover what the blurred stairs leave possible
+    return sharp;
   }
 
-  [[nodiscard]] double log_likelihood(double level, double rate, std::size_t stride) const {
+  [[nodiscard]] double log_likelihood(const StairLine& line) const {
     double sum = 0;
-    for (std::size_t i = 0; i < points_.size(); i += stride) {
-      const double z = miss(points_[i], level, rate) / scale(points_[i]);
-      sum -= std::min(z * z, square(kStray)) / 2;
-    }
-    return sum * static_cast<double>(stride);
+    for (const StairPoint& p : points_) sum -= std::min(square(miss(p, line) / scale(p)), square(kStray)) / 2;
+    return sum;
   }
-
-  [[nodiscard]] std::size_t size() const { return points_.size(); }
+  /// Of the lamp's error, which moves the first number with it.
+  [[nodiscard]] double lamp_sigma() const {
+    double weights = 0;
+    for (const StairPoint& p : points_) weights += 1 / square(scale(p));
+    return 1 / std::sqrt(weights);
+  }
+  [[nodiscard]] double log_prior(const StairLine& line) const {
+    const StairLine off = line - start_.line;
+    return -off.dot(precision_ * off) / 2;
+  }
 
  private:
-  [[nodiscard]] double scale(const StairPoint& p) const { return widen_ * std::max(p.sigma, kFloor); }
+  /// What a dot misses its step by.
+  [[nodiscard]] double miss(const StairPoint& p, const StairLine& line) const {
+    const double x = p.place.dot(line);
+    if (start_.turn <= 0) return p.u - stair(x, start_.width) - lamp_;
+    return wrap_symmetric(p.u - stair(wrap_positive(x, start_.turn), start_.width) - lamp_, start_.turn);
+  }
+  [[nodiscard]] static double own(const StairPoint& p) { return std::max(p.sigma, kFloor); }
+  [[nodiscard]] double scale(const StairPoint& p) const { return std::max(widen_ * own(p), blur_); }
 
-  std::vector<StairPoint> points_;
-  StairStart start_;
+  std::span<const StairPoint> points_;
+  const StairStart& start_;
+  Eigen::MatrixXd precision_;
   double lamp_ = 0;
   double widen_ = 1;
+  double blur_ = kFirstBlur;
 };
 
-/// Lines (level, rate) about a centre: a square grid, turned and stretched to the shape of what is likely.
-struct Grid {
-  Eigen::Vector2d centre;
-  Eigen::Matrix2d steps;  ///< columns: from one cell to the next
-  [[nodiscard]] Eigen::Vector2d at(int i, int j) const { return centre + steps * Eigen::Vector2d(i, j); }
+/// Lines drawn evenly from an ellipsoid, and what they are worth.
+struct Draws {
+  std::vector<StairLine> lines;
+  std::vector<double> logs;   ///< of likelihood
+  std::vector<double> prior;  ///< log of what was known before
 };
 
 struct Moments {
-  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
-  Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
-  double cells = 0;  ///< that share the weight: the exponential of its entropy
+  StairLine mean;
+  Eigen::MatrixXd covariance;
+  double heat = 1;  ///< power of the likelihood, below 1 while the draws are too coarse for it
 };
 
-/// Of the likelihood to the power `heat` over the grid.
-Moments moments(const Grid& grid, const std::vector<double>& logs, double heat) {
-  const double best = *std::max_element(logs.begin(), logs.end());
-  Moments m;
-  double total = 0;
-  double entropy = 0;
-  std::size_t cell = 0;
-  for (int i = -kHalf; i <= kHalf; ++i) {
-    for (int j = -kHalf; j <= kHalf; ++j) {
-      const double log = heat * (logs[cell++] - best);
-      const double p = std::exp(log);
-      const Eigen::Vector2d from_centre = grid.at(i, j) - grid.centre;
-      total += p;
-      entropy -= p * log;
-      m.mean += p * from_centre;
-      m.covariance += p * from_centre * from_centre.transpose();
-    }
+/// Each draw's weight under the likelihood to the power `heat`; returns how many share it.
+double weigh(const Draws& draws, double heat, std::vector<double>& weights) {
+  double most = -1e300;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    weights[i] = heat * draws.logs[i] + draws.prior[i];
+    most = std::max(most, weights[i]);
   }
-  m.mean /= total;
-  m.covariance = m.covariance / total - m.mean * m.mean.transpose();
-  m.mean += grid.centre;
-  m.cells = std::exp(entropy / total + std::log(total));
+  double sum = 0;
+  double squares = 0;
+  for (double& w : weights) {
+    w = std::exp(w - most);
+    sum += w;
+    squares += square(w);
+  }
+  for (double& w : weights) w /= sum;
+  return square(sum) / squares;
+}
+
+/// Weighted by the likelihood to the largest power that leaves enough of the draws their weight (or else the
+/// most): one finer than the draws would pick one of them by chance.
+Moments moments(const Draws& draws) {
+  const std::size_t n = draws.lines.size();
+  std::vector<double> weights(n);
+  Moments m;
+  double most = 0;
+  for (double heat = 1; heat > 1e-7 && most < kLeastShare * static_cast<double>(draws.lines.front().size());
+       heat /= 1.5) {
+    const double share = weigh(draws, heat, weights);
+    if (share <= most) continue;
+    most = share;
+    m.heat = heat;
+  }
+  weigh(draws, m.heat, weights);
+  const auto size = draws.lines.front().size();
+  m.mean = StairLine::Zero(size);
+  for (std::size_t i = 0; i < n; ++i) m.mean += weights[i] * draws.lines[i];
+  m.covariance = Eigen::MatrixXd::Zero(size, size);
+  for (std::size_t i = 0; i < n; ++i) {
+    const StairLine d = draws.lines[i] - m.mean;
+    m.covariance += weights[i] * d * d.transpose();
+  }
   return m;
 }
 
@@ -132,36 +165,59 @@ double stair(double x, double width) {
   return past <= 0 ? step : step + past / width;
 }
 
+StairMoments invert_stair(double u, double sigma, double width) {
+  if (width >= 1) return {u + 0.5, sigma};
+  // Beyond three rows from u nothing that was read can come from.
+  constexpr int kSteps = 240;
+  const double s = std::max(sigma, kFloor);
+  const double reach = 1.5 + 3 * s;
+  double w = 0;
+  double mean = 0;
+  double squares = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double offset = reach * (2 * (i + 0.5) / kSteps - 1);
+    const double p = std::exp(-square((u - stair(u + 0.5 + offset, width)) / s) / 2);
+    w += p;
+    mean += p * offset;
+    squares += p * offset * offset;
+  }
+  if (!(w > 0)) return {u + 0.5, std::hypot(s, 0.3)};
+  mean /= w;
+  return {u + 0.5 + mean, std::sqrt(std::max(squares / w - mean * mean, square(kFloor)))};
+}
+
 std::optional<StairFit> fit_stairs(std::span<const StairPoint> points, const StairStart& start) {
   Stairs stairs(points, start);
-  if (!stairs.find_lamp()) return std::nullopt;
-  Grid grid{
-      {start.level, start.rate},
-      Eigen::Vector2d(kWide, 2 * kWide / start.span).asDiagonal() * Eigen::Matrix2d::Identity() / kHalf};
-  Moments m;
-  for (int zoom = 0; zoom < kMostZooms; ++zoom) {
-    const std::size_t stride = zoom < 2 ? std::max<std::size_t>(1, stairs.size() / kCoarsePoints) : 1;
-    std::vector<double> logs;
-    for (int i = -kHalf; i <= kHalf; ++i) {
-      for (int j = -kHalf; j <= kHalf; ++j) {
-        const Eigen::Vector2d line = grid.at(i, j);
-        logs.push_back(stairs.log_likelihood(line.x(), line.y(), stride));
+  if (start.width >= 1 || points.empty() || !stairs.find_lamp()) return std::nullopt;
+  const auto size = start.line.size();
+  Moments m{start.line, start.covariance, 0};
+  bool last = false;
+  for (int round = 0; round < kRounds; ++round) {
+    const Eigen::MatrixXd spread = m.covariance.llt().matrixL();
+    const Eigen::MatrixXd least = 0.01 * spread * spread.transpose();  // where few draws carry the weight
+    Draws draws;
+    for (int i = 0; i < (last ? kLastDraws : kDraws) * static_cast<int>(size); ++i) {
+      StairLine z(size);
+      for (Eigen::Index k = 0; k < size; ++k) {
+        z(k) = random_normal(17, static_cast<std::uint64_t>(round),
+                             static_cast<std::uint64_t>(i / 2) * 4 + static_cast<std::uint64_t>(k));
       }
+      const double radius =
+          std::pow(random_uniform(18, static_cast<std::uint64_t>(round), static_cast<std::uint64_t>(i / 2)),
+                   1.0 / static_cast<double>(size));
+      z *= (i % 2 == 0 ? kReach : -kReach) * radius / z.norm();  // in pairs: the draws' own mean is no error
+      draws.lines.emplace_back(m.mean + spread * z);
+      draws.logs.push_back(stairs.log_likelihood(draws.lines.back()));
+      draws.prior.push_back(stairs.log_prior(draws.lines.back()));
     }
-    // A likelihood finer than the grid's cells would pick one of them by chance: it is melted until it covers
-    // a few, and hardens as the grid narrows.
-    double heat = 1;
-    for (m = moments(grid, logs, heat); m.cells < kLeastCells && heat > 1e-6; m = moments(grid, logs, heat))
-      heat /= 2;
-    stairs.refine(m.mean.x(), m.mean.y());
-    if (heat == 1 && stride == 1 && zoom >= 2) break;
-    grid.centre = m.mean;
-    const Eigen::Matrix2d shape = m.covariance + 0.05 * grid.steps * grid.steps.transpose();
-    const Eigen::Matrix2d narrower = shape.llt().matrixL().toDenseMatrix() * (kReach / kHalf);
-    // What the points leave open is bounded by where the start may be at all.
-    if (std::abs(narrower.determinant()) < std::abs(grid.steps.determinant())) grid.steps = narrower;
+    m = moments(draws);
+    if (last) break;
+    m.covariance += least;
+    last = (stairs.refine(m.mean, m.heat) && m.heat == 1) || round == kRounds - 2;
   }
-  return StairFit{m.mean.x(), std::sqrt(m.covariance(0, 0)), m.mean.y(), std::sqrt(m.covariance(1, 1))};
+  StairFit fit{m.mean, m.covariance.diagonal().cwiseSqrt()};
+  fit.sigma(0) = std::hypot(fit.sigma(0), stairs.lamp_sigma());
+  return fit;
 }
 
 }  // namespace emberlock

@@ -3,6 +3,8 @@
 #include <optional>
 #include <span>
 
+#include <Eigen/Dense>
+
 namespace emberlock {
 
 // All in rows: a flash of `width` rows about x row periods after the start of the read phase leaves its dot u
@@ -12,33 +14,40 @@ namespace emberlock {
 /// Where the dot stands of a flash of `width` rows whose centre comes x row periods after the start.
 double stair(double x, double width);
 
+/// A flash's x as one dot tells it: mean and deviation over all x that may have put it at u, read with
+/// `sigma`.
+struct StairMoments {
+  double mean = 0;
+  double sigma = 0;
+};
+StairMoments invert_stair(double u, double sigma, double width);
+
+/// What is looked for: x = place . line, of 2 to 4 numbers, a phase first.
+using StairLine = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 4, 1>;
+
 struct StairPoint {
-  double t = 0;      ///< seconds from the middle of all
+  StairLine place;
   double u = 0;      ///< rows from the lamp
   double sigma = 0;  ///< of u as read: of dot and lamp
 };
 
-/// The line to start from, of x against t.
 struct StairStart {
-  double level = 0;  ///< rows
-  double rate = 0;   ///< rows a second
-  double span = 1;   ///< seconds, from first to last
-  double turn = 0;   ///< T / t_row
-  double width = 0;  ///< of the flash, rows
+  StairLine line;              ///< a straight line's fit, say
+  Eigen::MatrixXd covariance;  ///< how far off it may be
+  double turn = 0;             ///< T / t_row, where x goes round; 0: it doesn't
+  double width = 0;            ///< of the flash, rows
 };
 
 /// Mean and deviation of what the stairs leave possible.
 struct StairFit {
-  double level = 0;  ///< x at t = 0
-  double level_sigma = 0;
-  double rate = 0;
-  double rate_sigma = 0;
+  StairLine line;
+  StairLine sigma;
 };
 
-/// The line x = level + rate t whose stairs the points stand on: mean and deviation of the likelihood over
-/// all lines near the start. The lamp's own constant error is what all points miss the stairs by, and is
-/// taken out. Nothing when the points scatter so far that rows can't be told apart, or the flash is about as
-/// long as a row.
+/// The line whose stairs the points stand on: mean and deviation of the likelihood over all lines near the
+/// start, by importance sampling that starts wide and melted and narrows as it hardens. The lamp's own
+/// constant error is what all points miss the stairs by, and is taken out. Nothing when the points scatter so
+/// far that rows can't be told apart, or the flash is about as long as a row.
 std::optional<StairFit> fit_stairs(std::span<const StairPoint> points, const StairStart& start);
 
 }  // namespace emberlock

@@ -103,18 +103,18 @@ inline std::vector<FrameReading> film(const ClockFilm& f) {
   return readings;
 }
 
-/// tau of frame i's read phase against a strobe of about one flash a frame, in [0, T).
-inline double true_tau(const ClockFilm& f, double frame) {
+/// tau of the strobe's flashes, about one a frame, on their line at time t.
+inline double true_tau(const ClockFilm& f, double t) {
   const double period = f.timing.frame_period.value();
-  return wrap_positive(f.first_flash + frame * (1 / f.flash_rate - period), period);
+  return wrap_positive(f.first_flash + (t - f.first_flash) * (1 - period * f.flash_rate), period);
 }
 
-/// The phases of a film's frames; frame i is stamped i T.
+/// The phases of a film's frames.
 inline std::vector<PhaseSample> phases(const ClockFilm& f) {
   std::vector<PhaseSample> samples;
   for (const FrameReading& r : film(f)) {
-    samples.push_back({TimePoint{} + f.timing.frame_period * static_cast<double>(r.frame),
-                       phase_of(r.reading, f.timing, Seconds(f.flash_width))});
+    samples.push_back(sample_of(r.reading, f.timing, Seconds(f.flash_width),
+                                TimePoint{} + f.timing.frame_period * static_cast<double>(r.frame)));
   }
   return samples;
 }

@@ -71,8 +71,10 @@ TEST(Drift, StaircaseOfASlowDrift) {
   for (int i = 0; i < 50; ++i) {
     auto samples = film({.tau0 = 0.01 + 2e-6 * i, .ppm = 2, .seconds = 10, .noise_rows = 0});
     for (PhaseSample& s : samples) {
-      s.phase.tau = Rows(std::floor((s.phase.tau / kRow).value()) + 0.5) * kRow;
-      s.phase.sigma = Rows(0.05) * kRow;
+      const Rows k(std::floor((s.phase.tau / kRow).value()));
+      s.phase.tau = (k + Rows(0.5)) * kRow;
+      s.phase.sigma = Rows(0.29) * kRow;
+      s.shifted = ShiftedRows{k, Rows(0.05)};
     }
     auto with = options();
     with.row_time = kRow;
@@ -82,7 +84,7 @@ TEST(Drift, StaircaseOfASlowDrift) {
     EXPECT_GT(drift->rate_sigma, PartsPerMillion(1));
     if (std::abs(drift->rate.value() - 2) > 2 * drift->rate_sigma.value()) ++outside;
   }
-  EXPECT_LE(outside, 4);
+  EXPECT_LE(outside, 8);  // the rate is one and the same in all films: no draw of what was possible
 }
 
 TEST(Drift, ThermalDriftIsFollowedByItsMeanRateWithAWiderError) {

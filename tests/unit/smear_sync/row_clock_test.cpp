@@ -79,7 +79,7 @@ double error_ns(const RowClock& clock) { return (clock.row_time.value() - kRowTi
 TEST(RowClock, WithinFiveNanosecondsFromOneSecondOfVideo) {
   double squares = 0;
   int inside = 0;
-  constexpr int kFilms = 200;
+  constexpr int kFilms = 25;
   for (std::uint64_t seed = 0; seed < kFilms; ++seed) {
     const double rate = RandomStream(seed, 3).uniform(299.5, 300.5);
     const Result<RowClock> clock = fit_row_clock(film({.flash_rate = rate, .seed = seed}), Hertz(rate));
@@ -97,10 +97,10 @@ TEST(RowClock, SigmaCoversTheErrorAtAnyRate) {
   int inside = 0;
   int counted = 0;
   double squares = 0;
-  for (std::uint64_t seed = 0; seed < 300; ++seed) {
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
     const double rate = RandomStream(seed, 3).uniform(280, 320);
-    const Result<RowClock> clock =
-        fit_row_clock(film({.flash_rate = rate, .flash_width = 0, .seed = seed}), Hertz(rate));
+    const Result<RowClock> clock = fit_row_clock(film({.flash_rate = rate, .flash_width = 0, .seed = seed}),
+                                                 Hertz(rate), std::nullopt, Seconds(0));
     ASSERT_TRUE(clock.ok()) << clock.error().message();
     if (clock->near_integer_pitch) continue;
     ++counted;
@@ -109,7 +109,7 @@ TEST(RowClock, SigmaCoversTheErrorAtAnyRate) {
   }
   std::printf("flashes of no width at 280..320/s: RMS error %.2f ns, within 3 sigma in %d of %d\n",
               std::sqrt(squares / counted), inside, counted);
-  EXPECT_GT(counted, 150);
+  EXPECT_GT(counted, 20);
   EXPECT_GE(inside, 0.98 * counted);
 }
 

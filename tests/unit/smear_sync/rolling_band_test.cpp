@@ -1,0 +1,186 @@
+#include "smear_sync/rolling_band.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+#include "smear_sync/drift.h"
+#include "smear_sync/row_clock.h"
+
+namespace emberlock {
+namespace {
+
+using testing::HasSubstr;
+
+/// A rolling shutter by definition: row r gathers the flashes of the exposure before t_start + r t_row, of a
+/// scene whose rows differ, in ambient light.
+struct Roller {
+  CcdTiming timing{
+      .rows = 480, .shifts = 480, .frame_period = Seconds(1 / 30.0), .row_time = microseconds_per_row(60)};
+  double exposure = 4e-3;
+  double ambient = 20;
+  double flash = 60;
+  double noise = 0.2;  ///< of a row's mean
+  double flash_width = 20e-6;
+  double flash_rate = 30;
+  double first_flash = 0.012;
+  std::uint64_t seed = 1;
+
+  [[nodiscard]] RowProfile frame(int i) const {
+    RowProfile p;
+    p.noise = std::max(noise, 0.01);
+    for (int y = 0; y < timing.rows; ++y) {
+      const int order = timing.direction == ReadDirection::top_first ? y : timing.rows - 1 - y;
+      const double end = i * timing.frame_period.value() + order * timing.row_time.value();
+      double light = 0;
+      const int last = static_cast<int>(std::ceil((end - first_flash) * flash_rate)) + 1;
+      for (int j = last - static_cast<int>(exposure * flash_rate) - 4; j <= last; ++j) {
+        const double begin = first_flash + j / flash_rate - flash_width / 2;
+        const double inside = std::min(begin + flash_width, end) - std::max(begin, end - exposure);
+        light += std::clamp(inside / flash_width, 0.0, 1.0);
+      }
+      const double scene = 1 + 0.4 * std::sin(0.05 * y);
+      p.level.push_back(
+          scene * (ambient + flash * light) +
+          noise * random_normal(seed, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(y)));
+    }
+    return p;
+  }
+  /// A strobe detuned by 1 %, for as long as its band crosses the frame.
+  [[nodiscard]] BandReference reference() const {
+    Roller detuned = *this;
+    detuned.flash_rate = 1 / timing.frame_period.value() * 1.023;
+    detuned.exposure = std::min(exposure, 0.4 * timing.frame_period.value());
+    std::vector<RowProfile> frames;
+    for (int i = 0; i < 90; ++i) frames.push_back(detuned.frame(i));
+    auto r = learn_band_reference(frames);
+    EXPECT_TRUE(r.ok());
+    return r.ok() ? *r : BandReference{};
+  }
+  [[nodiscard]] BandReading read(int i) const {
+    return read_bands(frame(i), reference(), {.direction = timing.direction});
+  }
+};
+
+TEST(RollingBand, TheFirstEdgeIsThePhaseWhateverTheExposureAndDirection) {
+  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+    for (const double exposure : {1e-3, 4e-3, 20e-3, 31e-3}) {
+      for (const double tau : {0.002, 0.0121, 0.0266}) {
+        Roller r;
+        r.timing.direction = direction;
+        r.exposure = exposure;
+        r.first_flash = tau;
+        const BandReading bands = r.read(3);
+        ASSERT_EQ(bands.reading.state, SmearState::dot)
+            << bands.reading.reason << " " << exposure << " " << tau;
+        const Phase phase = phase_of(bands.reading, r.timing, Seconds(r.flash_width));
+        EXPECT_NEAR(phase.tau.value(), tau, 0.5 * 60e-6);
+        EXPECT_LT(std::abs(phase.tau.value() - tau), 3 * phase.sigma.value());
+      }
+    }
+  }
+}
+
+TEST(RollingBand, ABandThatReachesIntoTheNextFrameKeepsItsOwnFirstEdge) {
+  Roller r;
+  r.first_flash = 0.027;  // rows 450 and on, and the top of the next frame
+  r.exposure = 8e-3;
+  const BandReading bands = r.read(5);
+  ASSERT_EQ(bands.reading.state, SmearState::dot);
+  EXPECT_NEAR(bands.reading.dots[0].y.value(), 450, 1);
+}
+
+TEST(RollingBand, TheLengthOfABandIsTheExposure) {
+  const BandReading bands = Roller{}.read(2);
+  ASSERT_EQ(bands.lengths.size(), 1U);
+  EXPECT_NEAR(bands.lengths[0].value(), 4e-3 / 60e-6, 0.6);
+}
+
+TEST(RollingBand, AFlashInThePauseBetweenFramesIsBlindNotWrong) {
+  Roller r;
+  r.first_flash = 0.031;
+  r.exposure = 6e-3;
+  EXPECT_EQ(r.read(4).reading.state, SmearState::no_dot);
+  EXPECT_EQ(phase_of(r.read(4).reading, r.timing, Seconds(r.flash_width)).state, PhaseState::blind);
+}
+
+TEST(RollingBand, AnExposureOfThePeriodShowsNoEdge) {
+  Roller r;
+  r.exposure = 1 / 30.0;
+  EXPECT_EQ(r.read(4).reading.state, SmearState::steady);
+}
+
+TEST(RollingBand, AmbientLightAloneIsNoFlash) {
+  Roller r;
+  RowProfile dark = r.frame(0);
+  r.flash = 0;
+  EXPECT_EQ(read_bands(r.frame(1), Roller{}.reference()).reading.state, SmearState::no_lamp);
+  Roller faint;
+  const BandReference reference = faint.reference();
+  RowProfile noisy = faint.frame(2);
+  noisy.noise = 30;
+  EXPECT_THAT(read_bands(noisy, reference).reading.reason, HasSubstr("faint"));
+}
+
+TEST(RollingBand, SeveralBandsAFrameTellTheRowTime) {
+  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+    Roller r;
+    r.timing.direction = direction;
+    r.exposure = 0.4e-3;
+    const BandReference reference = r.reference();
+    r.flash_rate = 411.3;
+    std::vector<SmearReading> combs;
+    for (int i = 0; i < 24; ++i) {
+      combs.push_back(read_bands(r.frame(i), reference, {.direction = direction}).reading);
+      ASSERT_EQ(combs.back().state, SmearState::comb) << combs.back().reason;
+    }
+    const auto clock = fit_row_clock(combs, Hertz(r.flash_rate));
+    ASSERT_TRUE(clock.ok()) << clock.error().message();
+    EXPECT_NEAR(clock->row_time.value() * 1e9, 60e3, std::max(3 * clock->sigma.value() * 1e9, 3.0));
+    EXPECT_LT(clock->sigma.value(), 20e-9);
+  }
+}
+
+TEST(RollingBand, ADetunedStrobeGivesAPhaseBelowARow) {
+  Roller r;
+  r.flash_rate = 30 * (1 - 400e-6);
+  const BandReference reference = r.reference();
+  std::vector<PhaseSample> samples;
+  for (int i = 0; i < 300; ++i) {
+    samples.push_back(sample_of(read_bands(r.frame(i), reference).reading, r.timing, Seconds(r.flash_width),
+                                TimePoint{} + r.timing.frame_period * i));
+  }
+  const auto line = fit_drift(samples, {.period = r.timing.frame_period, .row_time = r.timing.row_time});
+  ASSERT_TRUE(line.ok());
+  const double at = (line->at - TimePoint{}).value();
+  const double truth =
+      r.first_flash + (at - r.first_flash) * (1 - r.timing.frame_period.value() * r.flash_rate);
+  EXPECT_NEAR(wrap_symmetric(line->tau.value() - truth, r.timing.frame_period.value()) / 60e-6, 0, 0.02);
+}
+
+TEST(RollingBand, AReferenceNeedsEveryRowLitAndDark) {
+  Roller r;
+  const std::vector<RowProfile> still(10, r.frame(0));
+  const auto refused = learn_band_reference(still);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().what, HasSubstr("row 0"));
+  EXPECT_FALSE(learn_band_reference({}).ok());
+  EXPECT_EQ(read_bands(r.frame(0), {}).reading.state, SmearState::ambiguous);
+}
+
+TEST(RollingBand, TheProfileOfAPictureIsTheMeanOfItsRows) {
+  Image image({{64, 20}, PixelFormat::gray8, 8});
+  for (int y = 0; y < 20; ++y) {
+    for (int x = 0; x < 64; ++x) image.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(y * 3 + x % 2);
+  }
+  const RowProfile profile = row_profile(image.view());
+  ASSERT_EQ(profile.level.size(), 20U);
+  for (int y = 0; y < 20; ++y) EXPECT_NEAR(profile.level[static_cast<std::size_t>(y)], y * 3 + 0.5, 1e-9);
+  EXPECT_GT(profile.noise, 0);
+  EXPECT_TRUE(row_profile({}).level.empty());
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cinttypes>
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
@@ -286,7 +287,8 @@ Result<std::vector<bool>> flash_pattern(const FrameCode& code) {
   std::vector<bool> pattern(static_cast<std::size_t>(code.flashes()), true);
   for (int w = 0; w < code.words; ++w) {
     for (int i = 0; i < kWordLength; ++i) {
-      pattern[static_cast<std::size_t>(w * code.spacing + i)] =
+      const int flash = w * code.spacing + i;
+      pattern[static_cast<std::size_t>(flash)] =
           still[static_cast<std::size_t>(i)] != turned[static_cast<std::size_t>((i + w) % kWordLength)];
     }
   }
@@ -367,8 +369,10 @@ FrameOffset frame_offset(const NumberedRun& a, const NumberedRun& b, const Frame
   offset.frames = std::llround(nearest);
   offset.lag = (nearest - static_cast<double>(offset.frames)) * b.flashes_per_frame;
   offset.confidence = a.confidence * b.confidence;
-  offset.reason = text("frame %lld of one camera and %lld of the other start %.3f periods apart",
-                       static_cast<long long>(i), static_cast<long long>(i + offset.frames), offset.lag);
+  const std::int64_t match = i + offset.frames;
+  offset.reason =
+      text("frame %" PRId64 " of one camera and %" PRId64 " of the other start %.3f periods apart", i, match,
+           offset.lag);
   if (a.start_slack + b.start_slack > 0.5 - std::abs(offset.lag))
     offset.reason += "; it may be one frame more or less: a phase isn't known";
   return offset;

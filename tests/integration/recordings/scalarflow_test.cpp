@@ -46,7 +46,6 @@ void shrink(View& view) {
 class ScalarFlowTest : public testing::Test {
  protected:
   void SetUp() override {
-    if (!fs::exists(transforms())) GTEST_SKIP() << "no recording at " << transforms();
     auto scene = load_scene(transforms());
     ASSERT_TRUE(scene.ok()) << scene.error().message();
     scene_ = std::move(scene).value();

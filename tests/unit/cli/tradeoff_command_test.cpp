@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -15,6 +14,7 @@
 #include "recon/export/picture.h"
 #include "recon/preprocess/radiance.h"
 #include "tests/support/small_flame.h"
+#include "tests/support/verb.h"
 
 namespace emberlock::cli {
 namespace {
@@ -58,30 +58,9 @@ class TradeoffCommandTest : public testing::Test {
   }
   void TearDown() override { fs::remove_all(root_); }
 
-  struct Run {
-    int exit_code = 0;
-    std::string out;
-    std::string err;
-  };
-  [[nodiscard]] static Run run(std::vector<std::string> words) {
-    std::reverse(words.begin(), words.end());  // CLI11 takes them last first
-    CLI::App app{"", "emberlock"};
-    add_tradeoff(app);
-    add_reconstruct(app);
-    Run result;
-    testing::internal::CaptureStdout();
-    testing::internal::CaptureStderr();
-    try {
-      app.parse(words);
-    } catch (const CLI::RuntimeError& e) {
-      result.exit_code = e.get_exit_code();
-    } catch (const CLI::ParseError& e) {
-      result.exit_code = 2;
-      result.err = e.what();
-    }
-    result.out = testing::internal::GetCapturedStdout();
-    result.err += testing::internal::GetCapturedStderr();
-    return result;
+  using Run = test::VerbRun;
+  [[nodiscard]] static Run run(const std::vector<std::string>& words) {
+    return test::run_verb(words.front() == "tradeoff" ? add_tradeoff : add_reconstruct, words);
   }
   /// A sweep of two numbers of voxels, with further words.
   [[nodiscard]] Run tradeoff(std::vector<std::string> more) const {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/format.h>
+
 #include "smear_sync/align_choice.h"
 #include "smear_sync/align_forecast.h"
 #include "smear_sync/align_trim.h"
@@ -206,10 +208,11 @@ bool affordable(AlignState& state, AlignDecision& decision, const Context& c, co
   const double rows = c.options.tolerance.in_rows(c.options.row_time).value();
   if (c.tolerance < kTellable * noise) {
     decision.verdict = AlignVerdict::refused;
-    decision.reason = format("%.2g rows can't be told: phases are known to %.2g rows. Ask for %.2g rows",
-                             rows, (noise / c.options.row_time).value(),
-                             std::ceil(10 * kTellable * (noise / c.options.row_time).value()) / 10) +
-                      " or more, or let the flash be about a row long";
+    decision.reason =
+        fmt::format("{:.2g} rows can't be told: phases are known to {:.2g} rows. Ask for {:.2g} rows", rows,
+                    (noise / c.options.row_time).value(),
+                    std::ceil(10 * kTellable * (noise / c.options.row_time).value()) / 10) +
+        " or more, or let the flash be about a row long";
     return false;
   }
   if (decision.effort->within >= c.options.limits->probability) {

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <optional>
 
+#include <fmt/format.h>
+
 #include "smear_sync/align_words.h"
 
 namespace emberlock {
@@ -82,7 +84,7 @@ AlignTarget plan(const AlignState& state, const Timing& timing, const std::vecto
 
 std::string words(Seconds error, const ServoStep& step, SecondsPerRow row_time) {
   std::string stands = standing(error, row_time);
-  const std::string by = format(" %+.1f ppm", step.trim.value());
+  const std::string by = fmt::format(" {:+.1f} ppm", step.trim.value());
   switch (step.state) {
     case ServoState::slewing:
       return stands + ": comes at full rate, trimmed by" + by;

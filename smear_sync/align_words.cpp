@@ -2,11 +2,13 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
+
 namespace emberlock {
 
 std::string standing(Seconds error, SecondsPerRow row_time) {
-  return format("reads %.1f rows (%.3f ms) %s the target", std::abs((error / row_time).value()),
-                std::abs(in_milliseconds(error)), error.value() >= 0 ? "before" : "after");
+  return fmt::format("reads {:.1f} rows ({:.3f} ms) {} the target", std::abs((error / row_time).value()),
+                     std::abs(in_milliseconds(error)), error.value() >= 0 ? "before" : "after");
 }
 
 std::string plural(std::size_t count, const std::string& one) {
@@ -15,13 +17,13 @@ std::string plural(std::size_t count, const std::string& one) {
 
 std::string words(Seconds time) {
   const double s = time.value();
-  if (s < 100) return format("%.*f s", s < 10 ? 1 : 0, s);
-  if (s < 6000) return format("%.1f min", s / 60);
-  return format("%.1f h", s / 3600);
+  if (s < 100) return fmt::format("{:.{}f} s", s, s < 10 ? 1 : 0);
+  if (s < 6000) return fmt::format("{:.1f} min", s / 60);
+  return fmt::format("{:.1f} h", s / 3600);
 }
 
 std::string words(const AlignEffort& effort) {
-  return format("%.0f resets (95 %%: %d) and ", effort.resets, effort.resets_p95) + words(effort.time) +
+  return fmt::format("{:.0f} resets (95 %: {}) and ", effort.resets, effort.resets_p95) + words(effort.time) +
          " (95 %: " + words(effort.time_p95) + ")";
 }
 
@@ -30,17 +32,17 @@ std::string refusal(const AlignEffort& effort, const std::vector<AlignOffer>& of
   const AlignLimits limits = options.limits.value_or(AlignLimits{});
   const double rows = options.tolerance.in_rows(options.row_time).value();
   std::string text =
-      format("%.1f rows by %s are met with a probability of %.0f %% within %d resets and ", rows,
-             std::string(name(options.policy)).c_str(), 100 * effort.within, limits.resets) +
-      words(limits.time) + format(", and %.0f %% are asked for", 100 * limits.probability);
+      fmt::format("{:.1f} rows by {} are met with a probability of {:.0f} % within {} resets and ", rows,
+                  name(options.policy), 100 * effort.within, limits.resets) +
+      words(limits.time) + fmt::format(", and {:.0f} % are asked for", 100 * limits.probability);
   if (offers.empty()) return text + "; allow more resets or time";
   text += ". What could be met: ";
   for (std::size_t i = 0; i < offers.size(); ++i) {
     const AlignOffer& offer = offers[i];
     text += (i == 0 ? "" : "; ") +
-            format("%.1f rows by %s with ", offer.tolerance.in_rows(options.row_time).value(),
-                   std::string(name(offer.policy)).c_str()) +
-            words(offer.effort) + format(", at %.0f %%", 100 * offer.effort.within);
+            fmt::format("{:.1f} rows by {} with ", offer.tolerance.in_rows(options.row_time).value(),
+                        name(offer.policy)) +
+            words(offer.effort) + fmt::format(", at {:.0f} %", 100 * offer.effort.within);
   }
   return text;
 }

@@ -1,19 +1,12 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdio>
 #include <string>
 
 #include "smear_sync/align.h"
 
 // The sentences of the alignment's decisions, and what its steps share.
 namespace emberlock {
-
-std::string format(const char* pattern, auto... values) {
-  char text[200];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
 
 /// "reads 34.2 rows (1.847 ms) before the target"
 std::string standing(Seconds error, SecondsPerRow row_time);

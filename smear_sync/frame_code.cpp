@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cinttypes>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <limits>
+
+#include <fmt/format.h>
 
 namespace emberlock {
 namespace {
@@ -20,13 +20,6 @@ constexpr int kPhases = 32;         // tried where the phase isn't known: one li
 constexpr double kTie = 1;          // log-likelihoods that differ by less don't decide
 constexpr double kPlaceSlack = 3;   // a loss may lie where it is at most e^3 less likely than at best
 constexpr std::size_t kFewest = 8;  // frames
-
-template <class... Values>
-std::string text(const char* format, Values... values) {
-  char buffer[256];
-  std::snprintf(buffer, sizeof buffer, format, values...);
-  return buffer;
-}
 
 /// A maximum-length sequence by its recurrence: a flash is the sum modulo 2 of those `lags` before it.
 template <std::size_t N>
@@ -268,13 +261,13 @@ std::string why_not(std::span<const CodeFrame> frames, const DecodeOptions& o) {
     yes += f.seen == FlashSeen::yes ? 1U : 0U;
     no += f.seen == FlashSeen::no ? 1U : 0U;
   }
-  if (yes + no < kFewest) return text("only %zu frames tell whether the strobe lit them", yes + no);
+  if (yes + no < kFewest) return fmt::format("only {} frames tell whether the strobe lit them", yes + no);
   if (no == 0)
-    return text("no frame lacks its flash: let the strobe play the code, and film more than %d frames",
-                o.code.spacing);
+    return fmt::format("no frame lacks its flash: let the strobe play the code, and film more than {} frames",
+                       o.code.spacing);
   if (yes == 0) return "no frame shows the lamp";
-  return text(
-      "what is lit fits no part of the code: film more than %d frames, exposed for the whole frame period",
+  return fmt::format(
+      "what is lit fits no part of the code: film more than {} frames, exposed for the whole frame period",
       o.code.spacing);
 }
 
@@ -356,8 +349,8 @@ Result<FrameNumbers> number_frames(std::span<const CodeFrame> frames, const Deco
   }
   std::size_t numbered = 0;
   for (const Stretch& run : runs) numbered += run.end - run.begin;
-  numbers.reason = text("%zu of %zu frames numbered by the skipped flashes, %zu misread, %zu losses",
-                        numbered, frames.size(), misread, numbers.drops.size());
+  numbers.reason = fmt::format("{} of {} frames numbered by the skipped flashes, {} misread, {} losses",
+                               numbered, frames.size(), misread, numbers.drops.size());
   return numbers;
 }
 
@@ -370,9 +363,8 @@ FrameOffset frame_offset(const NumberedRun& a, const NumberedRun& b, const Frame
   offset.lag = (nearest - static_cast<double>(offset.frames)) * b.flashes_per_frame;
   offset.confidence = a.confidence * b.confidence;
   const std::int64_t match = i + offset.frames;
-  offset.reason =
-      text("frame %" PRId64 " of one camera and %" PRId64 " of the other start %.3f periods apart", i, match,
-           offset.lag);
+  offset.reason = fmt::format("frame {} of one camera and {} of the other start {:.3f} periods apart", i,
+                              match, offset.lag);
   if (a.start_slack + b.start_slack > 0.5 - std::abs(offset.lag))
     offset.reason += "; it may be one frame more or less: a phase isn't known";
   return offset;

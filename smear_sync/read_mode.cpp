@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <set>
 #include <vector>
 
 #include <Eigen/Dense>
+#include <fmt/format.h>
 
 namespace emberlock {
 namespace {
@@ -24,13 +24,6 @@ constexpr int kFewestFrames = 3;
 constexpr double kRateSigmas = 3;
 
 double square(double x) { return x * x; }
-
-template <class... Values>
-std::string text(const char* format, Values... values) {
-  char buffer[256];
-  std::snprintf(buffer, sizeof buffer, format, values...);
-  return buffer;
-}
 
 struct Dot {
   double frame = 0;  ///< against the middle one
@@ -188,26 +181,26 @@ void decide_direction(const Walk& top_first, const Walk& bottom_first, std::size
   const double flash_period = 1 / o.flash_rate.value();
   const double walk = wrap_symmetric(-1 / o.frame_rate.value(), flash_period) / o.row_time.value();
   if (dots < kFewestDots || frames < kFewestFrames) {
-    mode.direction_reason = text("only %d frames show dots: film the strobe for longer", frames);
+    mode.direction_reason = fmt::format("only {} frames show dots: film the strobe for longer", frames);
     return;
   }
   if (follow < kLeastPart * static_cast<double>(dots)) {
-    mode.direction_reason = text(
-        "the dots walk neither way as %.4f flashes a second at %.4f frames a second would: "
+    mode.direction_reason = fmt::format(
+        "the dots walk neither way as {:.4f} flashes a second at {:.4f} frames a second would: "
         "check both rates, and that no frames were lost",
         o.flash_rate.value(), o.frame_rate.value());
     return;
   }
   if (std::abs(top_first.cost - bottom_first.cost) < kDecisive) {
-    mode.direction_reason = text(
-        "flashes at %.4f/s walk %.3f rows a frame, which tells too little in %d frames: detune the "
-        "strobe by about %.3f flashes a second",
+    mode.direction_reason = fmt::format(
+        "flashes at {:.4f}/s walk {:.3f} rows a frame, which tells too little in {} frames: detune the "
+        "strobe by about {:.3f} flashes a second",
         o.flash_rate.value(), walk, frames, 0.01 * o.frame_rate.value());
     return;
   }
   mode.direction = top ? ReadDirection::top_first : ReadDirection::bottom_first;
-  mode.direction_reason = text("the dots walk as with the %s row read first, to %.2f rows RMS",
-                               top ? "top" : "bottom", best.residual);
+  mode.direction_reason = fmt::format("the dots walk as with the {} row read first, to {:.2f} rows RMS",
+                                      top ? "top" : "bottom", best.residual);
 }
 
 /// K from how far apart the two sides of the lamp stand: c_after - c_first = T - K t_row modulo P.
@@ -237,16 +230,17 @@ void find_shifts(const Walk& walk, const ReadModeOptions& o, ReadMode& mode) {
   }
   if (fitting.size() == 1) {
     mode.shifts = fitting.front();
-    mode.shifts_reason =
-        text("the two sides of the lamp say %.2f +- %.2f rows", mode.shifts_measured.value(), sigma);
+    mode.shifts_reason = fmt::format("the two sides of the lamp say {:.2f} +- {:.2f} rows",
+                                     mode.shifts_measured.value(), sigma);
   } else if (fitting.empty()) {
-    mode.shifts_reason = text(
-        "%.2f rows, which the two sides of the lamp say, lie outside of n = %d to T / t_row = %.1f: "
+    mode.shifts_reason = fmt::format(
+        "{:.2f} rows, which the two sides of the lamp say, lie outside of n = {} to T / t_row = {:.1f}: "
         "check t_row and the number of rows",
         mode.shifts_measured.value(), o.rows, frame_period / row_time);
   } else {
-    mode.shifts_reason = text("%d to %d fit, modulo %.2f rows: film for longer, with fewer flashes a second",
-                              fitting.front(), fitting.back(), modulo);
+    mode.shifts_reason =
+        fmt::format("{} to {} fit, modulo {:.2f} rows: film for longer, with fewer flashes a second",
+                    fitting.front(), fitting.back(), modulo);
   }
 }
 

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+
+#include <fmt/format.h>
 
 #include "base/log.h"
 
@@ -13,32 +14,26 @@ constexpr Hertz kSlowest{30.0 / 60};
 constexpr Hertz kFastest{20000.0 / 60};
 constexpr std::size_t kLongestCode = 4096;
 
-template <class... Words>
-std::string text(const Words&... words) {
-  std::ostringstream out;
-  (out << ... << words);
-  return out.str();
-}
-
 Status check(const StrobeSettings& s, const std::string& id) {
   const auto refuse = [&](std::string what, std::string remedy) {
     return Error{ErrorKind::bad_input, std::move(what), "strobe " + id, std::move(remedy)};
   };
   // Negated comparisons refuse NaN too.
   if (!(s.rate >= kSlowest && s.rate <= kFastest)) {
-    return refuse(text("the rate is ", s.rate.value(), " flashes a second"), "give 0.5 to 333.33");
+    return refuse(fmt::format("the rate is {} flashes a second", s.rate.value()), "give 0.5 to 333.33");
   }
   const Seconds longest = period(s.rate);
   if (!(s.phase >= Seconds(0) && s.phase < longest)) {
-    return refuse(text("the phase is ", s.phase.value(), " s"),
-                  text("give at least 0 and less than ", longest.value(), " s"));
+    return refuse(fmt::format("the phase is {} s", s.phase.value()),
+                  fmt::format("give at least 0 and less than {} s", longest.value()));
   }
   if (!(s.width > Seconds(0) && s.width < longest)) {
-    return refuse(text("the flash width is ", s.width.value(), " s"),
-                  text("give more than 0 and less than ", longest.value(), " s"));
+    return refuse(fmt::format("the flash width is {} s", s.width.value()),
+                  fmt::format("give more than 0 and less than {} s", longest.value()));
   }
   if (s.code.size() > kLongestCode) {
-    return refuse(text("the code has ", s.code.size(), " flashes"), text("give at most ", kLongestCode));
+    return refuse(fmt::format("the code has {} flashes", s.code.size()),
+                  fmt::format("give at most {}", kLongestCode));
   }
   return {};
 }

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include <fmt/format.h>
 
 #include "recon/adjust/find_extinction.h"
 #include "recon/adjust/predict_effects.h"
@@ -12,22 +13,16 @@
 namespace emberlock {
 namespace {
 
-std::string text(const char* format, double a, double b) {
-  char buffer[160];
-  std::snprintf(buffer, sizeof buffer, format, a, b);
-  return buffer;
-}
-
 std::string explain(const FoundExtinction& found) {
   const double even = found.extinction.value.value();
   const double soot = found.extinction.soot.value();
   if (soot <= 0)
-    return text("an even %.3g / m fits the pictures best, to %.3g grey levels on a coarse grid", even,
-                found.error);
+    return fmt::format("an even {:.3g} / m fits the pictures best, to {:.3g} grey levels on a coarse grid",
+                       even, found.error);
   if (even <= 0)
-    return text("%.3g / m like soot fits the pictures best, to %.3g grey levels on a coarse grid", soot,
-                found.error);
-  return text("%.3g / m even and %.3g / m like soot fit the pictures best", even, soot);
+    return fmt::format("{:.3g} / m like soot fits the pictures best, to {:.3g} grey levels on a coarse grid",
+                       soot, found.error);
+  return fmt::format("{:.3g} / m even and {:.3g} / m like soot fit the pictures best", even, soot);
 }
 
 /// The background and the clipped pixels: before the flame can be looked at, these must be known.
@@ -96,9 +91,10 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   } else {
     report.on = report.predicted_change >= request.tolerance;
     report.reason =
-        report.on ? explain(found)
-                  : text("the best fit, %.3g / m, changes the pictures by less than %.2g grey levels",
-                         found.extinction.value.value() + found.extinction.soot.value(), request.tolerance);
+        report.on
+            ? explain(found)
+            : fmt::format("the best fit, {:.3g} / m, changes the pictures by less than {:.2g} grey levels",
+                          found.extinction.value.value() + found.extinction.soot.value(), request.tolerance);
     decided.extinction = report.on ? found.extinction : Extinction{};
   }
   report.seconds = (elapsed ? elapsed() : Seconds(0)) - start;

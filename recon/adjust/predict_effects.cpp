@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include <fmt/format.h>
 
 #include "recon/effects/background.h"
 #include "recon/preprocess/picture_clues.h"
@@ -11,13 +12,6 @@ namespace emberlock {
 namespace {
 
 constexpr InScatterOptions kProbe{12, 2, 1e-2, 50};
-
-template <class... Values>
-std::string text(const char* format, Values... values) {
-  char buffer[200];
-  std::snprintf(buffer, sizeof buffer, format, values...);
-  return buffer;
-}
 
 /// The extinction alone: what every other effect is probed on top of.
 Effects extinction_of(const Effects& effects) {
@@ -110,8 +104,8 @@ class Predictor {
   bool decide(const char* name, double change, Seconds cost, const std::string& what,
               const char* if_off = "") {
     const bool on = by_hand() || calls_for(change);
-    std::string does = what + text(" changes the pictures by %.2g grey levels", change);
-    if (!on) does += text(", less than %.2g%s", request_.tolerance, if_off);
+    std::string does = what + fmt::format(" changes the pictures by {:.2g} grey levels", change);
+    if (!on) does += fmt::format(", less than {:.2g}{}", request_.tolerance, if_off);
     report(name, on, change, cost, by_hand() ? "set by hand: " + does : does);
     return on;
   }
@@ -180,7 +174,8 @@ void Predictor::choose_scattering() {
     }
   }
   const char* order = scattering.order == Order::single ? "single" : "multiple";
-  std::string what = text("%s scattering with an albedo of %.2g%s", order, scattering.albedo, assumed());
+  std::string what =
+      fmt::format("{} scattering with an albedo of {:.2g}{}", order, scattering.albedo, assumed());
   if (scattering.asymmetry == 0)
     what += ", which looks the same from all sides and only tells scattered from emitted light,";
   const Seconds cost = shot.preparation + volume_cost(shot, without_);
@@ -195,7 +190,7 @@ void Predictor::choose_phase_function(const Shot& shot, Scattering& scattering) 
   isotropic.asymmetry = 0;
   const Shot even = scatter(isotropic);
   const Seconds cost = std::max(Seconds(0), shot.preparation - even.preparation) + volume_cost(shot, even);
-  const std::string what = text("g = %.2g%s", scattering.asymmetry, assumed());
+  const std::string what = fmt::format("g = {:.2g}{}", scattering.asymmetry, assumed());
   const char* isotropic_then =
       ": scattering looks the same from all sides and only tells scattered from emitted light";
   if (!decide("phase function", change(shot, even), cost, what, isotropic_then)) scattering = isotropic;
@@ -223,8 +218,8 @@ void Predictor::choose_refraction() {
   const Shot without = shoot(few, plain_);
   const Shot with = shoot(few, probe, options);
   const double changed = change(with, without) / kColder;
-  const std::string what = text("gas of %.4g K in air of %.4g K%s", bent.refraction.flame.value(),
-                                bent.refraction.ambient.value(), assumed());
+  const std::string what = fmt::format("gas of {:.4g} K in air of {:.4g} K{}", bent.refraction.flame.value(),
+                                       bent.refraction.ambient.value(), assumed());
   if (decide("refraction", changed, pixel_cost(with, without, few.stride()), what))
     choice_.effects.refraction = bent.refraction;
 }
@@ -246,9 +241,10 @@ void Predictor::choose_background() {
     if (!border) return leave_out("background", "no background picture, and the flame covers all borders");
     lit.background = {Kind::constant, border->level};
     const auto& level = border->level;
-    what = text("a level of %.1f / %.1f / %.1f at the borders", level[0], level[1], level[2]);
+    what = fmt::format("a level of {:.1f} / {:.1f} / {:.1f} at the borders", level[0], level[1], level[2]);
     if (calls_for(border->unevenness))
-      what += text(" (uneven by %.1f: pictures of the background would tell more)", border->unevenness);
+      what +=
+          fmt::format(" (uneven by {:.1f}: pictures of the background would tell more)", border->unevenness);
   }
   const Shot with = shoot(lit);
   if (decide("background", change(with, without_), pixel_cost(with, without_, pictures_.stride()), what))
@@ -274,7 +270,7 @@ void Predictor::choose_exposure() {
   const Shot with = shoot(blurred);
   const double changed = change(with, without_) / std::pow(longer, kGrowth);
   const std::string what =
-      text("a shutter open for %.3g s at %.2g m/s", exposure.time.value(), exposure.rise_speed);
+      fmt::format("a shutter open for {:.3g} s at {:.2g} m/s", exposure.time.value(), exposure.rise_speed);
   if (decide("exposure", changed, volume_cost(with, without_), what)) choice_.effects.exposure = exposure;
 }
 
@@ -288,7 +284,7 @@ void Predictor::choose_gamma() {
   bent.sensor.clipping = Sensor::Clipping::none;
   const Shot with = shoot(bent);
   const Seconds cost = pixel_cost(with, without_, pictures_.stride());
-  if (decide("gamma", change(with, without_), cost, text("gamma %.3g", bent.sensor.gamma)))
+  if (decide("gamma", change(with, without_), cost, fmt::format("gamma {:.3g}", bent.sensor.gamma)))
     choice_.effects.sensor = bent.sensor;
 }
 
@@ -298,8 +294,8 @@ void Predictor::choose_saturation() {
   const double white = by_hand() ? told : clip_level(flame_.scene, boxes_, told);
   if (white <= 0) return leave_out("saturation", "no pixels pile up at white");
   const ClippedPixels clipped = clipped_pixels(flame_.scene, boxes_, white);
-  const std::string what = text("what is missing in the %.2g %% of the flame's pixels at white (%.4g)",
-                                100 * clipped.share, white);
+  const std::string what = fmt::format(
+      "what is missing in the {:.2g} % of the flame's pixels at white ({:.4g})", 100 * clipped.share, white);
   if (!decide("saturation", clipped.excess, Seconds(0), what)) return;
   Sensor& sensor = choice_.effects.sensor;
   sensor.clipping = Sensor::Clipping::at_white;

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 #include <string>
+
+#include <fmt/format.h>
 
 #include "recon/compute/pool.h"
 #include "recon/hull/hull_cuda.h"
@@ -118,8 +119,7 @@ Error empty_hull(const std::vector<Seen>& seen, const Grid& grid, Pool& pool) {
       worst = &s;
     }
   }
-  char threshold[32];
-  std::snprintf(threshold, sizeof threshold, "%.3g", worst->mask->threshold);
+  const std::string threshold = fmt::format("{:.3g}", worst->mask->threshold);
   const std::string share = least == 0 ? "everything" : "most";
   const std::string flame = worst->mask->box.empty() ? "it has no pixel" : "its pixels";
   return {ErrorKind::bad_input,

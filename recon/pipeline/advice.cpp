@@ -1,8 +1,9 @@
 #include "recon/pipeline/advice.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <limits>
+
+#include <fmt/format.h>
 
 #include "recon/pipeline/shipped_front.h"
 #include "recon/preprocess/flame_mask.h"
@@ -38,11 +39,9 @@ std::string bought(const Report& report, ErrorAt error) {
   if (trace.size() < 4) return {};
   const TracePoint& half = trace[(trace.size() - 1) / 2];
   const TracePoint& last = trace.back();
-  char text[200];
-  std::snprintf(
-      text, sizeof text, "iterations %d to %d (%.2f s to %.2f s) lowered the error from %.2f to %.2f; ",
-      half.iteration, last.iteration, half.time.value(), last.time.value(), error(half), error(last));
-  return text;
+  return fmt::format("iterations {} to {} ({:.2f} s to {:.2f} s) lowered the error from {:.2f} to {:.2f}; ",
+                     half.iteration, last.iteration, half.time.value(), last.time.value(), error(half),
+                     error(last));
 }
 
 }  // namespace
@@ -58,35 +57,28 @@ std::string next_step(const Report& report) {
   const double last = error(trace.back());
   const auto best = std::min_element(trace.begin(), trace.end(),
                                      [&](const auto& p, const auto& q) { return error(p) < error(q); });
-  char text[240];
   if (const double rise = last - error(*best); rise > 0.005 * last) {
-    std::snprintf(
-        text, sizeof text,
-        "more iterations don't help: the %s error was lowest after iteration %d (%.2f) and ended at %.2f",
+    return fmt::format(
+        "more iterations don't help: the {} error was lowest after iteration {} ({:.2f}) and ended at {:.2f}",
         which, best->iteration, error(*best), last);
-    return text;
   }
   const TracePoint& before = trace[trace.size() - 2];
   const Step step = trace.size() >= 4
                         ? next_half(report, error)
                         : Step{"one more iteration costs", (trace.back().time - before.time).value(),
                                std::max(0.0, error(before) - last)};
-  std::snprintf(text, sizeof text,
-                "%s about %.2g s and would lower the %s error (%.2f) by at most about %.2g", step.length,
-                step.seconds, which, last, step.gain);
-  return bought(report, error) + text;
+  return bought(report, error) +
+         fmt::format("{} about {:.2g} s and would lower the {} error ({:.2f}) by at most about {:.2g}",
+                     step.length, step.seconds, which, last, step.gain);
 }
 
 std::string more_voxels(const Report& report) {
   const int voxels = *std::max_element(report.voxels.begin(), report.voxels.end());
   const int finest = report.finest_voxels;
   if (!report.heldout_rmse || report.solver != "default" || finest < 1 || voxels < 1) return {};
-  char text[240];
   if (voxels >= finest) {
-    std::snprintf(text, sizeof text,
-                  "more voxels bring little: %d are what the pictures can show (two for three pixels)",
-                  finest);
-    return text;
+    return fmt::format("more voxels bring little: {} are what the pictures can show (two for three pixels)",
+                       finest);
   }
   const int more = std::min(finest, voxels + (voxels + 1) / 2);
   const std::vector<WorkPoint> front = scaled(shipped_front(), finest, 1, 1);
@@ -99,17 +91,13 @@ std::string more_voxels(const Report& report) {
   const double error = all_channels(*report.heldout_rmse);
   const double seconds = report.total_time.value() * std::max(1.0, then.seconds / now.seconds);
   if (then.error > kNoGain * now.error) {
-    std::snprintf(text, sizeof text,
-                  "by the shipped front, %d voxels instead of %d don't lower the held-out error", more,
-                  voxels);
-    return text;
+    return fmt::format("by the shipped front, {} voxels instead of {} don't lower the held-out error", more,
+                       voxels);
   }
-  std::snprintf(
-      text, sizeof text,
-      "by the shipped front, %d voxels instead of %d would take about %.2g s instead of %.2g and bring "
-      "the held-out error from %.2f to about %.2f",
+  return fmt::format(
+      "by the shipped front, {} voxels instead of {} would take about {:.2g} s instead of {:.2g} and bring "
+      "the held-out error from {:.2f} to about {:.2f}",
       more, voxels, seconds, report.total_time.value(), error, error * then.error / now.error);
-  return text;
 }
 
 std::vector<std::string> next_steps(const Report& report) {

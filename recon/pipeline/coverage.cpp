@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
+
+#include <fmt/format.h>
 
 namespace emberlock {
 namespace {
@@ -34,13 +35,10 @@ std::vector<std::string> coverage_warnings(const Scene& scene) {
     }
   }
   if (const double spread = spread_degrees(directions); spread < kSimilarDegrees) {
-    char text[200];
-    std::snprintf(
-        text, sizeof text,
-        "the %zu input view%s lie within %.0f degrees of one line: depth along it is a guess, whatever the "
+    warnings.push_back(fmt::format(
+        "the {} input view{} lie within {:.0f} degrees of one line: depth along it is a guess, whatever the "
         "input error says",
-        directions.size(), directions.size() == 1 ? "" : "s", std::ceil(spread));
-    warnings.emplace_back(text);
+        directions.size(), directions.size() == 1 ? "" : "s", std::ceil(spread)));
   } else if (directions.size() <= kFewViews) {
     warnings.emplace_back("only " + std::to_string(directions.size()) +
                           " input views: many volumes give the same pictures, add views to tell them apart");

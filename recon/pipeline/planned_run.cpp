@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
+
+#include <fmt/format.h>
 
 #include "recon/pipeline/grid_choice.h"
 #include "recon/pipeline/reference_run.h"
@@ -18,13 +19,6 @@ constexpr double kRenderReserve = 1.2;  // the same for the rendering, which not
 constexpr int kMostAttempts = 3;
 constexpr double kWorthTrying = 0.97;  // of the error reached: a smaller gain is not worth another attempt
 constexpr double kLargestCorrection = 4;
-
-template <class... Numbers>
-std::string text(const char* format, Numbers... numbers) {
-  char buffer[300];
-  std::snprintf(buffer, sizeof buffer, format, numbers...);
-  return buffer;
-}
 
 double heldout_error(const Outcome& outcome) {
   return all_channels(outcome.report.trace.back().heldout_rmse);
@@ -87,12 +81,12 @@ class Choices {
   /// What it would take to reach an error, were every setting open.
   [[nodiscard]] std::string needed(double error) const {
     if (const WorkPoint* p = quickest_reaching(all_, error)) {
-      return text("by the front, about %.2g s with %d voxels and effects %s would reach it", p->seconds,
-                  p->settings.voxels, p->settings.effects.c_str());
+      return fmt::format("by the front, about {:.2g} s with {} voxels and effects {} would reach it",
+                         p->seconds, p->settings.voxels, p->settings.effects);
     }
     const WorkPoint* best = best_within(all_, INFINITY);
-    return text(
-        "the front ends at about %.2f grey levels (%d voxels, %.2g s): more views or a better model "
+    return fmt::format(
+        "the front ends at about {:.2f} grey levels ({} voxels, {:.2g} s): more views or a better model "
         "would be needed, time alone doesn't reach it",
         best->error, best->settings.voxels, best->seconds);
   }
@@ -176,7 +170,7 @@ class PlannedRun {
 
   Outcome from_reference() {
     plan_.words.push_back(
-        text("%.3g s left no time for more than the reference run", asked_.solve.budget->value()));
+        fmt::format("{:.3g} s left no time for more than the reference run", asked_.solve.budget->value()));
     const Grid& grid = reference_.reconstruction.hull.grid;
     plan_.voxels = std::max({grid.nx, grid.ny, grid.nz}) - 1;
     plan_.iterations = reference_.reconstruction.iterations;
@@ -220,18 +214,19 @@ class PlannedRun {
     plan_.iterations = options.solve.iterations;
     plan_.effects_searched = !options.effects || !options.effects->fixed;
     plan_.predicted_time = Seconds(point.seconds);
-    const std::string iterations = plan_.iterations > 0 ? text("at most %d iteration%s", plan_.iterations,
-                                                               plan_.iterations == 1 ? "" : "s")
-                                                        : "iterations by the solver's rule";
+    const std::string iterations =
+        plan_.iterations > 0
+            ? fmt::format("at most {} iteration{}", plan_.iterations, plan_.iterations == 1 ? "" : "s")
+            : "iterations by the solver's rule";
     const char* effects =
         plan_.effects_searched ? "searched for" : (asked_.effects ? "set by hand" : "left out");
-    std::string words = text("%d voxels, %s, effects %s: by the front about %.2g s", plan_.voxels,
-                             iterations.c_str(), effects, point.seconds);
+    std::string words = fmt::format("{} voxels, {}, effects {}: by the front about {:.2g} s", plan_.voxels,
+                                    iterations, effects, point.seconds);
     if (judged()) {
       plan_.predicted_rmse = point.error;
-      words += text(" and %.2g grey levels", point.error);
+      words += fmt::format(" and {:.2g} grey levels", point.error);
     }
-    plan_.words.push_back(words + text(" (reference run: %.2g s)", reference_.seconds.value()));
+    plan_.words.push_back(words + fmt::format(" (reference run: {:.2g} s)", reference_.seconds.value()));
   }
 
   /// Grey levels above the target.
@@ -254,20 +249,20 @@ class PlannedRun {
     if (plan_.target_rmse) {
       plan_.missed_by = missed(best);
       if (plan_.missed_by > 0) {
-        plan_.words.push_back(
-            text("the target of %.3g grey levels was missed by %.2f: ", *plan_.target_rmse, plan_.missed_by) +
-            choices.needed(*plan_.target_rmse));
+        plan_.words.push_back(fmt::format("the target of {:.3g} grey levels was missed by {:.2f}: ",
+                                          *plan_.target_rmse, plan_.missed_by) +
+                              choices.needed(*plan_.target_rmse));
       } else {
-        plan_.words.push_back(text("the target of %.3g grey levels was reached after %.2g s",
-                                   *plan_.target_rmse,
-                                   result.trace.empty() ? 0.0 : result.trace.back().time.value()));
+        plan_.words.push_back(fmt::format("the target of {:.3g} grey levels was reached after {:.2g} s",
+                                          *plan_.target_rmse,
+                                          result.trace.empty() ? 0.0 : result.trace.back().time.value()));
       }
     }
     if (plan_.budget) {
       plan_.over_budget = std::max(Seconds(0), result.total_time - *plan_.budget);
       if (plan_.over_budget.value() > 0) {
-        plan_.words.push_back(text("the budget of %.3g s was exceeded by %.2g s", plan_.budget->value(),
-                                   plan_.over_budget.value()));
+        plan_.words.push_back(fmt::format("the budget of {:.3g} s was exceeded by {:.2g} s",
+                                          plan_.budget->value(), plan_.over_budget.value()));
       }
     }
     result.plan = plan_;

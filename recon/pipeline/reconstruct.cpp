@@ -1,8 +1,9 @@
 #include "recon/pipeline/reconstruct.h"
 
-#include <cstdio>
 #include <new>
 #include <system_error>
+
+#include <fmt/format.h>
 
 #include "base/file.h"
 #include "recon/export/picture.h"
@@ -44,8 +45,7 @@ Status write_outcome(const Outcome& outcome, const fs::path& folder) {
   std::error_code ec;
   fs::create_directory(staging.path() / "views", ec);
   for (std::size_t i = 0; i < outcome.renders.size(); ++i) {
-    char name[32];
-    std::snprintf(name, sizeof name, "%04zu.png", i);
+    const std::string name = fmt::format("{:04}.png", i);
     EMBERLOCK_RETURN_IF_ERROR(write_png(to_rgb8(outcome.renders[i]).view(), staging.path() / "views" / name));
   }
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / kMarker, to_json(outcome.report)));

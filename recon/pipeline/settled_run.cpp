@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "recon/adjust/choose_effects.h"
@@ -139,13 +139,12 @@ Result<Outcome> run_settled(const Task& task, const ReconstructOptions& options,
   const Seconds effects_time = task.elapsed() - start;
 
   const auto watch = [&](const Preview& state) {
-    char words[80];
-    std::snprintf(words, sizeof words, "iteration %d", state.point.iteration);
     // Without a limit the count of iterations is the solver's secret: approach the end without reaching it.
     const double share = solve_options.iterations > 0
                              ? static_cast<double>(state.point.iteration) / solve_options.iterations
                              : state.point.iteration / (state.point.iteration + 10.0);
-    report(progress, kSolveFrom + (kSolveTo - kSolveFrom) * std::min(share, 1.0), words);
+    report(progress, kSolveFrom + (kSolveTo - kSolveFrom) * std::min(share, 1.0),
+           fmt::format("iteration {}", state.point.iteration));
     if (task.preview) task.preview(state);
   };
   report(progress, kSolveFrom, "carving the hull");

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include <fmt/format.h>
 
 #include "recon/pipeline/grid_choice.h"
 #include "recon/pipeline/reference_run.h"
@@ -107,11 +108,9 @@ Result<std::string> measure_shipped_source(const ComputeOptions& compute, const 
     const auto b = std::find_if(fronts[1].begin(), fronts[1].end(),
                                 [&](const WorkPoint& p) { return p.settings == a.settings; });
     if (b == fronts[1].end()) continue;
-    char line[120];
-    std::snprintf(line, sizeof line, "    {%d, %d, \"%s\", %.4g, %.4g},\n", a.settings.voxels,
-                  a.settings.iterations, a.settings.effects.c_str(), std::sqrt(a.seconds * b->seconds),
-                  std::sqrt(a.error * b->error));
-    source += line;
+    source +=
+        fmt::format("    {{{}, {}, \"{}\", {:.4g}, {:.4g}}},\n", a.settings.voxels, a.settings.iterations,
+                    a.settings.effects, std::sqrt(a.seconds * b->seconds), std::sqrt(a.error * b->error));
   }
   return source + "};\n";
 }

@@ -6,6 +6,7 @@
 #include "base/frame.h"
 #include "base/quantity.h"
 #include "base/result.h"
+#include "base/sensor_kind.h"
 
 namespace emberlock {
 
@@ -30,6 +31,7 @@ struct CameraInfo {
   Hertz frame_rate;  ///< nominal
   ShutterReset reset = ShutterReset::none;
   std::optional<FrameRateTrim> trim = {};  ///< absent: it films at its own rate alone
+  SensorKind sensor = SensorKind::ccd;
 };
 
 /// A camera, opened. One owner thread; not thread-safe. Times are on the host's clock given to the driver.

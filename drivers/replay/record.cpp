@@ -23,6 +23,17 @@ v1::CameraStream to_proto(const CameraInfo& info) {
       stream.set_shutter_reset(v1::CameraStream::ON_COMMAND);
       break;
   }
+  switch (info.sensor) {
+    case SensorKind::ccd:
+      stream.set_sensor(v1::CameraStream::CCD);
+      break;
+    case SensorKind::rolling_shutter:
+      stream.set_sensor(v1::CameraStream::ROLLING_SHUTTER);
+      break;
+    case SensorKind::global_shutter:
+      stream.set_sensor(v1::CameraStream::GLOBAL_SHUTTER);
+      break;
+  }
   if (info.trim) {
     stream.set_trim_range_ppm(info.trim->range.value());
     stream.set_trim_step_ppm(info.trim->step.value());
@@ -39,6 +50,8 @@ Result<CameraInfo> camera_info(const v1::CameraStream& stream) {
   info.frame_rate = Hertz(stream.frame_rate_hz());
   if (stream.shutter_reset() == v1::CameraStream::BY_HAND) info.reset = ShutterReset::by_hand;
   if (stream.shutter_reset() == v1::CameraStream::ON_COMMAND) info.reset = ShutterReset::on_command;
+  if (stream.sensor() == v1::CameraStream::ROLLING_SHUTTER) info.sensor = SensorKind::rolling_shutter;
+  if (stream.sensor() == v1::CameraStream::GLOBAL_SHUTTER) info.sensor = SensorKind::global_shutter;
   if (stream.trim_range_ppm() > 0 && stream.trim_step_ppm() > 0) {
     info.trim = FrameRateTrim{PartsPerMillion(stream.trim_range_ppm()),
                               PartsPerMillion(stream.trim_step_ppm()), Seconds(stream.trim_latency_s())};

@@ -51,6 +51,15 @@ Status check(const VirtualCameraOptions& c) {
   return in_range(where, "first_phase", c.first_phase.value_or(Seconds(0)).value(), 0, 3600);
 }
 
+/// Of a group in a rig's name: a bare number is of CCDs.
+std::optional<SensorKind> sensor_kind(std::string_view text) {
+  if (text.empty()) return SensorKind::ccd;
+  for (const auto kind : {SensorKind::ccd, SensorKind::rolling_shutter, SensorKind::global_shutter}) {
+    if (text == name(kind)) return kind;
+  }
+  return std::nullopt;
+}
+
 CcdTiming draw_timing(const VirtualRigDraw& draw, RandomStream& random) {
   const double crystal = 1 + random.uniform(-1, 1) * draw.crystal_spread.value() * 1e-6;
   CcdTiming t;
@@ -77,6 +86,10 @@ std::uint64_t stream_seed(std::uint64_t seed, std::string_view camera_id) {
 }
 
 Status check_exposure(const VirtualScene& scene, const VirtualCameraOptions& camera) {
+  if (camera.exposure) {
+    return in_range("virtual camera " + camera.id, "exposure", camera.exposure->value(), 1e-6,
+                    camera.timing.frame_period.value());
+  }
   return in_range("virtual camera " + camera.id, "the scene's exposure", scene.exposure.value(), 0,
                   camera.timing.frame_period.value());
 }
@@ -114,6 +127,12 @@ VirtualRigOptions draw_virtual_rig(const VirtualRigDraw& draw) {
     const std::string number = std::to_string(i);
     c.id = "virtual-" + std::string(number.size() < 2 ? 2 - number.size() : 0, '0') + number;
     RandomStream random(stream_seed(draw.seed, c.id), 0);
+    if (static_cast<std::size_t>(i) < draw.sensors.size())
+      c.sensor = draw.sensors[static_cast<std::size_t>(i)];
+    if (c.sensor != SensorKind::ccd) {
+      c.exposure = draw.shutter_exposure;
+      rig.scene = lit_room_scene();
+    }
     c.layout = draw.layout;
     c.nominal_rate = draw.rate;
     c.timing = draw_timing(draw, random);
@@ -131,21 +150,28 @@ VirtualRigOptions draw_virtual_rig(const VirtualRigDraw& draw) {
 
 Result<VirtualRigOptions> parse_virtual_rig(std::string_view name, std::uint64_t seed) {
   const auto refuse = [&](std::string what) {
-    return Error{
-        ErrorKind::bad_input, std::move(what), "rig " + std::string(name),
-        "give virtual:N with 1 to " + std::to_string(kMostCameras) + " cameras, for example virtual:11"};
+    return Error{ErrorKind::bad_input, std::move(what), "rig " + std::string(name),
+                 "give virtual:N with 1 to " + std::to_string(kMostCameras) +
+                     " cameras, for example virtual:11 or virtual:4ccd+3rolling+2global"};
   };
   if (!name.starts_with(kScheme)) return refuse("there is no such rig");
-  const std::string_view digits = name.substr(kScheme.size());
-  int cameras = 0;
-  const auto [end, failed] = std::from_chars(digits.data(), digits.data() + digits.size(), cameras);
-  if (digits.empty() || failed == std::errc::invalid_argument || end != digits.data() + digits.size()) {
-    return refuse("the number of cameras is not a whole number");
+  VirtualRigDraw draw{.cameras = 0, .seed = seed};
+  for (std::string_view rest = name.substr(kScheme.size());;) {
+    const std::size_t plus = rest.find('+');
+    const std::string_view group = rest.substr(0, plus);
+    int cameras = 0;
+    const auto [end, failed] = std::from_chars(group.data(), group.data() + group.size(), cameras);
+    if (failed == std::errc::invalid_argument) return refuse("the number of cameras is not a whole number");
+    if (failed != std::errc{} || cameras < 1 || draw.cameras + cameras > kMostCameras) {
+      return refuse("the number of cameras is out of range");
+    }
+    const auto kind = sensor_kind(group.substr(static_cast<std::size_t>(end - group.data())));
+    if (!kind) return refuse("\"" + std::string(group) + "\" names no kind of sensor");
+    draw.cameras += cameras;
+    draw.sensors.insert(draw.sensors.end(), static_cast<std::size_t>(cameras), *kind);
+    if (plus == std::string_view::npos) return draw_virtual_rig(draw);
+    rest.remove_prefix(plus + 1);
   }
-  if (failed != std::errc{} || cameras < 1 || cameras > kMostCameras) {
-    return refuse("the number of cameras is out of range");
-  }
-  return draw_virtual_rig({.cameras = cameras, .seed = seed});
 }
 
 }  // namespace emberlock

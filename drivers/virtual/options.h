@@ -8,6 +8,7 @@
 
 #include "base/image.h"
 #include "base/result.h"
+#include "base/sensor_kind.h"
 #include "base/time_point.h"
 #include "drivers/camera.h"
 #include "drivers/virtual/scene.h"
@@ -26,9 +27,11 @@ struct VirtualLamp {
 
 struct VirtualCameraOptions {
   std::string id = "virtual-00";  ///< unique in the rig
+  SensorKind sensor = SensorKind::ccd;
   ImageLayout layout{.size = {1280, 720}};
-  Hertz nominal_rate{23.976};  ///< what the maker claims; the truth is timing.frame_period
-  CcdTiming timing{};          ///< rows equal to the layout's height
+  Hertz nominal_rate{23.976};         ///< what the maker claims; the truth is timing.frame_period
+  CcdTiming timing{};                 ///< rows equal to the layout's height
+  std::optional<Seconds> exposure{};  ///< > 0, at most the frame period; absent: the scene's
   SweepOut sweep_out = SweepOut::none;
   VirtualLamp lamp{};
   ShutterReset reset = ShutterReset::on_command;
@@ -57,12 +60,14 @@ struct VirtualRigOptions {
 
 /// How a rig of many cameras is drawn.
 struct VirtualRigDraw {
-  int cameras = 11;  ///< 1..64
+  int cameras = 11;                   ///< 1..64
+  std::vector<SensorKind> sensors{};  ///< by camera; CCDs beyond the list's end
   std::uint64_t seed = 1;
   ImageLayout layout{.size = {1280, 720}};
   /// `same`: one model, read from the top, with 20 dummy lines where the frame period leaves room. `mixed`:
   /// each camera draws its direction, and K from n, n + 20 and floor(T / t_row).
   enum class Models { same, mixed } models = Models::same;
+  Seconds shutter_exposure = milliseconds(4);  ///< of rolling and global shutters
   Hertz rate{23.976};
   SecondsPerRow row_time = microseconds_per_row(54);
   PartsPerMillion crystal_spread{20};  ///< frame period and row time are off by up to this, together
@@ -74,10 +79,11 @@ struct VirtualRigDraw {
 };
 
 /// Cameras "virtual-00"...: crystals, lamps (rows 0.28 n..0.72 n, radius 3..5), latencies and models by the
-/// seed. Every value may be changed before the rig is made.
+/// seed; the room is lit where a camera is no CCD. Every value may be changed before the rig is made.
 VirtualRigOptions draw_virtual_rig(const VirtualRigDraw& draw);
 
-/// A rig's name: "virtual:N" is draw_virtual_rig of N cameras, 1280 x 720 gray8. bad_input otherwise.
+/// A rig's name: "virtual:N" is draw_virtual_rig of N CCDs, 1280 x 720 gray8, "virtual:4ccd+3rolling+2global"
+/// of as many of each kind. bad_input otherwise.
 Result<VirtualRigOptions> parse_virtual_rig(std::string_view name, std::uint64_t seed = 1);
 
 /// The seed of everything that belongs to one camera.

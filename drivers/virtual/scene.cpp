@@ -20,6 +20,7 @@ Status check(const VirtualScene& scene) {
       {"background", scene.background, 0, 255},
       {"flash_level", scene.flash_level, 0, 1e9},
       {"steady_rate", scene.steady_rate, 0, 1e12},
+      {"room_share", scene.room_share, 0, 1},
       {"smear_leak", scene.smear_leak, 0, 1},
       {"halo_level", scene.halo_level, 0, 255},
       {"halo_length", scene.halo_length, 0.1, 100},
@@ -47,6 +48,12 @@ Status check(const VirtualScene& scene) {
 VirtualScene smear_scene() {
   VirtualScene scene;
   scene.passes = {Pass::lamp, Pass::bloom, Pass::smear, Pass::hot_pixels, Pass::shot_noise, Pass::read_noise};
+  return scene;
+}
+
+VirtualScene lit_room_scene() {
+  VirtualScene scene = smear_scene();
+  scene.passes.push_back(Pass::room);
   return scene;
 }
 

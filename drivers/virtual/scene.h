@@ -16,7 +16,8 @@ enum class Pass {
   flame,  ///< the scene's LightField, as exposed; its own smear is left out (a flame's is below a grey level)
   lamp,   ///< the strobe's image, when the strobe was lit in the exposure; saturates
   bloom,  ///< a lit, saturated lamp's glare and the overflow of its columns
-  smear,  ///< dots, combs and lines, by smear_sync/ccd_model
+  room,   ///< what a flash lights of the room about the lamp, over the whole picture
+  smear,  ///< of CCDs: dots, combs and lines, by smear_sync/ccd_model
   hot_pixels,  ///< fixed places of each camera
   shot_noise,  ///< variance in proportion to the light
   read_noise,  ///< the same variance everywhere
@@ -37,6 +38,7 @@ struct VirtualScene {
 
   double flash_level = 4000;  ///< one flash at the lamp's centre, before saturation; independent of its width
   double steady_rate = 1e7;   ///< steady light at the lamp's centre, grey levels a second: a line of about 45
+  double room_share = 0.015;  ///< of the lamp's light, that the room about it shows: 60 grey levels a flash
   double smear_leak = 0.01;   ///< share of the light that leaks into the register: dots of 40 grey levels
 
   double halo_level = 60;    ///< glare at the rim of the lamp's disk
@@ -60,6 +62,9 @@ Status check(const VirtualScene& scene);
 /// A dark room with the strobe: lamp, bloom, smear, hot pixels and both noises; exposed over the whole frame
 /// period.
 VirtualScene smear_scene();
+
+/// The same in a room that the flashes light, so that shutters without smear see them.
+VirtualScene lit_room_scene();
 
 /// A flame in a dark room, with both noises; exposed for 1 ms.
 VirtualScene flame_scene(std::shared_ptr<const LightField> flame);

@@ -14,6 +14,7 @@ constexpr double kEdgeSigma = 0.7;      // blur of the lamp's rim, pixels
 constexpr double kFaintest = 0.25;      // glare below this many grey levels is cut off
 constexpr double kOverflowLevel = 300;  // above white
 constexpr double kWhite = 255;
+constexpr double kRoomReach = 0.6;  // of the image's width, over which the room's light falls to 1 / e
 
 enum Stream : std::uint64_t { kNoiseStream = 1, kHotPixelStream = 2 };
 
@@ -76,11 +77,24 @@ void add_scaled(const float* from, int count, float scale, float* to) {
   for (int i = 0; i < count; ++i) to[i] += scale * from[i];
 }
 
-/// `to` spans the columns of `stamp` and every row of the image.
-void add_stamp(const Stamp& stamp, float scale, Stamp& to) {
+/// `to` spans the columns of `stamp` and every row of the image; scale(y) is a row's.
+void add_rows(const Stamp& stamp, const auto& scale, Stamp& to) {
   for (int y = stamp.y0; y < stamp.y1(); ++y) {
-    add_scaled(stamp.row(y), stamp.width, scale, to.row(y) + (stamp.x0 - to.x0));
+    add_scaled(stamp.row(y), stamp.width, scale(y), to.row(y) + (stamp.x0 - to.x0));
   }
+}
+
+void add_stamp(const Stamp& stamp, float scale, Stamp& to) {
+  add_rows(
+      stamp, [scale](int) { return scale; }, to);
+}
+
+/// How the room's light falls along one axis of `size` pixels.
+std::vector<float> falloff(int size, double centre, double reach) {
+  std::vector<float> part(static_cast<std::size_t>(size));
+  for (int i = 0; i < size; ++i)
+    part[static_cast<std::size_t>(i)] = static_cast<float>(std::exp(-std::pow((i - centre) / reach, 2)));
+  return part;
 }
 
 /// Grey levels that a pulse leaves at the lamp's centre in all.
@@ -94,6 +108,7 @@ float luminance(const float* rgb) { return 0.2126F * rgb[0] + 0.7152F * rgb[1] +
 
 VirtualSensor::VirtualSensor(const VirtualCameraOptions& options, int number, std::uint64_t seed)
     : layout_(options.layout),
+      kind_(options.sensor),
       timing_(options.timing),
       sweep_out_(options.sweep_out),
       lamp_(options.lamp),
@@ -151,7 +166,14 @@ void VirtualSensor::choose_passes() {
     frame_passes_.emplace_back(&VirtualSensor::draw_flame);
     row_passes_.emplace_back(&VirtualSensor::add_flame);
   }
-  if (listed(Pass::lamp) || listed(Pass::bloom) || listed(Pass::smear)) choose_strobe_light();
+  const bool rolls = kind_ == SensorKind::rolling_shutter;
+  if (listed(Pass::room) || (rolls && (listed(Pass::lamp) || listed(Pass::bloom)))) {
+    lit_.resize(static_cast<std::size_t>(layout_.size.height));
+    frame_passes_.emplace_back(&VirtualSensor::light_rows);
+  }
+  const bool smears = listed(Pass::smear) && kind_ == SensorKind::ccd;
+  if (listed(Pass::lamp) || listed(Pass::bloom) || smears) choose_strobe_light();
+  if (listed(Pass::room)) choose_room();
   if (listed(Pass::hot_pixels)) {
     hot_ = draw_hot_pixels(scene_->hot_pixels);
     row_passes_.emplace_back(&VirtualSensor::add_hot_pixels);
@@ -167,13 +189,26 @@ void VirtualSensor::choose_strobe_light() {
   light_ = stamp_about({lamp_.x, Rows(image_height / 2), lamp_.radius}, reach, image_height, image_height,
                        layout_.size);
   frame_passes_.emplace_back(&VirtualSensor::clear_light);
-  if (scene_->has(Pass::lamp)) frame_passes_.emplace_back(&VirtualSensor::draw_lamp);
+  const bool rolls = kind_ == SensorKind::rolling_shutter;
+  if (scene_->has(Pass::lamp))
+    frame_passes_.emplace_back(rolls ? &VirtualSensor::draw_rolled_lamp : &VirtualSensor::draw_lamp);
   if (bloom) {
-    bloom_shape_ = bloom_shape(*scene_, lamp_, layout_.size);
-    frame_passes_.emplace_back(&VirtualSensor::draw_bloom);
+    VirtualScene glare = *scene_;
+    if (kind_ != SensorKind::ccd) glare.overflow_up = glare.overflow_down = 0;  // no columns to run along
+    bloom_shape_ = bloom_shape(glare, lamp_, layout_.size);
+    frame_passes_.emplace_back(rolls ? &VirtualSensor::draw_rolled_bloom : &VirtualSensor::draw_bloom);
   }
-  if (scene_->has(Pass::smear)) frame_passes_.emplace_back(&VirtualSensor::draw_smear);
+  if (scene_->has(Pass::smear) && kind_ == SensorKind::ccd)
+    frame_passes_.emplace_back(&VirtualSensor::draw_smear);
   row_passes_.emplace_back(&VirtualSensor::add_strobe_light);
+}
+
+void VirtualSensor::choose_room() {
+  const double reach = kRoomReach * layout_.size.width;
+  room_x_ = falloff(layout_.size.width, lamp_.x, reach);
+  room_y_ = falloff(layout_.size.height, lamp_.y.value(), reach);
+  for (float& part : room_y_) part *= static_cast<float>(scene_->room_share);
+  row_passes_.emplace_back(&VirtualSensor::add_room);
 }
 
 void VirtualSensor::choose_noise() {
@@ -223,10 +258,11 @@ void VirtualSensor::clear_light(const Shot& /*shot*/) {
   std::fill(light_.values.begin(), light_.values.end(), 0.0F);
 }
 
-double VirtualSensor::lamp_level(const Shot& shot) const {
+double VirtualSensor::lamp_level(const Shot& shot, Seconds later) const {
   double level = 0;
   for (const LightPulse& p : shot.pulses) {
-    const Seconds lit = std::min(p.begin + p.width, Seconds(0)) - std::max(p.begin, -shot.exposure.duration);
+    const Seconds lit =
+        std::min(p.begin + p.width, later) - std::max(p.begin, later - shot.exposure.duration);
     if (lit > Seconds(0)) level += charge(*scene_, p) * (lit / p.width);
   }
   return level;
@@ -239,6 +275,27 @@ void VirtualSensor::draw_lamp(const Shot& shot) {
 
 void VirtualSensor::draw_bloom(const Shot& shot) {
   if (lamp_level(shot) > kWhite) add_stamp(bloom_shape_, 1, light_);
+}
+
+void VirtualSensor::light_rows(const Shot& shot) {
+  const int rows = layout_.size.height;
+  const bool down = timing_.direction == ReadDirection::top_first;
+  for (int y = 0; y < rows; ++y) {
+    const Rows order(kind_ != SensorKind::rolling_shutter ? 0 : down ? y : rows - 1 - y);
+    lit_[static_cast<std::size_t>(y)] = static_cast<float>(lamp_level(shot, order * timing_.row_time));
+  }
+}
+
+void VirtualSensor::draw_rolled_lamp(const Shot& /*shot*/) {
+  const auto lit = [this](int y) { return lit_[static_cast<std::size_t>(y)]; };
+  add_rows(lamp_shape_, lit, light_);
+}
+
+void VirtualSensor::draw_rolled_bloom(const Shot& /*shot*/) {
+  const auto saturates = [this](int y) {
+    return lit_[static_cast<std::size_t>(y)] > static_cast<float>(kWhite) ? 1.0F : 0.0F;
+  };
+  add_rows(bloom_shape_, saturates, light_);
 }
 
 void VirtualSensor::draw_smear(const Shot& shot) {
@@ -275,6 +332,12 @@ void VirtualSensor::add_strobe_light(const Shot& /*shot*/, int y) {
   for (int i = 0; i < light_.width; ++i) {
     for (int c = 0; c < n; ++c) row_[(light_.x0 + i) * n + c] += white[i];
   }
+}
+
+void VirtualSensor::add_room(const Shot& /*shot*/, int y) {
+  const float level = lit_[static_cast<std::size_t>(y)] * room_y_[static_cast<std::size_t>(y)];
+  const auto n = static_cast<std::size_t>(channels(layout_.format));
+  for (std::size_t i = 0; i < row_.size(); ++i) row_[i] += level * room_x_[i / n];
 }
 
 void VirtualSensor::add_hot_pixels(const Shot& /*shot*/, int y) {

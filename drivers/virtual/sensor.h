@@ -35,8 +35,9 @@ struct Exposure {
   Seconds duration;  ///< ends at the start of the read phase
 };
 
-/// The chip of one camera: light in, picture out. Results depend on the arguments and (seed, camera id)
-/// alone. Not thread-safe: it keeps its work space.
+/// The chip of one camera, of any kind: light in, picture out. A rolling shutter's row r, in the order of
+/// reading, is exposed r t_row after the first; a flame is drawn as the first row sees it. Results depend on
+/// the arguments and (seed, camera id) alone. Not thread-safe: it keeps its work space.
 class VirtualSensor {
  public:
   /// `number` is the camera's in the rig, as the scene's LightField counts. `options` are valid.
@@ -62,6 +63,7 @@ class VirtualSensor {
 
   void choose_passes();
   void choose_strobe_light();
+  void choose_room();
   void choose_noise();
   void choose_converter();
 
@@ -70,17 +72,22 @@ class VirtualSensor {
   void draw_lamp(const Shot& shot);
   void draw_bloom(const Shot& shot);
   void draw_smear(const Shot& shot);
+  void light_rows(const Shot& shot);
+  void draw_rolled_lamp(const Shot& shot);
+  void draw_rolled_bloom(const Shot& shot);
   void add_flame(const Shot& shot, int y);
   void add_strobe_light(const Shot& shot, int y);
+  void add_room(const Shot& shot, int y);
   void add_hot_pixels(const Shot& shot, int y);
   template <class Variance>
   void add_noise(const Shot& shot, int y, Variance variance);
   template <class Sample, class Convert>
   void store(int y, Image& image, Convert convert) const;
-  [[nodiscard]] double lamp_level(const Shot& shot) const;
+  [[nodiscard]] double lamp_level(const Shot& shot, Seconds later = Seconds(0)) const;
   [[nodiscard]] std::vector<Point> draw_hot_pixels(int count) const;
 
   ImageLayout layout_;
+  SensorKind kind_;
   CcdTiming timing_;
   SweepOut sweep_out_;
   VirtualLamp lamp_;
@@ -96,6 +103,9 @@ class VirtualSensor {
   Stamp lamp_shape_;           // 1 at the lamp's centre
   Stamp bloom_shape_;          // grey levels about a lamp that saturates
   Stamp light_;                // of lamp, bloom and smear: the full height of the columns about the lamp
+  std::vector<float> lit_;     // by row: light at the lamp's centre in the row's exposure
+  std::vector<float> room_x_;  // by column and by row: what the room shows of that light is their product
+  std::vector<float> room_y_;
   std::vector<Point> hot_;     // by row
   std::vector<float> flame_;   // 3 w h
   std::vector<float> row_;     // samples of the row in work, grey levels 0..255

@@ -15,6 +15,18 @@ enum Stream : std::uint64_t { kPhaseStream = 11, kJitterStream = 12, kDeviceCloc
 
 constexpr Seconds kLongestWait{1e8};  // keeps instants within 64 bits
 
+std::string_view model(SensorKind kind) {
+  switch (kind) {
+    case SensorKind::ccd:
+      return "Emberlock virtual CCD";
+    case SensorKind::rolling_shutter:
+      return "Emberlock virtual rolling shutter";
+    case SensorKind::global_shutter:
+      return "Emberlock virtual global shutter";
+  }
+  return "Emberlock virtual";
+}
+
 }  // namespace
 
 VirtualRoom::VirtualRoom(std::shared_ptr<Clock> clock, PartsPerMillion strobe_error, VirtualScene scene)
@@ -40,8 +52,10 @@ VirtualCamera::VirtualCamera(VirtualCameraOptions options, int number, const Vir
                              std::shared_ptr<const VirtualRoom> room)
     : options_(std::move(options)),
       room_(std::move(room)),
-      info_{options_.id,           "Emberlock virtual CCD", options_.layout,
-            options_.nominal_rate, options_.reset,          options_.trim},
+      info_{options_.id,     std::string(model(options_.sensor)),
+            options_.layout, options_.nominal_rate,
+            options_.reset,  options_.trim,
+            options_.sensor},
       sensor_(options_, number, rig.seed),
       seed_(stream_seed(rig.seed, options_.id)),
       queue_frames_(static_cast<std::uint64_t>(rig.queue_frames)),
@@ -171,6 +185,7 @@ std::vector<LightPulse> VirtualCamera::light_on(std::uint64_t frame_id) const {
 }
 
 Seconds VirtualCamera::exposure(const VirtualScene& scene) const {
+  if (options_.exposure) return *options_.exposure;
   return scene.exposure > Seconds(0) ? scene.exposure : options_.timing.frame_period;
 }
 

@@ -38,8 +38,8 @@ class VirtualRoom {
   std::vector<Change> scenes_;  // in order of time, never empty
 };
 
-/// One interline CCD camera. Frames are numbered from 0 at the first start() on, through stops and resets,
-/// and drawn when they are asked for.
+/// One camera of any kind of sensor. Frames are numbered from 0 at the first start() on, through stops and
+/// resets, and drawn when they are asked for.
 class VirtualCamera final : public Camera {
  public:
   VirtualCamera(VirtualCameraOptions options, int number, const VirtualRigOptions& rig,

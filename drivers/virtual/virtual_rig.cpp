@@ -63,6 +63,7 @@ TimePoint VirtualRig::read_start_after(int index, TimePoint after) const {
 std::vector<TrueDot> VirtualRig::dots(int index, std::uint64_t frame_id) const {
   const VirtualCamera& camera = parts_->cameras.at(index);
   const VirtualCameraOptions& truth = camera.truth();
+  if (truth.sensor != SensorKind::ccd) return {};
   const auto scene = camera.scene_of(frame_id);
   const TimePoint start = camera.read_start(frame_id);
   std::vector<TrueDot> dots;

@@ -20,16 +20,16 @@ struct TrueDot {
   TimePoint flash;   ///< centre of the flash that made it
 };
 
-/// Interline CCD cameras and the strobe they film, behind the interfaces of real ones. With a VirtualClock
-/// the rig is deterministic by seed and as fast as the pictures are drawn; with a SteadyClock it runs in real
-/// time.
+/// Cameras and the strobe they film, interline CCDs unless told otherwise, behind the interfaces of real
+/// ones. With a VirtualClock the rig is deterministic by seed and as fast as the pictures are drawn; with a
+/// SteadyClock it runs in real time.
 ///
 /// Each frame's pixels depend on (seed, camera id, frame id, phase, what strobe and scene did) alone: they
 /// are drawn when asked for, in any order. Cameras on a virtual clock may be used one after the other from
 /// one thread: frames that end while another camera is waited for queue up, and beyond `queue_frames` the
 /// oldest show as a gap in frame_id. Frame i is read during [t_start_i, t_start_i + K t_row) and arrives at
 /// its end; the first image after start() or a reset is kept back, since the register still held the old
-/// cycle.
+/// cycle. Read phases of rolling and global shutters begin as the exposure of what they read first ends, too.
 ///
 /// Thread safety: each camera and the strobe has one owner thread, different ones may differ. set_scene and
 /// the truth accessors may be called from any thread, but a camera's truth not while its owner starts, stops
@@ -61,7 +61,7 @@ class VirtualRig {
   [[nodiscard]] TimePoint read_start(int index, std::uint64_t frame_id) const;
   /// The same modulo the frame period, for the current read cycle: the first instant >= `after`.
   [[nodiscard]] TimePoint read_start_after(int index, TimePoint after) const;
-  /// The dots of a frame by order of flash, whether a pass draws them or not; none for steady light.
+  /// The dots of a CCD's frame by order of flash, whether a pass draws them or not; none for steady light.
   [[nodiscard]] std::vector<TrueDot> dots(int index, std::uint64_t frame_id) const;
 
  private:

@@ -27,7 +27,7 @@ TEST(SensorCost, ReadNoiseAloneIsThatOfAProgramThatKnowsNothingElse) {
 
 TEST(SensorCost, EachPassThatIsListedIsSeenToCost) {
   const double none = frame_of("no_pass");
-  for (const char* pass : {"smear", "hot_pixels", "quantise"})
+  for (const char* pass : {"smear", "room", "hot_pixels", "quantise"})
     EXPECT_GT(frame_of(pass), 1.005 * none) << pass;
   const double smear = frame_of("smear");
   const double lamp = frame_of("lamp_and_smear");

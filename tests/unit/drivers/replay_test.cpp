@@ -21,7 +21,8 @@ CameraInfo info_of(const std::string& id) {
           kLayout,
           Hertz(23.976),
           ShutterReset::on_command,
-          FrameRateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)}};
+          FrameRateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)},
+          id == "left" ? SensorKind::rolling_shutter : SensorKind::global_shutter};
 }
 
 StrobeSettings flashing(double phase_ms) {
@@ -87,6 +88,8 @@ TEST_F(Replay, CamerasAreDescribedAsTheyWereRecorded) {
   EXPECT_EQ(info.layout, kLayout);
   EXPECT_EQ(info.frame_rate, Hertz(23.976));
   EXPECT_EQ(info.reset, ShutterReset::on_command);
+  EXPECT_EQ(info.sensor, SensorKind::global_shutter);
+  EXPECT_EQ(rig_.cameras.at(0)->info().sensor, SensorKind::rolling_shutter);
   ASSERT_TRUE(info.trim);
   EXPECT_EQ(info.trim->step, PartsPerMillion(0.5));
 }

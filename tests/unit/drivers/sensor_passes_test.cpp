@@ -34,6 +34,7 @@ const PassCase kPasses[] = {
     {Pass::lamp, "lamp", [](VirtualScene&) {}},
     {Pass::bloom, "bloom",
      [](VirtualScene& s) { s.halo_level = 250, s.halo_length = 30, s.overflow_up = s.overflow_down = 40; }},
+    {Pass::room, "room", [](VirtualScene& s) { s.room_share = 0.05; }},
     {Pass::smear, "smear", [](VirtualScene& s) { s.smear_leak = 0.9; }},
     {Pass::hot_pixels, "hot_pixels", [](VirtualScene& s) { s.hot_pixels = 5000; }},
     {Pass::shot_noise, "shot_noise", [](VirtualScene& s) { s.electrons_per_level = 0.1; }},
@@ -82,6 +83,24 @@ TEST_P(SensorPasses, OneThatIsTakenOffTheListIsForgotten) {
   alone.flame = full_scene().flame;
   alone.passes = {GetParam().pass};
   EXPECT_EQ(expose(used, alone), expose(fresh, alone));
+}
+
+/// The scene again, from each kind of sensor that has no smear.
+TEST(SensorPasses, OfOtherSensorsOneThatIsNotListedLeavesNoTraceEither) {
+  for (const SensorKind kind : {SensorKind::rolling_shutter, SensorKind::global_shutter}) {
+    for (const PassCase& p : kPasses) {
+      VirtualCameraOptions camera = small_camera();
+      camera.sensor = kind;
+      const VirtualScene off = without(full_scene(), p.pass);
+      VirtualScene changed = off;
+      p.change(changed);
+      VirtualSensor one(camera, 0, 1);
+      VirtualSensor other(camera, 0, 1);
+      EXPECT_EQ(expose(one, off), expose(other, changed)) << p.name;
+      const bool seen = expose(one, off) != expose(other, full_scene());
+      EXPECT_EQ(seen, p.pass != Pass::smear) << p.name;
+    }
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Every, SensorPasses, testing::ValuesIn(kPasses),

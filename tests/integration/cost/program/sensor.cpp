@@ -71,6 +71,7 @@ int run(const std::string& name) {
       {"read_noise", {Pass::read_noise}},
       {"both_noises", {Pass::read_noise, Pass::shot_noise}},
       {"smear", {Pass::smear}},
+      {"room", {Pass::room}},
       {"lamp_and_smear", {Pass::lamp, Pass::smear}},
       {"lamp_bloom_and_smear", {Pass::lamp, Pass::bloom, Pass::smear}},
       {"hot_pixels", {Pass::hot_pixels}},

@@ -13,10 +13,11 @@ struct ColumnReading {
   bool line = false;         ///< brighter than its neighbours over the full height
   bool clipped = false;      ///< saturated, or so nearly that a dot has no room
   bool half_field = false;   ///< a spot that stands in every other row only: interlaced
-  int suspects = 0;        ///< spots above the noise that might be dots, but don't look enough like the lamp
-  double suspect_row = 0;  ///< the strongest one's row
-  double hidden = 0;       ///< fraction of the rows in which a dot would not be seen
-  double line_level = 0;   ///< of the line above its neighbours, samples
+  std::vector<DotFit>
+      suspects;             ///< spots above the noise that might be dots, but don't look enough like the lamp
+  bool compressed = false;  ///< gates are a quantiser's
+  double hidden = 0;        ///< fraction of the rows in which a dot would not be seen
+  double line_level = 0;    ///< of the line above its neighbours, samples
 };
 
 ColumnReading read_column(const Plane& plane, const Background& background, const Lamp& lamp,

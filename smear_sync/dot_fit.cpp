@@ -3,41 +3,88 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include <Eigen/Dense>
+
+#include "smear_sync/kernels.h"
 
 namespace emberlock::detail {
 namespace {
 
-using Vector6 = Eigen::Matrix<double, 6, 1>;
-using Matrix6 = Eigen::Matrix<double, 6, 6>;
+constexpr int kParameters = NormalSums::kParameters;  // amplitude, level, slope, x, y, radius
+using Vector6 = Eigen::Matrix<double, kParameters, 1>;
+using Matrix6 = Eigen::Matrix<double, kParameters, kParameters>;
+
+/// The window's pixels and their weights, rows padded to whole vectors by pixels of weight 0.
+struct Pixels {
+  int left = 0, top = 0, rows = 0, stride = 0, count = 0;
+  std::vector<float> v, weight;
+};
+
+Pixels gather(const Patch& patch, const FitWindow& w) {
+  Pixels p;
+  const int columns = w.right - w.left + 1;
+  p.left = w.left;
+  p.top = w.top;
+  p.rows = w.bottom - w.top + 1;
+  p.count = p.rows * columns;
+  p.stride = (columns + 7) / 8 * 8;
+  const std::size_t size = static_cast<std::size_t>(p.rows) * static_cast<std::size_t>(p.stride);
+  p.v.resize(size);
+  p.weight.resize(size);
+  for (int y = 0; y < p.rows; ++y) {
+    const std::ptrdiff_t at = std::ptrdiff_t{y} * p.stride;
+    std::copy_n(patch.row(w.top + y) + w.left, columns, p.v.begin() + at);
+    std::fill_n(p.weight.begin() + at, columns, 1.0F);
+  }
+  return p;
+}
+
+DiskModel row_model(const DotFit& f, int left, int y) {
+  return {.amplitude = static_cast<float>(f.amplitude),
+          .base = static_cast<float>(f.level),
+          .slope = static_cast<float>(f.slope),
+          .radius = static_cast<float>(f.radius),
+          .edge = static_cast<float>(1 / DotFit::kEdge),
+          .dx = static_cast<float>(left - f.x),
+          .dy = static_cast<float>(y - f.y)};
+}
 
 struct Normal {
   Matrix6 matrix = Matrix6::Zero();
   Vector6 right = Vector6::Zero();
   double squares = 0;
-  int pixels = 0;
 };
 
-// Parameters in this order: amplitude, level, slope, x, y, radius.
-Normal linearise(const Patch& patch, const FitWindow& window, const DotFit& f) {
-  Normal n;
-  for (int y = window.top; y <= window.bottom; ++y) {
-    const float* row = patch.row(y);
-    for (int x = window.left; x <= window.right; ++x) {
-      const double dx = x - f.x;
-      const double dy = y - f.y;
-      const double r = std::sqrt(dx * dx + dy * dy + 1e-6);
-      const double g = 1 / (1 + std::exp((r - f.radius) / DotFit::kEdge));
-      const double edge = f.amplitude * g * (1 - g) / DotFit::kEdge;
-      const Vector6 j(g, 1, dy, edge * dx / r, edge * dy / r - f.slope, edge);
-      const double residual = static_cast<double>(row[x]) - (f.level + f.slope * dy + f.amplitude * g);
-      n.matrix.selfadjointView<Eigen::Lower>().rankUpdate(j);
-      n.right += j * residual;
-      n.squares += residual * residual;
-      ++n.pixels;
-    }
+Normal linearise(const Pixels& p, const DotFit& f) {
+  NormalSums sums;
+  for (int y = 0; y < p.rows; ++y) {
+    const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(p.stride);
+    add_normal_row(row_model(f, p.left, p.top + y), &p.v[at], &p.weight[at], p.stride, sums);
   }
+  std::size_t k = 0;
+  const auto next = [&] {
+    double sum = 0;
+    for (const float v : sums.v[k]) sum += static_cast<double>(v);
+    ++k;
+    return sum;
+  };
+  Normal n;
+  for (int a = 0; a < kParameters; ++a) {
+    for (int b = 0; b <= a; ++b) n.matrix(a, b) = n.matrix(b, a) = next();
+  }
+  for (int a = 0; a < kParameters; ++a) n.right[a] = next();
+  n.squares = next();
+  return n;
+}
+
+/// With what is known of the slope: `stiffness` is (dark noise / slope_sigma)^2.
+Normal linearise(const Pixels& p, const DotFit& f, double stiffness) {
+  Normal n = linearise(p, f);
+  n.matrix(2, 2) += stiffness;
+  n.right[2] -= stiffness * f.slope;
+  n.squares += stiffness * f.slope * f.slope;
   return n;
 }
 
@@ -52,51 +99,100 @@ DotFit stepped(const DotFit& f, const Vector6& step) {
   return next;
 }
 
-}  // namespace
-
-double DotFit::disk(double px, double py) const {
-  return 1 / (1 + std::exp((std::hypot(px - x, py - y) - radius) / kEdge));
-}
-
-DotFit fit_dot(const Patch& patch, const FitWindow& window, DotFit f, double noise) {
-  constexpr int kIterations = 25;
-  double damping = 1e-3;
-  Normal normal = linearise(patch, window, f);
-  if (normal.pixels < 12) return f;
-  for (int i = 0; i < kIterations; ++i) {
-    Matrix6 damped = normal.matrix.selfadjointView<Eigen::Lower>();
+/// Levenberg-Marquardt; the normal equations near the end.
+Normal minimise(const Pixels& p, DotFit& f, const FitNoise& noise) {
+  constexpr int kIterations = 12;
+  // Of chi-square left to gain, which floats know to 1e-4: all parameters are within a thirtieth of their
+  // sigma.
+  constexpr double kStill = 1e-3;
+  const double variance = noise.dark * noise.dark;
+  const double stiffness = std::pow(noise.dark / noise.slope_sigma, 2);
+  double damping = 1e-4;
+  Normal normal = linearise(p, f, stiffness);
+  for (int i = 0; i < kIterations && damping < 1e6; ++i) {
+    Matrix6 damped = normal.matrix;
     damped.diagonal() *= 1 + damping;
     damped.diagonal().array() += 1e-9;
     const Vector6 step = damped.ldlt().solve(normal.right);
-    if (!step.allFinite()) return f;
+    if (!step.allFinite()) return normal;
+    const double gain = step.dot(normal.right) / variance;
     const DotFit next = stepped(f, step);
-    Normal trial = linearise(patch, window, next);
-    if (trial.squares <= normal.squares) {
-      const bool still =
-          normal.squares - trial.squares < 1e-6 * (normal.squares + 1e-9) && std::abs(step[4]) < 1e-3;
+    if (gain < kStill) {  // so small a step needs no proof
       f = next;
-      normal = std::move(trial);
-      damping = std::max(1e-6, damping / 5);
-      if (still) {
-        f.converged = true;
-        break;
-      }
+      break;
+    }
+    const Normal trial = linearise(p, next, stiffness);
+    if (trial.squares <= normal.squares + 0.1 * kStill * variance) {
+      f = next;
+      normal = trial;
+      damping = std::max(1e-6, damping / 10);
     } else {
-      damping *= 8;
-      if (damping > 1e6) {
-        f.converged = true;  // at a minimum to machine precision
-        break;
-      }
+      damping *= 10;
     }
   }
-  const Matrix6 full = normal.matrix.selfadjointView<Eigen::Lower>();
-  const double variance = normal.squares / std::max(1, normal.pixels - 6);
-  f.misfit = std::sqrt(variance) / noise;
+  return normal;
+}
+
+/// The fitted disk of amplitude 1 over all pixels.
+std::vector<float> disk_of(const Pixels& p, const DotFit& f) {
+  std::vector<float> disk(p.v.size());
+  for (int y = 0; y < p.rows; ++y) {
+    disk_row(row_model(f, p.left, p.top + y), p.stride,
+             &disk[static_cast<std::size_t>(y) * static_cast<std::size_t>(p.stride)]);
+  }
+  return disk;
+}
+
+/// Variance a sample of signal: the slope of squared residuals on the disk, where it stands out of its own
+/// error.
+double photon_gain(const Pixels& p, const DotFit& f, const std::vector<float>& disk, double dark) {
+  const auto amplitude = static_cast<float>(f.amplitude);
+  const auto variance = static_cast<float>(dark * dark);
+  float excess = 0;
+  float power = 0;
+  for (int y = 0; y < p.rows; ++y) {
+    const auto base = static_cast<float>(f.level + f.slope * (p.top + y - f.y));
+    for (int x = 0; x < p.stride; ++x) {
+      const std::size_t at =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(p.stride) + static_cast<std::size_t>(x);
+      const float signal = amplitude * disk[at] * p.weight[at];
+      const float residual = p.v[at] - base - signal;
+      excess += (residual * residual - variance) * signal;
+      power += signal * signal;
+    }
+  }
+  if (power <= 0) return 0;
+  const double gain = static_cast<double>(excess / power);
+  const double error = std::sqrt(2 / static_cast<double>(power)) * dark * dark;
+  return gain < 2 * error ? 0 : gain * gain * gain / (gain * gain + error * error);
+}
+
+}  // namespace
+
+DotFit fit_dot(const Patch& patch, const FitWindow& window, DotFit f, const FitNoise& noise) {
+  constexpr int kFewest = 12;  // pixels
+  if (window.right < window.left || window.bottom < window.top) return f;
+  Pixels pixels = gather(patch, window);
+  if (pixels.count < kFewest) return f;
+  Normal normal = minimise(pixels, f, noise);
+  if (f.amplitude > 0) {
+    const std::vector<float> disk = disk_of(pixels, f);
+    f.gain = photon_gain(pixels, f, disk, noise.dark);
+    constexpr double kMatters = 0.1;  // of the dark variance
+    const double raise = f.gain * f.amplitude / (noise.dark * noise.dark);
+    if (raise > kMatters) {
+      for (std::size_t i = 0; i < disk.size(); ++i)
+        pixels.weight[i] /= 1 + static_cast<float>(raise) * disk[i];
+      normal = minimise(pixels, f, noise);
+    }
+  }
+  const double variance = normal.squares / std::max(1, pixels.count - kParameters);
+  f.misfit = std::sqrt(variance) / noise.dark;
   const Matrix6 covariance =
-      (full + 1e-9 * Matrix6::Identity()).inverse() * std::max(noise * noise, variance);
+      (normal.matrix + 1e-9 * Matrix6::Identity()).inverse() * std::max(noise.dark * noise.dark, variance);
   f.sigma_x = std::sqrt(std::max(0.0, covariance(3, 3)));
   f.sigma_y = std::sqrt(std::max(0.0, covariance(4, 4)));
-  f.snr = f.amplitude * std::sqrt(full(0, 0)) / noise;
+  f.snr = f.amplitude * std::sqrt(normal.matrix(0, 0)) / noise.dark;
   return f;
 }
 
@@ -106,24 +202,32 @@ Evenness evenness(const Patch& patch, const FitWindow& window, const DotFit& f, 
   std::array<double, 6> power{};
   double total = 0;
   std::array<double, 2> brightest{};
+  std::vector<float> disk(static_cast<std::size_t>(window.right - window.left + 8));
   for (int y = window.top; y <= window.bottom; ++y) {
     const float* row = patch.row(y);
+    const auto base = static_cast<float>(f.level + f.slope * (y - f.y));
+    disk_row(row_model(f, window.left, y), window.right - window.left + 1, disk.data());
+    double row_signal = 0;
+    double row_power = 0;
     for (int x = window.left; x <= window.right; ++x) {
-      const double g = f.disk(x, y);
-      const double d = static_cast<double>(row[x]) - f.level - f.slope * (y - f.y);
-      const double s = d * g;
-      const std::array<std::size_t, 3> parts{x < f.x ? 0U : 1U, y < f.y ? 2U : 3U, y % 2 == 0 ? 4U : 5U};
-      for (const std::size_t part : parts) {
-        signal[part] += s;
-        power[part] += g * g;
-      }
-      total += s;
+      const auto g = static_cast<double>(disk[static_cast<std::size_t>(x - window.left)]);
+      const double s = static_cast<double>(row[x] - base) * g;
+      const std::size_t side = x < f.x ? 0 : 1;
+      signal[side] += s;
+      power[side] += g * g;
+      row_signal += s;
+      row_power += g * g;
       if (s > brightest[0]) {
         brightest = {s, brightest[0]};
       } else if (s > brightest[1]) {
         brightest[1] = s;
       }
     }
+    for (const std::size_t part : {y < f.y ? std::size_t{2} : 3, y % 2 == 0 ? std::size_t{4} : 5}) {
+      signal[part] += row_signal;
+      power[part] += row_power;
+    }
+    total += row_signal;
   }
   Evenness e;
   const auto amplitude = [&](std::size_t part) {

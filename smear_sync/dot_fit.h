@@ -19,18 +19,21 @@ struct DotFit {
          sigma_y = 0;  ///< standard errors from the curvature of the likelihood, scaled by the misfit
   double snr = 0;      ///< matched-filter signal over noise
   double misfit = 0;   ///< RMS residual over the noise
-  bool converged = false;
-
-  [[nodiscard]] double disk(double px, double py) const;
+  double gain = 0;     ///< of the photon noise: variance a sample of signal
 };
 
 /// Rows and columns of the patch that a fit may use, ends included.
-struct FitWindow {
-  int left = 0, right = 0, top = 0, bottom = 0;
+using FitWindow = Extent;
+
+/// What is known before the fit.
+struct FitNoise {
+  double dark = 1;         ///< standard deviation of a pixel without signal
+  double slope_sigma = 1;  ///< of the slope that levelling the columns has left, samples a row
 };
 
-/// Maximum likelihood under Gaussian noise (Levenberg-Marquardt from `start`).
-DotFit fit_dot(const Patch& patch, const FitWindow& window, DotFit start, double noise);
+/// Maximum likelihood under Gaussian noise of variance dark^2 + gain * signal (Levenberg-Marquardt from
+/// `start`). The gain is estimated from the residuals, and the pixels weighted by it.
+DotFit fit_dot(const Patch& patch, const FitWindow& window, DotFit start, const FitNoise& noise);
 
 /// How evenly the dot's light is spread: what tells a lamp's copy from hot pixels and from half a field.
 struct Evenness {

@@ -2,14 +2,10 @@
 
 #include <optional>
 
+#include "smear_sync/background.h"
 #include "smear_sync/plane.h"
 
 namespace emberlock::detail {
-
-/// Rows and columns of a plane, both ends included.
-struct Extent {
-  int left = 0, right = 0, top = 0, bottom = 0;
-};
 
 struct GlareCentre {
   double y = 0;

@@ -13,52 +13,20 @@ namespace {
 
 constexpr double kLow = 0.15;  // of the peak: where a lamp's outline ends and its halo begins
 constexpr double kHalf = 0.5;  // of the peak: its disk
-
-struct Span {
-  int first = 0, last = 0;
-};
-
-template <class Sample>
-void count_bright(const Plane& plane, double threshold, std::vector<std::uint16_t>& count) {
-  const auto limit = static_cast<Sample>(std::min<double>(threshold, std::numeric_limits<Sample>::max()));
-  std::uint16_t* out = count.data();
-  for (int y = 0; y < plane.size.height; ++y) {
-    const Sample* row = plane.row<Sample>(y);
-    for (int x = 0; x < plane.size.width; ++x)
-      out[x] = static_cast<std::uint16_t>(out[x] + (row[x] > limit ? 1 : 0));
-  }
-}
-
-/// Neighbouring columns with at least two bright pixels each, at least three columns wide: a hot pixel or a
-/// hot column is neither.
-std::vector<Span> bright_columns(const Plane& plane, double threshold) {
-  std::vector<std::uint16_t> count(static_cast<std::size_t>(plane.size.width));
-  if (plane.bytes == 1) {
-    count_bright<std::uint8_t>(plane, threshold, count);
-  } else {
-    count_bright<std::uint16_t>(plane, threshold, count);
-  }
-  std::vector<Span> spans;
-  for (int x = 0; x < plane.size.width; ++x) {
-    if (count[static_cast<std::size_t>(x)] < 2) continue;
-    const int first = x;
-    while (x + 1 < plane.size.width && count[static_cast<std::size_t>(x) + 1] >= 2) ++x;
-    if (x - first >= 2) spans.push_back({first, x});
-  }
-  return spans;
-}
+constexpr int kAside = 3;      // columns beside a bright area that its blur still reaches
 
 struct Blob {
-  std::vector<int> pixels;  // indices into the patch
+  std::vector<int> pixels;  // row by row: y * patch.stride + x
   int left = 0, right = 0, top = 0, bottom = 0;
 };
 
 /// Connected (8 neighbours) pixels above the threshold.
 std::vector<Blob> blobs(const Patch& patch, float threshold) {
   std::vector<Blob> found;
-  std::vector<char> seen(patch.v.size());
+  std::vector<char> seen(patch.size());
   std::vector<int> stack;
-  for (int start = 0; start < static_cast<int>(patch.v.size()); ++start) {
+  for (int start = 0; start < static_cast<int>(patch.size()); ++start) {
+    // The padding is zero and stays below.
     if (seen[static_cast<std::size_t>(start)] != 0 || patch.v[static_cast<std::size_t>(start)] <= threshold)
       continue;
     Blob blob{.pixels = {}, .left = patch.width, .right = -1, .top = patch.height, .bottom = -1};
@@ -68,15 +36,15 @@ std::vector<Blob> blobs(const Patch& patch, float threshold) {
       const int i = stack.back();
       stack.pop_back();
       blob.pixels.push_back(i);
-      const int x = i % patch.width;
-      const int y = i / patch.width;
+      const int x = i % patch.stride;
+      const int y = i / patch.stride;
       blob.left = std::min(blob.left, x);
       blob.right = std::max(blob.right, x);
       blob.top = std::min(blob.top, y);
       blob.bottom = std::max(blob.bottom, y);
       for (int ny = std::max(0, y - 1); ny <= std::min(patch.height - 1, y + 1); ++ny) {
         for (int nx = std::max(0, x - 1); nx <= std::min(patch.width - 1, x + 1); ++nx) {
-          const auto n = static_cast<std::size_t>(ny) * static_cast<std::size_t>(patch.width) +
+          const auto n = static_cast<std::size_t>(ny) * static_cast<std::size_t>(patch.stride) +
                          static_cast<std::size_t>(nx);
           if (seen[n] != 0 || patch.v[n] <= threshold) continue;
           seen[n] = 1;
@@ -140,23 +108,6 @@ Point centroid(const Patch& patch, const Blob& blob, double low, double high) {
   return {sx / sum, sy / sum};
 }
 
-/// Each column's own level taken out, so that a lamp on its own bright line still stands alone.
-std::vector<float> subtract_columns(Patch& patch) {
-  std::vector<float> level(static_cast<std::size_t>(patch.width));
-  std::vector<float> samples;
-  const int step = std::max(1, patch.height / 256);
-  for (int x = 0; x < patch.width; ++x) {
-    samples.clear();
-    for (int y = 0; y < patch.height; y += step) samples.push_back(patch.row(y)[x]);
-    level[static_cast<std::size_t>(x)] = median(samples);
-  }
-  for (int y = 0; y < patch.height; ++y) {
-    float* row = patch.row(y);
-    for (int x = 0; x < patch.width; ++x) row[x] -= level[static_cast<std::size_t>(x)];
-  }
-  return level;
-}
-
 /// A lamp's disk is bright all over; an outline with gaps and holes inside is something else's.
 bool solid(const Patch& patch, const Circle& circle, double level) {
   int inside = 0;
@@ -166,7 +117,9 @@ bool solid(const Patch& patch, const Circle& circle, double level) {
   const int y0 = static_cast<int>(std::lround(circle.y));
   for (int y = std::max(0, y0 - reach); y <= std::min(patch.height - 1, y0 + reach); ++y) {
     for (int x = std::max(0, x0 - reach); x <= std::min(patch.width - 1, x0 + reach); ++x) {
-      if (std::hypot(x - circle.x, y - circle.y) > circle.radius) continue;
+      const double dx = x - circle.x;
+      const double dy = y - circle.y;
+      if (dx * dx + dy * dy > circle.radius * circle.radius) continue;
       ++inside;
       if (static_cast<double>(patch.row(y)[x]) > level) ++bright;
     }
@@ -180,8 +133,9 @@ bool solid(const Patch& patch, const Circle& circle, double level) {
 void place_by_glare(const Plane& plane, const Background& background, const Patch& patch, const Blob& blob,
                     double& y, double& sigma) {
   if (blob.bottom - blob.top <= blob.right - blob.left + 1) return;
-  const auto glare =
-      glare_centre(plane, background, {patch.x0 + blob.left, patch.x0 + blob.right, blob.top, blob.bottom});
+  const auto glare = glare_centre(
+      plane, background,
+      {patch.x0 + blob.left, patch.x0 + blob.right, patch.y0 + blob.top, patch.y0 + blob.bottom});
   if (!glare || std::abs(glare->y - y) <= 0.5 + 3 * std::hypot(glare->sigma, sigma)) return;
   y = glare->y;
   sigma = glare->sigma;
@@ -196,13 +150,13 @@ Lamp measure(const Plane& plane, const Background& background, const Patch& patc
   for (const int i : blob.pixels) {
     const float v = patch.v[static_cast<std::size_t>(i)];
     if (v > kHalf * peak) ++half;
-    if (v + level[static_cast<std::size_t>(i % patch.width)] >= background.saturation) ++clipped;
+    if (v + level[static_cast<std::size_t>(i % patch.stride)] >= background.saturation) ++clipped;
   }
   lamp.flux = half;
   lamp.radius = std::sqrt(half / std::numbers::pi);
   lamp.saturated = clipped > 1;
-  const bool cut = blob.top == 0 || blob.bottom == patch.height - 1 || patch.x0 + blob.left == 0 ||
-                   patch.x0 + blob.right == plane.size.width - 1;
+  const bool cut = patch.y0 + blob.top == 0 || patch.y0 + blob.bottom == plane.size.height - 1 ||
+                   patch.x0 + blob.left == 0 || patch.x0 + blob.right == plane.size.width - 1;
   Point centre;
   std::optional<Circle> circle;
   if (lamp.saturated || cut) {
@@ -226,61 +180,93 @@ Lamp measure(const Plane& plane, const Background& background, const Patch& patc
     std::vector<float> own(level.begin() + blob.left, level.begin() + blob.right + 1);
     return static_cast<double>(median(own)) < background.level + 5 * background.noise;
   };
-  if (lamp.saturated && !cut && flash()) place_by_glare(plane, background, patch, blob, centre.y, lamp.sigma);
   lamp.x = patch.x0 + centre.x;
-  lamp.y = centre.y;
+  lamp.y = patch.y0 + centre.y;
+  if (lamp.saturated && !cut && flash()) place_by_glare(plane, background, patch, blob, lamp.y, lamp.sigma);
   lamp.centre_outside =
-      lamp.y < 0 || lamp.y > patch.height - 1 || lamp.x < 0 || lamp.x > plane.size.width - 1;
+      lamp.y < 0 || lamp.y > plane.size.height - 1 || lamp.x < 0 || lamp.x > plane.size.width - 1;
   if (lamp.centre_outside) {
     lamp.x = std::clamp(lamp.x, 0.0, plane.size.width - 1.0);
-    lamp.y = std::clamp(lamp.y, 0.0, patch.height - 1.0);
+    lamp.y = std::clamp(lamp.y, 0.0, plane.size.height - 1.0);
   }
   return lamp;
 }
 
+/// The area's columns, from some rows above its brightest to some below, each column's own level taken out,
+/// so that a lamp on its own bright line still stands alone. Grows until its first and last row are dark.
+Patch level_area(const Plane& plane, const Extent& area, const std::vector<float>& level) {
+  constexpr int kMargin = 12;
+  Extent e{area.left - kAside, area.right + kAside, area.top - kMargin, area.bottom + kMargin};
+  for (;;) {
+    Patch patch = cut(plane, e);
+    float top = 0;
+    for (int y = 0; y < patch.height; ++y) {
+      float* row = patch.row(y);
+      for (int x = 0; x < patch.width; ++x) {
+        row[x] -= level[static_cast<std::size_t>(x)];
+        top = std::max(top, row[x]);
+      }
+    }
+    const auto dark = [&](int y) {
+      const float* row = patch.row(y);
+      return *std::max_element(row, row + patch.width) <= static_cast<float>(kLow) * top;
+    };
+    const bool up = patch.y0 > 0 && !dark(0);
+    const bool down = patch.y0 + patch.height < plane.size.height && !dark(patch.height - 1);
+    if (!up && !down) return patch;
+    const int more = std::max(kMargin, patch.height);
+    if (up) e.top -= more;
+    if (down) e.bottom += more;
+  }
+}
+
 }  // namespace
 
-LampSearch find_lamps(const Plane& plane, const Background& background, const DetectOptions& options) {
-  LampSearch search;
+double lamp_gate(const Background& background, const DetectOptions& options) {
   // In a frame of little noise less contrast suffices, in one of much noise more is needed.
-  const double gate =
-      std::max(std::min(options.min_lamp_contrast * background.saturation, 400 * background.noise),
-               15 * background.noise);
+  return std::max(std::min(options.min_lamp_contrast * background.saturation, 400 * background.noise),
+                  15 * background.noise);
+}
+
+LampSearch find_lamps(const Plane& plane, const Background& background, const BrightAreas& bright,
+                      const DetectOptions& options) {
+  LampSearch search;
+  const double gate = lamp_gate(background, options);
   const double max_radius = options.max_lamp_radius * std::max(plane.size.width, plane.size.height);
   const double min_area = std::numbers::pi * options.min_lamp_radius * options.min_lamp_radius;
   search.why_none = "nothing in the frame is bright and compact enough to be the lamp";
-  std::vector<Span> spans = bright_columns(plane, background.level + gate);
-  constexpr std::size_t kMaxSpans = 32;
-  if (spans.size() > kMaxSpans) {
+  constexpr std::size_t kMostAreas = 32;
+  if (bright.everywhere || bright.areas.size() > kMostAreas) {
     search.why_none = "bright spots all over the frame: this is a scene, not a lamp before a dark background";
     return search;
   }
-  for (const Span& span : spans) {
-    if (span.last - span.first + 1 > 2 * max_radius + 8) {
+  for (const Extent& area : bright.areas) {
+    if (area.right - area.left + 1 > 2 * max_radius + 8) {
       search.why_none =
           "the bright area is too large to be a lamp; darken the scene or step back from the lamp";
       continue;
     }
-    Patch patch = columns(plane, span.first - 3, span.last + 3);
-    const std::vector<float> level = subtract_columns(patch);
-    int bright = 0;
+    const int left = std::max(0, area.left - kAside);
+    const int right = std::min(plane.size.width - 1, area.right + kAside);
+    const std::vector<float> level = column_medians(plane, left, right - left + 1, {});
+    int lit = 0;
     int clipped = 0;
     for (const float l : level) {
-      if (l > background.level + gate) ++bright;
-      if (l > 0.9 * background.saturation) ++clipped;
+      if (static_cast<double>(l) > background.level + gate) ++lit;
+      if (static_cast<double>(l) > 0.9 * background.saturation) ++clipped;
     }
-    search.bright_line = search.bright_line || bright >= 3;
+    search.bright_line = search.bright_line || lit >= 3;
     search.clipped_line = search.clipped_line || clipped >= 3;
-    float top = 0;
-    for (const float v : patch.v) top = std::max(top, v);
-    if (top < 0.5 * gate) continue;
-    for (Blob& blob : blobs(patch, static_cast<float>(kLow * top))) {
+    const Patch patch = level_area(plane, area, level);
+    const float top = *std::max_element(patch.row(0), patch.row(patch.height));
+    if (static_cast<double>(top) < 0.5 * gate) continue;
+    for (const Blob& blob : blobs(patch, static_cast<float>(kLow) * top)) {
       if (static_cast<double>(blob.pixels.size()) < min_area) continue;
-      const double peak = robust_peak(patch, blob, 5);
+      const double peak = static_cast<double>(robust_peak(patch, blob, 5));
       // On a bright line only the headroom above the line is left for the lamp.
-      if (peak < (bright >= 3 ? 0.5 : 1) * gate || blob.right - blob.left < 2 || blob.bottom - blob.top < 2)
+      if (peak < (lit >= 3 ? 0.5 : 1) * gate || blob.right - blob.left < 2 || blob.bottom - blob.top < 2)
         continue;
-      Lamp lamp = measure(plane, background, patch, level, blob, peak);
+      const Lamp lamp = measure(plane, background, patch, level, blob, peak);
       if (lamp.flux < min_area) continue;
       if (lamp.radius > max_radius) {
         search.why_none =

@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "smear_sync/background.h"
+#include "smear_sync/bright.h"
 #include "smear_sync/detect.h"
 #include "smear_sync/plane.h"
 
@@ -26,6 +28,11 @@ struct LampSearch {
   std::string why_none;
 };
 
-LampSearch find_lamps(const Plane& plane, const Background& background, const DetectOptions& options);
+/// Above the background: what is darker isn't the lamp. Samples of the plane.
+double lamp_gate(const Background& background, const DetectOptions& options);
+
+/// `bright` is what stands above lamp_gate().
+LampSearch find_lamps(const Plane& plane, const Background& background, const BrightAreas& bright,
+                      const DetectOptions& options);
 
 }  // namespace emberlock::detail

@@ -51,6 +51,12 @@ struct SmearReading {
   std::optional<LampReading> lamp;
   std::vector<DotReading> dots;  ///< top to bottom
   std::string reason;
+  /// All lamps of like brightness, the largest first: more than one when a second lamp or a reflection is in
+  /// sight.
+  std::vector<LampReading> lamps{};
+  /// When ambiguous: what stands in the lamp's column and might be a dot, top to bottom. Many frames may tell
+  /// (film.h).
+  std::vector<DotReading> spots{};
 };
 
 }  // namespace emberlock

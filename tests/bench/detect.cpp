@@ -3,6 +3,7 @@
 
 #include <benchmark/benchmark.h>
 
+#include "smear_sync/follow.h"
 #include "tests/support/smear_frames.h"
 
 namespace emberlock {
@@ -26,11 +27,23 @@ void read(benchmark::State& state, PixelFormat format, int depth, bool comb) {
   for (auto _ : state) benchmark::DoNotOptimize(detect(image.view()));
 }
 
+/// The frames after the first, of a camera that films on.
+void follow(benchmark::State& state, PixelFormat format, int depth) {
+  const Image image = frame(format, depth, false);
+  FollowingDetector detector;
+  benchmark::DoNotOptimize(detector.read(image.view()));
+  for (auto _ : state) benchmark::DoNotOptimize(detector.read(image.view()));
+}
+
 BENCHMARK_CAPTURE(read, gray8_dot, PixelFormat::gray8, 8, false)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(read, gray8_comb, PixelFormat::gray8, 8, true)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(read, gray12_dot, PixelFormat::gray16, 12, false)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(read, bayer8_dot, PixelFormat::bayer_rggb8, 8, false)->Unit(benchmark::kMicrosecond);
 BENCHMARK_CAPTURE(read, rgb8_dot, PixelFormat::rgb8, 8, false)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow, gray8_dot, PixelFormat::gray8, 8)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow, gray12_dot, PixelFormat::gray16, 12)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow, bayer8_dot, PixelFormat::bayer_rggb8, 8)->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(follow, rgb8_dot, PixelFormat::rgb8, 8)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace emberlock

@@ -87,21 +87,19 @@ class SmearScene {
     std::uint64_t seed = 1;
     PixelFormat format = PixelFormat::gray8;
   };
-  /// The frame that a sensor makes of the scene. Bayer: gains R 0.7, G 1, B 0.5 of the scene.
+  /// The frame that a sensor makes of the scene. Bayer and RGB: gains R 0.7, G 1, B 0.5 of the scene.
   [[nodiscard]] Image image(const Sensor& s) const {
     Image out({{width_, height_}, s.format, s.bit_depth});
     const int white = out.layout().white();
     const int n = channels(s.format);
+    Normals normals(s.seed);
     for (int y = 0; y < height_; ++y) {
       for (int x = 0; x < width_; ++x) {
         for (int c = 0; c < n; ++c) {
-          const std::uint64_t counter = (static_cast<std::uint64_t>(y) * static_cast<std::uint64_t>(width_) +
-                                         static_cast<std::uint64_t>(x)) *
-                                            3 +
-                                        static_cast<std::uint64_t>(c);
           double v = at(x, y) * gain(s.format, x, y, c);
-          const double sigma = std::sqrt(s.noise * s.noise + s.shot * std::max(0.0, v));
-          v += sigma * random_normal(s.seed, 77, counter);
+          const double sigma =
+              s.shot == 0 ? s.noise : std::sqrt(s.noise * s.noise + s.shot * std::max(0.0, v));
+          v += sigma * normals.next();
           v = std::clamp(v / 255, 0.0, 1.0);
           if (s.gamma != 1) v = std::pow(v, 1 / s.gamma);
           const long sample = std::lround(v * white);
@@ -117,6 +115,51 @@ class SmearScene {
   }
 
  private:
+  /// Standard normals, four from one draw: quantiles by table, and drawn anew in the last bin of either tail.
+  class Normals {
+   public:
+    explicit Normals(std::uint64_t seed) : random_(seed, 77) {}
+    double next() {
+      if (left_ == 0) {
+        bits_ = random_.bits();
+        left_ = 4;
+      }
+      const auto bin = static_cast<std::size_t>(bits_ & 0xffff);
+      bits_ >>= 16;
+      --left_;
+      if (bin != 0 && bin != 0xffff) return static_cast<double>(table()[bin]);
+      const double tail = quantile(random_.uniform() / 0x10000);
+      return bin == 0 ? tail : -tail;
+    }
+
+   private:
+    /// By bisection: P(normal < x) = p for p <= 1/2.
+    static double quantile(double p) {
+      double low = -10;
+      double high = 0;
+      for (int i = 0; i < 40; ++i) {
+        const double middle = (low + high) / 2;
+        (0.5 * std::erfc(-middle / 1.4142135623730951) < p ? low : high) = middle;
+      }
+      return (low + high) / 2;
+    }
+    static const std::vector<float>& table() {
+      static const std::vector<float> quantiles = [] {
+        std::vector<float> t(0x10000);
+        for (std::size_t i = 0; i < t.size() / 2; ++i) {
+          t[i] = static_cast<float>(quantile((static_cast<double>(i) + 0.5) / 0x10000));
+          t[t.size() - 1 - i] = -t[i];
+        }
+        return t;
+      }();
+      return quantiles;
+    }
+
+    RandomStream random_;
+    std::uint64_t bits_ = 0;
+    int left_ = 0;
+  };
+
   static double gain(PixelFormat format, int x, int y, int c) {
     if (is_bayer(format)) {
       if (x % 2 == 0 && y % 2 == 0) return 0.7;

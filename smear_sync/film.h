@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "smear_sync/reading.h"
+
+namespace emberlock {
+
+/// The lamp of a camera that stands still, from the readings of many frames: the mean over the unsaturated
+/// ones where there are any (a saturated lamp's outline is 0.07..0.7 rows off, the same way in every frame),
+/// else over all. `sigma` covers the readings' own errors and their scatter; that of saturated lamps doesn't
+/// fall with their number. Readings more than a pixel off the median don't count. Nothing without a lamp.
+std::optional<LampReading> combine_lamps(std::span<const SmearReading> film);
+
+/// Reads again what single frames of one camera left ambiguous, by what moves: the dots of a strobe that is
+/// detuned or moved walk together; reflections keep their place beside the lamp and hot pixels their row. A
+/// frame is settled when exactly one spot for each of its lamps moves, and over the film they travel
+/// `least_travel` or more. Frames in order; those that stay ambiguous say why.
+std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_travel = Rows(3));
+
+/// For each of several cameras that filmed the same flashes, whether its dots move as those of most do, up to
+/// the direction in which it reads: false for one whose "dots" are something else, or who has too few to
+/// tell. films[c][i] is camera c's frame i; cameras of one row time.
+std::vector<bool> move_together(std::span<const std::vector<SmearReading>> films);
+
+}  // namespace emberlock

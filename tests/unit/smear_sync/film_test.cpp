@@ -1,0 +1,106 @@
+// What many frames, and many cameras, tell that one can't.
+#include "smear_sync/film.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "smear_sync/detect.h"
+#include "tests/support/smear_frames.h"
+
+namespace emberlock {
+namespace {
+
+using test::SmearScene;
+
+constexpr double kLampX = 81.3;
+constexpr double kLampY = 180.4;
+
+SmearScene lamp_scene(double bright = 3000) { return SmearScene(160, 360).disk(kLampX, kLampY, 4, bright); }
+
+TEST(Film, UnsaturatedFramesTellTheLampsRow) {
+  std::vector<SmearReading> film;
+  for (std::uint64_t i = 0; i < 40; ++i) {
+    // A bloom drags the saturated lamp down.
+    const bool saturated = i % 4 != 0;
+    SmearScene scene = lamp_scene(saturated ? 3000 : 180);
+    if (saturated) scene.bloom(kLampX, kLampY, 2.5, 0, 60, 800);
+    film.push_back(detect(scene.image({.seed = i}).view()));
+  }
+  const auto lamp = combine_lamps(film);
+  ASSERT_TRUE(lamp);
+  EXPECT_FALSE(lamp->saturated);
+  EXPECT_NEAR(lamp->y.value(), kLampY, 0.02);
+  EXPECT_NEAR(lamp->x, kLampX, 0.02);
+  EXPECT_LT(lamp->sigma.value(), 0.02);
+  EXPECT_GE(lamp->sigma.value() * 5, std::abs(lamp->y.value() - kLampY));
+}
+
+TEST(Film, ManySaturatedFramesDontHideTheirCommonError) {
+  std::vector<SmearReading> film;
+  for (std::uint64_t i = 0; i < 30; ++i) film.push_back(detect(lamp_scene().image({.seed = i}).view()));
+  const auto lamp = combine_lamps(film);
+  ASSERT_TRUE(lamp);
+  EXPECT_TRUE(lamp->saturated);
+  EXPECT_GE(lamp->sigma.value(), 0.015);
+  EXPECT_FALSE(combine_lamps({}));
+}
+
+/// A camera's film: the lamp, its reflection below it if there is one, and their dots k0 + i rows on.
+std::vector<SmearReading> film_of(double reflection, double aside, int first_shift, int rows_a_frame,
+                                  const std::vector<double>& hot) {
+  std::vector<SmearReading> film;
+  for (int i = 0; i < 12; ++i) {
+    SmearScene scene = lamp_scene();
+    const double shift = first_shift + rows_a_frame * i;
+    scene.disk(kLampX, kLampY - shift, 4, 20);
+    if (reflection > 0) {
+      scene.disk(kLampX + aside, kLampY + reflection, 4, 3000);
+      scene.disk(kLampX + aside, kLampY + reflection - shift, 4, 20);
+    }
+    for (const double row : hot) scene.disk(kLampX, row, 4, 20);
+    film.push_back(detect(scene.image({.seed = static_cast<std::uint64_t>(i)}).view()));
+  }
+  return film;
+}
+
+TEST(Film, AReflectionInTheSameColumnIsToldFromTheLampByTheWalkOfBothDots) {
+  for (const double aside : {0.0, 1.0}) {
+    const std::vector<SmearReading> film = film_of(120, aside, 30, 3, {});
+    for (const SmearReading& r : film) ASSERT_EQ(r.state, SmearState::ambiguous) << r.reason;
+    const std::vector<SmearReading> settled = settle(film);
+    for (std::size_t i = 0; i < settled.size(); ++i) {
+      ASSERT_EQ(settled[i].state, SmearState::dot) << "frame " << i << ": " << settled[i].reason;
+      EXPECT_NEAR((settled[i].lamp->y - settled[i].dots[0].y).value(), 30 + 3.0 * static_cast<double>(i),
+                  0.5);
+    }
+  }
+}
+
+TEST(Film, ASpotThatStandsWhileTheDotWalksIsNone) {
+  const std::vector<SmearReading> film = film_of(0, 0, 30, 3, {300});
+  const std::vector<SmearReading> settled = settle(film);
+  for (std::size_t i = 0; i < settled.size(); ++i) {
+    ASSERT_EQ(settled[i].state, SmearState::dot) << settled[i].reason;
+    ASSERT_EQ(settled[i].dots.size(), 1U);
+    EXPECT_NEAR(settled[i].dots[0].y.value(), kLampY - 30 - 3.0 * static_cast<double>(i), 0.3);
+  }
+}
+
+TEST(Film, WhereNothingMovesNothingIsSettled) {
+  const std::vector<SmearReading> settled = settle(film_of(120, 1, 30, 0, {}));
+  for (const SmearReading& r : settled) {
+    EXPECT_EQ(r.state, SmearState::ambiguous);
+    EXPECT_NE(r.reason.find("detune"), std::string::npos) << r.reason;
+  }
+}
+
+TEST(Film, ACameraWhoseSpotDoesntMoveWithTheOthersIsFound) {
+  const std::vector<std::vector<SmearReading>> films{film_of(0, 0, 30, 3, {}), film_of(0, 0, 50, 3, {}),
+                                                     film_of(0, 0, 40, 0, {}), film_of(0, 0, 90, -3, {})};
+  EXPECT_EQ(move_together(films), (std::vector<bool>{true, true, false, true}))
+      << "the last camera reads the other way round";
+}
+
+}  // namespace
+}  // namespace emberlock

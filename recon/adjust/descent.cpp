@@ -9,7 +9,8 @@
 namespace emberlock {
 namespace {
 
-constexpr float kSmoothing = 0.006F;        // the Laplacian's weight over the mean of A^T A 1
+constexpr float kStiffness = 0.04F;  // of the tie of two neighbours, over the mean of A^T A 1
+constexpr float kSoftLight = 0.1F;   // differences below this share of the mean emission count quadratically
 constexpr float kMostMomentum = 0.93F;      // subsets are noisy: the full momentum would amplify that
 constexpr float kMostJointMomentum = 0.8F;  // of emission and extinction together, whose problem isn't convex
 constexpr float kVariation =
@@ -119,6 +120,7 @@ std::size_t Descent::rays_of(int subset) const {
 }
 
 void Descent::pass() {
+  engine_->stiffen(stiffness_, soft_);
   for (int s = 0; s < level_.subsets; ++s) {
     const std::size_t rays = rays_of(s);
     if (rays == 0) continue;
@@ -129,7 +131,7 @@ void Descent::pass() {
                                    static_cast<float>((momentum_time_ - 1) / next_time));
     momentum_time_ = next_time;
     const Engine::Step step{static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)),
-                            smoothing_, momentum};
+                            momentum};
     if (field_) {
       field_->emission = step;
       engine_->descend_field(*field_);
@@ -160,6 +162,21 @@ Descent::Sample Descent::sample() const {
           rays > 0 ? static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)) : 1.F};
 }
 
+/// Light that is seen over what an even medium of 1 would show, in the first subsets.
+float Descent::mean_emission(const std::vector<Rgba>& of_one, int subsets) const {
+  const Problem& problem = level_.problem;
+  double seen = 0;
+  double even = 0;
+  for (std::size_t r = 0; r < problem.list.subset_begin[static_cast<std::size_t>(subsets)]; ++r) {
+    even += static_cast<double>(of_one[r].c[0]);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float behind = problem.background.empty() ? 0.F : problem.background[r].c[c];
+      seen += static_cast<double>(problem.seen[r].c[c] - behind) / 3;
+    }
+  }
+  return even > 0 ? static_cast<float>(std::max(0.0, seen) / even) : 0;
+}
+
 /// A^T A 1 over the fitted rays; 1 only at the hull's key points. A field's extinction is lane 3 of x,
 /// thinned.
 void Descent::find_weights(const std::vector<Rgba>& x) {
@@ -174,12 +191,13 @@ void Descent::find_weights(const std::vector<Rgba>& x) {
     engine_->residual_against(dark, s);
     engine_->backproject(s);
   }
+  soft_ = kSoftLight * mean_emission(engine_->residuals(), taken.subsets);
   const std::vector<Rgba> gradient = engine_->gradient();
   std::vector<float> weights(gradient.size());
   Mean mean;
   for (std::size_t p = 0; p < weights.size(); ++p)
     if (active[p] != 0 && gradient[p].c[0] > 0) mean.add(weights[p] = taken.times * gradient[p].c[0]);
-  smoothing_ = kSmoothing * mean();
+  stiffness_ = kStiffness * mean();
   engine_->set_weights(weights);
 }
 

@@ -25,8 +25,8 @@ int stride_for(const SolverSetup& setup, const Grid& grid);
 /// fewer.
 Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets = 16);
 
-/// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Laplacian over x >= 0,
-/// by preconditioned ordered-subset steps with Nesterov's momentum.
+/// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Huber total variation
+/// over x >= 0, by preconditioned ordered-subset steps with Nesterov's momentum.
 class Descent {
  public:
   /// The level and the pool must outlive it. Starts from x: emission, and in lane 3 extinction where the
@@ -50,12 +50,14 @@ class Descent {
     float times;
   };
   [[nodiscard]] Sample sample() const;
+  [[nodiscard]] float mean_emission(const std::vector<Rgba>& of_one, int subsets) const;
   void find_weights(const std::vector<Rgba>& x);
 
   const Level& level_;
   std::unique_ptr<Engine> engine_;
   std::size_t fitted_ = 0;
-  float smoothing_ = 0;
+  float stiffness_ = 0;  // at most
+  float soft_ = 0;       // grey levels a voxel edge
   double momentum_time_ = 1;
   std::optional<Engine::FieldStep> field_;  // once the extinction is released
 };

@@ -15,8 +15,7 @@ namespace emberlock {
 class Engine {
  public:
   struct Step {
-    float scale;      ///< of the gradient: all rays over the rays that it was taken from
-    float smoothing;  ///< weight of the Laplacian
+    float scale;  ///< of the gradient: all rays over the rays that it was taken from
     float momentum;
   };
   struct PaperStep {
@@ -48,6 +47,9 @@ class Engine {
   virtual void clear_gradient() = 0;
   /// The weights of descend(): one a key point, 0 for those that take no part. Clears the gradient.
   virtual void set_weights(const std::vector<float>& weights) = 0;
+  /// Renews how firmly descend() ties key points to each other, see Stiffen: by `most` at most, in units of
+  /// the weights, falling where the light changes by more than `soft` a voxel edge.
+  virtual void stiffen(float most, float soft) = 0;
   virtual void descend(const Step& step) = 0;
 
   struct FieldStep {

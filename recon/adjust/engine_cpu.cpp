@@ -21,6 +21,7 @@ class CpuEngine final : public Engine {
         next_y_(x_.size()),
         gradient_(x_.size()),
         weight_(x_.size()),
+        stiffness_(x_.size()),
         residual_(problem.list.rays.size()) {
     const ExposureBlur blur(optics.exposure, problem.grid());
     if (!blur.identity()) blur_ = blur;
@@ -78,7 +79,12 @@ class CpuEngine final : public Engine {
     clear_gradient();
   }
 
-  void descend(const Step& step) override { each_row(table_.update, emission_step(step)); }
+  void stiffen(float most, float soft) override {
+    const Grid& g = problem_.grid();
+    each_row(table_.stiffen,
+             Stiffen<Real>{g.nx, g.ny, g.nz, y_.data(), stiffness_.data(), Real(most), Real(soft)});
+  }
+  void descend(const Step& step) override { update(table_.update, emission_step(step)); }
 
   void set_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
     field_weight_.assign(weights.begin(), weights.end());
@@ -86,9 +92,9 @@ class CpuEngine final : public Engine {
     clear_gradient();
   }
   void descend_field(const FieldStep& step) override {
-    each_row(table_.field_update,
-             DescendField<Real>{emission_step(step.emission), field_weight_.data(), reference_.data(),
-                                Real(step.variation), Real(step.soft), Real(step.most)});
+    update(table_.field_update,
+           DescendField<Real>{emission_step(step.emission), field_weight_.data(), reference_.data(),
+                              Real(step.variation), Real(step.soft), Real(step.most)});
   }
 
   void adjust(int subset, const PaperStep& step) override {
@@ -115,21 +121,25 @@ class CpuEngine final : public Engine {
             y_.data(),
             next_y_.data(),
             gradient_.data(),
+            stiffness_.data(),
             Real(step.scale),
-            Real(step.smoothing),
             Real(step.momentum)};
   }
   template <class Entry, class Update>
-  void each_row(Entry entry, const Update& update) {
+  void update(Entry entry, const Update& step) {
+    each_row(entry, step);
+    y_.swap(next_y_);
+  }
+  template <class Entry, class Act>
+  void each_row(Entry entry, const Act& act) {
     const Grid& g = problem_.grid();
     pool_.run(g.nz, [&](int k) {
       for (int j = 0; j < g.ny; ++j) {
         const Slice span = problem_.row_span[static_cast<std::size_t>(j) +
                                              static_cast<std::size_t>(g.ny) * static_cast<std::size_t>(k)];
-        entry(update, static_cast<int>(span.begin), static_cast<int>(span.end), j, k);
+        entry(act, static_cast<int>(span.begin), static_cast<int>(span.end), j, k);
       }
     });
-    y_.swap(next_y_);
   }
   [[nodiscard]] MarchWork<Real> work(int subset) {
     const std::size_t first =
@@ -191,7 +201,7 @@ class CpuEngine final : public Engine {
   Pool& pool_;
   const MarchTable<Real>& table_ = march_table<Real>();
   std::vector<Quad<Real>> x_, y_, next_y_, gradient_;
-  std::vector<Real> weight_, field_weight_, reference_;
+  std::vector<Real> weight_, stiffness_, field_weight_, reference_;
   std::vector<Quad<Real>> residual_;
   std::vector<Quad<Real>> samples_;  // of one subset
   std::vector<Rgba> offset_;

@@ -57,6 +57,7 @@ class CudaEngine final : public Engine {
         next_y_(size()),
         gradient_(size()),
         weight_(size()),
+        stiffness_(size()),
         residual_(problem.list.rays.size()),
         samples_(CudaBuffer<Quad<Real>>::unfilled(Extinction::kField ? problem.most_samples() : 0)),
         deposits_(CudaBuffer<Deposit<Real>>::unfilled(problem.most_samples())) {
@@ -137,6 +138,11 @@ class CudaEngine final : public Engine {
     gradient_.clear();
   }
 
+  void stiffen(float most, float soft) override {
+    const Grid& g = problem_.grid();
+    each_key_point(Stiffen<Real>{g.nx, g.ny, g.nz, y_.data(), stiffness_.data(), Real(most), Real(soft)},
+                   "stiffening");
+  }
   void descend(const Step& step) override { update(emission_step(step)); }
 
   void set_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
@@ -175,15 +181,27 @@ class CudaEngine final : public Engine {
   [[nodiscard]] Descend<Real> emission_step(const Step& step) {
     const Grid& g = problem_.grid();
     const Real scale(step.scale);
-    const Real smoothing(step.smoothing);
     const Real momentum(step.momentum);
-    return {g.nx,  g.ny,      g.nz,    weight_.data(), x_.data(), y_.data(), next_y_.data(), gradient_.data(),
-            scale, smoothing, momentum};
+    return {g.nx,
+            g.ny,
+            g.nz,
+            weight_.data(),
+            x_.data(),
+            y_.data(),
+            next_y_.data(),
+            gradient_.data(),
+            stiffness_.data(),
+            scale,
+            momentum};
   }
   template <class Update>
   void update(const Update& step) {
-    launch(size(), StepAt<Update>{step, problem_.grid().nx, problem_.grid().ny}, "stepping");
+    each_key_point(step, "stepping");
     y_.swap(next_y_);
+  }
+  template <class Act>
+  void each_key_point(const Act& act, const char* what) {
+    launch(size(), ActAt<Act>{act, problem_.grid().nx, problem_.grid().ny}, what);
   }
 
   /// The first ray or sample of a subset.
@@ -220,7 +238,7 @@ class CudaEngine final : public Engine {
   DeviceRayList lists_;
   CudaBuffer<Rgba> seen_, background_, offset_, target_;  // null where there is none
   CudaBuffer<Quad<Real>> x_, y_, next_y_, gradient_;
-  CudaBuffer<Real> weight_, field_weight_, reference_;
+  CudaBuffer<Real> weight_, stiffness_, field_weight_, reference_;
   CudaBuffer<Quad<Real>> residual_, samples_;  // samples of one subset
   CudaBuffer<Deposit<Real>> deposits_;         // of one subset
   std::vector<SortedSamples> by_voxel_;        // one a subset

@@ -11,6 +11,8 @@ HOST_DEVICE inline float exp_of(float x) { return expf(x); }
 HOST_DEVICE inline double exp_of(double x) { return exp(x); }
 HOST_DEVICE inline float expm1_of(float x) { return expm1f(x); }
 HOST_DEVICE inline double expm1_of(double x) { return expm1(x); }
+HOST_DEVICE inline float sqrt_of(float x) { return sqrtf(x); }
+HOST_DEVICE inline double sqrt_of(double x) { return sqrt(x); }
 
 // What the medium takes from the light, as policies of the march: chosen once on the host, so that the code
 // of the others isn't there at all. x is the optical depth of a step, sigma ds; phi(x) = (1 - exp(-x)) / x.

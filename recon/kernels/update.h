@@ -9,12 +9,45 @@
 
 namespace emberlock {
 
+/// How firmly light at a key point is tied to its six neighbours: the parabola that majorises the Huber total
+/// variation of lanes 0..2 at y (lagged diffusivity: Vogel and Oman 1996). Differences below `soft` count
+/// quadratically, those across a flame's edge by their size alone.
+///   stiffness = most / 2 * min(1, soft / |grad y|),  |grad y|^2 = mean over the colours, sum over the axes,
+///   of half the squared differences to both neighbours; what lies outside the grid is 0
+template <class Real>
+struct Stiffen {
+  int nx = 2, ny = 2, nz = 2;
+  const Quad<Real>* y = nullptr;
+  Real* stiffness = nullptr;
+  Real most = 0;
+  Real soft = 0;
+
+  HOST_DEVICE void operator()(int i, int j, int k) const {
+    const std::size_t row = static_cast<std::size_t>(nx);
+    const std::size_t plane = row * static_cast<std::size_t>(ny);
+    const std::size_t p =
+        static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + plane * static_cast<std::size_t>(k);
+    const Quad<Real> dark;
+    const Quad<Real> here = y[p];
+    const Real squares =
+        square(here - (i > 0 ? y[p - 1] : dark)) + square(here - (i < nx - 1 ? y[p + 1] : dark)) +
+        square(here - (j > 0 ? y[p - row] : dark)) + square(here - (j < ny - 1 ? y[p + row] : dark)) +
+        square(here - (k > 0 ? y[p - plane] : dark)) + square(here - (k < nz - 1 ? y[p + plane] : dark));
+    const Real steepness = sqrt_of(squares / 6);
+    stiffness[p] = most / 2 * (steepness > soft ? soft / steepness : Real(1));
+  }
+
+ private:
+  HOST_DEVICE static Real square(const Quad<Real>& d) {
+    return d.c[0] * d.c[0] + d.c[1] * d.c[1] + d.c[2] * d.c[2];
+  }
+};
+
 /// The default solver's step at one key point, for lanes 0..2 (lane 3 stays as it is): a gradient step with
 /// its own length, projection on x >= 0, Nesterov's look-ahead.
-///   x' = max(0, y - (scale * gradient + smoothing * laplacian(y)) / (weight + 12 smoothing)),  y' = x' +
-///   momentum * (x' - x)
-/// weight = A^T A 1 majorises A^T A (A >= 0), 12 the Laplacian's largest eigenvalue. The gradient is cleared
-/// for the next subset.
+///   x' = max(0, y - (scale * gradient + slope) / (weight + curvature)),  y' = x' + momentum * (x' - x)
+/// weight = A^T A 1 majorises A^T A (A >= 0); slope = sum of t (y - y_n) over the six neighbours, tied by the
+/// sum t of both ends' stiffness, and curvature = 2 sum of t. The gradient is cleared for the next subset.
 template <class Real>
 struct Descend {
   int nx = 2, ny = 2, nz = 2;
@@ -23,8 +56,8 @@ struct Descend {
   const Quad<Real>* y = nullptr;
   Quad<Real>* next_y = nullptr;
   Quad<Real>* gradient = nullptr;
+  const Real* stiffness = nullptr;
   Real scale = 1;
-  Real smoothing = 0;
   Real momentum = 0;
 
   HOST_DEVICE void operator()(int i, int j, int k) const {
@@ -36,25 +69,26 @@ struct Descend {
     gradient[p] = Quad<Real>{};
     if (weight[p] <= 0) return;
     const Quad<Real> here = y[p];
-    Quad<Real> slope = scale * g + smoothing * laplacian(i, j, k, p, row, plane);
+    Quad<Real> slope = scale * g;
+    Real curvature = weight[p];
+    tie(i > 0, p, p - 1, slope, curvature);
+    tie(i < nx - 1, p, p + 1, slope, curvature);
+    tie(j > 0, p, p - row, slope, curvature);
+    tie(j < ny - 1, p, p + row, slope, curvature);
+    tie(k > 0, p, p - plane, slope, curvature);
+    tie(k < nz - 1, p, p + plane, slope, curvature);
     slope.c[3] = 0;
-    const Quad<Real> after = non_negative(here - (1 / (weight[p] + 12 * smoothing)) * slope);
+    const Quad<Real> after = non_negative(here - (1 / curvature) * slope);
     next_y[p] = after + momentum * (after - x[p]);
     x[p] = after;
   }
 
  private:
-  /// 6 y minus its neighbours; what lies outside the grid is 0.
-  HOST_DEVICE Quad<Real> laplacian(int i, int j, int k, std::size_t p, std::size_t row,
-                                   std::size_t plane) const {
-    Quad<Real> around;
-    if (i > 0) around = around + y[p - 1];
-    if (i < nx - 1) around = around + y[p + 1];
-    if (j > 0) around = around + y[p - row];
-    if (j < ny - 1) around = around + y[p + row];
-    if (k > 0) around = around + y[p - plane];
-    if (k < nz - 1) around = around + y[p + plane];
-    return Real(6) * y[p] - around;
+  /// To neighbour q, or to the darkness where that lies outside the grid.
+  HOST_DEVICE void tie(bool inside, std::size_t p, std::size_t q, Quad<Real>& slope, Real& curvature) const {
+    const Real t = inside ? stiffness[p] + stiffness[q] : stiffness[p];
+    slope = slope + t * (inside ? y[p] - y[q] : y[p]);
+    curvature += 2 * t;
   }
 };
 
@@ -106,16 +140,16 @@ struct DescendField {
   }
 };
 
-/// A step at the key point of an index.
-template <class Step>
-struct StepAt {
-  Step step;
+/// What is done at a key point, by its index.
+template <class Act>
+struct ActAt {
+  Act act;
   int nx = 2, ny = 2;
 
   HOST_DEVICE void operator()(std::size_t p) const {
     const std::size_t row = static_cast<std::size_t>(nx);
     const std::size_t plane = row * static_cast<std::size_t>(ny);
-    step(static_cast<int>(p % row), static_cast<int>(p % plane / row), static_cast<int>(p / plane));
+    act(static_cast<int>(p % row), static_cast<int>(p % plane / row), static_cast<int>(p / plane));
   }
 };
 

@@ -36,12 +36,14 @@ struct MarchTable {
   /// residual as judged, and samples, of rays [begin, end).
   using FieldEntry = void (*)(const MarchWork<Real>&, const Judge<Real>&, std::size_t begin, std::size_t end);
   /// One row of key points [begin, end) x {j} x {k}.
+  using StiffenEntry = void (*)(const Stiffen<Real>&, int begin, int end, int j, int k);
   using UpdateEntry = void (*)(const Descend<Real>&, int begin, int end, int j, int k);
   using FieldUpdateEntry = void (*)(const DescendField<Real>&, int begin, int end, int j, int k);
 
   ForwardEntry forward[3][2];
   AdjointEntry adjoint[3][2];  ///< of a field: from `samples`
   FieldEntry field_forward[2];
+  StiffenEntry stiffen;
   UpdateEntry update;
   FieldUpdateEntry field_update;
 

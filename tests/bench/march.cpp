@@ -248,13 +248,14 @@ std::unique_ptr<Engine> engine_for(const Case& c, const Problem& problem, Pool& 
 }
 
 void work(Engine& engine, const Case& c) {
-  constexpr Engine::Step kSmall = {1e-7F, 1e-3F, 0.5F};  // stays where it is, near enough
+  constexpr Engine::Step kSmall = {1e-7F, 0.5F};  // stays where it is, near enough
   if (c.stage == Stage::forward) {
     engine.project(0);
     return;
   }
   if (c.goes_there()) engine.residual(0);
   if (c.comes_back()) engine.backproject(0);
+  if (c.updates()) engine.stiffen(1e-3F, 1);
   if (c.updates() && c.absorb == Absorb::field) engine.descend_field({kSmall, 1e-3F, 1e-3F, 0.3F});
   if (c.updates() && c.absorb != Absorb::field) engine.descend(kSmall);
 }

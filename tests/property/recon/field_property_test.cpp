@@ -145,6 +145,7 @@ TEST(FieldLaw, AStepOfTotalVariationAloneNeverRaisesIt) {
     const double most = magnitude(0.01, 1);
     const double soft = magnitude(1e-4, 1) * most;
     const std::vector<double> weights(g.size(), magnitude(1e-6, 1));
+    const std::vector<double> stiffness(g.size());
     std::vector<double> reference(g.size());
     for (std::size_t p = 0; p < g.size(); ++p) reference[p] = most * random_uniform(1, 1, p / 7);
     Values x = random_quads<double>(g.size(), 8, 1, most);
@@ -154,13 +155,13 @@ TEST(FieldLaw, AStepOfTotalVariationAloneNeverRaisesIt) {
     double before = variation(g, x, reference, soft);
     const double start = before;
     for (int step = 0; step < 20; ++step) {
-      const DescendField<double> descend{
-          {g.nx, g.ny, g.nz, weights.data(), x.data(), y.data(), next.data(), gradient.data(), 1, 0, 0},
-          weights.data(),
-          reference.data(),
-          magnitude(0.1, 10),
-          soft,
-          most};
+      const DescendField<double> descend{{g.nx, g.ny, g.nz, weights.data(), x.data(), y.data(), next.data(),
+                                          gradient.data(), stiffness.data(), 1, 0},
+                                         weights.data(),
+                                         reference.data(),
+                                         magnitude(0.1, 10),
+                                         soft,
+                                         most};
       for (int k = 0; k < g.nz; ++k)
         for (int j = 0; j < g.ny; ++j) march_table<double>().field_update(descend, 0, g.nx, j, k);
       y.swap(next);

@@ -44,7 +44,8 @@ void expect_same_marches(const MarchTable<Real>& table, bool curved) {
   expect_same(level.field_adjoint(field), baseline.field_adjoint(truth), "field gradient");
 }
 
-/// One look-ahead and one solution after a step of either kind, x and y one behind the other.
+/// One look-ahead and one solution after a step of either kind under renewed ties, x and y one behind the
+/// other.
 template <class Real>
 std::vector<Quad<Real>> stepped(const MarchTable<Real>& table, bool field) {
   Grid g;
@@ -56,10 +57,22 @@ std::vector<Quad<Real>> stepped(const MarchTable<Real>& table, bool field) {
   const auto y = random_quads<Real>(g.size(), 2, 1, 0.3);
   auto next = y;
   auto gradient = random_quads<Real>(g.size(), 3, 1, 0.1);
-  const Descend<Real> emission{g.nx,     g.ny,       g.nz,        weights.data(),
-                               x.data(), y.data(),   next.data(), gradient.data(),
-                               Real(2),  Real(0.01), Real(0.9)};
+  std::vector<Real> stiffness(g.size());
+  const Stiffen<Real> ties{g.nx, g.ny, g.nz, y.data(), stiffness.data(), Real(0.01), Real(0.1)};
+  const Descend<Real> emission{g.nx,
+                               g.ny,
+                               g.nz,
+                               weights.data(),
+                               x.data(),
+                               y.data(),
+                               next.data(),
+                               gradient.data(),
+                               stiffness.data(),
+                               Real(2),
+                               Real(0.9)};
   const DescendField<Real> both{emission, weights.data(), reference.data(), Real(0.1), Real(0.01), Real(0.3)};
+  for (int k = 0; k < g.nz; ++k)
+    for (int j = 0; j < g.ny; ++j) table.stiffen(ties, 0, g.nx, j, k);
   for (int k = 0; k < g.nz; ++k)
     for (int j = 0; j < g.ny; ++j)
       field ? table.field_update(both, 0, g.nx, j, k) : table.update(emission, 0, g.nx, j, k);

@@ -66,9 +66,10 @@ TEST_P(Threads, DescendTheSameBitsByEmissionAndExtinction) {
     engine->set_weights(weights);
     engine->set_field(std::vector<float>(points, 1e7F), std::vector<float>(points, 0.1F));
     for (int step = 0; step < 4; ++step) {
+      engine->stiffen(1, 0.5F);
       engine->residual(step % 2);
       engine->backproject(step % 2);
-      engine->descend_field({{2, 1, 0.5F}, 1e3F, 0.01F, 0.3F});
+      engine->descend_field({{2, 0.5F}, 1e3F, 0.01F, 0.3F});
     }
     std::vector<Rgba> x = engine->get();
     bool moved = false;

@@ -1,5 +1,5 @@
 // The march's hard cases, on every device of this machine. Those of scattering are in
-// tests/long/recon/in_scatter_test.cpp, the solvers' in hard_scenes_test.cpp.
+// tests/integration/optics/in_scatter_test.cpp, the solvers' in hard_scenes_test.cpp.
 #include <cmath>
 #include <fstream>
 

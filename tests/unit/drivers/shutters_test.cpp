@@ -74,8 +74,8 @@ TEST(RollingShutter, TheLampShowsInItsLitRowsOnly) {
   VirtualSensor sensor(options, 0, 1);
   // Rows 50 and 51 are exposed, through the lamp's middle: no light elsewhere, and no smear.
   const LightPulse flash{Rows(49.5) * SecondsPerRow(kRow), microseconds(20)};
-  const Image picture =
-      sensor.expose(std::make_shared<const VirtualScene>(scene), {&flash, 1}, {0, TimePoint{}, milliseconds(0.5)});
+  const Image picture = sensor.expose(std::make_shared<const VirtualScene>(scene), {&flash, 1},
+                                      {0, TimePoint{}, milliseconds(0.5)});
   for (int y = 0; y < 120; ++y) {
     const bool lit = y == 50 || y == 51;
     EXPECT_EQ(picture.view().sample(30, y), lit ? 4095 : 0) << y;
@@ -85,8 +85,13 @@ TEST(RollingShutter, TheLampShowsInItsLitRowsOnly) {
 TEST(GlobalShutter, TheFlashsShareInsideTheWindowScalesTheBrightness) {
   const Seconds exposure = milliseconds(3);
   const auto options = camera(SensorKind::global_shutter, exposure, ReadDirection::top_first);
-  for (const auto& [begin_us, share] : {std::pair{-1000.0, 1.0}, {-3000.0, 1.0}, {-3005.0, 0.75},
-                                        {-3020.0, 0.0}, {-5.0, 0.25}, {0.0, 0.0}, {9000.0, 0.0}}) {
+  for (const auto& [begin_us, share] : {std::pair{-1000.0, 1.0},
+                                        {-3000.0, 1.0},
+                                        {-3005.0, 0.75},
+                                        {-3020.0, 0.0},
+                                        {-5.0, 0.25},
+                                        {0.0, 0.0},
+                                        {9000.0, 0.0}}) {
     const auto part = parts(options, exposure, {microseconds(begin_us), microseconds(20)});
     for (const double p : part) ASSERT_NEAR(p, share, 0.02) << begin_us;
   }
@@ -98,7 +103,8 @@ TEST(GlobalShutter, LeavesNoSmear) {
   ASSERT_TRUE(rig->strobe().apply({.output = StrobeOutput::flashing, .rate = Hertz(24)}).ok());
   ASSERT_TRUE(rig->camera(0).start().ok());
   const Frame frame = rig->camera(0).next_frame(Seconds(1)).value();
-  for (int y = 0; y < 120; ++y) EXPECT_EQ(frame.image->view().sample(30, y), frame.image->view().sample(5, 5));
+  for (int y = 0; y < 120; ++y)
+    EXPECT_EQ(frame.image->view().sample(30, y), frame.image->view().sample(5, 5));
   EXPECT_TRUE(rig->dots(0, 0).empty());
 }
 
@@ -113,9 +119,10 @@ TEST(Shutters, EachCamerasOwnExposureGoesBeforeTheScenes) {
   setup.cameras[1].exposure.reset();
   auto rig = VirtualRig::create(setup, std::make_shared<VirtualClock>()).value();
   // A flash 20 ms before the read phases of both, which begin at whole periods.
-  ASSERT_TRUE(rig->strobe()
-                  .apply({.output = StrobeOutput::flashing, .rate = Hertz(24), .phase = Seconds(1 / 24.0 - 0.02)})
-                  .ok());
+  ASSERT_TRUE(
+      rig->strobe()
+          .apply({.output = StrobeOutput::flashing, .rate = Hertz(24), .phase = Seconds(1 / 24.0 - 0.02)})
+          .ok());
   int light[2];
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(rig->camera(i).start().ok());

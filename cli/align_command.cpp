@@ -1,7 +1,10 @@
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
+
+#include <fmt/format.h>
 
 #include "base/file.h"
 #include "cli/align_json.h"
@@ -45,10 +48,13 @@ void print_table(const AlignRoundReport& report) {
                 in_milliseconds(*report.decision.worst_pair));
   }
   std::printf("\n");
+  const bool mixed = std::any_of(report.sensors.begin(), report.sensors.end(),
+                                 [](SensorKind kind) { return kind != SensorKind::ccd; });
   for (std::size_t i = 0; i < report.cameras.size(); ++i) {
     const CameraDecision& camera = report.decision.cameras[i];
     const char mark = camera.reset ? '*' : camera.trim ? '~' : report.decision.reference == i ? '=' : ' ';
     std::printf("  %c %-12s ", mark, report.cameras[i].id.c_str());
+    if (mixed) std::printf("%-8s", std::string(name(report.sensors[i])).c_str());
     if (camera.error) {
       std::printf("%+8.1f rows %+8.3f ms", (*camera.error / row).value(), in_milliseconds(*camera.error));
     } else {
@@ -57,6 +63,18 @@ void print_table(const AlignRoundReport& report) {
     std::printf("  %s\n", camera.reason.c_str());
   }
   std::fflush(stdout);
+}
+
+/// What flashes told of a sensor other than a CCD.
+void print_sensor(const CameraInfo& camera, const std::optional<RowClock>& clock,
+                  const std::optional<Seconds>& exposure) {
+  if (camera.sensor == SensorKind::ccd) return;
+  std::string text = fmt::format("  {}, {} shutter:", camera.id, name(camera.sensor));
+  if (exposure) text += fmt::format(" exposes about {:.1f} ms", in_milliseconds(*exposure));
+  if (clock)
+    text +=
+        fmt::format(", t_row {:.3f} +- {:.3f} us", clock->row_time.value() * 1e6, clock->sigma.value() * 1e6);
+  std::printf("%s\n", (exposure || clock ? text : text + " nothing could be told of it").c_str());
 }
 
 void print_summary(const AlignRunResult& result) {
@@ -68,6 +86,8 @@ void print_summary(const AlignRunResult& result) {
                                                       : "NOT aligned",
               last.round, result.resets, std::string(name(result.options.policy)).c_str(),
               result.options.tolerance.in_rows(row).value(), row.value() * 1e6, last.reason.c_str());
+  for (std::size_t i = 0; i < result.cameras.size(); ++i)
+    print_sensor(result.cameras[i], result.row_clocks[i], result.exposures[i]);
 }
 
 /// Where the rounds go: JSON lines or tables on stdout.
@@ -146,7 +166,8 @@ void add_align(CLI::App& app) {
   CLI::App* verb = app.add_subcommand(
       "align",
       "Films the strobe and resets the cameras' shutters until all read within a tolerance of one another.");
-  verb->add_option("--rig", arguments->rig, "cameras and strobe: virtual:N")->capture_default_str();
+  verb->add_option("--rig", arguments->rig, "cameras and strobe: virtual:N, or virtual:4ccd+3rolling+2global")
+      ->capture_default_str();
   verb->add_option("--tolerance", arguments->tolerance,
                    "to the common target, to either side: 100rows, 5.4ms or 500us")
       ->capture_default_str();

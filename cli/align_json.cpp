@@ -129,6 +129,7 @@ ordered_json round_json(const AlignRoundReport& report) {
     }
     cameras.push_back(
         {{"id", report.cameras[i].id},
+         {"sensor", name(report.sensors[i])},
          {"state", name(camera.state)},
          {"tau_ms", phase.state == PhaseState::known ? ordered_json(in_milliseconds(phase.tau)) : nullptr},
          {"error_rows", error_rows},
@@ -175,6 +176,15 @@ ordered_json summary_json(const AlignRunResult& result, std::uint64_t seed) {
   line["offers"] = offers_json(last.offers, row);
   line["policy"] = name(result.options.policy);
   line["seed"] = seed;
+  for (std::size_t i = 0; i < result.cameras.size(); ++i) {
+    const auto& clock = result.row_clocks[i];
+    const auto& exposure = result.exposures[i];
+    line["cameras"].push_back(
+        {{"id", result.cameras[i].id},
+         {"sensor", name(result.cameras[i].sensor)},
+         {"t_row_us", clock ? ordered_json(clock->row_time.value() * 1e6) : nullptr},
+         {"exposure_ms", exposure ? ordered_json(in_milliseconds(*exposure)) : nullptr}});
+  }
   line["reason"] = last.reason;
   return line;
 }

@@ -5,10 +5,12 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "base/log.h"
-#include "base/random.h"
+#include "cli/align_bench.h"
 #include "cli/align_json.h"
-#include "drivers/replay/record.h"
+#include "smear_sync/align_words.h"
 #include "smear_sync/reset_delay.h"
 
 namespace emberlock::cli {
@@ -17,9 +19,16 @@ namespace {
 /// Cameras whose nominal rates differ by more can't be held in step by resets.
 constexpr double kSameRate = 500e-6;
 
-/// A dot may come from a flash of the read phase before: frames are trusted from the second one after a
-/// change.
+/// Periods that pass before frames show a change of the strobe.
 constexpr double kSettlingPeriods = 2;
+
+/// Looks that a global shutter's phase takes in a round, when its shutter wasn't reset.
+constexpr double kLooks = 4;
+
+/// Standard error of a swept phase that is aimed at: this part of the tolerance, or the least that sweeps
+/// reach.
+constexpr double kSweptPart = 0.04;
+constexpr Seconds kSweptLeast = microseconds(2);
 
 constexpr int kCombAttempts = 2;
 
@@ -39,98 +48,6 @@ std::optional<RateTrim> trim_of(const CameraInfo& info) {
   if (!info.trim) return std::nullopt;
   return RateTrim{info.trim->range, info.trim->step, info.trim->latency};
 }
-
-/// What was filmed of every camera between two changes.
-struct Film {
-  std::vector<std::vector<Frame>> frames;
-  std::vector<std::vector<SmearReading>> readings;
-};
-
-/// The devices, with everything that happens to them written down.
-class Bench {
- public:
-  Bench(const AlignRig& rig, const AlignRunOptions& options, Seconds period)
-      : rig_(rig), options_(options), period_(period) {}
-
-  [[nodiscard]] const StrobeSettings& strobe() const { return strobe_; }
-
-  /// Sets the strobe, if that changes anything; frames that show what was before are passed over from then
-  /// on.
-  Status set_strobe(const StrobeSettings& wanted) {
-    if (asked_ == wanted) return {};
-    EMBERLOCK_RETURN_IF_ERROR(rig_.strobe->apply(wanted));
-    const TimePoint now = rig_.clock->now();
-    EMBERLOCK_ASSIGN_OR_RETURN(strobe_, rig_.strobe->read_back());
-    asked_ = wanted;
-    fresh_ = now + kSettlingPeriods * period_;
-    return record(strobe_event(now, strobe_));
-  }
-
-  /// Tells the camera to reset its shutter at `moment` or a whole number of periods later; at a moment drawn
-  /// at random when there is none. Returns when it was told for.
-  Result<TimePoint> reset(std::size_t camera, std::optional<TimePoint> moment, int draw) {
-    const TimePoint now = rig_.clock->now();
-    const TimePoint earliest = now + options_.reset_lead;
-    TimePoint at =
-        earliest + period_ * random_uniform(options_.seed, camera, static_cast<std::uint64_t>(draw));
-    if (moment) at = *moment + period_ * std::ceil((earliest - *moment) / period_);
-    EMBERLOCK_RETURN_IF_ERROR(rig_.cameras[camera]->reset_shutter(at));
-    // Frames from before are older than the decision that led here: the other cameras' are passed over too.
-    fresh_ = std::max(fresh_, now);
-    EMBERLOCK_RETURN_IF_ERROR(record(reset_event(now, rig_.cameras[camera]->info().id, at)));
-    return at;
-  }
-
-  /// Trims the camera's frame rate. Returns when it was told.
-  Result<TimePoint> trim(std::size_t camera, PartsPerMillion trim) {
-    const TimePoint now = rig_.clock->now();
-    EMBERLOCK_RETURN_IF_ERROR(rig_.cameras[camera]->trim_rate(trim));
-    EMBERLOCK_RETURN_IF_ERROR(record(trim_event(now, rig_.cameras[camera]->info().id, trim)));
-    return now;
-  }
-
-  /// `count` frames of every camera, one of each in turn, and what they show.
-  Result<Film> film(int count, const Progress& progress, double from, double to, const char* what) {
-    Film film;
-    film.frames.resize(rig_.cameras.size());
-    film.readings.resize(rig_.cameras.size());
-    for (int i = 0; i < count; ++i) {
-      report(progress, from + (to - from) * i / count, what);
-      for (std::size_t camera = 0; camera < rig_.cameras.size(); ++camera) {
-        EMBERLOCK_ASSIGN_OR_RETURN(std::optional<Frame> frame, fresh_frame(camera));
-        if (!frame) continue;  // none came: fewer samples of this camera
-        film.readings[camera].push_back(detect(frame->image->view()));
-        film.frames[camera].push_back(std::move(*frame));
-      }
-    }
-    return film;
-  }
-
-  Status record(const v1::Event& event) { return rig_.recorder ? rig_.recorder->append(event) : Status{}; }
-
- private:
-  Result<std::optional<Frame>> fresh_frame(std::size_t camera) {
-    for (;;) {
-      Result<Frame> frame = rig_.cameras[camera]->next_frame(options_.frame_deadline);
-      if (!frame.ok()) {
-        if (frame.error().kind != ErrorKind::timed_out) return frame.error();
-        log(LogCategory::cli).warn("{}", frame.error().message());
-        return std::optional<Frame>();
-      }
-      if (rig_.recorder) EMBERLOCK_RETURN_IF_ERROR(rig_.recorder->write(camera, *frame));
-      const bool usable =
-          frame->stamp.monotonic_time >= fresh_ && frame->stamp.status == FrameStatus::complete;
-      if (usable) return std::optional<Frame>(std::move(*frame));
-    }
-  }
-
-  const AlignRig& rig_;
-  const AlignRunOptions& options_;
-  Seconds period_;
-  StrobeSettings strobe_;                ///< as read back
-  std::optional<StrobeSettings> asked_;  ///< as asked for
-  TimePoint fresh_;                      ///< frames that came before are passed over
-};
 
 Result<Seconds> common_period(const AlignRig& rig, const AlignRunOptions& options) {
   const auto refuse = [](std::string what, std::string where, std::string remedy) {
@@ -156,61 +73,103 @@ Result<Seconds> common_period(const AlignRig& rig, const AlignRunOptions& option
   return period(rate);
 }
 
-/// t_row of every camera from a comb. Cameras whose comb can't be read keep the mean of the others.
-Status measure_row_times(Bench& bench, const AlignRunOptions& options, AlignRunResult& result,
-                         const Progress& progress) {
+/// A mean of row times, each weighing by its standard error.
+class MeanRowTime {
+ public:
+  void add(const RowClock& clock) {
+    const double w = 1 / std::max(clock.sigma.value() * clock.sigma.value(), 1e-24);
+    weights_ += w;
+    moment_ += w * clock.row_time.value();
+  }
+  [[nodiscard]] std::optional<SecondsPerRow> value() const {
+    if (weights_ == 0) return std::nullopt;
+    return SecondsPerRow(moment_ / weights_);
+  }
+
+ private:
+  double weights_ = 0;
+  double moment_ = 0;
+};
+
+/// t_row of every CCD from a comb. CCDs whose comb can't be read keep the mean of the others.
+Status measure_row_times(const AlignRig& rig, AlignBench& bench, const AlignRunOptions& options,
+                         AlignRunResult& result, const Progress& progress) {
+  const std::vector<std::size_t> cameras = bench.cameras_with(SensorKind::ccd);
+  if (cameras.empty()) return {};
   StrobeSettings comb{
       .output = StrobeOutput::flashing, .rate = options.comb_rate, .width = options.flash_width};
   for (int attempt = 0; attempt < kCombAttempts; ++attempt) {
+    report(progress, 0.1 * attempt, "measuring the row time");
     EMBERLOCK_RETURN_IF_ERROR(bench.set_strobe(comb));
-    EMBERLOCK_ASSIGN_OR_RETURN(const Film film,
-                               bench.film(options.comb_frames, progress, 0, 0.2, "measuring the row time"));
+    EMBERLOCK_ASSIGN_OR_RETURN(const Film film, bench.film(cameras, options.comb_frames));
     bool near_integer = false;
-    double weights = 0;
-    double moment = 0;
-    for (std::size_t i = 0; i < film.readings.size(); ++i) {
+    MeanRowTime mean;
+    for (const std::size_t i : cameras) {
       const auto fit = fit_row_clock(film.readings[i], bench.strobe().rate, options.timing[i].frame_period);
       result.row_clocks[i].reset();
       if (!fit.ok()) {
-        log(LogCategory::cli).warn("camera {}: {}", i, fit.error().message());
+        log(LogCategory::cli).warn("camera {}: {}", rig.cameras[i]->info().id, fit.error().message());
         continue;
       }
       near_integer |= fit->near_integer_pitch;
       result.row_clocks[i] = *fit;
-      const double w = 1 / std::max(fit->sigma.value() * fit->sigma.value(), 1e-24);
-      weights += w;
-      moment += w * fit->row_time.value();
+      mean.add(*fit);
     }
-    if (weights == 0) {
+    if (!mean.value()) {
       return Error{ErrorKind::device, "no camera shows a comb of dots that a row time can be fitted to",
                    "measuring the row time",
-                   "check that the strobe flashes at " + std::to_string(options.comb_rate.value()) +
-                       "/s and is in view of the cameras"};
+                   fmt::format("check that the strobe flashes at {}/s and is in view of the cameras",
+                               options.comb_rate.value())};
     }
-    result.options.row_time = SecondsPerRow(moment / weights);
+    result.options.row_time = *mean.value();
     if (!near_integer) break;
     comb.rate = options.comb_rate * 0.983;  // another pitch, off the whole number
   }
-  for (std::size_t i = 0; i < result.timing.size(); ++i) {
-    result.timing[i].row_time =
-        result.row_clocks[i] ? result.row_clocks[i]->row_time : result.options.row_time;
+  for (const std::size_t i : cameras) {
+    bench.sensor(i).set_row_time(result.row_clocks[i] ? result.row_clocks[i]->row_time
+                                                      : result.options.row_time);
   }
   return {};
 }
 
-AlignRound to_round(const Film& film, const AlignRunResult& rig, const AlignRunOptions& options,
-                    const StrobeSettings& strobe) {
-  std::vector<std::vector<PhaseSample>> samples(film.frames.size());
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    for (std::size_t j = 0; j < film.frames[i].size(); ++j) {
-      samples[i].push_back({film.frames[i][j].stamp.monotonic_time,
-                            phase_of(film.readings[i][j], rig.timing[i], strobe.width)});
-    }
+/// What the sensors measured of themselves. Rows are CCD's where there is one, else a rolling shutter's.
+void adopt_sensors(const AlignRig& rig, AlignBench& bench, const AlignRunOptions& options,
+                   AlignRunResult& result) {
+  MeanRowTime mean;
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    const PhaseSensor& sensor = bench.sensor(i);
+    result.timing[i] = sensor.timing();
+    const auto clock = sensor.row_clock();
+    if (!clock) continue;
+    result.row_clocks[i] = clock;
+    mean.add(*clock);
   }
+  const bool rows_of_ccds = !bench.cameras_with(SensorKind::ccd).empty();
+  if (options.measure_row_time && !rows_of_ccds && mean.value()) result.options.row_time = *mean.value();
+}
+
+/// How a camera's tau moves against the strobe, as far as earlier rounds tell.
+Beat own_beat(const AlignState& state, std::size_t camera, const Beat& common, const AlignOptions& options) {
+  const double spread = options.rate_spread.value();
+  Beat own{common.rate, PartsPerMillion(std::hypot(common.sigma.value(), spread))};
+  if (!state.last_round || !state.cameras[camera].phase.phase_known()) return own;
+  const PhaseTrack& track = state.cameras[camera].phase;
+  const TimePoint later = *state.last_round + Seconds(1);  // when what was ordered is in force
+  const Drift drift = track.at(*state.last_round, track_options(options));
+  own.rate += drift.rate + track.trim(later);
+  own.sigma = PartsPerMillion(std::hypot(common.sigma.value(), drift.rate_sigma.value()));
+  return own;
+}
+
+AlignRound to_round(AlignBench& bench, const Film& film, const AlignRunResult& rig, const Beat& expected) {
+  const StrobeSettings& strobe = bench.strobe();
+  std::vector<std::vector<PhaseSample>> samples;
+  for (std::size_t i = 0; i < film.frames.size(); ++i)
+    samples.push_back(bench.sensor(i).phases(strobe.phase));
   const Seconds period = rig.options.period;
-  CommonPhases common = refer(samples, {.period = period,
-                                        .resolution = row_resolution(rig.options.row_time, strobe.width),
-                                        .beat = expected_beat(strobe.rate, period, options.rate_error)});
+  CommonPhases common = refer(
+      samples,
+      {.period = period, .resolution = row_resolution(rig.options.row_time, strobe.width), .beat = expected});
   AlignRound round{common.at, common.beat, strobe.phase, {}, {}, {}};
   for (std::size_t i = 0; i < samples.size(); ++i) {
     std::vector<TimePoint> stamps;
@@ -239,74 +198,127 @@ double part_within(const AlignDecision& decision, const AlignOptions& options) {
   return static_cast<double>(within) / static_cast<double>(decision.cameras.size());
 }
 
+/// One alignment: what is known, and the steps of a round.
+class AlignRunner {
+ public:
+  AlignRunner(const AlignRig& rig, const AlignRunOptions& options, Seconds period,
+              const AlignObserver& observer, const Progress& progress)
+      : rig_(rig), options_(options), observer_(observer), progress_(progress), bench_(rig, options, period) {
+    result_.options = options.align;
+    result_.options.period = period;
+    result_.options.round_time = period * (options.frames_per_round + kSettlingPeriods);
+    if (!bench_.cameras_with(SensorKind::global_shutter).empty())
+      result_.options.round_time += period * (kLooks * (1 + kSettlingPeriods));
+    result_.timing = options.timing;
+    for (CcdTiming& timing : result_.timing) timing.frame_period = period;
+    result_.row_clocks.resize(rig.cameras.size());
+    cameras_ = describe(rig, options);
+    for (const Camera* camera : rig.cameras) sensors_.push_back(camera->info().sensor);
+    flashes_ = {.output = StrobeOutput::flashing, .rate = rate(period), .width = options.flash_width};
+  }
+
+  Status start() {
+    for (Camera* camera : rig_.cameras) EMBERLOCK_RETURN_IF_ERROR(camera->start());
+    if (!options_.measure_row_time) return {};
+    return measure_row_times(rig_, bench_, options_, result_, progress_);
+  }
+
+  /// Films, decides, and carries the decision out.
+  Status round() {
+    EMBERLOCK_RETURN_IF_ERROR(bench_.set_strobe(flashes_));
+    // What a round before saw of the beat is no better than the settings, whose error is common to all
+    // rounds.
+    const Beat expected = expected_beat(bench_.strobe().rate, result_.options.period, options_.rate_error);
+    for (std::size_t i = 0; i < cameras_.size(); ++i)
+      bench_.sensor(i).begin_round(own_beat(state_, i, beat_.value_or(expected), result_.options));
+    const Seconds tolerance = result_.options.tolerance.in_time(result_.options.row_time);
+    EMBERLOCK_RETURN_IF_ERROR(
+        bench_.sweep(flashes_, std::max(kSweptPart * tolerance, kSweptLeast), progress_, reached_));
+    if (state_.rounds == 0) adopt_sensors(rig_, bench_, options_, result_);
+    report(progress_, reached_, fmt::format("round {}, {} resets", state_.rounds + 1, state_.resets));
+    EMBERLOCK_ASSIGN_OR_RETURN(const Film film, bench_.film_all(options_.frames_per_round));
+    AlignRound round = to_round(bench_, film, result_, expected);
+    beat_ = round.beat;
+    round.resets = std::exchange(resets_, {});
+    round.trims = std::exchange(trims_, {});
+    AlignStep step = align_step(state_, round, cameras_, result_.options);
+    state_ = std::move(step.state);
+    result_.last = std::move(step.decision);
+    if (result_.last.reference) reached_ = 0.2 + 0.8 * part_within(result_.last, result_.options);
+    EMBERLOCK_RETURN_IF_ERROR(tell({round, result_.last, cameras_, sensors_, result_.options, bench_.strobe(),
+                                    film.frames, film.readings}));
+    return carry_out();
+  }
+
+  [[nodiscard]] const AlignDecision& last() const { return result_.last; }
+
+  AlignRunResult finish() {
+    report(progress_, 1, result_.last.verdict == AlignVerdict::aligned ? "aligned" : "not aligned");
+    result_.resets = state_.resets;
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      result_.cameras.push_back(rig_.cameras[i]->info());
+      result_.exposures.push_back(bench_.sensor(i).exposure());
+      const CameraTrack& track = state_.cameras[i];
+      result_.delays.push_back(track.taught > 0 ? track.delay : cameras_[i].expected_delay);
+    }
+    return std::move(result_);
+  }
+
+ private:
+  Status tell(const AlignRoundReport& seen) {
+    v1::Event event;
+    event.set_monotonic_ns(seen.round.at.ns);
+    event.mutable_decision()->set_round(static_cast<std::uint32_t>(seen.decision.round));
+    event.mutable_decision()->set_json(round_json(seen).dump());
+    EMBERLOCK_RETURN_IF_ERROR(bench_.record(event));
+    if (observer_) observer_(seen);
+    return {};
+  }
+
+  Status carry_out() {
+    if (result_.last.strobe_phase) flashes_.phase = *result_.last.strobe_phase;
+    for (std::size_t i = 0; i < cameras_.size(); ++i) {
+      const CameraDecision& camera = result_.last.cameras[i];
+      if (camera.trim) {
+        EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at, bench_.trim(i, *camera.trim));
+        trims_.push_back({i, at, *camera.trim});
+      }
+      if (!camera.reset) continue;
+      EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at,
+                                 bench_.reset(i, camera.moment, state_.cameras[i].resets));
+      const bool told = cameras_[i].method == ResetMethod::on_command;
+      resets_.push_back({i, told ? std::optional(at) : std::nullopt});
+    }
+    return {};
+  }
+
+  const AlignRig& rig_;
+  const AlignRunOptions& options_;
+  const AlignObserver& observer_;
+  const Progress& progress_;
+  AlignBench bench_;
+  AlignRunResult result_;
+  std::vector<AlignCamera> cameras_;
+  std::vector<SensorKind> sensors_;
+  StrobeSettings flashes_;
+  std::optional<Beat> beat_;  ///< of the round before
+  AlignState state_;
+  std::vector<ResetDone> resets_;  ///< since the last round
+  std::vector<TrimDone> trims_;
+  double reached_ = 0.2;  ///< of the progress; the rest is the part of the cameras within tolerance
+};
+
 }  // namespace
 
 Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& options,
                                  const AlignObserver& observer, const Progress& progress) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Seconds period, common_period(rig, options));
-  AlignRunResult result;
-  result.options = options.align;
-  result.options.period = period;
-  result.options.round_time = period * (options.frames_per_round + kSettlingPeriods);
-  result.timing = options.timing;
-  for (CcdTiming& timing : result.timing) timing.frame_period = period;
-  result.row_clocks.resize(rig.cameras.size());
-  for (Camera* camera : rig.cameras) EMBERLOCK_RETURN_IF_ERROR(camera->start());
-
-  Bench bench(rig, options, period);
-  if (options.measure_row_time)
-    EMBERLOCK_RETURN_IF_ERROR(measure_row_times(bench, options, result, progress));
-
-  const std::vector<AlignCamera> cameras = describe(rig, options);
-  StrobeSettings flashes{
-      .output = StrobeOutput::flashing, .rate = rate(period), .width = options.flash_width};
-  AlignState state;
-  std::vector<ResetDone> resets;
-  std::vector<TrimDone> trims;
-  double reached = 0.2;  // of the progress; the rest is the part of the cameras within tolerance
+  AlignRunner run(rig, options, period, observer, progress);
+  EMBERLOCK_RETURN_IF_ERROR(run.start());
   do {
-    EMBERLOCK_RETURN_IF_ERROR(bench.set_strobe(flashes));
-    const std::string words =
-        "round " + std::to_string(state.rounds + 1) + ", " + std::to_string(state.resets) + " resets";
-    EMBERLOCK_ASSIGN_OR_RETURN(
-        const Film film, bench.film(options.frames_per_round, progress, reached, reached, words.c_str()));
-    AlignRound round = to_round(film, result, options, bench.strobe());
-    round.resets = std::exchange(resets, {});
-    round.trims = std::exchange(trims, {});
-    AlignStep step = align_step(state, round, cameras, result.options);
-    state = std::move(step.state);
-    result.last = std::move(step.decision);
-    if (result.last.reference) reached = 0.2 + 0.8 * part_within(result.last, result.options);
-
-    const AlignRoundReport seen{round,          result.last, cameras,      result.options,
-                                bench.strobe(), film.frames, film.readings};
-    v1::Event event;
-    event.set_monotonic_ns(round.at.ns);
-    event.mutable_decision()->set_round(static_cast<std::uint32_t>(result.last.round));
-    event.mutable_decision()->set_json(round_json(seen).dump());
-    EMBERLOCK_RETURN_IF_ERROR(bench.record(event));
-    if (observer) observer(seen);
-
-    if (result.last.strobe_phase) flashes.phase = *result.last.strobe_phase;
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-      const CameraDecision& camera = result.last.cameras[i];
-      if (camera.trim) {
-        EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at, bench.trim(i, *camera.trim));
-        trims.push_back({i, at, *camera.trim});
-      }
-      if (!camera.reset) continue;
-      EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at, bench.reset(i, camera.moment, state.cameras[i].resets));
-      const bool told = cameras[i].method == ResetMethod::on_command;
-      resets.push_back({i, told ? std::optional(at) : std::nullopt});
-    }
-  } while (result.last.verdict == AlignVerdict::go_on);
-  report(progress, 1, result.last.verdict == AlignVerdict::aligned ? "aligned" : "not aligned");
-
-  result.resets = state.resets;
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    result.delays.push_back(state.cameras[i].taught > 0 ? state.cameras[i].delay : cameras[i].expected_delay);
-  }
-  return result;
+    EMBERLOCK_RETURN_IF_ERROR(run.round());
+  } while (run.last().verdict == AlignVerdict::go_on);
+  return run.finish();
 }
 
 }  // namespace emberlock::cli

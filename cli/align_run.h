@@ -33,11 +33,11 @@ struct AlignRunOptions {
   /// and, once measured, row_time.
   AlignOptions align;
   /// By camera: n, K and d must be right (a wrong d reverses every correction); row_time is used where it
-  /// isn't measured.
+  /// isn't measured. Of global shutters n and t_row say nothing.
   std::vector<CcdTiming> timing;
   /// By camera, or empty: what is known of the resets' delay from an earlier run.
   std::vector<std::optional<ResetDelay>> delays;
-  bool measure_row_time = true;  ///< from a comb, before the first round
+  bool measure_row_time = true;  ///< of CCDs from a comb, before the first round
   Hertz comb_rate{300};
   int comb_frames = 24;      ///< of each camera
   int frames_per_round = 4;  ///< of each camera, > 0
@@ -53,6 +53,7 @@ struct AlignRoundReport {
   const AlignRound& round;
   const AlignDecision& decision;
   const std::vector<AlignCamera>& cameras;
+  const std::vector<SensorKind>& sensors;  ///< by camera
   const AlignOptions& options;
   const StrobeSettings& strobe;
   const std::vector<std::vector<Frame>>& frames;           ///< [camera][frame]
@@ -62,14 +63,17 @@ using AlignObserver = std::function<void(const AlignRoundReport&)>;
 
 struct AlignRunResult {
   AlignDecision last;
+  std::vector<CameraInfo> cameras;
   AlignOptions options;                             ///< with period and row_time as used
   std::vector<CcdTiming> timing;                    ///< with the row times measured
   std::vector<std::optional<RowClock>> row_clocks;  ///< by camera, where one was measured
+  std::vector<std::optional<Seconds>> exposures;    ///< by camera, where flashes tell
   std::vector<std::optional<ResetDelay>> delays;  ///< by camera, what is known now: options for the next run
   int resets = 0;
 };
 
-/// Films the strobe, measures t_row from a comb, then films, decides and resets until the cameras are aligned
+/// Films the strobe, measures t_row of CCDs from a comb and sweeps the strobe's phase for cameras of other
+/// sensors (smear_sync/phase_sensor.h), then films, decides and resets until the cameras are aligned
 /// or align_step gives up. Starts the cameras and leaves them filming. The decisions are align_step's; all
 /// that is taken from the clock are instants that are recorded with what they were taken for, so a recording
 /// replays to the same bits through this function. Errors: bad_input (frame rates that differ, sizes of the

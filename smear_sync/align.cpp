@@ -105,6 +105,7 @@ Seconds next_look(const Context& c) {
 void look_again(AlignState& state, AlignDecision& decision, const Context& c) {
   ++state.looks;
   std::string missing;
+  std::string why;
   bool blind = false;
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
@@ -116,17 +117,18 @@ void look_again(AlignState& state, AlignDecision& decision, const Context& c) {
     missing += (missing.empty() ? "" : ", ") + c.cameras[i].id;
     if (phase.state == PhaseState::blind) {
       blind = true;
-      camera.reason = "shows no dot: the strobe's phase is moved to bring it out (" + phase.reason + ")";
+      camera.reason = "shows no phase: the strobe's is moved to bring it out (" + phase.reason + ")";
     } else {
       camera.reason = "can't be read: see to its view of the lamp and to the strobe (" + phase.reason + ")";
+      if (why.empty()) why = phase.reason;
     }
   }
   if (state.looks > c.options.max_looks) {
     decision.verdict = AlignVerdict::given_up;
-    decision.reason = "no phase of " + missing + " after " +
-                      plural(static_cast<std::size_t>(state.looks), "look") +
-                      " at different phases of the strobe: check that the lamp is in view, not over-exposed, "
-                      "and flashes once a frame";
+    decision.reason =
+        "no phase of " + missing + " after " + plural(static_cast<std::size_t>(state.looks), "look") +
+        " at different phases of the strobe: " +
+        (why.empty() ? "check that the lamp is in view, not over-exposed, and flashes once a frame" : why);
     return;
   }
   if (blind) decision.strobe_phase = next_look(c);

@@ -9,6 +9,8 @@ namespace {
 
 constexpr std::size_t kFewest = 4;
 constexpr int kFirstDelays = 24;  // over the period: an exposure of a tenth of it is met twice
+constexpr int kSteps = 4;         // until one of 1/192 of it is
+constexpr int kStride = 7;        // between delays that are filmed one after the other; no divisor of theirs
 constexpr double kPartial = 6;    // sigmas off both levels: a flash that an edge cuts
 
 Error refuse(std::string what, std::string remedy) {
@@ -37,15 +39,18 @@ Result<Levels> levels_of(const std::vector<SweepSample>& samples, const SweepOpt
     high = std::max(high, s.level);
     levels.sigma = std::max(levels.sigma, s.sigma);
   }
-  if (!(high - low > options.min_snr * levels.sigma)) {
+  const auto alike = [] {
     return refuse("the pictures are alike at every delay of the flash",
                   "shorten an exposure that lasts the whole period, or bring the strobe into view");
-  }
+  };
+  if (!(high > low)) return alike();
   std::vector<double> dark;
   std::vector<double> lit;
   for (const SweepSample& s : samples) (s.level < (low + high) / 2 ? dark : lit).push_back(s.level);
   levels.dark = median(dark);
   levels.lit = median(lit);
+  // The extremes of many pictures of nothing lie as far apart; the middles of their halves don't.
+  if (!(levels.lit - levels.dark > options.min_snr * levels.sigma)) return alike();
   return levels;
 }
 
@@ -116,18 +121,33 @@ Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const 
   return window;
 }
 
-std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const SweepOptions& options,
-                                 Seconds resolution) {
+std::vector<Seconds> even_delays(int step, Seconds period) {
   std::vector<Seconds> delays;
-  if (samples.size() < kFewest) {
-    for (int i = 0; i < kFirstDelays; ++i)
-      delays.push_back(options.period * (i / static_cast<double>(kFirstDelays)));
-    return delays;
+  if (step < 0 || step >= kSteps) return delays;
+  const int count = step == 0 ? kFirstDelays : kFirstDelays << (step - 1);
+  for (int i = 0; i < count; ++i) {
+    const int place = i * kStride % count;
+    delays.push_back(period * ((place + (step == 0 ? 0 : 0.5)) / count));
+  }
+  return delays;
+}
+
+int even_delay_count() { return kFirstDelays << (kSteps - 1); }
+
+std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const SweepOptions& options,
+                                 Seconds resolution, SweepEdges edges) {
+  if (samples.size() < kFewest) return even_delays(0, options.period);
+  std::vector<Seconds> delays;
+  const std::vector<SweepSample> sorted = in_order(samples, options.period);
+  if (!levels_of(sorted, options).ok()) {
+    int step = 1;  // all that was filmed are steps before this one
+    while (step < kSteps && samples.size() >= static_cast<std::size_t>(kFirstDelays) << step) ++step;
+    return even_delays(step, options.period);
   }
   const auto window = fit_exposure(samples, options);
   if (!window.ok()) return delays;
   if (window->end_sigma > resolution) delays.push_back(window->end);
-  if (window->begin_sigma > resolution) delays.push_back(window->begin);
+  if (edges == SweepEdges::both && window->begin_sigma > resolution) delays.push_back(window->begin);
   return delays;
 }
 

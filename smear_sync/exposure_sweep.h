@@ -47,10 +47,20 @@ struct ExposureWindow {
 Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const SweepOptions& options,
                                     std::optional<double> white = std::nullopt);
 
-/// The delays to film next: first evenly over the period, then between the two at each edge, until both edges
-/// are known to `resolution`. Empty when done.
+/// Delays evenly over the period, 24 at first and with each step those between all that went before; empty
+/// after the last step, of 192 in all. What is near in delay is far apart in time, so that a slow drift is
+/// not taken for a slope.
+std::vector<Seconds> even_delays(int step, Seconds period);
+/// Of all steps: exposures of more than the period over this are met.
+int even_delay_count();
+
+/// Which of the exposure's edges is looked for; its end is the phase.
+enum class SweepEdges { both, end };
+
+/// The delays to film next: even_delays() until some are lit and some are dark, then between the two at each
+/// edge, until it is known to `resolution`. Empty when done, or when there is no more to try.
 std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const SweepOptions& options,
-                                 Seconds resolution);
+                                 Seconds resolution, SweepEdges edges = SweepEdges::both);
 
 /// tau of a flash that comes `delay` after the common time base: delay - end, modulo T.
 Phase phase_of(const ExposureWindow& window, Seconds delay, Seconds period);

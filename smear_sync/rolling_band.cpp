@@ -54,20 +54,26 @@ std::vector<Edge> edges_of(const std::vector<double>& part) {
 
 RowProfile row_profile(const ImageView& frame) {
   RowProfile profile;
-  if (frame.data == nullptr || frame.width() < 2 || frame.height() < 1) return profile;
+  if (frame.data == nullptr || frame.width() < 3 || frame.height() < 2) return profile;
   const detail::Plane plane = detail::to_plane(frame);
-  double squares = 0;
+  std::vector<float> row(static_cast<std::size_t>(plane.size.width));
+  std::vector<double> squares;
   for (int y = 0; y < plane.size.height; ++y) {
-    double sum = 0;
+    plane.read(y, 0, plane.size.width, row.data());
+    double sum = row.front();
     double differences = 0;  // of neighbours: noise, without the scene's slopes
-    for (int x = 0; x < plane.size.width; ++x) {
-      sum += plane.at(x, y);
-      if (x > 0) differences += std::pow(plane.at(x, y) - plane.at(x - 1, y), 2) / 2;
+    for (std::size_t x = 1; x < row.size(); ++x) {
+      sum += row[x];
+      differences += (row[x] - row[x - 1]) * (row[x] - row[x - 1]) / 2;
     }
     profile.level.push_back(sum / plane.size.width * plane.level);
-    squares += differences / std::max(1, plane.size.width - 1);
+    squares.push_back(differences / (plane.size.width - 1));
   }
-  profile.noise = std::sqrt(squares / plane.size.height / plane.size.width) * plane.level;
+  // The lamp's own rows and those of hot pixels are few.
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  const double square = std::max(*middle, plane.rounding * plane.rounding);
+  profile.noise = std::sqrt(square / plane.size.width) * plane.level;
   return profile;
 }
 

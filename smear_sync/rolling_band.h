@@ -8,8 +8,10 @@
 #include "base/image.h"
 #include "base/quantity.h"
 #include "base/result.h"
+#include "base/time_point.h"
 #include "smear_sync/ccd_timing.h"
 #include "smear_sync/reading.h"
+#include "smear_sync/row_clock.h"
 
 namespace emberlock {
 
@@ -57,5 +59,19 @@ struct BandReading {
 /// differ, or the flash is too faint for min_snr).
 BandReading read_bands(const RowProfile& frame, const BandReference& reference,
                        const BandOptions& options = {});
+
+/// A first edge that stood at `row`, counted in the order of reading, in a frame that came at `at` while the
+/// flashes came `delay` late.
+struct SweptEdge {
+  TimePoint at;
+  Seconds delay;
+  Rows row;
+};
+
+/// t_row from edges that moved with the flash's delay: row t_row = tau + delay + rate at, modulo T, by least
+/// squares for t_row, tau and rate. Whole rows limit it: 24 delays over the period give 1 part in 5000.
+/// Errors (bad_input): fewer than six edges; edges that move against the delay (the other read direction),
+/// or not in step with it.
+Result<RowClock> fit_swept_row_clock(std::span<const SweptEdge> edges, Seconds period);
 
 }  // namespace emberlock

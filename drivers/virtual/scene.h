@@ -38,8 +38,8 @@ struct VirtualScene {
 
   double flash_level = 4000;  ///< one flash at the lamp's centre, before saturation; independent of its width
   double steady_rate = 1e7;   ///< steady light at the lamp's centre, grey levels a second: a line of about 45
-  double room_share = 0.015;  ///< of the lamp's light, that the room about it shows: 60 grey levels a flash
-  double smear_leak = 0.01;   ///< share of the light that leaks into the register: dots of 40 grey levels
+  double room_share = 0.0015;  ///< of the lamp's light, that the room about it shows: 6 grey levels a flash
+  double smear_leak = 0.01;    ///< share of the light that leaks into the register: dots of 40 grey levels
 
   double halo_level = 60;    ///< glare at the rim of the lamp's disk
   double halo_length = 4;    ///< pixels over which glare falls to 1 / e

@@ -11,9 +11,11 @@
 namespace emberlock::test {
 
 /// Four cameras of 320 x 240 whose 240 rows take most of the frame period, so that few phases are blind.
-inline VirtualRigOptions small_rig(std::uint64_t seed, int cameras = 4) {
+inline VirtualRigOptions small_rig(std::uint64_t seed, int cameras = 4,
+                                   std::vector<SensorKind> sensors = {}) {
   VirtualRigDraw draw;
   draw.cameras = cameras;
+  draw.sensors = std::move(sensors);
   draw.seed = seed;
   draw.layout.size = {320, 240};
   draw.row_time = microseconds_per_row(150);

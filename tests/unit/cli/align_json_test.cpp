@@ -54,13 +54,15 @@ TEST(AlignJson, WhatIsNotKnownIsNull) {
   const std::vector<AlignCamera> cameras{{.id = "a", .model = "m", .expected_delay = {}}};
   const AlignOptions options;
   const auto step = align_step({}, round, cameras, options);
-  const auto json = round_json({round, step.decision, cameras, options, {}, {}, {}});
+  const std::vector<SensorKind> sensors(cameras.size(), SensorKind::rolling_shutter);
+  const auto json = round_json({round, step.decision, cameras, sensors, options, {}, {}, {}});
   EXPECT_TRUE(json["reference"].is_null());
   EXPECT_TRUE(json["worst_pair_rows"].is_null());
   EXPECT_TRUE(json["cameras"][0]["tau_ms"].is_null());
   EXPECT_TRUE(json["cameras"][0]["error_rows"].is_null());
   EXPECT_EQ(json["cameras"][0]["state"], "blind");
   EXPECT_FALSE(json["aligned"].get<bool>());
+  EXPECT_EQ(json["cameras"][0]["sensor"], "rolling");
 }
 
 TEST(AlignDelays, AreWrittenAndReadBackByCameraId) {

@@ -27,6 +27,7 @@ VirtualCameraOptions camera(SensorKind kind, Seconds exposure, ReadDirection dir
 VirtualScene room() {
   VirtualScene scene;
   scene.passes = {Pass::room};
+  scene.room_share = 0.015;
   return scene;
 }
 

@@ -160,6 +160,55 @@ TEST(RollingBand, ADetunedStrobeGivesAPhaseBelowARow) {
   EXPECT_NEAR(wrap_symmetric(line->tau.value() - truth, r.timing.frame_period.value()) / 60e-6, 0, 0.02);
 }
 
+/// First edges at delays over the whole period, each of another frame.
+std::vector<SweptEdge> swept(ReadDirection direction, double beat_ppm = 0) {
+  std::vector<SweptEdge> edges;
+  Roller still;
+  still.timing.direction = direction;
+  const BandReference reference = still.reference();
+  for (int i = 0; i < 24; ++i) {
+    Roller r = still;
+    const double delay = (i * 7 % 24) / 24.0 * still.timing.frame_period.value();
+    const double at = 5 * i * still.timing.frame_period.value();
+    r.first_flash = 0.004 + delay + beat_ppm * 1e-6 * at;
+    const BandReading bands = read_bands(r.frame(2), reference, {.direction = direction});
+    if (bands.reading.state != SmearState::dot) continue;
+    const double y = bands.reading.dots[0].y.value();
+    edges.push_back({TimePoint{} + Seconds(at), Seconds(delay),
+                     Rows(direction == ReadDirection::top_first ? y : r.timing.rows - 1 - y)});
+  }
+  return edges;
+}
+
+TEST(RollingBand, ASweepOfTheStrobesPhaseTellsTheRowTimeWhateverTheBeat) {
+  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+    for (const double beat : {0.0, 150.0, -150.0}) {
+      const auto edges = swept(direction, beat);
+      ASSERT_GT(edges.size(), 15U);
+      const auto clock = fit_swept_row_clock(edges, Roller{}.timing.frame_period);
+      ASSERT_TRUE(clock.ok()) << clock.error().message();
+      EXPECT_LT(std::abs(clock->row_time.value() - 60e-6), 3 * clock->sigma.value()) << beat;
+      EXPECT_LT(clock->sigma.value(), 60e-6 / 1500);
+    }
+  }
+}
+
+TEST(RollingBand, ASweepReadFromTheWrongEndIsToldByItsDirection) {
+  auto edges = swept(ReadDirection::top_first);
+  for (SweptEdge& e : edges) e.row = Rows(479) - e.row;
+  const auto clock = fit_swept_row_clock(edges, Roller{}.timing.frame_period);
+  ASSERT_FALSE(clock.ok());
+  EXPECT_THAT(clock.error().remedy, HasSubstr("other read direction"));
+}
+
+TEST(RollingBand, EdgesThatStandAnywhereTellNoRowTime) {
+  auto edges = swept(ReadDirection::top_first);
+  for (std::size_t i = 0; i < edges.size(); ++i) edges[i].row = Rows(480 * random_uniform(3, 3, i));
+  EXPECT_FALSE(fit_swept_row_clock(edges, Roller{}.timing.frame_period).ok());
+  edges.resize(5);
+  EXPECT_FALSE(fit_swept_row_clock(edges, Roller{}.timing.frame_period).ok());
+}
+
 TEST(RollingBand, AReferenceNeedsEveryRowLitAndDark) {
   Roller r;
   const std::vector<RowProfile> still(10, r.frame(0));

@@ -1,0 +1,148 @@
+#include "cli/align_bench.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/log.h"
+#include "base/random.h"
+#include "drivers/replay/record.h"
+
+namespace emberlock::cli {
+namespace {
+
+/// A flash may show in the frame of the read phase before, or in that of the next: frames are trusted from
+/// the second one after a change.
+constexpr double kSettlingPeriods = 2;
+
+/// Sensors that aren't content after so many answers never will be.
+constexpr int kMostSweeps = 40;
+
+/// Delays stay below the strobe's own period, which may be a little shorter than T.
+constexpr double kLongestDelay = 0.9995;
+
+/// Looks, each with the cameras that want it.
+using Looks = std::vector<std::pair<Look, std::vector<std::size_t>>>;
+
+void add(Looks& looks, const Look& look, std::size_t camera) {
+  const auto same = std::find_if(looks.begin(), looks.end(), [&](const auto& l) { return l.first == look; });
+  if (same == looks.end()) {
+    looks.push_back({look, {camera}});
+  } else {
+    same->second.push_back(camera);
+  }
+}
+
+}  // namespace
+
+AlignBench::AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period)
+    : rig_(rig), options_(options), period_(period), all_(rig.cameras.size()) {
+  std::iota(all_.begin(), all_.end(), std::size_t{0});
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    SensorOptions sensor{options.timing[i], options.flash_width};
+    sensor.timing.frame_period = period;
+    sensors_.push_back(make_phase_sensor(rig.cameras[i]->info().sensor, sensor));
+  }
+}
+
+std::vector<std::size_t> AlignBench::cameras_with(SensorKind kind) const {
+  std::vector<std::size_t> cameras;
+  for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
+    if (rig_.cameras[i]->info().sensor == kind) cameras.push_back(i);
+  }
+  return cameras;
+}
+
+Status AlignBench::set_strobe(const StrobeSettings& wanted) {
+  if (asked_ == wanted) return {};
+  EMBERLOCK_RETURN_IF_ERROR(rig_.strobe->apply(wanted));
+  const TimePoint now = rig_.clock->now();
+  EMBERLOCK_ASSIGN_OR_RETURN(strobe_, rig_.strobe->read_back());
+  asked_ = wanted;
+  fresh_ = now + kSettlingPeriods * period_;
+  return record(strobe_event(now, strobe_));
+}
+
+Result<TimePoint> AlignBench::reset(std::size_t camera, std::optional<TimePoint> moment, int draw) {
+  const TimePoint now = rig_.clock->now();
+  const TimePoint earliest = now + options_.reset_lead;
+  TimePoint at = earliest + period_ * random_uniform(options_.seed, camera, static_cast<std::uint64_t>(draw));
+  if (moment) at = *moment + period_ * std::ceil((earliest - *moment) / period_);
+  EMBERLOCK_RETURN_IF_ERROR(rig_.cameras[camera]->reset_shutter(at));
+  sensors_[camera]->forget_phase();
+  // Frames from before are older than the decision that led here: the other cameras' are passed over too.
+  fresh_ = std::max(fresh_, now);
+  EMBERLOCK_RETURN_IF_ERROR(record(reset_event(now, rig_.cameras[camera]->info().id, at)));
+  return at;
+}
+
+Result<TimePoint> AlignBench::trim(std::size_t camera, PartsPerMillion trim) {
+  const TimePoint now = rig_.clock->now();
+  EMBERLOCK_RETURN_IF_ERROR(rig_.cameras[camera]->trim_rate(trim));
+  EMBERLOCK_RETURN_IF_ERROR(record(trim_event(now, rig_.cameras[camera]->info().id, trim)));
+  return now;
+}
+
+Result<Film> AlignBench::film(const std::vector<std::size_t>& read, int count) {
+  Film film;
+  film.frames.resize(rig_.cameras.size());
+  film.readings.resize(rig_.cameras.size());
+  const bool lit = strobe_.output != StrobeOutput::off;
+  const Look look{lit ? std::optional(strobe_.phase) : std::nullopt};
+  for (int i = 0; i < count; ++i) {
+    for (const std::size_t camera : all_) {
+      EMBERLOCK_ASSIGN_OR_RETURN(std::optional<Frame> frame, fresh_frame(camera));
+      const bool asked = std::find(read.begin(), read.end(), camera) != read.end();
+      if (!frame || !asked) continue;  // none came: fewer samples of this camera
+      film.readings[camera].push_back(
+          sensors_[camera]->take(frame->image->view(), frame->stamp.monotonic_time, look));
+      film.frames[camera].push_back(std::move(*frame));
+    }
+  }
+  return film;
+}
+
+Result<Film> AlignBench::film_all(int count) { return film(all_, count); }
+
+Status AlignBench::sweep(const StrobeSettings& flashes, Seconds wanted, const Progress& progress,
+                         double done) {
+  int filmed = 0;
+  for (int i = 0; i < kMostSweeps; ++i) {
+    Looks looks;
+    for (std::size_t camera = 0; camera < sensors_.size(); ++camera) {
+      for (const Look& look : sensors_[camera]->wants(wanted)) add(looks, look, camera);
+    }
+    if (looks.empty()) break;
+    for (const auto& [look, cameras] : looks) {
+      report(progress, done, fmt::format("sweeping the strobe's phase, look {}", ++filmed));
+      StrobeSettings settings = flashes;
+      if (look.delay) {
+        settings.phase = std::min(*look.delay, kLongestDelay * emberlock::period(flashes.rate));
+      } else {
+        settings.output = StrobeOutput::off;
+      }
+      EMBERLOCK_RETURN_IF_ERROR(set_strobe(settings));
+      EMBERLOCK_RETURN_IF_ERROR(film(cameras, 1));
+    }
+  }
+  return set_strobe(flashes);
+}
+
+Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
+  for (;;) {
+    Result<Frame> frame = rig_.cameras[camera]->next_frame(options_.frame_deadline);
+    if (!frame.ok()) {
+      if (frame.error().kind != ErrorKind::timed_out) return frame.error();
+      log(LogCategory::cli).warn("{}", frame.error().message());
+      return std::optional<Frame>();
+    }
+    if (rig_.recorder) EMBERLOCK_RETURN_IF_ERROR(rig_.recorder->write(camera, *frame));
+    const bool usable = frame->stamp.monotonic_time >= fresh_ && frame->stamp.status == FrameStatus::complete;
+    if (usable) return std::optional<Frame>(std::move(*frame));
+  }
+}
+
+}  // namespace emberlock::cli

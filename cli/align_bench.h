@@ -1,0 +1,63 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "base/frame.h"
+#include "base/progress.h"
+#include "base/result.h"
+#include "cli/align_run.h"
+#include "session/writer.h"
+#include "smear_sync/phase_sensor.h"
+
+namespace emberlock::cli {
+
+/// What was read of every camera between two changes; nothing of those that weren't asked.
+struct Film {
+  std::vector<std::vector<Frame>> frames;
+  std::vector<std::vector<SmearReading>> readings;
+};
+
+/// The devices of an alignment and what reads their frames, with everything that happens to them written
+/// down.
+class AlignBench {
+ public:
+  AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period);
+
+  /// As it said of itself after the last change.
+  [[nodiscard]] const StrobeSettings& strobe() const { return strobe_; }
+  [[nodiscard]] PhaseSensor& sensor(std::size_t camera) { return *sensors_[camera]; }
+  [[nodiscard]] std::vector<std::size_t> cameras_with(SensorKind kind) const;
+
+  /// Sets the strobe, if that changes anything; frames that show what was before are passed over from then
+  /// on.
+  Status set_strobe(const StrobeSettings& wanted);
+  /// Tells the camera to reset its shutter at `moment` or a whole number of periods later; at a moment drawn
+  /// at random when there is none. Returns when it was told for.
+  Result<TimePoint> reset(std::size_t camera, std::optional<TimePoint> moment, int draw);
+  /// Trims the camera's frame rate. Returns when it was told.
+  Result<TimePoint> trim(std::size_t camera, PartsPerMillion trim);
+  /// `count` frames of every camera, one of each in turn, and what those of `read` show.
+  Result<Film> film(const std::vector<std::size_t>& read, int count);
+  Result<Film> film_all(int count);
+  /// Films the looks that the sensors want before they tell phases to a standard error of `wanted`, at
+  /// `flashes` but for the delay.
+  Status sweep(const StrobeSettings& flashes, Seconds wanted, const Progress& progress, double done);
+
+  Status record(const v1::Event& event) { return rig_.recorder ? rig_.recorder->append(event) : Status{}; }
+
+ private:
+  Result<std::optional<Frame>> fresh_frame(std::size_t camera);
+
+  const AlignRig& rig_;
+  const AlignRunOptions& options_;
+  Seconds period_;
+  std::vector<std::unique_ptr<PhaseSensor>> sensors_;  ///< by camera
+  std::vector<std::size_t> all_;
+  StrobeSettings strobe_;
+  std::optional<StrobeSettings> asked_;  ///< as asked for
+  TimePoint fresh_;                      ///< frames that came before are passed over
+};
+
+}  // namespace emberlock::cli

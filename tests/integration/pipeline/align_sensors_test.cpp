@@ -1,0 +1,157 @@
+// CCDs, rolling and global shutters in one alignment, from pictures to phases in truth.
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/align_json.h"
+#include "cli/align_record.h"
+#include "cli/align_run.h"
+#include "tests/support/small_rig.h"
+
+namespace emberlock::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using test::small_rig;
+using test::SmallBench;
+using testing::HasSubstr;
+
+constexpr auto kCcd = SensorKind::ccd;
+constexpr auto kRolling = SensorKind::rolling_shutter;
+constexpr auto kGlobal = SensorKind::global_shutter;
+
+/// What phases may be off by in these pictures.
+constexpr Rows kReadingError{1};
+
+VirtualRigOptions mixed_rig(std::uint64_t seed, const std::vector<SensorKind>& sensors = {
+                                                    kCcd, kRolling, kGlobal, kRolling, kGlobal}) {
+  return small_rig(seed, static_cast<int>(sensors.size()), sensors);
+}
+
+void expect_aligned_in_truth(SmallBench& bench) {
+  const auto result = run_align(bench.align, bench.options);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  ASSERT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
+  const SecondsPerRow row = result->options.row_time;
+  EXPECT_LT(bench.true_error(row), result->options.tolerance.in_rows(row) + kReadingError);
+}
+
+class EverySensor : public testing::TestWithParam<std::vector<SensorKind>> {};
+
+TEST_P(EverySensor, ComesWithinToleranceInTruth) {
+  SmallBench bench(mixed_rig(3, GetParam()));
+  bench.options.align.policy = AlignPolicy::timed;
+  expect_aligned_in_truth(bench);
+}
+
+INSTANTIATE_TEST_SUITE_P(AlignSensors, EverySensor,
+                         testing::Values(std::vector{kRolling, kRolling, kRolling},
+                                         std::vector{kGlobal, kGlobal, kGlobal},
+                                         std::vector{kCcd, kRolling, kGlobal, kRolling, kGlobal}));
+
+TEST(AlignSensors, AMixedRigComesWithinThreeRows) {
+  SmallBench bench(mixed_rig(5));
+  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.align.tolerance.amount = Rows(3);
+  expect_aligned_in_truth(bench);
+}
+
+TEST(AlignSensors, RowTimesAndExposuresAreMeasured) {
+  SmallBench bench(mixed_rig(5));
+  bench.options.align.max_rounds = 1;
+  const auto result = run_align(bench.align, bench.options);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  for (int i = 0; i < bench.rig->size(); ++i) {
+    const auto camera = static_cast<std::size_t>(i);
+    const VirtualCameraOptions& truth = bench.rig->truth(i);
+    if (truth.sensor == kRolling) {
+      ASSERT_TRUE(result->row_clocks[camera]);
+      const double error = (result->row_clocks[camera]->row_time - truth.timing.row_time).value();
+      EXPECT_LT(std::abs(error), 3 * result->row_clocks[camera]->sigma.value());
+      EXPECT_LT(std::abs(error / truth.timing.row_time.value()), 1e-3);
+    }
+    ASSERT_EQ(result->exposures[camera].has_value(), truth.sensor != kCcd);
+    if (!truth.exposure) continue;
+    const Seconds error = *result->exposures[camera] - *truth.exposure;
+    EXPECT_LT(abs(error), truth.timing.frame_period / 24) << i;
+  }
+}
+
+/// Aligns two cameras, one of them with this exposure; what is said of the camera that it doesn't suit.
+std::string said_of(SensorKind kind, Seconds exposure, Seconds flash_width = microseconds(20)) {
+  VirtualRigOptions setup = mixed_rig(4, {kind, kind});
+  setup.cameras[1].exposure = exposure;
+  SmallBench bench(setup);
+  bench.options.align.max_looks = 1;
+  bench.options.flash_width = flash_width;
+  const auto result = run_align(bench.align, bench.options);
+  EXPECT_TRUE(result.ok()) << result.error().message();
+  if (!result.ok()) return result.error().message();
+  EXPECT_EQ(result->last.verdict, AlignVerdict::given_up);
+  EXPECT_EQ(result->resets, 0);
+  EXPECT_THAT(result->last.reason, HasSubstr("virtual-01"));
+  return result->last.reason;
+}
+
+TEST(AlignSensors, AnExposureTooLongToSeeAnEdgeIsSaidAndWhatToDo) {
+  const Seconds period = small_rig(4).cameras[1].timing.frame_period;
+  EXPECT_THAT(said_of(kRolling, period), HasSubstr("too long to see an edge: shorten it"));
+  EXPECT_THAT(said_of(kGlobal, period), HasSubstr("shorten its exposure"));
+}
+
+TEST(AlignSensors, AnExposureTooShortToSeeAnEdgeIsSaidAndWhatToDo) {
+  EXPECT_THAT(said_of(kRolling, microseconds(60)), HasSubstr("lengthen"));
+  EXPECT_THAT(said_of(kGlobal, microseconds(60)), HasSubstr("lengthen"));
+}
+
+TEST(AlignSensors, AFlashLongerThanTheExposureIsSaidAndWhatToDo) {
+  EXPECT_THAT(said_of(kGlobal, milliseconds(1), milliseconds(3)), HasSubstr("shorten the flash"));
+  EXPECT_THAT(said_of(kRolling, milliseconds(1), milliseconds(3)), HasSubstr("shorten the flash"));
+}
+
+TEST(AlignSensors, AWrongReadDirectionOfARollingShutterIsNoticed) {
+  SmallBench bench(mixed_rig(4, {kCcd, kRolling}));
+  bench.options.timing[1].direction = ReadDirection::bottom_first;
+  bench.options.align.max_looks = 1;
+  const auto result = run_align(bench.align, bench.options);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->last.verdict, AlignVerdict::given_up);
+  EXPECT_THAT(result->last.cameras[1].reason, HasSubstr("other read direction"));
+}
+
+TEST(AlignSensors, FlashesThatLightNothingInViewAreSaid) {
+  VirtualRigOptions setup = mixed_rig(4, {kCcd, kRolling, kGlobal});
+  setup.scene.room_share = 0;
+  setup.cameras[2].lamp.x = -400;  // its light alone would tell a global shutter's phase
+  SmallBench bench(setup);
+  bench.options.align.max_looks = 1;
+  const auto result = run_align(bench.align, bench.options);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->last.verdict, AlignVerdict::given_up);
+  EXPECT_THAT(result->last.cameras[1].reason, HasSubstr("let the strobe light"));
+  EXPECT_THAT(result->last.cameras[2].reason, HasSubstr("bring the strobe into view"));
+}
+
+TEST(AlignSensors, ARecordingOfThemReplaysToTheBit) {
+  const fs::path folder = fs::path(testing::TempDir()) / "align_sensors_replay";
+  fs::remove_all(folder);
+  SmallBench bench(mixed_rig(6, {kCcd, kRolling, kGlobal}));
+  bench.options.align.policy = AlignPolicy::timed;
+  std::vector<std::string> live;
+  const auto into = [](std::vector<std::string>& lines) {
+    return [&lines](const AlignRoundReport& r) { lines.push_back(round_json(r).dump()); };
+  };
+  const auto recorded = record_align(folder, bench.align, bench.options, into(live));
+  ASSERT_TRUE(recorded.ok()) << recorded.error().message();
+  ASSERT_GT(recorded->resets, 0);
+  EXPECT_THAT(live, testing::Each(HasSubstr("\"sensor\":\"global\"")));
+  std::vector<std::string> again;
+  const auto replayed = replay_align(folder, into(again));
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(live, again);
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace emberlock::cli

@@ -24,6 +24,9 @@ constexpr int kMostSweeps = 40;
 /// Delays stay below the strobe's own period, which may be a little shorter than T.
 constexpr double kLongestDelay = 0.9995;
 
+/// How soon a wait notices that it is asked to stop.
+constexpr Seconds kWaitStep = milliseconds(200);
+
 /// Looks, each with the cameras that want it.
 using Looks = std::vector<std::pair<Look, std::vector<std::size_t>>>;
 
@@ -131,6 +134,15 @@ Status AlignBench::sweep(const StrobeSettings& flashes, Seconds wanted, const Pr
   return set_strobe(flashes);
 }
 
+void AlignBench::wait(TimePoint until, const StopAsked& stop) {
+  // The clock isn't asked: a recording knows only the instants that were recorded.
+  for (TimePoint t = filmed_; t < until && !(stop && stop());) {
+    t = std::min(t + kWaitStep, until);
+    rig_.clock->sleep_until(t);
+  }
+  fresh_ = std::max(fresh_, until);
+}
+
 Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
   for (;;) {
     Result<Frame> frame = rig_.cameras[camera]->next_frame(options_.frame_deadline);
@@ -140,6 +152,7 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
       return std::optional<Frame>();
     }
     if (rig_.recorder) EMBERLOCK_RETURN_IF_ERROR(rig_.recorder->write(camera, *frame));
+    filmed_ = std::max(filmed_, frame->stamp.monotonic_time);
     const bool usable = frame->stamp.monotonic_time >= fresh_ && frame->stamp.status == FrameStatus::complete;
     if (usable) return std::optional<Frame>(std::move(*frame));
   }

@@ -45,6 +45,9 @@ class AlignBench {
   /// `flashes` but for the delay.
   Status sweep(const StrobeSettings& flashes, Seconds wanted, const Progress& progress, double done);
 
+  /// Waits until `until`, or until it is asked to stop; the time since the last frame runs on.
+  void wait(TimePoint until, const StopAsked& stop);
+
   Status record(const v1::Event& event) { return rig_.recorder ? rig_.recorder->append(event) : Status{}; }
 
  private:
@@ -58,6 +61,7 @@ class AlignBench {
   StrobeSettings strobe_;
   std::optional<StrobeSettings> asked_;  ///< as asked for
   TimePoint fresh_;                      ///< frames that came before are passed over
+  TimePoint filmed_;                     ///< when the last frame came
 };
 
 }  // namespace emberlock::cli

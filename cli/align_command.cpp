@@ -11,6 +11,7 @@
 #include "cli/align_record.h"
 #include "cli/align_run.h"
 #include "cli/commands.h"
+#include "cli/interrupt.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
 
@@ -34,6 +35,7 @@ struct AlignArguments {
   double reset_seconds = 0;
   double trim_range_ppm = 0;
   double trim_step_ppm = 0.5;
+  std::optional<double> hold_minutes;
   std::string record;
   std::string replay;
   std::string delays;
@@ -86,6 +88,7 @@ void print_summary(const AlignRunResult& result) {
                                                       : "NOT aligned",
               last.round, result.resets, std::string(name(result.options.policy)).c_str(),
               result.options.tolerance.in_rows(row).value(), row.value() * 1e6, last.reason.c_str());
+  if (result.checks > 0) std::printf("  held by %d checks\n", result.checks);
   for (std::size_t i = 0; i < result.cameras.size(); ++i)
     print_sensor(result.cameras[i], result.row_clocks[i], result.exposures[i]);
 }
@@ -109,6 +112,7 @@ Result<AlignRunOptions> options_from(const AlignArguments& arguments) {
   options.align.limits =
       AlignLimits{arguments.max_resets, Seconds(60 * arguments.max_minutes), arguments.probability};
   options.seed = arguments.seed;
+  if (arguments.hold_minutes) options.hold = std::min(Seconds(60 * *arguments.hold_minutes), kUntilStopped);
   return options;
 }
 
@@ -136,8 +140,8 @@ Result<AlignRunResult> align_live(const AlignArguments& arguments, const AlignOb
   EMBERLOCK_ASSIGN_OR_RETURN(
       AlignRunResult result,
       arguments.record.empty()
-          ? run_align(rig, options, observer, progress_bar("align"))
-          : record_align(arguments.record, rig, options, observer, progress_bar("align")));
+          ? run_align(rig, options, observer, progress_bar("align"), Interrupt::asked)
+          : record_align(arguments.record, rig, options, observer, progress_bar("align"), Interrupt::asked));
   if (!arguments.delays.empty())
     EMBERLOCK_RETURN_IF_ERROR(write_delays(arguments.delays, rig, result.delays));
   return result;
@@ -147,7 +151,11 @@ void align(const AlignArguments& arguments) {
   const AlignObserver observer = printer(arguments.json);
   std::uint64_t seed = arguments.seed;
   const auto result = [&]() -> Result<AlignRunResult> {
-    if (arguments.replay.empty()) return align_live(arguments, observer);
+    if (arguments.replay.empty()) {
+      std::optional<Interrupt> interrupt;  // a run that isn't to be held ends by itself
+      if (arguments.hold_minutes) interrupt.emplace();
+      return align_live(arguments, observer);
+    }
     return replay_align(arguments.replay, observer, progress_bar("replay"), &seed);
   }();
   if (!result.ok()) fail(result.error());
@@ -206,6 +214,14 @@ void add_align(CLI::App& app) {
   verb->add_option(
       "--delays", arguments->delays,
       "file of what is known of the cameras' reset delays: read if it exists, written at the end");
+  verb->add_option(
+          "--hold", arguments->hold_minutes,
+          "once aligned: film again by each next check and reset what left, for so many minutes or until "
+          "Ctrl-C")
+      ->expected(0, 1)
+      ->default_str("1e9")
+      ->type_name("MINUTES")
+      ->check(CLI::PositiveNumber);
   auto* record = verb->add_option("--record", arguments->record,
                                   "record frames, strobe, resets and decisions to this folder");
   verb->add_option("--replay", arguments->replay,

@@ -99,6 +99,7 @@ AlignRunOptions options_from(const json& object) {
   options.reset_lead = Seconds(number(object, "reset_lead_s"));
   options.rate_error = PartsPerMillion(number(object, "rate_error_ppm"));
   options.seed = object.at("seed").get<std::uint64_t>();
+  if (const json& hold = object.at("hold_s"); !hold.is_null()) options.hold = Seconds(hold.get<double>());
   if (!object.at("cameras").is_array()) throw std::invalid_argument("cameras is not a list");
   for (const json& camera : object.at("cameras")) {
     options.timing.push_back(timing_from(camera));
@@ -167,6 +168,7 @@ ordered_json summary_json(const AlignRunResult& result, std::uint64_t seed) {
   line["aligned"] = last.verdict == AlignVerdict::aligned;
   line["rounds"] = last.round;
   line["resets"] = result.resets;
+  line["checks"] = result.checks;
   line["t_row_us"] = row.value() * 1e6;
   line["worst_pair_rows"] = last.worst_pair ? ordered_json((*last.worst_pair / row).value()) : nullptr;
   line["worst_pair_ms"] = last.worst_pair ? ordered_json(in_milliseconds(*last.worst_pair)) : nullptr;
@@ -224,6 +226,7 @@ ordered_json options_json(const AlignRunOptions& options) {
           {"reset_lead_s", options.reset_lead.value()},
           {"rate_error_ppm", options.rate_error.value()},
           {"seed", options.seed},
+          {"hold_s", seconds_json(options.hold)},
           {"cameras", cameras}};
 }
 

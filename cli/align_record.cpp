@@ -72,6 +72,8 @@ class DecisionCheck {
     if (!different_ && (i >= recorded_.size() || recorded_[i] != round_json(report).dump()))
       different_ = rounds_;
   }
+  /// Every recorded decision was met: the run ended here, by its verdict or because it was stopped.
+  [[nodiscard]] bool complete() const { return rounds_ >= recorded_.size(); }
   [[nodiscard]] Status verdict() const {
     if (!different_ && rounds_ == recorded_.size()) return {};
     return Error{ErrorKind::device,
@@ -91,7 +93,7 @@ class DecisionCheck {
 
 Result<AlignRunResult> record_align(const std::filesystem::path& folder, AlignRig rig,
                                     const AlignRunOptions& options, const AlignObserver& observer,
-                                    const Progress& progress) {
+                                    const Progress& progress, const StopAsked& stop) {
   v1::Manifest manifest;
   manifest.set_purpose("alignment");
   manifest.set_created_utc(utc_now());
@@ -101,7 +103,7 @@ Result<AlignRunResult> record_align(const std::filesystem::path& folder, AlignRi
   rig.recorder = &writer;
   EMBERLOCK_RETURN_IF_ERROR(
       append_note(writer, *rig.clock, nlohmann::ordered_json{{"align", options_json(options)}}.dump()));
-  Result<AlignRunResult> result = run_align(rig, options, observer, progress);
+  Result<AlignRunResult> result = run_align(rig, options, observer, progress, stop);
   // A run that failed leaves a readable recording too; its own error is the one to report.
   const auto finished = writer.finish();
   if (result.ok() && !finished.ok()) return finished.error();
@@ -122,7 +124,8 @@ Result<AlignRunResult> replay_align(const std::filesystem::path& folder, const A
     check.round(report);
     if (observer) observer(report);
   };
-  EMBERLOCK_ASSIGN_OR_RETURN(AlignRunResult result, run_align(rig, options, both, progress));
+  EMBERLOCK_ASSIGN_OR_RETURN(AlignRunResult result,
+                             run_align(rig, options, both, progress, [&] { return check.complete(); }));
   EMBERLOCK_RETURN_IF_ERROR(check.verdict());
   return result;
 }

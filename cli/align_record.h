@@ -13,7 +13,7 @@ namespace emberlock::cli {
 /// is kept.
 Result<AlignRunResult> record_align(const std::filesystem::path& folder, AlignRig rig,
                                     const AlignRunOptions& options, const AlignObserver& observer = {},
-                                    const Progress& progress = {});
+                                    const Progress& progress = {}, const StopAsked& stop = {});
 
 /// Runs a recorded alignment again from its frames. Errors: the reader's; bad_input when the session is not
 /// an alignment's; device when a decision differs from the recorded one (named by its round). `seed` receives

@@ -30,6 +30,12 @@ constexpr double kLooks = 4;
 constexpr double kSweptPart = 0.04;
 constexpr Seconds kSweptLeast = microseconds(2);
 
+/// Of the progress, before the end.
+constexpr double kNeverDone = 0.999;
+
+/// While cameras are held they are filmed at least this often, however long they promise to stay.
+constexpr Seconds kLongestWait{600};
+
 constexpr int kCombAttempts = 2;
 
 ResetMethod method_of(ShutterReset reset) {
@@ -235,10 +241,12 @@ class AlignRunner {
     EMBERLOCK_RETURN_IF_ERROR(
         bench_.sweep(flashes_, std::max(kSweptPart * tolerance, kSweptLeast), progress_, reached_));
     if (state_.rounds == 0) adopt_sensors(rig_, bench_, options_, result_);
-    report(progress_, reached_, fmt::format("round {}, {} resets", state_.rounds + 1, state_.resets));
+    report(progress_, std::min(reached_, kNeverDone),
+           fmt::format("round {}, {} resets", state_.rounds + 1, state_.resets));
     EMBERLOCK_ASSIGN_OR_RETURN(const Film film, bench_.film_all(options_.frames_per_round));
     AlignRound round = to_round(bench_, film, result_, expected);
     beat_ = round.beat;
+    at_ = round.at;
     round.resets = std::exchange(resets_, {});
     round.trims = std::exchange(trims_, {});
     AlignStep step = align_step(state_, round, cameras_, result_.options);
@@ -248,6 +256,30 @@ class AlignRunner {
     EMBERLOCK_RETURN_IF_ERROR(tell({round, result_.last, cameras_, sensors_, result_.options, bench_.strobe(),
                                     film.frames, film.readings}));
     return carry_out();
+  }
+
+  /// After a round that found the cameras aligned: keeps them so for the time asked for, or until it is
+  /// stopped, and as long as they can be.
+  Status hold(const StopAsked& stop) {
+    const TimePoint began = at_;
+    const auto left = [&] { return *options_.hold - (at_ - began); };
+    while (left() > Seconds(0) && !(stop && stop())) {
+      const bool waits = result_.last.verdict == AlignVerdict::aligned;
+      if (waits) {
+        const Seconds promised = result_.last.next_check.value_or(kLongestWait) - result_.options.round_time;
+        const Seconds pause = std::clamp(promised, Seconds(0), std::min(kLongestWait, left()));
+        report(progress_, std::min((at_ - began) / *options_.hold, kNeverDone),
+               fmt::format("held for {} by {} checks and {} resets, checks again in {}", words(at_ - began),
+                           result_.checks, state_.resets, words(pause)));
+        bench_.wait(at_ + pause, stop);
+        if (stop && stop()) break;
+      }
+      EMBERLOCK_RETURN_IF_ERROR(round());
+      result_.checks += waits ? 1 : 0;
+      if (result_.last.verdict == AlignVerdict::refused || result_.last.verdict == AlignVerdict::given_up)
+        break;
+    }
+    return {};
   }
 
   [[nodiscard]] const AlignDecision& last() const { return result_.last; }
@@ -302,6 +334,7 @@ class AlignRunner {
   std::vector<SensorKind> sensors_;
   StrobeSettings flashes_;
   std::optional<Beat> beat_;  ///< of the round before
+  TimePoint at_;              ///< its instant
   AlignState state_;
   std::vector<ResetDone> resets_;  ///< since the last round
   std::vector<TrimDone> trims_;
@@ -311,13 +344,15 @@ class AlignRunner {
 }  // namespace
 
 Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& options,
-                                 const AlignObserver& observer, const Progress& progress) {
+                                 const AlignObserver& observer, const Progress& progress,
+                                 const StopAsked& stop) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Seconds period, common_period(rig, options));
   AlignRunner run(rig, options, period, observer, progress);
   EMBERLOCK_RETURN_IF_ERROR(run.start());
   do {
     EMBERLOCK_RETURN_IF_ERROR(run.round());
-  } while (run.last().verdict == AlignVerdict::go_on);
+  } while (run.last().verdict == AlignVerdict::go_on && !(stop && stop()));
+  if (options.hold && run.last().verdict == AlignVerdict::aligned) EMBERLOCK_RETURN_IF_ERROR(run.hold(stop));
   return run.finish();
 }
 

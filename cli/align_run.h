@@ -46,7 +46,11 @@ struct AlignRunOptions {
   Seconds reset_lead = milliseconds(20);  ///< between ordering a reset and its earliest moment
   PartsPerMillion rate_error{20};         ///< standard error of the cameras' common rate against the strobe's
   std::uint64_t seed = 1;                 ///< of the moments of resets that aren't timed
+  /// Once aligned: goes on for so long, filming again by each next check and resetting what left.
+  std::optional<Seconds> hold{};
 };
+/// Of `hold`: until it is stopped.
+constexpr Seconds kUntilStopped{3e9};
 
 /// One round, as an observer sees it. References are good for the length of the call.
 struct AlignRoundReport {
@@ -70,7 +74,11 @@ struct AlignRunResult {
   std::vector<std::optional<Seconds>> exposures;    ///< by camera, where flashes tell
   std::vector<std::optional<ResetDelay>> delays;  ///< by camera, what is known now: options for the next run
   int resets = 0;
+  int checks = 0;  ///< while it was held
 };
+
+/// Asked between rounds and while nothing is to be done: true ends the run.
+using StopAsked = std::function<bool()>;
 
 /// Films the strobe, measures t_row of CCDs from a comb and sweeps the strobe's phase for cameras of other
 /// sensors (smear_sync/phase_sensor.h), then films, decides and resets until the cameras are aligned
@@ -79,6 +87,7 @@ struct AlignRunResult {
 /// replays to the same bits through this function. Errors: bad_input (frame rates that differ, sizes of the
 /// lists), and the devices'.
 Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& options,
-                                 const AlignObserver& observer = {}, const Progress& progress = {});
+                                 const AlignObserver& observer = {}, const Progress& progress = {},
+                                 const StopAsked& stop = {});
 
 }  // namespace emberlock::cli

@@ -357,6 +357,7 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   AlignState state = before;
   state.cameras.resize(cameras.size());
   ++state.rounds;
+  ++state.rounds_out;
   const bool trims = options.policy == AlignPolicy::trimmed;
   const Context c{round,
                   cameras,
@@ -385,10 +386,11 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   }
   state.last_round = round.at;
 
-  if (decision.verdict == AlignVerdict::go_on && state.rounds >= options.max_rounds) {
+  if (decision.verdict == AlignVerdict::aligned) state.rounds_out = 0;
+  if (decision.verdict == AlignVerdict::go_on && state.rounds_out >= options.max_rounds) {
     decision.verdict = AlignVerdict::given_up;
-    decision.reason = "not aligned after " + plural(static_cast<std::size_t>(state.rounds), "round") + ": " +
-                      decision.reason;
+    decision.reason = "not aligned after " + plural(static_cast<std::size_t>(state.rounds_out), "round") +
+                      ": " + decision.reason;
   }
   if (decision.verdict != AlignVerdict::go_on) {
     decision.strobe_phase.reset();

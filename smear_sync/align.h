@@ -102,7 +102,7 @@ struct AlignOptions {
   Seconds round_time{0.6};  ///< of one round of filming, for what is foretold, > 0
   Seconds reset_time{0};    ///< of one reset more in a round: an operator's way to the button
   std::optional<AlignLimits> limits = {};  ///< absent: nothing is refused for what it takes
-  int max_rounds = 500;                    ///< > 0
+  int max_rounds = 500;                    ///< without all within tolerance, > 0
   int max_looks = 6;                       ///< strobe phases tried in a row for cameras that show no dot, > 0
 };
 
@@ -155,6 +155,7 @@ struct AlignTarget {
 
 struct AlignState {
   int rounds = 0;
+  int rounds_out = 0;  ///< since all were last within tolerance
   int resets = 0;
   int looks = 0;           ///< rounds in a row that ended with a camera whose phase isn't known
   double jitter_seen = 0;  ///< s^2: sum over resets of a delay's squared deviation from its camera's mean

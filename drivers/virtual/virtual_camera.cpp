@@ -152,7 +152,7 @@ void VirtualCamera::drop_overflow() {
   const std::uint64_t delivered = delivered_by(room_->clock().now());
   if (delivered <= next_id_ + queue_frames_) return;
   const std::uint64_t oldest = delivered - queue_frames_;
-  log(LogCategory::drivers).warn("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
+  log(LogCategory::drivers).info("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
   next_id_ = oldest;
 }
 

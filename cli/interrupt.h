@@ -1,0 +1,29 @@
+#pragma once
+
+#include <csignal>
+
+namespace emberlock::cli {
+
+/// While it lives the first Ctrl-C only asks to stop, so that a run ends well; the second one kills. One at a
+/// time.
+class Interrupt {
+ public:
+  Interrupt() {
+    asked_ = 0;
+    struct sigaction action {};
+    action.sa_handler = [](int) { asked_ = 1; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    ::sigaction(SIGINT, &action, &before_);
+  }
+  ~Interrupt() { ::sigaction(SIGINT, &before_, nullptr); }
+  Interrupt(const Interrupt&) = delete;
+  Interrupt& operator=(const Interrupt&) = delete;
+
+  [[nodiscard]] static bool asked() { return asked_ != 0; }
+
+ private:
+  static inline volatile std::sig_atomic_t asked_ = 0;
+  struct sigaction before_ {};
+};
+
+}  // namespace emberlock::cli

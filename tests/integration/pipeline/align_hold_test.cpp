@@ -1,0 +1,107 @@
+// Cameras held in tolerance for minutes of their own time, on a virtual clock.
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "cli/align_json.h"
+#include "cli/align_record.h"
+#include "cli/align_run.h"
+#include "tests/support/small_rig.h"
+
+namespace emberlock::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using test::small_rig;
+using test::SmallBench;
+using testing::HasSubstr;
+
+/// Two crystals that are 50 ppm apart, which takes their cameras out of +-30 rows of 150 us in three minutes.
+SmallBench drifting_bench() {
+  VirtualRigOptions setup = small_rig(2);
+  setup.queue_frames = 8;  // frames that wait for the end of a pause are drawn for nothing
+  setup.cameras[1].timing.frame_period = setup.cameras[0].timing.frame_period * (1 - 25e-6);
+  setup.cameras[2].timing.frame_period = setup.cameras[0].timing.frame_period * (1 + 25e-6);
+  SmallBench bench(setup);
+  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.hold = Seconds(600);
+  return bench;
+}
+
+TEST(AlignHold, ChecksAsAnnouncedResetWhatLeavesAndEndsInTolerance) {
+  SmallBench bench = drifting_bench();
+  TimePoint aligned{};
+  TimePoint last{};
+  int checks = 0;
+  int resets = 0;  // ordered after the cameras were first aligned
+  Seconds late;
+  std::optional<TimePoint> due;
+  const auto result = run_align(bench.align, bench.options, [&](const AlignRoundReport& r) {
+    if (due) {
+      ++checks;
+      late = std::max(late, r.round.at - *due);
+    }
+    due.reset();
+    last = r.round.at;
+    if (r.decision.verdict == AlignVerdict::aligned) {
+      if (aligned == TimePoint{}) aligned = r.round.at;
+      ASSERT_TRUE(r.decision.next_check);
+      due = r.round.at + std::max(*r.decision.next_check, Seconds(1));
+      const Rows within = r.options.tolerance.in_rows(r.options.row_time) + Rows(1);
+      EXPECT_LT(bench.true_error(r.options.row_time), within) << r.decision.round;
+    } else if (aligned != TimePoint{}) {
+      for (const CameraDecision& camera : r.decision.cameras) resets += camera.reset ? 1 : 0;
+    }
+  });
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_EQ(result->last.verdict, AlignVerdict::aligned);
+  EXPECT_GE(last - aligned, Seconds(600));
+  EXPECT_LT(last - aligned, Seconds(610));
+  EXPECT_EQ(result->checks, checks);
+  EXPECT_GT(checks, 5);
+  EXPECT_LT(checks, 200) << "waits between them";
+  EXPECT_GT(resets, 0) << "something drifted out";
+  EXPECT_LT(late, Seconds(0.5)) << "no check comes after the time for which tolerance was promised";
+}
+
+TEST(AlignHold, EndsSoonWhenAskedTo) {
+  SmallBench bench = drifting_bench();
+  bench.options.hold = kUntilStopped;
+  int asked = 0;
+  const auto result = run_align(bench.align, bench.options, {}, {}, [&] { return ++asked > 2000; });
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_GT(result->checks, 0);
+  EXPECT_LE(asked, 2005);
+}
+
+TEST(AlignHold, TheLimitOfRoundsCountsFromTheLastTimeAllWereIn) {
+  SmallBench bench = drifting_bench();
+  bench.options.align.max_rounds = 12;
+  const auto result = run_align(bench.align, bench.options);
+  ASSERT_TRUE(result.ok());
+  EXPECT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
+  EXPECT_GT(result->last.round, 12);
+}
+
+TEST(AlignHold, ARecordingReplaysToTheBitThoughItWasStopped) {
+  const fs::path folder = fs::path(testing::TempDir()) / "align_hold_replay";
+  fs::remove_all(folder);
+  SmallBench bench = drifting_bench();
+  std::vector<std::string> live;
+  const auto into = [](std::vector<std::string>& lines) {
+    return [&lines](const AlignRoundReport& r) { lines.push_back(round_json(r).dump()); };
+  };
+  const auto recorded =
+      record_align(folder, bench.align, bench.options, into(live), {}, [&] { return live.size() >= 8; });
+  ASSERT_TRUE(recorded.ok()) << recorded.error().message();
+  ASSERT_GT(recorded->checks, 0);
+  std::vector<std::string> again;
+  const auto replayed = replay_align(folder, into(again));
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(live, again);
+  fs::remove_all(folder);
+}
+
+}  // namespace
+}  // namespace emberlock::cli

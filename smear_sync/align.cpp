@@ -326,6 +326,7 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
     decision.verdict = AlignVerdict::aligned;
     decision.reason = "every camera is locked within tolerance of the target";
   } else {
+    time_resets(state, decision, c, scene);
     decision.reason = "trims bring the cameras to the target";
     // Where a dot is missing trims go by what was foretold; that ages.
     for (std::size_t i = 0; i < c.cameras.size(); ++i) {

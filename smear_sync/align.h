@@ -98,7 +98,8 @@ struct AlignOptions {
   PartsPerMillion rate_spread{
       20};  ///< of the cameras' rates about the common beat, before they were seen: how fast a phase ages
   PartsPerMillion rate_wander{0.2};  ///< of a rate in a minute, as cameras warm up
-  Seconds trim_time{60};    ///< of trimmed, > 0: what trimming doesn't bring to the target by then is reset
+  Seconds trim_time{60};    ///< of trimmed, > 0: cameras that trims wouldn't bring to the target by then,
+                            ///< the outermost, are reset
   Seconds round_time{0.6};  ///< of one round of filming, for what is foretold, > 0
   Seconds reset_time{0};    ///< of one reset more in a round: an operator's way to the button
   std::optional<AlignLimits> limits = {};  ///< absent: nothing is refused for what it takes
@@ -163,6 +164,7 @@ struct AlignState {
   bool affordable = false;  ///< the limits have been looked at, and hold
   std::optional<TimePoint> last_round;
   std::optional<AlignTarget> target;  ///< of trims, once they have begun
+  std::optional<TimePoint> trimming;  ///< since when, until aligned
   std::vector<CameraTrack> cameras;
 };
 

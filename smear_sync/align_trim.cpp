@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include <fmt/format.h>
@@ -15,6 +16,12 @@ constexpr double kLongestWay = 3600;  // s, no plan goes further
 constexpr int kHalvings = 50;
 /// The target stands still from when the last camera has so many steps to go.
 constexpr double kNearSteps = 2;
+/// Nobody is reset for what a plan says before rates are known to this part of the trims' range.
+constexpr double kKnownRate = 0.03;
+/// Rounds that trims take to stop cleanly.
+constexpr double kSettlingRounds = 4;
+/// What is left for trims, however late it is: this part of the time. So nobody is reset for a short way.
+constexpr double kLeastPart = 0.25;
 
 /// What the servo is told in this round, the same for every camera.
 struct Timing {
@@ -56,14 +63,55 @@ double soonest(const std::vector<Course>& courses) {
   return late;
 }
 
-/// The target that the last camera reaches soonest; its rate is the middle one, which holds with the least
-/// trims. Settled when that is soon.
-AlignTarget plan(const AlignState& state, const Timing& timing, const std::vector<AlignCamera>& cameras,
-                 const AlignOptions& options, Seconds middle) {
+/// The time that is left for trims to meet.
+double time_left(const AlignState& state, const Timing& timing, const AlignOptions& options) {
+  const Seconds left = *state.trimming + options.trim_time - timing.at - kSettlingRounds * timing.interval;
+  return std::max(left, kLeastPart * options.trim_time).value();
+}
+
+/// Cameras that keep the others from meeting within t seconds: of the two that are farthest apart then, the
+/// one without which the others come nearer, and so on. Those that can't be brought by a reset stay.
+std::vector<std::size_t> latecomers(std::vector<Course> courses, const std::vector<AlignCamera>& cameras,
+                                    double t) {
+  std::vector<std::size_t> late;
+  std::vector<std::size_t> index(courses.size());
+  std::iota(index.begin(), index.end(), std::size_t{0});
+  while (courses.size() > 1) {
+    const Common all = common(courses, t);
+    if (all.from <= all.to) break;
+    std::optional<std::size_t> outermost;
+    double gap = all.from - all.to;
+    for (std::size_t i = 0; i < courses.size(); ++i) {
+      if (cameras[index[i]].method != ResetMethod::on_command) continue;
+      std::vector<Course> others = courses;
+      others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+      const Common rest = common(others, t);
+      if (rest.from - rest.to >= gap) continue;
+      gap = rest.from - rest.to;
+      outermost = i;
+    }
+    if (!outermost) break;
+    late.push_back(index[*outermost]);
+    courses.erase(courses.begin() + static_cast<std::ptrdiff_t>(*outermost));
+    index.erase(index.begin() + static_cast<std::ptrdiff_t>(*outermost));
+  }
+  return late;
+}
+
+struct Plan {
+  AlignTarget target;
+  std::vector<std::size_t> late;  ///< cameras that are reset rather than waited for
+};
+
+/// The target that the last camera reaches soonest, latecomers aside; its rate is the middle one, which holds
+/// with the least trims. Settled when that is soon.
+Plan plan(const AlignState& state, const Timing& timing, const std::vector<AlignCamera>& cameras,
+          const AlignOptions& options, Seconds middle) {
   const TrackOptions track = track_options(options);
   std::vector<Course> courses;
   double slowest = INFINITY;
   double fastest = -INFINITY;
+  bool foreseeable = true;
   TimePoint begin = timing.at;
   for (const AlignCamera& camera : cameras) begin = std::max(begin, timing.in_force(*camera.trim));
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -71,15 +119,22 @@ AlignTarget plan(const AlignState& state, const Timing& timing, const std::vecto
     const double rate = d.rate.value() * 1e-6;
     courses.push_back({wrap_symmetric(d.tau - middle, options.period).value(), rate,
                        (cameras[i].trim->range - cameras[i].trim->step).value() * 1e-6});
+    foreseeable = foreseeable && d.rate_sigma < kKnownRate * cameras[i].trim->range;
     slowest = std::min(slowest, rate);
     fastest = std::max(fastest, rate);
   }
+  std::vector<std::size_t> late;
+  if (foreseeable) late = latecomers(courses, cameras, time_left(state, timing, options));
+  std::vector<std::size_t> leave = late;
+  std::sort(leave.rbegin(), leave.rend());
+  for (const std::size_t i : leave) courses.erase(courses.begin() + static_cast<std::ptrdiff_t>(i));
   const double t = soonest(courses);
   const Common meeting = common(courses, t);
   const double rate = (slowest + fastest) / 2;
   const Seconds tau = middle + Seconds((meeting.from + meeting.to) / 2 - rate * t);
-  return {begin, wrap_positive(tau, options.period), PartsPerMillion(rate * 1e6),
-          t <= kNearSteps * timing.interval.value()};
+  return {{begin, wrap_positive(tau, options.period), PartsPerMillion(rate * 1e6),
+           late.empty() && t <= kNearSteps * timing.interval.value()},
+          std::move(late)};
 }
 
 std::string words(Seconds error, const ServoStep& step, SecondsPerRow row_time) {
@@ -108,7 +163,10 @@ bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& ro
   const TrackOptions track = track_options(options);
   if (!state.target || !state.target->settled) {
     const Seconds middle = wrap_positive(*decision.target - round.strobe_phase, options.period);
-    state.target = plan(state, timing, cameras, options, middle);
+    if (!state.trimming) state.trimming = round.at;
+    Plan planned = plan(state, timing, cameras, options, middle);
+    state.target = planned.target;
+    for (const std::size_t i : planned.late) decision.cameras[i].reset = true;
   }
   const AlignTarget& target = *state.target;
   decision.target =
@@ -126,6 +184,12 @@ bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& ro
     const PartsPerMillion holding = target.rate - now.rate;
     const PartsPerMillion ordered = phase.trim(from);
     const ServoStep step = rate_servo({to_go, then.tau_sigma, holding}, *cameras[i].trim, timing.interval);
+    if (camera.reset) {
+      camera.reason =
+          standing(*camera.error, options.row_time) + ", which trims take too long for: its shutter is reset";
+      all_in = false;
+      continue;
+    }
     camera.servo = step.state;
     if (abs(step.trim - ordered) > cameras[i].trim->step / 2) camera.trim = step.trim;
     camera.reason = words(*camera.error, step, options.row_time);
@@ -134,6 +198,7 @@ bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& ro
     all_in = all_in && in;
   }
   if (!all_in) return false;
+  state.trimming.reset();
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
     const PartsPerMillion holding = target.rate - state.cameras[i].phase.at(round.at, track).rate;

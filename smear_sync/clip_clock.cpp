@@ -53,18 +53,6 @@ std::vector<FrameReading> with_one_lamp(const ClipReading& clip, Rows& lamp) {
   return frames;
 }
 
-/// A walk that wants a frame rate which no crystal has tells nothing.
-void doubt(ReadMode& mode, Hertz rate) {
-  if (!mode.frame_rate_error || abs(*mode.frame_rate_error) <= kRateSigma * 3) return;
-  mode.direction_reason =
-      fmt::format("the dots' walk wants a frame rate {:.0f} ppm off {:.4f}: check both rates",
-                  mode.frame_rate_error->value(), rate.value());
-  mode.direction.reset();
-  mode.shifts.reset();
-  mode.shifts_measured = Rows(0);
-  mode.frame_rate_error.reset();
-}
-
 /// The frame rates that a file's claim may stand for: itself, and the ones in use that are often rounded to
 /// it.
 std::vector<Hertz> rates_to_try(const ClipReading& clip, const ClipOptions& options) {
@@ -270,7 +258,6 @@ Result<ClipWalk> read_walk(const ClipReading& clip, const ClipOptions& options) 
                                .row_time_sigma = options.row_time_sigma,
                                .rows = clip.rows};
     EMBERLOCK_ASSIGN_OR_RETURN(ReadMode mode, find_read_mode(frames, with));
-    doubt(mode, rate);
     if (mode.direction) return ClipWalk{rate, std::move(mode)};
     if (!first) first = ClipWalk{rate, std::move(mode)};
   }

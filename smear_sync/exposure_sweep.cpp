@@ -20,7 +20,8 @@ Error refuse(std::string what, std::string remedy) {
 struct Levels {
   double dark = 0;
   double lit = 0;
-  double sigma = 0;  ///< the largest of the samples'
+  double sigma = 0;       ///< the largest of the samples'
+  std::size_t whole = 0;  ///< samples that are fully lit
   [[nodiscard]] double part(double level) const { return (level - dark) / (lit - dark); }
 };
 
@@ -44,12 +45,17 @@ Result<Levels> levels_of(const std::vector<SweepSample>& samples, const SweepOpt
                   "shorten an exposure that lasts the whole period, or bring the strobe into view");
   };
   if (!(high > low)) return alike();
+  // Flashes that an edge cut are neither.
   std::vector<double> dark;
   std::vector<double> lit;
-  for (const SweepSample& s : samples) (s.level < (low + high) / 2 ? dark : lit).push_back(s.level);
+  for (const SweepSample& s : samples) {
+    if (s.level <= low + kPartial * levels.sigma) dark.push_back(s.level);
+    if (s.level >= high - kPartial * levels.sigma) lit.push_back(s.level);
+  }
   levels.dark = median(dark);
   levels.lit = median(lit);
-  // The extremes of many pictures of nothing lie as far apart; the middles of their halves don't.
+  levels.whole = lit.size();
+  // The extremes of many pictures of nothing lie as far apart; the middles of what is near them don't.
   if (!(levels.lit - levels.dark > options.min_snr * levels.sigma)) return alike();
   return levels;
 }
@@ -139,13 +145,20 @@ std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const Swe
   if (samples.size() < kFewest) return even_delays(0, options.period);
   std::vector<Seconds> delays;
   const std::vector<SweepSample> sorted = in_order(samples, options.period);
-  if (!levels_of(sorted, options).ok()) {
+  const auto levels = levels_of(sorted, options);
+  if (!levels.ok()) {
     int step = 1;  // all that was filmed are steps before this one
     while (step < kSteps && samples.size() >= static_cast<std::size_t>(kFirstDelays) << step) ++step;
     return even_delays(step, options.period);
   }
   const auto window = fit_exposure(samples, options);
   if (!window.ok()) return delays;
+  // A short exposure may have been met by one flash, which its edge cut.
+  if (levels->whole < 2) {
+    const auto brightest = std::max_element(sorted.begin(), sorted.end(),
+                                            [](const auto& a, const auto& b) { return a.level < b.level; });
+    return {brightest->delay - options.flash_width, brightest->delay + options.flash_width};
+  }
   if (window->end_sigma > resolution) delays.push_back(window->end);
   if (edges == SweepEdges::both && window->begin_sigma > resolution) delays.push_back(window->begin);
   return delays;

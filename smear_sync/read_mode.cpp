@@ -198,6 +198,14 @@ void decide_direction(const Walk& top_first, const Walk& bottom_first, std::size
         o.flash_rate.value(), walk, frames, 0.01 * o.frame_rate.value());
     return;
   }
+  // Near a whole number of flashes a frame the other direction may be told, of a camera that can't be.
+  const double off = -best.frame_period_change * o.frame_rate.value() * 1e6;
+  if (std::abs(off) > kRateSigmas * o.rate_sigma.value()) {
+    mode.direction_reason = fmt::format(
+        "the dots' walk wants a frame rate {:.0f} ppm off {:.4f}, believed to {:.0f} ppm: check both rates",
+        off, o.frame_rate.value(), o.rate_sigma.value());
+    return;
+  }
   mode.direction = top ? ReadDirection::top_first : ReadDirection::bottom_first;
   mode.direction_reason = fmt::format("the dots walk as with the {} row read first, to {:.2f} rows RMS",
                                       top ? "top" : "bottom", best.residual);

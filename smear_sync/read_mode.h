@@ -50,10 +50,11 @@ struct ReadMode {
 /// rows a second, or a comb, whose dots walk by what is left of T / P. Read phase i begins at t_0 + i T, so
 /// its flashes stand at tau = phi - i T modulo the flash period P = 1 / f; a dot stands d tau / t_row rows
 /// from its lamp, or K rows less once it wrapped. Both directions are fitted, each with the frame rate free
-/// within three rate_sigma; d is known when one explains the dots and the other doesn't. The two sides of the
-/// lamp then differ by K - T / t_row modulo P / t_row rows, and K is known when one whole number from n to T
-/// / t_row fits: so a comb of 300 flashes a second tells d and K of most cameras in a second, a single dot K
-/// once it was seen on both sides.
+/// within three rate_sigma; d is known when one explains the dots and the other doesn't, and not where that
+/// one wants a rate beyond (a strobe so near a whole rate of the frames' that a wrong one may seem to walk).
+/// The two sides of the lamp then differ by K - T / t_row modulo P / t_row rows, and K is known when one
+/// whole number from n to T / t_row fits: so a comb of 300 flashes a second tells d and K of most cameras in
+/// a second, a single dot K once it was seen on both sides.
 ///
 /// Readings with dots (states `dot` and `comb`) are used, others passed over; stray dots are outvoted. With
 /// sweep-out dots are seen on one side only, and K stays unknown (and isn't needed). Errors (bad_input):

@@ -6,51 +6,15 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "tests/support/shutters.h"
 
 namespace emberlock {
 namespace {
 
+using test::Shutter;
 using testing::HasSubstr;
 
-constexpr double kPeriod = 1 / 60.0;
-
-/// A global shutter that gathers [end - exposure, end) of every period.
-struct Shutter {
-  double end = 0.0031;
-  double exposure = 5e-3;
-  double ambient = 12;
-  double flash = 80;
-  double noise = 0.5;
-  double width = 20e-6;
-  double white = 1e9;
-  std::uint64_t seed = 1;
-
-  [[nodiscard]] SweepSample film(Seconds delay) const {
-    double light = 0;
-    for (int turn = -1; turn <= 2; ++turn) {
-      const double begin = delay.value() - width / 2 + turn * kPeriod;
-      light +=
-          std::max(0.0, std::min(begin + width, end + kPeriod) - std::max(begin, end + kPeriod - exposure)) /
-          width;
-    }
-    const auto counter = static_cast<std::uint64_t>(std::llround(delay.value() * 1e9));
-    const double level = ambient + flash * light + noise * random_normal(seed, 5, counter);
-    return {delay, std::min(level, white), noise};
-  }
-  /// Films what next_delays() asks for, to the end.
-  [[nodiscard]] std::vector<SweepSample> sweep(Seconds resolution) const {
-    std::vector<SweepSample> samples;
-    for (int round = 0; round < 40; ++round) {
-      const auto delays = next_delays(samples, options(), resolution);
-      if (delays.empty()) break;
-      for (const Seconds d : delays) samples.push_back(film(d));
-    }
-    return samples;
-  }
-  [[nodiscard]] SweepOptions options() const {
-    return {.period = Seconds(kPeriod), .flash_width = Seconds(width)};
-  }
-};
+constexpr double kPeriod = test::kShutterPeriod;
 
 double off(Seconds a, double b) { return wrap_symmetric(a.value() - b, kPeriod); }
 

@@ -79,6 +79,23 @@ TEST(ReadMode, DotsThatAreMissedAndStrayOnesAreOutvoted) {
   EXPECT_EQ(mode.shifts, 740) << mode.shifts_reason;
 }
 
+// A strobe of 24.0/s filmed at 23.976/s and taken for 24/s: dots that walk 1000 ppm, where none should.
+TEST(ReadMode, AWalkThatNoCrystalExplainsTellsNothing) {
+  for (const ReadDirection direction : kDirections) {
+    for (const double detuned : {24.0, 23.95, 23.99}) {
+      ClockFilm f{.flash_rate = detuned, .first_flash = 0.01, .frames = 240};
+      f.timing.direction = direction;
+      ReadModeOptions o = options(f);
+      o.frame_rate = Hertz(24.0);
+      const auto mode = find_read_mode(film(f), o);
+      ASSERT_TRUE(mode.ok());
+      EXPECT_TRUE(!mode->direction || *mode->direction == direction)
+          << detuned << " " << mode->direction_reason;
+      EXPECT_FALSE(mode->direction_reason.empty());
+    }
+  }
+}
+
 TEST(ReadMode, AStrobeInStepTellsNothing) {
   ClockFilm f{.flash_rate = 23.976, .first_flash = 0.01, .frames = 240};
   f.timing.frame_period = Seconds(1 / 23.976 * (1 - 12e-6));

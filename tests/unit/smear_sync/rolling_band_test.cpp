@@ -8,61 +8,13 @@
 #include "base/random.h"
 #include "smear_sync/drift.h"
 #include "smear_sync/row_clock.h"
+#include "tests/support/shutters.h"
 
 namespace emberlock {
 namespace {
 
+using test::Roller;
 using testing::HasSubstr;
-
-/// A rolling shutter by definition: row r gathers the flashes of the exposure before t_start + r t_row, of a
-/// scene whose rows differ, in ambient light.
-struct Roller {
-  CcdTiming timing{
-      .rows = 480, .shifts = 480, .frame_period = Seconds(1 / 30.0), .row_time = microseconds_per_row(60)};
-  double exposure = 4e-3;
-  double ambient = 20;
-  double flash = 60;
-  double noise = 0.2;  ///< of a row's mean
-  double flash_width = 20e-6;
-  double flash_rate = 30;
-  double first_flash = 0.012;
-  std::uint64_t seed = 1;
-
-  [[nodiscard]] RowProfile frame(int i) const {
-    RowProfile p;
-    p.noise = std::max(noise, 0.01);
-    for (int y = 0; y < timing.rows; ++y) {
-      const int order = timing.direction == ReadDirection::top_first ? y : timing.rows - 1 - y;
-      const double end = i * timing.frame_period.value() + order * timing.row_time.value();
-      double light = 0;
-      const int last = static_cast<int>(std::ceil((end - first_flash) * flash_rate)) + 1;
-      for (int j = last - static_cast<int>(exposure * flash_rate) - 4; j <= last; ++j) {
-        const double begin = first_flash + j / flash_rate - flash_width / 2;
-        const double inside = std::min(begin + flash_width, end) - std::max(begin, end - exposure);
-        light += std::clamp(inside / flash_width, 0.0, 1.0);
-      }
-      const double scene = 1 + 0.4 * std::sin(0.05 * y);
-      p.level.push_back(
-          scene * (ambient + flash * light) +
-          noise * random_normal(seed, static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(y)));
-    }
-    return p;
-  }
-  /// A strobe detuned by 1 %, for as long as its band crosses the frame.
-  [[nodiscard]] BandReference reference() const {
-    Roller detuned = *this;
-    detuned.flash_rate = 1 / timing.frame_period.value() * 1.023;
-    detuned.exposure = std::min(exposure, 0.4 * timing.frame_period.value());
-    std::vector<RowProfile> frames;
-    for (int i = 0; i < 90; ++i) frames.push_back(detuned.frame(i));
-    auto r = learn_band_reference(frames);
-    EXPECT_TRUE(r.ok());
-    return r.ok() ? *r : BandReference{};
-  }
-  [[nodiscard]] BandReading read(int i) const {
-    return read_bands(frame(i), reference(), {.direction = timing.direction});
-  }
-};
 
 TEST(RollingBand, TheFirstEdgeIsThePhaseWhateverTheExposureAndDirection) {
   for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {

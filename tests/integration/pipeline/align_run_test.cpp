@@ -3,25 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/support/small_rig.h"
+#include "tests/support/aligned.h"
 
 namespace emberlock::cli {
 namespace {
 
+using test::expect_aligned_in_truth;
+using test::kReadingError;
 using test::small_rig;
 using test::SmallBench;
 using testing::HasSubstr;
-
-// What a lamp's row may be off by in these pictures.
-constexpr Rows kReadingError{1};
-
-void expect_aligned_in_truth(SmallBench& bench) {
-  const auto result = run_align(bench.align, bench.options);
-  ASSERT_TRUE(result.ok()) << result.error().message();
-  ASSERT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
-  const SecondsPerRow row = result->options.row_time;
-  EXPECT_LT(bench.true_error(row), result->options.tolerance.in_rows(row) + kReadingError);
-}
 
 class EveryPolicy : public testing::TestWithParam<AlignPolicy> {};
 

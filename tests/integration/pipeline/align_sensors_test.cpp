@@ -1,18 +1,15 @@
 // CCDs, rolling and global shutters in one alignment, from pictures to phases in truth.
-#include <filesystem>
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/align_json.h"
-#include "cli/align_record.h"
 #include "cli/align_run.h"
-#include "tests/support/small_rig.h"
+#include "tests/support/aligned.h"
 
 namespace emberlock::cli {
 namespace {
 
-namespace fs = std::filesystem;
+using test::expect_aligned_in_truth;
+using test::expect_replays;
 using test::small_rig;
 using test::SmallBench;
 using testing::HasSubstr;
@@ -21,20 +18,9 @@ constexpr auto kCcd = SensorKind::ccd;
 constexpr auto kRolling = SensorKind::rolling_shutter;
 constexpr auto kGlobal = SensorKind::global_shutter;
 
-/// What phases may be off by in these pictures.
-constexpr Rows kReadingError{1};
-
 VirtualRigOptions mixed_rig(std::uint64_t seed, const std::vector<SensorKind>& sensors = {
                                                     kCcd, kRolling, kGlobal, kRolling, kGlobal}) {
   return small_rig(seed, static_cast<int>(sensors.size()), sensors);
-}
-
-void expect_aligned_in_truth(SmallBench& bench) {
-  const auto result = run_align(bench.align, bench.options);
-  ASSERT_TRUE(result.ok()) << result.error().message();
-  ASSERT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
-  const SecondsPerRow row = result->options.row_time;
-  EXPECT_LT(bench.true_error(row), result->options.tolerance.in_rows(row) + kReadingError);
 }
 
 class EverySensor : public testing::TestWithParam<std::vector<SensorKind>> {};
@@ -134,23 +120,11 @@ TEST(AlignSensors, FlashesThatLightNothingInViewAreSaid) {
 }
 
 TEST(AlignSensors, ARecordingOfThemReplaysToTheBit) {
-  const fs::path folder = fs::path(testing::TempDir()) / "align_sensors_replay";
-  fs::remove_all(folder);
   SmallBench bench(mixed_rig(6, {kCcd, kRolling, kGlobal}));
   bench.options.align.policy = AlignPolicy::timed;
-  std::vector<std::string> live;
-  const auto into = [](std::vector<std::string>& lines) {
-    return [&lines](const AlignRoundReport& r) { lines.push_back(round_json(r).dump()); };
-  };
-  const auto recorded = record_align(folder, bench.align, bench.options, into(live));
-  ASSERT_TRUE(recorded.ok()) << recorded.error().message();
-  ASSERT_GT(recorded->resets, 0);
-  EXPECT_THAT(live, testing::Each(HasSubstr("\"sensor\":\"global\"")));
-  std::vector<std::string> again;
-  const auto replayed = replay_align(folder, into(again));
-  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
-  EXPECT_EQ(live, again);
-  fs::remove_all(folder);
+  const auto rounds = expect_replays(bench, "align_sensors_replay");
+  EXPECT_THAT(rounds, testing::Each(HasSubstr("\"sensor\":\"global\"")));
+  EXPECT_THAT(rounds, testing::Contains(HasSubstr("\"reset\":true")));
 }
 
 }  // namespace

@@ -101,12 +101,18 @@ TEST(AlignTrim, ACameraWithoutTrimsIsNamed) {
   EXPECT_THAT(o.decision.reason, HasSubstr("cam0 can't be trimmed"));
 }
 
-TEST(AlignLimits, ATolerancePastTheLimitsIsRefusedWithWhatCouldBeMet) {
+/// Cameras known to be alike, of which so many rows are asked for within 60 resets and ten minutes.
+AlignSimulation limited(AlignPolicy policy, Rows rows) {
   AlignSimulation sim;
-  sim.options.policy = AlignPolicy::densest;
-  sim.options.tolerance = {Rows(3)};
+  sim.options.policy = policy;
+  sim.options.tolerance = {rows};
   sim.options.rate_spread = PartsPerMillion(1);
   sim.options.limits = AlignLimits{60, Seconds(600), 0.9};
+  return sim;
+}
+
+TEST(AlignLimits, ATolerancePastTheLimitsIsRefusedWithWhatCouldBeMet) {
+  const AlignSimulation sim = limited(AlignPolicy::densest, Rows(3));
   const AlignOutcome o = simulate(sim, 2);
   ASSERT_EQ(o.decision.verdict, AlignVerdict::refused);
   EXPECT_EQ(o.resets, 0);
@@ -119,11 +125,7 @@ TEST(AlignLimits, ATolerancePastTheLimitsIsRefusedWithWhatCouldBeMet) {
 }
 
 TEST(AlignLimits, AnOfferKeepsItsPromise) {
-  AlignSimulation sim;
-  sim.options.policy = AlignPolicy::densest;
-  sim.options.rate_spread = PartsPerMillion(1);
-  sim.options.tolerance = {Rows(3)};
-  sim.options.limits = AlignLimits{60, Seconds(600), 0.9};
+  AlignSimulation sim = limited(AlignPolicy::densest, Rows(3));
   const AlignOffer offer = simulate(sim, 2).decision.offers.at(1);
   sim.options.tolerance = offer.tolerance;
   sim.options.limits.reset();
@@ -156,10 +158,7 @@ TEST(AlignLimits, WhatIsForetoldIsWhatHappens) {
 }
 
 TEST(AlignLimits, AToleranceBelowTheNoiseIsRefused) {
-  AlignSimulation sim;
-  sim.options.policy = AlignPolicy::timed;
-  sim.options.tolerance = {Rows(0.2)};
-  sim.options.limits = AlignLimits{};
+  const AlignSimulation sim = limited(AlignPolicy::timed, Rows(0.2));
   const AlignOutcome o = simulate(sim, 1);
   EXPECT_EQ(o.decision.verdict, AlignVerdict::refused);
   EXPECT_THAT(o.decision.reason, HasSubstr("can't be told: phases are known to 0.3 rows"));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "tests/support/clock_film.h"
 #include "tests/support/shift_register.h"
 
 namespace emberlock {
@@ -121,6 +122,31 @@ TEST(Combine, JitterAtTheWrapAveragesAcrossIt) {
   const Phase phase = combine(samples_at({-0.4, 0.3, -0.2, 0.5, 0.3}), {}, {});
   ASSERT_EQ(phase.state, PhaseState::known);
   EXPECT_NEAR(wrap_symmetric(rows_of(phase), 772.39), 0.1, 0.01);
+}
+
+// A strobe that jitters by three rows about the instant at which charge begins to move: dots stand just above
+// the lamp, wrapped, and just below it.
+TEST(Combine, AStrobeThatJittersAtTheWrapIsReadFromItsFilm) {
+  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+    test::ClockFilm f{.flash_rate = 23.976, .first_flash = 0, .frames = 96, .jitter = 160e-6, .hidden = 0};
+    f.timing = {.rows = 720, .shifts = 772, .direction = direction};
+    std::vector<PhaseSample> samples;
+    int wrapped = 0;
+    for (const FrameReading& frame : film(f)) {
+      const TimePoint at = TimePoint{} + f.timing.frame_period * static_cast<double>(frame.frame);
+      samples.push_back({at, phase_of(frame.reading, f.timing, Seconds(f.flash_width))});
+      const Phase& phase = samples.back().phase;
+      // What the jitter does to one frame, beside its own error.
+      if (phase.state == PhaseState::known) samples.back().phase.sigma = Seconds(160e-6);
+      wrapped += phase.state == PhaseState::known && phase.tau > f.timing.frame_period / 2 ? 1 : 0;
+    }
+    EXPECT_GT(wrapped, 20);
+    EXPECT_LT(wrapped, 76);
+    const Phase phase = combine(samples, TimePoint{}, {.period = f.timing.frame_period});
+    ASSERT_EQ(phase.state, PhaseState::known) << phase.reason;
+    EXPECT_LT(abs(wrap_symmetric(phase.tau, f.timing.frame_period)), 4 * phase.sigma);
+    EXPECT_LT(phase.sigma, microseconds(25));
+  }
 }
 
 TEST(Combine, DropsTheFrameThatShowsAnotherDot) {

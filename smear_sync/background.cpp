@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <memory>
 
 #include "smear_sync/kernels.h"
 
@@ -85,29 +84,29 @@ Background measure_background(const Plane& plane, int runs) {
   return background;
 }
 
-std::vector<float> column_medians(const Plane& plane, int left, int count, Field field) {
+std::vector<float> column_medians(const Patch& patch, Field field) {
   constexpr int kRows = 81;
-  const int rows = std::max(1, (plane.size.height - field.first + field.step - 1) / field.step);
-  const auto width = static_cast<std::size_t>(count);
-  const std::unique_ptr<float[]> v(
-      new float[kRows * width]);  // NOLINT(*-avoid-c-arrays): left unset at first
-  for (int i = 0; i < kRows; ++i) {
+  const int rows = std::max(1, (patch.height - field.first + field.step - 1) / field.step);
+  const auto row = [&](int i) {
     // Any whole step might keep time with a comb; this order doesn't.
     const double turn = i * 0.6180339887;
     const int y = field.first + field.step * static_cast<int>((turn - std::floor(turn)) * rows);
-    plane.read(std::min(y, plane.size.height - 1), left, count,
-               v.get() + static_cast<std::size_t>(i) * width);
+    return patch.row(std::min(y, patch.height - 1));
+  };
+  const auto width = static_cast<std::size_t>(patch.stride);
+  std::vector<float> v(kRows / 3 * width);
+  for (int i = 0; i < kRows / 3; ++i) {
+    median_of_three(row(3 * i), row(3 * i + 1), row(3 * i + 2), patch.stride,
+                    v.data() + static_cast<std::size_t>(i) * width);
   }
-  for (std::size_t left_over = kRows / 3; left_over >= 1; left_over /= 3) {
+  for (std::size_t left_over = kRows / 9; left_over >= 1; left_over /= 3) {
     for (std::size_t i = 0; i < left_over; ++i) {
-      const float* a = v.get() + 3 * i * width;
-      const float* b = a + width;
-      const float* c = b + width;
-      float* out = v.get() + i * width;
-      median_of_three(a, b, c, count, out);
+      const float* a = v.data() + 3 * i * width;
+      median_of_three(a, a + width, a + 2 * width, patch.stride, v.data() + i * width);
     }
   }
-  return {v.get(), v.get() + width};
+  v.resize(width);
+  return v;
 }
 
 float median(std::span<float> values) {
@@ -119,7 +118,7 @@ float median(std::span<float> values) {
 
 double robust_scale(std::span<float> values) {
   for (float& v : values) v = std::abs(v);
-  return 1.4826 * static_cast<double>(median(values));
+  return kMadSigma * static_cast<double>(median(values));
 }
 
 }  // namespace emberlock::detail

@@ -24,12 +24,14 @@ Background measure_background(const Plane& plane, int runs = 64);
 struct Field {
   int first = 0, step = 1;
 };
-/// About the median of each of `count` columns from `left` on: medians of three of medians of three, from 81
-/// rows all over the field.
-std::vector<float> column_medians(const Plane& plane, int left, int count, Field field);
+/// About the median of each of the patch's columns, padding included: medians of three of medians of three,
+/// from 81 rows all over the field.
+std::vector<float> column_medians(const Patch& patch, Field field);
 
 float median(std::span<float> values);  ///< reorders; 0 for none
-/// 1.4826 times the median absolute value; reorders.
+/// A normal value's sigma over its median absolute value.
+constexpr double kMadSigma = 1.4826;
+/// kMadSigma times the median absolute value; reorders.
 double robust_scale(std::span<float> values);
 
 }  // namespace emberlock::detail

@@ -56,13 +56,19 @@ void find_runs(const Plane& plane, int y, int first, int last, float threshold, 
   end(last + 1);
 }
 
+/// In samples of the view: at least one of a sum over the threshold exceeds it.
+template <class Sample>
+Sample sample_limit(const Plane& plane, float threshold) {
+  return static_cast<Sample>(std::clamp<double>(std::floor(static_cast<double>(threshold) * plane.level), 0,
+                                                std::numeric_limits<Sample>::max()));
+}
+
 template <class Sample>
 void scan(const Plane& plane, float threshold, RowStep rows, BrightAreas& found) {
   const int per_pixel = channels(plane.view.layout.format);
   const int samples = plane.view.width() * per_pixel;
   const int chunk = kChunk / static_cast<int>(sizeof(Sample));
-  const auto limit = static_cast<Sample>(std::clamp<double>(
-      std::floor(static_cast<double>(threshold) * plane.level), 0, std::numeric_limits<Sample>::max()));
+  const auto limit = sample_limit<Sample>(plane, threshold);
   Sample peak = 0;
   for (int y = rows.first; y < plane.size.height && found.areas.size() < kMost; y += rows.step) {
     const Sample* row = plane.view.row_as<Sample>(y);
@@ -85,6 +91,18 @@ void scan(const Plane& plane, float threshold, RowStep rows, BrightAreas& found)
     }
   }
   found.peak = peak / plane.level;
+}
+
+template <class Sample>
+void scan_columns(const Plane& plane, int left, int right, float threshold, std::vector<Extent>& runs) {
+  const int per_pixel = channels(plane.view.layout.format);
+  const auto limit = sample_limit<Sample>(plane, threshold);
+  const RowStep rows = every_lamp(plane);
+  for (int y = rows.first; y < plane.size.height; y += rows.step) {
+    const Sample* row = plane.view.row_as<Sample>(y);
+    if (largest(row + left * per_pixel, (right + 1 - left) * per_pixel) > limit)
+      find_runs(plane, y, left, right, threshold, runs);
+  }
 }
 
 /// Joins runs that share columns or touch.
@@ -124,10 +142,15 @@ BrightAreas find_bright(const Plane& plane, double threshold, RowStep rows) {
   return found;
 }
 
-std::vector<Extent> find_bright_in(const Plane& plane, const Extent& part, double threshold) {
+std::vector<Extent> find_bright_in(const Plane& plane, int left, int right, double threshold) {
+  left = std::max(0, left);
+  right = std::min(plane.size.width - 1, right);
   std::vector<Extent> runs;
-  for (int y = part.top; y <= part.bottom; y += 2)
-    find_runs(plane, y, part.left, part.right, static_cast<float>(threshold), runs);
+  if (bytes_per_sample(plane.view.layout.format) == 1) {
+    scan_columns<std::uint8_t>(plane, left, right, static_cast<float>(threshold), runs);
+  } else {
+    scan_columns<std::uint16_t>(plane, left, right, static_cast<float>(threshold), runs);
+  }
   return runs;
 }
 

@@ -23,7 +23,7 @@ struct BrightAreas {
 /// Reads the frame in its own samples: a sum over the threshold has at least one sample over its mean.
 BrightAreas find_bright(const Plane& plane, double threshold, RowStep rows);
 
-/// The same in a part of the plane, every other row.
-std::vector<Extent> find_bright_in(const Plane& plane, const Extent& part, double threshold);
+/// The same in some columns, ends included, in rows enough that no lamp is missed: not merged.
+std::vector<Extent> find_bright_in(const Plane& plane, int left, int right, double threshold);
 
 }  // namespace emberlock::detail

@@ -170,10 +170,9 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
     const FitWindow window = window_around(c, list[i], above, below);
     DotFit start;
     start.x = c.x;
-    start.y = list[i].row;
+    start.y = list[i].y;
     start.radius = list[i].radius;
-    start.amplitude =
-        std::max(1.0, static_cast<double>(c.patch.row(list[i].row)[static_cast<int>(std::lround(c.x))]));
+    start.amplitude = std::max(1.0, c.core_mean(list[i].row));
     DotFit fit = fit_dot(c.patch, window, start, {c.noise, left_slope(c, list[i].row)});
     const Verdict verdict = judge(c, fit, window, min_snr, options);
     const double inflation = found.scale * (c.compressed ? kQuantiserSpread : 1);

@@ -30,23 +30,21 @@ float dark_level(std::span<float> values, double noise) {
 }
 
 /// The mean of what lies within four sigma of the column's median, in some rows of a field.
-void find_level(const Column& c, const Plane& plane, Field field, double noise, float* level) {
+void find_level(const Column& c, Field field, double noise, float* level) {
   // The level's error is the same in all rows of a column: it moves no dot, and a few rows tell it well
   // enough.
-  constexpr int kEnough = 120;
+  constexpr int kEnough = 80;
   const int step = field.step * std::max(1, c.patch.height / (field.step * kEnough));
-  const std::vector<float> centres = column_medians(plane, c.patch.x0, c.patch.width, field);
+  const std::vector<float> centres = column_medians(c.patch, field);
   std::copy(centres.begin(), centres.end(), level);
   const auto stride = static_cast<std::size_t>(c.patch.stride);
   std::vector<float> sum(stride);
   std::vector<float> counts(stride);
   std::vector<float> darker(stride);
-  std::vector<float> row(stride);
   int rows = 0;
   for (int y = field.first; y < c.patch.height; y += step) {
     if (c.near_lamp(y, 8 + c.radius)) continue;
-    plane.read(y, c.patch.x0, c.patch.width, row.data());
-    add_near(row.data(), level, static_cast<float>(4 * noise), c.patch.stride, sum.data(), counts.data(),
+    add_near(c.patch.row(y), level, static_cast<float>(4 * noise), c.patch.stride, sum.data(), counts.data(),
              darker.data());
     ++rows;
   }
@@ -58,26 +56,23 @@ void find_level(const Column& c, const Plane& plane, Field field, double noise, 
     }
     // The centre lies on a comb's dots or on a slope. The column's dark rows are its level.
     values.clear();
-    for (int y = field.first; y < c.patch.height; y += field.step)
-      values.push_back(plane.at(c.patch.x0 + static_cast<int>(x), y));
+    for (int y = field.first; y < c.patch.height; y += field.step) values.push_back(c.patch.row(y)[x]);
     level[x] = dark_level(values, noise);
   }
 }
 
-/// Reads the columns and takes each one's level out, even and odd rows apart (interlaced fields differ), lamp
-/// and dots ignored. Marks the rows in which something is brighter than `bright`.
-std::vector<char> read_levelled(Column& c, const Plane& plane, double noise, double bright) {
+/// Takes each column's level out, even and odd rows apart (interlaced fields differ), lamp and dots ignored.
+/// Marks the rows in which something is brighter than `bright`.
+std::vector<char> subtract_levels(Column& c, double noise, double bright) {
   const auto stride = static_cast<std::size_t>(c.patch.stride);
   c.level.assign(2 * stride, 0);
-  find_level(c, plane, {0, 2}, noise, c.level.data());
-  find_level(c, plane, {1, 2}, noise, c.level.data() + stride);
+  float* even = c.level.data();
+  float* odd = even + stride;
+  find_level(c, {0, 2}, noise, even);
+  find_level(c, {1, 2}, noise, odd);
   std::vector<char> marks(static_cast<std::size_t>(c.patch.height));
-  for (int y = 0; y < c.patch.height; ++y) {
-    const float* level = c.level.data() + static_cast<std::size_t>(y % 2) * stride;
-    plane.read(y, c.patch.x0, c.patch.width, c.patch.row(y));
-    marks[static_cast<std::size_t>(y)] =
-        subtract_row(c.patch.row(y), level, c.patch.stride, static_cast<float>(bright)) ? 1 : 0;
-  }
+  subtract_rows(c.patch.row(0), c.patch.stride, c.patch.height, even, odd, c.patch.stride,
+                static_cast<float>(bright), marks.data());
   return marks;
 }
 
@@ -87,6 +82,7 @@ void mend_hot_pixels(Column& c, double bright, const std::vector<char>& bright_r
     int x, y;
     float value;
   };
+  constexpr float kTowers = 2.5F;
   std::vector<Mend> mends;
   const auto threshold = static_cast<float>(bright);
   for (int y = 1; y + 1 < c.patch.height; ++y) {
@@ -96,12 +92,14 @@ void mend_hot_pixels(Column& c, double bright, const std::vector<char>& bright_r
       const float v = row[x];
       // Bright to the left and right: perhaps a row of a dot that only one field of an interlaced frame
       // holds.
-      if (v <= threshold || v < 2.5F * std::min(row[x - 1], row[x + 1])) continue;
+      if (v <= threshold || v < kTowers * std::min(row[x - 1], row[x + 1])) continue;
       std::array<float, 9> around{};
       for (int i = 0; i < 9; ++i)
         around[static_cast<std::size_t>(i)] = c.patch.row(y + i / 3 - 1)[x + i % 3 - 1];
-      const float middle = median(around);
-      if (v > 2.5F * std::max(0.0F, middle) + threshold) mends.push_back({x, y, middle});
+      const float low = (v - threshold) / kTowers;
+      constexpr int kMost = 5;  // of the nine: so their median is low
+      if (std::count_if(around.begin(), around.end(), [low](float a) { return a < low; }) >= kMost)
+        mends.push_back({x, y, median(around)});
     }
   }
   for (const Mend& m : mends) c.patch.row(m.y)[m.x] = m.value;
@@ -237,12 +235,13 @@ void hide_bloom(Column& c) {
     }
   }
   const int centre = static_cast<int>(std::lround(c.x));
-  for (int row = 0; row < c.patch.height; ++row) {
+  for (const int parity : {0, 1}) {
     // `level` was taken out: put it back to see what the sensor saw.
-    const float level = c.level[static_cast<std::size_t>(row % 2) * static_cast<std::size_t>(c.patch.stride) +
-                                static_cast<std::size_t>(centre)];
-    if (static_cast<double>(c.patch.row(row)[centre] + level) >= c.saturation)
-      c.hidden[static_cast<std::size_t>(row)] = 1;
+    const float* level = c.level.data() + static_cast<std::ptrdiff_t>(parity) * c.patch.stride;
+    const float limit = static_cast<float>(c.saturation) - level[centre];
+    for (int row = parity; row < c.patch.height; row += 2) {
+      if (c.patch.row(row)[centre] >= limit) c.hidden[static_cast<std::size_t>(row)] = 1;
+    }
   }
 }
 
@@ -250,24 +249,41 @@ void hide_bloom(Column& c) {
 /// from row to row, glare and lines those from column to column: the smaller of the two holds less of what
 /// isn't noise.
 double lane_noise(const Column& c, double noise) {
-  std::vector<float> along;
-  std::vector<float> across;
   const int centre = static_cast<int>(std::lround(c.x));
   const int first = std::max(0, centre - c.core());
   const int last = std::min(c.patch.width - 3, centre + c.core() - 2);
-  constexpr int kEnough = 800;
+  constexpr int kEnough = 400;
   const int step = std::max(1, c.patch.height * (last - first + 1) / (2 * kEnough));
-  for (int y = 0; y + 2 < c.patch.height; y += 2) {
-    if (c.near_lamp(y, 2 * c.radius + 4)) continue;
-    for (int x = first + y / 2 % step; x <= last; x += step) {
-      const float v = c.patch.row(y)[x];
-      along.push_back(c.patch.row(y + 2)[x] - v);
-      across.push_back(c.patch.row(y)[x + 2] - v);
+  const auto each = [&](auto take) {
+    for (int y = 0; y + 2 < c.patch.height; y += 2) {
+      if (c.near_lamp(y, 2 * c.radius + 4)) continue;
+      const float* row = c.patch.row(y);
+      const float* below = c.patch.row(y + 2);
+      for (int x = first + y / 2 % step; x <= last; x += step)
+        take(std::abs(below[x] - row[x]), std::abs(row[x + 2] - row[x]));
     }
-  }
+  };
+  // The median knows the noise to a few percent: less than that is no difference. Where half of the values
+  // are small, it needn't be found.
+  constexpr double kNoDifference = 1.15;
+  const auto usual = static_cast<float>(kNoDifference * noise * std::numbers::sqrt2 / kMadSigma);
+  int count = 0;
+  int small_along = 0;
+  int small_across = 0;
+  each([&](float down, float right) {
+    ++count;
+    small_along += down < usual ? 1 : 0;
+    small_across += right < usual ? 1 : 0;
+  });
+  if (2 * std::max(small_along, small_across) > count) return noise;
+  std::vector<float> along;
+  std::vector<float> across;
+  each([&](float down, float right) {
+    along.push_back(down);
+    across.push_back(right);
+  });
   const double rough = std::min(robust_scale(along), robust_scale(across)) / std::numbers::sqrt2;
-  // The median knows it to a few percent: less than that is no difference.
-  return rough < 1.15 * noise ? noise : std::min(rough, 3 * noise);
+  return std::clamp(rough, noise, 3 * noise);
 }
 
 }  // namespace
@@ -312,7 +328,7 @@ Column level_column(const Plane& plane, const Background& background, const Lamp
   const int reach = (2 * c.half_width + 3) * (Column::kLanes / 2) + c.half_width + 1;
   const int centre = static_cast<int>(std::lround(lamp.x));
   const int whole = (2 * reach + 1 + 7) / 8 * 8;  // no vector of the columns is cut
-  c.patch = unread(plane, {centre - reach, centre - reach + whole - 1, 0, plane.size.height - 1});
+  c.patch = cut(plane, {centre - reach, centre - reach + whole - 1, 0, plane.size.height - 1});
   c.x = lamp.x - c.patch.x0;
   c.y = lamp.y;
   c.saturation = background.saturation;
@@ -321,7 +337,7 @@ Column level_column(const Plane& plane, const Background& background, const Lamp
   c.compressed = background.compressed;
   c.noise = background.noise;
   const double bright = 6 * c.noise;
-  const std::vector<char> bright_rows = read_levelled(c, plane, std::max(background.noise, 0.5), bright);
+  const std::vector<char> bright_rows = subtract_levels(c, std::max(background.noise, 0.5), bright);
   mend_hot_pixels(c, bright, bright_rows);
   subtract_halo(c);
   hide_bloom(c);

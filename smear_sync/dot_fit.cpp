@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -16,39 +17,41 @@ constexpr int kParameters = NormalSums::kParameters;  // amplitude, level, slope
 using Vector6 = Eigen::Matrix<double, kParameters, 1>;
 using Matrix6 = Eigen::Matrix<double, kParameters, kParameters>;
 
-/// The window's pixels and their weights, rows padded to whole vectors by pixels of weight 0.
+/// The window's pixels, filled up to whole vectors by some of weight 0.
 struct Pixels {
-  int left = 0, top = 0, rows = 0, stride = 0, count = 0;
-  std::vector<float> v, weight;
+  int count = 0;
+  std::vector<float> x, y, value, weight;
+
+  [[nodiscard]] std::size_t size() const { return value.size(); }
+  [[nodiscard]] PixelSpan span() const {
+    return {x.data(), y.data(), value.data(), weight.data(), static_cast<int>(size())};
+  }
 };
 
 Pixels gather(const Patch& patch, const FitWindow& w) {
   Pixels p;
-  const int columns = w.right - w.left + 1;
-  p.left = w.left;
-  p.top = w.top;
-  p.rows = w.bottom - w.top + 1;
-  p.count = p.rows * columns;
-  p.stride = (columns + 7) / 8 * 8;
-  const std::size_t size = static_cast<std::size_t>(p.rows) * static_cast<std::size_t>(p.stride);
-  p.v.resize(size);
-  p.weight.resize(size);
-  for (int y = 0; y < p.rows; ++y) {
-    const std::ptrdiff_t at = std::ptrdiff_t{y} * p.stride;
-    std::copy_n(patch.row(w.top + y) + w.left, columns, p.v.begin() + at);
-    std::fill_n(p.weight.begin() + at, columns, 1.0F);
+  p.count = (w.right - w.left + 1) * (w.bottom - w.top + 1);
+  const std::size_t whole = (static_cast<std::size_t>(p.count) + 7) / 8 * 8;
+  for (std::vector<float>* v : {&p.x, &p.y, &p.value, &p.weight}) v->resize(whole);
+  const std::ptrdiff_t columns = w.right - w.left + 1;
+  for (int y = w.top; y <= w.bottom; ++y) {
+    const std::ptrdiff_t row = (y - w.top) * columns;
+    std::iota(p.x.begin() + row, p.x.begin() + row + columns, static_cast<float>(w.left));
+    std::fill_n(p.y.begin() + row, columns, static_cast<float>(y));
+    std::copy_n(patch.row(y) + w.left, columns, p.value.begin() + row);
   }
+  std::fill_n(p.weight.begin(), p.count, 1.0F);
   return p;
 }
 
-DiskModel row_model(const DotFit& f, int left, int y) {
+DiskModel model_of(const DotFit& f) {
   return {.amplitude = static_cast<float>(f.amplitude),
-          .base = static_cast<float>(f.level),
+          .level = static_cast<float>(f.level),
           .slope = static_cast<float>(f.slope),
+          .x = static_cast<float>(f.x),
+          .y = static_cast<float>(f.y),
           .radius = static_cast<float>(f.radius),
-          .edge = static_cast<float>(1 / DotFit::kEdge),
-          .dx = static_cast<float>(left - f.x),
-          .dy = static_cast<float>(y - f.y)};
+          .edge = static_cast<float>(1 / DotFit::kEdge)};
 }
 
 struct Normal {
@@ -58,11 +61,7 @@ struct Normal {
 };
 
 Normal linearise(const Pixels& p, const DotFit& f) {
-  NormalSums sums;
-  for (int y = 0; y < p.rows; ++y) {
-    const std::size_t at = static_cast<std::size_t>(y) * static_cast<std::size_t>(p.stride);
-    add_normal_row(row_model(f, p.left, p.top + y), &p.v[at], &p.weight[at], p.stride, sums);
-  }
+  const NormalSums sums = normal_sums(model_of(f), p.span());
   std::size_t k = 0;
   const auto next = [&] {
     double sum = 0;
@@ -99,12 +98,10 @@ DotFit stepped(const DotFit& f, const Vector6& step) {
   return next;
 }
 
-/// Levenberg-Marquardt; the normal equations near the end.
-Normal minimise(const Pixels& p, DotFit& f, const FitNoise& noise) {
+/// Levenberg-Marquardt until less than `still` of chi-square is left to gain; the normal equations near the
+/// end.
+Normal minimise(const Pixels& p, DotFit& f, const FitNoise& noise, double still) {
   constexpr int kIterations = 12;
-  // Of chi-square left to gain, which floats know to 1e-4: all parameters are within a thirtieth of their
-  // sigma.
-  constexpr double kStill = 1e-3;
   const double variance = noise.dark * noise.dark;
   const double stiffness = std::pow(noise.dark / noise.slope_sigma, 2);
   double damping = 1e-4;
@@ -117,12 +114,12 @@ Normal minimise(const Pixels& p, DotFit& f, const FitNoise& noise) {
     if (!step.allFinite()) return normal;
     const double gain = step.dot(normal.right) / variance;
     const DotFit next = stepped(f, step);
-    if (gain < kStill) {  // so small a step needs no proof
+    if (gain < still) {  // so small a step needs no proof
       f = next;
       break;
     }
     const Normal trial = linearise(p, next, stiffness);
-    if (trial.squares <= normal.squares + 0.1 * kStill * variance) {
+    if (trial.squares <= normal.squares + 0.1 * still * variance) {
       f = next;
       normal = trial;
       damping = std::max(1e-6, damping / 10);
@@ -133,33 +130,30 @@ Normal minimise(const Pixels& p, DotFit& f, const FitNoise& noise) {
   return normal;
 }
 
-/// The fitted disk of amplitude 1 over all pixels.
+/// The fitted disk of amplitude 1 at all pixels.
 std::vector<float> disk_of(const Pixels& p, const DotFit& f) {
-  std::vector<float> disk(p.v.size());
-  for (int y = 0; y < p.rows; ++y) {
-    disk_row(row_model(f, p.left, p.top + y), p.stride,
-             &disk[static_cast<std::size_t>(y) * static_cast<std::size_t>(p.stride)]);
-  }
+  std::vector<float> disk(p.size());
+  disk_at(model_of(f), p.span(), disk.data());
   return disk;
+}
+
+/// What the model's level and slope leave of a pixel.
+float above_level(const Pixels& p, const DiskModel& m, std::size_t i) {
+  return p.value[i] - m.level - m.slope * (p.y[i] - m.y);
 }
 
 /// Variance a sample of signal: the slope of squared residuals on the disk, where it stands out of its own
 /// error.
 double photon_gain(const Pixels& p, const DotFit& f, const std::vector<float>& disk, double dark) {
-  const auto amplitude = static_cast<float>(f.amplitude);
+  const DiskModel model = model_of(f);
   const auto variance = static_cast<float>(dark * dark);
   float excess = 0;
   float power = 0;
-  for (int y = 0; y < p.rows; ++y) {
-    const auto base = static_cast<float>(f.level + f.slope * (p.top + y - f.y));
-    for (int x = 0; x < p.stride; ++x) {
-      const std::size_t at =
-          static_cast<std::size_t>(y) * static_cast<std::size_t>(p.stride) + static_cast<std::size_t>(x);
-      const float signal = amplitude * disk[at] * p.weight[at];
-      const float residual = p.v[at] - base - signal;
-      excess += (residual * residual - variance) * signal;
-      power += signal * signal;
-    }
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const float signal = model.amplitude * disk[i] * p.weight[i];
+    const float residual = above_level(p, model, i) - signal;
+    excess += (residual * residual - variance) * signal;
+    power += signal * signal;
   }
   if (power <= 0) return 0;
   const double gain = static_cast<double>(excess / power);
@@ -174,7 +168,11 @@ DotFit fit_dot(const Patch& patch, const FitWindow& window, DotFit f, const FitN
   if (window.right < window.left || window.bottom < window.top) return f;
   Pixels pixels = gather(patch, window);
   if (pixels.count < kFewest) return f;
-  Normal normal = minimise(pixels, f, noise);
+  // Half a sigma is near enough to tell photon noise; in the end all parameters are within a thirtieth of
+  // theirs.
+  constexpr double kNear = 0.25;
+  constexpr double kStill = 1e-3;  // floats know chi-square to 1e-4
+  minimise(pixels, f, noise, kNear);
   if (f.amplitude > 0) {
     const std::vector<float> disk = disk_of(pixels, f);
     f.gain = photon_gain(pixels, f, disk, noise.dark);
@@ -183,9 +181,9 @@ DotFit fit_dot(const Patch& patch, const FitWindow& window, DotFit f, const FitN
     if (raise > kMatters) {
       for (std::size_t i = 0; i < disk.size(); ++i)
         pixels.weight[i] /= 1 + static_cast<float>(raise) * disk[i];
-      normal = minimise(pixels, f, noise);
     }
   }
+  const Normal normal = minimise(pixels, f, noise, kStill);
   const double variance = normal.squares / std::max(1, pixels.count - kParameters);
   f.misfit = std::sqrt(variance) / noise.dark;
   const Matrix6 covariance =
@@ -202,32 +200,25 @@ Evenness evenness(const Patch& patch, const FitWindow& window, const DotFit& f, 
   std::array<double, 6> power{};
   double total = 0;
   std::array<double, 2> brightest{};
-  std::vector<float> disk(static_cast<std::size_t>(window.right - window.left + 8));
-  for (int y = window.top; y <= window.bottom; ++y) {
-    const float* row = patch.row(y);
-    const auto base = static_cast<float>(f.level + f.slope * (y - f.y));
-    disk_row(row_model(f, window.left, y), window.right - window.left + 1, disk.data());
-    double row_signal = 0;
-    double row_power = 0;
-    for (int x = window.left; x <= window.right; ++x) {
-      const auto g = static_cast<double>(disk[static_cast<std::size_t>(x - window.left)]);
-      const double s = static_cast<double>(row[x] - base) * g;
-      const std::size_t side = x < f.x ? 0 : 1;
-      signal[side] += s;
-      power[side] += g * g;
-      row_signal += s;
-      row_power += g * g;
-      if (s > brightest[0]) {
-        brightest = {s, brightest[0]};
-      } else if (s > brightest[1]) {
-        brightest[1] = s;
-      }
+  const Pixels pixels = gather(patch, window);
+  const std::vector<float> disk = disk_of(pixels, f);
+  const DiskModel model = model_of(f);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(pixels.count); ++i) {
+    const auto g = static_cast<double>(disk[i]);
+    const double s = static_cast<double>(above_level(pixels, model, i)) * g;
+    const bool even_row = static_cast<int>(pixels.y[i]) % 2 == 0;
+    for (const std::size_t part :
+         {pixels.x[i] < model.x ? std::size_t{0} : 1, pixels.y[i] < model.y ? std::size_t{2} : 3,
+          even_row ? std::size_t{4} : 5}) {
+      signal[part] += s;
+      power[part] += g * g;
     }
-    for (const std::size_t part : {y < f.y ? std::size_t{2} : 3, y % 2 == 0 ? std::size_t{4} : 5}) {
-      signal[part] += row_signal;
-      power[part] += row_power;
+    total += s;
+    if (s > brightest[0]) {
+      brightest = {s, brightest[0]};
+    } else if (s > brightest[1]) {
+      brightest[1] = s;
     }
-    total += row_signal;
   }
   Evenness e;
   const auto amplitude = [&](std::size_t part) {

@@ -10,6 +10,8 @@
 namespace emberlock::detail {
 namespace {
 
+constexpr int kOwn = Column::kLanes / 2;
+
 /// The disk's marginal stands for the disk: exact enough to find a dot, which is then fitted in two
 /// dimensions.
 double profile(double radius, double d) {
@@ -21,11 +23,11 @@ double profile(double radius, double d) {
 std::vector<float> collapse(const Column& c, int lane, double radius, double& power) {
   const int height = c.patch.height;
   const int centre = c.lane_centre(lane);
-  const double shift = lane == Column::kLanes / 2 ? c.x - centre : 0;
+  const double shift = lane == kOwn ? c.x - centre : 0;
   // The lane of a lamp at the image's edge is cut by it.
   const int first = std::max(0, centre - c.half_width);
   const int last = std::min(c.patch.width - 1, centre + c.half_width);
-  std::vector<float> across(static_cast<std::size_t>(last - first + 16) / 16 * 16);
+  std::vector<float> across(static_cast<std::size_t>(last - first + 8) / 8 * 8);
   power = 0;
   for (int x = first; x <= last; ++x) {
     const double p = profile(radius, x - centre - shift);
@@ -101,53 +103,59 @@ std::vector<float> response(const Column& c, int lane, double radius, Rows rows)
   return z;
 }
 
+/// How far noise, grain and hot pixels take the response, from the lanes beside the lamp's own.
+void compare_lanes(const Column& c, double radius, Responses& r) {
+  constexpr int kApart = 5;  // rows: neighbours share theirs, one in a few tells the scale
+  std::vector<float> sample;
+  std::vector<double> extremes;
+  for (int lane = 0; lane < Column::kLanes; ++lane) {
+    if (lane == kOwn || !c.lane_inside(lane)) continue;
+    std::vector<float> z = response(c, lane, radius, Rows::whole);
+    for (std::size_t y = 0; y < z.size(); ++y) z[y] = c.hidden[y] != 0 ? 0 : z[y];
+    for (std::size_t y = 0; y < z.size(); y += kApart) {
+      if (z[y] != 0) sample.push_back(z[y]);
+    }
+    extremes.push_back(static_cast<double>(largest(z.data(), c.patch.height)));
+  }
+  if (!sample.empty()) r.scale = std::max(1.0, robust_scale(sample));
+  // Far more in one lane than in the other is another lamp's dot or hot pixels.
+  constexpr double kAlike = 2;
+  if (extremes.size() == 2)
+    r.extreme = std::min(std::max(extremes[0], extremes[1]), kAlike * std::min(extremes[0], extremes[1]));
+}
+
 }  // namespace
 
 Responses search_lanes(const Column& c, double min_snr) {
-  constexpr int kOwn = Column::kLanes / 2;
   Responses r;
-  std::vector<float> best(static_cast<std::size_t>(c.patch.height), 0);
-  std::vector<double> best_radius(best.size());
-  std::vector<float> empty;
-  std::vector<float> extremes(Column::kLanes, 0);
-  int lanes = 0;
-  for (const double factor : {1.0, 0.55}) {
-    const double radius = std::max(1.0, factor * c.radius);
-    for (int lane = 0; lane < Column::kLanes; ++lane) {
-      if (lane != kOwn && (!c.lane_inside(lane) || factor < 1)) continue;
-      std::vector<float> z = response(c, lane, radius, lane == kOwn ? Rows::all : Rows::whole);
-      if (lane != kOwn) {
-        for (std::size_t y = 0; y < z.size(); ++y) z[y] = c.hidden[y] != 0 ? 0 : z[y];
-        // One in a few tells the scale: neighbours share their rows anyway.
-        for (std::size_t y = 0; y < z.size(); y += 5) empty.push_back(z[y]);
-        float& extreme = extremes[static_cast<std::size_t>(lane)];
-        for (const float v : z) extreme = std::max(extreme, v);
-        ++lanes;
-        continue;
-      }
-      for (std::size_t y = 0; y < z.size(); ++y) {
-        if (z[y] <= best[y]) continue;
-        best[y] = z[y];
-        best_radius[y] = radius;
-      }
-    }
-  }
-  std::erase_if(empty, [](float v) { return v == 0; });
-  if (lanes > 0) r.scale = std::max(1.0, robust_scale(empty));
-  std::erase_if(extremes, [](float v) { return v == 0; });
-  // The median lane: one that holds another lamp's dots or hot pixels doesn't count.
-  if (extremes.size() >= 2) r.extreme = static_cast<double>(median(extremes));
-  const double gate = std::max(0.8 * min_snr * r.scale, 1.1 * r.extreme);
+  constexpr double kPart = 0.55;  // of the lamp's radius: a dot may be smaller, where the lamp is overexposed
+  const double radius = std::max(1.0, c.radius);
+  const double small = std::max(1.0, kPart * c.radius);
+  compare_lanes(c, radius, r);
+  const std::vector<float> as_lamp = response(c, kOwn, radius, Rows::all);
+  const std::vector<float> smaller = response(c, kOwn, small, Rows::all);
+  const auto best = [&](int y) {
+    return std::max(as_lamp[static_cast<std::size_t>(y)], smaller[static_cast<std::size_t>(y)]);
+  };
+  const auto gate = static_cast<float>(std::max(0.8 * min_snr * r.scale, 1.1 * r.extreme));
   for (int y = 0; y < c.patch.height; ++y) {
-    const float z = best[static_cast<std::size_t>(y)];
-    if (static_cast<double>(z) < gate) continue;
-    const int reach = std::max(1, static_cast<int>(best_radius[static_cast<std::size_t>(y)]));
+    const float z = best(y);
+    if (z < gate) continue;
+    const double size =
+        smaller[static_cast<std::size_t>(y)] > as_lamp[static_cast<std::size_t>(y)] ? small : radius;
+    const int reach = std::max(1, static_cast<int>(size));
     bool top = true;
-    for (int o = std::max(0, y - reach); o <= std::min(c.patch.height - 1, y + reach) && top; ++o) {
-      const float other = best[static_cast<std::size_t>(o)];
-      top = other < z || (other == z && o >= y);
+    for (int o = std::max(0, y - reach); o <= std::min(c.patch.height - 1, y + reach) && top; ++o)
+      top = best(o) < z || (best(o) == z && o >= y);
+    if (!top) continue;
+    double peak = y;
+    if (y > 0 && y + 1 < c.patch.height) {  // of the parabola through three rows
+      const float before = best(y - 1);
+      const float after = best(y + 1);
+      const float bend = 2 * z - before - after;
+      if (bend > 0) peak += static_cast<double>((after - before) / (2 * bend));
     }
-    if (top) r.candidates.push_back({y, best_radius[static_cast<std::size_t>(y)], z});
+    r.candidates.push_back({y, peak, size, z});
   }
   return r;
 }

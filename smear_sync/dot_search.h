@@ -9,6 +9,7 @@ namespace emberlock::detail {
 /// A row of the lamp's lane that looks like the middle of a dot.
 struct Candidate {
   int row = 0;
+  double y = 0;  ///< of the response's peak, near that row
   double radius = 0;
   float z = 0;  ///< matched-filter response over its noise
 };

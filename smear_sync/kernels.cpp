@@ -21,48 +21,58 @@ using Int8 = std::int32_t __attribute__((vector_size(32)));
   return v;
 }
 [[gnu::always_inline]] inline void store(float* p, Vec8 v) { std::memcpy(p, &v, sizeof v); }
-[[gnu::always_inline]] inline float sum(Vec8 v) {
-  return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7]));
+/// The sum of each of eight vectors.
+[[gnu::always_inline]] inline Vec8 sums(const Vec8* v) {
+  const auto pairs = [](Vec8 a, Vec8 b) {
+    return __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14) +
+           __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+  };
+  const auto quads = [](Vec8 a, Vec8 b) {
+    return __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13) +
+           __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15);
+  };
+  const Vec8 a = quads(pairs(v[0], v[1]), pairs(v[2], v[3]));
+  const Vec8 b = quads(pairs(v[4], v[5]), pairs(v[6], v[7]));
+  return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11) +
+         __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
 }
 
-/// 1 / (1 + exp(t)) to 1e-6, by exp(t) = 2^n 2^f with a polynomial for |f| <= 1/2.
-inline float logistic(float t) {
-  float power = t * 1.44269504F;
-  power = power < 60 ? power : 60;
-  power = power > -60 ? power : -60;
+/// exp(t) to 1e-6, as 2^n 2^f with a polynomial for |f| <= 1/2; t within +-41.
+[[gnu::always_inline]] inline Vec8 exp8(Vec8 t) {
+  Vec8 power = t * 1.44269504F;
+  power = power < 60 ? power : Vec8{} + 60;
+  power = power > -60 ? power : Vec8{} - 60;
   constexpr float kMagic = 12582912;  // 1.5 * 2^23: adding it rounds to whole numbers
-  const float whole = (power + kMagic) - kMagic;
-  const float f = power - whole;
-  float p = 1.5403530e-4F;  // coefficients of 2^f: ln(2)^k / k!
-  p = p * f + 1.3333558e-3F;
+  const Vec8 whole = (power + kMagic) - kMagic;
+  const Vec8 f = power - whole;
+  Vec8 p = f * 1.5403530e-4F + 1.3333558e-3F;  // coefficients of 2^f: ln(2)^k / k!
   p = p * f + 9.6181291e-3F;
   p = p * f + 5.5504109e-2F;
   p = p * f + 2.4022651e-1F;
   p = p * f + 6.9314718e-1F;
   p = p * f + 1;
-  const auto scale = std::bit_cast<float>((static_cast<std::int32_t>(whole) + 127) << 23);
-  return 1 / (1 + p * scale);
-}
-
-[[gnu::always_inline]] inline Vec8 logistic8(Vec8 t) {
-  Vec8 g;
-  for (int i = 0; i < 8; ++i) g[i] = logistic(t[i]);
-  return g;
+  const auto scale = std::bit_cast<Vec8>((__builtin_convertvector(whole, Int8) + 127) << 23);
+  return p * scale;
 }
 
 }  // namespace
 
-EMBERLOCK_VECTOR_CLONES bool subtract_row(float* __restrict row, const float* __restrict level, int count,
-                                          float limit) {
-  Int8 bright{};
-  for (int x = 0; x < count; x += 8) {
-    const Vec8 v = load(row + x) - load(level + x);
-    store(row + x, v);
-    bright |= v > limit;
+EMBERLOCK_VECTOR_CLONES void subtract_rows(float* __restrict rows, std::ptrdiff_t stride, int height,
+                                           const float* __restrict even, const float* __restrict odd,
+                                           int count, float limit, char* __restrict bright) {
+  for (int y = 0; y < height; ++y, rows += stride) {
+    const float* level = y % 2 == 0 ? even : odd;
+    Vec8 top = Vec8{} + limit;
+#pragma GCC unroll 4
+    for (int x = 0; x < count; x += 8) {
+      const Vec8 v = load(rows + x) - load(level + x);
+      store(rows + x, v);
+      top = v > top ? v : top;
+    }
+    const Int8 above = top > limit;
+    const auto any = std::bit_cast<std::array<std::int64_t, 4>>(above);
+    bright[y] = static_cast<char>((any[0] | any[1] | any[2] | any[3]) != 0);
   }
-  std::int32_t any = 0;
-  for (int i = 0; i < 8; ++i) any |= bright[i];
-  return any != 0;
 }
 
 EMBERLOCK_VECTOR_CLONES void add_near(const float* __restrict row, const float* __restrict centre,
@@ -75,6 +85,19 @@ EMBERLOCK_VECTOR_CLONES void add_near(const float* __restrict row, const float* 
     counts[x] += near ? 1 : 0;
     darker[x] += d < -reach ? 1 : 0;
   }
+}
+
+EMBERLOCK_VECTOR_CLONES float largest(const float* v, int count) {
+  Vec8 top{};
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    const Vec8 next = load(v + i);
+    top = next > top ? next : top;
+  }
+  float most = 0;
+  for (int k = 0; k < 8; ++k) most = top[k] > most ? top[k] : most;
+  for (; i < count; ++i) most = v[i] > most ? v[i] : most;
+  return most;
 }
 
 EMBERLOCK_VECTOR_CLONES void median_of_three(const float* a, const float* b, const float* c, int count,
@@ -91,14 +114,17 @@ EMBERLOCK_VECTOR_CLONES void median_of_three(const float* a, const float* b, con
 EMBERLOCK_VECTOR_CLONES void weighted_rows(const float* __restrict rows, std::ptrdiff_t stride, int height,
                                            const float* __restrict weights, int count,
                                            float* __restrict out) {
-  for (int y = 0; y < height; ++y, rows += stride) {
-    Vec8 a{};
-    Vec8 b{};
-    for (int x = 0; x < count; x += 16) {
-      a += load(weights + x) * load(rows + x);
-      b += load(weights + x + 8) * load(rows + x + 8);
+  constexpr int kBlock = 8;
+  for (int block = 0; block < height; block += kBlock) {
+    const int y = block < height - kBlock ? block : height - kBlock;  // the last one overlaps
+    const float* first = rows + y * stride;
+    Vec8 v[kBlock] = {};  // NOLINT(*-avoid-c-arrays): stays in registers
+    for (int x = 0; x < count; x += 8) {
+      const Vec8 weight = load(weights + x);
+#pragma GCC unroll 8
+      for (int i = 0; i < kBlock; ++i) v[i] += weight * load(first + i * stride + x);
     }
-    out[y] = sum(a + b);
+    store(out + y, sums(v));
   }
 }
 
@@ -121,39 +147,48 @@ EMBERLOCK_VECTOR_CLONES void filter_rows(const float* __restrict v, int height,
   }
 }
 
-EMBERLOCK_VECTOR_CLONES void add_normal_row(const DiskModel& m, const float* __restrict pixels,
-                                            const float* __restrict weights, int count, NormalSums& sums) {
+EMBERLOCK_VECTOR_CLONES NormalSums normal_sums(const DiskModel& m, const PixelSpan& pixels) {
   constexpr int kParameters = NormalSums::kParameters;
   constexpr int kProducts = NormalSums::kProducts;
-  for (int x = 0; x < count; x += 8) {
-    const Vec8 dx = Vec8{0, 1, 2, 3, 4, 5, 6, 7} + (m.dx + static_cast<float>(x));
-    Vec8 r = dx * dx + (m.dy * m.dy + 1e-6F);
-    for (int i = 0; i < 8; ++i) r[i] = std::sqrt(r[i]);
-    const Vec8 g = logistic8((r - m.radius) * m.edge);
+  Vec8 products[kProducts] = {};     // NOLINT(*-avoid-c-arrays): stays in registers where they are enough
+  Vec8 residuals[kParameters] = {};  // NOLINT(*-avoid-c-arrays): stays in registers where they are enough
+  Vec8 squares{};
+  for (int i = 0; i < pixels.count; i += 8) {
+    const Vec8 dx = load(pixels.x + i) - m.x;
+    const Vec8 dy = load(pixels.y + i) - m.y;
+    Vec8 r = dx * dx + dy * dy + 1e-6F;
+    for (int k = 0; k < 8; ++k) r[k] = std::sqrt(r[k]);
+    const Vec8 g = 1 / (1 + exp8((r - m.radius) * m.edge));
     const Vec8 e = (m.amplitude * m.edge) * g * (1 - g);
     const Vec8 e_over_r = e / r;
-    const Vec8 j[kParameters] = {// NOLINT(*-avoid-c-arrays): stays in registers
-                                 g, Vec8{} + 1, Vec8{} + m.dy, e_over_r * dx, e_over_r * m.dy - m.slope, e};
-    const Vec8 weight = load(weights + x);
-    const Vec8 residual = load(pixels + x) - (m.base + m.slope * m.dy) - m.amplitude * g;
+    // NOLINTNEXTLINE(*-avoid-c-arrays): stays in registers
+    const Vec8 j[kParameters] = {g, Vec8{} + 1, dy, e_over_r * dx, e_over_r * dy - m.slope, e};
+    const Vec8 weight = load(pixels.weight + i);
+    const Vec8 residual = load(pixels.value + i) - m.level - m.slope * dy - m.amplitude * g;
     int k = 0;
 #pragma GCC unroll 6
     for (int a = 0; a < kParameters; ++a) {
       const Vec8 weighted = weight * j[a];
 #pragma GCC unroll 6
-      for (int b = 0; b <= a; ++b, ++k) store(sums.v[k].data(), load(sums.v[k].data()) + weighted * j[b]);
-      float* right = sums.v[kProducts + a].data();
-      store(right, load(right) + weighted * residual);
+      for (int b = 0; b <= a; ++b, ++k) products[k] += weighted * j[b];
+      residuals[a] += weighted * residual;
     }
-    float* squares = sums.v[kProducts + kParameters].data();
-    store(squares, load(squares) + weight * residual * residual);
+    squares += weight * residual * residual;
   }
+  NormalSums sums;
+  for (int k = 0; k < kProducts; ++k) store(sums.v[k].data(), products[k]);
+  for (int a = 0; a < kParameters; ++a) store(sums.v[kProducts + a].data(), residuals[a]);
+  store(sums.v[kProducts + kParameters].data(), squares);
+  return sums;
 }
 
-EMBERLOCK_VECTOR_CLONES void disk_row(const DiskModel& m, int count, float* __restrict out) {
-  for (int x = 0; x < count; ++x) {
-    const float dx = m.dx + static_cast<float>(x);
-    out[x] = logistic((std::sqrt(dx * dx + m.dy * m.dy + 1e-6F) - m.radius) * m.edge);
+EMBERLOCK_VECTOR_CLONES void disk_at(const DiskModel& m, const PixelSpan& pixels, float* __restrict out) {
+  for (int i = 0; i < pixels.count; i += 8) {
+    const Vec8 dx = load(pixels.x + i) - m.x;
+    const Vec8 dy = load(pixels.y + i) - m.y;
+    Vec8 r = dx * dx + dy * dy + 1e-6F;
+    for (int k = 0; k < 8; ++k) r[k] = std::sqrt(r[k]);
+    store(out + i, 1 / (1 + exp8((r - m.radius) * m.edge)));
   }
 }
 

@@ -228,6 +228,39 @@ double lamp_gate(const Background& background, const DetectOptions& options) {
                   15 * background.noise);
 }
 
+bool LampGlance::same_as(const LampGlance& other) const {
+  constexpr double kSameMass = 0.02;
+  constexpr double kSamePlace = 0.05;  // pixels
+  return std::abs(mass - other.mass) < kSameMass * other.mass && std::abs(x - other.x) < kSamePlace &&
+         std::abs(y - other.y) < kSamePlace;
+}
+
+LampGlance glance_at(const Plane& plane, const Background& background, const Lamp& lamp) {
+  constexpr double kAround = 3;  // pixels
+  const auto near = [&](double centre, double side) {
+    return static_cast<int>(std::lround(centre + side * (lamp.radius + kAround)));
+  };
+  const Patch patch = cut(plane, {near(lamp.x, -1), near(lamp.x, 1), near(lamp.y, -1), near(lamp.y, 1)});
+  const auto low = static_cast<float>(background.level + kLow * lamp.peak);
+  const auto scale = static_cast<float>(1 / ((1 - 2 * kLow) * lamp.peak));
+  float mass = 0;
+  float sx = 0;
+  float sy = 0;
+  for (int y = 0; y < patch.height; ++y) {
+    const float* row = patch.row(y);
+    float row_mass = 0;
+    for (int x = 0; x < patch.width; ++x) {
+      const float w = std::clamp((row[x] - low) * scale, 0.0F, 1.0F);
+      row_mass += w;
+      sx += w * static_cast<float>(x);
+    }
+    mass += row_mass;
+    sy += row_mass * static_cast<float>(y);
+  }
+  if (mass <= 0) return {};
+  return {static_cast<double>(mass), static_cast<double>(sx / mass), static_cast<double>(sy / mass)};
+}
+
 LampSearch find_lamps(const Plane& plane, const Background& background, const BrightAreas& bright,
                       const DetectOptions& options) {
   LampSearch search;
@@ -248,7 +281,9 @@ LampSearch find_lamps(const Plane& plane, const Background& background, const Br
     }
     const int left = std::max(0, area.left - kAside);
     const int right = std::min(plane.size.width - 1, area.right + kAside);
-    const std::vector<float> level = column_medians(plane, left, right - left + 1, {});
+    const Patch columns = cut(plane, {left, right, 0, plane.size.height - 1});
+    std::vector<float> level = column_medians(columns, {});
+    level.resize(static_cast<std::size_t>(columns.width));
     int lit = 0;
     int clipped = 0;
     for (const float l : level) {

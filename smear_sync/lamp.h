@@ -31,6 +31,15 @@ struct LampSearch {
 /// Above the background: what is darker isn't the lamp. Samples of the plane.
 double lamp_gate(const Background& background, const DetectOptions& options);
 
+/// How much of a lamp there is and where: at a glance, whether it looks as it did.
+struct LampGlance {
+  double mass = 0;  ///< pixels, of full brightness
+  double x = 0, y = 0;
+  /// Nearer than a saturated lamp can be measured.
+  [[nodiscard]] bool same_as(const LampGlance& other) const;
+};
+LampGlance glance_at(const Plane& plane, const Background& background, const Lamp& lamp);
+
 /// `bright` is what stands above lamp_gate().
 LampSearch find_lamps(const Plane& plane, const Background& background, const BrightAreas& bright,
                       const DetectOptions& options);

@@ -1,7 +1,6 @@
 #include "smear_sync/plane.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "smear_sync/clones.h"
@@ -9,37 +8,22 @@
 namespace emberlock::detail {
 namespace {
 
-constexpr int kBlock = 64;
-
 template <class Sample>
 inline void read_gray(const ImageView& view, int y, int first, int count, float* __restrict out) {
   const Sample* in = view.row_as<Sample>(y) + first;
-  constexpr int kWhole = 8;  // of a length that the compiler knows
-  int i = 0;
-  for (; i + kWhole <= count; i += kWhole) {
-    for (int k = 0; k < kWhole; ++k) out[i + k] = static_cast<float>(in[i + k]);
-  }
-  for (; i < count; ++i) out[i] = static_cast<float>(in[i]);
+  for (int i = 0; i < count; ++i) out[i] = static_cast<float>(in[i]);
 }
 
-/// In blocks, column pairs first, so that the loops become vector code.
 template <class Sample>
-inline void read_cells(const ImageView& view, int y, int first, int count, float* out) {
+inline void read_cells(const ImageView& view, int y, int first, int count, float* __restrict out) {
   const int white = view.layout.white();
-  std::array<int, kBlock + 1> sums;   // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
-  std::array<int, kBlock + 1> peaks;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled below
-  for (int done = 0; done < count; done += kBlock) {
-    const int n = std::min(kBlock, count - done);
-    const Sample* a = view.row_as<Sample>(y) + first + done;
-    const Sample* b = view.row_as<Sample>(y + 1) + first + done;
-    for (int i = 0; i <= n; ++i) {
-      sums[i] = a[i] + b[i];
-      peaks[i] = std::max(a[i], b[i]);
-    }
-    for (int i = 0; i < n; ++i) {
-      const bool clipped = std::max(peaks[i], peaks[i + 1]) >= white;
-      out[done + i] = static_cast<float>(clipped ? 4 * white : sums[i] + sums[i + 1]);
-    }
+  const Sample* a = view.row_as<Sample>(y) + first;
+  const Sample* b = view.row_as<Sample>(y + 1) + first;
+  for (int i = 0; i < count; ++i) {
+    const Sample left = a[i] > b[i] ? a[i] : b[i];
+    const Sample right = a[i + 1] > b[i + 1] ? a[i + 1] : b[i + 1];
+    const int sum = a[i] + a[i + 1] + b[i] + b[i + 1];
+    out[i] = static_cast<float>((left > right ? left : right) >= white ? 4 * white : sum);
   }
 }
 
@@ -47,28 +31,35 @@ template <class Sample>
 inline void read_colours(const ImageView& view, int y, int first, int count, float* out) {
   const int white = view.layout.white();
   const Sample* in = view.row_as<Sample>(y) + std::ptrdiff_t{3} * first;
-  for (int i = 0; i < count; ++i, in += 3) {
-    const bool clipped = std::max({in[0], in[1], in[2]}) >= white;
-    out[i] = static_cast<float>(clipped ? 3 * white : in[0] + in[1] + in[2]);
+  for (int i = 0; i < count; ++i) {
+    const Sample a = in[3 * i];
+    const Sample b = in[3 * i + 1];
+    const Sample c = in[3 * i + 2];
+    const Sample peak = a > b ? a : b;
+    out[i] = static_cast<float>((peak > c ? peak : c) >= white ? 3 * white : a + b + c);
   }
 }
 
 }  // namespace
 
-EMBERLOCK_VECTOR_CLONES void Plane::read(int y, int first, int count, float* out) const {
+EMBERLOCK_VECTOR_CLONES void Plane::read_rows(int y, int rows, int first, int count, float* out,
+                                              std::ptrdiff_t stride) const {
+  const auto each = [&](auto row) {
+    for (int i = 0; i < rows; ++i) row(view, y + i, first, count, out + i * stride);
+  };
   switch (view.layout.format) {
     case PixelFormat::gray8:
-      return read_gray<std::uint8_t>(view, y, first, count, out);
+      return each(read_gray<std::uint8_t>);
     case PixelFormat::gray16:
-      return read_gray<std::uint16_t>(view, y, first, count, out);
+      return each(read_gray<std::uint16_t>);
     case PixelFormat::bayer_rggb8:
-      return read_cells<std::uint8_t>(view, y, first, count, out);
+      return each(read_cells<std::uint8_t>);
     case PixelFormat::bayer_rggb16:
-      return read_cells<std::uint16_t>(view, y, first, count, out);
+      return each(read_cells<std::uint16_t>);
     case PixelFormat::rgb8:
-      return read_colours<std::uint8_t>(view, y, first, count, out);
+      return each(read_colours<std::uint8_t>);
     case PixelFormat::rgb16:
-      return read_colours<std::uint16_t>(view, y, first, count, out);
+      return each(read_colours<std::uint16_t>);
   }
 }
 
@@ -91,7 +82,7 @@ Plane to_plane(const ImageView& view) {
   return plane;
 }
 
-Patch unread(const Plane& plane, Extent extent) {
+Patch cut(const Plane& plane, Extent extent) {
   Patch patch;
   patch.x0 = std::clamp(extent.left, 0, plane.size.width - 1);
   patch.y0 = std::clamp(extent.top, 0, plane.size.height - 1);
@@ -106,12 +97,7 @@ Patch unread(const Plane& plane, Extent extent) {
       std::fill(patch.row(y) + patch.width, patch.row(y) + patch.stride, 0.0F);
   }
   std::fill_n(patch.row(patch.height), kMoreRows * patch.stride, 0.0F);
-  return patch;
-}
-
-Patch cut(const Plane& plane, Extent extent) {
-  Patch patch = unread(plane, extent);
-  for (int y = 0; y < patch.height; ++y) plane.read(patch.y0 + y, patch.x0, patch.width, patch.row(y));
+  plane.read_rows(patch.y0, patch.height, patch.x0, patch.width, patch.row(0), patch.stride);
   return patch;
 }
 

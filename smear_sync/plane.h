@@ -21,8 +21,10 @@ struct Plane {
   double block_correlation = 1;  ///< and its variance, for differences of sums of 6 x 6 neighbours
   double rounding = 0.2887;  ///< standard deviation of a sample's rounding: 1 / sqrt(12) each that was summed
 
-  /// Samples [first, first + count) of a row; they must lie in the plane.
-  void read(int y, int first, int count, float* out) const;
+  /// Samples [first, first + count) of `rows` rows from y on, written `stride` apart; they must lie in the
+  /// plane.
+  void read_rows(int y, int rows, int first, int count, float* out, std::ptrdiff_t stride) const;
+  void read(int y, int first, int count, float* out) const { read_rows(y, 1, first, count, out, count); }
   [[nodiscard]] float at(int x, int y) const {
     float v = 0;
     read(y, x, 1, &v);
@@ -52,9 +54,7 @@ struct Patch {
 struct Extent {
   int left = 0, right = 0, top = 0, bottom = 0;
 };
-/// What of `extent` lies in the plane, the padding set and the pixels not.
-Patch unread(const Plane& plane, Extent extent);
-/// And its pixels.
+/// What of `extent` lies in the plane.
 Patch cut(const Plane& plane, Extent extent);
 
 }  // namespace emberlock::detail

@@ -47,6 +47,14 @@ TEST(Follow, TheLampGoesOutAndComesBackElsewhere) {
   EXPECT_NEAR(r.dots[0].y.value(), 180.1, 0.2);
 }
 
+TEST(Follow, ASaturatedLampIsMeasuredAgainOnceItMovesByAFractionOfAPixel) {
+  FollowingDetector detector;
+  const Rows before = detector.read(lamp_scene().image({.seed = 1}).view()).lamp->y;
+  EXPECT_EQ(detector.read(lamp_scene().image({.seed = 2}).view()).lamp->y, before);
+  const Image moved = SmearScene(320, 360).disk(kLampX, kLampY + 0.3, 4, 3000).image({.seed = 3});
+  EXPECT_EQ(detector.read(moved.view()).lamp->y, detect(moved.view()).lamp->y);
+}
+
 TEST(Follow, AReflectionThatAppearsInTheLampsColumnIsNoDot) {
   FollowingDetector detector;
   EXPECT_EQ(detector.read(lamp_scene().image({}).view()).state, SmearState::no_dot);

@@ -102,12 +102,14 @@ EMBERLOCK_VECTOR_CLONES float largest(const float* v, int count) {
 
 EMBERLOCK_VECTOR_CLONES void median_of_three(const float* a, const float* b, const float* c, int count,
                                              float* out) {
-#pragma GCC ivdep
-  for (int x = 0; x < count; ++x) {
-    const float low = a[x] < b[x] ? a[x] : b[x];
-    const float high = a[x] < b[x] ? b[x] : a[x];
-    const float rest = high < c[x] ? high : c[x];
-    out[x] = low > rest ? low : rest;
+  for (int x = 0; x < count; x += 8) {
+    const Vec8 first = load(a + x);
+    const Vec8 second = load(b + x);
+    const Vec8 third = load(c + x);
+    const Vec8 low = first < second ? first : second;
+    const Vec8 high = first < second ? second : first;
+    const Vec8 rest = high < third ? high : third;
+    store(out + x, low > rest ? low : rest);
   }
 }
 

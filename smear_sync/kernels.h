@@ -20,7 +20,7 @@ void add_near(const float* row, const float* centre, float reach, int count, flo
 /// The largest value, at least 0; any count.
 float largest(const float* v, int count);
 
-/// out[i] = median of a[i], b[i], c[i]; any count; `out` may be `a`.
+/// out[i] = median of a[i], b[i], c[i]; `out` may be `a`.
 void median_of_three(const float* a, const float* b, const float* c, int count, float* out);
 
 /// out[y] = sum over x of weights[x] * rows[y * stride + x], for 8 rows or more.

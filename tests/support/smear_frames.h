@@ -79,6 +79,16 @@ class SmearScene {
     return *this;
   }
 
+  /// What channel c of a pixel sees of the scene.
+  static double gain(PixelFormat format, int x, int y, int c) {
+    if (is_bayer(format)) {
+      if (x % 2 == 0 && y % 2 == 0) return 0.7;
+      return x % 2 == 1 && y % 2 == 1 ? 0.5 : 1;
+    }
+    if (channels(format) == 3) return c == 0 ? 0.7 : c == 1 ? 1.0 : 0.5;
+    return 1;
+  }
+
   struct Sensor {
     double noise = 1.2;  ///< grey levels of 8 bits
     double shot = 0;     ///< variance a grey level
@@ -159,15 +169,6 @@ class SmearScene {
     std::uint64_t bits_ = 0;
     int left_ = 0;
   };
-
-  static double gain(PixelFormat format, int x, int y, int c) {
-    if (is_bayer(format)) {
-      if (x % 2 == 0 && y % 2 == 0) return 0.7;
-      return x % 2 == 1 && y % 2 == 1 ? 0.5 : 1;
-    }
-    if (channels(format) == 3) return c == 0 ? 0.7 : c == 1 ? 1.0 : 0.5;
-    return 1;
-  }
 
   int width_, height_;
   std::vector<double> v_;

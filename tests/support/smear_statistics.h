@@ -60,34 +60,48 @@ inline SmearTruth draw_truth(const SmearRange& range, std::uint64_t seed, std::u
 }
 
 /// The Cramer-Rao bound on the standard error of the dot's row, from the Fisher information of all samples
-/// near it under Gaussian noise of variance noise^2 + shot * signal + 1/12 (rounding). Unknown beside the
-/// row: the amplitude, the column and each column's baseline, which `kHeight` rows tell. Nothing of the
-/// detector's model enters: slopes are differences of the drawn disk.
-inline double cramer_rao(const SmearTruth& t) {
+/// near it, in every colour, under Gaussian noise of variance noise^2 + shot * signal + rounding. Unknown
+/// beside the row: the amplitude, the column and the baseline of each column and colour, which its samples in
+/// `kHeight` rows tell. Nothing of the detector's model enters: slopes are differences of the drawn disk.
+inline double cramer_rao(const SmearTruth& t, PixelFormat format = PixelFormat::gray8, int bit_depth = 8) {
   constexpr double kStep = 0.02;
   const int reach = static_cast<int>(t.radius + 6 * t.blur) + 1;
   const int left = static_cast<int>(t.x) - reach;
   const int top = static_cast<int>(t.dot_y) - reach;
-  const double dark = t.noise * t.noise + t.shot * SmearTruth::kBackground + 1.0 / 12;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // amplitude, x, y
-  for (int x = left; x <= left + 2 * reach + 1; ++x) {
-    Eigen::Vector3d with_baseline = Eigen::Vector3d::Zero();
-    double baseline = (SmearTruth::kHeight - 2 * reach - 2) * (1 / dark + 0.5 * std::pow(t.shot / dark, 2));
-    for (int y = top; y <= top + 2 * reach + 1; ++y) {
-      const auto disk = [&](double dx, double dy) {
+  const int rows = 2 * reach + 2;
+  const double rounding = std::pow(255.0 / ((1 << bit_depth) - 1), 2) / 12;
+  const int kinds = is_bayer(format) ? 2 : channels(format);  // colours in a column
+  const int apart = is_bayer(format) ? 2 : 1;                 // rows between samples of one colour
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();      // amplitude, x, y
+  for (int x = left; x < left + rows; ++x) {
+    std::vector<std::array<double, 3>> disk;  // its value and its slopes by column and row, of amplitude 1
+    for (int y = top; y < top + rows; ++y) {
+      const auto at = [&](double dx, double dy) {
         return SmearScene::coverage(x - t.x - dx, y - t.dot_y - dy, t.radius, t.blur);
       };
-      const double g = disk(0, 0);
-      const Eigen::Vector3d slope(g, t.amplitude * (disk(kStep, 0) - disk(-kStep, 0)) / (2 * kStep),
-                                  t.amplitude * (disk(0, kStep) - disk(0, -kStep)) / (2 * kStep));
-      const double variance = dark + t.shot * t.amplitude * g;
-      // The mean tells, and a little the variance too, which grows with the signal.
-      const double weight = 1 / variance + 0.5 * std::pow(t.shot / variance, 2);
-      information += weight * slope * slope.transpose();
-      with_baseline += weight * slope;
-      baseline += weight;
+      disk.push_back({at(0, 0), (at(kStep, 0) - at(-kStep, 0)) / (2 * kStep),
+                      (at(0, kStep) - at(0, -kStep)) / (2 * kStep)});
     }
-    information -= with_baseline * with_baseline.transpose() / baseline;
+    for (int kind = 0; kind < kinds; ++kind) {
+      const int first = is_bayer(format) ? kind : 0;
+      const double gain = SmearScene::gain(format, x, top + first, kind);
+      const double dark = t.noise * t.noise + t.shot * SmearTruth::kBackground * gain + rounding;
+      const auto weight =
+          [&](double variance) {  // the mean tells, and a little the variance, which grows with it
+            return 1 / variance + 0.5 * std::pow(t.shot / variance, 2);
+          };
+      Eigen::Vector3d with_baseline = Eigen::Vector3d::Zero();
+      double baseline = static_cast<double>((SmearTruth::kHeight - rows) / apart) * weight(dark);
+      for (int i = first; i < rows; i += apart) {
+        const auto& [g, by_x, by_y] = disk[static_cast<std::size_t>(i)];
+        const Eigen::Vector3d slope = gain * Eigen::Vector3d(g, t.amplitude * by_x, t.amplitude * by_y);
+        const double w = weight(dark + t.shot * t.amplitude * g * gain);
+        information += w * slope * slope.transpose();
+        with_baseline += w * slope;
+        baseline += w;
+      }
+      information -= with_baseline * with_baseline.transpose() / baseline;
+    }
   }
   return std::sqrt(information.inverse()(2, 2));
 }
@@ -102,7 +116,8 @@ struct SmearTally {
          normed = 0;  ///< sums over the found: of errors, (error / bound)^2
   int within = 0;     ///< found, the error at most two stated sigma
 
-  void add(const SmearTruth& t, const SmearReading& r) {
+  void add(const SmearTruth& t, const SmearReading& r, PixelFormat format = PixelFormat::gray8,
+           int bit_depth = 8) {
     ++frames;
     if (r.state == SmearState::ambiguous || r.state == SmearState::blind || r.state == SmearState::saturated)
       ++abstained;
@@ -111,7 +126,7 @@ struct SmearTally {
     if (t.amplitude <= 0 || r.dots.size() != 1) return;
     const double error = r.dots[0].y.value() - t.dot_y;
     if (std::abs(error) > 3) return;
-    const double bound = cramer_rao(t);
+    const double bound = cramer_rao(t, format, bit_depth);
     ++found;
     bias += error;
     squares += error * error;
@@ -169,7 +184,7 @@ inline SmearTally read_dots(const SmearRange& range, const SmearScene::Sensor& s
       s.noise = t.noise;
       s.shot = t.shot;
       s.seed = seed * 1'000'003 + static_cast<std::uint64_t>(i);
-      sum.add(t, detect(t.scene().image(s).view()));
+      sum.add(t, detect(t.scene().image(s).view()), s.format, s.bit_depth);
     }
     return sum;
   });

@@ -16,7 +16,7 @@ constexpr double kQuantiserSpread =
 constexpr double kQuantiserWeakest = 1.5;
 constexpr double kQuantiserSure = 4;
 constexpr double kEightBitSure =
-    2;  // and in frames of 8 bits that don't look compressed: a gentle compressor's
+    2.5;  // and in frames of 8 bits that don't look compressed: a gentle compressor's
 
 enum class Verdict { dot, suspect, half_field, nothing };
 

@@ -9,7 +9,7 @@
 #include "base/result.h"
 #include "cli/align_run.h"
 #include "session/writer.h"
-#include "smear_sync/phase_sensor.h"
+#include "smear_sync/sensors/phase_sensor.h"
 
 namespace emberlock::cli {
 

@@ -10,8 +10,8 @@
 #include "base/log.h"
 #include "cli/align_bench.h"
 #include "cli/align_json.h"
-#include "smear_sync/align_words.h"
-#include "smear_sync/reset_delay.h"
+#include "smear_sync/align/align_words.h"
+#include "smear_sync/align/reset_delay.h"
 
 namespace emberlock::cli {
 namespace {

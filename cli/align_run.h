@@ -12,10 +12,10 @@
 #include "drivers/camera.h"
 #include "drivers/strobe.h"
 #include "session/writer.h"
-#include "smear_sync/align.h"
+#include "smear_sync/align/align.h"
 #include "smear_sync/ccd_timing.h"
-#include "smear_sync/detect.h"
-#include "smear_sync/row_clock.h"
+#include "smear_sync/clocks/row_clock.h"
+#include "smear_sync/detect/detect.h"
 
 namespace emberlock::cli {
 
@@ -81,7 +81,7 @@ struct AlignRunResult {
 using StopAsked = std::function<bool()>;
 
 /// Films the strobe, measures t_row of CCDs from a comb and sweeps the strobe's phase for cameras of other
-/// sensors (smear_sync/phase_sensor.h), then films, decides and resets until the cameras are aligned
+/// sensors (smear_sync/sensors/phase_sensor.h), then films, decides and resets until the cameras are aligned
 /// or align_step gives up. Starts the cameras and leaves them filming. The decisions are align_step's; all
 /// that is taken from the clock are instants that are recorded with what they were taken for, so a recording
 /// replays to the same bits through this function. Errors: bad_input (frame rates that differ, sizes of the

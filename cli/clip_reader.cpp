@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "session/frame_file.h"
-#include "smear_sync/detect.h"
+#include "smear_sync/detect/detect.h"
 
 namespace emberlock::cli {
 namespace {

@@ -6,8 +6,8 @@
 #include "base/image.h"
 #include "base/progress.h"
 #include "base/result.h"
-#include "smear_sync/clip_clock.h"
 #include "smear_sync/reading.h"
+#include "smear_sync/verify/clip_clock.h"
 
 namespace emberlock::cli {
 

@@ -9,7 +9,7 @@
 
 #include "cli/commands.h"
 #include "session/frame_file.h"
-#include "smear_sync/detect.h"
+#include "smear_sync/detect/detect.h"
 
 namespace emberlock::cli {
 namespace {

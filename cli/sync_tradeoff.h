@@ -11,7 +11,7 @@
 #include "base/progress.h"
 #include "base/quantity.h"
 #include "base/result.h"
-#include "smear_sync/align_simulation.h"
+#include "smear_sync/align/align_simulation.h"
 
 namespace emberlock::cli {
 

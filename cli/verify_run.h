@@ -10,8 +10,8 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "cli/clip_reader.h"
-#include "smear_sync/row_clock.h"
-#include "smear_sync/verify.h"
+#include "smear_sync/clocks/row_clock.h"
+#include "smear_sync/verify/verify.h"
 
 namespace emberlock::cli {
 

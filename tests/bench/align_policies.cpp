@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "smear_sync/align_simulation.h"
+#include "smear_sync/align/align_simulation.h"
 
 namespace {
 

@@ -7,8 +7,8 @@
 #include <functional>
 #include <string>
 
-#include "smear_sync/drift.h"
-#include "smear_sync/row_clock.h"
+#include "smear_sync/clocks/drift.h"
+#include "smear_sync/clocks/row_clock.h"
 #include "tests/support/clock_film.h"
 
 namespace emberlock {

@@ -1,9 +1,9 @@
 // Time of one reading; prints machine and build by Google Benchmark's own header.
-#include "smear_sync/detect.h"
+#include "smear_sync/detect/detect.h"
 
 #include <benchmark/benchmark.h>
 
-#include "smear_sync/follow.h"
+#include "smear_sync/detect/follow.h"
 #include "tests/support/smear_frames.h"
 
 namespace emberlock {

@@ -8,8 +8,8 @@
 
 #include "base/random.h"
 #include "smear_sync/ccd_timing.h"
-#include "smear_sync/phase.h"
-#include "smear_sync/read_mode.h"
+#include "smear_sync/clocks/phase.h"
+#include "smear_sync/clocks/read_mode.h"
 
 namespace emberlock::test {
 

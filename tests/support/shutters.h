@@ -8,8 +8,8 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
-#include "smear_sync/exposure_sweep.h"
-#include "smear_sync/rolling_band.h"
+#include "smear_sync/sensors/exposure_sweep.h"
+#include "smear_sync/sensors/rolling_band.h"
 
 namespace emberlock::test {
 

@@ -11,7 +11,7 @@
 
 #include <Eigen/Dense>
 
-#include "smear_sync/detect.h"
+#include "smear_sync/detect/detect.h"
 #include "tests/support/compressed_frames.h"
 #include "tests/support/smear_frames.h"
 

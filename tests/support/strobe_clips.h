@@ -13,7 +13,7 @@
 #include "base/random.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
-#include "smear_sync/frame_code.h"
+#include "smear_sync/clocks/frame_code.h"
 #include "tests/support/video_writer.h"
 
 namespace emberlock::test {

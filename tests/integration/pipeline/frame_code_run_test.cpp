@@ -6,9 +6,9 @@
 
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
-#include "smear_sync/detect.h"
-#include "smear_sync/frame_code.h"
-#include "smear_sync/phase.h"
+#include "smear_sync/clocks/frame_code.h"
+#include "smear_sync/clocks/phase.h"
+#include "smear_sync/detect/detect.h"
 
 namespace emberlock {
 namespace {

@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "session/frame_file.h"
-#include "smear_sync/detect.h"
+#include "smear_sync/detect/detect.h"
 
 namespace emberlock {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "smear_sync/detect.h"
+#include "smear_sync/detect/detect.h"
 #include "tests/support/smear_frames.h"
 #include "tests/support/smear_statistics.h"
 

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-#include "smear_sync/align.h"
-#include "smear_sync/phase.h"
+#include "smear_sync/align/align.h"
+#include "smear_sync/clocks/phase.h"
 #include "tests/support/shift_register.h"
 
 namespace emberlock {

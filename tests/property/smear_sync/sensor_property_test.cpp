@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
-#include "smear_sync/frame_code.h"
-#include "smear_sync/read_mode.h"
-#include "smear_sync/staircase.h"
+#include "smear_sync/clocks/frame_code.h"
+#include "smear_sync/clocks/read_mode.h"
+#include "smear_sync/clocks/staircase.h"
 #include "tests/support/clock_film.h"
 #include "tests/support/shutters.h"
 

@@ -1,9 +1,9 @@
-#include "smear_sync/align.h"
+#include "smear_sync/align/align.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "smear_sync/align_simulation.h"
+#include "smear_sync/align/align_simulation.h"
 
 namespace emberlock {
 namespace {

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "smear_sync/align_simulation.h"
+#include "smear_sync/align/align_simulation.h"
 
 namespace emberlock {
 namespace {

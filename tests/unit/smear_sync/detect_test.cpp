@@ -1,4 +1,4 @@
-#include "smear_sync/detect.h"
+#include "smear_sync/detect/detect.h"
 
 #include <cmath>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "smear_sync/drift.h"
+#include "smear_sync/clocks/drift.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "smear_sync/exposure_sweep.h"
+#include "smear_sync/sensors/exposure_sweep.h"
 
 #include <cmath>
 

@@ -1,11 +1,11 @@
 // What many frames, and many cameras, tell that one can't.
-#include "smear_sync/film.h"
+#include "smear_sync/detect/film.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-#include "smear_sync/detect.h"
+#include "smear_sync/detect/detect.h"
 #include "tests/support/smear_frames.h"
 
 namespace emberlock {

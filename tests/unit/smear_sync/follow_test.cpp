@@ -1,5 +1,5 @@
 // Reading frame after frame: the same as reading each alone, and nothing new goes unseen.
-#include "smear_sync/follow.h"
+#include "smear_sync/detect/follow.h"
 
 #include <cmath>
 

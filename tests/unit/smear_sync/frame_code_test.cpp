@@ -1,4 +1,4 @@
-#include "smear_sync/frame_code.h"
+#include "smear_sync/clocks/frame_code.h"
 
 #include <algorithm>
 #include <cmath>

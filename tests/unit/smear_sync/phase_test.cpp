@@ -1,4 +1,4 @@
-#include "smear_sync/phase.h"
+#include "smear_sync/clocks/phase.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "smear_sync/phase_track.h"
+#include "smear_sync/align/phase_track.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "smear_sync/rate_servo.h"
+#include "smear_sync/align/rate_servo.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "smear_sync/read_mode.h"
+#include "smear_sync/clocks/read_mode.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "smear_sync/reset_delay.h"
+#include "smear_sync/align/reset_delay.h"
 
 #include <gtest/gtest.h>
 

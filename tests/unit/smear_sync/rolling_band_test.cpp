@@ -1,4 +1,4 @@
-#include "smear_sync/rolling_band.h"
+#include "smear_sync/sensors/rolling_band.h"
 
 #include <cmath>
 
@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
-#include "smear_sync/drift.h"
-#include "smear_sync/row_clock.h"
+#include "smear_sync/clocks/drift.h"
+#include "smear_sync/clocks/row_clock.h"
 #include "tests/support/shutters.h"
 
 namespace emberlock {

@@ -1,4 +1,4 @@
-#include "smear_sync/row_clock.h"
+#include "smear_sync/clocks/row_clock.h"
 
 #include <algorithm>
 #include <cmath>

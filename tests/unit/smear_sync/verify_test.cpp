@@ -1,5 +1,5 @@
 // What clips of one strobe prove, told from readings made of flashes and shift registers alone.
-#include "smear_sync/verify.h"
+#include "smear_sync/verify/verify.h"
 
 #include <cmath>
 #include <set>

@@ -1,0 +1,406 @@
+#include "smear_sync/align/align.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "smear_sync/align/align_choice.h"
+#include "smear_sync/align/align_forecast.h"
+#include "smear_sync/align/align_trim.h"
+#include "smear_sync/align/align_words.h"
+#include "smear_sync/align/reset_delay.h"
+
+namespace emberlock {
+namespace {
+
+/// The strobe's delay goes round this part of the period: it must stay below the strobe's own, which may be
+/// shorter than T.
+constexpr double kLookRange = 0.95;
+/// Successive delays step by this part of the period: however the blind phases lie, no two looks are alike.
+constexpr double kLookStep = 0.381966011250105 * kLookRange;  // 1 - 1 / golden ratio
+
+/// A phase seen earlier counts until it may have walked by this part of the tolerance (one standard error);
+/// of the trims' reach, which is far more, while trims bring the cameras together.
+constexpr double kMemoryPart = 0.25;
+constexpr double kMemoryPartOfReach = 0.05;
+
+/// Shifts by hand that are remembered of a camera.
+constexpr std::size_t kShifts = 16;
+
+/// A tolerance of fewer standard errors of a phase can't be told.
+constexpr double kTellable = 2;
+
+/// The next check comes before any of the cameras leaves by so many standard errors.
+constexpr double kScheduleSigmas = 3;
+
+/// What is the same for all of a round's steps.
+struct Context {
+  const AlignRound& round;
+  const std::vector<AlignCamera>& cameras;
+  const AlignOptions& options;
+  TrackOptions track;
+  Seconds tolerance;
+  Seconds reach;  ///< of trims; zero where the policy doesn't trim
+
+  [[nodiscard]] Seconds remembered() const {
+    return std::max(kMemoryPart * tolerance, kMemoryPartOfReach * reach);
+  }
+};
+
+std::vector<std::optional<RateTrim>> trims_of(const std::vector<AlignCamera>& cameras) {
+  std::vector<std::optional<RateTrim>> trims;
+  trims.reserve(cameras.size());
+  for (const AlignCamera& camera : cameras) trims.push_back(camera.trim);
+  return trims;
+}
+
+/// Takes over what the round showed: delays and shifts of resets, trims ordered, phases of the cameras seen.
+void remember(AlignState& state, const Context& c) {
+  const AlignRound& round = c.round;
+  for (const TrimDone& done : round.trims) {
+    const auto& trim = c.cameras[done.camera].trim;
+    state.cameras[done.camera].phase.order_trim(done.at + (trim ? trim->latency : Seconds(0)), done.trim,
+                                                c.track);
+  }
+  for (const ResetDone& done : round.resets) {
+    CameraTrack& track = state.cameras[done.camera];
+    ++track.resets;
+    ++state.resets;
+    track.before_hand.reset();
+    if (!done.at && track.phase.phase_known()) track.before_hand = track.phase.at(round.at, c.track);
+    track.phase.forget_phase();
+    const auto& stamp = round.cameras[done.camera].stamp;
+    if (!done.at || !stamp) continue;
+    learn_delay(state, c.cameras, c.options, done.camera, wrap_positive(*stamp - *done.at, c.options.period));
+  }
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    Phase phase = round.cameras[i].phase;
+    if (phase.state != PhaseState::known) continue;
+    phase.tau = wrap_positive(phase.tau - round.strobe_phase, c.options.period);
+    CameraTrack& track = state.cameras[i];
+    track.phase.observe(round.at, phase, round.beat, c.track);
+    if (!track.before_hand) continue;
+    const Drift& before = *track.before_hand;
+    const Seconds moved = (round.at - before.at) * (before.rate.value() * 1e-6);
+    track.hand_shifts.push_back(wrap_positive(phase.tau - before.tau - moved, c.options.period));
+    if (track.hand_shifts.size() > kShifts) track.hand_shifts.erase(track.hand_shifts.begin());
+    track.before_hand.reset();
+  }
+}
+
+/// Where a camera stands at the round's instant: seen now, or earlier and sure enough still.
+std::optional<Drift> where(const CameraTrack& track, const Context& c) {
+  if (!track.phase.phase_known() || track.phase.aged(c.round.at) > c.remembered()) return std::nullopt;
+  return track.phase.at(c.round.at, c.track);
+}
+
+Seconds next_look(const Context& c) {
+  return wrap_positive(c.round.strobe_phase + kLookStep * c.options.period, kLookRange * c.options.period);
+}
+
+/// Some phases are missing: nobody is reset on half a view. Blind cameras are brought out by moving the
+/// strobe.
+void look_again(AlignState& state, AlignDecision& decision, const Context& c) {
+  ++state.looks;
+  std::string missing;
+  std::string why;
+  bool blind = false;
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    CameraDecision& camera = decision.cameras[i];
+    const Phase& phase = c.round.cameras[i].phase;
+    if (where(state.cameras[i], c)) {
+      camera.reason = "its phase is known: waits for the cameras whose phase isn't";
+      continue;
+    }
+    missing += (missing.empty() ? "" : ", ") + c.cameras[i].id;
+    if (phase.state == PhaseState::blind) {
+      blind = true;
+      camera.reason = "shows no phase: the strobe's is moved to bring it out (" + phase.reason + ")";
+    } else {
+      camera.reason = "can't be read: see to its view of the lamp and to the strobe (" + phase.reason + ")";
+      if (why.empty()) why = phase.reason;
+    }
+  }
+  if (state.looks > c.options.max_looks) {
+    decision.verdict = AlignVerdict::given_up;
+    decision.reason =
+        "no phase of " + missing + " after " + plural(static_cast<std::size_t>(state.looks), "look") +
+        " at different phases of the strobe: " +
+        (why.empty() ? "check that the lamp is in view, not over-exposed, and flashes once a frame" : why);
+    return;
+  }
+  if (blind) decision.strobe_phase = next_look(c);
+  decision.reason = "looks again for " + missing;
+}
+
+AlignScene scene_of(const AlignState& state, const std::vector<Drift>& drifts, const Context& c) {
+  AlignScene scene{
+      c.options.policy, c.options.period, std::max(c.tolerance, c.reach), c.options.reference, {}, {}};
+  const Seconds jitter = learnt_jitter(state, c.options);
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    scene.tau.push_back(drifts[i].tau);
+    Landing landing{c.cameras[i].method, std::nullopt, state.cameras[i].hand_shifts};
+    if (const auto delay = expected_delay(state, c.cameras, c.options, i))
+      landing.aim = Seconds(std::hypot(delay->sigma.value(), jitter.value()));
+    scene.landings.push_back(landing);
+  }
+  return scene;
+}
+
+/// Timed resets: each at its moment where the delay is known; else untimed, to teach it. A model is taught by
+/// one of its cameras, and the others wait.
+void time_resets(const AlignState& state, AlignDecision& decision, const Context& c,
+                 const AlignScene& scene) {
+  std::vector<std::string> teaching;
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    CameraDecision& camera = decision.cameras[i];
+    const AlignCamera& who = c.cameras[i];
+    if (!camera.reset || !scene.timed(i) || !c.round.cameras[i].stamp) continue;
+    if (const auto delay = expected_delay(state, c.cameras, c.options, i)) {
+      // t_start shall move by tau - tau_target, and the stamps move with it.
+      camera.moment = *c.round.cameras[i].stamp + *camera.error - delay->mean;
+      camera.reason += " at the moment that lands it on the target";
+    } else if (std::find(teaching.begin(), teaching.end(), who.model) == teaching.end()) {
+      teaching.push_back(who.model);
+      camera.reason += ", which teaches how long its reset takes";
+    } else {
+      camera.reset = false;
+      camera.reason = standing(*camera.error, c.options.row_time) +
+                      ", out of tolerance: waits until another " + who.model +
+                      " has taught how long a reset takes";
+    }
+  }
+}
+
+/// Orders for the cameras out of tolerance, and a sentence for every camera.
+void order_resets(AlignDecision& decision, const Context& c, const AlignScene& scene, Seconds target) {
+  const std::vector<bool> chosen = choose_resets(scene, target);
+  const std::string out = c.reach > Seconds(0) ? ", further than trims reach" : ", out of tolerance";
+  for (std::size_t i = 0; i < scene.tau.size(); ++i) {
+    CameraDecision& camera = decision.cameras[i];
+    const std::string stands = standing(*camera.error, c.options.row_time);
+    camera.reset = chosen[i];
+    if (c.options.policy == AlignPolicy::fixed_reference && i == scene.reference) {
+      camera.reason = "is the reference: the others are brought to its phase";
+    } else if (scene.within(i, target)) {
+      camera.reason = stands + (c.reach > Seconds(0) ? ", within reach of its trim" : ", within tolerance") +
+                      ": leave it";
+    } else if (!scene.movable(i)) {
+      camera.reason = stands + out + ", and can't be reset";
+    } else if (!chosen[i]) {
+      camera.reason = stands + out + ": waits, the target may yet come to it";
+    } else if (scene.landings[i].method == ResetMethod::by_hand) {
+      camera.reason = stands + out + ": reset its shutter by hand";
+    } else {
+      camera.reason = stands + out + ": its shutter is reset";
+    }
+  }
+}
+
+/// Whether the tolerance can be told from the noise, and is met within the limits. Asked once.
+bool affordable(AlignState& state, AlignDecision& decision, const Context& c, const AlignScene& scene,
+                const std::vector<Drift>& drifts) {
+  if (!c.options.limits || state.affordable) return true;
+  const Prospect prospect{scene, drifts, trims_of(c.cameras), learnt_jitter(state, c.options)};
+  decision.effort = foretell(prospect, c.options.policy, c.tolerance, c.options);
+  Seconds noise;
+  for (const Drift& drift : drifts) noise = std::max(noise, drift.tau_sigma);
+  const double rows = c.options.tolerance.in_rows(c.options.row_time).value();
+  if (c.tolerance < kTellable * noise) {
+    decision.verdict = AlignVerdict::refused;
+    decision.reason =
+        fmt::format("{:.2g} rows can't be told: phases are known to {:.2g} rows. Ask for {:.2g} rows", rows,
+                    (noise / c.options.row_time).value(),
+                    std::ceil(10 * kTellable * (noise / c.options.row_time).value()) / 10) +
+        " or more, or let the flash be about a row long";
+    return false;
+  }
+  if (decision.effort->within >= c.options.limits->probability) {
+    state.affordable = true;
+    return true;
+  }
+  decision.verdict = AlignVerdict::refused;
+  decision.offers = find_offers(prospect, c.options);
+  decision.reason = refusal(*decision.effort, decision.offers, c.options);
+  return false;
+}
+
+/// How long every camera stays in tolerance of a target that moves as the middle of them does, or as the
+/// reference does; and when to film again.
+void foresee(const AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
+             const Context& c) {
+  std::vector<double> rates;
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    const PhaseTrack& phase = state.cameras[i].phase;
+    const TimePoint later = c.round.at + Seconds(1e6);  // when all that was ordered is in force
+    rates.push_back((drifts[i].rate + decision.cameras[i].trim.value_or(phase.trim(later))).value());
+  }
+  const auto [slowest, fastest] = std::minmax_element(rates.begin(), rates.end());
+  const bool fixed = c.options.policy == AlignPolicy::fixed_reference;
+  const double common = state.target ? state.target->rate.value()
+                        : fixed      ? rates[c.options.reference]
+                                     : (*slowest + *fastest) / 2;
+  const double common_sigma = fixed ? drifts[c.options.reference].rate_sigma.value() : 0;
+  Seconds soonest(std::numeric_limits<double>::infinity());
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    Drift error = drifts[i];
+    error.tau = wrap_positive(*decision.cameras[i].error, c.options.period);
+    error.rate = PartsPerMillion(rates[i] - common);
+    error.rate_sigma = PartsPerMillion(std::hypot(drifts[i].rate_sigma.value(), common_sigma));
+    if (fixed && i == c.options.reference) error.rate_sigma = PartsPerMillion(0);
+    TimeLeftOptions left{
+        .tolerance = c.tolerance, .period = c.options.period, .wander_per_minute = c.options.rate_wander};
+    decision.cameras[i].time_left = time_left(error, c.round.at, left);
+    left.sigmas = kScheduleSigmas;
+    const Seconds sure = time_left(error, c.round.at, left).earliest;
+    if (sure >= soonest) continue;
+    soonest = sure;
+    first = i;
+  }
+  if (decision.verdict != AlignVerdict::aligned) return;
+  decision.next_check = soonest;
+  if (std::isfinite(soonest.value())) {
+    decision.reason += "; film the strobe again within " + words(soonest) + ", before " +
+                       c.cameras[first].id + " may have drifted out";
+  }
+}
+
+/// The camera that stands for the target.
+std::size_t nearest(const AlignDecision& decision, const AlignOptions& options) {
+  if (options.policy == AlignPolicy::fixed_reference) return options.reference;
+  const auto closer = [](const CameraDecision& a, const CameraDecision& b) {
+    return in_picoseconds(abs(*a.error)) < in_picoseconds(abs(*b.error));
+  };
+  const auto& cameras = decision.cameras;
+  return static_cast<std::size_t>(std::min_element(cameras.begin(), cameras.end(), closer) - cameras.begin());
+}
+
+void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts, const Context& c) {
+  state.looks = 0;
+  const AlignScene scene = scene_of(state, drifts, c);
+  const auto far = [&](Seconds target) {
+    for (std::size_t i = 0; i < drifts.size(); ++i) {
+      if (!scene.within(i, target)) return true;
+    }
+    return false;
+  };
+  Seconds target = choose_target(scene);
+  if (state.target && !far(target_at(*state.target, c.round.at, c.options.period))) {
+    target = target_at(*state.target, c.round.at, c.options.period);
+  } else {
+    state.target.reset();
+  }
+  decision.target = wrap_positive(target + c.round.strobe_phase, c.options.period);
+  decision.worst_pair = Seconds(0);
+  std::size_t out = 0;
+  std::string stuck;
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    CameraDecision& camera = decision.cameras[i];
+    camera.error = scene.error(i, target);
+    camera.sigma = drifts[i].tau_sigma;
+    camera.reason = standing(*camera.error, c.options.row_time);
+    for (std::size_t k = 0; k < i; ++k)
+      decision.worst_pair = std::max(*decision.worst_pair, abs(scene.error(i, scene.tau[k])));
+    if (scene.within(i, target)) continue;
+    ++out;
+    if (!scene.movable(i)) stuck += (stuck.empty() ? "" : ", ") + c.cameras[i].id;
+  }
+  decision.reference = nearest(decision, c.options);
+  if (!affordable(state, decision, c, scene, drifts)) return;
+  order_resets(decision, c, scene, target);
+  time_resets(state, decision, c, scene);
+
+  if (!stuck.empty()) {
+    decision.verdict = AlignVerdict::given_up;
+    decision.reason =
+        stuck + " can't be reset and lies out of tolerance: make it the reference, or widen the tolerance";
+  } else if (out > 0) {
+    decision.reason = plural(out, "camera") + (c.reach > Seconds(0) ? " out of reach" : " out of tolerance");
+  } else if (c.reach == Seconds(0)) {
+    decision.verdict = AlignVerdict::aligned;
+    decision.reason = "every camera lies within tolerance of the target";
+  } else if (trim_rates(state, decision, c.round, c.cameras, c.options)) {
+    decision.verdict = AlignVerdict::aligned;
+    decision.reason = "every camera is locked within tolerance of the target";
+  } else {
+    time_resets(state, decision, c, scene);
+    decision.reason = "trims bring the cameras to the target";
+    // Where a dot is missing trims go by what was foretold; that ages.
+    for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+      const bool blind = c.round.cameras[i].phase.state == PhaseState::blind;
+      if (blind && state.cameras[i].phase.aged(c.round.at) > kMemoryPart * c.tolerance)
+        decision.strobe_phase = next_look(c);
+    }
+  }
+  decision.reference = nearest(decision, c.options);
+  foresee(state, decision, drifts, c);
+}
+
+/// A policy that trims needs cameras that can be.
+std::optional<std::string> untrimmable(const Context& c) {
+  if (c.options.policy != AlignPolicy::trimmed) return std::nullopt;
+  for (const AlignCamera& camera : c.cameras) {
+    if (!camera.trim)
+      return "the frame rate of " + camera.id +
+             " can't be trimmed: use the timed policy, whose resets reach " +
+             "as far as their latency is steady";
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+AlignStep align_step(const AlignState& before, const AlignRound& round,
+                     const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
+  AlignState state = before;
+  state.cameras.resize(cameras.size());
+  ++state.rounds;
+  ++state.rounds_out;
+  const bool trims = options.policy == AlignPolicy::trimmed;
+  const Context c{round,
+                  cameras,
+                  options,
+                  track_options(options),
+                  options.tolerance.in_time(options.row_time),
+                  trims ? trim_reach(trims_of(cameras), options) : Seconds(0)};
+  remember(state, c);
+
+  AlignDecision decision;
+  decision.round = state.rounds;
+  decision.resets_so_far = state.resets;
+  decision.cameras.resize(cameras.size());
+  std::vector<Drift> drifts;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    decision.cameras[i].state = round.cameras[i].phase.state;
+    if (const auto drift = where(state.cameras[i], c)) drifts.push_back(*drift);
+  }
+  if (const auto reason = untrimmable(c)) {
+    decision.verdict = AlignVerdict::refused;
+    decision.reason = *reason;
+  } else if (drifts.size() < cameras.size()) {
+    look_again(state, decision, c);
+  } else {
+    judge(state, decision, drifts, c);
+  }
+  state.last_round = round.at;
+
+  if (decision.verdict == AlignVerdict::aligned) state.rounds_out = 0;
+  if (decision.verdict == AlignVerdict::go_on && state.rounds_out >= options.max_rounds) {
+    decision.verdict = AlignVerdict::given_up;
+    decision.reason = "not aligned after " + plural(static_cast<std::size_t>(state.rounds_out), "round") +
+                      ": " + decision.reason;
+  }
+  if (decision.verdict != AlignVerdict::go_on) {
+    decision.strobe_phase.reset();
+    for (CameraDecision& camera : decision.cameras) {
+      camera.reset = false;
+      camera.moment.reset();
+    }
+  }
+  return {std::move(state), std::move(decision)};
+}
+
+}  // namespace emberlock

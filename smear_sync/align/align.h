@@ -1,0 +1,219 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "base/quantity.h"
+#include "base/result.h"
+#include "base/time_point.h"
+#include "smear_sync/align/phase_track.h"
+#include "smear_sync/align/rate_servo.h"
+#include "smear_sync/clocks/drift.h"
+#include "smear_sync/clocks/phase.h"
+
+namespace emberlock {
+
+// The alignment as a pure step: what was known, and what a round of filming showed, give what is known now
+// and what to do next. It has no clock and no device: cli/align_run.h carries its orders out, and a recording
+// replays through it.
+
+/// Which cameras are reset, and towards what.
+enum class AlignPolicy {
+  fixed_reference,  ///< the paper's: one camera stays, the others are reset until each lies within tolerance
+  densest,  ///< the target is chosen anew each round: the middle of the cameras that take the fewest resets
+  timed,    ///< as densest, and each reset is ordered for the moment that lands it on the target
+  trimmed,  ///< as timed until all are within reach of their trims; then frame rates are trimmed (a
+            ///< phase-locked loop), towards the phase that the last camera reaches soonest
+};
+std::string_view name(AlignPolicy policy);
+/// From "fixed-reference", "densest", "timed" or "trimmed"; the error lists them.
+Result<AlignPolicy> parse_align_policy(std::string_view text);
+
+/// How far a camera may lie from the target, to either side; two cameras may differ by twice as much.
+struct Tolerance {
+  std::variant<Rows, Seconds> amount = Rows(100);
+  [[nodiscard]] Seconds in_time(SecondsPerRow row_time) const;
+  [[nodiscard]] Rows in_rows(SecondsPerRow row_time) const;
+};
+/// From "100rows", "5.4ms" or "500us": a positive number and its unit.
+Result<Tolerance> parse_tolerance(std::string_view text);
+
+/// How a camera's shutter phase can be drawn anew.
+enum class ResetMethod { none, by_hand, on_command };
+
+/// The time from the moment for which a reset is ordered to the stamps of the frames that follow, modulo T.
+/// It holds the camera's own latency and its transport's: nothing else needs to be known of either for a
+/// timed reset.
+struct ResetDelay {
+  Seconds mean;   ///< in [0, T)
+  Seconds sigma;  ///< standard error of the mean for this camera
+};
+
+struct AlignCamera {
+  std::string id;
+  std::string model;  ///< cameras of one model teach each other their delay
+  ResetMethod method = ResetMethod::on_command;
+  std::optional<ResetDelay>
+      expected_delay;  ///< known before (from an earlier session, or the model's data); else learnt
+  std::optional<RateTrim> trim = {};  ///< where its frame rate can be trimmed
+};
+
+/// What an operator will spend on an alignment. One that can't be had for it is refused before anything is
+/// reset.
+struct AlignLimits {
+  int resets = 1000;
+  Seconds time{3600};
+  double probability = 0.9;  ///< with which it must be had, 0..1
+};
+
+/// What bringing the cameras within a tolerance takes.
+struct AlignEffort {
+  double resets = 0;   ///< expected
+  int resets_p95 = 0;  ///< 95th percentile
+  Seconds time;        ///< expected
+  Seconds time_p95;    ///< 95th percentile
+  double within = 1;   ///< probability of being done within the limits; those that aren't count as their
+                       ///< limits above
+};
+
+/// A tolerance that could be met, and how.
+struct AlignOffer {
+  AlignPolicy policy = AlignPolicy::densest;
+  Tolerance tolerance;
+  AlignEffort effort;
+};
+
+struct AlignOptions {
+  AlignPolicy policy = AlignPolicy::densest;
+  Tolerance tolerance{};
+  Seconds period{1 / 23.976};                         ///< T
+  SecondsPerRow row_time = microseconds_per_row(54);  ///< t_row
+  std::size_t reference = 0;                          ///< of fixed_reference
+  Seconds delay_jitter =
+      milliseconds(0.2);  ///< standard deviation of one reset's delay about its camera's mean, > 0
+  PartsPerMillion rate_spread{
+      20};  ///< of the cameras' rates about the common beat, before they were seen: how fast a phase ages
+  PartsPerMillion rate_wander{0.2};  ///< of a rate in a minute, as cameras warm up
+  Seconds trim_time{60};    ///< of trimmed, > 0: cameras that trims wouldn't bring to the target by then,
+                            ///< the outermost, are reset
+  Seconds round_time{0.6};  ///< of one round of filming, for what is foretold, > 0
+  Seconds reset_time{0};    ///< of one reset more in a round: an operator's way to the button
+  std::optional<AlignLimits> limits = {};  ///< absent: nothing is refused for what it takes
+  int max_rounds = 500;                    ///< without all within tolerance, > 0
+  int max_looks = 6;                       ///< strobe phases tried in a row for cameras that show no dot, > 0
+};
+
+/// One camera in one round.
+struct CameraView {
+  Phase phase;  ///< at the round's instant
+  std::optional<TimePoint>
+      stamp;  ///< an instant, near the round's, at which its frames are stamped (modulo T)
+};
+
+struct ResetDone {
+  std::size_t camera = 0;
+  std::optional<TimePoint>
+      at;  ///< the moment that the camera was told; absent when an operator pressed a button
+};
+
+struct TrimDone {
+  std::size_t camera = 0;
+  TimePoint at;  ///< the moment that the camera was told
+  PartsPerMillion trim;
+};
+
+/// What a round of filming showed, and what was done since the one before.
+struct AlignRound {
+  TimePoint at;  ///< the instant to which all phases refer
+  Beat beat;
+  Seconds strobe_phase;  ///< the delay of the flashes during the round; tau grows by as much as it does
+  std::vector<CameraView> cameras;
+  std::vector<ResetDone> resets;     ///< carried out since the round before
+  std::vector<TrimDone> trims = {};  ///< likewise
+};
+
+/// What is remembered of a camera from round to round.
+struct CameraTrack {
+  PhaseTrack phase;  ///< strobe_phase taken out
+  int resets = 0;
+  int taught = 0;                    ///< resets whose delay was observed
+  std::optional<ResetDelay> delay;   ///< its own, once taught
+  std::optional<Drift> before_hand;  ///< where it stood before a reset by hand that hasn't been seen yet
+  std::vector<Seconds> hand_shifts;  ///< by which resets by hand moved its tau, modulo T; the newest last
+};
+
+/// The phase to which cameras are brought, strobe_phase taken out: it moves as a camera of this rate would.
+struct AlignTarget {
+  TimePoint at;
+  Seconds tau;
+  PartsPerMillion rate;
+  bool settled = false;  ///< trims are near it: it stays as it is
+};
+
+struct AlignState {
+  int rounds = 0;
+  int rounds_out = 0;  ///< since all were last within tolerance
+  int resets = 0;
+  int looks = 0;           ///< rounds in a row that ended with a camera whose phase isn't known
+  double jitter_seen = 0;  ///< s^2: sum over resets of a delay's squared deviation from its camera's mean
+  int jitter_samples = 0;
+  bool affordable = false;  ///< the limits have been looked at, and hold
+  std::optional<TimePoint> last_round;
+  std::optional<AlignTarget> target;  ///< of trims, once they have begun
+  std::optional<TimePoint> trimming;  ///< since when, until aligned
+  std::vector<CameraTrack> cameras;
+};
+
+struct CameraDecision {
+  PhaseState state = PhaseState::unusable;  ///< in this round
+  std::optional<Seconds>
+      error;           ///< to the target; positive when it reads earlier. From an earlier round if blind now
+  Seconds sigma;       ///< standard error of its own phase
+  bool reset = false;  ///< reset it now
+  std::optional<TimePoint> moment;  ///< order the reset for this instant or any that differs by whole periods
+  std::optional<PartsPerMillion> trim;  ///< trim its frame rate to this from now on, aligned or not
+  std::optional<ServoState> servo;      ///< of a camera that is trimmed
+  std::optional<TimeLeft> time_left;    ///< in tolerance, as it drifts now
+  std::string reason;                   ///< a sentence that an operator can act on
+};
+
+enum class AlignVerdict {
+  go_on,
+  aligned,
+  refused,   ///< the tolerance can't be met within the limits; `offers` says what could be
+  given_up,  ///< somebody must see to the rig
+};
+std::string_view name(AlignVerdict verdict);
+
+struct AlignDecision {
+  int round = 0;  ///< from 1
+  AlignVerdict verdict = AlignVerdict::go_on;
+  std::optional<Seconds> target;         ///< tau of the target in this round; absent while phases are missing
+  std::optional<std::size_t> reference;  ///< the camera nearest to the target; of fixed_reference that one
+  std::vector<CameraDecision> cameras;
+  std::optional<Seconds>
+      worst_pair;  ///< largest difference between two cameras; absent while phases are missing
+  std::optional<Seconds>
+      strobe_phase;  ///< the delay to which the strobe shall be moved, in [0, T), to bring blind cameras out
+  int resets_so_far = 0;              ///< before this decision's
+  std::optional<Seconds> next_check;  ///< once aligned: film again by then, before the drift may have led a
+                                      ///< camera out (three standard errors)
+  std::optional<AlignEffort> effort;  ///< foretold in the first round that has all phases, given limits
+  std::vector<AlignOffer> offers;     ///< of a refusal
+  std::string reason;                 ///< of the verdict, or what the rig waits for
+};
+
+struct AlignStep {
+  AlignState state;
+  AlignDecision decision;
+};
+
+/// One round. `round.cameras`, `cameras` and `state.cameras` (empty at first) go by the same index.
+AlignStep align_step(const AlignState& state, const AlignRound& round,
+                     const std::vector<AlignCamera>& cameras, const AlignOptions& options);
+
+}  // namespace emberlock

@@ -1,0 +1,265 @@
+#include "smear_sync/clocks/drift.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <vector>
+
+#include "smear_sync/clocks/staircase.h"
+
+namespace emberlock {
+namespace {
+
+constexpr double kHuber = 1.345;  // 95 % efficient on normal errors
+constexpr int kRobustRounds = 8;
+
+double square(double x) { return x * x; }
+
+struct Point {
+  double t;  ///< seconds from the first sample
+  double tau;
+  double sigma;
+};
+
+/// The rate under which the points gather best: the largest resultant of tau - rate t on the circle. A coarse
+/// search over all rates, then a fine one about its best.
+double gathering_rate(const std::vector<Point>& points, double span, const DriftOptions& options) {
+  const double period = options.period.value();
+  const auto resultant = [&](double rate) {
+    std::complex<double> sum = 0;
+    for (const Point& p : points) {
+      sum += std::polar(1 / square(p.sigma), 2 * std::numbers::pi * (p.tau - rate * p.t) / period);
+    }
+    return std::abs(sum);
+  };
+  const auto best_of = [&](double low, double high, double step) {
+    double best = low;
+    double most = -1;
+    for (double rate = low; rate <= high; rate += step) {
+      const double r = resultant(rate);
+      if (r > most) {
+        most = r;
+        best = rate;
+      }
+    }
+    return best;
+  };
+  const double expected = options.expected.value() * 1e-6;
+  const double fastest = options.fastest.value() * 1e-6;
+  // Half a lobe of the resultant is period / span wide; an eighth of it can't miss the top.
+  const double step = std::min(period / span / 8, fastest / 8);
+  const double coarse = best_of(expected - fastest, expected + fastest, step);
+  return best_of(coarse - step, coarse + step, step / 8);
+}
+
+struct Line {
+  double middle;  ///< weighted mean of t
+  double level;   ///< at the middle
+  double rate;
+  double level_variance;
+  double rate_variance;
+};
+
+Line weighted_line(const std::vector<Point>& points, const std::vector<double>& weights) {
+  double w = 0;
+  double wt = 0;
+  double wy = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    w += weights[i];
+    wt += weights[i] * points[i].t;
+    wy += weights[i] * points[i].tau;
+  }
+  Line line{wt / w, wy / w, 0, 1 / w, 0};
+  double tt = 0;
+  double ty = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const double t = points[i].t - line.middle;
+    tt += weights[i] * square(t);
+    ty += weights[i] * t * (points[i].tau - line.level);
+  }
+  line.rate = ty / tt;
+  line.rate_variance = 1 / tt;
+  return line;
+}
+
+double median(std::vector<double> v) {
+  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+  std::nth_element(v.begin(), middle, v.end());
+  return *middle;
+}
+
+/// Iteratively reweighted least squares. The scatter may be wider than the sigmas say, never narrower.
+Line robust_line(const std::vector<Point>& points) {
+  std::vector<double> weights(points.size());
+  std::vector<double> deviations(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) weights[i] = 1 / square(points[i].sigma);
+  Line line = weighted_line(points, weights);
+  double scale = 1;
+  for (int round = 0; round < kRobustRounds; ++round) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Point& p = points[i];
+      deviations[i] = std::abs(p.tau - line.level - line.rate * (p.t - line.middle)) / p.sigma;
+    }
+    scale = std::max(1.0, 1.4826 * median(deviations));
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const double deviation = deviations[i] / scale;
+      weights[i] = std::min(1.0, kHuber / std::max(deviation, 1e-12)) / square(points[i].sigma);
+    }
+    line = weighted_line(points, weights);
+  }
+  line.level_variance *= square(scale);
+  line.rate_variance *= square(scale);
+  return line;
+}
+
+/// Leaves the tolerance upwards: the first t >= 0 with error + rate t + curve t^2 / 2 = tolerance.
+double first_reached(double error, double rate, double curve, double tolerance) {
+  const double gap = tolerance - error;
+  if (gap <= 0) return 0;
+  const double root = square(rate) + 2 * curve * gap;
+  if (root < 0) return std::numeric_limits<double>::infinity();
+  const double down = rate + std::sqrt(root);  // 2 gap / down is the nearer root, without a difference
+  return down > 0 ? 2 * gap / down : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace
+
+Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions& options) {
+  std::vector<Point> points;
+  TimePoint first;
+  double span = 0;
+  for (const PhaseSample& s : samples) {
+    if (s.phase.state != PhaseState::known) continue;
+    if (points.empty()) first = s.at;
+    const double t = (s.at - first).value();
+    // A sigma of zero would be a sample that can't be wrong.
+    points.push_back({t, s.phase.tau.value(), std::max(s.phase.sigma.value(), 1e-12)});
+  }
+  if (!points.empty()) {
+    const auto [low, high] = std::minmax_element(points.begin(), points.end(),
+                                                 [](const Point& a, const Point& b) { return a.t < b.t; });
+    span = high->t - low->t;
+  }
+  if (points.size() < 3 || span <= 0) {
+    return Error{ErrorKind::bad_input, "a drift needs three frames with a dot, at different times", "drift",
+                 "film the strobe for longer"};
+  }
+
+  const double period = options.period.value();
+  const double gathered = gathering_rate(points, span, options);
+  std::complex<double> sum = 0;
+  for (const Point& p : points)
+    sum += std::polar(1 / square(p.sigma), 2 * std::numbers::pi * (p.tau - gathered * p.t) / period);
+  const double centre = std::arg(sum) / (2 * std::numbers::pi) * period;
+  for (Point& p : points) p.tau = wrap_symmetric(p.tau - gathered * p.t - centre, period);
+  Line line = robust_line(points);
+  line.level += centre + gathered * line.middle;
+  line.rate += gathered;
+
+  const double row_time = options.row_time.value();
+  const Seconds resolution =
+      row_time > 0 ? row_resolution(options.row_time, options.flash_width) : Seconds(0);
+  line.level_variance += square(resolution.value());
+  line.rate_variance += square(staircase_rate_error(resolution, Seconds(span)));
+  std::optional<StairFit> stairs;
+  if (resolution > Seconds(0)) {
+    std::vector<StairPoint> seen;
+    for (const PhaseSample& s : samples) {
+      if (!s.shifted || s.phase.state != PhaseState::known) continue;
+      seen.push_back({Eigen::Vector2d(1, (s.at - first).value() - line.middle), s.shifted->rows.value(),
+                      s.shifted->sigma.value()});
+    }
+    if (seen.size() >= 3) {
+      stairs = fit_stairs(seen, {.line = Eigen::Vector2d(line.level / row_time, line.rate / row_time),
+                                 .covariance = Eigen::Vector2d(square(0.5), square(1 / span)).asDiagonal(),
+                                 .turn = period / row_time,
+                                 .width = (options.flash_width / options.row_time).value()});
+    }
+  }
+  Drift drift;
+  drift.at = first + Seconds(line.middle);
+  drift.samples = static_cast<int>(points.size());
+  double level = line.level;
+  double level_sigma = std::sqrt(line.level_variance);
+  double rate = line.rate;
+  double rate_sigma = std::sqrt(line.rate_variance);
+  if (stairs) {
+    level = stairs->line(0) * row_time;
+    level_sigma = stairs->sigma(0) * row_time;
+    rate = stairs->line(1) * row_time;
+    rate_sigma = stairs->sigma(1) * row_time;
+  }
+  drift.tau = wrap_positive(Seconds(level), options.period);
+  const Rows shifted = row_time > 0 ? drift.tau / options.row_time : Rows(0);
+  drift.tau_sigma = Seconds(std::hypot(level_sigma, (shifted * options.row_time_sigma).value()));
+  drift.rate = PartsPerMillion(rate * 1e6);
+  drift.rate_sigma = PartsPerMillion(rate_sigma * 1e6);
+  return drift;
+}
+
+Phase phase_at(const Drift& line, TimePoint at, Seconds period) {
+  const double elapsed = (at - line.at).value();
+  return {PhaseState::known,
+          wrap_positive(line.tau + Seconds(line.rate.value() * 1e-6 * elapsed), period),
+          Seconds(std::hypot(line.tau_sigma.value(), line.rate_sigma.value() * 1e-6 * elapsed)),
+          {}};
+}
+
+Drift difference(const Drift& a, const Drift& b, Seconds period) {
+  // Between the two middles both phases are known best.
+  const double wa = 1 / std::max(square(a.rate_sigma.value()), 1e-18);
+  const double wb = 1 / std::max(square(b.rate_sigma.value()), 1e-18);
+  const TimePoint at = a.at + (b.at - a.at) * (wb / (wa + wb));
+  const Phase pa = phase_at(a, at, period);
+  const Phase pb = phase_at(b, at, period);
+  return {.at = at,
+          .tau = wrap_positive(pa.tau - pb.tau, period),
+          .tau_sigma = Seconds(std::hypot(pa.sigma.value(), pb.sigma.value())),
+          .rate = a.rate - b.rate,
+          .rate_sigma = PartsPerMillion(std::hypot(a.rate_sigma.value(), b.rate_sigma.value())),
+          .samples = std::min(a.samples, b.samples)};
+}
+
+Hertz frame_rate(const Drift& line, Hertz flash_rate) {
+  return flash_rate * (1 / (1 - line.rate.value() * 1e-6));
+}
+
+TimeLeft time_left(const Drift& error, TimePoint now, const TimeLeftOptions& options) {
+  const double elapsed = (now - error.at).value();
+  const double rate = error.rate.value() * 1e-6;
+  const double curve = options.wander_per_minute.value() * 1e-6 / 60;
+  // What wandered between the fit's middle and now is unknown as well.
+  const double wandered = curve * std::abs(elapsed);
+  const double rate_spread = options.sigmas * error.rate_sigma.value() * 1e-6 + wandered;
+  const double level = wrap_symmetric(error.tau.value() + rate * elapsed, options.period.value());
+  const double level_spread =
+      options.sigmas * std::hypot(error.tau_sigma.value(), error.rate_sigma.value() * 1e-6 * elapsed) +
+      wandered * std::abs(elapsed) / 2;
+  const double bound = options.tolerance.value();
+  if (std::abs(level) > bound) return {};
+
+  TimeLeft left;
+  const auto leaves = [&](double e, double r, double c) {
+    return std::min(first_reached(e, r, c, bound), first_reached(-e, -r, c, bound));
+  };
+  left.expected = Seconds(leaves(level, rate, 0));
+  double earliest = left.expected.value();
+  for (const double e : {level - level_spread, level + level_spread}) {
+    for (const double r : {rate - rate_spread, rate + rate_spread})
+      earliest = std::min(earliest, leaves(e, r, curve));
+  }
+  left.earliest = Seconds(earliest);
+  // The slowest way out starts as far from the bound as may be, and brakes; one that may stand still stays
+  // for ever.
+  const double sign = std::copysign(1.0, rate);
+  const double slowest = std::abs(rate) - rate_spread;
+  const double start = std::max(sign * level - level_spread, -bound);
+  left.latest = Seconds(slowest > 0 ? first_reached(start, slowest, -curve, bound)
+                                    : std::numeric_limits<double>::infinity());
+  return left;
+}
+
+}  // namespace emberlock

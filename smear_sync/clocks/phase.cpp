@@ -1,0 +1,259 @@
+#include "smear_sync/clocks/phase.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <optional>
+
+#include "smear_sync/clocks/staircase.h"
+
+namespace emberlock {
+namespace {
+
+constexpr double kOutlierSigmas = 5;
+
+double square(double x) { return x * x; }
+
+/// A frame that shows a dot, as a point on the circle at a common instant.
+struct Point {
+  double seconds;  ///< when the frame came, against that instant
+  double tau;
+  double sigma;
+};
+
+std::vector<Point> points_at(std::span<const PhaseSample> samples, TimePoint at,
+                             const CircleOptions& options) {
+  std::vector<Point> points;
+  for (const PhaseSample& s : samples) {
+    if (s.phase.state != PhaseState::known) continue;
+    const double elapsed = (at - s.at).value();
+    const double walked = options.beat.rate.value() * 1e-6 * elapsed;
+    const double unsure = options.beat.sigma.value() * 1e-6 * elapsed;
+    points.push_back({-elapsed, s.phase.tau.value() + walked, std::hypot(s.phase.sigma.value(), unsure)});
+  }
+  return points;
+}
+
+/// The point that is nearest to all the others: a median that knows no beginning of the circle.
+double circular_median(const std::vector<Point>& points, double period) {
+  double best = 0;
+  double best_sum = std::numeric_limits<double>::infinity();
+  for (const Point& candidate : points) {
+    double sum = 0;
+    for (const Point& p : points) sum += std::abs(wrap_symmetric(p.tau - candidate.tau, period));
+    if (sum < best_sum) {
+      best_sum = sum;
+      best = candidate.tau;
+    }
+  }
+  return best;
+}
+
+/// The points, as offsets from the centre, without those that disagree with it.
+std::vector<Point> offsets_that_agree(std::vector<Point> points, double centre, double period) {
+  for (Point& p : points) p.tau = wrap_symmetric(p.tau - centre, period);
+  // The centre is itself one of the points, with an error of its own.
+  std::erase_if(points, [](const Point& p) {
+    return std::abs(p.tau) > kOutlierSigmas * std::numbers::sqrt2 * p.sigma;
+  });
+  return points;
+}
+
+/// What one camera's frames say about the beat that is left after options.beat was taken out: a weighted
+/// line.
+struct Slope {
+  double rate;
+  double variance;
+};
+
+std::optional<Slope> slope_of(std::span<const PhaseSample> samples, TimePoint at,
+                              const CircleOptions& options) {
+  std::vector<Point> points = points_at(samples, at, options);
+  if (points.size() < 3) return std::nullopt;
+  const double period = options.period.value();
+  const double centre = circular_median(points, period);
+  points = offsets_that_agree(std::move(points), centre, period);
+  if (points.size() < 3) return std::nullopt;
+  double w = 0;
+  double wx = 0;
+  double wy = 0;
+  for (const Point& p : points) {
+    w += 1 / square(p.sigma);
+    wx += p.seconds / square(p.sigma);
+    wy += p.tau / square(p.sigma);
+  }
+  double xx = 0;
+  double xy = 0;
+  for (const Point& p : points) {
+    const double x = p.seconds - wx / w;
+    xx += square(x) / square(p.sigma);
+    xy += x * (p.tau - wy / w) / square(p.sigma);
+  }
+  if (xx <= 0) return std::nullopt;
+  const auto [first, last] = std::minmax_element(
+      points.begin(), points.end(), [](const Point& a, const Point& b) { return a.seconds < b.seconds; });
+  const double span = last->seconds - first->seconds;
+  return Slope{xy / xx, 1 / xx + square(staircase_rate_error(options.resolution, Seconds(span)))};
+}
+
+/// Why most of the frames without a phase have none, and whether moving the strobe may help.
+Phase majority_of_unknown(std::span<const PhaseSample> samples) {
+  std::map<std::string, int> counts[2];
+  int totals[2] = {0, 0};
+  for (const PhaseSample& s : samples) {
+    if (s.phase.state == PhaseState::known) continue;
+    const int unusable = s.phase.state == PhaseState::unusable ? 1 : 0;
+    ++totals[unusable];
+    ++counts[unusable][s.phase.reason];
+  }
+  const int which = totals[1] > totals[0] ? 1 : 0;
+  Phase phase{which == 1 ? PhaseState::unusable : PhaseState::blind, {}, {}, {}};
+  int most = 0;
+  for (const auto& [reason, count] : counts[which]) {
+    if (count > most) {
+      most = count;
+      phase.reason = reason;
+    }
+  }
+  return phase;
+}
+
+/// Of a reading with a lamp and one dot.
+ShiftedRows shifted_rows(const SmearReading& reading, const CcdTiming& timing) {
+  const DotReading& dot = reading.dots.front();
+  const Rows below = static_cast<double>(timing.direction) * (dot.y - reading.lamp->y);
+  return {wrap_positive(below, Rows(timing.shifts)),
+          Rows(std::hypot(dot.sigma.value(), reading.lamp->sigma.value()))};
+}
+
+}  // namespace
+
+std::string_view name(PhaseState state) {
+  switch (state) {
+    case PhaseState::known:
+      return "known";
+    case PhaseState::blind:
+      return "blind";
+    case PhaseState::unusable:
+      return "unusable";
+  }
+  return "unknown";
+}
+
+Seconds row_resolution(SecondsPerRow row_time, Seconds flash_width) {
+  const double w = std::clamp((flash_width / row_time).value(), 0.0, 1.0);
+  return Rows(std::pow(1 - w, 1.5) / std::sqrt(12.0)) * row_time;
+}
+
+double staircase_rate_error(Seconds resolution, Seconds span) { return 2.1 * (resolution / span); }
+
+Phase phase_of(const SmearReading& reading, const CcdTiming& timing, Seconds flash_width) {
+  Phase phase{PhaseState::unusable, {}, {}, reading.reason};
+  switch (reading.state) {
+    case SmearState::dot:
+      break;
+    case SmearState::no_dot:
+    case SmearState::blind:
+      phase.state = PhaseState::blind;
+      return phase;
+    case SmearState::comb:
+      phase.reason = "several dots: the strobe flashes faster than the camera films";
+      return phase;
+    case SmearState::steady:
+      phase.reason = "a full-height line: the lamp shines all the time, or flashes far too fast";
+      return phase;
+    case SmearState::saturated:
+    case SmearState::ambiguous:
+    case SmearState::no_lamp:
+      return phase;
+  }
+  if (!reading.lamp || reading.dots.size() != 1) {
+    phase.reason = "a dot without its lamp";
+    return phase;
+  }
+  const ShiftedRows shifted = shifted_rows(reading, timing);
+  const double width = (flash_width / timing.row_time).value();
+  const StairMoments x = invert_stair(shifted.rows.value(), shifted.sigma.value(), width);
+  phase.state = PhaseState::known;
+  phase.reason.clear();
+  phase.tau = wrap_positive(Rows(x.mean) * timing.row_time, timing.frame_period);
+  phase.sigma = Rows(x.sigma) * timing.row_time;
+  return phase;
+}
+
+PhaseSample sample_of(const SmearReading& reading, const CcdTiming& timing, Seconds flash_width,
+                      TimePoint read_start) {
+  PhaseSample sample{read_start, phase_of(reading, timing, flash_width)};
+  if (sample.phase.state != PhaseState::known) return sample;
+  sample.shifted = shifted_rows(reading, timing);
+  const Rows below = static_cast<double>(timing.direction) * (reading.dots.front().y - reading.lamp->y);
+  sample.at = read_start + sample.phase.tau;
+  if (below < Rows(0)) sample.at = sample.at - timing.frame_period;
+  return sample;
+}
+
+Beat expected_beat(Hertz strobe_rate, Seconds period, PartsPerMillion sigma) {
+  return {PartsPerMillion((1 / (strobe_rate * period) - 1) * 1e6), sigma};
+}
+
+Phase combine(std::span<const PhaseSample> samples, TimePoint at, const CircleOptions& options) {
+  if (samples.empty()) return {PhaseState::unusable, {}, {}, "no frames came"};
+  const std::vector<Point> points = points_at(samples, at, options);
+  if (points.empty() || points.size() * 2 < samples.size()) return majority_of_unknown(samples);
+
+  const double period = options.period.value();
+  const double centre = circular_median(points, period);
+  const std::vector<Point> agreeing = offsets_that_agree(points, centre, period);
+  if (agreeing.size() * 2 <= points.size()) {
+    return {PhaseState::unusable, {}, {}, "its dots stand at different rows from frame to frame"};
+  }
+  double weights = 0;
+  double moment = 0;
+  for (const Point& p : agreeing) {
+    const double w = 1 / square(p.sigma);
+    weights += w;
+    moment += w * p.tau;
+  }
+  Phase phase{PhaseState::known, {}, {}, {}};
+  phase.tau = wrap_positive(Seconds(centre + moment / weights), options.period);
+  phase.sigma = Seconds(std::sqrt(1 / weights + square(options.resolution.value())));
+  return phase;
+}
+
+CommonPhases refer(std::span<const std::vector<PhaseSample>> samples, const CircleOptions& options) {
+  TimePoint first{std::numeric_limits<std::int64_t>::max()};
+  TimePoint last{std::numeric_limits<std::int64_t>::min()};
+  for (const auto& camera : samples) {
+    for (const PhaseSample& s : camera) {
+      first = std::min(first, s.at);
+      last = std::max(last, s.at);
+    }
+  }
+  CommonPhases common;
+  common.beat = options.beat;
+  if (first <= last) common.at = {first.ns + (last.ns - first.ns) / 2};
+
+  // What was known before counts as one more camera.
+  const double known_before = options.beat.sigma.value() * 1e-6;
+  if (known_before > 0) {
+    double weights = 1 / square(known_before);
+    double moment = 0;
+    for (const auto& camera : samples) {
+      if (const auto slope = slope_of(camera, common.at, options)) {
+        weights += 1 / slope->variance;
+        moment += slope->rate / slope->variance;
+      }
+    }
+    common.beat.rate += PartsPerMillion(moment / weights * 1e6);
+    common.beat.sigma = PartsPerMillion(std::sqrt(1 / weights) * 1e6);
+  }
+
+  CircleOptions refined = options;
+  refined.beat = common.beat;
+  for (const auto& camera : samples) common.phases.push_back(combine(camera, common.at, refined));
+  return common;
+}
+
+}  // namespace emberlock

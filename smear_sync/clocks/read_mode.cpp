@@ -1,0 +1,282 @@
+#include "smear_sync/clocks/read_mode.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <numbers>
+#include <set>
+#include <vector>
+
+#include <Eigen/Dense>
+#include <fmt/format.h>
+
+namespace emberlock {
+namespace {
+
+constexpr double kRowScatter = 0.35;  // of one dot: whole rows, and the fit of a faint dot
+constexpr double kStray = 1.5;        // rows off its walk: not a dot of this strobe
+constexpr double kLeastPart = 0.7;    // of the dots that must follow
+constexpr double kDecisive = 25;      // difference of chi squares: five standard deviations
+constexpr std::size_t kFewestDots = 4;
+constexpr int kFewestFrames = 3;
+constexpr double kRateSigmas = 3;
+
+double square(double x) { return x * x; }
+
+struct Dot {
+  double frame = 0;  ///< against the middle one
+  double below = 0;  ///< the lamp, rows; negative above
+  double sigma = 0;
+};
+
+/// What one direction makes of the dots: v = d (y - y_s) t_row gathers at phi + c_side - i T modulo P.
+struct Walk {
+  double cost = std::numeric_limits<double>::infinity();
+  double frame_period_change = 0;  ///< of T, seconds
+  double frame_period_sigma = 0;
+  std::array<double, 2> place{};  ///< seconds: of the side reached first, and of the one after the wrap
+  std::array<int, 2> dots{};
+  std::array<std::set<long>, 2> rows;  ///< that dots stood in: whole rows err alike
+  double residual = 0;                 ///< RMS, rows
+};
+
+std::vector<Dot> dots_of(std::span<const FrameReading> frames) {
+  std::vector<double> lamps;
+  for (const FrameReading& f : frames) {
+    if (f.reading.lamp && !f.reading.dots.empty()) lamps.push_back(f.reading.lamp->y.value());
+  }
+  std::vector<Dot> dots;
+  if (lamps.empty()) return dots;
+  // The lamp stands still: its median errs less than each frame's.
+  const auto middle = lamps.begin() + static_cast<std::ptrdiff_t>(lamps.size() / 2);
+  std::nth_element(lamps.begin(), middle, lamps.end());
+  const std::size_t half = frames.size() / 2;
+  const auto centre = static_cast<double>(frames[half].frame);
+  for (const FrameReading& f : frames) {
+    const bool readable = f.reading.state == SmearState::dot || f.reading.state == SmearState::comb;
+    if (!readable) continue;
+    for (const DotReading& dot : f.reading.dots) {
+      dots.push_back({static_cast<double>(f.frame) - centre, dot.y.value() - *middle, dot.sigma.value()});
+    }
+  }
+  return dots;
+}
+
+class Fit {
+ public:
+  Fit(const std::vector<Dot>& dots, const ReadModeOptions& o)
+      : dots_(dots),
+        row_time_(o.row_time.value()),
+        period_(1 / o.frame_rate.value()),
+        flash_period_(1 / o.flash_rate.value()),
+        rate_sigma_(o.rate_sigma.value() * 1e-6 * period_) {
+    double first = 0;
+    double last = 0;
+    for (const Dot& d : dots) {
+      first = std::min(first, d.frame);
+      last = std::max(last, d.frame);
+    }
+    span_ = last - first;
+  }
+
+  /// The walk under one direction, T free about the nominal one.
+  [[nodiscard]] Walk along(int direction) const {
+    const double change = gathering(direction);
+    Walk walk;
+    walk.frame_period_change = change;
+    for (const int side : {0, 1}) {
+      const std::complex<double> sum = gathered(direction, side, change);
+      walk.place[static_cast<std::size_t>(side)] = std::arg(sum) / (2 * std::numbers::pi) * flash_period_;
+    }
+    for (int round = 0; round < 4; ++round) straighten(direction, round == 0 ? 4 * kStray : kStray, walk);
+    return walk;
+  }
+
+ private:
+  [[nodiscard]] static int side(const Dot& dot, int direction) { return direction * dot.below < 0 ? 1 : 0; }
+  [[nodiscard]] double seconds(const Dot& dot, int direction) const {
+    return direction * dot.below * row_time_ + dot.frame * period_;
+  }
+  [[nodiscard]] std::complex<double> gathered(int direction, int which, double change) const {
+    std::complex<double> sum = 0;
+    for (const Dot& dot : dots_) {
+      if (side(dot, direction) != which) continue;
+      sum += std::polar(
+          1.0, 2 * std::numbers::pi * (seconds(dot, direction) + dot.frame * change) / flash_period_);
+    }
+    return sum;
+  }
+  /// The change of T under which the dots of each side stand together best.
+  [[nodiscard]] double gathering(int direction) const {
+    const double reach = kRateSigmas * rate_sigma_;
+    const double step = flash_period_ / std::max(span_, 1.0) / 8;
+    double best = 0;
+    double most = -1;
+    for (double at = -std::floor(reach / step) * step; at <= reach; at += step) {
+      const double sum = std::abs(gathered(direction, 0, at)) + std::abs(gathered(direction, 1, at));
+      if (sum > most) {
+        most = sum;
+        best = at;
+      }
+    }
+    return best;
+  }
+  /// Least squares for T and the two sides' places, T held by what was known before; dots further than
+  /// `stray` rows cost no more than a stray.
+  void straighten(int direction, double stray, Walk& walk) const {
+    Eigen::Matrix3d matrix =
+        Eigen::Vector3d(1e-9, 1e-9, square(kRowScatter * row_time_ / rate_sigma_)).asDiagonal();
+    Eigen::Vector3d right(0, 0, -walk.frame_period_change * matrix(2, 2));
+    walk.dots = {};
+    walk.rows = {};
+    double squares = 0;
+    double cost = 0;
+    for (const Dot& dot : dots_) {
+      const auto s = static_cast<std::size_t>(side(dot, direction));
+      const double at = seconds(dot, direction) + dot.frame * walk.frame_period_change;
+      const double off = wrap_symmetric(at - walk.place[s], flash_period_);
+      cost += std::min(square(off / row_time_), square(kStray)) / square(kRowScatter);
+      if (std::abs(off) > stray * row_time_) continue;
+      Eigen::Vector3d v(s == 0 ? 1 : 0, s == 1 ? 1 : 0, -dot.frame);
+      matrix += v * v.transpose();
+      right += v * off;
+      squares += square(off / row_time_);
+      ++walk.dots[s];
+      walk.rows[s].insert(std::lround(dot.below));
+    }
+    const Eigen::Vector3d move = matrix.ldlt().solve(right);
+    walk.cost = cost + square(walk.frame_period_change / rate_sigma_);
+    walk.residual = std::sqrt(squares / std::max(1, walk.dots[0] + walk.dots[1]));
+    walk.place[0] += move.x();
+    walk.place[1] += move.y();
+    walk.frame_period_change += move.z();
+    walk.frame_period_sigma = kRowScatter * row_time_ * std::sqrt(matrix.inverse()(2, 2));
+  }
+
+  const std::vector<Dot>& dots_;
+  double row_time_, period_, flash_period_, rate_sigma_;
+  double span_ = 0;
+};
+
+Status check(const ReadModeOptions& o) {
+  const double values[] = {o.flash_rate.value(), o.frame_rate.value(), o.rate_sigma.value(),
+                           o.row_time.value(), static_cast<double>(o.rows)};
+  for (const double v : values) {
+    if (std::isfinite(v) && v > 0) continue;
+    return Error{ErrorKind::bad_input, "a rate, its error, the row time or the number of rows isn't positive",
+                 "read mode", "give the strobe's and the camera's rates in hertz and t_row from a comb"};
+  }
+  return {};
+}
+
+/// Whether, and why, one of the two walks is the camera's.
+void decide_direction(const Walk& top_first, const Walk& bottom_first, std::size_t dots, int frames,
+                      const ReadModeOptions& o, ReadMode& mode) {
+  const bool top = top_first.cost <= bottom_first.cost;
+  const Walk& best = top ? top_first : bottom_first;
+  const double follow = static_cast<double>(best.dots[0] + best.dots[1]);
+  // Rows a frame that flashes walk: what is left of T after whole flash periods.
+  const double flash_period = 1 / o.flash_rate.value();
+  const double walk = wrap_symmetric(-1 / o.frame_rate.value(), flash_period) / o.row_time.value();
+  if (dots < kFewestDots || frames < kFewestFrames) {
+    mode.direction_reason = fmt::format("only {} frames show dots: film the strobe for longer", frames);
+    return;
+  }
+  if (follow < kLeastPart * static_cast<double>(dots)) {
+    mode.direction_reason = fmt::format(
+        "the dots walk neither way as {:.4f} flashes a second at {:.4f} frames a second would: "
+        "check both rates, and that no frames were lost",
+        o.flash_rate.value(), o.frame_rate.value());
+    return;
+  }
+  if (std::abs(top_first.cost - bottom_first.cost) < kDecisive) {
+    mode.direction_reason = fmt::format(
+        "flashes at {:.4f}/s walk {:.3f} rows a frame, which tells too little in {} frames: detune the "
+        "strobe by about {:.3f} flashes a second",
+        o.flash_rate.value(), walk, frames, 0.01 * o.frame_rate.value());
+    return;
+  }
+  // Near a whole number of flashes a frame the other direction may be told, of a camera that can't be.
+  const double off = -best.frame_period_change * o.frame_rate.value() * 1e6;
+  if (std::abs(off) > kRateSigmas * o.rate_sigma.value()) {
+    mode.direction_reason = fmt::format(
+        "the dots' walk wants a frame rate {:.0f} ppm off {:.4f}, believed to {:.0f} ppm: check both rates",
+        off, o.frame_rate.value(), o.rate_sigma.value());
+    return;
+  }
+  mode.direction = top ? ReadDirection::top_first : ReadDirection::bottom_first;
+  mode.direction_reason = fmt::format("the dots walk as with the {} row read first, to {:.2f} rows RMS",
+                                      top ? "top" : "bottom", best.residual);
+}
+
+/// K from how far apart the two sides of the lamp stand: c_after - c_first = T - K t_row modulo P.
+void find_shifts(const Walk& walk, const ReadModeOptions& o, ReadMode& mode) {
+  if (walk.dots[0] < 2 || walk.dots[1] < 2) {
+    mode.shifts_reason =
+        "the dots stood on one side of the lamp only: detune the strobe until they have crossed over";
+    return;
+  }
+  const double row_time = o.row_time.value();
+  const double frame_period = 1 / o.frame_rate.value() + walk.frame_period_change;
+  const double modulo = 1 / o.flash_rate.value() / row_time;
+  const double measured = (frame_period - (walk.place[1] - walk.place[0])) / row_time;
+  // Dots in the same row err alike, however many frames show them.
+  double variance = square(measured * o.row_time_sigma.value() / row_time);
+  for (const auto& rows : walk.rows) variance += square(kRowScatter) / static_cast<double>(rows.size());
+  const double sigma = std::sqrt(variance);
+  mode.shifts_sigma = Rows(sigma);
+  mode.shifts_modulo = Rows(modulo);
+  const double most = std::floor(frame_period / row_time + 2 * sigma);
+  mode.shifts_measured =
+      Rows(o.rows + wrap_symmetric(measured - (o.rows + most) / 2, modulo) + (most - o.rows) / 2);
+  std::vector<int> fitting;
+  const double reach = std::max(0.5, 2.5 * sigma);
+  for (int k = o.rows; k <= static_cast<int>(most); ++k) {
+    if (std::abs(wrap_symmetric(k - measured, modulo)) <= reach) fitting.push_back(k);
+  }
+  if (fitting.size() == 1) {
+    mode.shifts = fitting.front();
+    mode.shifts_reason = fmt::format("the two sides of the lamp say {:.2f} +- {:.2f} rows",
+                                     mode.shifts_measured.value(), sigma);
+  } else if (fitting.empty()) {
+    mode.shifts_reason = fmt::format(
+        "{:.2f} rows, which the two sides of the lamp say, lie outside of n = {} to T / t_row = {:.1f}: "
+        "check t_row and the number of rows",
+        mode.shifts_measured.value(), o.rows, frame_period / row_time);
+  } else {
+    mode.shifts_reason =
+        fmt::format("{} to {} fit, modulo {:.2f} rows: film for longer, with fewer flashes a second",
+                    fitting.front(), fitting.back(), modulo);
+  }
+}
+
+}  // namespace
+
+Result<ReadMode> find_read_mode(std::span<const FrameReading> frames, const ReadModeOptions& options) {
+  EMBERLOCK_RETURN_IF_ERROR(check(options));
+  ReadMode mode;
+  const std::vector<Dot> dots = dots_of(frames);
+  std::set<double> shown;
+  for (const Dot& dot : dots) shown.insert(dot.frame);
+  mode.frames = static_cast<int>(shown.size());
+  const Fit fit(dots, options);
+  const Walk down = fit.along(+1);
+  const Walk up = fit.along(-1);
+  decide_direction(down, up, dots.size(), mode.frames, options, mode);
+  if (!mode.direction) {
+    mode.shifts_reason = "the read direction isn't known";
+    return mode;
+  }
+  const Walk& walk = mode.direction == ReadDirection::top_first ? down : up;
+  mode.residual = Rows(walk.residual);
+  mode.dots = walk.dots[0] + walk.dots[1];
+  const double period = 1 / options.frame_rate.value();
+  mode.frame_rate_error = PartsPerMillion((period / (period + walk.frame_period_change) - 1) * 1e6);
+  mode.frame_rate_sigma = PartsPerMillion(walk.frame_period_sigma / period * 1e6);
+  find_shifts(walk, options, mode);
+  return mode;
+}
+
+}  // namespace emberlock

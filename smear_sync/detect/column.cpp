@@ -1,0 +1,191 @@
+#include "smear_sync/detect/column.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "smear_sync/detect/column_patch.h"
+#include "smear_sync/detect/dot_search.h"
+
+namespace emberlock::detail {
+namespace {
+
+constexpr double kQuantiserGate = 2;  // its errors aren't Gaussian: rare blocks keep one whole coefficient
+constexpr double kQuantiserSpread =
+    4;  // and are shared by whole blocks and films, so that positions scatter more
+// Grey levels: what is weaker is what a compressor leaves of noise, and up to the second may be.
+constexpr double kQuantiserWeakest = 1.5;
+constexpr double kQuantiserSure = 4;
+constexpr double kEightBitSure =
+    2.5;  // and in frames of 8 bits that don't look compressed: a gentle compressor's
+
+enum class Verdict { dot, suspect, half_field, nothing };
+
+/// Whether the spot hangs on the rows that lamp and bloom hide, with no valley between: then it is their
+/// flank, or can't be told from it.
+bool attached(const Column& c, const DotFit& f) {
+  const int guard = static_cast<int>(std::ceil(f.radius + 2));
+  const int row = static_cast<int>(std::lround(f.y));
+  const int towards = f.y < c.y ? 1 : -1;
+  double lowest = c.core_mean(std::clamp(row, 0, c.patch.height - 1));
+  const double valley = lowest - std::max(0.5 * f.amplitude, 4 * c.noise / std::sqrt(2.0 * c.core() + 1));
+  for (int i = 0; i <= guard; ++i) {
+    const int y = row + i * towards;
+    if (y < 0 || y >= c.patch.height) return false;
+    if (!c.visible(y)) return lowest > valley;
+    lowest = std::min(lowest, c.core_mean(y));
+  }
+  return false;
+}
+
+/// Whether the spot has the lamp's shape: a part of its size, as bright everywhere, fitted well and in one
+/// place.
+bool lamp_like(const Column& c, const DotFit& f, const Evenness& e) {
+  constexpr double kLoosest = 0.7;  // rows: so wide and faint a spot is a level's unevenness
+  return f.misfit <= 1.6 + 0.12 * f.amplitude / c.noise && e.least_half > 0.4 - 3 * e.half_sigma &&
+         f.radius <= 1.4 * c.radius + 0.7 && f.sigma_y < kLoosest;
+}
+
+Verdict judge(const Column& c, const DotFit& f, const FitWindow& w, double min_snr,
+              const DetectOptions& options) {
+  if (f.amplitude <= (c.compressed ? kQuantiserWeakest / c.sample_level : 0) || f.snr < min_snr)
+    return Verdict::nothing;
+  if (f.y < -0.5 || f.y > c.patch.height - 0.5 || f.radius > 2.2 * c.radius + 2 || attached(c, f))
+    return Verdict::nothing;
+  // What is left of a halo whose shape isn't quite round looks like a dot of a part of it.
+  if (f.amplitude < 0.3 * c.halo_at(std::abs(f.y - c.y))) return Verdict::nothing;
+  const Evenness e = evenness(c.patch, w, f, c.noise);
+  // Hot pixels: much smaller than the lamp, or nearly all of the light in a pixel or two.
+  const double smallest = std::max(0.7, 0.33 * c.radius);
+  if (f.radius < smallest || e.brightest_two > 0.62) return Verdict::nothing;
+  // Charge moves along its column and no other; only the lamp's own place is a little uncertain.
+  if (std::abs(f.x - c.x) > std::max(0.5, 0.12 * c.radius) + 3 * f.sigma_x) return Verdict::nothing;
+  if (e.least_field < 0.35 && e.least_field + 4 * e.half_sigma < 0.9 && e.least_half > 0.4)
+    return Verdict::half_field;
+  if (!lamp_like(c, f, e) || f.snr < options.min_dot_snr) return Verdict::suspect;
+  const double sure = c.compressed ? kQuantiserSure : c.eight_bits ? kEightBitSure : 0;
+  if (f.amplitude * c.sample_level < sure) return Verdict::suspect;
+  return c.compressed && f.snr < kQuantiserGate * min_snr ? Verdict::suspect : Verdict::dot;
+}
+
+/// The lamp's lane against its neighbours, in blocks of rows: a line is there in nearly all of them.
+void find_line(const Column& c, ColumnReading& reading) {
+  const int core = c.core();
+  const int centre = static_cast<int>(std::lround(c.x));
+  std::vector<float> beside;
+  double inside = 0;
+  int columns_inside = 0;
+  int clipped = 0;
+  for (int x = 0; x < c.patch.width; ++x) {
+    const float level = (c.level[static_cast<std::size_t>(x)] +
+                         c.level[static_cast<std::size_t>(c.patch.stride) + static_cast<std::size_t>(x)]) /
+                        2;
+    if (std::abs(x - centre) <= core) {
+      inside += static_cast<double>(level);
+      ++columns_inside;
+      if (level > 0.9 * c.saturation) ++clipped;
+    } else if (std::abs(x - centre) > 2 * c.radius + 4) {
+      beside.push_back(level);
+    }
+  }
+  reading.clipped = 2 * clipped > columns_inside;
+  if (beside.size() < 4 || columns_inside == 0) return;
+  std::vector<float> deviations = beside;
+  const float outside = median(beside);
+  for (float& v : deviations) v -= outside;
+  const double spread = robust_scale(deviations);  // of one column's level, fixed pattern included
+  reading.line_level = inside / columns_inside - static_cast<double>(outside);
+  const double rows = std::max(1.0, c.patch.height * (1 - reading.hidden));
+  const double error =
+      std::hypot(c.noise / std::sqrt(rows * columns_inside), spread / std::sqrt(columns_inside));
+  if (reading.line_level < std::max(6 * error, 0.25 / c.sample_level)) return;
+  constexpr int kBlock = 16;
+  int blocks = 0;
+  int bright = 0;
+  for (int top = 0; top + kBlock <= c.patch.height; top += kBlock) {
+    double sum = 0;
+    int rows_seen = 0;
+    for (int y = top; y < top + kBlock; ++y) {
+      if (!c.visible(y)) continue;
+      sum += c.core_mean(y);
+      ++rows_seen;
+    }
+    if (rows_seen < kBlock / 2) continue;
+    ++blocks;
+    if (sum / rows_seen + reading.line_level > 0.4 * reading.line_level) ++bright;
+  }
+  reading.line = blocks >= 3 && bright >= 0.85 * blocks;
+}
+
+/// The slope along y that levelling may have left near a row: a part of what it took out, anything beside the
+/// bloom.
+double left_slope(const Column& c, int row) {
+  const double distance = std::abs(row - c.y);
+  const double halo = std::abs(c.halo_at(std::max(0.0, distance - 1)) - c.halo_at(distance + 1)) / 2;
+  const int reach = static_cast<int>(std::ceil(c.radius)) + 12;
+  bool clear = !c.compressed;
+  for (int y = std::max(0, row - reach); y <= std::min(c.patch.height - 1, row + reach); ++y)
+    clear = clear && c.visible(y);
+  constexpr double kNone = 1e-3;  // of the noise, a row
+  return clear ? 0.3 * halo + kNone * c.noise : c.noise;
+}
+
+FitWindow window_around(const Column& c, const Candidate& candidate, int above, int below) {
+  const int reach = static_cast<int>(std::ceil(c.radius)) + 4;
+  const int centre = static_cast<int>(std::lround(c.x));
+  FitWindow w;
+  w.left = std::max(0, centre - c.half_width - 2);
+  w.right = std::min(c.patch.width - 1, centre + c.half_width + 2);
+  w.top = std::max({0, candidate.row - reach, (candidate.row + above) / 2});
+  w.bottom = std::min({c.patch.height - 1, candidate.row + reach, (candidate.row + below + 1) / 2});
+  while (w.top < candidate.row && !c.visible(w.top)) ++w.top;
+  while (w.bottom > candidate.row && !c.visible(w.bottom)) --w.bottom;
+  for (int y = candidate.row; y >= w.top; --y) {
+    if (!c.visible(y)) w.top = y + 1;
+  }
+  for (int y = candidate.row; y <= w.bottom; ++y) {
+    if (!c.visible(y)) w.bottom = y - 1;
+  }
+  return w;
+}
+
+}  // namespace
+
+ColumnReading read_column(const Plane& plane, const Background& background, const Lamp& lamp,
+                          const DetectOptions& options) {
+  ColumnReading reading;
+  Column c = level_column(plane, background, lamp);
+  reading.hidden = static_cast<double>(std::count(c.hidden.begin(), c.hidden.end(), 1)) / c.patch.height;
+  find_line(c, reading);
+  if (reading.clipped) return reading;
+  const Responses found = search_lanes(c, options.min_dot_snr);
+  // Grain that only the lanes show: a quantiser's too.
+  constexpr double kCoarse = 1.5;
+  c.compressed = c.compressed || found.scale > kCoarse;
+  reading.compressed = c.compressed;
+  const double min_snr = std::max(options.min_dot_snr * found.scale, 1.25 * found.extreme);
+  const auto& list = found.candidates;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const int above = i > 0 ? list[i - 1].row : -c.patch.height;
+    const int below = i + 1 < list.size() ? list[i + 1].row : 2 * c.patch.height;
+    const FitWindow window = window_around(c, list[i], above, below);
+    DotFit start;
+    start.x = c.x;
+    start.y = list[i].y;
+    start.radius = list[i].radius;
+    start.amplitude = std::max(1.0, c.core_mean(list[i].row));
+    DotFit fit = fit_dot(c.patch, window, start, {c.noise, left_slope(c, list[i].row)});
+    const Verdict verdict = judge(c, fit, window, min_snr, options);
+    const double inflation = found.scale * (c.compressed ? kQuantiserSpread : 1);
+    fit.sigma_y *= inflation;
+    fit.sigma_x *= inflation;
+    fit.x += c.patch.x0;
+    if (verdict == Verdict::dot) reading.dots.push_back(fit);
+    if (verdict == Verdict::half_field) reading.half_field = true;
+    if (verdict == Verdict::suspect) reading.suspects.push_back(fit);
+  }
+  std::sort(reading.dots.begin(), reading.dots.end(),
+            [](const DotFit& a, const DotFit& b) { return a.y < b.y; });
+  return reading;
+}
+
+}  // namespace emberlock::detail

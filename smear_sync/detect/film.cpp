@@ -1,0 +1,201 @@
+#include "smear_sync/detect/film.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace emberlock {
+namespace {
+
+constexpr double kSamePlace = 0.8;  // rows: what doesn't move stays within
+
+double middle(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+/// Everything in the lamp's column of a frame that is a dot or might be one.
+std::vector<DotReading> all_spots(const SmearReading& reading) {
+  std::vector<DotReading> spots = reading.dots;
+  spots.insert(spots.end(), reading.spots.begin(), reading.spots.end());
+  std::sort(spots.begin(), spots.end(), [](const DotReading& a, const DotReading& b) { return a.y < b.y; });
+  return spots;
+}
+
+/// The rows at which something stands in most of the frames that show anything.
+std::vector<double> standing_rows(std::span<const SmearReading> film) {
+  std::vector<double> rows;
+  int frames = 0;
+  for (const SmearReading& reading : film) {
+    const std::vector<DotReading> spots = all_spots(reading);
+    for (const DotReading& spot : spots) rows.push_back(spot.y.value());
+    if (!spots.empty()) ++frames;
+  }
+  std::vector<double> standing;
+  for (const double row : rows) {
+    const auto near =
+        std::count_if(rows.begin(), rows.end(), [row](double r) { return std::abs(r - row) < kSamePlace; });
+    if (2 * near > frames) standing.push_back(row);
+  }
+  return standing;
+}
+
+bool among(const std::vector<double>& rows, double row) {
+  return std::any_of(rows.begin(), rows.end(), [row](double r) { return std::abs(r - row) < kSamePlace; });
+}
+
+/// The lamps whose dots fall into the columns of the reading's own, top to bottom.
+std::vector<LampReading> lamps_of_column(const SmearReading& reading) {
+  std::vector<LampReading> lamps;
+  const double reach = std::max(0.6, 0.15 * reading.lamp->radius);  // the detector takes no dots from beyond
+  for (const LampReading& lamp : reading.lamps) {
+    if (std::abs(lamp.x - reading.lamp->x) < reach) lamps.push_back(lamp);
+  }
+  if (lamps.empty()) lamps.push_back(*reading.lamp);
+  std::sort(lamps.begin(), lamps.end(), [](const LampReading& a, const LampReading& b) { return a.y < b.y; });
+  return lamps;
+}
+
+/// The one dot of the reading's lamp among the spots that move; nothing when they aren't one for each lamp,
+/// moved alike.
+std::optional<DotReading> own_dot(const SmearReading& reading, const std::vector<DotReading>& moving) {
+  const std::vector<LampReading> lamps = lamps_of_column(reading);
+  if (moving.size() != lamps.size()) return std::nullopt;
+  std::optional<DotReading> own;
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    const Rows shift = moving[i].y - lamps[i].y;
+    const Rows allowed = Rows(1) + 4 * (moving[i].sigma + moving[0].sigma + lamps[i].sigma + lamps[0].sigma);
+    if (abs(shift - (moving[0].y - lamps[0].y)) > allowed) return std::nullopt;
+    if (lamps[i].y == reading.lamp->y) own = moving[i];
+  }
+  if (own) own->side = own->y < reading.lamp->y ? Side::above : Side::below;
+  return own;
+}
+
+}  // namespace
+
+std::optional<LampReading> combine_lamps(std::span<const SmearReading> film) {
+  std::vector<LampReading> lamps;
+  for (const SmearReading& reading : film) {
+    if (reading.lamp) lamps.push_back(*reading.lamp);
+  }
+  const bool clear =
+      std::any_of(lamps.begin(), lamps.end(), [](const LampReading& l) { return !l.saturated; });
+  std::erase_if(lamps, [clear](const LampReading& l) { return clear && l.saturated; });
+  if (lamps.empty()) return std::nullopt;
+  std::vector<double> xs;
+  std::vector<double> ys;
+  for (const LampReading& lamp : lamps) {
+    xs.push_back(lamp.x);
+    ys.push_back(lamp.y.value());
+  }
+  const double x = middle(xs);
+  const double y = middle(ys);
+  std::erase_if(lamps,
+                [&](const LampReading& l) { return std::abs(l.x - x) > 1 || std::abs(l.y.value() - y) > 1; });
+  LampReading mean;
+  double weights = 0;
+  double errors = 0;
+  for (const LampReading& lamp : lamps) {
+    const double weight = 1 / std::pow(std::max(lamp.sigma.value(), 1e-3), 2);
+    weights += weight;
+    mean.x += weight * lamp.x;
+    mean.y += weight * lamp.y;
+    mean.radius += weight * lamp.radius;
+    errors += lamp.sigma.value() / static_cast<double>(lamps.size());
+  }
+  if (lamps.empty()) return std::nullopt;
+  mean.x /= weights;
+  mean.y /= weights;
+  mean.radius /= weights;
+  mean.saturated = !clear;
+  double scatter = 0;
+  for (const LampReading& lamp : lamps) scatter += std::pow((lamp.y - mean.y).value(), 2);
+  const auto n = static_cast<double>(lamps.size());
+  scatter = n > 1 ? std::sqrt(scatter / (n - 1) / n) : 0;
+  const double own = clear ? std::sqrt(1 / weights) : errors;
+  mean.sigma = Rows(std::max(own, scatter));
+  return mean;
+}
+
+std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_travel) {
+  std::vector<SmearReading> settled(film.begin(), film.end());
+  const std::vector<double> standing = standing_rows(film);
+  std::vector<std::optional<DotReading>> dots(film.size());
+  double first = 1e9;
+  double last = -1e9;
+  for (std::size_t i = 0; i < film.size(); ++i) {
+    if (!film[i].lamp) continue;
+    std::vector<DotReading> moving = all_spots(film[i]);
+    std::erase_if(moving, [&](const DotReading& spot) { return among(standing, spot.y.value()); });
+    if (moving.empty()) continue;
+    dots[i] = own_dot(film[i], moving);
+    if (!dots[i]) continue;
+    first = std::min(first, dots[i]->y.value());
+    last = std::max(last, dots[i]->y.value());
+  }
+  const bool moved = Rows(last - first) >= least_travel;
+  for (std::size_t i = 0; i < settled.size(); ++i) {
+    SmearReading& reading = settled[i];
+    // A dot that stands while another spot walks is none either.
+    const bool standing_dot =
+        moved && reading.state == SmearState::dot && among(standing, reading.dots[0].y.value());
+    const bool open =
+        reading.state == SmearState::ambiguous || reading.state == SmearState::comb || standing_dot;
+    if (!open || !reading.lamp) continue;
+    if (moved && dots[i]) {
+      reading.state = SmearState::dot;
+      reading.dots = {*dots[i]};
+      reading.spots.clear();
+      reading.reason = fmt::format("one dot {:.1f} rows {} the lamp, told by its walk from what stands still",
+                                   abs(dots[i]->y - reading.lamp->y).value(), name(dots[i]->side));
+    } else if (standing_dot) {
+      reading.state = SmearState::ambiguous;
+      reading.spots = std::exchange(reading.dots, {});
+      reading.reason = "a spot stands still while the strobe's dots walk: a reflection or hot pixels";
+    } else if (!moved && reading.state == SmearState::ambiguous) {
+      reading.reason += "; nothing moved that would tell, detune the strobe";
+    }
+  }
+  return settled;
+}
+
+std::vector<bool> move_together(std::span<const std::vector<SmearReading>> films) {
+  // Rows from one frame to the next, where both show one dot.
+  std::size_t frames = 0;
+  for (const auto& film : films) frames = std::max(frames, film.size());
+  const auto step = [&](std::size_t camera, std::size_t i) -> std::optional<double> {
+    const auto& film = films[camera];
+    if (i + 1 >= film.size() || film[i].state != SmearState::dot || film[i + 1].state != SmearState::dot)
+      return {};
+    return (film[i + 1].dots[0].y - film[i].dots[0].y).value();
+  };
+  const auto alike = [&](std::size_t a, std::size_t b) {
+    int same = 0;
+    int mirrored = 0;
+    int seen = 0;
+    constexpr double kWholeRows = 1.6;  // either of the two dots may have taken its whole row a frame earlier
+    for (std::size_t i = 0; i < frames; ++i) {
+      const auto of_a = step(a, i);
+      const auto of_b = step(b, i);
+      if (!of_a || !of_b || std::abs(*of_a) < kWholeRows) continue;  // where `a` stands, anything agrees
+      ++seen;
+      if (std::abs(*of_a - *of_b) < kWholeRows) ++same;
+      if (std::abs(*of_a + *of_b) < kWholeRows) ++mirrored;
+    }
+    return seen >= 3 && std::max(same, mirrored) >= 0.8 * seen;
+  };
+  std::vector<bool> together(films.size());
+  for (std::size_t camera = 0; camera < films.size(); ++camera) {
+    std::size_t others = 0;
+    for (std::size_t other = 0; other < films.size(); ++other) {
+      if (other != camera && alike(other, camera) && alike(camera, other)) ++others;
+    }
+    together[camera] = 2 * (others + 1) > films.size();
+  }
+  return together;
+}
+
+}  // namespace emberlock

@@ -1,0 +1,156 @@
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "smear_sync/sensors/exposure_sweep.h"
+#include "smear_sync/sensors/phase_sensor.h"
+#include "smear_sync/sensors/rolling_band.h"
+
+namespace emberlock {
+namespace {
+
+/// Edges that tell a row time.
+constexpr std::size_t kFewestEdges = 6;
+/// A band of fewer flash widths is the flash, not the exposure.
+constexpr double kLeastExposure = 2;
+
+class RollingSensor final : public PhaseSensor {
+ public:
+  explicit RollingSensor(const SensorOptions& options) : options_(options) {
+    options_.timing.shifts = options_.timing.rows;
+  }
+
+  void begin_round(const Beat& /*own*/) override { taken_.clear(); }
+
+  std::vector<Look> wants(Seconds /*wanted*/) override {
+    if (reference_ || !unreadable_.empty()) return {};
+    std::vector<Look> looks;
+    if (step_ == 0) {
+      looks.emplace_back();
+    } else if (const Status learnt = learn(); learnt.ok()) {
+      return {};
+    } else if (even_delays(step_, options_.timing.frame_period).empty()) {
+      unreadable_ =
+          learnt.error().what +
+          ": let the strobe light what the camera sees from top to bottom, or lengthen its exposure";
+    }
+    for (const Seconds delay : even_delays(step_, options_.timing.frame_period)) looks.push_back({delay});
+    ++step_;
+    return looks;
+  }
+
+  SmearReading take(const ImageView& frame, TimePoint at, const Look& look) override {
+    RowProfile profile = row_profile(frame);
+    SmearReading reading;
+    if (reference_) {
+      reading = read_bands(profile, *reference_, {.direction = options_.timing.direction}).reading;
+    } else {
+      reading.reason = unreadable_;
+      if (unreadable_.empty()) swept_.push_back({at, look, std::move(profile)});
+    }
+    taken_.push_back({at, look, reading});
+    return reading;
+  }
+
+  std::vector<PhaseSample> phases(Seconds delay) override {
+    std::vector<PhaseSample> samples;
+    for (const Taken& t : taken_) {
+      if (t.look.delay != delay) continue;
+      Phase phase = unreadable_.empty() ? phase_of(t.reading, options_.timing, options_.flash_width)
+                                        : Phase{PhaseState::unusable, {}, {}, unreadable_};
+      samples.push_back({t.at, std::move(phase)});
+    }
+    return samples;
+  }
+  void forget_phase() override {}
+  void set_row_time(SecondsPerRow row_time) override { options_.timing.row_time = row_time; }
+  [[nodiscard]] const CcdTiming& timing() const override { return options_.timing; }
+  [[nodiscard]] std::optional<RowClock> row_clock() const override { return clock_; }
+  [[nodiscard]] std::optional<Seconds> exposure() const override { return exposure_; }
+
+ private:
+  struct Swept {
+    TimePoint at;
+    Look look;
+    RowProfile profile;
+  };
+  struct Taken {
+    TimePoint at;
+    Look look;
+    SmearReading reading;
+  };
+
+  /// What the sweep shows; an error where it doesn't show all rows dark and lit.
+  Status learn() {
+    std::vector<RowProfile> profiles;
+    for (const Swept& s : swept_) profiles.push_back(s.profile);
+    EMBERLOCK_ASSIGN_OR_RETURN(const BandReference reference, learn_band_reference(profiles));
+    const bool down = options_.timing.direction == ReadDirection::top_first;
+    const Rows last(options_.timing.rows - 1);
+    std::vector<SweptEdge> edges;
+    double lit = 0;
+    double looks = 0;
+    for (const Swept& s : swept_) {
+      if (!s.look.delay) continue;
+      lit += lit_part(s.profile, reference);
+      ++looks;
+      const BandReading bands = read_bands(s.profile, reference, {.direction = options_.timing.direction});
+      if (bands.reading.state != SmearState::dot) continue;
+      const Rows y = bands.reading.dots.front().y;
+      edges.push_back({s.at, *s.look.delay, down ? y : last - y});
+    }
+    // A row is lit at the delays that fall into its exposure.
+    exposure_ = options_.timing.frame_period * (lit / looks);
+    judge(edges);
+    reference_ = reference;
+    swept_.clear();
+    return {};
+  }
+
+  static double lit_part(const RowProfile& profile, const BandReference& reference) {
+    double part = 0;
+    for (std::size_t r = 0; r < profile.level.size(); ++r)
+      part += (profile.level[r] - reference.dark[r]) / (reference.lit[r] - reference.dark[r]);
+    return part / static_cast<double>(profile.level.size());
+  }
+
+  /// t_row, or why edges can't be told.
+  void judge(const std::vector<SweptEdge>& edges) {
+    const Seconds period = options_.timing.frame_period;
+    if (*exposure_ < kLeastExposure * options_.flash_width) {
+      unreadable_ = fmt::format(
+          "its exposure of {:.0f} us is no longer than the flash: lengthen it, or shorten the flash",
+          exposure_->value() * 1e6);
+    } else if (edges.size() < kFewestEdges) {
+      const bool long_one = *exposure_ > period / 2;
+      unreadable_ =
+          fmt::format("its exposure of {:.2f} ms of a period of {:.2f} ms is too {} to see an edge: {} it",
+                      in_milliseconds(*exposure_), in_milliseconds(period), long_one ? "long" : "short",
+                      long_one ? "shorten" : "lengthen");
+    } else if (const auto clock = fit_swept_row_clock(edges, period); clock.ok()) {
+      clock_ = *clock;
+      options_.timing.row_time = clock->row_time;
+    } else {
+      unreadable_ = clock.error().what + ": " + clock.error().remedy;
+    }
+  }
+
+  SensorOptions options_;
+  int step_ = 0;              ///< of the sweep
+  std::vector<Swept> swept_;  ///< until the reference is learnt
+  std::vector<Taken> taken_;  ///< in this round
+  std::optional<BandReference> reference_;
+  std::optional<RowClock> clock_;
+  std::optional<Seconds> exposure_;
+  std::string unreadable_;  ///< why no phase can be told, and what to do about it
+};
+
+}  // namespace
+
+std::unique_ptr<PhaseSensor> make_rolling_sensor(const SensorOptions& options) {
+  return std::make_unique<RollingSensor>(options);
+}
+
+}  // namespace emberlock

@@ -1,0 +1,313 @@
+#include "smear_sync/verify/clip_clock.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace emberlock {
+namespace {
+
+constexpr PartsPerMillion kRateSigma{40};      // of a camera's clock against a strobe's, as bought
+constexpr PartsPerMillion kNextToTheWalk{60};  // a line may differ that much from what the walk told
+constexpr PartsPerMillion kNextToTheClaim{500};
+constexpr std::size_t kFewestDots = 5;
+constexpr int kMostTurns = 4;
+constexpr double kOneLine = 1.5;  // rows: half of the dots lie that near to a line that is theirs
+
+template <class Number>
+Number median(std::vector<Number> v) {
+  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
+  std::nth_element(v.begin(), middle, v.end());
+  return *middle;
+}
+
+/// The lamp stands still: its place is the median of all frames', each frame's dot is told from there, and
+/// what shines elsewhere (a dot whose lamp wasn't lit, a reflection) isn't the lamp.
+std::vector<FrameReading> with_one_lamp(const ClipReading& clip, Rows& lamp) {
+  std::vector<FrameReading> frames;
+  std::vector<double> rows;
+  std::vector<double> columns;
+  std::vector<double> radii;
+  for (std::size_t i = 0; i < clip.frames.size(); ++i) {
+    frames.push_back({static_cast<std::int64_t>(i), clip.frames[i]});
+    if (const auto& seen = clip.frames[i].lamp) {
+      rows.push_back(seen->y.value());
+      columns.push_back(seen->x);
+      radii.push_back(seen->radius);
+    }
+  }
+  if (rows.empty()) return frames;
+  lamp = Rows(median(rows));
+  const double column = median(columns);
+  const double reach = median(radii) + 2;
+  for (FrameReading& f : frames) {
+    if (!f.reading.lamp) continue;
+    if (std::hypot(f.reading.lamp->x - column, (f.reading.lamp->y - lamp).value()) <= reach) {
+      f.reading.lamp->y = lamp;
+    } else {
+      f.reading = {SmearState::no_lamp, {}, {}, "what shines isn't where the lamp is in the other frames"};
+    }
+  }
+  return frames;
+}
+
+/// The frame rates that a file's claim may stand for: itself, and the ones in use that are often rounded to
+/// it.
+std::vector<Hertz> rates_to_try(const ClipReading& clip, const ClipOptions& options) {
+  if (options.frame_rate) return {*options.frame_rate};
+  constexpr std::array kInUse = {24000.0 / 1001,
+                                 24.0,
+                                 25.0,
+                                 30000.0 / 1001,
+                                 30.0,
+                                 48.0,
+                                 50.0,
+                                 60000.0 / 1001,
+                                 60.0,
+                                 100.0,
+                                 120000.0 / 1001,
+                                 120.0,
+                                 240000.0 / 1001,
+                                 240.0};
+  std::vector<Hertz> rates;
+  if (clip.claimed_rate) rates.push_back(*clip.claimed_rate);
+  const Hertz about = clip.claimed_rate.value_or(options.flash_rate);
+  const double reach = clip.claimed_rate ? 0.0015 : 0.03;
+  for (const double rate : kInUse) {
+    const double off = std::abs(rate / about.value() - 1);
+    if (off < reach && (!clip.claimed_rate || off > 1e-6)) rates.emplace_back(rate);
+  }
+  if (rates.empty()) rates.push_back(options.flash_rate);
+  return rates;
+}
+
+std::vector<CodeFrame> flashes_seen(const std::vector<FrameReading>& frames) {
+  std::vector<CodeFrame> seen;
+  seen.reserve(frames.size());
+  for (const FrameReading& f : frames) seen.push_back({f.frame, flash_seen(f.reading)});
+  return seen;
+}
+
+/// Whether the frame's dot is of the read phase before its own: behind the lamp in the order of reading.
+bool wrapped(const SmearReading& reading, const CcdTiming& timing) {
+  if (reading.dots.size() != 1 || !reading.lamp) return false;
+  return static_cast<double>(timing.direction) * (reading.dots.front().y - reading.lamp->y) < Rows(0);
+}
+
+/// Phases by the camera's own count; frames between which some were lost are left out.
+std::vector<PhaseSample> samples_of(const std::vector<FrameReading>& frames, const ClipClock& clock,
+                                    Seconds flash_width) {
+  std::vector<PhaseSample> samples;
+  for (const FrameReading& f : frames) {
+    const bool between_runs =
+        std::any_of(clock.numbers.drops.begin(), clock.numbers.drops.end(),
+                    [&](const DroppedFrames& d) { return f.frame > d.after && f.frame < d.before; });
+    const auto read_phase =
+        static_cast<double>(clock.count_of(f.frame) - (wrapped(f.reading, clock.timing) ? 1 : 0));
+    const TimePoint start = TimePoint{} + clock.believed_period * read_phase;
+    samples.push_back(between_runs
+                          ? PhaseSample{start, {PhaseState::unusable, {}, {}, "a frame was lost near it"}}
+                          : sample_of(f.reading, clock.timing, flash_width, start));
+    samples.back().at = start;  // modulo P phases are straight against the read phases' starts
+  }
+  return samples;
+}
+
+/// Fits the line through the samples and puts down how far each dot lies from it; false, with the reason,
+/// when there is none.
+bool fit_line(const std::vector<FrameReading>& frames, const ClipOptions& options, ClipClock& clock) {
+  const std::vector<PhaseSample> samples = samples_of(frames, clock, options.flash_width);
+  const auto known = std::count_if(samples.begin(), samples.end(),
+                                   [](const PhaseSample& s) { return s.phase.state == PhaseState::known; });
+  if (known < static_cast<std::ptrdiff_t>(kFewestDots)) {
+    const Phase none = combine(samples, {}, {.period = clock.flash_period});
+    clock.state = none.state == PhaseState::blind ? PhaseState::blind : PhaseState::unusable;
+    clock.reason =
+        frames.size() < 2 * kFewestDots
+            ? fmt::format("it has {} frames only; film the strobe for ten seconds", frames.size())
+            : fmt::format("{} of its {} frames show a dot; most say: {}", known, frames.size(), none.reason);
+    return false;
+  }
+  const bool told = clock.mode.frame_rate_error.has_value();
+  const Seconds walk_a_frame = clock.flash_period - clock.timing.frame_period;
+  const DriftOptions with{.period = clock.flash_period,
+                          .row_time = options.row_time,
+                          .row_time_sigma = options.row_time_sigma,
+                          .flash_width = options.flash_width,
+                          .expected = PartsPerMillion(1e6 * (walk_a_frame / clock.believed_period)),
+                          .fastest = told ? kNextToTheWalk : kNextToTheClaim};
+  const Result<Drift> line = fit_drift(samples, with);
+  if (!line.ok()) {
+    clock.reason = line.error().what;
+    return false;
+  }
+  clock.line = *line;
+  clock.points.clear();
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (samples[i].phase.state != PhaseState::known) continue;
+    const Phase fitted = phase_at(*line, samples[i].at, clock.flash_period);
+    const Seconds residual = wrap_symmetric(samples[i].phase.tau - fitted.tau, clock.flash_period);
+    clock.points.push_back(
+        {static_cast<int>(i), frames[i].reading.dots.front().y, samples[i].phase.tau, residual});
+  }
+  return true;
+}
+
+/// K as the walk told it, else as it may best be guessed.
+int first_shifts(const ClipReading& clip, const ClipOptions& options, const ClipClock& clock) {
+  if (clock.mode.shifts) return *clock.mode.shifts;
+  const int most = static_cast<int>((clock.timing.frame_period / options.row_time).value());
+  if (clock.mode.shifts_measured > Rows(0))
+    return std::clamp(static_cast<int>(std::lround(clock.mode.shifts_measured.value())), clip.rows,
+                      std::max(clip.rows, most));
+  return options.shifts.value_or(clip.rows);
+}
+
+/// By how many rows the dots that wrapped stand off the line's others: what K is too large.
+int excess_shifts(const std::vector<FrameReading>& frames, const ClipClock& clock) {
+  std::vector<double> residuals[2];
+  for (const ClipPoint& p : clock.points) {
+    const auto side = wrapped(frames[static_cast<std::size_t>(p.frame)].reading, clock.timing) ? 1U : 0U;
+    residuals[side].push_back((p.residual / clock.timing.row_time).value());
+  }
+  if (residuals[0].size() < kFewestDots || residuals[1].size() < kFewestDots) return 0;
+  return static_cast<int>(std::lround(median(residuals[1]) - median(residuals[0])));
+}
+
+void find_line(const std::vector<FrameReading>& frames, const ClipOptions& options, ClipClock& clock) {
+  clock.line.reset();
+  clock.points.clear();
+  clock.state = PhaseState::unusable;
+  clock.reason.clear();
+  if (!fit_line(frames, options, clock)) return;
+  if (const int excess = excess_shifts(frames, clock); excess != 0) {
+    clock.timing.shifts = std::max(clock.timing.rows, clock.timing.shifts - excess);
+    if (!fit_line(frames, options, clock)) return;
+  }
+  clock.timing.frame_period = clock.flash_period - clock.believed_period * (clock.line->rate.value() * 1e-6);
+  clock.period_sigma = clock.believed_period * (clock.line->rate_sigma.value() * 1e-6);
+  std::vector<double> distances;
+  for (const ClipPoint& p : clock.points)
+    distances.push_back(std::abs((p.residual / options.row_time).value()));
+  if (median(distances) > kOneLine) {
+    clock.reason = fmt::format(
+        "its dots stand {:.1f} rows off any steady walk: another strobe, a rate that isn't {:.4f} flashes a "
+        "second, or frames lost without a code",
+        median(distances), options.flash_rate.value());
+    return;
+  }
+  clock.state = PhaseState::known;
+}
+
+bool same_losses(const FrameNumbers& a, const FrameNumbers& b) {
+  return std::equal(a.drops.begin(), a.drops.end(), b.drops.begin(), b.drops.end(),
+                    [](const DroppedFrames& x, const DroppedFrames& y) {
+                      return x.after == y.after && x.before == y.before && x.frames == y.frames;
+                    });
+}
+
+Status check(const ClipOptions& options) {
+  const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
+  if (!positive(options.flash_rate.value()))
+    return Error{ErrorKind::bad_input, "the flash rate isn't a positive number", "flash rate",
+                 "give the strobe's rate in flashes a second"};
+  if (!positive(options.row_time.value()))
+    return Error{ErrorKind::bad_input, "the row time isn't a positive number", "row time",
+                 "give it in microseconds, about 54 for a 720-row CCD, or film a comb"};
+  return {};
+}
+
+}  // namespace
+
+std::int64_t ClipClock::count_of(std::int64_t i) const {
+  for (const DroppedFrames& drop : numbers.drops) {
+    if (i >= drop.before) i += drop.frames;
+  }
+  return i;
+}
+
+Phase ClipClock::phase_of_frame(std::int64_t i) const {
+  return phase_at(*line, TimePoint{} + believed_period * static_cast<double>(count_of(i)), flash_period);
+}
+
+const NumberedRun* ClipClock::run_at(std::int64_t i) const {
+  const NumberedRun* nearest = nullptr;
+  std::int64_t least = 0;
+  for (const NumberedRun& run : numbers.runs) {
+    const std::int64_t away = std::max({std::int64_t{0}, run.first - i, i - run.last});
+    if (nearest == nullptr || away < least) {
+      nearest = &run;
+      least = away;
+    }
+  }
+  return nearest;
+}
+
+Result<ClipWalk> read_walk(const ClipReading& clip, const ClipOptions& options) {
+  std::vector<FrameReading> frames;
+  for (std::size_t i = 0; i < clip.frames.size(); ++i)
+    frames.push_back({static_cast<std::int64_t>(i), clip.frames[i]});
+  std::optional<ClipWalk> first;
+  for (const Hertz rate : rates_to_try(clip, options)) {
+    const ReadModeOptions with{.flash_rate = options.flash_rate,
+                               .frame_rate = rate,
+                               .rate_sigma = kRateSigma,
+                               .row_time = options.row_time,
+                               .row_time_sigma = options.row_time_sigma,
+                               .rows = clip.rows};
+    EMBERLOCK_ASSIGN_OR_RETURN(ReadMode mode, find_read_mode(frames, with));
+    if (mode.direction) return ClipWalk{rate, std::move(mode)};
+    if (!first) first = ClipWalk{rate, std::move(mode)};
+  }
+  return std::move(*first);
+}
+
+Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& options) {
+  EMBERLOCK_RETURN_IF_ERROR(check(options));
+  ClipClock clock;
+  clock.flash_period = period(options.flash_rate);
+  const std::vector<FrameReading> frames = with_one_lamp(clip, clock.lamp);
+  for (const FrameReading& f : frames) clock.lit += f.reading.lamp ? 1 : 0;
+  if (clip.claimed_rate && !options.frame_rate &&
+      std::abs(clip.claimed_rate->value() / options.flash_rate.value() - 1) > 0.05) {
+    clock.reason = fmt::format(
+        "the file claims {:.3f} frames a second: flash the strobe about once a frame, or give --frame-rate",
+        clip.claimed_rate->value());
+    return clock;
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(ClipWalk walk, read_walk(clip, options));
+  clock.mode = std::move(walk.mode);
+  clock.believed_period = period(walk.frame_rate);
+  const double off = clock.mode.frame_rate_error.value_or(PartsPerMillion(0)).value() * 1e-6;
+  clock.timing = {
+      .rows = clip.rows,
+      .shifts = clip.rows,
+      .frame_period = clock.believed_period / (1 + off),
+      .row_time = options.row_time,
+      .direction = clock.mode.direction.value_or(options.direction.value_or(ReadDirection::top_first))};
+
+  clock.timing.shifts = first_shifts(clip, options, clock);
+
+  // The code counts the frames that were lost on the way, which the line needs; the line says where in the
+  // frame the flash falls, which the code needs where that is near the frame's border. Both agree after a
+  // turn or two.
+  const std::vector<CodeFrame> seen = flashes_seen(frames);
+  DecodeOptions decode{.code = options.code,
+                       .flashes_per_frame = clock.timing.frame_period / clock.flash_period};
+  EMBERLOCK_ASSIGN_OR_RETURN(clock.numbers, number_frames(seen, decode));
+  for (int turn = 0; turn < kMostTurns; ++turn) {
+    find_line(frames, options, clock);
+    if (!clock.line) break;
+    decode.flashes_per_frame = clock.timing.frame_period / clock.flash_period;
+    decode.first_phase = clock.phase_of_frame(0).tau / clock.flash_period;
+    EMBERLOCK_ASSIGN_OR_RETURN(FrameNumbers numbers, number_frames(seen, decode));
+    const bool agree = same_losses(numbers, clock.numbers);
+    clock.numbers = std::move(numbers);
+    if (agree) break;
+  }
+  return clock;
+}
+
+}  // namespace emberlock

@@ -11,7 +11,8 @@
 #include <thread>
 
 #include "session/frame_file.h"
-#include "smear_sync/detect/detect.h"
+#include "smear_sync/detect/film.h"
+#include "smear_sync/detect/follow.h"
 
 namespace emberlock::cli {
 namespace {
@@ -87,6 +88,7 @@ Result<FilmedClip> read_clip(const std::string& file, const Advanced& advanced) 
   clip.reading.file = file;
   clip.reading.claimed_rate = claims.frame_rate;
   StripKeeper keeper;
+  FollowingDetector detector;
   for (int number = 0;; ++number) {
     const Result<Image> image = video->next();
     if (!image.ok()) {
@@ -94,12 +96,13 @@ Result<FilmedClip> read_clip(const std::string& file, const Advanced& advanced) 
       break;
     }
     clip.reading.rows = image->layout().size.height;
-    SmearReading reading = detect(image->view());
+    SmearReading reading = detector.read(image->view());
     keeper.see(image->view(), reading, number);
     clip.reading.frames.push_back(std::move(reading));
     if (claims.frames.value_or(0) > 0)
       advanced(std::min(1.0, (number + 1.0) / static_cast<double>(*claims.frames)));
   }
+  clip.reading.frames = settle(clip.reading.frames);
   clip.strips = keeper.take();
   return clip;
 }

@@ -1,6 +1,6 @@
 #include "smear_sync/sensors/phase_sensor.h"
 
-#include "smear_sync/detect/detect.h"
+#include "smear_sync/detect/follow.h"
 
 namespace emberlock {
 namespace {
@@ -12,7 +12,7 @@ class SmearSensor final : public PhaseSensor {
   void begin_round(const Beat& /*own*/) override { taken_.clear(); }
   std::vector<Look> wants(Seconds /*wanted*/) override { return {}; }
   SmearReading take(const ImageView& frame, TimePoint at, const Look& look) override {
-    taken_.push_back({at, look, detect(frame)});
+    taken_.push_back({at, look, detector_.read(frame)});
     return taken_.back().reading;
   }
   [[nodiscard]] std::vector<PhaseSample> phases(Seconds delay) override {
@@ -34,6 +34,7 @@ class SmearSensor final : public PhaseSensor {
     SmearReading reading;
   };
   SensorOptions options_;
+  FollowingDetector detector_;
   std::vector<Taken> taken_;
 };
 

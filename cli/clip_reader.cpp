@@ -102,7 +102,7 @@ Result<FilmedClip> read_clip(const std::string& file, const Advanced& advanced) 
     if (claims.frames.value_or(0) > 0)
       advanced(std::min(1.0, (number + 1.0) / static_cast<double>(*claims.frames)));
   }
-  clip.reading.frames = settle(clip.reading.frames);
+  clip.reading.frames = share_lamp(settle(clip.reading.frames));
   clip.strips = keeper.take();
   return clip;
 }

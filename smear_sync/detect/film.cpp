@@ -74,6 +74,11 @@ std::optional<DotReading> own_dot(const SmearReading& reading, const std::vector
   return own;
 }
 
+/// More than a pixel from (x, y).
+bool away(const LampReading& lamp, double x, double y) {
+  return std::abs(lamp.x - x) > 1 || std::abs(lamp.y.value() - y) > 1;
+}
+
 }  // namespace
 
 std::optional<LampReading> combine_lamps(std::span<const SmearReading> film) {
@@ -93,8 +98,7 @@ std::optional<LampReading> combine_lamps(std::span<const SmearReading> film) {
   }
   const double x = middle(xs);
   const double y = middle(ys);
-  std::erase_if(lamps,
-                [&](const LampReading& l) { return std::abs(l.x - x) > 1 || std::abs(l.y.value() - y) > 1; });
+  std::erase_if(lamps, [&](const LampReading& l) { return away(l, x, y); });
   LampReading mean;
   double weights = 0;
   double errors = 0;
@@ -118,6 +122,15 @@ std::optional<LampReading> combine_lamps(std::span<const SmearReading> film) {
   const double own = clear ? std::sqrt(1 / weights) : errors;
   mean.sigma = Rows(std::max(own, scatter));
   return mean;
+}
+
+std::vector<SmearReading> share_lamp(std::span<const SmearReading> film) {
+  std::vector<SmearReading> shared(film.begin(), film.end());
+  const std::optional<LampReading> lamp = combine_lamps(film);
+  if (!lamp) return shared;
+  for (SmearReading& reading : shared)
+    if (reading.lamp && !away(*reading.lamp, lamp->x, lamp->y.value())) reading.lamp = lamp;
+  return shared;
 }
 
 std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_travel) {

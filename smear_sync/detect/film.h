@@ -17,8 +17,13 @@ std::optional<LampReading> combine_lamps(std::span<const SmearReading> film);
 /// Reads again what single frames of one camera left ambiguous, by what moves: the dots of a strobe that is
 /// detuned or moved walk together; reflections keep their place beside the lamp and hot pixels their row. A
 /// frame is settled when exactly one spot for each of its lamps moves, and over the film they travel
-/// `least_travel` or more. Frames in order; those that stay ambiguous say why.
-std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_travel = Rows(3));
+/// `least_travel` or more: an even walk of four rows stands nowhere for half of its frames, which is what
+/// standing still means here. Frames in order; those that stay ambiguous say why.
+std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_travel = Rows(4));
+
+/// The film with combine_lamps()' lamp in every frame whose own lies within a pixel of it, the rest as it
+/// was: frames that show the lamp unsaturated measure it for those that don't.
+std::vector<SmearReading> share_lamp(std::span<const SmearReading> film);
 
 /// For each of several cameras that filmed the same flashes, whether its dots move as those of most do, up to
 /// the direction in which it reads: false for one whose "dots" are something else, or who has too few to

@@ -34,6 +34,26 @@ TEST(Film, UnsaturatedFramesTellTheLampsRow) {
   EXPECT_NEAR(lamp->x, kLampX, 0.02);
   EXPECT_LT(lamp->sigma.value(), 0.02);
   EXPECT_GE(lamp->sigma.value() * 5, std::abs(lamp->y.value() - kLampY));
+
+  film[1].lamp->y += Rows(3);  // as if the camera had been bumped
+  const std::vector<SmearReading> shared = share_lamp(film);
+  for (std::size_t i = 0; i < film.size(); ++i) {
+    EXPECT_EQ(shared[i].lamp->y, i == 1 ? film[i].lamp->y : combine_lamps(film)->y);
+    EXPECT_EQ(shared[i].state, film[i].state);
+  }
+}
+
+TEST(Film, AWalkJustLongEnoughToTellLosesNoDot) {
+  for (const double travel : {2.0, 3.0, 3.9, 4.2, 6.0}) {
+    std::vector<SmearReading> film;
+    for (int i = 0; i < 40; ++i) {
+      SmearScene scene = lamp_scene();
+      scene.disk(kLampX, kLampY - 30 - travel * i / 39, 4, 20);
+      film.push_back(detect(scene.image({.seed = static_cast<std::uint64_t>(i)}).view()));
+    }
+    for (const SmearReading& r : settle(film))
+      EXPECT_EQ(r.state, SmearState::dot) << travel << ": " << r.reason;
+  }
 }
 
 TEST(Film, ManySaturatedFramesDontHideTheirCommonError) {

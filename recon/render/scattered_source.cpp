@@ -32,21 +32,28 @@ void take_out_in_scatter(Volume& volume, const Hull& medium, const Effects& effe
   Effects once = effects;  // light from all of the source, straight to where it is scattered
   once.scattering.order = Scattering::Order::single;
   once.scattering.asymmetry = 0;
-  const std::vector<float> all = volume.emission;
+  const bool scattered_again = effects.scattering.order == Scattering::Order::multiple;
+  const std::vector<float> seen = volume.emission;
+  Volume source = volume;  // of the light that is scattered
   const float per_meter = 1 / volume.grid.edge;
-  // Scattered once: what is scattered came from the emission, which the next round knows better.
-  const int rounds = effects.scattering.order == Scattering::Order::single ? 6 : 1;
-  for (int round = 0; round < rounds; ++round) {
-    const ScatterField field = find_in_scatter(volume, medium, once, {}, pool);
+  constexpr int kRounds =
+      6;  // each finds more of the light that came from where less is emitted than thought
+  for (int round = 0; round < kRounds; ++round) {
+    const ScatterField field = find_in_scatter(source, medium, once, {}, pool);
     if (field.empty()) return;
     std::vector<Rgba> scattered(volume.grid.size());
     if (effects.extinction.model == Extinction::Model::field)
       for (std::size_t p = 0; p < scattered.size(); ++p)
         scattered[p].c[3] = volume.grid.edge * volume.extinction[p];
     add_in_scatter(field, Eigen::Vector3d::Zero(), volume.grid, effects.extinction, pool, scattered);
-    for (std::size_t p = 0; p < scattered.size(); ++p)
-      for (std::size_t c = 0; c < 3; ++c)
-        volume.emission[3 * p + c] = std::max(0.F, all[3 * p + c] - per_meter * scattered[p].c[c]);
+    for (std::size_t p = 0; p < scattered.size(); ++p) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        const float in = per_meter * scattered[p].c[c];
+        const float out = std::max(0.F, seen[3 * p + c] - in);
+        volume.emission[3 * p + c] = out;
+        source.emission[3 * p + c] = scattered_again ? out + in : out;
+      }
+    }
   }
 }
 

@@ -11,7 +11,8 @@ void add_in_scatter(const ScatterField& field, const Eigen::Vector3d& camera_cen
 
 /// Takes a volume whose emission is all of its source, scattered light included, and leaves the light that it
 /// emits. Scattered light is taken as even in all directions (the phase function's asymmetry is left out).
-/// What would be negative becomes 0.
+/// What would be negative becomes 0: more is scattered there than was seen, which the rest then emits less
+/// for.
 void take_out_in_scatter(Volume& volume, const Hull& medium, const Effects& effects, Pool& pool);
 
 }  // namespace emberlock

@@ -80,9 +80,8 @@ class CpuEngine final : public Engine {
   }
 
   void stiffen(float most, float soft) override {
-    const Grid& g = problem_.grid();
     each_row(table_.stiffen,
-             Stiffen<Real>{g.nx, g.ny, g.nz, y_.data(), stiffness_.data(), Real(most), Real(soft)});
+             Stiffen<Real>{problem_.grid(), y_.data(), stiffness_.data(), Real(most), Real(soft)});
   }
   void descend(const Step& step) override { update(table_.update, emission_step(step)); }
 
@@ -112,18 +111,8 @@ class CpuEngine final : public Engine {
     if (blur_) blurred_ = converted<Real>(blur_->forward(converted<float>(y_), pool_));
   }
   [[nodiscard]] Descend<Real> emission_step(const Step& step) {
-    const Grid& g = problem_.grid();
-    return {g.nx,
-            g.ny,
-            g.nz,
-            weight_.data(),
-            x_.data(),
-            y_.data(),
-            next_y_.data(),
-            gradient_.data(),
-            stiffness_.data(),
-            Real(step.scale),
-            Real(step.momentum)};
+    return {problem_.grid(),  weight_.data(),    x_.data(),        y_.data(),          next_y_.data(),
+            gradient_.data(), stiffness_.data(), Real(step.scale), Real(step.momentum)};
   }
   template <class Entry, class Update>
   void update(Entry entry, const Update& step) {

@@ -139,8 +139,7 @@ class CudaEngine final : public Engine {
   }
 
   void stiffen(float most, float soft) override {
-    const Grid& g = problem_.grid();
-    each_key_point(Stiffen<Real>{g.nx, g.ny, g.nz, y_.data(), stiffness_.data(), Real(most), Real(soft)},
+    each_key_point(Stiffen<Real>{problem_.grid(), y_.data(), stiffness_.data(), Real(most), Real(soft)},
                    "stiffening");
   }
   void descend(const Step& step) override { update(emission_step(step)); }
@@ -179,20 +178,8 @@ class CudaEngine final : public Engine {
   [[nodiscard]] const Quad<Real>* exposed() { return blur_ ? blur_->forward(y_) : y_.data(); }
   [[nodiscard]] Radiance radiance() { return {lists_.table(), exposed(), extinction_}; }
   [[nodiscard]] Descend<Real> emission_step(const Step& step) {
-    const Grid& g = problem_.grid();
-    const Real scale(step.scale);
-    const Real momentum(step.momentum);
-    return {g.nx,
-            g.ny,
-            g.nz,
-            weight_.data(),
-            x_.data(),
-            y_.data(),
-            next_y_.data(),
-            gradient_.data(),
-            stiffness_.data(),
-            scale,
-            momentum};
+    return {problem_.grid(),  weight_.data(),    x_.data(),        y_.data(),          next_y_.data(),
+            gradient_.data(), stiffness_.data(), Real(step.scale), Real(step.momentum)};
   }
   template <class Update>
   void update(const Update& step) {
@@ -201,7 +188,7 @@ class CudaEngine final : public Engine {
   }
   template <class Act>
   void each_key_point(const Act& act, const char* what) {
-    launch(size(), ActAt<Act>{act, problem_.grid().nx, problem_.grid().ny}, what);
+    launch(size(), ActAt<Act>{act, problem_.grid()}, what);
   }
 
   /// The first ray or sample of a subset.

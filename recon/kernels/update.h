@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "base/host_device.h"
+#include "recon/kernels/grid.h"
 #include "recon/kernels/march.h"
 #include "recon/kernels/rgba.h"
 
@@ -16,23 +17,22 @@ namespace emberlock {
 ///   of half the squared differences to both neighbours; what lies outside the grid is 0
 template <class Real>
 struct Stiffen {
-  int nx = 2, ny = 2, nz = 2;
+  Grid grid;
   const Quad<Real>* y = nullptr;
   Real* stiffness = nullptr;
   Real most = 0;
   Real soft = 0;
 
   HOST_DEVICE void operator()(int i, int j, int k) const {
-    const std::size_t row = static_cast<std::size_t>(nx);
-    const std::size_t plane = row * static_cast<std::size_t>(ny);
-    const std::size_t p =
-        static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + plane * static_cast<std::size_t>(k);
+    const std::size_t p = grid.index(i, j, k);
+    const std::size_t row = grid.index(0, 1, 0);
+    const std::size_t plane = grid.index(0, 0, 1);
     const Quad<Real> dark;
     const Quad<Real> here = y[p];
     const Real squares =
-        square(here - (i > 0 ? y[p - 1] : dark)) + square(here - (i < nx - 1 ? y[p + 1] : dark)) +
-        square(here - (j > 0 ? y[p - row] : dark)) + square(here - (j < ny - 1 ? y[p + row] : dark)) +
-        square(here - (k > 0 ? y[p - plane] : dark)) + square(here - (k < nz - 1 ? y[p + plane] : dark));
+        square(here - (i > 0 ? y[p - 1] : dark)) + square(here - (i < grid.nx - 1 ? y[p + 1] : dark)) +
+        square(here - (j > 0 ? y[p - row] : dark)) + square(here - (j < grid.ny - 1 ? y[p + row] : dark)) +
+        square(here - (k > 0 ? y[p - plane] : dark)) + square(here - (k < grid.nz - 1 ? y[p + plane] : dark));
     const Real steepness = sqrt_of(squares / 6);
     stiffness[p] = most / 2 * (steepness > soft ? soft / steepness : Real(1));
   }
@@ -50,7 +50,7 @@ struct Stiffen {
 /// sum t of both ends' stiffness, and curvature = 2 sum of t. The gradient is cleared for the next subset.
 template <class Real>
 struct Descend {
-  int nx = 2, ny = 2, nz = 2;
+  Grid grid;
   const Real* weight = nullptr;  ///< 0 where no ray comes: such key points stay at 0
   Quad<Real>* x = nullptr;
   const Quad<Real>* y = nullptr;
@@ -61,10 +61,9 @@ struct Descend {
   Real momentum = 0;
 
   HOST_DEVICE void operator()(int i, int j, int k) const {
-    const std::size_t row = static_cast<std::size_t>(nx);
-    const std::size_t plane = row * static_cast<std::size_t>(ny);
-    const std::size_t p =
-        static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + plane * static_cast<std::size_t>(k);
+    const std::size_t p = grid.index(i, j, k);
+    const std::size_t row = grid.index(0, 1, 0);
+    const std::size_t plane = grid.index(0, 0, 1);
     const Quad<Real> g = gradient[p];
     gradient[p] = Quad<Real>{};
     if (weight[p] <= 0) return;
@@ -72,11 +71,11 @@ struct Descend {
     Quad<Real> slope = scale * g;
     Real curvature = weight[p];
     tie(i > 0, p, p - 1, slope, curvature);
-    tie(i < nx - 1, p, p + 1, slope, curvature);
+    tie(i < grid.nx - 1, p, p + 1, slope, curvature);
     tie(j > 0, p, p - row, slope, curvature);
-    tie(j < ny - 1, p, p + row, slope, curvature);
+    tie(j < grid.ny - 1, p, p + row, slope, curvature);
     tie(k > 0, p, p - plane, slope, curvature);
-    tie(k < nz - 1, p, p + plane, slope, curvature);
+    tie(k < grid.nz - 1, p, p + plane, slope, curvature);
     slope.c[3] = 0;
     const Quad<Real> after = non_negative(here - (1 / curvature) * slope);
     next_y[p] = after + momentum * (after - x[p]);
@@ -107,10 +106,9 @@ struct DescendField {
 
   HOST_DEVICE void operator()(int i, int j, int k) const {
     const Descend<Real>& e = emission;
-    const std::size_t row = static_cast<std::size_t>(e.nx);
-    const std::size_t plane = row * static_cast<std::size_t>(e.ny);
-    const std::size_t p =
-        static_cast<std::size_t>(i) + row * static_cast<std::size_t>(j) + plane * static_cast<std::size_t>(k);
+    const std::size_t p = e.grid.index(i, j, k);
+    const std::size_t row = e.grid.index(0, 1, 0);
+    const std::size_t plane = e.grid.index(0, 0, 1);
     const Real slope_of_residual = e.scale * e.gradient[p].c[3];
     const Real before = e.x[p].c[3];
     e(i, j, k);
@@ -119,11 +117,11 @@ struct DescendField {
     Real curvature = weight[p];
     const Real u = e.y[p].c[3] - reference[p];
     if (i > 0) vary(u, p - 1, slope, curvature);
-    if (i < e.nx - 1) vary(u, p + 1, slope, curvature);
+    if (i < e.grid.nx - 1) vary(u, p + 1, slope, curvature);
     if (j > 0) vary(u, p - row, slope, curvature);
-    if (j < e.ny - 1) vary(u, p + row, slope, curvature);
+    if (j < e.grid.ny - 1) vary(u, p + row, slope, curvature);
     if (k > 0) vary(u, p - plane, slope, curvature);
-    if (k < e.nz - 1) vary(u, p + plane, slope, curvature);
+    if (k < e.grid.nz - 1) vary(u, p + plane, slope, curvature);
     const Real after = clamp_to(e.y[p].c[3] - slope / curvature, Real(0), most);
     e.x[p].c[3] = after;
     e.next_y[p].c[3] = clamp_to(after + e.momentum * (after - before), Real(0), most);
@@ -144,11 +142,11 @@ struct DescendField {
 template <class Act>
 struct ActAt {
   Act act;
-  int nx = 2, ny = 2;
+  Grid grid;
 
   HOST_DEVICE void operator()(std::size_t p) const {
-    const std::size_t row = static_cast<std::size_t>(nx);
-    const std::size_t plane = row * static_cast<std::size_t>(ny);
+    const std::size_t row = grid.index(0, 1, 0);
+    const std::size_t plane = grid.index(0, 0, 1);
     act(static_cast<int>(p % row), static_cast<int>(p % plane / row), static_cast<int>(p / plane));
   }
 };

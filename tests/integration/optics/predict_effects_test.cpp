@@ -118,14 +118,19 @@ void expect_within(double factor, double predicted, double full, const char* wha
   EXPECT_GT(predicted, full / factor) << what;
 }
 
+/// The change that `asked` predicts of an effect is that of the full simulation's pictures, within a factor.
+EffectReport expect_predicted(double factor, const char* effect, const Filmed& filmed,
+                              const std::string& asked, const Pictures& full, const Pictures& plain) {
+  EffectReport report = report_of(filmed.predict(asked.c_str()), effect);
+  expect_within(factor, report.predicted_change, filmed.change_over_boxes(full, plain), asked.c_str());
+  return report;
+}
+
 TEST_P(PredictEffects, InScatterIsTheFullSimulationsWithinTwoFifths) {
   const auto compare = [](const Filmed& filmed, const Pictures& plain, const std::string& parameters) {
-    const EffectReport report =
-        report_of(filmed.predict(("auto:tolerance=0.01:" + parameters).c_str()), "scattering");
-    const std::string simulated = "extinction=1,scattering=multiple:" + parameters;
-    EXPECT_TRUE(report.on);
-    expect_within(1.4, report.predicted_change,
-                  filmed.change_over_boxes(filmed.full(simulated.c_str()), plain), parameters.c_str());
+    const Pictures full = filmed.full(("extinction=1,scattering=multiple:" + parameters).c_str());
+    EXPECT_TRUE(
+        expect_predicted(1.4, "scattering", filmed, "auto:tolerance=0.01:" + parameters, full, plain).on);
   };
   const Pictures plain = sooty().full("none");
   for (const char* parameters : {"albedo=0.1:g=0", "albedo=0.5:g=0", "albedo=0.9:g=0", "albedo=0.5:g=0.6"})
@@ -134,25 +139,19 @@ TEST_P(PredictEffects, InScatterIsTheFullSimulationsWithinTwoFifths) {
 }
 
 TEST_P(PredictEffects, PhaseFunctionIsTheFullSimulationsWithinAFifth) {
-  const Pictures isotropic = sooty().full("extinction=1,scattering=multiple:albedo=0.5");
-  for (const char* g : {"0.6", "-0.5"}) {
-    const std::string asked = std::string("auto:albedo=0.5:tolerance=0.01:g=") + g;
-    const std::string simulated = std::string("extinction=1,scattering=multiple:albedo=0.5:g=") + g;
-    expect_within(1.2, report_of(sooty().predict(asked.c_str()), "phase function").predicted_change,
-                  sooty().change_over_boxes(sooty().full(simulated.c_str()), isotropic), g);
-  }
+  const std::string isotropic = "extinction=1,scattering=multiple:albedo=0.5";
+  const Pictures plain = sooty().full(isotropic.c_str());
+  for (const std::string g : {":g=0.6", ":g=-0.5"})
+    expect_predicted(1.2, "phase function", sooty(), "auto:albedo=0.5:tolerance=0.01" + g,
+                     sooty().full((isotropic + g).c_str()), plain);
 }
 
 TEST_P(PredictEffects, RefractionIsTheFullSimulationsWithinTwoFifths) {
   for (const Filmed* filmed : {&sooty(), &two_even_plumes()}) {
     const Pictures plain = filmed->full("none");
-    for (const char* ambient : {"293", "100"}) {  // 100 K bends three times more
-      const std::string asked = std::string("auto:ambient=") + ambient;
-      const std::string simulated = std::string("refraction=curved:ambient=") + ambient;
-      const double full = filmed->change_over_boxes(filmed->full(simulated.c_str()), plain);
-      expect_within(1.4, report_of(filmed->predict(asked.c_str()), "refraction").predicted_change, full,
-                    ambient);
-    }
+    for (const std::string ambient : {"ambient=293", "ambient=100"})  // 100 K bends three times more
+      expect_predicted(1.4, "refraction", *filmed, "auto:" + ambient,
+                       filmed->full(("refraction=curved:" + ambient).c_str()), plain);
   }
 }
 
@@ -168,20 +167,14 @@ TEST_P(PredictEffects, ExposureIsTheMeanOfInstantsWithinAFactorOfTwo) {
       for (std::size_t v = 0; v < mean.size(); ++v)
         for (std::size_t p = 0; p < mean[v].rgb.size(); ++p) mean[v].rgb[p] += instant[v].rgb[p] / kInstants;
     }
-    const std::string asked = "auto:exposure=" + std::to_string(time);
-    expect_within(2, report_of(sooty().predict(asked.c_str()), "exposure").predicted_change,
-                  sooty().change_over_boxes(mean, plain), asked.c_str());
+    expect_predicted(2, "exposure", sooty(), "auto:exposure=" + std::to_string(time), mean, plain);
   }
 }
 
 TEST_P(PredictEffects, GammaIsTheFullSimulationsWithinATenth) {
   const Pictures plain = sooty().full("none");
-  for (const char* gamma : {"1.05", "2.2"}) {
-    const std::string asked = std::string("auto:gamma=") + gamma;
-    const std::string simulated = std::string("gamma=") + gamma;
-    expect_within(1.1, report_of(sooty().predict(asked.c_str()), "gamma").predicted_change,
-                  sooty().change_over_boxes(sooty().full(simulated.c_str()), plain), gamma);
-  }
+  for (const std::string gamma : {"gamma=1.05", "gamma=2.2"})
+    expect_predicted(1.1, "gamma", sooty(), "auto:" + gamma, sooty().full(gamma.c_str()), plain);
 }
 
 TEST_P(PredictEffects, AnEvenBackgroundIsFoundAtTheBordersAndItsChangePredicted) {

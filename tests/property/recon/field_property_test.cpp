@@ -155,13 +155,13 @@ TEST(FieldLaw, AStepOfTotalVariationAloneNeverRaisesIt) {
     double before = variation(g, x, reference, soft);
     const double start = before;
     for (int step = 0; step < 20; ++step) {
-      const DescendField<double> descend{{g.nx, g.ny, g.nz, weights.data(), x.data(), y.data(), next.data(),
-                                          gradient.data(), stiffness.data(), 1, 0},
-                                         weights.data(),
-                                         reference.data(),
-                                         magnitude(0.1, 10),
-                                         soft,
-                                         most};
+      const DescendField<double> descend{
+          {g, weights.data(), x.data(), y.data(), next.data(), gradient.data(), stiffness.data(), 1, 0},
+          weights.data(),
+          reference.data(),
+          magnitude(0.1, 10),
+          soft,
+          most};
       for (int k = 0; k < g.nz; ++k)
         for (int j = 0; j < g.ny; ++j) march_table<double>().field_update(descend, 0, g.nx, j, k);
       y.swap(next);

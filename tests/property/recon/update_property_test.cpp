@@ -65,8 +65,7 @@ double variation(const Case& c, const std::vector<Rgba64>& y) {
 std::vector<double> stiffened(const Case& c) {
   std::vector<double> stiffness(c.y.size());
   const Grid& g = c.grid;
-  const ActAt<Stiffen<double>> act{
-      {g.nx, g.ny, g.nz, c.y.data(), stiffness.data(), c.most, c.soft}, g.nx, g.ny};
+  const ActAt<Stiffen<double>> act{{g, c.y.data(), stiffness.data(), c.most, c.soft}, g};
   for (std::size_t p = 0; p < stiffness.size(); ++p) act(p);
   return stiffness;
 }
@@ -90,10 +89,9 @@ TEST(UpdateLaw, AStepThatNoPictureAsksForNeverRaisesTheVariation) {
     const std::vector<double> stiffness = stiffened(c);
     const std::vector<double> weights(g.size(), 1e-9 * c.most);
     std::vector<Rgba64> x = c.y, next = c.y, gradient(g.size());
-    const ActAt<Descend<double>> act{{g.nx, g.ny, g.nz, weights.data(), x.data(), c.y.data(), next.data(),
-                                      gradient.data(), stiffness.data(), 1.0, 0.0},
-                                     g.nx,
-                                     g.ny};
+    const ActAt<Descend<double>> act{
+        {g, weights.data(), x.data(), c.y.data(), next.data(), gradient.data(), stiffness.data(), 1.0, 0.0},
+        g};
     for (std::size_t p = 0; p < x.size(); ++p) act(p);
     const double before = variation(c, c.y);
     RC_ASSERT(variation(c, x) < before + 1e-12);

@@ -8,7 +8,7 @@
 #include "recon/effects/refraction.h"
 #include "recon/hull/hull.h"
 #include "recon/hull/ray_list.h"
-#include "recon/render/march_table.h"
+#include "tests/support/marches.h"
 
 namespace emberlock {
 
@@ -60,73 +60,6 @@ inline MarchCase march_case(const MarchCaseOptions& options = {}) {
   out.list = clip_rays({&out.cameras[0], &out.cameras[1]}, medium, clip, pool);
   return out;
 }
-
-/// The marches of one table over all rays of a list, on the calling thread.
-template <class Real>
-class Marcher {
- public:
-  using Values = std::vector<Quad<Real>>;
-
-  explicit Marcher(const RayList& list, const MarchTable<Real>& table = march_table<Real>())
-      : list_(list), table_(table), travel_(list.bends.empty() ? Travel::straight : Travel::curved) {}
-
-  /// Radiance, and transmittance in lane 3, of each ray; `sigma` of constant extinction.
-  [[nodiscard]] Values forward(Absorb absorb, const Values& volume, Real sigma = 0) const {
-    Values seen(list_.rays.size());
-    MarchWork<Real> work = work_on(volume, sigma);
-    work.residual = seen.data();
-    table_.forward_of(absorb, travel_)(work, 0, seen.size());
-    return seen;
-  }
-  /// A^T residual at the key points, under no or constant extinction.
-  [[nodiscard]] Values adjoint(Absorb absorb, Values residual, Real sigma = 0) const {
-    Values gradient(list_.grid.size());
-    MarchWork<Real> work = work_on({}, sigma);
-    work.residual = residual.data();
-    work.gradient = gradient.data();
-    scatter(absorb, work);
-    return gradient;
-  }
-
-  struct Field {
-    Values residual;  ///< as judged, one a ray
-    Values samples;   ///< what FieldForward leaves
-  };
-  [[nodiscard]] Field field_forward(const Values& volume, const Judge<Real>& judge) const {
-    Field field{Values(list_.rays.size()), Values(list_.first_sample(list_.rays.size()))};
-    MarchWork<Real> work = work_on(volume, 0);
-    work.residual = field.residual.data();
-    work.samples = field.samples.data();
-    table_.field_forward[static_cast<int>(travel_)](work, judge, 0, list_.rays.size());
-    return field;
-  }
-  /// Of 1/2 |residual|^2 by emission (lanes 0..2) and extinction (lane 3).
-  [[nodiscard]] Values field_adjoint(Field field) const {
-    Values gradient(list_.grid.size());
-    MarchWork<Real> work = work_on({}, 0);
-    work.residual = field.residual.data();
-    work.samples = field.samples.data();
-    work.gradient = gradient.data();
-    scatter(Absorb::field, work);
-    return gradient;
-  }
-
- private:
-  [[nodiscard]] MarchWork<Real> work_on(const Values& volume, Real sigma) const {
-    MarchWork<Real> work;
-    work.rays = list_.table();
-    work.volume = volume.data();
-    work.sigma = sigma;
-    return work;
-  }
-  void scatter(Absorb absorb, const MarchWork<Real>& work) const {
-    for (std::uint32_t n = 0; n < list_.runs.size(); ++n) table_.adjoint_of(absorb, travel_)(work, &n, 1);
-  }
-
-  const RayList& list_;
-  const MarchTable<Real>& table_;
-  Travel travel_;
-};
 
 /// Uniform numbers in [0, most) in lanes 0..2 and in [0, most_fourth) in lane 3.
 template <class Real>

@@ -5,10 +5,13 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(FieldLaw);
 
 using Values = std::vector<Rgba64>;
 
@@ -36,7 +39,7 @@ Values moved(const Values& x, double by, const Values& direction) {
   return out;
 }
 
-TEST(FieldLaw, GradientIsThatOfCentralDifferences) {
+TEST_P(FieldLaw, GradientIsThatOfCentralDifferences) {
   law("d/dt 1/2 |R(x + t d)|^2 = <gradient, d>, with a background, bounds and any thickness", [] {
     const MarchCase c = some_case();
     const std::size_t rays = c.list.rays.size();
@@ -46,15 +49,15 @@ TEST(FieldLaw, GradientIsThatOfCentralDifferences) {
     const auto background = random_quads<float>(rays, 2, 2);
     const Judge<double> judge{seen.data(), *rc::gen::arbitrary<bool>() ? background.data() : nullptr, nullptr,
                               *rc::gen::element(0.0, 0.8)};
-    const Marcher<double> march(c.list);
+    const auto march = marches_on<double>(device_here(), c.list);
     const Values x = random_quads<double>(c.list.grid.size(), 3, 0.5, thick);
     Values d = random_quads<double>(c.list.grid.size(), 4, 1, 1);
     for (Rgba64& v : d) v = v - Rgba64{{0.5, 0.5, 0.5, 0.5}};
     const auto cost = [&](const Values& at) {
-      const Values residual = march.field_forward(at, judge).residual;
+      const Values residual = march->field_forward(at, judge).residual;
       return 0.5 * dot(residual, residual);
     };
-    const Values gradient = march.field_adjoint(march.field_forward(x, judge));
+    const Values gradient = march->field_adjoint(march->field_forward(x, judge));
     const double expected = dot(gradient, d, 4);
     constexpr double kStep = 1e-5;  // balances the cube's remainder and rounding
     const double slope = (cost(moved(x, kStep, d)) - cost(moved(x, -kStep, d))) / (2 * kStep);
@@ -67,15 +70,15 @@ TEST(FieldLaw, GradientIsThatOfCentralDifferences) {
   });
 }
 
-TEST(FieldLaw, TransmittanceIsTheExponentialOfTheDepth) {
+TEST_P(FieldLaw, TransmittanceIsTheExponentialOfTheDepth) {
   law("T = exp(-sum of sigma ds), the depth being what an emission of sigma gives without extinction", [] {
     const MarchCase c = some_case();
-    const Marcher<double> march(c.list);
+    const auto march = marches_on<double>(device_here(), c.list);
     const double thick = magnitude(1e-5, 3);
     Values x = random_quads<double>(c.list.grid.size(), 5, 0, thick);
     for (Rgba64& v : x) v.c[0] = v.c[3];
-    const Values depth = march.forward(Absorb::nothing, x);
-    const Values seen = march.forward(Absorb::field, x);
+    const Values depth = march->forward(Absorb::nothing, x);
+    const Values seen = march->forward(Absorb::field, x);
     for (std::size_t r = 0; r < seen.size(); ++r) {
       const double expected = std::exp(-depth[r].c[0]);
       RC_ASSERT(std::abs(seen[r].c[3] - expected) <= 1e-13);
@@ -85,31 +88,31 @@ TEST(FieldLaw, TransmittanceIsTheExponentialOfTheDepth) {
   });
 }
 
-TEST(FieldLaw, AnEvenFieldIsConstantExtinction) {
+TEST_P(FieldLaw, AnEvenFieldIsConstantExtinction) {
   law("the field's march with the same sigma everywhere equals the constant policy's, within its "
       "single-precision lengths",
       [] {
         const MarchCase c = some_case();
-        const Marcher<double> march(c.list);
+        const auto march = marches_on<double>(device_here(), c.list);
         const double sigma = magnitude(1e-6, 1e6);
         Values x = random_quads<double>(c.list.grid.size(), 6);
         for (Rgba64& v : x) v.c[3] = sigma;
-        const Values field = march.forward(Absorb::field, x);
-        const Values constant = march.forward(Absorb::constant, x, sigma);
+        const Values field = march->forward(Absorb::field, x);
+        const Values constant = march->forward(Absorb::constant, x, sigma);
         for (std::size_t r = 0; r < field.size(); ++r)
           for (int l = 0; l < 4; ++l)
             RC_ASSERT(std::abs(field[r].c[l] - constant[r].c[l]) <= 1e-6 * std::max(1.0, constant[r].c[l]));
       });
 }
 
-TEST(FieldLaw, RadianceStaysBetweenNothingAndTheBrightestSource) {
+TEST_P(FieldLaw, RadianceStaysBetweenNothingAndTheBrightestSource) {
   law("0 <= L <= max(j / sigma) (1 - T), 0 <= T <= 1, in single precision too", [] {
     const MarchCase c = some_case();
-    const Marcher<float> march(c.list);
+    const auto march = marches_on<float>(device_here(), c.list);
     auto x = random_quads<float>(c.list.grid.size(), 7, 1, magnitude(1e-3, 1e8));
     for (Rgba& v : x)
       for (int l = 0; l < 3; ++l) v.c[l] *= v.c[3];  // sources of 0..1
-    for (const Rgba& seen : march.forward(Absorb::field, x)) {
+    for (const Rgba& seen : march->forward(Absorb::field, x)) {
       RC_ASSERT(seen.c[3] >= -1e-6F && seen.c[3] <= 1);
       for (int l = 0; l < 3; ++l) RC_ASSERT(seen.c[l] >= 0 && seen.c[l] <= 1 - seen.c[3] + 1e-5F);
     }
@@ -136,7 +139,7 @@ double variation(const Grid& g, const Values& x, const std::vector<double>& refe
   return sum;
 }
 
-TEST(FieldLaw, AStepOfTotalVariationAloneNeverRaisesIt) {
+TEST_P(FieldLaw, AStepOfTotalVariationAloneNeverRaisesIt) {
   law("majorised steps without a residual lower the variation and keep 0 <= sigma <= most", [] {
     Grid g;
     g.nx = *rc::gen::inRange(2, 9);
@@ -162,8 +165,7 @@ TEST(FieldLaw, AStepOfTotalVariationAloneNeverRaisesIt) {
           magnitude(0.1, 10),
           soft,
           most};
-      for (int k = 0; k < g.nz; ++k)
-        for (int j = 0; j < g.ny; ++j) march_table<double>().field_update(descend, 0, g.nx, j, k);
+      step_on(device_here(), descend);
       y.swap(next);
       const double now = variation(g, x, reference, soft);
       RC_ASSERT(now <= before * (1 + 1e-12));

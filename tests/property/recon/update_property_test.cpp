@@ -7,9 +7,13 @@
 #include "base/random.h"
 #include "recon/kernels/grid.h"
 #include "recon/kernels/update.h"
+#include "tests/support/devices.h"
+#include "tests/support/marches.h"
 
 namespace emberlock {
 namespace {
+
+ON_EACH_DEVICE(UpdateLaw);
 
 /// Some light on a small grid, a part of it dark.
 struct Case {
@@ -64,13 +68,11 @@ double variation(const Case& c, const std::vector<Rgba64>& y) {
 
 std::vector<double> stiffened(const Case& c) {
   std::vector<double> stiffness(c.y.size());
-  const Grid& g = c.grid;
-  const ActAt<Stiffen<double>> act{{g, c.y.data(), stiffness.data(), c.most, c.soft}, g};
-  for (std::size_t p = 0; p < stiffness.size(); ++p) act(p);
+  step_on(device_here(), Stiffen<double>{c.grid, c.y.data(), stiffness.data(), c.most, c.soft});
   return stiffness;
 }
 
-TEST(UpdateLaw, TiesAreFirmWhereLightIsEvenAndSoftenAcrossEdges) {
+TEST_P(UpdateLaw, TiesAreFirmWhereLightIsEvenAndSoftenAcrossEdges) {
   EXPECT_TRUE(rc::check("stiffness = most / 2 min(1, soft / |grad y|)", [] {
     const Case c = random_case();
     const std::vector<double> stiffness = stiffened(c);
@@ -82,17 +84,15 @@ TEST(UpdateLaw, TiesAreFirmWhereLightIsEvenAndSoftenAcrossEdges) {
   }));
 }
 
-TEST(UpdateLaw, AStepThatNoPictureAsksForNeverRaisesTheVariation) {
+TEST_P(UpdateLaw, AStepThatNoPictureAsksForNeverRaisesTheVariation) {
   EXPECT_TRUE(rc::check("the parabola majorises the Huber variation", [] {
     const Case c = random_case();
     const Grid& g = c.grid;
     const std::vector<double> stiffness = stiffened(c);
     const std::vector<double> weights(g.size(), 1e-9 * c.most);
     std::vector<Rgba64> x = c.y, next = c.y, gradient(g.size());
-    const ActAt<Descend<double>> act{
-        {g, weights.data(), x.data(), c.y.data(), next.data(), gradient.data(), stiffness.data(), 1.0, 0.0},
-        g};
-    for (std::size_t p = 0; p < x.size(); ++p) act(p);
+    step_on(device_here(), Descend<double>{g, weights.data(), x.data(), c.y.data(), next.data(),
+                                           gradient.data(), stiffness.data(), 1.0, 0.0});
     const double before = variation(c, c.y);
     RC_ASSERT(variation(c, x) < before + 1e-12);
     for (std::size_t p = 0; p < x.size(); ++p) RC_ASSERT(x[p].c[3] == c.y[p].c[3]);

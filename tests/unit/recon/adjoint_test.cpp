@@ -9,6 +9,8 @@
 namespace emberlock {
 namespace {
 
+ON_EACH_DEVICE(Adjoint);
+
 constexpr double kExtinctions[] = {0, 0.05, 1, 20};  // a voxel edge
 
 template <class Real>
@@ -17,19 +19,19 @@ constexpr double kBound = sizeof(Real) == sizeof(float) ? 1e-6 : 1e-12;
 /// Key points x rays; the background adds T B to what is rendered, which no emission changes.
 template <class Real>
 void expect_transpose(const RayList& list, double sigma, const std::vector<Rgba>& background) {
-  const Marcher<Real> march(list);
+  const auto march = marches_on<Real>(device_here(), list);
   const Absorb absorb = sigma > 0 ? Absorb::constant : Absorb::nothing;
   const auto x = random_quads<Real>(list.grid.size(), 5);
   const auto y = random_quads<Real>(list.rays.size(), 6);
   const std::vector<Rgba> black(list.rays.size());
   const Judge<Real> judge{black.data(), background.empty() ? nullptr : background.data(), nullptr, 0};
   const auto judged = [&](const std::vector<Quad<Real>>& volume) {
-    auto residual = march.forward(absorb, volume, static_cast<Real>(sigma));
+    auto residual = march->forward(absorb, volume, static_cast<Real>(sigma));
     for (std::size_t r = 0; r < residual.size(); ++r) residual[r] = judge(r, residual[r]);
     return residual;
   };
   const double left = dot(judged(x), y) - dot(judged(std::vector<Quad<Real>>(x.size())), y);
-  const double right = dot(x, march.adjoint(absorb, y, static_cast<Real>(sigma)));
+  const double right = dot(x, march->adjoint(absorb, y, static_cast<Real>(sigma)));
   ASSERT_GT(left, 10);
   EXPECT_NEAR(left / right, 1, kBound<Real>) << "sigma " << sigma;
 }
@@ -37,16 +39,16 @@ void expect_transpose(const RayList& list, double sigma, const std::vector<Rgba>
 /// The same with the extinction in lane 3 of x, held fixed.
 template <class Real>
 void expect_transpose_of_field(const RayList& list, double sigma, const std::vector<Rgba>& background) {
-  const Marcher<Real> march(list);
+  const auto march = marches_on<Real>(device_here(), list);
   const auto x = random_quads<Real>(list.grid.size(), 5, 1, 2 * sigma);
   const auto dark = random_quads<Real>(list.grid.size(), 5, 0, 2 * sigma);
   const std::vector<Rgba> black(list.rays.size());
   const Judge<Real> judge{black.data(), background.empty() ? nullptr : background.data(), nullptr, 0};
-  auto field = march.field_forward(x, judge);
+  auto field = march->field_forward(x, judge);
   const auto y = random_quads<Real>(list.rays.size(), 6);
-  const double left = dot(field.residual, y) - dot(march.field_forward(dark, judge).residual, y);
+  const double left = dot(field.residual, y) - dot(march->field_forward(dark, judge).residual, y);
   field.residual = y;
-  const double right = dot(x, march.field_adjoint(field));
+  const double right = dot(x, march->field_adjoint(field));
   ASSERT_GT(left, 10);
   EXPECT_NEAR(left / right, 1, kBound<Real>) << "sigma " << sigma;
 }
@@ -63,12 +65,10 @@ void expect_transposes(bool curved) {
   }
 }
 
-TEST(Adjoint, OfStraightRaysIsTheTransposeInSinglePrecision) { expect_transposes<float>(false); }
-TEST(Adjoint, OfStraightRaysIsTheTransposeInDoublePrecision) { expect_transposes<double>(false); }
-TEST(Adjoint, OfCurvedRaysIsTheTransposeInSinglePrecision) { expect_transposes<float>(true); }
-TEST(Adjoint, OfCurvedRaysIsTheTransposeInDoublePrecision) { expect_transposes<double>(true); }
-
-ON_EACH_DEVICE(EngineAdjoint);
+TEST_P(Adjoint, OfStraightRaysIsTheTransposeInSinglePrecision) { expect_transposes<float>(false); }
+TEST_P(Adjoint, OfStraightRaysIsTheTransposeInDoublePrecision) { expect_transposes<double>(false); }
+TEST_P(Adjoint, OfCurvedRaysIsTheTransposeInSinglePrecision) { expect_transposes<float>(true); }
+TEST_P(Adjoint, OfCurvedRaysIsTheTransposeInDoublePrecision) { expect_transposes<double>(true); }
 
 /// Two views of a medium with holes, through even gas or a lens of it.
 Problem problem_of(const RefractiveIndex* gas, Pool& pool) {
@@ -100,7 +100,7 @@ void expect_transpose(const Problem& problem, const Optics& optics, Precision pr
   EXPECT_NEAR(left / right, 1, 1e-6) << "sigma " << optics.sigma;
 }
 
-TEST_P(EngineAdjoint, IsTheTransposeUnderEveryExtinctionPathExposureAndPrecision) {
+TEST_P(Adjoint, OfTheEngineIsTheTransposeUnderEveryExtinctionPathExposureAndPrecision) {
   Pool pool(2, device_here());
   const RefractiveIndex lens = lens_of_gas();
   Exposure long_one{Exposure::Shutter::integrated, Seconds(0.025), 1};
@@ -116,7 +116,7 @@ TEST_P(EngineAdjoint, IsTheTransposeUnderEveryExtinctionPathExposureAndPrecision
   }
 }
 
-TEST_P(EngineAdjoint, HasTheSameBitsOnEveryRun) {
+TEST_P(Adjoint, OfTheEngineHasTheSameBitsOnEveryRun) {
   Pool pool(2, device_here());
   const Problem problem = problem_of(nullptr, pool);
   std::vector<Rgba> first;

@@ -14,7 +14,7 @@ namespace {
 ON_EACH_DEVICE(PrecisionTest);
 
 /// The largest difference of two lists over the largest value of the second, lanes 0..lanes - 1.
-double relative_difference(const std::vector<Rgba>& a, const Marcher<double>::Values& b, int lanes) {
+double relative_difference(const std::vector<Rgba>& a, const Marches<double>::Values& b, int lanes) {
   double difference = 0;
   double largest = 0;
   for (std::size_t i = 0; i < b.size(); ++i)
@@ -25,8 +25,8 @@ double relative_difference(const std::vector<Rgba>& a, const Marcher<double>::Va
   return difference / largest;
 }
 
-Marcher<double>::Values widened(const std::vector<Rgba>& from) {
-  Marcher<double>::Values to(from.size());
+Marches<double>::Values widened(const std::vector<Rgba>& from) {
+  Marches<double>::Values to(from.size());
   for (std::size_t i = 0; i < from.size(); ++i)
     for (int c = 0; c < 4; ++c) to[i].c[c] = static_cast<double>(from[i].c[c]);
   return to;
@@ -61,51 +61,51 @@ TEST(Precision, PhiAndItsSlopeHoldTheirDigitsAtEveryDepth) {
   EXPECT_EQ(phi_slope(0.0), -0.5);
 }
 
-TEST(Precision, MarchesDifferByAHundredThousandthOfTheBrightest) {
+TEST_P(PrecisionTest, MarchesDifferByAHundredThousandthOfTheBrightest) {
   for (const bool curved : {false, true}) {
     const MarchCase c = march_case({.curved = curved});
-    const Marcher<float> narrow(c.list);
-    const Marcher<double> wide(c.list);
+    const auto narrow = marches_on<float>(device_here(), c.list);
+    const auto wide = marches_on<double>(device_here(), c.list);
     for (const double sigma : {0.0, 1e-4, 0.05, 1.0, 20.0}) {
       const auto x = random_quads<float>(c.list.grid.size(), 1, 1, 2 * sigma);
       const Absorb known = sigma > 0 ? Absorb::constant : Absorb::nothing;
       for (const Absorb absorb : {known, Absorb::field})
-        EXPECT_LT(relative_difference(narrow.forward(absorb, x, static_cast<float>(sigma)),
-                                      wide.forward(absorb, widened(x), sigma), 3),
+        EXPECT_LT(relative_difference(narrow->forward(absorb, x, static_cast<float>(sigma)),
+                                      wide->forward(absorb, widened(x), sigma), 3),
                   1e-5)
             << sigma;
       const auto y = random_quads<float>(c.list.rays.size(), 2);
-      EXPECT_LT(relative_difference(narrow.adjoint(known, y, static_cast<float>(sigma)),
-                                    wide.adjoint(known, widened(y), sigma), 3),
+      EXPECT_LT(relative_difference(narrow->adjoint(known, y, static_cast<float>(sigma)),
+                                    wide->adjoint(known, widened(y), sigma), 3),
                 1e-5)
           << sigma;
     }
   }
 }
 
-TEST(Precision, TransmittanceIsRightToMillionthsHoweverThickTheMedium) {
+TEST_P(PrecisionTest, TransmittanceIsRightToMillionthsHoweverThickTheMedium) {
   const MarchCase c = march_case();
   for (double sigma = 1e-6; sigma < 1e9; sigma *= 10) {
     const auto x = random_quads<float>(c.list.grid.size(), 1, 1, 2 * sigma);
-    const auto narrow = Marcher<float>(c.list).forward(Absorb::field, x);
-    const auto wide = Marcher<double>(c.list).forward(Absorb::field, widened(x));
+    const auto narrow = marches_on<float>(device_here(), c.list)->forward(Absorb::field, x);
+    const auto wide = marches_on<double>(device_here(), c.list)->forward(Absorb::field, widened(x));
     for (std::size_t r = 0; r < wide.size(); ++r)
       EXPECT_NEAR(static_cast<double>(narrow[r].c[3]), wide[r].c[3], 5e-6) << sigma;
   }
 }
 
-TEST(Precision, GradientsByEmissionAndExtinctionDifferByAHundredThousandthOfTheLargest) {
+TEST_P(PrecisionTest, GradientsByEmissionAndExtinctionDifferByAHundredThousandthOfTheLargest) {
   const MarchCase c = march_case();
   const auto seen = random_quads<float>(c.list.rays.size(), 1, 2);
   const auto background = random_quads<float>(c.list.rays.size(), 2);
   for (const double sigma : {0.0, 1e-4, 0.05, 1.0, 20.0}) {
     const auto x = random_quads<float>(c.list.grid.size(), 3, 1, 2 * sigma);
-    const Marcher<float> narrow(c.list);
-    const Marcher<double> wide(c.list);
+    const auto narrow = marches_on<float>(device_here(), c.list);
+    const auto wide = marches_on<double>(device_here(), c.list);
     const auto a =
-        narrow.field_adjoint(narrow.field_forward(x, {seen.data(), background.data(), nullptr, 0}));
+        narrow->field_adjoint(narrow->field_forward(x, {seen.data(), background.data(), nullptr, 0}));
     const auto b =
-        wide.field_adjoint(wide.field_forward(widened(x), {seen.data(), background.data(), nullptr, 0}));
+        wide->field_adjoint(wide->field_forward(widened(x), {seen.data(), background.data(), nullptr, 0}));
     EXPECT_LT(relative_difference(a, b, 4), 1e-5) << sigma;
   }
 }

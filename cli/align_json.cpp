@@ -90,6 +90,7 @@ AlignRunOptions options_from(const json& object) {
   }
   options.align.max_rounds = integer(object, "max_rounds");
   options.align.max_looks = integer(object, "max_looks");
+  options.align.nod = Seconds(number(object, "nod_s"));
   options.measure_row_time = object.at("measure_row_time").get<bool>();
   options.comb_rate = Hertz(number(object, "comb_rate_hz"));
   options.comb_frames = integer(object, "comb_frames");
@@ -217,6 +218,7 @@ ordered_json options_json(const AlignRunOptions& options) {
           {"limits", limits_json(align.limits)},
           {"max_rounds", align.max_rounds},
           {"max_looks", align.max_looks},
+          {"nod_s", align.nod.value()},
           {"measure_row_time", options.measure_row_time},
           {"comb_rate_hz", options.comb_rate.value()},
           {"comb_frames", options.comb_frames},

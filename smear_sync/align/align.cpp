@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -10,6 +11,7 @@
 #include "smear_sync/align/align_forecast.h"
 #include "smear_sync/align/align_trim.h"
 #include "smear_sync/align/align_words.h"
+#include "smear_sync/align/move_together.h"
 #include "smear_sync/align/reset_delay.h"
 
 namespace emberlock {
@@ -71,10 +73,14 @@ void remember(AlignState& state, const Context& c) {
     track.before_hand.reset();
     if (!done.at && track.phase.phase_known()) track.before_hand = track.phase.at(round.at, c.track);
     track.phase.forget_phase();
+    track.sighted.reset();
+    track.moved = false;
+    track.doubt.clear();
     const auto& stamp = round.cameras[done.camera].stamp;
     if (!done.at || !stamp) continue;
     learn_delay(state, c.cameras, c.options, done.camera, wrap_positive(*stamp - *done.at, c.options.period));
   }
+  watch_moves(state, round, c.options);
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     Phase phase = round.cameras[i].phase;
     if (phase.state != PhaseState::known) continue;
@@ -92,31 +98,39 @@ void remember(AlignState& state, const Context& c) {
 
 /// Where a camera stands at the round's instant: seen now, or earlier and sure enough still.
 std::optional<Drift> where(const CameraTrack& track, const Context& c) {
+  if (!track.doubt.empty()) return std::nullopt;
   if (!track.phase.phase_known() || track.phase.aged(c.round.at) > c.remembered()) return std::nullopt;
   return track.phase.at(c.round.at, c.track);
 }
 
-Seconds next_look(const Context& c) {
-  return wrap_positive(c.round.strobe_phase + kLookStep * c.options.period, kLookRange * c.options.period);
+Seconds moved_strobe(const Context& c, Seconds by) {
+  return wrap_positive(c.round.strobe_phase + by, kLookRange * c.options.period);
 }
 
-/// Some phases are missing: nobody is reset on half a view. Blind cameras are brought out by moving the
-/// strobe.
+Seconds next_look(const Context& c) { return moved_strobe(c, kLookStep * c.options.period); }
+
+/// Some phases are missing: nobody is reset on half a view. Blind cameras, and those whose dots are in doubt,
+/// are brought out by moving the strobe.
 void look_again(AlignState& state, AlignDecision& decision, const Context& c) {
   ++state.looks;
   std::string missing;
   std::string why;
-  bool blind = false;
+  bool hidden = false;
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
+    const std::string& doubt = state.cameras[i].doubt;
     const Phase& phase = c.round.cameras[i].phase;
     if (where(state.cameras[i], c)) {
       camera.reason = "its phase is known: waits for the cameras whose phase isn't";
       continue;
     }
     missing += (missing.empty() ? "" : ", ") + c.cameras[i].id;
-    if (phase.state == PhaseState::blind) {
-      blind = true;
+    if (!doubt.empty()) {
+      hidden = true;
+      camera.reason = doubt;
+      if (why.empty()) why = doubt;
+    } else if (phase.state == PhaseState::blind) {
+      hidden = true;
       camera.reason = "shows no phase: the strobe's is moved to bring it out (" + phase.reason + ")";
     } else {
       camera.reason = "can't be read: see to its view of the lamp and to the strobe (" + phase.reason + ")";
@@ -131,7 +145,7 @@ void look_again(AlignState& state, AlignDecision& decision, const Context& c) {
         (why.empty() ? "check that the lamp is in view, not over-exposed, and flashes once a frame" : why);
     return;
   }
-  if (blind) decision.strobe_phase = next_look(c);
+  if (hidden) decision.strobe_phase = next_look(c);
   decision.reason = "looks again for " + missing;
 }
 
@@ -279,7 +293,7 @@ std::size_t nearest(const AlignDecision& decision, const AlignOptions& options) 
 }
 
 void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts, const Context& c) {
-  state.looks = 0;
+  const int looks = std::exchange(state.looks, 0);
   const AlignScene scene = scene_of(state, drifts, c);
   const auto far = [&](Seconds target) {
     for (std::size_t i = 0; i < drifts.size(); ++i) {
@@ -335,6 +349,7 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
         decision.strobe_phase = next_look(c);
     }
   }
+  ask_for_moves(state, decision, c.cameras, c.options, moved_strobe(c, c.options.nod), looks);
   decision.reference = nearest(decision, c.options);
   foresee(state, decision, drifts, c);
 }
@@ -374,7 +389,8 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   decision.cameras.resize(cameras.size());
   std::vector<Drift> drifts;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    decision.cameras[i].state = round.cameras[i].phase.state;
+    const bool doubted = !state.cameras[i].doubt.empty();
+    decision.cameras[i].state = doubted ? PhaseState::unusable : round.cameras[i].phase.state;
     if (const auto drift = where(state.cameras[i], c)) drifts.push_back(*drift);
   }
   if (const auto reason = untrimmable(c)) {

@@ -105,6 +105,9 @@ struct AlignOptions {
   std::optional<AlignLimits> limits = {};  ///< absent: nothing is refused for what it takes
   int max_rounds = 500;                    ///< without all within tolerance, > 0
   int max_looks = 6;                       ///< strobe phases tried in a row for cameras that show no dot, > 0
+  /// By which the strobe is moved to see that every dot moves with it, as no reflection does, before cameras
+  /// are called aligned; > 0 and < T / 4. Zero: what looks like a dot is believed.
+  Seconds nod = milliseconds(2);
 };
 
 /// One camera in one round.
@@ -136,6 +139,12 @@ struct AlignRound {
   std::vector<TrimDone> trims = {};  ///< likewise
 };
 
+/// A dot, or what passes for one, where it stood when it was seen.
+struct Sighting {
+  Seconds tau;           ///< strobe_phase included
+  Seconds strobe_phase;  ///< of that round
+};
+
 /// What is remembered of a camera from round to round.
 struct CameraTrack {
   PhaseTrack phase;  ///< strobe_phase taken out
@@ -144,6 +153,10 @@ struct CameraTrack {
   std::optional<ResetDelay> delay;   ///< its own, once taught
   std::optional<Drift> before_hand;  ///< where it stood before a reset by hand that hasn't been seen yet
   std::vector<Seconds> hand_shifts;  ///< by which resets by hand moved its tau, modulo T; the newest last
+  // Since the shutter's phase was last drawn:
+  std::optional<Sighting> sighted;  ///< the newest
+  bool moved = false;               ///< its dot was seen to move with the strobe
+  std::string doubt;  ///< why what is seen isn't taken for its dot: it moved otherwise; empty if it is
 };
 
 /// The phase to which cameras are brought, strobe_phase taken out: it moves as a camera of this rate would.
@@ -158,7 +171,7 @@ struct AlignState {
   int rounds = 0;
   int rounds_out = 0;  ///< since all were last within tolerance
   int resets = 0;
-  int looks = 0;           ///< rounds in a row that ended with a camera whose phase isn't known
+  int looks = 0;  ///< rounds in a row that ended with a camera whose phase isn't known, or hasn't moved yet
   double jitter_seen = 0;  ///< s^2: sum over resets of a delay's squared deviation from its camera's mean
   int jitter_samples = 0;
   bool affordable = false;  ///< the limits have been looked at, and hold
@@ -169,7 +182,7 @@ struct AlignState {
 };
 
 struct CameraDecision {
-  PhaseState state = PhaseState::unusable;  ///< in this round
+  PhaseState state = PhaseState::unusable;  ///< in this round; a dot in doubt is none
   std::optional<Seconds>
       error;           ///< to the target; positive when it reads earlier. From an earlier round if blind now
   Seconds sigma;       ///< standard error of its own phase
@@ -197,14 +210,14 @@ struct AlignDecision {
   std::vector<CameraDecision> cameras;
   std::optional<Seconds>
       worst_pair;  ///< largest difference between two cameras; absent while phases are missing
-  std::optional<Seconds>
-      strobe_phase;  ///< the delay to which the strobe shall be moved, in [0, T), to bring blind cameras out
-  int resets_so_far = 0;              ///< before this decision's
-  std::optional<Seconds> next_check;  ///< once aligned: film again by then, before the drift may have led a
-                                      ///< camera out (three standard errors)
-  std::optional<AlignEffort> effort;  ///< foretold in the first round that has all phases, given limits
-  std::vector<AlignOffer> offers;     ///< of a refusal
-  std::string reason;                 ///< of the verdict, or what the rig waits for
+  std::optional<Seconds> strobe_phase;  ///< the delay to which the strobe shall be moved, in [0, T): to bring
+                                        ///< blind cameras out, or to see that dots move with it
+  int resets_so_far = 0;                ///< before this decision's
+  std::optional<Seconds> next_check;    ///< once aligned: film again by then, before the drift may have led a
+                                        ///< camera out (three standard errors)
+  std::optional<AlignEffort> effort;    ///< foretold in the first round that has all phases, given limits
+  std::vector<AlignOffer> offers;       ///< of a refusal
+  std::string reason;                   ///< of the verdict, or what the rig waits for
 };
 
 struct AlignStep {

@@ -78,6 +78,7 @@ Play play(const Prospect& prospect, AlignPolicy policy, Seconds tolerance, const
       }
       return true;
     }();
+    if (inside && !trimmed && options.nod > Seconds(0)) result.seconds += seconds;  // to see the dots move
     if (inside && trimmed) {
       Seconds farthest;
       for (std::size_t i = 0; i < scene.tau.size(); ++i)

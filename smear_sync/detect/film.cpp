@@ -175,40 +175,4 @@ std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_
   return settled;
 }
 
-std::vector<bool> move_together(std::span<const std::vector<SmearReading>> films) {
-  // Rows from one frame to the next, where both show one dot.
-  std::size_t frames = 0;
-  for (const auto& film : films) frames = std::max(frames, film.size());
-  const auto step = [&](std::size_t camera, std::size_t i) -> std::optional<double> {
-    const auto& film = films[camera];
-    if (i + 1 >= film.size() || film[i].state != SmearState::dot || film[i + 1].state != SmearState::dot)
-      return {};
-    return (film[i + 1].dots[0].y - film[i].dots[0].y).value();
-  };
-  const auto alike = [&](std::size_t a, std::size_t b) {
-    int same = 0;
-    int mirrored = 0;
-    int seen = 0;
-    constexpr double kWholeRows = 1.6;  // either of the two dots may have taken its whole row a frame earlier
-    for (std::size_t i = 0; i < frames; ++i) {
-      const auto of_a = step(a, i);
-      const auto of_b = step(b, i);
-      if (!of_a || !of_b || std::abs(*of_a) < kWholeRows) continue;  // where `a` stands, anything agrees
-      ++seen;
-      if (std::abs(*of_a - *of_b) < kWholeRows) ++same;
-      if (std::abs(*of_a + *of_b) < kWholeRows) ++mirrored;
-    }
-    return seen >= 3 && std::max(same, mirrored) >= 0.8 * seen;
-  };
-  std::vector<bool> together(films.size());
-  for (std::size_t camera = 0; camera < films.size(); ++camera) {
-    std::size_t others = 0;
-    for (std::size_t other = 0; other < films.size(); ++other) {
-      if (other != camera && alike(other, camera) && alike(camera, other)) ++others;
-    }
-    together[camera] = 2 * (others + 1) > films.size();
-  }
-  return together;
-}
-
 }  // namespace emberlock

@@ -25,9 +25,4 @@ std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_
 /// was: frames that show the lamp unsaturated measure it for those that don't.
 std::vector<SmearReading> share_lamp(std::span<const SmearReading> film);
 
-/// For each of several cameras that filmed the same flashes, whether its dots move as those of most do, up to
-/// the direction in which it reads: false for one whose "dots" are something else, or who has too few to
-/// tell. films[c][i] is camera c's frame i; cameras of one row time.
-std::vector<bool> move_together(std::span<const std::vector<SmearReading>> films);
-
 }  // namespace emberlock

@@ -1,5 +1,10 @@
 #include "cli/align_run.h"
 
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -122,6 +127,73 @@ TEST(AlignRun, ALampOutOfViewIsNamedNotAligned) {
   EXPECT_EQ(result->last.verdict, AlignVerdict::given_up);
   EXPECT_THAT(result->last.reason, HasSubstr("virtual-02"));
   EXPECT_EQ(result->resets, 0);
+}
+
+/// Stray light on one camera: a disk as bright as a dot, which no flash moves.
+class Glint final : public LightField {
+ public:
+  Glint(int camera, const VirtualCameraOptions& at, Rows y) : camera_(camera), at_(at), y_(y) {}
+  void add_radiance(int camera, TimePoint, Seconds, std::span<float> rgb) const override {
+    if (camera != camera_) return;
+    const ImageSize size = at_.layout.size;
+    for (int y = 0; y < size.height; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const double rho = std::hypot(x - at_.lamp.x, y - y_.value());
+        const double level = 40 * 0.5 * std::erfc((rho - at_.lamp.radius) / 1.1);
+        const auto sample = 3 * (static_cast<std::size_t>(size.width) * y + x);
+        for (std::size_t c = 0; c < 3; ++c) rgb[sample + c] += static_cast<float>(level);
+      }
+    }
+  }
+
+ private:
+  int camera_;
+  VirtualCameraOptions at_;
+  Rows y_;
+};
+
+/// Three cameras within a few rows of each other, and one whose flash falls into the rest of its transfer:
+/// what stands where its dot would be, were it in step, is a reflection.
+SmallBench bench_with_a_reflection() {
+  VirtualRigOptions setup = small_rig(3);
+  const Seconds period = setup.cameras[0].timing.frame_period;
+  for (VirtualCameraOptions& camera : setup.cameras) camera.first_phase = 0.6 * period;
+  VirtualCameraOptions& last = setup.cameras[3];
+  last.first_phase = 0.6 * period + Rows(125) * last.timing.row_time;
+  const Rows in_step(110);
+  const bool below = last.lamp.y + in_step < Rows(last.timing.rows);
+  setup.scene.passes.push_back(Pass::flame);
+  setup.scene.flame = std::make_shared<Glint>(
+      3, last, below ? last.lamp.y + in_step : last.lamp.y + in_step - Rows(last.timing.shifts));
+  SmallBench bench(setup);
+  bench.options.measure_row_time = false;
+  bench.options.align.row_time = last.timing.row_time;
+  for (CcdTiming& timing : bench.options.timing) timing.row_time = last.timing.row_time;
+  return bench;
+}
+
+TEST(AlignRun, AReflectionThatLooksLikeADotIsFoundByMovingTheStrobe) {
+  SmallBench believing = bench_with_a_reflection();
+  believing.options.align.nod = Seconds(0);
+  const auto taken_in = run_align(believing.align, believing.options);
+  ASSERT_TRUE(taken_in.ok()) << taken_in.error().message();
+  ASSERT_EQ(taken_in->last.verdict, AlignVerdict::aligned) << taken_in->last.reason;
+  ASSERT_GT(believing.true_error(taken_in->options.row_time), Rows(50)) << "a dot that is believed misleads";
+
+  SmallBench bench = bench_with_a_reflection();
+  std::vector<std::string> said;
+  const auto result = run_align(bench.align, bench.options, [&](const AlignRoundReport& report) {
+    said.push_back(report.decision.cameras[3].reason);
+    for (std::size_t i = 0; i < 3; ++i)
+      EXPECT_THAT(report.decision.cameras[i].reason, testing::Not(HasSubstr("reflection"))) << i;
+  });
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_EQ(result->last.verdict, AlignVerdict::given_up);
+  EXPECT_THAT(result->last.reason, HasSubstr("virtual-03"));
+  EXPECT_EQ(result->resets, 0);
+  ASSERT_GE(said.size(), 2U);
+  EXPECT_THAT(said[1], HasSubstr("stood still when the strobe's flashes were moved by 2.00 ms"));
+  EXPECT_THAT(said[1], HasSubstr("look for a reflection"));
 }
 
 TEST(AlignRun, CamerasOfDifferentFrameRatesAreRefused) {

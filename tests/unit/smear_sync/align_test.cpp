@@ -39,11 +39,16 @@ std::vector<int> reset_in(const AlignDecision& decision) {
   return cameras;
 }
 
+/// What looks like a dot is believed at first sight.
+AlignOptions believing(AlignPolicy policy = AlignPolicy::densest) {
+  return {.policy = policy, .nod = Seconds(0)};
+}
+
 const double kBlind = std::numeric_limits<double>::quiet_NaN();
 
 TEST(Align, WithinToleranceNobodyIsReset) {
   const auto step =
-      align_step({}, round_at({300, 350, 395}), rig(3), {.policy = AlignPolicy::fixed_reference});
+      align_step({}, round_at({300, 350, 395}), rig(3), believing(AlignPolicy::fixed_reference));
   EXPECT_EQ(step.decision.verdict, AlignVerdict::aligned);
   EXPECT_THAT(reset_in(step.decision), testing::IsEmpty());
   EXPECT_NEAR((*step.decision.worst_pair / kRow).value(), 95, 1e-6);
@@ -52,7 +57,7 @@ TEST(Align, WithinToleranceNobodyIsReset) {
 
 TEST(Align, ReportsTheWorstPairBesideTheErrorToTheReference) {
   const auto step =
-      align_step({}, round_at({300, 205, 395}), rig(3), {.policy = AlignPolicy::fixed_reference});
+      align_step({}, round_at({300, 205, 395}), rig(3), believing(AlignPolicy::fixed_reference));
   EXPECT_EQ(step.decision.verdict, AlignVerdict::aligned);
   EXPECT_NEAR((*step.decision.worst_pair / kRow).value(), 190, 1e-6);
 }
@@ -67,7 +72,7 @@ TEST(Align, FixedReferenceResetsEveryoneOutOfTolerance) {
 }
 
 TEST(Align, ErrorsGoRoundTheFramePeriodNotTheRows) {
-  const auto step = align_step({}, round_at({5, 715}), rig(2), {.policy = AlignPolicy::fixed_reference});
+  const auto step = align_step({}, round_at({5, 715}), rig(2), believing(AlignPolicy::fixed_reference));
   EXPECT_EQ(step.decision.verdict, AlignVerdict::aligned);
   EXPECT_NEAR((*step.decision.cameras[1].error / kRow).value(), -62.4, 0.1);
 }
@@ -81,7 +86,7 @@ TEST(Align, DensestTakesTheReferenceWhereMostCamerasLieAndResetsTheFarthestFirst
 
 TEST(Align, ABlindCameraIsNeverWithoutError) {
   const auto cameras = rig(2);
-  const auto first = align_step({}, round_at({300, kBlind}), cameras, {});
+  const auto first = align_step({}, round_at({300, kBlind}), cameras, believing());
   EXPECT_EQ(first.decision.verdict, AlignVerdict::go_on);
   EXPECT_FALSE(first.decision.cameras[1].error);
   EXPECT_FALSE(first.decision.worst_pair);
@@ -93,7 +98,7 @@ TEST(Align, ABlindCameraIsNeverWithoutError) {
   second.at = TimePoint{} + Seconds(1);
   second.strobe_phase = *first.decision.strobe_phase;
   second.cameras[1].phase.tau = Rows(310) * kRow + second.strobe_phase;
-  const auto step = align_step(first.state, second, cameras, {});
+  const auto step = align_step(first.state, second, cameras, believing());
   EXPECT_EQ(step.decision.verdict, AlignVerdict::aligned);
   EXPECT_NEAR((*step.decision.worst_pair / kRow).value(), 10, 1e-6);
 }

@@ -1,4 +1,4 @@
-// What many frames, and many cameras, tell that one can't.
+// What many frames tell that one can't.
 #include "smear_sync/detect/film.h"
 
 #include <cmath>
@@ -113,13 +113,6 @@ TEST(Film, WhereNothingMovesNothingIsSettled) {
     EXPECT_EQ(r.state, SmearState::ambiguous);
     EXPECT_NE(r.reason.find("detune"), std::string::npos) << r.reason;
   }
-}
-
-TEST(Film, ACameraWhoseSpotDoesntMoveWithTheOthersIsFound) {
-  const std::vector<std::vector<SmearReading>> films{film_of(0, 0, 30, 3, {}), film_of(0, 0, 50, 3, {}),
-                                                     film_of(0, 0, 40, 0, {}), film_of(0, 0, 90, -3, {})};
-  EXPECT_EQ(move_together(films), (std::vector<bool>{true, true, false, true}))
-      << "the last camera reads the other way round";
 }
 
 }  // namespace

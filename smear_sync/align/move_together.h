@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "base/quantity.h"
+
+namespace emberlock {
+
+struct AlignCamera;
+struct AlignDecision;
+struct AlignOptions;
+struct AlignRound;
+struct AlignState;
+
+/// How a camera's tau moved from where it was seen last to where it is seen now, in which time the strobe was
+/// moved.
+struct DotMove {
+  Seconds strobe;    ///< by how much the strobe was moved
+  Seconds expected;  ///< what tau moves by: as the strobe, and as the camera drifts
+  Seconds seen;      ///< what it did move by
+  Seconds sigma;     ///< standard error of `seen - expected`
+};
+
+/// What stands in a camera's picture for its dot, told by moving the strobe.
+enum class DotMotion {
+  untold,    ///< not seen at two places of the strobe, or too roughly
+  with_all,  ///< as the other cameras' dots, and as the strobe
+  none,      ///< it stands still: a reflection of the lamp, or hot pixels
+  against,   ///< as far as the others' the other way round: its read direction is set wrong
+  otherwise,
+};
+
+/// The motions of all the cameras that filmed the same flashes, by camera; nothing of one that wasn't seen
+/// twice. What most of them differ by from what is expected, counting the strobe's word for one camera more,
+/// is their common motion: a beat that is known too roughly, a strobe that isn't where it says. Differences
+/// of up to five standard errors are none; a move is told from standing still from twice as much on.
+std::vector<DotMotion> move_together(std::span<const std::optional<DotMove>> cameras, Seconds period);
+
+/// Compares what the round shows with what was seen before the strobe was moved: notes in `state` which
+/// cameras' dots move with the strobe, and why those that move otherwise aren't taken for dots. Comes before
+/// the round's phases are taken over.
+void watch_moves(AlignState& state, const AlignRound& round, const AlignOptions& options);
+
+/// Cameras whose dots haven't been seen to move with the strobe aren't called aligned: a decision that resets
+/// nobody moves the strobe to `nodded` for them. `looks`: rounds in a row that did so or looked for a phase.
+void ask_for_moves(AlignState& state, AlignDecision& decision, const std::vector<AlignCamera>& cameras,
+                   const AlignOptions& options, Seconds nodded, int looks);
+
+}  // namespace emberlock

@@ -48,8 +48,9 @@ Cutter::Cutter(const Hull& medium, const RayListOptions& options) {
   voxels = {g.nx - 1, g.ny - 1, g.nz - 1, nullptr};
   const auto count = [](int along) { return (along + kBlock - 1) / kBlock; };
   blocks = {count(voxels.mx), count(voxels.my), count(voxels.mz), nullptr};
-  inside_.resize(voxels.size());
-  occupied_.resize(blocks.size());
+  const auto whole_words = [](std::size_t bytes) { return (bytes + 3) / 4 * 4; };  // for clip_bundle()
+  inside_.resize(whole_words(voxels.size()));
+  occupied_.resize(whole_words(blocks.size()));
   std::size_t voxel = 0;
   for (int k = 0; k < voxels.mz; ++k)
     for (int j = 0; j < voxels.my; ++j)

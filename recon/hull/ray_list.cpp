@@ -1,11 +1,13 @@
 #include "recon/hull/ray_list.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <Eigen/LU>
 
 #include "recon/calibrate/camera_model.h"
+#include "recon/hull/clip_bundle.h"
 #include "recon/hull/hull.h"
 #include "recon/hull/kernel_views.h"
 #include "recon/hull/ray_list_cuda.h"
@@ -76,31 +78,80 @@ void each_pixel(const PixelTile& tile, const PixelRays& camera, const RayListOpt
     }
 }
 
+/// Adds one ray; each_run(emit) gives its runs.
+template <class EachRun>
+void add_ray(TileRays& out, int subset, std::uint32_t pixel, MarchRay ray, bool curved,
+             const EachRun& each_run) {
+  ray.first_run = static_cast<std::uint32_t>(out.runs.size());
+  const std::uint32_t before = out.samples;
+  each_run([&](Run run, const float* from, const float* along) {
+    run.first_sample = out.samples;
+    out.samples += static_cast<std::uint32_t>(run.count);
+    out.runs.push_back(run);
+    if (curved) out.bends.push_back({{from[0], from[1], from[2]}, {along[0], along[1], along[2]}});
+  });
+  ray.runs = static_cast<std::uint32_t>(out.runs.size()) - ray.first_run;
+  if (ray.runs == 0) return;
+  out.rays.push_back(ray);
+  out.pixels.push_back(pixel);
+  out.subsets.push_back(subset);
+  RayCounts& counts = out.counts[static_cast<std::size_t>(subset)];
+  counts = counts + RayCounts{1, ray.runs, out.samples - before};
+}
+
+/// Straight rays, a bundle at a time.
+class BundledPixels {
+ public:
+  BundledPixels(const CutRay& cut, const float* origin, TileRays& out) : cut_(cut), out_(out) {
+    bundle_.origin = origin;
+  }
+
+  void add(int subset, std::uint32_t pixel, const MarchRay& ray) {
+    const auto lane = static_cast<std::size_t>(bundle_.rays++);
+    for (int a = 0; a < 3; ++a) bundle_.direction[a][lane] = ray.direction[a];
+    pixels_[lane] = {subset, pixel, ray};
+    if (bundle_.rays == RayBundle::kMost) clip();
+  }
+  void clip() {
+    clip_bundle(cut_.voxels, cut_.blocks, bundle_, crossings_);
+    for (std::size_t lane = 0; lane < static_cast<std::size_t>(bundle_.rays); ++lane) {
+      const std::vector<float>& t = crossings_[lane];
+      const Pixel& p = pixels_[lane];
+      add_ray(out_, p.subset, p.pixel, p.ray, false, [&](const auto& emit) {
+        float before = 0;
+        for (std::size_t i = 0; i + 1 < t.size(); i += 2)
+          cut_.cut_stretch(bundle_.origin, p.ray.direction, t[i], t[i + 1], before, emit);
+      });
+    }
+    bundle_.rays = 0;
+  }
+
+ private:
+  struct Pixel {
+    int subset = 0;
+    std::uint32_t pixel = 0;
+    MarchRay ray;
+  };
+  const CutRay& cut_;
+  TileRays& out_;
+  RayBundle bundle_;
+  Crossings crossings_;
+  std::array<Pixel, RayBundle::kMost> pixels_;
+};
+
 TileRays clip_tile(const CutRay& cut, const PixelRays& camera, const float* origin, const PixelTile& tile,
                    const RayListOptions& options) {
   TileRays out;
   out.counts.resize(static_cast<std::size_t>(options.subsets));
+  BundledPixels straight(cut, origin, out);
   each_pixel(tile, camera, options, [&](int subset, std::uint32_t pixel) {
     MarchRay ray;
     camera(pixel, ray.direction);
     ray.view = tile.view;
-    ray.first_run = static_cast<std::uint32_t>(out.runs.size());
-    const std::uint32_t before = out.samples;
-    cut(origin, ray.direction, [&](Run run, const float* from, const float* along) {
-      run.first_sample = out.samples;
-      out.samples += static_cast<std::uint32_t>(run.count);
-      out.runs.push_back(run);
-      if (options.gas != nullptr)
-        out.bends.push_back({{from[0], from[1], from[2]}, {along[0], along[1], along[2]}});
-    });
-    ray.runs = static_cast<std::uint32_t>(out.runs.size()) - ray.first_run;
-    if (ray.runs == 0) return;
-    out.rays.push_back(ray);
-    out.pixels.push_back(pixel);
-    out.subsets.push_back(subset);
-    RayCounts& counts = out.counts[static_cast<std::size_t>(subset)];
-    counts = counts + RayCounts{1, ray.runs, out.samples - before};
+    if (options.gas == nullptr) return straight.add(subset, pixel, ray);
+    add_ray(out, subset, pixel, ray, true, [&](const auto& emit) { cut(origin, ray.direction, emit); });
   });
+  straight.clip();
   return out;
 }
 

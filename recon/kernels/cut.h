@@ -49,36 +49,42 @@ struct CutRay {
   HOST_DEVICE inline void operator()(const float* origin, const float* direction, const Emit& emit) const {
     float before = 0;
     if (gas.values == nullptr) {
-      cut_stretch(origin, direction, kEndless, before, emit);
+      cut_line(origin, direction, kEndless, before, emit);
       return;
     }
     trace(gas, origin, direction, [&](const float* from, const float* along, float length) {
-      cut_stretch(from, along, length, before, emit);
+      cut_line(from, along, length, before, emit);
     });
   }
 
- private:
-  /// The runs of a straight line's first `length` edges; `before` is what lies inside the medium in front of
-  /// it.
+  /// The runs of a stretch [t0, t1] of a straight line, all of it inside the medium; `before` is what lies
+  /// there in front of it, and then with it.
   template <class Emit>
-  HOST_DEVICE inline void cut_stretch(const float* origin, const float* direction, float length,
+  HOST_DEVICE inline void cut_stretch(const float* origin, const float* direction, float t0, float t1,
                                       float& before, const Emit& emit) const {
+    constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
+    if (t1 - t0 < kSliver) return;
+    const int steps = static_cast<int>(ceilf((t1 - t0) / step - 1e-3F));
+    const int count = steps > 1 ? steps : 1;
+    const float ds = (t1 - t0) / static_cast<float>(count);
+    cut_at_slabs(origin[2], direction[2], t0, ds, count, voxels.mz, [&](int first, int size) {
+      const float ahead = static_cast<float>(first) * ds;
+      // The middle sample tells the slab: the first may have been rounded across the border.
+      const int middle = first + size / 2;
+      const float t = t0 + (static_cast<float>(middle) + 0.5F) * ds;
+      const int slab = clamp_cell(origin[2] + direction[2] * t, voxels.mz + 1) / kSlab;
+      emit(Run{t0 + ahead, ds, before + ahead, 0, 0, size, slab}, origin, direction);
+    });
+    before += t1 - t0;
+  }
+
+ private:
+  /// The runs of a straight line's first `length` edges.
+  template <class Emit>
+  HOST_DEVICE inline void cut_line(const float* origin, const float* direction, float length, float& before,
+                                   const Emit& emit) const {
     clip_to_medium(voxels, blocks, origin, direction, [&](float t0, float t1) {
-      constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
-      t1 = length < t1 ? length : t1;
-      if (t1 - t0 < kSliver) return;
-      const int steps = static_cast<int>(ceilf((t1 - t0) / step - 1e-3F));
-      const int count = steps > 1 ? steps : 1;
-      const float ds = (t1 - t0) / static_cast<float>(count);
-      cut_at_slabs(origin[2], direction[2], t0, ds, count, voxels.mz, [&](int first, int size) {
-        const float ahead = static_cast<float>(first) * ds;
-        // The middle sample tells the slab: the first may have been rounded across the border.
-        const int middle = first + size / 2;
-        const float t = t0 + (static_cast<float>(middle) + 0.5F) * ds;
-        const int slab = clamp_cell(origin[2] + direction[2] * t, voxels.mz + 1) / kSlab;
-        emit(Run{t0 + ahead, ds, before + ahead, 0, 0, size, slab}, origin, direction);
-      });
-      before += t1 - t0;
+      cut_stretch(origin, direction, t0, length < t1 ? length : t1, before, emit);
     });
   }
 };

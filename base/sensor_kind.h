@@ -2,6 +2,8 @@
 
 #include <string_view>
 
+#include "base/one_to_one.h"
+
 namespace emberlock {
 
 /// How a camera's sensor is exposed and read, which decides what a flash leaves in its pictures. In each,
@@ -12,17 +14,11 @@ enum class SensorKind {
   global_shutter,   ///< the whole frame is exposed at once: a flash falls into it or doesn't
 };
 
-/// "ccd", "rolling" or "global".
-constexpr std::string_view name(SensorKind kind) {
-  switch (kind) {
-    case SensorKind::ccd:
-      return "ccd";
-    case SensorKind::rolling_shutter:
-      return "rolling";
-    case SensorKind::global_shutter:
-      return "global";
-  }
-  return "unknown";
-}
+inline constexpr OneToOne<SensorKind, std::string_view, 3> kSensorNames{
+    {{{SensorKind::ccd, "ccd"},
+      {SensorKind::rolling_shutter, "rolling"},
+      {SensorKind::global_shutter, "global"}}}};
+
+constexpr std::string_view name(SensorKind kind) { return kSensorNames.second_of(kind).value_or("unknown"); }
 
 }  // namespace emberlock

@@ -1,28 +1,22 @@
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+#include "base/one_to_one.h"
 
-std::string_view name(SmearState state) {
-  switch (state) {
-    case SmearState::dot:
-      return "dot";
-    case SmearState::no_dot:
-      return "no_dot";
-    case SmearState::comb:
-      return "comb";
-    case SmearState::steady:
-      return "steady";
-    case SmearState::saturated:
-      return "saturated";
-    case SmearState::blind:
-      return "blind";
-    case SmearState::ambiguous:
-      return "ambiguous";
-    case SmearState::no_lamp:
-      return "no_lamp";
-  }
-  return "unknown";
-}
+namespace emberlock {
+namespace {
+
+constexpr OneToOne<SmearState, std::string_view, 8> kStateNames{{{{SmearState::dot, "dot"},
+                                                                  {SmearState::no_dot, "no_dot"},
+                                                                  {SmearState::comb, "comb"},
+                                                                  {SmearState::steady, "steady"},
+                                                                  {SmearState::saturated, "saturated"},
+                                                                  {SmearState::blind, "blind"},
+                                                                  {SmearState::ambiguous, "ambiguous"},
+                                                                  {SmearState::no_lamp, "no_lamp"}}}};
+
+}  // namespace
+
+std::string_view name(SmearState state) { return kStateNames.second_of(state).value_or("unknown"); }
 
 std::string_view name(Side side) { return side == Side::above ? "above" : "below"; }
 

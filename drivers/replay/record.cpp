@@ -2,9 +2,26 @@
 
 #include <cmath>
 
+#include "base/one_to_one.h"
 #include "session/layout.h"
 
 namespace emberlock {
+namespace {
+
+constexpr OneToOne<ShutterReset, v1::CameraStream::ShutterReset, 3> kResets{
+    {{{ShutterReset::none, v1::CameraStream::NONE},
+      {ShutterReset::by_hand, v1::CameraStream::BY_HAND},
+      {ShutterReset::on_command, v1::CameraStream::ON_COMMAND}}}};
+constexpr OneToOne<SensorKind, v1::CameraStream::Sensor, 3> kSensors{
+    {{{SensorKind::ccd, v1::CameraStream::CCD},
+      {SensorKind::rolling_shutter, v1::CameraStream::ROLLING_SHUTTER},
+      {SensorKind::global_shutter, v1::CameraStream::GLOBAL_SHUTTER}}}};
+constexpr OneToOne<StrobeOutput, v1::StrobeState::Output, 3> kOutputs{
+    {{{StrobeOutput::off, v1::StrobeState::OFF},
+      {StrobeOutput::flashing, v1::StrobeState::FLASHING},
+      {StrobeOutput::steady, v1::StrobeState::STEADY}}}};
+
+}  // namespace
 
 v1::CameraStream to_proto(const CameraInfo& info) {
   v1::CameraStream stream;
@@ -12,28 +29,8 @@ v1::CameraStream to_proto(const CameraInfo& info) {
   stream.set_model(info.model);
   set_layout(stream, info.layout);
   stream.set_frame_rate_hz(info.frame_rate.value());
-  switch (info.reset) {
-    case ShutterReset::none:
-      stream.set_shutter_reset(v1::CameraStream::NONE);
-      break;
-    case ShutterReset::by_hand:
-      stream.set_shutter_reset(v1::CameraStream::BY_HAND);
-      break;
-    case ShutterReset::on_command:
-      stream.set_shutter_reset(v1::CameraStream::ON_COMMAND);
-      break;
-  }
-  switch (info.sensor) {
-    case SensorKind::ccd:
-      stream.set_sensor(v1::CameraStream::CCD);
-      break;
-    case SensorKind::rolling_shutter:
-      stream.set_sensor(v1::CameraStream::ROLLING_SHUTTER);
-      break;
-    case SensorKind::global_shutter:
-      stream.set_sensor(v1::CameraStream::GLOBAL_SHUTTER);
-      break;
-  }
+  stream.set_shutter_reset(kResets.second_of(info.reset).value_or(v1::CameraStream::NONE));
+  stream.set_sensor(kSensors.second_of(info.sensor).value_or(v1::CameraStream::CCD));
   if (info.trim) {
     stream.set_trim_range_ppm(info.trim->range.value());
     stream.set_trim_step_ppm(info.trim->step.value());
@@ -48,10 +45,8 @@ Result<CameraInfo> camera_info(const v1::CameraStream& stream) {
   info.id = stream.camera_id();
   info.model = stream.model();
   info.frame_rate = Hertz(stream.frame_rate_hz());
-  if (stream.shutter_reset() == v1::CameraStream::BY_HAND) info.reset = ShutterReset::by_hand;
-  if (stream.shutter_reset() == v1::CameraStream::ON_COMMAND) info.reset = ShutterReset::on_command;
-  if (stream.sensor() == v1::CameraStream::ROLLING_SHUTTER) info.sensor = SensorKind::rolling_shutter;
-  if (stream.sensor() == v1::CameraStream::GLOBAL_SHUTTER) info.sensor = SensorKind::global_shutter;
+  info.reset = kResets.first_of(stream.shutter_reset()).value_or(ShutterReset::none);
+  info.sensor = kSensors.first_of(stream.sensor()).value_or(SensorKind::ccd);
   if (stream.trim_range_ppm() > 0 && stream.trim_step_ppm() > 0) {
     info.trim = FrameRateTrim{PartsPerMillion(stream.trim_range_ppm()),
                               PartsPerMillion(stream.trim_step_ppm()), Seconds(stream.trim_latency_s())};
@@ -63,17 +58,7 @@ v1::Event strobe_event(TimePoint now, const StrobeSettings& s) {
   v1::Event event;
   event.set_monotonic_ns(now.ns);
   v1::StrobeState& state = *event.mutable_strobe();
-  switch (s.output) {
-    case StrobeOutput::off:
-      state.set_output(v1::StrobeState::OFF);
-      break;
-    case StrobeOutput::flashing:
-      state.set_output(v1::StrobeState::FLASHING);
-      break;
-    case StrobeOutput::steady:
-      state.set_output(v1::StrobeState::STEADY);
-      break;
-  }
+  state.set_output(kOutputs.second_of(s.output).value_or(v1::StrobeState::OFF));
   state.set_rate_hz(s.rate.value());
   state.set_phase_s(s.phase.value());
   state.set_width_s(s.width.value());
@@ -103,22 +88,12 @@ Result<StrobeSettings> strobe_settings(const v1::StrobeState& state) {
     return Error{ErrorKind::bad_input, "a recorded strobe state has an unusable value",
                  std::string("events.binpb, StrobeState.") + field, "Restore the session's events"};
   };
-  switch (state.output()) {
-    case v1::StrobeState::OFF:
-      s.output = StrobeOutput::off;
-      break;
-    case v1::StrobeState::FLASHING:
-      s.output = StrobeOutput::flashing;
-      break;
-    case v1::StrobeState::STEADY:
-      s.output = StrobeOutput::steady;
-      break;
-    default:
-      return damaged("output");
-  }
+  const auto output = kOutputs.first_of(state.output());
+  if (!output) return damaged("output");
   if (!std::isfinite(state.rate_hz())) return damaged("rate_hz");
   if (!std::isfinite(state.phase_s())) return damaged("phase_s");
   if (!std::isfinite(state.width_s())) return damaged("width_s");
+  s.output = *output;
   s.rate = Hertz(state.rate_hz());
   s.phase = Seconds(state.phase_s());
   s.width = Seconds(state.width_s());

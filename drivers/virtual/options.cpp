@@ -54,10 +54,7 @@ Status check(const VirtualCameraOptions& c) {
 /// Of a group in a rig's name: a bare number is of CCDs.
 std::optional<SensorKind> sensor_kind(std::string_view text) {
   if (text.empty()) return SensorKind::ccd;
-  for (const auto kind : {SensorKind::ccd, SensorKind::rolling_shutter, SensorKind::global_shutter}) {
-    if (text == name(kind)) return kind;
-  }
-  return std::nullopt;
+  return kSensorNames.first_of(text);
 }
 
 CcdTiming draw_timing(const VirtualRigDraw& draw, RandomStream& random) {

@@ -4,7 +4,17 @@
 
 #include <fmt/format.h>
 
+#include "base/one_to_one.h"
+
 namespace emberlock {
+namespace {
+
+constexpr OneToOne<AlignVerdict, std::string_view, 4> kVerdictNames{{{{AlignVerdict::go_on, "go-on"},
+                                                                      {AlignVerdict::aligned, "aligned"},
+                                                                      {AlignVerdict::refused, "refused"},
+                                                                      {AlignVerdict::given_up, "given-up"}}}};
+
+}  // namespace
 
 std::string standing(Seconds error, SecondsPerRow row_time) {
   return fmt::format("reads {:.1f} rows ({:.3f} ms) {} the target", std::abs((error / row_time).value()),
@@ -51,32 +61,6 @@ TrackOptions track_options(const AlignOptions& options) {
   return {.period = options.period, .rate_spread = options.rate_spread, .rate_wander = options.rate_wander};
 }
 
-std::string_view name(AlignPolicy policy) {
-  switch (policy) {
-    case AlignPolicy::fixed_reference:
-      return "fixed-reference";
-    case AlignPolicy::densest:
-      return "densest";
-    case AlignPolicy::timed:
-      return "timed";
-    case AlignPolicy::trimmed:
-      return "trimmed";
-  }
-  return "unknown";
-}
-
-std::string_view name(AlignVerdict verdict) {
-  switch (verdict) {
-    case AlignVerdict::go_on:
-      return "go-on";
-    case AlignVerdict::aligned:
-      return "aligned";
-    case AlignVerdict::refused:
-      return "refused";
-    case AlignVerdict::given_up:
-      return "given-up";
-  }
-  return "unknown";
-}
+std::string_view name(AlignVerdict verdict) { return kVerdictNames.second_of(verdict).value_or("unknown"); }
 
 }  // namespace emberlock

@@ -3,8 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/one_to_one.h"
+
 namespace emberlock {
 namespace {
+
+constexpr OneToOne<ServoState, std::string_view, 3> kServoNames{
+    {{{ServoState::slewing, "slewing"}, {ServoState::settling, "settling"}, {ServoState::locked, "locked"}}}};
 
 constexpr double kWithinNoise = 2;    // standard errors
 constexpr double kLockedGain = 0.25;  // of the error, in one interval
@@ -17,17 +22,7 @@ PartsPerMillion rounded(double ppm, const RateTrim& camera) {
 
 }  // namespace
 
-std::string_view name(ServoState state) {
-  switch (state) {
-    case ServoState::slewing:
-      return "slewing";
-    case ServoState::settling:
-      return "settling";
-    case ServoState::locked:
-      return "locked";
-  }
-  return "unknown";
-}
+std::string_view name(ServoState state) { return kServoNames.second_of(state).value_or("unknown"); }
 
 ServoStep rate_servo(const ServoSample& sample, const RateTrim& camera, Seconds interval) {
   const double arriving = sample.error / interval * 1e6;

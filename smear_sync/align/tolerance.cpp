@@ -2,9 +2,19 @@
 #include <cmath>
 #include <string>
 
+#include "base/one_to_one.h"
 #include "smear_sync/align/align.h"
 
 namespace emberlock {
+namespace {
+
+constexpr OneToOne<AlignPolicy, std::string_view, 4> kPolicyNames{
+    {{{AlignPolicy::fixed_reference, "fixed-reference"},
+      {AlignPolicy::densest, "densest"},
+      {AlignPolicy::timed, "timed"},
+      {AlignPolicy::trimmed, "trimmed"}}}};
+
+}  // namespace
 
 Seconds Tolerance::in_time(SecondsPerRow row_time) const {
   if (const auto* rows = std::get_if<Rows>(&amount)) return *rows * row_time;
@@ -32,11 +42,10 @@ Result<Tolerance> parse_tolerance(std::string_view text) {
   return refuse(unit.empty() ? "has no unit" : "has an unknown unit '" + std::string(unit) + "'");
 }
 
+std::string_view name(AlignPolicy policy) { return kPolicyNames.second_of(policy).value_or("unknown"); }
+
 Result<AlignPolicy> parse_align_policy(std::string_view text) {
-  for (const auto policy :
-       {AlignPolicy::fixed_reference, AlignPolicy::densest, AlignPolicy::timed, AlignPolicy::trimmed}) {
-    if (text == name(policy)) return policy;
-  }
+  if (const auto policy = kPolicyNames.first_of(text)) return *policy;
   return Error{ErrorKind::bad_input, "is no policy", "policy '" + std::string(text) + "'",
                "use fixed-reference, densest, timed or trimmed"};
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "smear_sync/clocks/staircase.h"
+#include "smear_sync/clocks/weighted_line.h"
 
 namespace emberlock {
 namespace {
@@ -55,36 +56,6 @@ double gathering_rate(const std::vector<Point>& points, double span, const Drift
   return best_of(coarse - step, coarse + step, step / 8);
 }
 
-struct Line {
-  double middle;  ///< weighted mean of t
-  double level;   ///< at the middle
-  double rate;
-  double level_variance;
-  double rate_variance;
-};
-
-Line weighted_line(const std::vector<Point>& points, const std::vector<double>& weights) {
-  double w = 0;
-  double wt = 0;
-  double wy = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    w += weights[i];
-    wt += weights[i] * points[i].t;
-    wy += weights[i] * points[i].tau;
-  }
-  Line line{wt / w, wy / w, 0, 1 / w, 0};
-  double tt = 0;
-  double ty = 0;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const double t = points[i].t - line.middle;
-    tt += weights[i] * square(t);
-    ty += weights[i] * t * (points[i].tau - line.level);
-  }
-  line.rate = ty / tt;
-  line.rate_variance = 1 / tt;
-  return line;
-}
-
 double median(std::vector<double> v) {
   const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
   std::nth_element(v.begin(), middle, v.end());
@@ -92,11 +63,12 @@ double median(std::vector<double> v) {
 }
 
 /// Iteratively reweighted least squares. The scatter may be wider than the sigmas say, never narrower.
-Line robust_line(const std::vector<Point>& points) {
-  std::vector<double> weights(points.size());
+WeightedLine robust_line(const std::vector<Point>& points) {
+  std::vector<LinePoint> weighted;
+  weighted.reserve(points.size());
+  for (const Point& p : points) weighted.push_back({p.t, p.tau, 1 / square(p.sigma)});
   std::vector<double> deviations(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) weights[i] = 1 / square(points[i].sigma);
-  Line line = weighted_line(points, weights);
+  WeightedLine line = weighted_line(weighted);
   double scale = 1;
   for (int round = 0; round < kRobustRounds; ++round) {
     for (std::size_t i = 0; i < points.size(); ++i) {
@@ -106,9 +78,9 @@ Line robust_line(const std::vector<Point>& points) {
     scale = std::max(1.0, 1.4826 * median(deviations));
     for (std::size_t i = 0; i < points.size(); ++i) {
       const double deviation = deviations[i] / scale;
-      weights[i] = std::min(1.0, kHuber / std::max(deviation, 1e-12)) / square(points[i].sigma);
+      weighted[i].weight = std::min(1.0, kHuber / std::max(deviation, 1e-12)) / square(points[i].sigma);
     }
-    line = weighted_line(points, weights);
+    line = weighted_line(weighted);
   }
   line.level_variance *= square(scale);
   line.rate_variance *= square(scale);
@@ -155,7 +127,7 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
     sum += std::polar(1 / square(p.sigma), 2 * std::numbers::pi * (p.tau - gathered * p.t) / period);
   const double centre = std::arg(sum) / (2 * std::numbers::pi) * period;
   for (Point& p : points) p.tau = wrap_symmetric(p.tau - gathered * p.t - centre, period);
-  Line line = robust_line(points);
+  WeightedLine line = robust_line(points);
   line.level += centre + gathered * line.middle;
   line.rate += gathered;
 

@@ -7,10 +7,15 @@
 #include <numbers>
 #include <optional>
 
+#include "base/one_to_one.h"
 #include "smear_sync/clocks/staircase.h"
+#include "smear_sync/clocks/weighted_line.h"
 
 namespace emberlock {
 namespace {
+
+constexpr OneToOne<PhaseState, std::string_view, 3> kPhaseNames{
+    {{{PhaseState::known, "known"}, {PhaseState::blind, "blind"}, {PhaseState::unusable, "unusable"}}}};
 
 constexpr double kOutlierSigmas = 5;
 
@@ -76,26 +81,16 @@ std::optional<Slope> slope_of(std::span<const PhaseSample> samples, TimePoint at
   const double centre = circular_median(points, period);
   points = offsets_that_agree(std::move(points), centre, period);
   if (points.size() < 3) return std::nullopt;
-  double w = 0;
-  double wx = 0;
-  double wy = 0;
-  for (const Point& p : points) {
-    w += 1 / square(p.sigma);
-    wx += p.seconds / square(p.sigma);
-    wy += p.tau / square(p.sigma);
-  }
-  double xx = 0;
-  double xy = 0;
-  for (const Point& p : points) {
-    const double x = p.seconds - wx / w;
-    xx += square(x) / square(p.sigma);
-    xy += x * (p.tau - wy / w) / square(p.sigma);
-  }
-  if (xx <= 0) return std::nullopt;
+  std::vector<LinePoint> weighted;
+  weighted.reserve(points.size());
+  for (const Point& p : points) weighted.push_back({p.seconds, p.tau, 1 / square(p.sigma)});
+  const WeightedLine line = weighted_line(weighted);
+  if (!std::isfinite(line.rate_variance)) return std::nullopt;
   const auto [first, last] = std::minmax_element(
       points.begin(), points.end(), [](const Point& a, const Point& b) { return a.seconds < b.seconds; });
   const double span = last->seconds - first->seconds;
-  return Slope{xy / xx, 1 / xx + square(staircase_rate_error(options.resolution, Seconds(span)))};
+  return Slope{line.rate,
+               line.rate_variance + square(staircase_rate_error(options.resolution, Seconds(span)))};
 }
 
 /// Why most of the frames without a phase have none, and whether moving the strobe may help.
@@ -130,17 +125,7 @@ ShiftedRows shifted_rows(const SmearReading& reading, const CcdTiming& timing) {
 
 }  // namespace
 
-std::string_view name(PhaseState state) {
-  switch (state) {
-    case PhaseState::known:
-      return "known";
-    case PhaseState::blind:
-      return "blind";
-    case PhaseState::unusable:
-      return "unusable";
-  }
-  return "unknown";
-}
+std::string_view name(PhaseState state) { return kPhaseNames.second_of(state).value_or("unknown"); }
 
 Seconds row_resolution(SecondsPerRow row_time, Seconds flash_width) {
   const double w = std::clamp((flash_width / row_time).value(), 0.0, 1.0);

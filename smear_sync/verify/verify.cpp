@@ -7,8 +7,23 @@
 
 #include <fmt/format.h>
 
+#include "base/one_to_one.h"
+
 namespace emberlock {
 namespace {
+
+constexpr OneToOne<ClipsVerdict, std::string_view, 3> kVerdictNames{
+    {{{ClipsVerdict::in_sync, "in sync"},
+      {ClipsVerdict::out_of_tolerance, "out of tolerance"},
+      {ClipsVerdict::not_proven, "not proven"}}}};
+
+constexpr OneToOne<ClipState, std::string_view, 6> kClipNames{
+    {{{ClipState::in_sync, "in sync"},
+      {ClipState::out_of_tolerance, "out of tolerance"},
+      {ClipState::ambiguous, "ambiguous"},
+      {ClipState::direction_unknown, "direction unknown"},
+      {ClipState::blind, "blind"},
+      {ClipState::unusable, "unusable"}}}};
 
 constexpr double kSigmas = 2;
 
@@ -237,35 +252,9 @@ void conclude(VerifyResult& result) {
 
 }  // namespace
 
-std::string_view name(ClipState state) {
-  switch (state) {
-    case ClipState::in_sync:
-      return "in sync";
-    case ClipState::out_of_tolerance:
-      return "out of tolerance";
-    case ClipState::ambiguous:
-      return "ambiguous";
-    case ClipState::direction_unknown:
-      return "direction unknown";
-    case ClipState::blind:
-      return "blind";
-    case ClipState::unusable:
-      return "unusable";
-  }
-  return "unknown";
-}
+std::string_view name(ClipState state) { return kClipNames.second_of(state).value_or("unknown"); }
 
-std::string_view name(ClipsVerdict verdict) {
-  switch (verdict) {
-    case ClipsVerdict::in_sync:
-      return "in sync";
-    case ClipsVerdict::out_of_tolerance:
-      return "out of tolerance";
-    case ClipsVerdict::not_proven:
-      return "not proven";
-  }
-  return "unknown";
-}
+std::string_view name(ClipsVerdict verdict) { return kVerdictNames.second_of(verdict).value_or("unknown"); }
 
 Result<VerifyResult> verify_clips(std::span<const ClipReading> clips, const VerifyOptions& options) {
   if (clips.size() < 2) {

@@ -16,11 +16,15 @@ namespace emberlock {
 namespace {
 
 constexpr double kRowScatter = 0.35;  // of one dot: whole rows, and the fit of a faint dot
-constexpr double kStray = 1.5;        // rows off its walk: not a dot of this strobe
-constexpr double kLeastPart = 0.7;    // of the dots that must follow
-constexpr double kDecisive = 25;      // difference of chi squares: five standard deviations
+constexpr double kReadScatter = 0.2;  // the latter alone
+constexpr std::size_t kHarmonics = 12;
+constexpr double kStray = 1.5;      // rows off its walk: not a dot of this strobe
+constexpr double kLeastPart = 0.7;  // of the dots that must follow
+constexpr double kDecisive = 25;    // difference of chi squares: five standard deviations
 constexpr std::size_t kFewestDots = 4;
 constexpr int kFewestFrames = 3;
+/// Another K is ruled out when it lies so many standard errors off.
+constexpr double kShiftSigmas = 4;
 constexpr double kRateSigmas = 3;
 
 double square(double x) { return x * x; }
@@ -38,8 +42,8 @@ struct Walk {
   double frame_period_sigma = 0;
   std::array<double, 2> place{};  ///< seconds: of the side reached first, and of the one after the wrap
   std::array<int, 2> dots{};
-  std::array<std::set<long>, 2> rows;  ///< that dots stood in: whole rows err alike
-  double residual = 0;                 ///< RMS, rows
+  double apart_sigma = 0;  ///< of the places' difference, seconds
+  double residual = 0;     ///< RMS, rows
 };
 
 std::vector<Dot> dots_of(std::span<const FrameReading> frames) {
@@ -91,6 +95,7 @@ class Fit {
       walk.place[static_cast<std::size_t>(side)] = std::arg(sum) / (2 * std::numbers::pi) * flash_period_;
     }
     for (int round = 0; round < 4; ++round) straighten(direction, round == 0 ? 4 * kStray : kStray, walk);
+    state_errors(direction, walk);
     return walk;
   }
 
@@ -126,11 +131,9 @@ class Fit {
   /// Least squares for T and the two sides' places, T held by what was known before; dots further than
   /// `stray` rows cost no more than a stray.
   void straighten(int direction, double stray, Walk& walk) const {
-    Eigen::Matrix3d matrix =
-        Eigen::Vector3d(1e-9, 1e-9, square(kRowScatter * row_time_ / rate_sigma_)).asDiagonal();
+    Eigen::Matrix3d matrix = known_before();
     Eigen::Vector3d right(0, 0, -walk.frame_period_change * matrix(2, 2));
     walk.dots = {};
-    walk.rows = {};
     double squares = 0;
     double cost = 0;
     for (const Dot& dot : dots_) {
@@ -144,7 +147,6 @@ class Fit {
       right += v * off;
       squares += square(off / row_time_);
       ++walk.dots[s];
-      walk.rows[s].insert(std::lround(dot.below));
     }
     const Eigen::Vector3d move = matrix.ldlt().solve(right);
     walk.cost = cost + square(walk.frame_period_change / rate_sigma_);
@@ -152,7 +154,59 @@ class Fit {
     walk.place[0] += move.x();
     walk.place[1] += move.y();
     walk.frame_period_change += move.z();
-    walk.frame_period_sigma = kRowScatter * row_time_ * std::sqrt(matrix.inverse()(2, 2));
+  }
+  /// Whole rows err as the fraction of a row that was cut off: alike wherever a walk of whole rows a frame
+  /// comes back to the same fraction. The walk tells each dot's fraction but for a part common to a side's;
+  /// over all such parts, the mean square of a sum of such errors follows from the harmonics of a sawtooth.
+  void state_errors(int direction, Walk& walk) const {
+    Eigen::Matrix3d matrix = known_before();
+    std::vector<std::pair<Eigen::Vector3d, double>>
+        used;  // and the row that the walk says, with its fraction
+    for (const Dot& dot : dots_) {
+      const int s = side(dot, direction);
+      const double at = seconds(dot, direction) + dot.frame * walk.frame_period_change;
+      const double off = wrap_symmetric(at - walk.place[static_cast<std::size_t>(s)], flash_period_);
+      if (std::abs(off) > kStray * row_time_) continue;
+      used.push_back(
+          {{s == 0 ? 1.0 : 0.0, s == 1 ? 1.0 : 0.0, -dot.frame}, direction * dot.below - off / row_time_});
+      matrix += used.back().first * used.back().first.transpose();
+    }
+    const Eigen::Matrix3d inverse = matrix.inverse();
+    // Stairs draw a walk to whole rows in a few frames: the true one, whose fractions err, may be any near
+    // by.
+    for (const double more : {-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0}) {
+      const double bent = more / std::max(span_, 1.0);
+      walk.frame_period_sigma =
+          std::max(walk.frame_period_sigma, row_time_ * error_of(inverse.col(2), used, bent));
+      walk.apart_sigma =
+          std::max(walk.apart_sigma, row_time_ * error_of(inverse.col(1) - inverse.col(0), used, bent));
+    }
+  }
+  /// Of the sum, over dots, of (combination . place) times their errors, were the walk `bent` rows a frame
+  /// faster; rows.
+  [[nodiscard]] static double error_of(const Eigen::Vector3d& combination,
+                                       const std::vector<std::pair<Eigen::Vector3d, double>>& used,
+                                       double bent) {
+    double squares = 0;
+    std::array<std::array<std::complex<double>, kHarmonics>, 2> sums{};
+    for (const auto& [place, row] : used) {
+      const double share = combination.dot(place);
+      squares += square(share);
+      const std::complex<double> turn = std::polar(1.0, 2 * std::numbers::pi * (row - bent * place.z()));
+      std::complex<double> harmonic = share;
+      for (std::complex<double>& sum : sums[place.x() > 0 ? 0 : 1]) sum += harmonic *= turn;
+    }
+    double variance = square(kReadScatter) * squares;
+    double covered = 0;
+    for (std::size_t k = 0; k < kHarmonics; ++k) {
+      const double power = 1 / (2 * square(std::numbers::pi * static_cast<double>(k + 1)));
+      variance += power * (std::norm(sums[0][k]) + std::norm(sums[1][k]));
+      covered += power;
+    }
+    return std::sqrt(variance + (1.0 / 12 - covered) * squares);
+  }
+  [[nodiscard]] Eigen::Matrix3d known_before() const {
+    return Eigen::Vector3d(1e-9, 1e-9, square(kRowScatter * row_time_ / rate_sigma_)).asDiagonal();
   }
 
   const std::vector<Dot>& dots_;
@@ -222,17 +276,15 @@ void find_shifts(const Walk& walk, const ReadModeOptions& o, ReadMode& mode) {
   const double frame_period = 1 / o.frame_rate.value() + walk.frame_period_change;
   const double modulo = 1 / o.flash_rate.value() / row_time;
   const double measured = (frame_period - (walk.place[1] - walk.place[0])) / row_time;
-  // Dots in the same row err alike, however many frames show them.
-  double variance = square(measured * o.row_time_sigma.value() / row_time);
-  for (const auto& rows : walk.rows) variance += square(kRowScatter) / static_cast<double>(rows.size());
-  const double sigma = std::sqrt(variance);
+  const double sigma =
+      std::hypot(measured * o.row_time_sigma.value() / row_time, walk.apart_sigma / row_time);
   mode.shifts_sigma = Rows(sigma);
   mode.shifts_modulo = Rows(modulo);
   const double most = std::floor(frame_period / row_time + 2 * sigma);
   mode.shifts_measured =
       Rows(o.rows + wrap_symmetric(measured - (o.rows + most) / 2, modulo) + (most - o.rows) / 2);
   std::vector<int> fitting;
-  const double reach = std::max(0.5, 2.5 * sigma);
+  const double reach = std::max(0.5, kShiftSigmas * sigma);
   for (int k = o.rows; k <= static_cast<int>(most); ++k) {
     if (std::abs(wrap_symmetric(k - measured, modulo)) <= reach) fitting.push_back(k);
   }

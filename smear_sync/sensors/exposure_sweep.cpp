@@ -72,9 +72,11 @@ Edge place_edge(const SweepSample& out, const SweepSample& in, double sign, cons
                 const SweepOptions& options, bool saturated) {
   const double period = options.period.value();
   const double width = options.flash_width.value();
+  // Parts this near to nothing and to the whole pass for them.
+  const auto blurred = [&](const SweepSample& s) { return kPartial * s.sigma / (levels.lit - levels.dark); };
   const auto cut = [&](const SweepSample& s) {
     const double part = levels.part(s.level);
-    const double noise = kPartial * s.sigma / (levels.lit - levels.dark);
+    const double noise = blurred(s);
     return !saturated && part > noise && part < 1 - noise;
   };
   for (const SweepSample* s : {&out, &in}) {
@@ -84,7 +86,9 @@ Edge place_edge(const SweepSample& out, const SweepSample& in, double sign, cons
     return {place, s->sigma / (levels.lit - levels.dark) * width};
   }
   const double gap = wrap_symmetric(in.delay.value() - out.delay.value(), period);
-  return {out.delay.value() + gap / 2, std::max(std::abs(gap) - width, 0.1 * width) / std::sqrt(12.0)};
+  const double hidden = std::min(1.0, blurred(out) + blurred(in)) * width;
+  return {out.delay.value() + gap / 2,
+          std::max(std::abs(gap) - width + hidden, 0.1 * width) / std::sqrt(12.0)};
 }
 
 std::vector<SweepSample> in_order(std::span<const SweepSample> samples, Seconds period) {

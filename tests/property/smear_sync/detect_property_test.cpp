@@ -27,7 +27,7 @@ void expect_at_the_bound(const SmearRange& range, std::uint64_t seed) {
   EXPECT_LE(t.over_bound(), 1.15);
   EXPECT_GE(t.within_two_sigma(), 0.9);
   EXPECT_LE(t.within_two_sigma(), 0.995);
-  EXPECT_LE(std::abs(t.mean_error()), 3.5 * t.rms() / std::sqrt(t.found) + 0.005);
+  EXPECT_LE(std::abs(t.mean_error()), 3 * t.rms() / std::sqrt(t.found) + 0.005);
 }
 
 TEST(DetectProperty, FaintDotsOfSmallLampsAreReadAtTheCramerRaoBound) {

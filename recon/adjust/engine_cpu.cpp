@@ -80,8 +80,8 @@ class CpuEngine final : public Engine {
   }
 
   void stiffen(float most, float soft) override {
-    each_row(table_.stiffen,
-             Stiffen<Real>{problem_.grid(), y_.data(), stiffness_.data(), Real(most), Real(soft)});
+    each_row(table_.stiffen, Stiffen<Real>{problem_.grid(), weight_.data(), y_.data(), stiffness_.data(),
+                                           Real(most), Real(soft)});
   }
   void descend(const Step& step) override { update(table_.update, emission_step(step)); }
 

@@ -139,8 +139,9 @@ class CudaEngine final : public Engine {
   }
 
   void stiffen(float most, float soft) override {
-    each_key_point(Stiffen<Real>{problem_.grid(), y_.data(), stiffness_.data(), Real(most), Real(soft)},
-                   "stiffening");
+    each_key_point(
+        Stiffen<Real>{problem_.grid(), weight_.data(), y_.data(), stiffness_.data(), Real(most), Real(soft)},
+        "stiffening");
   }
   void descend(const Step& step) override { update(emission_step(step)); }
 

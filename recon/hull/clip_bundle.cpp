@@ -22,6 +22,8 @@ using Bools = hn::Mask<Floats>;
 constexpr Floats kFloats;
 constexpr Ints kInts;
 
+static_assert(std::endian::native == std::endian::little, "walk() takes bytes out of words");
+
 HWY_INLINE Float all(float v) { return hn::Set(kFloats, v); }
 HWY_INLINE Int all(int v) { return hn::Set(kInts, v); }
 

@@ -78,9 +78,10 @@ void each_pixel(const PixelTile& tile, const PixelRays& camera, const RayListOpt
     }
 }
 
-/// Adds one ray; each_run(emit) gives its runs.
+/// Adds one ray; each_run(emit) gives its runs, of straight rays or of curved ones, whose runs have bends.
+enum class Rays { straight, curved };
 template <class EachRun>
-void add_ray(TileRays& out, int subset, std::uint32_t pixel, MarchRay ray, bool curved,
+void add_ray(TileRays& out, int subset, std::uint32_t pixel, MarchRay ray, Rays rays,
              const EachRun& each_run) {
   ray.first_run = static_cast<std::uint32_t>(out.runs.size());
   const std::uint32_t before = out.samples;
@@ -88,7 +89,8 @@ void add_ray(TileRays& out, int subset, std::uint32_t pixel, MarchRay ray, bool 
     run.first_sample = out.samples;
     out.samples += static_cast<std::uint32_t>(run.count);
     out.runs.push_back(run);
-    if (curved) out.bends.push_back({{from[0], from[1], from[2]}, {along[0], along[1], along[2]}});
+    if (rays == Rays::curved)
+      out.bends.push_back({{from[0], from[1], from[2]}, {along[0], along[1], along[2]}});
   });
   ray.runs = static_cast<std::uint32_t>(out.runs.size()) - ray.first_run;
   if (ray.runs == 0) return;
@@ -117,7 +119,7 @@ class BundledPixels {
     for (std::size_t lane = 0; lane < static_cast<std::size_t>(bundle_.rays); ++lane) {
       const std::vector<float>& t = crossings_[lane];
       const Pixel& p = pixels_[lane];
-      add_ray(out_, p.subset, p.pixel, p.ray, false, [&](const auto& emit) {
+      add_ray(out_, p.subset, p.pixel, p.ray, Rays::straight, [&](const auto& emit) {
         float before = 0;
         for (std::size_t i = 0; i + 1 < t.size(); i += 2)
           cut_.cut_stretch(bundle_.origin, p.ray.direction, t[i], t[i + 1], before, emit);
@@ -149,7 +151,8 @@ TileRays clip_tile(const CutRay& cut, const PixelRays& camera, const float* orig
     camera(pixel, ray.direction);
     ray.view = tile.view;
     if (options.gas == nullptr) return straight.add(subset, pixel, ray);
-    add_ray(out, subset, pixel, ray, true, [&](const auto& emit) { cut(origin, ray.direction, emit); });
+    add_ray(out, subset, pixel, ray, Rays::curved,
+            [&](const auto& emit) { cut(origin, ray.direction, emit); });
   });
   straight.clip();
   return out;

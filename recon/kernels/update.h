@@ -15,9 +15,11 @@ namespace emberlock {
 /// quadratically, those across a flame's edge by their size alone.
 ///   stiffness = most / 2 * min(1, soft / |grad y|),  |grad y|^2 = mean over the colours, sum over the axes,
 ///   of half the squared differences to both neighbours; what lies outside the grid is 0
+/// Key points that no ray comes to tie nobody.
 template <class Real>
 struct Stiffen {
   Grid grid;
+  const Real* weight = nullptr;  ///< as Descend's
   const Quad<Real>* y = nullptr;
   Real* stiffness = nullptr;
   Real most = 0;
@@ -34,7 +36,7 @@ struct Stiffen {
         square(here - (j > 0 ? y[p - row] : dark)) + square(here - (j < grid.ny - 1 ? y[p + row] : dark)) +
         square(here - (k > 0 ? y[p - plane] : dark)) + square(here - (k < grid.nz - 1 ? y[p + plane] : dark));
     const Real steepness = sqrt_of(squares / 6);
-    stiffness[p] = most / 2 * (steepness > soft ? soft / steepness : Real(1));
+    stiffness[p] = weight[p] > 0 ? most / 2 * (steepness > soft ? soft / steepness : Real(1)) : Real(0);
   }
 
  private:

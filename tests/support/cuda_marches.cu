@@ -149,9 +149,10 @@ template std::unique_ptr<Marches<float>> cuda_marches(const RayList& list);
 template std::unique_ptr<Marches<double>> cuda_marches(const RayList& list);
 
 void cuda_step(const Stiffen<double>& step) {
+  const Copy<const double> weight(step.weight, step.grid.size());
   const Copy<const Rgba64> y(step.y, step.grid.size());
   const Copy<double> stiffness(step.stiffness, step.grid.size());
-  each_key_point(Stiffen<double>{step.grid, y.data(), stiffness.data(), step.most, step.soft});
+  each_key_point(Stiffen<double>{step.grid, weight.data(), y.data(), stiffness.data(), step.most, step.soft});
   stiffness.back();
 }
 void cuda_step(const Descend<double>& step) {

@@ -20,6 +20,7 @@ struct Case {
   Grid grid;
   double most = 1, soft = 1;
   std::vector<Rgba64> y;
+  std::vector<double> weights;  // 0 where no ray comes, which is dark then
 };
 
 Case random_case() {
@@ -34,6 +35,13 @@ Case random_case() {
   for (std::size_t p = 0; p < c.y.size(); ++p)
     for (std::uint64_t lane = 0; lane < 4; ++lane)
       c.y[p].c[lane] = std::max(0.0, random_uniform(static_cast<std::uint64_t>(seed), p, lane) - 0.3);
+  c.weights.resize(c.y.size());
+  for (std::size_t p = 0; p < c.y.size(); ++p) {
+    if (random_uniform(static_cast<std::uint64_t>(seed), p, 4) < 0.8)
+      c.weights[p] = 1e-9 * c.most;
+    else
+      c.y[p] = {};
+  }
   return c;
 }
 
@@ -68,7 +76,8 @@ double variation(const Case& c, const std::vector<Rgba64>& y) {
 
 std::vector<double> stiffened(const Case& c) {
   std::vector<double> stiffness(c.y.size());
-  step_on(device_here(), Stiffen<double>{c.grid, c.y.data(), stiffness.data(), c.most, c.soft});
+  step_on(device_here(),
+          Stiffen<double>{c.grid, c.weights.data(), c.y.data(), stiffness.data(), c.most, c.soft});
   return stiffness;
 }
 
@@ -78,7 +87,7 @@ TEST_P(UpdateLaw, TiesAreFirmWhereLightIsEvenAndSoftenAcrossEdges) {
     const std::vector<double> stiffness = stiffened(c);
     const std::vector<double> steep = steepness(c.grid, c.y);
     for (std::size_t p = 0; p < steep.size(); ++p) {
-      const double expected = c.most / 2 * std::min(1.0, c.soft / steep[p]);
+      const double expected = c.weights[p] > 0 ? c.most / 2 * std::min(1.0, c.soft / steep[p]) : 0;
       RC_ASSERT(std::abs(stiffness[p] - expected) <= 1e-12 * c.most);
     }
   }));
@@ -89,12 +98,13 @@ TEST_P(UpdateLaw, AStepThatNoPictureAsksForNeverRaisesTheVariation) {
     const Case c = random_case();
     const Grid& g = c.grid;
     const std::vector<double> stiffness = stiffened(c);
-    const std::vector<double> weights(g.size(), 1e-9 * c.most);
     std::vector<Rgba64> x = c.y, next = c.y, gradient(g.size());
-    step_on(device_here(), Descend<double>{g, weights.data(), x.data(), c.y.data(), next.data(),
+    step_on(device_here(), Descend<double>{g, c.weights.data(), x.data(), c.y.data(), next.data(),
                                            gradient.data(), stiffness.data(), 1.0, 0.0});
     const double before = variation(c, c.y);
-    RC_ASSERT(variation(c, x) < before + 1e-12);
+    if (before > 1e-9) {
+      RC_ASSERT(variation(c, x) < before);
+    }
     for (std::size_t p = 0; p < x.size(); ++p) RC_ASSERT(x[p].c[3] == c.y[p].c[3]);
   }));
 }

@@ -58,7 +58,7 @@ std::vector<Quad<Real>> stepped(const MarchTable<Real>& table, bool field) {
   auto next = y;
   auto gradient = random_quads<Real>(g.size(), 3, 1, 0.1);
   std::vector<Real> stiffness(g.size());
-  const Stiffen<Real> ties{g, y.data(), stiffness.data(), Real(0.01), Real(0.1)};
+  const Stiffen<Real> ties{g, weights.data(), y.data(), stiffness.data(), Real(0.01), Real(0.1)};
   const Descend<Real> emission{g,           weights.data(),  x.data(),         y.data(),
                                next.data(), gradient.data(), stiffness.data(), Real(2),
                                Real(0.9)};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include "smear_sync/detect/kernels.h"
 
@@ -68,8 +69,14 @@ Background measure_background(const Plane& plane, int runs) {
   const double variance = count > 0 ? sum / (2 * count) : 0;
   background.noise = std::max(plane.rounding, std::sqrt(variance));
   // Quantisers leave most neighbours equal, or where noise survives them take the fine grain and leave the
-  // coarse.
-  const bool flat = equal > 0.6 * static_cast<double>(differences.size());
+  // coarse, or spare it in some blocks and not in others: then more neighbours are equal than of Gaussian
+  // noise of the same variance.
+  const auto pairs = static_cast<double>(std::max<std::size_t>(1, differences.size()));
+  const double equals = equal / pairs;
+  background.flat = equals > 0.6;
+  const double gaussian = 1 / (std::sqrt(4 * std::numbers::pi) * background.noise);
+  const bool uneven = plane.view.layout.bit_depth == 8 &&
+                      equals - gaussian > std::max(0.25 * gaussian, 6 * std::sqrt(gaussian / pairs));
   double coarse = 0;
   int blocks_used = 0;
   for (const float d : blocks) {
@@ -80,7 +87,7 @@ Background measure_background(const Plane& plane, int runs) {
   const double white = 2 * kBlock * kBlock * background.noise * background.noise * plane.block_correlation;
   background.grain = blocks_used > 0 ? std::sqrt(coarse / (blocks_used * white)) : 1;
   constexpr double kCoarse = 1.25;  // six times its error for white noise
-  background.compressed = flat || background.grain > kCoarse;
+  background.compressed = background.flat || uneven || background.grain > kCoarse;
   return background;
 }
 

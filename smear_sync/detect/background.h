@@ -16,6 +16,7 @@ struct Background {
           ///< signal that is clipped in a deeper container (12 bits in a 16-bit file)
   double grain = 1;         ///< noise of the sum of 6 x 6 neighbours, over that of independent pixels
   bool compressed = false;  ///< by a quantiser (or noiseless): noise says little about artefacts
+  bool flat = false;        ///< and so far that no noise is left
 };
 /// From runs of 36 pixels all over the frame; all but `saturation`, which its brightest rows tell.
 Background measure_background(const Plane& plane, int runs = 64);

@@ -10,8 +10,12 @@ namespace emberlock::detail {
 namespace {
 
 constexpr double kQuantiserGate = 2;  // its errors aren't Gaussian: rare blocks keep one whole coefficient
-constexpr double kQuantiserSpread =
-    4;  // and are shared by whole blocks and films, so that positions scatter more
+// What a quantiser leaves of the frames that it predicted from, and of edges, lies along the dot's rim like a
+// shift of it: grey levels times rows, RMS, where noise survives it and where none does (H.264 at a CRF of
+// 28).
+constexpr double kGrainyShift = 1.8;
+constexpr double kFlatShift = 5.5;
+constexpr double kLoosest = 0.7;  // rows: a spot less sharply placed is none that could be used
 // Grey levels: what is weaker is what a compressor leaves of noise, and up to the second may be.
 constexpr double kQuantiserWeakest = 1.5;
 constexpr double kQuantiserSure = 4;
@@ -40,7 +44,6 @@ bool attached(const Column& c, const DotFit& f) {
 /// Whether the spot has the lamp's shape: a part of its size, as bright everywhere, fitted well and in one
 /// place.
 bool lamp_like(const Column& c, const DotFit& f, const Evenness& e) {
-  constexpr double kLoosest = 0.7;  // rows: so wide and faint a spot is a level's unevenness
   return f.misfit <= 1.6 + 0.12 * f.amplitude / c.noise && e.least_half > 0.4 - 3 * e.half_sigma &&
          f.radius <= 1.4 * c.radius + 0.7 && f.sigma_y < kLoosest;
 }
@@ -174,10 +177,11 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
     start.radius = list[i].radius;
     start.amplitude = std::max(1.0, c.core_mean(list[i].row));
     DotFit fit = fit_dot(c.patch, window, start, {c.noise, left_slope(c, list[i].row)});
-    const Verdict verdict = judge(c, fit, window, min_snr, options);
-    const double inflation = found.scale * (c.compressed ? kQuantiserSpread : 1);
-    fit.sigma_y *= inflation;
-    fit.sigma_x *= inflation;
+    Verdict verdict = judge(c, fit, window, min_snr, options);
+    const double shift = c.compressed ? (c.flat ? kFlatShift : kGrainyShift) / c.sample_level : 0;
+    fit.sigma_y = std::hypot(fit.sigma_y * found.scale, shift / std::max(fit.amplitude, 1e-9));
+    fit.sigma_x = std::hypot(fit.sigma_x * found.scale, shift / std::max(fit.amplitude, 1e-9));
+    if (verdict == Verdict::dot && c.compressed && fit.sigma_y > kLoosest) verdict = Verdict::suspect;
     fit.x += c.patch.x0;
     if (verdict == Verdict::dot) reading.dots.push_back(fit);
     if (verdict == Verdict::half_field) reading.half_field = true;

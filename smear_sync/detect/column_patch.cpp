@@ -335,6 +335,7 @@ Column level_column(const Plane& plane, const Background& background, const Lamp
   c.sample_level = plane.level;
   c.eight_bits = plane.view.layout.bit_depth == 8;
   c.compressed = background.compressed;
+  c.flat = background.flat;
   c.noise = background.noise;
   const double bright = 6 * c.noise;
   const std::vector<char> bright_rows = subtract_levels(c, std::max(background.noise, 0.5), bright);

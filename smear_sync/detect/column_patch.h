@@ -23,6 +23,7 @@ struct Column {
   double sample_level = 1;  ///< grey levels a sample
   bool eight_bits = false;
   bool compressed = false;
+  bool flat = false;         ///< and no noise is left
   std::vector<char> hidden;  ///< rows in which a dot can't be seen
   std::vector<double> halo;  ///< around the lamp, by whole pixels of radius; empty without one
   double halo_end = 0;       ///< at the last of them

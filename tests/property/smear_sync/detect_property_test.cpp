@@ -55,6 +55,18 @@ TEST(DetectProperty, CompressedFramesWithoutADotShowNone) {
   }
 }
 
+TEST(DetectProperty, CompressedDotsErrAsMuchAsTheyState) {
+  for (const int crf : {18, 23, 28}) {
+    const auto h264 = [crf](const std::vector<Image>& film) { return test::through_h264(film, crf); };
+    const SmearTally t = test::read_compressed(h264, test::Dots::one, {}, 192, 17);
+    std::printf("CRF %d: %d of %d found, %d abstained, RMS %.3f rows, %.1f %% within 2 sigma\n", crf, t.found,
+                t.frames, t.abstained, t.rms(), 100 * t.within_two_sigma());
+    EXPECT_EQ(t.dots, t.found) << "dots where there are none";
+    EXPECT_GE(t.found, 0.75 * t.frames);
+    EXPECT_GE(t.within_two_sigma(), 0.9);
+  }
+}
+
 TEST(DetectProperty, AMirroredFrameGivesTheMirroredReading) {
   for (std::uint64_t i = 0; i < 40; ++i) {
     RandomStream random(14, i);

@@ -6,7 +6,8 @@
 namespace emberlock {
 
 /// Gates of the detector. Those in multiples of the noise follow the frame's own noise, measured away from
-/// the lamp.
+/// the lamp. No dot weaker than 2.5 grey levels is taken from a frame of 8 bits: a gentle compressor makes
+/// those of noise.
 struct DetectOptions {
   double min_lamp_contrast = 0.2;  ///< of the full scale, above the background; (0, 1]
   double min_lamp_radius = 1.8;    ///< pixels; a smaller bright spot is hot pixels; >= 1.5
@@ -19,7 +20,7 @@ struct DetectOptions {
 /// Reads one frame of a strobe: where the lamp is, which dots stand in its column, and what that means.
 ///
 /// A flash freezes the lamp while charge is shifted, so a dot is a faint copy of the lamp's disk, k rows away
-/// in the same columns (SMEAR.md; the paper's section "CCD Smear"). The detector looks for exactly that and
+/// in the same columns (the paper's section "CCD Smear"). The detector looks for exactly that and
 /// for nothing else: what doesn't have the lamp's columns, size and evenness isn't a dot, and where two
 /// explanations fit, the state is `ambiguous` and there are no dots.
 ///

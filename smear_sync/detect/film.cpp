@@ -10,6 +10,9 @@ namespace emberlock {
 namespace {
 
 constexpr double kSamePlace = 0.8;  // rows: what doesn't move stays within
+// Spots of a frame: hot pixels and reflections are fewer. The dots of a comb at a multiple of the frame rate
+// stand.
+constexpr std::size_t kStandingComb = 3;
 
 double middle(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -33,23 +36,29 @@ std::vector<double> standing_rows(std::span<const SmearReading> film) {
     for (const DotReading& spot : spots) rows.push_back(spot.y.value());
     if (!spots.empty()) ++frames;
   }
+  std::sort(rows.begin(), rows.end());
   std::vector<double> standing;
+  auto low = rows.begin();
+  auto high = rows.begin();
   for (const double row : rows) {
-    const auto near =
-        std::count_if(rows.begin(), rows.end(), [row](double r) { return std::abs(r - row) < kSamePlace; });
-    if (2 * near > frames) standing.push_back(row);
+    while (row - *low >= kSamePlace) ++low;
+    while (high != rows.end() && *high - row < kSamePlace) ++high;
+    if (2 * (high - low) > frames) standing.push_back(row);
   }
   return standing;
 }
 
+/// Whether the row is one of the sorted ones.
 bool among(const std::vector<double>& rows, double row) {
-  return std::any_of(rows.begin(), rows.end(), [row](double r) { return std::abs(r - row) < kSamePlace; });
+  const auto from = std::upper_bound(rows.begin(), rows.end(), row - kSamePlace);
+  return from != rows.end() && *from - row < kSamePlace;
 }
 
 /// The lamps whose dots fall into the columns of the reading's own, top to bottom.
 std::vector<LampReading> lamps_of_column(const SmearReading& reading) {
   std::vector<LampReading> lamps;
-  const double reach = std::max(0.6, 0.15 * reading.lamp->radius);  // the detector takes no dots from beyond
+  const double reach =
+      std::max(0.6, 0.15 * reading.lamp->radius);  // about where the detector takes dots from
   for (const LampReading& lamp : reading.lamps) {
     if (std::abs(lamp.x - reading.lamp->x) < reach) lamps.push_back(lamp);
   }
@@ -142,8 +151,9 @@ std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_
   for (std::size_t i = 0; i < film.size(); ++i) {
     if (!film[i].lamp) continue;
     std::vector<DotReading> moving = all_spots(film[i]);
-    std::erase_if(moving, [&](const DotReading& spot) { return among(standing, spot.y.value()); });
-    if (moving.empty()) continue;
+    const std::size_t still =
+        std::erase_if(moving, [&](const DotReading& spot) { return among(standing, spot.y.value()); });
+    if (moving.empty() || still >= kStandingComb) continue;
     dots[i] = own_dot(film[i], moving);
     if (!dots[i]) continue;
     first = std::min(first, dots[i]->y.value());

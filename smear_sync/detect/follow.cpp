@@ -21,7 +21,7 @@ SmearReading FollowingDetector::read(const ImageView& frame) {
     return detail::nothing(why);
   }
   const detail::Plane plane = detail::to_plane(frame);
-  constexpr unsigned kWholeLook = 128;  // frames: about a second
+  constexpr unsigned kWholeLook = 128;  // frames: a few seconds
   const unsigned turn = turn_++;
   if (known_ && known_->layout == frame.layout && turn % kWholeLook != 0) {
     if (std::optional<detail::Look> look = detail::look_again(plane, known_->look, turn, options_)) {

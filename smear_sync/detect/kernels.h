@@ -3,8 +3,8 @@
 #include <array>
 #include <cstddef>
 
-// The loops over pixels in which a reading's time goes: plain loops without aliases and choices, which the
-// compiler makes vector code of. Pointers are to floats, `count` is a multiple of 8 unless said otherwise.
+// The loops over pixels in which a reading's time goes, without aliases and branches, which the compiler
+// makes vector code of. Pointers are to floats, `count` is a multiple of 8 unless said otherwise.
 namespace emberlock::detail {
 
 /// Takes `even` out of the even rows and `odd` out of the odd ones; bright[y] says whether anything that is

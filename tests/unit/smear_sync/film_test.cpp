@@ -107,6 +107,24 @@ TEST(Film, ASpotThatStandsWhileTheDotWalksIsNone) {
   }
 }
 
+// Flashes at a multiple of the frame rate; faint teeth at either end are seen in every third frame.
+TEST(Film, ACombThatStandsStaysAComb) {
+  std::vector<SmearReading> film;
+  for (int i = 0; i < 12; ++i) {
+    SmearScene scene = lamp_scene();
+    for (int tooth = 1; tooth <= 4; ++tooth) scene.disk(kLampX, kLampY - 30 * tooth, 4, 20);
+    if (i % 3 == 0) scene.disk(kLampX, kLampY + 30, 4, 20);
+    if (i % 3 == 1) scene.disk(kLampX, kLampY + 60, 4, 20);
+    film.push_back(detect(scene.image({.seed = static_cast<std::uint64_t>(i)}).view()));
+    ASSERT_EQ(film.back().state, SmearState::comb) << film.back().reason;
+  }
+  const std::vector<SmearReading> settled = settle(film);
+  for (std::size_t i = 0; i < film.size(); ++i) {
+    EXPECT_EQ(settled[i].state, SmearState::comb) << settled[i].reason;
+    EXPECT_EQ(settled[i].dots.size(), film[i].dots.size());
+  }
+}
+
 TEST(Film, WhereNothingMovesNothingIsSettled) {
   const std::vector<SmearReading> settled = settle(film_of(120, 1, 30, 0, {}));
   for (const SmearReading& r : settled) {

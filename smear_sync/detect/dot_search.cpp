@@ -15,8 +15,10 @@ constexpr int kOwn = Column::kLanes / 2;
 /// The disk's marginal stands for the disk: exact enough to find a dot, which is then fitted in two
 /// dimensions.
 double profile(double radius, double d) {
+  constexpr double kBlurred = 0.6;
   const double half = std::sqrt(std::max(0.0, radius * radius - d * d)) / radius;
-  return std::max(half, 0.6 / (1 + std::exp((std::abs(d) - radius) / DotFit::kEdge)));
+  if (half >= kBlurred) return half;
+  return std::max(half, kBlurred / (1 + std::exp((std::abs(d) - radius) / DotFit::kEdge)));
 }
 
 /// A lane summed over its columns, weighted by the lamp's profile; the sum of the squared weights in `power`.

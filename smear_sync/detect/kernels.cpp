@@ -55,6 +55,34 @@ using Int8 = std::int32_t __attribute__((vector_size(32)));
   return p * scale;
 }
 
+/// Adds the normal equations' products, and the right side's, of parameters [kFirst, kEnd) with all before
+/// them.
+template <int kFirst, int kEnd>
+[[gnu::always_inline]] inline void add_products(const Vec8 (*j)[NormalSums::kParameters],
+                                                const Vec8* residual, const float* weights, int vectors,
+                                                Vec8* sums) {
+  constexpr int kBegin = kFirst * (kFirst + 1) / 2;
+  constexpr int kCount = kEnd * (kEnd + 1) / 2 - kBegin;
+  Vec8 products[kCount];      // NOLINT(*-avoid-c-arrays): stays in registers
+  Vec8 right[kEnd - kFirst];  // NOLINT(*-avoid-c-arrays): stays in registers
+  Vec8* right_sums = sums + NormalSums::kProducts + kFirst;
+  for (int k = 0; k < kCount; ++k) products[k] = sums[kBegin + k];
+  for (int a = 0; a < kEnd - kFirst; ++a) right[a] = right_sums[a];
+  for (int n = 0; n < vectors; ++n) {
+    const Vec8 weight = load(weights + 8 * n);
+    int k = 0;
+#pragma GCC unroll 6
+    for (int a = kFirst; a < kEnd; ++a) {
+      const Vec8 weighted = weight * j[n][a];
+#pragma GCC unroll 6
+      for (int b = 0; b <= a; ++b, ++k) products[k] += weighted * j[n][b];
+      right[a - kFirst] += weighted * residual[n];
+    }
+  }
+  for (int k = 0; k < kCount; ++k) sums[kBegin + k] = products[k];
+  for (int a = 0; a < kEnd - kFirst; ++a) right_sums[a] = right[a];
+}
+
 }  // namespace
 
 EMBERLOCK_VECTOR_CLONES void subtract_rows(float* __restrict rows, std::ptrdiff_t stride, int height,
@@ -152,36 +180,40 @@ EMBERLOCK_VECTOR_CLONES void filter_rows(const float* __restrict v, int height,
 EMBERLOCK_VECTOR_CLONES NormalSums normal_sums(const DiskModel& m, const PixelSpan& pixels) {
   constexpr int kParameters = NormalSums::kParameters;
   constexpr int kProducts = NormalSums::kProducts;
-  Vec8 products[kProducts] = {};     // NOLINT(*-avoid-c-arrays): stays in registers where they are enough
-  Vec8 residuals[kParameters] = {};  // NOLINT(*-avoid-c-arrays): stays in registers where they are enough
-  Vec8 squares{};
-  for (int i = 0; i < pixels.count; i += 8) {
-    const Vec8 dx = load(pixels.x + i) - m.x;
-    const Vec8 dy = load(pixels.y + i) - m.y;
-    Vec8 r = dx * dx + dy * dy + 1e-6F;
-    for (int k = 0; k < 8; ++k) r[k] = std::sqrt(r[k]);
-    const Vec8 g = 1 / (1 + exp8((r - m.radius) * m.edge));
-    const Vec8 e = (m.amplitude * m.edge) * g * (1 - g);
-    const Vec8 e_over_r = e / r;
-    // NOLINTNEXTLINE(*-avoid-c-arrays): stays in registers
-    const Vec8 j[kParameters] = {g, Vec8{} + 1, dy, e_over_r * dx, e_over_r * dy - m.slope, e};
-    const Vec8 weight = load(pixels.weight + i);
-    const Vec8 residual = load(pixels.value + i) - m.level - m.slope * dy - m.amplitude * g;
-    int k = 0;
-#pragma GCC unroll 6
-    for (int a = 0; a < kParameters; ++a) {
-      const Vec8 weighted = weight * j[a];
-#pragma GCC unroll 6
-      for (int b = 0; b <= a; ++b, ++k) products[k] += weighted * j[b];
-      residuals[a] += weighted * residual;
+  constexpr int kBlock = 32;
+  Vec8 sums[NormalSums::kSums] = {};  // NOLINT(*-avoid-c-arrays)
+  // What is summed of a block's pixels, then the sums: all at once they are more than there are registers.
+  Vec8 j[kBlock][kParameters];  // NOLINT(*-avoid-c-arrays)
+  Vec8 residual[kBlock];        // NOLINT(*-avoid-c-arrays)
+  for (int block = 0; block < pixels.count; block += 8 * kBlock) {
+    const int vectors = (pixels.count - block < 8 * kBlock ? pixels.count - block : 8 * kBlock) / 8;
+    for (int n = 0; n < vectors; ++n) {
+      const int i = block + 8 * n;
+      const Vec8 dx = load(pixels.x + i) - m.x;
+      const Vec8 dy = load(pixels.y + i) - m.y;
+      Vec8 r = dx * dx + dy * dy + 1e-6F;
+      for (int k = 0; k < 8; ++k) r[k] = std::sqrt(r[k]);
+      const Vec8 g = 1 / (1 + exp8((r - m.radius) * m.edge));
+      const Vec8 e = (m.amplitude * m.edge) * g * (1 - g);
+      const Vec8 e_over_r = e / r;
+      j[n][0] = g;
+      j[n][1] = Vec8{} + 1;
+      j[n][2] = dy;
+      j[n][3] = e_over_r * dx;
+      j[n][4] = e_over_r * dy - m.slope;
+      j[n][5] = e;
+      residual[n] = load(pixels.value + i) - m.level - m.slope * dy - m.amplitude * g;
     }
-    squares += weight * residual * residual;
+    const float* weights = pixels.weight + block;
+    add_products<0, 4>(j, residual, weights, vectors, sums);
+    add_products<4, kParameters>(j, residual, weights, vectors, sums);
+    Vec8 squares = sums[kProducts + kParameters];
+    for (int n = 0; n < vectors; ++n) squares += load(weights + 8 * n) * residual[n] * residual[n];
+    sums[kProducts + kParameters] = squares;
   }
-  NormalSums sums;
-  for (int k = 0; k < kProducts; ++k) store(sums.v[k].data(), products[k]);
-  for (int a = 0; a < kParameters; ++a) store(sums.v[kProducts + a].data(), residuals[a]);
-  store(sums.v[kProducts + kParameters].data(), squares);
-  return sums;
+  NormalSums result;
+  for (int k = 0; k < NormalSums::kSums; ++k) store(result.v[k].data(), sums[k]);
+  return result;
 }
 
 EMBERLOCK_VECTOR_CLONES void disk_at(const DiskModel& m, const PixelSpan& pixels, float* __restrict out) {

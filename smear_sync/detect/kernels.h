@@ -49,7 +49,8 @@ struct PixelSpan {
 struct NormalSums {
   static constexpr int kParameters = 6;
   static constexpr int kProducts = kParameters * (kParameters + 1) / 2;
-  std::array<std::array<float, 8>, kProducts + kParameters + 1> v{};
+  static constexpr int kSums = kProducts + kParameters + 1;
+  std::array<std::array<float, 8>, kSums> v{};
 };
 NormalSums normal_sums(const DiskModel& model, const PixelSpan& pixels);
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <type_traits>
 
 #include "smear_sync/detect/clones.h"
 
@@ -14,29 +16,39 @@ inline void read_gray(const ImageView& view, int y, int first, int count, float*
   for (int i = 0; i < count; ++i) out[i] = static_cast<float>(in[i]);
 }
 
+/// Holds the sum of four samples: no wider than it must be, so that more fit into a vector.
+template <class Sample>
+using SumOf = std::conditional_t<sizeof(Sample) == 1, std::uint16_t, std::int32_t>;
+
 template <class Sample>
 inline void read_cells(const ImageView& view, int y, int first, int count, float* __restrict out) {
-  const int white = view.layout.white();
+  using Sum = SumOf<Sample>;
+  const auto white = static_cast<Sample>(view.layout.white());
+  const auto clipped = static_cast<Sum>(4 * white);
   const Sample* a = view.row_as<Sample>(y) + first;
   const Sample* b = view.row_as<Sample>(y + 1) + first;
   for (int i = 0; i < count; ++i) {
     const Sample left = a[i] > b[i] ? a[i] : b[i];
     const Sample right = a[i + 1] > b[i + 1] ? a[i + 1] : b[i + 1];
-    const int sum = a[i] + a[i + 1] + b[i] + b[i + 1];
-    out[i] = static_cast<float>((left > right ? left : right) >= white ? 4 * white : sum);
+    const auto sum = static_cast<Sum>(a[i] + a[i + 1] + b[i] + b[i + 1]);
+    const Sum told = (left > right ? left : right) >= white ? clipped : sum;
+    out[i] = static_cast<float>(told);
   }
 }
 
 template <class Sample>
 inline void read_colours(const ImageView& view, int y, int first, int count, float* out) {
-  const int white = view.layout.white();
+  using Sum = SumOf<Sample>;
+  const auto white = static_cast<Sample>(view.layout.white());
+  const auto clipped = static_cast<Sum>(3 * white);
   const Sample* in = view.row_as<Sample>(y) + std::ptrdiff_t{3} * first;
   for (int i = 0; i < count; ++i) {
     const Sample a = in[3 * i];
     const Sample b = in[3 * i + 1];
     const Sample c = in[3 * i + 2];
     const Sample peak = a > b ? a : b;
-    out[i] = static_cast<float>((peak > c ? peak : c) >= white ? 3 * white : a + b + c);
+    const Sum told = (peak > c ? peak : c) >= white ? clipped : static_cast<Sum>(a + b + c);
+    out[i] = static_cast<float>(told);
   }
 }
 

@@ -7,7 +7,7 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
-#if defined(__SANITIZE_THREAD__)
+#ifdef EMBERLOCK_THREAD_SANITIZER
 #include <sanitizer/tsan_interface.h>
 #endif
 
@@ -17,12 +17,12 @@ namespace {
 // Debian's oneTBB is not instrumented: ThreadSanitizer doesn't see that starting a task and waiting for it
 // order memory. These two calls say so; elsewhere they are nothing.
 void publish([[maybe_unused]] void* address) {
-#if defined(__SANITIZE_THREAD__)
+#ifdef EMBERLOCK_THREAD_SANITIZER
   __tsan_release(address);
 #endif
 }
 void observe([[maybe_unused]] void* address) {
-#if defined(__SANITIZE_THREAD__)
+#ifdef EMBERLOCK_THREAD_SANITIZER
   __tsan_acquire(address);
 #endif
 }

@@ -1,0 +1,1 @@
+// Carries the headers that sanitizers' builds precompile: tests/CMakeLists.txt lists them.

@@ -53,17 +53,18 @@ std::vector<float> response(const Column& c, int lane, double radius, Rows rows)
   double across_power = 0;
   const std::vector<float> collapsed = collapse(c, lane, radius, across_power);
   const int reach = static_cast<int>(std::ceil(radius)) + 5;
-  std::vector<double> along;
+  std::vector<double> along(static_cast<std::size_t>(2 * reach) + 1);
+  for (int dy = 0; dy <= reach; ++dy)
+    along[static_cast<std::size_t>(reach + dy)] = along[static_cast<std::size_t>(reach - dy)] =
+        profile(radius, dy);
   double mean = 0;
-  for (int dy = -reach; dy <= reach; ++dy) {
-    along.push_back(profile(radius, dy));
-    mean += along.back() / (2 * reach + 1);
-  }
+  for (const double h : along) mean += h / (2 * reach + 1);
   double power = 0;
   for (const double h : along) power += (h - mean) * (h - mean);
   const double norm = 1 / (std::sqrt(power * across_power) * c.noise);
   std::vector<float> z(static_cast<std::size_t>(height), 0);
   std::vector<float> kernel;
+  kernel.reserve(static_cast<std::size_t>(reach) + 1);
   for (int t = 0; t <= reach; ++t) {
     const double h = along.at(static_cast<std::size_t>(reach) + static_cast<std::size_t>(t)) - mean;
     kernel.push_back(static_cast<float>(h * norm * (t == 0 ? 0.5 : 1)));
@@ -109,11 +110,16 @@ std::vector<float> response(const Column& c, int lane, double radius, Rows rows)
 void compare_lanes(const Column& c, double radius, Responses& r) {
   constexpr int kApart = 5;  // rows: neighbours share theirs, one in a few tells the scale
   std::vector<float> sample;
+  sample.reserve(c.hidden.size());
   std::vector<double> extremes;
+  std::vector<std::size_t> hidden;
+  for (std::size_t y = 0; y < c.hidden.size(); ++y) {
+    if (c.hidden[y] != 0) hidden.push_back(y);
+  }
   for (int lane = 0; lane < Column::kLanes; ++lane) {
     if (lane == kOwn || !c.lane_inside(lane)) continue;
     std::vector<float> z = response(c, lane, radius, Rows::whole);
-    for (std::size_t y = 0; y < z.size(); ++y) z[y] = c.hidden[y] != 0 ? 0 : z[y];
+    for (const std::size_t y : hidden) z[y] = 0;
     for (std::size_t y = 0; y < z.size(); y += kApart) {
       if (z[y] != 0) sample.push_back(z[y]);
     }

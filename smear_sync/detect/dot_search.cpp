@@ -54,9 +54,7 @@ std::vector<float> response(const Column& c, int lane, double radius, Rows rows)
   const std::vector<float> collapsed = collapse(c, lane, radius, across_power);
   const int reach = static_cast<int>(std::ceil(radius)) + 5;
   std::vector<double> along(static_cast<std::size_t>(2 * reach) + 1);
-  for (int dy = 0; dy <= reach; ++dy)
-    along[static_cast<std::size_t>(reach + dy)] = along[static_cast<std::size_t>(reach - dy)] =
-        profile(radius, dy);
+  for (int i = 0; i <= 2 * reach; ++i) along[static_cast<std::size_t>(i)] = profile(radius, i - reach);
   double mean = 0;
   for (const double h : along) mean += h / (2 * reach + 1);
   double power = 0;

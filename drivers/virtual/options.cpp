@@ -159,7 +159,7 @@ Result<VirtualRigOptions> parse_virtual_rig(std::string_view name, std::uint64_t
     int cameras = 0;
     const auto [end, failed] = std::from_chars(group.data(), group.data() + group.size(), cameras);
     if (failed == std::errc::invalid_argument) return refuse("the number of cameras is not a whole number");
-    if (failed != std::errc{} || cameras < 1 || draw.cameras + cameras > kMostCameras) {
+    if (failed != std::errc{} || cameras < 1 || cameras > kMostCameras - draw.cameras) {
       return refuse("the number of cameras is out of range");
     }
     const auto kind = sensor_kind(group.substr(static_cast<std::size_t>(end - group.data())));

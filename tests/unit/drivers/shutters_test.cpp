@@ -154,7 +154,8 @@ TEST(Shutters, ARigsNameTellsHowManyOfEachKind) {
   }
   EXPECT_TRUE(rig->scene.has(Pass::room));
   EXPECT_FALSE(parse_virtual_rig("virtual:6")->scene.has(Pass::room)) << "nobody needs it";
-  for (const char* odd : {"virtual:", "virtual:2+", "virtual:+2", "virtual:2cmos", "virtual:60ccd+5global"}) {
+  for (const char* odd : {"virtual:", "virtual:2+", "virtual:+2", "virtual:2cmos", "virtual:60ccd+5global",
+                          "virtual:1+2147483647ccd"}) {
     const auto refused = parse_virtual_rig(odd);
     ASSERT_FALSE(refused.ok()) << odd;
     EXPECT_THAT(refused.error().message(), HasSubstr("4ccd+3rolling+2global"));

@@ -15,10 +15,14 @@ class Interrupt {
     action.sa_flags = static_cast<int>(SA_RESETHAND);
     ::sigaction(SIGINT, &action, &before_);
   }
-  ~Interrupt() { ::sigaction(SIGINT, &before_, nullptr); }
+  ~Interrupt() {
+    ::sigaction(SIGINT, &before_, nullptr);
+    asked_ = 0;
+  }
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
+  /// False while there is none.
   [[nodiscard]] static bool asked() { return asked_ != 0; }
 
  private:

@@ -20,9 +20,13 @@ struct Film {
 };
 
 /// The devices of an alignment and what reads their frames, with everything that happens to them written
-/// down.
+/// down. `rig` and `options` must outlive it. Errors of what acts on devices are theirs and the recorder's.
 class AlignBench {
  public:
+  /// Periods that pass before frames show a change of the strobe: a flash may show in the frame of the read
+  /// phase before, or in that of the next, so frames are trusted from the second one on.
+  static constexpr double kSettlingPeriods = 2;
+
   AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period);
 
   /// As it said of itself after the last change.
@@ -31,18 +35,21 @@ class AlignBench {
   [[nodiscard]] std::vector<std::size_t> cameras_with(SensorKind kind) const;
 
   /// Sets the strobe, if that changes anything; frames that show what was before are passed over from then
-  /// on.
+  /// on. Errors: the strobe's; settings that couldn't be read back are asked for again the next time.
   Status set_strobe(const StrobeSettings& wanted);
   /// Tells the camera to reset its shutter at `moment` or a whole number of periods later; at a moment drawn
-  /// at random when there is none. Returns when it was told for.
+  /// at random when there is none; `draw` is the number of that reset. Returns when it was told for. Error
+  /// device: a camera that can't be reset.
   Result<TimePoint> reset(std::size_t camera, std::optional<TimePoint> moment, int draw);
-  /// Trims the camera's frame rate. Returns when it was told.
+  /// Trims the camera's frame rate. Returns when it was told. Error device: it can't be, or not so far.
   Result<TimePoint> trim(std::size_t camera, PartsPerMillion trim);
-  /// `count` frames of every camera, one of each in turn, and what those of `read` show.
+  /// `count` frames of every camera, one of each in turn, and what those of `read` show. A frame that doesn't
+  /// come in time is left out, with a warning; errors: a camera that is lost, a recording that has ended.
   Result<Film> film(const std::vector<std::size_t>& read, int count);
   Result<Film> film_all(int count);
-  /// Films the looks that the sensors want before they tell phases to a standard error of `wanted`, at
-  /// `flashes` but for the delay.
+  /// Films the looks that the sensors ask for before they tell phases to a standard error of `wanted`, at
+  /// `flashes` but for the delay, and sets the strobe to `flashes`. `done`, 0..1, is what `progress` is told
+  /// of the run meanwhile. Errors: set_strobe's and film's; sensors that are never content are none.
   Status sweep(const StrobeSettings& flashes, Seconds wanted, const Progress& progress, double done);
 
   /// Waits until `until`, or until it is asked to stop; the time since the last frame runs on.

@@ -65,6 +65,14 @@ CcdTiming timing_from(const json& object) {
   return timing;
 }
 
+/// Recordings from before the strobe was moved have none; the first ones that did called it a nod.
+Seconds strobe_step_from(const json& object) {
+  for (const char* key : {"strobe_step_s", "nod_s"}) {
+    if (object.contains(key)) return Seconds(number(object, key));
+  }
+  return Seconds(0);
+}
+
 AlignRunOptions options_from(const json& object) {
   AlignRunOptions options;
   const auto policy = parse_align_policy(object.at("policy").get<std::string>());
@@ -90,7 +98,7 @@ AlignRunOptions options_from(const json& object) {
   }
   options.align.max_rounds = integer(object, "max_rounds");
   options.align.max_looks = integer(object, "max_looks");
-  options.align.nod = Seconds(number(object, "nod_s"));
+  options.align.strobe_step = strobe_step_from(object);
   options.measure_row_time = object.at("measure_row_time").get<bool>();
   options.comb_rate = Hertz(number(object, "comb_rate_hz"));
   options.comb_frames = integer(object, "comb_frames");
@@ -100,7 +108,9 @@ AlignRunOptions options_from(const json& object) {
   options.reset_lead = Seconds(number(object, "reset_lead_s"));
   options.rate_error = PartsPerMillion(number(object, "rate_error_ppm"));
   options.seed = object.at("seed").get<std::uint64_t>();
-  if (const json& hold = object.at("hold_s"); !hold.is_null()) options.hold = Seconds(hold.get<double>());
+  // Before runs could be held there was no such key.
+  if (const json hold = object.value("hold_s", json()); !hold.is_null())
+    options.hold = Seconds(hold.get<double>());
   if (!object.at("cameras").is_array()) throw std::invalid_argument("cameras is not a list");
   for (const json& camera : object.at("cameras")) {
     options.timing.push_back(timing_from(camera));
@@ -218,7 +228,7 @@ ordered_json options_json(const AlignRunOptions& options) {
           {"limits", limits_json(align.limits)},
           {"max_rounds", align.max_rounds},
           {"max_looks", align.max_looks},
-          {"nod_s", align.nod.value()},
+          {"strobe_step_s", align.strobe_step.value()},
           {"measure_row_time", options.measure_row_time},
           {"comb_rate_hz", options.comb_rate.value()},
           {"comb_frames", options.comb_frames},

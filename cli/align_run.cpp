@@ -11,6 +11,7 @@
 #include "cli/align_bench.h"
 #include "cli/align_json.h"
 #include "smear_sync/align/align_words.h"
+#include "smear_sync/align/move_together.h"
 #include "smear_sync/align/reset_delay.h"
 
 namespace emberlock::cli {
@@ -19,16 +20,22 @@ namespace {
 /// Cameras whose nominal rates differ by more can't be held in step by resets.
 constexpr double kSameRate = 500e-6;
 
-/// Periods that pass before frames show a change of the strobe.
-constexpr double kSettlingPeriods = 2;
+/// Looks about the edge that the phase of one global shutter takes in a round, beside one without flashes
+/// that all of them share.
+constexpr double kLooks = 5;
+/// And those over the whole period that come first when some were reset: all of these share them too.
+constexpr double kSweepLooks = 24;
 
-/// Looks that a global shutter's phase takes in a round, when its shutter wasn't reset.
-constexpr double kLooks = 4;
-
-/// Standard error of a swept phase that is aimed at: this part of the tolerance, or the least that sweeps
-/// reach.
+/// Standard error of a swept phase that is aimed at: this part of the tolerance, as fine as tells whether
+/// the edge follows the strobe's step, or the least that sweeps reach.
 constexpr double kSweptPart = 0.04;
 constexpr Seconds kSweptLeast = microseconds(2);
+
+Seconds wanted_of_sweeps(const AlignOptions& options) {
+  Seconds wanted = kSweptPart * options.tolerance.in_time(options.row_time);
+  if (options.strobe_step > Seconds(0)) wanted = std::min(wanted, kToldPartOfStep * options.strobe_step);
+  return std::max(wanted, kSweptLeast);
+}
 
 /// Of the progress, before the end.
 constexpr double kNeverDone = 0.999;
@@ -76,7 +83,16 @@ Result<Seconds> common_period(const AlignRig& rig, const AlignRunOptions& option
                     "camera " + camera->info().id, "set all cameras to one frame rate");
     }
   }
-  return period(rate);
+  const Seconds period = emberlock::period(rate);
+  const Seconds step = options.align.strobe_step;
+  if (!(step >= Seconds(0) && step < period / 4)) {
+    return refuse(
+        fmt::format("the strobe can't be moved by {:.4g} ms to see dots follow", in_milliseconds(step)),
+        "align",
+        fmt::format("choose a step of less than a quarter of the frame period, {:.4g} ms; 0: none",
+                    in_milliseconds(period / 4)));
+  }
+  return period;
 }
 
 /// A mean of row times, each weighing by its standard error.
@@ -212,9 +228,12 @@ class AlignRunner {
       : rig_(rig), options_(options), observer_(observer), progress_(progress), bench_(rig, options, period) {
     result_.options = options.align;
     result_.options.period = period;
-    result_.options.round_time = period * (options.frames_per_round + kSettlingPeriods);
-    if (!bench_.cameras_with(SensorKind::global_shutter).empty())
-      result_.options.round_time += period * (kLooks * (1 + kSettlingPeriods));
+    result_.options.round_time = period * (options.frames_per_round + AlignBench::kSettlingPeriods);
+    if (const auto swept = bench_.cameras_with(SensorKind::global_shutter); !swept.empty()) {
+      const Seconds look = period * (1 + AlignBench::kSettlingPeriods);
+      result_.options.round_time += (1 + kLooks * static_cast<double>(swept.size())) * look;
+      result_.options.sweep_time = kSweepLooks * look;
+    }
     result_.timing = options.timing;
     for (CcdTiming& timing : result_.timing) timing.frame_period = period;
     result_.row_clocks.resize(rig.cameras.size());
@@ -237,10 +256,8 @@ class AlignRunner {
     const Beat expected = expected_beat(bench_.strobe().rate, result_.options.period, options_.rate_error);
     for (std::size_t i = 0; i < cameras_.size(); ++i)
       bench_.sensor(i).begin_round(own_beat(state_, i, beat_.value_or(expected), result_.options));
-    const Seconds tolerance = result_.options.tolerance.in_time(result_.options.row_time);
-    EMBERLOCK_RETURN_IF_ERROR(
-        bench_.sweep(flashes_, std::max(kSweptPart * tolerance, kSweptLeast), progress_, reached_));
-    if (state_.rounds == 0) adopt_sensors(rig_, bench_, options_, result_);
+    EMBERLOCK_RETURN_IF_ERROR(bench_.sweep(flashes_, wanted_of_sweeps(result_.options), progress_, reached_));
+    adopt_sensors(rig_, bench_, options_, result_);
     report(progress_, std::min(reached_, kNeverDone),
            fmt::format("round {}, {} resets", state_.rounds + 1, state_.resets));
     EMBERLOCK_ASSIGN_OR_RETURN(const Film film, bench_.film_all(options_.frames_per_round));

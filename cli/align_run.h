@@ -29,8 +29,8 @@ struct AlignRig {
 };
 
 struct AlignRunOptions {
-  /// period, row_time, rows: of the rig's cameras; the run sets period and round_time to the cameras' own
-  /// and, once measured, row_time.
+  /// period, row_time, rows: of the rig's cameras; the run sets period, round_time and sweep_time to the
+  /// cameras' own and, once measured, row_time.
   AlignOptions align;
   /// By camera: n, K and d must be right (a wrong d reverses every correction); row_time is used where it
   /// isn't measured. Of global shutters n and t_row say nothing.

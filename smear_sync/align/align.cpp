@@ -75,6 +75,7 @@ void remember(AlignState& state, const Context& c) {
     track.phase.forget_phase();
     track.sighted.reset();
     track.moved = false;
+    track.rough.reset();
     track.doubt.clear();
     const auto& stamp = round.cameras[done.camera].stamp;
     if (!done.at || !stamp) continue;
@@ -349,7 +350,7 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
         decision.strobe_phase = next_look(c);
     }
   }
-  ask_for_moves(state, decision, c.cameras, c.options, moved_strobe(c, c.options.nod), looks);
+  ask_for_moves(state, decision, c.cameras, c.options, moved_strobe(c, c.options.strobe_step), looks);
   decision.reference = nearest(decision, c.options);
   foresee(state, decision, drifts, c);
 }

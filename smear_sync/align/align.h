@@ -102,12 +102,13 @@ struct AlignOptions {
                             ///< the outermost, are reset
   Seconds round_time{0.6};  ///< of one round of filming, for what is foretold, > 0
   Seconds reset_time{0};    ///< of one reset more in a round: an operator's way to the button
+  Seconds sweep_time{0};    ///< of a round after resets, beyond its own: what finds a reset shutter's phase
   std::optional<AlignLimits> limits = {};  ///< absent: nothing is refused for what it takes
   int max_rounds = 500;                    ///< without all within tolerance, > 0
   int max_looks = 6;                       ///< strobe phases tried in a row for cameras that show no dot, > 0
   /// By which the strobe is moved to see that every dot moves with it, as no reflection does, before cameras
   /// are called aligned; > 0 and < T / 4. Zero: what looks like a dot is believed.
-  Seconds nod = milliseconds(2);
+  Seconds strobe_step = milliseconds(2);
 };
 
 /// One camera in one round.
@@ -156,6 +157,7 @@ struct CameraTrack {
   // Since the shutter's phase was last drawn:
   std::optional<Sighting> sighted;  ///< the newest
   bool moved = false;               ///< its dot was seen to move with the strobe
+  std::optional<Seconds> rough;  ///< seen at two places of the strobe, but only to this: too roughly to tell
   std::string doubt;  ///< why what is seen isn't taken for its dot: it moved otherwise; empty if it is
 };
 

@@ -78,7 +78,8 @@ Play play(const Prospect& prospect, AlignPolicy policy, Seconds tolerance, const
       }
       return true;
     }();
-    if (inside && !trimmed && options.nod > Seconds(0)) result.seconds += seconds;  // to see the dots move
+    if (inside && !trimmed && options.strobe_step > Seconds(0))
+      result.seconds += seconds;  // to see the dots move
     if (inside && trimmed) {
       Seconds farthest;
       for (std::size_t i = 0; i < scene.tau.size(); ++i)
@@ -87,7 +88,7 @@ Play play(const Prospect& prospect, AlignPolicy policy, Seconds tolerance, const
     }
     const int resets = carry_out(scene, chosen, target, prospect.jitter, random);
     result.resets += resets;
-    const double acting = resets * options.reset_time.value();
+    const double acting = resets * options.reset_time.value() + (resets > 0 ? options.sweep_time.value() : 0);
     result.seconds += acting;
     const bool over = result.resets > limits.resets || result.seconds > limits.time.value();
     if (over || inside || resets == 0) {

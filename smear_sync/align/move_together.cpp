@@ -27,15 +27,18 @@ Seconds common_excess(std::span<const std::optional<DotMove>> cameras, Seconds p
   return abs(low) < abs(high) ? low : high;
 }
 
-std::string doubt_of(DotMotion motion, const DotMove& move, bool all_stand) {
-  const std::string moved =
-      fmt::format("when the strobe's flashes were moved by {:.2f} ms", in_milliseconds(move.strobe));
+std::string when_moved(const DotMove& move) {
+  return fmt::format("when the strobe's flashes were moved by {:.2f} ms", in_milliseconds(move.strobe));
+}
+
+/// Of a camera that shows this while another's dot did move.
+std::string doubt_of(DotMotion motion, const DotMove& move) {
+  const std::string moved = when_moved(move);
   switch (motion) {
     case DotMotion::untold:
     case DotMotion::with_all:
       break;
     case DotMotion::none:
-      if (all_stand) return "no camera's dot moved " + moved + ": see whether the strobe does as it is told";
       return "its dot stood still " + moved +
              ": look for a reflection of the lamp in the lamp's own columns, shade it, or turn the camera";
     case DotMotion::against:
@@ -46,6 +49,46 @@ std::string doubt_of(DotMotion motion, const DotMove& move, bool all_stand) {
              "columns";
   }
   return {};
+}
+
+/// The cameras whose dots haven't been seen to move: those that nothing was seen of, and those seen too
+/// roughly.
+struct Unmoved {
+  std::string unseen;
+  std::string rough;
+  Seconds sigma;  ///< of the roughest
+
+  [[nodiscard]] std::string all() const {
+    return unseen + (unseen.empty() || rough.empty() ? "" : ", ") + rough;
+  }
+};
+
+Unmoved unmoved_of(const AlignState& state, const std::vector<AlignCamera>& cameras) {
+  Unmoved unmoved;
+  for (std::size_t i = 0; i < cameras.size(); ++i) {
+    const CameraTrack& track = state.cameras[i];
+    if (track.moved) continue;
+    std::string& list = track.rough ? unmoved.rough : unmoved.unseen;
+    list += (list.empty() ? "" : ", ") + cameras[i].id;
+    unmoved.sigma = std::max(unmoved.sigma, track.rough.value_or(Seconds(0)));
+  }
+  return unmoved;
+}
+
+/// Why a run ends whose cameras lie in tolerance as far as anybody can tell.
+std::string why_untold(const Unmoved& unmoved, const AlignOptions& options, int looks) {
+  std::string why;
+  if (!unmoved.unseen.empty()) {
+    why = "no dot of " + unmoved.unseen + " was seen at two places of the strobe in " +
+          plural(static_cast<std::size_t>(looks), "look") +
+          ": check that the lamp is in view and not over-exposed";
+  }
+  if (unmoved.rough.empty()) return why;
+  if (!why.empty()) why += "; ";
+  return why + fmt::format(
+                   "the phase of {} is known to {:.2f} ms, too roughly to see it follow the "
+                   "strobe by {:.2f} ms: ask for a finer tolerance, or give it more of the flash",
+                   unmoved.rough, in_milliseconds(unmoved.sigma), in_milliseconds(options.strobe_step));
 }
 
 }  // namespace
@@ -96,37 +139,39 @@ void watch_moves(AlignState& state, const AlignRound& round, const AlignOptions&
       stands > 1 && std::count(motions.begin(), motions.end(), DotMotion::untold) + stands ==
                         static_cast<std::ptrdiff_t>(motions.size());
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    if (motions[i] == DotMotion::untold) continue;
     CameraTrack& track = state.cameras[i];
+    if (motions[i] == DotMotion::untold) {
+      if (moves[i] && moves[i]->strobe != Seconds(0)) track.rough = moves[i]->sigma;
+      continue;
+    }
     track.moved = motions[i] == DotMotion::with_all;
-    track.doubt = doubt_of(motions[i], *moves[i], all_stand);
+    track.rough.reset();
+    track.doubt = all_stand ? "no camera's dot moved " + when_moved(*moves[i]) +
+                                  ": see whether the strobe does as it is told"
+                            : doubt_of(motions[i], *moves[i]);
   }
 }
 
 void ask_for_moves(AlignState& state, AlignDecision& decision, const std::vector<AlignCamera>& cameras,
-                   const AlignOptions& options, Seconds nodded, int looks) {
+                   const AlignOptions& options, Seconds stepped, int looks) {
   const bool resets = std::any_of(decision.cameras.begin(), decision.cameras.end(),
                                   [](const CameraDecision& camera) { return camera.reset; });
   const bool open = decision.verdict == AlignVerdict::go_on || decision.verdict == AlignVerdict::aligned;
-  if (options.nod == Seconds(0) || resets || !open) return;
-  std::string unmoved;
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
-    if (!state.cameras[i].moved) unmoved += (unmoved.empty() ? "" : ", ") + cameras[i].id;
-  }
-  if (unmoved.empty()) return;
-  if (!decision.strobe_phase) decision.strobe_phase = nodded;
+  if (options.strobe_step == Seconds(0) || resets || !open) return;
+  const Unmoved unmoved = unmoved_of(state, cameras);
+  const std::string all = unmoved.all();
+  if (all.empty()) return;
+  if (!decision.strobe_phase) decision.strobe_phase = stepped;
   if (decision.verdict == AlignVerdict::go_on) return;
   state.looks = looks + 1;
   if (state.looks > options.max_looks) {
     decision.verdict = AlignVerdict::given_up;
-    decision.reason = "no dot of " + unmoved + " was seen at two places of the strobe in " +
-                      plural(static_cast<std::size_t>(state.looks), "look") +
-                      ": check that the lamp is in view and not over-exposed";
+    decision.reason = why_untold(unmoved, options, state.looks);
     return;
   }
   decision.verdict = AlignVerdict::go_on;
   decision.reason += fmt::format("; the strobe is moved by {:.2f} ms, which the dot of {} must follow",
-                                 in_milliseconds(options.nod), unmoved);
+                                 in_milliseconds(options.strobe_step), all);
 }
 
 }  // namespace emberlock

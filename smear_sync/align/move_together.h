@@ -25,12 +25,15 @@ struct DotMove {
 
 /// What stands in a camera's picture for its dot, told by moving the strobe.
 enum class DotMotion {
-  untold,    ///< not seen at two places of the strobe, or too roughly
-  with_all,  ///< as the other cameras' dots, and as the strobe
-  none,      ///< it stands still: a reflection of the lamp, or hot pixels
-  against,   ///< as far as the others' the other way round: its read direction is set wrong
-  otherwise,
+  untold,     ///< not seen at two places of the strobe, or too roughly
+  with_all,   ///< as the other cameras' dots, and as the strobe
+  none,       ///< it stands still: a reflection of the lamp, or hot pixels
+  against,    ///< as far as the others' the other way round: its read direction is set wrong
+  otherwise,  ///< by neither: a wrong row time, a reset that nobody ordered, a reflection of another flash
 };
+
+/// Two phases, each known to this part of the strobe's step, tell a dot that followed it from one that stood.
+constexpr double kToldPartOfStep = 1.0 / 20;
 
 /// The motions of all the cameras that filmed the same flashes, by camera; nothing of one that wasn't seen
 /// twice. What most of them differ by from what is expected, counting the strobe's word for one camera more,
@@ -44,8 +47,8 @@ std::vector<DotMotion> move_together(std::span<const std::optional<DotMove>> cam
 void watch_moves(AlignState& state, const AlignRound& round, const AlignOptions& options);
 
 /// Cameras whose dots haven't been seen to move with the strobe aren't called aligned: a decision that resets
-/// nobody moves the strobe to `nodded` for them. `looks`: rounds in a row that did so or looked for a phase.
+/// nobody moves the strobe to `stepped` for them. `looks`: rounds in a row that did so or looked for a phase.
 void ask_for_moves(AlignState& state, AlignDecision& decision, const std::vector<AlignCamera>& cameras,
-                   const AlignOptions& options, Seconds nodded, int looks);
+                   const AlignOptions& options, Seconds stepped, int looks);
 
 }  // namespace emberlock

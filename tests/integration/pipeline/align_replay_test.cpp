@@ -1,5 +1,6 @@
 #include <filesystem>
 #include <fstream>
+#include <functional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -39,6 +40,18 @@ class AlignReplay : public testing::Test {
         }
       }
     };
+  }
+
+  /// Changes the recorded events, whose length must stay.
+  void edit_events(const std::function<void(std::string&)>& edit) const {
+    const fs::path events = folder_ / "events.binpb";
+    std::string bytes;
+    {
+      std::ifstream in(events, std::ios::binary);
+      bytes.assign(std::istreambuf_iterator<char>(in), {});
+    }
+    edit(bytes);
+    std::ofstream(events, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   }
 
   fs::path folder_;
@@ -81,6 +94,25 @@ TEST_F(AlignReplay, GivesTheSameReadingsAndDecisionsToTheBit) {
   EXPECT_EQ(summary_json(*recorded, bench.options.seed).dump(), summary_json(*replayed, seed).dump());
 }
 
+// From before the strobe was moved and before runs were held: the settings have neither.
+TEST_F(AlignReplay, TheFirstRecordingsReplay) {
+  SmallBench bench(small_rig(4));
+  bench.options.align.strobe_step = Seconds(0);
+  std::vector<std::string> live;
+  ASSERT_TRUE(record_align(folder_, bench.align, bench.options, into(live)).ok());
+  edit_events([](std::string& bytes) {
+    for (const std::string setting : {R"("strobe_step_s":0.0,)", R"("hold_s":null,)"}) {
+      const auto at = bytes.find(setting);
+      ASSERT_NE(at, std::string::npos) << setting;
+      bytes.replace(at, setting.size(), setting.size(), ' ');
+    }
+  });
+  std::vector<std::string> again;
+  const auto replayed = replay_align(folder_, into(again));
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(live, again);
+}
+
 TEST_F(AlignReplay, EveryFrameOfTheRunIsInTheRecording) {
   SmallBench bench(small_rig(4));
   ASSERT_TRUE(record_align(folder_, bench.align, bench.options).ok());
@@ -96,17 +128,12 @@ TEST_F(AlignReplay, ADecisionThatDiffersFromTheRecordedOneIsAnError) {
   SmallBench bench(small_rig(4));
   ASSERT_TRUE(record_align(folder_, bench.align, bench.options).ok());
   // One digit of a recorded decision, changed in place.
-  const fs::path events = folder_ / "events.binpb";
-  std::string bytes;
-  {
-    std::ifstream in(events, std::ios::binary);
-    bytes.assign(std::istreambuf_iterator<char>(in), {});
-  }
-  const auto at = bytes.find("\"beat_ppm\":");
-  ASSERT_NE(at, std::string::npos);
-  char& digit = bytes[at + 13];
-  digit = digit == '3' ? '4' : '3';
-  std::ofstream(events, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  edit_events([](std::string& bytes) {
+    const auto at = bytes.find("\"beat_ppm\":");
+    ASSERT_NE(at, std::string::npos);
+    char& digit = bytes[at + 13];
+    digit = digit == '3' ? '4' : '3';
+  });
   const auto replayed = replay_align(folder_);
   ASSERT_FALSE(replayed.ok());
   EXPECT_THAT(replayed.error().message(), HasSubstr("round 1"));

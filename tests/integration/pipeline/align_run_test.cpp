@@ -174,7 +174,7 @@ SmallBench bench_with_a_reflection() {
 
 TEST(AlignRun, AReflectionThatLooksLikeADotIsFoundByMovingTheStrobe) {
   SmallBench believing = bench_with_a_reflection();
-  believing.options.align.nod = Seconds(0);
+  believing.options.align.strobe_step = Seconds(0);
   const auto taken_in = run_align(believing.align, believing.options);
   ASSERT_TRUE(taken_in.ok()) << taken_in.error().message();
   ASSERT_EQ(taken_in->last.verdict, AlignVerdict::aligned) << taken_in->last.reason;
@@ -194,6 +194,18 @@ TEST(AlignRun, AReflectionThatLooksLikeADotIsFoundByMovingTheStrobe) {
   ASSERT_GE(said.size(), 2U);
   EXPECT_THAT(said[1], HasSubstr("stood still when the strobe's flashes were moved by 2.00 ms"));
   EXPECT_THAT(said[1], HasSubstr("look for a reflection"));
+}
+
+TEST(AlignRun, AStepOfTheStrobeThatGoesHalfRoundIsRefused) {
+  SmallBench bench(small_rig(1));
+  const Seconds period = bench.rig->truth(0).timing.frame_period;
+  for (const Seconds step : {period / 3, milliseconds(-1), Seconds(NAN)}) {
+    bench.options.align.strobe_step = step;
+    const auto result = run_align(bench.align, bench.options);
+    ASSERT_FALSE(result.ok());
+    EXPECT_EQ(result.error().kind, ErrorKind::bad_input);
+    EXPECT_THAT(result.error().message(), HasSubstr("less than a quarter of the frame period, 10.4"));
+  }
 }
 
 TEST(AlignRun, CamerasOfDifferentFrameRatesAreRefused) {

@@ -131,7 +131,7 @@ TEST(AlignLaws, ACommonShiftOfTheStrobeChangesNoDecision) {
 TEST(AlignLaws, OnlyCamerasOutOfToleranceAreReset) {
   law("and somebody is reset exactly when not aligned", [] {
     AlignOptions options = any_options();
-    options.nod = Seconds(0);  // cameras in tolerance would be looked at once more
+    options.strobe_step = Seconds(0);  // cameras in tolerance would be looked at once more
     const auto decision = align_step({}, any_round(5), rig(5), options).decision;
     bool any_reset = false;
     for (const CameraDecision& camera : decision.cameras) {

@@ -40,12 +40,25 @@ TEST(AlignJson, EveryMissingOrMistypedFieldIsAnErrorNotACrash) {
   for (const auto& [key, value] : whole.items()) {
     auto missing = whole;
     missing.erase(key);
-    EXPECT_FALSE(options_from_json(missing).ok()) << key;
+    const bool newer = key == "strobe_step_s" || key == "hold_s";  // than the first recordings
+    EXPECT_EQ(options_from_json(missing).ok(), newer) << key;
     auto mistyped = whole;
     mistyped[key] = nlohmann::json::object();
     EXPECT_FALSE(options_from_json(mistyped).ok()) << key;
   }
   EXPECT_FALSE(options_from_json(nullptr).ok());
+}
+
+TEST(AlignJson, SettingsFromBeforeTheStrobeWasMovedAndRunsWereHeldAreRead) {
+  auto first = nlohmann::json::parse(options_json(some_options()).dump());
+  first.erase("strobe_step_s");
+  first.erase("hold_s");
+  const auto unmoved = options_from_json(first);
+  ASSERT_TRUE(unmoved.ok()) << unmoved.error().message();
+  EXPECT_EQ(unmoved->align.strobe_step, Seconds(0));
+  EXPECT_FALSE(unmoved->hold);
+  first["nod_s"] = 0.001;  // as the step was called at first
+  EXPECT_EQ(options_from_json(first)->align.strobe_step, milliseconds(1));
 }
 
 TEST(AlignJson, WhatIsNotKnownIsNull) {

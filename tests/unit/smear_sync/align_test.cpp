@@ -41,7 +41,7 @@ std::vector<int> reset_in(const AlignDecision& decision) {
 
 /// What looks like a dot is believed at first sight.
 AlignOptions believing(AlignPolicy policy = AlignPolicy::densest) {
-  return {.policy = policy, .nod = Seconds(0)};
+  return {.policy = policy, .strobe_step = Seconds(0)};
 }
 
 const double kBlind = std::numeric_limits<double>::quiet_NaN();

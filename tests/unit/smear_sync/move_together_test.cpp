@@ -1,5 +1,7 @@
 #include "smear_sync/align/move_together.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -70,12 +72,15 @@ class ThreeCameras {
       const Seconds tau = milliseconds(16) + gain * strobe_;
       round.cameras.push_back({{PhaseState::known, wrap_positive(tau, kPeriod), microseconds(16), {}}, {}});
     }
+    if (rough_ > Seconds(0)) round.cameras[2].phase.sigma = rough_;
     AlignStep step = align_step(state_, round, cameras_, {});
     state_ = step.state;
     strobe_ = step.decision.strobe_phase.value_or(strobe_);
     return step;
   }
   void heal() { gains_[2] = 1; }
+  /// The third one's phases are known to this.
+  void roughen(Seconds sigma) { rough_ = sigma; }
 
  private:
   std::vector<double> gains_;
@@ -84,6 +89,7 @@ class ThreeCameras {
                                     {"c", "ccd", ResetMethod::on_command, {}, {}}};
   AlignState state_;
   Seconds strobe_;
+  Seconds rough_;
   int rounds_ = 0;
 };
 
@@ -125,6 +131,27 @@ TEST(MoveTogether, AReflectionThatIsShadedIsForgotten) {
   EXPECT_EQ(decision.verdict, AlignVerdict::aligned) << decision.reason;
 }
 
+// In tolerance, but known to a fifth of the strobe's step: neither moved nor standing.
+TEST(MoveTogether, ADotThatIsKnownTooRoughlyIsNotSaidToBeUnseen) {
+  ThreeCameras rig(1);
+  rig.roughen(milliseconds(0.4));
+  AlignDecision decision = rig.round().decision;
+  for (int i = 0; decision.verdict == AlignVerdict::go_on; ++i) {
+    ASSERT_LT(i, 20);
+    decision = rig.round().decision;
+  }
+  EXPECT_EQ(decision.verdict, AlignVerdict::given_up);
+  EXPECT_THAT(decision.reason, HasSubstr("the phase of c is known to"));
+  EXPECT_THAT(decision.reason, HasSubstr("too roughly to see it follow the strobe by 2.00 ms"));
+  EXPECT_THAT(decision.reason, testing::Not(HasSubstr("no dot")));
+}
+
+TEST(MoveTogether, TwoPhasesKnownToTheStatedPartOfTheStepTellAMove) {
+  const double sigma = kToldPartOfStep * in_milliseconds(kMoved) * std::sqrt(2.0);
+  EXPECT_THAT(motions_of({moved_by(2, sigma)}), ElementsAre(kWith));
+  EXPECT_THAT(motions_of({moved_by(0, sigma), moved_by(2)}), ElementsAre(DotMotion::none, kWith));
+}
+
 TEST(MoveTogether, AWrongReadDirectionIsNamed) {
   ThreeCameras rig(-1);
   (void)rig.round();
@@ -151,7 +178,9 @@ TEST(MoveTogether, NoTrueDotIsDoubted) {
   sim.flash_rows = 0.37;
   sim.noise_rows = 0.05;
   sim.rate_spread = PartsPerMillion(20);
-  for (const auto policy : {AlignPolicy::fixed_reference, AlignPolicy::timed}) {
+  sim.trim = RateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
+  for (const auto policy :
+       {AlignPolicy::fixed_reference, AlignPolicy::densest, AlignPolicy::timed, AlignPolicy::trimmed}) {
     sim.options.policy = policy;
     for (std::uint64_t seed = 0; seed < 100; ++seed) {
       const AlignOutcome outcome = simulate(sim, seed);

@@ -14,10 +14,6 @@
 namespace emberlock::cli {
 namespace {
 
-/// A flash may show in the frame of the read phase before, or in that of the next: frames are trusted from
-/// the second one after a change.
-constexpr double kSettlingPeriods = 2;
-
 /// Sensors that aren't content after so many answers never will be.
 constexpr int kMostSweeps = 40;
 
@@ -29,6 +25,13 @@ constexpr Seconds kWaitStep = milliseconds(200);
 
 /// Looks, each with the cameras that want it.
 using Looks = std::vector<std::pair<Look, std::vector<std::size_t>>>;
+
+/// Whether no flash comes. Looks without flashes skip every one: a strobe that is switched off may begin
+/// anew with its time base, and with it every camera's phase.
+bool dark(const StrobeSettings& s) {
+  const bool skips_all = !s.code.empty() && std::count(s.code.begin(), s.code.end(), true) == 0;
+  return s.output == StrobeOutput::off || skips_all;
+}
 
 void add(Looks& looks, const Look& look, std::size_t camera) {
   const auto same = std::find_if(looks.begin(), looks.end(), [&](const auto& l) { return l.first == look; });
@@ -93,8 +96,7 @@ Result<Film> AlignBench::film(const std::vector<std::size_t>& read, int count) {
   Film film;
   film.frames.resize(rig_.cameras.size());
   film.readings.resize(rig_.cameras.size());
-  const bool lit = strobe_.output != StrobeOutput::off;
-  const Look look{lit ? std::optional(strobe_.phase) : std::nullopt};
+  const Look look{dark(strobe_) ? std::nullopt : std::optional(strobe_.phase)};
   for (int i = 0; i < count; ++i) {
     for (const std::size_t camera : all_) {
       EMBERLOCK_ASSIGN_OR_RETURN(std::optional<Frame> frame, fresh_frame(camera));
@@ -113,19 +115,27 @@ Result<Film> AlignBench::film_all(int count) { return film(all_, count); }
 Status AlignBench::sweep(const StrobeSettings& flashes, Seconds wanted, const Progress& progress,
                          double done) {
   int filmed = 0;
+  std::vector<std::vector<Look>> asked_for(sensors_.size());
   for (int i = 0; i < kMostSweeps; ++i) {
+    std::size_t most = 0;
+    for (std::size_t camera = 0; camera < sensors_.size(); ++camera) {
+      if (asked_for[camera].empty()) asked_for[camera] = sensors_[camera]->next_looks(wanted);
+      most = std::max(most, asked_for[camera].size());
+    }
+    if (most == 0) break;
+    // Long sweeps come first: the edges that are refined after them don't move away meanwhile.
     Looks looks;
     for (std::size_t camera = 0; camera < sensors_.size(); ++camera) {
-      for (const Look& look : sensors_[camera]->wants(wanted)) add(looks, look, camera);
+      if (2 * asked_for[camera].size() <= most) continue;
+      for (const Look& look : std::exchange(asked_for[camera], {})) add(looks, look, camera);
     }
-    if (looks.empty()) break;
     for (const auto& [look, cameras] : looks) {
       report(progress, done, fmt::format("sweeping the strobe's phase, look {}", ++filmed));
       StrobeSettings settings = flashes;
       if (look.delay) {
         settings.phase = std::min(*look.delay, kLongestDelay * emberlock::period(flashes.rate));
       } else {
-        settings.output = StrobeOutput::off;
+        settings.code = {false};
       }
       EMBERLOCK_RETURN_IF_ERROR(set_strobe(settings));
       EMBERLOCK_RETURN_IF_ERROR(film(cameras, 1));

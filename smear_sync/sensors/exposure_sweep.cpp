@@ -72,12 +72,16 @@ Edge place_edge(const SweepSample& out, const SweepSample& in, double sign, cons
                 const SweepOptions& options, bool saturated) {
   const double period = options.period.value();
   const double width = options.flash_width.value();
+  const double gap = wrap_symmetric(in.delay.value() - out.delay.value(), period);
+  const double middle = out.delay.value() + gap / 2;
+  // Any part of a clipped flash may pass for the whole: half of the gap and of the flash are two sigmas.
+  if (saturated) return {middle, (std::abs(gap) + width) / 4};
   // Parts this near to nothing and to the whole pass for them.
   const auto blurred = [&](const SweepSample& s) { return kPartial * s.sigma / (levels.lit - levels.dark); };
   const auto cut = [&](const SweepSample& s) {
     const double part = levels.part(s.level);
     const double noise = blurred(s);
-    return !saturated && part > noise && part < 1 - noise;
+    return part > noise && part < 1 - noise;
   };
   for (const SweepSample* s : {&out, &in}) {
     if (!cut(*s)) continue;
@@ -85,10 +89,8 @@ Edge place_edge(const SweepSample& out, const SweepSample& in, double sign, cons
     const double place = s->delay.value() - sign * (levels.part(s->level) - 0.5) * width;
     return {place, s->sigma / (levels.lit - levels.dark) * width};
   }
-  const double gap = wrap_symmetric(in.delay.value() - out.delay.value(), period);
   const double hidden = std::min(1.0, blurred(out) + blurred(in)) * width;
-  return {out.delay.value() + gap / 2,
-          std::max(std::abs(gap) - width + hidden, 0.1 * width) / std::sqrt(12.0)};
+  return {middle, std::max(std::abs(gap) - width + hidden, 0.1 * width) / std::sqrt(12.0)};
 }
 
 std::vector<SweepSample> in_order(std::span<const SweepSample> samples, Seconds period) {
@@ -101,8 +103,7 @@ std::vector<SweepSample> in_order(std::span<const SweepSample> samples, Seconds 
 
 }  // namespace
 
-Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const SweepOptions& options,
-                                    std::optional<double> white) {
+Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const SweepOptions& options) {
   if (samples.size() < kFewest)
     return refuse("fewer than four delays were filmed", "sweep over the whole period");
   const std::vector<SweepSample> sorted = in_order(samples, options.period);
@@ -110,7 +111,9 @@ Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const 
   ExposureWindow window;
   window.dark = levels.dark;
   window.lit = levels.lit;
-  window.saturated = white && levels.lit >= *white;
+  window.saturated = std::any_of(sorted.begin(), sorted.end(), [&](const SweepSample& s) {
+    return s.clipped && levels.part(s.level) >= 0.5;
+  });
   int begins = 0;
   for (std::size_t i = 0; i < sorted.size(); ++i) {
     const SweepSample& a = sorted[i];
@@ -163,6 +166,8 @@ std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const Swe
                                             [](const auto& a, const auto& b) { return a.level < b.level; });
     return {brightest->delay - options.flash_width, brightest->delay + options.flash_width};
   }
+  // Clipped flashes tell an edge to a quarter of their width at best.
+  if (window->saturated) resolution = std::max(resolution, options.flash_width / 3);
   if (window->end_sigma > resolution) delays.push_back(window->end);
   if (edges == SweepEdges::both && window->begin_sigma > resolution) delays.push_back(window->begin);
   return delays;

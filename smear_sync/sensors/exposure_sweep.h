@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -18,8 +17,9 @@ namespace emberlock {
 struct SweepSample {
   Seconds
       delay;  ///< of the flash's centre against a time base common to all cameras, modulo T, beat taken out
-  double level = 0;  ///< what the picture gathered: a mean over the part that the strobe lights; any unit
-  double sigma = 0;  ///< its standard error, > 0
+  double level = 0;      ///< what the picture gathered: a mean over the part that the strobe lights; any unit
+  double sigma = 0;      ///< its standard error, > 0
+  bool clipped = false;  ///< so much of it is white that part of a flash can't be told by it
 };
 
 struct SweepOptions {
@@ -35,17 +35,15 @@ struct ExposureWindow {
   Seconds end_sigma;
   Seconds begin;
   Seconds begin_sigma;
-  double dark = 0;  ///< level without the flash
-  double lit = 0;   ///< and with it
-  bool saturated =
-      false;  ///< lit levels stand at `white`: parts of a flash can't be told, only whether there was one
+  double dark = 0;         ///< level without the flash
+  double lit = 0;          ///< and with it
+  bool saturated = false;  ///< lit samples were clipped: of a flash at an edge only that it was there is told
 };
 
 /// The window from a sweep over the whole period. Errors (bad_input), each with what to do: fewer than four
 /// samples; every delay lit (exposed for the whole period: shorten it) or none (too faint, or the strobe is
 /// out of view); light and dark that alternate more than once (another light, or the strobe moved).
-Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const SweepOptions& options,
-                                    std::optional<double> white = std::nullopt);
+Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const SweepOptions& options);
 
 /// Delays evenly over the period, 24 at first and with each step those between all that went before; empty
 /// after the last step, of 192 in all. What is near in delay is far apart in time, so that a slow drift is
@@ -58,7 +56,8 @@ int even_delay_count();
 enum class SweepEdges { both, end };
 
 /// The delays to film next: even_delays() until some are lit and some are dark, then between the two at each
-/// edge, until it is known to `resolution`. Empty when done, or when there is no more to try.
+/// edge, until it is known to `resolution`, or to a third of a flash's width where pictures are saturated.
+/// Empty when done, or when there is no more to try.
 std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const SweepOptions& options,
                                  Seconds resolution, SweepEdges edges = SweepEdges::both);
 

@@ -1,8 +1,38 @@
 #include "smear_sync/sensors/phase_sensor.h"
 
+#include <fmt/format.h>
+
 #include "smear_sync/detect/follow.h"
+#include "smear_sync/sensors/taken_look.h"
 
 namespace emberlock {
+namespace detail {
+namespace {
+
+/// An exposure of fewer flash widths has no plateau whose end could be told.
+constexpr double kLeastExposure = 2;
+
+}  // namespace
+
+std::vector<PhaseSample> phases_at(Seconds delay, std::span<const TakenLook> taken,
+                                   const SensorOptions& options) {
+  std::vector<PhaseSample> samples;
+  for (const TakenLook& t : taken) {
+    if (t.look.delay != delay) continue;
+    samples.push_back({t.at, phase_of(t.reading, options.timing, options.flash_width)});
+  }
+  return samples;
+}
+
+std::string too_short(Seconds exposure, Seconds flash_width) {
+  if (exposure >= kLeastExposure * flash_width) return {};
+  return fmt::format(
+      "its exposure of {:.0f} us is no longer than the flash: lengthen it, or shorten the flash",
+      exposure.value() * 1e6);
+}
+
+}  // namespace detail
+
 namespace {
 
 class SmearSensor final : public PhaseSensor {
@@ -10,32 +40,22 @@ class SmearSensor final : public PhaseSensor {
   explicit SmearSensor(const SensorOptions& options) : options_(options) {}
 
   void begin_round(const Beat& /*own*/) override { taken_.clear(); }
-  std::vector<Look> wants(Seconds /*wanted*/) override { return {}; }
+  std::vector<Look> next_looks(Seconds /*wanted*/) override { return {}; }
   SmearReading take(const ImageView& frame, TimePoint at, const Look& look) override {
     taken_.push_back({at, look, detector_.read(frame)});
     return taken_.back().reading;
   }
   [[nodiscard]] std::vector<PhaseSample> phases(Seconds delay) override {
-    std::vector<PhaseSample> samples;
-    for (const Taken& t : taken_) {
-      if (t.look.delay != delay) continue;
-      samples.push_back({t.at, phase_of(t.reading, options_.timing, options_.flash_width)});
-    }
-    return samples;
+    return detail::phases_at(delay, taken_, options_);
   }
   void forget_phase() override {}
   void set_row_time(SecondsPerRow row_time) override { options_.timing.row_time = row_time; }
   [[nodiscard]] const CcdTiming& timing() const override { return options_.timing; }
 
  private:
-  struct Taken {
-    TimePoint at;
-    Look look;
-    SmearReading reading;
-  };
   SensorOptions options_;
   FollowingDetector detector_;
-  std::vector<Taken> taken_;
+  std::vector<detail::TakenLook> taken_;
 };
 
 }  // namespace

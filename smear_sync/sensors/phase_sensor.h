@@ -36,9 +36,10 @@ class PhaseSensor {
 
   /// Forgets the frames of the round before. `own` is how this camera's tau moves against the strobe.
   virtual void begin_round(const Beat& own) = 0;
-  /// Looks to be filmed, a frame each, before phases can be told to a standard error of `wanted`; asked again
-  /// once their frames were taken. None: go on with the round, whether phases can be told or not.
-  [[nodiscard]] virtual std::vector<Look> wants(Seconds wanted) = 0;
+  /// Learns from the frames taken, and says which looks are to be filmed next, a frame each, before phases
+  /// can be told to a standard error of `wanted`; asked again once their frames were taken. None: go on with
+  /// the round, whether phases can be told or not.
+  [[nodiscard]] virtual std::vector<Look> next_looks(Seconds wanted) = 0;
   /// A frame that came at `at`, and what it shows.
   virtual SmearReading take(const ImageView& frame, TimePoint at, const Look& look) = 0;
   /// What the round's frames tell of tau at a delay of `delay`; what isn't known says why, and what to do.
@@ -57,10 +58,12 @@ class PhaseSensor {
 
 /// Dots of the smear: every frame of one flash tells a phase.
 std::unique_ptr<PhaseSensor> make_smear_sensor(const SensorOptions& options);
-/// Bands (rolling_band.h), after a sweep of looks that shows every row dark and lit, and tells t_row.
+/// Bands (rolling_band.h), after a sweep of looks that shows every row dark and lit, and tells t_row. After a
+/// round that shows nothing that could be read it sweeps anew: light or exposure may have changed.
 std::unique_ptr<PhaseSensor> make_rolling_sensor(const SensorOptions& options);
 /// Sweeps (exposure_sweep.h): a whole one when its phase isn't known, a few looks about the edge from round
-/// to round.
+/// to round. Each round has a look without flashes, over which the others are counted, so that rounds compare
+/// whatever the ambient light does. After a round that tells no phase it starts anew.
 std::unique_ptr<PhaseSensor> make_global_sensor(const SensorOptions& options);
 
 std::unique_ptr<PhaseSensor> make_phase_sensor(SensorKind kind, const SensorOptions& options);

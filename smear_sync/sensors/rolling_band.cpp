@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "smear_sync/detect/judge.h"
 #include "smear_sync/detect/plane.h"
 
 namespace emberlock {
@@ -54,7 +55,7 @@ std::vector<Edge> edges_of(const std::vector<double>& part) {
 
 RowProfile row_profile(const ImageView& frame) {
   RowProfile profile;
-  if (frame.data == nullptr || frame.width() < 3 || frame.height() < 2) return profile;
+  if (!detail::unreadable(frame).empty()) return profile;
   const detail::Plane plane = detail::to_plane(frame);
   std::vector<float> row(static_cast<std::size_t>(plane.size.width));
   std::vector<double> squares;
@@ -62,11 +63,14 @@ RowProfile row_profile(const ImageView& frame) {
     plane.read(y, 0, plane.size.width, row.data());
     double sum = row.front();
     double differences = 0;  // of neighbours: noise, without the scene's slopes
+    double clipped = row.front() >= plane.white ? row.front() : 0;
     for (std::size_t x = 1; x < row.size(); ++x) {
       sum += row[x];
+      clipped += row[x] >= plane.white ? row[x] : 0;
       differences += (row[x] - row[x - 1]) * (row[x] - row[x - 1]) / 2;
     }
     profile.level.push_back(sum / plane.size.width * plane.level);
+    profile.clipped += clipped / plane.size.width / plane.size.height * plane.level;
     squares.push_back(differences / (plane.size.width - 1));
   }
   // The lamp's own rows and those of hot pixels are few.

@@ -28,9 +28,10 @@ namespace emberlock {
 /// What a row gathers: mean over its samples, grey levels of the frame's own depth.
 struct RowProfile {
   std::vector<double> level;
-  double noise = 0;  ///< standard error of one level
+  double noise = 0;    ///< standard error of one level
+  double clipped = 0;  ///< what saturated samples hold of the rows' mean level
 };
-/// An empty or malformed view has no rows.
+/// A view that the detector can't read either (empty, malformed, smaller than 8 x 8) has no rows.
 RowProfile row_profile(const ImageView& frame);
 
 /// The picture without and with the flash, row by row: ambient light, and the scene's own brightness under

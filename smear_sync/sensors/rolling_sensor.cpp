@@ -4,17 +4,17 @@
 
 #include <fmt/format.h>
 
+#include "smear_sync/detect/judge.h"
 #include "smear_sync/sensors/exposure_sweep.h"
 #include "smear_sync/sensors/phase_sensor.h"
 #include "smear_sync/sensors/rolling_band.h"
+#include "smear_sync/sensors/taken_look.h"
 
 namespace emberlock {
 namespace {
 
 /// Edges that tell a row time.
 constexpr std::size_t kFewestEdges = 6;
-/// A band of fewer flash widths is the flash, not the exposure.
-constexpr double kLeastExposure = 2;
 
 class RollingSensor final : public PhaseSensor {
  public:
@@ -22,21 +22,22 @@ class RollingSensor final : public PhaseSensor {
     options_.timing.shifts = options_.timing.rows;
   }
 
-  void begin_round(const Beat& /*own*/) override { taken_.clear(); }
+  void begin_round(const Beat& /*own*/) override {
+    taken_.clear();
+    if (nothing_read_) sweep_anew();
+  }
 
-  std::vector<Look> wants(Seconds /*wanted*/) override {
-    if (reference_ || !unreadable_.empty()) return {};
+  std::vector<Look> next_looks(Seconds /*wanted*/) override {
+    if (!sweeping()) return {};
+    const std::vector<Seconds> delays = even_delays(step_, options_.timing.frame_period);
     std::vector<Look> looks;
     if (step_ == 0) {
       looks.emplace_back();
-    } else if (const Status learnt = learn(); learnt.ok()) {
-      return {};
-    } else if (even_delays(step_, options_.timing.frame_period).empty()) {
-      unreadable_ =
-          learnt.error().what +
-          ": let the strobe light what the camera sees from top to bottom, or lengthen its exposure";
+    } else {
+      learn(delays);
+      if (!sweeping()) return {};
     }
-    for (const Seconds delay : even_delays(step_, options_.timing.frame_period)) looks.push_back({delay});
+    for (const Seconds delay : delays) looks.push_back({delay});
     ++step_;
     return looks;
   }
@@ -44,24 +45,28 @@ class RollingSensor final : public PhaseSensor {
   SmearReading take(const ImageView& frame, TimePoint at, const Look& look) override {
     RowProfile profile = row_profile(frame);
     SmearReading reading;
-    if (reference_) {
+    if (profile.level.empty()) {
+      reading.reason = detail::unreadable(frame);
+    } else if (sweeping()) {
+      swept_.push_back({at, look, std::move(profile)});
+      return reading;
+    } else if (reference_ && unreadable_.empty()) {
       reading = read_bands(profile, *reference_, {.direction = options_.timing.direction}).reading;
     } else {
       reading.reason = unreadable_;
-      if (unreadable_.empty()) swept_.push_back({at, look, std::move(profile)});
     }
     taken_.push_back({at, look, reading});
     return reading;
   }
 
   std::vector<PhaseSample> phases(Seconds delay) override {
-    std::vector<PhaseSample> samples;
-    for (const Taken& t : taken_) {
-      if (t.look.delay != delay) continue;
-      Phase phase = unreadable_.empty() ? phase_of(t.reading, options_.timing, options_.flash_width)
-                                        : Phase{PhaseState::unusable, {}, {}, unreadable_};
-      samples.push_back({t.at, std::move(phase)});
+    std::vector<PhaseSample> samples = detail::phases_at(delay, taken_, options_);
+    if (!unreadable_.empty()) {
+      for (PhaseSample& sample : samples) sample.phase = {PhaseState::unusable, {}, {}, unreadable_};
     }
+    nothing_read_ = !samples.empty() && std::all_of(samples.begin(), samples.end(), [](const PhaseSample& s) {
+      return s.phase.state == PhaseState::unusable;
+    });
     return samples;
   }
   void forget_phase() override {}
@@ -76,14 +81,29 @@ class RollingSensor final : public PhaseSensor {
     Look look;
     RowProfile profile;
   };
-  struct Taken {
-    TimePoint at;
-    Look look;
-    SmearReading reading;
-  };
 
-  /// What the sweep shows; an error where it doesn't show all rows dark and lit.
-  Status learn() {
+  [[nodiscard]] bool sweeping() const { return !reference_ && unreadable_.empty(); }
+
+  void sweep_anew() {
+    step_ = 0;
+    swept_.clear();
+    reference_.reset();
+    clock_.reset();
+    exposure_.reset();
+    unreadable_.clear();
+    nothing_read_ = false;
+  }
+
+  /// What the sweep shows so far; where that isn't enough, and there is nothing `still_to_come`, it says why.
+  void learn(const std::vector<Seconds>& still_to_come) {
+    const Status learnt = learn_reference();
+    if (learnt.ok() || !still_to_come.empty()) return;
+    unreadable_ = learnt.error().what +
+                  ": let the strobe light what the camera sees from top to bottom, or lengthen its exposure";
+  }
+
+  /// An error where the sweep doesn't show all rows dark and lit.
+  Status learn_reference() {
     std::vector<RowProfile> profiles;
     for (const Swept& s : swept_) profiles.push_back(s.profile);
     EMBERLOCK_ASSIGN_OR_RETURN(const BandReference reference, learn_band_reference(profiles));
@@ -119,11 +139,9 @@ class RollingSensor final : public PhaseSensor {
   /// t_row, or why edges can't be told.
   void judge(const std::vector<SweptEdge>& edges) {
     const Seconds period = options_.timing.frame_period;
-    if (*exposure_ < kLeastExposure * options_.flash_width) {
-      unreadable_ = fmt::format(
-          "its exposure of {:.0f} us is no longer than the flash: lengthen it, or shorten the flash",
-          exposure_->value() * 1e6);
-    } else if (edges.size() < kFewestEdges) {
+    unreadable_ = detail::too_short(*exposure_, options_.flash_width);
+    if (!unreadable_.empty()) return;
+    if (edges.size() < kFewestEdges) {
       const bool long_one = *exposure_ > period / 2;
       unreadable_ =
           fmt::format("its exposure of {:.2f} ms of a period of {:.2f} ms is too {} to see an edge: {} it",
@@ -138,13 +156,14 @@ class RollingSensor final : public PhaseSensor {
   }
 
   SensorOptions options_;
-  int step_ = 0;              ///< of the sweep
-  std::vector<Swept> swept_;  ///< until the reference is learnt
-  std::vector<Taken> taken_;  ///< in this round
+  int step_ = 0;                          ///< of the sweep
+  std::vector<Swept> swept_;              ///< until the reference is learnt
+  std::vector<detail::TakenLook> taken_;  ///< in this round
   std::optional<BandReference> reference_;
   std::optional<RowClock> clock_;
   std::optional<Seconds> exposure_;
-  std::string unreadable_;  ///< why no phase can be told, and what to do about it
+  std::string unreadable_;     ///< why no phase can be told, and what to do about it
+  bool nothing_read_ = false;  ///< in the round before
 };
 
 }  // namespace

@@ -86,13 +86,14 @@ struct Shutter {
     }
     const auto counter = static_cast<std::uint64_t>(std::llround(delay.value() * 1e9));
     const double level = ambient + flash * light + noise * random_normal(seed, 5, counter);
-    return {delay, std::min(level, white), noise};
+    return {delay, std::min(level, white), noise, level >= white};
   }
   /// Films what next_delays() asks for, to the end.
-  [[nodiscard]] std::vector<SweepSample> sweep(Seconds resolution) const {
+  [[nodiscard]] std::vector<SweepSample> sweep(Seconds resolution,
+                                               SweepEdges edges = SweepEdges::both) const {
     std::vector<SweepSample> samples;
     for (int round = 0; round < 40; ++round) {
-      const auto delays = next_delays(samples, options(), resolution);
+      const auto delays = next_delays(samples, options(), resolution, edges);
       if (delays.empty()) break;
       for (const Seconds d : delays) samples.push_back(film(d));
     }

@@ -39,6 +39,18 @@ TEST(ExposureSweep, BothEdgesWithinTheirSigmas) {
   EXPECT_GE(inside, 0.88 * count);
 }
 
+TEST(ExposureSweep, TheEndAloneIsLookedForWhereItIsThePhase) {
+  const Shutter s;
+  const auto both = s.sweep(microseconds(2));
+  const auto end = s.sweep(microseconds(2), SweepEdges::end);
+  EXPECT_LE(end.size() + 3, both.size());
+  const auto window = fit_exposure(end, s.options());
+  ASSERT_TRUE(window.ok());
+  EXPECT_LE(window->end_sigma, microseconds(2));
+  EXPECT_LT(std::abs(off(window->end, s.end)), 4 * window->end_sigma.value());
+  EXPECT_GT(window->begin_sigma.value(), kPeriod / 24 / 4) << "as the even delays left it";
+}
+
 TEST(ExposureSweep, ACoarseSweepSaysHowCoarse) {
   const Shutter s;
   std::vector<SweepSample> samples;
@@ -57,11 +69,18 @@ TEST(ExposureSweep, TheWindowLiesAcrossTheWrap) {
 }
 
 TEST(ExposureSweep, SaturatedPicturesTellEdgesBetweenDelaysOnly) {
-  const Shutter s{.white = 40};
-  const auto window = fit_exposure(s.sweep(microseconds(40)), s.options(), 40.0);
-  ASSERT_TRUE(window.ok());
-  EXPECT_TRUE(window->saturated);
-  EXPECT_LT(std::abs(off(window->end, s.end)), 2 * window->end_sigma.value() + s.width);
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    RandomStream random(seed, 8);
+    const Shutter s{.end = random.uniform(0, kPeriod), .white = random.uniform(15, 90), .seed = seed};
+    const auto samples = s.sweep(microseconds(2));
+    EXPECT_LT(samples.size(), 60U) << "what can't be told finer isn't filmed again and again";
+    const auto window = fit_exposure(samples, s.options());
+    ASSERT_TRUE(window.ok());
+    EXPECT_TRUE(window->saturated);
+    EXPECT_LE(window->end_sigma.value(), s.width / 3);
+    EXPECT_LT(std::abs(off(window->end, s.end)), 2 * window->end_sigma.value());
+    EXPECT_LT(std::abs(off(window->begin, s.end - s.exposure)), 2 * window->begin_sigma.value());
+  }
 }
 
 TEST(ExposureSweep, AnExposureOfThePeriodOrAFlashOutOfViewIsRefused) {

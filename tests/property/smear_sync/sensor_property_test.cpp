@@ -23,7 +23,10 @@ ReadDirection any_direction() {
 void law(const char* description, auto check) { EXPECT_TRUE(rc::check(description, check)); }
 
 TEST(ReadModeLaws, ADirectionThatIsToldIsTheCameras) {
-  law("whatever strobe, lamp and crystal", [] {
+  int films = 0;
+  int told = 0;
+  int shifts_told = 0;
+  law("whatever strobe, lamp and crystal", [&] {
     test::ClockFilm f{.flash_rate = 23.976 * any(0.985, 1.015),
                       .first_flash = any(0, 0.04),
                       .frames = *rc::gen::inRange(20, 200),
@@ -38,12 +41,13 @@ TEST(ReadModeLaws, ADirectionThatIsToldIsTheCameras) {
         find_read_mode(film(f), {.flash_rate = Hertz(f.flash_rate), .row_time = f.timing.row_time});
     RC_ASSERT(mode.ok());
     RC_ASSERT(!mode->direction_reason.empty());
-    RC_CLASSIFY(mode->direction.has_value(), "told");
+    ++films;
     if (!mode->direction) return;
+    ++told;
     RC_ASSERT(*mode->direction == f.timing.direction);
     const double off = (1 / (23.976 * f.timing.frame_period.value()) - 1) * 1e6;
     RC_ASSERT(std::abs(mode->frame_rate_error->value() - off) < 6 * mode->frame_rate_sigma.value() + 0.1);
-    RC_CLASSIFY(mode->shifts.has_value(), "shifts told");
+    shifts_told += mode->shifts ? 1 : 0;
     if (mode->shifts_sigma > Rows(0)) {
       const Rows shifts_off = mode->shifts_measured - Rows(f.timing.shifts);
       RC_ASSERT(abs(wrap_symmetric(shifts_off, mode->shifts_modulo)) < 5 * mode->shifts_sigma);
@@ -51,6 +55,8 @@ TEST(ReadModeLaws, ADirectionThatIsToldIsTheCameras) {
     if (!mode->shifts) return;
     RC_ASSERT(*mode->shifts == f.timing.shifts);
   });
+  EXPECT_GT(told, 0.9 * films) << "a law of what is never told would be empty";
+  EXPECT_GT(shifts_told, 0.15 * films);
 }
 
 TEST(StaircaseLaws, StairsClimbARowARowAndAreInvertedToTheirOwnRow) {
@@ -71,6 +77,8 @@ TEST(FrameCodeLaws, FramesAreNumberedAsTheFlashesThatLitThem) {
   const FrameCode code;
   const auto pattern = flash_pattern(code);
   ASSERT_TRUE(pattern.ok());
+  int films = 0;
+  int numbered = 0;
   law("numbers are right or not given, though frames were misread", [&] {
     const double step = 1 + any(-2e-4, 2e-4);
     const double start = any(0, code.flashes());
@@ -89,7 +97,8 @@ TEST(FrameCodeLaws, FramesAreNumberedAsTheFlashesThatLitThem) {
     const auto numbers = number_frames(seen, {.code = code, .flashes_per_frame = step});
     RC_ASSERT(numbers.ok());
     RC_ASSERT(!numbers->reason.empty());
-    RC_CLASSIFY(!numbers->runs.empty(), "numbered");
+    ++films;
+    numbered += numbers->runs.empty() ? 0 : 1;
     for (const NumberedRun& run : numbers->runs) {
       const std::int64_t i = run.first + (run.last - run.first) / 2;
       const double truth = start + step * static_cast<double>(i);
@@ -97,6 +106,7 @@ TEST(FrameCodeLaws, FramesAreNumberedAsTheFlashesThatLitThem) {
       RC_ASSERT(std::abs(wrap_symmetric(told - truth, code.flashes())) <= run.start_slack + 0.51);
     }
   });
+  EXPECT_GT(numbered, 0.7 * films) << "a law of what is never told would be empty";
 }
 
 TEST(RollingBandLaws, APhaseThatIsToldIsTheFlashs) {

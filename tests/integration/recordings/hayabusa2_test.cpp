@@ -1,28 +1,23 @@
 // A real CCD frame with vertical smear: Hayabusa2's ONC-W2, the Earth as a steady source (ISAS/JAXA, public
 // domain).
-#include <cstdlib>
 #include <filesystem>
 
 #include <gtest/gtest.h>
 
 #include "session/frame_file.h"
 #include "smear_sync/detect/detect.h"
+#include "tests/support/recordings.h"
 
 namespace emberlock {
 namespace {
 
-std::filesystem::path recording(const char* name) {
-  const char* folder = std::getenv("EMBERLOCK_DATA");
-  const std::filesystem::path data = folder != nullptr
-                                         ? std::filesystem::path(folder)
-                                         : std::filesystem::path(EMBERLOCK_SOURCE_DIR) / "../shared/data";
-  return data / "smear_hayabusa2" / name;
-}
-
-class Hayabusa2 : public testing::TestWithParam<const char*> {};
+class Hayabusa2 : public testing::TestWithParam<const char*> {
+ protected:
+  void SetUp() override { SKIP_WITHOUT_RECORDINGS(); }
+};
 
 TEST_P(Hayabusa2, TheEarthIsASteadyLampAndTheTrapIsNoDot) {
-  const std::filesystem::path file = recording(GetParam());
+  const std::filesystem::path file = test::recordings() / "smear_hayabusa2" / GetParam();
   const Result<Image> image = read_image(file);
   ASSERT_TRUE(image.ok()) << image.error().message();
   EXPECT_EQ(image->layout().size, (ImageSize{1024, 1024}));

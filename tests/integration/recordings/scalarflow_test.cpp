@@ -1,7 +1,6 @@
 // One frame of real smoke in five calibrated views (ScalarFlow, Eckert, Um, Thuerey 2019).
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 
 #include <gtest/gtest.h>
@@ -10,6 +9,7 @@
 #include "recon/pipeline/reconstruct.h"
 #include "recon/pipeline/scene.h"
 #include "recon/preprocess/flame_mask.h"
+#include "tests/support/recordings.h"
 
 namespace emberlock {
 namespace {
@@ -18,12 +18,7 @@ namespace fs = std::filesystem;
 constexpr int kVoxels = 78;  // along the longest edge: 44 x 78 x 44
 constexpr double kThreshold = 15;
 
-fs::path transforms() {
-  const char* data = std::getenv("EMBERLOCK_DATA");
-  const fs::path root =
-      data != nullptr ? fs::path(data) : fs::path(EMBERLOCK_SOURCE_DIR) / ".." / "shared" / "data";
-  return root / "scalarflow" / "transforms.json";
-}
+fs::path transforms() { return test::recordings() / "scalarflow" / "transforms.json"; }
 
 /// Averages squares of kShrink x kShrink pixels: nine times less work, and a voxel still covers 3.6 pixels.
 void shrink(View& view) {
@@ -46,6 +41,7 @@ void shrink(View& view) {
 class ScalarFlowTest : public testing::Test {
  protected:
   void SetUp() override {
+    SKIP_WITHOUT_RECORDINGS();
     auto scene = load_scene(transforms());
     ASSERT_TRUE(scene.ok()) << scene.error().message();
     scene_ = std::move(scene).value();

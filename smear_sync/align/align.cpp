@@ -8,48 +8,21 @@
 #include <fmt/format.h>
 
 #include "smear_sync/align/align_choice.h"
+#include "smear_sync/align/align_context.h"
 #include "smear_sync/align/align_forecast.h"
+#include "smear_sync/align/align_look.h"
 #include "smear_sync/align/align_trim.h"
 #include "smear_sync/align/align_words.h"
-#include "smear_sync/align/move_together.h"
 #include "smear_sync/align/reset_delay.h"
 
 namespace emberlock {
 namespace {
-
-/// The strobe's delay goes round this part of the period: it must stay below the strobe's own, which may be
-/// shorter than T.
-constexpr double kLookRange = 0.95;
-/// Successive delays step by this part of the period: however the blind phases lie, no two looks are alike.
-constexpr double kLookStep = 0.381966011250105 * kLookRange;  // 1 - 1 / golden ratio
-
-/// A phase seen earlier counts until it may have walked by this part of the tolerance (one standard error);
-/// of the trims' reach, which is far more, while trims bring the cameras together.
-constexpr double kMemoryPart = 0.25;
-constexpr double kMemoryPartOfReach = 0.05;
-
-/// Shifts by hand that are remembered of a camera.
-constexpr std::size_t kShifts = 16;
 
 /// A tolerance of fewer standard errors of a phase can't be told.
 constexpr double kTellable = 2;
 
 /// The next check comes before any of the cameras leaves by so many standard errors.
 constexpr double kScheduleSigmas = 3;
-
-/// What is the same for all of a round's steps.
-struct Context {
-  const AlignRound& round;
-  const std::vector<AlignCamera>& cameras;
-  const AlignOptions& options;
-  TrackOptions track;
-  Seconds tolerance;
-  Seconds reach;  ///< of trims; zero where the policy doesn't trim
-
-  [[nodiscard]] Seconds remembered() const {
-    return std::max(kMemoryPart * tolerance, kMemoryPartOfReach * reach);
-  }
-};
 
 std::vector<std::optional<RateTrim>> trims_of(const std::vector<AlignCamera>& cameras) {
   std::vector<std::optional<RateTrim>> trims;
@@ -58,99 +31,7 @@ std::vector<std::optional<RateTrim>> trims_of(const std::vector<AlignCamera>& ca
   return trims;
 }
 
-/// Takes over what the round showed: delays and shifts of resets, trims ordered, phases of the cameras seen.
-void remember(AlignState& state, const Context& c) {
-  const AlignRound& round = c.round;
-  for (const TrimDone& done : round.trims) {
-    const auto& trim = c.cameras[done.camera].trim;
-    state.cameras[done.camera].phase.order_trim(done.at + (trim ? trim->latency : Seconds(0)), done.trim,
-                                                c.track);
-  }
-  for (const ResetDone& done : round.resets) {
-    CameraTrack& track = state.cameras[done.camera];
-    ++track.resets;
-    ++state.resets;
-    track.before_hand.reset();
-    if (!done.at && track.phase.phase_known()) track.before_hand = track.phase.at(round.at, c.track);
-    track.phase.forget_phase();
-    track.sighted.reset();
-    track.moved = false;
-    track.rough.reset();
-    track.doubt.clear();
-    const auto& stamp = round.cameras[done.camera].stamp;
-    if (!done.at || !stamp) continue;
-    learn_delay(state, c.cameras, c.options, done.camera, wrap_positive(*stamp - *done.at, c.options.period));
-  }
-  watch_moves(state, round, c.options);
-  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
-    Phase phase = round.cameras[i].phase;
-    if (phase.state != PhaseState::known) continue;
-    phase.tau = wrap_positive(phase.tau - round.strobe_phase, c.options.period);
-    CameraTrack& track = state.cameras[i];
-    track.phase.observe(round.at, phase, round.beat, c.track);
-    if (!track.before_hand) continue;
-    const Drift& before = *track.before_hand;
-    const Seconds moved = (round.at - before.at) * (before.rate.value() * 1e-6);
-    track.hand_shifts.push_back(wrap_positive(phase.tau - before.tau - moved, c.options.period));
-    if (track.hand_shifts.size() > kShifts) track.hand_shifts.erase(track.hand_shifts.begin());
-    track.before_hand.reset();
-  }
-}
-
-/// Where a camera stands at the round's instant: seen now, or earlier and sure enough still.
-std::optional<Drift> where(const CameraTrack& track, const Context& c) {
-  if (!track.doubt.empty()) return std::nullopt;
-  if (!track.phase.phase_known() || track.phase.aged(c.round.at) > c.remembered()) return std::nullopt;
-  return track.phase.at(c.round.at, c.track);
-}
-
-Seconds moved_strobe(const Context& c, Seconds by) {
-  return wrap_positive(c.round.strobe_phase + by, kLookRange * c.options.period);
-}
-
-Seconds next_look(const Context& c) { return moved_strobe(c, kLookStep * c.options.period); }
-
-/// Some phases are missing: nobody is reset on half a view. Blind cameras, and those whose dots are in doubt,
-/// are brought out by moving the strobe.
-void look_again(AlignState& state, AlignDecision& decision, const Context& c) {
-  ++state.looks;
-  std::string missing;
-  std::string why;
-  bool hidden = false;
-  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
-    CameraDecision& camera = decision.cameras[i];
-    const std::string& doubt = state.cameras[i].doubt;
-    const Phase& phase = c.round.cameras[i].phase;
-    if (where(state.cameras[i], c)) {
-      camera.reason = "its phase is known: waits for the cameras whose phase isn't";
-      continue;
-    }
-    missing += (missing.empty() ? "" : ", ") + c.cameras[i].id;
-    if (!doubt.empty()) {
-      hidden = true;
-      camera.reason = doubt;
-      if (why.empty()) why = doubt;
-    } else if (phase.state == PhaseState::blind) {
-      hidden = true;
-      camera.reason = "shows no phase: the strobe's is moved to bring it out (" + phase.reason + ")";
-    } else {
-      camera.reason = "can't be read: see to its view of the lamp and to the strobe (" + phase.reason + ")";
-      if (why.empty()) why = phase.reason;
-    }
-  }
-  if (state.looks > c.options.max_looks) {
-    decision.verdict = AlignVerdict::given_up;
-    decision.reason =
-        "no phase of " + missing + " after " + plural(static_cast<std::size_t>(state.looks), "look") +
-        " at different phases of the strobe: " +
-        (why.empty() ? "check that the lamp is in view, not over-exposed, and flashes once a frame" : why);
-    return;
-  }
-  if (hidden) decision.strobe_phase = next_look(c);
-  decision.reason = "looks again for " + missing;
-}
-
-AlignScene scene_of(const AlignState& state, const std::vector<Drift>& drifts, const Context& c) {
+AlignScene scene_of(const AlignState& state, const std::vector<Drift>& drifts, const AlignContext& c) {
   AlignScene scene{
       c.options.policy, c.options.period, std::max(c.tolerance, c.reach), c.options.reference, {}, {}};
   const Seconds jitter = learnt_jitter(state, c.options);
@@ -166,7 +47,7 @@ AlignScene scene_of(const AlignState& state, const std::vector<Drift>& drifts, c
 
 /// Timed resets: each at its moment where the delay is known; else untimed, to teach it. A model is taught by
 /// one of its cameras, and the others wait.
-void time_resets(const AlignState& state, AlignDecision& decision, const Context& c,
+void time_resets(const AlignState& state, AlignDecision& decision, const AlignContext& c,
                  const AlignScene& scene) {
   std::vector<std::string> teaching;
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
@@ -190,7 +71,7 @@ void time_resets(const AlignState& state, AlignDecision& decision, const Context
 }
 
 /// Orders for the cameras out of tolerance, and a sentence for every camera.
-void order_resets(AlignDecision& decision, const Context& c, const AlignScene& scene, Seconds target) {
+void order_resets(AlignDecision& decision, const AlignContext& c, const AlignScene& scene, Seconds target) {
   const std::vector<bool> chosen = choose_resets(scene, target);
   const std::string out = c.reach > Seconds(0) ? ", further than trims reach" : ", out of tolerance";
   for (std::size_t i = 0; i < scene.tau.size(); ++i) {
@@ -215,7 +96,7 @@ void order_resets(AlignDecision& decision, const Context& c, const AlignScene& s
 }
 
 /// Whether the tolerance can be told from the noise, and is met within the limits. Asked once.
-bool affordable(AlignState& state, AlignDecision& decision, const Context& c, const AlignScene& scene,
+bool can_be_met(AlignState& state, AlignDecision& decision, const AlignContext& c, const AlignScene& scene,
                 const std::vector<Drift>& drifts) {
   if (!c.options.limits || state.affordable) return true;
   const Prospect prospect{scene, drifts, trims_of(c.cameras), learnt_jitter(state, c.options)};
@@ -245,7 +126,7 @@ bool affordable(AlignState& state, AlignDecision& decision, const Context& c, co
 /// How long every camera stays in tolerance of a target that moves as the middle of them does, or as the
 /// reference does; and when to film again.
 void foresee(const AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
-             const Context& c) {
+             const AlignContext& c) {
   std::vector<double> rates;
   for (std::size_t i = 0; i < drifts.size(); ++i) {
     const PhaseTrack& phase = state.cameras[i].phase;
@@ -293,7 +174,8 @@ std::size_t nearest(const AlignDecision& decision, const AlignOptions& options) 
   return static_cast<std::size_t>(std::min_element(cameras.begin(), cameras.end(), closer) - cameras.begin());
 }
 
-void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts, const Context& c) {
+void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
+           const AlignContext& c) {
   const int looks = std::exchange(state.looks, 0);
   const AlignScene scene = scene_of(state, drifts, c);
   const auto far = [&](Seconds target) {
@@ -324,7 +206,7 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
     if (!scene.movable(i)) stuck += (stuck.empty() ? "" : ", ") + c.cameras[i].id;
   }
   decision.reference = nearest(decision, c.options);
-  if (!affordable(state, decision, c, scene, drifts)) return;
+  if (!can_be_met(state, decision, c, scene, drifts)) return;
   order_resets(decision, c, scene, target);
   time_resets(state, decision, c, scene);
 
@@ -350,13 +232,13 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
         decision.strobe_phase = next_look(c);
     }
   }
-  ask_for_moves(state, decision, c.cameras, c.options, moved_strobe(c, c.options.strobe_step), looks);
+  ask_for_moves(state, decision, c, looks);
   decision.reference = nearest(decision, c.options);
   foresee(state, decision, drifts, c);
 }
 
 /// A policy that trims needs cameras that can be.
-std::optional<std::string> untrimmable(const Context& c) {
+std::optional<std::string> untrimmable(const AlignContext& c) {
   if (c.options.policy != AlignPolicy::trimmed) return std::nullopt;
   for (const AlignCamera& camera : c.cameras) {
     if (!camera.trim)
@@ -376,12 +258,12 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   ++state.rounds;
   ++state.rounds_out;
   const bool trims = options.policy == AlignPolicy::trimmed;
-  const Context c{round,
-                  cameras,
-                  options,
-                  track_options(options),
-                  options.tolerance.in_time(options.row_time),
-                  trims ? trim_reach(trims_of(cameras), options) : Seconds(0)};
+  const AlignContext c{round,
+                       cameras,
+                       options,
+                       track_options(options),
+                       options.tolerance.in_time(options.row_time),
+                       trims ? trim_reach(trims_of(cameras), options) : Seconds(0)};
   remember(state, c);
 
   AlignDecision decision;

@@ -108,7 +108,7 @@ T percentile_95(std::vector<T> values) {
   return *at;
 }
 
-bool affordable(const AlignEffort& effort, const AlignOptions& options) {
+bool within_limits(const AlignEffort& effort, const AlignOptions& options) {
   return effort.within >= options.limits.value_or(AlignLimits{}).probability;
 }
 
@@ -160,7 +160,7 @@ std::vector<AlignOffer> find_offers(const Prospect& prospect, const AlignOptions
   for (const AlignPolicy policy : {AlignPolicy::timed, AlignPolicy::trimmed}) {
     if (policy == options.policy || !possible(prospect, policy, options)) continue;
     const AlignEffort effort = foretell(prospect, policy, asked, options);
-    if (affordable(effort, options)) offers.push_back({policy, options.tolerance, effort});
+    if (within_limits(effort, options)) offers.push_back({policy, options.tolerance, effort});
   }
   for (const double rows :
        {1.0, 2.0, 3.0, 5.0, 7.0, 10.0, 15.0, 20.0, 30.0, 50.0, 70.0, 100.0, 150.0, 200.0}) {
@@ -168,7 +168,7 @@ std::vector<AlignOffer> find_offers(const Prospect& prospect, const AlignOptions
     const Seconds tolerance = wider.in_time(options.row_time);
     if (tolerance <= asked || tolerance >= options.period / 2) continue;
     const AlignEffort effort = foretell(prospect, options.policy, tolerance, options);
-    if (!affordable(effort, options)) continue;
+    if (!within_limits(effort, options)) continue;
     offers.push_back({options.policy, wider, effort});
     break;
   }

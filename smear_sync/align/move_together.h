@@ -8,12 +8,6 @@
 
 namespace emberlock {
 
-struct AlignCamera;
-struct AlignDecision;
-struct AlignOptions;
-struct AlignRound;
-struct AlignState;
-
 /// How a camera's tau moved from where it was seen last to where it is seen now, in which time the strobe was
 /// moved.
 struct DotMove {
@@ -40,15 +34,5 @@ constexpr double kToldPartOfStep = 1.0 / 20;
 /// is their common motion: a beat that is known too roughly, a strobe that isn't where it says. Differences
 /// of up to five standard errors are none; a move is told from standing still from twice as much on.
 std::vector<DotMotion> move_together(std::span<const std::optional<DotMove>> cameras, Seconds period);
-
-/// Compares what the round shows with what was seen before the strobe was moved: notes in `state` which
-/// cameras' dots move with the strobe, and why those that move otherwise aren't taken for dots. Comes before
-/// the round's phases are taken over.
-void watch_moves(AlignState& state, const AlignRound& round, const AlignOptions& options);
-
-/// Cameras whose dots haven't been seen to move with the strobe aren't called aligned: a decision that resets
-/// nobody moves the strobe to `stepped` for them. `looks`: rounds in a row that did so or looked for a phase.
-void ask_for_moves(AlignState& state, AlignDecision& decision, const std::vector<AlignCamera>& cameras,
-                   const AlignOptions& options, Seconds stepped, int looks);
 
 }  // namespace emberlock

@@ -61,7 +61,8 @@ HWY_INLINE void walk(const VoxelMask& mask, const Rays& rays, Float t, Float lea
     next[a] = hn::IfThenElse(along, never, hn::Div(hn::Sub(hn::ConvertTo(kFloats, face), o), d));
   }
   Int before = all(0);
-  for (Bools walking = hn::Lt(t, leave); !hn::AllFalse(kFloats, walking); walking = hn::Lt(t, leave)) {
+  Bools walking = hn::Lt(t, leave);
+  while (!hn::AllFalse(kFloats, walking)) {
     const Int word = hn::GatherIndex(kInts, words, hn::ShiftRight<2>(at));
     const Int here = hn::And(hn::Shr(word, hn::ShiftLeft<3>(hn::And(at, all(3)))), all(1));
     const Bools border = hn::And(walking, hn::RebindMask(kFloats, hn::Ne(here, before)));
@@ -73,11 +74,13 @@ HWY_INLINE void walk(const VoxelMask& mask, const Rays& rays, Float t, Float lea
     const Float face = hn::IfThenElse(x, next[0], hn::IfThenElse(y, next[1], next[2]));
     const Int step = hn::IfThenElse(hn::RebindMask(kInts, x), hop[0],
                                     hn::IfThenElse(hn::RebindMask(kInts, y), hop[1], hop[2]));
-    at = hn::Add(at, hn::IfThenElseZero(hn::RebindMask(kInts, walking), step));
     next[0] = hn::Add(next[0], hn::IfThenElseZero(x, delta[0]));
     next[1] = hn::Add(next[1], hn::IfThenElseZero(y, delta[1]));
     next[2] = hn::Add(next[2], hn::IfThenElseZero(z, delta[2]));
     t = hn::IfThenElse(hn::Gt(t, face), t, face);
+    walking = hn::Lt(t, leave);
+    // A ray that has left stays where it was: its next voxel may lie beyond the mask.
+    at = hn::Add(at, hn::IfThenElseZero(hn::RebindMask(kInts, walking), step));
   }
   cross(hn::RebindMask(kFloats, hn::Ne(before, all(0))), hn::FirstN(kFloats, 0), leave);
 }

@@ -45,7 +45,11 @@ void add(Looks& looks, const Look& look, std::size_t camera) {
 }  // namespace
 
 AlignBench::AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period)
-    : rig_(rig), options_(options), period_(period), all_(rig.cameras.size()) {
+    : rig_(rig),
+      options_(options),
+      period_(period),
+      all_(rig.cameras.size()),
+      passed_over_(rig.cameras.size()) {
   std::iota(all_.begin(), all_.end(), std::size_t{0});
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     SensorOptions sensor{options.timing[i], options.flash_width};
@@ -151,6 +155,7 @@ void AlignBench::wait(TimePoint until, const StopAsked& stop) {
     rig_.clock->sleep_until(t);
   }
   fresh_ = std::max(fresh_, until);
+  for (const std::size_t camera : all_) passed_over_[camera] += rig_.cameras[camera]->pass_over(until);
 }
 
 Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
@@ -161,7 +166,10 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
       log(LogCategory::cli).warn("{}", frame.error().message());
       return std::optional<Frame>();
     }
-    if (rig_.recorder) EMBERLOCK_RETURN_IF_ERROR(rig_.recorder->write(camera, *frame));
+    if (rig_.recorder) {
+      EMBERLOCK_RETURN_IF_ERROR(rig_.recorder->write(camera, *frame));
+      rig_.recorder->count_lost(camera, LossCause::passed_over, std::exchange(passed_over_[camera], 0));
+    }
     filmed_ = std::max(filmed_, frame->stamp.monotonic_time);
     const bool usable = frame->stamp.monotonic_time >= fresh_ && frame->stamp.status == FrameStatus::complete;
     if (usable) return std::optional<Frame>(std::move(*frame));

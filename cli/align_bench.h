@@ -52,7 +52,8 @@ class AlignBench {
   /// of the run meanwhile. Errors: set_strobe's and film's; sensors that are never content are none.
   Status sweep(const StrobeSettings& flashes, Seconds wanted, const Progress& progress, double done);
 
-  /// Waits until `until`, or until it is asked to stop; the time since the last frame runs on.
+  /// Waits until `until`, or until it is asked to stop. The frames that come meanwhile are passed over, and
+  /// counted as such.
   void wait(TimePoint until, const StopAsked& stop);
 
   Status record(const v1::Event& event) { return rig_.recorder ? rig_.recorder->append(event) : Status{}; }
@@ -66,9 +67,10 @@ class AlignBench {
   std::vector<std::unique_ptr<PhaseSensor>> sensors_;  ///< by camera
   std::vector<std::size_t> all_;
   StrobeSettings strobe_;
-  std::optional<StrobeSettings> asked_;  ///< as asked for
-  TimePoint fresh_;                      ///< frames that came before are passed over
-  TimePoint filmed_;                     ///< when the last frame came
+  std::optional<StrobeSettings> asked_;     ///< as asked for
+  TimePoint fresh_;                         ///< frames that came before are passed over
+  TimePoint filmed_;                        ///< when the last frame came
+  std::vector<std::uint64_t> passed_over_;  ///< frames of each camera since its last one
 };
 
 }  // namespace emberlock::cli

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -47,6 +48,9 @@ class Camera {
   /// The next frame in order, waiting at most `deadline`. Errors: timed_out, device (camera lost),
   /// out_of_data (a recording has ended).
   virtual Result<Frame> next_frame(Seconds deadline) = 0;
+  /// Drops the frames that came until `until` and weren't taken, as nobody wants them: they aren't lost.
+  /// Returns how many.
+  virtual std::uint64_t pass_over(TimePoint until) = 0;
   /// Draws the shutter phase anew, the action starting at `at` (at once if that has passed). Frames queued
   /// before it are dropped: the next frame shows the new phase. Error `device` when the camera can't
   /// (ShutterReset::none).

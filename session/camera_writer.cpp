@@ -149,6 +149,8 @@ void CameraWriter::count_lost(LossCause cause, std::uint64_t frames) {
       return counts_.set_queue(counts_.queue() + frames);
     case LossCause::disk:
       return counts_.set_disk(counts_.disk() + frames);
+    case LossCause::passed_over:
+      return counts_.set_passed_over(counts_.passed_over() + frames);
   }
 }
 
@@ -169,9 +171,9 @@ Result<v1::Counts> CameraWriter::reconcile() const {
     return mismatch(std::to_string(arrivals_.delivered()) + " frames arrived, but " +
                     std::to_string(accounted) + " were written or counted as dropped");
   }
-  const std::uint64_t by_driver = counts_.transport() + counts_.underrun();
+  const std::uint64_t by_driver = counts_.transport() + counts_.underrun() + counts_.passed_over();
   if (by_driver > arrivals_.missing()) {
-    return mismatch("the driver lost " + std::to_string(by_driver) + " frames, but only " +
+    return mismatch("the driver lost or left " + std::to_string(by_driver) + " frames, but only " +
                     std::to_string(arrivals_.missing()) + " frame ids are missing");
   }
   v1::Counts counts = counts_;

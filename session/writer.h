@@ -29,10 +29,11 @@ struct WriterOptions {
 
 /// Why a frame that the camera made isn't in the recording.
 enum class LossCause {
-  transport,  ///< the bus or network lost it
-  underrun,   ///< the driver had no buffer for it
-  queue,      ///< the encoder was too slow: the recorder's queue was full
-  disk,       ///< no space, or the disk refused
+  transport,    ///< the bus or network lost it
+  underrun,     ///< the driver had no buffer for it
+  queue,        ///< the encoder was too slow: the recorder's queue was full
+  disk,         ///< no space, or the disk refused
+  passed_over,  ///< it was left with the driver on purpose, as nobody wanted it: not lost
 };
 
 /// The frames that a camera delivered, by their ids.
@@ -75,9 +76,9 @@ class SessionWriter {
   /// written counts as lost to the disk. Below the floor of free space a later frame may succeed; after a
   /// failed write none of the camera will.
   Status write(std::size_t camera, const Frame& frame);
-  /// Counts frames that will never be written. For `transport` and `underrun`, `frames` of the ids that never
-  /// arrived were lost by the driver rather than by the camera; for `queue` and `disk` they arrived and were
-  /// dropped.
+  /// Counts frames that will never be written. For `transport`, `underrun` and `passed_over`, `frames` of the
+  /// ids that never arrived were lost or left by the driver rather than lost by the camera; for `queue` and
+  /// `disk` they arrived and were dropped.
   void count_lost(std::size_t camera, LossCause cause, std::uint64_t frames);
   /// For whoever puts a queue before write(): what arrived before that queue, instead of what write() saw.
   void set_arrivals(std::size_t camera, const Arrivals& arrivals);

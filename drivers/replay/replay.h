@@ -64,6 +64,8 @@ class ReplayCamera final : public Camera {
   Status start() override;
   void stop() override { filming_ = false; }
   Result<Frame> next_frame(Seconds deadline) override;
+  /// None: what the live run passed over isn't in the recording.
+  std::uint64_t pass_over(TimePoint /*until*/) override { return 0; }
   /// Error device also where the recorded reset was ordered for another instant.
   Status reset_shutter(TimePoint at) override;
   /// Error device also where the recorded trim was another one.

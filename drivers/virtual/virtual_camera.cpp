@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "base/log.h"
 #include "base/random.h"
@@ -152,7 +153,7 @@ void VirtualCamera::drop_overflow() {
   const std::uint64_t delivered = delivered_by(room_->clock().now());
   if (delivered <= next_id_ + queue_frames_) return;
   const std::uint64_t oldest = delivered - queue_frames_;
-  log(LogCategory::drivers).info("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
+  log(LogCategory::drivers).warn("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
   next_id_ = oldest;
 }
 
@@ -173,6 +174,12 @@ Result<Frame> VirtualCamera::next_frame(Seconds deadline) {
   clock.sleep_until(ready);
   drop_overflow();
   return draw(next_id_++);
+}
+
+std::uint64_t VirtualCamera::pass_over(TimePoint until) {
+  if (!filming_) return 0;
+  const std::uint64_t first_wanted = std::max(next_id_, delivered_by(std::min(until, room_->clock().now())));
+  return first_wanted - std::exchange(next_id_, first_wanted);
 }
 
 std::shared_ptr<const VirtualScene> VirtualCamera::scene_of(std::uint64_t frame_id) const {

@@ -49,6 +49,7 @@ class VirtualCamera final : public Camera {
   Status start() override;
   void stop() override { filming_ = false; }
   Result<Frame> next_frame(Seconds deadline) override;
+  std::uint64_t pass_over(TimePoint until) override;
   Status reset_shutter(TimePoint at) override;
   Status trim_rate(PartsPerMillion trim) override;
 

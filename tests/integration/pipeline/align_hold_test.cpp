@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "cli/align_run.h"
+#include "session/reader.h"
 #include "tests/support/aligned.h"
 
 namespace emberlock::cli {
@@ -16,7 +17,6 @@ using testing::HasSubstr;
 /// Two crystals that are 50 ppm apart, which takes their cameras out of +-30 rows of 150 us in three minutes.
 SmallBench drifting_bench() {
   VirtualRigOptions setup = small_rig(2);
-  setup.queue_frames = 8;  // frames that wait for the end of a pause are drawn for nothing
   setup.cameras[1].timing.frame_period = setup.cameras[0].timing.frame_period * (1 - 25e-6);
   setup.cameras[2].timing.frame_period = setup.cameras[0].timing.frame_period * (1 + 25e-6);
   SmallBench bench(setup);
@@ -60,6 +60,27 @@ TEST(AlignHold, ChecksAsAnnouncedResetWhatLeavesAndEndsInTolerance) {
   EXPECT_LT(checks, 200) << "waits between them";
   EXPECT_GT(resets, 0) << "something drifted out";
   EXPECT_LE(late, Seconds(0)) << "no check comes after the time for which tolerance was promised";
+}
+
+TEST(AlignHold, FramesThatComeWhileNothingIsFilmedAreCountedAsPassedOver) {
+  VirtualRigOptions setup = small_rig(2);
+  for (VirtualCameraOptions& camera : setup.cameras)  // in step: nobody is reset
+    camera.first_phase = 0.6 * camera.timing.frame_period;
+  SmallBench bench(setup);
+  bench.options.hold = Seconds(120);
+  const auto folder = std::filesystem::path(testing::TempDir()) / "align_hold_counts";
+  std::filesystem::remove_all(folder);
+  const auto result = record_align(folder, bench.align, bench.options);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  ASSERT_GT(result->checks, 0);
+  ASSERT_EQ(result->resets, 0);
+  const auto session = SessionReader::open(folder);
+  ASSERT_TRUE(session.ok());
+  for (const v1::CameraStream& camera : session->manifest().cameras()) {
+    EXPECT_GT(camera.counts().passed_over(), 1000U);
+    EXPECT_EQ(camera.counts().camera_gap(), 0U);
+  }
+  std::filesystem::remove_all(folder);
 }
 
 TEST(AlignHold, EndsSoonWhenAskedTo) {

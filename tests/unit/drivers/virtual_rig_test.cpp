@@ -5,11 +5,14 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
 
+#include "base/log.h"
 #include "tests/support/virtual_cameras.h"
 
 namespace emberlock {
@@ -38,6 +41,46 @@ TEST(VirtualRig, FramesComeAtTheEndOfTheirReadPhase) {
     // The first image after the start is kept back.
     EXPECT_NEAR((rig->read_start(0, id) - TimePoint{}).value(), (static_cast<double>(id) + 1) / 24, 1e-9);
   }
+}
+
+/// What the drivers log while it lives.
+class DriversLog {
+ public:
+  DriversLog() { log(LogCategory::drivers).sinks().push_back(sink_); }
+  ~DriversLog() { log(LogCategory::drivers).sinks().pop_back(); }
+  DriversLog(const DriversLog&) = delete;
+  DriversLog& operator=(const DriversLog&) = delete;
+  [[nodiscard]] std::string text() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+  std::shared_ptr<spdlog::sinks::sink> sink_ = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_);
+};
+
+TEST(VirtualRig, FramesThatAreLostAreWarnedOf) {
+  const DriversLog said;
+  const auto rig = small_rig({small_camera()}, {});
+  ASSERT_TRUE(rig->camera(0).start().ok());
+  rig->clock().sleep_until(rig->clock().now() + Seconds(100));
+  EXPECT_GT(rig->camera(0).next_frame(Seconds(1)).value().stamp.frame_id, 1000U);
+  EXPECT_THAT(said.text(), HasSubstr("frames lost, the queue was full"));
+}
+
+TEST(VirtualRig, FramesThatArePassedOverAreCountedAndNotLost) {
+  const DriversLog said;
+  const auto rig = small_rig({small_camera()}, {});
+  Camera& camera = rig->camera(0);
+  EXPECT_EQ(camera.pass_over(rig->clock().now()), 0U) << "it doesn't film";
+  ASSERT_TRUE(camera.start().ok());
+  const std::uint64_t before = camera.next_frame(Seconds(1)).value().stamp.frame_id;
+  const TimePoint until = rig->clock().now() + Seconds(100);
+  rig->clock().sleep_until(until);
+  const std::uint64_t passed = camera.pass_over(until);
+  EXPECT_EQ(camera.pass_over(until), 0U);
+  const Frame next = camera.next_frame(Seconds(1)).value();
+  EXPECT_GE(next.stamp.monotonic_time, until);
+  EXPECT_EQ(next.stamp.frame_id, before + passed + 1);
+  EXPECT_EQ(said.text(), "");
 }
 
 TEST(VirtualRig, AShortDeadlineTimesOutAndLosesNothing) {

@@ -174,6 +174,18 @@ TEST(Recording, CountsAddUp) {
   EXPECT_EQ(manifest->cameras(1).counts().recorded(), 0U);
 }
 
+TEST(Recording, FramesThatNobodyWantedAreNoGap) {
+  const TempFolder temp;
+  auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());
+  ASSERT_TRUE(writer);
+  for (const std::uint64_t id : {0, 10}) ASSERT_TRUE(writer->write(0, noise_frame(kSmall, id)));
+  writer->count_lost(0, LossCause::passed_over, 8);
+  const auto manifest = writer->finish();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  EXPECT_EQ(manifest->cameras(0).counts().passed_over(), 8U);
+  EXPECT_EQ(manifest->cameras(0).counts().camera_gap(), 1U);
+}
+
 TEST(Recording, CountsThatContradictAreAnErrorAndTheSessionStaysUnfinished) {
   const TempFolder temp;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kSmall}), small_disk_options());

@@ -97,6 +97,13 @@ class SensorRounds {
   [[nodiscard]] Seconds off(const ToldRound& told) const {
     return abs(wrap_symmetric(told.phase.tau - shutter_.tau(told.at, kDelay), shutter_.period));
   }
+  /// A picture whose rows overlap.
+  SmearReading take_malformed() {
+    const Image picture = shutter_.picture(now_, {kDelay});
+    ImageView view = picture.view();
+    view.stride = 1;
+    return sensor_.take(view, now_, {kDelay});
+  }
   void wait(Seconds time) { now_ = now_ + time; }
 
   static constexpr Seconds kDelay{0.0175};

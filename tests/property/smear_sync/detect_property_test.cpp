@@ -24,6 +24,7 @@ void expect_at_the_bound(const SmearRange& range, std::uint64_t seed) {
               100 * t.within_two_sigma());
   EXPECT_EQ(t.dots, t.found) << "dots where there are none";
   EXPECT_GE(t.found, 0.99 * t.frames);
+  EXPECT_LE(t.rms(), 0.2);
   EXPECT_LE(t.over_bound(), 1.15);
   EXPECT_GE(t.within_two_sigma(), 0.9);
   EXPECT_LE(t.within_two_sigma(), 0.995);

@@ -13,9 +13,3 @@ inline std::filesystem::path recordings() {
 }
 
 }  // namespace emberlock::test
-
-/// In a fixture's SetUp: skips, and says so, where there is no such folder; one that lacks a file fails.
-#define SKIP_WITHOUT_RECORDINGS()                                                         \
-  if (!std::filesystem::exists(emberlock::test::recordings()))                            \
-  GTEST_SKIP() << "no recordings in " << emberlock::test::recordings().lexically_normal() \
-               << ": set EMBERLOCK_DATA to their folder"

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstdint>
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
 #include "base/random.h"
 #include "smear_sync/sensors/phase_sensor.h"
 
@@ -119,5 +122,18 @@ class SensorRounds {
   PhaseSensor& sensor_;
   TimePoint now_;
 };
+
+inline const Beat kStill{PartsPerMillion(0), PartsPerMillion(1)};
+
+/// What is said of an exposure that is too short, and of one that is too long; then it is as it was.
+inline void expect_exposures_advised(ScriptedShutter& shutter, SensorRounds& rounds,
+                                     const char* of_long_one) {
+  const Seconds right = shutter.exposure;
+  shutter.exposure = microseconds(30);
+  EXPECT_THAT(rounds.film(kStill).phase.reason, testing::HasSubstr("lengthen"));
+  shutter.exposure = shutter.period;
+  EXPECT_THAT(rounds.film(kStill).phase.reason, testing::HasSubstr(of_long_one));
+  shutter.exposure = right;
+}
 
 }  // namespace emberlock::test

@@ -16,13 +16,17 @@ struct Level {
   const char* name;
   const char* program;  ///< compiled for this level
 };
-constexpr Level kLevels[] = {{Isa::baseline, "baseline", EMBERLOCK_COST_MARCH},
-                             {Isa::v3, "v3", EMBERLOCK_COST_MARCH_V3}};
+/// Those that this CPU runs.
+std::vector<Level> levels() {
+  std::vector<Level> all{{Isa::baseline, "baseline", EMBERLOCK_COST_MARCH},
+                         {Isa::v3, "v3", EMBERLOCK_COST_MARCH_V3}};
+  std::erase_if(all, [](const Level& level) { return level.isa > best_isa(); });
+  return all;
+}
 
 class Cost : public testing::TestWithParam<Level> {
  protected:
   void SetUp() override {
-    if (GetParam().isa > best_isa()) GTEST_SKIP() << "this CPU doesn't run " << GetParam().name;
     ASSERT_EQ(shell("valgrind --version").status, 0) << "valgrind is missing: run scripts/setup";
   }
 
@@ -55,7 +59,7 @@ TEST_P(Cost, PictureWithoutEffectsIsAMarchAndNoMore) {
   EXPECT_GT(instructions("picture_of_effects") / by_hand, 1.05) << "what is on is seen to cost";
 }
 
-INSTANTIATE_TEST_SUITE_P(Levels, Cost, testing::ValuesIn(kLevels),
+INSTANTIATE_TEST_SUITE_P(Levels, Cost, testing::ValuesIn(levels()),
                          [](const auto& level) { return std::string(level.param.name); });
 
 }  // namespace

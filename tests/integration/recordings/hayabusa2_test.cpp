@@ -11,10 +11,7 @@
 namespace emberlock {
 namespace {
 
-class Hayabusa2 : public testing::TestWithParam<const char*> {
- protected:
-  void SetUp() override { SKIP_WITHOUT_RECORDINGS(); }
-};
+class Hayabusa2 : public testing::TestWithParam<const char*> {};
 
 TEST_P(Hayabusa2, TheEarthIsASteadyLampAndTheTrapIsNoDot) {
   const std::filesystem::path file = test::recordings() / "smear_hayabusa2" / GetParam();

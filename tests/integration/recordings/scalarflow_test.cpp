@@ -41,7 +41,6 @@ void shrink(View& view) {
 class ScalarFlowTest : public testing::Test {
  protected:
   void SetUp() override {
-    SKIP_WITHOUT_RECORDINGS();
     auto scene = load_scene(transforms());
     ASSERT_TRUE(scene.ok()) << scene.error().message();
     scene_ = std::move(scene).value();

@@ -7,12 +7,12 @@
 namespace emberlock {
 namespace {
 
+using test::kStill;
 using test::ScriptedShutter;
 using test::SensorRounds;
 using test::ToldRound;
 using testing::HasSubstr;
 
-const Beat kStill{PartsPerMillion(0), PartsPerMillion(1)};
 constexpr int kFewLooks = 12;
 
 class GlobalSensor : public testing::Test {
@@ -112,11 +112,7 @@ TEST_F(GlobalSensor, AShutterThatWasMovedUnseenIsFoundAgain) {
 }
 
 TEST_F(GlobalSensor, AnExposureThatIsMendedAsAdvisedIsHeard) {
-  shutter.exposure = microseconds(30);
-  EXPECT_THAT(rounds.film(kStill).phase.reason, HasSubstr("lengthen"));
-  shutter.exposure = shutter.period;
-  EXPECT_THAT(rounds.film(kStill).phase.reason, HasSubstr("shorten its exposure"));
-  shutter.exposure = milliseconds(4);
+  test::expect_exposures_advised(shutter, rounds, "shorten its exposure");
   expect_true();
 }
 

@@ -7,12 +7,11 @@
 namespace emberlock {
 namespace {
 
+using test::kStill;
 using test::ScriptedShutter;
 using test::SensorRounds;
 using test::ToldRound;
 using testing::HasSubstr;
-
-const Beat kStill{PartsPerMillion(0), PartsPerMillion(1)};
 
 class RollingSensor : public testing::Test {
  protected:
@@ -57,11 +56,7 @@ TEST_F(RollingSensor, AmbientLightThatRisesIsLearntAnew) {
 }
 
 TEST_F(RollingSensor, AnExposureThatIsMendedAsAdvisedIsHeard) {
-  shutter.exposure = microseconds(30);
-  EXPECT_THAT(rounds.film(kStill).phase.reason, HasSubstr("lengthen"));
-  shutter.exposure = shutter.period;
-  EXPECT_THAT(rounds.film(kStill).phase.reason, HasSubstr("shorten"));
-  shutter.exposure = milliseconds(4);
+  test::expect_exposures_advised(shutter, rounds, "shorten");
   expect_true();
 }
 

@@ -16,6 +16,10 @@ constexpr OneToOne<SensorKind, v1::CameraStream::Sensor, 3> kSensors{
     {{{SensorKind::ccd, v1::CameraStream::CCD},
       {SensorKind::rolling_shutter, v1::CameraStream::ROLLING_SHUTTER},
       {SensorKind::global_shutter, v1::CameraStream::GLOBAL_SHUTTER}}}};
+constexpr OneToOne<DeviceTimeOf, v1::CameraStream::DeviceTimeOf, 3> kDeviceTimes{
+    {{{DeviceTimeOf::unknown, v1::CameraStream::UNKNOWN},
+      {DeviceTimeOf::exposure_start, v1::CameraStream::EXPOSURE_START},
+      {DeviceTimeOf::frame_end, v1::CameraStream::FRAME_END}}}};
 constexpr OneToOne<StrobeOutput, v1::StrobeState::Output, 3> kOutputs{
     {{{StrobeOutput::off, v1::StrobeState::OFF},
       {StrobeOutput::flashing, v1::StrobeState::FLASHING},
@@ -31,6 +35,7 @@ v1::CameraStream to_proto(const CameraInfo& info) {
   stream.set_frame_rate_hz(info.frame_rate.value());
   stream.set_shutter_reset(kResets.second_of(info.reset).value_or(v1::CameraStream::NONE));
   stream.set_sensor(kSensors.second_of(info.sensor).value_or(v1::CameraStream::CCD));
+  stream.set_device_time_of(kDeviceTimes.second_of(info.device_time_of).value_or(v1::CameraStream::UNKNOWN));
   if (info.trim) {
     stream.set_trim_range_ppm(info.trim->range.value());
     stream.set_trim_step_ppm(info.trim->step.value());
@@ -47,6 +52,7 @@ Result<CameraInfo> camera_info(const v1::CameraStream& stream) {
   info.frame_rate = Hertz(stream.frame_rate_hz());
   info.reset = kResets.first_of(stream.shutter_reset()).value_or(ShutterReset::none);
   info.sensor = kSensors.first_of(stream.sensor()).value_or(SensorKind::ccd);
+  info.device_time_of = kDeviceTimes.first_of(stream.device_time_of()).value_or(DeviceTimeOf::unknown);
   if (stream.trim_range_ppm() > 0 && stream.trim_step_ppm() > 0) {
     info.trim = FrameRateTrim{PartsPerMillion(stream.trim_range_ppm()),
                               PartsPerMillion(stream.trim_step_ppm()), Seconds(stream.trim_latency_s())};

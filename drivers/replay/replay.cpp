@@ -78,7 +78,9 @@ Result<Frame> ReplayCamera::next_frame(Seconds /*deadline*/) {
   const std::size_t i = next_frame_;
   if (i < session_->stamps(camera_).size()) {
     ++next_frame_;
-    clock_->frame_replayed(session_->stamps(camera_)[i].monotonic_time);
+    const FrameStamp& stamp = session_->stamps(camera_)[i];
+    ++(stamp.status == FrameStatus::complete ? counts_.delivered : counts_.damaged);
+    clock_->frame_replayed(stamp.monotonic_time);
   }
   return session_->read(camera_, i);
 }

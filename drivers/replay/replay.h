@@ -61,6 +61,8 @@ class ReplayCamera final : public Camera {
   ReplayCamera(std::shared_ptr<SessionReader> session, std::size_t camera,
                std::shared_ptr<ReplayClock> clock);
   [[nodiscard]] const CameraInfo& info() const override { return info_; }
+  /// Of what was replayed; what the live run lost stands in the session's manifest.
+  [[nodiscard]] FrameCounts counts() const override { return counts_; }
   Status start() override;
   void stop() override { filming_ = false; }
   Result<Frame> next_frame(Seconds deadline) override;
@@ -79,6 +81,7 @@ class ReplayCamera final : public Camera {
   std::size_t camera_;
   std::shared_ptr<ReplayClock> clock_;
   CameraInfo info_;
+  FrameCounts counts_;
   bool filming_ = false;
   std::size_t next_frame_ = 0;
   std::size_t next_event_ = 0;

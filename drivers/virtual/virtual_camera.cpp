@@ -88,7 +88,9 @@ Status VirtualCamera::reset_shutter(TimePoint at) {
                             : options_.reset_jitter * random_normal(seed_, kJitterStream, draw);
   const Seconds latency = std::max(Seconds(0), options_.reset_latency + drawn);
   // The old cycle runs until `at`; what it delivered or would have is counted, and dropped.
-  begin_cycle(at + latency, delivered_by(at));
+  const std::uint64_t first_wanted = delivered_by(at);
+  counts_.passed_over += first_wanted - next_id_;
+  begin_cycle(at + latency, first_wanted);
   log(LogCategory::drivers).debug("{}: shutter reset {}", info_.id, draw);
   return {};
 }
@@ -154,6 +156,7 @@ void VirtualCamera::drop_overflow() {
   if (delivered <= next_id_ + queue_frames_) return;
   const std::uint64_t oldest = delivered - queue_frames_;
   log(LogCategory::drivers).warn("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
+  counts_.queue += oldest - next_id_;
   next_id_ = oldest;
 }
 
@@ -173,13 +176,16 @@ Result<Frame> VirtualCamera::next_frame(Seconds deadline) {
   }
   clock.sleep_until(ready);
   drop_overflow();
+  ++counts_.delivered;
   return draw(next_id_++);
 }
 
 std::uint64_t VirtualCamera::pass_over(TimePoint until) {
   if (!filming_) return 0;
   const std::uint64_t first_wanted = std::max(next_id_, delivered_by(std::min(until, room_->clock().now())));
-  return first_wanted - std::exchange(next_id_, first_wanted);
+  const std::uint64_t dropped = first_wanted - std::exchange(next_id_, first_wanted);
+  counts_.passed_over += dropped;
+  return dropped;
 }
 
 std::shared_ptr<const VirtualScene> VirtualCamera::scene_of(std::uint64_t frame_id) const {

@@ -46,6 +46,7 @@ class VirtualCamera final : public Camera {
                 std::shared_ptr<const VirtualRoom> room);
 
   [[nodiscard]] const CameraInfo& info() const override { return info_; }
+  [[nodiscard]] FrameCounts counts() const override { return counts_; }
   Status start() override;
   void stop() override { filming_ = false; }
   Result<Frame> next_frame(Seconds deadline) override;
@@ -94,6 +95,7 @@ class VirtualCamera final : public Camera {
   std::uint64_t next_id_ = 0;
   Seconds period_;  ///< as trimmed
   bool filming_ = false;
+  FrameCounts counts_;
 };
 
 }  // namespace emberlock

@@ -1,0 +1,52 @@
+#include "drivers/holder.h"
+
+#include <fstream>
+#include <system_error>
+
+#include <unistd.h>
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+std::optional<int> pid_of(const fs::path& proc_entry) {
+  const std::string name = proc_entry.filename();
+  if (name.empty() || name.find_first_not_of("0123456789") != std::string::npos || name.size() > 9) return {};
+  return std::stoi(name);
+}
+
+bool has_open(const fs::path& process, const fs::path& file) {
+  std::error_code error;
+  for (fs::directory_iterator fd(process / "fd", error), end; !error && fd != end; fd.increment(error)) {
+    std::error_code gone;
+    if (fs::read_symlink(fd->path(), gone) == file) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::optional<Holder> holder_of(const fs::path& device) {
+  std::error_code error;
+  const fs::path file = fs::canonical(device, error);
+  if (error) return {};
+  for (fs::directory_iterator process("/proc", error), end; !error && process != end;
+       process.increment(error)) {
+    const auto pid = pid_of(process->path());
+    if (!pid || *pid == ::getpid() || !has_open(process->path(), file)) continue;
+    Holder holder{*pid, {}};
+    std::ifstream comm(process->path() / "comm");
+    std::getline(comm, holder.program);
+    return holder;
+  }
+  return {};
+}
+
+Error held_error(const fs::path& device, const std::string& where) {
+  const auto holder = holder_of(device);
+  if (!holder) return {ErrorKind::device, "another process has it", where, "close the program that uses it"};
+  return {ErrorKind::device, holder->program + " (process " + std::to_string(holder->pid) + ") has it", where,
+          "close that program, then try again"};
+}
+
+}  // namespace emberlock

@@ -43,10 +43,10 @@ struct CameraFound {
 
 /// How a camera shall film; what isn't said is the driver's choice.
 struct CameraRequest {
-  std::optional<ImageSize> size;                     ///< else the largest
-  std::optional<PixelFormat> format;                 ///< else what keeps most of what the camera sends
-  std::optional<Hertz> frame_rate;                   ///< else the fastest; rounded to what the camera can
-  std::optional<Seconds> exposure;                   ///< else as the camera is set
+  std::optional<ImageSize> size = {};                ///< else the largest
+  std::optional<PixelFormat> format = {};            ///< else what keeps most of what the camera sends
+  std::optional<Hertz> frame_rate = {};              ///< else the fastest; rounded to what the camera can
+  std::optional<Seconds> exposure = {};              ///< else as the camera is set
   std::map<std::string, std::string> controls = {};  ///< by the device's own names, set before it films
 };
 

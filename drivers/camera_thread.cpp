@@ -1,0 +1,349 @@
+#include "drivers/camera_thread.h"
+
+#include <algorithm>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/clock.h"
+#include "base/log.h"
+
+namespace emberlock {
+namespace {
+
+using Time = std::chrono::steady_clock::time_point;
+
+Time now() { return std::chrono::steady_clock::now(); }
+Time after(Time t, Seconds wait) {
+  constexpr Seconds kLongestWait{1e8};
+  return t + std::chrono::nanoseconds(std::llround(std::clamp(wait, Seconds(0), kLongestWait).value() * 1e9));
+}
+Seconds since(Time t) { return Seconds(std::chrono::duration<double>(now() - t).count()); }
+
+/// How long one wait for a frame is, so that orders are soon heard.
+constexpr Seconds kSlice = milliseconds(20);
+
+}  // namespace
+
+/// What the thread and its owner share. The camera is used by the thread alone.
+class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
+ public:
+  Worker(std::unique_ptr<Camera> camera, CameraThreadOptions options)
+      : options_(options), info_(camera->info()), camera_(std::move(camera)) {}
+
+  void launch() {
+    std::thread([self = shared_from_this()] { self->run(); }).detach();
+  }
+
+  /// The thread shall end. Whether it did in time.
+  bool finish() {
+    std::unique_lock lock(mutex_);
+    quit_ = true;
+    thread_wakes_.notify_all();
+    return owner_wakes_.wait_until(lock, after(now(), options_.call_deadline), [this] { return done_; });
+  }
+
+  State state() const {
+    const std::lock_guard lock(mutex_);
+    if (hangs()) return State::quarantined;
+    if (!filming_) return State::idle;
+    return lost_ ? State::lost : State::filming;
+  }
+
+  const CameraInfo& info() const { return info_; }
+
+  FrameCounts counts() const {
+    const std::lock_guard lock(mutex_);
+    FrameCounts all = of_camera_;
+    all.delivered = own_.delivered;
+    all.damaged = own_.damaged;
+    all.queue += own_.queue;
+    all.passed_over += own_.passed_over;
+    return all;
+  }
+
+  /// Has the thread call `order`, and waits for what comes of it.
+  Status call(const std::string& what, std::function<Status(Camera&)> order) {
+    std::unique_lock lock(mutex_);
+    if (hangs()) return hanging();
+    const auto answer = std::make_shared<std::optional<Status>>();
+    orders_.push_back({what, now(), [order = std::move(order), answer, this](Camera& camera) {
+                         Status status = order(camera);
+                         const std::lock_guard inner(mutex_);
+                         *answer = std::move(status);
+                       }});
+    thread_wakes_.notify_all();
+    // One wait for a frame may have to end first.
+    const Time until = after(now(), options_.call_deadline + kSlice);
+    owner_wakes_.wait_until(lock, until, [&] { return answer->has_value(); });
+    if (answer->has_value()) return **answer;
+    return hangs() ? hanging() : silent(what);
+  }
+
+  Status start() {
+    {
+      const std::lock_guard lock(mutex_);
+      if (filming_ && !hangs()) return {};
+    }
+    return call("start", [this](Camera& camera) {
+      Status status = camera.start();
+      const std::lock_guard lock(mutex_);
+      filming_ = status.ok();
+      lost_ = false;
+      return status;
+    });
+  }
+
+  Status stop() {
+    {
+      const std::lock_guard lock(mutex_);
+      filming_ = false;
+    }
+    Status stopped = call("stop", [](Camera& camera) {
+      camera.stop();
+      return Status{};
+    });
+    const std::lock_guard lock(mutex_);
+    drop_frames();
+    waiting_.clear();
+    return stopped;
+  }
+
+  Result<Frame> next_frame(Seconds deadline) {
+    std::unique_lock lock(mutex_);
+    const Time until = after(now(), deadline);
+    while (waiting_.empty() && now() < until && !hangs()) {
+      owner_wakes_.wait_until(lock, busy_until_ ? std::min(until, *busy_until_) : until);
+    }
+    if (!waiting_.empty()) {
+      Result<Frame> next = std::move(waiting_.front());
+      waiting_.pop_front();
+      if (next) ++(next->stamp.status == FrameStatus::complete ? own_.delivered : own_.damaged);
+      return next;
+    }
+    if (hangs()) return hanging();
+    if (!filming_) {
+      return Error{ErrorKind::device, "it does not film", where(), "start() it first"};
+    }
+    if (lost_) {
+      return Error{ErrorKind::timed_out,
+                   fmt::format("it has been away for {:.1f} s", since(lost_since_).value()), where(),
+                   "plug it in again, or switch it on; it films on by itself"};
+    }
+    return Error{ErrorKind::timed_out, fmt::format("no frame within {:g} s", deadline.value()), where(),
+                 "wait longer than a frame period; see whether its lamp says that it films"};
+  }
+
+  std::uint64_t pass_over(TimePoint until) {
+    const std::lock_guard lock(mutex_);
+    wanted_from_ = std::max(wanted_from_, until);
+    const auto first_wanted = std::find_if(
+        waiting_.begin(), waiting_.end(),
+        [&](const Result<Frame>& waiting) { return !waiting || waiting->stamp.monotonic_time > until; });
+    passed_unsaid_ += static_cast<std::uint64_t>(first_wanted - waiting_.begin());
+    waiting_.erase(waiting_.begin(), first_wanted);
+    own_.passed_over += passed_unsaid_;
+    return std::exchange(passed_unsaid_, 0);
+  }
+
+  Status reset(TimePoint at) {
+    const std::lock_guard lock(mutex_);
+    if (info_.reset == ShutterReset::none) {
+      return Error{ErrorKind::device, "its shutter can't be reset", where(),
+                   "choose a camera whose reset is by_hand or on_command"};
+    }
+    if (hangs()) return hanging();
+    if (!filming_) return Error{ErrorKind::device, "it does not film", where(), "start() it first"};
+    const auto reset = [at, this](Camera& camera) {
+      const Status status = camera.reset_shutter(at);
+      const std::lock_guard inner(mutex_);
+      drop_frames();
+      if (!status) waiting_.push_back(status.error());
+      --resets_to_do_;
+    };
+    ++resets_to_do_;
+    orders_.push_back({"reset_shutter", after(now(), at - SteadyClock().now()), reset});
+    drop_frames();
+    thread_wakes_.notify_all();
+    return {};
+  }
+
+ private:
+  struct Order {
+    std::string what;
+    Time begins;  ///< when the camera shall do it
+    std::function<void(Camera&)> act;
+  };
+
+  // Behind the lock, all of them.
+
+  [[nodiscard]] std::string where() const { return "camera " + info_.id; }
+  [[nodiscard]] bool hangs() const { return busy_until_ && now() > *busy_until_; }
+  [[nodiscard]] Error hanging() const {
+    return {ErrorKind::device,
+            fmt::format("it hangs, for {:.1f} s so far, in {}", since(busy_since_).value(), busy_with_),
+            where(), "unplug it or switch it off and on again; the other cameras go on"};
+  }
+  [[nodiscard]] Error silent(const std::string& what) const {
+    return {ErrorKind::timed_out,
+            fmt::format("{} wasn't done within {:g} s", what, options_.call_deadline.value()), where(),
+            "unplug it or switch it off and on again"};
+  }
+  void drop_frames() {
+    own_.passed_over += static_cast<std::uint64_t>(
+        std::count_if(waiting_.begin(), waiting_.end(), [](const Result<Frame>& r) { return r.ok(); }));
+    std::erase_if(waiting_, [](const Result<Frame>& r) { return r.ok(); });
+  }
+
+  /// Calls the camera without the lock; meanwhile it may be seen to hang.
+  template <class Act>
+  auto busy(std::unique_lock<std::mutex>& lock, const std::string& with, Time begins, const Act& act) {
+    busy_with_ = with;
+    busy_since_ = now();
+    busy_until_ = after(std::max(begins, busy_since_), options_.call_deadline);
+    lock.unlock();
+    struct Done {
+      std::unique_lock<std::mutex>& lock;
+      Worker& worker;
+      ~Done() {
+        lock.lock();
+        worker.busy_until_.reset();
+        worker.owner_wakes_.notify_all();
+      }
+    } const done{lock, *this};
+    return act(*camera_);
+  }
+
+  void run() {
+    std::unique_lock lock(mutex_);
+    while (!quit_) {
+      if (!orders_.empty()) {
+        const Order order = std::move(orders_.front());
+        orders_.pop_front();
+        busy(lock, order.what, order.begins, order.act);
+      } else if (filming_ && !lost_) {
+        take_frame(lock);
+      } else if (filming_ && now() >= retry_at_) {
+        look_for_it(lock);
+      } else if (filming_) {
+        thread_wakes_.wait_until(lock, retry_at_);
+      } else {
+        thread_wakes_.wait(lock);
+      }
+    }
+    busy(lock, "stop", now(), [this](Camera& camera) {
+      camera.stop();
+      camera_.reset();
+    });
+    done_ = true;
+    owner_wakes_.notify_all();
+  }
+
+  void take_frame(std::unique_lock<std::mutex>& lock) {
+    auto [next, counted] = busy(lock, "next_frame", after(now(), kSlice), [](Camera& camera) {
+      auto frame = camera.next_frame(kSlice);
+      return std::pair(std::move(frame), camera.counts());
+    });
+    of_camera_ = counted;
+    if (next) return add(std::move(next));
+    if (next.error().kind == ErrorKind::timed_out) return;
+    if (next.error().kind == ErrorKind::device) {
+      log(LogCategory::drivers).warn("{}", next.error().message());
+      lost_ = true;
+      lost_since_ = now();
+      retry_at_ = after(now(), options_.retry);
+    } else if (next.error().kind == ErrorKind::out_of_data) {
+      filming_ = false;
+    }
+    waiting_.push_back(std::move(next));
+  }
+
+  void add(Result<Frame> frame) {
+    if (resets_to_do_ > 0) {
+      ++own_.passed_over;
+    } else if (frame->stamp.monotonic_time <= wanted_from_) {
+      ++passed_unsaid_;
+    } else {
+      if (waiting_.size() >= options_.queue_frames) drop_oldest();
+      waiting_.push_back(std::move(frame));
+    }
+  }
+
+  void drop_oldest() {
+    const auto oldest = std::find_if(waiting_.begin(), waiting_.end(),
+                                     [](const Result<Frame>& waiting) { return waiting.ok(); });
+    if (oldest == waiting_.end()) return;
+    waiting_.erase(oldest);
+    if (own_.queue++ == 0) {
+      log(LogCategory::drivers)
+          .warn("{}: frames are lost, the queue of {} is full", where(), options_.queue_frames);
+    }
+  }
+
+  void look_for_it(std::unique_lock<std::mutex>& lock) {
+    const Status back = busy(lock, "start", now(), [](Camera& camera) { return camera.start(); });
+    retry_at_ = after(now(), options_.retry);
+    if (!back) return;
+    lost_ = false;
+    log(LogCategory::drivers).warn("{}: it is back after {:.1f} s", where(), since(lost_since_).value());
+  }
+
+  const CameraThreadOptions options_;
+  const CameraInfo info_;
+  std::unique_ptr<Camera> camera_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable thread_wakes_;
+  std::condition_variable owner_wakes_;
+  std::deque<Order> orders_;
+  std::deque<Result<Frame>> waiting_;
+  FrameCounts of_camera_;
+  FrameCounts own_;
+  std::uint64_t passed_unsaid_ = 0;  ///< dropped after pass_over() returned; the next one says so
+  TimePoint wanted_from_;
+  int resets_to_do_ = 0;
+  bool filming_ = false;  ///< as the owner wants it
+  bool lost_ = false;
+  Time lost_since_;
+  Time retry_at_;
+  std::string busy_with_;
+  Time busy_since_;
+  std::optional<Time> busy_until_;  ///< while a call into the camera goes on: when it is overdue
+  bool quit_ = false;
+  bool done_ = false;
+};
+
+CameraThread::CameraThread(std::unique_ptr<Camera> camera, CameraThreadOptions options)
+    : worker_(std::make_shared<Worker>(std::move(camera), options)) {
+  worker_->launch();
+}
+
+CameraThread::~CameraThread() {
+  if (!worker_->finish())
+    log(LogCategory::drivers).error("camera {}: it hangs and is left behind", worker_->info().id);
+}
+
+CameraThread::State CameraThread::state() const { return worker_->state(); }
+const CameraInfo& CameraThread::info() const { return worker_->info(); }
+FrameCounts CameraThread::counts() const { return worker_->counts(); }
+Status CameraThread::start() { return worker_->start(); }
+void CameraThread::stop() {
+  if (const Status stopped = worker_->stop(); !stopped)
+    log(LogCategory::drivers).error("{}", stopped.error().message());
+}
+Result<Frame> CameraThread::next_frame(Seconds deadline) { return worker_->next_frame(deadline); }
+std::uint64_t CameraThread::pass_over(TimePoint until) { return worker_->pass_over(until); }
+Status CameraThread::reset_shutter(TimePoint at) { return worker_->reset(at); }
+Status CameraThread::trim_rate(PartsPerMillion trim) {
+  return worker_->call("trim_rate", [trim](Camera& camera) { return camera.trim_rate(trim); });
+}
+
+}  // namespace emberlock

@@ -1,0 +1,278 @@
+#include "drivers/camera_thread.h"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "base/clock.h"
+
+namespace emberlock {
+namespace {
+
+using std::chrono::steady_clock;
+using ::testing::HasSubstr;
+using State = CameraThread::State;
+
+constexpr Seconds kSoon{5};  // far more than anything here takes
+const CameraThreadOptions kQuick{
+    .queue_frames = 4, .retry = milliseconds(10), .call_deadline = milliseconds(200)};
+
+/// A device on a desk: a test plugs it in and out, has it make frames, and hang.
+class Desk {
+ public:
+  std::atomic<bool> plugged{true};
+  std::atomic<int> starts{0};
+  std::atomic<int> stops{0};
+  std::atomic<int> alive{0};
+  std::atomic<double> trimmed{0};
+
+  void make_frames(int count) {
+    const std::lock_guard lock(mutex_);
+    made_ += count;
+  }
+  std::optional<std::uint64_t> take() {
+    const std::lock_guard lock(mutex_);
+    if (taken_ == made_) return {};
+    return taken_++;
+  }
+  void hang() { set(true); }
+  void go_on() { set(false); }
+  void pass_hang() {
+    std::unique_lock lock(mutex_);
+    free_.wait(lock, [this] { return !hanging_; });
+  }
+
+ private:
+  void set(bool hanging) {
+    const std::lock_guard lock(mutex_);
+    hanging_ = hanging;
+    free_.notify_all();
+  }
+  std::mutex mutex_;
+  std::condition_variable free_;
+  std::uint64_t made_ = 0;
+  std::uint64_t taken_ = 0;
+  bool hanging_ = false;
+};
+
+class DeskCamera final : public Camera {
+ public:
+  explicit DeskCamera(std::shared_ptr<Desk> desk, ShutterReset reset = ShutterReset::on_command)
+      : desk_(std::move(desk)) {
+    info_.id = "c7";
+    info_.reset = reset;
+    ++desk_->alive;
+  }
+  ~DeskCamera() override { --desk_->alive; }
+  DeskCamera(const DeskCamera&) = delete;
+  DeskCamera& operator=(const DeskCamera&) = delete;
+
+  const CameraInfo& info() const override { return info_; }
+  FrameCounts counts() const override { return counts_; }
+  Status start() override {
+    if (!desk_->plugged) return Error{ErrorKind::device, "it isn't there", "camera c7", {}};
+    ++desk_->starts;
+    filming_ = true;
+    return {};
+  }
+  void stop() override {
+    ++desk_->stops;
+    filming_ = false;
+  }
+  Result<Frame> next_frame(Seconds deadline) override {
+    desk_->pass_hang();
+    if (!filming_) return Error{ErrorKind::device, "it does not film", "camera c7", {}};
+    if (!desk_->plugged) {
+      filming_ = false;
+      return Error{ErrorKind::device, "it was unplugged", "camera c7", {}};
+    }
+    if (const auto id = desk_->take()) {
+      ++counts_.delivered;
+      Frame frame;
+      frame.stamp.frame_id = *id;
+      frame.stamp.monotonic_time = SteadyClock().now();
+      return frame;
+    }
+    std::this_thread::sleep_for(std::chrono::duration<double>(std::min(deadline.value(), .001)));
+    return Error{ErrorKind::timed_out, "no frame", "camera c7", {}};
+  }
+  std::uint64_t pass_over(TimePoint /*until*/) override { return 0; }
+  Status reset_shutter(TimePoint at) override {
+    SteadyClock().sleep_until(at);
+    if (!desk_->plugged) return Error{ErrorKind::device, "it was unplugged", "camera c7", {}};
+    return {};
+  }
+  Status trim_rate(PartsPerMillion trim) override {
+    desk_->trimmed = trim.value();
+    return {};
+  }
+
+ private:
+  std::shared_ptr<Desk> desk_;
+  CameraInfo info_;
+  FrameCounts counts_;
+  bool filming_ = false;
+};
+
+struct CameraThreadTest : ::testing::Test {
+  std::shared_ptr<Desk> desk = std::make_shared<Desk>();
+  std::unique_ptr<CameraThread> camera =
+      std::make_unique<CameraThread>(std::make_unique<DeskCamera>(desk), kQuick);
+
+  void until(const std::function<bool()>& holds) const {
+    const auto give_up = steady_clock::now() + std::chrono::seconds(5);
+    while (!holds() && steady_clock::now() < give_up)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ASSERT_TRUE(holds());
+  }
+};
+
+TEST_F(CameraThreadTest, FramesComeInOrderAndAreCountedAsTheyAreTaken) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->make_frames(3);
+  for (std::uint64_t id = 0; id < 3; ++id) EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, id);
+  EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 3}));
+  const auto none = camera->next_frame(milliseconds(5));
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.error().kind, ErrorKind::timed_out);
+}
+
+TEST_F(CameraThreadTest, AFullQueueLosesItsOldestAndCountsThem) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->make_frames(10);
+  until([&] { return camera->counts().queue == 6; });
+  for (std::uint64_t id = 6; id < 10; ++id) EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, id);
+  EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 4, .queue = 6}));
+}
+
+TEST_F(CameraThreadTest, ACameraThatWentAwayIsSaidOnceAndFilmsOnWhenItIsBack) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->plugged = false;
+  EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::device);
+  EXPECT_EQ(camera->state(), State::lost);
+  const auto away = camera->next_frame(milliseconds(30));
+  ASSERT_FALSE(away.ok());
+  EXPECT_EQ(away.error().kind, ErrorKind::timed_out);
+  EXPECT_THAT(away.error().message(), HasSubstr("it has been away"));
+  desk->make_frames(1);
+  desk->plugged = true;
+  ASSERT_TRUE(camera->next_frame(kSoon).ok());
+  EXPECT_EQ(camera->state(), State::filming);
+  EXPECT_EQ(desk->starts, 2);
+}
+
+TEST_F(CameraThreadTest, StoppedWhileItIsAwayItIsNotLookedForAnyMore) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->plugged = false;
+  EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::device);
+  camera->stop();
+  desk->plugged = true;
+  std::this_thread::sleep_for(std::chrono::milliseconds(60));
+  EXPECT_EQ(desk->starts, 1);
+  EXPECT_EQ(camera->state(), State::idle);
+}
+
+TEST_F(CameraThreadTest, OneThatHangsIsQuarantinedUntilItGoesOn) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->hang();
+  const auto began = steady_clock::now();
+  const auto hanging = camera->next_frame(kSoon);
+  ASSERT_FALSE(hanging.ok());
+  EXPECT_EQ(hanging.error().kind, ErrorKind::device);
+  EXPECT_THAT(hanging.error().message(), HasSubstr("camera c7: it hangs"));
+  EXPECT_THAT(hanging.error().message(), HasSubstr("in next_frame"));
+  EXPECT_LT(steady_clock::now() - began, std::chrono::seconds(2));
+  EXPECT_EQ(camera->state(), State::quarantined);
+  EXPECT_EQ(camera->trim_rate(PartsPerMillion(3)).error().kind, ErrorKind::device);
+  desk->make_frames(1);
+  desk->go_on();
+  until([&] { return camera->state() == State::filming; });
+  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+}
+
+TEST_F(CameraThreadTest, OneThatHangsForGoodIsLeftBehindInBoundedTime) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->hang();
+  EXPECT_FALSE(camera->next_frame(kSoon).ok());
+  const auto began = steady_clock::now();
+  camera->stop();
+  camera.reset();
+  EXPECT_LT(steady_clock::now() - began, std::chrono::seconds(2));
+  EXPECT_EQ(desk->alive, 1);
+  desk->go_on();
+  until([&] { return desk->alive == 0; });
+}
+
+TEST_F(CameraThreadTest, AResetReturnsAtOnceAndDropsWhatShowsTheOldPhase) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->make_frames(2);
+  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+  const auto began = steady_clock::now();
+  const TimePoint at = SteadyClock().now() + milliseconds(100);
+  ASSERT_TRUE(camera->reset_shutter(at).ok());
+  EXPECT_LT(steady_clock::now() - began, std::chrono::milliseconds(90));
+  EXPECT_EQ(camera->next_frame(milliseconds(20)).error().kind, ErrorKind::timed_out);
+  SteadyClock().sleep_until(at + milliseconds(50));
+  desk->make_frames(1);
+  EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, 2);
+  EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 2, .passed_over = 1}));
+}
+
+TEST_F(CameraThreadTest, AResetThatFailsIsSaidByTheNextFrame) {
+  ASSERT_TRUE(camera->start().ok());
+  const TimePoint at = SteadyClock().now() + milliseconds(60);
+  ASSERT_TRUE(camera->reset_shutter(at).ok());
+  desk->plugged = false;
+  EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::device);
+}
+
+TEST_F(CameraThreadTest, AShutterThatCannotBeResetIsRefusedAtOnce) {
+  CameraThread fixed(std::make_unique<DeskCamera>(desk, ShutterReset::none), kQuick);
+  ASSERT_TRUE(fixed.start().ok());
+  EXPECT_THAT(fixed.reset_shutter({}).error().message(), HasSubstr("can't be reset"));
+}
+
+TEST_F(CameraThreadTest, FramesPassedOverAreSaidAndCounted) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->make_frames(3);
+  std::uint64_t passed = 0;
+  until([&] { return (passed += camera->pass_over(SteadyClock().now())) == 3; });
+  desk->make_frames(1);
+  EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, 3);
+  EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 1, .passed_over = 3}));
+}
+
+TEST_F(CameraThreadTest, StopDropsWhatWaits) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->make_frames(2);
+  until([&] { return !desk->take(); });
+  camera->stop();
+  EXPECT_EQ(desk->stops, 1);
+  EXPECT_EQ(camera->next_frame(milliseconds(5)).error().kind, ErrorKind::device);
+  ASSERT_TRUE(camera->start().ok());
+  desk->make_frames(1);
+  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+}
+
+TEST_F(CameraThreadTest, TrimsReachTheCamera) {
+  ASSERT_TRUE(camera->trim_rate(PartsPerMillion(12)).ok());
+  EXPECT_EQ(desk->trimmed, 12);
+}
+
+TEST_F(CameraThreadTest, ACameraThatIsNotThereRefusesToStart) {
+  desk->plugged = false;
+  EXPECT_EQ(camera->start().error().kind, ErrorKind::device);
+  EXPECT_EQ(camera->state(), State::idle);
+}
+
+}  // namespace
+}  // namespace emberlock

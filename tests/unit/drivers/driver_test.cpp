@@ -1,0 +1,93 @@
+#include "drivers/driver.h"
+
+#include <csignal>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "base/unique_fd.h"
+
+namespace emberlock {
+namespace {
+
+using ::testing::HasSubstr;
+
+CameraMode mode(ImageSize size, PixelFormat format, double rate, int depth = 8) {
+  return {{size, format, depth}, std::string(name(format)), Hertz(rate)};
+}
+
+const std::vector<CameraMode> kModes{
+    mode({640, 480}, PixelFormat::gray8, 60),       mode({1280, 720}, PixelFormat::gray8, 30),
+    mode({1280, 720}, PixelFormat::rgb8, 30),       mode({1280, 720}, PixelFormat::bayer_rggb8, 30),
+    mode({1280, 720}, PixelFormat::gray16, 15, 12), mode({1280, 720}, PixelFormat::bayer_rggb8, 25),
+};
+
+TEST(ChooseMode, WhatKeepsMostWhereNothingIsAskedFor) {
+  EXPECT_EQ(choose_mode(kModes, {}, "cam").value(), kModes[3]);
+}
+
+TEST(ChooseMode, WhatIsAskedForIsKept) {
+  CameraRequest request;
+  request.frame_rate = Hertz(50);
+  EXPECT_EQ(choose_mode(kModes, request, "cam").value(), kModes[0]);
+  request = {.format = PixelFormat::gray16};
+  EXPECT_EQ(choose_mode(kModes, request, "cam").value(), kModes[4]);
+  request = {.size = ImageSize{640, 480}};
+  EXPECT_EQ(choose_mode(kModes, request, "cam").value(), kModes[0]);
+}
+
+TEST(ChooseMode, ARateSaidWithFewDigitsIsMet) {
+  const std::vector<CameraMode> film{mode({640, 480}, PixelFormat::gray8, 23.976)};
+  CameraRequest request;
+  request.frame_rate = Hertz(23.98);
+  EXPECT_TRUE(choose_mode(film, request, "cam").ok());
+  request.frame_rate = Hertz(25);
+  EXPECT_FALSE(choose_mode(film, request, "cam").ok());
+}
+
+TEST(ChooseMode, ARefusalSaysWhatTheCameraCanDo) {
+  CameraRequest request;
+  request.size = ImageSize{1920, 1080};
+  const auto refused = choose_mode(kModes, request, "camera c7");
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(refused.error().message(), HasSubstr("camera c7: it has no pictures of 1920 x 1080"));
+  EXPECT_THAT(refused.error().message(), HasSubstr("640 x 480 gray8 at 60 frames/s"));
+  EXPECT_FALSE(choose_mode({}, {}, "cam").ok());
+}
+
+TEST(HolderOf, AnotherProcessIsNamedOurselvesAreNot) {
+  const std::filesystem::path file =
+      std::filesystem::temp_directory_path() / ("emberlock_held_" + std::to_string(::getpid()));
+  int ready[2];
+  ASSERT_EQ(::pipe(ready), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (::open(file.c_str(), O_RDWR | O_CREAT, 0600) < 0 || ::write(ready[1], "x", 1) != 1) ::_exit(1);
+    ::pause();
+    ::_exit(0);
+  }
+  char byte = 0;
+  ASSERT_EQ(::read(ready[0], &byte, 1), 1);
+  const auto held = holder_of(file);
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  ASSERT_TRUE(held);
+  EXPECT_EQ(held->pid, child);
+  EXPECT_FALSE(held->program.empty());
+
+  const UniqueFd ours(::open(file.c_str(), O_RDONLY));
+  EXPECT_FALSE(holder_of(file));
+  EXPECT_THAT(held_error(file, "camera c7").message(), HasSubstr("another process"));
+  std::filesystem::remove(file);
+  EXPECT_FALSE(holder_of(file));
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/quantity.h"
+#include "base/result.h"
+
+struct udev;
+struct udev_monitor;
+
+namespace emberlock {
+
+enum class Hotplug { came, went };
+
+struct HotplugEvent {
+  Hotplug what = Hotplug::came;
+  std::string subsystem;  ///< "video4linux", "usb", "tty"
+  std::string node;       ///< "/dev/video3"
+};
+
+/// Hears of devices that are plugged in and out, from udev where it runs (nodes then have their links and
+/// groups already), else from the kernel. Network cameras don't show here. One owner thread.
+class HotplugMonitor {
+ public:
+  /// Error io: the system gives no such events.
+  static Result<HotplugMonitor> open(const std::vector<std::string>& subsystems);
+  /// The next event, waiting at most `deadline`; what isn't plugging in or out is left out.
+  std::optional<HotplugEvent> next(Seconds deadline);
+
+ private:
+  struct Release {
+    void operator()(udev* context) const;
+    void operator()(udev_monitor* monitor) const;
+  };
+  HotplugMonitor(std::unique_ptr<udev, Release> context, std::unique_ptr<udev_monitor, Release> monitor);
+  std::unique_ptr<udev, Release> context_;
+  std::unique_ptr<udev_monitor, Release> monitor_;
+};
+
+}  // namespace emberlock

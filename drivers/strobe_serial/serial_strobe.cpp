@@ -1,0 +1,105 @@
+#include "drivers/strobe_serial/serial_strobe.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "base/log.h"
+
+namespace emberlock {
+namespace {
+
+constexpr Seconds kCall(4);        // a code of 4096 flashes and its read back at 115200 baud take 1 s
+constexpr Seconds kGreeting(0.8);  // by when a device that was there before answers
+
+}  // namespace
+
+SerialStrobe::SerialStrobe(std::string id, std::unique_ptr<const Dialect> dialect, Opener open,
+                           std::shared_ptr<Clock> clock)
+    : id_(std::move(id)), dialect_(std::move(dialect)), open_(std::move(open)), clock_(std::move(clock)) {}
+
+Error SerialStrobe::named(Error error) const {
+  error.where = "strobe " + id_;
+  return error;
+}
+
+Status SerialStrobe::ready(TimePoint until) {
+  if (!line_) {
+    EMBERLOCK_ASSIGN_OR_RETURN(auto wire, open_());
+    line_.emplace(std::move(wire), *dialect_, *clock_);
+  }
+  if (line_->in_step()) return {};
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string model,
+                             line_->greet(std::min(until, clock_->now() + kGreeting)));
+  log(LogCategory::drivers).debug("{}: {} answers", id_, model);
+  return {};
+}
+
+template <class Call>
+auto SerialStrobe::with_device(const Call& call) -> decltype(call(TimePoint())) {
+  const TimePoint until = clock_->now() + kCall;
+  const auto attempt = [&]() -> decltype(call(until)) {
+    EMBERLOCK_RETURN_IF_ERROR(ready(until));
+    return call(until);
+  };
+  auto result = attempt();
+  const bool again = !result.ok() && result.error().kind != ErrorKind::bad_input && line_ && !line_->lost();
+  if (again) result = attempt();
+  if (line_ && line_->lost()) line_.reset();
+  if (!result.ok()) return named(result.error());
+  return result;
+}
+
+Result<std::string> SerialStrobe::greet(Seconds patience) {
+  if (!line_) {
+    auto wire = open_();
+    if (!wire) return named(wire.error());
+    line_.emplace(std::move(*wire), *dialect_, *clock_);
+  }
+  auto model = line_->greet(clock_->now() + patience);
+  if (line_->lost()) line_.reset();
+  if (!model) return named(model.error());
+  return model;
+}
+
+Result<StrobeSettings> SerialStrobe::settings(TimePoint until) {
+  std::vector<std::string> answers;
+  while (const auto question = dialect_->question(answers)) {
+    EMBERLOCK_ASSIGN_OR_RETURN(std::string answer, line_->ask(*question, until));
+    answers.push_back(std::move(answer));
+  }
+  return dialect_->settings(answers);
+}
+
+Result<StrobeSettings> SerialStrobe::read_back() {
+  return with_device([&](TimePoint until) { return settings(until); });
+}
+
+Status SerialStrobe::apply(const StrobeSettings& to) {
+  // What can't be is refused without a word to the device.
+  if (const auto possible = dialect_->apply(to, std::nullopt); !possible) return named(possible.error());
+  return with_device([&](TimePoint until) -> Status {
+    std::optional<StrobeSettings> now;
+    if (auto told = settings(until)) {
+      now = std::move(*told);
+    } else if (!line_->in_step()) {
+      return told.error();
+    }
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<Command> commands, dialect_->apply(to, now));
+    for (const Command& command : commands) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::string answer, line_->ask(command, until));
+      if (command.answer == Answer::status) {
+        EMBERLOCK_RETURN_IF_ERROR(dialect_->accepted(command, answer));
+      }
+    }
+    // Its answer shows that all of it has taken effect.
+    EMBERLOCK_ASSIGN_OR_RETURN(const StrobeSettings after, settings(until));
+    if (after.output == to.output && after.code == to.code) return {};
+    return Error{ErrorKind::device,
+                 after.code == to.code ? "it took the settings, but its light isn't as asked for"
+                                       : "it took the settings, but plays another code",
+                 {},
+                 "look at its front panel, interlock and keys"};
+  });
+}
+
+}  // namespace emberlock

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/clock.h"
+#include "drivers/strobe.h"
+#include "drivers/strobe_serial/dialect.h"
+#include "drivers/strobe_serial/line.h"
+
+namespace emberlock {
+
+/// A strobe that listens to a dialect on a wire. A wire that dies is closed, and the next call opens it anew;
+/// what the device lost with its power it says itself (read_back), nothing is set again unasked. A call that
+/// fails over silence or noise is made once more, as every command may be said twice. A silent device is
+/// reported within 2 s, and every call ends within 4 s.
+class SerialStrobe final : public Strobe {
+ public:
+  /// Finds the device again wherever it is plugged in. Error device: it isn't there, or somebody else has it.
+  using Opener = std::function<Result<std::unique_ptr<Wire>>()>;
+
+  SerialStrobe(std::string id, std::unique_ptr<const Dialect> dialect, Opener open,
+               std::shared_ptr<Clock> clock);
+
+  [[nodiscard]] const std::string& id() const override { return id_; }
+  Status apply(const StrobeSettings& settings) override;
+  Result<StrobeSettings> read_back() override;
+
+  /// Opens the wire where it isn't, and says hello for as long as `patience`: a microcontroller that the
+  /// port's opening has reset needs a while. Returns the device's model.
+  Result<std::string> greet(Seconds patience);
+
+ private:
+  template <class Call>
+  auto with_device(const Call& call) -> decltype(call(TimePoint()));
+  Status ready(TimePoint until);
+  Result<StrobeSettings> settings(TimePoint until);
+  Error named(Error error) const;
+
+  std::string id_;
+  std::unique_ptr<const Dialect> dialect_;
+  Opener open_;
+  std::shared_ptr<Clock> clock_;
+  std::optional<Line> line_;
+};
+
+}  // namespace emberlock

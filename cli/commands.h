@@ -8,6 +8,7 @@
 namespace emberlock::cli {
 
 // Each function adds one verb; its callback does the work and ends in fail() or normally.
+void add_devices(CLI::App& app);
 void add_smear(CLI::App& app);
 void add_align(CLI::App& app);
 void add_reconstruct(CLI::App& app);

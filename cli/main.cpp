@@ -6,6 +6,7 @@ int main(int argc, char** argv) {
       "emberlock"};
   app.require_subcommand(1);
   app.set_version_flag("--version", "emberlock " EMBERLOCK_VERSION);
+  emberlock::cli::add_devices(app);
   emberlock::cli::add_smear(app);
   emberlock::cli::add_align(app);
   emberlock::cli::add_reconstruct(app);

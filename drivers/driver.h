@@ -36,6 +36,8 @@ struct CameraFound {
   ShutterReset reset = ShutterReset::none;
   std::optional<FrameRateTrim> trim = {};
   ExternalTrigger trigger = ExternalTrigger::absent;
+  std::optional<double> link_megabits =
+      {};                             ///< what its bus or network carries a second, where that can be asked
   std::optional<Holder> holder = {};  ///< the process that has it, if one has
   std::vector<std::string> notes =
       {};  ///< what an operator should know: "packets of 576 bytes, the network takes 1500"

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drivers/driver.h"
+
+// Everything that is there, by all drivers.
+namespace emberlock::cli {
+
+struct ListedCamera {
+  std::string_view driver;
+  CameraFound found;
+};
+
+/// What was found, by driver and id.
+struct DeviceList {
+  std::vector<ListedCamera> cameras;
+  std::vector<Error> failures;  ///< of drivers that couldn't look
+};
+
+/// Every driver of real cameras.
+std::span<const CameraDriver> camera_drivers();
+
+/// Asks all drivers at once.
+DeviceList list_devices(std::span<const CameraDriver> drivers);
+
+/// The camera of this id, with its driver. Error bad_input names what there is instead.
+Result<ListedCamera> find_camera(const DeviceList& list, const std::string& id);
+
+/// What came and what went from one list to the next, by id.
+struct DeviceChanges {
+  std::vector<ListedCamera> came;
+  std::vector<ListedCamera> went;
+};
+DeviceChanges changes(const DeviceList& before, const DeviceList& after);
+
+/// Lines for people, a block a camera; `Detail::all_modes` with every mode.
+enum class Detail { best_mode, all_modes };
+std::string device_table(const DeviceList& list, Detail detail);
+/// One JSON object: {"cameras": [...], "failures": [...]}.
+std::string device_json(const DeviceList& list);
+
+}  // namespace emberlock::cli

@@ -1,0 +1,228 @@
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/clock.h"
+#include "cli/commands.h"
+#include "cli/device_list.h"
+#include "cli/interrupt.h"
+#include "drivers/camera_thread.h"
+#include "drivers/hotplug.h"
+#include "drivers/probe.h"
+#include "drivers/virtual/virtual_rig.h"
+
+namespace emberlock::cli {
+namespace {
+
+struct ListArguments {
+  bool all_modes = false;
+  bool json = false;
+};
+
+struct ProbeArguments {
+  std::string id;
+  std::string rig;
+  double seconds = 5;
+  int resets = 0;
+  std::string size;
+  double rate = 0;
+  bool json = false;
+};
+
+void print_failures(const DeviceList& list) {
+  for (const Error& failure : list.failures)
+    std::fprintf(stderr, "emberlock: %s\n", failure.message().c_str());
+}
+
+void list(const ListArguments& arguments) {
+  const DeviceList found = list_devices(camera_drivers());
+  if (arguments.json) {
+    std::printf("%s\n", device_json(found).c_str());
+    return;
+  }
+  print_failures(found);
+  std::printf("%s", device_table(found, arguments.all_modes ? Detail::all_modes : Detail::best_mode).c_str());
+  if (found.cameras.empty()) {
+    std::printf(
+        "No camera was found. Is it switched on and plugged in? Are the rules of udev/ installed, and are "
+        "you in the "
+        "group emberlock?\n");
+  }
+}
+
+/// Cameras that come and go, as they do, until Ctrl-C.
+void watch() {
+  constexpr Seconds kLook{2};  // network cameras say nothing when they come
+  const Interrupt interrupt;
+  auto hotplug = HotplugMonitor::open({"video4linux", "usb", "tty"});
+  if (!hotplug) std::fprintf(stderr, "emberlock: %s\n", hotplug.error().message().c_str());
+  DeviceList before = list_devices(camera_drivers());
+  std::printf("%s", device_table(before, Detail::best_mode).c_str());
+  std::fflush(stdout);
+  SteadyClock clock;
+  while (!Interrupt::asked()) {
+    if (hotplug) {
+      hotplug->next(kLook);
+    } else {
+      clock.sleep_until(clock.now() + kLook);
+    }
+    DeviceList after = list_devices(camera_drivers());
+    const DeviceChanges changed = changes(before, after);
+    for (const ListedCamera& camera : changed.went) std::printf("gone: %s\n", camera.found.id.c_str());
+    if (!changed.came.empty())
+      std::printf("came:\n%s", device_table({changed.came, {}}, Detail::best_mode).c_str());
+    std::fflush(stdout);
+    before = std::move(after);
+  }
+}
+
+Result<CameraRequest> request_from(const ProbeArguments& arguments) {
+  CameraRequest request;
+  if (arguments.rate > 0) request.frame_rate = Hertz(arguments.rate);
+  if (arguments.size.empty()) return request;
+  ImageSize size;
+  int used = 0;
+  if (std::sscanf(arguments.size.c_str(), "%dx%d%n", &size.width, &size.height, &used) != 2 ||
+      used != static_cast<int>(arguments.size.size())) {
+    return Error{ErrorKind::bad_input, "not a size: \"" + arguments.size + "\"", "--size", "say 1280x720"};
+  }
+  request.size = size;
+  return request;
+}
+
+struct Probed {
+  std::string where;
+  ProbeFilm film;
+  ProbeVerdict verdict;
+};
+
+Result<Probed> probe_virtual(const ProbeArguments& arguments, const ProbeOptions& options) {
+  const auto clock = std::make_shared<SteadyClock>();
+  EMBERLOCK_ASSIGN_OR_RETURN(const VirtualRigOptions drawn, parse_virtual_rig(arguments.rig));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto rig, VirtualRig::create(drawn, clock));
+  for (int i = 0; i < rig->size(); ++i) {
+    if (rig->camera(i).info().id != arguments.id) continue;
+    EMBERLOCK_ASSIGN_OR_RETURN(ProbeFilm film,
+                               film_probe(rig->camera(i), options, *clock, progress_bar("probe")));
+    ProbeVerdict verdict = judge(film, {});
+    return Probed{arguments.rig, std::move(film), std::move(verdict)};
+  }
+  return Error{ErrorKind::bad_input, "there is no such camera in " + arguments.rig, arguments.id,
+               "there is virtual-00 and so on"};
+}
+
+Result<Probed> probe_real(const ProbeArguments& arguments, const ProbeOptions& options) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const CameraRequest request, request_from(arguments));
+  const DeviceList there = list_devices(camera_drivers());
+  print_failures(there);
+  EMBERLOCK_ASSIGN_OR_RETURN(const ListedCamera listed, find_camera(there, arguments.id));
+  const auto drivers = camera_drivers();
+  const auto driver = std::find_if(drivers.begin(), drivers.end(),
+                                   [&](const CameraDriver& d) { return d.name == listed.driver; });
+  EMBERLOCK_ASSIGN_OR_RETURN(auto opened, driver->open(arguments.id, request));
+  CameraThread camera(std::move(opened));
+  SteadyClock clock;
+  EMBERLOCK_ASSIGN_OR_RETURN(ProbeFilm film, film_probe(camera, options, clock, progress_bar("probe")));
+  ProbeVerdict verdict = judge(film, listed.found.link_megabits);
+  return Probed{listed.found.address, std::move(film), std::move(verdict)};
+}
+
+nlohmann::ordered_json probe_json(const Probed& probed) {
+  nlohmann::ordered_json findings = nlohmann::ordered_json::array();
+  for (const ProbeFinding& f : probed.verdict.findings) {
+    findings.push_back(
+        {{"what", f.what}, {"fitness", name(f.fitness)}, {"measured", f.measured}, {"remedy", f.remedy}});
+  }
+  const FrameCounts& c = probed.film.counts;
+  nlohmann::ordered_json json{{"id", probed.film.info.id},
+                              {"fitness", name(probed.verdict.fitness)},
+                              {"frame_rate_hz", probed.verdict.rate.value()},
+                              {"arrival_jitter_s", probed.verdict.arrival_jitter.value()},
+                              {"arrival_worst_s", probed.verdict.arrival_worst.value()},
+                              {"counts",
+                               {{"delivered", c.delivered},
+                                {"damaged", c.damaged},
+                                {"camera_gap", c.camera_gap},
+                                {"transport", c.transport},
+                                {"resend", c.resend},
+                                {"underrun", c.underrun},
+                                {"queue", c.queue}}},
+                              {"reset_mean_s", nullptr},
+                              {"reset_jitter_s", nullptr},
+                              {"findings", std::move(findings)}};
+  if (probed.verdict.reset) {
+    json["reset_mean_s"] = probed.verdict.reset->mean.value();
+    json["reset_jitter_s"] = probed.verdict.reset->sigma.value();
+  }
+  return json;
+}
+
+void print_probe(const Probed& probed) {
+  const CameraInfo& info = probed.film.info;
+  std::printf("%s (%s, %s), %d x %d %s\n", info.id.c_str(), info.model.c_str(), probed.where.c_str(),
+              info.layout.size.width, info.layout.size.height, std::string(name(info.layout.format)).c_str());
+  for (const ProbeFinding& f : probed.verdict.findings) {
+    std::printf("  %-10s %-6s %s\n", f.what.c_str(), std::string(name(f.fitness)).c_str(),
+                f.measured.c_str());
+    if (!f.remedy.empty()) std::printf("  %-10s %-6s -> %s\n", "", "", f.remedy.c_str());
+  }
+  std::printf("%s\n", probed.verdict.fitness == Fitness::good   ? "fit"
+                      : probed.verdict.fitness == Fitness::poor ? "usable; see what is poor"
+                                                                : "not fit as it is");
+}
+
+void probe(const ProbeArguments& arguments) {
+  const ProbeOptions options{Seconds(arguments.seconds), arguments.resets};
+  const Probed probed =
+      or_fail(arguments.rig.empty() ? probe_real(arguments, options) : probe_virtual(arguments, options));
+  if (arguments.json) {
+    std::printf(
+        "%s\n",
+        probe_json(probed).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
+  } else {
+    print_probe(probed);
+  }
+  if (probed.verdict.fitness == Fitness::unfit) throw CLI::RuntimeError(1);
+}
+
+void add_probe(CLI::App& devices) {
+  auto a = std::make_shared<ProbeArguments>();
+  CLI::App* verb = devices.add_subcommand(
+      "probe",
+      "Films for some seconds with one camera and judges: rate, losses by cause, arrival, bandwidth.");
+  verb->add_option("ID", a->id, "The camera, as `emberlock devices` names it")->required();
+  verb->add_option("--seconds", a->seconds, "How long to film")
+      ->check(CLI::Range(0.5, 3600.0))
+      ->capture_default_str();
+  verb->add_option("--resets", a->resets, "Then time as many resets of its shutter")
+      ->check(CLI::Range(0, 1000));
+  verb->add_option("--size", a->size, "WIDTHxHEIGHT; the largest if not said");
+  verb->add_option("--rate", a->rate, "Frames a second; the fastest if not said")->check(CLI::PositiveNumber);
+  verb->add_option("--rig", a->rig, "A virtual rig instead of what is plugged in: virtual:11");
+  verb->add_flag("--json", a->json, "One JSON object");
+  verb->callback([a] { probe(*a); });
+}
+
+}  // namespace
+
+void add_devices(CLI::App& app) {
+  auto a = std::make_shared<ListArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "devices", "Lists the cameras that are there, what they can do, and which process holds them.");
+  verb->require_subcommand(0, 1);
+  verb->add_flag("--modes", a->all_modes, "With every way in which each camera can film");
+  verb->add_flag("--json", a->json, "One JSON object");
+  verb->callback([a, verb] {
+    if (verb->get_subcommands().empty()) list(*a);
+  });
+  add_probe(*verb);
+  verb->add_subcommand("watch", "Lists cameras as they come and go, until Ctrl-C.")->callback(watch);
+}
+
+}  // namespace emberlock::cli

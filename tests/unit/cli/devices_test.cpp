@@ -1,0 +1,122 @@
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "cli/device_list.h"
+#include "tests/support/verb.h"
+
+namespace emberlock::cli {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+CameraFound camera(const std::string& id) {
+  CameraFound found;
+  found.id = id;
+  found.model = "Model";
+  found.address = "/dev/video3";
+  found.modes = {{{.size = {640, 480}}, "GREY", Hertz(30)},
+                 {{.size = {1280, 720}, .format = PixelFormat::rgb8}, "YUYV", Hertz(10)}};
+  found.reset = ShutterReset::on_command;
+  return found;
+}
+
+const std::vector<CameraDriver> kDrivers{
+    {"second",
+     [] {
+       return Result<std::vector<CameraFound>>(std::vector{camera("b2"), camera("b1")});
+     },
+     nullptr},
+    {"broken",
+     [] {
+       return Result<std::vector<CameraFound>>(Error{ErrorKind::io, "no bus", "usb", "plug it in"});
+     },
+     nullptr},
+    {"first", [] { return Result<std::vector<CameraFound>>(std::vector{camera("a1")}); }, nullptr},
+};
+
+TEST(Devices, AllDriversAreAskedAndOneThatFailsHidesNoOther) {
+  const DeviceList list = list_devices(kDrivers);
+  ASSERT_EQ(list.cameras.size(), 3);
+  EXPECT_EQ(list.cameras[0].found.id, "a1");
+  EXPECT_EQ(list.cameras[1].found.id, "b1");
+  EXPECT_EQ(list.cameras[2].found.id, "b2");
+  ASSERT_EQ(list.failures.size(), 1);
+  EXPECT_THAT(list.failures[0].message(), HasSubstr("no bus"));
+}
+
+TEST(Devices, AnUnknownIdIsToldWhatThereIs) {
+  const DeviceList list = list_devices(kDrivers);
+  EXPECT_EQ(find_camera(list, "b1")->driver, "second");
+  EXPECT_THAT(find_camera(list, "b7").error().message(), HasSubstr("a1, b1, b2"));
+  EXPECT_EQ(find_camera({}, "b7").error().kind, ErrorKind::bad_input);
+}
+
+TEST(Devices, WhatCameAndWhatWentIsToldById) {
+  const DeviceList before = list_devices(kDrivers);
+  DeviceList after = before;
+  after.cameras.erase(after.cameras.begin());
+  after.cameras.push_back({"first", camera("a9")});
+  const DeviceChanges changed = changes(before, after);
+  ASSERT_EQ(changed.came.size(), 1);
+  EXPECT_EQ(changed.came[0].found.id, "a9");
+  ASSERT_EQ(changed.went.size(), 1);
+  EXPECT_EQ(changed.went[0].found.id, "a1");
+}
+
+TEST(Devices, TheTableSaysWhatACameraCanDoAndWhoHoldsIt) {
+  DeviceList list = list_devices(kDrivers);
+  list.cameras[0].found.holder = Holder{4711, "gvfsd-gphoto2"};
+  list.cameras[0].found.trim = FrameRateTrim{PartsPerMillion(200), PartsPerMillion(5), Seconds(.1)};
+  list.cameras[1].found.modes.clear();
+  list.cameras[2].found.trigger = ExternalTrigger::present;
+  const std::string table = device_table(list, Detail::best_mode);
+  EXPECT_THAT(table, HasSubstr("gvfsd-gphoto2 (process 4711)"));
+  EXPECT_THAT(table, HasSubstr("1280 x 720 rgb8 (YUYV) at 10/s, 1 more"));
+  EXPECT_THAT(table, Not(HasSubstr("640 x 480")));
+  EXPECT_THAT(table, HasSubstr("can't be asked now"));
+  EXPECT_THAT(table, HasSubstr("reset on command, trim +-200 ppm in steps of 5, no external trigger"));
+  EXPECT_THAT(table, HasSubstr("reset on command, external trigger"));
+  EXPECT_THAT(device_table(list, Detail::all_modes), HasSubstr("640 x 480 gray8 (GREY) at 30/s"));
+}
+
+TEST(Devices, TheJsonHoldsTheSame) {
+  DeviceList list = list_devices(kDrivers);
+  list.cameras[0].found.holder = Holder{4711, "gvfsd-gphoto2"};
+  list.cameras[0].found.link_megabits = 480;
+  const auto json = nlohmann::json::parse(device_json(list));
+  ASSERT_EQ(json["cameras"].size(), 3);
+  EXPECT_EQ(json["cameras"][0]["held_by"]["pid"], 4711);
+  EXPECT_EQ(json["cameras"][0]["link_megabits"], 480);
+  EXPECT_EQ(json["cameras"][1]["held_by"], nullptr);
+  EXPECT_EQ(json["cameras"][0]["modes"][1]["width"], 1280);
+  EXPECT_EQ(json["failures"].size(), 1);
+}
+
+TEST(Devices, ProbingAVirtualCameraTellsItsRateAndItsResets) {
+  const auto run = test::run_verb(add_devices, {"devices", "probe", "virtual-00", "--rig", "virtual:1",
+                                                "--seconds", "1", "--resets", "2", "--json"});
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  const auto json = nlohmann::json::parse(run.out);
+  EXPECT_EQ(json["id"], "virtual-00");
+  EXPECT_EQ(json["counts"]["camera_gap"], 0);
+  EXPECT_NEAR(json["frame_rate_hz"].get<double>(), 23.976, .01);
+  EXPECT_GT(json["reset_mean_s"].get<double>(), .1);
+}
+
+TEST(Devices, WhatCannotBeProbedIsSaid) {
+  using test::run_verb;
+  EXPECT_EQ(run_verb(add_devices, {"devices", "probe", "nobody", "--rig", "virtual:1"}).exit_code, 2);
+  EXPECT_EQ(run_verb(add_devices, {"devices", "probe", "virtual-00", "--rig", "virtual:none"}).exit_code, 2);
+  EXPECT_EQ(run_verb(add_devices, {"devices", "probe"}).exit_code, 2);
+  const auto size = run_verb(add_devices, {"devices", "probe", "nobody", "--size", "big"});
+  EXPECT_EQ(size.exit_code, 2);
+  EXPECT_THAT(size.err, HasSubstr("Say 1280x720"));
+}
+
+}  // namespace
+}  // namespace emberlock::cli

@@ -208,6 +208,10 @@ Status PtpReader::check(const std::string& what) const {
   return malformed(fmt::format("its {} of {} bytes ends too soon", what, bytes_.size()));
 }
 
+bool PtpDeviceInfo::has(std::uint16_t operation) const {
+  return std::find(operations.begin(), operations.end(), operation) != operations.end();
+}
+
 Result<PtpDeviceInfo> parse_ptp_device_info(std::span<const std::byte> bytes) {
   PtpReader in(bytes);
   PtpDeviceInfo info;

@@ -82,6 +82,8 @@ struct PtpDeviceInfo {
   std::string model;
   std::string version;
   std::string serial;  ///< may be empty
+
+  [[nodiscard]] bool has(std::uint16_t operation) const;
 };
 Result<PtpDeviceInfo> parse_ptp_device_info(std::span<const std::byte> bytes);
 

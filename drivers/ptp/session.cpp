@@ -16,7 +16,6 @@ enum Operation : std::uint16_t {
   kGetObjectHandles = 0x1007,
   kGetObjectInfo = 0x1008,
   kGetObject = 0x1009,
-  kGetPartialObject = 0x101b,
 };
 enum Response : std::uint16_t { kOk = 0x2001, kDeviceBusy = 0x2019, kSessionAlreadyOpen = 0x201e };
 
@@ -282,7 +281,7 @@ Result<std::uint64_t> PtpSession::partial_object(std::uint32_t handle, std::uint
     return sink(piece);
   };
   EMBERLOCK_RETURN_IF_ERROR(
-      transact({kGetPartialObject, {handle, offset, bytes}, {}, counted, bytes}, deadline));
+      transact({kPtpGetPartialObject, {handle, offset, bytes}, {}, counted, bytes}, deadline));
   return came;
 }
 

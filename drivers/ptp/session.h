@@ -20,6 +20,8 @@ namespace emberlock {
 /// How long a device may take for an answer without much data.
 inline constexpr Seconds kPtpDeadline{1};
 
+inline constexpr std::uint16_t kPtpGetPartialObject = 0x101b;
+
 /// Takes the data of an answer piece by piece; its error ends the transaction.
 using PtpSink = std::function<Status(std::span<const std::byte>)>;
 

@@ -275,8 +275,10 @@ bool UsbTransport::cancel(std::uint32_t transaction) {
 int UsbTransport::clear_halt(std::uint8_t endpoint) {
   // Clearing what isn't halted makes some devices lose count of their packets.
   std::array<std::uint8_t, 2> status{1, 0};
-  libusb_control_transfer(handle_.get(), kFromEndpoint, LIBUSB_REQUEST_GET_STATUS, 0, endpoint, status.data(),
-                          static_cast<std::uint16_t>(status.size()), as_milliseconds(kControlDeadline));
+  const int error = libusb_control_transfer(
+      handle_.get(), kFromEndpoint, LIBUSB_REQUEST_GET_STATUS, 0, endpoint, status.data(),
+      static_cast<std::uint16_t>(status.size()), as_milliseconds(kControlDeadline));
+  if (error == LIBUSB_ERROR_TIMEOUT || error == LIBUSB_ERROR_NO_DEVICE) return error;
   return (status[0] & 1) != 0 ? libusb_clear_halt(handle_.get(), endpoint) : 0;
 }
 
@@ -298,10 +300,7 @@ Status UsbTransport::recover(std::uint32_t transaction) {
   if (!cancel(transaction)) {
     const int error = ask(kDeviceReset, kToInterface, {});
     if (error == LIBUSB_ERROR_NO_DEVICE) return failed(error);
-    if (error == LIBUSB_ERROR_TIMEOUT) {  // it doesn't even answer to control: as if unplugged and plugged in
-      const int reset = libusb_reset_device(handle_.get());
-      if (reset != 0) return failed(reset == LIBUSB_ERROR_NOT_FOUND ? LIBUSB_ERROR_NO_DEVICE : reset);
-    }
+    if (error == LIBUSB_ERROR_TIMEOUT) return failed(error);  // it doesn't even answer to control
   }
   for (const std::uint8_t endpoint : {interface_.in, interface_.out}) {
     const int error = clear_halt(endpoint);

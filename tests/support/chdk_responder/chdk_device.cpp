@@ -221,9 +221,11 @@ void Device::power_on() {
 std::vector<std::byte> Device::content(std::uint32_t handle, std::uint32_t offset,
                                        std::uint32_t count) const {
   std::vector<std::byte> bytes(count);
+  std::uint64_t word = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
     const std::uint32_t at = offset + i;
-    bytes[i] = static_cast<std::byte>(random_bits(options_.seed, handle, at / 8) >> (at % 8 * 8));
+    if (i == 0 || at % 8 == 0) word = random_bits(options_.seed, handle, at / 8);
+    bytes[i] = static_cast<std::byte>(word >> (at % 8 * 8));
   }
   return bytes;
 }

@@ -3,51 +3,31 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
+#include <cstddef>
+#include <string>
+#include <variant>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "drivers/ptp/live_view.h"
-#include "drivers/virtual/virtual_clock.h"
-#include "tests/support/chdk_responder/fake_transport.h"
+#include "tests/support/chdk_responder/bench.h"
 
 namespace emberlock {
 namespace {
 
-using chdk_responder::Cable;
-using chdk_responder::Device;
-using chdk_responder::DeviceOptions;
-using chdk_responder::FakeTransport;
+using chdk_responder::OpenBench;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-struct Bench {
-  explicit Bench(DeviceOptions options = {})
-      : clock(std::make_shared<VirtualClock>()),
-        cable(std::make_shared<Cable>(Cable{clock, Device(std::move(options))})),
-        session(std::make_unique<FakeTransport>(cable), "camera E1", clock),
-        chdk(session) {
-    EXPECT_TRUE(session.open().ok());
-  }
-  Device& device() { return cable->device; }
-  void record() {
-    ASSERT_TRUE(chdk.change_mode(ChdkMode::record).ok());
-    clock->sleep_until(clock->now() + Seconds(1));
-  }
-  Result<PtpAnswer> live_view() {
-    const Status asked = chdk.ask_for_live_view();
-    return asked.ok() ? session.finish(Seconds(1)) : asked.error();
-  }
-
-  std::shared_ptr<VirtualClock> clock;
-  std::shared_ptr<Cable> cable;
-  PtpSession session;
-  Chdk chdk;
-};
+Result<PtpAnswer> live_view(OpenBench& bench) {
+  const Status asked = bench.chdk.ask_for_live_view();
+  return asked.ok() ? bench.session.finish(Seconds(1)) : asked.error();
+}
 
 TEST(Chdk, SaysItsVersion) {
-  Bench bench;
+  OpenBench bench;
   const auto version = bench.chdk.version();
   ASSERT_TRUE(version.ok()) << version.error().message();
   EXPECT_EQ(version->major, 2u);
@@ -55,20 +35,20 @@ TEST(Chdk, SaysItsVersion) {
 }
 
 TEST(Chdk, IsMissedWithAnErrorWhereTheFirmwareIsCanonsOwn) {
-  Bench bench({.chdk = false});
+  OpenBench bench({.chdk = false});
   const auto version = bench.chdk.version();
   ASSERT_FALSE(version.ok());
   EXPECT_THAT(version.error().message(), HasSubstr("refuses CHDK: operation not supported"));
 }
 
 TEST(Chdk, AScriptReturnsItsValuesByType) {
-  Bench bench;
+  OpenBench bench;
   EXPECT_THAT(bench.chdk.run("return get_mode()").value(),
               ElementsAre(ChdkValue(false), ChdkValue(false), ChdkValue(2)));
 }
 
 TEST(Chdk, WhatAScriptWritesComesAsMessagesInOrder) {
-  Bench bench;
+  OpenBench bench;
   const std::uint32_t script =
       bench.chdk.start_script("write_usb_msg(\"one\"); write_usb_msg(\"two\")").value();
   for (const char* text : {"one", "two"}) {
@@ -82,7 +62,7 @@ TEST(Chdk, WhatAScriptWritesComesAsMessagesInOrder) {
 }
 
 TEST(Chdk, AScriptHearsWhatIsWrittenToIt) {
-  Bench bench;
+  OpenBench bench;
   ASSERT_TRUE(bench.chdk.start_script("return read_usb_msg(1000)").ok());
   EXPECT_TRUE(bench.chdk.script_status()->running);
   ASSERT_TRUE(bench.chdk.write_message("go").ok());
@@ -94,7 +74,7 @@ TEST(Chdk, AScriptHearsWhatIsWrittenToIt) {
 }
 
 TEST(Chdk, AnEmptyMessageNeverReachesTheCamera) {
-  Bench bench;
+  OpenBench bench;
   ASSERT_TRUE(bench.chdk.start_script("return read_usb_msg(1000)").ok());
   const int before = bench.device().transactions();
   const Status refused = bench.chdk.write_message("");
@@ -105,20 +85,20 @@ TEST(Chdk, AnEmptyMessageNeverReachesTheCamera) {
 }
 
 TEST(Chdk, AScriptThatDoesNotCompileOrFailsSaysWhy) {
-  Bench bench;
+  OpenBench bench;
   EXPECT_THAT(bench.chdk.run("sleep((1)").error().message(), HasSubstr("unexpected symbol"));
   EXPECT_THAT(bench.chdk.run("error(\"no card\")").error().message(), HasSubstr("no card"));
   EXPECT_THAT(bench.chdk.run("brew()").error().message(), HasSubstr("attempt to call"));
 }
 
 TEST(Chdk, MessagesLeftByAnEarlierScriptAreNotTakenForThisOnes) {
-  Bench bench;
+  OpenBench bench;
   ASSERT_TRUE(bench.chdk.start_script("return get_mode()").ok());
   EXPECT_THAT(bench.chdk.run("return get_movie_status()").value(), ElementsAre(ChdkValue(0)));
 }
 
 TEST(Chdk, AScriptThatDoesNotEndIsLeftAtTheDeadline) {
-  Bench bench;
+  OpenBench bench;
   const TimePoint begin = bench.clock->now();
   const auto endless = bench.chdk.run("sleep(100000)", Seconds(0.5));
   ASSERT_FALSE(endless.ok());
@@ -127,10 +107,10 @@ TEST(Chdk, AScriptThatDoesNotEndIsLeftAtTheDeadline) {
 }
 
 TEST(Chdk, AMovieStartsRecordsAndIsSaved) {
-  Bench bench;
+  OpenBench bench;
   bench.record();
   const auto after = [&](Seconds pause) {
-    bench.clock->sleep_until(bench.clock->now() + pause);
+    bench.pass(pause);
     return bench.chdk.movie().value();
   };
   EXPECT_EQ(bench.chdk.movie().value(), ChdkMovie::stopped);
@@ -160,9 +140,9 @@ INSTANTIATE_TEST_SUITE_P(Cameras, ChdkLiveView, testing::Values(Camera{"Digic4",
                          [](const auto& shown) { return shown.param.name; });
 
 TEST_P(ChdkLiveView, ComesAsBrightnessAndAsColour) {
-  Bench bench({.live_view_type = GetParam().type, .live_view = {354, 40}});
+  OpenBench bench({.live_view_type = GetParam().type, .live_view = {354, 40}});
   bench.record();
-  const auto answer = bench.live_view();
+  const auto answer = live_view(bench);
   ASSERT_TRUE(answer.ok()) << answer.error().message();
   const auto view = parse_live_view(answer->data);
   ASSERT_TRUE(view.ok()) << view.error().message();
@@ -184,16 +164,16 @@ TEST_P(ChdkLiveView, ComesAsBrightnessAndAsColour) {
 }
 
 TEST(ChdkLiveView, IsAbsentInPlaybackMode) {
-  Bench bench;
-  const auto view = parse_live_view(bench.live_view()->data);
+  OpenBench bench;
+  const auto view = parse_live_view(live_view(bench)->data);
   ASSERT_TRUE(view.ok()) << view.error().message();
   EXPECT_FALSE(view->has_value());
 }
 
 TEST(ChdkLiveView, EveryTruncationIsRefused) {
-  Bench bench({.live_view = {8, 3}, .buffer_width = 8});
+  OpenBench bench({.live_view = {8, 3}, .buffer_width = 8});
   bench.record();
-  const auto whole = bench.live_view()->data;
+  const auto whole = live_view(bench)->data;
   ASSERT_TRUE(parse_live_view(whole).ok());
   for (std::size_t size = 0; size < whole.size(); ++size) {
     EXPECT_FALSE(parse_live_view(std::span(whole).first(size)).ok()) << size;
@@ -201,9 +181,9 @@ TEST(ChdkLiveView, EveryTruncationIsRefused) {
 }
 
 TEST(ChdkLiveView, DescriptionsThatCannotBeAreRefused) {
-  Bench bench({.live_view = {8, 3}, .buffer_width = 8});
+  OpenBench bench({.live_view = {8, 3}, .buffer_width = 8});
   bench.record();
-  const auto whole = bench.live_view()->data;
+  const auto whole = live_view(bench)->data;
   const auto with = [&](std::size_t word, std::uint32_t value) {
     auto changed = whole;
     for (std::size_t i = 0; i < 4; ++i) changed[4 * word + i] = static_cast<std::byte>(value >> (8 * i));

@@ -1,35 +1,22 @@
 // A session against a camera of tests/support/chdk_responder, in process and in virtual time.
-#include <memory>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "drivers/ptp/session.h"
-#include "drivers/virtual/virtual_clock.h"
-#include "tests/support/chdk_responder/fake_transport.h"
+#include "tests/support/chdk_responder/bench.h"
 
 namespace emberlock {
 namespace {
 
-using chdk_responder::Cable;
-using chdk_responder::Device;
-using chdk_responder::DeviceOptions;
+using chdk_responder::Bench;
 using chdk_responder::FakeTransport;
 using chdk_responder::Faults;
+using chdk_responder::OpenBench;
 using testing::HasSubstr;
-
-struct Bench {
-  explicit Bench(DeviceOptions options = {})
-      : clock(std::make_shared<VirtualClock>()),
-        cable(std::make_shared<Cable>(Cable{clock, Device(std::move(options))})),
-        session(std::make_unique<FakeTransport>(cable), "camera E1", clock) {}
-  Device& device() { return cable->device; }
-  Seconds elapsed() { return clock->now() - TimePoint{}; }
-
-  std::shared_ptr<VirtualClock> clock;
-  std::shared_ptr<Cable> cable;
-  PtpSession session;
-};
 
 std::vector<std::byte> object(Bench& bench, std::uint32_t handle, std::uint32_t bytes) {
   std::vector<std::byte> content;
@@ -45,8 +32,7 @@ std::vector<std::byte> object(Bench& bench, std::uint32_t handle, std::uint32_t 
 }
 
 TEST(PtpSession, ACameraSaysWhatItIs) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   const auto info = bench.session.device_info();
   ASSERT_TRUE(info.ok()) << info.error().message();
   EXPECT_EQ(info->vendor_extension, 0x0bu);
@@ -72,8 +58,7 @@ TEST(PtpSession, FilesOfEverySizeAroundAPacketComeAsTheyAre) {
 }
 
 TEST(PtpSession, AHeaderInATransferOfItsOwnIsAllowed) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   bench.device().faults.header_alone = -1;
   const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 3000});
   EXPECT_EQ(object(bench, handle, 3000), bench.device().content(handle, 0, 3000));
@@ -91,8 +76,7 @@ TEST(PtpSession, ASessionLeftOpenByAProgramThatDiedIsClosedFirst) {
 }
 
 TEST(PtpSession, APartOfAFileComesFromItsOffset) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 10'000});
   std::vector<std::byte> content;
   const auto came = bench.session.partial_object(
@@ -107,8 +91,7 @@ TEST(PtpSession, APartOfAFileComesFromItsOffset) {
 }
 
 TEST(PtpSession, ABusyCameraIsAskedAgain) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   bench.device().faults.busy = 5;
   EXPECT_TRUE(bench.session.storages().ok());
   bench.device().faults.busy = -1;
@@ -119,8 +102,7 @@ TEST(PtpSession, ABusyCameraIsAskedAgain) {
 }
 
 TEST(PtpSession, ARefusalIsToldInWordsAndTheSessionGoesOn) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   const auto info = bench.session.object_info(99);
   ASSERT_FALSE(info.ok());
   EXPECT_EQ(info.error().message(), "camera E1: it refuses GetObjectInfo: invalid object handle (0x2009)");
@@ -129,8 +111,7 @@ TEST(PtpSession, ARefusalIsToldInWordsAndTheSessionGoesOn) {
 }
 
 TEST(PtpSession, AHangingCameraIsGivenUpAtTheDeadlineAndRecoveredByTheNextQuestion) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   bench.device().faults.hang = 1;
   const Seconds before = bench.elapsed();
   const auto silent = bench.session.storages();
@@ -142,8 +123,7 @@ TEST(PtpSession, AHangingCameraIsGivenUpAtTheDeadlineAndRecoveredByTheNextQuesti
 }
 
 TEST(PtpSession, ACameraThatHangsForGoodIsLeftInBoundedTime) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   bench.device().faults.hang = -1;
   const Seconds before = bench.elapsed();
   bench.session.close();
@@ -151,8 +131,7 @@ TEST(PtpSession, ACameraThatHangsForGoodIsLeftInBoundedTime) {
 }
 
 TEST(PtpSession, ALateAnswerMayBeWaitedForInParts) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   bench.device().faults.latency = milliseconds(95);
   ASSERT_TRUE(bench.session.begin({0x1004}).ok());
   int waits = 0;
@@ -181,8 +160,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& shown) { return shown.param.name; });
 
 TEST_P(PtpSessionMalformed, IsAnErrorAndTheNextQuestionIsAnswered) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 5000});
   bench.device().faults.*GetParam().fault = 1;
   const auto info = bench.session.object_info(handle);
@@ -202,8 +180,7 @@ TEST_P(PtpSessionMalformed, ForEverEndsInAnErrorEachTime) {
 }
 
 TEST(PtpSession, AnUnpluggedCameraIsAnErrorAtOnce) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   bench.cable->plugged = false;
   const auto gone = bench.session.storages();
   ASSERT_FALSE(gone.ok());
@@ -212,8 +189,7 @@ TEST(PtpSession, AnUnpluggedCameraIsAnErrorAtOnce) {
 }
 
 TEST(PtpSession, DataBeyondWhatWasAskedForAreRefusedBeforeTheyAreRead) {
-  Bench bench;
-  ASSERT_TRUE(bench.session.open().ok());
+  OpenBench bench;
   const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 5000});
   EXPECT_FALSE(bench.session.transact({0x1009, {handle}, {}, {}, 4999}).ok());
   EXPECT_TRUE(bench.session.transact({0x1009, {handle}, {}, {}, 5000}).ok());

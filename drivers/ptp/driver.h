@@ -1,0 +1,10 @@
+#pragma once
+
+#include "drivers/driver.h"
+
+namespace emberlock {
+
+/// Cameras on the USB that speak PTP. All are found; those with CHDK can be opened, as ChdkCamera says.
+CameraDriver ptp_driver();
+
+}  // namespace emberlock

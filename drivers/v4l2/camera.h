@@ -1,0 +1,65 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "drivers/driver.h"
+#include "drivers/v4l2/device.h"
+#include "drivers/v4l2/frame_numbers.h"
+#include "drivers/v4l2/modes.h"
+
+namespace emberlock {
+
+/// A camera behind V4L2, its buffers mapped from opening on, so that no other process takes it.
+class V4l2Camera final : public Camera {
+ public:
+  static Result<std::unique_ptr<Camera>> open(const std::string& id, const CameraRequest& request);
+
+  [[nodiscard]] const CameraInfo& info() const override { return info_; }
+  [[nodiscard]] FrameCounts counts() const override { return counts_; }
+  Status start() override;
+  void stop() override;
+  Result<Frame> next_frame(Seconds deadline) override;
+  std::uint64_t pass_over(TimePoint until) override;
+  Status reset_shutter(TimePoint at) override;
+  Status trim_rate(PartsPerMillion trim) override;
+
+ private:
+  /// A device set up to film, and what came of it.
+  struct SetUp {
+    V4l2Device device;
+    std::string model;
+    V4l2Mode mode;
+    Hertz frame_rate;
+    std::size_t stride;
+    DeviceTimeOf time_of;
+  };
+  /// In the mode that suits the request best, or as it was before.
+  static Result<SetUp> set_up(const std::string& id, const CameraRequest& request,
+                              const std::optional<V4l2Mode>& before);
+  V4l2Camera(const std::string& id, const CameraRequest& request, SetUp set_up);
+
+  /// The device's time of a frame, and its number; counts what is missing before it.
+  FrameStamp stamp(const v4l2_buffer& buffer);
+  Result<Frame> hand_on(const V4l2Device::Filled& filled);
+  void drop(const V4l2Device::Filled& filled);
+  void give_back(std::uint32_t index);
+  Error lost(int error);
+  [[nodiscard]] Error not_filming() const;
+  [[nodiscard]] std::string where() const { return "camera " + info_.id; }
+
+  CameraInfo info_;
+  CameraRequest request_;
+  V4l2Mode mode_;
+  std::optional<SetUp> set_up_;  ///< none: it went away
+  FrameNumbers numbers_;
+  FrameCounts counts_;
+  bool films_ = false;
+  std::optional<V4l2Device::Filled> held_;  ///< taken from the kernel while passing over, and wanted
+  std::deque<TimePoint> given_back_;        ///< when the last buffers were, the latest last
+  bool starved_ = false;                    ///< the kernel had no buffer when the frame before came
+};
+
+}  // namespace emberlock

@@ -63,6 +63,7 @@ Result<std::size_t> set_format(const V4l2Device& device, const V4l2Mode& mode, c
 Result<V4l2Mode> choose(const std::vector<V4l2Mode>& offered, const CameraRequest& request,
                         const std::string& where) {
   std::vector<CameraMode> modes;
+  modes.reserve(offered.size());
   for (const V4l2Mode& mode : offered) modes.push_back(mode.mode);
   EMBERLOCK_ASSIGN_OR_RETURN(const CameraMode chosen, choose_mode(modes, request, where));
   return offered[static_cast<std::size_t>(std::find(modes.begin(), modes.end(), chosen) - modes.begin())];

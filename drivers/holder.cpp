@@ -24,12 +24,9 @@ bool has_open(const fs::path& process, const fs::path& file) {
   return false;
 }
 
-}  // namespace
-
-std::optional<Holder> holder_of(const fs::path& device) {
+/// Another process one of whose descriptors shows this target in /proc.
+std::optional<Holder> who_has(const fs::path& file) {
   std::error_code error;
-  const fs::path file = fs::canonical(device, error);
-  if (error) return {};
   for (fs::directory_iterator process("/proc", error), end; !error && process != end;
        process.increment(error)) {
     const auto pid = pid_of(process->path());
@@ -41,6 +38,16 @@ std::optional<Holder> holder_of(const fs::path& device) {
   }
   return {};
 }
+
+}  // namespace
+
+std::optional<Holder> holder_of(const fs::path& device) {
+  std::error_code error;
+  const fs::path file = fs::canonical(device, error);
+  return error ? std::nullopt : who_has(file);
+}
+
+std::optional<Holder> holder_of_socket(const std::string& inode) { return who_has("socket:[" + inode + "]"); }
 
 Error held_error(const fs::path& device, const std::string& where) {
   const auto holder = holder_of(device);

@@ -1,0 +1,266 @@
+#include "drivers/aravis/aravis_camera.h"
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/log.h"
+
+namespace emberlock::aravis {
+namespace {
+
+/// Of kCallDeadline, what a call of the library may take; the rest is ours.
+constexpr Seconds kLibraryDeadline = kCallDeadline - milliseconds(100);
+constexpr Seconds kSlice = milliseconds(100);  // between two looks for a camera that went away
+
+CameraInfo info_of(const std::string& id, const Link& link) {
+  CameraInfo info;
+  info.id = id;
+  info.model = link.seen().model;
+  info.layout = link.applied().offer.mode.layout;
+  info.frame_rate = link.applied().frame_rate;
+  info.reset = ShutterReset::on_command;
+  return info;
+}
+
+/// A free-running camera that sends nothing for so long is gone: told before the heartbeat is, which takes
+/// 5 .. 6.1 s. A slow one has only the heartbeat.
+Seconds longest_silence(const Applied& applied) {
+  constexpr Seconds kShortest{3};
+  const Seconds frames = period(applied.frame_rate) * 8;
+  return applied.free_running && frames <= kShortest ? kShortest
+                                                     : Seconds(std::numeric_limits<double>::infinity());
+}
+
+}  // namespace
+
+AravisCamera::AravisCamera(std::string id, CameraRequest request, std::shared_ptr<Link> link)
+    : id_(std::move(id)), request_(std::move(request)), info_(info_of(id_, *link)), link_(std::move(link)) {}
+
+AravisCamera::~AravisCamera() {
+  if (link_ != nullptr) let_go(kLibraryDeadline);
+}
+
+Error AravisCamera::failure(std::string what, std::string remedy) const {
+  return {ErrorKind::device, std::move(what), "camera " + id_, std::move(remedy)};
+}
+
+template <class T>
+std::optional<T> AravisCamera::bounded(Seconds deadline, std::function<T(Link&)> call) {
+  const auto returned = std::make_shared<std::atomic<bool>>(false);
+  auto answer = in_background<T>([call = std::move(call), returned, link = link_]() mutable {
+    T value = call(*link);
+    link.reset();
+    *returned = true;
+    return value;
+  });
+  if (done_within(answer, deadline)) return answer.get();
+  log(LogCategory::drivers).warn("camera {}: it hangs, and is left alone until its last call returns", id_);
+  filming_ = false;
+  held_.reset();
+  link_.reset();
+  hanging_ = returned;
+  hangs_since_ = clock_.now();
+  return {};
+}
+
+void AravisCamera::let_go(Seconds deadline) {
+  held_.reset();
+  const auto closed = in_background<bool>([link = std::exchange(link_, nullptr)]() mutable {
+    link.reset();
+    return true;
+  });
+  done_within(closed, deadline);
+}
+
+Error AravisCamera::lose(std::string what) {
+  filming_ = false;
+  ledger_.begin_anew();
+  let_go(Seconds(0));
+  Error error = failure(std::move(what), "check its cable and power; start() looks for it again");
+  log(LogCategory::drivers).warn("{}", error.message());
+  return error;
+}
+
+Status AravisCamera::start() {
+  if (filming_) return {};
+  if (hanging_ && !*hanging_) {
+    return failure(fmt::format("it hangs: it was asked {:.0f} s ago and hasn't answered",
+                               (clock_.now() - hangs_since_).value()),
+                   "it is left alone until that call returns; cut its power if it doesn't");
+  }
+  hanging_.reset();
+  if (link_ != nullptr && link_->control_lost()) let_go(Seconds(0));
+  if (!starting_) {
+    starting_ =
+        in_background<Linked>([id = id_, request = request_, link = std::exchange(link_, nullptr)]() mutable {
+          if (link == nullptr) {
+            const auto seen = locate(id);
+            if (!seen) return Linked(seen.error());
+            auto opened = Link::open(*seen, request);
+            if (!opened) return opened;
+            link = std::move(opened).value();
+          }
+          const Status started = link->start();
+          return started ? Linked(std::move(link)) : Linked(started.error());
+        });
+    hangs_since_ = clock_.now();
+  }
+  if (!done_within(*starting_, kLibraryDeadline)) {
+    return failure(fmt::format("it hasn't answered for {:.0f} s", (clock_.now() - hangs_since_).value()),
+                   "start() goes on waiting for it");
+  }
+  auto linked = std::exchange(starting_, std::nullopt)->get();
+  if (!linked) return linked.error();
+  link_ = std::move(linked).value();
+  if (link_->applied().offer.mode.layout != info_.layout) {
+    let_go(Seconds(0));
+    return failure("its pictures have another size or format than before", "open it anew");
+  }
+  filming_ = true;
+  ledger_.begin_anew();
+  wanted_from_ = {};
+  device_time_ = {};
+  last_sign_ = clock_.now();
+  signs_ = underruns_ = 0;
+  starved_ = false;
+  return {};
+}
+
+void AravisCamera::stop() {
+  if (!filming_) return;
+  filming_ = false;
+  const TimePoint until = clock_.now() + kLibraryDeadline;
+  const auto stopped =
+      bounded<bool>(kLibraryDeadline, [](Link& link) { return link.stop_acquisition().ok(); });
+  if (!stopped) return;
+  if (!*stopped) return let_go(Seconds(0));  // it went away; start() looks for it
+  // The last frame is given up 0.1 s after its last packet.
+  while (clock_.now() < until) {
+    auto arrived = next_arrived(milliseconds(150));
+    if (!arrived) break;
+    drop(*std::move(arrived), Fate::passed_over);
+  }
+  ledger_.begin_anew();
+  bounded<bool>(until - clock_.now(), [](Link& link) { return link.close_stream(), true; });
+}
+
+std::optional<Arrived> AravisCamera::next_arrived(Seconds deadline) {
+  if (held_) return std::exchange(held_, std::nullopt);
+  return link_->pop(deadline);
+}
+
+FrameLedger::Entry AravisCamera::record(const Arrived& arrived, Fate fate) {
+  // Frames that found no buffer are missing behind all that waited in buffers then: at the next gap.
+  const std::uint64_t underruns = link_->underruns();
+  if (std::exchange(underruns_, underruns) != underruns) starved_ = true;
+  if (!arrived.frame_id) {
+    ledger_.unnumbered(starved_ ? Fate::underrun : fate);
+    return {};
+  }
+  const std::uint64_t before = ledger_.counts().underrun;
+  const auto entry = ledger_.record(*arrived.frame_id, fate, starved_ ? Fate::underrun : Fate::camera_gap);
+  if (ledger_.counts().underrun != before) starved_ = false;
+  return entry;
+}
+
+void AravisCamera::drop(Arrived arrived, Fate fate) {
+  if (arrived.arrival == Arrival::transport) fate = Fate::transport;
+  if (arrived.arrival == Arrival::resend) fate = Fate::resend;
+  record(arrived, fate);
+  link_->recycle(std::move(arrived));
+}
+
+std::optional<Frame> AravisCamera::hand_on(Arrived arrived) {
+  if (arrived.arrival == Arrival::transport || arrived.arrival == Arrival::resend ||
+      arrived.arrival == Arrival::cleared || arrived.system_time < wanted_from_ || !arrived.frame_id) {
+    drop(std::move(arrived), Fate::passed_over);
+    return {};
+  }
+  // Which of the two it will be is known once it has its number; a new count begins with a new clock.
+  const bool backward = arrived.device_time <= device_time_;
+  const bool odd = arrived.arrival == Arrival::odd;
+  const auto entry = record(arrived, backward || odd ? Fate::damaged : Fate::delivered);
+  Frame frame;
+  frame.stamp.frame_id = entry.number;
+  frame.stamp.device_time = device_time_ = arrived.device_time;
+  frame.stamp.system_time = arrived.system_time;
+  frame.stamp.monotonic_time = clock_.now() - (wall_clock() - arrived.system_time);
+  frame.stamp.status = backward || odd ? FrameStatus::damaged : FrameStatus::complete;
+  auto image = link_->take(std::move(arrived));
+  if (!image) {
+    log(LogCategory::drivers).warn("camera {}: {}", id_, image.error().message());
+    return {};
+  }
+  frame.image = std::move(image).value();
+  return frame;
+}
+
+bool AravisCamera::silent() {
+  const std::uint64_t signs = link_->signs_of_life();
+  const TimePoint now = clock_.now();
+  if (std::exchange(signs_, signs) != signs) last_sign_ = now;
+  return now - last_sign_ > longest_silence(link_->applied());
+}
+
+Result<Frame> AravisCamera::next_frame(Seconds deadline) {
+  if (!filming_) return failure("it does not film", "start() it first");
+  const TimePoint until = clock_.now() + std::max(Seconds(0), deadline);
+  for (;;) {
+    const Seconds left = until - clock_.now();
+    if (auto arrived = next_arrived(std::clamp(left, Seconds(0), kSlice))) {
+      if (auto frame = hand_on(*std::move(arrived))) return *std::move(frame);
+      continue;
+    }
+    if (link_->control_lost()) return lose("it went away, or another program took control of it");
+    if (silent()) return lose("it went away: it sends nothing any more");
+    if (left <= Seconds(0)) {
+      return Error{ErrorKind::timed_out, "no frame came in time", "camera " + id_,
+                   "wait longer, or check its trigger"};
+    }
+  }
+}
+
+std::uint64_t AravisCamera::pass_over(TimePoint until) {
+  if (!filming_) return 0;
+  return pass_over_before(wall_clock() - (clock_.now() - until) + nanoseconds(1));
+}
+
+std::uint64_t AravisCamera::pass_over_before(TimePoint wall) {
+  const std::uint64_t before = ledger_.counts().passed_over;
+  while (auto arrived = next_arrived(Seconds(0))) {
+    if (arrived->system_time >= wall) {
+      held_ = std::move(arrived);
+      break;
+    }
+    drop(*std::move(arrived), Fate::passed_over);
+  }
+  return ledger_.counts().passed_over - before;
+}
+
+Status AravisCamera::reset_shutter(TimePoint at) {
+  if (!filming_) return failure("it does not film", "start() it first");
+  const Seconds wait = at - clock_.now();
+  if (wait > kLongestReset) {
+    return failure(fmt::format("a reset {:.1f} s ahead is too early to order", wait.value()),
+                   fmt::format("order it at most {:.0f} s before", kLongestReset.value()));
+  }
+  clock_.sleep_until(at);
+  const auto restarted = bounded<Result<TimePoint>>(kLibraryDeadline - kLongestReset,
+                                                    [](Link& link) { return link.restart_acquisition(); });
+  if (!restarted) return failure("it hangs, and didn't restart its cycle when told to", "cut its power");
+  if (!*restarted) return lose(restarted->error().what);
+  wanted_from_ = restarted->value();
+  pass_over_before(wanted_from_);
+  ledger_.begin_anew();
+  last_sign_ = clock_.now();
+  return {};
+}
+
+Status AravisCamera::trim_rate(PartsPerMillion /*trim*/) {
+  return failure("its frame rate can't be trimmed", "choose a camera whose rate can be");
+}
+
+}  // namespace emberlock::aravis

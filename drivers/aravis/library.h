@@ -1,0 +1,74 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <future>
+#include <memory>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include <arv.h>
+
+#include "base/quantity.h"
+#include "base/result.h"
+
+// What of GLib and Aravis needs an owner, and calls that may hang.
+namespace emberlock::aravis {
+
+struct Unref {
+  void operator()(gpointer object) const { g_object_unref(object); }
+};
+/// Owns one reference of a GObject.
+template <class T>
+using ObjectPtr = std::unique_ptr<T, Unref>;
+
+struct Free {
+  void operator()(gpointer memory) const { g_free(memory); }
+};
+template <class T>
+using MemoryPtr = std::unique_ptr<T, Free>;
+
+/// Where a call of the library leaves its error: `arv_...(camera, error.out())`.
+class ErrorSlot {
+ public:
+  ErrorSlot() = default;
+  ErrorSlot(const ErrorSlot&) = delete;
+  ErrorSlot& operator=(const ErrorSlot&) = delete;
+  ~ErrorSlot() { g_clear_error(&error_); }
+
+  /// To be handed to one call; forgets an error of the call before.
+  GError** out() {
+    g_clear_error(&error_);
+    return &error_;
+  }
+  [[nodiscard]] bool failed() const { return error_ != nullptr; }
+  [[nodiscard]] std::string text() const { return error_ == nullptr ? "" : error_->message; }
+  [[nodiscard]] Error error(ErrorKind kind, const std::string& where, std::string remedy = {}) const {
+    return {kind, text(), where, std::move(remedy)};
+  }
+
+ private:
+  GError* error_ = nullptr;
+};
+
+/// Runs work that may hang on a thread of its own, which is left behind if nobody waits. What the work holds
+/// and an answer that nobody took are destroyed on that thread: that may hang too.
+template <class T>
+std::future<T> in_background(std::function<T()> work) {
+  std::promise<T> promise;
+  auto answer = promise.get_future();
+  std::thread([promise = std::move(promise), work = std::move(work)]() mutable {
+    T value = work();
+    work = nullptr;
+    promise.set_value(std::move(value));
+  }).detach();
+  return answer;
+}
+
+template <class T>
+bool done_within(const std::future<T>& answer, Seconds deadline) {
+  return answer.wait_for(std::chrono::duration<double>(deadline.value())) == std::future_status::ready;
+}
+
+}  // namespace emberlock::aravis

@@ -1,0 +1,213 @@
+#include "drivers/aravis/link.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include "base/log.h"
+#include "drivers/aravis/pixel_format.h"
+
+namespace emberlock::aravis {
+namespace {
+
+constexpr std::uint64_t kNoId = ~std::uint64_t{0};  // never a frame's: GigE has 16 bits, or starts low
+
+/// The memory of a buffer that becomes an image.
+struct ImageMemory {
+  std::shared_ptr<Image> image;
+};
+void free_memory(gpointer memory) { delete static_cast<ImageMemory*>(memory); }
+
+using Flag = std::shared_ptr<std::atomic<bool>>;
+void on_control_lost(ArvDevice*, gpointer flag) { **static_cast<Flag*>(flag) = true; }
+void free_flag(gpointer flag, GClosure*) { delete static_cast<Flag*>(flag); }
+
+}  // namespace
+
+TimePoint wall_clock() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return {std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
+}
+
+Result<std::shared_ptr<Link>> Link::open(const Seen& seen, const CameraRequest& request) {
+  const std::string where = "camera " + seen.id;
+  std::shared_ptr<Link> link(new Link);
+  EMBERLOCK_ASSIGN_OR_RETURN(link->camera_, open_seen(seen));
+  link->where_ = where;
+  link->seen_ = seen;
+  ArvCamera* camera = link->camera_.get();
+  ArvDevice* device = arv_camera_get_device(camera);
+  g_signal_connect_data(device, "control-lost", G_CALLBACK(on_control_lost), new Flag(link->control_lost_),
+                        free_flag, GConnectFlags{});
+  ErrorSlot error;
+  if (arv_camera_is_gv_device(camera) != 0 && arv_gv_device_is_controller(ARV_GV_DEVICE(device)) == 0) {
+    return held(seen).value_or(Error{ErrorKind::device, "it gives nobody control", where, "cut its power"});
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(link->applied_, apply(camera, request, where));
+  if (const auto resend = request.controls.find(kPacketResend); resend != request.controls.end()) {
+    link->resend_ = resend->second;
+  }
+  link->pixel_format_ = arv_camera_get_pixel_format(camera, error.out());
+  if (error.failed()) return error.error(ErrorKind::device, where);
+  link->payload_ = arv_camera_get_payload(camera, error.out());
+  if (error.failed()) return error.error(ErrorKind::device, where);
+  const PackedPixels& pixels = link->applied_.offer.pixels;
+  const std::size_t bytes = row_bytes(pixels) * static_cast<std::size_t>(pixels.size.height);
+  if (link->payload_ < bytes) {
+    return Error{ErrorKind::device, "it announces fewer bytes than its pictures have", where,
+                 "choose another format"};
+  }
+  // USB3's stream remembers where each of its buffers lies, so there they must stay.
+  link->into_images_ =
+      arv_camera_is_gv_device(camera) != 0 && lies_as_image(pixels) && link->payload_ == bytes;
+  for (const std::string& note : notes_of(camera)) log(LogCategory::drivers).info("{}: {}", where, note);
+  return link;
+}
+
+Link::~Link() {
+  if (stream_ != nullptr) static_cast<void>(stop_acquisition());
+}
+
+Status Link::start() {
+  ErrorSlot error;
+  if (arv_camera_is_gv_device(camera_.get()) != 0) {
+    // Aravis opens a packet socket before it says whose packets it wants, and takes what other cameras send
+    // in between for this one's frames. A socket that is bound to its own port can't err so, nor needs root.
+    arv_camera_gv_set_stream_options(camera_.get(), ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
+  }
+  stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, error.out()));
+  if (stream_ == nullptr) return error.error(ErrorKind::device, where_, "it may have been taken over");
+  if (ARV_IS_GV_STREAM(stream_.get())) {
+    if (!resend_.empty()) {
+      g_object_set(
+          stream_.get(), "packet-resend",
+          resend_ == "always" ? ARV_GV_STREAM_PACKET_RESEND_ALWAYS : ARV_GV_STREAM_PACKET_RESEND_NEVER,
+          nullptr);
+    }
+    ArvGvStreamPacketResend policy = ARV_GV_STREAM_PACKET_RESEND_NEVER;
+    g_object_get(stream_.get(), "packet-resend", &policy, nullptr);
+    resends_ = policy == ARV_GV_STREAM_PACKET_RESEND_ALWAYS;
+    // Bursts of whole frames must fit into the socket; the kernel gives what net.core.rmem_max allows.
+    constexpr std::size_t kFrames = 4;
+    g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+                 static_cast<gint>(std::min<std::size_t>(kFrames * payload_, 64U << 20U)), nullptr);
+  }
+  EMBERLOCK_RETURN_IF_ERROR(queue_buffers());
+  arv_camera_start_acquisition(camera_.get(), error.out());
+  if (!error.failed()) return {};
+  stream_.reset();
+  return error.error(ErrorKind::device, where_);
+}
+
+Status Link::queue_buffers() {
+  constexpr std::size_t kMostMemory = 256U << 20U;
+  constexpr std::size_t kManyFrames = 50;
+  const auto one_second = static_cast<std::size_t>(std::ceil(applied_.frame_rate.value())) + 1;
+  std::size_t n = std::max(kManyFrames, one_second);
+  if (n * payload_ > kMostMemory) n = std::max<std::size_t>({one_second, kMostMemory / payload_, 4});
+  for (std::size_t i = 0; i < n; ++i) push(new_buffer());
+  return {};
+}
+
+Status Link::stop_acquisition() {
+  ErrorSlot error;
+  arv_camera_stop_acquisition(camera_.get(), error.out());
+  if (error.failed()) return error.error(ErrorKind::device, where_);
+  return {};
+}
+
+Result<TimePoint> Link::restart_acquisition() {
+  ErrorSlot error;
+  arv_camera_stop_acquisition(camera_.get(), error.out());
+  const TimePoint restarted = wall_clock();
+  if (!error.failed()) arv_camera_start_acquisition(camera_.get(), error.out());
+  if (error.failed()) return error.error(ErrorKind::device, where_);
+  return restarted;
+}
+
+ObjectPtr<ArvBuffer> Link::new_buffer() const {
+  if (!into_images_) return ObjectPtr<ArvBuffer>(arv_buffer_new_allocate(payload_));
+  auto image = std::make_shared<Image>(applied_.offer.mode.layout);
+  auto* memory = new ImageMemory{std::move(image)};
+  return ObjectPtr<ArvBuffer>(
+      arv_buffer_new_full(payload_, memory->image->bytes().data(), memory, free_memory));
+}
+
+void Link::push(ObjectPtr<ArvBuffer> buffer) {
+  // The library leaves the id of an earlier frame there when the packet with the id is lost.
+  arv_buffer_set_frame_id(buffer.get(), kNoId);
+  arv_stream_push_buffer(stream_.get(), buffer.release());
+}
+
+Arrival Link::judge(ArvBuffer* buffer) const {
+  switch (arv_buffer_get_status(buffer)) {
+    case ARV_BUFFER_STATUS_SUCCESS:
+      break;
+    case ARV_BUFFER_STATUS_TIMEOUT:
+      return resends_ ? Arrival::resend : Arrival::transport;
+    case ARV_BUFFER_STATUS_CLEARED:
+    case ARV_BUFFER_STATUS_ABORTED:
+    case ARV_BUFFER_STATUS_FILLING:
+      return Arrival::cleared;
+    default:  // packets missing, or with wrong numbers, or too many
+      return Arrival::transport;
+  }
+  if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_IMAGE &&
+      arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_EXTENDED_CHUNK_DATA) {
+    return Arrival::odd;
+  }
+  const ImageSize size = applied_.offer.pixels.size;
+  std::size_t received = 0;
+  arv_buffer_get_image_data(buffer, &received);
+  const std::size_t wanted = row_bytes(applied_.offer.pixels) * static_cast<std::size_t>(size.height);
+  const bool as_agreed = received >= wanted && arv_buffer_get_image_width(buffer) == size.width &&
+                         arv_buffer_get_image_height(buffer) == size.height &&
+                         arv_buffer_get_image_pixel_format(buffer) == pixel_format_;
+  return as_agreed ? Arrival::whole : Arrival::odd;
+}
+
+std::optional<Arrived> Link::pop(Seconds deadline) {
+  const auto wait = static_cast<guint64>(std::max(0.0, in_microseconds(deadline)));
+  ObjectPtr<ArvBuffer> buffer(wait == 0 ? arv_stream_try_pop_buffer(stream_.get())
+                                        : arv_stream_timeout_pop_buffer(stream_.get(), wait));
+  if (buffer == nullptr) return {};
+  Arrived arrived;
+  arrived.arrival = judge(buffer.get());
+  const std::uint64_t id = arv_buffer_get_frame_id(buffer.get());
+  if (id != kNoId) arrived.frame_id = id;
+  arrived.device_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer.get()))};
+  arrived.system_time = {static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer.get()))};
+  arrived.buffer = std::move(buffer);
+  return arrived;
+}
+
+Result<std::shared_ptr<const Image>> Link::take(Arrived arrived) {
+  ArvBuffer* buffer = arrived.buffer.get();
+  if (into_images_) {
+    auto* memory = static_cast<const ImageMemory*>(arv_buffer_get_user_data(buffer));
+    std::shared_ptr<const Image> image = memory->image;
+    push(new_buffer());
+    return image;
+  }
+  std::size_t size = 0;
+  const auto* data = static_cast<const std::byte*>(arv_buffer_get_data(buffer, &size));
+  const PackedPixels& pixels = applied_.offer.pixels;
+  int padding = 0, unused = 0;
+  arv_buffer_get_image_padding(buffer, &padding, &unused);
+  auto image = unpack(pixels, {data, size}, row_bytes(pixels) + static_cast<std::size_t>(padding));
+  push(std::move(arrived.buffer));
+  EMBERLOCK_ASSIGN_OR_RETURN(Image unpacked, std::move(image));
+  return std::shared_ptr<const Image>(std::make_shared<Image>(std::move(unpacked)));
+}
+
+std::uint64_t Link::signs_of_life() const {
+  return arv_stream_get_info_uint64_by_name(stream_.get(), "n_transferred_bytes") +
+         arv_stream_get_info_uint64_by_name(stream_.get(), "n_ignored_bytes");
+}
+
+std::uint64_t Link::underruns() const {
+  return arv_stream_get_info_uint64_by_name(stream_.get(), "n_underruns");
+}
+
+}  // namespace emberlock::aravis

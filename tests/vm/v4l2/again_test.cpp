@@ -84,7 +84,8 @@ TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
   const int more_descriptors = open_descriptors() - descriptors;
   const long more_memory = resident_kilobytes() - memory;
   std::printf(
-      "%d rounds of unplugging 2 vivid cameras: both reported %.0f ms (median; longest %.0f), all "
+      "%d rounds of unplugging 2 vivid cameras: both reported %.0f ms after the kernel had removed them "
+      "(median; longest %.0f), both "
       "filming %.0f ms "
       "after their return (median; longest %.0f); %+d descriptors, %+ld kB resident after the first %d\n",
       rounds, 1e3 * quantile(reports, 0.5), 1e3 * longest_report, 1e3 * quantile(returns, 0.5),

@@ -97,14 +97,16 @@ TEST_F(V4l2Fleet, NoFrameIsUnaccountedForAndOneThatGoesLeavesTheOthersAlone) {
   EXPECT_EQ(unaccounted, 0U);
   EXPECT_EQ(all.damaged, 0U);
 
-  const TimePoint gone = SteadyClock().now();
   Vivid::control(4, "Disconnect", "1");
+  const TimePoint gone = SteadyClock().now();
   Result<Frame> next = Error{};
   do {
     next = cameras_[4]->next_frame(Seconds(2));
   } while (next.ok());
   EXPECT_EQ(next.error().kind, ErrorKind::device) << next.error().message();
-  EXPECT_LE(SteadyClock().now() - gone, Seconds(1));
+  const Seconds report = SteadyClock().now() - gone;
+  std::printf("one of 11 that went was reported after %.0f ms\n", in_milliseconds(report));
+  EXPECT_LE(report, Seconds(1));
   EXPECT_EQ(cameras_[4]->state(), CameraThread::State::lost);
   for (int i = 0; i < kCameras; ++i) {
     if (i == 4) continue;

@@ -31,6 +31,7 @@ class Vivid : public testing::Test {
     if (cameras_ == loaded) {
       unplug();
       plug_in();
+      settle();
       return;
     }
     std::string nodes = "0x1";  // pictures alone, no sound, text or radio
@@ -48,7 +49,6 @@ class Vivid : public testing::Test {
   void plug_in() {
     tell("bind");
     wait_for([this] { return there() == cameras_; });
-    settle();
   }
   /// Sets one of vivid's own controls, beside whoever films: "Inject Fatal Streaming Error".
   static void control(int camera, const std::string& name, const std::string& value) {

@@ -25,9 +25,12 @@ Error no_such_mode(std::span<const CameraMode> modes, const std::string& what, c
 }
 
 /// How much of a scene a mode keeps: colour first, then depth; what is sent as it was measured before what is
-/// computed from it.
-std::tuple<bool, int, bool> fidelity(const ImageLayout& layout) {
-  return {channels(layout.format) > 1 || is_bayer(layout.format), layout.bit_depth, is_bayer(layout.format)};
+/// computed from it, and that before JPEGs.
+std::tuple<bool, int, int> fidelity(const CameraMode& mode) {
+  const ImageLayout& layout = mode.layout;
+  const bool jpeg = mode.encoding == "MJPG" || mode.encoding == "JPEG";
+  const int as_measured = is_bayer(layout.format) ? 2 : jpeg ? 0 : 1;
+  return {channels(layout.format) > 1 || is_bayer(layout.format), layout.bit_depth, as_measured};
 }
 
 long area(const CameraMode& mode) {
@@ -62,8 +65,7 @@ Result<CameraMode> choose_mode(std::span<const CameraMode> modes, const CameraRe
                         camera);
   }
   return *std::max_element(left.begin(), left.end(), [](const CameraMode& a, const CameraMode& b) {
-    return std::tuple(area(a), fidelity(a.layout), a.frame_rate) <
-           std::tuple(area(b), fidelity(b.layout), b.frame_rate);
+    return std::tuple(area(a), fidelity(a), a.frame_rate) < std::tuple(area(b), fidelity(b), b.frame_rate);
   });
 }
 

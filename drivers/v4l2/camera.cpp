@@ -210,24 +210,32 @@ FrameStamp V4l2Camera::stamp(const v4l2_buffer& buffer) {
   // later.
   starved_ = given_back_.size() + 1 >= set_up_->device.buffers() && given_back_.front() > device_time;
   FrameStamp stamp{number.frame_id, device_time, wall_clock(), now(), FrameStatus::complete};
-  const bool whole =
-      (buffer.flags & V4L2_BUF_FLAG_ERROR) == 0 &&
-      buffer.bytesused >= (mode_.pixels.size.height - 1) * set_up_->stride + row_bytes(mode_.pixels);
+  const std::size_t needed =
+      is_jpeg(mode_.fourcc) ? 1 : (mode_.pixels.size.height - 1) * set_up_->stride + row_bytes(mode_.pixels);
+  const bool whole = (buffer.flags & V4L2_BUF_FLAG_ERROR) == 0 && buffer.bytesused >= needed;
   if (!whole) stamp.status = FrameStatus::damaged;
   return stamp;
 }
 
-Result<Frame> V4l2Camera::hand_on(const V4l2Device::Filled& filled) {
-  const FrameStamp stamped = stamp(filled.buffer);
+DecodedJpeg V4l2Camera::picture(const V4l2Device::Filled& filled) const {
+  if (is_jpeg(mode_.fourcc)) {
+    return decode_jpeg(
+        filled.bytes.first(std::min<std::size_t>(filled.buffer.bytesused, filled.bytes.size())),
+        mode_.pixels.size);
+  }
   // The one copy. What is missing of a damaged frame is what an older one left in the buffer.
   auto image = unpack(mode_.pixels, filled.bytes, set_up_->stride);
+  if (!image) return {Image(info_.layout), FrameStatus::damaged};
+  return {std::move(image).value(), FrameStatus::complete};
+}
+
+Frame V4l2Camera::hand_on(const V4l2Device::Filled& filled) {
+  FrameStamp stamped = stamp(filled.buffer);
+  auto [image, status] = picture(filled);
   give_back(filled.buffer.index);
-  if (!image) {
-    ++counts_.transport;
-    return Error{ErrorKind::device, image.error().what, where(), "choose another size or pixel format"};
-  }
+  if (status == FrameStatus::damaged) stamped.status = status;
   ++(stamped.status == FrameStatus::complete ? counts_.delivered : counts_.damaged);
-  return Frame{stamped, std::make_shared<const Image>(std::move(image).value())};
+  return Frame{stamped, std::make_shared<const Image>(std::move(image))};
 }
 
 void V4l2Camera::drop(const V4l2Device::Filled& filled) {

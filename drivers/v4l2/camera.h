@@ -8,6 +8,7 @@
 #include "drivers/driver.h"
 #include "drivers/v4l2/device.h"
 #include "drivers/v4l2/frame_numbers.h"
+#include "drivers/v4l2/jpeg.h"
 #include "drivers/v4l2/modes.h"
 
 namespace emberlock {
@@ -43,7 +44,8 @@ class V4l2Camera final : public Camera {
 
   /// The device's time of a frame, and its number; counts what is missing before it.
   FrameStamp stamp(const v4l2_buffer& buffer);
-  Result<Frame> hand_on(const V4l2Device::Filled& filled);
+  [[nodiscard]] DecodedJpeg picture(const V4l2Device::Filled& filled) const;
+  Frame hand_on(const V4l2Device::Filled& filled);
   void drop(const V4l2Device::Filled& filled);
   void give_back(std::uint32_t index);
   Error lost(int error);

@@ -131,6 +131,8 @@ std::optional<V4l2Packing> packing_of(std::uint32_t fourcc) {
       return V4l2Packing{PixelPacking::gray16};
     case V4L2_PIX_FMT_Y10P:
       return V4l2Packing{PixelPacking::gray10_mipi};
+    case V4L2_PIX_FMT_MJPEG:
+    case V4L2_PIX_FMT_JPEG:
     case V4L2_PIX_FMT_RGB24:
       return V4l2Packing{PixelPacking::rgb8};
     case V4L2_PIX_FMT_BGR24:
@@ -175,6 +177,8 @@ std::optional<V4l2Packing> packing_of(std::uint32_t fourcc) {
       return {};
   }
 }
+
+bool is_jpeg(std::uint32_t fourcc) { return fourcc == V4L2_PIX_FMT_MJPEG || fourcc == V4L2_PIX_FMT_JPEG; }
 
 std::string fourcc_name(std::uint32_t fourcc) {
   std::string name;

@@ -29,6 +29,9 @@ struct V4l2Packing {
 };
 std::optional<V4l2Packing> packing_of(std::uint32_t fourcc);
 
+/// Each frame is a JPEG.
+bool is_jpeg(std::uint32_t fourcc);
+
 /// "YUYV"; letters that can't be shown become '.'.
 std::string fourcc_name(std::uint32_t fourcc);
 
@@ -36,7 +39,7 @@ std::string fourcc_name(std::uint32_t fourcc);
 struct V4l2Mode {
   CameraMode mode;
   std::uint32_t fourcc = 0;
-  PackedPixels pixels;
+  PackedPixels pixels;  ///< of a JPEG only the size counts
   /// Seconds a frame, shortest first, all > 0. Where any between two will do, those two.
   std::vector<v4l2_fract> intervals;
   enum class Between { none, any } between = Between::none;

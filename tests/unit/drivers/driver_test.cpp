@@ -42,6 +42,15 @@ TEST(ChooseMode, WhatIsAskedForIsKept) {
   EXPECT_EQ(choose_mode(kModes, request, "cam").value(), kModes[0]);
 }
 
+TEST(ChooseMode, AJpegIsTakenForItsRateAlone) {
+  const std::vector<CameraMode> webcam{{{{1280, 720}, PixelFormat::rgb8, 8}, "YUYV", Hertz(10)},
+                                       {{{1280, 720}, PixelFormat::rgb8, 8}, "MJPG", Hertz(30)}};
+  EXPECT_EQ(choose_mode(webcam, {}, "cam").value(), webcam[0]);
+  CameraRequest request;
+  request.frame_rate = Hertz(24);
+  EXPECT_EQ(choose_mode(webcam, request, "cam").value(), webcam[1]);
+}
+
 TEST(ChooseMode, ARateSaidWithFewDigitsIsMet) {
   const std::vector<CameraMode> film{mode({640, 480}, PixelFormat::gray8, 23.976)};
   CameraRequest request;

@@ -62,6 +62,8 @@ TEST_F(ControllerTest, AnswersTheExampleOfItsDocumentToTheByte) {
   EXPECT_EQ(answers, 3);
 }
 
+TEST_F(ControllerTest, FitsAChipOfTwoKilobytes) { EXPECT_LE(sizeof(Controller), 1450U); }
+
 TEST_F(ControllerTest, RoundsPhaseAndWidthToItsTicks) {
   EXPECT_EQ(ask(set("flash per=41708375 pha=749 wid=20250")),
             "ok flash per=41708375 pha=500 wid=20500 len=0 sum=65535 dog=0 n=0 bad=0");

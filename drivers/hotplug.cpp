@@ -59,10 +59,10 @@ std::optional<HotplugEvent> HotplugMonitor::next(Seconds deadline) {
         udev_monitor_receive_device(monitor_.get()), &udev_device_unref);
     if (!device) continue;
     const std::string action = or_empty(udev_device_get_action(device.get()));
-    if (action != "add" && action != "remove") continue;
+    const char* const node = udev_device_get_devnode(device.get());
+    if ((action != "add" && action != "remove") || node == nullptr) continue;
     return HotplugEvent{action == "add" ? Hotplug::came : Hotplug::went,
-                        or_empty(udev_device_get_subsystem(device.get())),
-                        or_empty(udev_device_get_devnode(device.get()))};
+                        or_empty(udev_device_get_subsystem(device.get())), node};
   }
 }
 

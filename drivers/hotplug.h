@@ -27,7 +27,8 @@ class HotplugMonitor {
  public:
   /// Error io: the system gives no such events.
   static Result<HotplugMonitor> open(const std::vector<std::string>& subsystems);
-  /// The next event, waiting at most `deadline`; what isn't plugging in or out is left out.
+  /// The next event, waiting at most `deadline`; what isn't plugging in or out is left out, as are
+  /// parts without a node of their own (a USB device's interfaces).
   std::optional<HotplugEvent> next(Seconds deadline);
 
  private:

@@ -46,12 +46,12 @@ std::string output_of(const std::string& command) {
 std::string properties(const std::string& device) {
   return output_of("udevadm settle; udevadm info --query=property --name=" + device);
 }
-void expect_ours(const std::string& device) {
+void expect_ours(const std::string& device, const char* group_name = "emberlock") {
   struct stat status {};
   ASSERT_EQ(::stat(device.c_str(), &status), 0) << device;
   const group* owner = ::getgrgid(status.st_gid);
   ASSERT_NE(owner, nullptr);
-  EXPECT_STREQ(owner->gr_name, "emberlock") << device;
+  EXPECT_STREQ(owner->gr_name, group_name) << device;
   EXPECT_EQ(status.st_mode & 0777, 0660U) << device;
 }
 /// Of the USB device with this serial number.
@@ -115,6 +115,21 @@ TEST(UdevRules, APtpCameraIsOursAndStaysAwake) {
   EXPECT_EQ(power_of(serial), "on");
   ASSERT_TRUE(qmp->unplug("ptp").ok());
   EXPECT_TRUE(vanishes(link));
+}
+
+TEST(UdevRules, WithoutTheGroupAPortStaysWithTheDistributionsOwn) {
+  ASSERT_EQ(
+      std::system("cp /etc/group /tmp/group && sed -i /^emberlock:/d /etc/group && udevadm control --reload"),
+      0);
+  SerialGadget gadget("E78");
+  EXPECT_TRUE(appears("strobe-E78"));
+  expect_ours("/dev/emberlock/strobe-E78", "dialout");
+  ASSERT_EQ(std::system("cp /tmp/group /etc/group && udevadm control --reload"), 0);
+  gadget.unplug();
+  EXPECT_TRUE(vanishes("strobe-E78"));
+  gadget.plug();
+  EXPECT_TRUE(appears("strobe-E78"));
+  expect_ours("/dev/emberlock/strobe-E78");
 }
 
 }  // namespace

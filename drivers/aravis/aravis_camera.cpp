@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "base/log.h"
+#include "drivers/aravis/gvcp.h"
 
 namespace emberlock::aravis {
 namespace {
@@ -14,6 +15,9 @@ namespace {
 /// Of kCallDeadline, what a call of the library may take; the rest is ours.
 constexpr Seconds kLibraryDeadline = kCallDeadline - milliseconds(100);
 constexpr Seconds kSlice = milliseconds(100);  // between two looks for a camera that went away
+/// A GigE camera that is silent so long is asked for a register again and again, and given up when it hasn't
+/// answered for so long: sooner than its heartbeat is, which takes the library 5 .. 6.1 s.
+constexpr Seconds kSilent{1}, kAskEvery{0.5}, kUnanswered{2};
 
 CameraInfo info_of(const std::string& id, const Link& link) {
   CameraInfo info;
@@ -23,15 +27,6 @@ CameraInfo info_of(const std::string& id, const Link& link) {
   info.frame_rate = link.applied().frame_rate;
   info.reset = ShutterReset::on_command;
   return info;
-}
-
-/// A free-running camera that sends nothing for so long is gone: told before the heartbeat is, which takes
-/// 5 .. 6.1 s. A slow one has only the heartbeat.
-Seconds longest_silence(const Applied& applied) {
-  constexpr Seconds kShortest{3};
-  const Seconds frames = period(applied.frame_rate) * 8;
-  return applied.free_running && frames <= kShortest ? kShortest
-                                                     : Seconds(std::numeric_limits<double>::infinity());
 }
 
 }  // namespace
@@ -124,6 +119,7 @@ Status AravisCamera::start() {
   wanted_from_ = {};
   device_time_ = {};
   last_sign_ = clock_.now();
+  unanswered_since_.reset();
   signs_ = underruns_ = 0;
   starved_ = false;
   return {};
@@ -199,10 +195,22 @@ std::optional<Frame> AravisCamera::hand_on(Arrived arrived) {
 }
 
 bool AravisCamera::silent() {
+  if (link_->seen().transport != Transport::gige) return false;  // USB tells at once
   const std::uint64_t signs = link_->signs_of_life();
   const TimePoint now = clock_.now();
-  if (std::exchange(signs_, signs) != signs) last_sign_ = now;
-  return now - last_sign_ > longest_silence(link_->applied());
+  if (std::exchange(signs_, signs) != signs) {
+    last_sign_ = now;
+    unanswered_since_.reset();
+  }
+  if (now - last_sign_ < kSilent || now < next_question_) return false;
+  next_question_ = now + kAskEvery;
+  if (answers(link_->seen().address)) {
+    last_sign_ = clock_.now();
+    unanswered_since_.reset();
+    return false;
+  }
+  if (!unanswered_since_) unanswered_since_ = now;
+  return now - *unanswered_since_ >= kUnanswered;
 }
 
 Result<Frame> AravisCamera::next_frame(Seconds deadline) {
@@ -215,7 +223,7 @@ Result<Frame> AravisCamera::next_frame(Seconds deadline) {
       continue;
     }
     if (link_->control_lost()) return lose("it went away, or another program took control of it");
-    if (silent()) return lose("it went away: it sends nothing any more");
+    if (silent()) return lose("it went away: it neither sends nor answers");
     if (left <= Seconds(0)) {
       return Error{ErrorKind::timed_out, "no frame came in time", "camera " + id_,
                    "wait longer, or check its trigger"};
@@ -242,13 +250,13 @@ std::uint64_t AravisCamera::pass_over_before(TimePoint wall) {
 
 Status AravisCamera::reset_shutter(TimePoint at) {
   if (!filming_) return failure("it does not film", "start() it first");
-  const Seconds wait = at - clock_.now();
-  if (wait > kLongestReset) {
-    return failure(fmt::format("a reset {:.1f} s ahead is too early to order", wait.value()),
-                   fmt::format("order it at most {:.0f} s before", kLongestReset.value()));
+  const TimePoint ordered = clock_.now();
+  if (at - ordered > kLongestReset) {
+    return failure(fmt::format("a reset {:.1f} s ahead is too early to order", (at - ordered).value()),
+                   fmt::format("order it at most {:.1f} s before", kLongestReset.value()));
   }
   clock_.sleep_until(at);
-  const auto restarted = bounded<Result<TimePoint>>(kLibraryDeadline - kLongestReset,
+  const auto restarted = bounded<Result<TimePoint>>(ordered + kLibraryDeadline - clock_.now(),
                                                     [](Link& link) { return link.restart_acquisition(); });
   if (!restarted) return failure("it hangs, and didn't restart its cycle when told to", "cut its power");
   if (!*restarted) return lose(restarted->error().what);

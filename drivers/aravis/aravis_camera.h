@@ -22,7 +22,7 @@ namespace emberlock::aravis {
 /// kLongestReset ahead. Times are on the machine's monotonic clock.
 class AravisCamera final : public Camera {
  public:
-  static constexpr Seconds kLongestReset{1};
+  static constexpr Seconds kLongestReset = milliseconds(500);
 
   /// The link is filming or not; `request` sets the camera up again after it was lost.
   AravisCamera(std::string id, CameraRequest request, std::shared_ptr<Link> link);
@@ -49,6 +49,7 @@ class AravisCamera final : public Camera {
   std::uint64_t pass_over_before(TimePoint wall);
   void drop(Arrived arrived, Fate fate);
   FrameLedger::Entry record(const Arrived& arrived, Fate fate);
+  /// Whether it went away: it sends nothing, and doesn't answer when it is asked for something.
   [[nodiscard]] bool silent();
   /// Calls the library on a thread of its own. None if that takes longer: the camera is quarantined then, the
   /// link left to that thread.
@@ -69,9 +70,11 @@ class AravisCamera final : public Camera {
   std::shared_ptr<const std::atomic<bool>> hanging_;  ///< true once the call that hung has returned
   TimePoint hangs_since_;
   std::optional<Arrived> held_;  ///< popped, but not taken yet
-  TimePoint wanted_from_;  ///< frames that came before it, by the wall clock, are of an older shutter phase
-  TimePoint device_time_;  ///< of the last frame
-  TimePoint last_sign_;    ///< when something last came from the camera
+  TimePoint wanted_from_;    ///< frames that came before it, by the wall clock, are of an older shutter phase
+  TimePoint device_time_;    ///< of the last frame
+  TimePoint last_sign_;      ///< when something last came from the camera
+  TimePoint next_question_;  ///< to a camera that is silent
+  std::optional<TimePoint> unanswered_since_;
   std::uint64_t signs_ = 0, underruns_ = 0;
   bool starved_ = false;  ///< a gap to come is one of frames that found no buffer
 };

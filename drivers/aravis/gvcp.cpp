@@ -104,6 +104,11 @@ std::optional<std::uint32_t> read_register(const std::string& camera_address, st
   return static_cast<std::uint32_t>(ntohs(answer[4])) << 16 | ntohs(answer[5]);
 }
 
+bool answers(const std::string& camera_address) {
+  // Any register would do, but the one for control: to read that is a heartbeat to some cameras.
+  return read_register(camera_address, kStreamPort, milliseconds(100)).has_value();
+}
+
 std::optional<Identity> identity_at(const std::string& camera_address) {
   Identity identity;
   const auto high = read_register(camera_address, kMacHigh, kAnswer);

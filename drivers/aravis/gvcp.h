@@ -15,6 +15,9 @@ namespace emberlock::aravis {
 std::optional<std::uint32_t> read_register(const std::string& camera_address, std::uint32_t register_address,
                                            Seconds deadline);
 
+/// Whether a camera answers at this address, within 0.1 s.
+bool answers(const std::string& camera_address);
+
 struct Identity {
   std::string serial;  ///< empty where it has none
   std::string mac;     ///< "00:11:22:33:44:55"

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <thread>
 #include <utility>
 
 #include "base/log.h"
@@ -20,7 +21,16 @@ struct ImageMemory {
 void free_memory(gpointer memory) { delete static_cast<ImageMemory*>(memory); }
 
 using Flag = std::shared_ptr<std::atomic<bool>>;
-void on_control_lost(ArvDevice*, gpointer flag) { **static_cast<Flag*>(flag) = true; }
+void on_control_lost(ArvDevice* device, gpointer flag) {
+  **static_cast<Flag*>(flag) = true;
+  // The thread that tells us holds a reference meanwhile. Were it the last, the device would wait for the end
+  // of that thread on that thread: so there is another one, until all others are gone.
+  std::thread([device = ObjectPtr<ArvDevice>(ARV_DEVICE(g_object_ref(device)))] {
+    while (g_atomic_int_get(&G_OBJECT(device.get())->ref_count) > 1) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }).detach();
+}
 void free_flag(gpointer flag, GClosure*) { delete static_cast<Flag*>(flag); }
 
 }  // namespace

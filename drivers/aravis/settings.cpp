@@ -188,9 +188,13 @@ Status set_rate(ArvCamera* camera, Hertz rate, const std::string& where) {
   return {};
 }
 
+/// Selectors first: they say what the others speak of.
 Status set_controls(ArvCamera* camera, const CameraRequest& request, const std::string& where) {
-  for (const auto& [name, value] : request.controls) {
-    EMBERLOCK_RETURN_IF_ERROR(set_control(camera, name, value, where));
+  for (const bool selectors : {true, false}) {
+    for (const auto& [name, value] : request.controls) {
+      if (name.ends_with("Selector") != selectors) continue;
+      EMBERLOCK_RETURN_IF_ERROR(set_control(camera, name, value, where));
+    }
   }
   return {};
 }

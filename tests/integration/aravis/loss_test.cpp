@@ -86,7 +86,8 @@ TEST_F(LossTest, ACameraThatDiesIsReportedPickedUpAgainAndHarmsNoOther) {
   const Film after = film_for(killed, Seconds(2));
   EXPECT_EQ(after.wrong_pixels, 0U);  // the exposure too is as it was
   EXPECT_NEAR(static_cast<double>(after.frames), 30, 4);
-  EXPECT_EQ(killed.counts().lost(), counts_before.lost());
+  // The frame that the kill tore, and a first one that found a small socket.
+  EXPECT_LE(killed.counts().lost(), counts_before.lost() + 2);
 
   hanging.join();
   ASSERT_TRUE(frozen_film.error.has_value());
@@ -104,6 +105,25 @@ TEST_F(LossTest, ACameraThatDiesIsReportedPickedUpAgainAndHarmsNoOther) {
   }
   std::printf("killed, reported after %.2f s; frozen, after %.2f s; restarted, streaming after %.2f s\n",
               report.value(), frozen_report, returned.value());
+}
+
+TEST_F(LossTest, ACameraThatWaitsForItsTriggerIsLostOnlyWhenItAnswersNoMore) {
+  const auto processes = fakes(1, "TRIGGER");
+  CameraRequest request = small_film();
+  request.controls = {
+      {"TriggerSelector", "FrameStart"}, {"TriggerMode", "On"}, {"TriggerSource", "Software"}};
+  auto camera = driver.open("TRIGGER1", request);
+  ASSERT_TRUE(camera.ok()) << camera.error().message();
+  ASSERT_TRUE((*camera)->start().ok());
+  const Film waiting = film_for(**camera, Seconds(3.5));
+  EXPECT_FALSE(waiting.error.has_value()) << waiting.error->message();
+  EXPECT_EQ(waiting.frames, 0U);
+  processes[0]->kill();
+  const TimePoint killed = clock.now();
+  const Film film = film_for(**camera, Seconds(10));
+  ASSERT_TRUE(film.error.has_value());
+  EXPECT_EQ(film.error->kind, ErrorKind::device);
+  EXPECT_LE((film.ended - killed).value(), kReportWithin.value());
 }
 
 TEST_F(LossTest, StoppingACameraThatHangsIsBounded) {
@@ -151,7 +171,7 @@ Footprint footprint() {
 // EMBERLOCK_ARAVIS_ROUNDS=100 for the figure: cameras that are killed and come back.
 TEST_F(LossTest, KilledAndRestartedTimeAndAgainNothingLeaks) {
   constexpr int kCameras = 10;
-  const int rounds = std::max(2, asked_for("EMBERLOCK_ARAVIS_ROUNDS", 20) / kCameras);
+  const int rounds = std::max(1, asked_for("EMBERLOCK_ARAVIS_ROUNDS", 10) / kCameras);
   const auto processes = fakes(kCameras, "ROUND");
   auto cameras = open_all(processes, small_film());
   ASSERT_EQ(cameras.size(), std::size_t{kCameras});

@@ -8,6 +8,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "drivers/ptp/driver.h"
+#include "drivers/v4l2/v4l2.h"
+
 namespace emberlock::cli {
 namespace {
 
@@ -88,7 +91,10 @@ bool has(const DeviceList& list, const std::string& id) {
 
 }  // namespace
 
-std::span<const CameraDriver> camera_drivers() { return {}; }
+std::span<const CameraDriver> camera_drivers() {
+  static const std::array<CameraDriver, 2> drivers{v4l2_driver(), ptp_driver()};
+  return drivers;
+}
 
 DeviceList list_devices(std::span<const CameraDriver> drivers) {
   std::vector<std::future<Result<std::vector<CameraFound>>>> asked;

@@ -56,6 +56,16 @@ std::string can_words(const CameraFound& camera) {
   return words;
 }
 
+ordered_json holder_json(const std::optional<Holder>& holder) {
+  if (!holder) return nullptr;
+  return {{"pid", holder->pid}, {"program", holder->program}};
+}
+
+std::string holder_line(const std::optional<Holder>& holder) {
+  if (!holder) return {};
+  return fmt::format("  held by  {} (process {})\n", holder->program, holder->pid);
+}
+
 ordered_json camera_json(const ListedCamera& camera) {
   const CameraFound& found = camera.found;
   ordered_json modes = ordered_json::array();
@@ -75,18 +85,26 @@ ordered_json camera_json(const ListedCamera& camera) {
                     {"trim_range_ppm", nullptr},
                     {"external_trigger", found.trigger == ExternalTrigger::present},
                     {"link_megabits", nullptr},
-                    {"held_by", nullptr},
+                    {"held_by", holder_json(found.holder)},
                     {"notes", found.notes},
                     {"modes", std::move(modes)}};
   if (found.trim) json["trim_range_ppm"] = found.trim->range.value();
   if (found.link_megabits) json["link_megabits"] = *found.link_megabits;
-  if (found.holder) json["held_by"] = {{"pid", found.holder->pid}, {"program", found.holder->program}};
   return json;
 }
 
-bool has(const DeviceList& list, const std::string& id) {
-  return std::any_of(list.cameras.begin(), list.cameras.end(),
-                     [&](const ListedCamera& camera) { return camera.found.id == id; });
+const std::string& id_of(const ListedCamera& camera) { return camera.found.id; }
+const std::string& id_of(const StrobeFound& port) { return port.id; }
+
+/// Those of `devices` whose ids `others` lack.
+template <class Found>
+std::vector<Found> without(const std::vector<Found>& devices, const std::vector<Found>& others) {
+  std::vector<Found> left;
+  std::copy_if(devices.begin(), devices.end(), std::back_inserter(left), [&](const Found& device) {
+    return std::none_of(others.begin(), others.end(),
+                        [&](const Found& other) { return id_of(other) == id_of(device); });
+  });
+  return left;
 }
 
 }  // namespace
@@ -96,7 +114,7 @@ std::span<const CameraDriver> camera_drivers() {
   return drivers;
 }
 
-DeviceList list_devices(std::span<const CameraDriver> drivers) {
+DeviceList list_cameras(std::span<const CameraDriver> drivers) {
   std::vector<std::future<Result<std::vector<CameraFound>>>> asked;
   asked.reserve(drivers.size());
   for (const CameraDriver& driver : drivers) asked.push_back(std::async(std::launch::async, driver.find));
@@ -117,6 +135,16 @@ DeviceList list_devices(std::span<const CameraDriver> drivers) {
   return list;
 }
 
+DeviceList list_devices() {
+  DeviceList list = list_cameras(camera_drivers());
+  if (auto ports = find_serial_strobes()) {
+    list.ports = std::move(ports).value();
+  } else {
+    list.failures.push_back(ports.error());
+  }
+  return list;
+}
+
 Result<ListedCamera> find_camera(const DeviceList& list, const std::string& id) {
   std::string there;
   for (const ListedCamera& camera : list.cameras) {
@@ -128,12 +156,8 @@ Result<ListedCamera> find_camera(const DeviceList& list, const std::string& id) 
 }
 
 DeviceChanges changes(const DeviceList& before, const DeviceList& after) {
-  DeviceChanges changed;
-  std::copy_if(after.cameras.begin(), after.cameras.end(), std::back_inserter(changed.came),
-               [&](const ListedCamera& camera) { return !has(before, camera.found.id); });
-  std::copy_if(before.cameras.begin(), before.cameras.end(), std::back_inserter(changed.went),
-               [&](const ListedCamera& camera) { return !has(after, camera.found.id); });
-  return changed;
+  return {{without(after.cameras, before.cameras), without(after.ports, before.ports), {}},
+          {without(before.cameras, after.cameras), without(before.ports, after.ports), {}}};
 }
 
 std::string device_table(const DeviceList& list, Detail detail) {
@@ -142,9 +166,14 @@ std::string device_table(const DeviceList& list, Detail detail) {
     const CameraFound& found = camera.found;
     table += fmt::format("{}\n  is       {}, {} at {}\n  films    {}\n  can      {}\n", found.id, found.model,
                          camera.driver, found.address, modes_words(found, detail), can_words(found));
-    if (found.holder)
-      table += fmt::format("  held by  {} (process {})\n", found.holder->program, found.holder->pid);
+    table += holder_line(found.holder);
     for (const std::string& note : found.notes) table += fmt::format("  note     {}\n", note);
+  }
+  for (const StrobeFound& port : list.ports) {
+    table += fmt::format(
+        "{}\n  is       {}, serial port {}; `emberlock devices probe {}` asks whether it is a strobe\n",
+        port.id, port.model, port.address, port.id);
+    table += holder_line(port.holder);
   }
   return table;
 }
@@ -152,10 +181,18 @@ std::string device_table(const DeviceList& list, Detail detail) {
 std::string device_json(const DeviceList& list) {
   ordered_json cameras = ordered_json::array();
   for (const ListedCamera& camera : list.cameras) cameras.push_back(camera_json(camera));
+  ordered_json ports = ordered_json::array();
+  for (const StrobeFound& port : list.ports) {
+    ports.push_back({{"id", port.id},
+                     {"model", port.model},
+                     {"address", port.address},
+                     {"held_by", holder_json(port.holder)}});
+  }
   ordered_json failures = ordered_json::array();
   for (const Error& failure : list.failures) failures.push_back(failure.message());
-  return ordered_json{{"cameras", std::move(cameras)}, {"failures", std::move(failures)}}.dump(
-      -1, ' ', false, ordered_json::error_handler_t::replace);
+  return ordered_json{
+      {"cameras", std::move(cameras)}, {"serial_ports", std::move(ports)}, {"failures", std::move(failures)}}
+      .dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
 }  // namespace emberlock::cli

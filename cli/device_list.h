@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "drivers/driver.h"
+#include "drivers/strobe_serial/strobe_serial.h"
 
 // Everything that is there, by all drivers.
 namespace emberlock::cli {
@@ -14,9 +15,10 @@ struct ListedCamera {
   CameraFound found;
 };
 
-/// What was found, by driver and id.
+/// What was found: cameras by driver and id, and the serial ports, any of which may lead to a strobe.
 struct DeviceList {
   std::vector<ListedCamera> cameras;
+  std::vector<StrobeFound> ports;
   std::vector<Error> failures;  ///< of drivers that couldn't look
 };
 
@@ -24,22 +26,24 @@ struct DeviceList {
 std::span<const CameraDriver> camera_drivers();
 
 /// Asks all drivers at once.
-DeviceList list_devices(std::span<const CameraDriver> drivers);
+DeviceList list_cameras(std::span<const CameraDriver> drivers);
+/// The cameras of all drivers, and the serial ports.
+DeviceList list_devices();
 
 /// The camera of this id, with its driver. Error bad_input names what there is instead.
 Result<ListedCamera> find_camera(const DeviceList& list, const std::string& id);
 
 /// What came and what went from one list to the next, by id.
 struct DeviceChanges {
-  std::vector<ListedCamera> came;
-  std::vector<ListedCamera> went;
+  DeviceList came;
+  DeviceList went;
 };
 DeviceChanges changes(const DeviceList& before, const DeviceList& after);
 
 /// Lines for people, a block a camera; `Detail::all_modes` with every mode.
 enum class Detail { best_mode, all_modes };
 std::string device_table(const DeviceList& list, Detail detail);
-/// One JSON object: {"cameras": [...], "failures": [...]}.
+/// One JSON object: {"cameras": [...], "serial_ports": [...], "failures": [...]}.
 std::string device_json(const DeviceList& list);
 
 }  // namespace emberlock::cli

@@ -41,7 +41,7 @@ void print_failures(const DeviceList& list) {
 }
 
 void list(const ListArguments& arguments) {
-  const DeviceList found = list_devices(camera_drivers());
+  const DeviceList found = list_devices();
   if (arguments.json) {
     std::printf("%s\n", device_json(found).c_str());
     return;
@@ -56,13 +56,13 @@ void list(const ListArguments& arguments) {
   }
 }
 
-/// Cameras that come and go, as they do, until Ctrl-C.
+/// Devices that come and go, as they do, until Ctrl-C.
 void watch() {
   constexpr Seconds kLook{2};  // network cameras say nothing when they come
   const Interrupt interrupt;
   auto hotplug = HotplugMonitor::open({"video4linux", "usb", "tty"});
   if (!hotplug) std::fprintf(stderr, "emberlock: %s\n", hotplug.error().message().c_str());
-  DeviceList before = list_devices(camera_drivers());
+  DeviceList before = list_devices();
   std::printf("%s", device_table(before, Detail::best_mode).c_str());
   std::fflush(stdout);
   SteadyClock clock;
@@ -72,11 +72,13 @@ void watch() {
     } else {
       clock.sleep_until(clock.now() + kLook);
     }
-    DeviceList after = list_devices(camera_drivers());
+    DeviceList after = list_devices();
     const DeviceChanges changed = changes(before, after);
-    for (const ListedCamera& camera : changed.went) std::printf("gone: %s\n", camera.found.id.c_str());
-    if (!changed.came.empty())
-      std::printf("came:\n%s", device_table({changed.came, {}}, Detail::best_mode).c_str());
+    for (const ListedCamera& camera : changed.went.cameras)
+      std::printf("gone: %s\n", camera.found.id.c_str());
+    for (const StrobeFound& port : changed.went.ports) std::printf("gone: %s\n", port.id.c_str());
+    if (const std::string came = device_table(changed.came, Detail::best_mode); !came.empty())
+      std::printf("came:\n%s", came.c_str());
     std::fflush(stdout);
     before = std::move(after);
   }
@@ -117,10 +119,9 @@ Result<Probed> probe_virtual(const ProbeArguments& arguments, const ProbeOptions
                "there is virtual-00 and so on"};
 }
 
-Result<Probed> probe_real(const ProbeArguments& arguments, const ProbeOptions& options) {
+Result<Probed> probe_real(const ProbeArguments& arguments, const ProbeOptions& options,
+                          const DeviceList& there) {
   EMBERLOCK_ASSIGN_OR_RETURN(const CameraRequest request, request_from(arguments));
-  const DeviceList there = list_devices(camera_drivers());
-  print_failures(there);
   EMBERLOCK_ASSIGN_OR_RETURN(const ListedCamera listed, find_camera(there, arguments.id));
   const auto drivers = camera_drivers();
   const auto driver = std::find_if(drivers.begin(), drivers.end(),
@@ -177,14 +178,31 @@ void print_probe(const Probed& probed) {
                                                                 : "not fit as it is");
 }
 
+void print_json(const nlohmann::ordered_json& json) {
+  std::printf("%s\n", json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
+}
+
+/// Whether a serial port leads to a strobe, and to which.
+void probe_port(const ProbeArguments& arguments, const StrobeFound& port) {
+  const StrobeIdentity strobe = or_fail(identify_strobe(port.id));
+  const std::string dialect(name_of(strobe.dialect));
+  if (arguments.json) return print_json({{"id", port.id}, {"dialect", dialect}, {"model", strobe.model}});
+  std::printf("%s (%s): a strobe, %s, that speaks %s\n", port.id.c_str(), port.address.c_str(),
+              strobe.model.c_str(), dialect.c_str());
+}
+
 void probe(const ProbeArguments& arguments) {
+  DeviceList there;
+  if (arguments.rig.empty()) there = list_devices();
+  print_failures(there);
+  for (const StrobeFound& port : there.ports) {
+    if (port.id == arguments.id) return probe_port(arguments, port);
+  }
   const ProbeOptions options{Seconds(arguments.seconds), arguments.resets};
-  const Probed probed =
-      or_fail(arguments.rig.empty() ? probe_real(arguments, options) : probe_virtual(arguments, options));
+  const Probed probed = or_fail(arguments.rig.empty() ? probe_real(arguments, options, there)
+                                                      : probe_virtual(arguments, options));
   if (arguments.json) {
-    std::printf(
-        "%s\n",
-        probe_json(probed).dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
+    print_json(probe_json(probed));
   } else {
     print_probe(probed);
   }
@@ -193,10 +211,11 @@ void probe(const ProbeArguments& arguments) {
 
 void add_probe(CLI::App& devices) {
   auto a = std::make_shared<ProbeArguments>();
-  CLI::App* verb = devices.add_subcommand(
-      "probe",
-      "Films for some seconds with one camera and judges: rate, losses by cause, arrival, bandwidth.");
-  verb->add_option("ID", a->id, "The camera, as `emberlock devices` names it")->required();
+  CLI::App* verb = devices.add_subcommand("probe",
+                                          "Films for some seconds with one camera and judges: rate, losses "
+                                          "by cause, arrival, bandwidth. Asks a serial "
+                                          "port whether it leads to a strobe, and which.");
+  verb->add_option("ID", a->id, "The camera or port, as `emberlock devices` names it")->required();
   verb->add_option("--seconds", a->seconds, "How long to film")
       ->check(CLI::Range(0.5, 3600.0))
       ->capture_default_str();
@@ -214,7 +233,8 @@ void add_probe(CLI::App& devices) {
 void add_devices(CLI::App& app) {
   auto a = std::make_shared<ListArguments>();
   CLI::App* verb = app.add_subcommand(
-      "devices", "Lists the cameras that are there, what they can do, and which process holds them.");
+      "devices",
+      "Lists the cameras and serial ports that are there, what they can do, and which process holds them.");
   verb->require_subcommand(0, 1);
   verb->add_flag("--modes", a->all_modes, "With every way in which each camera can film");
   verb->add_flag("--json", a->json, "One JSON object");
@@ -222,7 +242,7 @@ void add_devices(CLI::App& app) {
     if (verb->get_subcommands().empty()) list(*a);
   });
   add_probe(*verb);
-  verb->add_subcommand("watch", "Lists cameras as they come and go, until Ctrl-C.")->callback(watch);
+  verb->add_subcommand("watch", "Lists devices as they come and go, until Ctrl-C.")->callback(watch);
 }
 
 }  // namespace emberlock::cli

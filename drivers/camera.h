@@ -83,9 +83,9 @@ class Camera {
   /// Drops the frames that came until `until` and weren't taken, as nobody wants them: they aren't lost.
   /// Returns how many.
   virtual std::uint64_t pass_over(TimePoint until) = 0;
-  /// Draws the shutter phase anew, the action starting at `at` (at once if that has passed). Frames queued
-  /// before it are dropped: the next frame shows the new phase. Error `device` when the camera can't
-  /// (ShutterReset::none).
+  /// Draws the shutter phase anew, the action starting at `at` (at once if that has passed); may wait until
+  /// then. Frames queued before it are dropped: the next frame shows the new phase. Error `device` when the
+  /// camera can't (ShutterReset::none).
   virtual Status reset_shutter(TimePoint at) = 0;
   /// Films faster than its own rate by `trim` from soon on, resets of the shutter notwithstanding; no frame
   /// is lost. What is asked for is rounded to a step. Error `device` when the camera can't, or not so far.

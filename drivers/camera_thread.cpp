@@ -30,6 +30,9 @@ Seconds since(Time t) { return Seconds(std::chrono::duration<double>(now() - t).
 
 /// How long one wait for a frame is, so that orders are soon heard.
 constexpr Seconds kSlice = milliseconds(20);
+constexpr const char* kReset = "reset_shutter";
+/// How long before its instant a camera is told of a reset.
+constexpr Seconds kPrepared = milliseconds(5);
 
 }  // namespace
 
@@ -70,51 +73,71 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     return all;
   }
 
-  /// Has the thread call `order`, and waits for what comes of it.
-  Status call(const std::string& what, std::function<Status(Camera&)> order) {
+  /// Has the thread call `act`, and waits for what comes of it. One that isn't done in time never is.
+  Status call(const std::string& what, std::function<Status(Camera&)> act) {
     std::unique_lock lock(mutex_);
     if (hangs()) return hanging();
     const auto answer = std::make_shared<std::optional<Status>>();
-    orders_.push_back({what, now(), [order = std::move(order), answer, this](Camera& camera) {
-                         Status status = order(camera);
-                         const std::lock_guard inner(mutex_);
-                         *answer = std::move(status);
-                       }});
-    thread_wakes_.notify_all();
+    const auto given_up = std::make_shared<bool>(false);
+    order(what, now(), [act = std::move(act), answer, given_up, this](Camera& camera) {
+      {
+        const std::lock_guard inner(mutex_);
+        if (*given_up) return;
+      }
+      Status status = act(camera);
+      const std::lock_guard inner(mutex_);
+      *answer = std::move(status);
+    });
     // One wait for a frame may have to end first.
     const Time until = after(now(), options_.call_deadline + kSlice);
     owner_wakes_.wait_until(lock, until, [&] { return answer->has_value(); });
     if (answer->has_value()) return **answer;
+    *given_up = true;
     return hangs() ? hanging() : silent(what);
   }
 
   Status start() {
+    std::uint64_t film = 0;
     {
       const std::lock_guard lock(mutex_);
       if (filming_ && !hangs()) return {};
+      film = ++film_;
     }
-    return call("start", [this](Camera& camera) {
+    const Status started = call("start", [film, this](Camera& camera) {
       Status status = camera.start();
       const std::lock_guard lock(mutex_);
+      if (film != film_) return status;  // too late: nobody waits for it
       filming_ = status.ok();
       lost_ = false;
       return status;
     });
+    const std::lock_guard lock(mutex_);
+    if (!started) ++film_;
+    return started;
   }
 
+  /// Also of a camera that hangs: it is stopped when it goes on.
   Status stop() {
-    {
-      const std::lock_guard lock(mutex_);
-      filming_ = false;
-    }
-    Status stopped = call("stop", [](Camera& camera) {
-      camera.stop();
-      return Status{};
-    });
-    const std::lock_guard lock(mutex_);
+    std::unique_lock lock(mutex_);
+    filming_ = false;
+    lost_ = false;
+    ++film_;
+    orders_.clear();
+    resets_to_do_ = 0;
     drop_frames();
     waiting_.clear();
-    return stopped;
+    const auto stopped = std::make_shared<bool>(false);
+    order("stop", now(), [stopped, this](Camera& camera) {
+      camera.stop();
+      const std::lock_guard inner(mutex_);
+      *stopped = true;
+    });
+    const Time until = after(now(), options_.call_deadline + kSlice);
+    while (!*stopped && now() < until && !hangs()) {
+      owner_wakes_.wait_until(lock, busy_until_ ? std::min(until, *busy_until_) : until);
+    }
+    if (*stopped) return {};
+    return hangs() ? hanging() : silent("stop");
   }
 
   Result<Frame> next_frame(Seconds deadline) {
@@ -134,9 +157,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       return Error{ErrorKind::device, "it does not film", where(), "start() it first"};
     }
     if (lost_) {
-      return Error{ErrorKind::timed_out,
-                   fmt::format("it has been away for {:.1f} s", since(lost_since_).value()), where(),
-                   "plug it in again, or switch it on; it films on by itself"};
+      return away();
     }
     return Error{ErrorKind::timed_out, fmt::format("no frame within {:g} s", deadline.value()), where(),
                  "wait longer than a frame period; see whether its lamp says that it films"};
@@ -162,17 +183,18 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     }
     if (hangs()) return hanging();
     if (!filming_) return Error{ErrorKind::device, "it does not film", where(), "start() it first"};
-    const auto reset = [at, this](Camera& camera) {
+    if (lost_) return away();
+    ++resets_to_do_;
+    const Time begins = after(now(), at - SteadyClock().now());
+    order(kReset, begins, [at, film = film_, this](Camera& camera) {
       const Status status = camera.reset_shutter(at);
       const std::lock_guard inner(mutex_);
+      if (film != film_) return;
       drop_frames();
-      if (!status) waiting_.push_back(status.error());
-      --resets_to_do_;
-    };
-    ++resets_to_do_;
-    orders_.push_back({"reset_shutter", after(now(), at - SteadyClock().now()), reset});
+      if (resets_to_do_ > 0) --resets_to_do_;
+      if (!status) lose(status.error());
+    });
     drop_frames();
-    thread_wakes_.notify_all();
     return {};
   }
 
@@ -192,10 +214,27 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
             fmt::format("it hangs, for {:.1f} s so far, in {}", since(busy_since_).value(), busy_with_),
             where(), "unplug it or switch it off and on again; the other cameras go on"};
   }
+  [[nodiscard]] Error away() const {
+    return {ErrorKind::timed_out, fmt::format("it has been away for {:.1f} s", since(lost_since_).value()),
+            where(), "plug it in again, or switch it on; it films on by itself"};
+  }
   [[nodiscard]] Error silent(const std::string& what) const {
     return {ErrorKind::timed_out,
             fmt::format("{} wasn't done within {:g} s", what, options_.call_deadline.value()), where(),
             "unplug it or switch it off and on again"};
+  }
+  void order(std::string what, Time begins, std::function<void(Camera&)> act) {
+    orders_.push_back({std::move(what), begins, std::move(act)});
+    thread_wakes_.notify_all();
+  }
+  void lose(const Error& error) {
+    log(LogCategory::drivers).warn("{}", error.message());
+    lost_ = true;
+    lost_since_ = now();
+    retry_at_ = after(now(), options_.retry);
+    waiting_.push_back(error);
+    std::erase_if(orders_, [](const Order& order) { return order.what == kReset; });
+    resets_to_do_ = 0;
   }
   void drop_frames() {
     own_.passed_over += static_cast<std::uint64_t>(
@@ -214,7 +253,9 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       std::unique_lock<std::mutex>& lock;
       Worker& worker;
       ~Done() {
+        const FrameCounts counted = worker.camera_->counts();
         lock.lock();
+        worker.of_camera_ = counted;
         worker.busy_until_.reset();
         worker.owner_wakes_.notify_all();
       }
@@ -222,13 +263,30 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     return act(*camera_);
   }
 
+  /// The first order whose time has come. What the camera shall do at an instant it is told a little before,
+  /// so that it needn't be woken for it.
+  std::optional<Order> due() {
+    const Time soon = after(now(), kPrepared);
+    const auto first = std::find_if(orders_.begin(), orders_.end(),
+                                    [&](const Order& order) { return order.begins <= soon; });
+    if (first == orders_.end()) return {};
+    Order found = std::move(*first);
+    orders_.erase(first);
+    return found;
+  }
+
+  /// How long the thread may wait for something else.
+  [[nodiscard]] Seconds until_next_order() const {
+    Seconds wait = kSlice;
+    for (const Order& order : orders_) wait = std::min(wait, -since(order.begins) - kPrepared);
+    return std::max(wait, Seconds(0));
+  }
+
   void run() {
     std::unique_lock lock(mutex_);
     while (!quit_) {
-      if (!orders_.empty()) {
-        const Order order = std::move(orders_.front());
-        orders_.pop_front();
-        busy(lock, order.what, order.begins, order.act);
+      if (const auto order = due()) {
+        busy(lock, order->what, order->begins, order->act);
       } else if (filming_ && !lost_) {
         take_frame(lock);
       } else if (filming_ && now() >= retry_at_) {
@@ -239,35 +297,31 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
         thread_wakes_.wait(lock);
       }
     }
-    busy(lock, "stop", now(), [this](Camera& camera) {
-      camera.stop();
-      camera_.reset();
-    });
+    busy(lock, "stop", now(), [](Camera& camera) { camera.stop(); });
+    busy_until_ = after(now(), options_.call_deadline);
+    lock.unlock();
+    camera_.reset();
+    lock.lock();
+    busy_until_.reset();
     done_ = true;
     owner_wakes_.notify_all();
   }
 
   void take_frame(std::unique_lock<std::mutex>& lock) {
-    auto [next, counted] = busy(lock, "next_frame", after(now(), kSlice), [](Camera& camera) {
-      auto frame = camera.next_frame(kSlice);
-      return std::pair(std::move(frame), camera.counts());
-    });
-    of_camera_ = counted;
-    if (next) return add(std::move(next));
-    if (next.error().kind == ErrorKind::timed_out) return;
-    if (next.error().kind == ErrorKind::device) {
-      log(LogCategory::drivers).warn("{}", next.error().message());
-      lost_ = true;
-      lost_since_ = now();
-      retry_at_ = after(now(), options_.retry);
-    } else if (next.error().kind == ErrorKind::out_of_data) {
-      filming_ = false;
-    }
-    waiting_.push_back(std::move(next));
+    const std::uint64_t film = film_;
+    const Seconds slice = until_next_order();
+    Result<Frame> next = busy(lock, "next_frame", after(now(), slice),
+                              [slice](Camera& camera) { return camera.next_frame(slice); });
+    if (next) return add(std::move(next), film);
+    if (film != film_ || next.error().kind == ErrorKind::timed_out) return;
+    if (next.error().kind == ErrorKind::device) return lose(next.error());
+    if (next.error().kind == ErrorKind::out_of_data) filming_ = false;
+    // The same trouble again and again is said once.
+    if (waiting_.empty() || waiting_.back()) waiting_.push_back(std::move(next));
   }
 
-  void add(Result<Frame> frame) {
-    if (resets_to_do_ > 0) {
+  void add(Result<Frame> frame, std::uint64_t film) {
+    if (resets_to_do_ > 0 || film != film_) {
       ++own_.passed_over;
     } else if (frame->stamp.monotonic_time <= wanted_from_) {
       ++passed_unsaid_;
@@ -310,7 +364,8 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   std::uint64_t passed_unsaid_ = 0;  ///< dropped after pass_over() returned; the next one says so
   TimePoint wanted_from_;
   int resets_to_do_ = 0;
-  bool filming_ = false;  ///< as the owner wants it
+  std::uint64_t film_ = 0;  ///< counts starts and stops: what was begun before one is nobody's any more
+  bool filming_ = false;    ///< as the owner wants it
   bool lost_ = false;
   Time lost_since_;
   Time retry_at_;

@@ -40,7 +40,7 @@ const std::vector<CameraDriver> kDrivers{
 };
 
 TEST(Devices, AllDriversAreAskedAndOneThatFailsHidesNoOther) {
-  const DeviceList list = list_devices(kDrivers);
+  const DeviceList list = list_cameras(kDrivers);
   ASSERT_EQ(list.cameras.size(), 3);
   EXPECT_EQ(list.cameras[0].found.id, "a1");
   EXPECT_EQ(list.cameras[1].found.id, "b1");
@@ -50,31 +50,38 @@ TEST(Devices, AllDriversAreAskedAndOneThatFailsHidesNoOther) {
 }
 
 TEST(Devices, AnUnknownIdIsToldWhatThereIs) {
-  const DeviceList list = list_devices(kDrivers);
+  const DeviceList list = list_cameras(kDrivers);
   EXPECT_EQ(find_camera(list, "b1")->driver, "second");
   EXPECT_THAT(find_camera(list, "b7").error().message(), HasSubstr("a1, b1, b2"));
   EXPECT_EQ(find_camera({}, "b7").error().kind, ErrorKind::bad_input);
 }
 
 TEST(Devices, WhatCameAndWhatWentIsToldById) {
-  const DeviceList before = list_devices(kDrivers);
+  const DeviceList before = list_cameras(kDrivers);
   DeviceList after = before;
   after.cameras.erase(after.cameras.begin());
   after.cameras.push_back({"first", camera("a9")});
+  after.ports.push_back({"SN7", "Pico", "/dev/ttyACM0"});
   const DeviceChanges changed = changes(before, after);
-  ASSERT_EQ(changed.came.size(), 1);
-  EXPECT_EQ(changed.came[0].found.id, "a9");
-  ASSERT_EQ(changed.went.size(), 1);
-  EXPECT_EQ(changed.went[0].found.id, "a1");
+  ASSERT_EQ(changed.came.cameras.size(), 1);
+  EXPECT_EQ(changed.came.cameras[0].found.id, "a9");
+  ASSERT_EQ(changed.went.cameras.size(), 1);
+  EXPECT_EQ(changed.went.cameras[0].found.id, "a1");
+  ASSERT_EQ(changed.came.ports.size(), 1);
+  EXPECT_EQ(changed.came.ports[0].id, "SN7");
+  EXPECT_TRUE(changed.went.ports.empty());
 }
 
 TEST(Devices, TheTableSaysWhatACameraCanDoAndWhoHoldsIt) {
-  DeviceList list = list_devices(kDrivers);
+  DeviceList list = list_cameras(kDrivers);
   list.cameras[0].found.holder = Holder{4711, "gvfsd-gphoto2"};
   list.cameras[0].found.trim = FrameRateTrim{PartsPerMillion(200), PartsPerMillion(5), Seconds(.1)};
   list.cameras[1].found.modes.clear();
   list.cameras[2].found.trigger = ExternalTrigger::present;
+  list.ports.push_back({"SN7", "Pico", "/dev/ttyACM0", Holder{12, "minicom"}});
   const std::string table = device_table(list, Detail::best_mode);
+  EXPECT_THAT(table, HasSubstr("Pico, serial port /dev/ttyACM0; `emberlock devices probe SN7`"));
+  EXPECT_THAT(table, HasSubstr("minicom (process 12)"));
   EXPECT_THAT(table, HasSubstr("gvfsd-gphoto2 (process 4711)"));
   EXPECT_THAT(table, HasSubstr("1280 x 720 rgb8 (YUYV) at 10/s, 1 more"));
   EXPECT_THAT(table, Not(HasSubstr("640 x 480")));
@@ -85,10 +92,12 @@ TEST(Devices, TheTableSaysWhatACameraCanDoAndWhoHoldsIt) {
 }
 
 TEST(Devices, TheJsonHoldsTheSame) {
-  DeviceList list = list_devices(kDrivers);
+  DeviceList list = list_cameras(kDrivers);
   list.cameras[0].found.holder = Holder{4711, "gvfsd-gphoto2"};
   list.cameras[0].found.link_megabits = 480;
+  list.ports.push_back({"SN7", "Pico", "/dev/ttyACM0", Holder{12, "minicom"}});
   const auto json = nlohmann::json::parse(device_json(list));
+  EXPECT_EQ(json["serial_ports"][0]["held_by"]["program"], "minicom");
   ASSERT_EQ(json["cameras"].size(), 3);
   EXPECT_EQ(json["cameras"][0]["held_by"]["pid"], 4711);
   EXPECT_EQ(json["cameras"][0]["link_megabits"], 480);

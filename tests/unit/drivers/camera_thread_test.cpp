@@ -34,6 +34,9 @@ class Desk {
   std::atomic<int> stops{0};
   std::atomic<int> alive{0};
   std::atomic<double> trimmed{0};
+  std::atomic<int> resets{0};
+  std::atomic<std::int64_t> reset_at{0};
+  std::atomic<bool> refuses_resets{false};
 
   void make_frames(int count) {
     const std::lock_guard lock(mutex_);
@@ -108,6 +111,9 @@ class DeskCamera final : public Camera {
   std::uint64_t pass_over(TimePoint /*until*/) override { return 0; }
   Status reset_shutter(TimePoint at) override {
     SteadyClock().sleep_until(at);
+    desk_->reset_at = SteadyClock().now().ns;
+    ++desk_->resets;
+    if (desk_->refuses_resets) return Error{ErrorKind::device, "it refuses the reset", "camera c7", {}};
     if (!desk_->plugged) return Error{ErrorKind::device, "it was unplugged", "camera c7", {}};
     return {};
   }
@@ -130,9 +136,10 @@ struct CameraThreadTest : ::testing::Test {
 
   void until(const std::function<bool()>& holds) const {
     const auto give_up = steady_clock::now() + std::chrono::seconds(5);
-    while (!holds() && steady_clock::now() < give_up)
+    bool held = false;
+    while (!(held = holds()) && steady_clock::now() < give_up)
       std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    ASSERT_TRUE(holds());
+    ASSERT_TRUE(held);
   }
 };
 
@@ -212,27 +219,69 @@ TEST_F(CameraThreadTest, OneThatHangsForGoodIsLeftBehindInBoundedTime) {
   until([&] { return desk->alive == 0; });
 }
 
-TEST_F(CameraThreadTest, AResetReturnsAtOnceAndDropsWhatShowsTheOldPhase) {
+TEST_F(CameraThreadTest, AResetReturnsBeforeItsInstantAndNoFrameOfTheOldPhaseIsHandedOn) {
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(2);
   EXPECT_TRUE(camera->next_frame(kSoon).ok());
-  const auto began = steady_clock::now();
-  const TimePoint at = SteadyClock().now() + milliseconds(100);
+  const TimePoint at = SteadyClock().now() + milliseconds(150);
   ASSERT_TRUE(camera->reset_shutter(at).ok());
-  EXPECT_LT(steady_clock::now() - began, std::chrono::milliseconds(90));
-  EXPECT_EQ(camera->next_frame(milliseconds(20)).error().kind, ErrorKind::timed_out);
-  SteadyClock().sleep_until(at + milliseconds(50));
-  desk->make_frames(1);
-  EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, 2);
-  EXPECT_EQ(camera->counts(), (FrameCounts{.delivered = 2, .passed_over = 1}));
+  EXPECT_LT(SteadyClock().now(), at);
+  desk->make_frames(3);  // before the instant
+  until([&] { return camera->counts().passed_over == 4; });
+  until([&] { return desk->resets == 1; });
+  EXPECT_GE(desk->reset_at.load(), at.ns);
+  until([&] {
+    desk->make_frames(1);
+    return camera->next_frame(milliseconds(20)).ok();
+  });
+  const FrameCounts counts = camera->counts();
+  EXPECT_EQ(counts.delivered, 2);
+  EXPECT_GE(counts.passed_over, 4);
 }
 
-TEST_F(CameraThreadTest, AResetThatFailsIsSaidByTheNextFrame) {
+TEST_F(CameraThreadTest, OthersAreHeardWhileAResetWaitsForItsInstant) {
   ASSERT_TRUE(camera->start().ok());
-  const TimePoint at = SteadyClock().now() + milliseconds(60);
-  ASSERT_TRUE(camera->reset_shutter(at).ok());
+  ASSERT_TRUE(camera->reset_shutter(SteadyClock().now() + Seconds(60)).ok());
+  EXPECT_TRUE(camera->trim_rate(PartsPerMillion(7)).ok());
+  EXPECT_EQ(desk->trimmed, 7);
+  camera->stop();
+  EXPECT_EQ(desk->stops, 1);
+  EXPECT_EQ(camera->state(), State::idle);
+  ASSERT_TRUE(camera->start().ok());
+  desk->make_frames(1);
+  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+  EXPECT_EQ(desk->resets, 0);
+}
+
+TEST_F(CameraThreadTest, AResetThatFailsIsSaidOnceByTheNextFrame) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->refuses_resets = true;
+  ASSERT_TRUE(camera->reset_shutter(SteadyClock().now()).ok());
+  EXPECT_THAT(camera->next_frame(kSoon).error().message(), HasSubstr("it refuses the reset"));
+  const auto next = camera->next_frame(milliseconds(30));
+  EXPECT_TRUE(next.ok() || next.error().kind == ErrorKind::timed_out) << next.error().message();
+}
+
+TEST_F(CameraThreadTest, WhatIsAwayCannotBeReset) {
+  ASSERT_TRUE(camera->start().ok());
   desk->plugged = false;
   EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::device);
+  EXPECT_EQ(camera->reset_shutter({}).error().kind, ErrorKind::timed_out);
+}
+
+TEST_F(CameraThreadTest, StoppedWhileItHangsItIsStoppedWhenItGoesOn) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->hang();
+  EXPECT_FALSE(camera->next_frame(kSoon).ok());
+  camera->stop();
+  EXPECT_EQ(desk->stops, 0);
+  desk->make_frames(1);
+  desk->go_on();
+  until([&] { return desk->stops == 1; });
+  EXPECT_EQ(camera->state(), State::idle);
+  ASSERT_TRUE(camera->start().ok());
+  EXPECT_EQ(camera->next_frame(milliseconds(20)).error().kind, ErrorKind::timed_out);  // frame 0 was nobody's
+  EXPECT_EQ(camera->counts().passed_over, 1);
 }
 
 TEST_F(CameraThreadTest, AShutterThatCannotBeResetIsRefusedAtOnce) {
@@ -253,14 +302,15 @@ TEST_F(CameraThreadTest, FramesPassedOverAreSaidAndCounted) {
 
 TEST_F(CameraThreadTest, StopDropsWhatWaits) {
   ASSERT_TRUE(camera->start().ok());
-  desk->make_frames(2);
-  until([&] { return !desk->take(); });
+  desk->make_frames(6);
+  until([&] { return camera->counts().queue == 2; });  // all six have come, four wait
   camera->stop();
   EXPECT_EQ(desk->stops, 1);
+  EXPECT_EQ(camera->counts(), (FrameCounts{.queue = 2, .passed_over = 4}));
   EXPECT_EQ(camera->next_frame(milliseconds(5)).error().kind, ErrorKind::device);
   ASSERT_TRUE(camera->start().ok());
   desk->make_frames(1);
-  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+  EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, 6);
 }
 
 TEST_F(CameraThreadTest, TrimsReachTheCamera) {

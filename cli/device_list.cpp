@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "drivers/aravis/aravis_driver.h"
 #include "drivers/ptp/driver.h"
 #include "drivers/v4l2/v4l2.h"
 
@@ -15,6 +16,8 @@ namespace emberlock::cli {
 namespace {
 
 using nlohmann::ordered_json;
+
+constexpr std::string_view kSerialPorts = "strobe_serial";
 
 std::string_view name(ShutterReset reset) {
   switch (reset) {
@@ -110,7 +113,7 @@ std::vector<Found> without(const std::vector<Found>& devices, const std::vector<
 }  // namespace
 
 std::span<const CameraDriver> camera_drivers() {
-  static const std::array<CameraDriver, 2> drivers{v4l2_driver(), ptp_driver()};
+  static const std::array<CameraDriver, 3> drivers{v4l2_driver(), aravis_driver(), ptp_driver()};
   return drivers;
 }
 
@@ -122,7 +125,7 @@ DeviceList list_cameras(std::span<const CameraDriver> drivers) {
   for (std::size_t i = 0; i < drivers.size(); ++i) {
     auto found = asked[i].get();
     if (!found) {
-      list.failures.push_back(found.error());
+      list.failures.push_back({drivers[i].name, found.error()});
       continue;
     }
     for (CameraFound& camera : *found) list.cameras.push_back({drivers[i].name, std::move(camera)});
@@ -140,7 +143,7 @@ DeviceList list_devices() {
   if (auto ports = find_serial_strobes()) {
     list.ports = std::move(ports).value();
   } else {
-    list.failures.push_back(ports.error());
+    list.failures.push_back({kSerialPorts, ports.error()});
   }
   return list;
 }
@@ -153,6 +156,15 @@ Result<ListedCamera> find_camera(const DeviceList& list, const std::string& id) 
   }
   return Error{ErrorKind::bad_input, "there is no such camera", id,
                there.empty() ? "no camera was found: see `emberlock devices`" : "there is " + there};
+}
+
+DeviceList keep_unseen(const DeviceList& before, DeviceList now) {
+  for (const DeviceList::Failure& failure : now.failures) {
+    std::copy_if(before.cameras.begin(), before.cameras.end(), std::back_inserter(now.cameras),
+                 [&](const ListedCamera& camera) { return camera.driver == failure.driver; });
+    if (failure.driver == kSerialPorts) now.ports = before.ports;
+  }
+  return now;
 }
 
 DeviceChanges changes(const DeviceList& before, const DeviceList& after) {
@@ -189,7 +201,7 @@ std::string device_json(const DeviceList& list) {
                      {"held_by", holder_json(port.holder)}});
   }
   ordered_json failures = ordered_json::array();
-  for (const Error& failure : list.failures) failures.push_back(failure.message());
+  for (const DeviceList::Failure& failure : list.failures) failures.push_back(failure.error.message());
   return ordered_json{
       {"cameras", std::move(cameras)}, {"serial_ports", std::move(ports)}, {"failures", std::move(failures)}}
       .dump(-1, ' ', false, ordered_json::error_handler_t::replace);

@@ -19,7 +19,11 @@ struct ListedCamera {
 struct DeviceList {
   std::vector<ListedCamera> cameras;
   std::vector<StrobeFound> ports;
-  std::vector<Error> failures;  ///< of drivers that couldn't look
+  struct Failure {
+    std::string_view driver;
+    Error error;
+  };
+  std::vector<Failure> failures;  ///< of drivers that couldn't look
 };
 
 /// Every driver of real cameras.
@@ -32,6 +36,9 @@ DeviceList list_devices();
 
 /// The camera of this id, with its driver. Error bad_input names what there is instead.
 Result<ListedCamera> find_camera(const DeviceList& list, const std::string& id);
+
+/// `now`, with what drivers that couldn't look this time had `before`.
+DeviceList keep_unseen(const DeviceList& before, DeviceList now);
 
 /// What came and what went from one list to the next, by id.
 struct DeviceChanges {

@@ -36,8 +36,8 @@ struct ProbeArguments {
 };
 
 void print_failures(const DeviceList& list) {
-  for (const Error& failure : list.failures)
-    std::fprintf(stderr, "emberlock: %s\n", failure.message().c_str());
+  for (const DeviceList::Failure& failure : list.failures)
+    std::fprintf(stderr, "emberlock: %s\n", failure.error.message().c_str());
 }
 
 void list(const ListArguments& arguments) {
@@ -72,7 +72,7 @@ void watch() {
     } else {
       clock.sleep_until(clock.now() + kLook);
     }
-    DeviceList after = list_devices();
+    DeviceList after = keep_unseen(before, list_devices());
     const DeviceChanges changed = changes(before, after);
     for (const ListedCamera& camera : changed.went.cameras)
       std::printf("gone: %s\n", camera.found.id.c_str());

@@ -103,7 +103,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       if (filming_ && !hangs()) return {};
       film = ++film_;
     }
-    const Status started = call("start", [film, this](Camera& camera) {
+    Status started = call("start", [film, this](Camera& camera) {
       Status status = camera.start();
       const std::lock_guard lock(mutex_);
       if (film != film_) return status;  // too late: nobody waits for it

@@ -46,7 +46,7 @@ TEST(Devices, AllDriversAreAskedAndOneThatFailsHidesNoOther) {
   EXPECT_EQ(list.cameras[1].found.id, "b1");
   EXPECT_EQ(list.cameras[2].found.id, "b2");
   ASSERT_EQ(list.failures.size(), 1);
-  EXPECT_THAT(list.failures[0].message(), HasSubstr("no bus"));
+  EXPECT_THAT(list.failures[0].error.message(), HasSubstr("no bus"));
 }
 
 TEST(Devices, AnUnknownIdIsToldWhatThereIs) {
@@ -70,6 +70,16 @@ TEST(Devices, WhatCameAndWhatWentIsToldById) {
   ASSERT_EQ(changed.came.ports.size(), 1);
   EXPECT_EQ(changed.came.ports[0].id, "SN7");
   EXPECT_TRUE(changed.went.ports.empty());
+}
+
+TEST(Devices, WhatADriverHadStaysWhileItCannotLook) {
+  DeviceList before;
+  before.cameras = {{"broken", camera("x1")}, {"first", camera("gone")}};
+  const DeviceList now = keep_unseen(before, list_cameras(kDrivers));
+  EXPECT_TRUE(find_camera(now, "x1").ok());
+  const DeviceChanges changed = changes(before, now);
+  ASSERT_EQ(changed.went.cameras.size(), 1);
+  EXPECT_EQ(changed.went.cameras[0].found.id, "gone");
 }
 
 TEST(Devices, TheTableSaysWhatACameraCanDoAndWhoHoldsIt) {

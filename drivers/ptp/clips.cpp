@@ -6,6 +6,7 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <set>
 #include <system_error>
 #include <utility>
 
@@ -31,6 +32,7 @@ constexpr Seconds kPartDeadline{10};
 constexpr Seconds kPollPause = milliseconds(20);
 constexpr double kSlowestBytesPerSecond = 200e3;
 constexpr std::uint32_t kTooLarge = 0xffffffff;
+constexpr std::uint16_t kFolder = 0x3001;
 
 Error io_error(const fs::path& file, const std::string& what) {
   return {ErrorKind::io, fmt::format("{}: {}", what, std::strerror(errno)), file.string(),
@@ -227,10 +229,19 @@ Status stop_movie(Chdk& chdk, Clock& clock, Seconds deadline) {
 }
 
 Result<std::vector<Clip>> list_clips(PtpSession& session) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::uint32_t> handles, session.objects());
+  // Folder by folder: some cameras give what lies in all of them at once, others only seem to.
+  EMBERLOCK_ASSIGN_OR_RETURN(std::vector<std::uint32_t> left, session.objects());
+  std::set<std::uint32_t> seen;
   std::vector<Clip> clips;
-  for (const std::uint32_t handle : handles) {
+  while (!left.empty()) {
+    const std::uint32_t handle = left.back();
+    left.pop_back();
+    if (!seen.insert(handle).second) continue;
     EMBERLOCK_ASSIGN_OR_RETURN(const PtpObjectInfo info, session.object_info(handle));
+    if (info.format == kFolder) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::uint32_t> inside, session.objects(handle));
+      left.insert(left.end(), inside.begin(), inside.end());
+    }
     if (!is_movie(info)) continue;
     if (info.bytes == kTooLarge) {
       log(LogCategory::drivers)

@@ -254,10 +254,10 @@ Result<std::vector<std::uint32_t>> PtpSession::storages() {
   return list.ok() ? std::move(list) : named(list.error());
 }
 
-Result<std::vector<std::uint32_t>> PtpSession::objects() {
-  // Of any storage and format, in any folder.
+Result<std::vector<std::uint32_t>> PtpSession::objects(std::uint32_t folder) {
+  // On any card, of any format.
   EMBERLOCK_ASSIGN_OR_RETURN(const PtpAnswer answer,
-                             transact({kGetObjectHandles, {kAny, 0, 0}}, kListDeadline));
+                             transact({kGetObjectHandles, {kAny, 0, folder}}, kListDeadline));
   auto list = parse_ptp_u32_array(answer.data);
   return list.ok() ? std::move(list) : named(list.error());
 }

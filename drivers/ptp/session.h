@@ -21,6 +21,8 @@ namespace emberlock {
 inline constexpr Seconds kPtpDeadline{1};
 
 inline constexpr std::uint16_t kPtpGetPartialObject = 0x101b;
+/// The folder that holds what lies in none.
+inline constexpr std::uint32_t kPtpRoot = 0xffffffff;
 
 /// Takes the data of an answer piece by piece; its error ends the transaction.
 using PtpSink = std::function<Status(std::span<const std::byte>)>;
@@ -72,8 +74,8 @@ class PtpSession {
 
   Result<PtpDeviceInfo> device_info();
   Result<std::vector<std::uint32_t>> storages();
-  /// Handles of all files and folders on the card; a full one may take seconds.
-  Result<std::vector<std::uint32_t>> objects();
+  /// Handles of the files and folders in a folder; of a full one that may take seconds.
+  Result<std::vector<std::uint32_t>> objects(std::uint32_t folder = kPtpRoot);
   Result<PtpObjectInfo> object_info(std::uint32_t handle);
   /// The whole of a file, into `sink`.
   Status object(std::uint32_t handle, std::uint64_t bytes, const PtpSink& sink, Seconds deadline);

@@ -342,6 +342,13 @@ Result<std::vector<UsbPtpDevice>> list_usb_ptp() {
   return found;
 }
 
+namespace {
+Error unopened(const UsbPtpDevice& device, int error) {
+  return {ErrorKind::device, fmt::format("it can't be opened: {}", libusb_strerror(error)), device.path,
+          "unplug it and plug it in again"};
+}
+}  // namespace
+
 Result<std::unique_ptr<PtpTransport>> open_usb_ptp(const UsbPtpDevice& device) {
   EMBERLOCK_ASSIGN_OR_RETURN(Bus bus, Bus::scan());
   for (libusb_device* candidate : bus.devices) {
@@ -357,11 +364,11 @@ Result<std::unique_ptr<PtpTransport>> open_usb_ptp(const UsbPtpDevice& device) {
       return Error{ErrorKind::device, "we may not open " + device.node().string(), device.path,
                    "install the udev rules and join their group (udev/README.md)"};
     }
-    if (error != 0) break;
+    if (error != 0) return unopened(device, error);
     Handle handle(raw);
     error = libusb_claim_interface(raw, interface->number);
     if (error == LIBUSB_ERROR_BUSY) return held_error(device.node(), device.path);
-    if (error != 0) break;
+    if (error != 0) return unopened(device, error);
     return std::unique_ptr<PtpTransport>(
         std::make_unique<UsbTransport>(std::move(bus.context), std::move(handle), *interface));
   }

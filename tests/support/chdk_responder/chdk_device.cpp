@@ -198,10 +198,14 @@ std::optional<Outgoing> Device::take(std::size_t most, TimePoint by) {
   return piece;
 }
 
-void Device::reset() {
+void Device::cancel() {
   inbox_.clear();
   outbox_.clear();
   awaiting_data_.reset();
+}
+
+void Device::reset() {
+  cancel();
   session_open_ = false;
 }
 
@@ -262,7 +266,7 @@ std::vector<std::byte> Device::object_info(std::uint32_t handle) const {
   Bytes bytes;
   bytes.u32(kStorage).u16(object.format).u16(0).u32(object.bytes).u16(0);
   for (int i = 0; i < 6; ++i) bytes.u32(0);
-  bytes.u32(0)
+  bytes.u32(object.folder)
       .u16(0)
       .u32(0)
       .u32(0)
@@ -292,7 +296,10 @@ Device::Answer Device::answer(const Command& command, std::span<const std::byte>
       return {.data = Bytes().u32s({kStorage}).take()};
     case 0x1007: {
       std::vector<std::uint32_t> handles;
-      for (const auto& [key, value] : objects_) handles.push_back(key);
+      const std::uint32_t folder = command.param(2) == 0xffffffff ? 0 : command.param(2);
+      for (const auto& [key, value] : objects_) {
+        if (value.folder == folder) handles.push_back(key);
+      }
       return {.data = Bytes().u32s(handles).take()};
     }
     case 0x1008:
@@ -487,7 +494,7 @@ void Device::live_on(TimePoint now) {
   }
   const double seconds = (at - movie_since_).value();
   const auto bytes = static_cast<std::uint32_t>(seconds * options_.movie_bytes_per_second) + 1000;
-  add_object({"MVI_" + std::to_string(1000 + next_handle_) + ".AVI", 0x300a, bytes});
+  add_object({"MVI_" + std::to_string(1000 + next_handle_) + ".AVI", 0x300a, bytes, 0});
 }
 
 }  // namespace emberlock::chdk_responder

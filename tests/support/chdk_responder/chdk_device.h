@@ -55,6 +55,7 @@ struct StoredObject {
   std::string name;
   std::uint16_t format = 0;
   std::uint32_t bytes = 0;
+  std::uint32_t folder = 0;  ///< a handle; 0: the root
 };
 
 /// What waits to be read from the bulk pipe.
@@ -80,6 +81,8 @@ class Device {
   [[nodiscard]] std::optional<TimePoint> next_ready() const;
   /// The request 0x66 of the still image class: all pipes empty, no session.
   void reset();
+  /// The request 0x64: what it was about to send is dropped.
+  void cancel();
   /// As after the battery was taken out; the card stays.
   void power_on();
 

@@ -50,7 +50,7 @@ TEST(PtpSession, FilesOfEverySizeAroundAPacketComeAsTheyAre) {
     // With the header of 12 bytes: below, at and above one, two and 512 packets.
     for (const std::uint32_t bytes :
          {1u, 499u, 500u, 501u, 1011u, 1012u, 1013u, 262131u, 262132u, 262133u, 600000u}) {
-      const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, bytes});
+      const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, bytes, 0});
       EXPECT_EQ(object(bench, handle, bytes), bench.device().content(handle, 0, bytes)) << bytes;
     }
     EXPECT_EQ(bench.cable->recoveries, 0);
@@ -60,7 +60,7 @@ TEST(PtpSession, FilesOfEverySizeAroundAPacketComeAsTheyAre) {
 TEST(PtpSession, AHeaderInATransferOfItsOwnIsAllowed) {
   OpenBench bench;
   bench.device().faults.header_alone = -1;
-  const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 3000});
+  const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 3000, 0});
   EXPECT_EQ(object(bench, handle, 3000), bench.device().content(handle, 0, 3000));
 }
 
@@ -77,7 +77,7 @@ TEST(PtpSession, ASessionLeftOpenByAProgramThatDiedIsClosedFirst) {
 
 TEST(PtpSession, APartOfAFileComesFromItsOffset) {
   OpenBench bench;
-  const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 10'000});
+  const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 10'000, 0});
   std::vector<std::byte> content;
   const auto came = bench.session.partial_object(
       handle, 9'000, 5'000,
@@ -161,7 +161,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_P(PtpSessionMalformed, IsAnErrorAndTheNextQuestionIsAnswered) {
   OpenBench bench;
-  const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 5000});
+  const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 5000, 0});
   bench.device().faults.*GetParam().fault = 1;
   const auto info = bench.session.object_info(handle);
   ASSERT_FALSE(info.ok());
@@ -190,7 +190,7 @@ TEST(PtpSession, AnUnpluggedCameraIsAnErrorAtOnce) {
 
 TEST(PtpSession, DataBeyondWhatWasAskedForAreRefusedBeforeTheyAreRead) {
   OpenBench bench;
-  const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 5000});
+  const std::uint32_t handle = bench.device().add_object({"A.AVI", 0x300a, 5000, 0});
   EXPECT_FALSE(bench.session.transact({0x1009, {handle}, {}, {}, 4999}).ok());
   EXPECT_TRUE(bench.session.transact({0x1009, {handle}, {}, {}, 5000}).ok());
 }

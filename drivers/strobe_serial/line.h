@@ -35,6 +35,9 @@ class Line {
   /// The answer; empty where there is none. Errors: timed_out (silent), device (garbled, gone).
   Result<std::string> ask(const Command& command, TimePoint until);
 
+  /// Somebody found sense in no answer: greet() before the next question.
+  void doubt() { in_step_ = false; }
+
   [[nodiscard]] bool lost() const { return lost_; }  ///< the wire is dead
   [[nodiscard]] bool in_step() const { return in_step_; }
 

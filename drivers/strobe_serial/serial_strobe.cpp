@@ -39,7 +39,10 @@ auto SerialStrobe::with_device(const Call& call) -> decltype(call(TimePoint())) 
   const TimePoint until = clock_->now() + kCall;
   const auto attempt = [&]() -> decltype(call(until)) {
     EMBERLOCK_RETURN_IF_ERROR(ready(until));
-    return call(until);
+    auto made = call(until);
+    // An answer without sense may have been another question's.
+    if (!made.ok() && made.error().kind != ErrorKind::bad_input) line_->doubt();
+    return made;
   };
   auto result = attempt();
   const bool again = !result.ok() && result.error().kind != ErrorKind::bad_input && line_ && !line_->lost();

@@ -22,6 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 bool within_five_seconds(const std::function<bool()>& holds) {
   for (int i = 0; i < 250; ++i) {
@@ -114,6 +115,22 @@ TEST(UdevRules, APtpCameraIsOursAndStaysAwake) {
   EXPECT_EQ(link, "camera-" + serial);
   EXPECT_EQ(power_of(serial), "on");
   ASSERT_TRUE(qmp->unplug("ptp").ok());
+  EXPECT_TRUE(vanishes(link));
+}
+
+TEST(UdevRules, ACanonIsKeptFromGvfs) {
+  auto qmp = Qmp::open();
+  ASSERT_TRUE(qmp.ok()) << qmp.error().message();
+  auto plugged = qmp->plug_chdk("canon");
+  ASSERT_TRUE(plugged.ok()) << plugged.error().message();
+  ASSERT_TRUE(within_five_seconds([] { return !link_with("camera-").empty(); }));
+  const std::string link = link_with("camera-"), device = fs::canonical("/dev/emberlock/" + link);
+  expect_ours(device);
+  const std::string known = properties(device);
+  EXPECT_THAT(known, HasSubstr("ID_VENDOR_ID=04a9"));
+  EXPECT_THAT(known, Not(HasSubstr("GPHOTO2")));
+  EXPECT_THAT(known, Not(HasSubstr("ID_MTP_DEVICE")));
+  ASSERT_TRUE(qmp->unplug("canon").ok());
   EXPECT_TRUE(vanishes(link));
 }
 

@@ -21,4 +21,7 @@ class SteadyClock final : public Clock {
   void sleep_until(TimePoint t) override;
 };
 
+/// Now by the wall clock, since 1970-01-01 UTC. It may jump.
+TimePoint wall_clock();
+
 }  // namespace emberlock

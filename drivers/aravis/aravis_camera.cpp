@@ -148,24 +148,24 @@ std::optional<Arrived> AravisCamera::next_arrived(Seconds deadline) {
   return link_->pop(deadline);
 }
 
-FrameLedger::Entry AravisCamera::record(const Arrived& arrived, Fate fate) {
+std::uint64_t AravisCamera::record(std::optional<std::uint64_t> frame_id, Fate fate) {
   // Frames that found no buffer are missing behind all that waited in buffers then: at the next gap.
   const std::uint64_t underruns = link_->underruns();
   if (std::exchange(underruns_, underruns) != underruns) starved_ = true;
-  if (!arrived.frame_id) {
+  if (!frame_id) {
     ledger_.unnumbered(starved_ ? Fate::underrun : fate);
     return {};
   }
   const std::uint64_t before = ledger_.counts().underrun;
-  const auto entry = ledger_.record(*arrived.frame_id, fate, starved_ ? Fate::underrun : Fate::camera_gap);
+  const std::uint64_t number = ledger_.record(*frame_id, fate, starved_ ? Fate::underrun : Fate::camera_gap);
   if (ledger_.counts().underrun != before) starved_ = false;
-  return entry;
+  return number;
 }
 
 void AravisCamera::drop(Arrived arrived, Fate fate) {
   if (arrived.arrival == Arrival::transport) fate = Fate::transport;
   if (arrived.arrival == Arrival::resend) fate = Fate::resend;
-  record(arrived, fate);
+  record(arrived.frame_id, fate);
   link_->recycle(std::move(arrived));
 }
 
@@ -175,21 +175,21 @@ std::optional<Frame> AravisCamera::hand_on(Arrived arrived) {
     drop(std::move(arrived), Fate::passed_over);
     return {};
   }
-  // Which of the two it will be is known once it has its number; a new count begins with a new clock.
-  const bool backward = arrived.device_time <= device_time_;
-  const bool odd = arrived.arrival == Arrival::odd;
-  const auto entry = record(arrived, backward || odd ? Fate::damaged : Fate::delivered);
+  // A clock that goes backward shows a frame made of two. Cameras without one say 0.
+  const bool damaged = arrived.arrival == Arrival::odd || arrived.device_time < device_time_;
   Frame frame;
-  frame.stamp.frame_id = entry.number;
   frame.stamp.device_time = device_time_ = arrived.device_time;
   frame.stamp.system_time = arrived.system_time;
   frame.stamp.monotonic_time = clock_.now() - (wall_clock() - arrived.system_time);
-  frame.stamp.status = backward || odd ? FrameStatus::damaged : FrameStatus::complete;
+  frame.stamp.status = damaged ? FrameStatus::damaged : FrameStatus::complete;
+  const auto frame_id = arrived.frame_id;
   auto image = link_->take(std::move(arrived));
   if (!image) {
+    record(frame_id, Fate::transport);
     log(LogCategory::drivers).warn("camera {}: {}", id_, image.error().message());
     return {};
   }
+  frame.stamp.frame_id = record(frame_id, damaged ? Fate::damaged : Fate::delivered);
   frame.image = std::move(image).value();
   return frame;
 }
@@ -263,6 +263,7 @@ Status AravisCamera::reset_shutter(TimePoint at) {
   wanted_from_ = restarted->value();
   pass_over_before(wanted_from_);
   ledger_.begin_anew();
+  device_time_ = {};
   last_sign_ = clock_.now();
   return {};
 }

@@ -48,7 +48,7 @@ class AravisCamera final : public Camera {
   /// Frames that came before an instant of the wall clock.
   std::uint64_t pass_over_before(TimePoint wall);
   void drop(Arrived arrived, Fate fate);
-  FrameLedger::Entry record(const Arrived& arrived, Fate fate);
+  std::uint64_t record(std::optional<std::uint64_t> frame_id, Fate fate);
   /// Whether it went away: it sends nothing, and doesn't answer when it is asked for something.
   [[nodiscard]] bool silent();
   /// Calls the library on a thread of its own. None if that takes longer: the camera is quarantined then, the

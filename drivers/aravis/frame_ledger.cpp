@@ -18,7 +18,7 @@ std::optional<std::uint64_t> steps(std::uint64_t from, std::uint64_t to) {
 
 }  // namespace
 
-FrameLedger::Entry FrameLedger::record(std::uint64_t id, Fate fate, Fate gap) {
+std::uint64_t FrameLedger::record(std::uint64_t id, Fate fate, Fate gap) {
   const auto forward = last_id_ ? steps(*last_id_, id) : std::nullopt;
   if (!forward) {
     begin_anew();
@@ -31,9 +31,9 @@ FrameLedger::Entry FrameLedger::record(std::uint64_t id, Fate fate, Fate gap) {
     unnumbered_.clear();
   }
   last_id_ = id;
-  const Entry entry{next_, !forward};
+  const std::uint64_t number = next_;
   count(fate);
-  return entry;
+  return number;
 }
 
 void FrameLedger::begin_anew() {

@@ -16,14 +16,9 @@ enum class Fate { delivered, damaged, camera_gap, transport, resend, underrun, p
 /// with 64, and begin anew at every start.
 class FrameLedger {
  public:
-  struct Entry {
-    std::uint64_t number = 0;  ///< running, without wraps or new beginnings
-    bool anew = false;         ///< the camera's own count began anew with this frame
-  };
-
   /// The frame that the camera numbers `id`, in the camera's order. Numbers skipped before it meet `gap`, but
-  /// for those that unnumbered() spoke of.
-  Entry record(std::uint64_t id, Fate fate, Fate gap = Fate::camera_gap);
+  /// for those that unnumbered() spoke of. Returns its running number, without wraps or new beginnings.
+  std::uint64_t record(std::uint64_t id, Fate fate, Fate gap = Fate::camera_gap);
   /// A frame of which came a part, but not the part that says its number.
   void unnumbered(Fate fate) { unnumbered_.push_back(fate); }
   /// The camera's next count begins anew, without a gap.

@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "drivers/aravis/pixel_format.h"
 
@@ -34,11 +35,6 @@ void on_control_lost(ArvDevice* device, gpointer flag) {
 void free_flag(gpointer flag, GClosure*) { delete static_cast<Flag*>(flag); }
 
 }  // namespace
-
-TimePoint wall_clock() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return {std::chrono::duration_cast<std::chrono::nanoseconds>(now).count()};
-}
 
 Result<std::shared_ptr<Link>> Link::open(const Seen& seen, const CameraRequest& request) {
   const std::string where = "camera " + seen.id;

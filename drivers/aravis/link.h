@@ -24,9 +24,6 @@ enum class Arrival {
   cleared,    ///< it was being filled when the stream was stopped
 };
 
-/// Now, by the wall clock that Aravis stamps buffers with.
-TimePoint wall_clock();
-
 /// A buffer with what it says of its frame.
 struct Arrived {
   Arrival arrival = Arrival::whole;

@@ -1,11 +1,11 @@
 #include "drivers/ptp/chdk_camera.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "base/clock.h"
 #include "base/log.h"
 
 namespace emberlock {
@@ -16,10 +16,6 @@ constexpr Seconds kPollPause = milliseconds(15);
 constexpr Seconds kAnswerDeadline{1};
 constexpr int kMostLostInARow = 3;
 constexpr Seconds kEndOfQuestion = milliseconds(300);
-
-TimePoint wall_clock() {
-  return {std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count()};
-}
 
 std::string_view name(ChdkReset reset) {
   switch (reset) {

@@ -1,7 +1,6 @@
 #include "drivers/v4l2/camera.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
 #include <utility>
 
@@ -18,11 +17,6 @@ constexpr std::uint32_t kBuffers = 8;
 constexpr Seconds kSlice = milliseconds(200);
 
 TimePoint now() { return SteadyClock().now(); }
-
-TimePoint wall_clock() {
-  const auto since_epoch = std::chrono::system_clock::now().time_since_epoch();
-  return {std::chrono::duration_cast<std::chrono::nanoseconds>(since_epoch).count()};
-}
 
 TimePoint time_of(const v4l2_buffer& buffer) {
   return {static_cast<std::int64_t>(buffer.timestamp.tv_sec) * 1'000'000'000 +

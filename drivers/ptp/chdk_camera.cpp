@@ -201,7 +201,6 @@ void ChdkCamera::stop() {
   if (!filming_) return;
   if (session_) drop_question();
   filming_ = false;
-  reset_due_.reset();
   steps_.clear();
   step_since_.reset();
   power_.reset();
@@ -216,14 +215,12 @@ void ChdkCamera::drop_question() {
 
 Status ChdkCamera::reset_shutter(TimePoint at) {
   if (!filming_) return refuse("it does not film", "start() it before resetting its shutter");
-  reset_due_ = at;
-  if (at > clock_->now()) return {};
+  clock_->sleep_until(at);
   const Status begun = begin_reset();
   return begun.ok() ? begun : lose(begun.error());
 }
 
 Status ChdkCamera::begin_reset() {
-  reset_due_.reset();
   drop_question();
   last_reset_ = Reset{clock_->now()};
   step_since_.reset();
@@ -251,7 +248,6 @@ Status ChdkCamera::trim_rate(PartsPerMillion /*trim*/) {
 Error ChdkCamera::lose(Error error) {
   session_.reset();
   filming_ = false;
-  reset_due_.reset();
   steps_.clear();
   step_since_.reset();
   power_.reset();
@@ -264,12 +260,8 @@ Result<Frame> ChdkCamera::next_frame(Seconds deadline) {
   if (!filming_) return refuse("it does not film", "start() it first");
   const TimePoint until = clock_->now() + deadline;
   for (;;) {
-    if (reset_due_ && clock_->now() >= *reset_due_) {
-      const Status begun = begin_reset();
-      if (!begun.ok()) return lose(begun.error());
-    }
     if (steps_.empty()) {
-      auto frame = fetch(reset_due_ ? std::min(until, *reset_due_) : until);
+      auto frame = fetch(until);
       if (!frame.ok()) return lose(frame.error());
       if (*frame) return std::move(**frame);
     } else {

@@ -118,7 +118,6 @@ class ChdkCamera final : public Camera {
   std::deque<Step> steps_;
   std::optional<TimePoint> step_since_;  ///< absent: the first one hasn't begun
   std::optional<PowerCommand> power_;
-  std::optional<TimePoint> reset_due_;
   std::optional<Reset> last_reset_;
 
   std::uint64_t next_id_ = 0;

@@ -1,8 +1,10 @@
 #include "drivers/ptp/power_command.h"
 
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -11,6 +13,12 @@
 #include <unistd.h>
 
 namespace emberlock {
+namespace {
+
+/// How long a command may go on that nobody waits for any more.
+constexpr std::chrono::milliseconds kLongest{60000};
+
+}  // namespace
 
 Result<PowerCommand> PowerCommand::start(const std::string& command_line, const std::string& camera) {
   std::string shell = "/bin/sh";
@@ -45,8 +53,15 @@ PowerCommand& PowerCommand::operator=(PowerCommand&& o) noexcept {
 
 PowerCommand::~PowerCommand() {
   if (pid_ < 0 || state() != State::running) return;
-  ::kill(-pid_, SIGKILL);
-  ::waitpid(pid_, nullptr, 0);
+  std::thread([pid = pid_] {
+    constexpr auto kPause = std::chrono::milliseconds(100);
+    for (auto left = kLongest; left.count() > 0; left -= kPause) {
+      if (::waitpid(pid, nullptr, WNOHANG) != 0) return;
+      std::this_thread::sleep_for(kPause);
+    }
+    ::kill(-pid, SIGKILL);
+    ::waitpid(pid, nullptr, 0);
+  }).detach();
 }
 
 PowerCommand::State PowerCommand::state() {

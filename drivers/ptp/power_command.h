@@ -9,8 +9,8 @@
 namespace emberlock {
 
 /// A command line of the user's that switches a camera's power off and on, run by the shell. It is told which
-/// camera by the environment variable EMBERLOCK_CAMERA, and killed with what it started if it still runs when
-/// this is destroyed.
+/// camera by the environment variable EMBERLOCK_CAMERA. Destroyed while it runs it is left to end by itself,
+/// as a camera that it has switched off would stay off; after a minute it is killed with what it started.
 class PowerCommand {
  public:
   enum class State { running, succeeded, failed };

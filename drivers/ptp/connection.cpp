@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <string_view>
 #include <utility>
@@ -27,7 +29,37 @@ bool is_blank(const std::string& serial) {
   return std::all_of(serial.begin(), serial.end(), [](char c) { return c == '0' || c == ' '; });
 }
 
+/// The ids of devices that were connected to once: a held one can't be asked again. A device has another
+/// number on its bus each time that it is plugged in.
+class KnownIds {
+ public:
+  void remember(const UsbPtpDevice& usb, const std::string& id) {
+    const std::lock_guard lock(mutex_);
+    ids_[key(usb)] = id;
+  }
+  std::optional<std::string> of(const UsbPtpDevice& usb) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = ids_.find(key(usb));
+    return found == ids_.end() ? std::nullopt : std::optional(found->second);
+  }
+
+ private:
+  static std::pair<std::string, int> key(const UsbPtpDevice& usb) { return {usb.path, usb.number}; }
+  mutable std::mutex mutex_;
+  std::map<std::pair<std::string, int>, std::string> ids_;
+};
+
+KnownIds& known_ids() {
+  static KnownIds ids;
+  return ids;
+}
+
 }  // namespace
+
+std::string ptp_id(const UsbPtpDevice& usb) {
+  if (auto known = known_ids().of(usb)) return *std::move(known);
+  return ptp_id(usb, {});
+}
 
 std::string ptp_id(const UsbPtpDevice& usb, const std::string& ptp_serial) {
   for (const std::string* serial : {&ptp_serial, &usb.serial}) {
@@ -48,15 +80,20 @@ Result<PtpConnection> connect_ptp(const UsbPtpDevice& usb) {
   EMBERLOCK_RETURN_IF_ERROR(connection.session->open());
   EMBERLOCK_ASSIGN_OR_RETURN(connection.info, connection.session->device_info());
   connection.id = ptp_id(usb, connection.info.serial);
+  known_ids().remember(usb, connection.id);
   connection.session->rename("camera " + connection.id);
   return connection;
 }
 
 Result<PtpConnection> connect_ptp(const std::string& id) {
   EMBERLOCK_ASSIGN_OR_RETURN(std::vector<UsbPtpDevice> devices, list_usb_ptp());
-  // First those that look like it, so that others aren't disturbed.
-  const auto looks_like_it = [&](const UsbPtpDevice& d) { return ptp_id(d, {}) == id || d.path == id; };
+  // First those that look like it. Those that are known to be others are left alone.
+  const auto looks_like_it = [&](const UsbPtpDevice& d) { return ptp_id(d) == id || d.path == id; };
+  std::erase_if(devices, [&](const UsbPtpDevice& d) { return known_ids().of(d) && !looks_like_it(d); });
   std::stable_partition(devices.begin(), devices.end(), looks_like_it);
+  // One search at a time: several would hold each other's cameras.
+  static std::mutex searching;
+  const std::lock_guard lock(searching);
   SteadyClock clock;
   const TimePoint until = clock.now() + kSearchDeadline;
   std::optional<Error> why;

@@ -26,6 +26,9 @@ using PtpConnect = std::function<Result<PtpConnection>()>;
 /// with what a folder's name can't have replaced by '_'.
 std::string ptp_id(const UsbPtpDevice& usb, const std::string& ptp_serial);
 
+/// The id of a device that needn't be asked: as it was when it was connected to, else by its USB descriptor.
+std::string ptp_id(const UsbPtpDevice& usb);
+
 /// Opens the device at its place on the bus, within 1.5 s. Errors: as open_usb_ptp and PtpSession::open.
 Result<PtpConnection> connect_ptp(const UsbPtpDevice& usb);
 /// Finds the device by its id and opens it. Others that are free are asked for theirs if need be, for 2 s at

@@ -39,7 +39,7 @@ void describe_chdk(PtpConnection& connection, CameraFound& found) {
 
 CameraFound look_at(const UsbPtpDevice& usb) {
   CameraFound found;
-  found.id = ptp_id(usb, {});
+  found.id = ptp_id(usb);
   found.model = usb.name;
   found.address = usb.path;
   auto connection = connect_ptp(usb);
@@ -71,12 +71,14 @@ Result<std::vector<CameraFound>> find() {
     threads.emplace_back([&found, &devices, i] { found[i] = look_at(devices[i]); });
   }
   for (std::thread& thread : threads) thread.join();
-  // Serial numbers of all zeros or of a whole series aren't identities.
+  // Serial numbers of a whole series aren't identities.
+  const std::vector<CameraFound> all = found;
   for (CameraFound& camera : found) {
     const auto same =
-        std::count_if(found.begin(), found.end(), [&](const CameraFound& o) { return o.id == camera.id; });
-    if (same > 1)
-      camera.notes.push_back("another one has the same serial number; open it as " + camera.address);
+        std::count_if(all.begin(), all.end(), [&](const CameraFound& o) { return o.id == camera.id; });
+    if (same < 2) continue;
+    camera.notes.push_back("another one has the same serial number, " + camera.id);
+    camera.id = camera.address;
   }
   return found;
 }

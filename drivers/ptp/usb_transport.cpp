@@ -123,6 +123,15 @@ std::string read_line(const std::filesystem::path& file) {
   return line;
 }
 
+/// What the bus hangs on, as buses are numbered in the order of their finding.
+std::string controller_of(const std::filesystem::path& sysfs, int bus) {
+  std::error_code error;
+  const std::filesystem::path root = "usb" + std::to_string(bus);
+  std::filesystem::path at = std::filesystem::canonical(sysfs, error);
+  while (!error && at.has_relative_path() && at.filename() != root) at = at.parent_path();
+  return at.filename() == root ? at.parent_path().filename().string() : std::to_string(bus);
+}
+
 UsbPtpDevice describe(libusb_device* device, std::uint16_t vendor) {
   UsbPtpDevice found;
   found.vendor = vendor;
@@ -130,12 +139,12 @@ UsbPtpDevice describe(libusb_device* device, std::uint16_t vendor) {
   found.number = libusb_get_device_address(device);
   std::array<std::uint8_t, 8> ports{};
   const int depth = libusb_get_port_numbers(device, ports.data(), static_cast<int>(ports.size()));
-  std::string name = std::to_string(found.bus);
+  std::string plug;
   for (int i = 0; i < depth; ++i)
-    name += (i == 0 ? '-' : '.') + std::to_string(ports.at(static_cast<std::size_t>(i)));
-  found.path = "usb-" + name;
+    plug += (i == 0 ? '-' : '.') + std::to_string(ports.at(static_cast<std::size_t>(i)));
   // The kernel has read its descriptor already: a device that hangs isn't asked.
-  const std::filesystem::path sysfs = "/sys/bus/usb/devices/" + name;
+  const std::filesystem::path sysfs = "/sys/bus/usb/devices/" + std::to_string(found.bus) + plug;
+  found.path = "usb-" + controller_of(sysfs, found.bus) + plug;
   found.name = read_line(sysfs / "product");
   found.serial = read_line(sysfs / "serial");
   return found;

@@ -16,7 +16,7 @@ struct UsbPtpDevice {
   std::uint16_t vendor = 0;
   int bus = 0;
   int number = 0;      ///< on the bus; another one each time that it is plugged in
-  std::string path;    ///< the ports that it hangs on: "usb-3-1.2"
+  std::string path;    ///< the controller and ports that it hangs on: "usb-0000:00:14.0-1.2"
   std::string name;    ///< what its descriptor says, may be empty
   std::string serial;  ///< likewise
 

@@ -58,7 +58,7 @@ TEST_F(FilmTest, ElevenCamerasFilmWithoutAFrameUnaccountedFor) {
     EXPECT_LE(films[i].skipped, counts.lost());  // the first frame may find a small socket
     EXPECT_EQ(films[i].wrong_pixels, 0U);
     EXPECT_EQ(films[i].wrong_number, 0U);
-    EXPECT_GT(static_cast<double>(films[i].frames), 0.9 * 15 * time.value());
+    EXPECT_GT(static_cast<double>(films[i].frames), 0.5 * 15 * time.value());
     EXPECT_FALSE(films[i].error.has_value());
     lost += counts.lost();
     sent += its;

@@ -1,9 +1,11 @@
 #include <algorithm>
 #include <cstdio>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -31,7 +33,10 @@ struct ProbeArguments {
   double seconds = 5;
   int resets = 0;
   std::string size;
+  std::string format;
   double rate = 0;
+  double exposure_ms = 0;
+  std::vector<std::string> controls;
   bool json = false;
 };
 
@@ -84,9 +89,27 @@ void watch() {
   }
 }
 
+const std::map<std::string, PixelFormat> kFormats = [] {
+  std::map<std::string, PixelFormat> formats;
+  for (const PixelFormat f : {PixelFormat::gray8, PixelFormat::gray16, PixelFormat::bayer_rggb8,
+                              PixelFormat::bayer_rggb16, PixelFormat::rgb8, PixelFormat::rgb16}) {
+    formats.emplace(name(f), f);
+  }
+  return formats;
+}();
+
 Result<CameraRequest> request_from(const ProbeArguments& arguments) {
   CameraRequest request;
   if (arguments.rate > 0) request.frame_rate = Hertz(arguments.rate);
+  if (arguments.exposure_ms > 0) request.exposure = milliseconds(arguments.exposure_ms);
+  if (!arguments.format.empty()) request.format = kFormats.at(arguments.format);
+  for (const std::string& control : arguments.controls) {
+    const auto equals = control.find('=');
+    if (equals == 0 || equals == std::string::npos) {
+      return Error{ErrorKind::bad_input, "not a control: \"" + control + "\"", "--control", "say NAME=VALUE"};
+    }
+    request.controls[control.substr(0, equals)] = control.substr(equals + 1);
+  }
   if (arguments.size.empty()) return request;
   ImageSize size;
   int used = 0;
@@ -153,7 +176,8 @@ nlohmann::ordered_json probe_json(const Probed& probed) {
                                 {"transport", c.transport},
                                 {"resend", c.resend},
                                 {"underrun", c.underrun},
-                                {"queue", c.queue}}},
+                                {"queue", c.queue},
+                                {"passed_over", c.passed_over}}},
                               {"reset_mean_s", nullptr},
                               {"reset_jitter_s", nullptr},
                               {"findings", std::move(findings)}};
@@ -223,6 +247,11 @@ void add_probe(CLI::App& devices) {
       ->check(CLI::Range(0, 1000));
   verb->add_option("--size", a->size, "WIDTHxHEIGHT; the largest if not said");
   verb->add_option("--rate", a->rate, "Frames a second; the fastest if not said")->check(CLI::PositiveNumber);
+  verb->add_option("--format", a->format, "Pixels as they are handed on; what keeps most if not said")
+      ->check(CLI::IsMember(kFormats));
+  verb->add_option("--exposure-ms", a->exposure_ms, "As the camera is set if not said")
+      ->check(CLI::PositiveNumber);
+  verb->add_option("--control", a->controls, "NAME=VALUE by the camera's own names, as often as needed");
   verb->add_option("--rig", a->rig, "A virtual rig instead of what is plugged in: virtual:11");
   verb->add_flag("--json", a->json, "One JSON object");
   verb->callback([a] { probe(*a); });

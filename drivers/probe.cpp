@@ -19,7 +19,7 @@ constexpr double kFullLink = 0.8;
 /// Losses above this part leave holes in a flame's film.
 constexpr double kManyLost = 0.01;
 constexpr Seconds kFirstFrame{3};
-constexpr Seconds kAfterReset{5};
+constexpr Seconds kAfterReset{30};  // by a power cycle it takes many seconds
 
 struct EvenRate {
   Seconds period;

@@ -31,13 +31,24 @@ std::string fit_for_a_name(std::string text) {
   return text;
 }
 
-/// The serial number of the USB device that a node is part of.
-std::string usb_serial(const fs::path& folder) {
+/// The folder of the USB device that a node is part of; empty where it is none.
+fs::path usb_device(const fs::path& folder) {
   std::error_code error;
   for (fs::path device = folder; device.has_relative_path(); device = device.parent_path()) {
-    if (fs::exists(device / "idVendor", error)) return fit_for_a_name(attribute(device / "serial"));
+    if (fs::exists(device / "idVendor", error)) return device;
   }
   return {};
+}
+
+/// Empty where it is none: some makers number all their devices 0.
+std::string usb_serial(const fs::path& device) {
+  const std::string serial = attribute(device / "serial");
+  return serial.find_first_not_of("0 ") == std::string::npos ? "" : fit_for_a_name(serial);
+}
+
+std::optional<double> usb_megabits(const fs::path& device) {
+  const double speed = std::atof(attribute(device / "speed").c_str());
+  return speed > 0 ? std::optional(speed) : std::nullopt;
 }
 
 bool is_usb_interface(std::string_view name) {
@@ -78,9 +89,11 @@ std::vector<VideoNode> list_video_nodes(const fs::path& sysfs) {
     const std::string number = attribute(folder / "index");
     const int index = std::atoi(number.c_str());
     const std::string model = attribute(folder / "name");
-    VideoNode node{"/dev/" + name, model, plugged_in_at(folder, model, index), {}, {}};
+    VideoNode node{"/dev/" + name, model, plugged_in_at(folder, model, index), {}, {}, {}};
+    const fs::path usb = usb_device(folder);
+    if (!usb.empty()) node.usb_megabits = usb_megabits(usb);
     // A device's further nodes (a camera's metadata, say) have its number too; the first one is the camera.
-    if (index == 0) node.serial = usb_serial(folder);
+    if (index == 0 && !usb.empty()) node.serial = usb_serial(usb);
     nodes.push_back(std::move(node));
   }
   std::sort(nodes.begin(), nodes.end(),

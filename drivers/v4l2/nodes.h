@@ -13,11 +13,12 @@ namespace emberlock {
 
 /// A device node of V4L2: a camera, or something else that has one.
 struct VideoNode {
-  std::filesystem::path device;  ///< "/dev/video3"; may change
-  std::string model;             ///< as the driver names it
-  std::string path;              ///< where it is plugged in: "usb-0000:00:14.0-1.2:1.0"
-  std::string serial;            ///< empty: it says none
-  std::string id;                ///< the serial number, else (or where another says the same one) the path
+  std::filesystem::path device;             ///< "/dev/video3"; may change
+  std::string model;                        ///< as the driver names it
+  std::string path;                         ///< where it is plugged in: "usb-0000:00:14.0-1.2:1.0"
+  std::string serial;                       ///< empty: it says none
+  std::optional<double> usb_megabits = {};  ///< what its USB connection carries a second
+  std::string id;  ///< the serial number, else (or where another says the same one) the path
 };
 
 /// All there are, by path.

@@ -29,6 +29,7 @@ CameraFound known_of(const VideoNode& node) {
   found.model = node.model;
   found.address = node.device;
   found.reset = ShutterReset::on_command;
+  found.link_megabits = node.usb_megabits;
   return found;
 }
 
@@ -44,7 +45,10 @@ std::optional<CameraFound> ask(const VideoNode& node) {
   const auto card = device->camera_card();
   if (!card) return {};
   found.model = *card;
-  if (device->in_use()) found.holder = holder_of(node.device);
+  if (device->in_use()) {
+    found.holder = holder_of(node.device);
+    if (!found.holder) found.notes.emplace_back("in use, by this process or by another user's");
+  }
   const V4l2Modes offered = list_modes(device->as_ioctl(), {});
   for (const V4l2Mode& mode : offered.modes) found.modes.push_back(mode.mode);
   if (!offered.unknown.empty()) {

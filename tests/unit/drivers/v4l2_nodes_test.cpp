@@ -30,6 +30,7 @@ class V4l2Nodes : public testing::Test {
   void say(const fs::path& device, const std::string& serial) {
     fs::create_directories(root_ / "devices" / device);
     write(root_ / "devices" / device / "idVendor", "046d");
+    write(root_ / "devices" / device / "speed", "480");
     if (!serial.empty()) write(root_ / "devices" / device / "serial", serial);
   }
   std::vector<std::string> ids() const {
@@ -50,6 +51,13 @@ TEST_F(V4l2Nodes, AreKnownByTheirSerialNumber) {
   EXPECT_EQ(nodes[0].id, "A1_B2");
   EXPECT_EQ(nodes[0].device, "/dev/video4");
   EXPECT_EQ(nodes[0].model, "HD Webcam");
+  EXPECT_EQ(nodes[0].usb_megabits, 480);
+}
+
+TEST_F(V4l2Nodes, ASerialNumberOfZerosIsNone) {
+  say(hub_ / "3-1.2", "00000000");
+  add("video4", hub_ / "3-1.2/3-1.2:1.0", "HD Webcam");
+  EXPECT_THAT(ids(), testing::ElementsAre("usb-0000:00:14.0-1.2:1.0"));
 }
 
 TEST_F(V4l2Nodes, OfEqualModelsWithoutSerialsAreKnownByTheirPlugs) {

@@ -25,7 +25,8 @@ class Strobe {
  public:
   virtual ~Strobe() = default;
   [[nodiscard]] virtual const std::string& id() const = 0;
-  /// Takes effect before it returns. Errors: bad_input (out of range: says which and the range), device.
+  /// Takes effect before it returns. Errors: bad_input (out of range: says which and the range), device
+  /// (gone, or what it says that it does is more than its own steps away), timed_out (silent).
   virtual Status apply(const StrobeSettings& settings) = 0;
   /// What the strobe itself says that it does, rounded to its own steps.
   virtual Result<StrobeSettings> read_back() = 0;

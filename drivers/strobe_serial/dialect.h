@@ -63,6 +63,13 @@ struct Framing {
   bool numbered = false;  ///< replies tell which command they answer, so one may be said again at any time
 };
 
+/// How far what a device says that it does may be from what it was asked for: its steps. What it adjusts
+/// further isn't what was asked for.
+struct Rounding {
+  Hertz rate;
+  Seconds phase, width;
+};
+
 /// One language. Immutable and thread-safe; the same input gives the same output.
 class Dialect {
  public:
@@ -86,6 +93,9 @@ class Dialect {
       const StrobeSettings& to, const std::optional<StrobeSettings>& now) const = 0;
   /// Whether the device obeyed. Errors: bad_input (out of its range), device.
   [[nodiscard]] virtual Status accepted(const Command& command, std::string_view reply) const = 0;
+
+  /// Of settings that apply() finds possible, while flashing.
+  [[nodiscard]] virtual Rounding rounding(const StrobeSettings& to) const = 0;
 
   /// The question that follows these answers; none when they say all.
   [[nodiscard]] virtual std::optional<Command> question(std::span<const std::string> answers) const = 0;

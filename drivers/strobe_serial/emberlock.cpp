@@ -162,6 +162,12 @@ class Controller final : public Dialect {
                  "apply the settings again"};
   }
 
+  /// A nanosecond of the period, a tick of the others.
+  Rounding rounding(const StrobeSettings& to) const override {
+    constexpr Seconds kLongestTick = microseconds(1);
+    return {.rate = to.rate * (to.rate * nanoseconds(1)), .phase = kLongestTick, .width = kLongestTick};
+  }
+
   std::optional<Command> question(std::span<const std::string> answers) const override {
     if (answers.empty()) return Command{"get", Answer::value};
     const auto told = report(answers[0]);

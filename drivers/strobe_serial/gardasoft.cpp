@@ -102,10 +102,15 @@ class Gardasoft final : public Dialect {
     if (!text.starts_with("Err")) return garbled(reply, "the prompt alone");
     const auto code = number_in(trim(text.substr(3)));
     if (!code) return garbled(reply, "a number of an error");
-    constexpr double kAdjusted = 5;  // a warning: read_back says what it became
+    constexpr double kAdjusted = 5;  // a warning: settings() says what it became
     if (*code == kAdjusted) return {};
     if (*code == 1) return refuse(ErrorKind::bad_input, "a value is out of range");
     return refuse(ErrorKind::device, "the command isn't taken");
+  }
+
+  Rounding rounding(const StrobeSettings& to) const override {
+    constexpr Seconds kStep = milliseconds(0.01);  // of the trigger's period and the delay
+    return {.rate = to.rate * (to.rate * kStep), .phase = kStep, .width = microseconds(1)};
   }
 
   std::optional<Command> question(std::span<const std::string> answers) const override {

@@ -70,6 +70,12 @@ class Schott final : public Dialect {
     return {};
   }
 
+  /// To whole Hertz, and thousandths of the period that makes.
+  Rounding rounding(const StrobeSettings& to) const override {
+    const Seconds every = period(Hertz(std::round(to.rate.value())));
+    return {.rate = Hertz(0.5), .phase = Seconds(0), .width = every * (1 / kDutySteps)};
+  }
+
   std::optional<Command> question(std::span<const std::string> answers) const override {
     if (answers.size() >= kQuestions) return std::nullopt;
     return Command{questions()[answers.size()] + "?", Answer::value};

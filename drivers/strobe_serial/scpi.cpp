@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <cmath>
@@ -71,6 +72,15 @@ class Scpi final : public Dialect {
                  fmt::format("it refuses the settings ({} says {})", command.text, reply),
                  {},
                  "give what its manual allows"};
+  }
+
+  /// Agilent's 81100 keeps four digits of everything, the others six at least.
+  Rounding rounding(const StrobeSettings& to) const override {
+    const double digits = phase_ == ScpiPhase::delay ? 1e-3 : 1e-5;
+    constexpr double kAngle = 0.1 / 360;
+    return {.rate = std::max(Hertz(1e-6), to.rate * digits),
+            .phase = period(to.rate) * std::max(kAngle, digits),
+            .width = std::max(nanoseconds(10), to.width * digits)};
   }
 
   std::optional<Command> question(std::span<const std::string> answers) const override {

@@ -1,7 +1,10 @@
 #include "drivers/strobe_serial/serial_strobe.h"
 
 #include <algorithm>
+#include <string_view>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "base/log.h"
 
@@ -10,6 +13,34 @@ namespace {
 
 constexpr Seconds kCall(4);        // a code of 4096 flashes and its read back at 115200 baud take 1 s
 constexpr Seconds kGreeting(0.8);  // by when a device that was there before answers
+
+/// Error device: it does something else than it was asked for, beyond its own steps.
+Status verify(const StrobeSettings& told, const StrobeSettings& asked, const Rounding& rounding) {
+  const auto refuse = [](std::string what, const char* remedy) {
+    return Error{ErrorKind::device, "it took the settings, but " + std::move(what), {}, remedy};
+  };
+  constexpr const char* kPanel = "look at its front panel, interlock and keys";
+  if (told.code != asked.code) return refuse("plays another code", kPanel);
+  if (told.output != asked.output) return refuse("its light isn't as asked for", kPanel);
+  if (asked.output != StrobeOutput::flashing) return {};
+
+  const auto differs = [&](std::string_view what, double wanted, double is, std::string_view unit) {
+    return refuse(
+        fmt::format("says that its {} is {:.9g} {}, asked for {:.9g} {}", what, is, unit, wanted, unit),
+        "ask for what it can do, or lift the limit on its front panel");
+  };
+  constexpr double kDecimals = 1 + 1e-9;  // a whole step off, as floating point has it
+  if (abs(told.rate - asked.rate) > rounding.rate * kDecimals)
+    return differs("rate", asked.rate.value(), told.rate.value(), "flashes a second");
+  if (abs(told.width - asked.width) > rounding.width * kDecimals)
+    return differs("flash width", asked.width.value(), told.width.value(), "s");
+  // A phase near the period's end moves with that, and may wrap.
+  const Seconds every = period(told.rate);
+  const Seconds late = abs(wrap_symmetric(told.phase - asked.phase, every));
+  if (late > rounding.phase * kDecimals + abs(every - period(asked.rate)) + Seconds(1e-12))
+    return differs("phase", asked.phase.value(), told.phase.value(), "s");
+  return {};
+}
 
 }  // namespace
 
@@ -96,12 +127,7 @@ Status SerialStrobe::apply(const StrobeSettings& to) {
     }
     // Its answer shows that all of it has taken effect.
     EMBERLOCK_ASSIGN_OR_RETURN(const StrobeSettings after, settings(until));
-    if (after.output == to.output && after.code == to.code) return {};
-    return Error{ErrorKind::device,
-                 after.code == to.code ? "it took the settings, but its light isn't as asked for"
-                                       : "it took the settings, but plays another code",
-                 {},
-                 "look at its front panel, interlock and keys"};
+    return verify(after, to, dialect_->rounding(to));
   });
 }
 

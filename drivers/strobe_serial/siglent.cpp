@@ -7,7 +7,7 @@
 #include "drivers/strobe_serial/dialects.h"
 
 // Siglent's SDG generators that know no SCPI tree (SDG programming guide, BSWV and OUTP). A pulse has no PHSE
-// there, but a delay in seconds. They report no errors: what was taken is what reads back.
+// there, but a delay in seconds. They report no errors and clip: what was taken is what reads back.
 namespace emberlock::strobe_serial {
 namespace {
 
@@ -46,6 +46,14 @@ class Siglent final : public Dialect {
 
   Status accepted(const Command& command, std::string_view reply) const override {
     return garbled(reply, "nothing to " + command.text);
+  }
+
+  /// It says six digits of its parameters at least.
+  Rounding rounding(const StrobeSettings& to) const override {
+    constexpr double kDigits = 1e-5;
+    return {.rate = std::max(Hertz(1e-6), to.rate * kDigits),
+            .phase = std::max(nanoseconds(10), to.phase * kDigits),
+            .width = std::max(nanoseconds(10), to.width * kDigits)};
   }
 
   std::optional<Command> question(std::span<const std::string> answers) const override {

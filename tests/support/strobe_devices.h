@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <deque>
+#include <limits>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -33,6 +34,9 @@ class StrobeDevice {
     }
     return said;
   }
+  /// Beyond these it does less than it is asked for, and says no word of it.
+  double silent_most_rate = std::numeric_limits<double>::infinity();
+  double silent_widest = std::numeric_limits<double>::infinity();
   virtual std::string noise() const { return "\x81\xfe!?\n\r>"; }
 
  protected:
@@ -80,9 +84,10 @@ class ScpiDevice final : public StrobeDevice {
     if (line == ":SOUR1:FUNC PULS") return function = "PULS", "";
     if (line == ":SOUR1:FUNC:PULS:WIDT MIN") return width = 1.6e-8, "";
     if (is(":SOUR1:FUNC:PULS:WIDT ")) {
-      set_within(width, to_step(number(value(":SOUR1:FUNC:PULS:WIDT")), 1e-9), 1 / rate);
+      const double next = to_step(number(value(":SOUR1:FUNC:PULS:WIDT")), 1e-9);
+      set_within(width, std::min(next, silent_widest), 1 / rate);
     } else if (is(":SOUR1:FREQ ")) {
-      const double next = to_step(number(value(":SOUR1:FREQ")), 1e-6);
+      const double next = std::min(to_step(number(value(":SOUR1:FREQ")), 1e-6), silent_most_rate);
       if (width >= 1 / next)
         errors.push_back("-221,\"Settings conflict; pulse width\"");
       else
@@ -108,7 +113,7 @@ class SiglentDevice final : public StrobeDevice {
   SiglentDevice() : StrobeDevice('\n') {}
   std::string type = "SINE";
   double rate = 1000, width = 2e-4, delay = 0;
-  bool on = false;
+  bool on = false, takes_delay = true;
 
  private:
   std::string answer(const std::string& line) override {
@@ -143,9 +148,9 @@ class SiglentDevice final : public StrobeDevice {
   }
   void set(const std::string& key, const std::string& text) {
     if (key == "WVTP") type = text;
-    if (key == "FRQ") rate = to_step(number(text), 1e-6);
-    if (key == "WIDTH") width = std::min(to_step(number(text), 1e-8), 0.999 / rate);
-    if (key == "DLY") delay = std::min(to_step(number(text), 1e-8), 1 / rate - 1e-8);
+    if (key == "FRQ") rate = std::min(to_step(number(text), 1e-6), silent_most_rate);
+    if (key == "WIDTH") width = std::min({to_step(number(text), 1e-8), 0.999 / rate, silent_widest});
+    if (key == "DLY" && takes_delay) delay = std::min(to_step(number(text), 1e-8), 1 / rate - 1e-8);
   }
 };
 
@@ -171,14 +176,18 @@ class GardasoftDevice final : public StrobeDevice {
           mode, brightness, delay, width * 1000);
     }
     if (line == "TT0") return trigger = 0, "";
-    if (line.starts_with("TT1,")) return trigger = 1, every = to_step(number(line.substr(4)), 0.01), "";
+    if (line.starts_with("TT1,")) {
+      trigger = 1;
+      every = std::max(to_step(number(line.substr(4)), 0.01), 1000 / silent_most_rate);
+      return "";
+    }
     if (line.starts_with("RS1,")) return mode = 0, brightness = number(line.substr(4)), "";
     if (line.starts_with("RT1,")) {
       const auto second = line.find(',', 4), third = line.find(',', second + 1);
       const double asked = number(line.substr(4, second - 4));
       mode = 1;
       if (lamp_fails) event = 34;
-      width = std::clamp(to_step(asked, 0.001), 0.01, widest);
+      width = std::clamp(to_step(asked, 0.001), 0.01, std::min(widest, 1000 * silent_widest));
       delay = std::max(to_step(number(line.substr(second + 1, third - second - 1)), 0.01), 0.01);
       brightness = number(line.substr(third + 1));
       return asked > widest ? "Err 5" : "";
@@ -212,6 +221,8 @@ class SchottDevice final : public StrobeDevice {
         const double asked = number(text);
         if (asked < least || asked > most) return fmt::format("&n{}p{}\r\n", line.substr(1, 2), text);
         value = static_cast<int>(asked);
+        rate = static_cast<int>(std::min<double>(rate, silent_most_rate));
+        duty = static_cast<int>(std::min(duty * 1.0, 1000 * rate * silent_widest));
       }
       std::string name(head);
       for (char& c : name) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
@@ -231,8 +242,23 @@ class ControllerDevice final : public StrobeDevice {
 
  private:
   std::string answer(const std::string& line) override {
-    for (const char c : line) controller.take(c, now_ms);
+    for (const char c : clamped(line)) controller.take(c, now_ms);
     return controller.take('\n', now_ms) ? controller.reply() : "";
+  }
+  /// The line as a controller understands it that clamps.
+  std::string clamped(const std::string& line) const {
+    if (std::isinf(silent_most_rate) && std::isinf(silent_widest)) return line;
+    const auto value_of = [&](std::string_view key) { return line.find(key) + key.size(); };
+    const std::size_t per = value_of(" per="), pha = line.find(" pha="), wid = value_of(" wid="),
+                      len = line.find(" len="), sum = line.rfind('*');
+    if (pha == std::string::npos) return line;
+    const std::string text =
+        fmt::format("{}{:.0f}{}{:.0f}{}", line.substr(0, per),
+                    std::max(number(std::string_view(line).substr(per)), 1e9 / silent_most_rate),
+                    line.substr(pha, wid - pha),
+                    std::min(number(std::string_view(line).substr(wid)), 1e9 * silent_widest),
+                    line.substr(len, sum - len));
+    return fmt::format("{}*{:04X}", text, emberlock_controller::crc16(text.data(), text.size()));
   }
 };
 

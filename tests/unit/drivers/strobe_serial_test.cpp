@@ -157,6 +157,28 @@ TEST_P(SerialStrobeTest, WhatCantBeIsRefusedWithoutAWordToTheDevice) {
   EXPECT_EQ(bench_.heard, 0);
 }
 
+TEST_P(SerialStrobeTest, ARateThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesBoth) {
+  bench_.device->silent_most_rate = 20;
+  const Status status = bench_.strobe.apply(kSettings);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().kind, ErrorKind::device);
+  EXPECT_THAT(status.error().what, HasSubstr("its rate is 20 flashes a second, asked for 25"));
+  StrobeSettings slower = kSettings;
+  slower.rate = Hertz(20);
+  EXPECT_TRUE(bench_.strobe.apply(slower).ok());
+}
+
+TEST_P(SerialStrobeTest, AWidthThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesBoth) {
+  bench_.device->silent_widest = 0.003;
+  const Status status = bench_.strobe.apply(kSettings);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().kind, ErrorKind::device);
+  EXPECT_THAT(status.error().what, HasSubstr("its flash width is 0.003 s, asked for 0.004 s"));
+  StrobeSettings dark = kSettings;
+  dark.output = StrobeOutput::off;
+  EXPECT_TRUE(bench_.strobe.apply(dark).ok()) << "no flash that could be too short";
+}
+
 INSTANTIATE_TEST_SUITE_P(Dialects, SerialStrobeTest, testing::ValuesIn(test::kAllDialects),
                          [](const auto& tested) {
                            std::string name(name_of(tested.param));
@@ -235,6 +257,17 @@ TEST(SerialStrobeDevices, WhatAnInstrumentRefusesIsToldWithItsOwnWords) {
   EXPECT_THAT(status.error().what, HasSubstr("-222,\"Data out of range\""));
 }
 
+TEST(SerialStrobeDevices, ADelayThatAGeneratorIgnoresIsAnError) {
+  StrobeBench bench(StrobeDialect::siglent_bswv);
+  bench.as<test::SiglentDevice>().takes_delay = false;
+  StrobeSettings s = kSettings;
+  s.phase = milliseconds(39.5);
+  const Status status = bench.strobe.apply(s);
+  ASSERT_FALSE(status.ok());
+  EXPECT_EQ(status.error().kind, ErrorKind::device);
+  EXPECT_THAT(status.error().what, HasSubstr("its phase is 0 s, asked for 0.0395 s"));
+}
+
 TEST(SerialStrobeDevices, AGeneratorThatMakesNoPulsesIsNoStrobeUntilItIsSetUp) {
   for (const StrobeDialect dialect : {StrobeDialect::scpi, StrobeDialect::siglent_bswv}) {
     StrobeBench bench(dialect);
@@ -261,12 +294,12 @@ TEST(SerialStrobeDevices, SomebodyElsesDeviceIsNotGreeted) {
   }
 }
 
-TEST(SerialStrobeDevices, AGardasoftMayEchoAndMayAdjust) {
+TEST(SerialStrobeDevices, AGardasoftMayEchoAndWhatItAdjustsIsAnError) {
   StrobeBench bench(StrobeDialect::gardasoft_rt);
   bench.as<test::GardasoftDevice>().echoes = true;
   ASSERT_TRUE(bench.strobe.apply(kSettings).ok());
   bench.as<test::GardasoftDevice>().widest = 3;
-  ASSERT_TRUE(bench.strobe.apply(kSettings).ok()) << "Err 5 warns of what read_back tells";
+  EXPECT_THAT(bench.strobe.apply(kSettings).error().what, HasSubstr("0.003 s, asked for 0.004 s"));
   EXPECT_NEAR(bench.strobe.read_back().value().width.value(), 0.003, 1e-9);
 }
 

@@ -47,7 +47,7 @@ class Scpi final : public Dialect {
     std::vector<Command> commands{{"*CLS"}};
     if (to.output == StrobeOutput::off) commands.push_back({output_ + " OFF"});
     commands.push_back({source_ + ":FUNC PULS"});
-    const Command width{fmt::format("{}:FUNC:PULS:WIDT {:.9g}", source_, to.width.value())};
+    const Command width{fmt::format("{}:FUNC:PULS:WIDT {:.12g}", source_, to.width.value())};
     const Command rate{fmt::format("{}:FREQ {:.12g}", source_, to.rate.value())};
     if (now) {
       add_width_and_rate(commands, width, rate, to, *now);

@@ -14,6 +14,7 @@ namespace {
 
 /// Of kCallDeadline, what a call of the library may take; the rest is ours.
 constexpr Seconds kLibraryDeadline = kCallDeadline - milliseconds(100);
+constexpr TimePoint kEver{std::numeric_limits<std::int64_t>::max()};
 constexpr Seconds kSlice = milliseconds(100);  // between two looks for a camera that went away
 /// A GigE camera that is silent so long is asked for a register again and again, and given up when it hasn't
 /// answered for so long: sooner than its heartbeat is, which takes the library 5 .. 6.1 s.
@@ -73,6 +74,7 @@ void AravisCamera::let_go(Seconds deadline) {
 Error AravisCamera::lose(std::string what) {
   filming_ = false;
   ledger_.begin_anew();
+  link_->give_up();
   let_go(Seconds(0));
   Error error = failure(std::move(what), "check its cable and power; start() looks for it again");
   log(LogCategory::drivers).warn("{}", error.message());
@@ -120,8 +122,9 @@ Status AravisCamera::start() {
   device_time_ = {};
   last_sign_ = clock_.now();
   unanswered_since_.reset();
-  signs_ = underruns_ = 0;
-  starved_ = false;
+  signs_ = 0;
+  last_came_ = {};
+  droughts_ended_.clear();
   return {};
 }
 
@@ -129,6 +132,7 @@ void AravisCamera::stop() {
   if (!filming_) return;
   filming_ = false;
   const TimePoint until = clock_.now() + kLibraryDeadline;
+  pass_over_before(kEver);  // counted before the call that may hang
   const auto stopped =
       bounded<bool>(kLibraryDeadline, [](Link& link) { return link.stop_acquisition().ok(); });
   if (!stopped) return;
@@ -148,24 +152,29 @@ std::optional<Arrived> AravisCamera::next_arrived(Seconds deadline) {
   return link_->pop(deadline);
 }
 
-std::uint64_t AravisCamera::record(std::optional<std::uint64_t> frame_id, Fate fate) {
-  // Frames that found no buffer are missing behind all that waited in buffers then: at the next gap.
-  const std::uint64_t underruns = link_->underruns();
-  if (std::exchange(underruns_, underruns) != underruns) starved_ = true;
+std::uint64_t AravisCamera::record(std::optional<std::uint64_t> frame_id, TimePoint came, Fate fate) {
   if (!frame_id) {
-    ledger_.unnumbered(starved_ ? Fate::underrun : fate);
+    ledger_.unnumbered(fate);
     return {};
   }
-  const std::uint64_t before = ledger_.counts().underrun;
-  const std::uint64_t number = ledger_.record(*frame_id, fate, starved_ ? Fate::underrun : Fate::camera_gap);
-  if (ledger_.counts().underrun != before) starved_ = false;
-  return number;
+  // Frames are missing for want of buffers where the want ended between the two that came.
+  bool starved = false;
+  for (; !droughts_ended_.empty() && droughts_ended_.front() <= came; droughts_ended_.pop_front()) {
+    starved = starved || droughts_ended_.front() > last_came_;
+  }
+  last_came_ = came;
+  return ledger_.record(*frame_id, fate, starved ? Fate::underrun : Fate::camera_gap);
+}
+
+void AravisCamera::note_drought() {
+  if (link_->starving()) droughts_ended_.push_back(wall_clock());
 }
 
 void AravisCamera::drop(Arrived arrived, Fate fate) {
   if (arrived.arrival == Arrival::transport) fate = Fate::transport;
   if (arrived.arrival == Arrival::resend) fate = Fate::resend;
-  record(arrived.frame_id, fate);
+  record(arrived.frame_id, arrived.system_time, fate);
+  note_drought();
   link_->recycle(std::move(arrived));
 }
 
@@ -183,13 +192,14 @@ std::optional<Frame> AravisCamera::hand_on(Arrived arrived) {
   frame.stamp.monotonic_time = clock_.now() - (wall_clock() - arrived.system_time);
   frame.stamp.status = damaged ? FrameStatus::damaged : FrameStatus::complete;
   const auto frame_id = arrived.frame_id;
+  note_drought();
   auto image = link_->take(std::move(arrived));
   if (!image) {
-    record(frame_id, Fate::transport);
+    record(frame_id, frame.stamp.system_time, Fate::transport);
     log(LogCategory::drivers).warn("camera {}: {}", id_, image.error().message());
     return {};
   }
-  frame.stamp.frame_id = record(frame_id, damaged ? Fate::damaged : Fate::delivered);
+  frame.stamp.frame_id = record(frame_id, frame.stamp.system_time, damaged ? Fate::damaged : Fate::delivered);
   frame.image = std::move(image).value();
   return frame;
 }
@@ -256,6 +266,7 @@ Status AravisCamera::reset_shutter(TimePoint at) {
                    fmt::format("order it at most {:.1f} s before", kLongestReset.value()));
   }
   clock_.sleep_until(at);
+  pass_over_before(kEver);
   const auto restarted = bounded<Result<TimePoint>>(ordered + kLibraryDeadline - clock_.now(),
                                                     [](Link& link) { return link.restart_acquisition(); });
   if (!restarted) return failure("it hangs, and didn't restart its cycle when told to", "cut its power");

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <future>
 #include <memory>
@@ -47,8 +48,10 @@ class AravisCamera final : public Camera {
   std::optional<Frame> hand_on(Arrived arrived);
   /// Frames that came before an instant of the wall clock.
   std::uint64_t pass_over_before(TimePoint wall);
+  /// To be called before a buffer is given back.
+  void note_drought();
   void drop(Arrived arrived, Fate fate);
-  std::uint64_t record(std::optional<std::uint64_t> frame_id, Fate fate);
+  std::uint64_t record(std::optional<std::uint64_t> frame_id, TimePoint came, Fate fate);
   /// Whether it went away: it sends nothing, and doesn't answer when it is asked for something.
   [[nodiscard]] bool silent();
   /// Calls the library on a thread of its own. None if that takes longer: the camera is quarantined then, the
@@ -75,8 +78,9 @@ class AravisCamera final : public Camera {
   TimePoint last_sign_;      ///< when something last came from the camera
   TimePoint next_question_;  ///< to a camera that is silent
   std::optional<TimePoint> unanswered_since_;
-  std::uint64_t signs_ = 0, underruns_ = 0;
-  bool starved_ = false;  ///< a gap to come is one of frames that found no buffer
+  std::uint64_t signs_ = 0;
+  TimePoint last_came_;                   ///< the last frame, by the wall clock
+  std::deque<TimePoint> droughts_ended_;  ///< when a stream without a buffer got one, by the wall clock
 };
 
 }  // namespace emberlock::aravis

@@ -26,7 +26,8 @@ std::uint64_t FrameLedger::record(std::uint64_t id, Fate fate, Fate gap) {
     const std::uint64_t skipped = *forward - 1;
     // More unnumbered than skipped were pieces of one frame.
     const std::uint64_t explained = std::min<std::uint64_t>(skipped, unnumbered_.size());
-    for (std::uint64_t i = 0; i < explained; ++i) count(unnumbered_[i]);
+    // Of a frame at the edge of a want of buffers only the end finds one.
+    for (std::uint64_t i = 0; i < explained; ++i) count(gap == Fate::underrun ? gap : unnumbered_[i]);
     count(gap, skipped - explained);
     unnumbered_.clear();
   }

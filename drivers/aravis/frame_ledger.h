@@ -17,7 +17,8 @@ enum class Fate { delivered, damaged, camera_gap, transport, resend, underrun, p
 class FrameLedger {
  public:
   /// The frame that the camera numbers `id`, in the camera's order. Numbers skipped before it meet `gap`, but
-  /// for those that unnumbered() spoke of. Returns its running number, without wraps or new beginnings.
+  /// for those that unnumbered() spoke of; of an underrun those too. Returns its running number, without
+  /// wraps or new beginnings.
   std::uint64_t record(std::uint64_t id, Fate fate, Fate gap = Fate::camera_gap);
   /// A frame of which came a part, but not the part that says its number.
   void unnumbered(Fate fate) { unnumbered_.push_back(fate); }

@@ -72,7 +72,7 @@ Result<std::shared_ptr<Link>> Link::open(const Seen& seen, const CameraRequest& 
 }
 
 Link::~Link() {
-  if (stream_ != nullptr) static_cast<void>(stop_acquisition());
+  if (stream_ != nullptr && !given_up_) static_cast<void>(stop_acquisition());
 }
 
 Status Link::start() {
@@ -212,8 +212,10 @@ std::uint64_t Link::signs_of_life() const {
          arv_stream_get_info_uint64_by_name(stream_.get(), "n_ignored_bytes");
 }
 
-std::uint64_t Link::underruns() const {
-  return arv_stream_get_info_uint64_by_name(stream_.get(), "n_underruns");
+bool Link::starving() const {
+  gint waiting = 0;
+  arv_stream_get_n_buffers(stream_.get(), &waiting, nullptr);
+  return waiting <= 0 && ARV_IS_GV_STREAM(stream_.get());  // USB3 takes all at once
 }
 
 }  // namespace emberlock::aravis

@@ -49,6 +49,9 @@ class Link {
   /// The camera went away or another program took it over; told by the library within 6 s or so.
   [[nodiscard]] bool control_lost() const { return *control_lost_; }
 
+  /// It is gone: closing wastes no time on telling it to stop.
+  void give_up() { given_up_ = true; }
+
   Status start();
   /// Films no longer; what was on its way may still be popped.
   Status stop_acquisition();
@@ -64,8 +67,8 @@ class Link {
   void recycle(Arrived arrived) { push(std::move(arrived.buffer)); }
   /// Grows with whatever comes from the camera, used or not.
   [[nodiscard]] std::uint64_t signs_of_life() const;
-  /// Grows when a frame finds no buffer; how far is no count of frames before Aravis 0.8.29.
-  [[nodiscard]] std::uint64_t underruns() const;
+  /// Whether no buffer waits for a frame. (How many underruns Aravis counts is of no use before 0.8.29.)
+  [[nodiscard]] bool starving() const;
 
  private:
   Link() = default;
@@ -81,6 +84,7 @@ class Link {
   std::size_t payload_ = 0;   ///< bytes the camera sends a frame
   bool into_images_ = false;  ///< buffers are the memory of images
   bool resends_ = false;
+  bool given_up_ = false;
   std::shared_ptr<std::atomic<bool>> control_lost_ = std::make_shared<std::atomic<bool>>(false);
   ObjectPtr<ArvCamera> camera_;
   ObjectPtr<ArvStream> stream_;  ///< while it films; let go before the camera

@@ -56,6 +56,14 @@ TEST(FrameLedger, FramesWithoutANumberExplainTheGapTheyLieIn) {
   EXPECT_EQ(ledger.counts(), (FrameCounts{.delivered = 2, .camera_gap = 1, .transport = 1, .resend = 1}));
 }
 
+TEST(FrameLedger, APieceAtTheEdgeOfAnUnderrunIsOfTheUnderrun) {
+  FrameLedger ledger;
+  number(ledger, 10);
+  ledger.unnumbered(Fate::transport);
+  EXPECT_EQ(ledger.record(14, Fate::delivered, Fate::underrun), 4U);
+  EXPECT_EQ(ledger.counts(), (FrameCounts{.delivered = 2, .underrun = 3}));
+}
+
 TEST(FrameLedger, TwoPiecesOfOneFrameAreOneFrame) {
   FrameLedger ledger;
   number(ledger, 10);

@@ -54,7 +54,7 @@ std::optional<HotplugEvent> HotplugMonitor::next(Seconds deadline) {
     const double left = std::max(0.0, in_milliseconds(until - clock.now()));
     const int polled = ::poll(&ready, 1, static_cast<int>(std::ceil(left)));
     if (polled < 0 && errno == EINTR) continue;
-    if (polled <= 0) return {};
+    if (polled <= 0 || clock.now() > until) return {};
     const std::unique_ptr<udev_device, decltype(&udev_device_unref)> device(
         udev_monitor_receive_device(monitor_.get()), &udev_device_unref);
     if (!device) continue;

@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
+#include <filesystem>
 #include <numeric>
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
+#include <malloc.h>
 
 #include "base/clock.h"
 #include "drivers/camera_thread.h"
@@ -36,18 +36,17 @@ int open_descriptors() {
   return n;
 }
 
-long resident_kilobytes() {
-  std::ifstream file("/proc/self/statm");
-  long total = 0;
-  long resident = 0;
-  file >> total >> resident;
-  return resident * ::sysconf(_SC_PAGESIZE) / 1024;
+/// What the program has asked for and not given back.
+long heap_kilobytes() {
+  const auto heap = ::mallinfo2();
+  return static_cast<long>((heap.uordblks + heap.hblkhd) / 1024);
 }
 
 TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
   std::vector<std::unique_ptr<CameraThread>> cameras;
   for (int i = 0; i < 2; ++i) {
-    cameras.push_back(std::make_unique<CameraThread>(v4l2_driver().open(id(i), small_gray()).value()));
+    cameras.push_back(std::make_unique<CameraThread>(v4l2_driver().open(id(i), small_gray()).value(),
+                                                     CameraThreadOptions{.queue_frames = 2}));
     ASSERT_TRUE(cameras.back()->start().ok());
   }
   const int rounds = from_environment("EMBERLOCK_VM_ROUNDS", 10);
@@ -59,7 +58,7 @@ TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
   for (int round = 0; round < rounds; ++round) {
     if (round == kWarmUp) {
       descriptors = open_descriptors();
-      memory = resident_kilobytes();
+      memory = heap_kilobytes();
     }
     unplug();
     TimePoint since = SteadyClock().now();
@@ -82,20 +81,20 @@ TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
   const auto longest_report = *std::max_element(reports.begin(), reports.end());
   const auto longest_return = *std::max_element(returns.begin(), returns.end());
   const int more_descriptors = open_descriptors() - descriptors;
-  const long more_memory = resident_kilobytes() - memory;
+  const long more_memory = heap_kilobytes() - memory;
   std::printf(
       "%d rounds of unplugging 2 vivid cameras: both reported %.0f ms after the kernel had removed them "
       "(median; longest %.0f), both "
       "filming %.0f ms "
-      "after their return (median; longest %.0f); %+d descriptors, %+ld kB resident after the first %d\n",
+      "after their return (median; longest %.0f); %+d descriptors, %+ld kB of heap after the first %d\n",
       rounds, 1e3 * quantile(reports, 0.5), 1e3 * longest_report, 1e3 * quantile(returns, 0.5),
       1e3 * longest_return, more_descriptors, more_memory, kWarmUp);
   EXPECT_LE(longest_report, 1.0);
   EXPECT_LE(longest_return, 3.0);
   if (rounds <= kWarmUp) return;
   EXPECT_EQ(more_descriptors, 0);
-  // A leaked picture alone would be 225 kB a camera and round.
-  EXPECT_LE(more_memory, 4096);
+  // One leaked picture of each camera and round would be twice that; two of each may wait in the queues.
+  EXPECT_LE(more_memory, 225L * std::max(rounds - kWarmUp, 4));
 }
 
 TEST_F(V4l2Again, AResetsDelayIsKnownByTheTimestamps) {

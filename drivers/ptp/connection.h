@@ -29,10 +29,11 @@ std::string ptp_id(const UsbPtpDevice& usb, const std::string& ptp_serial);
 /// The id of a device that needn't be asked: as it was when it was connected to, else by its USB descriptor.
 std::string ptp_id(const UsbPtpDevice& usb);
 
-/// Opens the device at its place on the bus, within 1.5 s. Errors: as open_usb_ptp and PtpSession::open.
+/// Opens the device at its place on the bus: within 1.5 s, 3 s where it must be recovered first. Errors: as
+/// open_usb_ptp and PtpSession::open.
 Result<PtpConnection> connect_ptp(const UsbPtpDevice& usb);
-/// Finds the device by its id and opens it. Others that are free are asked for theirs if need be, for 2 s at
-/// most.
+/// Finds the device by its id and opens it. Others that are free are asked for theirs if need be; none is
+/// begun with after 2 s.
 Result<PtpConnection> connect_ptp(const std::string& id);
 
 /// Whether CHDK may be asked for: no other maker's 0x9999 means it.

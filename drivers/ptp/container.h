@@ -17,7 +17,8 @@ enum class PtpType : std::uint16_t { command = 1, data = 2, response = 3, event 
 
 inline constexpr std::size_t kPtpHeaderBytes = 12;
 inline constexpr std::size_t kPtpMostParams = 5;
-/// A header's length when the sender doesn't know it: a short packet ends such data.
+/// A header's length when the sender doesn't know it. Sessions refuse such data: nothing would tell its end
+/// from a loss.
 inline constexpr std::uint32_t kPtpLengthUnknown = 0xffffffff;
 
 /// What every container begins with.

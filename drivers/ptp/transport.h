@@ -35,8 +35,8 @@ class PtpTransport {
   /// The next bytes that the device sends, at most `most`. Error timed_out: none yet; nothing is lost, and
   /// the next call must ask for the same `most`.
   virtual Result<PtpPiece> receive(std::size_t most, Seconds deadline) = 0;
-  /// Makes both pipes usable after an error or in the middle of a transaction, within 1 s. The device may
-  /// have closed its session.
+  /// Makes both pipes usable after an error or in the middle of a transaction, within 1.6 s, unless the
+  /// device doesn't even let a halt be cleared (the kernel gives that 5 s). It may have closed its session.
   virtual Status recover(std::uint32_t transaction) = 0;
 };
 

@@ -22,7 +22,8 @@ constexpr std::uint16_t kCanon = 0x04a9;
 constexpr Seconds kControlDeadline = milliseconds(150);
 constexpr Seconds kCancelDeadline = milliseconds(500);
 constexpr Seconds kDrainPause = milliseconds(20);
-constexpr int kMostDrained = 64;
+/// How long a recovery may go on draining; what comes before takes 1.1 s at the most.
+constexpr Seconds kRecovery = milliseconds(1500);
 constexpr std::size_t kBuffer = std::size_t{1} << 18;
 
 // Requests of the still image class (PIMA 15740:2000, annex D.5.2).
@@ -179,7 +180,7 @@ class UsbTransport final : public PtpTransport {
   /// Whether the device takes the cancellation and is ready again.
   bool cancel(std::uint32_t transaction);
   int clear_halt(std::uint8_t endpoint);
-  int drain();
+  int drain(TimePoint until);
 
   Context context_;
   Handle handle_;
@@ -291,8 +292,8 @@ int UsbTransport::clear_halt(std::uint8_t endpoint) {
   return (status[0] & 1) != 0 ? libusb_clear_halt(handle_.get(), endpoint) : 0;
 }
 
-int UsbTransport::drain() {
-  for (int i = 0; i < kMostDrained; ++i) {
+int UsbTransport::drain(TimePoint until) {
+  while (clock_.now() < until) {
     int came = 0;
     const int error =
         libusb_bulk_transfer(handle_.get(), interface_.in, reinterpret_cast<unsigned char*>(buffer_.get()),
@@ -305,6 +306,7 @@ int UsbTransport::drain() {
 
 Status UsbTransport::recover(std::uint32_t transaction) {
   log(LogCategory::drivers).debug("ptp: recovers from transaction {}", transaction);
+  const TimePoint until = clock_.now() + kRecovery;
   if (cancel_receiving() == Fly::flying) return failed(LIBUSB_ERROR_BUSY);
   if (!cancel(transaction)) {
     const int error = ask(kDeviceReset, kToInterface, {});
@@ -315,8 +317,13 @@ Status UsbTransport::recover(std::uint32_t transaction) {
     const int error = clear_halt(endpoint);
     if (error != 0) return failed(error);
   }
-  const int error = drain();
+  const int error = drain(until);
   return error == 0 ? Status() : failed(error);
+}
+
+Error unopened(const UsbPtpDevice& device, int error) {
+  return {ErrorKind::device, fmt::format("it can't be opened: {}", libusb_strerror(error)), device.path,
+          "unplug it and plug it in again"};
 }
 
 UsbTransport::~UsbTransport() {
@@ -350,13 +357,6 @@ Result<std::vector<UsbPtpDevice>> list_usb_ptp() {
             [](const UsbPtpDevice& a, const UsbPtpDevice& b) { return a.path < b.path; });
   return found;
 }
-
-namespace {
-Error unopened(const UsbPtpDevice& device, int error) {
-  return {ErrorKind::device, fmt::format("it can't be opened: {}", libusb_strerror(error)), device.path,
-          "unplug it and plug it in again"};
-}
-}  // namespace
 
 Result<std::unique_ptr<PtpTransport>> open_usb_ptp(const UsbPtpDevice& device) {
   EMBERLOCK_ASSIGN_OR_RETURN(Bus bus, Bus::scan());

@@ -39,6 +39,7 @@ void ask(const Seen& seen, CameraFound& found) {
   const Status asked = inspect(seen, [&found](ArvCamera* camera) {
     for (const Offer& offer : offers(camera, {})) found.modes.push_back(offer.mode);
     found.trigger = trigger_of(camera);
+    found.link_megabits = link_megabits_of(camera);
     for (std::string& note : notes_of(camera)) found.notes.push_back(std::move(note));
   });
   if (!asked) found.notes.push_back("it can't be opened: " + asked.error().what);

@@ -75,6 +75,11 @@ std::optional<Holder> owner_of(const std::string& address, std::uint16_t port) {
   return {};
 }
 
+/// A second address of an interface is named "eth0:1".
+std::string name_of(const ifaddrs& interface) {
+  return {interface.ifa_name, std::strcspn(interface.ifa_name, ":")};
+}
+
 }  // namespace
 
 std::optional<std::uint32_t> read_register(const std::string& camera_address, std::uint32_t register_address,
@@ -147,13 +152,22 @@ std::optional<int> network_mtu(const std::string& interface_address) {
   std::optional<int> mtu;
   each_interface(interface_address, [&mtu](const ifaddrs& interface) {
     ifreq request{};
-    // A second address of an interface is named "eth0:1".
-    const std::string name(interface.ifa_name, std::strcspn(interface.ifa_name, ":"));
+    const std::string name = name_of(interface);
     name.copy(request.ifr_name, IFNAMSIZ - 1);
     const UniqueFd fd(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
     if (fd && ::ioctl(fd.get(), SIOCGIFMTU, &request) == 0) mtu = request.ifr_mtu;
   });
   return mtu;
+}
+
+std::optional<double> network_megabits(const std::string& interface_address) {
+  std::optional<double> megabits;
+  each_interface(interface_address, [&megabits](const ifaddrs& interface) {
+    double speed = 0;  // unreadable where it is down, or has none as the loopback
+    if (std::ifstream("/sys/class/net/" + name_of(interface) + "/speed") >> speed && speed > 0)
+      megabits = speed;
+  });
+  return megabits;
 }
 
 }  // namespace emberlock::aravis

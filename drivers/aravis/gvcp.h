@@ -34,5 +34,7 @@ std::optional<Controller> controller_of(const std::string& camera_address);
 
 /// Bytes of the longest packet that the interface with this address takes.
 std::optional<int> network_mtu(const std::string& interface_address);
+/// Megabits a second that the interface with this address carries; none where it doesn't say.
+std::optional<double> network_megabits(const std::string& interface_address);
 
 }  // namespace emberlock::aravis

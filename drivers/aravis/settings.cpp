@@ -61,13 +61,18 @@ std::optional<Offer> offer(const std::string& encoding, PackedPixels pixels, Her
 
 std::string list(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
 
-std::optional<std::string> packet_note(ArvCamera* camera) {
-  if (arv_camera_is_gv_device(camera) == 0) return {};
-  const auto packets = static_cast<int>(arv_camera_gv_get_packet_size(camera, nullptr));
+/// Of the network interface by which a GigE camera is reached.
+std::string interface_address(ArvCamera* camera) {
   GSocketAddress* here = arv_gv_device_get_interface_address(ARV_GV_DEVICE(arv_camera_get_device(camera)));
   const MemoryPtr<char> address(
       g_inet_address_to_string(g_inet_socket_address_get_address(G_INET_SOCKET_ADDRESS(here))));
-  const auto mtu = network_mtu(address.get());
+  return address.get();
+}
+
+std::optional<std::string> packet_note(ArvCamera* camera) {
+  if (arv_camera_is_gv_device(camera) == 0) return {};
+  const auto packets = static_cast<int>(arv_camera_gv_get_packet_size(camera, nullptr));
+  const auto mtu = network_mtu(interface_address(camera));
   constexpr int kAnyNetwork = 1500;
   if (!mtu || packets <= 0) return {};
   if (packets > *mtu) {
@@ -231,6 +236,11 @@ ExternalTrigger trigger_of(ArvCamera* camera) {
   const bool outside = std::any_of(sources.begin(), sources.end(),
                                    [](const std::string& source) { return !source.starts_with("Software"); });
   return outside ? ExternalTrigger::present : ExternalTrigger::absent;
+}
+
+std::optional<double> link_megabits_of(ArvCamera* camera) {
+  if (arv_camera_is_gv_device(camera) == 0) return {};
+  return network_megabits(interface_address(camera));
 }
 
 std::vector<std::string> notes_of(ArvCamera* camera) {

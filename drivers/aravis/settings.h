@@ -22,6 +22,8 @@ struct Offer {
 std::vector<Offer> offers(ArvCamera* camera, const std::optional<ImageSize>& size);
 
 ExternalTrigger trigger_of(ArvCamera* camera);
+/// What the network by which it is reached carries a second; none of USB3 cameras.
+std::optional<double> link_megabits_of(ArvCamera* camera);
 /// Packets against the network, inter-packet delay, synchronised clocks, sizes.
 std::vector<std::string> notes_of(ArvCamera* camera);
 

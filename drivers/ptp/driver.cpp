@@ -42,6 +42,7 @@ CameraFound look_at(const UsbPtpDevice& usb) {
   found.id = ptp_id(usb);
   found.model = usb.name;
   found.address = usb.path;
+  if (usb.megabits > 0) found.link_megabits = usb.megabits;
   auto connection = connect_ptp(usb);
   if (!connection.ok()) {
     found.holder = holder_of(usb.node());

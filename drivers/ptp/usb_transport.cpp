@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <optional>
 #include <span>
@@ -148,6 +149,7 @@ UsbPtpDevice describe(libusb_device* device, std::uint16_t vendor) {
   found.path = "usb-" + controller_of(sysfs, found.bus) + plug;
   found.name = read_line(sysfs / "product");
   found.serial = read_line(sysfs / "serial");
+  found.megabits = std::atof(read_line(sysfs / "speed").c_str());
   return found;
 }
 

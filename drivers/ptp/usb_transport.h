@@ -15,10 +15,11 @@ namespace emberlock {
 struct UsbPtpDevice {
   std::uint16_t vendor = 0;
   int bus = 0;
-  int number = 0;      ///< on the bus; another one each time that it is plugged in
-  std::string path;    ///< the controller and ports that it hangs on: "usb-0000:00:14.0-1.2"
-  std::string name;    ///< what its descriptor says, may be empty
-  std::string serial;  ///< likewise
+  int number = 0;       ///< on the bus; another one each time that it is plugged in
+  std::string path;     ///< the controller and ports that it hangs on: "usb-0000:00:14.0-1.2"
+  std::string name;     ///< what its descriptor says, may be empty
+  std::string serial;   ///< likewise
+  double megabits = 0;  ///< that its connection carries a second; 0 where that isn't known
 
   [[nodiscard]] std::filesystem::path node() const;  ///< /dev/bus/usb/BBB/DDD
 };

@@ -137,6 +137,8 @@ TEST_F(FilmTest, AResetShowsTheNewCycleAndLosesNothing) {
   EXPECT_EQ((*camera)->info().reset, ShutterReset::on_command);
   ASSERT_TRUE((*camera)->start().ok());
   Film film = film_for(**camera, milliseconds(300));
+  // The kernel may lose the very first frame, before the library has enlarged its socket.
+  const std::uint64_t lost_before = (*camera)->counts().lost();
   std::vector<double> latencies;
   for (int i = 0; i < asked_for("EMBERLOCK_ARAVIS_RESETS", 8); ++i) {
     const TimePoint at = clock.now() + milliseconds(20);
@@ -151,7 +153,7 @@ TEST_F(FilmTest, AResetShowsTheNewCycleAndLosesNothing) {
   }
   (*camera)->stop();
   EXPECT_LE(film.skipped, (*camera)->counts().passed_over);
-  EXPECT_EQ((*camera)->counts().lost(), 0U);
+  EXPECT_EQ((*camera)->counts().lost(), lost_before);
   EXPECT_EQ(film.wrong_number, 0U);
   EXPECT_EQ(all_of((*camera)->counts()), processes[0]->sent().frames.size());
   double mean = 0, square = 0;

@@ -78,6 +78,7 @@ TEST_F(ChdkOnUsb, IsFoundWithWhatItCanDo) {
   EXPECT_EQ(found->front().reset, ShutterReset::on_command);
   EXPECT_THAT(found->front().notes, testing::Contains(HasSubstr("CHDK 2.9")));
   EXPECT_THAT(found->front().address, testing::StartsWith("usb-"));
+  EXPECT_GE(found->front().link_megabits.value_or(0), 12);
 }
 
 TEST_F(ChdkOnUsb, ScriptsAndMessagesGoBothWays) {

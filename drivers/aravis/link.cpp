@@ -3,8 +3,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
 #include <thread>
 #include <utility>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 #include "base/clock.h"
 #include "base/log.h"
@@ -33,6 +39,24 @@ void on_control_lost(ArvDevice* device, gpointer flag) {
   }).detach();
 }
 void free_flag(gpointer flag, GClosure*) { delete static_cast<Flag*>(flag); }
+
+/// Of this process's UDP socket that is bound to `port`.
+void enlarge_socket(std::uint16_t port, int bytes) {
+  std::error_code gone;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", gone)) {
+    const int fd = std::atoi(entry.path().filename().c_str());
+    sockaddr_in bound{};
+    socklen_t size = sizeof bound;
+    int type = 0;
+    socklen_t type_size = sizeof type;
+    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&bound), &size) != 0 || bound.sin_family != AF_INET ||
+        ntohs(bound.sin_port) != port || ::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &type_size) != 0 ||
+        type != SOCK_DGRAM) {
+      continue;
+    }
+    ::setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &bytes, sizeof bytes);
+  }
+}
 
 }  // namespace
 
@@ -96,8 +120,11 @@ Status Link::start() {
     resends_ = policy == ARV_GV_STREAM_PACKET_RESEND_ALWAYS;
     // Bursts of whole frames must fit into the socket; the kernel gives what net.core.rmem_max allows.
     constexpr std::size_t kFrames = 4;
+    const auto bytes = static_cast<int>(std::min<std::size_t>(kFrames * payload_, 64U << 20U));
     g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
-                 static_cast<gint>(std::min<std::size_t>(kFrames * payload_, 64U << 20U)), nullptr);
+                 bytes, nullptr);
+    // Aravis does so when the first packet has come, which is too late for the first frame.
+    enlarge_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())), bytes);
   }
   EMBERLOCK_RETURN_IF_ERROR(queue_buffers());
   arv_camera_start_acquisition(camera_.get(), error.out());

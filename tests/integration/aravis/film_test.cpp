@@ -58,7 +58,7 @@ TEST_F(FilmTest, ElevenCamerasFilmWithoutAFrameUnaccountedFor) {
     EXPECT_LE(films[i].skipped, counts.lost());  // the first frame may find a small socket
     EXPECT_EQ(films[i].wrong_pixels, 0U);
     EXPECT_EQ(films[i].wrong_number, 0U);
-    EXPECT_GT(static_cast<double>(films[i].frames), 0.5 * 15 * time.value());
+    EXPECT_GT(static_cast<double>(films[i].frames), 0.9 * 15 * time.value());
     EXPECT_FALSE(films[i].error.has_value());
     lost += counts.lost();
     sent += its;
@@ -103,9 +103,8 @@ TEST_F(FilmTest, FramesThatTheNetworkTearsAreCountedByCauseAndNeverHandedOn) {
     EXPECT_EQ(films[i].wrong_number, 0U);
     EXPECT_EQ(films[i].damaged, 0U);
     EXPECT_EQ(films[i].frames, counts.delivered);
-    EXPECT_LE(counts.delivered + counts.passed_over, sent.frames.size() - sent.incomplete.size());
-    EXPECT_GE(torn, sent.incomplete.size());
-    EXPECT_LE(torn, sent.incomplete.size() + 3);  // the kernel too may lose one, on a busy machine
+    EXPECT_EQ(counts.delivered + counts.passed_over, sent.frames.size() - sent.incomplete.size());
+    EXPECT_EQ(torn, sent.incomplete.size());
     EXPECT_EQ(counts.lost(), torn);
     EXPECT_EQ(all_of(counts), sent.frames.size());
   }
@@ -137,8 +136,6 @@ TEST_F(FilmTest, AResetShowsTheNewCycleAndLosesNothing) {
   EXPECT_EQ((*camera)->info().reset, ShutterReset::on_command);
   ASSERT_TRUE((*camera)->start().ok());
   Film film = film_for(**camera, milliseconds(300));
-  // The kernel may lose the very first frame, before the library has enlarged its socket.
-  const std::uint64_t lost_before = (*camera)->counts().lost();
   std::vector<double> latencies;
   for (int i = 0; i < asked_for("EMBERLOCK_ARAVIS_RESETS", 8); ++i) {
     const TimePoint at = clock.now() + milliseconds(20);
@@ -153,7 +150,7 @@ TEST_F(FilmTest, AResetShowsTheNewCycleAndLosesNothing) {
   }
   (*camera)->stop();
   EXPECT_LE(film.skipped, (*camera)->counts().passed_over);
-  EXPECT_EQ((*camera)->counts().lost(), lost_before);
+  EXPECT_EQ((*camera)->counts().lost(), 0U);
   EXPECT_EQ(film.wrong_number, 0U);
   EXPECT_EQ(all_of((*camera)->counts()), processes[0]->sent().frames.size());
   double mean = 0, square = 0;

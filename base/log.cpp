@@ -11,7 +11,8 @@
 namespace emberlock {
 namespace {
 
-constexpr std::array<const char*, 6> kNames{"base", "smear_sync", "session", "drivers", "recon", "cli"};
+constexpr std::array<const char*, 7> kNames{"base",  "smear_sync", "session", "drivers",
+                                            "recon", "daemon",     "cli"};
 
 std::array<std::shared_ptr<spdlog::logger>, kNames.size()> make_loggers() {
   const auto sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();

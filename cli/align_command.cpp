@@ -7,11 +7,11 @@
 #include <fmt/format.h>
 
 #include "base/file.h"
-#include "cli/align_json.h"
-#include "cli/align_record.h"
-#include "cli/align_run.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "daemon/align/json.h"
+#include "daemon/align/record.h"
+#include "daemon/align/run.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
 

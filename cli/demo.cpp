@@ -5,7 +5,7 @@
 #include <thread>
 
 #include "base/clock.h"
-#include "cli/align_record.h"
+#include "daemon/align/record.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "recon/pipeline/scene.h"
 #include "session/async_writer.h"

@@ -12,8 +12,8 @@
 
 #include "base/clock.h"
 #include "cli/commands.h"
-#include "cli/device_list.h"
 #include "cli/interrupt.h"
+#include "daemon/devices/device_list.h"
 #include "drivers/camera_thread.h"
 #include "drivers/hotplug.h"
 #include "drivers/probe.h"

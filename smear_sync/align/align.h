@@ -18,8 +18,8 @@
 namespace emberlock {
 
 // The alignment as a pure step: what was known, and what a round of filming showed, give what is known now
-// and what to do next. It has no clock and no device: cli/align_run.h carries its orders out, and a recording
-// replays through it.
+// and what to do next. It has no clock and no device: daemon/align/run.h carries its orders out, and a
+// recording replays through it.
 
 /// Which cameras are reset, and towards what.
 enum class AlignPolicy {

@@ -27,7 +27,7 @@ Delays measure(SensorKind kind, int rigs) {
     test::SmallBench bench(setup);
     bench.options.align.policy = AlignPolicy::timed;
     bench.options.align.tolerance.amount = Rows(10);
-    const auto result = cli::run_align(bench.align, bench.options);
+    const auto result = run_align(bench.align, bench.options);
     if (!result.ok()) {
       std::fprintf(stderr, "rig %d: %s\n", seed, result.error().message().c_str());
       continue;

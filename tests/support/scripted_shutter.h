@@ -72,7 +72,7 @@ struct ToldRound {
   int looks = 0;
 };
 
-/// Films a shutter for a sensor as cli/align_bench.h films a camera: looks three periods apart until the
+/// Films a shutter for a sensor as daemon/align/bench.h films a camera: looks three periods apart until the
 /// sensor is content, then four frames of flashes that come `delay` late.
 class SensorRounds {
  public:

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "cli/align_run.h"
+#include "daemon/align/run.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
 
@@ -53,8 +53,8 @@ struct SmallBench {
   }
 
   std::unique_ptr<VirtualRig> rig;
-  cli::AlignRig align;
-  cli::AlignRunOptions options;
+  AlignRig align;
+  AlignRunOptions options;
 };
 
 }  // namespace emberlock::test

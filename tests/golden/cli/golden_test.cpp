@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 
 #include "base/file.h"
-#include "cli/align_json.h"
+#include "daemon/align/json.h"
 #include "recon/export/report.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/synthetic/flame.h"

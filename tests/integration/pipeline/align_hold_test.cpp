@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/align_run.h"
+#include "daemon/align/run.h"
 #include "session/reader.h"
 #include "tests/support/aligned.h"
 

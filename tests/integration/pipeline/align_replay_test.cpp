@@ -5,8 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/align_json.h"
-#include "cli/align_record.h"
+#include "daemon/align/json.h"
+#include "daemon/align/record.h"
 #include "session/reader.h"
 #include "tests/support/small_rig.h"
 

@@ -1,5 +1,3 @@
-#include "cli/align_run.h"
-
 #include <cmath>
 #include <memory>
 #include <string>
@@ -8,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/align/run.h"
 #include "tests/support/aligned.h"
 
 namespace emberlock::cli {

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "cli/align_run.h"
+#include "daemon/align/run.h"
 #include "tests/support/aligned.h"
 
 namespace emberlock::cli {

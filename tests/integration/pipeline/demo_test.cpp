@@ -9,7 +9,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
-#include "cli/align_record.h"
+#include "daemon/align/record.h"
 #include "recon/preprocess/flame_mask.h"
 #include "session/reader.h"
 

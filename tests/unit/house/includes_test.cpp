@@ -21,7 +21,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
     {"session", {"base", "proto"}},
     {"drivers", {"base", "session"}},
     {"recon", {"base", "session"}},
-    {"cli", {"base", "proto", "smear_sync", "session", "drivers", "recon"}},
+    {"daemon", {"base", "proto", "smear_sync", "session", "drivers", "recon"}},
+    {"cli", {"base", "proto", "smear_sync", "session", "drivers", "recon", "daemon"}},
 };
 
 // Inside these a folder includes itself, the ones before it, and what lies directly in the house's folder.
@@ -114,7 +115,8 @@ TEST(House, NothingIncludesTests) {
 }
 
 TEST(House, EveryFolderExplainsItself) {
-  for (const char* folder : {"base", "proto", "smear_sync", "session", "drivers", "recon", "cli", "tests"}) {
+  for (const char* folder :
+       {"base", "proto", "smear_sync", "session", "drivers", "recon", "daemon", "cli", "tests"}) {
     EXPECT_TRUE(fs::exists(kRoot / folder / "README.md")) << folder;
   }
 }

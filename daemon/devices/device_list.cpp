@@ -1,4 +1,4 @@
-#include "cli/device_list.h"
+#include "daemon/devices/device_list.h"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 #include "drivers/ptp/driver.h"
 #include "drivers/v4l2/v4l2.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 namespace {
 
 using nlohmann::ordered_json;
@@ -207,4 +207,4 @@ std::string device_json(const DeviceList& list) {
       .dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -1,4 +1,4 @@
-#include "cli/align_bench.h"
+#include "daemon/align/bench.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include "base/random.h"
 #include "drivers/replay/record.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 namespace {
 
 /// Sensors that aren't content after so many answers never will be.
@@ -163,7 +163,7 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
     Result<Frame> frame = rig_.cameras[camera]->next_frame(options_.frame_deadline);
     if (!frame.ok()) {
       if (frame.error().kind != ErrorKind::timed_out) return frame.error();
-      log(LogCategory::cli).warn("{}", frame.error().message());
+      log(LogCategory::daemon).warn("{}", frame.error().message());
       return std::optional<Frame>();
     }
     if (rig_.recorder) {
@@ -176,4 +176,4 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
   }
 }
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -1,4 +1,4 @@
-#include "cli/align_run.h"
+#include "daemon/align/run.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,13 +8,13 @@
 #include <fmt/format.h>
 
 #include "base/log.h"
-#include "cli/align_bench.h"
-#include "cli/align_json.h"
+#include "daemon/align/bench.h"
+#include "daemon/align/json.h"
 #include "smear_sync/align/align_words.h"
 #include "smear_sync/align/move_together.h"
 #include "smear_sync/align/reset_delay.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 namespace {
 
 /// Cameras whose nominal rates differ by more can't be held in step by resets.
@@ -130,7 +130,7 @@ Status measure_row_times(const AlignRig& rig, AlignBench& bench, const AlignRunO
       const auto fit = fit_row_clock(film.readings[i], bench.strobe().rate, options.timing[i].frame_period);
       result.row_clocks[i].reset();
       if (!fit.ok()) {
-        log(LogCategory::cli).warn("camera {}: {}", rig.cameras[i]->info().id, fit.error().message());
+        log(LogCategory::daemon).warn("camera {}: {}", rig.cameras[i]->info().id, fit.error().message());
         continue;
       }
       near_integer |= fit->near_integer_pitch;
@@ -373,4 +373,4 @@ Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& opt
   return run.finish();
 }
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

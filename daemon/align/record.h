@@ -4,9 +4,9 @@
 #include <optional>
 #include <vector>
 
-#include "cli/align_run.h"
+#include "daemon/align/run.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 
 /// run_align(), recorded as a session in `folder`: every frame delivered, every strobe setting, reset and
 /// decision, and the settings themselves. Errors: run_align's and the writer's; what was recorded until then
@@ -28,4 +28,4 @@ Result<std::vector<std::optional<ResetDelay>>> read_delays(const std::filesystem
 Status write_delays(const std::filesystem::path& file, const AlignRig& rig,
                     const std::vector<std::optional<ResetDelay>>& delays);
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

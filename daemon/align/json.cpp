@@ -1,10 +1,10 @@
-#include "cli/align_json.h"
+#include "daemon/align/json.h"
 
 #include <cmath>
 #include <stdexcept>
 #include <string>
 
-namespace emberlock::cli {
+namespace emberlock {
 namespace {
 
 using nlohmann::json;
@@ -251,4 +251,4 @@ Result<AlignRunOptions> options_from_json(const json& object) {
   }
 }
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -8,7 +8,7 @@
 #include "drivers/strobe_serial/strobe_serial.h"
 
 // Everything that is there, by all drivers.
-namespace emberlock::cli {
+namespace emberlock {
 
 struct ListedCamera {
   std::string_view driver;
@@ -53,4 +53,4 @@ std::string device_table(const DeviceList& list, Detail detail);
 /// One JSON object: {"cameras": [...], "serial_ports": [...], "failures": [...]}.
 std::string device_json(const DeviceList& list);
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -7,11 +7,11 @@
 #include "base/frame.h"
 #include "base/progress.h"
 #include "base/result.h"
-#include "cli/align_run.h"
+#include "daemon/align/run.h"
 #include "session/writer.h"
 #include "smear_sync/sensors/phase_sensor.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 
 /// What was read of every camera between two changes; nothing of those that weren't asked.
 struct Film {
@@ -73,4 +73,4 @@ class AlignBench {
   std::vector<std::uint64_t> passed_over_;  ///< frames of each camera since its last one
 };
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -2,9 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "cli/align_run.h"
+#include "daemon/align/run.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 
 /// What `emberlock align --json` prints for a round. What isn't known is null. Numbers round-trip.
 nlohmann::ordered_json round_json(const AlignRoundReport& report);
@@ -16,4 +16,4 @@ nlohmann::ordered_json summary_json(const AlignRunResult& result, std::uint64_t 
 nlohmann::ordered_json options_json(const AlignRunOptions& options);
 Result<AlignRunOptions> options_from_json(const nlohmann::json& json);
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -1,13 +1,12 @@
-#include "cli/align_json.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/file.h"
-#include "cli/align_record.h"
+#include "daemon/align/json.h"
+#include "daemon/align/record.h"
 #include "tests/support/small_rig.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 namespace {
 
 using testing::HasSubstr;
@@ -108,4 +107,4 @@ TEST(AlignDelays, ADamagedFileIsNamedWithTheCamera) {
 }
 
 }  // namespace
-}  // namespace emberlock::cli
+}  // namespace emberlock

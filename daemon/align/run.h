@@ -17,7 +17,7 @@
 #include "smear_sync/clocks/row_clock.h"
 #include "smear_sync/detect/detect.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 
 /// What an alignment acts on. Cameras go by their index everywhere.
 struct AlignRig {
@@ -90,4 +90,4 @@ Result<AlignRunResult> run_align(const AlignRig& rig, const AlignRunOptions& opt
                                  const AlignObserver& observer = {}, const Progress& progress = {},
                                  const StopAsked& stop = {});
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

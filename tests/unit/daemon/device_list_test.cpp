@@ -1,14 +1,12 @@
+#include "daemon/devices/device_list.h"
+
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "cli/commands.h"
-#include "cli/device_list.h"
-#include "tests/support/verb.h"
-
-namespace emberlock::cli {
+namespace emberlock {
 namespace {
 
 using ::testing::HasSubstr;
@@ -116,26 +114,5 @@ TEST(Devices, TheJsonHoldsTheSame) {
   EXPECT_EQ(json["failures"].size(), 1);
 }
 
-TEST(Devices, ProbingAVirtualCameraTellsItsRateAndItsResets) {
-  const auto run = test::run_verb(add_devices, {"devices", "probe", "virtual-00", "--rig", "virtual:1",
-                                                "--seconds", "1", "--resets", "2", "--json"});
-  EXPECT_EQ(run.exit_code, 0) << run.err;
-  const auto json = nlohmann::json::parse(run.out);
-  EXPECT_EQ(json["id"], "virtual-00");
-  EXPECT_EQ(json["counts"]["camera_gap"], 0);
-  EXPECT_NEAR(json["frame_rate_hz"].get<double>(), 23.976, .01);
-  EXPECT_GT(json["reset_mean_s"].get<double>(), .1);
-}
-
-TEST(Devices, WhatCannotBeProbedIsSaid) {
-  using test::run_verb;
-  EXPECT_EQ(run_verb(add_devices, {"devices", "probe", "nobody", "--rig", "virtual:1"}).exit_code, 2);
-  EXPECT_EQ(run_verb(add_devices, {"devices", "probe", "virtual-00", "--rig", "virtual:none"}).exit_code, 2);
-  EXPECT_EQ(run_verb(add_devices, {"devices", "probe"}).exit_code, 2);
-  const auto size = run_verb(add_devices, {"devices", "probe", "nobody", "--size", "big"});
-  EXPECT_EQ(size.exit_code, 2);
-  EXPECT_THAT(size.err, HasSubstr("Say 1280x720"));
-}
-
 }  // namespace
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -1,13 +1,12 @@
 // The devices of an alignment: what a change of the strobe or a reset leaves of the frames, and what is
 // filmed for whom.
-#include "cli/align_bench.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/align/bench.h"
 #include "tests/support/small_rig.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 namespace {
 
 using test::small_rig;
@@ -109,4 +108,4 @@ TEST_F(AlignBenchTest, AWaitThatIsStoppedEndsSoon) {
 }
 
 }  // namespace
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -1,4 +1,4 @@
-#include "cli/align_record.h"
+#include "daemon/align/record.h"
 
 #include <chrono>
 #include <ctime>
@@ -6,11 +6,11 @@
 #include <utility>
 
 #include "base/file.h"
-#include "cli/align_json.h"
+#include "daemon/align/json.h"
 #include "drivers/replay/record.h"
 #include "drivers/replay/replay.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 namespace {
 
 /// Answers as the clock of the recorded run did: once for each change of the strobe, reset and trim.
@@ -169,4 +169,4 @@ Status write_delays(const std::filesystem::path& file, const AlignRig& rig,
   return write_file_atomically(file, json.dump(2) + "\n");
 }
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

@@ -13,6 +13,7 @@ enum class ErrorKind {
   device,       ///< a camera, strobe or accelerator failed or is absent
   out_of_data,  ///< the stream, file or recording has ended
   timed_out,    ///< a deadline passed
+  refused,      ///< it can't be done in the present state; another moment may do
 };
 
 /// What went wrong, where (file, field, device), and what to do about it.

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <functional>
+
+#include "base/result.h"
+#include "daemon/board.h"
+#include "emberlock/v1/services.pb.h"
+
+namespace emberlock {
+
+/// Takes how far a job is; false ends it early.
+using JobObserver = std::function<bool(const v1::JobProgress&)>;
+
+/// What clients ask of the daemon, whichever way they come: a method for each rpc of services.proto that isn't a plain
+/// stream (those are the board's). Any thread may call; calls may take seconds (devices, queues that drain), so servers
+/// make them on threads of their own. Errors: `refused` for what can't be done in the present phase, else as
+/// base/result.h has them.
+class Api {
+ public:
+  virtual ~Api() = default;
+  [[nodiscard]] virtual Board& board() = 0;
+
+  virtual Status acknowledge(const v1::AcknowledgeRequest& request) = 0;
+  virtual Result<v1::ListDevicesResponse> list_devices() = 0;
+  virtual Result<v1::StrobeState> strobe() = 0;
+  virtual Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted) = 0;
+  virtual Status align(const v1::AlignRequest& request) = 0;
+  virtual Status stop_sync() = 0;
+  virtual Result<v1::RecordingStatus> record(const v1::RecordRequest& request) = 0;
+  virtual Result<v1::RecordingStatus> stop_recording() = 0;
+  virtual Result<v1::ListSessionsResponse> list_sessions() = 0;
+  virtual Result<v1::Manifest> session(const v1::SessionRequest& request) = 0;
+  // The last progress told has `done`; what they return is only why none could begin.
+  virtual Status verify_session(const v1::SessionRequest& request, const JobObserver& observer) = 0;
+  virtual Status repair_session(const v1::SessionRequest& request, const JobObserver& observer) = 0;
+  virtual Status export_session(const v1::ExportRequest& request, const JobObserver& observer) = 0;
+  virtual Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) = 0;
+  virtual Result<v1::ReconstructionStatus> cancel_reconstruction() = 0;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,121 @@
+#include "daemon/board.h"
+
+#include <algorithm>
+#include <ctime>
+#include <utility>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include "base/clock.h"
+
+namespace emberlock {
+
+std::string utc_now() {
+  const std::int64_t ms = wall_clock().ns / 1'000'000;
+  return fmt::format("{:%FT%T}.{:03}Z", fmt::gmtime(static_cast<std::time_t>(ms / 1000)), ms % 1000);
+}
+
+void Board::show(v1::DaemonStatus status) {
+  {
+    const std::lock_guard lock(mutex_);
+    status.set_revision(++revision_);
+    status_ = std::make_shared<const v1::DaemonStatus>(std::move(status));
+  }
+  tell(Topic::status);
+}
+
+std::shared_ptr<const v1::DaemonStatus> Board::status() const {
+  const std::lock_guard lock(mutex_);
+  return status_;
+}
+
+void Board::notice(v1::Light light, const std::string& text) {
+  {
+    v1::Notice notice;
+    notice.set_light(light);
+    notice.set_utc(utc_now());
+    notice.set_text(text);
+    const std::lock_guard lock(mutex_);
+    notice.set_id(next_notice_++);
+    notices_.push_back(std::move(notice));
+    if (notices_.size() > kNotices) notices_.pop_front();
+  }
+  tell(Topic::notices);
+}
+
+std::vector<v1::Notice> Board::notices(std::uint64_t after) const {
+  const std::lock_guard lock(mutex_);
+  const auto first =
+      std::find_if(notices_.begin(), notices_.end(), [&](const v1::Notice& n) { return n.id() > after; });
+  return {first, notices_.end()};
+}
+
+void Board::show(std::shared_ptr<const v1::Picture> picture) {
+  {
+    const std::lock_guard lock(mutex_);
+    pictures_[picture->camera_id()] = std::move(picture);
+  }
+  tell(Topic::pictures);
+}
+
+std::map<std::string, std::shared_ptr<const v1::Picture>> Board::pictures() const {
+  const std::lock_guard lock(mutex_);
+  return pictures_;
+}
+
+void Board::show(std::shared_ptr<const v1::IterationPreview> preview) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!iterations_.empty()) {
+      if (iterations_.back()->reconstruction() != preview->reconstruction()) {
+        iterations_.clear();
+      } else {
+        v1::IterationPreview numbers = *iterations_.back();
+        numbers.clear_captured_jpeg();
+        numbers.clear_rendered_jpeg();
+        numbers.clear_volume();
+        iterations_.back() = std::make_shared<const v1::IterationPreview>(std::move(numbers));
+      }
+    }
+    iterations_.push_back(std::move(preview));
+  }
+  tell(Topic::iterations);
+}
+
+std::vector<std::shared_ptr<const v1::IterationPreview>> Board::iterations(std::size_t from) const {
+  const std::lock_guard lock(mutex_);
+  const std::size_t first = std::min(from, iterations_.size());
+  return {iterations_.begin() + static_cast<std::ptrdiff_t>(first), iterations_.end()};
+}
+
+Subscription Board::subscribe(std::function<void(Topic)> changed) {
+  const std::lock_guard lock(telling_);
+  const std::uint64_t key = next_subscriber_++;
+  subscribers_[key] = std::move(changed);
+  return Subscription([this, key] {
+    const std::lock_guard ending(telling_);
+    subscribers_.erase(key);
+  });
+}
+
+Subscription Board::want_pictures() {
+  const std::lock_guard lock(mutex_);
+  ++picture_watchers_;
+  return Subscription([this] {
+    const std::lock_guard ending(mutex_);
+    --picture_watchers_;
+  });
+}
+
+bool Board::pictures_wanted() const {
+  const std::lock_guard lock(mutex_);
+  return picture_watchers_ > 0;
+}
+
+void Board::tell(Topic topic) {
+  const std::lock_guard lock(telling_);
+  for (const auto& [key, changed] : subscribers_) changed(topic);
+}
+
+}  // namespace emberlock

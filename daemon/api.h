@@ -11,10 +11,10 @@ namespace emberlock {
 /// Takes how far a job is; false ends it early.
 using JobObserver = std::function<bool(const v1::JobProgress&)>;
 
-/// What clients ask of the daemon, whichever way they come: a method for each rpc of services.proto that isn't a plain
-/// stream (those are the board's). Any thread may call; calls may take seconds (devices, queues that drain), so servers
-/// make them on threads of their own. Errors: `refused` for what can't be done in the present phase, else as
-/// base/result.h has them.
+/// What clients ask of the daemon, whichever way they come: a method for each rpc of services.proto that
+/// isn't a plain stream (those are the board's). Any thread may call; calls may take seconds (devices, queues
+/// that drain), so servers make them on threads of their own. Errors: `refused` for what can't be done in the
+/// present phase, else as base/result.h has them.
 class Api {
  public:
   virtual ~Api() = default;

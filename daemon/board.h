@@ -14,7 +14,8 @@
 
 namespace emberlock {
 
-/// Ends a subscription when it goes. Its function is not running, and won't, once the destructor has returned.
+/// Ends a subscription when it goes. Its function is not running, and won't, once the destructor has
+/// returned.
 class Subscription {
  public:
   Subscription() = default;
@@ -54,8 +55,8 @@ class Board {
 
   /// Forgets those of another reconstruction.
   void show(std::shared_ptr<const v1::IterationPreview> preview);
-  /// Of the running or last reconstruction those from the `from`th on (counted from 0), in order; only the newest has
-  /// pictures and volume.
+  /// Of the running or last reconstruction those from the `from`th on (counted from 0), in order; only the
+  /// newest has pictures and volume.
   [[nodiscard]] std::vector<std::shared_ptr<const v1::IterationPreview>> iterations(std::size_t from) const;
 
   /// `changed` is called after each change, from whichever thread makes it: it must return at once, and call

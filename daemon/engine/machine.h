@@ -1,0 +1,141 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "base/result.h"
+#include "emberlock/v1/status.pb.h"
+
+namespace emberlock {
+
+// The daemon's states as a pure function: what was, and what happened or is asked for, give what is, and what
+// to do. It has no clock, thread or device; engine/conductor.h carries out what it orders and tells it what
+// came of that.
+//
+//             align                row time              aligned
+//   IDLE ───────────► CALIBRATING ─────────► ALIGNING ───────────► LOCKED ─┐ a check found all in tolerance
+//    ▲ ▲                  │ ▲                   │ ▲ a check found one out  │ │
+//    │ └──── stop, refused, given up ───────────┘ └────────────────────────┴─┘
+//    │                    │ └─ a camera came back                          │ record
+//    │  all written       ▼ (any of them)                                  ▼
+//    └──── FINISHING ◄── CAPTURING ◄───────────────────────────────────────┘
+//
+// FINISHING leads back to where the recording began. A reconstruction runs beside all of it.
+
+enum class Lock { absent, held };
+
+struct MachineState {
+  v1::Phase phase = v1::IDLE;
+  std::string reason = "nothing is asked for";
+  Lock lock = Lock::absent;        ///< of CAPTURING and FINISHING: whether it began locked
+  std::string session;             ///< of CAPTURING and FINISHING
+  bool reconstruct_after = false;  ///< the recording is handed on once it is finished
+  std::string reconstructing;      ///< the session of the running reconstruction; empty: none runs
+  std::vector<v1::Fault> faults;   ///< by id; those that are over stay until acknowledged
+  std::uint64_t next_fault = 1;
+};
+
+/// Who a fault concerns: by these it is raised once, and mended.
+struct FaultKey {
+  v1::Fault::Kind kind = v1::Fault::KIND_UNSPECIFIED;
+  std::string subject = {};
+};
+
+// What is asked for.
+struct AskAlign {};
+struct AskIdle {};  ///< to end the alignment, or to let go of the lock
+struct AskRecord {
+  std::string session;
+  bool unlocked = false;  ///< even though the cameras aren't locked
+  bool reconstruct = false;
+};
+struct AskStopRecording {};
+struct AskReconstruct {
+  std::string session;
+};
+struct AskCancelReconstruction {};
+struct AskAcknowledge {
+  std::uint64_t fault = 0;  ///< 0: all that are over
+};
+
+// What happened.
+struct RowTimeMeasured {};
+struct RoundDone {
+  v1::AlignmentStatus::Verdict verdict = v1::AlignmentStatus::VERDICT_UNSPECIFIED;
+  std::string reason;
+};
+/// The alignment stopped for a reason that isn't its own: a device. It begins again once `Recovered`.
+struct AlignmentBroken {
+  std::string reason;
+};
+struct Recovered {};
+/// The last check promised the lock until now, and none could be made since.
+struct LockExpired {
+  std::string reason;
+};
+struct RecordingBegun {};
+struct RecordingRefused {
+  Error error;
+};
+/// It has to end: the disk, or no camera is left, or its time is over.
+struct RecordingEnds {
+  std::string reason;
+};
+struct RecordingFinished {
+  bool whole = false;  ///< the counts of camera, queue and file agree, and the disk took all
+  std::string verdict;
+};
+struct ReconstructionEnded {
+  bool ok = false;
+  std::string what;
+  std::string remedy = {};
+};
+struct FaultRaised {
+  FaultKey key;
+  v1::Light light = v1::RED;
+  std::string what = {};
+  std::string remedy = {};
+};
+struct FaultMended {
+  FaultKey key;
+};
+
+using Happening =
+    std::variant<AskAlign, AskIdle, AskRecord, AskStopRecording, AskReconstruct, AskCancelReconstruction,
+                 AskAcknowledge, RowTimeMeasured, RoundDone, AlignmentBroken, Recovered, LockExpired,
+                 RecordingBegun, RecordingRefused, RecordingEnds, RecordingFinished, ReconstructionEnded,
+                 FaultRaised, FaultMended>;
+
+enum class Action {
+  begin_alignment,  ///< anew, from the row time on
+  end_alignment,
+  check_lock,  ///< film a round now
+  begin_recording,
+  finish_recording,
+  begin_reconstruction,
+  cancel_reconstruction,
+};
+
+/// A line for the journal.
+struct Remark {
+  v1::Light light = v1::GREEN;
+  std::string text;
+};
+
+struct MachineStep {
+  MachineState state;
+  std::vector<Action> actions;  ///< in this order
+  std::vector<Remark> remarks;
+  std::optional<Error> refusal;  ///< of what was asked for: kind `refused`; nothing has changed then
+};
+
+/// `utc` is when it happened (ISO 8601), for faults.
+MachineStep step(const MachineState& state, const Happening& happening, const std::string& utc);
+
+/// Of the whole: the worst fault that isn't over, else by phase.
+v1::Light light(const MachineState& state);
+
+}  // namespace emberlock

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/frame.h"
+#include "base/result.h"
+#include "drivers/camera.h"
+#include "emberlock/v1/status.pb.h"
+#include "session/async_writer.h"
+
+namespace emberlock {
+
+/// What driver and recorder say of one camera's frames in one recording.
+struct CameraBooks {
+  FrameCounts before;          ///< the driver's, when it began
+  FrameCounts after;           ///< and when it ended
+  std::uint64_t left_out = 0;  ///< delivered in that time, but filmed before it began
+  Arrivals arrivals;           ///< what was handed to the recorder
+};
+
+/// Of the frame numbers that are missing among the arrivals those that the driver has an explanation for.
+/// What it lost before the first arrival or after the last is none of the recording's.
+struct Explained {
+  std::uint64_t transport = 0;
+  std::uint64_t underrun = 0;
+  std::uint64_t passed_over = 0;
+};
+Explained explain(const CameraBooks& books);
+
+/// Why driver, queue and file don't agree on a camera's frames, in a sentence; empty if they do.
+std::string disagreement(const CameraBooks& books, const v1::Counts& file);
+
+struct RecorderOptions {
+  WriterOptions writer;
+  AsyncWriterOptions queue;
+};
+
+/// One recording in progress: frames in, a session's folder out, and the books on what became of each. One
+/// thread.
+class Recorder {
+ public:
+  /// Of `manifest` the caller fills what SessionWriter::create says. `before` is what the drivers count now,
+  /// by camera.
+  static Result<std::unique_ptr<Recorder>> begin(const std::filesystem::path& folder,
+                                                 const v1::Manifest& manifest, const RecorderOptions& options,
+                                                 const std::vector<FrameCounts>& before, TimePoint now);
+
+  /// Never waits. Frames that came before it began are left out.
+  void take(std::size_t camera, Frame frame);
+  Status append(const v1::Event& event) { return writer_.append(event); }
+  /// The disk's first refusal: nothing that comes later is sure to be kept.
+  [[nodiscard]] std::optional<Error> failure() const { return writer_.failure(); }
+  [[nodiscard]] v1::RecordingStatus status(TimePoint now) const;
+
+  /// Drains the queues, closes the session and compares the books. The last call.
+  v1::RecordingStatus finish(const std::vector<FrameCounts>& after, TimePoint now);
+
+ private:
+  Recorder(SessionWriter writer, const RecorderOptions& options, std::string session, std::string purpose,
+           const std::vector<FrameCounts>& before, TimePoint now);
+
+  AsyncWriter writer_;
+  std::string session_;
+  std::string purpose_;
+  TimePoint began_;
+  std::vector<CameraBooks> books_;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace emberlock

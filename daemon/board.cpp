@@ -54,6 +54,7 @@ std::vector<v1::Notice> Board::notices(std::uint64_t after) const {
 void Board::show(std::shared_ptr<const v1::Picture> picture) {
   {
     const std::lock_guard lock(mutex_);
+    if (picture_watchers_ == 0) return;
     pictures_[picture->camera_id()] = std::move(picture);
   }
   tell(Topic::pictures);
@@ -104,7 +105,8 @@ Subscription Board::want_pictures() {
   ++picture_watchers_;
   return Subscription([this] {
     const std::lock_guard ending(mutex_);
-    --picture_watchers_;
+    // Whoever comes later waits for a new one rather than to see the past.
+    if (--picture_watchers_ == 0) pictures_.clear();
   });
 }
 

@@ -49,6 +49,7 @@ class Board {
   void notice(v1::Light light, const std::string& text);
   [[nodiscard]] std::vector<v1::Notice> notices(std::uint64_t after) const;
 
+  /// Dropped while nobody wants pictures.
   void show(std::shared_ptr<const v1::Picture> picture);
   /// The newest of each camera, by camera id.
   [[nodiscard]] std::map<std::string, std::shared_ptr<const v1::Picture>> pictures() const;
@@ -62,7 +63,7 @@ class Board {
   /// `changed` is called after each change, from whichever thread makes it: it must return at once, and call
   /// nothing of the board's but what is const.
   [[nodiscard]] Subscription subscribe(std::function<void(Topic)> changed);
-  /// Whether anybody wants pictures: only then are they made.
+  /// Whether anybody wants pictures: only then are they made. With the last who wants them the pictures go.
   [[nodiscard]] Subscription want_pictures();
   [[nodiscard]] bool pictures_wanted() const;
 

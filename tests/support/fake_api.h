@@ -1,0 +1,116 @@
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "daemon/api.h"
+
+namespace emberlock::test {
+
+/// A daemon without devices: it shows what a test puts on its board, remembers what it was asked, and answers
+/// what the test says. Set the answers before the first call; calls come from any thread.
+class FakeApi : public Api {
+ public:
+  Board& board() override { return board_; }
+
+  Status acknowledge(const v1::AcknowledgeRequest& request) override {
+    return ask("acknowledge", request, on_acknowledge);
+  }
+  Result<v1::ListDevicesResponse> list_devices() override { return ask("list_devices", on_list_devices); }
+  Result<v1::StrobeState> strobe() override { return ask("strobe", on_strobe); }
+  Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted) override {
+    return ask("apply_strobe", wanted, on_apply_strobe);
+  }
+  Status align(const v1::AlignRequest& request) override { return ask("align", request, on_align); }
+  Status stop_sync() override { return ask("stop_sync", on_stop_sync); }
+  Result<v1::RecordingStatus> record(const v1::RecordRequest& request) override {
+    return ask("record", request, on_record);
+  }
+  Result<v1::RecordingStatus> stop_recording() override { return ask("stop_recording", on_stop_recording); }
+  Result<v1::ListSessionsResponse> list_sessions() override { return ask("list_sessions", on_list_sessions); }
+  Result<v1::Manifest> session(const v1::SessionRequest& request) override {
+    return ask("session", request, on_session);
+  }
+  Status verify_session(const v1::SessionRequest& request, const JobObserver& observer) override {
+    return job("verify_session", request, observer);
+  }
+  Status repair_session(const v1::SessionRequest& request, const JobObserver& observer) override {
+    return job("repair_session", request, observer);
+  }
+  Status export_session(const v1::ExportRequest& request, const JobObserver& observer) override {
+    return job("export_session", request, observer);
+  }
+  Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override {
+    return ask("reconstruct", request, on_reconstruct);
+  }
+  Result<v1::ReconstructionStatus> cancel_reconstruction() override {
+    return ask("cancel_reconstruction", on_cancel_reconstruction);
+  }
+
+  /// Each call's name, with its request as one line: "align tolerance: \"100rows\"".
+  [[nodiscard]] std::vector<std::string> calls() const {
+    const std::lock_guard lock(mutex_);
+    return calls_;
+  }
+
+  /// Unset: success, or the empty message.
+  std::function<Status(const v1::AcknowledgeRequest&)> on_acknowledge;
+  std::function<Result<v1::ListDevicesResponse>()> on_list_devices;
+  std::function<Result<v1::StrobeState>()> on_strobe;
+  std::function<Result<v1::StrobeState>(const v1::StrobeState&)> on_apply_strobe;
+  std::function<Status(const v1::AlignRequest&)> on_align;
+  std::function<Status()> on_stop_sync;
+  std::function<Result<v1::RecordingStatus>(const v1::RecordRequest&)> on_record;
+  std::function<Result<v1::RecordingStatus>()> on_stop_recording;
+  std::function<Result<v1::ListSessionsResponse>()> on_list_sessions;
+  std::function<Result<v1::Manifest>(const v1::SessionRequest&)> on_session;
+  std::function<Result<v1::ReconstructionStatus>(const v1::ReconstructRequest&)> on_reconstruct;
+  std::function<Result<v1::ReconstructionStatus>()> on_cancel_reconstruction;
+  /// What verify, repair and export do; unset: one progress, done and ok.
+  std::function<Status(const JobObserver&)> on_job;
+
+ private:
+  void remember(std::string call) {
+    const std::lock_guard lock(mutex_);
+    calls_.push_back(std::move(call));
+  }
+  template <class Answer>
+  Answer ask(const char* name, const std::function<Answer()>& answer) {
+    remember(name);
+    return answer ? answer() : empty<Answer>();
+  }
+  template <class Request, class Answer>
+  Answer ask(const std::string& name, const Request& request,
+             const std::function<Answer(const Request&)>& answer) {
+    const std::string line = request.ShortDebugString();
+    remember(line.empty() ? name : name + " " + line);
+    return answer ? answer(request) : empty<Answer>();
+  }
+  template <class Request>
+  Status job(const std::string& name, const Request& request, const JobObserver& observer) {
+    remember(name + " " + request.ShortDebugString());
+    if (on_job) return on_job(observer);
+    v1::JobProgress whole;
+    whole.set_fraction(1);
+    whole.set_done(true);
+    whole.set_ok(true);
+    observer(whole);
+    return {};
+  }
+  template <class Answer>
+  static Answer empty() {
+    if constexpr (std::is_same_v<Answer, Status>)
+      return Status();
+    else
+      return std::remove_reference_t<decltype(std::declval<Answer&>().value())>();
+  }
+
+  Board board_;
+  mutable std::mutex mutex_;
+  std::vector<std::string> calls_;
+};
+
+}  // namespace emberlock::test

@@ -54,6 +54,24 @@ class AsyncWriter::Lane {
     lost_[cause] += frames;
   }
 
+  CameraProgress progress() const {
+    const std::scoped_lock lock(mutex_);
+    CameraProgress now{static_cast<double>(queue_.size()) / static_cast<double>(bound_), written_.bytes, {}};
+    const auto lost = [&](LossCause cause) {
+      const auto found = lost_.find(cause);
+      return found == lost_.end() ? 0 : found->second;
+    };
+    now.counts.set_recorded(written_.frames);
+    now.counts.set_transport(lost(LossCause::transport));
+    now.counts.set_underrun(lost(LossCause::underrun));
+    now.counts.set_queue(lost(LossCause::queue));
+    now.counts.set_disk(written_.refused + lost(LossCause::disk));
+    now.counts.set_passed_over(lost(LossCause::passed_over));
+    const std::uint64_t by_driver = now.counts.transport() + now.counts.underrun() + now.counts.passed_over();
+    now.counts.set_camera_gap(arrivals_.missing() - std::min(arrivals_.missing(), by_driver));
+    return now;
+  }
+
   /// Ends the thread once the queue is empty, and tells the writer what it couldn't see.
   void finish() {
     end(Ending::drain);
@@ -85,21 +103,23 @@ class AsyncWriter::Lane {
 
   void encode() {
     while (const auto frame = pop()) {
-      if (const Status written = shared_.writer.write(camera_, *frame); !written) {
-        shared_.note_failure(written.error());
-      }
+      const Status written = shared_.writer.write(camera_, *frame);
+      if (!written) shared_.note_failure(written.error());
+      const std::scoped_lock lock(mutex_);
+      written_ = shared_.writer.written(camera_);
     }
   }
 
   Shared& shared_;
   const std::size_t camera_;
   const std::size_t bound_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Frame> queue_;
   bool ended_ = false;
   Arrivals arrivals_;
   std::map<LossCause, std::uint64_t> lost_;
+  WrittenSoFar written_;
   std::thread thread_;  ///< last: it uses all of the above
 };
 
@@ -127,6 +147,8 @@ std::optional<Error> AsyncWriter::failure() const {
   const std::scoped_lock lock(shared_->mutex);
   return shared_->failure;
 }
+
+CameraProgress AsyncWriter::progress(std::size_t camera) const { return lanes_.at(camera)->progress(); }
 
 Result<v1::Manifest> AsyncWriter::finish() {
   for (const auto& lane : lanes_) lane->finish();

@@ -8,6 +8,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/log.h"
+#include "session/camera_reader.h"
 #include "session/files.h"
 #include "session/layout.h"
 
@@ -16,6 +18,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr Seconds kSpaceCheckInterval{1};
+constexpr Seconds kRetryInterval{1};
 constexpr std::uint64_t kSpaceCheckBytes = std::uint64_t{64} << 20;
 constexpr std::uint32_t kLongestGapMs = 60'000;
 
@@ -36,7 +39,7 @@ Result<std::unique_ptr<CameraWriter>> CameraWriter::create(const fs::path& folde
   std::error_code ec;
   fs::create_directory(folder / stream.camera_id(), ec);
   const fs::path path = index_path(folder, stream.camera_id());
-  UniqueFd index(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644));
+  UniqueFd index(::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644));
   if (!index) return errno_error(path, "cannot create");
   EMBERLOCK_RETURN_IF_ERROR(write_fully(index.get(), encode_index_header(), path));
   std::unique_ptr<CameraWriter> writer(
@@ -59,7 +62,13 @@ Status CameraWriter::write_pixels(const Frame& frame) {
                  "camera " + camera_id_ + ", frame " + std::to_string(frame.stamp.frame_id),
                  "Give each layout a session of its own"};
   }
-  EMBERLOCK_RETURN_IF_ERROR(make_room(frame.stamp));
+  if (refusal_ && frame.stamp.monotonic_time < retry_at_) return *refusal_;
+  refusal_.reset();
+  if (Status room = make_room(frame.stamp); !room) {
+    // A disk below its floor is asked for each frame: that costs little, and every frame counts.
+    if (!space_low_) refuse(room.error(), frame.stamp);
+    return room;
+  }
   v1::Segment& segment = *segments_.rbegin();
   IndexRecord record;
   record.stamp = frame.stamp;
@@ -75,7 +84,8 @@ Status CameraWriter::write_pixels(const Frame& frame) {
     written = write_fully(index_.get(), {bytes.data(), bytes.size()}, index_path(folder_, camera_id_));
   }
   if (!written) {
-    failed_ = written.error();
+    abandon_segment(written.error());
+    refuse(written.error(), frame.stamp);
     return written;
   }
   bytes_since_check_ += segment_->bytes() - record.file_offset;
@@ -126,9 +136,61 @@ Status CameraWriter::open_segment(const FrameStamp& stamp) {
 
 Status CameraWriter::close_segment() {
   Status closed = segment_->close();
+  if (!closed) {
+    abandon_segment(closed.error());
+    return closed;
+  }
+  bytes_closed_ += segment_->bytes();
   segment_.reset();
-  if (!closed) failed_ = closed.error();
-  return closed;
+  return {};
+}
+
+void CameraWriter::refuse(const Error& why, const FrameStamp& stamp) {
+  refusal_ = why;
+  retry_at_ = stamp.monotonic_time + kRetryInterval;
+}
+
+/// After a failed write: the segment stays as it is, and its frames that aren't whole on the disk are counted
+/// as the disk's instead.
+void CameraWriter::abandon_segment(const Error& why) {
+  log(LogCategory::session).warn("camera {}: {}", camera_id_, why.message());
+  bytes_closed_ += segment_->bytes();
+  segment_.reset();
+  const auto kept = cut_index();
+  if (!kept) {
+    failed_ = kept.error();
+    return;
+  }
+  v1::Segment& segment = *segments_.rbegin();
+  const std::uint64_t cost = segment.frames() - *kept;
+  counts_.set_recorded(counts_.recorded() - cost);
+  counts_.set_disk(counts_.disk() + cost);
+  segment.set_frames(*kept);
+  if (*kept > 0) return;
+  std::error_code ec;
+  fs::remove(folder_ / segment.file(), ec);
+  segments_.RemoveLast();
+}
+
+/// Takes the last segment's frames that can't be read back off the index, which a failed write may have torn
+/// too. Returns how many stay. What was written before them reached the disk, so the search goes from the
+/// end.
+Result<std::uint64_t> CameraWriter::cut_index() {
+  const v1::Segment& segment = *segments_.rbegin();
+  const fs::path path = index_path(folder_, camera_id_);
+  const auto start = static_cast<off_t>(kIndexHeaderBytes + segment.first_frame() * kIndexRecordBytes);
+  std::string bytes(segment.frames() * kIndexRecordBytes, '\0');
+  if (::pread(index_.get(), bytes.data(), bytes.size(), start) != static_cast<ssize_t>(bytes.size())) {
+    return errno_error(path, "cannot read back");
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(ParsedIndex index, parse_index(encode_index_header() + bytes, path.string()));
+  std::size_t kept = index.records.size();
+  CameraReader reader(folder_, camera_id_, layout_, std::move(index.records));
+  while (kept > 0 && !reader.read(kept - 1).ok()) --kept;
+  if (::ftruncate(index_.get(), start + static_cast<off_t>(kept * kIndexRecordBytes)) != 0) {
+    return errno_error(path, "cannot cut off what the disk refused");
+  }
+  return kept;
 }
 
 /// The frame's arrival within its segment, for players; made to rise, whatever the clock does.
@@ -137,6 +199,12 @@ std::uint32_t CameraWriter::next_milliseconds(const FrameStamp& stamp) const {
   const std::int64_t elapsed = (stamp.monotonic_time.ns - segment_start_.ns) / 1'000'000;
   return static_cast<std::uint32_t>(std::clamp<std::int64_t>(
       elapsed, std::int64_t{last_milliseconds_} + 1, std::int64_t{last_milliseconds_} + kLongestGapMs));
+}
+
+WrittenSoFar CameraWriter::written() const {
+  return {counts_.recorded(), counts_.disk(),
+          bytes_closed_ + (segment_ ? segment_->bytes() : 0) + kIndexHeaderBytes +
+              counts_.recorded() * kIndexRecordBytes};
 }
 
 void CameraWriter::count_lost(LossCause cause, std::uint64_t frames) {

@@ -24,9 +24,10 @@ class CameraWriter {
                                                       const WriterOptions& options);
   Status write(const Frame& frame);
   void count_lost(LossCause cause, std::uint64_t frames);
+  [[nodiscard]] WrittenSoFar written() const;
   void set_arrivals(const Arrivals& arrivals) { arrivals_ = arrivals; }
   /// Closes the last segment and fills in the stream's segments and counts, reconciled with the index on
-  /// disk.
+  /// disk. That the disk refused frames is no error: they are counted.
   Status finish(v1::CameraStream& stream);
 
  private:
@@ -37,6 +38,9 @@ class CameraWriter {
   Status check_free_space(const FrameStamp& stamp);
   Status open_segment(const FrameStamp& stamp);
   Status close_segment();
+  void refuse(const Error& why, const FrameStamp& stamp);
+  void abandon_segment(const Error& why);
+  Result<std::uint64_t> cut_index();
   [[nodiscard]] std::uint32_t next_milliseconds(const FrameStamp& stamp) const;
   Result<v1::Counts> reconcile() const;
 
@@ -54,11 +58,14 @@ class CameraWriter {
 
   TimePoint space_checked_;  ///< by the frames' clock
   std::uint64_t bytes_since_check_ = 0;
-  bool space_low_ = true;  ///< or not yet looked
+  std::uint64_t bytes_closed_ = 0;  ///< of segments that are closed
+  bool space_low_ = true;           ///< or not yet looked
 
   Arrivals arrivals_;
   v1::Counts counts_;
-  std::optional<Error> failed_;  ///< a write failed: the file's end is unknown
+  std::optional<Error> refusal_;  ///< the disk's last, a retry of which is due at retry_at_
+  TimePoint retry_at_;            ///< by the frames' clock
+  std::optional<Error> failed_;   ///< the index on disk isn't known any more: nothing can be written
 };
 
 }  // namespace emberlock

@@ -44,13 +44,19 @@ Result<EventLog> EventLog::open(const std::filesystem::path& path, Mode mode) {
   if (!fd) return errno_error(path, "cannot open for writing");
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {
     if (errno != EWOULDBLOCK) return errno_error(path, "cannot lock");
-    return Error{ErrorKind::io, "the session is still being written by another process", path.string(),
+    return Error{ErrorKind::refused, "the session is still being written by another process", path.string(),
                  "Stop that recorder, or wait for it"};
   }
   return EventLog(std::move(fd), path);
 }
 
-Status EventLog::append(const v1::Event& event) { return write_fully(fd_.get(), encode(event), path_); }
+Status EventLog::append(const v1::Event& event) {
+  const off_t end = ::lseek(fd_.get(), 0, SEEK_END);
+  Status written = write_fully(fd_.get(), encode(event), path_);
+  // A part of an event would hide those that follow.
+  if (!written && ::ftruncate(fd_.get(), end) != 0) return errno_error(path_, "cannot cut off a torn event");
+  return written;
+}
 
 Status EventLog::sync() {
   if (::fdatasync(fd_.get()) != 0) return errno_error(path_, "cannot flush");

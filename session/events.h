@@ -29,7 +29,7 @@ std::string encode(const v1::Event& event);
 class EventLog {
  public:
   enum class Mode { create, reopen };
-  /// Error io also where another process holds the lock: the session is being recorded.
+  /// Error `refused` where another process holds the lock: the session is being recorded.
   static Result<EventLog> open(const std::filesystem::path& path, Mode mode);
   Status append(const v1::Event& event);
   Status sync();

@@ -1,32 +1,29 @@
 #include "session/files.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <set>
 #include <system_error>
 
+#include <fcntl.h>
 #include <google/protobuf/util/json_util.h>
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/unique_fd.h"
 #include "session/layout.h"
+#include "session/name.h"
 
 namespace emberlock {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kMaxManifestBytes = std::size_t{64} << 20;
+constexpr off_t kReserveBytes = off_t{1} << 20;  // some 10 000 segments in the manifest
 
-bool is_folder_name(const std::string& id) {
-  const auto allowed = [](unsigned char c) {
-    return std::isalnum(c) != 0 ||
-           std::string_view(" ._:-").find(static_cast<char>(c)) != std::string_view::npos;
-  };
-  return !id.empty() && id.size() <= 200 && id.front() != '.' && std::all_of(id.begin(), id.end(), allowed);
-}
+fs::path reserve_path(const fs::path& folder) { return folder / "reserve"; }
 
 template <class Values>
 bool all_finite(const Values& values) {
@@ -145,6 +142,20 @@ Status write_manifest(const fs::path& folder, const v1::Manifest& manifest) {
                  manifest_path(folder).string(), "Use UTF-8 in its texts"};
   }
   return write_file_atomically(manifest_path(folder), json);
+}
+
+Status keep_reserve(const fs::path& folder) {
+  const fs::path path = reserve_path(folder);
+  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0644));
+  if (!fd) return errno_error(path, "cannot create");
+  errno = ::posix_fallocate(fd.get(), 0, kReserveBytes);
+  if (errno != 0) return errno_error(path, "cannot keep room for the manifest");
+  return {};
+}
+
+void drop_reserve(const fs::path& folder) {
+  std::error_code ec;
+  fs::remove(reserve_path(folder), ec);
 }
 
 Status write_fully(int fd, std::string_view bytes, const fs::path& path) {

@@ -30,6 +30,11 @@ Result<v1::Manifest> read_manifest(const std::filesystem::path& folder);
 Status check_manifest(const v1::Manifest& manifest, const std::string& where);
 Status write_manifest(const std::filesystem::path& folder, const v1::Manifest& manifest);
 
+/// Keeps room on the disk for the finished manifest, so that a session ends well on a full one; and gives it
+/// up.
+Status keep_reserve(const std::filesystem::path& folder);
+void drop_reserve(const std::filesystem::path& folder);
+
 /// Writes all of `bytes`, whatever signals come.
 Status write_fully(int fd, std::string_view bytes, const std::filesystem::path& path);
 /// "PATH: ACTION: <errno's words>" as an io error.

@@ -106,6 +106,7 @@ Result<SalvageReport> salvage(const fs::path& folder, const Progress& progress) 
   EMBERLOCK_ASSIGN_OR_RETURN(v1::Manifest manifest, read_manifest(folder));
   EMBERLOCK_ASSIGN_OR_RETURN(const EventLog lock,
                              EventLog::open(events_path(folder), EventLog::Mode::reopen));
+  drop_reserve(folder);
   SalvageReport report;
   EMBERLOCK_ASSIGN_OR_RETURN(report.events_kept, salvage_events(folder));
   bool repaired = false;

@@ -23,7 +23,7 @@ struct SalvageReport {
 
 /// Repairs a session whose recorder was killed: cuts torn ends off the index and the events, keeps the frames
 /// that decode, and turns the manifest SALVAGED. A finished session is left alone. Errors: bad_input (no
-/// session), io (among them: a recorder still writes it).
+/// session), io, refused (a recorder still writes it).
 Result<SalvageReport> salvage(const std::filesystem::path& folder, const Progress& progress = {});
 
 /// Turns the uncompressed segments of a finished session into FFV1. Each is replaced only after every frame

@@ -31,8 +31,8 @@ Result<std::unique_ptr<SegmentWriter>> SegmentWriter::create(const std::filesyst
                                                              const ImageLayout& layout, Encoding encoding,
                                                              Hertz frame_rate) {
   quiet_libav();
-  std::unique_ptr<SegmentWriter> writer(new SegmentWriter(layout));
-  EMBERLOCK_RETURN_IF_ERROR(writer->open(path, encoding, frame_rate));
+  std::unique_ptr<SegmentWriter> writer(new SegmentWriter(layout, encoding));
+  EMBERLOCK_RETURN_IF_ERROR(writer->open(path, frame_rate));
   return writer;
 }
 
@@ -43,22 +43,22 @@ Error SegmentWriter::failure(int code, const char* action) const {
           "Check the disk's space and health"};
 }
 
-Status SegmentWriter::open(const std::filesystem::path& path, Encoding encoding, Hertz frame_rate) {
+Status SegmentWriter::open(const std::filesystem::path& path, Hertz frame_rate) {
   EMBERLOCK_ASSIGN_OR_RETURN(file_, AvFile::open(path, AvFile::Mode::create));
   const AVCodec* codec =
-      avcodec_find_encoder(encoding == Encoding::ffv1 ? AV_CODEC_ID_FFV1 : AV_CODEC_ID_RAWVIDEO);
+      avcodec_find_encoder(encoding_ == Encoding::ffv1 ? AV_CODEC_ID_FFV1 : AV_CODEC_ID_RAWVIDEO);
   if (codec == nullptr) return failure(AVERROR_ENCODER_NOT_FOUND, "cannot encode");
   encoder_.reset(avcodec_alloc_context3(codec));
   AVCodecContext& c = *encoder_;
   c.width = layout_.size.width;
   c.height = layout_.size.height;
-  c.pix_fmt = coded_format(layout_, encoding);
+  c.pix_fmt = coded_format(layout_, encoding_);
   c.time_base = kMilliseconds;
   c.framerate = as_rational(frame_rate);
   c.gop_size = 1;  // every frame stands for itself
   c.thread_count = 1;
   c.flags |= AV_CODEC_FLAG_BITEXACT;
-  if (encoding == Encoding::ffv1) {
+  if (encoding_ == Encoding::ffv1) {
     c.level = 3;
     // libav's default of at least four slices corrupts images of a few pixels.
     if (c.width < kSmallestSliced || c.height < kSmallestSliced) c.slices = 1;
@@ -75,12 +75,12 @@ Status SegmentWriter::open(const std::filesystem::path& path, Encoding encoding,
   frame_->width = c.width;
   frame_->height = c.height;
   if (const int code = av_frame_get_buffer(frame_.get(), 0); code < 0) return failure(code, "cannot encode");
-  return write_header(encoding, frame_rate);
+  return write_header(frame_rate);
 }
 
-Status SegmentWriter::write_header(Encoding encoding, Hertz frame_rate) {
+Status SegmentWriter::write_header(Hertz frame_rate) {
   AVFormatContext* format = nullptr;
-  const char* container = encoding == Encoding::ffv1 ? "matroska" : "nut";
+  const char* container = encoding_ == Encoding::ffv1 ? "matroska" : "nut";
   int code = avformat_alloc_output_context2(&format, nullptr, container, nullptr);
   if (code < 0) return failure(code, "cannot write");
   format_.reset(format);
@@ -91,7 +91,7 @@ Status SegmentWriter::write_header(Encoding encoding, Hertz frame_rate) {
   stream->avg_frame_rate = as_rational(frame_rate);
   avcodec_parameters_from_context(stream->codecpar, encoder_.get());
   AVDictionary* options = nullptr;
-  if (encoding == Encoding::ffv1) {
+  if (encoding_ == Encoding::ffv1) {
     av_dict_set_int(&options, "cluster_time_limit", kClusterMilliseconds, 0);
     av_dict_set_int(&options, "cluster_size_limit", kClusterBytes, 0);
   }
@@ -101,10 +101,22 @@ Status SegmentWriter::write_header(Encoding encoding, Hertz frame_rate) {
     format_.reset();
     return failure(code, "cannot write");
   }
+  file_->io()->direct = encoding_ == Encoding::raw_nut ? 1 : 0;  // pixels go from the image to the kernel
   return {};
 }
 
+/// What the encoder for raw video would hand on, less its copy: rows without gaps between them.
+Status SegmentWriter::put_uncompressed(const Image& image, std::uint32_t milliseconds) {
+  // The packet is only read.
+  packet_->data = const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(image.bytes().data()));
+  packet_->size = static_cast<int>(image.bytes().size());
+  packet_->pts = milliseconds;
+  packet_->dts = milliseconds;
+  return put_packet();
+}
+
 Status SegmentWriter::write(const Image& image, std::uint32_t milliseconds) {
+  if (encoding_ == Encoding::raw_nut) return put_uncompressed(image, milliseconds);
   if (const int code = av_frame_make_writable(frame_.get()); code < 0) return failure(code, "cannot encode");
   to_av(image, *frame_);
   frame_->pts = milliseconds;
@@ -116,17 +128,22 @@ Status SegmentWriter::write(const Image& image, std::uint32_t milliseconds) {
 
 Status SegmentWriter::drain() {
   for (;;) {
-    int code = avcodec_receive_packet(encoder_.get(), packet_.get());
+    const int code = avcodec_receive_packet(encoder_.get(), packet_.get());
     if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return {};
     if (code < 0) return failure(code, "cannot encode");
-    packet_->stream_index = 0;
-    packet_->flags |= AV_PKT_FLAG_KEY;
-    av_packet_rescale_ts(packet_.get(), kMilliseconds, format_->streams[0]->time_base);
-    code = av_write_frame(format_.get(), packet_.get());
-    av_packet_unref(packet_.get());
-    if (code >= 0) code = file_->io()->error;
-    if (code < 0) return failure(code, "cannot write");
+    EMBERLOCK_RETURN_IF_ERROR(put_packet());
   }
+}
+
+Status SegmentWriter::put_packet() {
+  packet_->stream_index = 0;
+  packet_->flags |= AV_PKT_FLAG_KEY;
+  av_packet_rescale_ts(packet_.get(), kMilliseconds, format_->streams[0]->time_base);
+  int code = av_write_frame(format_.get(), packet_.get());
+  av_packet_unref(packet_.get());
+  if (code >= 0) code = file_->io()->error;
+  if (code < 0) return failure(code, "cannot write");
+  return {};
 }
 
 Status SegmentWriter::close() {

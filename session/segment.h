@@ -32,13 +32,16 @@ class SegmentWriter {
   [[nodiscard]] std::uint64_t bytes() const;
 
  private:
-  explicit SegmentWriter(ImageLayout layout) : layout_(layout) {}
-  Status open(const std::filesystem::path& path, Encoding encoding, Hertz frame_rate);
-  Status write_header(Encoding encoding, Hertz frame_rate);
+  SegmentWriter(ImageLayout layout, Encoding encoding) : layout_(layout), encoding_(encoding) {}
+  Status open(const std::filesystem::path& path, Hertz frame_rate);
+  Status write_header(Hertz frame_rate);
+  Status put_uncompressed(const Image& image, std::uint32_t milliseconds);
   Status drain();
+  Status put_packet();
   [[nodiscard]] Error failure(int code, const char* action) const;
 
   ImageLayout layout_;
+  Encoding encoding_;
   std::unique_ptr<AvFile> file_;
   std::unique_ptr<AVFormatContext, AvFreeOutput> format_;
   AvPtr<AVCodecContext> encoder_;

@@ -53,6 +53,7 @@ Result<SessionWriter> SessionWriter::create(const fs::path& folder, v1::Manifest
   EMBERLOCK_RETURN_IF_ERROR(create_folder(folder));
   SessionWriter writer(folder, std::move(manifest));
   EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder, writer.manifest_));
+  EMBERLOCK_RETURN_IF_ERROR(keep_reserve(folder));
   EMBERLOCK_ASSIGN_OR_RETURN(EventLog events, EventLog::open(events_path(folder), EventLog::Mode::create));
   writer.events_ = std::make_unique<EventLog>(std::move(events));
   for (const v1::CameraStream& camera : writer.manifest_.cameras()) {
@@ -70,6 +71,8 @@ void SessionWriter::count_lost(std::size_t camera, LossCause cause, std::uint64_
   cameras_.at(camera)->count_lost(cause, frames);
 }
 
+WrittenSoFar SessionWriter::written(std::size_t camera) const { return cameras_.at(camera)->written(); }
+
 void SessionWriter::set_arrivals(std::size_t camera, const Arrivals& arrivals) {
   cameras_.at(camera)->set_arrivals(arrivals);
 }
@@ -85,6 +88,7 @@ Result<v1::Manifest> SessionWriter::finish() {
   if (!first) return first.error();
   EMBERLOCK_RETURN_IF_ERROR(events_->sync());
   manifest_.set_state(v1::Manifest::COMPLETE);
+  drop_reserve(folder_);
   EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder_, manifest_));
   return manifest_;
 }

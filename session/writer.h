@@ -54,6 +54,12 @@ class Arrivals {
   std::uint64_t last_id_ = 0;
 };
 
+struct WrittenSoFar {
+  std::uint64_t frames = 0;
+  std::uint64_t refused = 0;  ///< frames, by the disk
+  std::uint64_t bytes = 0;    ///< handed to the disk, of segments and index
+};
+
 /// Writes a session's folder. Distinct cameras may be written from distinct threads at the same time; one
 /// camera, and append(), by one thread at a time. Destroyed without finish() it leaves what a killed recorder
 /// would leave: a session in state RECORDING, for `salvage`.
@@ -73,20 +79,23 @@ class SessionWriter {
 
   /// Appends a frame of camera `camera` (its place in the manifest). Frame ids rise; one that doesn't says
   /// that the camera counts anew. Errors: bad_input (other layout than the manifest's), io. A frame not
-  /// written counts as lost to the disk. Below the floor of free space a later frame may succeed; after a
-  /// failed write none of the camera will.
+  /// written counts as lost to the disk, as do those before it that a failed write turns out to have cost. A
+  /// later frame may succeed, in a new segment: it is tried once a second.
   Status write(std::size_t camera, const Frame& frame);
   /// Counts frames that will never be written. For `transport`, `underrun` and `passed_over`, `frames` of the
   /// ids that never arrived were lost or left by the driver rather than lost by the camera; for `queue` and
   /// `disk` they arrived and were dropped.
   void count_lost(std::size_t camera, LossCause cause, std::uint64_t frames);
+  /// Asked by the camera's thread.
+  [[nodiscard]] WrittenSoFar written(std::size_t camera) const;
   /// For whoever puts a queue before write(): what arrived before that queue, instead of what write() saw.
   void set_arrivals(std::size_t camera, const Arrivals& arrivals);
   /// Any time, in the order of happening.
   Status append(const v1::Event& event);
 
-  /// Closes everything, reconciles the counts with what lies on disk and turns the manifest COMPLETE. After
-  /// an Error (disk failure, or counts that don't add up) the session stays RECORDING.
+  /// Closes everything, reconciles the counts with what lies on disk and turns the manifest COMPLETE, for
+  /// which room was kept: a disk that is full by now keeps what it has, and what it refused is counted. After
+  /// an Error (the disk fails, or counts don't add up) the session stays RECORDING.
   Result<v1::Manifest> finish();
 
  private:

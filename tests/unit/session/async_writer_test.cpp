@@ -1,10 +1,15 @@
 #include "session/async_writer.h"
 
+#include <array>
 #include <thread>
 #include <vector>
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include "base/unique_fd.h"
 #include "session/reader.h"
 #include "tests/support/recording.h"
 
@@ -113,6 +118,59 @@ TEST(AsyncWriter, AFrameOfAnotherLayoutIsToldAndCounted) {
   EXPECT_EQ(manifest->cameras(0).counts().disk(), 1U);
   EXPECT_EQ(manifest->cameras(0).counts().recorded(), 1U);
   EXPECT_EQ(writer.failure()->kind, ErrorKind::bad_input);
+}
+
+/// A segment "file" that takes 64 KiB and then nothing, until somebody reads: a disk that hangs.
+void put_stalled_disk(const std::filesystem::path& segment) { ASSERT_EQ(::mkfifo(segment.c_str(), 0600), 0); }
+
+TEST(AsyncWriter, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
+  const TempFolder temp;
+  AsyncWriter writer(SessionWriter::create(temp / "s", manifest_of({kLayout, kLayout}),
+                                           small_disk_options(Encoding::raw_nut))
+                         .value(),
+                     {.queue_frames = 8});
+  put_stalled_disk(temp / "s/cam0/000000.nut");
+  std::uint64_t refused = 0;
+  for (std::uint64_t i = 0; i < 200; ++i) {  // 600 KB; were push() to wait, it would wait for ever
+    if (!writer.push(0, noise_frame(kLayout, i))) ++refused;
+    while (!writer.push(1, noise_frame(kLayout, i))) std::this_thread::yield();
+  }
+  EXPECT_GT(refused, 100U);
+  const CameraProgress stalled = writer.progress(0);
+  EXPECT_EQ(stalled.queue_fill, 1);
+  EXPECT_EQ(stalled.counts.queue(), refused);
+  EXPECT_LT(stalled.counts.recorded(), 60U);
+
+  std::thread disk([&] {  // it comes back
+    const UniqueFd fd(::open((temp / "s/cam0/000000.nut").c_str(), O_RDONLY | O_CLOEXEC));
+    std::array<char, 4096> bytes{};
+    while (::read(fd.get(), bytes.data(), bytes.size()) > 0) {
+    }
+  });
+  const auto manifest = writer.finish();
+  disk.join();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  // A pipe keeps nothing: what went into it is lost to the disk, and said so.
+  const v1::Counts& counts = manifest->cameras(0).counts();
+  EXPECT_EQ(counts.recorded(), 0U);
+  EXPECT_EQ(counts.queue(), refused);
+  EXPECT_EQ(accounted(counts), 200U);
+}
+
+TEST(AsyncWriter, ProgressAddsUpToWhatFinishTells) {
+  const TempFolder temp;
+  AsyncWriter writer(writer_for(temp / "s", 2), {.queue_frames = 100});
+  for (const std::uint64_t id : {0, 1, 2, 7, 8}) writer.push(1, noise_frame(kLayout, id));
+  writer.count_lost(1, LossCause::transport, 3);
+  while (writer.progress(1).counts.recorded() < 5) std::this_thread::yield();
+  const CameraProgress now = writer.progress(1);
+  EXPECT_EQ(now.queue_fill, 0);
+  EXPECT_GT(now.bytes, 5U * 68);
+  const auto manifest = writer.finish();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  EXPECT_EQ(now.counts.SerializeAsString(), manifest->cameras(1).counts().SerializeAsString());
+  EXPECT_EQ(now.counts.camera_gap(), 1U);
+  EXPECT_EQ(writer.progress(0).counts.recorded(), 0U);
 }
 
 TEST(AsyncWriter, PushesAfterTheEndAreRefused) {

@@ -1,0 +1,62 @@
+#include "session/name.h"
+
+#include <algorithm>
+#include <array>
+#include <string>
+
+namespace emberlock {
+namespace {
+
+constexpr std::size_t kMaxNameBytes =
+    200;  // file systems have 255; files made beside a folder add to its name
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+bool allowed(char c) {
+  return (lower(c) >= 'a' && lower(c) <= 'z') || is_digit(c) ||
+         std::string_view(" ._:-").find(c) != std::string_view::npos;
+}
+
+/// Names of devices on Windows, whatever follows a point (Microsoft, "Naming Files, Paths, and Namespaces").
+bool is_windows_device(std::string_view name) {
+  std::string stem(name.substr(0, name.find('.')));
+  while (stem.ends_with(' ')) stem.pop_back();
+  std::transform(stem.begin(), stem.end(), stem.begin(), lower);
+  constexpr std::array<std::string_view, 4> kDevices{"con", "prn", "aux", "nul"};
+  if (std::find(kDevices.begin(), kDevices.end(), stem) != kDevices.end()) return true;
+  return stem.size() == 4 && (stem.starts_with("com") || stem.starts_with("lpt")) && is_digit(stem[3]);
+}
+
+/// The name as a message may show it.
+std::string shown(std::string_view name) {
+  constexpr std::size_t kShown = 60;
+  std::string text = "session \"";
+  for (const char c : name.substr(0, kShown)) text += c >= ' ' && c <= '~' ? c : '?';
+  return text + (name.size() > kShown ? "...\"" : "\"");
+}
+
+}  // namespace
+
+bool is_folder_name(std::string_view name) {
+  return !name.empty() && name.size() <= kMaxNameBytes && name.front() != '.' &&
+         std::all_of(name.begin(), name.end(), allowed);
+}
+
+Status check_session_name(std::string_view name) {
+  const auto bad = [&](std::string what, std::string remedy) {
+    return Error{ErrorKind::bad_input, std::move(what), shown(name), std::move(remedy)};
+  };
+  if (!is_folder_name(name)) {
+    return bad("can't name a session",
+               "Use letters, digits, space and . _ : - alone, no point in front, at most " +
+                   std::to_string(kMaxNameBytes));
+  }
+  if (name.ends_with(' ') || name.ends_with('.')) {
+    return bad("ends with a space or a point, which Windows drops", "Leave it off");
+  }
+  if (is_windows_device(name)) return bad("is the name of a device on Windows", "Choose another name");
+  return {};
+}
+
+}  // namespace emberlock

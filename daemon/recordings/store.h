@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/progress.h"
+#include "base/result.h"
+#include "base/time_point.h"
+#include "drivers/camera.h"
+#include "emberlock/v1/services.pb.h"
+#include "emberlock/v1/status.pb.h"
+#include "session/salvage.h"
+#include "session/writer.h"
+
+namespace emberlock {
+
+struct StoreOptions {
+  std::uint64_t min_free_bytes = WriterOptions{}.min_free_bytes;  ///< the floor: below it frames are refused
+};
+
+/// What became of a session whose recorder was killed.
+struct Salvaged {
+  std::string session;
+  Result<SalvageReport> outcome;  ///< `refused`: another process still records it
+};
+
+/// The folder in which sessions lie, a folder each. Any thread may call anything.
+class SessionStore {
+ public:
+  /// Creates the folder where there is none. Error io: it can't be written.
+  static Result<SessionStore> open(std::filesystem::path folder, StoreOptions options = {});
+
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  /// The newest first. One that can't be read is there too, with the reason.
+  [[nodiscard]] v1::ListSessionsResponse list() const;
+  /// The folder of a session that is there. Error bad_input: a name that can't be one, or no such session.
+  [[nodiscard]] Result<std::filesystem::path> path_of(std::string_view name) const;
+  /// The folder for a new session, not yet made. An empty name becomes the time, "2026-11-22 03-15-09", with
+  /// a number behind it where that is taken. Error bad_input: the name can't be one, or is taken.
+  [[nodiscard]] Result<std::filesystem::path> path_for_new(std::string_view name, TimePoint wall_clock) const;
+  /// Free space, and how long it lasts at this rate, e.g. bytes_per_second of all cameras.
+  [[nodiscard]] Result<v1::StorageStatus> storage(double bytes_per_s) const;
+  /// At start-up: salvages each session that says that it is being recorded and that nobody records.
+  [[nodiscard]] std::vector<Salvaged> salvage_all(const Progress& progress = {}) const;
+
+ private:
+  SessionStore(std::filesystem::path folder, StoreOptions options)
+      : folder_(std::move(folder)), options_(options) {}
+  std::filesystem::path folder_;
+  StoreOptions options_;
+};
+
+/// What a recording of these cameras takes of the disk at most, each at its nominal rate. FFV1 is counted
+/// with what noise makes of it, which it can't compress: how well a flame does nobody knows before.
+double bytes_per_second(std::span<const CameraInfo> cameras, Encoding encoding);
+
+}  // namespace emberlock

@@ -1,0 +1,172 @@
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "daemon/recordings/store.h"
+#include "session/files.h"
+#include "tests/support/recording.h"
+
+namespace emberlock {
+namespace {
+
+using test::manifest_of;
+using test::noise_frame;
+using test::record;
+using test::small_disk_options;
+using test::TempFolder;
+
+const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
+constexpr TimePoint kNow{1'795'317'309'000'000'000};  // 2026-11-22 03:15:09
+
+SessionStore store_in(const TempFolder& temp) { return SessionStore::open(temp / "store").value(); }
+
+/// A session as a killed recorder leaves it.
+void leave_unfinished(const std::filesystem::path& folder) {
+  auto writer = SessionWriter::create(folder, manifest_of({kLayout}), small_disk_options());
+  for (std::uint64_t i = 0; i < 40; ++i) ASSERT_TRUE(writer->write(0, noise_frame(kLayout, i)));
+}
+
+TEST(SessionStore, ListsTheNewestFirstAndTellsOfThoseThatCannotBeRead) {
+  const TempFolder temp;
+  const SessionStore store = store_in(temp);
+  EXPECT_EQ(store.list().sessions_size(), 0);
+  record(store.folder() / "old", kLayout, 5, small_disk_options());
+  auto manifest = manifest_of({kLayout, kLayout});
+  manifest.set_created_utc("2026-11-22T03:00:00Z");
+  auto writer = SessionWriter::create(store.folder() / "new", manifest, small_disk_options());
+  ASSERT_TRUE(writer);
+  writer->count_lost(1, LossCause::disk, 0);
+  for (std::uint64_t i = 0; i < 7; ++i) ASSERT_TRUE(writer->write(1, noise_frame(kLayout, i * 2)));
+  ASSERT_TRUE(writer->finish());
+  std::filesystem::create_directories(store.folder() / "broken");
+  test::put_bytes(manifest_path(store.folder() / "broken"), "{");
+  std::filesystem::create_directories(store.folder() / "no session");
+  test::put_bytes(store.folder() / "a file", "");
+
+  const auto list = store.list();
+  ASSERT_EQ(list.sessions_size(), 3);
+  EXPECT_EQ(list.sessions(0).session(), "new");
+  EXPECT_EQ(list.sessions(0).state(), v1::Manifest::COMPLETE);
+  EXPECT_EQ(list.sessions(0).frames(), 7U);
+  EXPECT_EQ(list.sessions(0).lost(), 6U);
+  EXPECT_EQ(list.sessions(0).cameras(), 2U);
+  EXPECT_GT(list.sessions(0).bytes(), 7U * 64 * 48 / 2);
+  EXPECT_FALSE(list.sessions(0).calibrated());
+  EXPECT_EQ(list.sessions(1).session(), "broken");
+  EXPECT_NE(list.sessions(1).error().find("manifest.json"), std::string::npos);
+  EXPECT_EQ(list.sessions(2).session(), "old");
+  EXPECT_EQ(list.sessions(2).frames(), 5U);
+}
+
+TEST(SessionStore, ASessionWithEveryCalibrationAndItsBoxCanBeReconstructed) {
+  const TempFolder temp;
+  const SessionStore store = store_in(temp);
+  auto manifest = manifest_of({kLayout});
+  for (const double v : {0.0, 0.0, 0.0}) manifest.mutable_box()->add_center(v);
+  for (const double v : {1.0, 1.0, 1.0}) manifest.mutable_box()->add_size(v);
+  v1::Calibration& calibration = *manifest.mutable_cameras(0)->mutable_calibration();
+  calibration.set_fx(100);
+  calibration.set_fy(100);
+  for (int i = 0; i < 12; ++i) calibration.add_camera_from_world(i % 5 == 0 ? 1 : 0);
+  auto writer = SessionWriter::create(store.folder() / "s", manifest, small_disk_options());
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->finish());
+  EXPECT_TRUE(store.list().sessions(0).calibrated());
+}
+
+TEST(SessionStore, NamesThatLeadElsewhereAreRefusedForOldAndNewSessions) {
+  const TempFolder temp;
+  const SessionStore store = store_in(temp);
+  record(temp / "outside", kLayout, 1, small_disk_options());
+  for (const std::string& name : {std::string(".."), std::string("../outside"), std::string("/etc"),
+                                  std::string("a/b"), std::string("a\0b", 3), std::string(".hidden")}) {
+    const auto old = store.path_of(name);
+    ASSERT_FALSE(old) << name;
+    EXPECT_EQ(old.error().kind, ErrorKind::bad_input);
+    EXPECT_FALSE(store.path_for_new(name, kNow)) << name;
+  }
+  EXPECT_FALSE(store.path_of("absent"));
+}
+
+TEST(SessionStore, NewSessionsAreNamedByTimeAndNeverTakeATakenName) {
+  const TempFolder temp;
+  const SessionStore store = store_in(temp);
+  const auto first = store.path_for_new("", kNow);
+  ASSERT_TRUE(first);
+  EXPECT_EQ(first->filename(), "2026-11-22 03-15-09");
+  record(*first, kLayout, 1, small_disk_options());
+  const auto second = store.path_for_new("", kNow);
+  ASSERT_TRUE(second);
+  EXPECT_EQ(second->filename(), "2026-11-22 03-15-09 2");
+  EXPECT_FALSE(store.path_for_new("2026-11-22 03-15-09", kNow));
+  EXPECT_EQ(store.path_of("2026-11-22 03-15-09").value(), *first);
+}
+
+TEST(SessionStore, MinutesLeftAreThoseAboveTheFloor) {
+  const TempFolder temp;
+  const SessionStore all = SessionStore::open(temp / "store", {.min_free_bytes = 0}).value();
+  const auto unbounded = all.storage(1e6);
+  ASSERT_TRUE(unbounded);
+  EXPECT_NEAR(unbounded->minutes_left(), static_cast<double>(unbounded->free_bytes()) / 60e6,
+              1e-9 * unbounded->minutes_left());
+  const SessionStore none = SessionStore::open(temp / "store", {.min_free_bytes = ~std::uint64_t{0}}).value();
+  EXPECT_EQ(none.storage(1e6)->minutes_left(), 0);
+}
+
+TEST(SessionStore, BytesASecondBoundWhatNoiseTakesOnTheDisk) {
+  const TempFolder temp;
+  constexpr std::uint64_t kFrames = 5;
+  for (const ImageLayout& layout :
+       {ImageLayout{{320, 240}, PixelFormat::gray8, 8}, ImageLayout{{160, 120}, PixelFormat::gray16, 12},
+        ImageLayout{{320, 240}, PixelFormat::gray16, 16}, ImageLayout{{160, 120}, PixelFormat::rgb8, 8},
+        ImageLayout{{320, 240}, PixelFormat::rgb16, 16}}) {
+    for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut}) {
+      const auto folder = temp / "s";
+      std::filesystem::remove_all(folder);
+      record(folder, layout, kFrames, small_disk_options(encoding));
+      const auto bytes = static_cast<double>(std::filesystem::file_size(find_segment(folder, "cam0", 0)) +
+                                             std::filesystem::file_size(index_path(folder, "cam0")));
+      CameraInfo camera;
+      camera.layout = layout;
+      camera.frame_rate = Hertz(100);
+      const double bound = bytes_per_second(std::vector{camera}, encoding) * kFrames / 100;
+      EXPECT_LE(bytes, bound * 1.01) << name(layout.format) << layout.bit_depth;
+      EXPECT_GE(bytes, bound * .6) << name(layout.format) << layout.bit_depth;
+    }
+  }
+}
+
+TEST(SessionStore, AtStartUpSalvagesWhatAKilledRecorderLeftAndNothingElse) {
+  const TempFolder temp;
+  const SessionStore store = store_in(temp);
+  record(store.folder() / "finished", kLayout, 5, small_disk_options());
+  leave_unfinished(store.folder() / "killed");
+  auto alive =
+      SessionWriter::create(store.folder() / "recorded now", manifest_of({kLayout}), small_disk_options());
+  ASSERT_TRUE(alive);
+  const auto list = store.list();
+  EXPECT_EQ(list.sessions(1).session(), "killed");
+  EXPECT_EQ(list.sessions(1).frames(), 40U);
+
+  const std::vector<Salvaged> done = store.salvage_all();
+  ASSERT_EQ(done.size(), 2U);
+  EXPECT_EQ(done[0].session, "killed");
+  ASSERT_TRUE(done[0].outcome) << done[0].outcome.error().message();
+  EXPECT_GT(done[0].outcome->cameras.at(0).kept, 10U);
+  EXPECT_EQ(done[1].session, "recorded now");
+  ASSERT_FALSE(done[1].outcome);
+  EXPECT_EQ(done[1].outcome.error().kind, ErrorKind::refused);
+  EXPECT_TRUE(SessionReader::open(store.folder() / "killed"));
+}
+
+TEST(SessionStore, AFolderThatCannotBeMadeIsRefusedWithTheReason) {
+  const TempFolder temp;
+  test::put_bytes(temp / "file", "");
+  const auto store = SessionStore::open(temp / "file/store");
+  ASSERT_FALSE(store);
+  EXPECT_NE(store.error().message().find("file/store"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -44,10 +44,11 @@ void add(Looks& looks, const Look& look, std::size_t camera) {
 
 }  // namespace
 
-AlignBench::AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period)
+AlignBench::AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period, StopAsked stop)
     : rig_(rig),
       options_(options),
       period_(period),
+      stop_(std::move(stop)),
       all_(rig.cameras.size()),
       passed_over_(rig.cameras.size()) {
   std::iota(all_.begin(), all_.end(), std::size_t{0});
@@ -104,6 +105,7 @@ Result<Film> AlignBench::film(const std::vector<std::size_t>& read, int count) {
   for (int i = 0; i < count; ++i) {
     for (const std::size_t camera : all_) {
       EMBERLOCK_ASSIGN_OR_RETURN(std::optional<Frame> frame, fresh_frame(camera));
+      if (stopped()) return film;
       const bool asked = std::find(read.begin(), read.end(), camera) != read.end();
       if (!frame || !asked) continue;  // none came: fewer samples of this camera
       film.readings[camera].push_back(
@@ -143,6 +145,7 @@ Status AlignBench::sweep(const StrobeSettings& flashes, Seconds wanted, const Pr
       }
       EMBERLOCK_RETURN_IF_ERROR(set_strobe(settings));
       EMBERLOCK_RETURN_IF_ERROR(film(cameras, 1));
+      if (stopped()) return {};
     }
   }
   return set_strobe(flashes);
@@ -154,13 +157,25 @@ void AlignBench::wait(TimePoint until, const StopAsked& stop) {
     t = std::min(t + kWaitStep, until);
     rig_.clock->sleep_until(t);
   }
+  pass_over(until);
+}
+
+void AlignBench::pass_over(TimePoint until) {
   fresh_ = std::max(fresh_, until);
   for (const std::size_t camera : all_) passed_over_[camera] += rig_.cameras[camera]->pass_over(until);
 }
 
+Result<Frame> AlignBench::next_frame(std::size_t camera) {
+  for (Seconds left = options_.frame_deadline;; left -= kWaitStep) {
+    Result<Frame> frame = rig_.cameras[camera]->next_frame(stop_ ? std::min(left, kWaitStep) : left);
+    const bool late = !frame.ok() && frame.error().kind == ErrorKind::timed_out;
+    if (!late || !stop_ || left <= kWaitStep || stopped()) return frame;
+  }
+}
+
 Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
-  for (;;) {
-    Result<Frame> frame = rig_.cameras[camera]->next_frame(options_.frame_deadline);
+  while (!stopped()) {
+    Result<Frame> frame = next_frame(camera);
     if (!frame.ok()) {
       if (frame.error().kind != ErrorKind::timed_out) return frame.error();
       log(LogCategory::daemon).warn("{}", frame.error().message());
@@ -174,6 +189,7 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
     const bool usable = frame->stamp.monotonic_time >= fresh_ && frame->stamp.status == FrameStatus::complete;
     if (usable) return std::optional<Frame>(std::move(*frame));
   }
+  return std::optional<Frame>();
 }
 
 }  // namespace emberlock

@@ -27,11 +27,12 @@ class AlignBench {
   /// phase before, or in that of the next, so frames are trusted from the second one on.
   static constexpr double kSettlingPeriods = 2;
 
-  AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period);
+  AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period, StopAsked stop = {});
 
   /// As it said of itself after the last change.
   [[nodiscard]] const StrobeSettings& strobe() const { return strobe_; }
   [[nodiscard]] PhaseSensor& sensor(std::size_t camera) { return *sensors_[camera]; }
+  [[nodiscard]] const PhaseSensor& sensor(std::size_t camera) const { return *sensors_[camera]; }
   [[nodiscard]] std::vector<std::size_t> cameras_with(SensorKind kind) const;
 
   /// Sets the strobe, if that changes anything; frames that show what was before are passed over from then
@@ -45,6 +46,7 @@ class AlignBench {
   Result<TimePoint> trim(std::size_t camera, PartsPerMillion trim);
   /// `count` frames of every camera, one of each in turn, and what those of `read` show. A frame that doesn't
   /// come in time is left out, with a warning; errors: a camera that is lost, a recording that has ended.
+  /// What was filmed until then when it is stopped.
   Result<Film> film(const std::vector<std::size_t>& read, int count);
   Result<Film> film_all(int count);
   /// Films the looks that the sensors ask for before they tell phases to a standard error of `wanted`, at
@@ -52,18 +54,25 @@ class AlignBench {
   /// of the run meanwhile. Errors: set_strobe's and film's; sensors that are never content are none.
   Status sweep(const StrobeSettings& flashes, Seconds wanted, const Progress& progress, double done);
 
-  /// Waits until `until`, or until it is asked to stop. The frames that come meanwhile are passed over, and
-  /// counted as such.
+  /// Waits until `until`, or until it is asked to stop, and passes over the frames that come meanwhile.
   void wait(TimePoint until, const StopAsked& stop);
+  /// Frames that came until `until` aren't wanted: those that wait are dropped, and counted as such.
+  void pass_over(TimePoint until);
+
+  /// Whether it is asked to stop.
+  [[nodiscard]] bool stopped() const { return stop_ && stop_(); }
 
   Status record(const v1::Event& event) { return rig_.recorder ? rig_.recorder->append(event) : Status{}; }
 
  private:
+  /// The next frame, within the deadline for it.
+  Result<Frame> next_frame(std::size_t camera);
   Result<std::optional<Frame>> fresh_frame(std::size_t camera);
 
   const AlignRig& rig_;
   const AlignRunOptions& options_;
   Seconds period_;
+  StopAsked stop_;
   std::vector<std::unique_ptr<PhaseSensor>> sensors_;  ///< by camera
   std::vector<std::size_t> all_;
   StrobeSettings strobe_;

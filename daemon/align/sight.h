@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "base/quantity.h"
+#include "base/sensor_kind.h"
+#include "smear_sync/ccd_timing.h"
+#include "smear_sync/reading.h"
+
+namespace emberlock {
+
+/// Where things stand in a camera's picture: columns and rows from 0 at the centre of the top left pixel.
+struct CameraSight {
+  std::optional<LampReading> lamp;
+  std::vector<DotReading> dots;
+  std::optional<Rows> target_row;  ///< where a CCD's dot would stand if it were on target; absent where that
+                                   ///< is out of sight, or no target is known
+  std::optional<Rows> tolerance;   ///< of CCDs: to either side of it
+};
+
+/// The sight of a frame that reads `reading`. `target`: tau of the target in that round, strobe's delay
+/// included.
+CameraSight sight_of(const SmearReading& reading, SensorKind sensor, const CcdTiming& timing,
+                     std::optional<Seconds> target, Seconds tolerance);
+
+}  // namespace emberlock

@@ -9,8 +9,8 @@
 
 #include "base/progress.h"
 #include "base/result.h"
-#include "cli/demo_rig.h"
 #include "daemon/align/run.h"
+#include "daemon/devices/stage.h"
 #include "recon/pipeline/reconstruct.h"
 
 namespace emberlock::cli {

@@ -85,7 +85,10 @@ class Stepper {
   }
 
   void operator()(const RoundDone& happened) {
-    if (now().phase != v1::ALIGNING && now().phase != v1::LOCKED) return;
+    const bool over =
+        happened.verdict == v1::AlignmentStatus::REFUSED || happened.verdict == v1::AlignmentStatus::GIVEN_UP;
+    const bool filmed = now().phase == v1::ALIGNING || now().phase == v1::LOCKED;
+    if (!filmed && !(over && now().phase == v1::CALIBRATING)) return;  // no row time can be measured
     switch (happened.verdict) {
       case v1::AlignmentStatus::ALIGNED:
         mend({v1::Fault::LOCK_LOST});

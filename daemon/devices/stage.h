@@ -10,9 +10,9 @@
 #include "recon/calibrate/camera_model.h"
 #include "recon/synthetic/flame.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 
-/// What the demonstration films with: an arc of cameras about one metre from a flame of some 15 cm, as in the
+/// Where simulated cameras stand: an arc of cameras about one metre from a flame of some 15 cm, as in the
 /// paper's section "Data Capture".
 struct Stage {
   Box box;                           ///< the flame's volume
@@ -37,8 +37,21 @@ class FlameLight final : public LightField {
   Grid grid_;
 };
 
+/// The flame as it is at one instant, drawn once for each camera: it costs cameras that film in real time
+/// next to nothing.
+class StillFlame final : public LightField {
+ public:
+  /// Renders it for every camera, which takes a moment.
+  StillFlame(const FlameLight& flame, const Stage& stage, TimePoint instant);
+  void add_radiance(int camera, TimePoint exposure_start, Seconds exposure,
+                    std::span<float> rgb) const override;
+
+ private:
+  std::vector<std::vector<float>> rgb_;  ///< by camera
+};
+
 /// The manifest's stream of a camera: identity and layout from the driver, geometry from its calibration.
 v1::CameraStream describe(const CameraInfo& info, const CameraModel& calibration);
 v1::Box describe(const Box& box);
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

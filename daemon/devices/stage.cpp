@@ -1,4 +1,4 @@
-#include "cli/demo_rig.h"
+#include "daemon/devices/stage.h"
 
 #include <cmath>
 #include <numbers>
@@ -6,7 +6,7 @@
 #include "drivers/replay/record.h"
 #include "recon/render/render.h"
 
-namespace emberlock::cli {
+namespace emberlock {
 
 Stage demo_stage(int cameras, ImageSize image) {
   constexpr double kDistance = 1.0;  // metres
@@ -36,6 +36,21 @@ void FlameLight::add_radiance(int camera, TimePoint exposure_start, Seconds expo
   const RadianceImage image = render_view(truth.volume, truth.medium, truth.effects,
                                           stage_.cameras[static_cast<std::size_t>(camera)], options);
   for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] += image.rgb[i];
+}
+
+StillFlame::StillFlame(const FlameLight& flame, const Stage& stage, TimePoint instant) {
+  for (std::size_t i = 0; i < stage.cameras.size(); ++i) {
+    const ImageSize size = stage.cameras[i].intrinsics.size;
+    rgb_.emplace_back(std::size_t{3} * static_cast<std::size_t>(size.width) *
+                      static_cast<std::size_t>(size.height));
+    flame.add_radiance(static_cast<int>(i), instant, Seconds(0), rgb_.back());
+  }
+}
+
+void StillFlame::add_radiance(int camera, TimePoint /*exposure_start*/, Seconds /*exposure*/,
+                              std::span<float> rgb) const {
+  const std::vector<float>& still = rgb_[static_cast<std::size_t>(camera)];
+  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] += still[i];
 }
 
 v1::CameraStream describe(const CameraInfo& info, const CameraModel& calibration) {
@@ -69,4 +84,4 @@ v1::Box describe(const Box& box) {
   return message;
 }
 
-}  // namespace emberlock::cli
+}  // namespace emberlock

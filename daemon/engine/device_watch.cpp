@@ -1,0 +1,109 @@
+#include "daemon/engine/device_watch.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace emberlock {
+namespace {
+
+using State = v1::CameraStatus;
+
+bool gone(State::State state) { return state == State::LOST || state == State::QUARANTINED; }
+
+Happening raised(State::State state, const std::string& id) {
+  if (state == State::LOST) {
+    return FaultRaised{{v1::Fault::CAMERA_LOST, id},
+                       v1::RED,
+                       "the camera went away",
+                       "See to its cable and its power: it is taken up again by itself"};
+  }
+  return FaultRaised{{v1::Fault::CAMERA_HANGS, id},
+                     v1::RED,
+                     "the camera doesn't answer any more",
+                     "Unplug it and plug it in again; if that doesn't help, restart emberlockd"};
+}
+
+Happening mended(State::State state, const std::string& id) {
+  return FaultMended{{state == State::LOST ? v1::Fault::CAMERA_LOST : v1::Fault::CAMERA_HANGS, id}};
+}
+
+std::uint64_t made(const FrameCounts& counts) {
+  return counts.delivered + counts.damaged + counts.passed_over + counts.lost();
+}
+
+}  // namespace
+
+DeviceWatch::DeviceWatch(std::vector<std::string> camera_ids)
+    : ids_(std::move(camera_ids)),
+      states_(ids_.size(), State::FILMING),
+      rates_(ids_.size(), 0.0),
+      made_(ids_.size(), 0) {}
+
+std::vector<Happening> DeviceWatch::cameras(const std::vector<v1::CameraStatus::State>& states) {
+  std::vector<Happening> happenings;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    if (states[i] == states_[i]) continue;
+    if (gone(states_[i])) happenings.push_back(mended(states_[i], ids_[i]));
+    if (gone(states[i])) happenings.push_back(raised(states[i], ids_[i]));
+  }
+  states_ = states;
+  const bool all_lost = none_films();
+  if (all_lost != all_lost_) {
+    const FaultKey key{v1::Fault::ALL_CAMERAS_LOST};
+    if (all_lost) {
+      happenings.emplace_back(FaultRaised{key, v1::RED, "no camera is left",
+                                          "See to the hub, the switch or the power that they share"});
+    } else {
+      happenings.emplace_back(FaultMended{key});
+    }
+    all_lost_ = all_lost;
+  }
+  return happenings;
+}
+
+std::vector<Happening> DeviceWatch::strobe(const std::string& id, const Status& answer) {
+  const FaultKey key{v1::Fault::STROBE_SILENT, id};
+  if (answer.ok()) {
+    if (!std::exchange(strobe_silent_, false)) return {};
+    return {FaultMended{key}};
+  }
+  strobe_silent_ = true;
+  const std::string& remedy = answer.error().remedy;
+  return {FaultRaised{
+      key, v1::RED, answer.error().what,
+      remedy.empty() ? "See to its power and its cable: it is asked again every second" : remedy}};
+}
+
+std::vector<Happening> DeviceWatch::clocks(TimePoint monotonic, TimePoint wall) {
+  const Seconds ahead = wall - monotonic;
+  const Seconds step = ahead - wall_ahead_.value_or(ahead);
+  wall_ahead_ = ahead;
+  if (abs(step) < kClockStep) return {};
+  return {FaultRaised{
+      {v1::Fault::CLOCK_STEPPED},
+      v1::AMBER,
+      fmt::format("the wall clock was moved by {:+.1f} s", step.value()),
+      "Nothing is lost: frames are ordered by a clock that can't be moved. Times of day in a recording "
+      "that runs are off by that from here on"}};
+}
+
+void DeviceWatch::frames(const std::vector<FrameCounts>& counts, TimePoint now) {
+  const Seconds span = counted_ ? now - *counted_ : kRateSpan;
+  if (span < kRateSpan) return;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    const std::uint64_t total = made(counts[i]);
+    if (counted_) rates_[i] = static_cast<double>(total - made_[i]) / span.value();
+    made_[i] = total;
+  }
+  counted_ = now;
+}
+
+bool DeviceWatch::all_film() const { return std::none_of(states_.begin(), states_.end(), gone); }
+bool DeviceWatch::none_films() const {
+  return !states_.empty() && std::all_of(states_.begin(), states_.end(), gone);
+}
+
+}  // namespace emberlock

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "base/time_point.h"
+#include "daemon/engine/machine.h"
+#include "drivers/camera.h"
+
+namespace emberlock {
+
+/// Turns what devices say of themselves into happenings, each told once. Pure but for what it remembers.
+class DeviceWatch {
+ public:
+  /// The wall clock may differ from the monotonic one by this much more than before.
+  static constexpr Seconds kClockStep{0.5};
+  /// A camera's rate is measured over so long.
+  static constexpr Seconds kRateSpan{2};
+
+  explicit DeviceWatch(std::vector<std::string> camera_ids);
+
+  std::vector<Happening> cameras(const std::vector<v1::CameraStatus::State>& states);
+  std::vector<Happening> strobe(const std::string& id, const Status& answer);
+  std::vector<Happening> clocks(TimePoint monotonic, TimePoint wall);
+  void frames(const std::vector<FrameCounts>& counts, TimePoint now);
+
+  [[nodiscard]] bool all_film() const;
+  [[nodiscard]] bool none_films() const;
+  /// Frames a second that the camera made lately; 0 while that isn't known.
+  [[nodiscard]] double rate(std::size_t camera) const { return rates_[camera]; }
+
+ private:
+  std::vector<std::string> ids_;
+  std::vector<v1::CameraStatus::State> states_;
+  bool all_lost_ = false;
+  bool strobe_silent_ = false;
+  std::optional<Seconds> wall_ahead_;
+  std::vector<double> rates_;
+  std::vector<std::uint64_t> made_;
+  std::optional<TimePoint> counted_;
+};
+
+}  // namespace emberlock

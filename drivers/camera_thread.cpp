@@ -310,11 +310,8 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   void take_frame(std::unique_lock<std::mutex>& lock) {
     const std::uint64_t film = film_;
     const Seconds slice = until_next_order();
-    Result<Frame> next = busy(lock, "next_frame", after(now(), slice), [&](Camera& camera) {
-      Result<Frame> frame = camera.next_frame(slice);
-      if (frame && options_.on_frame) options_.on_frame(*frame);
-      return frame;
-    });
+    Result<Frame> next = busy(lock, "next_frame", after(now(), slice),
+                              [slice](Camera& camera) { return camera.next_frame(slice); });
     if (next) return add(std::move(next), film);
     if (film != film_ || next.error().kind == ErrorKind::timed_out) return;
     if (next.error().kind == ErrorKind::device) return lose(next.error());

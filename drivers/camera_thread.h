@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 
 #include "drivers/camera.h"
@@ -14,8 +13,6 @@ struct CameraThreadOptions {
   Seconds retry = milliseconds(250);  ///< between two looks for a camera that went away, > 0
   Seconds call_deadline =
       kCallDeadline * 1.5;  ///< what a call may take before the camera is held to hang, > 0
-  /// Sees every frame on the camera's thread, those that nobody takes too. Must return at once.
-  std::function<void(const Frame&)> on_frame = {};
 };
 
 /// A camera that is driven by a thread of its own, behind the same interface. What it adds:

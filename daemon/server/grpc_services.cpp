@@ -1,0 +1,224 @@
+#include "daemon/server/grpc_services.h"
+
+#include <type_traits>
+#include <utility>
+
+#include "emberlock/v1/services.grpc.pb.h"
+
+namespace emberlock {
+namespace {
+
+using Context = grpc::CallbackServerContext;
+
+grpc::Status too_many(const char* what) {
+  return {grpc::StatusCode::RESOURCE_EXHAUSTED,
+          std::string("emberlockd: ") + what + ". Try again in a moment"};
+}
+
+grpc::Status put(Result<void> result, v1::Empty* /*response*/) { return grpc_status(result); }
+template <class Response>
+grpc::Status put(Result<Response> result, Response* response) {
+  if (!result) return grpc_status(result.error());
+  *response = std::move(*result);
+  return grpc::Status::OK;
+}
+
+/// Asks on a worker's thread. gRPC keeps request and response until the answer is given.
+template <class Response, class Ask>
+grpc::ServerUnaryReactor* answer(const GrpcBackend& backend, Context* context, Response* response, Ask ask) {
+  grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+  const bool queued = backend.workers.run(
+      [ask = std::move(ask), reactor, response] { reactor->Finish(put(ask(), response)); });
+  if (!queued) reactor->Finish(too_many("too many calls are waiting"));
+  return reactor;
+}
+
+template <class Message, class Feed>
+grpc::ServerWriteReactor<Message>* watch(const GrpcBackend& backend, Feed feed) {
+  auto* stream =
+      new WatchStream<Message, Feed>(backend.pump, std::move(feed));  // deletes itself when it is done
+  if (!backend.pump.add(stream)) stream->Finish(too_many("too many watchers"));
+  return stream;
+}
+
+template <class Request>
+grpc::ServerWriteReactor<v1::JobProgress>* start_job(const GrpcBackend& backend, const Request& request,
+                                                     Status (Api::*ask)(const Request&, const JobObserver&)) {
+  const auto job = std::make_shared<Job>([&pump = backend.pump] { pump.wake(); });
+  auto* stream = new JobStream(backend.pump, job);  // deletes itself when it is done
+  const bool queued = backend.jobs.run([job, request, ask, &api = backend.api] {
+    job->run([&](const JobObserver& observer) { return (api.*ask)(request, observer); });
+  });
+  if (!queued)
+    stream->Finish(too_many("too many jobs are waiting"));
+  else if (!backend.pump.add(stream))
+    stream->Finish(too_many("too many watchers"));
+  return stream;
+}
+
+class DaemonService final : public v1::Daemon::CallbackService {
+ public:
+  explicit DaemonService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* GetStatus(Context* context, const v1::Empty* /*request*/,
+                                      v1::DaemonStatus* response) override {
+    *response = *backend_.api.board().status();
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    reactor->Finish(grpc::Status::OK);
+    return reactor;
+  }
+  grpc::ServerWriteReactor<v1::DaemonStatus>* WatchStatus(Context* /*context*/,
+                                                          const v1::Empty* /*request*/) override {
+    return watch<v1::DaemonStatus>(backend_, StatusFeed(backend_.api.board()));
+  }
+  grpc::ServerWriteReactor<v1::Notice>* WatchNotices(Context* /*context*/,
+                                                     const v1::WatchNoticesRequest* request) override {
+    return watch<v1::Notice>(backend_, NoticeFeed(backend_.api.board(), request->after()));
+  }
+  grpc::ServerUnaryReactor* Acknowledge(Context* context, const v1::AcknowledgeRequest* request,
+                                        v1::Empty* response) override {
+    return answer(backend_, context, response,
+                  [this, request] { return backend_.api.acknowledge(*request); });
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
+class DevicesService final : public v1::Devices::CallbackService {
+ public:
+  explicit DevicesService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* List(Context* context, const v1::Empty* /*request*/,
+                                 v1::ListDevicesResponse* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.list_devices(); });
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
+class StrobeService final : public v1::Strobe::CallbackService {
+ public:
+  explicit StrobeService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* Get(Context* context, const v1::Empty* /*request*/,
+                                v1::StrobeState* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.strobe(); });
+  }
+  grpc::ServerUnaryReactor* Apply(Context* context, const v1::StrobeState* request,
+                                  v1::StrobeState* response) override {
+    return answer(backend_, context, response,
+                  [this, request] { return backend_.api.apply_strobe(*request); });
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
+class SyncService final : public v1::Sync::CallbackService {
+ public:
+  explicit SyncService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* Align(Context* context, const v1::AlignRequest* request,
+                                  v1::Empty* response) override {
+    return answer(backend_, context, response, [this, request] { return backend_.api.align(*request); });
+  }
+  grpc::ServerUnaryReactor* Stop(Context* context, const v1::Empty* /*request*/,
+                                 v1::Empty* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.stop_sync(); });
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
+class CaptureService final : public v1::Capture::CallbackService {
+ public:
+  explicit CaptureService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* Record(Context* context, const v1::RecordRequest* request,
+                                   v1::RecordingStatus* response) override {
+    return answer(backend_, context, response, [this, request] { return backend_.api.record(*request); });
+  }
+  grpc::ServerUnaryReactor* Stop(Context* context, const v1::Empty* /*request*/,
+                                 v1::RecordingStatus* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.stop_recording(); });
+  }
+  grpc::ServerWriteReactor<v1::Picture>* WatchPictures(Context* /*context*/,
+                                                       const v1::WatchPicturesRequest* request) override {
+    return watch<v1::Picture>(backend_, PictureFeed(backend_.api.board(), *request));
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
+class SessionsService final : public v1::Sessions::CallbackService {
+ public:
+  explicit SessionsService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* List(Context* context, const v1::Empty* /*request*/,
+                                 v1::ListSessionsResponse* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.list_sessions(); });
+  }
+  grpc::ServerUnaryReactor* Get(Context* context, const v1::SessionRequest* request,
+                                v1::Manifest* response) override {
+    return answer(backend_, context, response, [this, request] { return backend_.api.session(*request); });
+  }
+  grpc::ServerWriteReactor<v1::JobProgress>* Verify(Context* /*context*/,
+                                                    const v1::SessionRequest* request) override {
+    return start_job(backend_, *request, &Api::verify_session);
+  }
+  grpc::ServerWriteReactor<v1::JobProgress>* Repair(Context* /*context*/,
+                                                    const v1::SessionRequest* request) override {
+    return start_job(backend_, *request, &Api::repair_session);
+  }
+  grpc::ServerWriteReactor<v1::JobProgress>* Export(Context* /*context*/,
+                                                    const v1::ExportRequest* request) override {
+    return start_job(backend_, *request, &Api::export_session);
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
+class ReconstructService final : public v1::Reconstruct::CallbackService {
+ public:
+  explicit ReconstructService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* Start(Context* context, const v1::ReconstructRequest* request,
+                                  v1::ReconstructionStatus* response) override {
+    return answer(backend_, context, response,
+                  [this, request] { return backend_.api.reconstruct(*request); });
+  }
+  grpc::ServerUnaryReactor* Cancel(Context* context, const v1::Empty* /*request*/,
+                                   v1::ReconstructionStatus* response) override {
+    return answer(backend_, context, response, [this] { return backend_.api.cancel_reconstruction(); });
+  }
+  grpc::ServerWriteReactor<v1::IterationPreview>* Watch(Context* /*context*/,
+                                                        const v1::Empty* /*request*/) override {
+    return watch<v1::IterationPreview>(backend_, IterationFeed(backend_.api.board()));
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
+}  // namespace
+
+struct GrpcServices::All {
+  explicit All(GrpcBackend b)
+      : daemon(b), devices(b), strobe(b), sync(b), capture(b), sessions(b), reconstruct(b) {}
+  DaemonService daemon;
+  DevicesService devices;
+  StrobeService strobe;
+  SyncService sync;
+  CaptureService capture;
+  SessionsService sessions;
+  ReconstructService reconstruct;
+};
+
+GrpcServices::GrpcServices(GrpcBackend backend) : all_(std::make_unique<All>(backend)) {}
+GrpcServices::~GrpcServices() = default;
+
+void GrpcServices::add_to(grpc::ServerBuilder& builder) {
+  grpc::Service* const services[] = {&all_->daemon,  &all_->devices,  &all_->strobe,     &all_->sync,
+                                     &all_->capture, &all_->sessions, &all_->reconstruct};
+  for (grpc::Service* service : services) builder.RegisterService(service);
+}
+
+}  // namespace emberlock

@@ -1,0 +1,47 @@
+#include "daemon/server/workers.h"
+
+#include <utility>
+
+namespace emberlock {
+
+Workers::Workers(std::size_t threads, std::size_t waiting) : waiting_(waiting), idle_(threads) {
+  for (std::size_t i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+}
+
+Workers::~Workers() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  changed_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+bool Workers::run(std::function<void()> call) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (queue_.size() >= idle_ + waiting_) return false;
+    queue_.push_back(std::move(call));
+  }
+  changed_.notify_one();
+  return true;
+}
+
+void Workers::work() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    changed_.wait(lock, [this] { return ending_ || !queue_.empty(); });
+    if (queue_.empty()) return;
+    --idle_;
+    {
+      const std::function<void()> call = std::move(queue_.front());
+      queue_.pop_front();
+      lock.unlock();
+      call();
+    }
+    lock.lock();
+    ++idle_;
+  }
+}
+
+}  // namespace emberlock

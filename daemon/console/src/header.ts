@@ -1,0 +1,117 @@
+// What is read from across the room: the phase, whether all is well, who does what next, and what is wrong.
+import type {DaemonStatus, Fault} from './api.gen';
+import {act} from './act';
+import {el, Keyed, set, setText, show} from './dom';
+import {clock, fixed, timeOfDay} from './format';
+import type {Connection} from './link';
+import {lightWords, phaseWords, showSign, Sign} from './light';
+import {call} from './wire';
+
+class FaultLine {
+  private readonly sign = new Sign();
+  private readonly kind = el('strong');
+  private readonly what = el('span', {class: 'what'});
+  private readonly remedy = el('span', {class: 'remedy'});
+  private readonly since = el('span', {class: 'note'});
+  private readonly button = el('button', {type: 'button'}, 'Acknowledge');
+  readonly root = el('li', {class: 'fault'}, this.sign.root, el('p', {}, this.kind, ' ', this.what, ' ', this.remedy), this.since, this.button);
+
+  constructor(private readonly id: number) {
+    this.button.addEventListener('click', () => void act(call('Daemon/Acknowledge', {fault_id: this.id})));
+  }
+
+  show(fault: Fault): void {
+    this.sign.show(fault.light);
+    set(this.root, 'data-light', fault.light);
+    set(this.root, 'data-over', fault.over);
+    setText(this.kind, `${faultWords(fault.kind)}${fault.subject ? ` (${fault.subject})` : ''}:`);
+    setText(this.what, fault.what);
+    setText(this.remedy, fault.remedy);
+    setText(this.since, fault.over ? `since ${timeOfDay(fault.since_utc)}, over now` : `since ${timeOfDay(fault.since_utc)}`);
+    // One that goes on would stay on the list: there is nothing to acknowledge yet.
+    show(this.button, fault.over);
+  }
+}
+
+/** CAMERA_LOST: "Camera lost". */
+export function faultWords(kind: Fault['kind']): string {
+  return kind[0] + kind.slice(1).toLowerCase().replaceAll('_', ' ');
+}
+
+export class Header {
+  private readonly sign = new Sign();
+  private readonly light = el('span', {class: 'light'});
+  private readonly phase = el('h1', {}, '…');
+  private readonly clock = el('span', {class: 'clock', hidden: true});
+  private readonly reason = el('p', {class: 'reason'});
+  private readonly next = el('p', {class: 'next-step'});
+  private readonly nextTitle = el('span', {class: 'title'}, 'Next');
+  private readonly nextBox = el('div', {class: 'next', hidden: true}, this.nextTitle, this.next);
+  private readonly rig = el('span', {class: 'rig'});
+  private readonly disk = el('span');
+  private readonly time = el('time');
+  private readonly link = el('span', {class: 'link', 'data-connection': 'connecting'}, 'connecting');
+  private readonly faults = el('ul', {class: 'faults', 'aria-label': 'Faults', hidden: true});
+  private readonly lines = new Keyed<Fault, FaultLine>(this.faults, id => new FaultLine(Number(id)), (line, fault) => line.show(fault));
+  private readonly lost = el('div', {class: 'connection-lost', role: 'alert', hidden: true});
+  private readonly live = el('div', {class: 'hidden', 'aria-live': 'assertive', id: 'announcements'});
+  private said = '';
+  private lostAt?: number;
+  readonly root: HTMLElement;
+
+  constructor() {
+    this.root = el('header', {class: 'top'}, this.lost,
+      el('div', {class: 'line'},
+        el('div', {class: 'phase'}, this.sign.root, el('div', {}, el('div', {class: 'words'}, this.phase, this.clock, this.light), this.reason)),
+        this.nextBox,
+        el('div', {class: 'meta'}, this.link, this.rig, this.disk, this.time)),
+      this.faults, this.live);
+    setInterval(() => this.showLost(), 1000);
+  }
+
+  show(status: DaemonStatus): void {
+    set(this.root, 'data-phase', status.phase);
+    set(this.root, 'data-light', status.light);
+    showSign(this.sign, this.phase, status.light, phaseWords[status.phase]);
+    setText(this.light, lightWords[status.light]);
+    show(this.clock, status.phase === 'CAPTURING');
+    setText(this.clock, clock(status.recording?.seconds ?? 0));
+    setText(this.reason, status.reason);
+    const camera = status.alignment?.reset_next || status.cameras.find(each => each.reset_next)?.id;
+    show(this.nextBox, status.next_step !== '' || Boolean(camera));
+    set(this.nextBox, 'data-reset', Boolean(camera));
+    setText(this.nextTitle, camera ? `Reset ${camera}` : 'Next');
+    setText(this.next, status.next_step);
+    setText(this.rig, [status.rig, status.version && `emberlockd ${status.version}`].filter(Boolean).join(' · '));
+    const storage = status.storage;
+    setText(this.disk, storage ? `disk ${storage.minutes_left >= 120 ? `${fixed(storage.minutes_left / 60, 1)} h` : `${fixed(storage.minutes_left, 0)} min`}` : '');
+    setText(this.time, timeOfDay(status.now_utc));
+    show(this.faults, status.faults.length > 0);
+    this.lines.show([...status.faults].sort((a, b) => Number(a.over) - Number(b.over) || (a.light === b.light ? b.id - a.id : a.light === 'RED' ? -1 : 1)), fault => String(fault.id));
+    document.title = `${phaseWords[status.phase]} – Emberlock`;
+    this.say(`${phaseWords[status.phase]}.${camera ? ` Reset ${camera}.` : ''}${status.light === 'RED' ? ` ${status.reason}` : ''}`);
+  }
+
+  connection(state: Connection): void {
+    set(this.link, 'data-connection', state);
+    setText(this.link, {connecting: 'connecting', open: 'live', lost: 'lost', token: 'token needed'}[state]);
+    if (state === 'open') this.lostAt = undefined;
+    else if (state === 'lost') this.lostAt ??= performance.now();
+    set(document.documentElement, 'data-stale', this.lostAt !== undefined);
+    this.showLost();
+  }
+
+  private showLost(): void {
+    show(this.lost, this.lostAt !== undefined);
+    if (this.lostAt === undefined) return;
+    const text = `Connection to emberlockd lost ${Math.round((performance.now() - this.lostAt) / 1000)} s ago. What is shown is old. Trying again …`;
+    setText(this.lost, text);
+    this.say('Connection lost.');
+  }
+
+  private say(words: string): void {
+    if (words === this.said) return;
+    this.said = words;
+    setText(this.live, words);
+  }
+}

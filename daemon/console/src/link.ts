@@ -1,0 +1,119 @@
+// The WebSocket: what the daemon tells, as it tells it; and again from the start when the connection was lost.
+import type {DaemonStatus, IterationPreview, Notice} from './api.gen';
+import {ApiError, type BinaryHeader, call, decode, unpack} from './wire';
+
+export type Connection = 'connecting' | 'open' | 'lost' | 'token';
+
+export interface Listener {
+  connection(state: Connection): void;
+  status(status: DaemonStatus): void;
+  notice(notice: Notice): void;
+  iteration(preview: IterationPreview): void;
+  bytes(header: BinaryHeader, bytes: Uint8Array): void;
+}
+
+const kQuiet = 3000;           // ms without a word after which the daemon is asked whether it is there
+const kLongestWait = 2000;     // ms between tries to connect again
+
+const ask = () => call('Daemon/GetStatus', {}, AbortSignal.timeout(2000));
+
+export class Link {
+  private socket?: WebSocket;
+  private wait = 250;
+  private heard = 0;
+  private asking = false;
+  private timer?: number;
+  private wanted: {camera_ids: string[]; rate_hz: number} | null = null;
+
+  constructor(private readonly listener: Listener) {
+    setInterval(() => void this.checkQuiet(), 500);
+    addEventListener('online', () => this.hurry());
+    document.addEventListener('visibilitychange', () => { if (!document.hidden) this.hurry(); });
+    addEventListener('pagehide', () => this.socket?.close());
+    this.connect();
+  }
+
+  /** Asks for live pictures of these cameras, so many a second at most; null: of none. */
+  watch(wanted: {camera_ids: string[]; rate_hz: number} | null): void {
+    if (JSON.stringify(wanted) === JSON.stringify(this.wanted)) return;
+    this.wanted = wanted;
+    this.sendWatch();
+  }
+
+  /** Gives the daemon the token, which it answers with a cookie. False: it isn't the right one. */
+  async unlock(token: string): Promise<boolean> {
+    const answer = await fetch(`/?token=${encodeURIComponent(token)}`, {credentials: 'same-origin'}).catch(() => undefined);
+    if (!answer || answer.status === 401) return false;
+    this.connect();
+    return true;
+  }
+
+  private connect(): void {
+    clearTimeout(this.timer);
+    this.listener.connection('connecting');
+    const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/api/v1/watch`);
+    socket.binaryType = 'arraybuffer';
+    this.socket = socket;
+    this.heard = performance.now();
+    socket.onopen = () => {
+      this.wait = 250;
+      this.listener.connection('open');
+      this.sendWatch();
+    };
+    socket.onmessage = event => this.receive(event.data as string | ArrayBuffer);
+    socket.onclose = () => { if (this.socket === socket) void this.lost(); };
+  }
+
+  private receive(data: string | ArrayBuffer): void {
+    this.heard = performance.now();
+    if (typeof data !== 'string') {
+      this.listener.bytes(...unpack(data));
+      return;
+    }
+    const message = JSON.parse(data) as {status?: unknown; notice?: unknown; iteration?: unknown};
+    if (message.status) this.listener.status(decode('DaemonStatus', message.status) as DaemonStatus);
+    if (message.notice) this.listener.notice(decode('Notice', message.notice) as Notice);
+    if (message.iteration) this.listener.iteration(decode('IterationPreview', message.iteration) as IterationPreview);
+  }
+
+  private sendWatch(): void {
+    if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({watch: this.wanted}));
+  }
+
+  // A WebSocket that is refused doesn't say why: a call does.
+  private async lost(): Promise<void> {
+    this.socket = undefined;
+    this.listener.connection('lost');
+    const answer = await ask().catch((error: unknown) => error);
+    if (answer instanceof ApiError && answer.status === 401) {
+      this.listener.connection('token');
+      return;
+    }
+    if (this.socket) return;  // somebody was in a hurry
+    this.timer = window.setTimeout(() => this.connect(), this.wait);
+    this.wait = Math.min(2 * this.wait, kLongestWait);
+  }
+
+  // A network that swallows everything closes nothing.
+  private async checkQuiet(): Promise<void> {
+    const socket = this.socket;
+    if (socket?.readyState !== WebSocket.OPEN || this.asking || performance.now() - this.heard < kQuiet) return;
+    this.asking = true;
+    const answer = await ask().catch(() => undefined);
+    this.asking = false;
+    if (answer) {
+      this.heard = performance.now();
+      this.listener.status(answer);
+    } else if (this.socket === socket) {
+      socket.onclose = null;
+      socket.close();
+      void this.lost();
+    }
+  }
+
+  private hurry(): void {
+    if (this.socket) return;
+    this.wait = 250;
+    this.connect();
+  }
+}

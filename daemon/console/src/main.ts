@@ -1,0 +1,76 @@
+// The page: one part for each thing the operator minds, all shown from the daemon's status as it comes.
+import './style.css';
+
+import {toastArea} from './act';
+import {Alignment} from './alignment';
+import {Cameras} from './cameras';
+import {diagnostics} from './diagnostics';
+import {el, setText} from './dom';
+import {fixed} from './format';
+import {Header} from './header';
+import {Journal} from './journal';
+import {Keys} from './keys';
+import {Link} from './link';
+import {Record} from './record';
+import {Reconstruction} from './reconstruction';
+import {Sessions} from './sessions';
+import {Strobe} from './strobe';
+import {Token} from './token';
+
+const header = new Header();
+const cameras: Cameras = new Cameras(wanted => link.watch(wanted));
+const record = new Record();
+const alignment = new Alignment();
+const strobe = new Strobe();
+const reconstruction = new Reconstruction();
+const sessions = new Sessions();
+const journal = new Journal();
+const token = new Token(word => link.unlock(word));
+const figures = el('span', {id: 'diagnostics'});
+const goTo = (id: string) => () => document.getElementById(id)?.scrollIntoView();
+const keys = new Keys([
+  {key: 'n', words: 'to the camera that is to be reset', run: () => cameras.focusNext()},
+  {key: 'a', words: 'align; while aligned twice: stop', run: () => alignment.key()},
+  {key: 'r', words: 'twice within 5 s: record, or stop recording', run: () => record.press('key')},
+  {key: '1', words: 'cameras', run: () => scrollTo({top: 0})},
+  {key: '2', words: 'reconstruction', run: goTo('reconstruction')},
+  {key: '3', words: 'sessions', run: goTo('sessions')},
+  {key: '4', words: 'journal', run: goTo('journal')},
+]);
+
+document.body.append(
+  header.root,
+  el('main', {},
+    el('div', {class: 'rig-view'}, cameras.root, el('aside', {}, record.root, alignment.root, strobe.root)),
+    reconstruction.root, sessions.root, journal.root),
+  el('footer', {}, figures, el('button', {class: 'quiet', type: 'button', onclick: () => keys.help.showModal()}, 'Keys: ?')),
+  cameras.enlarged.root, keys.help, token.root, toastArea);
+
+const link: Link = new Link({
+  connection(state) {
+    header.connection(state);
+    if (state === 'token') token.ask();
+    if (state !== 'open') return;
+    token.close();
+    diagnostics.forget();
+    cameras.restart();
+    journal.clear();
+  },
+  status(status) {
+    diagnostics.heard(status.now_ns);
+    for (const part of [header, cameras, record, alignment, strobe, reconstruction, sessions]) part.show(status);
+  },
+  notice: notice => journal.add(notice),
+  iteration: preview => reconstruction.preview(preview),
+  bytes(head, bytes) {
+    if (head.kind === 'picture') cameras.offer(head, bytes);
+    else if (head.kind === 'volume') void reconstruction.showVolume(head, bytes);
+    else void reconstruction.view(head, bytes);
+  },
+});
+
+setInterval(() => {
+  const {cameras: live, fps_min, fps_mean, latency_median_ms, latency_p95_ms} = diagnostics.summary();
+  setText(figures, live === 0 ? 'no live pictures'
+    : `${live} live · ${fixed(fps_mean, 1)} fps (least ${fixed(fps_min, 1)}) · frame to screen ${fixed(latency_median_ms, 0)} ms (95 %: ${fixed(latency_p95_ms, 0)} ms)`);
+}, 1000);

@@ -1,0 +1,134 @@
+// A reconstruction as it runs: captured beside rendered after every iteration, error against time, the volume.
+import type {DaemonStatus, Iteration, IterationPreview, Light, ReconstructionStatus} from './api.gen';
+import {act, TwoStep} from './act';
+import {el, set, setText, show} from './dom';
+import {fixed, known, percent, span} from './format';
+import {showSign, Sign} from './light';
+import {bitmapOf, paint} from './picture';
+import {Plot} from './plot';
+import type {View, Volume} from './wire';
+import {call} from './wire';
+import type {VolumeView} from './volume';
+
+const states: Record<ReconstructionStatus['state'], [Light, string]> = {
+  STATE_UNSPECIFIED: ['LIGHT_UNSPECIFIED', ''],
+  RUNNING: ['GREEN', 'running'],
+  DONE: ['GREEN', 'done'],
+  FAILED: ['RED', 'failed'],
+  CANCELLED: ['AMBER', 'cancelled'],
+};
+
+export class Reconstruction {
+  private readonly sign = new Sign();
+  private readonly word = el('span', {class: 'word'});
+  private readonly cancel = el('button', {class: 'quiet', type: 'button', onclick: () => this.cancelling.press()}, 'Cancel');
+  private readonly cancelling = new TwoStep(this.cancel, armed => (armed ? 'Press again to cancel' : 'Cancel'), () => void act(call('Reconstruct/Cancel')));
+  private readonly bar = el('progress', {max: 1, value: 0, 'aria-label': 'Progress'});
+  private readonly doing = el('p', {role: 'status'});
+  private readonly error = el('p', {class: 'verdict', 'data-verdict': 'FAILED', hidden: true});
+  private readonly views = {captured: el('canvas', {width: 4, height: 3}), rendered: el('canvas', {width: 4, height: 3})};
+  private readonly captions = {captured: el('figcaption', {}, 'Captured'), rendered: el('figcaption', {}, 'Rendered')};
+  private readonly plot = new Plot('Error against time');
+  private readonly latest = el('p', {class: 'latest'});
+  private readonly place = el('div', {class: 'volume', tabindex: 0, role: 'img', 'aria-label': 'The reconstructed volume: drag to turn it, arrow keys turn it too'});
+  private readonly volumeNote = el('p', {class: 'note'}, 'The volume comes with the first iteration.');
+  private readonly effects = el('ul');
+  private readonly advice = el('ul');
+  private readonly result = el('p', {class: 'result'});
+  private readonly content: HTMLElement;
+  private readonly none = el('p', {class: 'empty'}, 'Nothing was reconstructed since the start. Sessions below has a button for each that is calibrated.');
+  private readonly advised = el('div', {}, el('h3', {}, 'What the next step would cost'), this.advice);
+  private readonly chosen = el('div', {}, el('h3', {}, 'Effects'), this.effects);
+  private volume?: Promise<VolumeView>;
+  private next?: [Volume, Uint8Array];
+  private iterations: Iteration[] = [];
+  private id = '';
+  readonly root: HTMLElement;
+
+  constructor() {
+    this.content = el('div', {class: 'reconstruction', hidden: true},
+      el('div', {class: 'pair'}, el('figure', {}, this.views.captured, this.captions.captured), el('figure', {}, this.views.rendered, this.captions.rendered)),
+      el('div', {class: 'progress'}, this.latest, this.plot.root, this.chosen, this.advised, this.result),
+      el('div', {class: 'turn'}, this.place, this.volumeNote));
+    this.place.addEventListener('keydown', event => {
+      const degrees = {ArrowLeft: -10, ArrowRight: 10}[event.key];
+      if (degrees === undefined || !this.volume) return;
+      event.preventDefault();
+      void this.volume.then(view => view.turn(degrees));
+    });
+    this.root = el('section', {id: 'reconstruction', class: 'panel', 'aria-labelledby': 'reconstruction-title'},
+      el('header', {}, this.sign.root, el('h2', {id: 'reconstruction-title'}, 'Reconstruction'), this.word, this.doing, this.bar, this.cancel),
+      this.error, this.none, this.content);
+  }
+
+  show(status: DaemonStatus): void {
+    const r = status.reconstruction;
+    show(this.none, !r);
+    show(this.content, r !== undefined);
+    for (const part of [this.bar, this.cancel, this.sign.root]) show(part, r !== undefined);
+    if (!r) return;
+    if (r.id !== this.id) this.begin(r.id);
+    const [light, word] = states[r.state];
+    showSign(this.sign, this.word, light, word);
+    this.bar.value = r.fraction;
+    show(this.bar, r.state === 'RUNNING');
+    show(this.cancel, r.state === 'RUNNING');
+    setText(this.doing, [r.session, r.doing, r.state === 'RUNNING' ? percent(r.fraction) : '', span(r.seconds), r.device && `on ${r.device}`].filter(Boolean).join(' · '));
+    show(this.error, r.error !== '');
+    setText(this.error, r.error);
+    if (r.iterations.length >= this.iterations.length) this.showIterations(r.iterations);
+    for (const [list, lines, holder] of [[this.effects, r.effects, this.chosen], [this.advice, r.advice, this.advised]] as const) {
+      show(holder, lines.length > 0);
+      if (list.childElementCount !== lines.length || [...list.children].some((item, place) => item.textContent !== lines[place])) {
+        list.replaceChildren(...lines.map(line => el('li', {}, line)));
+      }
+    }
+    setText(this.result, r.result ? `Written to ${r.result}` : '');
+  }
+
+  preview(preview: IterationPreview): void {
+    if (preview.reconstruction !== this.id) this.begin(preview.reconstruction);
+    const {iteration} = preview;
+    if (iteration && iteration.iteration > (this.iterations.at(-1)?.iteration ?? -1)) this.showIterations([...this.iterations, iteration]);
+  }
+
+  async view(header: View, jpeg: Uint8Array): Promise<void> {
+    paint(this.views[header.kind], await bitmapOf(jpeg));
+    setText(this.captions[header.kind], `${header.kind === 'captured' ? 'Captured by' : 'Rendered as'} ${header.camera_id}, iteration ${header.iteration}`);
+    set(this.views[header.kind], 'data-iteration', header.iteration);
+  }
+
+  async showVolume(header: Volume, voxels: Uint8Array): Promise<void> {
+    this.next = [header, voxels];
+    try {
+      this.volume ??= import('./volume').then(module => new module.VolumeView(this.place));
+      const view = await this.volume;
+      if (!this.next) return;
+      const newest = this.next;
+      this.next = undefined;
+      view.show(...newest);
+      set(this.place, 'data-voxels', newest[0].nx * newest[0].ny * newest[0].nz);
+      setText(this.volumeNote, `${newest[0].nx} × ${newest[0].ny} × ${newest[0].nz} voxels shown. Drag to turn, wheel to zoom.`);
+    } catch (error) {
+      setText(this.volumeNote, `The volume can't be shown: ${String(error)}. It needs WebGL 2.`);
+    }
+  }
+
+  private begin(id: string): void {
+    this.id = id;
+    this.showIterations([]);
+  }
+
+  private showIterations(list: Iteration[]): void {
+    if (list.length === this.iterations.length && list.length > 0) return;
+    this.iterations = list;
+    const last = list.at(-1);
+    show(this.plot.root, last !== undefined);
+    setText(this.latest, last ? `Iteration ${last.iteration}: error ${fixed(last.input_rmse, 2)} of 255${known(last.heldout_rmse) ? `, held out ${fixed(last.heldout_rmse, 2)}` : ''}` : '');
+    set(this.latest, 'data-iterations', list.length);
+    if (!last) return;
+    const heldOut = list.some(item => known(item.heldout_rmse));
+    this.plot.show({x: 'seconds', y: 'error, grey levels', lines: [{name: 'input views', colour: '#56b4e9'}, ...(heldOut ? [{name: 'held out view', colour: '#e69f00'}] : [])]},
+                   [list.map(item => item.seconds), list.map(item => item.input_rmse), ...(heldOut ? [list.map(item => item.heldout_rmse ?? null)] : [])]);
+  }
+}

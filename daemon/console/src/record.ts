@@ -1,0 +1,143 @@
+// Recording: one big button, and what the recording loses or doesn't.
+import type {Counts, DaemonStatus, RecordingStatus} from './api.gen';
+import {act, TwoStep} from './act';
+import {el, set, setText, show} from './dom';
+import {bytes, clock, count, fixed, percent, plural, short} from './format';
+import {call} from './wire';
+
+const causes: [keyof Counts, string][] = [
+  ['camera_gap', 'never arrived'], ['transport', 'lost on the bus'], ['underrun', 'no buffer'], ['queue', 'encoder too slow'], ['disk', 'disk refused'],
+];
+
+/** Frames of a recording that are gone, by cause, most first; empty: none. */
+export function drops(counts: Counts | undefined): [string, number][] {
+  return causes.map(([cause, words]): [string, number] => [words, counts?.[cause] ?? 0]).filter(([, lost]) => lost > 0).sort((a, b) => b[1] - a[1]);
+}
+
+export class Record {
+  private readonly button = el('button', {class: 'record', type: 'button', 'aria-keyshortcuts': 'R'});
+  private readonly hint = el('p', {class: 'note hint', role: 'status'});
+  private readonly time = el('output', {class: 'clock'}, '0:00.0');
+  private readonly session = el('p', {class: 'session'});
+  private readonly numbers = el('dl', {class: 'numbers'});
+  private readonly queue = el('meter', {min: 0, max: 1, low: 0.5, high: 0.8, optimum: 0, 'aria-label': 'Fullest queue'});
+  private readonly queueWords = el('span');
+  private readonly drops = el('p', {class: 'drops'});
+  private readonly disk = el('p', {class: 'disk'});
+  private readonly verdict = el('p', {class: 'verdict', role: 'status'});
+  private readonly name = el('input', {name: 'name', maxlength: 80, placeholder: 'by time', autocomplete: 'off', spellcheck: false,
+                                       pattern: '[A-Za-z0-9 ._:\\-]*', title: 'Letters, digits, space and . _ : -'});
+  private readonly purpose = el('select', {name: 'purpose'}, el('option', {value: 'flame'}, 'flame'), el('option', {value: 'alignment'}, 'alignment'));
+  private readonly seconds = el('input', {name: 'seconds', type: 'number', min: 0, step: 'any', placeholder: 'until stopped', inputmode: 'decimal'});
+  private readonly reconstruct = el('input', {name: 'reconstruct', type: 'checkbox'});
+  private readonly step = new TwoStep(this.button, armed => this.words(armed), () => this.go());
+  private status?: DaemonStatus;
+  private waiting = false;
+  readonly root: HTMLElement;
+
+  constructor() {
+    this.button.addEventListener('click', () => this.press('button'));
+    const option = (label: string, input: HTMLElement) => el('label', {}, el('span', {}, label), input);
+    this.root = el('section', {id: 'record', class: 'panel', 'aria-labelledby': 'record-title'},
+      el('h2', {id: 'record-title', class: 'hidden'}, 'Recording'),
+      el('div', {class: 'record-line'}, this.button, el('div', {}, this.time, this.session)), this.hint,
+      this.disk, this.numbers, el('div', {class: 'queue'}, el('span', {}, 'queue'), this.queue, this.queueWords), this.drops, this.verdict,
+      el('details', {}, el('summary', {}, 'Name and length'),
+        el('div', {class: 'options'}, option('Name', this.name), option('Of', this.purpose), option('Seconds', this.seconds),
+          option('Reconstruct it afterwards', this.reconstruct))));
+  }
+
+  /** By key everything takes two presses. By the button a start takes one when the cameras are locked; all else two. */
+  press(by: 'key' | 'button'): void {
+    if (this.button.disabled) return;
+    if (by === 'button' && this.status?.phase === 'LOCKED' && !this.step.armed) this.go();
+    else this.step.press();
+    this.showHint();
+  }
+
+  show(status: DaemonStatus): void {
+    const before = this.status?.phase;
+    this.status = status;
+    if (before !== status.phase && this.step.armed) this.step.disarm();
+    const recording = status.recording;
+    const phase = status.phase;
+    this.button.disabled = this.waiting || phase === 'FINISHING' || phase === 'CALIBRATING' || phase === 'ALIGNING' || phase === 'PHASE_UNSPECIFIED';
+    set(this.button, 'data-recording', phase === 'CAPTURING');
+    this.step.show();
+    this.showHint();
+    this.showDisk(status);
+    for (const part of [this.numbers, this.queue.parentElement!, this.drops]) show(part, recording !== undefined);
+    setText(this.time, clock(recording?.seconds ?? 0));
+    setText(this.session, recording?.session ?? '');
+    set(this.root, 'data-recording', recording?.state);
+    show(this.verdict, recording?.state === 'COMPLETE' || recording?.state === 'FAILED');
+    if (recording) this.showRecording(recording);
+  }
+
+  private words(armed: boolean): string {
+    if (this.waiting) return '…';
+    if (this.status?.phase === 'CAPTURING') return armed ? 'Press again: stop' : 'Stop';
+    if (this.status?.phase === 'FINISHING') return 'Finishing';
+    if (armed) return this.status?.phase === 'LOCKED' ? 'Press again: record' : 'Press again: record unlocked';
+    return 'Record';
+  }
+
+  private showHint(): void {
+    const phase = this.status?.phase;
+    setText(this.hint, this.step.armed ? (phase === 'IDLE' ? 'The cameras are not locked: their frames will not be of the same instants.' : 'Within 5 seconds, or nothing happens.')
+            : phase === 'IDLE' ? 'Not locked: recording needs a second press.'
+            : phase === 'ALIGNING' || phase === 'CALIBRATING' ? 'After the alignment, or when it is stopped.' : '');
+  }
+
+  private showDisk(status: DaemonStatus): void {
+    const s = status.storage;
+    set(this.disk, 'data-light', !s ? 'LIGHT_UNSPECIFIED' : s.minutes_left < 2 ? 'RED' : s.minutes_left < 10 ? 'AMBER' : 'GREEN');
+    setText(this.disk, s ? `Disk: ${s.minutes_left >= 120 ? `${fixed(s.minutes_left / 60, 1)} h` : `${fixed(s.minutes_left, s.minutes_left < 10 ? 1 : 0)} min`} left, ${bytes(s.free_bytes)} free` : '');
+  }
+
+  private showRecording(r: RecordingStatus): void {
+    const list: [string, string][] = [
+      ['frames', count(r.frames)],
+      ['written', bytes(r.bytes)],
+      ['rate', `${fixed(r.bytes_per_s / 1e6, 1)} MB/s`],
+      ['spread at start', short(r.spread_s)],
+    ];
+    if (r.transcoded !== undefined && r.transcoded < 1) list.push(['compressed', percent(r.transcoded)]);
+    while (this.numbers.children.length > list.length) this.numbers.lastElementChild!.remove();
+    while (this.numbers.children.length < list.length) this.numbers.append(el('div', {}, el('dt'), el('dd')));
+    list.forEach(([name, value], place) => {
+      setText(this.numbers.children[place]!.children[0]!, name);
+      setText(this.numbers.children[place]!.children[1]!, value);
+    });
+    this.queue.value = r.queue_fill;
+    setText(this.queueWords, percent(r.queue_fill));
+    const lost = drops(r.lost);
+    set(this.drops, 'data-bad', lost.length > 0);
+    setText(this.drops, lost.length === 0 ? 'No frame lost' : `Lost: ${lost.map(([cause, frames]) => `${count(frames)} ${cause}`).join(', ')}`);
+    set(this.verdict, 'data-verdict', r.state);
+    setText(this.verdict, r.verdict || (r.state === 'COMPLETE' ? `${plural(r.frames, 'frame')}, all accounted for.` : ''));
+  }
+
+  private go(): void {
+    const stop = this.status?.phase === 'CAPTURING';
+    if (!stop && !this.name.checkValidity()) {
+      this.name.closest('details')!.open = true;
+      this.name.reportValidity();
+      return;
+    }
+    this.waiting = true;
+    this.button.disabled = true;
+    this.step.show();
+    void act<unknown>(stop ? call('Capture/Stop') : call('Capture/Record', {
+      name: this.name.value.trim(),
+      purpose: this.purpose.value,
+      seconds: this.seconds.valueAsNumber || 0,
+      unlocked: this.status?.phase !== 'LOCKED',
+      reconstruct: this.reconstruct.checked,
+    })).then(answer => {
+      this.waiting = false;
+      if (answer && !stop) this.name.value = '';
+      if (this.status) this.show(this.status);
+    });
+  }
+}

@@ -1,0 +1,68 @@
+// One camera: its live picture with what alignment saw, and the numbers that an operator acts on.
+import type {CameraStatus} from './api.gen';
+import {el, set, setText, show} from './dom';
+import {count, known, offset, ppm, rows, span} from './format';
+import {cameraWord, lostFrames, showSign, Sign} from './light';
+import {Gauge, Overlay} from './overlay';
+import {LivePicture} from './picture';
+
+export class Tile {
+  readonly picture = new LivePicture();
+  camera?: CameraStatus;
+  private readonly sign = new Sign();
+  private readonly word = el('span', {class: 'word'});
+  private readonly overlay = new Overlay();
+  private readonly gauge = new Gauge();
+  private readonly error = el('span', {class: 'error-rows'});
+  private readonly time = el('span', {class: 'error-time'});
+  private readonly drift = el('dd');
+  private readonly left = el('dd');
+  private readonly trials = el('dd');
+  private readonly lost = el('dd');
+  private readonly reason = el('p', {class: 'reason'});
+  private readonly nextMark = el('span', {class: 'next-mark', hidden: true});
+  readonly root: HTMLElement;
+
+  constructor(readonly id: string, open: (id: string) => void) {
+    this.root = el('article', {class: 'tile', tabindex: 0, role: 'button', 'data-camera': id, onclick: () => open(id)},
+      el('div', {class: 'picture'}, this.picture.canvas, this.overlay.root, this.nextMark),
+      el('div', {class: 'facts'},
+        el('header', {}, this.sign.root, el('h3', {}, id), this.word),
+        this.reason,
+        el('div', {class: 'error'}, this.error, this.time),
+        this.gauge.root,
+        el('dl', {},
+          el('div', {}, el('dt', {}, 'drift'), this.drift),
+          el('div', {}, el('dt', {}, 'left'), this.left),
+          el('div', {}, el('dt', {}, 'trials'), this.trials),
+          el('div', {}, el('dt', {}, 'lost'), this.lost))));
+    this.root.addEventListener('keydown', event => {
+      if (event.key !== 'Enter' && event.key !== ' ') return;
+      event.preventDefault();
+      open(id);
+    });
+  }
+
+  show(camera: CameraStatus): void {
+    this.camera = camera;
+    const word = cameraWord(camera);
+    showSign(this.sign, this.word, camera.light, word);
+    set(this.root, 'data-light', camera.light);
+    set(this.root, 'data-state', camera.state);
+    set(this.root, 'data-next', camera.reset_next);
+    show(this.nextMark, camera.reset_next);
+    setText(this.nextMark, camera.reset === 'BY_HAND' ? 'Reset this camera now' : 'Reset next');
+    this.overlay.show(camera);
+    this.gauge.show(camera.error_rows, camera.tolerance_rows);
+    setText(this.error, known(camera.error_rows) ? rows(camera.error_rows) : '– rows');
+    setText(this.time, known(camera.error_s) ? offset(camera.error_s) : '');
+    setText(this.drift, ppm(camera.drift_ppm));
+    setText(this.left, span(camera.time_left_s));
+    setText(this.trials, count(camera.resets));
+    const lost = lostFrames(camera);
+    setText(this.lost, count(lost));
+    set(this.lost.parentElement!, 'data-bad', lost > 0);
+    setText(this.reason, camera.reason);
+    set(this.root, 'aria-label', `Camera ${camera.id}: ${word}${camera.reset_next ? ', to be reset now' : ''}. ${camera.reason}`);
+  }
+}

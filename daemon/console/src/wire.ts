@@ -1,0 +1,102 @@
+// What goes over the wire: protobuf's JSON with its defaults filled in, calls, streams of jobs, and the WebSocket's messages.
+import {type Calls, fields, responses, type Streams} from './api.gen';
+
+/** Why a call failed: the daemon's code ("FAILED_PRECONDITION", ...) and its sentence. */
+export class ApiError extends Error {
+  constructor(readonly status: number, readonly code: string, message: string) {
+    super(message);
+  }
+}
+
+/** Reads a message of this type: what protobuf leaves out gets its default, 64-bit numbers and "NaN" become numbers. */
+export function decode(type: string, json: unknown): unknown {
+  const table = fields[type];
+  if (!table) throw new Error(`unknown message ${type}`);
+  const source = (json ?? {}) as Record<string, unknown>;
+  const message: Record<string, unknown> = {};
+  for (const [name, [of, kind, label]] of Object.entries(table)) {
+    const value = source[name];
+    if (label === 'many') message[name] = ((value ?? []) as unknown[]).map(item => one(of, kind, item));
+    else if (value !== undefined && value !== null) message[name] = one(of, kind, value);
+    else if (label === 'one') message[name] = of === 'enum' ? kind : {number: 0, boolean: false, string: ''}[kind];
+  }
+  return message;
+}
+
+function one(of: string, kind: string, value: unknown): unknown {
+  if (of === 'message') return decode(kind, value);
+  return of === 'scalar' && kind === 'number' ? Number(value) : value;
+}
+
+async function post(path: string, request: unknown, signal?: AbortSignal): Promise<Response> {
+  const response = await fetch(`/api/v1/${path}`, {
+    method: 'POST',
+    headers: {'Content-Type': 'application/json'},
+    body: JSON.stringify(request),
+    signal,
+  });
+  if (response.ok) return response;
+  const error = (await response.json().catch(() => ({}))) as {code?: string; message?: string};
+  throw new ApiError(response.status, error.code ?? '', error.message ?? `${path}: answered ${response.status} ${response.statusText}`);
+}
+
+export async function call<M extends keyof Calls>(method: M, request: Calls[M][0] = {}, signal?: AbortSignal): Promise<Calls[M][1]> {
+  const response = await post(method, request, signal);
+  return decode(responses[method], await response.json()) as Calls[M][1];
+}
+
+/** Of a job: tells each message, and returns the last. */
+export async function follow<M extends keyof Streams>(method: M, request: Streams[M][0],
+                                                      tell: (message: Streams[M][1]) => void): Promise<Streams[M][1] | undefined> {
+  const reader = (await post(method, request)).body!.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = '';
+  let last: Streams[M][1] | undefined;
+  for (;;) {
+    const {done, value} = await reader.read();
+    const lines = (rest + (value ?? '')).split('\n');
+    rest = done ? '' : lines.pop()!;
+    for (const line of lines.filter(text => text.trim() !== '')) {
+      const json = JSON.parse(line) as {code?: string; message?: string};
+      if (json.code !== undefined && json.message !== undefined) throw new ApiError(500, json.code, json.message);
+      tell((last = decode(responses[method], json) as Streams[M][1]));
+    }
+    if (done) return last;
+  }
+}
+
+/** The header of a binary message, and the bytes behind it. */
+export interface Picture {
+  kind: 'picture';
+  camera_id: string;
+  frame_id: number;
+  monotonic_ns: number;
+  width: number;
+  height: number;
+}
+export interface View {
+  kind: 'captured' | 'rendered';
+  iteration: number;
+  camera_id: string;
+}
+export interface Volume {
+  kind: 'volume';
+  nx: number;
+  ny: number;
+  nz: number;
+  box?: {center?: number[]; size?: number[]};
+  brightest: number;
+}
+export type BinaryHeader = Picture | View | Volume;
+
+/** u32 little-endian length, so much JSON, then the bytes. 64-bit numbers may come as strings. */
+export function unpack(message: ArrayBuffer): [BinaryHeader, Uint8Array] {
+  if (message.byteLength < 4) throw new Error('a binary message without its header');
+  const length = new DataView(message).getUint32(0, true);
+  if (4 + length > message.byteLength) throw new Error('a binary message shorter than its header says');
+  const header = JSON.parse(new TextDecoder().decode(new Uint8Array(message, 4, length))) as BinaryHeader;
+  if (header.kind === 'picture') {
+    header.frame_id = Number(header.frame_id);
+    header.monotonic_ns = Number(header.monotonic_ns);
+  }
+  return [header, new Uint8Array(message, 4 + length)];
+}

@@ -1,0 +1,14 @@
+import {defineConfig} from 'vite';
+
+// Served by emberlockd from share/emberlock/console, or by `npm run dev` in front of one that runs (EMBERLOCK_URL).
+export default defineConfig({
+  base: './',
+  build: {
+    target: 'es2022',
+    emptyOutDir: true,
+    reportCompressedSize: false,
+    chunkSizeWarningLimit: 1500,  // kB: vtk.js, read only when there is a volume to show
+    modulePreload: {polyfill: false},
+  },
+  server: {proxy: {'/api': {target: process.env.EMBERLOCK_URL ?? 'http://127.0.0.1:8741', ws: true}}},
+});

@@ -1,0 +1,465 @@
+// The page before a daemon that plays what real rigs seldom do: states, disconnects, refusals, faults, eleven cameras at every width.
+import {readdirSync, statSync} from 'node:fs';
+import {fileURLToPath} from 'node:url';
+
+import type {Browser, Page} from 'playwright-core';
+import {afterAll, afterEach, beforeAll, beforeEach, describe, expect, test} from 'vitest';
+
+import {Mock, Refusal} from './mock/mock';
+import {flamePictures, flameVolume, lampPictures} from './mock/pictures';
+import {aligning, alignment, camera, capturing, idle, iteration, locked, reconstruction, seen} from './mock/scene';
+import {openPage, screenshot, startChromium, type Watched} from './support/chromium';
+
+const kConsole = process.env.EMBERLOCK_CONSOLE ?? fileURLToPath(new URL('../../build/release/console', import.meta.url));
+const kScreen = {width: 1920, height: 1080};
+const kLaptop = {width: 1280, height: 800};
+const kPhone = {width: 360, height: 800};
+
+let browser: Browser;
+let lamp: Uint8Array[];
+let flame: Uint8Array[];
+let mock: Mock;
+const opened: Watched[] = [];
+
+beforeAll(async () => {
+  browser = await startChromium();
+  lamp = await lampPictures(browser, 6);
+  flame = await flamePictures(browser, 12);
+}, 60_000);
+afterAll(() => browser.close());
+
+beforeEach(async () => {
+  mock = new Mock(kConsole);
+  mock.jpeg = (_, frame) => lamp[frame % lamp.length];
+  await mock.start();
+});
+afterEach(async () => {
+  const complaints = opened.flatMap(each => each.complaints);
+  for (const {page} of opened.splice(0)) await page.context().close();
+  await mock.stop();
+  expect(complaints, 'what the browser complained of').toEqual([]);
+});
+
+async function open(size = kScreen): Promise<Page> {
+  const watched = await openPage(browser, mock.url, size);
+  opened.push(watched);
+  await watched.page.waitForSelector('.link[data-connection=open]');
+  return watched.page;
+}
+const text = (page: Page, selector: string) => page.locator(selector).first().innerText();
+async function until<T>(read: () => Promise<T> | T, wanted: (value: T) => boolean, words: string): Promise<void> {
+  let value = await read();
+  for (const end = Date.now() + 8000; !wanted(value) && Date.now() < end; value = await read()) await new Promise(resolve => setTimeout(resolve, 30));
+  expect(wanted(value), `${words}; it is ${JSON.stringify(value)}`).toBe(true);
+}
+const overflows = (page: Page) => page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+
+describe('what is shown', () => {
+  test('eleven cameras, orders and the header stand on one screen of 1920 x 1080, and of 1280 x 800', async () => {
+    mock.status = idle();
+    for (const size of [kScreen, kLaptop]) {
+      const page = await open(size);
+      mock.show(aligning(9));
+      await page.waitForSelector('.tile[data-next]');
+      await page.waitForTimeout(700);
+      const boxes = await page.locator('.tile').evaluateAll(tiles => tiles.map(tile => tile.getBoundingClientRect()).map(box => ({bottom: box.bottom, width: box.width})));
+      expect(boxes).toHaveLength(11);
+      for (const box of boxes) {
+        expect(box.bottom).toBeLessThanOrEqual(size.height);
+        expect(box.width).toBeGreaterThan(150);
+      }
+      expect(await overflows(page)).toBe(0);
+      await screenshot(page, `aligning-${size.width}`);
+    }
+  });
+
+  test('who is to be reset stands first, twice as wide, and in words', async () => {
+    mock.status = aligning(9);
+    const page = await open();
+    await page.waitForSelector('.tile[data-next]');
+    const [first, second] = await page.locator('.tile').evaluateAll(tiles => tiles.slice(0, 2).map(tile => ({id: (tile as HTMLElement).dataset.camera, width: tile.getBoundingClientRect().width})));
+    expect(first!.id).toBe('virtual-04');
+    expect(first!.width).toBeGreaterThan(1.9 * second!.width);
+    expect(await text(page, '.tile[data-next] .next-mark')).toBe('Reset this camera now');
+    expect(await text(page, '.next .title')).toBe('Reset virtual-04');
+    expect(await text(page, '.next .next-step')).toMatch(/^Press the power button of virtual-04 twice/);
+    await page.keyboard.press('n');
+    expect(await page.evaluate(() => (document.activeElement as HTMLElement).dataset.camera)).toBe('virtual-04');
+  });
+
+  test('a tile tells error in rows and time, drift, time left, trials and losses', async () => {
+    mock.status = {...locked(), cameras: [seen(0, 30, false, {
+      error_rows: -21.44, error_s: -1.158e-3, drift_ppm: 2.31, time_left_s: 412, resets: 3,
+      counts: {delivered: 900, damaged: 1, camera_gap: 0, transport: 4, resend: 0, underrun: 0, queue: 0, passed_over: 100},
+    })]};
+    const page = await open();
+    const tile = page.locator('.tile');
+    expect(await tile.locator('.error-rows').innerText()).toBe('−21.4 rows');
+    expect(await tile.locator('.error-time').innerText()).toBe('−1.16 ms');
+    expect(await tile.locator('dd').allInnerTexts()).toEqual(['+2.3 ppm', '6 min 52 s', '3', '5']);
+    expect(await tile.locator('.word').innerText()).toBe('in tolerance');
+  });
+
+  test('every state has a word beside its colour, and a shape of its own', async () => {
+    mock.status = {...idle(), phase: 'ALIGNING', cameras: [
+      seen(0, 30, false), seen(1, 1, false, {error_rows: 440}), camera(2, {state: 'LOST', light: 'RED', reason: 'Went away; it is being looked for. Look at its cable.'}),
+      camera(3, {state: 'QUARANTINED', light: 'RED', reason: 'Hangs. Switch it off and on.'}), camera(4, {sight: 'ambiguous', light: 'AMBER', reason: 'Two dots fit. Move the strobe.'}),
+      camera(5, {state: 'STOPPED', light: 'LIGHT_UNSPECIFIED'}),
+    ]};
+    const page = await open();
+    await page.waitForSelector('.tile');
+    expect(await page.locator('.tile .word').allInnerTexts()).toEqual(['in tolerance', 'out of tolerance', 'lost', 'hangs', 'ambiguous', 'stopped']);
+    const shapes = await page.locator('.tile header .sign path').evaluateAll(paths => paths.map(path => path.getAttribute('d')));
+    expect(new Set([shapes[0], shapes[1], shapes[4], shapes[5]]).size).toBe(4);
+    await screenshot(page, 'states-1920');
+  });
+
+  test('lamp, dot, target row and band are drawn where the daemon says, in the picture’s own pixels', async () => {
+    mock.status = {...locked(), cameras: [seen(0, 30, false, {width: 640, height: 480, lamp: {x: 320, y: 400}, lamp_radius: 26, dots: [{x: 320, y: 240}], target_row: 120, tolerance_rows: 20})]};
+    const page = await open();
+    await page.waitForFunction(() => window.emberlockDiagnostics.shown.size === 1);
+    const where = await page.evaluate(() => {
+      const box = (selector: string) => document.querySelector(`.tile .overlay ${selector}`)!.getBoundingClientRect();
+      const frame = document.querySelector('.tile .overlay')!.getBoundingClientRect();
+      const scale = Math.min(frame.width / 640, frame.height / 480);
+      const left = frame.left + (frame.width - 640 * scale) / 2;
+      const top = frame.top + (frame.height - 480 * scale) / 2;
+      const lamp = box('.lamp');
+      const dot = box('.dots path');
+      return {lamp: [(lamp.left + lamp.width / 2 - left) / scale, (lamp.top + lamp.height / 2 - top) / scale, lamp.width / scale / 2],
+              dot: (dot.top + dot.height / 2 - top) / scale, target: (box('.target').top - top) / scale,
+              band: [(box('.band').top - top) / scale, box('.band').height / scale]};
+    });
+    expect(where.lamp[0]).toBeCloseTo(320.5, 0);
+    expect(where.lamp[1]).toBeCloseTo(400.5, 0);
+    expect(where.lamp[2]).toBeCloseTo(26, 0);
+    expect(where.dot).toBeCloseTo(240.5, 0);
+    expect(where.target).toBeCloseTo(120.5, 0);
+    expect(where.band[0]).toBeCloseTo(100.5, 0);
+    expect(where.band[1]).toBeCloseTo(40, 0);
+    const colour = await page.evaluate(() => {
+      const canvas = document.querySelector<HTMLCanvasElement>('.tile canvas')!;
+      return [...canvas.getContext('2d')!.getImageData(320, 400, 1, 1).data.slice(0, 3)];
+    });
+    expect(Math.min(...colour)).toBeGreaterThan(240);  // the lamp itself
+  });
+
+  test('numbers not known yet are dashes, never zeros or NaN', async () => {
+    mock.status = idle();
+    mock.show({alignment: alignment(2, {worst_pair_s: undefined, cost: undefined}), cameras: [camera(0)]});
+    const page = await open();
+    await page.waitForSelector('.tile');
+    expect(await text(page, '.tile .error-rows')).toBe('– rows');
+    expect(await page.evaluate(() => document.body.innerText)).not.toMatch(/NaN|undefined|Infinity/);
+  });
+
+  test('eleven tiles live', async () => {
+    mock.status = locked();
+    const page = await open();
+    await page.waitForTimeout(4000);
+    const summary = await page.evaluate(() => window.emberlockDiagnostics.summary());
+    expect(summary.cameras).toBe(11);
+    expect(await text(page, '#diagnostics')).toMatch(/^11 live · [\d.]+ fps \(least [\d.]+\) · frame to screen \d+ ms \(95 %: \d+ ms\)$/);
+    await screenshot(page, 'locked-1920');
+    const enlarged = page.locator('dialog.enlarged');
+    await page.locator('.tile').nth(3).press('Enter');
+    await until(() => mock.wanted[0], wanted => wanted?.camera_ids.join() === 'virtual-03' && wanted.rate_hz === 24, 'only the enlarged one is asked for');
+    await page.keyboard.press('ArrowRight');
+    expect(await enlarged.locator('h2').innerText()).toBe('virtual-04');
+    await page.waitForTimeout(500);
+    await screenshot(page, 'enlarged-1920');
+    await page.keyboard.press('Escape');
+    expect(await enlarged.isVisible()).toBe(false);
+    await until(() => page.evaluate(() => (document.activeElement as HTMLElement).dataset.camera), id => id === 'virtual-04', 'its tile has the focus');
+    await until(() => mock.wanted[0], wanted => wanted?.camera_ids.length === 0, 'all are asked for again');
+  });
+
+  test('on a phone nothing is wider than the screen', async () => {
+    mock.status = {...aligning(9), recording: capturing(8).recording, reconstruction: reconstruction(3)};
+    mock.answers['Sessions/List'] = () => ({sessions: [{session: '2026-11-22_031500', state: 'COMPLETE', purpose: 'flame', created_utc: '2026-11-22T03:15:00Z', cameras: 11, frames: 2112, lost: 0, bytes: 649e6, error: '', calibrated: true}]});
+    const page = await open(kPhone);
+    await page.waitForSelector('tr[data-session]');
+    await page.waitForTimeout(500);
+    expect(await overflows(page)).toBe(0);
+    await until(() => mock.wanted[0]?.camera_ids.length, count => count! > 0 && count! < 11, 'only tiles in sight are asked for');
+    await screenshot(page, 'phone-360', true);
+    await screenshot(page, 'phone-first-360');
+    await page.locator('.tile').first().click();
+    await page.waitForTimeout(300);
+    expect(await overflows(page)).toBe(0);
+    await screenshot(page, 'phone-enlarged-360');
+  });
+});
+
+describe('the connection', () => {
+  test('lost is shown at once, and it comes back by itself', async () => {
+    mock.status = locked();
+    const page = await open();
+    await page.waitForSelector('.tile');
+    const begin = Date.now();
+    await mock.stop();
+    await page.waitForSelector('.connection-lost:not([hidden])');
+    expect(Date.now() - begin).toBeLessThan(1000);
+    expect(await text(page, '.connection-lost')).toMatch(/What is shown is old/);
+    await screenshot(page, 'lost-1920');
+    mock.status = idle();
+    await mock.start();
+    await page.waitForSelector('.link[data-connection=open]', {timeout: 8000});
+    expect(await page.locator('.connection-lost').isVisible()).toBe(false);
+    expect(await text(page, 'h1')).toBe('Idle');
+  });
+
+  test('a daemon that says nothing more is found out', async () => {
+    mock.status = locked();
+    const page = await open();
+    mock.silent = true;
+    await page.waitForSelector('.connection-lost:not([hidden])', {timeout: 9000});
+    mock.silent = false;
+    await page.waitForSelector('.link[data-connection=open]', {timeout: 9000});
+  });
+
+  test('a token is asked for, a wrong one refused, the right one opens', async () => {
+    mock.status = idle();
+    mock.token = 'sesame street';
+    const watched = await openPage(browser, mock.url, kLaptop);
+    opened.push(watched);
+    const {page} = watched;
+    await page.waitForSelector('dialog.token[open]');
+    await page.fill('#token', 'open');
+    await page.keyboard.press('Enter');
+    await page.waitForFunction(() => document.querySelector('dialog.token .note')!.textContent === 'That is not the token.');
+    await screenshot(page, 'token-1280');
+    await page.fill('#token', 'sesame street');
+    await page.keyboard.press('Enter');
+    await page.waitForSelector('.link[data-connection=open]');
+    expect(await page.locator('dialog.token').isVisible()).toBe(false);
+  });
+
+  test('a hidden page asks for no pictures', async () => {
+    mock.status = locked();
+    const page = await open();
+    await until(() => mock.wanted[0], wanted => wanted !== null, 'pictures are asked for');
+    await page.evaluate(() => {
+      Object.defineProperty(document, 'hidden', {value: true, configurable: true});
+      document.dispatchEvent(new Event('visibilitychange'));
+    });
+    await until(() => mock.wanted[0], wanted => wanted === null, 'none is asked for');
+  });
+});
+
+describe('orders', () => {
+  test('a refusal’s offers are buttons that ask for exactly that', async () => {
+    mock.status = idle();
+    mock.show({light: 'RED', reason: 'Refused: 10 rows can’t be met by hand within 60 resets.', alignment: alignment(0, {
+      verdict: 'REFUSED', tolerance_rows: 10, reason: '10 rows would take about 400 resets; 60 are allowed.', offers: [
+        {policy: 'densest', tolerance_rows: 120, cost: {resets: 22, resets_p95: 40, time_s: 90, time_p95_s: 160}},
+        {policy: 'timed', tolerance_rows: 60.5, cost: {resets: 12, resets_p95: 19, time_s: 40, time_p95_s: 75}}]})});
+    const page = await open();
+    expect(await page.locator('.offer').allInnerTexts()).toEqual([
+      '± 120 rows, densest\nabout 22 resets in 90 s (95 %: 40 in 2 min 40 s)', expect.stringContaining('about 12 resets')]);
+    await screenshot(page, 'refused-1920');
+    await page.locator('.offer').nth(1).click();
+    await page.getByRole('button', {name: 'Try it anyway'}).click();
+    await until(() => mock.calls.filter(({method}) => method === 'Sync/Align').map(({request}) => request), calls => calls.length === 2, 'two orders');
+    const orders = mock.calls.filter(({method}) => method === 'Sync/Align').map(({request}) => request);
+    expect(orders[0]).toEqual({tolerance: '60.5rows', policy: 'timed', anyway: false});
+    expect(orders[1]).toMatchObject({anyway: true});
+  });
+
+  test('what the daemon refuses is told in its words', async () => {
+    mock.status = idle();
+    mock.answers['Sync/Align'] = () => { throw new Refusal(400, 'FAILED_PRECONDITION', 'align: no camera films. Start them first.'); };
+    const page = await open();
+    await page.fill('#tolerance', '100');
+    await page.getByRole('button', {name: 'Align', exact: true}).click();
+    await page.waitForSelector('.toast');
+    expect(await text(page, '.toast p')).toBe('align: no camera films. Start them first.');
+    expect(mock.calls.find(({method}) => method === 'Sync/Align')!.request).toMatchObject({tolerance: '100rows'});
+    await page.getByRole('button', {name: 'Dismiss'}).click();
+    expect(await page.locator('.toast').count()).toBe(0);
+  });
+
+  const records = () => mock.calls.filter(({method}) => method.startsWith('Capture/'));
+
+  test('locked, one press records; stopping takes two', async () => {
+    mock.status = locked();
+    mock.answers['Capture/Record'] = () => { mock.show(capturing(0.1)); return {}; };
+    mock.answers['Capture/Stop'] = () => { mock.show({...locked(), recording: {...capturing(8).recording!, state: 'COMPLETE', verdict: '2112 frames, all accounted for.'}}); return {}; };
+    const page = await open();
+    await page.locator('button.record').click();
+    await until(() => text(page, 'h1'), words => words === 'Recording', 'it records');
+    expect(records()[0]!.request).toMatchObject({unlocked: false, purpose: 'flame', seconds: 0});
+    mock.show(capturing(7.35, {lost: {recorded: 1900, camera_gap: 0, transport: 3, underrun: 0, queue: 9, disk: 0, passed_over: 0}, queue_fill: 0.83}));
+    await until(() => text(page, '.clock'), words => words === '0:07.3', 'the clock runs');
+    expect(await text(page, '.drops')).toBe('Lost: 9 encoder too slow, 3 lost on the bus');
+    expect(await text(page, '#record .numbers')).toContain('81.1 MB/s');
+    await screenshot(page, 'recording-1920');
+    await page.locator('button.record').click();
+    expect(await text(page, 'button.record')).toMatch(/Press again/);
+    expect(records()).toHaveLength(1);
+    await page.locator('button.record').click();
+    await until(() => text(page, '#record .verdict'), words => words === '2112 frames, all accounted for.', 'the verdict is shown');
+    expect(records()).toHaveLength(2);
+  });
+
+  test('not locked, a second press is needed and says why; by key always', async () => {
+    mock.status = idle();
+    const page = await open();
+    await page.waitForSelector('.tile');
+    await page.keyboard.press('r');
+    expect(await text(page, 'button.record')).toBe('Press again: record unlocked');
+    expect(await text(page, '.hint')).toMatch(/not be of the same instants/);
+    expect(records()).toHaveLength(0);
+    mock.show(locked());  // what was armed for another phase doesn't count
+    await until(() => text(page, 'button.record'), words => words === 'Record', 'disarmed');
+    await page.keyboard.press('r');
+    expect(records()).toHaveLength(0);
+    await page.keyboard.press('r');
+    await until(() => records().length, many => many === 1, 'it records');
+    expect(records()[0]!.request).toMatchObject({unlocked: false});
+  });
+
+  test('a letter typed into a field orders nothing', async () => {
+    mock.status = locked();
+    const page = await open();
+    await page.locator('#record summary').click();
+    await page.locator('#record input[name=name]').pressSequentially('rare arrangement');
+    expect(await text(page, 'button.record')).toBe('Record');
+    expect(records()).toHaveLength(0);
+  });
+
+  test('the strobe is set in Hz, ms and µs, and what it read back is shown', async () => {
+    mock.status = idle();
+    mock.answers['Strobe/Apply'] = () => ({output: 'FLASHING', rate_hz: 23.9762, phase_s: 0.004, width_s: 2e-5, code: []});
+    const page = await open();
+    await page.waitForSelector('#strobe-rate');
+    await page.fill('#strobe-rate', '23.976');
+    await page.fill('#strobe-phase', '4');
+    await page.fill('#strobe-width', '20');
+    await page.locator('label[for=strobe-FLASHING]').click();
+    mock.show();  // a status that comes meanwhile overwrites nothing
+    await page.waitForTimeout(100);
+    await page.locator('#strobe button[type=submit]').click();
+    await until(() => text(page, '#strobe .read-back'), words => words === 'Reads back: 23.976 Hz, phase +4.00 ms, width 20 µs, flashing'.replace('+', ''), 'read back');
+    expect(mock.calls.find(({method}) => method === 'Strobe/Apply')!.request).toEqual({output: 'FLASHING', rate_hz: 23.976, phase_s: 0.004, width_s: expect.closeTo(2e-5, 12), code: []});
+    mock.show(aligning(3));
+    await page.waitForFunction(() => (document.querySelector('#strobe button') as HTMLButtonElement).disabled);
+  });
+
+  test('a fault names what happened and what to do; over, it can be acknowledged', async () => {
+    mock.status = idle();
+    mock.show({light: 'RED', reason: 'The strobe doesn’t answer.', faults: [
+      {id: 3, kind: 'CAMERA_LOST', light: 'AMBER', subject: 'virtual-02', what: 'It went away.', remedy: 'Look at its cable.', since_utc: '2026-11-22T03:10:00Z', over: true},
+      {id: 7, kind: 'STROBE_SILENT', light: 'RED', subject: 'ttyACM0', what: 'No answer for 2 s.', remedy: 'Look at its cable and power.', since_utc: '2026-11-22T03:12:00Z', over: false}]});
+    const page = await open();
+    expect(await page.locator('.fault p').allInnerTexts()).toEqual(['Strobe silent (ttyACM0): No answer for 2 s. Look at its cable and power.', 'Camera lost (virtual-02): It went away. Look at its cable.']);
+    await screenshot(page, 'faults-1920');
+    await page.locator('.fault[data-over] button').click();
+    await until(() => mock.calls.find(({method}) => method === 'Daemon/Acknowledge')?.request, request => request?.fault_id === 3, 'acknowledged');
+  });
+
+  test('by keyboard alone: focus is seen, ? lists the keys', async () => {
+    mock.status = locked();
+    const page = await open();
+    await page.waitForSelector('.tile');
+    await page.keyboard.press('Tab');
+    const outline = await page.evaluate(() => getComputedStyle(document.activeElement!).outlineWidth);
+    expect(outline).toBe('3px');
+    await page.keyboard.press('ArrowRight');
+    expect(await page.evaluate(() => (document.activeElement as HTMLElement).dataset.camera)).toBe('virtual-01');
+    await page.keyboard.press('?');
+    expect(await page.locator('dialog.help dt').allInnerTexts()).toContain('R');
+    await screenshot(page, 'help-1920');
+    await page.keyboard.press('Escape');
+    expect(await page.locator('dialog.help').isVisible()).toBe(false);
+  });
+
+  test('a change of phase is announced', async () => {
+    mock.status = idle();
+    const page = await open();
+    mock.show(aligning(3));
+    await until(() => page.locator('#announcements').textContent(), words => words === 'Aligning. Reset virtual-01.' || /^Aligning\. Reset/.test(words ?? ''), 'announced');
+    expect(await page.locator('#announcements').getAttribute('aria-live')).toBe('assertive');
+  });
+});
+
+describe('what was recorded', () => {
+  const entry = {session: 'candle 1', state: 'COMPLETE' as const, purpose: 'flame', created_utc: '2026-11-22T03:15:00Z', cameras: 11, frames: 15840, lost: 0, bytes: 14.6e9, error: '', calibrated: true};
+
+  test('sessions are listed, verified with progress, exported, reconstructed', async () => {
+    mock.status = idle();
+    mock.answers['Sessions/List'] = () => ({sessions: [entry, {...entry, session: 'torn', error: 'manifest.json: not JSON. Repair it.', calibrated: false}]});
+    let go: () => void = () => undefined;
+    mock.jobs['Sessions/Verify'] = async function* () {
+      yield {fraction: 0.4, doing: 'reads virtual-03'};
+      await new Promise<void>(resolve => { go = resolve; });
+      yield {fraction: 1, doing: 'all frames are as recorded', done: true, ok: true, report: '{"frames": 15840, "damaged": 0}'};
+    };
+    mock.jobs['Sessions/Export'] = async function* () { yield {fraction: 1, doing: 'disk full', done: true, ok: false, report: ''}; };
+    const page = await open();
+    const row = page.locator('tr[data-session="candle 1"]');
+    expect(await row.locator('td').allInnerTexts()).toEqual(expect.arrayContaining(['flame', '11', '15 840', '0', '14.6 GB']));
+    expect(await page.locator('tr[data-session=torn] .state').innerText()).toContain('unreadable: manifest.json: not JSON. Repair it.');
+    expect(await page.getByRole('button', {name: 'Reconstruct torn'}).isDisabled()).toBe(true);
+    await page.getByRole('button', {name: 'Verify candle 1'}).click();
+    await until(() => row.locator('.job > span').innerText(), words => words === 'reads virtual-03 40 %', 'progress');
+    go();
+    await until(() => row.locator('.job > span').innerText(), words => words === 'Done: all frames are as recorded', 'done');
+    expect(await row.locator('.report').innerText()).toBe('frames: 15840\ndamaged: 0');
+    await page.getByRole('button', {name: 'Export videos candle 1'}).click();
+    await until(() => row.locator('.job').getAttribute('data-ok'), ok => ok === 'false', 'failed');
+    expect(mock.calls.find(({method}) => method === 'Sessions/Export')!.request).toEqual({session: 'candle 1', format: 'VIDEO'});
+    await page.getByRole('button', {name: 'Reconstruct candle 1'}).click();
+    await until(() => mock.calls.some(({method, request}) => method === 'Reconstruct/Start' && request.session === 'candle 1'), Boolean, 'started');
+  });
+
+  test('a reconstruction is seen after every iteration, and its volume turns', async () => {
+    mock.status = locked();
+    const page = await open();
+    for (let at = 1; at <= 5; ++at) {
+      mock.show({reconstruction: reconstruction(at)});
+      mock.tell({iteration: {reconstruction: 'r1', iteration: iteration(at), camera_id: 'virtual-03'}});
+      mock.tellBytes({kind: 'captured', iteration: at, camera_id: 'virtual-03'}, flame[11]!);
+      mock.tellBytes({kind: 'rendered', iteration: at, camera_id: 'virtual-03'}, flame[at]!);
+    }
+    const {header, bytes} = flameVolume();
+    mock.tellBytes(header, bytes);
+    await page.waitForSelector('.pair canvas[data-iteration="5"]');
+    expect(await text(page, '.latest')).toBe('Iteration 5: error 4.74 of 255, held out 5.98');
+    expect(await text(page, '#reconstruction header')).toContain('adjusts the volume · 42 %');
+    await page.locator('#reconstruction').scrollIntoViewIfNeeded();
+    await page.waitForSelector('.volume[data-voxels="32768"] canvas', {timeout: 20_000});
+    await page.waitForTimeout(800);
+    const picture = async () => (await page.locator('.volume').screenshot()).toString('base64');
+    const before = await picture();
+    const box = (await page.locator('.volume').boundingBox())!;
+    await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
+    await page.mouse.down();
+    await page.mouse.move(box.x + box.width / 2 + 120, box.y + box.height / 2 + 10, {steps: 5});
+    await page.mouse.up();
+    await page.waitForTimeout(500);
+    expect(await picture()).not.toBe(before);
+    await page.keyboard.press('2');
+    await page.waitForTimeout(400);
+    await screenshot(page, 'reconstruction-1920');
+    await page.getByRole('button', {name: 'Cancel'}).click();
+    await page.getByRole('button', {name: 'Press again to cancel'}).click();
+    await until(() => mock.calls.some(({method}) => method === 'Reconstruct/Cancel'), Boolean, 'cancelled');
+  }, 60_000);
+
+  test('the journal shows the newest line first, and each once', async () => {
+    mock.status = idle();
+    mock.notice('GREEN', 'Started.');
+    mock.notice('AMBER', 'virtual-02 went away.');
+    const page = await open();
+    mock.notice('GREEN', 'virtual-02 is back.');
+    await until(() => page.locator('.journal li').allInnerTexts(), lines => lines.length === 3, 'three lines');
+    expect((await page.locator('.journal li').allInnerTexts())[0]).toContain('virtual-02 is back.');
+  });
+});
+
+test('the page stays small: what is loaded before the first volume is below 200 kB', () => {
+  const files = readdirSync(`${kConsole}/assets`).filter(name => !name.startsWith('volume'));
+  expect(files.length).toBeGreaterThan(1);
+  expect(files.reduce((sum, name) => sum + statSync(`${kConsole}/assets/${name}`).size, 0)).toBeLessThan(200_000);
+});

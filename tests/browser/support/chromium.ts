@@ -1,0 +1,44 @@
+// Debian's Chromium, driven by Playwright.
+import {mkdirSync} from 'node:fs';
+
+import {type Browser, chromium, type Page} from 'playwright-core';
+
+export async function startChromium(): Promise<Browser> {
+  return chromium.launch({
+    executablePath: process.env.EMBERLOCK_CHROMIUM ?? '/usr/bin/chromium',
+    args: ['--headless', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
+           '--disable-component-update', '--disable-sync', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
+  });
+}
+
+/** A page that remembers what the browser complained of: scripts that failed, rules of content security that were broken, requests elsewhere. */
+export interface Watched {
+  page: Page;
+  complaints: string[];
+}
+
+export async function openPage(browser: Browser, url: string, size: {width: number; height: number}, options: {reducedMotion?: 'reduce'} = {}): Promise<Watched> {
+  const context = await browser.newContext({viewport: size, reducedMotion: options.reducedMotion ?? 'reduce'});
+  const page = await context.newPage();
+  const complaints: string[] = [];
+  page.on('pageerror', error => complaints.push(`script: ${error.message}`));
+  // A refused request is told here too; tests that refuse on purpose look at what the page shows instead.
+  page.on('console', message => {
+    if (message.type() === 'error' && !/Failed to load resource|WebSocket connection/.test(message.text())) complaints.push(message.text());
+  });
+  const host = new URL(url).host;
+  page.on('request', request => {
+    const to = new URL(request.url());
+    if (to.host !== host && !['blob:', 'data:'].includes(to.protocol)) complaints.push(`asks elsewhere: ${request.url()}`);
+  });
+  await page.goto(url);
+  return {page, complaints};
+}
+
+/** Into EMBERLOCK_SCREENSHOTS, if that is set. */
+export async function screenshot(page: Page, name: string, fullPage = false): Promise<void> {
+  const folder = process.env.EMBERLOCK_SCREENSHOTS;
+  if (!folder) return;
+  mkdirSync(folder, {recursive: true});
+  await page.screenshot({path: `${folder}/${name}.png`, fullPage, timeout: 60_000});
+}

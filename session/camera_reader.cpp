@@ -13,8 +13,29 @@ namespace fs = std::filesystem;
 
 Result<ParsedIndex> read_index(const fs::path& folder, const std::string& camera_id) {
   const fs::path path = index_path(folder, camera_id);
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::string bytes, read_file(path, std::size_t{4} << 30));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string bytes, read_file(path, kMaxIndexBytes));
   return parse_index(bytes, path.string());
+}
+
+std::size_t end_of_segment(const std::vector<IndexRecord>& records, std::size_t first) {
+  std::size_t end = first;
+  while (end < records.size() && records[end].segment == records[first].segment) ++end;
+  return end;
+}
+
+void list_segments(const fs::path& folder, const std::vector<IndexRecord>& records,
+                   v1::CameraStream& stream) {
+  stream.clear_segments();
+  for (std::size_t first = 0, end = 0; first < records.size(); first = end) {
+    end = end_of_segment(records, first);
+    const std::uint32_t number = records[first].segment;
+    const fs::path path = find_segment(folder, stream.camera_id(), number);
+    v1::Segment& segment = *stream.add_segments();
+    segment.set_file(path.empty() ? segment_name(stream.camera_id(), number, Encoding::ffv1)
+                                  : path.lexically_relative(folder).generic_string());
+    segment.set_first_frame(first);
+    segment.set_frames(end - first);
+  }
 }
 
 CameraReader::CameraReader(fs::path folder, std::string camera_id, ImageLayout layout,

@@ -8,6 +8,7 @@
 
 #include "base/frame.h"
 #include "base/result.h"
+#include "emberlock/v1/session.pb.h"
 #include "session/index.h"
 #include "session/segment.h"
 
@@ -36,6 +37,13 @@ class CameraReader {
   std::optional<SegmentReader> segment_;
   std::uint32_t number_ = 0;  ///< of segment_
 };
+
+/// The first record of another segment than that of `first`, from there on; the end if there is none.
+std::size_t end_of_segment(const std::vector<IndexRecord>& records, std::size_t first);
+
+/// The manifest's list of segments, as the records have them.
+void list_segments(const std::filesystem::path& folder, const std::vector<IndexRecord>& records,
+                   v1::CameraStream& stream);
 
 /// The records of a camera's index file, with what is wrong with it.
 Result<ParsedIndex> read_index(const std::filesystem::path& folder, const std::string& camera_id);

@@ -106,6 +106,16 @@ std::array<char, kIndexRecordBytes> encode(const IndexRecord& r) {
   return bytes;
 }
 
+std::string encode_index(const std::vector<IndexRecord>& records) {
+  std::string bytes = encode_index_header();
+  bytes.reserve(bytes.size() + records.size() * kIndexRecordBytes);
+  for (const IndexRecord& record : records) {
+    const auto encoded = encode(record);
+    bytes.append(encoded.data(), encoded.size());
+  }
+  return bytes;
+}
+
 Result<ParsedIndex> parse_index(std::string_view bytes, const std::string& where) {
   ParsedIndex index;
   const std::string header = encode_index_header();

@@ -35,9 +35,13 @@ struct IndexRecord {
 
 inline constexpr std::size_t kIndexHeaderBytes = 16;
 inline constexpr std::size_t kIndexRecordBytes = 68;
+inline constexpr std::size_t kMaxIndexBytes = std::size_t{4} << 30;  ///< 63 million frames
 
 std::string encode_index_header();
 std::array<char, kIndexRecordBytes> encode(const IndexRecord& record);
+
+/// A whole file of them.
+std::string encode_index(const std::vector<IndexRecord>& records);
 
 struct ParsedIndex {
   std::vector<IndexRecord> records;  ///< the good ones, in order

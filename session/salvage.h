@@ -19,16 +19,19 @@ struct SalvagedCamera {
 struct SalvageReport {
   std::vector<SalvagedCamera> cameras;
   std::uint64_t events_kept = 0;
+  bool changed = false;  ///< false: there was nothing to mend
 };
 
 /// Repairs a session whose recorder was killed: cuts torn ends off the index and the events, keeps the frames
-/// that decode, and turns the manifest SALVAGED. A finished session is left alone. Errors: bad_input (no
-/// session), io, refused (a recorder still writes it).
+/// that decode, and turns the manifest SALVAGED. Of a finished session only an index or events that can't be
+/// read are mended; `repair` does the rest. Errors: bad_input (no session), io, refused (a recorder still
+/// writes it).
 Result<SalvageReport> salvage(const std::filesystem::path& folder, const Progress& progress = {});
 
 /// Turns the uncompressed segments of a finished session into FFV1. Each is replaced only after every frame
 /// of its successor has been read back and matched with its hash; a failure leaves the session as readable as
-/// before.
-Status transcode(const std::filesystem::path& folder, const Progress& progress = {});
+/// before. One that was cut short, by the observer or a crash, is taken up again. Errors: bad_input, io,
+/// refused (ended by the observer, or another process writes the session).
+Status transcode(const std::filesystem::path& folder, const Observer& observer = {});
 
 }  // namespace emberlock

@@ -4,6 +4,7 @@ extern "C" {
 #include <libavutil/opt.h>
 }
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -165,7 +166,8 @@ SegmentReader::SegmentReader(std::filesystem::path path, ImageLayout layout, AvI
       layout_(layout),
       input_(std::move(input)),
       packet_(av_packet_alloc()),
-      frame_(av_frame_alloc()) {}
+      frame_(av_frame_alloc()),
+      beyond_(std::numeric_limits<std::int64_t>::max()) {}
 
 Result<SegmentReader> SegmentReader::open(const std::filesystem::path& path, const ImageLayout& layout) {
   auto input = open_av_input(path, Checking::strict);
@@ -195,23 +197,30 @@ Result<Image> SegmentReader::read(std::uint32_t milliseconds) {
   const std::int64_t target = ticks(milliseconds);
   const bool ahead = position_ >= 0 && target >= position_ && target - position_ <= ticks(kNear);
   if (ahead || seek(milliseconds)) {
-    auto image = scan_to(milliseconds);
-    if (image) return image;
+    auto image = scan_to(milliseconds, From::here);
+    if (image || target >= beyond_) return image;
   }
-  // A damaged seek table must not cost a good frame: once more, from the start.
+  return scan_from_start(milliseconds);
+}
+
+/// A damaged seek table must not cost a good frame.
+Result<Image> SegmentReader::scan_from_start(std::uint32_t milliseconds) {
   EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(path_, Checking::strict));
   input_.format.reset();  // before its file
   input_ = std::move(fresh);
-  return scan_to(milliseconds);
+  return scan_to(milliseconds, From::start);
 }
 
-Result<Image> SegmentReader::scan_to(std::uint32_t milliseconds) {
+Result<Image> SegmentReader::scan_to(std::uint32_t milliseconds, From from) {
   const std::int64_t target = ticks(milliseconds);
   position_ = -1;
   for (;;) {
     av_packet_unref(packet_.get());
     const int code = av_read_frame(input_.format.get(), packet_.get());
-    if (code < 0) return damaged("the frame isn't in the segment, which is truncated or damaged");
+    if (code < 0) {
+      if (from == From::start) beyond_ = std::min(beyond_, target);
+      return damaged("the frame isn't in the segment, which is truncated or damaged");
+    }
     if (packet_->stream_index != input_.stream || packet_->pts < target) continue;
     if (packet_->pts > target) return damaged("the frame isn't in the segment, which is damaged");
     auto image = decode();

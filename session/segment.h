@@ -60,7 +60,9 @@ class SegmentReader {
 
  private:
   SegmentReader(std::filesystem::path path, ImageLayout layout, AvInput input);
-  Result<Image> scan_to(std::uint32_t milliseconds);
+  enum class From { here, start };
+  Result<Image> scan_to(std::uint32_t milliseconds, From from);
+  Result<Image> scan_from_start(std::uint32_t milliseconds);
   Result<Image> decode();
   bool seek(std::uint32_t milliseconds);
   [[nodiscard]] std::int64_t ticks(std::uint32_t milliseconds) const;
@@ -71,6 +73,7 @@ class SegmentReader {
   AvInput input_;
   AvPtr<AVPacket> packet_;
   AvPtr<AVFrame> frame_;
+  std::int64_t beyond_;        ///< reading from the start ends before this time stamp
   std::int64_t position_ = 0;  ///< every packet before this time stamp has been read; -1: unknown
 };
 

@@ -1,0 +1,146 @@
+#include "session/verify.h"
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/file.h"
+#include "session/camera_reader.h"
+#include "session/events.h"
+#include "session/files.h"
+#include "session/layout.h"
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+std::string of(std::uint64_t part, std::uint64_t whole) {
+  return std::to_string(part) + " of " + std::to_string(whole) + " frames";
+}
+
+/// What the index of a camera holds; what is wrong with it goes to the check's problems.
+std::vector<IndexRecord> check_index(const fs::path& folder, v1::Manifest::State state,
+                                     const v1::CameraStream& stream, CameraCheck& check) {
+  const std::string file = index_path(folder, stream.camera_id()).lexically_relative(folder).string();
+  auto index = read_index(folder, stream.camera_id());
+  const bool finished = state != v1::Manifest::RECORDING;
+  if (!index) {
+    check.recorded = finished ? stream.counts().recorded() : 0;
+    check.missing = check.recorded;
+    check.problems.push_back(file + ": " + index.error().what);
+    return {};
+  }
+  const std::size_t records = index->records.size();
+  check.recorded = finished ? stream.counts().recorded() : records + index->bad_records;
+  check.missing = check.recorded - std::min<std::uint64_t>(check.recorded, records);
+  if (!index->whole()) {
+    check.problems.push_back(file + ": damaged: " + std::to_string(index->bad_records) + " bad records, " +
+                             std::to_string(index->torn_bytes) + " bytes of a torn one");
+  }
+  if (finished && check.recorded != records) {
+    check.problems.push_back(file + ": holds " + of(records, check.recorded) + " that the manifest counts");
+  }
+  return std::move(index->records);
+}
+
+/// The manifest's list against what the index says, files' endings aside, which transcoding changes.
+void check_segments(const fs::path& folder, const std::vector<IndexRecord>& records,
+                    const v1::CameraStream& stream, CameraCheck& check) {
+  v1::CameraStream expected = stream;
+  list_segments(folder, records, expected);
+  const auto same = [](const v1::Segment& a, const v1::Segment& b) {
+    return fs::path(a.file()).replace_extension() == fs::path(b.file()).replace_extension() &&
+           a.first_frame() == b.first_frame() && a.frames() == b.frames();
+  };
+  if (!std::equal(stream.segments().begin(), stream.segments().end(), expected.segments().begin(),
+                  expected.segments().end(), same)) {
+    check.problems.emplace_back("manifest.json: its list of segments isn't what the index says");
+  }
+}
+
+Status check_frames(const fs::path& folder, CameraReader& reader, const std::string& camera_id,
+                    CameraCheck& check, const Observer& observer) {
+  const auto& records = reader.records();
+  for (std::size_t first = 0, end = 0; first < records.size(); first = end) {
+    end = end_of_segment(records, first);
+    std::uint64_t bad = 0;
+    std::string reason;
+    for (std::size_t i = first; i < end; ++i) {
+      EMBERLOCK_RETURN_IF_ERROR(observe(observer,
+                                        static_cast<double>(i) / static_cast<double>(records.size()),
+                                        "reading back " + camera_id));
+      const auto frame = reader.read(i);
+      if (frame) continue;
+      if (++bad == 1) reason = frame.error().what + " (frame " + std::to_string(i) + ")";
+    }
+    check.bad += bad;
+    check.good += end - first - bad;
+    if (bad == 0) continue;
+    const fs::path path = find_segment(folder, camera_id, records[first].segment);
+    const std::string file = path.empty() ? segment_name(camera_id, records[first].segment, Encoding::ffv1)
+                                          : path.lexically_relative(folder).string();
+    check.problems.push_back(
+        fmt::format("{}: {} can't be read back: {}", file, of(bad, end - first), reason));
+  }
+  return {};
+}
+
+Result<CameraCheck> check_camera(const fs::path& folder, const v1::Manifest& manifest,
+                                 const v1::CameraStream& stream, const Observer& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(stream));
+  CameraCheck check;
+  check.camera_id = stream.camera_id();
+  std::vector<IndexRecord> records = check_index(folder, manifest.state(), stream, check);
+  if (manifest.state() != v1::Manifest::RECORDING) check_segments(folder, records, stream, check);
+  CameraReader reader(folder, stream.camera_id(), layout, std::move(records));
+  EMBERLOCK_RETURN_IF_ERROR(check_frames(folder, reader, stream.camera_id(), check, observer));
+  return check;
+}
+
+void check_events(const fs::path& folder, SessionCheck& check) {
+  const auto bytes = read_file(events_path(folder));
+  if (!bytes) {
+    check.problems.push_back("events.binpb: " + bytes.error().what);
+    return;
+  }
+  const ParsedEvents events = parse_events(*bytes);
+  check.events = events.events.size();
+  if (events.valid_bytes != bytes->size()) {
+    check.problems.push_back("events.binpb: damaged from byte " + std::to_string(events.valid_bytes));
+  }
+}
+
+}  // namespace
+
+bool SessionCheck::whole() const {
+  return (state == v1::Manifest::COMPLETE || state == v1::Manifest::SALVAGED) && problems.empty() &&
+         std::all_of(cameras.begin(), cameras.end(), [](const CameraCheck& c) { return c.problems.empty(); });
+}
+
+Result<SessionCheck> verify_session(const fs::path& folder, const Observer& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest, read_manifest(folder));
+  SessionCheck check;
+  check.state = manifest.state();
+  const double cameras = manifest.cameras_size();
+  for (int i = 0; i < manifest.cameras_size(); ++i) {
+    EMBERLOCK_ASSIGN_OR_RETURN(CameraCheck camera,
+                               check_camera(folder, manifest, manifest.cameras(i),
+                                            part_of(observer, i / cameras, (i + 1) / cameras)));
+    check.cameras.push_back(std::move(camera));
+  }
+  check_events(folder, check);
+  if (check.state == v1::Manifest::RECORDING) {
+    check.problems.emplace_back(
+        "manifest.json: the recording isn't finished: its recorder still runs or was killed");
+    check.to_do =
+        "Wait for its recorder; if that was killed, `emberlock sessions repair` keeps what reached the disk";
+  } else if (!check.whole()) {
+    check.to_do = "Restore the named files from a copy, or let `emberlock sessions repair` keep what is good";
+  }
+  static_cast<void>(observe(observer, 1, "read back"));
+  return check;
+}
+
+}  // namespace emberlock

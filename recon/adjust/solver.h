@@ -63,6 +63,8 @@ struct Preview {
   /// Never makes the device wait: each call starts a copy and gives the last that has arrived, which is that
   /// of an earlier call on a GPU; nothing before the first has.
   std::function<std::optional<Volume>()> recent;
+  const Hull& hull;
+  const Effects& effects;  ///< but scattering: what it adds is still part of the volume's light
 };
 
 /// Time since the solve began, as the caller measures it.

@@ -38,7 +38,8 @@ bool Tracker::record(int iteration, const std::array<double, 3>& input_rmse, Eng
               [&] {
                 const std::vector<Rgba> x = engine.recent();
                 return x.empty() ? std::optional<Volume>() : volume(x);
-              }});
+              },
+              setup_.hull, setup_.effects});
   }
   if (held_out_ && setup_.options.target_rmse &&
       all_channels(point.heldout_rmse) <= *setup_.options.target_rmse)

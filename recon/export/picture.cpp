@@ -9,6 +9,21 @@
 #include "base/file.h"
 
 namespace emberlock {
+namespace {
+
+/// Gray8 as it is, rgb8 as blue, green, red.
+cv::Mat as_opencv_orders(const ImageView& image) {
+  const bool colour = image.layout.format == PixelFormat::rgb8;
+  // OpenCV takes the pixels as writable, imencode only reads them.
+  cv::Mat view(image.height(), image.width(), colour ? CV_8UC3 : CV_8UC1, const_cast<std::byte*>(image.data),
+               image.stride);
+  if (!colour) return view;
+  cv::Mat ordered;
+  cv::cvtColor(view, ordered, cv::COLOR_RGB2BGR);
+  return ordered;
+}
+
+}  // namespace
 
 Status write_png(const ImageView& image, const std::filesystem::path& path) {
   if (image.layout.format != PixelFormat::gray8 && image.layout.format != PixelFormat::rgb8) {
@@ -18,22 +33,23 @@ Status write_png(const ImageView& image, const std::filesystem::path& path) {
   if (image.width() < 1 || image.height() < 1) {
     return Error{ErrorKind::bad_input, "the picture is empty", path.string(), "Give at least one pixel"};
   }
-  const bool colour = image.layout.format == PixelFormat::rgb8;
-  // OpenCV takes the pixels as writable, imencode only reads them.
-  const cv::Mat view(image.height(), image.width(), colour ? CV_8UC3 : CV_8UC1,
-                     const_cast<std::byte*>(image.data), image.stride);
-  cv::Mat ordered;
-  if (colour) {
-    cv::cvtColor(view, ordered, cv::COLOR_RGB2BGR);
-  } else {
-    ordered = view;
-  }
+  const cv::Mat ordered = as_opencv_orders(image);
   std::vector<unsigned char> bytes;
   if (!cv::imencode(".png", ordered, bytes)) {
     return Error{ErrorKind::io, "cannot encode the picture", path.string(),
                  "Check that the picture isn't empty"};
   }
   return write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
+Result<std::string> to_jpeg(const ImageView& image) {
+  std::vector<unsigned char> bytes;
+  if (image.layout.format != PixelFormat::rgb8 || image.width() < 1 || image.height() < 1 ||
+      !cv::imencode(".jpg", as_opencv_orders(image), bytes, {cv::IMWRITE_JPEG_QUALITY, 85})) {
+    return Error{ErrorKind::bad_input, "cannot be made a JPEG", "picture",
+                 "Give rgb8 and at least one pixel"};
+  }
+  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
 }  // namespace emberlock

@@ -1,0 +1,93 @@
+#include "recon/export/preview.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "recon/export/picture.h"
+
+namespace emberlock {
+namespace {
+
+TEST(Preview, KeepsProportionsAndNeverGrows) {
+  EXPECT_EQ(preview_size({1280, 720}, 480), (ImageSize{480, 270}));
+  EXPECT_EQ(preview_size({320, 240}, 480), (ImageSize{320, 240}));
+  EXPECT_EQ(preview_size({5000, 1}, 480), (ImageSize{480, 1}));
+}
+
+TEST(Preview, ASmallPictureShowsTheSamePointsAtTheSamePlaces) {
+  CameraModel camera{{{1281, 719}, 900, 910, 640, 350, {0.1, -0.05, 0.001, 0.002, 0}}, {}};
+  const CameraModel small = resized(camera, {480, 270});
+  const Eigen::Vector3d world(0.2, -0.1, 1);
+  const Eigen::Vector2d full = camera.project(world);
+  const Eigen::Vector2d there = small.project(world);
+  EXPECT_NEAR(there.x() / 480, full.x() / 1281, 1e-12);
+  EXPECT_NEAR(there.y() / 270, full.y() / 719, 1e-12);
+}
+
+TEST(Preview, ShrinkingKeepsTheMeanOfEachChannel) {
+  RadianceImage image({60, 40});
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = static_cast<float>(i * 7919 % 251);
+  const RadianceImage small = shrunk(image, {20, 10});
+  const auto mean = [](const RadianceImage& of, std::size_t c) {
+    double sum = 0;
+    for (std::size_t i = c; i < of.rgb.size(); i += 3) sum += of.rgb[i];
+    return 3 * sum / static_cast<double>(of.rgb.size());
+  };
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(mean(small, c), mean(image, c), 1e-3);
+}
+
+TEST(Preview, CoarseBlocksHoldTheMeanOfTheirPointsEvenWhereTheyAreCutOff) {
+  Volume volume;
+  volume.grid = {{-1, -2, -3}, 0.5F, 10, 7, 4};
+  volume.emission.resize(3 * volume.grid.size());
+  for (std::size_t i = 0; i < volume.emission.size(); ++i)
+    volume.emission[i] = static_cast<float>(i * 31 % 97);
+  const CoarseBrightness coarse = coarse_brightness(volume, 4);  // blocks of three points
+  ASSERT_EQ((std::array{coarse.nx, coarse.ny, coarse.nz}), (std::array{4, 3, 2}));
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(coarse.box.size[axis], 1.5 * (4 - axis), 1e-6);
+    // The first point lies in the middle of its own half voxel edge.
+    EXPECT_NEAR(coarse.box.center[axis] - coarse.box.size[axis] / 2, -1.25 - axis, 1e-6);
+  }
+  double brightest = 0;
+  std::size_t v = 0;
+  for (int k = 0; k < 2; ++k)
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 4; ++i, ++v) {
+        double sum = 0;
+        int values = 0;
+        for (int z = 3 * k; z < std::min(4, 3 * k + 3); ++z)
+          for (int y = 3 * j; y < std::min(7, 3 * j + 3); ++y)
+            for (int x = 3 * i; x < std::min(10, 3 * i + 3); ++x)
+              for (std::size_t c = 0; c < 3; ++c, ++values)
+                sum += volume.emission[3 * volume.grid.index(x, y, z) + c];
+        brightest = std::max(brightest, sum / values);
+        EXPECT_NEAR(coarse.voxels[v], 255 * sum / values / coarse.brightest, 0.51)
+            << i << " " << j << " " << k;
+      }
+  EXPECT_NEAR(coarse.brightest, brightest, 1e-4);
+}
+
+TEST(Preview, ADarkVolumeIsDark) {
+  Volume volume;
+  volume.grid = {{0, 0, 0}, 1, 300, 2, 2};
+  volume.emission.assign(3 * volume.grid.size(), -1.0F);
+  const CoarseBrightness coarse = coarse_brightness(volume, 64);
+  EXPECT_LE(coarse.nx, 64);
+  EXPECT_EQ(coarse.brightest, 0);
+  EXPECT_EQ(std::count(coarse.voxels.begin(), coarse.voxels.end(), 0), coarse.nx * coarse.ny * coarse.nz);
+}
+
+TEST(Preview, AJpegTakesColourAloneAndSomethingToShow) {
+  const auto jpeg = to_jpeg(Image(ImageLayout{{16, 8}, PixelFormat::rgb8, 8}).view());
+  ASSERT_TRUE(jpeg.ok());
+  EXPECT_EQ(jpeg->substr(0, 2), "\xff\xd8");
+  EXPECT_FALSE(to_jpeg(Image(ImageLayout{{16, 8}, PixelFormat::gray8, 8}).view()).ok());
+  EXPECT_FALSE(to_jpeg(Image(ImageLayout{{0, 0}, PixelFormat::rgb8, 8}).view()).ok());
+}
+
+}  // namespace
+}  // namespace emberlock

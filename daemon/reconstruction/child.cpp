@@ -1,0 +1,301 @@
+#include "daemon/reconstruction/child.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <csignal>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include "daemon/reconstruction/messages.h"
+#include "daemon/reconstruction/process.h"
+#include "recon/compute/device.h"
+#include "session/files.h"
+#include "session/name.h"
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+using Steady = std::chrono::steady_clock;
+
+constexpr Seconds kKillTime{2};                 // a killed process is gone by then
+constexpr std::uint32_t kLargestVoxels = 1024;  // as `emberlock reconstruct --voxels` takes them
+
+Steady::duration duration(Seconds seconds) {
+  return std::chrono::duration_cast<Steady::duration>(std::chrono::duration<double>(seconds.value()));
+}
+
+std::int64_t now_ns() {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(Steady::now().time_since_epoch()).count();
+}
+
+Error refuse_field(const char* field, std::string what, std::string remedy) {
+  return {ErrorKind::bad_input, std::move(what), field, std::move(remedy)};
+}
+
+Status check_request(const v1::ReconstructRequest& request) {
+  if (!std::isfinite(request.budget_s()) || request.budget_s() < 0)
+    return refuse_field("budget_s", "is no length of time", "Give seconds above 0, or 0 for none");
+  if (request.voxels() > kLargestVoxels)
+    return refuse_field("voxels", fmt::format("{} are too many", request.voxels()),
+                        fmt::format("Give at most {}, or 0 for the paper's rule", kLargestVoxels));
+  if (!request.device().empty()) {
+    if (const auto device = parse_device(request.device()); !device) return device.error();
+  }
+  return {};
+}
+
+/// What a child wrote to stderr, as far as a sentence can hold it.
+class LastWords {
+ public:
+  void add(std::string_view bytes) {
+    held_.append(bytes);
+    if (held_.size() > kMost) held_.erase(0, held_.size() - kMost);
+  }
+  /// Its last lines, in printable ASCII.
+  [[nodiscard]] std::string text() const {
+    std::vector<std::string> lines(1);
+    for (const char c : held_) {
+      if (c == '\n' || c == '\r') {
+        if (!lines.back().empty()) lines.emplace_back();
+      } else {
+        lines.back() += c >= ' ' && c <= '~' ? c : '?';
+      }
+    }
+    if (lines.back().empty()) lines.pop_back();
+    if (lines.size() > kLines) lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(kLines));
+    return fmt::format("{}", fmt::join(lines, " / "));
+  }
+
+ private:
+  static constexpr std::size_t kMost = 2000;  // bytes
+  static constexpr std::size_t kLines = 4;
+  std::string held_;
+};
+
+/// As poll() takes it; at least 1, at most a minute.
+int milliseconds_until(Steady::time_point deadline) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Steady::now()).count();
+  return static_cast<int>(std::clamp<std::int64_t>(left, 1, 60'000));
+}
+
+enum class ReadEnd { open, closed };
+
+using TakeBytes = std::function<void(std::string_view)>;
+
+/// Gives `take` what is there now; at most 1 MiB, so that nobody is kept from the rest.
+ReadEnd read_all(int fd, const TakeBytes& take) {
+  char bytes[65536];
+  for (int i = 0; i < 16; ++i) {
+    const ssize_t n = ::read(fd, bytes, sizeof bytes);
+    if (n > 0) {
+      take({bytes, static_cast<std::size_t>(n)});
+    } else if (n == 0 || (errno != EINTR && errno != EAGAIN)) {
+      return ReadEnd::closed;
+    } else if (errno == EAGAIN) {
+      return ReadEnd::open;
+    }
+  }
+  return ReadEnd::open;
+}
+
+}  // namespace
+
+ReconstructionChild::ReconstructionChild(ReconstructionOptions options, Board& board,
+                                         std::function<void()> changed)
+    : options_(std::move(options)),
+      board_(board),
+      changed_(std::move(changed)),
+      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
+
+ReconstructionChild::~ReconstructionChild() {
+  {
+    const std::lock_guard lock(mutex_);
+    asked_ = Asked::kill;
+  }
+  ::eventfd_write(wake_.get(), 1);
+  if (thread_.joinable()) thread_.join();
+}
+
+Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::ReconstructRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(check_session_name(request.session()));
+  EMBERLOCK_RETURN_IF_ERROR(check_request(request));
+  const fs::path session = fs::absolute(options_.sessions / request.session());
+  std::error_code ec;
+  if (!fs::is_regular_file(manifest_path(session), ec)) {
+    return Error{ErrorKind::bad_input, "there is no such session", request.session(),
+                 "Look at `emberlock sessions list`"};
+  }
+  const v1::ReconstructRequest& unasked = options_.unasked;
+  const std::string& device = !request.device().empty() ? request.device() : unasked.device();
+  const double budget = request.budget_s() > 0 ? request.budget_s() : unasked.budget_s();
+  const std::uint32_t voxels = request.voxels() > 0 ? request.voxels() : unasked.voxels();
+  const auto& hold_out = request.hold_out().empty() ? unasked.hold_out() : request.hold_out();
+  const std::string frame = request.has_frame() ? fmt::format("frame-{}", request.frame()) : "middle-frame";
+  std::vector<std::string> command = {options_.program.string(), "reconstruct", session.string()};
+  const auto option = [&](const char* name, std::string value) {
+    command.insert(command.end(), {name, std::move(value)});
+  };
+  option("--out", fs::absolute(options_.results / request.session() / frame).string());
+  option("--progress-fd", std::to_string(ChildProcess::kMessagesFd));
+  if (!device.empty()) option("--device", device);
+  if (request.has_frame()) option("--frame", std::to_string(request.frame()));
+  if (budget > 0) option("--budget", fmt::format("{}", budget));
+  if (voxels > 0) option("--voxels", std::to_string(voxels));
+  if (!hold_out.empty()) option("--hold-out", fmt::format("{}", fmt::join(hold_out, ",")));
+  if (options_.threads > 0) option("--threads", std::to_string(options_.threads));
+
+  const std::lock_guard starting(starting_);
+  {
+    const std::lock_guard lock(mutex_);
+    if (running_) {
+      return Error{ErrorKind::refused, "one runs already, of session " + state_->status().session(),
+                   "reconstruction", "Wait for it, or cancel it"};
+    }
+  }
+  if (thread_.joinable()) thread_.join();
+  {
+    const std::lock_guard lock(mutex_);
+    v1::ReconstructionStatus begun;
+    begun.set_id(fmt::format("{} {}", request.session(), utc_now()));
+    begun.set_session(request.session());
+    begun.set_device(device);
+    state_.emplace(std::move(begun));
+    begun_ns_ = now_ns();
+    asked_ = Asked::nothing;
+    running_ = true;
+  }
+  // The child dies with the thread that started it, as the kernel counts parents: it is the one that watches
+  // it.
+  thread_ = std::thread([this, words = std::move(command)] { supervise(words); });
+  return *status();
+}
+
+Result<v1::ReconstructionStatus> ReconstructionChild::cancel() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (!running_) {
+      return Error{ErrorKind::refused, "none runs", "reconstruction", "There is nothing to cancel"};
+    }
+    asked_ = Asked::cancel;
+  }
+  ::eventfd_write(wake_.get(), 1);
+  return *status();
+}
+
+std::optional<v1::ReconstructionStatus> ReconstructionChild::status() const {
+  const std::lock_guard lock(mutex_);
+  if (!state_) return std::nullopt;
+  v1::ReconstructionStatus status = state_->status();
+  if (running_ && asked_ != Asked::nothing) status.set_doing("being cancelled");
+  status.set_seconds(running_ ? static_cast<double>(now_ns() - begun_ns_) * 1e-9 : seconds_);
+  return status;
+}
+
+void ReconstructionChild::supervise(const std::vector<std::string>& command) {
+  LastWords last_words;
+  ChildEnd end;
+  if (auto process = ChildProcess::spawn(command, options_.niceness); process.ok()) {
+    end = watch(*process, [&](std::string_view bytes) { last_words.add(bytes); });
+  } else {
+    end.why = ChildEnd::Why::not_started;
+    end.words = process.error().message();
+  }
+  {
+    const std::lock_guard lock(mutex_);
+    state_->end(end, last_words.text());
+    seconds_ = static_cast<double>(now_ns() - begun_ns_) * 1e-9;
+    running_ = false;
+  }
+  if (changed_) changed_();
+}
+
+void ReconstructionChild::take(v1::ChildMessage&& message) {
+  std::optional<v1::IterationPreview> preview;
+  {
+    const std::lock_guard lock(mutex_);
+    preview = state_->take(std::move(message));
+  }
+  if (preview) board_.show(std::make_shared<const v1::IterationPreview>(std::move(*preview)));
+  if (changed_) changed_();
+}
+
+ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take_words) {
+  ChildEnd end;
+  ChildMessageParser parser;
+  Steady::time_point heard = Steady::now();
+  std::optional<Steady::time_point> kill_at;
+  const auto condemn = [&](ChildEnd::Why why, std::string words) {
+    end.why = why;
+    end.words = std::move(words);
+    process.signal(SIGKILL);
+  };
+  pollfd polled[] = {{wake_.get(), POLLIN, 0},
+                     {process.exited(), POLLIN, 0},
+                     {process.messages(), POLLIN, 0},
+                     {process.errors(), POLLIN, 0}};
+  pollfd& messages = polled[2];
+  pollfd& errors = polled[3];
+  const auto read_messages = [&] {
+    Status parsed;
+    const ReadEnd at = read_all(messages.fd, [&](std::string_view bytes) {
+      if (!parsed) return;
+      parsed = parser.add(bytes, [&](v1::ChildMessage&& message) {
+        heard = Steady::now();
+        take(std::move(message));
+      });
+    });
+    if (at == ReadEnd::closed || !parsed) messages.fd = -1;
+    if (!parsed && end.why == ChildEnd::Why::by_itself)
+      condemn(ChildEnd::Why::unreadable,
+              "it sent what can't be understood, " + parsed.error().what + ", and was killed");
+  };
+  const auto read_errors = [&] {
+    if (read_all(errors.fd, take_words) == ReadEnd::closed) errors.fd = -1;
+  };
+
+  while (polled[1].revents == 0) {
+    const bool condemned = end.why != ChildEnd::Why::by_itself;
+    const auto silent_at = condemned ? Steady::time_point::max() : heard + duration(options_.silence);
+    ::poll(polled, std::size(polled), milliseconds_until(kill_at.value_or(silent_at)));
+    if (polled[0].revents != 0) {
+      eventfd_t count = 0;
+      ::eventfd_read(wake_.get(), &count);
+      const std::lock_guard lock(mutex_);
+      if (asked_ == Asked::kill) condemn(ChildEnd::Why::cancelled, {});
+      if (asked_ == Asked::cancel && end.why == ChildEnd::Why::by_itself) {
+        end.why = ChildEnd::Why::cancelled;
+        process.signal(SIGTERM);
+        kill_at = Steady::now() + duration(options_.grace);
+      }
+    }
+    if (messages.fd >= 0 && messages.revents != 0) read_messages();
+    if (errors.fd >= 0 && errors.revents != 0) read_errors();
+    const Steady::time_point now = Steady::now();
+    if (kill_at && now >= *kill_at) {
+      process.signal(SIGKILL);
+      kill_at.reset();
+    }
+    if (end.why == ChildEnd::Why::by_itself && now >= heard + duration(options_.silence))
+      condemn(ChildEnd::Why::silent,
+              fmt::format("it told nothing for {:g} s and was killed", options_.silence.value()));
+  }
+  // What it wrote just before it went.
+  if (messages.fd >= 0) read_messages();
+  if (errors.fd >= 0) read_errors();
+  const ChildProcess::Exit exit = process.reap();
+  end.code = exit.code;
+  end.signal = exit.signal;
+  return end;
+}
+
+}  // namespace emberlock

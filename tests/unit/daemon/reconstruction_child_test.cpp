@@ -1,0 +1,272 @@
+#include <chrono>
+#include <condition_variable>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+
+#include "base/unique_fd.h"
+#include "daemon/reconstruction/child.h"
+#include "daemon/reconstruction/messages.h"
+#include "tests/support/recording.h"
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+using State = v1::ReconstructionStatus;
+
+/// A folder with a session "candle", and a shell script in the place of `emberlock`.
+class ReconstructionChildTest : public testing::Test {
+ protected:
+  ReconstructionChildTest() {
+    fs::create_directories(root_ / "sessions/candle");
+    std::ofstream(root_ / "sessions/candle/manifest.json") << "{}";
+    options_.program = root_ / "program";
+    options_.sessions = root_ / "sessions";
+    options_.results = root_ / "results";
+  }
+
+  /// With ROOT for the folder. What `message(NAME, ...)` wrote is sent by `cat ROOT/NAME >&3`.
+  ReconstructionChild& with_script(const std::string& script) {
+    std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n"
+                                     << script << "\n";
+    fs::permissions(root_ / "program", fs::perms::owner_all);
+    child_ = std::make_unique<ReconstructionChild>(options_, board_, [this] {
+      const std::lock_guard lock(mutex_);
+      changed_.notify_all();
+    });
+    return *child_;
+  }
+  void message(const std::string& name, const v1::ChildMessage& message) const {
+    std::ofstream(root_ / name, std::ios::binary) << framed(message);
+  }
+  void done_message() const {
+    v1::ChildMessage done;
+    done.mutable_done()->set_result("there");
+    message("done", done);
+  }
+  static v1::ReconstructRequest request(const std::string& session = "candle") {
+    v1::ReconstructRequest request;
+    request.set_session(session);
+    return request;
+  }
+  /// Waits until it runs no more.
+  v1::ReconstructionStatus end() {
+    std::unique_lock lock(mutex_);
+    changed_.wait_for(lock, std::chrono::seconds(20),
+                      [&] { return child_->status()->state() != State::RUNNING; });
+    return *child_->status();
+  }
+  v1::ReconstructionStatus end_of(const std::string& script) {
+    const auto started = with_script(script).start(request());
+    EXPECT_TRUE(started.ok()) << started.error().message();
+    return end();
+  }
+  /// Waits until a script has written the file whole.
+  std::string wait_for_line(const std::string& name) const {
+    for (int i = 0; i < 2000; ++i) {
+      std::ifstream in(root_ / name);
+      std::string line;
+      if (std::getline(in, line) && !in.eof()) return line;
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    ADD_FAILURE() << name << " never came";
+    return {};
+  }
+  /// Whether a process is gone, or will be within seconds.
+  static bool goes_away(const std::string& pid) {
+    for (int i = 0; i < 1000; ++i) {
+      if (::kill(std::stoi(pid), 0) != 0) return true;
+      std::ifstream stat("/proc/" + pid + "/stat");
+      std::string text;
+      std::getline(stat, text);
+      if (text.find(") Z ") != std::string::npos) return true;  // dead, and nobody has waited for it yet
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    return false;
+  }
+
+  test::TempFolder root_;
+  Board board_;
+  ReconstructionOptions options_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::unique_ptr<ReconstructionChild> child_;
+};
+
+TEST_F(ReconstructionChildTest, ShowsEveryIterationAndEndsWithTheResult) {
+  done_message();
+  v1::ChildMessage iteration;
+  iteration.mutable_iteration()->mutable_iteration()->set_iteration(1);
+  iteration.mutable_iteration()->set_rendered_jpeg("one");
+  message("one", iteration);
+  iteration.mutable_iteration()->mutable_iteration()->set_iteration(2);
+  message("two", iteration);
+  const auto status = end_of("echo \"$@\" > $ROOT/words; cat $ROOT/one $ROOT/two $ROOT/done >&3");
+  EXPECT_EQ(status.state(), State::DONE) << status.error();
+  EXPECT_EQ(status.result(), "there");
+  EXPECT_EQ(status.iterations_size(), 2);
+  EXPECT_GT(status.seconds(), 0);
+  const auto shown = board_.iterations(0);
+  ASSERT_EQ(shown.size(), 2U);
+  EXPECT_EQ(shown[1]->reconstruction(), status.id());
+  const std::string root = root_.path().string();
+  EXPECT_EQ(wait_for_line("words"), "reconstruct " + root + "/sessions/candle --out " + root +
+                                        "/results/candle/middle-frame --progress-fd 3");
+}
+
+TEST_F(ReconstructionChildTest, WhatIsAskedReachesTheProgram) {
+  options_.unasked.set_budget_s(100);
+  options_.threads = 2;
+  v1::ReconstructRequest wanted = request();
+  wanted.set_frame(7);
+  wanted.set_budget_s(2.5);
+  wanted.set_voxels(64);
+  wanted.add_hold_out(1);
+  wanted.add_hold_out(3);
+  wanted.set_device("cpu");
+  ASSERT_TRUE(with_script("echo \"$@\" > $ROOT/words").start(wanted).ok());
+  EXPECT_THAT(wait_for_line("words"),
+              HasSubstr("/results/candle/frame-7 --progress-fd 3 --device cpu --frame 7 "
+                        "--budget 2.5 --voxels 64 --hold-out 1,3 --threads 2"));
+}
+
+TEST_F(ReconstructionChildTest, ACrashIsNamedWithItsLastWords) {
+  const auto status = end_of("echo first; for i in 1 2 3 4 5 6; do echo line $i >&2; done; kill -SEGV $$");
+  EXPECT_EQ(status.state(), State::FAILED);
+  EXPECT_THAT(status.error(), HasSubstr("SIGSEGV"));
+  EXPECT_THAT(status.error(), HasSubstr("line 5 / line 6"));
+  EXPECT_THAT(status.error(), Not(HasSubstr("line 1")));
+}
+
+TEST_F(ReconstructionChildTest, LastWordsInNoAlphabetAreStillASentence) {
+  EXPECT_THAT(end_of("printf 'a\\377\\033[1mb' >&2; exit 1").error(), HasSubstr("a??[1mb"));
+}
+
+TEST_F(ReconstructionChildTest, OneThatHangsIsKilled) {
+  options_.silence = Seconds(0.2);
+  const auto status = end_of("trap '' TERM; echo $$ > $ROOT/pid; while :; do sleep 0.05; done");
+  EXPECT_EQ(status.state(), State::FAILED);
+  EXPECT_THAT(status.error(), HasSubstr("told nothing for 0.2 s"));
+  EXPECT_TRUE(goes_away(wait_for_line("pid")));
+}
+
+TEST_F(ReconstructionChildTest, OneThatTellsSomethingInTimeDoesNotHang) {
+  options_.silence = Seconds(0.5);
+  done_message();
+  v1::ChildMessage progress;
+  progress.mutable_progress()->set_doing("x");
+  message("progress", progress);
+  const auto status =
+      end_of("for i in 1 2 3 4 5 6 7 8; do cat $ROOT/progress >&3; sleep 0.1; done; cat $ROOT/done >&3");
+  EXPECT_EQ(status.state(), State::DONE) << status.error();
+}
+
+TEST_F(ReconstructionChildTest, GarbageEndsIt) {
+  const auto status = end_of("printf '\\004\\377\\377\\377\\377' >&3; sleep 100");
+  EXPECT_EQ(status.state(), State::FAILED);
+  EXPECT_THAT(status.error(), HasSubstr("can't be understood"));
+}
+
+TEST_F(ReconstructionChildTest, AMessageTooLargeEndsIt) {
+  EXPECT_THAT(end_of("printf '\\377\\377\\377\\177' >&3; cat /dev/zero >&3").error(), HasSubstr("over"));
+}
+
+TEST_F(ReconstructionChildTest, ItsOwnWordsOfItsFailureAreTheError) {
+  v1::ChildMessage failure;
+  failure.mutable_failure()->set_message("candle: no box. Give --box");
+  message("failure", failure);
+  EXPECT_EQ(end_of("cat $ROOT/failure >&3; exit 2").error(), "candle: no box. Give --box");
+}
+
+TEST_F(ReconstructionChildTest, OneThatClosesItsPipeAndLivesOnHangs) {
+  options_.silence = Seconds(0.2);
+  EXPECT_THAT(end_of("exec 3>&-; exec 2>&-; sleep 100").error(), HasSubstr("told nothing"));
+  EXPECT_THAT(end_of("exec 3>&-; exit 0").error(), HasSubstr("without a result"));
+}
+
+TEST_F(ReconstructionChildTest, WhatItLeavesBehindIsKilledAndKeepsNobodyWaiting) {
+  const auto status = end_of("sleep 100 & echo $! > $ROOT/pid; exit 1");
+  EXPECT_EQ(status.state(), State::FAILED);
+  EXPECT_TRUE(goes_away(wait_for_line("pid")));
+}
+
+TEST_F(ReconstructionChildTest, CancelledItEndsAndTheNextCanStart) {
+  ReconstructionChild& child = with_script("echo x > $ROOT/begun; exec sleep 100");
+  EXPECT_EQ(child.cancel().error().kind, ErrorKind::refused);
+  ASSERT_TRUE(child.start(request()).ok());
+  wait_for_line("begun");
+  const auto second = child.start(request());
+  ASSERT_FALSE(second.ok());
+  EXPECT_EQ(second.error().kind, ErrorKind::refused);
+  EXPECT_TRUE(child.cancel().ok());
+  EXPECT_EQ(end().state(), State::CANCELLED);
+  EXPECT_TRUE(child.start(request()).ok());
+}
+
+TEST_F(ReconstructionChildTest, OneThatIgnoresTheCancelIsKilledAfterTheGrace) {
+  options_.grace = Seconds(0.1);
+  ReconstructionChild& child = with_script("trap '' TERM; echo $$ > $ROOT/pid; while :; do sleep 0.05; done");
+  ASSERT_TRUE(child.start(request()).ok());
+  const std::string pid = wait_for_line("pid");
+  EXPECT_EQ(child.cancel()->doing(), "being cancelled");
+  EXPECT_EQ(end().state(), State::CANCELLED);
+  EXPECT_TRUE(goes_away(pid));
+}
+
+TEST_F(ReconstructionChildTest, ItGoesWithItsOwner) {
+  ASSERT_TRUE(with_script("echo $$ > $ROOT/pid; exec sleep 100").start(request()).ok());
+  const std::string pid = wait_for_line("pid");
+  child_.reset();
+  EXPECT_TRUE(goes_away(pid));
+}
+
+TEST_F(ReconstructionChildTest, ItHoldsNoneOfOurFilesAndLetsOthersGoFirst) {
+  const UniqueFd ours(::open((root_ / "ours").c_str(), O_CREAT | O_RDONLY, 0600));  // not closed on exec
+  end_of("sleep 0.3; ls -l /proc/$$/fd > $ROOT/held; nice > $ROOT/nice");
+  const std::string held = test::bytes_of(root_ / "held");
+  EXPECT_THAT(held, HasSubstr("/dev/null"));
+  EXPECT_THAT(held, Not(HasSubstr("/ours")));
+  EXPECT_GE(std::stoi(wait_for_line("nice")), 10);
+}
+
+TEST_F(ReconstructionChildTest, AProgramThatIsNotThereIsNamed) {
+  with_script("");
+  fs::remove(root_ / "program");
+  ASSERT_TRUE(child_->start(request()).ok());
+  EXPECT_THAT(end().error(), HasSubstr(options_.program.string()));
+}
+
+TEST_F(ReconstructionChildTest, SessionsOutsideTheFolderAndValuesOutOfRangeAreRefused) {
+  fs::create_directories(root_ / "elsewhere");
+  std::ofstream(root_ / "elsewhere/manifest.json") << "{}";
+  ReconstructionChild& child = with_script("echo x > $ROOT/begun");
+  for (const char* name :
+       {"", ".", "..", "../elsewhere", "candle/../../elsewhere", "/etc", "absent", "a\nb"}) {
+    const auto refused = child.start(request(name));
+    ASSERT_FALSE(refused.ok()) << name;
+    EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
+  }
+  v1::ReconstructRequest wrong = request();
+  wrong.set_voxels(5000);
+  EXPECT_THAT(child.start(wrong).error().message(), HasSubstr("voxels"));
+  wrong = request();
+  wrong.set_device("--help");
+  EXPECT_THAT(child.start(wrong).error().message(), HasSubstr("cuda"));
+  wrong = request();
+  wrong.set_budget_s(-1);
+  EXPECT_THAT(child.start(wrong).error().message(), HasSubstr("budget_s"));
+  EXPECT_FALSE(child.status().has_value());
+  EXPECT_FALSE(fs::exists(root_ / "begun"));
+}
+
+}  // namespace
+}  // namespace emberlock

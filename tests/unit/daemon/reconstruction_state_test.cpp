@@ -1,0 +1,146 @@
+#include <cmath>
+#include <csignal>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include <gmock/gmock.h>
+
+#include "daemon/reconstruction/state.h"
+
+namespace emberlock {
+namespace {
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+ReconstructionState begun(const std::string& device = "cuda") {
+  v1::ReconstructionStatus status;
+  status.set_id("candle 1");
+  status.set_session("candle");
+  status.set_device(device);
+  return ReconstructionState(status);
+}
+
+v1::ChildMessage at_work(double fraction, const std::string& doing) {
+  v1::ChildMessage message;
+  message.mutable_progress()->set_fraction(fraction);
+  message.mutable_progress()->set_doing(doing);
+  return message;
+}
+
+v1::ChildMessage iteration(std::uint32_t number) {
+  v1::ChildMessage message;
+  message.mutable_iteration()->mutable_iteration()->set_iteration(number);
+  return message;
+}
+
+v1::ChildMessage done() {
+  v1::ChildMessage message;
+  message.mutable_done()->set_result("/results/candle");
+  message.mutable_done()->add_advice("as many iterations again");
+  message.mutable_done()->add_warnings("few views");
+  return message;
+}
+
+/// Of a child that ended so while it carved the hull.
+std::string error_of(const ChildEnd& end, const std::string& device = "cuda",
+                     const std::string& last_words = "") {
+  ReconstructionState state = begun(device);
+  state.take(at_work(0.3, "carving the hull"));
+  state.end(end, last_words);
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::FAILED);
+  return state.status().error();
+}
+
+TEST(ReconstructionState, IsDoneWhenTheChildSaidSoAndLeftWell) {
+  ReconstructionState state = begun();
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::RUNNING);
+  state.take(done());
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::RUNNING) << "it hasn't left yet";
+  state.end({}, "");
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::DONE);
+  EXPECT_EQ(state.status().fraction(), 1);
+  EXPECT_EQ(state.status().result(), "/results/candle");
+  EXPECT_THAT(state.status().advice(), ElementsAre("as many iterations again", "few views"));
+}
+
+TEST(ReconstructionState, ACancelThatCameTooLateIsNone) {
+  ReconstructionState state = begun();
+  state.take(done());
+  state.end({.why = ChildEnd::Why::cancelled}, "");
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::DONE);
+}
+
+TEST(ReconstructionState, AFractionThatIsNoneIsPassedOver) {
+  ReconstructionState state = begun();
+  state.take(at_work(0.25, "a"));
+  state.take(at_work(std::nan(""), "b"));
+  EXPECT_EQ(state.status().fraction(), 0.25);
+  EXPECT_EQ(state.status().doing(), "b");
+  state.take(at_work(1e300, "c"));
+  EXPECT_EQ(state.status().fraction(), 1);
+}
+
+TEST(ReconstructionState, IterationsBearItsIdAndThePictureAtTheEndIsNoFurtherOne) {
+  ReconstructionState state = begun();
+  EXPECT_EQ(state.take(iteration(1))->reconstruction(), "candle 1");
+  state.take(iteration(2));
+  EXPECT_TRUE(state.take(iteration(2)).has_value()) << "the board shows its picture";
+  EXPECT_EQ(state.status().iterations_size(), 2);
+}
+
+TEST(ReconstructionState, OfManyIterationsTheNewestAreKept) {
+  ReconstructionState state = begun();
+  for (std::uint32_t i = 1; i <= 1200; ++i) state.take(iteration(i));
+  ASSERT_EQ(state.status().iterations_size(), ReconstructionState::kIterations);
+  EXPECT_EQ(state.status().iterations().rbegin()->iteration(), 1200U);
+}
+
+TEST(ReconstructionState, AVolumeWhoseBytesAreNotItsSizeIsNotShown) {
+  ReconstructionState state = begun();
+  v1::ChildMessage message = iteration(1);
+  v1::VolumePreview& volume = *message.mutable_iteration()->mutable_volume();
+  volume.set_nx(2);
+  volume.set_ny(2);
+  volume.set_nz(2);
+  for (int i = 0; i < 3; ++i) {
+    volume.mutable_box()->add_center(0);
+    volume.mutable_box()->add_size(1);
+  }
+  volume.set_voxels("12345678");
+  EXPECT_TRUE(state.take(v1::ChildMessage(message))->has_volume());
+  volume.set_voxels("1234567");
+  EXPECT_FALSE(state.take(v1::ChildMessage(message))->has_volume());
+  volume.set_nx(std::numeric_limits<std::uint32_t>::max());
+  EXPECT_FALSE(state.take(std::move(message))->has_volume());
+}
+
+TEST(ReconstructionState, ACrashNamesItsSignalWhatItDidAndTheWayOut) {
+  const std::string error = error_of({.signal = SIGSEGV}, "cuda", "CUDA error 700");
+  EXPECT_THAT(error, HasSubstr("SIGSEGV"));
+  EXPECT_THAT(error, HasSubstr("carving the hull"));
+  EXPECT_THAT(error, HasSubstr("CUDA error 700"));
+  EXPECT_THAT(error, HasSubstr("device cpu"));
+  EXPECT_THAT(error_of({.signal = SIGSEGV}, "cpu"), Not(HasSubstr("device cpu"))) << "it is what failed";
+  EXPECT_THAT(error_of({.signal = SIGKILL}), HasSubstr("memory"));
+}
+
+TEST(ReconstructionState, WhatTheChildSaidOfItsFailureIsTheError) {
+  ReconstructionState state = begun();
+  v1::ChildMessage message;
+  message.mutable_failure()->set_message("--voxels: not enough memory. Give fewer");
+  state.take(std::move(message));
+  state.end({.code = 2}, "emberlock: the same");
+  EXPECT_EQ(state.status().error(), "--voxels: not enough memory. Give fewer");
+}
+
+TEST(ReconstructionState, AnEndWithoutAResultIsAFailure) {
+  EXPECT_THAT(error_of({}), HasSubstr("without a result"));
+  EXPECT_THAT(error_of({.code = 127}), HasSubstr("127"));
+  EXPECT_THAT(error_of({.why = ChildEnd::Why::silent, .words = "it told nothing for 600 s"}),
+              HasSubstr("600 s"));
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -54,15 +54,22 @@ class Reader {
         {reading_.config, root, [this](const toml::source_region& at, std::string what, std::string remedy) {
            problem(at, std::move(what), std::move(remedy));
          }});
-    return std::move(reading_);
+    return take();
   }
 
   void problem(const toml::source_region& at, std::string what, std::string remedy) {
-    reading_.problems.push_back(Error{ErrorKind::bad_input, std::move(what),
-                                      fmt::format("{}:{}:{}", file_.string(), at.begin.line, at.begin.column),
-                                      std::move(remedy)});
+    problems_.emplace_back(
+        at.begin,
+        Error{ErrorKind::bad_input, std::move(what),
+              fmt::format("{}:{}:{}", file_.string(), at.begin.line, at.begin.column), std::move(remedy)});
   }
-  ConfigReading take() { return std::move(reading_); }
+  /// With the problems in the order of the file.
+  ConfigReading take() {
+    std::stable_sort(problems_.begin(), problems_.end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (auto& [place, problem] : problems_) reading_.problems.push_back(std::move(problem));
+    return std::move(reading_);
+  }
 
  private:
   /// What may stand in a table: its keys, and the sections directly below it.
@@ -158,6 +165,7 @@ class Reader {
 
   std::filesystem::path file_;
   ConfigReading reading_;
+  std::vector<std::pair<toml::source_position, Error>> problems_;
 };
 
 /// Relative paths start from the file's folder.
@@ -175,6 +183,15 @@ void anchor(DaemonConfig& config, const std::filesystem::path& folder) {
                      &server.token_file, &server.console}) {
     from_folder(*path);
   }
+}
+
+/// PREFIX/share/emberlock/console of PREFIX/sbin/emberlockd, else console of a build's bin/emberlockd.
+std::filesystem::path console_beside_program() {
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  const std::filesystem::path prefix = program.parent_path().parent_path();
+  const std::filesystem::path built = prefix / "console";
+  return std::filesystem::is_directory(built, error) ? built : prefix / "share/emberlock/console";
 }
 
 }  // namespace
@@ -200,7 +217,9 @@ Result<DaemonConfig> parse_config(std::string_view text, const std::filesystem::
 
 Result<DaemonConfig> load_config(const std::filesystem::path& file) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kLargestFile));
-  return parse_config(text, file);
+  EMBERLOCK_ASSIGN_OR_RETURN(DaemonConfig config, parse_config(text, file));
+  if (config.server.console.empty()) config.server.console = console_beside_program();
+  return config;
 }
 
 }  // namespace emberlock

@@ -114,13 +114,13 @@ struct ServerConfig {
   std::filesystem::path tls_certificate, tls_key;  ///< PEM
   std::filesystem::path
       tls_clients;  ///< PEM of the authority that signs clients' certificates; empty: none asked for
-  std::filesystem::path token_file;                          ///< its first line is the token
-  std::filesystem::path console = EMBERLOCK_CONSOLE_FOLDER;  ///< the console's files
-  int viewers = 64;                                          ///< at most so many WebSockets
-  int picture_width = 480;                                   ///< pixels, at most
-  Hertz picture_rate{12};                                    ///< of a camera, at most
-  int picture_quality = 75;                                  ///< JPEG's, 1..100
-  std::uint64_t message_bytes = std::uint64_t{4} << 20;      ///< a client's request, at most
+  std::filesystem::path token_file;  ///< its first line is the token
+  std::filesystem::path console;  ///< the console's files; empty: load_config finds them beside the program
+  int viewers = 64;               ///< at most so many WebSockets
+  int picture_width = 480;        ///< pixels, at most
+  Hertz picture_rate{12};         ///< of a camera, at most
+  int picture_quality = 75;       ///< JPEG's, 1..100
+  std::uint64_t message_bytes = std::uint64_t{4} << 20;  ///< a client's request, at most
 };
 
 struct LogConfig {

@@ -386,7 +386,10 @@ Section<DaemonConfig> make_server_section() {
                "\"clients.crt\""),
        text<C>("token_file", EMBERLOCK_AT(server.token_file), kPath,
                "Its first line is the token that clients show; nobody else may read it.", "\"token\""),
-       text<C>("console", EMBERLOCK_AT(server.console), kPath, "The folder of the console's files."),
+       text<C>("console", EMBERLOCK_AT(server.console), kPath,
+               "The folder of the console's files; share/emberlock/console beside the program's folder if "
+               "absent.",
+               "\"console\""),
        number<C>("viewers", EMBERLOCK_AT(server.viewers), {1, 1000}, "Consoles that may watch at a time."),
        number<C>("picture_width", EMBERLOCK_AT(server.picture_width), {32, 4096},
                  "Of live pictures, in pixels, at most."),

@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
   emberlock::cli::add_verify(app);
   emberlock::cli::add_tradeoff(app);
   emberlock::cli::add_demo(app);
+  emberlock::cli::add_doctor(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {

@@ -1,4 +1,5 @@
 #include "cli/commands.h"
+#include "cli/manual.h"
 
 int main(int argc, char** argv) {
   CLI::App app{
@@ -14,6 +15,7 @@ int main(int argc, char** argv) {
   emberlock::cli::add_tradeoff(app);
   emberlock::cli::add_demo(app);
   emberlock::cli::add_doctor(app);
+  emberlock::cli::add_manual(app, EMBERLOCK_VERSION);
   try {
     app.parse(argc, argv);
   } catch (const CLI::Success& e) {

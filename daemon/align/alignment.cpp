@@ -308,8 +308,8 @@ void Alignment::look(const Film& film) {
     if (film.readings[i].empty()) {
       sights_[i] = {};
     } else {
-      sights_[i] = sight_of(film.readings[i].back(), sensors_[i], result_.timing[i], result_.last.target,
-                            tolerance);
+      sights_[i] =
+          sight_of(film.readings[i].back(), sensors_[i], result_.timing[i], result_.last.target, tolerance);
     }
   }
 }
@@ -333,8 +333,7 @@ Status Alignment::carry_out() {
       trims_.push_back({i, at, *camera.trim});
     }
     if (!camera.reset) continue;
-    EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at,
-                               bench_.reset(i, camera.moment, state_.cameras[i].resets));
+    EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at, bench_.reset(i, camera.moment, state_.cameras[i].resets));
     const bool told = cameras_[i].method == ResetMethod::on_command;
     resets_.push_back({i, told ? std::optional(at) : std::nullopt});
   }

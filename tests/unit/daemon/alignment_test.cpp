@@ -1,10 +1,11 @@
 // One alignment, stepped by a caller that does other things between its rounds.
+#include "daemon/align/alignment.h"
+
 #include <cmath>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/align/alignment.h"
 #include "tests/support/small_rig.h"
 
 namespace emberlock {
@@ -83,7 +84,8 @@ TEST_F(AlignmentTest, ChecksTellTheDriftOfEveryCamera) {
   }
   std::vector<double> truth;
   for (int i = 0; i < bench.rig->size(); ++i)
-    truth.push_back(1e6 * (bench.rig->truth(0).timing.frame_period / bench.rig->truth(i).timing.frame_period));
+    truth.push_back(1e6 *
+                    (bench.rig->truth(0).timing.frame_period / bench.rig->truth(i).timing.frame_period));
   const auto [slowest, fastest] = std::minmax_element(truth.begin(), truth.end());
   const double middle = (*slowest + *fastest) / 2;
   for (std::size_t i = 0; i < truth.size(); ++i)
@@ -189,8 +191,8 @@ TEST(CameraSight, ATargetWhereADotWouldNotShowIsAbsent) {
   ASSERT_TRUE(target(180.5));
   EXPECT_NEAR(target(180.5)->value(), 20, 1e-9) << "wrapped";
   EXPECT_FALSE(target(261)) << "the register rests";
-  EXPECT_FALSE(sight_of(reading, SensorKind::rolling_shutter, timing, Seconds(0.01), milliseconds(3))
-                   .target_row);
+  EXPECT_FALSE(
+      sight_of(reading, SensorKind::rolling_shutter, timing, Seconds(0.01), milliseconds(3)).target_row);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   emberlock::cli::add_verify(app);
   emberlock::cli::add_tradeoff(app);
   emberlock::cli::add_demo(app);
+  emberlock::cli::add_sessions(app);
   emberlock::cli::add_doctor(app);
   emberlock::cli::add_manual(app, EMBERLOCK_VERSION);
   try {

@@ -1,0 +1,160 @@
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+#include <google/protobuf/util/json_util.h>
+
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "daemon/recordings/json.h"
+#include "daemon/recordings/store.h"
+#include "session/export.h"
+#include "session/verify.h"
+
+namespace emberlock::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SessionsArguments {
+  std::string folder;
+  std::string out;
+  std::string format = "png";
+  bool json = false;
+};
+
+/// A progress bar that Ctrl-C ends the step of.
+Observer until_interrupted(const std::string& title) {
+  return [bar = progress_bar(title)](double fraction, std::string_view what) {
+    bar(fraction, what);
+    return !Interrupt::asked();
+  };
+}
+
+std::string size_of(std::uint64_t bytes) {
+  return fmt::format("{:.1f} MB", static_cast<double>(bytes) / 1e6);
+}
+
+void print_table(const v1::ListSessionsResponse& sessions) {
+  if (sessions.sessions().empty()) std::printf("No sessions.\n");
+  for (const auto& s : sessions.sessions()) {
+    if (!s.error().empty()) {
+      std::printf("%-24s unreadable: %s\n", s.session().c_str(), s.error().c_str());
+      continue;
+    }
+    std::printf("%-24s %-9s %-10s %-24s %2u cameras %8llu frames %6llu lost %12s%s\n", s.session().c_str(),
+                v1::Manifest::State_Name(s.state()).c_str(), s.purpose().c_str(), s.created_utc().c_str(),
+                s.cameras(), static_cast<unsigned long long>(s.frames()),
+                static_cast<unsigned long long>(s.lost()), size_of(s.bytes()).c_str(),
+                s.calibrated() ? "  calibrated" : "");
+  }
+}
+
+void list(const SessionsArguments& a) {
+  if (!fs::is_directory(a.folder)) {
+    fail({ErrorKind::bad_input, "no such folder", a.folder, "Name the folder in which sessions lie"});
+  }
+  const v1::ListSessionsResponse sessions = or_fail(SessionStore::open(a.folder)).list();
+  if (!a.json) return print_table(sessions);
+  std::string json;
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  static_cast<void>(google::protobuf::util::MessageToJsonString(sessions, &json, options));
+  std::printf("%s\n", json.c_str());
+}
+
+void verify(const SessionsArguments& a) {
+  const Interrupt interrupt;
+  const SessionCheck check = or_fail(verify_session(a.folder, until_interrupted("verify")));
+  if (a.json) {
+    std::printf("%s\n", to_line(to_json(check)).c_str());
+  } else {
+    for (const CameraCheck& c : check.cameras) {
+      std::printf("%-24s %s of %s frames good", c.camera_id.c_str(), std::to_string(c.good).c_str(),
+                  std::to_string(c.recorded).c_str());
+      if (c.bad > 0) std::printf(", %s can't be read back", std::to_string(c.bad).c_str());
+      if (c.missing > 0) std::printf(", %s missing from the index", std::to_string(c.missing).c_str());
+      std::printf("\n");
+      for (const std::string& problem : c.problems) std::printf("  %s\n", problem.c_str());
+    }
+    for (const std::string& problem : check.problems) std::printf("%s\n", problem.c_str());
+    std::printf("%s\n", check.whole() ? "All there." : (check.to_do + ".").c_str());
+  }
+  if (!check.whole()) throw CLI::RuntimeError(1);
+}
+
+void repair(const SessionsArguments& a) {
+  const Interrupt interrupt;
+  const RepairReport report = or_fail(repair_session(a.folder, until_interrupted("repair")));
+  if (a.json) {
+    std::printf("%s\n", to_line(to_json(report)).c_str());
+    return;
+  }
+  for (const RepairedCamera& c : report.cameras) {
+    std::printf("%-24s %s frames kept, %s lost\n", c.camera_id.c_str(), std::to_string(c.kept).c_str(),
+                std::to_string(c.lost).c_str());
+    for (const std::string& file : c.rewritten) std::printf("  %s was written anew\n", file.c_str());
+  }
+  std::printf("%s\n", report.changed ? "Mended." : "Nothing to mend: all there.");
+}
+
+void export_frames(const SessionsArguments& a) {
+  const Interrupt interrupt;
+  const ExportFormat format = a.format == "png" ? ExportFormat::png : ExportFormat::video;
+  const ExportReport report = or_fail(export_session(a.folder, a.out, format, until_interrupted("export")));
+  if (a.json) {
+    std::printf("%s\n", to_line(to_json(report)).c_str());
+    return;
+  }
+  for (const ExportedCamera& c : report.cameras) {
+    std::printf("%s: %s frames", (fs::path(a.out) / c.file).c_str(), std::to_string(c.frames).c_str());
+    if (format == ExportFormat::video)
+      std::printf(" at %.3f a second, %s", c.frame_rate.value(), report.codec.c_str());
+    if (c.gaps > 0) std::printf(", %s gaps", std::to_string(c.gaps).c_str());
+    if (c.repeated > 0) std::printf(" filled with %s repeated frames", std::to_string(c.repeated).c_str());
+    if (c.unreadable > 0) std::printf(", %s unreadable ones left out", std::to_string(c.unreadable).c_str());
+    std::printf("\n");
+  }
+}
+
+/// `sessions NAME`, of one session's folder.
+CLI::App* add_verb(CLI::App& sessions, const char* name, const char* words,
+                   const std::shared_ptr<SessionsArguments>& a, void (*run)(const SessionsArguments&)) {
+  CLI::App* verb = sessions.add_subcommand(name, words);
+  verb->add_option("SESSION", a->folder, "The session's folder")->required();
+  verb->add_flag("--json", a->json, "One JSON object");
+  verb->callback([a, run] { run(*a); });
+  return verb;
+}
+
+}  // namespace
+
+void add_sessions(CLI::App& app) {
+  auto a = std::make_shared<SessionsArguments>();
+  CLI::App* sessions = app.add_subcommand("sessions", "Lists, verifies, mends and exports recordings.");
+  sessions->require_subcommand(1);
+  CLI::App* all = sessions->add_subcommand("list", "The sessions in a folder, the newest first.");
+  all->add_option("FOLDER", a->folder, "In which sessions lie; this one if not said");
+  all->add_flag("--json", a->json, "One JSON object");
+  all->callback([a] {
+    if (a->folder.empty()) a->folder = ".";
+    list(*a);
+  });
+  add_verb(*sessions, "verify",
+           "Reads every frame back and compares it with what was recorded. Exit code 1: not all there.", a,
+           verify);
+  add_verb(*sessions, "repair",
+           "Salvages a session whose recorder was killed; of a damaged one keeps what is good and says what "
+           "is lost.",
+           a, repair);
+  CLI::App* out =
+      add_verb(*sessions, "export", "Writes frames as files that other programs read.", a, export_frames);
+  out->add_option("--out", a->out, "The folder to make")->required();
+  out->add_option("--format", a->format, "png: images, sample for sample; video: H.264, to look at")
+      ->check(CLI::IsMember({"png", "video"}))
+      ->capture_default_str();
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,79 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "session/files.h"
+#include "tests/support/recording.h"
+#include "tests/support/verb.h"
+
+namespace emberlock::cli {
+namespace {
+
+using test::record;
+using test::run_verb;
+using test::small_disk_options;
+using test::TempFolder;
+using ::testing::HasSubstr;
+
+const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
+
+void damage(const std::filesystem::path& session) {
+  const auto path = find_segment(session, "cam0", 0);
+  std::string bytes = test::bytes_of(path);
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+  test::put_bytes(path, bytes);
+}
+
+TEST(SessionsVerb, ListsWhatLiesInAFolder) {
+  const TempFolder temp;
+  record(temp / "flame 1", kLayout, 5, small_disk_options());
+  const auto table = run_verb(add_sessions, {"sessions", "list", temp.path().string()});
+  EXPECT_EQ(table.exit_code, 0) << table.err;
+  EXPECT_THAT(table.out, HasSubstr("flame 1"));
+  EXPECT_THAT(table.out, HasSubstr("COMPLETE"));
+  const auto json =
+      nlohmann::json::parse(run_verb(add_sessions, {"sessions", "list", temp.path().string(), "--json"}).out);
+  EXPECT_EQ(json["sessions"][0]["session"], "flame 1");
+  EXPECT_EQ(json["sessions"][0]["frames"], "5");
+  EXPECT_EQ(run_verb(add_sessions, {"sessions", "list", (temp / "absent").string()}).exit_code, 2);
+  EXPECT_FALSE(std::filesystem::exists(temp / "absent"));
+}
+
+TEST(SessionsVerb, VerifiesRepairsAndVerifiesAgain) {
+  const TempFolder temp;
+  record(temp / "s", kLayout, 5, small_disk_options());
+  const std::string session = (temp / "s").string();
+  EXPECT_EQ(run_verb(add_sessions, {"sessions", "verify", session}).exit_code, 0);
+  damage(temp / "s");
+  const auto bad = run_verb(add_sessions, {"sessions", "verify", session});
+  EXPECT_EQ(bad.exit_code, 1);
+  EXPECT_THAT(bad.out, HasSubstr("000000.mkv"));
+  EXPECT_THAT(bad.out, HasSubstr("repair"));
+  const auto repaired = run_verb(add_sessions, {"sessions", "repair", session, "--json"});
+  EXPECT_EQ(repaired.exit_code, 0) << repaired.err;
+  EXPECT_EQ(nlohmann::json::parse(repaired.out)["cameras"][0]["lost"], 1);
+  const auto good = run_verb(add_sessions, {"sessions", "verify", session, "--json"});
+  EXPECT_EQ(good.exit_code, 0);
+  EXPECT_EQ(nlohmann::json::parse(good.out)["cameras"][0]["good"], 4);
+  EXPECT_EQ(run_verb(add_sessions, {"sessions", "verify", (temp / "absent").string()}).exit_code, 2);
+}
+
+TEST(SessionsVerb, ExportsImagesAndVideos) {
+  const TempFolder temp;
+  record(temp / "s", kLayout, 3, small_disk_options());
+  const std::string session = (temp / "s").string();
+  const auto images =
+      run_verb(add_sessions, {"sessions", "export", session, "--out", (temp / "png").string()});
+  EXPECT_EQ(images.exit_code, 0) << images.err;
+  EXPECT_TRUE(std::filesystem::exists(temp / "png/cam0/000002.png"));
+  const auto video = run_verb(add_sessions, {"sessions", "export", session, "--out", (temp / "mp4").string(),
+                                             "--format", "video", "--json"});
+  EXPECT_EQ(video.exit_code, 0) << video.err;
+  EXPECT_EQ(nlohmann::json::parse(video.out)["cameras"][0]["frames"], 3);
+  EXPECT_TRUE(std::filesystem::exists(temp / "mp4/cam0.mp4"));
+  EXPECT_EQ(run_verb(add_sessions, {"sessions", "export", session, "--out", session}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace emberlock::cli

@@ -9,15 +9,15 @@ import {call} from './wire';
 const verdicts = {VERDICT_UNSPECIFIED: '', GO_ON: 'going on', ALIGNED: 'aligned', REFUSED: 'refused', GIVEN_UP: 'given up'};
 const policies = ['', 'fixed-reference', 'densest', 'timed', 'trimmed'];
 
-/** "about 12 resets in 40 s (95 %: 20 in 1 min 10 s)". */
+/** "12 resets in 40 s (95 %: 20 in 1 min 10 s)". */
 export function costWords(cost: AlignmentCost): string {
-  return `about ${plural(Math.round(cost.resets), 'reset')} in ${span(cost.time_s)} (95 %: ${count(cost.resets_p95)} in ${span(cost.time_p95_s)})`;
+  return `${plural(Math.round(cost.resets), 'reset')} in ${span(cost.time_s)} (95 %: ${count(cost.resets_p95)} in ${span(cost.time_p95_s)})`;
 }
 
 export class Alignment {
-  private readonly tolerance = el('input', {id: 'tolerance', name: 'tolerance', size: 9, placeholder: 'configured', spellcheck: false, autocomplete: 'off',
+  private readonly tolerance = el('input', {id: 'tolerance', name: 'tolerance', size: 9, placeholder: 'default', spellcheck: false, autocomplete: 'off',
                                             'aria-describedby': 'tolerance-help'});
-  private readonly policy = el('select', {id: 'policy', name: 'policy'}, ...policies.map(name => el('option', {value: name}, name || 'configured')));
+  private readonly policy = el('select', {id: 'policy', name: 'policy'}, ...policies.map(name => el('option', {value: name}, name || 'default')));
   private readonly start = el('button', {class: 'primary', type: 'submit'}, 'Align');
   private readonly stop = el('button', {class: 'quiet', type: 'button', onclick: () => this.stopping.press()}, 'Stop');
   private readonly stopping = new TwoStep(this.stop, armed => (armed ? 'Press again to stop' : 'Stop'), () => void act(call('Sync/Stop')));
@@ -36,13 +36,14 @@ export class Alignment {
       el('span', {id: 'tolerance-help', class: 'hidden'}, 'For example 100rows or 5.4ms'));
     this.root = el('section', {id: 'alignment', class: 'panel', 'aria-labelledby': 'alignment-title'},
       el('h2', {id: 'alignment-title'}, 'Alignment'), form, this.verdict, this.offers, this.numbers, this.plot.root, this.cost);
+    show(this.plot.root, false);
   }
 
   show(status: DaemonStatus): void {
     const busy = status.phase === 'CAPTURING' || status.phase === 'FINISHING';
     const running = status.phase === 'CALIBRATING' || status.phase === 'ALIGNING';
     this.start.disabled = busy || running;
-    setText(this.start, status.phase === 'LOCKED' ? 'Align anew' : running ? 'Aligning …' : 'Align');
+    setText(this.start, status.phase === 'LOCKED' ? 'Align anew' : 'Align');
     this.stop.disabled = !(running || status.phase === 'LOCKED');
     if (this.stop.disabled && this.stopping.armed) this.stopping.disarm();
     const a = status.alignment;
@@ -54,7 +55,7 @@ export class Alignment {
     setText(this.verdict, [verdicts[a.verdict] && `${verdicts[a.verdict][0]!.toUpperCase()}${verdicts[a.verdict].slice(1)}.`, a.reason].filter(Boolean).join(' '));
     this.showNumbers(a);
     this.showOffers(a, this.start.disabled);
-    setText(this.cost, a.cost ? `Foretold: ${costWords(a.cost)}.` : '');
+    setText(this.cost, a.cost ? `Foretold: ${costWords(a.cost)}` : '');
     this.showHistory(a, status.cameras.map(camera => camera.id));
   }
 
@@ -75,7 +76,7 @@ export class Alignment {
 
   private showNumbers(a: AlignmentStatus): void {
     const list: [string, string][] = [
-      ['tolerance', `± ${fixed(a.tolerance_rows, 0)} rows`],
+      ['± rows', fixed(a.tolerance_rows, 0)],
       ['policy', a.policy || '–'],
       ['round', count(a.round)],
       ['resets', count(a.resets)],

@@ -46,6 +46,9 @@ document.body.append(
   el('footer', {}, figures, el('button', {class: 'quiet', type: 'button', onclick: () => keys.help.showModal()}, 'Keys: ?')),
   cameras.enlarged.root, keys.help, token.root, toastArea);
 
+// What scrolls stops below the header, however many faults that names.
+new ResizeObserver(() => document.documentElement.style.setProperty('--header', `${header.root.offsetHeight}px`)).observe(header.root);
+
 const link: Link = new Link({
   connection(state) {
     header.connection(state);

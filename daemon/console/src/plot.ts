@@ -79,7 +79,7 @@ export class Plot {
       cursor: {show: false},
       scales: {x: {time: false}, y: options.linear ? {distr: 4, asinh: options.linear} : {}},
       axes: [{...axis, label: options.x, size: 34},
-             {...axis, label: options.y, size: 58, ...(linear ? {splits: (plot: uPlot) => ticksAround(linear, plot.scales.y!)} : {}),
+             {...axis, label: options.y, size: 58, ...(linear ? {splits: (plot: uPlot) => ticksAround(linear, plot.scales.y!), filter: (_: uPlot, splits: number[]) => splits} : {}),
               ...(tick ? {values: (_: uPlot, values: number[]) => values.map(v => (v === null ? '' : tick(v)))} : {})}],
       series: [{}, ...lines.map(line => ({stroke: line.colour, width: 2, dash: line.dash, points: {show: true, size: 5, fill: line.colour}, spanGaps: true}))],
       hooks: {drawAxes: [plot => this.drawBand(plot)]},

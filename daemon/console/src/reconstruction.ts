@@ -32,8 +32,8 @@ export class Reconstruction {
   private readonly latest = el('p', {class: 'latest'});
   private readonly place = el('div', {class: 'volume', tabindex: 0, role: 'img', 'aria-label': 'The reconstructed volume: drag to turn it, arrow keys turn it too'});
   private readonly volumeNote = el('p', {class: 'note'}, 'The volume comes with the first iteration.');
-  private readonly effects = el('ul');
-  private readonly advice = el('ul');
+  private readonly effects = el('ul', {class: 'reasons'});
+  private readonly advice = el('ul', {class: 'reasons'});
   private readonly result = el('p', {class: 'result'});
   private readonly content: HTMLElement;
   private readonly none = el('p', {class: 'empty'}, 'Nothing was reconstructed since the start. Sessions below has a button for each that is calibrated.');

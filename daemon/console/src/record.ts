@@ -2,7 +2,7 @@
 import type {Counts, DaemonStatus, RecordingStatus} from './api.gen';
 import {act, TwoStep} from './act';
 import {el, set, setText, show} from './dom';
-import {bytes, clock, count, fixed, percent, plural, short} from './format';
+import {bytes, clock, count, fixed, percent, short} from './format';
 import {call} from './wire';
 
 const causes: [keyof Counts, string][] = [
@@ -100,7 +100,7 @@ export class Record {
       ['frames', count(r.frames)],
       ['written', bytes(r.bytes)],
       ['rate', `${fixed(r.bytes_per_s / 1e6, 1)} MB/s`],
-      ['spread at start', short(r.spread_s)],
+      ['spread', short(r.spread_s)],
     ];
     if (r.transcoded !== undefined && r.transcoded < 1) list.push(['compressed', percent(r.transcoded)]);
     while (this.numbers.children.length > list.length) this.numbers.lastElementChild!.remove();
@@ -115,7 +115,7 @@ export class Record {
     set(this.drops, 'data-bad', lost.length > 0);
     setText(this.drops, lost.length === 0 ? 'No frame lost' : `Lost: ${lost.map(([cause, frames]) => `${count(frames)} ${cause}`).join(', ')}`);
     set(this.verdict, 'data-verdict', r.state);
-    setText(this.verdict, r.verdict || (r.state === 'COMPLETE' ? `${plural(r.frames, 'frame')}, all accounted for.` : ''));
+    setText(this.verdict, r.verdict);
   }
 
   private go(): void {

@@ -1,8 +1,8 @@
 // What is read from across the room: the phase, whether all is well, who does what next, and what is wrong.
-import type {DaemonStatus, Fault} from './api.gen';
+import type {CameraStatus, DaemonStatus, Fault} from './api.gen';
 import {act} from './act';
 import {el, Keyed, set, setText, show} from './dom';
-import {clock, fixed, timeOfDay} from './format';
+import {clock, count, fixed, known, timeOfDay} from './format';
 import type {Connection} from './link';
 import {lightWords, phaseWords, showSign, Sign} from './light';
 import {call} from './wire';
@@ -36,6 +36,14 @@ class FaultLine {
 /** CAMERA_LOST: "Camera lost". */
 export function faultWords(kind: Fault['kind']): string {
   return kind[0] + kind.slice(1).toLowerCase().replaceAll('_', ' ');
+}
+
+/** Why this camera is the one: "It is 412 rows early; 100 are allowed." */
+export function resetWhy(camera: CameraStatus | undefined): string {
+  if (!camera) return '';
+  if (!known(camera.error_rows)) return camera.reason;
+  const off = `It is ${count(Math.abs(camera.error_rows))} rows ${camera.error_rows > 0 ? 'early' : 'late'}`;
+  return known(camera.tolerance_rows) ? `${off}; ${count(camera.tolerance_rows)} are allowed.` : `${off}.`;
 }
 
 export class Header {
@@ -78,10 +86,11 @@ export class Header {
     setText(this.clock, clock(status.recording?.seconds ?? 0));
     setText(this.reason, status.reason);
     const camera = status.alignment?.reset_next || status.cameras.find(each => each.reset_next)?.id;
+    const why = resetWhy(status.cameras.find(each => each.id === camera));
     show(this.nextBox, status.next_step !== '' || Boolean(camera));
     set(this.nextBox, 'data-reset', Boolean(camera));
     setText(this.nextTitle, camera ? `Reset ${camera}` : 'Next');
-    setText(this.next, status.next_step);
+    setText(this.next, [status.next_step.replace(/[^.!?]$/, '$&.'), why].filter(Boolean).join(' '));
     setText(this.rig, [status.rig, status.version && `emberlockd ${status.version}`].filter(Boolean).join(' · '));
     const storage = status.storage;
     setText(this.disk, storage ? `disk ${storage.minutes_left >= 120 ? `${fixed(storage.minutes_left / 60, 1)} h` : `${fixed(storage.minutes_left, 0)} min`}` : '');

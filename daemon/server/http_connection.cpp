@@ -1,0 +1,299 @@
+#include "daemon/server/http_connection.h"
+
+#include <utility>
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/write.hpp>
+#include <boost/beast/http/chunk_encode.hpp>
+#include <boost/beast/http/read.hpp>
+#include <boost/beast/http/write.hpp>
+#include <boost/beast/websocket/rfc6455.hpp>
+#include <fmt/format.h>
+
+#include "daemon/server/errors.h"
+#include "daemon/server/metrics.h"
+#include "daemon/server/viewer.h"
+
+namespace emberlock {
+namespace {
+
+namespace asio = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+
+constexpr std::string_view kApiPath = "/api/v1/";
+constexpr std::string_view kWatchPath = "/api/v1/watch";
+constexpr std::string_view kJson = "application/json";
+constexpr std::string_view kText = "text/plain; charset=utf-8";
+constexpr const char* kPolicy =
+    "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' blob: data:; "
+    "worker-src 'self' "
+    "blob:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
+beast::string_view view(std::string_view text) { return {text.data(), text.size()}; }
+
+}  // namespace
+
+HttpConnection::HttpConnection(HttpContext& context, asio::ip::tcp::socket socket)
+    : context_(context), stream_(std::move(socket)) {
+  ++context_.connection_count;
+  beast::error_code ignored;
+  stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
+}
+
+HttpConnection::~HttpConnection() {
+  --context_.connection_count;
+  end_job();
+}
+
+void HttpConnection::close() {
+  beast::error_code ignored;
+  stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
+  stream_.close();
+}
+
+void HttpConnection::read_header() {
+  parser_.emplace();
+  parser_->header_limit(context_.options.largest_header);
+  parser_->body_limit(context_.options.largest_body);
+  stream_.expires_after(context_.patience());
+  http::async_read_header(
+      stream_, buffer_, *parser_,
+      [self = shared_from_this()](beast::error_code error, std::size_t /*bytes*/) {
+        if (!error) return self->judge();
+        if (error == http::error::header_limit)
+          return self->respond_error(431, "INVALID_ARGUMENT", "the head is too long", Next::end);
+        if (error == http::error::body_limit)
+          return self->respond_error(413, "INVALID_ARGUMENT", "the body is too long", Next::end);
+        if (error.category() == make_error_code(http::error::bad_method).category() &&
+            error != http::error::end_of_stream && error != http::error::partial_message)
+          return self->respond_error(400, "INVALID_ARGUMENT", "this is no HTTP", Next::end);
+        self->close();
+      });
+}
+
+void HttpConnection::judge() {
+  const auto& request = parser_->get();
+  auto target = parse_target(view(request.target()));
+  if (!target) return respond_error(400, "INVALID_ARGUMENT", "no such address", Next::end);
+  target_ = *std::move(target);
+  if (target_.path == "/healthz") return read_body();
+  const HttpHead head{.host = view(request[http::field::host]),
+                      .origin = view(request[http::field::origin]),
+                      .authorization = view(request[http::field::authorization]),
+                      .cookie = view(request[http::field::cookie])};
+  switch (context_.gate.judge(head, target_)) {
+    case HttpVerdict::welcome:
+      return read_body();
+    case HttpVerdict::give_cookie: {
+      Response moved = response(303, kText, "");
+      moved.set(http::field::location, view(std::string_view(target_.path)));
+      moved.set(http::field::set_cookie, HttpGate::cookie_of(target_.token));
+      return respond(std::move(moved), Next::end);
+    }
+    case HttpVerdict::wrong_host:
+      return respond_error(421, "PERMISSION_DENIED",
+                           "this name doesn't lead here: use localhost, or the address in numbers",
+                           Next::end);
+    case HttpVerdict::foreign_origin:
+      return respond_error(403, "PERMISSION_DENIED", "another site's page may not ask", Next::end);
+    case HttpVerdict::no_token:
+      return respond_error(
+          401, "UNAUTHENTICATED",
+          "the token is missing or wrong: open this page once with ?token=TOKEN, or send it as "
+          "\"Authorization: Bearer TOKEN\"",
+          Next::end);
+  }
+}
+
+void HttpConnection::read_body() {
+  stream_.expires_after(context_.patience());
+  http::async_read(stream_, buffer_, *parser_,
+                   [self = shared_from_this()](beast::error_code error, std::size_t /*bytes*/) {
+                     if (!error) return self->answer();
+                     if (error == http::error::body_limit)
+                       return self->respond_error(413, "INVALID_ARGUMENT", "the body is too long", Next::end);
+                     self->close();
+                   });
+}
+
+void HttpConnection::answer() {
+  stream_.expires_never();  // calls may take as long as devices do
+  const http::verb method = parser_->get().method();
+  const std::string_view path = target_.path;
+  if (path == kWatchPath) return watch();
+  if (path.starts_with(kApiPath)) {
+    if (method == http::verb::post) return answer_api(path.substr(kApiPath.size()));
+    return respond_error(405, "INVALID_ARGUMENT", "methods are called by POST");
+  }
+  if (method != http::verb::get && method != http::verb::head)
+    return respond_error(405, "INVALID_ARGUMENT", "this is read by GET");
+  if (path == "/healthz") {
+    const bool runs = context_.api.board().status()->phase() != v1::PHASE_UNSPECIFIED;
+    return respond(response(runs ? 200 : 503, kText, runs ? "serving\n" : "starting\n"));
+  }
+  if (path == "/metrics") {
+    const std::size_t others = context_.options.other_watchers ? context_.options.other_watchers() : 0;
+    return respond(response(200, "text/plain; version=0.0.4; charset=utf-8",
+                            metrics_text(*context_.api.board().status(), process_usage(),
+                                         {.viewers = context_.viewer_count, .other_watchers = others})));
+  }
+  answer_file();
+}
+
+void HttpConnection::answer_file() {
+  const ConsoleFiles::File* file = context_.console.find(target_.path);
+  if (file == nullptr && target_.path == "/")
+    return respond(
+        response(404, kText, "The console isn't installed here: [server] console names its folder.\n"));
+  if (file == nullptr) return respond_error(404, "NOT_FOUND", "there is no such page");
+  const bool known = view(parser_->get()[http::field::if_none_match]) == file->tag;
+  Response found = response(known ? 304 : 200, file->type, known ? std::string() : file->content);
+  found.set(http::field::etag, file->tag);
+  found.set(http::field::cache_control, view(file->caching));
+  found.set("Content-Security-Policy", kPolicy);
+  respond(std::move(found));
+}
+
+void HttpConnection::answer_api(std::string_view name) {
+  const JsonMethod* method = find_json_method(name);
+  if (method == nullptr) return respond_error(404, "UNIMPLEMENTED", "there is no such method");
+  if (method->job != nullptr) return start_job(*method);
+  call(*method);
+}
+
+void HttpConnection::call(const JsonMethod& method) {
+  // The connection is let go of on the server's thread, where alone it may end.
+  const bool queued = context_.workers.run([self = shared_from_this(), &method]() mutable {
+    auto result = method.call(self->context_.api, self->parser_->get().body());
+    auto& loop = self->context_.loop;
+    asio::post(loop, [self = std::move(self), result = std::move(result)]() mutable {
+      if (!result) return self->respond_error(result.error());
+      self->respond(self->response(200, kJson, std::move(*result)));
+    });
+  });
+  if (!queued) respond_error(429, "RESOURCE_EXHAUSTED", "too many calls are waiting: try again in a moment");
+}
+
+void HttpConnection::watch() {
+  if (!beast::websocket::is_upgrade(parser_->get()))
+    return respond_error(426, "INVALID_ARGUMENT", "this is a WebSocket");
+  if (context_.viewer_count >= context_.options.viewers)
+    return respond_error(503, "RESOURCE_EXHAUSTED", "too many consoles are open: close one", Next::end);
+  std::make_shared<Viewer>(context_, std::move(stream_))->run(parser_->release());
+}
+
+// ---- jobs: one JSON object a line, the newest progress alone
+
+void HttpConnection::start_job(const JsonMethod& method) {
+  if (parser_->get().version() < 11)
+    return respond_error(505, "INVALID_ARGUMENT", "jobs are told in chunks: HTTP/1.1", Next::end);
+  auto run = method.job(context_.api, parser_->get().body());
+  if (!run) return respond_error(run.error());
+  job_ = std::make_shared<Job>([weak = weak_from_this(), &loop = context_.loop] {
+    asio::post(loop, [weak] {
+      if (const auto self = weak.lock()) self->write_progress();
+    });
+  });
+  if (!context_.job_workers.run([job = job_, run = std::move(*run)] { job->run(run); })) {
+    job_.reset();
+    return respond_error(429, "RESOURCE_EXHAUSTED",
+                         "too many jobs are waiting: try again when one has ended");
+  }
+  context_.jobs.insert(job_);
+  notice_end();
+}
+
+/// Keeps the connection while its job runs, and ends the job when the client goes.
+void HttpConnection::notice_end() {
+  stream_.socket().async_wait(asio::ip::tcp::socket::wait_read,
+                              [self = shared_from_this()](beast::error_code error) {
+                                if (error) return;
+                                self->end_job();
+                                self->close();
+                              });
+}
+
+void HttpConnection::end_job() {
+  if (!job_) return;
+  job_->cancel();
+  context_.jobs.erase(job_);
+  job_.reset();
+}
+
+void HttpConnection::write_progress() {
+  if (!job_ || line_) return;
+  if (const auto progress = job_->take()) return write_line(to_json(*progress) + '\n');
+  const auto ended = job_->ended();
+  if (!ended) return;
+  end_job();
+  if (!head_sent_ && !ended->ok()) return respond_error(ended->error());
+  stream_.expires_after(context_.patience());
+  asio::async_write(
+      stream_, http::make_chunk_last(),
+      [self = shared_from_this()](beast::error_code /*error*/, std::size_t /*bytes*/) { self->close(); });
+}
+
+void HttpConnection::write_line(const std::string& json) {
+  std::string bytes;
+  if (!std::exchange(head_sent_, true)) {
+    bytes =
+        "HTTP/1.1 200 OK\r\nContent-Type: application/x-ndjson\r\nCache-Control: "
+        "no-store\r\nX-Content-Type-Options: "
+        "nosniff\r\nTransfer-Encoding: chunked\r\nConnection: close\r\n\r\n";
+  }
+  bytes += fmt::format("{:x}\r\n{}\r\n", json.size(), json);
+  line_ = std::make_shared<const std::string>(std::move(bytes));
+  stream_.expires_after(context_.patience());
+  asio::async_write(stream_, asio::buffer(*line_),
+                    [self = shared_from_this()](beast::error_code error, std::size_t /*bytes*/) {
+                      self->line_.reset();
+                      if (error) {
+                        self->end_job();
+                        return self->close();
+                      }
+                      self->stream_.expires_never();
+                      self->write_progress();
+                    });
+}
+
+// ---- answers
+
+HttpConnection::Response HttpConnection::response(unsigned status, std::string_view type,
+                                                  std::string content) const {
+  Response made{static_cast<http::status>(status), 11, std::move(content)};
+  made.set(http::field::content_type, view(type));
+  made.set(http::field::cache_control, "no-store");
+  made.set("X-Content-Type-Options", "nosniff");
+  made.set("Referrer-Policy", "no-referrer");
+  return made;
+}
+
+void HttpConnection::respond(Response response, Next next) {
+  const auto& request = parser_->get();
+  const bool only_head = request.method() == http::verb::head;
+  const bool ends = next == Next::end || !parser_->is_done() || !request.keep_alive();
+  response.keep_alive(!ends);
+  response.content_length(response.body().size());
+  if (only_head) response.body().clear();
+  answer_ = std::make_shared<const Response>(std::move(response));
+  stream_.expires_after(context_.patience());
+  http::async_write(stream_, *answer_,
+                    [self = shared_from_this(), ends](beast::error_code error, std::size_t /*bytes*/) {
+                      self->answer_.reset();
+                      if (error || ends) return self->close();
+                      self->read_header();
+                    });
+}
+
+void HttpConnection::respond_error(unsigned status, std::string_view code, std::string_view message,
+                                   Next next) {
+  respond(response(status, kJson, error_json(code, message) + '\n'), next);
+}
+
+void HttpConnection::respond_error(const Error& error) {
+  respond_error(static_cast<unsigned>(http_status(error.kind)), code_name(error.kind), error.message());
+}
+
+}  // namespace emberlock

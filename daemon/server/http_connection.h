@@ -1,0 +1,74 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/message.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <boost/beast/http/serializer.hpp>
+#include <boost/beast/http/string_body.hpp>
+
+#include "daemon/server/http_context.h"
+#include "daemon/server/json_api.h"
+
+namespace emberlock {
+
+/// One connection: requests one after another, each with a deadline, until it becomes a viewer or ends. On
+/// the server's thread.
+class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
+ public:
+  HttpConnection(HttpContext& context, boost::asio::ip::tcp::socket socket);
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
+  ~HttpConnection();
+
+  void run() { read_header(); }
+
+ private:
+  using Body = boost::beast::http::string_body;
+  using Response = boost::beast::http::response<Body>;
+  enum class Next { go_on, end };
+
+  void read_header();
+  /// Refuses by the head alone, before a body is read.
+  void judge();
+  void read_body();
+  void answer();
+  void answer_api(std::string_view method);
+  void answer_file();
+  void call(const JsonMethod& method);
+  void watch();
+
+  void start_job(const JsonMethod& method);
+  void notice_end();
+  void write_progress();
+  void write_line(const std::string& json);
+  void end_job();
+
+  [[nodiscard]] Response response(unsigned status, std::string_view type, std::string content) const;
+  void respond(Response response, Next next = Next::go_on);
+  void respond_error(unsigned status, std::string_view code, std::string_view message,
+                     Next next = Next::go_on);
+  void respond_error(const Error& error);
+  void close();
+
+  HttpContext& context_;
+  boost::beast::tcp_stream stream_;
+  boost::beast::flat_buffer buffer_;
+  std::optional<boost::beast::http::request_parser<Body>> parser_;
+  HttpTarget target_;
+  std::shared_ptr<const Response> answer_;  ///< that is being sent
+
+  std::shared_ptr<Job> job_;
+  std::shared_ptr<const std::string> line_;  ///< that is being sent
+  bool head_sent_ = false;
+};
+
+}  // namespace emberlock

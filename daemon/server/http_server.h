@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "base/quantity.h"
+#include "base/result.h"
+#include "daemon/api.h"
+#include "daemon/server/access.h"
+
+namespace emberlock {
+
+struct HttpServerOptions {
+  std::string listen = "127.0.0.1:7140";  ///< "address:port", "[::1]:7140"; port 0: any that is free
+  /// Demanded of everybody if `listen` isn't of this machine alone; then it must be there.
+  std::optional<Token> token = {};
+  std::filesystem::path console =
+      {};  ///< its files; where there are none the API is served alone, and a page that says so
+  std::size_t viewers = 64;       ///< WebSockets; beyond it 503
+  std::size_t connections = 256;  ///< beyond it they are closed at once
+  std::size_t workers = 4;        ///< calls at a time
+  std::size_t waiting = 32;       ///< more that queue; beyond it 429
+  std::size_t jobs = 2;           ///< verify, repair and export at a time
+  std::size_t waiting_jobs = 8;
+  std::uint32_t largest_header = 16 << 10;  ///< bytes
+  std::uint64_t largest_body = 1 << 20;     ///< bytes
+  std::size_t largest_wish = 64 << 10;      ///< bytes of a message from a viewer
+  Seconds patience{
+      15};  ///< for a whole header or body, for a client to take an answer, for a sign of life of a viewer
+  std::function<std::size_t()> other_watchers =
+      {};  ///< for /metrics: those that aren't viewers here (gRPC's)
+};
+
+/// The console and the API over HTTP/1.1, from one thread:
+///   GET /, /assets/...           the console
+///   POST /api/v1/<Service>/<Method>  json_api.h; jobs answer with one JSON object a line, as they go
+///   GET /api/v1/watch            WebSocket: watch_messages.h
+///   GET /metrics                 for Prometheus;  GET /healthz: 200 once the engine runs, without a token
+/// Serves while it lives; the Api must outlive it.
+class HttpServer {
+ public:
+  /// Errors: bad_input for an address that is none or that needs a token, io where the port is taken.
+  static Result<std::unique_ptr<HttpServer>> start(Api& api, HttpServerOptions options);
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+  /// Ends connections and jobs at once; calls that run are waited for.
+  ~HttpServer();
+
+  [[nodiscard]] int port() const;
+  [[nodiscard]] std::size_t viewers() const;
+
+ private:
+  struct Parts;
+  explicit HttpServer(std::unique_ptr<Parts> parts);
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include "emberlock/v1/status.pb.h"
+
+namespace emberlock {
+
+/// What the operating system counts of this process.
+struct ProcessUsage {
+  double cpu_s = 0;
+  std::uint64_t resident_bytes = 0;
+  std::size_t open_files = 0;
+  double start_s = 0;  ///< since 1970-01-01 UTC
+};
+/// What can't be read is 0.
+ProcessUsage process_usage();
+
+struct WatcherCounts {
+  std::size_t viewers = 0;         ///< consoles
+  std::size_t other_watchers = 0;  ///< gRPC's streams
+};
+
+/// All of it in Prometheus' text format, version 0.0.4.
+std::string metrics_text(const v1::DaemonStatus& status, const ProcessUsage& process,
+                         const WatcherCounts& watchers);
+
+}  // namespace emberlock

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/result.h"
+#include "emberlock/v1/services.pb.h"
+#include "emberlock/v1/status.pb.h"
+
+// What goes over the console's WebSocket. From the daemon, as text: {"status": DaemonStatus}, {"notice":
+// Notice},
+// {"iteration": IterationPreview without bytes}; as binary, what has bytes: the length of a header (u32,
+// little-endian), the header, which is JSON with a "kind", then the bytes. From the console, as text:
+// {"watch": WatchPicturesRequest}, or
+// {"watch": null} for no pictures.
+namespace emberlock {
+
+struct WatchMessage {
+  enum class Kind { text, binary };
+  Kind kind = Kind::text;
+  std::string bytes;
+};
+
+WatchMessage watch_message(const v1::DaemonStatus& status);
+WatchMessage watch_message(const v1::Notice& notice);
+/// {"kind": "picture", "camera_id", "frame_id", "monotonic_ns", "width", "height"} and the JPEG.
+WatchMessage watch_message(const v1::Picture& picture);
+/// The numbers, then what it has of {"kind": "captured" | "rendered", "reconstruction", "iteration",
+/// "camera_id"} with a JPEG, and {"kind": "volume", "reconstruction", "iteration", "nx", "ny", "nz", "box",
+/// "brightest"} with the voxels.
+std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview);
+
+/// What a console's message wants: which pictures, or none. Error bad_input: it is no such message.
+Result<std::optional<v1::WatchPicturesRequest>> parse_wish(std::string_view text);
+
+}  // namespace emberlock

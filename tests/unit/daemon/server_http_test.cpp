@@ -1,0 +1,323 @@
+// The console's server, asked by a client that says whatever bytes a test likes.
+#include <atomic>
+#include <chrono>
+#include <fstream>
+#include <future>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "daemon/server/http_server.h"
+#include "tests/support/fake_api.h"
+#include "tests/support/http_client.h"
+#include "tests/support/recording.h"
+#include "tests/support/wait.h"
+
+namespace emberlock {
+namespace {
+
+using nlohmann::json;
+using test::ask;
+using test::ask_raw;
+using test::HttpAnswer;
+using test::wait_until;
+using testing::AnyOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+class ServerHttpTest : public testing::Test {
+ protected:
+  ServerHttpTest() {
+    std::filesystem::create_directories(folder / "console/assets");
+    std::ofstream(folder / "console/index.html") << "<!doctype html>console";
+    std::ofstream(folder / "console/assets/main-0a1b2c3d.js") << "start()";
+    std::ofstream(folder / "secret") << "secret";
+    std::filesystem::create_symlink(folder / "secret", folder / "console/link.txt");
+  }
+  void serve(HttpServerOptions options = {}) {
+    if (options.listen == HttpServerOptions().listen) options.listen = "127.0.0.1:0";
+    options.console = folder / "console";
+    auto started = HttpServer::start(api, std::move(options));
+    ASSERT_TRUE(started.ok()) << started.error().message();
+    server = std::move(started).value();
+    port = server->port();
+  }
+  void show(v1::Phase phase) {
+    v1::DaemonStatus status;
+    status.set_phase(phase);
+    api.board().show(status);
+  }
+
+  test::TempFolder folder;
+  test::FakeApi api;
+  std::unique_ptr<HttpServer> server;
+  int port = 0;
+};
+
+TEST_F(ServerHttpTest, TheConsoleIsServedAndOnlyItsHashedNamesAreKeptForGood) {
+  serve();
+  const HttpAnswer page = ask(port, "GET", "/");
+  EXPECT_EQ(page.status, 200);
+  EXPECT_EQ(page.body, "<!doctype html>console");
+  EXPECT_THAT(page.head, HasSubstr("Content-Type: text/html"));
+  EXPECT_THAT(page.head, HasSubstr("script-src 'self'"));
+  EXPECT_THAT(page.head, HasSubstr("X-Content-Type-Options: nosniff"));
+  EXPECT_THAT(page.head, HasSubstr("Cache-Control: no-cache"));
+  const HttpAnswer script = ask(port, "GET", "/assets/main-0a1b2c3d.js");
+  EXPECT_EQ(script.body, "start()");
+  EXPECT_THAT(script.head, HasSubstr("text/javascript"));
+  EXPECT_THAT(script.head, HasSubstr("immutable"));
+}
+
+TEST_F(ServerHttpTest, WhatABrowserHasAlreadyIsNotSentAgain) {
+  serve();
+  const HttpAnswer page = ask(port, "GET", "/");
+  const std::size_t at = page.head.find("ETag: ");
+  ASSERT_NE(at, std::string::npos);
+  const std::string tag = page.head.substr(at + 6, page.head.find("\r\n", at) - at - 6);
+  const HttpAnswer again = ask(port, "GET", "/", "", "Host: localhost\r\nIf-None-Match: " + tag + "\r\n");
+  EXPECT_EQ(again.status, 304);
+  EXPECT_THAT(again.body, IsEmpty());
+  const HttpAnswer head = ask(port, "HEAD", "/");
+  EXPECT_EQ(head.status, 200);
+  EXPECT_THAT(head.body, IsEmpty());
+  EXPECT_THAT(head.head, HasSubstr("Content-Length: 22"));
+}
+
+TEST_F(ServerHttpTest, NoPathLeadsOutOfTheConsole) {
+  serve();
+  for (const char* path : {"/../secret", "/assets/../../secret", "/%2e%2e/secret", "/..%2fsecret", "//secret",
+                           "/link.txt", "/./secret", "/console/../secret", "secret", "../secret", "*",
+                           "http://localhost/../secret", "/index.html%00.js", "/assets"}) {
+    const HttpAnswer answer = ask(port, "GET", path);
+    EXPECT_THAT(answer.status, AnyOf(400, 404)) << path;
+    EXPECT_THAT(answer.body, Not(HasSubstr("\"secret\""))) << path;
+  }
+}
+
+TEST_F(ServerHttpTest, CallsAreAskedOfTheApiInJson) {
+  api.on_record = [](const v1::RecordRequest& request) {
+    v1::RecordingStatus status;
+    status.set_session(request.name());
+    status.set_bytes_per_s(5);
+    return status;
+  };
+  serve();
+  const HttpAnswer answer =
+      ask(port, "POST", "/api/v1/Capture/Record", R"({"name": "flame 1", "unlocked": true})");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(json::parse(answer.body), json({{"session", "flame 1"}, {"bytes_per_s", 5}}));
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Sync/Stop").body, "{}");
+  EXPECT_THAT(api.calls(), ElementsAre("record name: \"flame 1\" unlocked: true", "stop_sync"));
+}
+
+TEST_F(ServerHttpTest, AnErrorHasItsCodeAndTheWholeMessage) {
+  api.on_stop_sync = [] { return Error{ErrorKind::refused, "nothing is aligned", "sync", "align first"}; };
+  serve();
+  const HttpAnswer answer = ask(port, "POST", "/api/v1/Sync/Stop");
+  EXPECT_EQ(answer.status, 409);
+  EXPECT_EQ(json::parse(answer.body),
+            json({{"code", "FAILED_PRECONDITION"}, {"message", "sync: nothing is aligned. Align first"}}));
+}
+
+TEST_F(ServerHttpTest, WhatIsNoRequestOfOursIsRefusedAndNeverReachesTheApi) {
+  serve();
+  const struct {
+    const char* method;
+    const char* target;
+    std::string body;
+    int status;
+  } cases[] = {
+      {"POST", "/api/v1/Sync/Align", "{", 400},
+      {"POST", "/api/v1/Sync/Align", "[]", 400},
+      {"POST", "/api/v1/Sync/Align", R"({"tolerence": "100rows"})", 400},
+      {"POST", "/api/v1/Sync/Align", R"({"anyway": "perhaps"})", 400},
+      {"POST", "/api/v1/Sync/Align", std::string(100'000, '['), 400},
+      {"POST", "/api/v1/Sync/Nothing", "", 404},
+      {"POST", "/api/v1/", "", 404},
+      {"GET", "/api/v1/Sync/Align", "", 405},
+      {"DELETE", "/", "", 405},
+      {"GET", "/api/v1/watch", "", 426},
+      {"GET", "/nothing", "", 404},
+  };
+  for (const auto& c : cases)
+    EXPECT_EQ(ask(port, c.method, c.target, c.body).status, c.status) << c.target << c.body;
+  EXPECT_THAT(api.calls(), IsEmpty());
+}
+
+TEST_F(ServerHttpTest, OversizedAndMalformedRequestsAreRefused) {
+  serve();
+  EXPECT_EQ(ask(port, "GET", "/" + std::string(20'000, 'a')).status, 431);
+  EXPECT_EQ(ask(port, "GET", "/", "", "Host: localhost\r\nX: " + std::string(20'000, 'a') + "\r\n").status,
+            431);
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Sync/Align", std::string(2'000'000, ' ')).status, 413);
+  EXPECT_EQ(ask_raw(port, "this is no HTTP\r\n\r\n").status, 400);
+  EXPECT_EQ(ask_raw(port, std::string("\x16\x03\x01\x02\x00\x01", 6) + std::string(500, '\0')).status, 400);
+  EXPECT_THAT(api.calls(), IsEmpty());
+}
+
+TEST_F(ServerHttpTest, AClientThatDawdlesIsCutOff) {
+  serve({.patience = milliseconds(100)});
+  const UniqueFd idle = test::connect_to(port);
+  const UniqueFd in_head = test::connect_to(port);
+  test::send_all(in_head, "GET / HTTP/1.1\r\nHost:");
+  const UniqueFd in_body = test::connect_to(port);
+  test::send_all(in_body,
+                 "POST /api/v1/Sync/Stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n\r\n{");
+  // Each ends, without an answer.
+  for (const UniqueFd* socket : {&idle, &in_head, &in_body})
+    EXPECT_THAT(test::read_to_end(*socket), IsEmpty());
+  EXPECT_EQ(ask(port, "GET", "/").status, 200);
+}
+
+TEST_F(ServerHttpTest, BeyondTheMostConnectionsNoneIsTaken) {
+  serve({.connections = 1});
+  {
+    const UniqueFd first = test::connect_to(port);
+    ASSERT_TRUE(wait_until([&] { return ask(port, "GET", "/").status == 0; }));
+  }
+  EXPECT_TRUE(wait_until([&] { return ask(port, "GET", "/").status == 200; }));
+}
+
+TEST_F(ServerHttpTest, BeyondTheQueueCallsAreRefused) {
+  std::promise<void> go;
+  const std::shared_future<void> gone = go.get_future().share();
+  std::atomic<int> running = 0;
+  api.on_stop_sync = [&] {
+    ++running;
+    gone.wait();
+    return Status();
+  };
+  serve({.workers = 1, .waiting = 0});
+  auto first = std::async(std::launch::async, [&] { return ask(port, "POST", "/api/v1/Sync/Stop").status; });
+  ASSERT_TRUE(wait_until([&] { return running == 1; }));
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Sync/Stop").status, 429);
+  EXPECT_EQ(ask(port, "GET", "/").status, 200);
+  go.set_value();
+  EXPECT_EQ(first.get(), 200);
+}
+
+TEST_F(ServerHttpTest, AnotherSitesPageAndAForeignNameAreTurnedAway) {
+  serve();
+  const auto status_for = [&](const std::string& headers) {
+    return ask(port, "POST", "/api/v1/Sync/Stop", "", headers).status;
+  };
+  EXPECT_EQ(status_for("Host: localhost:7140\r\nOrigin: http://localhost:7140\r\n"), 200);
+  EXPECT_EQ(status_for("Host: 127.0.0.1\r\n"), 200);
+  EXPECT_EQ(status_for("Host: [::1]:7140\r\n"), 200);
+  EXPECT_EQ(status_for("Host: localhost:7140\r\nOrigin: http://evil.example\r\n"), 403);
+  EXPECT_EQ(status_for("Host: localhost:7140\r\nOrigin: http://localhost:8000\r\n"), 403);
+  EXPECT_EQ(status_for("Host: localhost\r\nOrigin: null\r\n"), 403);
+  EXPECT_EQ(status_for("Host: evil.example\r\n"), 421);
+  EXPECT_EQ(status_for("Host: localhost.evil.example:80\r\n"), 421);
+  EXPECT_EQ(status_for("Host: 127.0.0.1.evil.example\r\n"), 421);
+  EXPECT_EQ(status_for(""), 421);
+  EXPECT_EQ(api.calls().size(), 3U);
+}
+
+TEST_F(ServerHttpTest, BeyondThisMachineItStartsOnlyWithAToken) {
+  const auto started = HttpServer::start(api, {.listen = "0.0.0.0:0"});
+  ASSERT_FALSE(started.ok());
+  EXPECT_THAT(started.error().message(), HasSubstr("--make-token"));
+  for (const char* nowhere :
+       {"", "7140", "localhost", "lab:7140", "127.0.0.1:", "127.0.0.1:99999", "127.0.0.1:71x"})
+    EXPECT_FALSE(HttpServer::start(api, {.listen = nowhere}).ok()) << nowhere;
+}
+
+TEST_F(ServerHttpTest, ATokenIsShownAsHeaderOrCookieAndAnAddressWithItGivesTheCookie) {
+  serve({.listen = "0.0.0.0:0", .token = *Token::parse("0123456789abcdef")});
+  const auto get = [&](const std::string& target, const std::string& headers) {
+    return ask(port, "GET", target, "", "Host: lab:7140\r\n" + headers);
+  };
+  EXPECT_EQ(get("/", "").status, 401);
+  EXPECT_EQ(get("/metrics", "Authorization: Bearer 0123456789abcdeX\r\n").status, 401);
+  EXPECT_EQ(get("/?token=wrong", "Cookie: emberlock_token=wrong\r\n").status, 401);
+  EXPECT_EQ(get("/metrics", "Authorization: Bearer 0123456789abcdef\r\n").status, 200);
+  EXPECT_EQ(get("/healthz", "").status, 503);  // tells nothing but that
+  const HttpAnswer moved = get("/?token=0123456789abcde%66", "");
+  EXPECT_EQ(moved.status, 303);
+  EXPECT_THAT(moved.head, HasSubstr("Location: /\r\n"));
+  EXPECT_THAT(moved.head,
+              HasSubstr("Set-Cookie: emberlock_token=0123456789abcdef; Path=/; HttpOnly; SameSite=Strict"));
+  EXPECT_EQ(get("/", "Cookie: theme=dark; emberlock_token=0123456789abcdef\r\n").status, 200);
+}
+
+TEST_F(ServerHttpTest, AJobTellsALineForEachProgressAndItsLast) {
+  api.on_job = [](const JobObserver& observer) {
+    v1::JobProgress progress;
+    for (int i = 0; i < 100; ++i) observer(progress);
+    progress.set_done(true);
+    progress.set_report("{}");
+    observer(progress);
+    return Status();
+  };
+  serve();
+  const HttpAnswer answer = ask(port, "POST", "/api/v1/Sessions/Verify", R"({"session": "s"})");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_THAT(answer.head, HasSubstr("application/x-ndjson"));
+  EXPECT_THAT(answer.body, HasSubstr("{\"done\":true,\"report\":\"{}\"}\n\r\n0\r\n\r\n"));
+}
+
+TEST_F(ServerHttpTest, AJobThatCannotBeginIsAnError) {
+  api.on_job = [](const JobObserver&) { return Error{ErrorKind::bad_input, "no such session", "x"}; };
+  serve();
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Sessions/Repair", R"({"session": "x"})").status, 400);
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Sessions/Repair", "x").status, 400);
+}
+
+TEST_F(ServerHttpTest, AJobEndsWhenItsClientGoesInMidStream) {
+  std::atomic<bool> begun = false, ended = false;
+  api.on_job = [&](const JobObserver& observer) {
+    begun = true;
+    while (observer({})) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ended = true;
+    return Status();
+  };
+  serve();
+  {
+    const UniqueFd client = test::connect_to(port);
+    test::send_all(client,
+                   "POST /api/v1/Sessions/Export HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+    ASSERT_TRUE(wait_until([&] { return begun.load(); }));
+  }
+  EXPECT_TRUE(wait_until([&] { return ended.load(); }));
+}
+
+TEST_F(ServerHttpTest, TheServerGoesWhileJobsRun) {
+  std::atomic<bool> begun = false;
+  api.on_job = [&](const JobObserver& observer) {
+    begun = true;
+    while (observer({})) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return Status();
+  };
+  serve();
+  const UniqueFd client = test::connect_to(port);
+  test::send_all(client,
+                 "POST /api/v1/Sessions/Export HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+  ASSERT_TRUE(wait_until([&] { return begun.load(); }));
+  server.reset();
+}
+
+TEST_F(ServerHttpTest, HealthAndMetricsFollowTheEngine) {
+  serve();
+  EXPECT_EQ(ask(port, "GET", "/healthz").status, 503);
+  show(v1::LOCKED);
+  EXPECT_EQ(ask(port, "GET", "/healthz").status, 200);
+  const HttpAnswer metrics = ask(port, "GET", "/metrics");
+  EXPECT_THAT(metrics.head, HasSubstr("text/plain; version=0.0.4"));
+  EXPECT_THAT(metrics.body, HasSubstr("emberlock_phase{state=\"locked\"} 1\n"));
+}
+
+TEST_F(ServerHttpTest, ATakenPortIsAnError) {
+  serve();
+  const auto second = HttpServer::start(api, {.listen = "127.0.0.1:" + std::to_string(port)});
+  ASSERT_FALSE(second.ok());
+  EXPECT_THAT(second.error().message(), HasSubstr("Address already in use"));
+}
+
+}  // namespace
+}  // namespace emberlock

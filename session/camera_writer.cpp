@@ -153,7 +153,9 @@ void CameraWriter::refuse(const Error& why, const FrameStamp& stamp) {
 /// After a failed write: the segment stays as it is, and its frames that aren't whole on the disk are counted
 /// as the disk's instead.
 void CameraWriter::abandon_segment(const Error& why) {
-  log(LogCategory::session).warn("camera {}: {}", camera_id_, why.message());
+  // A disk that stays full is said once.
+  const auto level = std::exchange(warned_, true) ? spdlog::level::debug : spdlog::level::warn;
+  log(LogCategory::session).log(level, "camera {}: {}", camera_id_, why.message());
   bytes_closed_ += segment_->bytes();
   segment_.reset();
   const auto kept = cut_index();

@@ -65,7 +65,8 @@ class CameraWriter {
   v1::Counts counts_;
   std::optional<Error> refusal_;  ///< the disk's last, a retry of which is due at retry_at_
   TimePoint retry_at_;            ///< by the frames' clock
-  std::optional<Error> failed_;   ///< the index on disk isn't known any more: nothing can be written
+  bool warned_ = false;
+  std::optional<Error> failed_;  ///< the index on disk isn't known any more: nothing can be written
 };
 
 }  // namespace emberlock

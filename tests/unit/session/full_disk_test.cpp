@@ -1,0 +1,137 @@
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <system_error>
+
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "session/async_writer.h"
+#include "session/files.h"
+#include "session/verify.h"
+#include "tests/support/recording.h"
+
+// A disk that is full, in earnest: a process of its own records to a small file system in memory (in a mount
+// namespace), or may not let a file grow.
+namespace emberlock {
+namespace {
+
+using test::manifest_of;
+using test::noise_frame;
+using test::small_disk_options;
+using test::TempFolder;
+
+const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
+constexpr std::uint64_t kFrames = 2000;  // 6 MB a camera
+constexpr int kNoNamespace = 77;
+
+/// Runs `body` in a child process; it says by its text what went wrong. Returns the exit code.
+int in_a_process(const std::function<std::string()>& body) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const std::string wrong = body();
+    if (wrong == "no namespace") ::_exit(kNoNamespace);
+    if (!wrong.empty()) std::fprintf(stderr, "%s\n", wrong.c_str());
+    ::_exit(wrong.empty() ? 0 : 1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : 1;
+}
+
+std::string mount_small_disk(const std::filesystem::path& at, int megabytes) {
+  const bool alone =
+      ::geteuid() == 0 ? ::unshare(CLONE_NEWNS) == 0 : ::unshare(CLONE_NEWUSER | CLONE_NEWNS) == 0;
+  const std::string options = "size=" + std::to_string(megabytes) + "m";
+  const bool mounted = alone && ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) == 0 &&
+                       ::mount("small", at.c_str(), "tmpfs", 0, options.c_str()) == 0;
+  return mounted ? "" : "no namespace";
+}
+
+/// Records two cameras until all frames were offered; says what doesn't add up.
+std::string record_all(const std::filesystem::path& folder, Encoding encoding, std::uint64_t& lost) {
+  auto session = SessionWriter::create(folder, manifest_of({kLayout, kLayout}), small_disk_options(encoding));
+  if (!session) return session.error().message();
+  AsyncWriter writer(std::move(session).value(), {.queue_frames = kFrames});
+  for (std::uint64_t i = 0; i < kFrames; ++i) {
+    for (const std::size_t camera : {0, 1}) writer.push(camera, noise_frame(kLayout, i, camera));
+  }
+  const auto manifest = writer.finish();
+  if (!manifest) return manifest.error().message();
+  if (manifest->state() != v1::Manifest::COMPLETE) return "the manifest isn't finished";
+  if (!writer.failure()) return "nobody was told";
+  lost = 0;
+  for (const v1::CameraStream& camera : manifest->cameras()) {
+    if (camera.counts().recorded() + camera.counts().disk() != kFrames) return "a frame is unaccounted for";
+    if (camera.counts().recorded() < 100) return "what was written before isn't kept";
+    lost += camera.counts().disk();
+  }
+  const auto check = verify_session(folder);
+  if (!check) return check.error().message();
+  if (!check->whole())
+    return check->cameras[0].problems.empty() ? check->to_do : check->cameras[0].problems[0];
+  return "";
+}
+
+class FullDisk : public testing::TestWithParam<Encoding> {};
+
+TEST_P(FullDisk, InMidRecordingKeepsWhatIsWrittenFinishesTheManifestAndCountsTheRest) {
+  const TempFolder temp;
+  const int code = in_a_process([&]() -> std::string {
+    if (std::string wrong = mount_small_disk(temp.path(), 5); !wrong.empty()) return wrong;
+    std::uint64_t lost = 0;
+    std::string wrong = record_all(temp / "s", GetParam(), lost);
+    return wrong.empty() && lost < kFrames ? "the disk held more than it can" : wrong;
+  });
+  if (code == kNoNamespace) GTEST_SKIP() << "this kernel lets nobody mount here";
+  EXPECT_EQ(code, 0);
+}
+
+TEST_P(FullDisk, ThatHasRoomAgainIsRecordedToInANewSegment) {
+  const TempFolder temp;
+  const int code = in_a_process([&]() -> std::string {
+    if (std::string wrong = mount_small_disk(temp.path(), 6); !wrong.empty()) return wrong;
+    auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options(GetParam()));
+    if (!writer) return writer.error().message();
+    test::put_bytes(temp / "other", std::string(std::size_t{4} << 20, 'x'));
+    std::uint64_t i = 0;
+    while (i < kFrames && writer->write(0, noise_frame(kLayout, i, 0)).ok()) ++i;
+    if (i == kFrames) return "the disk wasn't full";
+    std::filesystem::remove(temp / "other");
+    const std::uint64_t full_at = i;
+    while (i < full_at + 300) static_cast<void>(writer->write(0, noise_frame(kLayout, ++i, 0)));
+    const auto manifest = writer->finish();
+    if (!manifest) return manifest.error().message();
+    const v1::CameraStream& camera = manifest->cameras(0);
+    if (camera.segments_size() != 2) return "segments: " + std::to_string(camera.segments_size());
+    if (camera.counts().disk() > 150) return "lost: " + std::to_string(camera.counts().disk());
+    if (camera.counts().recorded() + camera.counts().disk() != i + 1) return "a frame is unaccounted for";
+    const auto check = verify_session(temp / "s");
+    return check && check->whole() ? "" : "it can't be read back";
+  });
+  if (code == kNoNamespace) GTEST_SKIP() << "this kernel lets nobody mount here";
+  EXPECT_EQ(code, 0);
+}
+
+TEST_P(FullDisk, FilesThatMayNotGrowAreAsAFullDisk) {
+  const TempFolder temp;
+  const int code = in_a_process([&]() -> std::string {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{2 << 20, 2 << 20};
+    if (::setrlimit(RLIMIT_FSIZE, &limit) != 0) return "no limit";
+    std::uint64_t lost = 0;
+    return record_all(temp / "s", GetParam(), lost);
+  });
+  EXPECT_EQ(code, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Recording, FullDisk, testing::Values(Encoding::ffv1, Encoding::raw_nut));
+
+}  // namespace
+}  // namespace emberlock

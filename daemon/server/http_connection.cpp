@@ -99,6 +99,8 @@ void HttpConnection::judge() {
     case HttpVerdict::foreign_origin:
       return respond_error(403, "PERMISSION_DENIED", "another site's page may not ask", Next::end);
     case HttpVerdict::no_token:
+      // The page itself is no secret: it asks for the token.
+      if (target_.token.empty() && context_.console.find(target_.path) != nullptr) return read_body();
       return respond_error(
           401, "UNAUTHENTICATED",
           "the token is missing or wrong: open this page once with ?token=TOKEN, or send it as "

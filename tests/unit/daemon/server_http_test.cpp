@@ -233,7 +233,9 @@ TEST_F(ServerHttpTest, ATokenIsShownAsHeaderOrCookieAndAnAddressWithItGivesTheCo
   const auto get = [&](const std::string& target, const std::string& headers) {
     return ask(port, "GET", target, "", "Host: lab:7140\r\n" + headers);
   };
-  EXPECT_EQ(get("/", "").status, 401);
+  EXPECT_EQ(get("/", "").status, 200);  // the page, which asks for it
+  EXPECT_EQ(get("/metrics", "").status, 401);
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Daemon/GetStatus", "", "Host: lab:7140\r\n").status, 401);
   EXPECT_EQ(get("/metrics", "Authorization: Bearer 0123456789abcdeX\r\n").status, 401);
   EXPECT_EQ(get("/?token=wrong", "Cookie: emberlock_token=wrong\r\n").status, 401);
   EXPECT_EQ(get("/metrics", "Authorization: Bearer 0123456789abcdef\r\n").status, 200);

@@ -32,7 +32,7 @@ export class Cameras {
   private readonly summary = el('span', {class: 'note'});
   readonly root = el('section', {id: 'cameras', 'aria-label': 'Cameras'}, el('h2', {class: 'hidden'}, 'Cameras ', this.summary), this.grid, this.none);
   readonly enlarged = new Enlarged(() => this.wish());
-  private readonly tiles = new Keyed<DaemonStatus['cameras'][number], Tile>(this.grid, id => this.make(id), (tile, camera) => tile.show(camera));
+  private readonly tiles = new Keyed<DaemonStatus['cameras'][number], Tile>(this.grid, id => this.make(id), (tile, camera) => tile.show(camera, this.status?.alignment?.tolerance_s || undefined));
   private readonly visible = new Set<string>();
   private readonly sight = new IntersectionObserver(entries => {
     for (const entry of entries) {

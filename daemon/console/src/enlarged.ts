@@ -10,11 +10,11 @@ const resetWords = {SHUTTER_RESET_UNSPECIFIED: 'unknown', NONE: 'not possible', 
 const sensorWords = {CCD: 'CCD', ROLLING_SHUTTER: 'rolling shutter', GLOBAL_SHUTTER: 'global shutter'};
 
 /** Every number of a camera with its name. */
-export function facts(c: CameraStatus): [string, string][] {
+export function facts(c: CameraStatus, tolerance: number | undefined): [string, string][] {
   const list: [string, string][] = [
     ['error', known(c.error_rows) ? `${rows(c.error_rows)} = ${offset(c.error_s)}` : '–'],
     ['known to', known(c.sigma_rows) ? `± ${fixed(c.sigma_rows, 1)} rows` : '–'],
-    ['tolerance', known(c.tolerance_rows) ? `± ${fixed(c.tolerance_rows, 0)} rows` : '–'],
+    ['tolerance', known(tolerance) ? `± ${short(tolerance)}` : '–'],
     ['drift', ppm(c.drift_ppm)],
     ['time left', span(c.time_left_s)],
     ['trials (resets)', count(c.resets)],
@@ -97,13 +97,14 @@ export class Enlarged {
       this.root.close();
       return;
     }
+    const tolerance = status.alignment?.tolerance_s || undefined;
     setText(this.title, camera.id);
-    showSign(this.sign, this.word, camera.light, cameraWord(camera));
+    showSign(this.sign, this.word, camera.light, cameraWord(camera, tolerance));
     setText(this.error, known(camera.error_rows) ? `${rows(camera.error_rows)} · ${offset(camera.error_s)}` : short(undefined));
-    this.gauge.show(camera.error_rows, camera.tolerance_rows);
+    this.gauge.show(camera.error_s, tolerance);
     setText(this.reason, camera.reason);
     this.overlay.show(camera);
-    const all = facts(camera);
+    const all = facts(camera, tolerance);
     while (this.list.children.length > all.length) this.list.lastElementChild!.remove();
     while (this.list.children.length < all.length) this.list.append(el('div', {}, el('dt'), el('dd')));
     all.forEach(([name, value], place) => {

@@ -39,11 +39,11 @@ export function faultWords(kind: Fault['kind']): string {
 }
 
 /** Why this camera is the one: "It is 412 rows early; 100 are allowed." */
-export function resetWhy(camera: CameraStatus | undefined): string {
+export function resetWhy(camera: CameraStatus | undefined, tolerance: number | undefined): string {
   if (!camera) return '';
   if (!known(camera.error_rows)) return camera.reason;
   const off = `It is ${count(Math.abs(camera.error_rows))} rows ${camera.error_rows > 0 ? 'early' : 'late'}`;
-  return known(camera.tolerance_rows) ? `${off}; ${count(camera.tolerance_rows)} are allowed.` : `${off}.`;
+  return tolerance ? `${off}; ${count(tolerance)} are allowed.` : `${off}.`;
 }
 
 export class Header {
@@ -86,7 +86,7 @@ export class Header {
     setText(this.clock, clock(status.recording?.seconds ?? 0));
     setText(this.reason, status.reason);
     const camera = status.alignment?.reset_next || status.cameras.find(each => each.reset_next)?.id;
-    const why = resetWhy(status.cameras.find(each => each.id === camera));
+    const why = resetWhy(status.cameras.find(each => each.id === camera), status.alignment?.tolerance_rows);
     show(this.nextBox, status.next_step !== '' || Boolean(camera));
     set(this.nextBox, 'data-reset', Boolean(camera));
     setText(this.nextTitle, camera ? `Reset ${camera}` : 'Next');

@@ -38,8 +38,8 @@ export class Sign {
   }
 }
 
-/** "in tolerance", "lost", ...: what a camera's light stands for. */
-export function cameraWord(camera: CameraStatus): string {
+/** "in tolerance", "lost", ...: what a camera's light stands for. The tolerance in seconds, of the alignment. */
+export function cameraWord(camera: CameraStatus, tolerance: number | undefined): string {
   switch (camera.state) {
     case 'LOST': return 'lost';
     case 'QUARANTINED': return 'hangs';
@@ -47,8 +47,8 @@ export function cameraWord(camera: CameraStatus): string {
     case 'STATE_UNSPECIFIED': return 'unknown';
     case 'FILMING': break;
   }
-  if (known(camera.error_rows) && known(camera.tolerance_rows)) {
-    return Math.abs(camera.error_rows) <= camera.tolerance_rows ? 'in tolerance' : 'out of tolerance';
+  if (known(camera.error_s) && known(tolerance)) {
+    return Math.abs(camera.error_s) <= tolerance ? 'in tolerance' : 'out of tolerance';
   }
   if (camera.sight !== '' && camera.sight !== 'dot' && camera.sight !== 'known') return camera.sight.replaceAll(/[-_]/g, ' ');
   return camera.light === 'RED' ? 'act' : camera.light === 'AMBER' ? 'look' : 'filming';

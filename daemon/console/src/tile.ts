@@ -43,9 +43,9 @@ export class Tile {
     });
   }
 
-  show(camera: CameraStatus): void {
+  show(camera: CameraStatus, tolerance: number | undefined): void {
     this.camera = camera;
-    const word = cameraWord(camera);
+    const word = cameraWord(camera, tolerance);
     showSign(this.sign, this.word, camera.light, word);
     set(this.root, 'data-light', camera.light);
     set(this.root, 'data-state', camera.state);
@@ -53,7 +53,7 @@ export class Tile {
     show(this.nextMark, camera.reset_next);
     setText(this.nextMark, camera.reset === 'BY_HAND' ? 'Reset this camera now' : 'Reset next');
     this.overlay.show(camera);
-    this.gauge.show(camera.error_rows, camera.tolerance_rows);
+    this.gauge.show(camera.error_s, tolerance);
     setText(this.error, known(camera.error_rows) ? rows(camera.error_rows) : '– rows');
     setText(this.time, known(camera.error_s) ? offset(camera.error_s) : '');
     setText(this.drift, ppm(camera.drift_ppm));

@@ -34,7 +34,7 @@ export function seen(index: number, round: number, next: boolean, change: Wire<C
     reason: inside ? 'In tolerance.' : next ? 'Press its power button twice; it comes back by itself.' : 'Waits for its turn.',
     error_rows: error, error_s: error * kRowTime, sigma_rows: 0.4, drift_ppm: 3 * Math.sin(index), time_left_s: inside ? 400 + 13 * index : 0,
     resets: inside ? 1 + (index % 4) : 0, reset_next: next, lamp: {x: 320, y: 400}, lamp_radius: 26,
-    dots: [{x: 320, y: 210 - error / 5}], target_row: 210, tolerance_rows: kTolerance, row_time_s: kRowTime, ...change,
+    dots: [{x: 320, y: 210 - error / 5}], target_row: 210, tolerance_rows: kTolerance / 5, row_time_s: kRowTime, ...change,
   });
 }
 

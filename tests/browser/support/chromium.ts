@@ -7,7 +7,9 @@ export async function startChromium(): Promise<Browser> {
   return chromium.launch({
     executablePath: process.env.EMBERLOCK_CHROMIUM ?? '/usr/bin/chromium',
     args: ['--headless', '--no-sandbox', '--disable-quic', '--no-first-run', '--disable-background-networking',
-           '--disable-component-update', '--disable-sync', '--use-angle=swiftshader', '--enable-unsafe-swiftshader', '--ignore-gpu-blocklist'],
+           '--disable-component-update', '--disable-sync',
+           // Without a GPU: WebGL by SwiftShader, for the volume alone; composing the page so would take most of a processor.
+           '--disable-gpu-compositing', '--use-angle=swiftshader', '--enable-unsafe-swiftshader'],
   });
 }
 
@@ -41,4 +43,12 @@ export async function screenshot(page: Page, name: string, fullPage = false): Pr
   if (!folder) return;
   mkdirSync(folder, {recursive: true});
   await page.screenshot({path: `${folder}/${name}.png`, fullPage, timeout: 60_000});
+}
+
+/** Waits until what is read is as wanted; what it was at last stands in the message. */
+export async function until<T>(read: () => Promise<T> | T, wanted: (value: T) => boolean, words: string, seconds = 8): Promise<T> {
+  let value = await read();
+  for (const end = Date.now() + 1000 * seconds; !wanted(value) && Date.now() < end; value = await read()) await new Promise(resolve => setTimeout(resolve, 30));
+  if (!wanted(value)) throw new Error(`not so within ${seconds} s: ${words}; it is ${JSON.stringify(value)}`);
+  return value;
 }

@@ -5,12 +5,12 @@ import {fileURLToPath} from 'node:url';
 import type {Browser, Page} from 'playwright-core';
 import {afterAll, afterEach, beforeAll, beforeEach, describe, expect, test} from 'vitest';
 
-import {Mock, Refusal} from './mock/mock';
-import {flamePictures, flameVolume, lampPictures} from './mock/pictures';
-import {aligning, alignment, camera, capturing, idle, iteration, locked, reconstruction, seen} from './mock/scene';
-import {openPage, screenshot, startChromium, type Watched} from './support/chromium';
+import {Mock, Refusal} from './mock';
+import {flamePictures, flameVolume, lampPictures} from './pictures';
+import {aligning, alignment, camera, capturing, idle, iteration, locked, reconstruction, seen} from './scene';
+import {openPage, screenshot, startChromium, until, type Watched} from '../support/chromium';
 
-const kConsole = process.env.EMBERLOCK_CONSOLE ?? fileURLToPath(new URL('../../build/release/console', import.meta.url));
+const kConsole = process.env.EMBERLOCK_CONSOLE ?? fileURLToPath(new URL('../../../build/release/console', import.meta.url));
 const kScreen = {width: 1920, height: 1080};
 const kLaptop = {width: 1280, height: 800};
 const kPhone = {width: 360, height: 800};
@@ -47,11 +47,6 @@ async function open(size = kScreen): Promise<Page> {
   return watched.page;
 }
 const text = (page: Page, selector: string) => page.locator(selector).first().innerText();
-async function until<T>(read: () => Promise<T> | T, wanted: (value: T) => boolean, words: string): Promise<void> {
-  let value = await read();
-  for (const end = Date.now() + 8000; !wanted(value) && Date.now() < end; value = await read()) await new Promise(resolve => setTimeout(resolve, 30));
-  expect(wanted(value), `${words}; it is ${JSON.stringify(value)}`).toBe(true);
-}
 const overflows = (page: Page) => page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
 
 describe('what is shown', () => {
@@ -101,8 +96,8 @@ describe('what is shown', () => {
   });
 
   test('every state has a word beside its colour, and a shape of its own', async () => {
-    mock.status = {...idle(), phase: 'ALIGNING', cameras: [
-      seen(0, 30, false), seen(1, 1, false, {error_rows: 440}), camera(2, {state: 'LOST', light: 'RED', reason: 'Went away; it is being looked for. Look at its cable.'}),
+    mock.status = {...idle(), phase: 'ALIGNING', alignment: alignment(1), cameras: [
+      seen(0, 30, false), seen(1, 1, false, {error_rows: 440, error_s: 0.0238}), camera(2, {state: 'LOST', light: 'RED', reason: 'Went away; it is being looked for. Look at its cable.'}),
       camera(3, {state: 'QUARANTINED', light: 'RED', reason: 'Hangs. Switch it off and on.'}), camera(4, {sight: 'ambiguous', light: 'AMBER', reason: 'Two dots fit. Move the strobe.'}),
       camera(5, {state: 'STOPPED', light: 'LIGHT_UNSPECIFIED'}),
     ]};

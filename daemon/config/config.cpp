@@ -75,8 +75,8 @@ class Reader {
   /// What may stand in a table: its keys, and the sections directly below it.
   template <class T>
   std::vector<std::string> known_in(const std::string& section, const std::vector<Key<T>>& keys) {
-    std::vector<std::string> known;
-    for (const auto& key : keys) known.push_back(key.name);
+    std::vector<std::string> known(keys.size());
+    std::transform(keys.begin(), keys.end(), known.begin(), [](const auto& key) { return key.name; });
     const std::string prefix = section.empty() ? "" : section + ".";
     const auto add = [&](const std::string& name) {
       if (name == section || !name.starts_with(prefix)) return;

@@ -69,7 +69,7 @@ std::string config_manual(std::string_view version) {
   page += roff(
       "A TOML file (https://toml.io). Every key may be left out. A key that isn't known is an error, as is a "
       "value out "
-      "of its range: `emberlockd --check-config FILE` tells all of them, each with its line. Relative paths "
+      "of its range: `emberlockd --check-config` tells all of them, each with its line. Relative paths "
       "start from "
       "the file's folder. `emberlockd --print-config` prints a file with every key.");
   page += "\n";

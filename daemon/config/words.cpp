@@ -61,7 +61,7 @@ std::string commented_config() {
   std::string text = comment(
       "The configuration of emberlockd(8). A line behind a bare # is a key with its default: take the # away "
       "and "
-      "change it. `emberlockd --check-config FILE` says what is wrong with a file. Relative paths start from "
+      "change it. `emberlockd --check-config` says what is wrong with a file. Relative paths start from "
       "the "
       "file's folder.");
   text += "\n";

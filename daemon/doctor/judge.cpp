@@ -184,7 +184,8 @@ Check config(const Facts& f) {
   if (f.config_problems.empty()) return {"configuration", Health::ok, f.config_file.string(), ""};
   std::string found = f.config_problems.front().message();
   if (f.config_problems.size() > 1) found += fmt::format(" (and {} more)", f.config_problems.size() - 1);
-  return {"configuration", Health::fail, found, "emberlockd --check-config " + f.config_file.string()};
+  return {"configuration", Health::fail, found,
+          "emberlockd --check-config --config " + f.config_file.string()};
 }
 
 Check daemon(const Facts& f) {

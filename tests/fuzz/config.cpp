@@ -1,0 +1,23 @@
+#include "daemon/config/config.h"
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+/// Whatever a configuration file holds: problems, each with its place and a remedy, or a configuration that
+/// says the same when it is printed and read again.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace emberlock;
+  const std::filesystem::path file = "/fuzz/emberlockd.toml";
+  const ConfigReading once = read_config({reinterpret_cast<const char*>(data), size}, file);
+  for (const Error& problem : once.problems) {
+    if (problem.what.empty() || problem.where.empty() || problem.remedy.empty()) std::abort();
+  }
+  if (!once.problems.empty()) return 0;
+  const std::string printed = print_config(once.config);
+  const ConfigReading again = read_config(printed, file);
+  if (!again.problems.empty() || print_config(again.config) != printed) std::abort();
+  return 0;
+}

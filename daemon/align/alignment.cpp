@@ -136,6 +136,9 @@ AlignRound to_round(AlignBench& bench, const Film& film, const AlignRunResult& r
     std::vector<TimePoint> stamps;
     for (const Frame& frame : film.frames[i]) stamps.push_back(frame.stamp.monotonic_time);
     round.cameras.push_back({std::move(common.phases[i]), common_stamp(stamps, common.at, period)});
+    if (!film.away[i] || rig.options.reset_by == ResetBy::orders) continue;
+    round.cameras.back().away = true;
+    round.cameras.back().phase = {PhaseState::unusable, {}, {}, "it sends no frames"};
   }
   return round;
 }
@@ -229,6 +232,8 @@ Status Alignment::round() {
   AlignStep step = align_step(state_, round, cameras_, result_.options);
   state_ = std::move(step.state);
   result_.last = std::move(step.decision);
+  for (const std::size_t camera : result_.last.jumped) bench_.sensor(camera).forget_phase();
+  promise();
   if (result_.last.reference) reached_ = 0.2 + 0.8 * part_within(result_.last, result_.options);
   look(film);
   EMBERLOCK_RETURN_IF_ERROR(tell({round, result_.last, cameras_, sensors_, result_.options, bench_.strobe(),
@@ -259,13 +264,23 @@ AlignRunResult Alignment::result() const {
   return all;
 }
 
-bool Alignment::locked(TimePoint now) const {
-  if (last().verdict != AlignVerdict::aligned) return false;
-  return !last().next_check || now - at_ <= *last().next_check;
+void Alignment::promise() {
+  if (last().verdict == AlignVerdict::aligned) {
+    promised_until_ = at_ + std::min(last().next_check.value_or(kLongestWait), kUntilStopped);
+    return;
+  }
+  const Seconds tolerance = result_.options.tolerance.in_time(result_.options.row_time);
+  const auto breaks = [&](std::size_t i) {
+    const CameraDecision& camera = last().cameras[i];
+    return camera.reset || state_.cameras[i].away || (camera.error && abs(*camera.error) > tolerance);
+  };
+  bool broken = last().verdict != AlignVerdict::go_on || !last().jumped.empty();
+  for (std::size_t i = 0; i < cameras_.size(); ++i) broken = broken || breaks(i);
+  if (broken) promised_until_.reset();
 }
 
 Seconds Alignment::time_left(TimePoint now) const {
-  if (last().verdict != AlignVerdict::aligned) return Seconds(0);
+  if (!locked(now)) return Seconds(0);
   Seconds left(std::numeric_limits<double>::infinity());
   for (const CameraDecision& camera : last().cameras) {
     if (camera.time_left) left = std::min(left, camera.time_left->earliest - (now - at_));

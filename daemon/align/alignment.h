@@ -67,8 +67,9 @@ class Alignment {
 
   // By what is known of every camera's phase and rate, at any instant after the last round.
 
-  /// Whether all cameras are in tolerance, to three standard errors.
-  [[nodiscard]] bool locked(TimePoint now) const;
+  /// Whether all cameras are in tolerance, to three standard errors: as the last aligned round promised, as
+  /// long as no round since has seen a camera out, reset or away.
+  [[nodiscard]] bool locked(TimePoint now) const { return promised_until_ && now <= *promised_until_; }
   /// How long until the first camera may leave tolerance (95 %); 0 when it may have, or isn't aligned.
   /// Infinite where none ever does.
   [[nodiscard]] Seconds time_left(TimePoint now) const;
@@ -86,6 +87,7 @@ class Alignment {
   Status tell(const AlignRoundReport& seen);
   Status carry_out();
   void look(const Film& film);
+  void promise();
 
   AlignRig rig_;
   AlignRunOptions options_;
@@ -102,6 +104,7 @@ class Alignment {
   std::optional<Beat> beat_;  ///< of the round before
   TimePoint at_;              ///< its instant
   AlignState state_;
+  std::optional<TimePoint> promised_until_;
   std::vector<ResetDone> resets_;  ///< since the last round
   std::vector<TrimDone> trims_;
   double reached_ = 0.2;  ///< of the progress; the rest is the part of the cameras within tolerance

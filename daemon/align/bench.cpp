@@ -20,6 +20,11 @@ constexpr int kMostSweeps = 40;
 /// Delays stay below the strobe's own period, which may be a little shorter than T.
 constexpr double kLongestDelay = 0.9995;
 
+/// Where anybody may reset a camera, it is away when no frame comes for so many periods; one that was away
+/// is there again when one comes at once.
+constexpr double kPatience = 12;
+constexpr double kPatienceWhileAway = 2.5;
+
 /// How soon a wait notices that it is asked to stop.
 constexpr Seconds kWaitStep = milliseconds(200);
 
@@ -50,7 +55,10 @@ AlignBench::AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seco
       period_(period),
       stop_(std::move(stop)),
       all_(rig.cameras.size()),
-      passed_over_(rig.cameras.size()) {
+      passed_over_(rig.cameras.size()),
+      taken_(rig.cameras.size()),
+      reset_ordered_(rig.cameras.size()),
+      away_(rig.cameras.size()) {
   std::iota(all_.begin(), all_.end(), std::size_t{0});
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     SensorOptions sensor{options.timing[i], options.flash_width};
@@ -84,6 +92,7 @@ Result<TimePoint> AlignBench::reset(std::size_t camera, std::optional<TimePoint>
   if (moment) at = *moment + period_ * std::ceil((earliest - *moment) / period_);
   EMBERLOCK_RETURN_IF_ERROR(rig_.cameras[camera]->reset_shutter(at));
   sensors_[camera]->forget_phase();
+  reset_ordered_[camera] = true;
   // Frames from before are older than the decision that led here: the other cameras' are passed over too.
   fresh_ = std::max(fresh_, now);
   EMBERLOCK_RETURN_IF_ERROR(record(reset_event(now, rig_.cameras[camera]->info().id, at)));
@@ -101,17 +110,30 @@ Result<Film> AlignBench::film(const std::vector<std::size_t>& read, int count) {
   Film film;
   film.frames.resize(rig_.cameras.size());
   film.readings.resize(rig_.cameras.size());
+  film.away.resize(rig_.cameras.size());
   const Look look{dark(strobe_) ? std::nullopt : std::optional(strobe_.phase)};
+  if (anybody_resets()) {
+    for (const std::size_t camera : all_) {
+      // One that is looked for by nobody else; it may still be gone.
+      if (away_[camera]) static_cast<void>(rig_.cameras[camera]->start());
+    }
+  }
   for (int i = 0; i < count; ++i) {
     for (const std::size_t camera : all_) {
+      if (film.away[camera] && anybody_resets()) continue;
       EMBERLOCK_ASSIGN_OR_RETURN(std::optional<Frame> frame, fresh_frame(camera));
       if (stopped()) return film;
+      if (!frame) film.away[camera] = true;
       const bool asked = std::find(read.begin(), read.end(), camera) != read.end();
       if (!frame || !asked) continue;  // none came: fewer samples of this camera
       film.readings[camera].push_back(
           sensors_[camera]->take(frame->image->view(), frame->stamp.monotonic_time, look));
       film.frames[camera].push_back(std::move(*frame));
     }
+  }
+  away_ = film.away;
+  if (anybody_resets() && std::find(away_.begin(), away_.end(), false) == away_.end()) {
+    return Error{ErrorKind::device, "no camera sends frames", "align", "switch them on, or plug them in"};
   }
   return film;
 }
@@ -165,8 +187,13 @@ void AlignBench::pass_over(TimePoint until) {
   for (const std::size_t camera : all_) passed_over_[camera] += rig_.cameras[camera]->pass_over(until);
 }
 
+Seconds AlignBench::deadline(std::size_t camera) const {
+  if (!anybody_resets() || reset_ordered_[camera]) return options_.frame_deadline;
+  return std::min(options_.frame_deadline, (away_[camera] ? kPatienceWhileAway : kPatience) * period_);
+}
+
 Result<Frame> AlignBench::next_frame(std::size_t camera) {
-  for (Seconds left = options_.frame_deadline;; left -= kWaitStep) {
+  for (Seconds left = deadline(camera);; left -= kWaitStep) {
     Result<Frame> frame = rig_.cameras[camera]->next_frame(stop_ ? std::min(left, kWaitStep) : left);
     const bool late = !frame.ok() && frame.error().kind == ErrorKind::timed_out;
     if (!late || !stop_ || left <= kWaitStep || stopped()) return frame;
@@ -177,10 +204,18 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
   while (!stopped()) {
     Result<Frame> frame = next_frame(camera);
     if (!frame.ok()) {
-      if (frame.error().kind != ErrorKind::timed_out) return frame.error();
-      log(LogCategory::daemon).warn("{}", frame.error().message());
+      const ErrorKind kind = frame.error().kind;
+      const bool lost = kind == ErrorKind::device && anybody_resets();
+      if (kind != ErrorKind::timed_out && !lost) return frame.error();
+      if (stopped()) break;
+      if (!away_[camera]) log(LogCategory::daemon).warn("{}", frame.error().message());
+      EMBERLOCK_RETURN_IF_ERROR(
+          record(late_event(filmed_, {rig_.cameras[camera]->info().id, taken_[camera], deadline(camera)})));
+      reset_ordered_[camera] = false;
       return std::optional<Frame>();
     }
+    ++taken_[camera];
+    reset_ordered_[camera] = false;
     if (rig_.recorder) {
       EMBERLOCK_RETURN_IF_ERROR(rig_.recorder->write(camera, *frame));
       rig_.recorder->count_lost(camera, LossCause::passed_over, std::exchange(passed_over_[camera], 0));

@@ -17,6 +17,7 @@ namespace emberlock {
 struct Film {
   std::vector<std::vector<Frame>> frames;
   std::vector<std::vector<SmearReading>> readings;
+  std::vector<bool> away;  ///< by camera: a frame didn't come in time
 };
 
 /// The devices of an alignment and what reads their frames, with everything that happens to them written
@@ -46,6 +47,8 @@ class AlignBench {
   Result<TimePoint> trim(std::size_t camera, PartsPerMillion trim);
   /// `count` frames of every camera, one of each in turn, and what those of `read` show. A frame that doesn't
   /// come in time is left out, with a warning; errors: a camera that is lost, a recording that has ended.
+  /// Where anybody may reset or switch off cameras a lost one is late like others, the rest of the film goes
+  /// on without it, and error device is that no camera films.
   /// What was filmed until then when it is stopped.
   Result<Film> film(const std::vector<std::size_t>& read, int count);
   Result<Film> film_all(int count);
@@ -65,8 +68,11 @@ class AlignBench {
   Status record(const v1::Event& event) { return rig_.recorder ? rig_.recorder->append(event) : Status{}; }
 
  private:
-  /// The next frame, within the deadline for it.
+  /// How long the camera's next frame is waited for.
+  [[nodiscard]] Seconds deadline(std::size_t camera) const;
+  /// The next frame, within that time.
   Result<Frame> next_frame(std::size_t camera);
+  [[nodiscard]] bool anybody_resets() const { return options_.align.reset_by == ResetBy::anybody; }
   Result<std::optional<Frame>> fresh_frame(std::size_t camera);
 
   const AlignRig& rig_;
@@ -80,6 +86,9 @@ class AlignBench {
   TimePoint fresh_;                         ///< frames that came before are passed over
   TimePoint filmed_;                        ///< when the last frame came
   std::vector<std::uint64_t> passed_over_;  ///< frames of each camera since its last one
+  std::vector<std::uint64_t> taken_;        ///< frames of each camera
+  std::vector<bool> reset_ordered_;         ///< no frame has come since
+  std::vector<bool> away_;                  ///< in the last film
 };
 
 }  // namespace emberlock

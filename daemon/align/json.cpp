@@ -98,6 +98,7 @@ AlignRunOptions options_from(const json& object) {
   }
   options.align.max_rounds = integer(object, "max_rounds");
   options.align.max_looks = integer(object, "max_looks");
+  if (object.value("reset_by", "orders") == "anybody") options.align.reset_by = ResetBy::anybody;
   options.align.strobe_step = strobe_step_from(object);
   options.measure_row_time = object.at("measure_row_time").get<bool>();
   options.comb_rate = Hertz(number(object, "comb_rate_hz"));
@@ -169,6 +170,8 @@ ordered_json round_json(const AlignRoundReport& report) {
   line["effort"] = decision.effort ? effort_json(*decision.effort) : nullptr;
   line["offers"] = offers_json(decision.offers, row);
   line["reason"] = decision.reason;
+  if (decision.reset_next) line["reset_next"] = report.cameras[*decision.reset_next].id;
+  for (const std::size_t camera : decision.jumped) line["jumped"].push_back(report.cameras[camera].id);
   return line;
 }
 
@@ -228,6 +231,7 @@ ordered_json options_json(const AlignRunOptions& options) {
           {"limits", limits_json(align.limits)},
           {"max_rounds", align.max_rounds},
           {"max_looks", align.max_looks},
+          {"reset_by", align.reset_by == ResetBy::anybody ? "anybody" : "orders"},
           {"strobe_step_s", align.strobe_step.value()},
           {"measure_row_time", options.measure_row_time},
           {"comb_rate_hz", options.comb_rate.value()},

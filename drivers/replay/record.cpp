@@ -1,12 +1,18 @@
 #include "drivers/replay/record.h"
 
 #include <cmath>
+#include <sstream>
+#include <string_view>
+
+#include <fmt/format.h>
 
 #include "base/one_to_one.h"
 #include "session/layout.h"
 
 namespace emberlock {
 namespace {
+
+constexpr std::string_view kLate = "late frame: ";
 
 constexpr OneToOne<ShutterReset, v1::CameraStream::ShutterReset, 3> kResets{
     {{{ShutterReset::none, v1::CameraStream::NONE},
@@ -78,6 +84,24 @@ v1::Event reset_event(TimePoint now, const std::string& camera_id, TimePoint at)
   event.mutable_reset()->set_camera_id(camera_id);
   event.mutable_reset()->set_at_ns(at.ns);
   return event;
+}
+
+v1::Event late_event(TimePoint at, const LateFrame& late) {
+  v1::Event event;
+  event.set_monotonic_ns(at.ns);
+  event.set_note(fmt::format("{}{} {} {}", kLate, late.after_frames, late.waited.value(), late.camera_id));
+  return event;
+}
+
+std::optional<LateFrame> late_frame(const v1::Event& event) {
+  if (!event.has_note() || !event.note().starts_with(kLate)) return std::nullopt;
+  LateFrame late;
+  double waited = 0;
+  std::istringstream fields(event.note().substr(kLate.size()));
+  if (!(fields >> late.after_frames >> waited >> std::ws && std::getline(fields, late.camera_id)))
+    return std::nullopt;
+  late.waited = Seconds(waited);
+  return late;
 }
 
 v1::Event trim_event(TimePoint now, const std::string& camera_id, PartsPerMillion trim) {

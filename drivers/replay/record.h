@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <string>
+
 #include "base/result.h"
 #include "drivers/camera.h"
 #include "drivers/strobe.h"
@@ -20,6 +24,17 @@ v1::Event reset_event(TimePoint now, const std::string& camera_id, TimePoint at)
 
 /// To be appended after each Camera::trim_rate that succeeded, with `now` asked before it.
 v1::Event trim_event(TimePoint now, const std::string& camera_id, PartsPerMillion trim);
+
+/// A frame that was waited for in vain.
+struct LateFrame {
+  std::string camera_id;
+  std::uint64_t after_frames = 0;  ///< so many of the camera's frames are recorded before
+  Seconds waited;
+};
+/// To be appended for each, as a note; `at` is an instant that is known already.
+v1::Event late_event(TimePoint at, const LateFrame& late);
+/// Of any other event none.
+std::optional<LateFrame> late_frame(const v1::Event& event);
 
 /// Errors: bad_input where a number isn't finite or the output unknown.
 Result<StrobeSettings> strobe_settings(const v1::StrobeState& state);

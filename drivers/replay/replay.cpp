@@ -65,16 +65,32 @@ ReplayCamera::ReplayCamera(std::shared_ptr<SessionReader> session, std::size_t c
       camera_(camera),
       clock_(std::move(clock)),
       // The reader has checked the layout, the one thing that can be wrong.
-      info_(camera_info(session_->manifest().cameras(static_cast<int>(camera))).value()) {}
+      info_(camera_info(session_->manifest().cameras(static_cast<int>(camera))).value()) {
+  for (const v1::Event& event : session_->events()) {
+    if (auto late = late_frame(event); late && late->camera_id == info_.id) late_.push_back(*late);
+  }
+}
 
 Status ReplayCamera::start() {
   filming_ = true;
   return {};
 }
 
-Result<Frame> ReplayCamera::next_frame(Seconds /*deadline*/) {
+bool ReplayCamera::late(Seconds deadline) {
+  constexpr Seconds kRounding{1e-6};
+  if (late_.empty() || late_.front().after_frames != next_frame_) return false;
+  waited_ += deadline;
+  if (waited_ + kRounding >= late_.front().waited) {
+    waited_ = Seconds(0);
+    late_.pop_front();
+  }
+  return true;
+}
+
+Result<Frame> ReplayCamera::next_frame(Seconds deadline) {
   if (!filming_)
     return Error{ErrorKind::device, "the camera isn't filming", "camera " + info_.id, "Start it first"};
+  if (late(deadline)) return Error{ErrorKind::timed_out, "no frame came in time", "camera " + info_.id};
   const std::size_t i = next_frame_;
   if (i < session_->stamps(camera_).size()) {
     ++next_frame_;

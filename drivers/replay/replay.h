@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <deque>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -11,6 +12,7 @@
 #include "base/clock.h"
 #include "base/result.h"
 #include "drivers/camera.h"
+#include "drivers/replay/record.h"
 #include "drivers/strobe.h"
 #include "session/reader.h"
 
@@ -53,9 +55,9 @@ class ReplayClock final : public Clock {
   std::optional<TimePoint> own_;
 };
 
-/// One camera of a session. Deadlines don't matter: a recorded frame is there at once. A frame that the
-/// session can't give back (damaged file) is an Error of kind bad_input that names file and frame; the call
-/// after goes on behind it.
+/// One camera of a session. A recorded frame is there at once; one that was waited for in vain is waited for
+/// as long as then, by the sum of deadlines. A frame that the session can't give back (damaged file) is an
+/// Error of kind bad_input that names file and frame; the call after goes on behind it.
 class ReplayCamera final : public Camera {
  public:
   ReplayCamera(std::shared_ptr<SessionReader> session, std::size_t camera,
@@ -76,6 +78,8 @@ class ReplayCamera final : public Camera {
  private:
   /// The camera's next reset or trim among the events, from next_event_ on; none where there is no other.
   [[nodiscard]] std::optional<std::size_t> next_order() const;
+  /// Whether the next frame was waited for in vain, and still is.
+  [[nodiscard]] bool late(Seconds deadline);
 
   std::shared_ptr<SessionReader> session_;
   std::size_t camera_;
@@ -85,6 +89,8 @@ class ReplayCamera final : public Camera {
   bool filming_ = false;
   std::size_t next_frame_ = 0;
   std::size_t next_event_ = 0;
+  std::deque<LateFrame> late_;  ///< to come
+  Seconds waited_;              ///< for the first of them, so far
 };
 
 /// The session's strobe.

@@ -95,6 +95,30 @@ void order_resets(AlignDecision& decision, const AlignContext& c, const AlignSce
   }
 }
 
+/// People reset one camera at a time: the one that they were asked for as long as it has to be, then the one
+/// that is farthest out.
+void ask_for_one(AlignState& state, AlignDecision& decision, const AlignContext& c) {
+  if (c.options.reset_by == ResetBy::orders) return;
+  std::optional<std::size_t> farthest;
+  const std::optional<std::size_t> before = std::exchange(state.asked, std::nullopt);
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    CameraDecision& camera = decision.cameras[i];
+    if (!camera.reset || c.cameras[i].method != ResetMethod::by_hand) continue;
+    if (before == i) state.asked = i;
+    if (!farthest || abs(*camera.error) > abs(*decision.cameras[*farthest].error)) farthest = i;
+  }
+  if (!state.asked) state.asked = farthest;
+  decision.reset_next = state.asked;
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    CameraDecision& camera = decision.cameras[i];
+    if (!camera.reset || c.cameras[i].method != ResetMethod::by_hand) continue;
+    camera.reset = false;
+    if (i == state.asked) continue;
+    camera.reason = standing(*camera.error, c.options.row_time) +
+                    ", out of tolerance: its turn comes after " + c.cameras[*state.asked].id + "'s";
+  }
+}
+
 /// Whether the tolerance can be told from the noise, and is met within the limits. Asked once.
 bool can_be_met(AlignState& state, AlignDecision& decision, const AlignContext& c, const AlignScene& scene,
                 const std::vector<Drift>& drifts) {
@@ -232,6 +256,7 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
         decision.strobe_phase = next_look(c);
     }
   }
+  ask_for_one(state, decision, c);
   ask_for_moves(state, decision, c, looks);
   decision.reference = nearest(decision, c.options);
   foresee(state, decision, drifts, c);
@@ -264,9 +289,8 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
                        track_options(options),
                        options.tolerance.in_time(options.row_time),
                        trims ? trim_reach(trims_of(cameras), options) : Seconds(0)};
-  remember(state, c);
-
   AlignDecision decision;
+  decision.jumped = remember(state, c);
   decision.round = state.rounds;
   decision.resets_so_far = state.resets;
   decision.cameras.resize(cameras.size());
@@ -286,6 +310,11 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   }
   state.last_round = round.at;
 
+  // People take their time, and may be gone.
+  const bool waits =
+      decision.reset_next || std::any_of(state.cameras.begin(), state.cameras.end(),
+                                         [](const CameraTrack& camera) { return camera.away; });
+  if (waits) --state.rounds_out;
   if (decision.verdict == AlignVerdict::aligned) state.rounds_out = 0;
   if (decision.verdict == AlignVerdict::go_on && state.rounds_out >= options.max_rounds) {
     decision.verdict = AlignVerdict::given_up;
@@ -294,6 +323,7 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   }
   if (decision.verdict != AlignVerdict::go_on) {
     decision.strobe_phase.reset();
+    decision.reset_next.reset();
     for (CameraDecision& camera : decision.cameras) {
       camera.reset = false;
       camera.moment.reset();

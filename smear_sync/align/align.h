@@ -45,6 +45,13 @@ Result<Tolerance> parse_tolerance(std::string_view text);
 /// How a camera's shutter phase can be drawn anew.
 enum class ResetMethod { none, by_hand, on_command };
 
+/// Who resets shutters while an alignment runs.
+enum class ResetBy {
+  orders,   ///< the alignment alone, also those by hand: it knows of each
+  anybody,  ///< people too, who press buttons and say nothing: they are asked for one camera at a time, and a
+            ///< phase that jumps, or a camera that was away, has been reset
+};
+
 /// The time from the moment for which a reset is ordered to the stamps of the frames that follow, modulo T.
 /// It holds the camera's own latency and its transport's: nothing else needs to be known of either for a
 /// timed reset.
@@ -109,13 +116,15 @@ struct AlignOptions {
   /// By which the strobe is moved to see that every dot moves with it, as no reflection does, before cameras
   /// are called aligned; > 0 and < T / 4. Zero: what looks like a dot is believed.
   Seconds strobe_step = milliseconds(2);
+  ResetBy reset_by = ResetBy::orders;
 };
 
 /// One camera in one round.
 struct CameraView {
   Phase phase;  ///< at the round's instant
   std::optional<TimePoint>
-      stamp;  ///< an instant, near the round's, at which its frames are stamped (modulo T)
+      stamp;          ///< an instant, near the round's, at which its frames are stamped (modulo T)
+  bool away = false;  ///< no frame came in time: switched off, unplugged, or somebody resets it
 };
 
 struct ResetDone {
@@ -159,6 +168,7 @@ struct CameraTrack {
   bool moved = false;               ///< its dot was seen to move with the strobe
   std::optional<Seconds> rough;  ///< seen at two places of the strobe, but only to this: too roughly to tell
   std::string doubt;  ///< why what is seen isn't taken for its dot: it moved otherwise; empty if it is
+  bool away = false;  ///< in the last round
 };
 
 /// The phase to which cameras are brought, strobe_phase taken out: it moves as a camera of this rate would.
@@ -180,6 +190,7 @@ struct AlignState {
   std::optional<TimePoint> last_round;
   std::optional<AlignTarget> target;  ///< of trims, once they have begun
   std::optional<TimePoint> trimming;  ///< since when, until aligned
+  std::optional<std::size_t> asked;   ///< the camera that somebody was asked to reset
   std::vector<CameraTrack> cameras;
 };
 
@@ -215,11 +226,13 @@ struct AlignDecision {
   std::optional<Seconds> strobe_phase;  ///< the delay to which the strobe shall be moved, in [0, T): to bring
                                         ///< blind cameras out, or to see that dots move with it
   int resets_so_far = 0;                ///< before this decision's
-  std::optional<Seconds> next_check;    ///< once aligned: film again by then, before the drift may have led a
-                                        ///< camera out (three standard errors)
-  std::optional<AlignEffort> effort;    ///< foretold in the first round that has all phases, given limits
-  std::vector<AlignOffer> offers;       ///< of a refusal
-  std::string reason;                   ///< of the verdict, or what the rig waits for
+  std::optional<std::size_t> reset_next;  ///< of ResetBy::anybody: the camera that somebody must reset now
+  std::vector<std::size_t> jumped;        ///< likewise: those that somebody has reset, as this round shows
+  std::optional<Seconds> next_check;  ///< once aligned: film again by then, before the drift may have led a
+                                      ///< camera out (three standard errors)
+  std::optional<AlignEffort> effort;  ///< foretold in the first round that has all phases, given limits
+  std::vector<AlignOffer> offers;     ///< of a refusal
+  std::string reason;                 ///< of the verdict, or what the rig waits for
 };
 
 struct AlignStep {

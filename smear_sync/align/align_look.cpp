@@ -9,6 +9,7 @@
 #include "smear_sync/align/align_words.h"
 #include "smear_sync/align/move_together.h"
 #include "smear_sync/align/reset_delay.h"
+#include "smear_sync/align/unordered_reset.h"
 
 namespace emberlock {
 namespace {
@@ -125,13 +126,38 @@ void watch_moves(AlignState& state, const AlignContext& c) {
   }
 }
 
+/// The shutter's phase was drawn anew, or may have been; `before` is kept where a shift is to be learnt.
+void forget(CameraTrack& track, std::optional<Drift> before) {
+  track.before_hand = std::move(before);
+  track.phase.forget_phase();
+  track.sighted.reset();
+  track.moved = false;
+  track.rough.reset();
+  track.doubt.clear();
+}
+
+/// What people did: cameras that were switched off, and phases that jumped. Returns the latter.
+std::vector<std::size_t> notice_people(AlignState& state, const AlignContext& c) {
+  if (c.options.reset_by == ResetBy::orders) return {};
+  const auto lose = [&](CameraTrack& track) {
+    if (track.phase.phase_known()) forget(track, track.phase.at(c.round.at, c.track));
+  };
+  for (std::size_t i = 0; i < state.cameras.size(); ++i) {
+    state.cameras[i].away = c.round.cameras[i].away;
+    if (state.cameras[i].away) lose(state.cameras[i]);
+  }
+  std::vector<std::size_t> jumped = unordered_resets(state, c);
+  for (const std::size_t i : jumped) lose(state.cameras[i]);
+  return jumped;
+}
+
 Seconds moved_strobe(const AlignContext& c, Seconds by) {
   return wrap_positive(c.round.strobe_phase + by, kLookRange * c.options.period);
 }
 
 }  // namespace
 
-void remember(AlignState& state, const AlignContext& c) {
+std::vector<std::size_t> remember(AlignState& state, const AlignContext& c) {
   const AlignRound& round = c.round;
   for (const TrimDone& done : round.trims) {
     const auto& trim = c.cameras[done.camera].trim;
@@ -142,17 +168,13 @@ void remember(AlignState& state, const AlignContext& c) {
     CameraTrack& track = state.cameras[done.camera];
     ++track.resets;
     ++state.resets;
-    track.before_hand.reset();
-    if (!done.at && track.phase.phase_known()) track.before_hand = track.phase.at(round.at, c.track);
-    track.phase.forget_phase();
-    track.sighted.reset();
-    track.moved = false;
-    track.rough.reset();
-    track.doubt.clear();
+    const bool shifts = !done.at && track.phase.phase_known();
+    forget(track, shifts ? std::optional(track.phase.at(round.at, c.track)) : std::nullopt);
     const auto& stamp = round.cameras[done.camera].stamp;
     if (!done.at || !stamp) continue;
     learn_delay(state, c.cameras, c.options, done.camera, wrap_positive(*stamp - *done.at, c.options.period));
   }
+  std::vector<std::size_t> jumped = notice_people(state, c);
   watch_moves(state, c);
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     Phase phase = round.cameras[i].phase;
@@ -163,10 +185,19 @@ void remember(AlignState& state, const AlignContext& c) {
     if (!track.before_hand) continue;
     const Drift& before = *track.before_hand;
     const Seconds moved = (round.at - before.at) * (before.rate.value() * 1e-6);
-    track.hand_shifts.push_back(wrap_positive(phase.tau - before.tau - moved, c.options.period));
-    if (track.hand_shifts.size() > kShifts) track.hand_shifts.erase(track.hand_shifts.begin());
+    const Seconds shift = phase.tau - before.tau - moved;
     track.before_hand.reset();
+    if (c.options.reset_by == ResetBy::anybody) {
+      const Seconds sigma(std::hypot(before.tau_sigma.value(), phase.sigma.value()));
+      if (same_phase(shift, sigma, c)) continue;  // it was only out of sight
+      ++track.resets;
+      ++state.resets;
+      if (std::find(jumped.begin(), jumped.end(), i) == jumped.end()) jumped.push_back(i);
+    }
+    track.hand_shifts.push_back(wrap_positive(shift, c.options.period));
+    if (track.hand_shifts.size() > kShifts) track.hand_shifts.erase(track.hand_shifts.begin());
   }
+  return jumped;
 }
 
 std::optional<Drift> where(const CameraTrack& track, const AlignContext& c) {
@@ -182,6 +213,7 @@ void look_again(AlignState& state, AlignDecision& decision, const AlignContext& 
   std::string missing;
   std::string why;
   bool hidden = false;
+  bool away = false;
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
     const std::string& doubt = state.cameras[i].doubt;
@@ -191,7 +223,10 @@ void look_again(AlignState& state, AlignDecision& decision, const AlignContext& 
       continue;
     }
     missing += (missing.empty() ? "" : ", ") + c.cameras[i].id;
-    if (!doubt.empty()) {
+    if (c.round.cameras[i].away) {
+      away = true;
+      camera.reason = "sends no frames: switch it on, or plug it in; it goes on by itself";
+    } else if (!doubt.empty()) {
       hidden = true;
       camera.reason = doubt;
       if (why.empty()) why = doubt;
@@ -203,7 +238,9 @@ void look_again(AlignState& state, AlignDecision& decision, const AlignContext& 
       if (why.empty()) why = phase.reason;
     }
   }
-  if (state.looks > c.options.max_looks) {
+  if (away) {
+    state.looks = 0;  // looks find nobody who isn't there
+  } else if (state.looks > c.options.max_looks) {
     decision.verdict = AlignVerdict::given_up;
     decision.reason =
         "no phase of " + missing + " after " + plural(static_cast<std::size_t>(state.looks), "look") +
@@ -212,7 +249,7 @@ void look_again(AlignState& state, AlignDecision& decision, const AlignContext& 
     return;
   }
   if (hidden) decision.strobe_phase = next_look(c);
-  decision.reason = "looks again for " + missing;
+  decision.reason = (away ? "waits for " : "looks again for ") + missing;
 }
 
 void ask_for_moves(AlignState& state, AlignDecision& decision, const AlignContext& c, int looks) {

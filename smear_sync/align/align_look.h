@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <vector>
 
 #include "smear_sync/align/align_context.h"
 
@@ -8,7 +10,8 @@
 namespace emberlock {
 
 /// Takes over what the round showed: delays and shifts of resets, trims ordered, phases of the cameras seen.
-void remember(AlignState& state, const AlignContext& c);
+/// Returns the cameras that somebody has reset without an order.
+std::vector<std::size_t> remember(AlignState& state, const AlignContext& c);
 
 /// Where a camera stands at the round's instant: seen now, or earlier and sure enough still.
 std::optional<Drift> where(const CameraTrack& track, const AlignContext& c);

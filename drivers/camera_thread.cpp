@@ -40,7 +40,7 @@ constexpr Seconds kPrepared = milliseconds(5);
 class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
  public:
   Worker(std::unique_ptr<Camera> camera, CameraThreadOptions options)
-      : options_(options), info_(camera->info()), camera_(std::move(camera)) {}
+      : options_(std::move(options)), info_(camera->info()), id_(info_.id), camera_(std::move(camera)) {}
 
   void launch() {
     std::thread([self = shared_from_this()] { self->run(); }).detach();
@@ -59,6 +59,12 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     if (hangs()) return State::quarantined;
     if (!filming_) return State::idle;
     return lost_ ? State::lost : State::filming;
+  }
+
+  std::optional<Error> trouble() const {
+    const std::lock_guard lock(mutex_);
+    if (hangs()) return hanging();
+    return filming_ && lost_ ? lost_by_ : std::nullopt;
   }
 
   const CameraInfo& info() const { return info_; }
@@ -109,11 +115,18 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       if (film != film_) return status;  // too late: nobody waits for it
       filming_ = status.ok();
       lost_ = false;
+      if (status) learn(camera.info());
       return status;
     });
     const std::lock_guard lock(mutex_);
-    if (!started) ++film_;
-    return started;
+    adopt_info();
+    if (started) return started;
+    ++film_;
+    if (options_.absent == CameraThreadOptions::Absent::fails) return started;
+    filming_ = true;
+    lose(started.error());
+    thread_wakes_.notify_all();
+    return {};
   }
 
   /// Also of a camera that hangs: it is stopped when it goes on.
@@ -146,6 +159,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     while (waiting_.empty() && now() < until && !hangs()) {
       owner_wakes_.wait_until(lock, busy_until_ ? std::min(until, *busy_until_) : until);
     }
+    adopt_info();
     if (!waiting_.empty()) {
       Result<Frame> next = std::move(waiting_.front());
       waiting_.pop_front();
@@ -207,7 +221,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
 
   // Behind the lock, all of them.
 
-  [[nodiscard]] std::string where() const { return "camera " + info_.id; }
+  [[nodiscard]] std::string where() const { return "camera " + id_; }
   [[nodiscard]] bool hangs() const { return busy_until_ && now() > *busy_until_; }
   [[nodiscard]] Error hanging() const {
     return {ErrorKind::device,
@@ -230,11 +244,16 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   void lose(const Error& error) {
     log(LogCategory::drivers).warn("{}", error.message());
     lost_ = true;
+    lost_by_ = error;
     lost_since_ = now();
     retry_at_ = after(now(), options_.retry);
     waiting_.push_back(error);
     std::erase_if(orders_, [](const Order& order) { return order.what == kReset; });
     resets_to_do_ = 0;
+  }
+  void learn(const CameraInfo& info) { learnt_info_ = info; }
+  void adopt_info() {
+    if (learnt_info_) info_ = *std::exchange(learnt_info_, std::nullopt);
   }
   void drop_frames() {
     own_.passed_over += static_cast<std::uint64_t>(
@@ -310,8 +329,11 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   void take_frame(std::unique_lock<std::mutex>& lock) {
     const std::uint64_t film = film_;
     const Seconds slice = until_next_order();
-    Result<Frame> next = busy(lock, "next_frame", after(now(), slice),
-                              [slice](Camera& camera) { return camera.next_frame(slice); });
+    Result<Frame> next = busy(lock, "next_frame", after(now(), slice), [slice, this](Camera& camera) {
+      Result<Frame> frame = camera.next_frame(slice);
+      if (frame && options_.on_frame) options_.on_frame(*frame);
+      return frame;
+    });
     if (next) return add(std::move(next), film);
     if (film != film_ || next.error().kind == ErrorKind::timed_out) return;
     if (next.error().kind == ErrorKind::device) return lose(next.error());
@@ -345,13 +367,18 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   void look_for_it(std::unique_lock<std::mutex>& lock) {
     const Status back = busy(lock, "start", now(), [](Camera& camera) { return camera.start(); });
     retry_at_ = after(now(), options_.retry);
-    if (!back) return;
+    if (!back) {
+      lost_by_ = back.error();
+      return;
+    }
     lost_ = false;
+    learn(camera_->info());
     log(LogCategory::drivers).warn("{}: it is back after {:.1f} s", where(), since(lost_since_).value());
   }
 
   const CameraThreadOptions options_;
-  const CameraInfo info_;
+  CameraInfo info_;  ///< the owner's
+  const std::string id_;
   std::unique_ptr<Camera> camera_;
 
   mutable std::mutex mutex_;
@@ -367,6 +394,8 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   std::uint64_t film_ = 0;  ///< counts starts and stops: what was begun before one is nobody's any more
   bool filming_ = false;    ///< as the owner wants it
   bool lost_ = false;
+  std::optional<Error> lost_by_;
+  std::optional<CameraInfo> learnt_info_;
   Time lost_since_;
   Time retry_at_;
   std::string busy_with_;
@@ -377,7 +406,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
 };
 
 CameraThread::CameraThread(std::unique_ptr<Camera> camera, CameraThreadOptions options)
-    : worker_(std::make_shared<Worker>(std::move(camera), options)) {
+    : worker_(std::make_shared<Worker>(std::move(camera), std::move(options))) {
   worker_->launch();
 }
 
@@ -387,6 +416,7 @@ CameraThread::~CameraThread() {
 }
 
 CameraThread::State CameraThread::state() const { return worker_->state(); }
+std::optional<Error> CameraThread::trouble() const { return worker_->trouble(); }
 const CameraInfo& CameraThread::info() const { return worker_->info(); }
 FrameCounts CameraThread::counts() const { return worker_->counts(); }
 Status CameraThread::start() { return worker_->start(); }

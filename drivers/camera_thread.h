@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 
 #include "drivers/camera.h"
 
@@ -13,6 +15,11 @@ struct CameraThreadOptions {
   Seconds retry = milliseconds(250);  ///< between two looks for a camera that went away, > 0
   Seconds call_deadline =
       kCallDeadline * 1.5;  ///< what a call may take before the camera is held to hang, > 0
+  /// Whether start() fails while the camera isn't there, or has it looked for as one that went away.
+  enum class Absent { fails, is_looked_for } absent = Absent::fails;
+  /// Shown every frame as it comes, also those that nobody takes. Called on the camera's thread; must return
+  /// at once.
+  std::function<void(const Frame&)> on_frame = {};
 };
 
 /// A camera that is driven by a thread of its own, behind the same interface. What it adds:
@@ -23,7 +30,8 @@ struct CameraThreadOptions {
 ///   call says `device` at once, until the hanging one returns. Destroyed meanwhile, thread and camera are
 ///   left behind, and end by themselves should they ever return.
 /// reset_shutter() returns at once, and frames are passed over until it is done; an error of it comes from
-/// next_frame. Frames that wait in the queue are in none of the counts. One owner thread, but for state() and
+/// next_frame. Frames that wait in the queue are in none of the counts. What a camera says of itself once it
+/// has come is adopted by start() and next_frame(). One owner thread, but for state(), trouble() and
 /// counts(), which any may ask. On the machine's monotonic clock.
 class CameraThread final : public Camera {
  public:
@@ -40,6 +48,8 @@ class CameraThread final : public Camera {
   CameraThread& operator=(const CameraThread&) = delete;
 
   [[nodiscard]] State state() const;
+  /// Why it is lost or quarantined.
+  [[nodiscard]] std::optional<Error> trouble() const;
 
   [[nodiscard]] const CameraInfo& info() const override;
   [[nodiscard]] FrameCounts counts() const override;

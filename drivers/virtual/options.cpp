@@ -4,6 +4,9 @@
 #include <charconv>
 #include <cmath>
 #include <set>
+#include <utility>
+
+#include <fmt/format.h>
 
 #include "base/random.h"
 
@@ -114,33 +117,33 @@ Status check(const VirtualRigOptions& options) {
   return {};
 }
 
+VirtualCameraOptions draw_virtual_camera(const VirtualRigDraw& draw, std::string id, SensorKind sensor) {
+  VirtualCameraOptions c;
+  c.id = std::move(id);
+  c.sensor = sensor;
+  RandomStream random(stream_seed(draw.seed, c.id), 0);
+  if (sensor != SensorKind::ccd) c.exposure = draw.shutter_exposure;
+  c.layout = draw.layout;
+  c.nominal_rate = draw.rate;
+  c.timing = draw_timing(draw, random);
+  c.lamp.x = random.uniform(0.3, 0.7) * draw.layout.size.width;
+  c.lamp.y = Rows(random.uniform(0.28, 0.72) * draw.layout.size.height);
+  c.lamp.radius = random.uniform(3, 5);
+  c.reset = draw.reset;
+  c.reset_latency = draw.reset_latency + draw.reset_latency_spread * random.uniform(-1, 1);
+  c.reset_jitter = draw.reset_jitter;
+  c.trim = draw.trim;
+  return c;
+}
+
 VirtualRigOptions draw_virtual_rig(const VirtualRigDraw& draw) {
   VirtualRigOptions rig;
   rig.seed = draw.seed;
-  const double width = draw.layout.size.width;
-  const double height = draw.layout.size.height;
   for (int i = 0; i < draw.cameras; ++i) {
-    VirtualCameraOptions c;
-    const std::string number = std::to_string(i);
-    c.id = "virtual-" + std::string(number.size() < 2 ? 2 - number.size() : 0, '0') + number;
-    RandomStream random(stream_seed(draw.seed, c.id), 0);
-    if (static_cast<std::size_t>(i) < draw.sensors.size())
-      c.sensor = draw.sensors[static_cast<std::size_t>(i)];
-    if (c.sensor != SensorKind::ccd) {
-      c.exposure = draw.shutter_exposure;
-      rig.scene = lit_room_scene();
-    }
-    c.layout = draw.layout;
-    c.nominal_rate = draw.rate;
-    c.timing = draw_timing(draw, random);
-    c.lamp.x = random.uniform(0.3, 0.7) * width;
-    c.lamp.y = Rows(random.uniform(0.28, 0.72) * height);
-    c.lamp.radius = random.uniform(3, 5);
-    c.reset = draw.reset;
-    c.reset_latency = draw.reset_latency + draw.reset_latency_spread * random.uniform(-1, 1);
-    c.reset_jitter = draw.reset_jitter;
-    c.trim = draw.trim;
-    rig.cameras.push_back(std::move(c));
+    const auto place = static_cast<std::size_t>(i);
+    const SensorKind sensor = place < draw.sensors.size() ? draw.sensors[place] : SensorKind::ccd;
+    if (sensor != SensorKind::ccd) rig.scene = lit_room_scene();
+    rig.cameras.push_back(draw_virtual_camera(draw, fmt::format("virtual-{:02}", i), sensor));
   }
   return rig;
 }

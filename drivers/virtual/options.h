@@ -82,6 +82,9 @@ struct VirtualRigDraw {
 /// seed; the room is lit where a camera is no CCD. Every value may be changed before the rig is made.
 VirtualRigOptions draw_virtual_rig(const VirtualRigDraw& draw);
 
+/// One camera, drawn by its id and the seed; `draw` says what it is, but for how many there are.
+VirtualCameraOptions draw_virtual_camera(const VirtualRigDraw& draw, std::string id, SensorKind sensor);
+
 /// A rig's name: "virtual:N" is draw_virtual_rig of N CCDs, 1280 x 720 gray8, "virtual:4ccd+3rolling+2global"
 /// of as many of each kind. bad_input otherwise.
 Result<VirtualRigOptions> parse_virtual_rig(std::string_view name, std::uint64_t seed = 1);

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <memory>
+
+#include "base/image.h"
+#include "drivers/virtual/light_field.h"
+
+namespace emberlock {
+
+/// A flame that stands still amid so many cameras that film pictures of this size, on the stage of stage.h.
+/// Drawing it takes a moment.
+std::shared_ptr<const LightField> still_flame(int cameras, ImageSize size);
+
+}  // namespace emberlock

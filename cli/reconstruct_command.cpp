@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "cli/commands.h"
+#include "cli/progress_stream.h"
 #include "cli/scene_options.h"
 #include "recon/pipeline/advice.h"
 #include "recon/pipeline/grid_choice.h"
@@ -39,6 +40,7 @@ struct Arguments {
   int iterations = 0;
   int threads = 0;
   std::uint64_t seed = 1;
+  std::optional<int> progress_fd;
 };
 
 }  // namespace
@@ -126,20 +128,51 @@ void print_summary(const Report& report, const std::string& out) {
   std::printf("%-16s %s\n", "written to", out.c_str());
 }
 
-void reconstruct_command(const Arguments& arguments) {
-  const ReconstructOptions options = or_fail(options_of(arguments));
+/// Who watches: the terminal, or another program.
+struct Watchers {
+  Progress progress;
+  ProgressStream* stream = nullptr;
+};
+
+Result<Outcome> reconstruct_files(const Arguments& arguments, const Watchers& watchers) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const ReconstructOptions options, options_of(arguments));
   SceneOptions scene_options;
   scene_options.frame = arguments.frame;
-  if (!arguments.box.empty()) scene_options.box = or_fail(parse_box(arguments.box));
-  or_fail(check_output(arguments.out));
-  Scene scene = or_fail(load_scene(arguments.input, scene_options));
-  or_fail(hold_out(scene, arguments.held_out));
-  scene = or_fail(choose_views(scene, arguments.views));
+  if (!arguments.box.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(scene_options.box, parse_box(arguments.box));
+  }
+  EMBERLOCK_RETURN_IF_ERROR(check_output(arguments.out));
+  if (watchers.stream != nullptr) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
+    watchers.stream->loading(device);
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(Scene scene, load_scene(arguments.input, scene_options));
+  EMBERLOCK_RETURN_IF_ERROR(hold_out(scene, arguments.held_out));
+  EMBERLOCK_ASSIGN_OR_RETURN(scene, choose_views(scene, arguments.views));
+  std::function<void(const Preview&)> preview;
+  if (watchers.stream != nullptr) {
+    preview = [&](const Preview& state) { watchers.stream->iteration(state, scene, options.solve.compute); };
+  }
   SteadyClock clock;
-  Outcome outcome = or_fail(reconstruct(scene, options, clock, progress_bar("reconstruct")));
+  EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, reconstruct(scene, options, clock, watchers.progress, preview));
   outcome.report.input = arguments.input;
-  or_fail(write_outcome(outcome, arguments.out));
-  print_summary(outcome.report, arguments.out);
+  EMBERLOCK_RETURN_IF_ERROR(write_outcome(outcome, arguments.out));
+  if (watchers.stream != nullptr) watchers.stream->done(outcome, scene, arguments.out);
+  return outcome;
+}
+
+void reconstruct_command(const Arguments& arguments) {
+  if (!arguments.progress_fd) {
+    const Outcome outcome = or_fail(reconstruct_files(arguments, {progress_bar("reconstruct")}));
+    return print_summary(outcome.report, arguments.out);
+  }
+  ProgressStream stream = or_fail(ProgressStream::open(*arguments.progress_fd));
+  const auto outcome = reconstruct_files(
+      arguments,
+      {[&](double fraction, std::string_view doing) { stream.progress(fraction, doing); }, &stream});
+  if (outcome) return;
+  stream.failed(outcome.error());
+  fail(outcome.error());
 }
 
 }  // namespace
@@ -189,6 +222,10 @@ void add_reconstruct(CLI::App& app) {
   verb->add_option("--seed", a.seed, "Of the random numbers in the paper's solver")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
+  verb->add_option("--progress-fd", a.progress_fd,
+                   "For programs: tell progress, every iteration and the result on this descriptor "
+                   "(emberlock/v1/child.proto), nothing on stdout; die with the parent")
+      ->check(CLI::NonNegativeNumber);
   verb->callback([arguments] { reconstruct_command(*arguments); });
 }
 

@@ -6,11 +6,15 @@
 #include <vector>
 
 #include <Eigen/Geometry>
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "base/file.h"
+#include "base/unique_fd.h"
 #include "cli/commands.h"
+#include "daemon/reconstruction/messages.h"
 #include "recon/calibrate/pose.h"
 #include "recon/export/picture.h"
 #include "tests/support/verb.h"
@@ -97,6 +101,78 @@ TEST_F(ReconstructCommandTest, WritesVolumeViewsAndReport) {
   EXPECT_LT(result.out.find("held-out error"), result.out.find("input error"))
       << "the error that counts comes first";
   EXPECT_THAT(result.out, HasSubstr("only 3 input views"));
+}
+
+/// Everything that `emberlock reconstruct --progress-fd` told.
+std::vector<v1::ChildMessage> read_messages(const fs::path& path) {
+  std::vector<v1::ChildMessage> messages;
+  ChildMessageParser parser;
+  const Status status = parser.add(
+      read_file(path).value(), [&](v1::ChildMessage&& message) { messages.push_back(std::move(message)); });
+  EXPECT_TRUE(status.ok());
+  return messages;
+}
+
+TEST_F(ReconstructCommandTest, AnotherProgramIsToldEveryIterationAndTheResult) {
+  const std::vector<std::string> words = {"--voxels",  "16",   "--hold-out",   "1", "--device", "cpu",
+                                          "--effects", "none", "--iterations", "6"};
+  ASSERT_EQ(run(words).exit_code, 0);
+  const json unwatched = report();
+  const UniqueFd file(::open((root_ / "messages").c_str(), O_CREAT | O_WRONLY, 0600));
+  std::vector<std::string> watched_words = words;
+  watched_words.insert(watched_words.end(), {"--progress-fd", std::to_string(file.get())});
+  const Run result = run(watched_words);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(result.out + result.err, "");
+
+  std::vector<v1::IterationPreview> iterations;
+  std::string device;
+  const auto messages = read_messages(root_ / "messages");
+  for (const v1::ChildMessage& message : messages) {
+    if (message.has_iteration()) iterations.push_back(message.iteration());
+    if (message.has_progress()) device += message.progress().device();
+  }
+  EXPECT_EQ(device, "cpu");
+  const json watched = report();
+  ASSERT_EQ(iterations.size(), watched["trace"].size() + 1)
+      << "each, and the last once more with its pictures";
+  for (std::size_t i = 0; i + 1 < iterations.size(); ++i) {
+    EXPECT_EQ(iterations[i].iteration().iteration(), i + 1);
+    EXPECT_TRUE(iterations[i].iteration().has_heldout_rmse());
+    EXPECT_EQ(watched["trace"][i]["input_rmse"], unwatched["trace"][i]["input_rmse"])
+        << "watching changes nothing";
+  }
+  for (const v1::IterationPreview& shown : {iterations.front(), iterations.back()}) {
+    EXPECT_EQ(shown.camera_id(), "view1.png") << "the one that the solver doesn't know";
+    EXPECT_EQ(shown.captured_jpeg().substr(0, 2), "\xff\xd8");
+    EXPECT_EQ(shown.rendered_jpeg().substr(0, 2), "\xff\xd8");
+    EXPECT_EQ(shown.volume().voxels().size(), 17U * 17U * 17U);
+    EXPECT_GT(shown.volume().brightest(), 0);
+  }
+  ASSERT_TRUE(messages.back().has_done());
+  EXPECT_EQ(messages.back().done().result(), (root_ / "out").string());
+  EXPECT_FALSE(messages.back().done().effects().empty());
+  EXPECT_FALSE(messages.back().done().advice().empty());
+}
+
+TEST_F(ReconstructCommandTest, WhenNobodyReadsAnyMoreTheWorkGoesOn) {
+  int ends[2];
+  ASSERT_EQ(::pipe(ends), 0);
+  ::close(ends[0]);
+  const UniqueFd write(ends[1]);
+  const Run result = run({"--voxels", "8", "--device", "cpu", "--effects", "none", "--progress-fd",
+                          std::to_string(write.get())});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_TRUE(fs::exists(root_ / "out" / "volume.vdb"));
+}
+
+TEST_F(ReconstructCommandTest, AFailureIsToldOnTheDescriptorToo) {
+  const UniqueFd file(::open((root_ / "messages.png").c_str(), O_CREAT | O_WRONLY, 0600));
+  expect_refused(run({"--hold-out", "9", "--progress-fd", std::to_string(file.get())}), "0 to 4");
+  const auto messages = read_messages(root_ / "messages.png");
+  ASSERT_TRUE(messages.back().has_failure());
+  EXPECT_THAT(messages.back().failure().message(), HasSubstr("0 to 4"));
+  expect_refused(run({"--progress-fd", "1000"}), "--progress-fd");
 }
 
 TEST_F(ReconstructCommandTest, WithNothingHeldOutItSaysThatTheInputErrorProvesNothing) {

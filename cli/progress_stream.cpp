@@ -1,0 +1,159 @@
+#include "cli/progress_stream.h"
+
+#include <algorithm>
+#include <csignal>
+#include <string>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/prctl.h>
+
+#include "daemon/reconstruction/messages.h"
+#include "recon/export/picture.h"
+#include "recon/export/preview.h"
+#include "recon/pipeline/advice.h"
+#include "recon/preprocess/flame_mask.h"
+#include "recon/preprocess/radiance.h"
+#include "recon/render/render.h"
+#include "session/files.h"
+
+namespace emberlock::cli {
+namespace {
+
+constexpr int kWidest = 480;  // of a picture, pixels
+constexpr int kBlocks = 64;   // of a volume, along its longest edge
+constexpr auto kRarely = std::chrono::milliseconds(200);
+constexpr int kShare = 20;  // pictures take one part in so many of the time
+
+v1::Iteration numbers(const TracePoint& point, bool judged) {
+  v1::Iteration iteration;
+  iteration.set_iteration(static_cast<std::uint32_t>(point.iteration));
+  iteration.set_seconds(point.time.value());
+  iteration.set_input_rmse(all_channels(point.input_rmse));
+  if (judged) iteration.set_heldout_rmse(all_channels(point.heldout_rmse));
+  return iteration;
+}
+
+/// The view to show: one that the solver doesn't know, if there is one.
+std::size_t shown_view(const Scene& scene) {
+  const auto held_out = std::find_if(scene.views.begin(), scene.views.end(),
+                                     [](const View& view) { return view.role == ViewRole::held_out; });
+  return held_out == scene.views.end() ? 0 : static_cast<std::size_t>(held_out - scene.views.begin());
+}
+
+bool is_judged(const Scene& scene) { return scene.views[shown_view(scene)].role == ViewRole::held_out; }
+
+std::string jpeg(const RadianceImage& image) {
+  auto bytes = to_jpeg(to_rgb8(image).view());
+  return bytes ? std::move(*bytes) : std::string();
+}
+
+void add_pictures(v1::IterationPreview& message, const View& view, const RadianceImage& rendered) {
+  message.set_camera_id(view.name);
+  message.set_captured_jpeg(jpeg(shrunk(view.image, rendered.size)));
+  message.set_rendered_jpeg(jpeg(rendered));
+}
+
+void add_volume(v1::IterationPreview& message, const Volume& volume) {
+  const CoarseBrightness coarse = coarse_brightness(volume, kBlocks);
+  v1::VolumePreview& preview = *message.mutable_volume();
+  preview.set_nx(static_cast<std::uint32_t>(coarse.nx));
+  preview.set_ny(static_cast<std::uint32_t>(coarse.ny));
+  preview.set_nz(static_cast<std::uint32_t>(coarse.nz));
+  for (const double value : coarse.box.center) preview.mutable_box()->add_center(value);
+  for (const double value : coarse.box.size) preview.mutable_box()->add_size(value);
+  preview.set_brightest(coarse.brightest);
+  preview.set_voxels(coarse.voxels.data(), coarse.voxels.size());
+}
+
+/// A view of a solve's volume, as it is so far.
+RadianceImage rendered_small(const Volume& volume, const Preview& preview, const View& view,
+                             const ComputeOptions& compute) {
+  const ImageSize size = preview_size(view.image.size, kWidest);
+  Effects effects = preview.effects;
+  effects.scattering = {};
+  effects.refraction = {};  // moves things by less than one of these pixels
+  RenderOptions options{.compute = compute};
+  RadianceImage behind;
+  if (view.background) {
+    behind = shrunk(*view.background, size);
+    options.background = &behind;
+  }
+  return render_view(volume, preview.hull, effects, resized(view.camera, size), options);
+}
+
+}  // namespace
+
+Result<ProgressStream> ProgressStream::open(int fd) {
+  if (::fcntl(fd, F_GETFD) < 0) {
+    return Error{ErrorKind::bad_input, fmt::format("descriptor {} isn't open", fd), "--progress-fd",
+                 "Start this program with a pipe there"};
+  }
+  ::signal(SIGPIPE, SIG_IGN);
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  return ProgressStream(fd);
+}
+
+void ProgressStream::send(const v1::ChildMessage& message) {
+  if (!broken_) broken_ = !write_fully(fd_, framed(message), "--progress-fd").ok();
+}
+
+void ProgressStream::loading(Device device) {
+  v1::ChildMessage message;
+  message.mutable_progress()->set_doing("loading the pictures");
+  message.mutable_progress()->set_device(device == Device::cuda ? "cuda" : "cpu");
+  send(message);
+}
+
+void ProgressStream::progress(double fraction, std::string_view doing) {
+  v1::ChildMessage message;
+  message.mutable_progress()->set_fraction(fraction);
+  message.mutable_progress()->set_doing(std::string(doing));
+  send(message);
+}
+
+void ProgressStream::iteration(const Preview& preview, const Scene& scene, const ComputeOptions& compute) {
+  if (broken_) return;
+  v1::ChildMessage message;
+  v1::IterationPreview& shown = *message.mutable_iteration();
+  *shown.mutable_iteration() = numbers(preview.point, is_judged(scene));
+  const Clock::time_point begin = Clock::now();
+  if (begin >= pictures_due_) {
+    if (const std::optional<Volume> volume = preview.recent()) {
+      const View& view = scene.views[shown_view(scene)];
+      add_pictures(shown, view, rendered_small(*volume, preview, view, compute));
+      add_volume(shown, *volume);
+      pictures_due_ = begin + std::max<Clock::duration>(kRarely, kShare * (Clock::now() - begin));
+    }
+  }
+  send(message);
+}
+
+void ProgressStream::done(const Outcome& outcome, const Scene& scene, const std::string& folder) {
+  v1::ChildMessage last;
+  v1::IterationPreview& shown = *last.mutable_iteration();
+  const Report& report = outcome.report;
+  if (!report.trace.empty()) *shown.mutable_iteration() = numbers(report.trace.back(), is_judged(scene));
+  const std::size_t v = shown_view(scene);
+  const ImageSize size = preview_size(scene.views[v].image.size, kWidest);
+  add_pictures(shown, scene.views[v], shrunk(outcome.renders[v], size));
+  add_volume(shown, outcome.reconstruction.volume);
+  send(last);
+
+  v1::ChildMessage message;
+  v1::ChildMessage::Done& done = *message.mutable_done();
+  for (const EffectReport& effect : report.effects)
+    done.add_effects(fmt::format("{} {}: {}", effect.name, effect.on ? "on" : "off", effect.reason));
+  for (const std::string& advice : next_steps(report)) done.add_advice(advice);
+  for (const std::string& warning : report.warnings) done.add_warnings(warning);
+  done.set_result(folder);
+  send(message);
+}
+
+void ProgressStream::failed(const Error& error) {
+  v1::ChildMessage message;
+  message.mutable_failure()->set_message(error.message());
+  send(message);
+}
+
+}  // namespace emberlock::cli

@@ -2,11 +2,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <set>
 #include <string>
 
 #include <fmt/format.h>
 
 #include "base/file.h"
+#include "cli/align_daemon.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "daemon/align/json.h"
@@ -22,7 +24,7 @@ namespace {
 constexpr Seconds kTrimLatency = milliseconds(80);
 
 struct AlignArguments {
-  std::string rig = "virtual:11";
+  std::string rig;
   std::string tolerance = "100rows";
   std::string policy = "densest";
   std::uint64_t seed = 1;
@@ -39,6 +41,8 @@ struct AlignArguments {
   std::string record;
   std::string replay;
   std::string delays;
+  DaemonAlignment by_daemon;
+  bool anyway = false;
 };
 
 void print_table(const AlignRoundReport& report) {
@@ -147,6 +151,11 @@ Result<AlignRunResult> align_live(const AlignArguments& arguments, const AlignOb
   return result;
 }
 
+/// Whether the daemon is asked: no rig was named, and nothing is to be run again.
+bool asks_daemon(const AlignArguments& arguments) {
+  return arguments.rig.empty() && arguments.replay.empty();
+}
+
 void align(const AlignArguments& arguments) {
   const AlignObserver observer = printer(arguments.json);
   std::uint64_t seed = arguments.seed;
@@ -167,15 +176,35 @@ void align(const AlignArguments& arguments) {
   if (result->last.verdict != AlignVerdict::aligned) throw CLI::RuntimeError(1);
 }
 
+/// What the daemon can be asked for; the rest is its configuration's.
+DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App& verb) {
+  static const std::set<std::string> kAskable = {"--tolerance", "--policy", "--anyway", "--stop",
+                                                 "--json",      "--daemon", "--ca",     "--token-file"};
+  for (const CLI::Option* option : verb.get_options()) {
+    if (option->count() > 0 && kAskable.count(option->get_name()) == 0) {
+      fail({ErrorKind::bad_input, "is for a rig of its own", option->get_name(),
+            "Give --rig too, or leave it to the daemon's configuration"});
+    }
+  }
+  DaemonAlignment wanted = arguments.by_daemon;
+  wanted.json = arguments.json;
+  if (verb.count("--tolerance") > 0) wanted.request.set_tolerance(arguments.tolerance);
+  if (verb.count("--policy") > 0) wanted.request.set_policy(arguments.policy);
+  wanted.request.set_anyway(arguments.anyway);
+  return wanted;
+}
+
 }  // namespace
 
 void add_align(CLI::App& app) {
   auto arguments = std::make_shared<AlignArguments>();
-  CLI::App* verb = app.add_subcommand(
-      "align",
-      "Films the strobe and resets the cameras' shutters until all read within a tolerance of one another.");
-  verb->add_option("--rig", arguments->rig, "cameras and strobe: virtual:N, or virtual:4ccd+3rolling+2global")
-      ->capture_default_str();
+  CLI::App* verb = app.add_subcommand("align",
+                                      "Films the strobe and resets the cameras' shutters until all read "
+                                      "within a tolerance of one another: by the "
+                                      "daemon, or here with --rig.");
+  CLI::Option* rig =
+      verb->add_option("--rig", arguments->rig,
+                       "cameras and strobe: virtual:N, or virtual:4ccd+3rolling+2global [the daemon's]");
   verb->add_option("--tolerance", arguments->tolerance,
                    "to the common target, to either side: 100rows, 5.4ms or 500us")
       ->capture_default_str();
@@ -227,7 +256,16 @@ void add_align(CLI::App& app) {
   verb->add_option("--replay", arguments->replay,
                    "instead of filming, run a recorded alignment again, with its own settings")
       ->excludes(record);
-  verb->callback([arguments] { align(*arguments); });
+  add_daemon_options(*verb, arguments->by_daemon.daemon);
+  verb->add_flag("--anyway", arguments->anyway,
+                 "of the daemon: even where the configured limits of time and resets won't hold")
+      ->excludes(rig);
+  verb->add_flag("--stop", arguments->by_daemon.stop, "of the daemon: stop aligning, or let the lock go")
+      ->excludes(rig);
+  verb->callback([arguments, verb] {
+    if (!asks_daemon(*arguments)) return align(*arguments);
+    align_by_daemon(asked_of_daemon(*arguments, *verb));
+  });
 }
 
 }  // namespace emberlock::cli

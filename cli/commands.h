@@ -19,6 +19,10 @@ void add_tradeoff_sync(CLI::App& parent);
 void add_demo(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_sessions(CLI::App& app);
+void add_status(CLI::App& app);
+void add_watch(CLI::App& app);
+void add_record(CLI::App& app);
+void add_strobe(CLI::App& app);
 
 /// Prints "emberlock: <message>" on stderr and leaves with exit code 2 for bad input, else 1 (as
 /// CLI::RuntimeError).

@@ -16,6 +16,10 @@ int main(int argc, char** argv) {
   emberlock::cli::add_demo(app);
   emberlock::cli::add_sessions(app);
   emberlock::cli::add_doctor(app);
+  emberlock::cli::add_status(app);
+  emberlock::cli::add_watch(app);
+  emberlock::cli::add_record(app);
+  emberlock::cli::add_strobe(app);
   emberlock::cli::add_manual(app, EMBERLOCK_VERSION);
   try {
     app.parse(argc, argv);

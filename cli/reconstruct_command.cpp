@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <set>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "base/clock.h"
 #include "cli/commands.h"
 #include "cli/progress_stream.h"
+#include "cli/reconstruct_daemon.h"
 #include "cli/scene_options.h"
 #include "recon/pipeline/advice.h"
 #include "recon/pipeline/grid_choice.h"
@@ -41,6 +43,7 @@ struct Arguments {
   int threads = 0;
   std::uint64_t seed = 1;
   std::optional<int> progress_fd;
+  DaemonReconstruction by_daemon;
 };
 
 }  // namespace
@@ -161,7 +164,32 @@ Result<Outcome> reconstruct_files(const Arguments& arguments, const Watchers& wa
   return outcome;
 }
 
+/// What the daemon can be asked for; the rest is its configuration's.
+DaemonReconstruction asked_of_daemon(const Arguments& arguments, const CLI::App& verb) {
+  static const std::set<std::string> kAskable = {"input",    "--daemon",   "--ca",    "--token-file",
+                                                 "--cancel", "--json",     "--frame", "--budget",
+                                                 "--voxels", "--hold-out", "--device"};
+  for (const CLI::Option* option : verb.get_options()) {
+    if (option->count() > 0 && kAskable.count(option->get_name()) == 0) {
+      fail({ErrorKind::bad_input, "isn't the daemon's to be asked", option->get_name(),
+            "Leave it away, or reconstruct here, without --daemon"});
+    }
+  }
+  if (arguments.input.empty() && !arguments.by_daemon.cancel) throw CLI::RequiredError("input");
+  DaemonReconstruction wanted = arguments.by_daemon;
+  v1::ReconstructRequest& request = wanted.request;
+  request.set_session(arguments.input);
+  if (arguments.frame) request.set_frame(*arguments.frame);
+  request.set_budget_s(arguments.budget.value_or(0));
+  request.set_voxels(static_cast<std::uint32_t>(arguments.voxels.value_or(0)));
+  for (const int view : arguments.held_out) request.add_hold_out(static_cast<std::uint32_t>(view));
+  if (verb.count("--device") > 0) request.set_device(arguments.device);
+  return wanted;
+}
+
 void reconstruct_command(const Arguments& arguments) {
+  if (arguments.input.empty()) throw CLI::RequiredError("input");
+  if (arguments.out.empty()) throw CLI::RequiredError("--out");
   if (!arguments.progress_fd) {
     const Outcome outcome = or_fail(reconstruct_files(arguments, {progress_bar("reconstruct")}));
     return print_summary(outcome.report, arguments.out);
@@ -182,10 +210,11 @@ void add_reconstruct(CLI::App& app) {
   CLI::App* verb = app.add_subcommand("reconstruct",
                                       "Reconstruct the flame's volume from calibrated pictures or a session");
   Arguments& a = *arguments;
-  verb->add_option("input", a.input,
-                   "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder")
-      ->required();
-  verb->add_option("--out", a.out, "Folder for volume.vdb, views/ and report.json")->required();
+  verb->add_option(
+      "input", a.input,
+      "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder; with --daemon a "
+      "session's name");
+  verb->add_option("--out", a.out, "Folder for volume.vdb, views/ and report.json");
   verb->add_option("--box", a.box,
                    "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's box]");
   verb->add_option("--voxels", a.voxels, "Voxels along the longest edge [two for three pixels, at most 256]")
@@ -226,7 +255,18 @@ void add_reconstruct(CLI::App& app) {
                    "For programs: tell progress, every iteration and the result on this descriptor "
                    "(emberlock/v1/child.proto), nothing on stdout; die with the parent")
       ->check(CLI::NonNegativeNumber);
-  verb->callback([arguments] { reconstruct_command(*arguments); });
+  CLI::Option* by_daemon = add_daemon_options(*verb, a.by_daemon.daemon);
+  by_daemon->description("Let emberlockd do it, behind the session's name: unix:PATH or HOST:PORT")
+      ->expected(0, 1)
+      ->default_str(a.by_daemon.daemon.address);
+  verb->add_flag("--cancel", a.by_daemon.cancel, "Of the daemon: cancel the one that runs")->needs(by_daemon);
+  verb->add_flag("--json", a.by_daemon.json,
+                 "Of the daemon: Iteration a line, then ReconstructionStatus (emberlock/v1/status.proto)")
+      ->needs(by_daemon);
+  verb->callback([arguments, verb, by_daemon] {
+    if (by_daemon->count() == 0) return reconstruct_command(*arguments);
+    reconstruct_by_daemon(asked_of_daemon(*arguments, *verb));
+  });
 }
 
 }  // namespace emberlock::cli

@@ -4,10 +4,10 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <google/protobuf/util/json_util.h>
 
 #include "cli/commands.h"
 #include "cli/interrupt.h"
+#include "cli/sessions_daemon.h"
 #include "daemon/recordings/json.h"
 #include "daemon/recordings/store.h"
 #include "session/export.h"
@@ -23,6 +23,7 @@ struct SessionsArguments {
   std::string out;
   std::string format = "png";
   bool json = false;
+  DaemonAddress daemon;
 };
 
 /// A progress bar that Ctrl-C ends the step of.
@@ -52,20 +53,22 @@ void print_table(const v1::ListSessionsResponse& sessions) {
   }
 }
 
-void list(const SessionsArguments& a) {
+v1::ListSessionsResponse sessions_in(const SessionsArguments& a) {
+  if (a.folder.empty()) return sessions_of_daemon(a.daemon);
   if (!fs::is_directory(a.folder)) {
     fail({ErrorKind::bad_input, "no such folder", a.folder, "Name the folder in which sessions lie"});
   }
-  const v1::ListSessionsResponse sessions = or_fail(SessionStore::open(a.folder)).list();
+  return or_fail(SessionStore::open(a.folder)).list();
+}
+
+void list(const SessionsArguments& a) {
+  const v1::ListSessionsResponse sessions = sessions_in(a);
   if (!a.json) return print_table(sessions);
-  std::string json;
-  google::protobuf::util::JsonPrintOptions options;
-  options.preserve_proto_field_names = true;
-  static_cast<void>(google::protobuf::util::MessageToJsonString(sessions, &json, options));
-  std::printf("%s\n", json.c_str());
+  std::printf("%s\n", json_line(sessions).c_str());
 }
 
 void verify(const SessionsArguments& a) {
+  if (is_daemons(a.folder)) return job_by_daemon(a.daemon, SessionJob::verify, a.folder, a.json);
   const Interrupt interrupt;
   const SessionCheck check = or_fail(verify_session(a.folder, until_interrupted("verify")));
   if (a.json) {
@@ -86,6 +89,7 @@ void verify(const SessionsArguments& a) {
 }
 
 void repair(const SessionsArguments& a) {
+  if (is_daemons(a.folder)) return job_by_daemon(a.daemon, SessionJob::repair, a.folder, a.json);
   const Interrupt interrupt;
   const RepairReport report = or_fail(repair_session(a.folder, until_interrupted("repair")));
   if (a.json) {
@@ -101,8 +105,16 @@ void repair(const SessionsArguments& a) {
 }
 
 void export_frames(const SessionsArguments& a) {
+  const bool png = a.format == "png";
+  if (is_daemons(a.folder)) {
+    if (!a.out.empty())
+      fail({ErrorKind::bad_input, "the daemon chooses where", "--out",
+            "Leave it away, or name a folder: ./" + a.folder});
+    return job_by_daemon(a.daemon, png ? SessionJob::export_png : SessionJob::export_video, a.folder, a.json);
+  }
+  if (a.out.empty()) throw CLI::RequiredError("--out");
   const Interrupt interrupt;
-  const ExportFormat format = a.format == "png" ? ExportFormat::png : ExportFormat::video;
+  const ExportFormat format = png ? ExportFormat::png : ExportFormat::video;
   const ExportReport report = or_fail(export_session(a.folder, a.out, format, until_interrupted("export")));
   if (a.json) {
     std::printf("%s\n", to_line(to_json(report)).c_str());
@@ -123,7 +135,9 @@ void export_frames(const SessionsArguments& a) {
 CLI::App* add_verb(CLI::App& sessions, const char* name, const char* words,
                    const std::shared_ptr<SessionsArguments>& a, void (*run)(const SessionsArguments&)) {
   CLI::App* verb = sessions.add_subcommand(name, words);
-  verb->add_option("SESSION", a->folder, "The session's folder")->required();
+  verb->add_option("SESSION", a->folder, "The session's folder, or the name of one of the daemon's")
+      ->required();
+  add_daemon_options(*verb, a->daemon);
   verb->add_flag("--json", a->json, "One JSON object");
   verb->callback([a, run] { run(*a); });
   return verb;
@@ -133,15 +147,14 @@ CLI::App* add_verb(CLI::App& sessions, const char* name, const char* words,
 
 void add_sessions(CLI::App& app) {
   auto a = std::make_shared<SessionsArguments>();
-  CLI::App* sessions = app.add_subcommand("sessions", "Lists, verifies, mends and exports recordings.");
+  CLI::App* sessions = app.add_subcommand(
+      "sessions", "Lists, verifies, mends and exports recordings: the daemon's by name, others by path.");
   sessions->require_subcommand(1);
   CLI::App* all = sessions->add_subcommand("list", "The sessions in a folder, the newest first.");
-  all->add_option("FOLDER", a->folder, "In which sessions lie; this one if not said");
+  all->add_option("FOLDER", a->folder, "In which sessions lie [the daemon's]");
+  add_daemon_options(*all, a->daemon);
   all->add_flag("--json", a->json, "One JSON object");
-  all->callback([a] {
-    if (a->folder.empty()) a->folder = ".";
-    list(*a);
-  });
+  all->callback([a] { list(*a); });
   add_verb(*sessions, "verify",
            "Reads every frame back and compares it with what was recorded. Exit code 1: not all there.", a,
            verify);
@@ -151,7 +164,7 @@ void add_sessions(CLI::App& app) {
            a, repair);
   CLI::App* out =
       add_verb(*sessions, "export", "Writes frames as files that other programs read.", a, export_frames);
-  out->add_option("--out", a->out, "The folder to make")->required();
+  out->add_option("--out", a->out, "The folder to make; the daemon chooses its own");
   out->add_option("--format", a->format, "png: images, sample for sample; video: H.264, to look at")
       ->check(CLI::IsMember({"png", "video"}))
       ->capture_default_str();

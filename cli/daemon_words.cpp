@@ -1,0 +1,177 @@
+#include "cli/daemon_words.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <cmath>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace emberlock::cli {
+namespace {
+
+/// How a line of a camera says where it reads: "+3.2 rows +-0.4", or the phase's state.
+std::string sight(const v1::CameraStatus& camera) {
+  if (!camera.has_error_rows()) return camera.sight();
+  std::string text = fmt::format("{:+.1f} rows", camera.error_rows());
+  if (camera.has_sigma_rows()) text += fmt::format(" +-{:.1f}", camera.sigma_rows());
+  return text;
+}
+
+void add_line(std::string& text, std::string_view label, const std::string& value) {
+  if (!value.empty()) text += fmt::format("{:<10} {}\n", label, value);
+}
+
+std::string camera_line(const v1::CameraStatus& camera) {
+  const bool filming = camera.state() == v1::CameraStatus::FILMING;
+  std::string line =
+      fmt::format("  {}{:<14} {:<6} {:<11}", camera.reset_next() ? '*' : ' ', camera.id(),
+                  in_words(camera.light()), in_words(v1::CameraStatus::State_Name(camera.state())));
+  line += fmt::format(" {:>7}", filming ? fmt::format("{:.1f} Hz", camera.measured_rate_hz()) : "");
+  line += fmt::format("  {:<20}", sight(camera));
+  if (camera.has_drift_ppm()) line += fmt::format(" {:+.2f} ppm", camera.drift_ppm());
+  if (camera.has_time_left_s()) line += fmt::format(", {} left", seconds_in_words(camera.time_left_s()));
+  if (!camera.reason().empty()) line += fmt::format("  {}", camera.reason());
+  while (line.back() == ' ') line.pop_back();
+  return line + "\n";
+}
+
+std::string strobe_line(const v1::StrobeStatus& strobe) {
+  if (strobe.id().empty()) return "none";
+  const v1::StrobeState& settings = strobe.settings();
+  std::string text = fmt::format("{}, {}: {}", strobe.id(), in_words(strobe.light()),
+                                 in_words(v1::StrobeState::Output_Name(settings.output())));
+  if (settings.output() == v1::StrobeState::FLASHING)
+    text += fmt::format(" at {:.6g} Hz, {:.4g} us", settings.rate_hz(), settings.width_s() * 1e6);
+  return strobe.reason().empty() ? text : text + ", " + strobe.reason();
+}
+
+std::string reconstruction_line(const v1::ReconstructionStatus& reconstruction) {
+  std::string text = fmt::format("{}: {}", reconstruction.session(),
+                                 in_words(v1::ReconstructionStatus::State_Name(reconstruction.state())));
+  switch (reconstruction.state()) {
+    case v1::ReconstructionStatus::RUNNING:
+      return text + fmt::format(", {:.0f} %, {}, {}", 100 * reconstruction.fraction(), reconstruction.doing(),
+                                seconds_in_words(reconstruction.seconds()));
+    case v1::ReconstructionStatus::DONE:
+      return text + fmt::format(" after {}, in {}", seconds_in_words(reconstruction.seconds()),
+                                reconstruction.result());
+    case v1::ReconstructionStatus::FAILED:
+      return text + ", " + reconstruction.error();
+    default:
+      return text;
+  }
+}
+
+std::string storage_line(const v1::StorageStatus& storage) {
+  return fmt::format("{}, {} free, {:.0f} min of recording left", storage.folder(),
+                     bytes_in_words(static_cast<double>(storage.free_bytes())),
+                     std::floor(storage.minutes_left()));
+}
+
+std::string fault_lines(const v1::Fault& fault) {
+  std::string text = fmt::format(
+      "  {:<6} {}{}: {}{}\n", in_words(fault.light()), in_words(v1::Fault::Kind_Name(fault.kind())),
+      fault.subject().empty() ? "" : " " + fault.subject(), fault.what(), fault.over() ? " (over)" : "");
+  if (!fault.remedy().empty()) text += fmt::format("         {}\n", fault.remedy());
+  return text;
+}
+
+}  // namespace
+
+std::string in_words(std::string enum_name) {
+  for (char& c : enum_name)
+    c = c == '_' ? ' ' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return enum_name.ends_with("unspecified") ? "unknown" : enum_name;
+}
+
+std::string in_words(v1::Light light) { return in_words(v1::Light_Name(light)); }
+
+std::string bytes_in_words(double bytes) {
+  constexpr std::array<const char*, 5> kUnits = {"B", "kB", "MB", "GB", "TB"};
+  std::size_t unit = 0;
+  for (; bytes >= 999.5 && unit + 1 < kUnits.size(); ++unit) bytes /= 1000;
+  return fmt::format("{:.{}f} {}", bytes, unit == 0 || bytes >= 99.95 ? 0 : 1, kUnits[unit]);
+}
+
+std::string seconds_in_words(double seconds) {
+  if (!std::isfinite(seconds)) return "unknown";
+  if (seconds < 9.95) return fmt::format("{:.1f} s", seconds);
+  const auto whole = static_cast<std::int64_t>(std::llround(std::min(seconds, 1e15)));
+  if (whole < 120) return fmt::format("{} s", whole);
+  if (whole < 7200) return fmt::format("{} min {} s", whole / 60, whole % 60);
+  return fmt::format("{} h {} min", whole / 3600, whole / 60 % 60);
+}
+
+std::string losses(const v1::Counts& counts) {
+  std::vector<std::string> parts;
+  const auto add = [&](std::uint64_t n, const char* cause) {
+    if (n > 0) parts.push_back(fmt::format("{} {}", n, cause));
+  };
+  add(counts.camera_gap(), "never came from the camera");
+  add(counts.transport(), "on the way");
+  add(counts.underrun(), "for want of a buffer");
+  add(counts.queue(), "in the queue");
+  add(counts.disk(), "refused by the disk");
+  return parts.empty() ? "none" : fmt::format("{}", fmt::join(parts, ", "));
+}
+
+std::string recording_line(const v1::RecordingStatus& recording) {
+  const std::string lost = losses(recording.lost());
+  return fmt::format("{}: {}, {}, {} frames, {} lost, {}, {}/s, queue {:.0f} %", recording.session(),
+                     in_words(v1::RecordingStatus::State_Name(recording.state())),
+                     seconds_in_words(recording.seconds()), recording.frames(), lost,
+                     bytes_in_words(static_cast<double>(recording.bytes())),
+                     bytes_in_words(recording.bytes_per_s()), 100 * recording.queue_fill());
+}
+
+std::string iteration_line(const v1::Iteration& iteration) {
+  std::string text = fmt::format("iteration {}: {:.1f} s, input error {:.2f}", iteration.iteration(),
+                                 iteration.seconds(), iteration.input_rmse());
+  if (iteration.has_heldout_rmse()) text += fmt::format(", held-out error {:.2f}", iteration.heldout_rmse());
+  return text + " grey levels";
+}
+
+std::string round_table(const v1::DaemonStatus& status) {
+  const v1::AlignmentStatus& alignment = status.alignment();
+  std::string text = fmt::format("round {}: {}; {} resets so far", alignment.round(), alignment.reason(),
+                                 alignment.resets());
+  if (alignment.has_worst_pair_s())
+    text += fmt::format("; worst pair {:.3f} ms", alignment.worst_pair_s() * 1e3);
+  text += "\n";
+  for (const v1::CameraStatus& camera : status.cameras()) text += camera_line(camera);
+  return text;
+}
+
+std::string status_screen(const v1::DaemonStatus& status) {
+  std::string text;
+  add_line(text, "rig",
+           fmt::format("{} (emberlockd {}, up {})", status.rig(), status.version(),
+                       seconds_in_words(status.uptime_s())));
+  add_line(text, "state",
+           fmt::format("{}, {}{}{}", in_words(v1::Phase_Name(status.phase())), in_words(status.light()),
+                       status.reason().empty() ? "" : ": ", status.reason()));
+  add_line(text, "next", status.next_step());
+  if (status.has_alignment() && status.alignment().has_time_left_s())
+    add_line(text, "lock",
+             fmt::format("{} rows allowed, {} left", status.alignment().tolerance_rows(),
+                         seconds_in_words(status.alignment().time_left_s())));
+  add_line(text, "strobe", strobe_line(status.strobe()));
+  if (status.has_storage()) add_line(text, "disk", storage_line(status.storage()));
+  if (status.has_recording()) {
+    add_line(text, "recording", recording_line(status.recording()));
+    add_line(text, "", status.recording().verdict());
+  }
+  if (status.has_reconstruction()) add_line(text, "volume", reconstruction_line(status.reconstruction()));
+  if (!status.faults().empty()) text += "faults\n";
+  for (const v1::Fault& fault : status.faults()) text += fault_lines(fault);
+  if (!status.cameras().empty()) text += "cameras\n";
+  for (const v1::CameraStatus& camera : status.cameras()) text += camera_line(camera);
+  return text;
+}
+
+}  // namespace emberlock::cli

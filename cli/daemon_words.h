@@ -1,0 +1,30 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "emberlock/v1/status.pb.h"
+
+// What the daemon shows, as people read it in a terminal.
+namespace emberlock::cli {
+
+/// "LOCKED" as "locked", "BY_HAND" as "by hand".
+std::string in_words(std::string enum_name);
+std::string in_words(v1::Light light);
+/// "1.5 GB", "980 kB": powers of ten.
+std::string bytes_in_words(double bytes);
+/// "0.4 s", "12 s", "5 min 20 s", "3 h 10 min".
+std::string seconds_in_words(double seconds);
+
+/// One screen of `emberlock status`.
+std::string status_screen(const v1::DaemonStatus& status);
+/// "candle: 12 s, 3168 frames, none lost, 1.2 GB, 86.1 MB/s, queue 3 %".
+std::string recording_line(const v1::RecordingStatus& recording);
+/// Frames that a recording lost, by cause: "12 queue, 3 transport"; "none".
+std::string losses(const v1::Counts& counts);
+/// "iteration 3: 2.1 s, input error 5.31, held-out error 6.20 grey levels".
+std::string iteration_line(const v1::Iteration& iteration);
+/// What a round of alignment showed: a line, and one for each camera.
+std::string round_table(const v1::DaemonStatus& status);
+
+}  // namespace emberlock::cli

@@ -1,0 +1,70 @@
+#include "cli/reconstruct_daemon.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <string>
+
+#include "cli/commands.h"
+#include "cli/daemon_words.h"
+#include "cli/interrupt.h"
+
+namespace emberlock::cli {
+namespace {
+
+using State = v1::ReconstructionStatus;
+
+void print_iteration(const v1::Iteration& iteration, bool json) {
+  std::printf("%s\n", (json ? json_line(iteration) : iteration_line(iteration)).c_str());
+  std::fflush(stdout);
+}
+
+void conclude(const v1::ReconstructionStatus& status, bool json) {
+  if (json) {
+    std::printf("%s\n", json_line(status).c_str());
+  } else {
+    for (const std::string& effect : status.effects()) std::printf("%-10s %s\n", "effect", effect.c_str());
+    for (const std::string& advice : status.advice()) std::printf("%-10s %s\n", "next step", advice.c_str());
+    if (status.state() == State::DONE)
+      std::printf("%-10s %s after %s\n", "written to", status.result().c_str(),
+                  seconds_in_words(status.seconds()).c_str());
+  }
+  if (status.state() == State::DONE) return;
+  std::fprintf(stderr, "emberlock: %s: %s\n", status.session().c_str(),
+               status.error().empty() ? status.doing().c_str() : status.error().c_str());
+  throw CLI::RuntimeError(1);
+}
+
+}  // namespace
+
+void reconstruct_by_daemon(const DaemonReconstruction& wanted) {
+  Client client = connect_or_leave(wanted.daemon);
+  if (wanted.cancel) {
+    or_leave(client, client.cancel_reconstruction());
+    return;
+  }
+  const v1::ReconstructionStatus begun = or_leave(client, client.reconstruct(wanted.request));
+  const Interrupt interrupt;
+  const Progress progress = wanted.json ? Progress() : progress_bar(begun.session());
+  v1::ReconstructionStatus last = begun;
+  double shown = 0;  // the newest iteration on the screen; their numbers may begin anew, their times don't
+  or_leave(client, client.watch_status(
+                       [&](const v1::DaemonStatus& status) {
+                         if (status.reconstruction().id() != begun.id()) return true;
+                         last = status.reconstruction();
+                         for (const v1::Iteration& iteration : last.iterations()) {
+                           if (iteration.seconds() > shown) print_iteration(iteration, wanted.json);
+                           shown = std::max(shown, iteration.seconds());
+                         }
+                         report(progress, last.fraction(), last.doing());
+                         return last.state() == State::RUNNING;
+                       },
+                       Interrupt::asked));
+  if (last.state() != State::RUNNING) return conclude(last, wanted.json);
+  if (Interrupt::asked()) {
+    std::fprintf(stderr, "the daemon goes on; `emberlock reconstruct --cancel --daemon` ends it\n");
+    throw CLI::RuntimeError(1);
+  }
+  leave(client, {ErrorKind::io, "the daemon ended before it was done"});
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,135 @@
+// A recorded session, reconstructed by the program itself as the daemon's child.
+#include <condition_variable>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "daemon/reconstruction/child.h"
+#include "recon/preprocess/radiance.h"
+#include "recon/synthetic/flame.h"
+#include "tests/support/recording.h"
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using State = v1::ReconstructionStatus;
+
+v1::Manifest manifest_of(const Scene& scene) {
+  v1::Manifest manifest = test::manifest_of(
+      std::vector<ImageLayout>(scene.views.size(), {scene.views.front().image.size, PixelFormat::rgb8, 8}));
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    const CameraModel& camera = scene.views[i].camera;
+    v1::Calibration& calibration = *manifest.mutable_cameras(static_cast<int>(i))->mutable_calibration();
+    calibration.set_fx(camera.intrinsics.fx);
+    calibration.set_fy(camera.intrinsics.fy);
+    calibration.set_cx(camera.intrinsics.cx);
+    calibration.set_cy(camera.intrinsics.cy);
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column)
+        calibration.add_camera_from_world(camera.camera_from_world.rotation(row, column));
+      calibration.add_camera_from_world(camera.camera_from_world.translation[row]);
+    }
+  }
+  for (const double value : scene.box.center) manifest.mutable_box()->add_center(value);
+  for (const double value : scene.box.size) manifest.mutable_box()->add_size(value);
+  return manifest;
+}
+
+/// One frame of the paper's eleven cameras, at 64 x 48.
+void record_flame(const fs::path& folder) {
+  PaperSceneOptions options;
+  options.image = {64, 48};
+  options.truth_voxels = 32;
+  const Scene scene = paper_scene(options);
+  const auto check = [](const auto& result) {
+    if (!result.ok()) throw std::runtime_error(result.error().message());
+  };
+  auto writer = SessionWriter::create(folder, manifest_of(scene), test::small_disk_options());
+  check(writer);
+  for (std::size_t camera = 0; camera < scene.views.size(); ++camera) {
+    Frame frame;
+    frame.image = std::make_shared<const Image>(to_rgb8(scene.views[camera].image));
+    check(writer->write(camera, frame));
+  }
+  check(writer->finish());
+}
+
+class DaemonReconstruction : public testing::Test {
+ protected:
+  DaemonReconstruction() {
+    record_flame(folder_ / "sessions/candle");
+    ReconstructionOptions options;
+    options.program = EMBERLOCK_PROGRAM;
+    options.sessions = folder_ / "sessions";
+    options.results = folder_ / "results";
+    options.unasked.set_device("cpu");
+    options.unasked.set_voxels(24);
+    options.unasked.add_hold_out(10);
+    child_ = std::make_unique<ReconstructionChild>(options, board_, [this] {
+      const std::lock_guard lock(mutex_);
+      changed_.notify_all();
+    });
+  }
+  [[nodiscard]] bool running() const { return child_->status()->state() == State::RUNNING; }
+  /// Waits while it runs and the condition doesn't hold.
+  void wait_for(const std::function<bool()>& condition) {
+    std::unique_lock lock(mutex_);
+    while (running() && !condition()) changed_.wait_for(lock, std::chrono::seconds(1));
+  }
+  static v1::ReconstructRequest candle() {
+    v1::ReconstructRequest request;
+    request.set_session("candle");
+    return request;
+  }
+
+  test::TempFolder folder_;
+  Board board_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::unique_ptr<ReconstructionChild> child_;
+};
+
+TEST_F(DaemonReconstruction, ARecordedFlameBecomesAVolumeThatIsSeenGrowing) {
+  ASSERT_TRUE(child_->start(candle()).ok());
+  wait_for([] { return false; });
+  const v1::ReconstructionStatus status = *child_->status();
+  ASSERT_EQ(status.state(), State::DONE) << status.error();
+  EXPECT_EQ(status.device(), "cpu");
+  EXPECT_TRUE(fs::exists(fs::path(status.result()) / "volume.vdb"));
+  EXPECT_FALSE(status.effects().empty());
+  const auto shown = board_.iterations(0);
+  ASSERT_EQ(static_cast<int>(shown.size()), status.iterations_size() + 1);
+  EXPECT_LT(shown.back()->iteration().heldout_rmse(), shown.front()->iteration().heldout_rmse());
+  EXPECT_EQ(shown.back()->camera_id(), "cam10");
+  EXPECT_EQ(shown.back()->volume().voxels().size(), 25U * 25U * 25U);
+  EXPECT_FALSE(shown.back()->rendered_jpeg().empty());
+}
+
+TEST_F(DaemonReconstruction, OneThatIsCancelledLeavesNoHalfResult) {
+  v1::ReconstructRequest request = candle();
+  request.set_voxels(200);
+  ASSERT_TRUE(child_->start(request).ok());
+  wait_for([&] { return child_->status()->doing() != "starting"; });
+  ASSERT_TRUE(child_->cancel().ok());
+  wait_for([] { return false; });
+  EXPECT_EQ(child_->status()->state(), State::CANCELLED) << child_->status()->error();
+  EXPECT_FALSE(fs::exists(folder_ / "results/candle/middle-frame"));
+}
+
+TEST_F(DaemonReconstruction, WhatItRefusesIsToldInItsOwnWords) {
+  v1::ReconstructRequest request = candle();
+  request.add_hold_out(30);
+  ASSERT_TRUE(child_->start(request).ok());
+  wait_for([] { return false; });
+  EXPECT_EQ(child_->status()->state(), State::FAILED);
+  EXPECT_THAT(child_->status()->error(), HasSubstr("0 to 10"));
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -1,0 +1,341 @@
+// The verbs that ask emberlockd, against a real server on a socket and a daemon without devices.
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <functional>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/client.h"
+#include "cli/commands.h"
+#include "daemon/server/grpc_server.h"
+#include "tests/support/fake_api.h"
+#include "tests/support/recording.h"
+#include "tests/support/verb.h"
+
+namespace emberlock::cli {
+namespace {
+using nlohmann::json;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+
+v1::DaemonStatus status_in(v1::Phase phase, v1::Light light = v1::GREEN, const std::string& reason = "") {
+  v1::DaemonStatus status;
+  status.set_phase(phase);
+  status.set_light(light);
+  status.set_reason(reason);
+  status.set_rig("bench");
+  return status;
+}
+
+class DaemonVerbs : public testing::Test {
+ protected:
+  DaemonVerbs() {
+    api_.board().show(status_in(v1::IDLE));
+    GrpcServerOptions options;
+    options.socket = folder_ / "socket";
+    auto server = GrpcServer::start(api_, options);
+    if (!server) throw std::runtime_error(server.error().message());
+    server_ = std::move(*server);
+  }
+  ~DaemonVerbs() override {
+    for (std::thread& thread : threads_) thread.join();
+  }
+
+  test::VerbRun run(void (*add)(CLI::App&), std::vector<std::string> words) const {
+    words.insert(words.end(), {"--daemon", "unix:" + (folder_ / "socket").string()});
+    return test::run_verb(add, std::move(words));
+  }
+  /// In a while, as a daemon's engine does it: each step a tenth of a second after the one before.
+  void soon(std::vector<std::function<void()>> steps) {
+    threads_.emplace_back([steps = std::move(steps)] {
+      for (const auto& step : steps) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(150));
+        step();
+      }
+    });
+  }
+  void show_soon(std::vector<v1::DaemonStatus> statuses) {
+    std::vector<std::function<void()>> steps;
+    for (v1::DaemonStatus& status : statuses)
+      steps.emplace_back([this, status = std::move(status)] { api_.board().show(status); });
+    soon(std::move(steps));
+  }
+
+  test::TempFolder folder_;
+  test::FakeApi api_;
+  std::unique_ptr<GrpcServer> server_;
+  std::vector<std::thread> threads_;
+};
+
+TEST(DaemonVerbsAlone, WithoutADaemonTheySayWhatToDoAndLeaveWithThree) {
+  const test::TempFolder folder;
+  const std::string nobody = "unix:" + (folder / "socket").string();
+  for (const auto& [add, words] : std::vector<std::pair<void (*)(CLI::App&), std::vector<std::string>>>{
+           {add_status, {"status"}},
+           {add_watch, {"watch"}},
+           {add_align, {"align"}},
+           {add_record, {"record"}},
+           {add_strobe, {"strobe"}},
+           {add_reconstruct, {"reconstruct", "candle"}}}) {
+    std::vector<std::string> line = words;
+    line.insert(line.end(), {"--daemon", nobody});
+    const test::VerbRun result = test::run_verb(add, line);
+    EXPECT_EQ(result.exit_code, kUnreachable) << words[0];
+    EXPECT_THAT(result.err, HasSubstr("systemctl start emberlockd")) << words[0];
+    EXPECT_EQ(result.out, "") << words[0];
+  }
+}
+
+TEST(DaemonVerbsAlone, AnAddressThatIsNoneAndADaemonElsewhereWithoutItsTokenAreBadInput) {
+  EXPECT_EQ(test::run_verb(add_status, {"status", "--daemon", "unix:" + std::string(200, 'x')}).exit_code, 2);
+  const test::VerbRun result = test::run_verb(add_status, {"status", "--daemon", "lab:7410"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--token-file"));
+}
+
+TEST(DaemonVerbsAlone, WhatOnlyARigOfItsOwnKnowsIsNotAskedOfTheDaemon) {
+  EXPECT_THAT(test::run_verb(add_align, {"align", "--seed", "3"}).err, HasSubstr("--seed"));
+  EXPECT_THAT(test::run_verb(add_reconstruct, {"reconstruct", "candle", "--daemon", "--out", "x"}).err,
+              HasSubstr("--out"));
+  EXPECT_EQ(test::run_verb(add_reconstruct, {"reconstruct", "candle"}).exit_code, 2) << "without --out";
+}
+
+TEST_F(DaemonVerbs, StatusIsAScreenForPeopleAndJsonForPrograms) {
+  v1::DaemonStatus status = status_in(v1::LOCKED, v1::AMBER, "cam1 drifts");
+  status.set_next_step("look at cam1");
+  v1::Fault& fault = *status.add_faults();
+  fault.set_kind(v1::Fault::CAMERA_LOST);
+  fault.set_light(v1::AMBER);
+  fault.set_subject("cam2");
+  fault.set_what("its cable came off");
+  fault.set_remedy("Plug it in");
+  v1::CameraStatus& camera = *status.add_cameras();
+  camera.set_id("cam1");
+  camera.set_state(v1::CameraStatus::FILMING);
+  camera.set_error_rows(-3.25);
+  api_.board().show(status);
+  const test::VerbRun screen = run(add_status, {"status"});
+  EXPECT_EQ(screen.exit_code, 0) << screen.err;
+  for (const char* words : {"bench", "locked, amber: cam1 drifts", "look at cam1", "camera lost cam2",
+                            "Plug it in", "cam1", "-3.2 rows"}) {
+    EXPECT_THAT(screen.out, HasSubstr(words));
+  }
+  const json printed = json::parse(run(add_status, {"status", "--json"}).out);
+  EXPECT_EQ(printed["faults"][0]["remedy"], "Plug it in");
+  EXPECT_EQ(printed["next_step"], "look at cam1") << "named as in the .proto";
+}
+
+TEST_F(DaemonVerbs, AStatusThatIsRedIsTheExitCodeToo) {
+  api_.board().show(status_in(v1::IDLE, v1::RED, "all cameras are gone"));
+  EXPECT_EQ(run(add_status, {"status"}).exit_code, 1);
+  EXPECT_EQ(run(add_status, {"status", "--acknowledge"}).exit_code, 1);
+  EXPECT_THAT(api_.calls(), ElementsAre(HasSubstr("acknowledge")));
+}
+
+TEST_F(DaemonVerbs, AlignShowsItsRoundsUntilItIsLocked) {
+  api_.board().show(status_in(v1::LOCKED, v1::GREEN, "of yesterday"));
+  v1::DaemonStatus round = status_in(v1::ALIGNING);
+  round.mutable_alignment()->set_round(1);
+  round.mutable_alignment()->set_reason("cam3 is to be reset");
+  round.set_next_step("reset cam3");
+  v1::DaemonStatus second = round;
+  second.mutable_alignment()->set_round(2);
+  v1::DaemonStatus locked = second;
+  locked.set_phase(v1::LOCKED);
+  locked.set_reason("all within 40 rows");
+  api_.on_align = [&](const v1::AlignRequest&) {
+    show_soon({round, second, locked});
+    return Status();
+  };
+  const test::VerbRun result = run(add_align, {"align", "--tolerance", "50rows"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("round 1: cam3 is to be reset"));
+  EXPECT_THAT(result.out, HasSubstr("next: reset cam3"));
+  EXPECT_THAT(result.out, HasSubstr("round 2"));
+  EXPECT_THAT(result.out, HasSubstr("locked: all within 40 rows"));
+  EXPECT_THAT(api_.calls(), ElementsAre("align tolerance: \"50rows\""));
+}
+
+TEST_F(DaemonVerbs, AnAlignmentThatIsRefusedSaysWhatCouldBeMet) {
+  v1::DaemonStatus refused = status_in(v1::IDLE, v1::AMBER, "would take 900 resets");
+  refused.mutable_alignment()->set_verdict(v1::AlignmentStatus::REFUSED);
+  v1::AlignmentOffer& offer = *refused.mutable_alignment()->add_offers();
+  offer.set_policy("timed");
+  offer.set_tolerance_rows(200);
+  api_.on_align = [&](const v1::AlignRequest&) {
+    show_soon({status_in(v1::ALIGNING), refused});
+    return Status();
+  };
+  const test::VerbRun result = run(add_align, {"align"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, HasSubstr("900 resets"));
+  EXPECT_THAT(result.out, HasSubstr("200 rows with policy timed"));
+}
+
+TEST_F(DaemonVerbs, AlignStopLetsTheLockGo) {
+  EXPECT_EQ(run(add_align, {"align", "--stop"}).exit_code, 0);
+  EXPECT_THAT(api_.calls(), ElementsAre("stop_sync"));
+}
+
+v1::DaemonStatus recording(v1::RecordingStatus::State state, std::uint64_t frames) {
+  v1::DaemonStatus status = status_in(v1::CAPTURING);
+  status.mutable_recording()->set_session("candle");
+  status.mutable_recording()->set_state(state);
+  status.mutable_recording()->set_frames(frames);
+  if (state != v1::RecordingStatus::RECORDING) status.mutable_recording()->set_verdict("the books agree");
+  return status;
+}
+
+TEST_F(DaemonVerbs, RecordFollowsToTheVerdict) {
+  api_.on_record = [&](const v1::RecordRequest&) {
+    show_soon({recording(v1::RecordingStatus::RECORDING, 24), recording(v1::RecordingStatus::COMPLETE, 48)});
+    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
+  };
+  const test::VerbRun result = run(add_record, {"record", "candle", "--seconds", "2", "--reconstruct"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("24 frames"));
+  EXPECT_THAT(result.out, HasSubstr("48 frames, none lost"));
+  EXPECT_THAT(result.out, HasSubstr("the books agree"));
+  EXPECT_THAT(api_.calls().front(), HasSubstr("name: \"candle\""));
+  EXPECT_THAT(api_.calls().front(), HasSubstr("seconds: 2"));
+  EXPECT_THAT(api_.calls().front(), HasSubstr("reconstruct: true"));
+}
+
+TEST_F(DaemonVerbs, ARecordingWhoseCountsDoNotAgreeIsAFailure) {
+  api_.on_record = [&](const v1::RecordRequest&) {
+    v1::DaemonStatus failed = recording(v1::RecordingStatus::FAILED, 47);
+    failed.mutable_recording()->mutable_lost()->set_queue(1);
+    show_soon({failed});
+    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
+  };
+  const test::VerbRun result = run(add_record, {"record", "candle", "--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(
+      json::parse(result.out.substr(result.out.rfind('\n', result.out.size() - 2) + 1))["lost"]["queue"],
+      "1");
+}
+
+TEST_F(DaemonVerbs, CtrlCEndsTheRecordingAndWaitsUntilItIsFinished) {
+  api_.on_record = [&](const v1::RecordRequest&) {
+    soon(
+        {[&] { api_.board().show(recording(v1::RecordingStatus::RECORDING, 24)); }, [] { ::raise(SIGINT); }});
+    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
+  };
+  api_.on_stop_recording = [&] {
+    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::COMPLETE, 30).recording());
+  };
+  const test::VerbRun result = run(add_record, {"record", "candle"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("30 frames"));
+  EXPECT_EQ(api_.calls().back(), "stop_recording");
+}
+
+TEST_F(DaemonVerbs, ARefusalIsToldInTheDaemonsWords) {
+  api_.on_record = [](const v1::RecordRequest&) {
+    return Result<v1::RecordingStatus>(
+        Error{ErrorKind::refused, "the cameras aren't locked", "candle", "align first, or give --unlocked"});
+  };
+  const test::VerbRun result = run(add_record, {"record", "candle"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("candle: the cameras aren't locked. Align first, or give --unlocked"));
+}
+
+TEST_F(DaemonVerbs, WatchFollowsStatusJournalAndIterations) {
+  v1::IterationPreview preview;
+  preview.set_reconstruction("candle 1");
+  preview.mutable_iteration()->set_iteration(3);
+  preview.set_rendered_jpeg("bytes");
+  soon({[&] { api_.board().notice(v1::AMBER, "cam2 is slow"); },
+        [&] { api_.board().show(std::make_shared<const v1::IterationPreview>(preview)); },
+        [&] { api_.board().show(status_in(v1::LOCKED, v1::GREEN, "all in tolerance")); }});
+  const test::VerbRun result = run(add_watch, {"watch", "--seconds", "1.5", "--json"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("cam2 is slow"));
+  EXPECT_THAT(result.out, HasSubstr("{\"iteration\":"));
+  EXPECT_THAT(result.out, Not(HasSubstr("rendered_jpeg")));
+  EXPECT_THAT(result.out, HasSubstr("all in tolerance"));
+  std::istringstream lines(result.out);
+  for (std::string line; std::getline(lines, line);) EXPECT_TRUE(json::accept(line)) << line;
+}
+
+TEST_F(DaemonVerbs, ADaemonThatGoesAwayWhileItIsWatchedIsToldApart) {
+  soon({[&] { server_.reset(); }});
+  const test::VerbRun result = run(add_watch, {"watch", "--seconds", "20"});
+  EXPECT_EQ(result.exit_code, kUnreachable);
+  EXPECT_THAT(result.err, HasSubstr("went away"));
+}
+
+TEST_F(DaemonVerbs, StrobeChangesWhatItIsToldAlone) {
+  v1::StrobeState state;
+  state.set_output(v1::StrobeState::OFF);
+  state.set_rate_hz(24);
+  state.set_width_s(1e-4);
+  api_.on_strobe = [state] { return Result<v1::StrobeState>(state); };
+  api_.on_apply_strobe = [](const v1::StrobeState& wanted) { return Result<v1::StrobeState>(wanted); };
+  EXPECT_THAT(run(add_strobe, {"strobe"}).out, HasSubstr("24 Hz"));
+  EXPECT_THAT(api_.calls(), ElementsAre("strobe"));
+  const test::VerbRun result =
+      run(add_strobe, {"strobe", "--output", "flashing", "--code", "1101", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json applied = json::parse(result.out);
+  EXPECT_EQ(applied["output"], "FLASHING");
+  EXPECT_EQ(applied["rate_hz"], 24);
+  EXPECT_EQ(applied["code"], (json{true, true, false, true}));
+  EXPECT_EQ(run(add_strobe, {"strobe", "--code", "12"}).exit_code, 2);
+}
+
+v1::DaemonStatus reconstructing(v1::ReconstructionStatus::State state, int iterations) {
+  v1::DaemonStatus status = status_in(v1::IDLE);
+  v1::ReconstructionStatus& reconstruction = *status.mutable_reconstruction();
+  reconstruction.set_id("candle 1");
+  reconstruction.set_session("candle");
+  reconstruction.set_state(state);
+  for (int i = 1; i <= iterations; ++i) {
+    v1::Iteration& iteration = *reconstruction.add_iterations();
+    iteration.set_iteration(static_cast<std::uint32_t>(i));
+    iteration.set_seconds(i);
+  }
+  if (state == v1::ReconstructionStatus::DONE) reconstruction.set_result("/results/candle");
+  if (state == v1::ReconstructionStatus::FAILED)
+    reconstruction.set_error("it crashed by SIGSEGV. Try device cpu");
+  return status;
+}
+
+TEST_F(DaemonVerbs, ReconstructShowsEveryIterationAndTheResult) {
+  api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
+    show_soon({reconstructing(v1::ReconstructionStatus::RUNNING, 1),
+               reconstructing(v1::ReconstructionStatus::RUNNING, 3),
+               reconstructing(v1::ReconstructionStatus::DONE, 4)});
+    return Result<v1::ReconstructionStatus>(
+        reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
+  };
+  const test::VerbRun result =
+      run(add_reconstruct, {"reconstruct", "candle", "--voxels", "64", "--hold-out", "1,3"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  for (const char* line : {"iteration 1:", "iteration 2:", "iteration 3:", "iteration 4:", "/results/candle"})
+    EXPECT_THAT(result.out, HasSubstr(line));
+  EXPECT_THAT(api_.calls(),
+              ElementsAre("reconstruct session: \"candle\" voxels: 64 hold_out: 1 hold_out: 3"));
+}
+
+TEST_F(DaemonVerbs, AReconstructionThatFailedSaysWhy) {
+  api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
+    show_soon({reconstructing(v1::ReconstructionStatus::FAILED, 1)});
+    return Result<v1::ReconstructionStatus>(
+        reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
+  };
+  const test::VerbRun result = run(add_reconstruct, {"reconstruct", "candle", "--json"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("SIGSEGV"));
+}
+
+}  // namespace
+}  // namespace emberlock::cli

@@ -102,7 +102,7 @@ struct ReconstructionConfig {
   std::optional<int> voxels{};                  ///< along the longest edge; else likewise
   std::vector<int> hold_out{};                  ///< views kept for judging the result, counted from 0
   int threads = 0;                              ///< 0: every core
-  Seconds silence{120};                         ///< without a word of progress: it hangs, and is ended
+  Seconds silence{600};                         ///< without a word of progress: it hangs, and is ended
   int niceness = 10;
 };
 

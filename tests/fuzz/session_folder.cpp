@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -8,19 +6,23 @@
 #include <string>
 #include <string_view>
 
+#include <unistd.h>
+
 #include "session/reader.h"
 #include "session/salvage.h"
 #include "session/verify.h"
 
-// A whole session, damaged: everything that reads one says what is good or why it can't, and agrees. The input is the five
-// files of a session one after the other, each behind its length as three bytes, little-endian; what is left of the input
-// belongs to the last. Frames that come are compared with their hashes by the reader itself; what repair leaves must be whole.
+// A whole session, damaged: everything that reads one says what is good or why it can't, and agrees. The
+// input is the five files of a session one after the other, each behind its length as three bytes,
+// little-endian; what is left of the input belongs to the last. Frames that come are compared with their
+// hashes by the reader itself; what repair leaves must be whole.
 namespace {
 
 namespace fs = std::filesystem;
 using namespace emberlock;
 
-constexpr const char* kFiles[] = {"manifest.json", "events.binpb", "cam0/index.bin", "cam0/000000.mkv", "cam0/000001.nut"};
+constexpr const char* kFiles[] = {"manifest.json", "events.binpb", "cam0/index.bin", "cam0/000000.mkv",
+                                  "cam0/000001.nut"};
 
 const fs::path& folder() {
   static const fs::path path = [] {

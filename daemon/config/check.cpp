@@ -106,7 +106,7 @@ bool is_local(const std::string& host) {
 void check_server(const Together& t) {
   const ServerConfig& server = t.config.server;
   const auto host = [&](const std::string& address, const char* key) {
-    const auto found = address.empty() ? std::nullopt : host_of(address);
+    auto found = address.empty() ? std::nullopt : host_of(address);
     if (!found && !address.empty()) {
       t.problem(place(t.root, key), "\"" + address + "\" is no address", "give HOST:PORT, as 127.0.0.1:7140");
     }

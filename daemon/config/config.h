@@ -153,8 +153,8 @@ Result<DaemonConfig> parse_config(std::string_view toml, const std::filesystem::
 /// Reads the file, too.
 Result<DaemonConfig> load_config(const std::filesystem::path& file);
 
-/// A configuration file with every key, each with its words, unit, range and default, commented out: it says
-/// what the empty file says.
+/// A configuration file with every key, its words, unit, range and default, commented out but for a simulated
+/// rig: a file to begin with.
 std::string commented_config();
 /// The configuration as TOML, every key that has a value.
 std::string print_config(const DaemonConfig& config);

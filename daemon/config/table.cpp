@@ -7,8 +7,10 @@
 namespace emberlock::config {
 namespace {
 
+// NOLINTBEGIN(bugprone-macro-parentheses): a member can't stand in parentheses.
 #define EMBERLOCK_AT(member) \
   [](auto& c) -> auto& { return c.member; }
+// NOLINTEND(bugprone-macro-parentheses)
 
 constexpr double kMilli = 1e-3;
 constexpr double kMicro = 1e-6;

@@ -27,17 +27,25 @@ std::string comment(std::string_view text) {
   return lines + "\n";
 }
 
+/// Keys that `in_force` says otherwise than `unsaid` stand as they are, the others behind a # with their
+/// defaults.
 template <class T>
-std::string commented(const Section<T>& section, const char* open, const char* close) {
+std::string commented(const Section<T>& section, const char* open, const char* close, const T& in_force,
+                      const T& unsaid) {
   std::string text = comment(section.words) + open + section.name + close + "\n";
   const T defaults{};
   for (const Key<T>& key : section.keys) {
     std::string takes = key.takes + ".";
     takes.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(takes.front())));
     if (!key.applies_words.empty()) takes += " For cameras " + key.applies_words + ".";
+    const std::string said = key.write(in_force);
     const std::string value = key.write(defaults);
-    text += "\n" + comment(key.sentence + " " + takes) + "#" + key.name + " = " +
-            (value.empty() ? key.example + "  # for example" : value) + "\n";
+    text += "\n" + comment(key.sentence + " " + takes);
+    if (said != key.write(unsaid)) {
+      text += key.name + " = " + said + "\n";
+    } else {
+      text += "#" + key.name + " = " + (value.empty() ? key.example + "  # for example" : value) + "\n";
+    }
   }
   return text + "\n";
 }
@@ -58,16 +66,28 @@ std::string printed(const Section<T>& section, const T& from) {
 }  // namespace
 
 std::string commented_config() {
+  // A rig that everybody has, to see what happens. A camera's driver must be said.
+  CameraConfig camera;
+  camera.count = 4;
+  camera.request.size = ImageSize{640, 480};
+  CameraConfig unsaid;
+  unsaid.source = CameraSource::replay;
+  DaemonConfig config;
+  config.rig.name = "four simulated cameras";
+  config.rig.strobe.source = StrobeSource::virtual_;
+
   std::string text = comment(
-      "The configuration of emberlockd(8). A line behind a bare # is a key with its default: take the # away "
-      "and "
-      "change it. `emberlockd --check-config` says what is wrong with a file. Relative paths start from "
-      "the "
+      "The configuration of emberlockd(8). To begin with it has a simulated rig; `emberlock devices` lists "
+      "the cameras "
+      "and serial ports that are there to take its place. A line behind a bare # is a key with its default: "
+      "take the # "
+      "away and change it. `emberlockd --check-config` says what is wrong with a file. Relative paths start "
+      "from the "
       "file's folder.");
   text += "\n";
   for (const auto& section : config::sections()) {
-    text += commented(section, "[", "]");
-    if (section.name == "rig") text += commented(config::camera_section(), "#[[", "]]");
+    text += commented(section, "[", "]", config, DaemonConfig{});
+    if (section.name == "rig") text += commented(config::camera_section(), "[[", "]]", camera, unsaid);
   }
   return text;
 }

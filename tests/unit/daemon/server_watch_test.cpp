@@ -1,0 +1,229 @@
+// Consoles that watch: what they are told, and that one that stalls, talks nonsense or goes costs the others
+// nothing.
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "daemon/server/http_server.h"
+#include "tests/support/fake_api.h"
+#include "tests/support/wait.h"
+#include "tests/support/watch_client.h"
+
+namespace emberlock {
+namespace {
+
+using nlohmann::json;
+using test::wait_until;
+using test::WatchClient;
+using testing::HasSubstr;
+
+class ServerWatchTest : public testing::Test {
+ protected:
+  void serve(HttpServerOptions options = {}) {
+    options.listen = "127.0.0.1:0";
+    auto started = HttpServer::start(api, std::move(options));
+    ASSERT_TRUE(started.ok()) << started.error().message();
+    server = std::move(started).value();
+  }
+  void show(v1::Phase phase) {
+    v1::DaemonStatus status;
+    status.set_phase(phase);
+    api.board().show(status);
+  }
+  std::shared_ptr<const v1::Picture> picture(const std::string& camera, std::uint64_t frame,
+                                             std::size_t bytes = 1000) {
+    auto made = std::make_shared<v1::Picture>();
+    made->set_camera_id(camera);
+    made->set_frame_id(frame);
+    made->set_jpeg(std::string(bytes, 'j'));
+    return made;
+  }
+  /// The next of these as JSON; empty once the server ended.
+  static json text(WatchClient& client) {
+    while (const auto message = client.hear()) {
+      if (message->opcode == 1) return json::parse(message->bytes);
+    }
+    return {};
+  }
+  struct Binary {
+    json header;
+    std::string bytes;
+  };
+  static Binary split(const std::string& message) {
+    std::uint32_t size = 0;
+    for (unsigned i = 0; i < 4; ++i)
+      size |= static_cast<std::uint32_t>(static_cast<unsigned char>(message[i])) << 8 * i;
+    return {json::parse(message.substr(4, size)), message.substr(4 + size)};
+  }
+  static Binary binary(WatchClient& client) {
+    while (const auto message = client.hear()) {
+      if (message->opcode == 2) return split(message->bytes);
+    }
+    return {};
+  }
+
+  test::FakeApi api;
+  std::unique_ptr<HttpServer> server;
+};
+
+TEST_F(ServerWatchTest, AConsoleIsToldWhatIsAndWhatChanges) {
+  show(v1::IDLE);
+  api.board().notice(v1::GREEN, "started");
+  serve();
+  WatchClient console(server->port());
+  ASSERT_TRUE(console.open());
+  EXPECT_EQ(text(console)["status"]["phase"], "IDLE");
+  EXPECT_EQ(text(console)["notice"]["text"], "started");
+  show(v1::ALIGNING);
+  EXPECT_EQ(text(console)["status"]["phase"], "ALIGNING");
+}
+
+TEST_F(ServerWatchTest, PicturesComeWhileTheyAreWantedAndOfTheCamerasWanted) {
+  show(v1::IDLE);
+  serve();
+  WatchClient console(server->port());
+  text(console);
+  EXPECT_FALSE(api.board().pictures_wanted());
+  console.say(R"({"watch": {"camera_ids": ["b"], "rate_hz": 10}})");
+  ASSERT_TRUE(wait_until([&] { return api.board().pictures_wanted(); }));
+  api.board().show(picture("a", 1));
+  api.board().show(picture("b", 2));
+  const Binary shown = binary(console);
+  EXPECT_EQ(shown.header, json({{"kind", "picture"},
+                                {"camera_id", "b"},
+                                {"frame_id", 2},
+                                {"monotonic_ns", 0},
+                                {"width", 0},
+                                {"height", 0}}));
+  EXPECT_EQ(shown.bytes, std::string(1000, 'j'));
+  console.say(R"({"watch": null})");
+  EXPECT_TRUE(wait_until([&] { return !api.board().pictures_wanted(); }));
+}
+
+TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
+  serve();
+  auto preview = std::make_shared<v1::IterationPreview>();
+  preview->set_reconstruction("r");
+  preview->mutable_iteration()->set_iteration(3);
+  preview->set_camera_id("CAM 1");
+  preview->set_captured_jpeg("captured");
+  preview->set_rendered_jpeg("rendered");
+  preview->mutable_volume()->set_nx(2);
+  preview->mutable_volume()->mutable_box()->add_size(0.5);
+  preview->mutable_volume()->set_voxels("voxels");
+  api.board().show(preview);
+  WatchClient console(server->port());
+  json numbers = text(console);
+  while (!numbers.contains("iteration")) numbers = text(console);
+  EXPECT_EQ(
+      numbers,
+      json::parse(R"({"iteration":{"reconstruction":"r","iteration":{"iteration":3},"camera_id":"CAM 1"}})"));
+  const Binary captured = binary(console);
+  EXPECT_EQ(captured.header["kind"], "captured");
+  EXPECT_EQ(captured.header["camera_id"], "CAM 1");
+  EXPECT_EQ(captured.bytes, "captured");
+  EXPECT_EQ(binary(console).header["kind"], "rendered");
+  const Binary volume = binary(console);
+  EXPECT_EQ(volume.header["nx"], 2);
+  EXPECT_EQ(volume.header["box"]["size"][0], 0.5);
+  EXPECT_EQ(volume.bytes, "voxels");
+}
+
+TEST_F(ServerWatchTest, WhoTalksNonsenseIsPutOutAndTheOthersStay) {
+  serve();
+  WatchClient other(server->port());
+  for (const std::string& nonsense :
+       {std::string("{"), std::string("{\"watch\": 3}"), std::string("{\"watch\": {\"rate_hz\": -1}}"),
+        std::string(), std::string(100'000, '{')}) {
+    WatchClient console(server->port());
+    console.say(nonsense);
+    while (console.hear()) continue;  // until it is put out
+  }
+  {
+    WatchClient console(server->port());
+    console.say("{\"watch\": null}", 2);  // as binary
+    while (console.hear()) continue;
+  }
+  ASSERT_TRUE(wait_until([&] { return server->viewers() == 1; }));
+  show(v1::LOCKED);
+  json told = text(other);
+  while (told.is_object() && told["status"]["phase"] != "LOCKED") told = text(other);
+  EXPECT_TRUE(told.is_object());
+}
+
+TEST_F(ServerWatchTest, BeyondTheMostConsolesIsRefusedUntilOneGoes) {
+  serve({.viewers = 1});
+  {
+    WatchClient first(server->port());
+    ASSERT_TRUE(first.open());
+    WatchClient second(server->port());
+    EXPECT_FALSE(second.open());
+    EXPECT_THAT(second.answer(), HasSubstr("503"));
+  }
+  EXPECT_TRUE(wait_until([&] { return server->viewers() == 0; }));
+  EXPECT_TRUE(WatchClient(server->port()).open());
+}
+
+TEST_F(ServerWatchTest, AnotherSitesPageMayNotWatch) {
+  serve();
+  const WatchClient console(server->port(), "Host: localhost\r\nOrigin: http://evil.example\r\n");
+  EXPECT_THAT(console.answer(), HasSubstr("403"));
+}
+
+TEST_F(ServerWatchTest, AConsoleThatGivesNoSignOfLifeIsGone) {
+  serve({.patience = milliseconds(200)});
+  WatchClient silent(server->port());
+  ASSERT_EQ(server->viewers(), 1U);
+  EXPECT_TRUE(wait_until([&] { return server->viewers() == 0; }));
+}
+
+// 11 cameras, 50 consoles, of which one never reads. The others get every picture, and of those that the one
+// missed nothing is kept.
+TEST_F(ServerWatchTest, OfFiftyConsolesOneStallsAndTheOthersSeeEverything) {
+  constexpr std::size_t kConsoles = 49, kCameras = 11, kRounds = 15, kBytes = 40'000;
+  serve();
+  WatchClient stalled(server->port());
+  stalled.say(R"({"watch": {"rate_hz": 1000}})");
+  std::vector<WatchClient> consoles;
+  for (std::size_t i = 0; i < kConsoles; ++i) {
+    consoles.emplace_back(server->port()).say(R"({"watch": {"rate_hz": 1000}})");
+  }
+  ASSERT_TRUE(wait_until([&] { return server->viewers() == kConsoles + 1; }));
+  std::this_thread::sleep_for(
+      std::chrono::milliseconds(50));  // for their wishes; those that come late see the next round
+  std::vector<std::weak_ptr<const v1::Picture>> shown;
+  std::vector<std::map<std::string, std::uint64_t>> seen(kConsoles);
+  for (std::uint64_t round = 1; round <= kRounds; ++round) {
+    for (std::size_t camera = 0; camera < kCameras; ++camera) {
+      const auto made = picture("camera " + std::to_string(camera), round, kBytes);
+      shown.push_back(made);
+      api.board().show(made);
+    }
+    ASSERT_TRUE(wait_until([&] {
+      std::size_t whole = 0;
+      for (std::size_t i = 0; i < kConsoles; ++i) {
+        while (const auto message = consoles[i].hear_now()) {
+          if (message->opcode != 2) continue;
+          const json header = split(message->bytes).header;
+          seen[i][header["camera_id"]] = header["frame_id"];
+        }
+        whole += seen[i].size() == kCameras &&
+                 std::all_of(seen[i].begin(), seen[i].end(),
+                             [&](const auto& camera) { return camera.second == round; });
+      }
+      return whole == kConsoles;
+    })) << round;
+  }
+  // Of each camera at most: the newest, and the one that the stalled console was sent last.
+  const auto kept = std::count_if(shown.begin(), shown.end(), [](const auto& one) { return !one.expired(); });
+  EXPECT_LE(kept, 2 * kCameras);
+  EXPECT_EQ(server->viewers(), kConsoles + 1);
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -77,7 +77,7 @@ export class Plot {
       ...this.size(),
       legend: {show: false},
       cursor: {show: false},
-      scales: {x: {time: false}, y: options.linear ? {distr: 4, asinh: options.linear} : {}},
+      scales: {x: {time: false}, y: options.linear ? {distr: 4, asinh: options.linear, range: (_: uPlot, least: number, most: number) => this.around(least, most)} : {}},
       axes: [{...axis, label: options.x, size: 34},
              {...axis, label: options.y, size: 58, ...(linear ? {splits: (plot: uPlot) => ticksAround(linear, plot.scales.y!), filter: (_: uPlot, splits: number[]) => splits} : {}),
               ...(tick ? {values: (_: uPlot, values: number[]) => values.map(v => (v === null ? '' : tick(v)))} : {})}],
@@ -108,6 +108,11 @@ export class Plot {
     plot.ctx.fillStyle = 'rgba(0, 158, 115, 0.22)';
     plot.ctx.fillRect(left, upper, width, lower - upper);
     plot.ctx.restore();
+  }
+
+  /** All values, and the band with some room. */
+  private around(least: number, most: number): [number, number] {
+    return [Math.min(1.1 * (least ?? 0), -1.5 * this.band), Math.max(1.1 * (most ?? 0), 1.5 * this.band)];
   }
 
   private size(): {width: number; height: number} {

@@ -98,7 +98,7 @@ struct GrpcServer::Parts {
         pump(options.watchers),
         services({api, workers, jobs, pump}) {}
 
-  Status listen(const GrpcServerOptions& options);
+  Status listen(GrpcServerOptions& options);
   void follow(Board& board);
 
   // The server goes first; while it does, the rest still serves.
@@ -113,12 +113,15 @@ struct GrpcServer::Parts {
   Subscription subscription;
 };
 
-Status GrpcServer::Parts::listen(const GrpcServerOptions& options) {
+Status GrpcServer::Parts::listen(GrpcServerOptions& options) {
   grpc::ServerBuilder builder;
   set_limits(builder, options);
   services.add_to(builder);
   if (!options.socket.empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(lock, SocketLock::take(options.socket));
+    lock = std::move(options.lock);
+    if (!lock) {
+      EMBERLOCK_ASSIGN_OR_RETURN(lock, SocketLock::take(options.socket));
+    }
     builder.AddListeningPort("unix:" + options.socket.string(), grpc::InsecureServerCredentials());
   }
   if (!options.tcp_address.empty())

@@ -1,0 +1,129 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "daemon/align/alignment.h"
+#include "daemon/board.h"
+#include "daemon/config/config.h"
+#include "daemon/devices/geometry.h"
+#include "daemon/devices/rig.h"
+#include "daemon/engine/device_watch.h"
+#include "daemon/engine/machine.h"
+#include "daemon/engine/recorder.h"
+#include "daemon/reconstruction/child.h"
+#include "daemon/recordings/store.h"
+#include "daemon/recordings/transcoder.h"
+
+namespace emberlock {
+
+/// What a conductor works with; all of it outlives it.
+struct ConductorParts {
+  Rig& rig;
+  const Geometry& geometry;
+  const DaemonConfig& config;
+  SessionStore& store;
+  ReconstructionChild& reconstruction;
+  Transcoder& transcoder;
+  Board& board;
+};
+
+/// Carries out what the machine orders, with the rig's devices: it aligns, holds the lock, records. One
+/// thread; engine.h has one for it, a test on a virtual clock steps it by itself.
+class Conductor {
+ public:
+  /// `stop` ends a round of alignment early: somebody asked for something else.
+  explicit Conductor(const ConductorParts& parts, StopAsked stop = {});
+  Conductor(const Conductor&) = delete;
+  Conductor& operator=(const Conductor&) = delete;
+  ~Conductor();
+
+  // What clients ask for (api.h).
+  Status align(const v1::AlignRequest& request);
+  Status stop_sync();
+  Status record(const v1::RecordRequest& request);
+  Status stop_recording();
+  Status reconstruct(const v1::ReconstructRequest& request);
+  Status cancel_reconstruction();
+  Status acknowledge(const v1::AcknowledgeRequest& request);
+  Result<v1::StrobeState> strobe();
+  Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted);
+
+  /// What became of a recording that was compressed in the background.
+  void transcoded(const std::string& session, const Status& outcome);
+
+  /// One slice of what the phase has to do: a round of filming, or the frames that have come. Returns after
+  /// that; idle it has nothing to wait for.
+  void work();
+
+  /// Whether there is nothing to do until frames come, or somebody asks for something.
+  [[nodiscard]] bool waits() const;
+  [[nodiscard]] v1::Phase phase() const { return state_.phase; }
+  [[nodiscard]] v1::DaemonStatus status() const;
+
+ private:
+  Status happen(const Happening& happening);
+  void carry_out(Action action);
+  void begin_alignment();
+  void end_alignment();
+  void begin_recording();
+  void finish_recording();
+  void begin_reconstruction();
+  void measure_row_time();
+  void film_round();
+  void hold();
+  void capture();
+  void drain();
+  void heed_devices();
+  void heed_disk();
+  void heed_reconstruction();
+  void break_alignment(const std::string& reason);
+  /// Why alignment failed: a device that is gone, else itself.
+  void explain_failure(const Error& error);
+  [[nodiscard]] std::vector<FrameCounts> counts() const;
+  [[nodiscard]] std::vector<v1::CameraStatus::State> camera_states() const;
+  void remember(const AlignRoundReport& round);
+  void describe_cameras(v1::DaemonStatus& status) const;
+  void describe_alignment(v1::AlignmentStatus& status) const;
+
+  [[nodiscard]] bool real_time() const { return parts_.rig.pace() == Rig::Pace::real_time; }
+
+  ConductorParts parts_;
+  AlignRig devices_;
+  StopAsked stop_;
+  MachineState state_;
+  DeviceWatch watch_;
+
+  AlignRunOptions align_options_;
+  std::unique_ptr<Alignment> alignment_;
+  TimePoint align_began_;
+  std::deque<v1::RoundPoint> history_;
+  std::optional<AlignEffort> foretold_;
+  bool check_now_ = false;
+  bool expired_ = false;  ///< the lock's end has been told
+  bool phase_lost_ =
+      false;  ///< a camera went away while it was recorded: what is known of its shutter is void
+
+  std::unique_ptr<Recorder> recorder_;
+  v1::RecordRequest record_request_;
+  std::filesystem::path record_folder_;
+  std::optional<v1::RecordingStatus> recording_;  ///< the last that ended
+  TimePoint record_began_;
+  std::optional<TimePoint> last_frame_;
+  std::vector<bool> ended_;  ///< recordings that are replayed have ends
+  v1::ReconstructRequest reconstruct_request_;
+  StrobeSettings strobe_settings_;
+  Status strobe_status_;  ///< of its last answer
+  std::optional<TimePoint> strobe_asked_;
+  v1::StorageStatus storage_;
+  std::optional<TimePoint> disk_looked_;
+  TimePoint began_;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,282 @@
+#include "daemon/engine/engine.h"
+
+#include <chrono>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/clock.h"
+#include "daemon/devices/device_list.h"
+#include "daemon/recordings/json.h"
+#include "session/export.h"
+#include "session/files.h"
+#include "session/verify.h"
+
+namespace emberlock {
+namespace {
+
+constexpr auto kPause = std::chrono::milliseconds(4);     ///< between two looks for frames
+constexpr Seconds kShown{0.1};                            ///< between two statuses
+constexpr Seconds kLongestSilence{10};                    ///< of the thread or of a camera that says it films
+constexpr auto kLongestFinish = std::chrono::minutes(5);  ///< of queues that drain to a slow disk
+
+std::uint64_t made(const FrameCounts& counts) {
+  return counts.delivered + counts.damaged + counts.passed_over + counts.lost();
+}
+
+ReconstructionOptions reconstruction_options(const DaemonConfig& config) {
+  ReconstructionOptions options;
+  const ReconstructionConfig& wanted = config.reconstruction;
+  options.unasked.set_device(wanted.device);
+  if (wanted.budget) options.unasked.set_budget_s(wanted.budget->value());
+  if (wanted.voxels) options.unasked.set_voxels(static_cast<std::uint32_t>(*wanted.voxels));
+  for (const int view : wanted.hold_out) options.unasked.add_hold_out(static_cast<std::uint32_t>(view));
+  options.threads = wanted.threads;
+  options.program = config.reconstruction.program;
+  options.sessions = config.recording.folder;
+  options.results = config.recording.folder.parent_path() / "results";
+  options.silence = config.reconstruction.silence;
+  options.niceness = config.reconstruction.niceness;
+  return options;
+}
+
+/// Runs a job to its end; the last that `observer` is told is what came of it.
+template <class Job, class Good>
+Status run_job(const JobObserver& observer, const Job& job, const Good& good) {
+  auto outcome = job(Observer([&](double fraction, std::string_view doing) {
+    v1::JobProgress progress;
+    progress.set_fraction(fraction);
+    progress.set_doing(std::string(doing));
+    return observer(progress);
+  }));
+  if (!outcome.ok()) return outcome.error();
+  v1::JobProgress last;
+  last.set_fraction(1);
+  last.set_done(true);
+  last.set_ok(good(*outcome));
+  last.set_report(to_line(to_json(*outcome)));
+  observer(last);
+  return {};
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Engine>> Engine::start(const DaemonConfig& config, Board& board, OnFrame on_frame,
+                                              RigOptions rig_options) {
+  EMBERLOCK_ASSIGN_OR_RETURN(SessionStore store,
+                             SessionStore::open(config.recording.folder,
+                                                {.min_free_bytes = config.recording.writer.min_free_bytes}));
+  for (const Salvaged& salvaged : store.salvage_all()) {
+    const bool ok = salvaged.outcome.ok();
+    board.notice(v1::AMBER, fmt::format("{} was not finished: {}", salvaged.session,
+                                        ok ? "salvaged, what reached the disk is kept"
+                                           : salvaged.outcome.error().message()));
+  }
+  const auto ids = std::make_shared<std::vector<std::string>>();  // complete before the first frame
+  if (on_frame) {
+    rig_options.on_frame = [ids, show = std::move(on_frame)](std::size_t camera, const Frame& frame) {
+      show((*ids)[camera], frame);
+    };
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(std::unique_ptr<Rig> rig, Rig::open(config.rig, std::move(rig_options)));
+  for (std::size_t i = 0; i < rig->size(); ++i) ids->push_back(rig->camera(i).info().id);
+  EMBERLOCK_ASSIGN_OR_RETURN(Geometry geometry, Geometry::of(config.rig, *rig));
+  return std::unique_ptr<Engine>(
+      new Engine(config, board, std::move(store), std::move(rig), std::move(geometry)));
+}
+
+Engine::Engine(const DaemonConfig& config, Board& board, SessionStore store, std::unique_ptr<Rig> rig,
+               Geometry geometry)
+    : config_(config),
+      board_(board),
+      store_(std::move(store)),
+      rig_(std::move(rig)),
+      geometry_(std::move(geometry)),
+      reconstruction_(reconstruction_options(config), board),
+      transcoder_([this](const std::string& session, const Status& outcome) {
+        post([session, outcome](Conductor& c) { c.transcoded(session, outcome); });
+      }),
+      thread_([this] { run(); }) {}
+
+Engine::~Engine() {
+  ending_ = true;
+  asked_.notify_all();
+  thread_.join();
+}
+
+void Engine::run() {
+  const auto went_round = [this] { went_round_ns_ = SteadyClock().now().ns; };
+  Conductor conductor({*rig_, geometry_, config_, store_, reconstruction_, transcoder_, board_},
+                      [this, went_round] {
+                        went_round();
+                        return urgent_ > 0 || ending_;
+                      });
+  if (config_.alignment.at_start == AlignmentConfig::AtStart::align) {
+    if (const Status asked = conductor.align({}); !asked.ok())
+      board_.notice(v1::AMBER, asked.error().message());
+  }
+  TimePoint shown;
+  while (!ending_) {
+    std::deque<std::function<void(Conductor&)>> calls;
+    {
+      std::unique_lock lock(mutex_);
+      if (calls_.empty() && conductor.waits()) asked_.wait_for(lock, kPause);
+      calls.swap(calls_);
+    }
+    for (const auto& call : calls) call(conductor);
+    conductor.work();
+    went_round();
+    const TimePoint now = SteadyClock().now();
+    if (calls.empty() && now - shown < kShown) continue;
+    shown = now;
+    board_.show(conductor.status());
+    shown_.notify_all();
+  }
+  const std::lock_guard lock(mutex_);
+  calls_.clear();  // their promises break: whoever waits is told
+}
+
+void Engine::post(std::function<void(Conductor&)> call) {
+  {
+    const std::lock_guard lock(mutex_);
+    calls_.push_back(std::move(call));
+  }
+  asked_.notify_all();
+}
+
+template <class Answer>
+Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call) {
+  auto promise = std::make_shared<std::promise<Answer>>();
+  std::future<Answer> answer = promise->get_future();
+  const bool urgent = urgency == Urgency::interrupts;
+  if (urgent) ++urgent_;
+  post([this, urgent, promise = std::move(promise), call = std::move(call)](Conductor& conductor) {
+    if (urgent) --urgent_;
+    promise->set_value(call(conductor));
+  });
+  try {
+    return answer.get();
+  } catch (const std::future_error&) {
+    return Error{ErrorKind::refused, "it is shutting down", "emberlockd", "Start it again"};
+  }
+}
+
+bool Engine::alive() const {
+  const TimePoint now = SteadyClock().now();
+  if (now - TimePoint{went_round_ns_.load()} > kLongestSilence) return false;
+  if (rig_->pace() != Rig::Pace::real_time) return true;
+  const std::lock_guard lock(progress_mutex_);
+  progress_.resize(rig_->size());
+  bool all = true;
+  for (std::size_t i = 0; i < rig_->size(); ++i) {
+    const std::uint64_t frames = made(rig_->counts(i));
+    if (rig_->state(i) != CameraThread::State::filming || frames != progress_[i].frames ||
+        progress_[i].at == TimePoint{})
+      progress_[i] = {frames, now};
+    all &= now - progress_[i].at <= kLongestSilence;
+  }
+  return all;
+}
+
+Status Engine::acknowledge(const v1::AcknowledgeRequest& request) {
+  return on_thread<Status>(Urgency::waits, [request](Conductor& c) { return c.acknowledge(request); });
+}
+
+Result<v1::ListDevicesResponse> Engine::list_devices() {
+  v1::ListDevicesResponse response;
+  response.set_json(device_json(emberlock::list_devices()));
+  return response;
+}
+
+Result<v1::StrobeState> Engine::strobe() {
+  return on_thread<Result<v1::StrobeState>>(Urgency::waits, [](Conductor& c) { return c.strobe(); });
+}
+
+Result<v1::StrobeState> Engine::apply_strobe(const v1::StrobeState& wanted) {
+  return on_thread<Result<v1::StrobeState>>(Urgency::waits,
+                                            [wanted](Conductor& c) { return c.apply_strobe(wanted); });
+}
+
+Status Engine::align(const v1::AlignRequest& request) {
+  return on_thread<Status>(Urgency::interrupts, [request](Conductor& c) { return c.align(request); });
+}
+
+Status Engine::stop_sync() {
+  return on_thread<Status>(Urgency::interrupts, [](Conductor& c) { return c.stop_sync(); });
+}
+
+Result<v1::RecordingStatus> Engine::record(const v1::RecordRequest& request) {
+  return on_thread<Result<v1::RecordingStatus>>(Urgency::waits,
+                                                [request](Conductor& c) -> Result<v1::RecordingStatus> {
+                                                  EMBERLOCK_RETURN_IF_ERROR(c.record(request));
+                                                  return c.status().recording();
+                                                });
+}
+
+Result<v1::RecordingStatus> Engine::stop_recording() {
+  EMBERLOCK_RETURN_IF_ERROR(
+      on_thread<Status>(Urgency::waits, [](Conductor& c) { return c.stop_recording(); }));
+  std::unique_lock lock(mutex_);
+  const auto finished = [this] {
+    const v1::Phase phase = board_.status()->phase();
+    return ending_ || (phase != v1::CAPTURING && phase != v1::FINISHING);
+  };
+  if (!shown_.wait_for(lock, kLongestFinish, finished)) {
+    return Error{ErrorKind::timed_out, "its queues still drain to the disk", "the recording",
+                 "Watch the status: it is told there when it is finished"};
+  }
+  return board_.status()->recording();
+}
+
+Result<v1::ListSessionsResponse> Engine::list_sessions() { return store_.list(); }
+
+Result<v1::Manifest> Engine::session(const v1::SessionRequest& request) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, store_.path_of(request.session()));
+  return read_manifest(folder);
+}
+
+Status Engine::verify_session(const v1::SessionRequest& request, const JobObserver& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, store_.path_of(request.session()));
+  return run_job(
+      observer, [&](const Observer& seen) { return emberlock::verify_session(folder, seen); },
+      [](const SessionCheck& check) { return check.whole(); });
+}
+
+Status Engine::repair_session(const v1::SessionRequest& request, const JobObserver& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, store_.path_of(request.session()));
+  return run_job(
+      observer, [&](const Observer& seen) { return emberlock::repair_session(folder, seen); },
+      [](const RepairReport& /*report*/) { return true; });
+}
+
+Status Engine::export_session(const v1::ExportRequest& request, const JobObserver& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, store_.path_of(request.session()));
+  const bool video = request.format() == v1::ExportRequest::VIDEO;
+  const auto target =
+      config_.recording.folder.parent_path() / "exports" / request.session() / (video ? "video" : "png");
+  return run_job(
+      observer,
+      [&](const Observer& seen) {
+        return emberlock::export_session(folder, target, video ? ExportFormat::video : ExportFormat::png,
+                                         seen);
+      },
+      [](const ExportReport& /*report*/) { return true; });
+}
+
+Result<v1::ReconstructionStatus> Engine::reconstruct(const v1::ReconstructRequest& request) {
+  return on_thread<Result<v1::ReconstructionStatus>>(
+      Urgency::waits, [request](Conductor& c) -> Result<v1::ReconstructionStatus> {
+        EMBERLOCK_RETURN_IF_ERROR(c.reconstruct(request));
+        return c.status().reconstruction();
+      });
+}
+
+Result<v1::ReconstructionStatus> Engine::cancel_reconstruction() {
+  return on_thread<Result<v1::ReconstructionStatus>>(Urgency::waits,
+                                                     [](Conductor& c) -> Result<v1::ReconstructionStatus> {
+                                                       EMBERLOCK_RETURN_IF_ERROR(c.cancel_reconstruction());
+                                                       return c.status().reconstruction();
+                                                     });
+}
+
+}  // namespace emberlock

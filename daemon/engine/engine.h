@@ -1,0 +1,93 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "base/result.h"
+#include "daemon/api.h"
+#include "daemon/engine/conductor.h"
+
+namespace emberlock {
+
+/// The daemon behind its servers: a conductor on a thread of its own, which alone touches the devices, and
+/// what clients ask of it. Any thread may call the Api.
+class Engine final : public Api {
+ public:
+  /// Sees every frame, by its camera's id, on that camera's thread: it must return at once.
+  using OnFrame = std::function<void(const std::string& camera_id, const Frame& frame)>;
+
+  /// Opens the sessions' folder (salvaging what a killed recorder left) and the rig. Devices that aren't
+  /// there don't keep it from starting. `board` outlives it. Errors: bad_input and io.
+  static Result<std::unique_ptr<Engine>> start(const DaemonConfig& config, Board& board,
+                                               OnFrame on_frame = {}, RigOptions rig_options = {});
+  ~Engine() override;
+  Engine(const Engine&) = delete;
+  Engine& operator=(const Engine&) = delete;
+
+  /// Whether the thread went round lately, and every camera either films, or is known not to: what the
+  /// watchdog asks.
+  [[nodiscard]] bool alive() const;
+
+  [[nodiscard]] Board& board() override { return board_; }
+  Status acknowledge(const v1::AcknowledgeRequest& request) override;
+  Result<v1::ListDevicesResponse> list_devices() override;
+  Result<v1::StrobeState> strobe() override;
+  Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted) override;
+  Status align(const v1::AlignRequest& request) override;
+  Status stop_sync() override;
+  Result<v1::RecordingStatus> record(const v1::RecordRequest& request) override;
+  Result<v1::RecordingStatus> stop_recording() override;
+  Result<v1::ListSessionsResponse> list_sessions() override;
+  Result<v1::Manifest> session(const v1::SessionRequest& request) override;
+  Status verify_session(const v1::SessionRequest& request, const JobObserver& observer) override;
+  Status repair_session(const v1::SessionRequest& request, const JobObserver& observer) override;
+  Status export_session(const v1::ExportRequest& request, const JobObserver& observer) override;
+  Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override;
+  Result<v1::ReconstructionStatus> cancel_reconstruction() override;
+
+ private:
+  enum class Urgency {
+    waits,       ///< until the round that is filmed is over
+    interrupts,  ///< it ends the round
+  };
+
+  Engine(const DaemonConfig& config, Board& board, SessionStore store, std::unique_ptr<Rig> rig,
+         Geometry geometry);
+  void run();
+  /// Has it done on the thread, and waits for that.
+  void post(std::function<void(Conductor&)> call);
+  template <class Answer>
+  Answer on_thread(Urgency urgency, std::function<Answer(Conductor&)> call);
+
+  const DaemonConfig config_;
+  Board& board_;
+  SessionStore store_;
+  std::unique_ptr<Rig> rig_;
+  Geometry geometry_;
+  ReconstructionChild reconstruction_;
+
+  std::mutex mutex_;
+  std::condition_variable asked_;
+  std::condition_variable shown_;  ///< a status was published
+  std::deque<std::function<void(Conductor&)>> calls_;
+  std::atomic<int> urgent_ = 0;
+  std::atomic<bool> ending_ = false;
+  std::atomic<std::int64_t> went_round_ns_ = 0;
+
+  struct CameraProgress {
+    std::uint64_t frames = 0;
+    TimePoint at;
+  };
+  mutable std::mutex progress_mutex_;
+  mutable std::vector<CameraProgress> progress_;  ///< by camera, as alive() saw it
+  Transcoder transcoder_;
+  std::thread thread_;  ///< last: it uses all of the above
+};
+
+}  // namespace emberlock

@@ -1,0 +1,143 @@
+// emberlockd: the daemon.
+#include <csignal>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <systemd/sd-daemon.h>
+
+#include "daemon/config/config.h"
+#include "daemon/config/preflight.h"
+#include "daemon/engine/engine.h"
+#include "daemon/server/access.h"
+#include "daemon/server/grpc_server.h"
+#include "daemon/server/http_server.h"
+#include "daemon/server/pictures.h"
+
+namespace emberlock {
+namespace {
+
+/// The signals that end it: blocked in every thread, and waited for in one.
+sigset_t ending_signals() {
+  sigset_t set;
+  sigemptyset(&set);
+  sigaddset(&set, SIGINT);
+  sigaddset(&set, SIGTERM);
+  return set;
+}
+
+int fail(const Error& error) {
+  std::fprintf(stderr, "emberlockd: %s\n", error.message().c_str());
+  return error.kind == ErrorKind::bad_input ? 2 : 1;
+}
+
+/// Tells systemd that it lives, as long as it does, until it shall end.
+void stay(const Engine& engine) {
+  const sigset_t ending = ending_signals();
+  std::uint64_t watchdog_us = 0;
+  const bool watched = ::sd_watchdog_enabled(0, &watchdog_us) > 0;
+  for (;;) {
+    const timespec second{1, 0};
+    if (::sigtimedwait(&ending, nullptr, &second) > 0) return;
+    if (watched && engine.alive()) ::sd_notify(0, "WATCHDOG=1");
+  }
+}
+
+Result<std::optional<Token>> token_of(const ServerConfig& config) {
+  if (config.token_file.empty()) return std::optional<Token>();
+  EMBERLOCK_ASSIGN_OR_RETURN(Token token, Token::read(config.token_file));
+  return std::optional<Token>(std::move(token));
+}
+
+Result<GrpcServerOptions> grpc_options(const ServerConfig& config) {
+  GrpcServerOptions options;
+  options.socket = config.socket;
+  options.tcp_address = config.listen;
+  EMBERLOCK_ASSIGN_OR_RETURN(options.token, token_of(config));
+  options.largest_request = static_cast<int>(config.message_bytes);
+  if (!config.listen.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.tls, TlsIdentity::read(config.tls_certificate, config.tls_key));
+  }
+  return options;
+}
+
+Status serve(const DaemonConfig& config) {
+  const sigset_t ending = ending_signals();
+  ::pthread_sigmask(SIG_BLOCK, &ending, nullptr);
+  std::signal(SIGPIPE, SIG_IGN);
+  EMBERLOCK_ASSIGN_OR_RETURN(GrpcServerOptions grpc, grpc_options(config.server));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Token> token, token_of(config.server));
+  // A second daemon ends here, before it touches a device.
+  EMBERLOCK_ASSIGN_OR_RETURN(grpc.lock, SocketLock::take(config.server.socket));
+
+  Board board;
+  Pictures pictures(board,
+                    {config.server.picture_width, config.server.picture_rate, config.server.picture_quality});
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      const std::unique_ptr<Engine> engine,
+      Engine::start(config, board, [&pictures](const std::string& camera, const Frame& frame) {
+        pictures.offer(camera, frame);
+      }));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<GrpcServer> grpc_server,
+                             GrpcServer::start(*engine, std::move(grpc)));
+  std::unique_ptr<HttpServer> http_server;
+  if (!config.server.http_listen.empty()) {
+    HttpServerOptions options;
+    options.listen = config.server.http_listen;
+    options.token = token;
+    options.console = config.server.console;
+    options.viewers = static_cast<std::size_t>(config.server.viewers);
+    options.other_watchers = [&grpc_server] { return grpc_server->watchers(); };
+    EMBERLOCK_ASSIGN_OR_RETURN(http_server, HttpServer::start(*engine, std::move(options)));
+    std::fprintf(stderr, "emberlockd: the console is at http://%s\n", config.server.http_listen.c_str());
+  }
+  ::sd_notify(0, "READY=1");
+  stay(*engine);
+  ::sd_notify(0, "STOPPING=1");
+  return {};
+}
+
+}  // namespace
+}  // namespace emberlock
+
+int main(int argc, char** argv) {
+  using namespace emberlock;
+  CLI::App app{"Drives cameras and strobe: aligns, holds the lock, records, hands on to reconstruction.",
+               "emberlockd"};
+  std::string config_path = "/etc/emberlock/emberlockd.toml";
+  std::string token_file;
+  bool check = false;
+  bool print = false;
+  app.add_option("--config", config_path, "The configuration file")->capture_default_str();
+  app.add_flag("--check-config", check, "Says what is wrong with the configuration, and ends");
+  app.add_flag("--print-config", print,
+               "Prints a configuration file with every key, its range and default, and ends");
+  app.add_option("--make-token", token_file,
+                 "Writes a new token for clients from elsewhere to this file, and ends");
+  app.set_version_flag("--version", "emberlockd " EMBERLOCK_VERSION);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  if (print) {
+    std::printf("%s", commented_config().c_str());
+    return 0;
+  }
+  if (!token_file.empty()) {
+    const Status made = make_token(token_file);
+    return made.ok() ? 0 : fail(made.error());
+  }
+  if (check) {
+    const std::vector<Error> problems = check_config(config_path);
+    for (const Error& problem : problems) fail(problem);
+    if (problems.empty()) std::printf("%s: good\n", config_path.c_str());
+    return problems.empty() ? 0 : 2;
+  }
+  const auto config = load_config(config_path);
+  if (!config.ok()) return fail(config.error());
+  const Status served = serve(*config);
+  return served.ok() ? 0 : fail(served.error());
+}

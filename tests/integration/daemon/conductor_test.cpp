@@ -1,0 +1,198 @@
+// The daemon without its servers: from the strobe to a recording, on simulated cameras and a clock of their
+// own.
+#include "daemon/engine/conductor.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "session/reader.h"
+#include "tests/support/small_daemon.h"
+
+namespace emberlock {
+namespace {
+
+using test::small_config;
+using test::SmallDaemon;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::SizeIs;
+
+class Daemon : public ::testing::Test {
+ protected:
+  /// The largest true difference between two read phases, modulo the frame period.
+  static Seconds true_spread(VirtualRig& rig) {
+    const TimePoint now = rig.clock().now();
+    const double period = rig.truth(0).timing.frame_period.value();
+    double spread = 0;
+    for (int a = 0; a < rig.size(); ++a) {
+      for (int b = 0; b < a; ++b) {
+        const double apart = (rig.read_start_after(a, now) - rig.read_start_after(b, now)).value();
+        spread = std::max(spread, std::abs(std::remainder(apart, period)));
+      }
+    }
+    return Seconds(spread);
+  }
+  test::TempFolder temp_;
+};
+
+TEST_F(Daemon, FromColdToLocked) {
+  SmallDaemon daemon(small_config(temp_.path()));
+  EXPECT_EQ(daemon.conductor->status().phase(), v1::IDLE);
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  EXPECT_EQ(daemon.conductor->phase(), v1::CALIBRATING);
+  ASSERT_TRUE(daemon.reach(v1::ALIGNING));
+  ASSERT_TRUE(daemon.reach(v1::LOCKED));
+  const v1::DaemonStatus status = daemon.conductor->status();
+  const double tolerance = status.alignment().tolerance_s();
+  EXPECT_LE(true_spread(*daemon.rig->virtual_rig()).value(), 2 * tolerance);
+  EXPECT_EQ(status.light(), v1::GREEN);
+  EXPECT_GT(status.alignment().time_left_s(), 0);
+  EXPECT_GT(status.alignment().history_size(), 0);
+  EXPECT_GT(status.alignment().cost().time_p95_s(), 0);
+  EXPECT_THAT(status.cameras(), SizeIs(4));
+  const double row_time = daemon.rig->virtual_rig()->truth(0).timing.row_time.value();
+  for (const v1::CameraStatus& camera : status.cameras()) {
+    EXPECT_LE(std::abs(camera.error_s()), tolerance);
+    EXPECT_NEAR(camera.row_time_s() / row_time, 1, 1e-3);
+  }
+}
+
+TEST_F(Daemon, PicturesAreToldWhereLampDotAndTargetAre) {
+  SmallDaemon daemon(small_config(temp_.path()));
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  int dots = 0;
+  ASSERT_TRUE(daemon.work_until([&] {
+    const v1::DaemonStatus status = daemon.conductor->status();
+    for (const v1::CameraStatus& camera : status.cameras()) {
+      if (camera.sight() != "known" || !camera.has_target_row() || !camera.has_lamp()) continue;
+      ++dots;
+      EXPECT_NEAR(camera.dots(0).x(), camera.lamp().x(), 2);
+      EXPECT_NEAR(camera.tolerance_rows(), 30, .01);
+      // The dot stands off its target by just the error, unless it is so far out that it wrapped.
+      if (std::abs(camera.error_rows()) > 60) continue;
+      EXPECT_NEAR(std::abs(camera.dots(0).y() - camera.target_row()), std::abs(camera.error_rows()), 1.5);
+    }
+    return status.phase() == v1::LOCKED;
+  }));
+  EXPECT_GE(dots, 3);
+}
+
+TEST_F(Daemon, HeldForAnHourItIsNeverOutUnnoticed) {
+  SmallDaemon daemon(small_config(temp_.path()));
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED));
+  const TimePoint from = daemon.rig->clock().now();
+  // Two cameras may lie a tolerance to either side, each as well as flashes shorter than a row tell: to half
+  // a one.
+  const v1::AlignmentStatus aligned = daemon.conductor->status().alignment();
+  const Seconds allowed = 2 * Seconds(aligned.tolerance_s() + 0.5 * aligned.row_time_s());
+  for (int i = 0; i < 2000 && daemon.rig->clock().now() - from < Seconds(3600); ++i) {
+    if (daemon.conductor->phase() == v1::LOCKED) {
+      ASSERT_LE(true_spread(*daemon.rig->virtual_rig()), allowed) << daemon.conductor->status().reason();
+    }
+    daemon.conductor->work();
+  }
+  EXPECT_GE((daemon.rig->clock().now() - from).value(), 3600) << daemon.conductor->status().reason();
+  EXPECT_GT(daemon.conductor->status().alignment().checks(), 5);
+}
+
+TEST_F(Daemon, ALockedRecordingIsWholeAndTheLockIsCheckedAfterIt) {
+  SmallDaemon daemon(small_config(temp_.path()));
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED));
+  v1::RecordRequest request;
+  request.set_name("take 1");
+  request.set_seconds(2);
+  ASSERT_TRUE(daemon.conductor->record(request).ok());
+  EXPECT_EQ(daemon.conductor->phase(), v1::CAPTURING);
+  const v1::StrobeState dark = *daemon.conductor->strobe();
+  EXPECT_THAT(dark.code(), ElementsAre(false));  // its time base goes on
+  ASSERT_TRUE(daemon.reach(v1::FINISHING));
+  const int rounds = static_cast<int>(daemon.conductor->status().alignment().round());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED));
+  const v1::RecordingStatus recording = daemon.conductor->status().recording();
+  EXPECT_EQ(recording.state(), v1::RecordingStatus::COMPLETE) << recording.verdict();
+  EXPECT_THAT(recording.verdict(), HasSubstr("none lost"));
+  ASSERT_TRUE(daemon.work_until(
+      [&] { return static_cast<int>(daemon.conductor->status().alignment().round()) > rounds; }));
+  EXPECT_EQ(daemon.conductor->phase(), v1::LOCKED);
+
+  auto session = SessionReader::open(temp_.path() / "sessions" / "take 1");
+  ASSERT_TRUE(session.ok()) << session.error().message();
+  for (std::size_t camera = 0; camera < 4; ++camera) {
+    EXPECT_NEAR(static_cast<double>(session->stamps(camera).size()), 2 * 23.976, 3);
+    EXPECT_TRUE(session->read(camera, 0).ok());
+  }
+}
+
+TEST_F(Daemon, WhatCannotBeDoneNowIsRefusedWithARemedy) {
+  SmallDaemon daemon(small_config(temp_.path()));
+  v1::RecordRequest request;
+  const Status unlocked = daemon.conductor->record(request);
+  ASSERT_FALSE(unlocked.ok());
+  EXPECT_EQ(unlocked.error().kind, ErrorKind::refused);
+  EXPECT_FALSE(unlocked.error().remedy.empty());
+  EXPECT_FALSE(daemon.conductor->stop_recording().ok());
+  request.set_unlocked(true);
+  request.set_name("../outside");
+  EXPECT_EQ(daemon.conductor->record(request).error().kind, ErrorKind::bad_input);
+  request.set_name("take");
+  ASSERT_TRUE(daemon.conductor->record(request).ok());
+  EXPECT_EQ(daemon.conductor->align({}).error().kind, ErrorKind::refused);
+  ASSERT_TRUE(daemon.conductor->stop_recording().ok());
+  ASSERT_TRUE(daemon.reach(v1::IDLE));
+  EXPECT_EQ(daemon.conductor->record(request).error().kind, ErrorKind::bad_input);  // the name is taken
+}
+
+TEST_F(Daemon, AWholeRecordingReplaysThroughItBitForBit) {
+  {
+    SmallDaemon live(small_config(temp_.path()));
+    v1::RecordRequest request;
+    request.set_name("live");
+    request.set_unlocked(true);
+    request.set_seconds(3);
+    ASSERT_TRUE(live.conductor->record(request).ok());
+    ASSERT_TRUE(live.reach(v1::IDLE));
+  }
+  DaemonConfig config = small_config(temp_.path());
+  config.rig.cameras.clear();
+  CameraConfig replayed;
+  replayed.source = CameraSource::replay;
+  config.rig.cameras.push_back(replayed);
+  config.rig.replay_session = temp_.path() / "sessions" / "live";
+  config.rig.strobe.source = StrobeSource::replay;
+  SmallDaemon again(config);
+  v1::RecordRequest request;
+  request.set_name("again");
+  request.set_unlocked(true);
+  ASSERT_TRUE(again.conductor->record(request).ok());
+  ASSERT_TRUE(again.reach(v1::IDLE));
+  EXPECT_EQ(again.conductor->status().recording().state(), v1::RecordingStatus::COMPLETE)
+      << again.conductor->status().recording().verdict();
+  auto first = SessionReader::open(temp_.path() / "sessions" / "live").value();
+  auto second = SessionReader::open(temp_.path() / "sessions" / "again").value();
+  for (std::size_t camera = 0; camera < 4; ++camera) {
+    ASSERT_EQ(first.stamps(camera), second.stamps(camera));
+    for (std::size_t i = 0; i < first.stamps(camera).size(); ++i)
+      ASSERT_EQ(first.read(camera, i)->image->bytes(), second.read(camera, i)->image->bytes());
+  }
+}
+
+TEST_F(Daemon, StoppedInMidAlignmentItIsIdleAtOnce) {
+  bool stop = false;
+  SmallDaemon daemon(small_config(temp_.path()), {}, [&] { return stop; });
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  ASSERT_TRUE(daemon.reach(v1::ALIGNING));
+  stop = true;
+  daemon.conductor->work();
+  EXPECT_EQ(daemon.conductor->phase(), v1::ALIGNING);
+  ASSERT_TRUE(daemon.conductor->stop_sync().ok());
+  EXPECT_EQ(daemon.conductor->phase(), v1::IDLE);
+  EXPECT_EQ(daemon.conductor->strobe()->output(), v1::StrobeState::OFF);
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "daemon/engine/conductor.h"
+#include "tests/support/recording.h"
+
+namespace emberlock::test {
+
+/// Four simulated cameras of 320 x 240 and their strobe, on a clock of their own.
+inline DaemonConfig small_config(const std::filesystem::path& folder) {
+  DaemonConfig config;
+  config.rig.name = "small";
+  CameraConfig cameras;
+  cameras.count = 4;
+  cameras.request.size = ImageSize{320, 240};
+  config.rig.cameras.push_back(cameras);
+  config.rig.virtual_rig.time = VirtualConfig::Time::fast;
+  config.rig.strobe.source = StrobeSource::virtual_;
+  config.recording.folder = folder / "sessions";
+  config.recording.writer = small_disk_options(Encoding::raw_nut);
+  config.alignment.run.align.tolerance.amount = Rows(30);
+  config.alignment.run.comb_frames = 12;
+  return config;
+}
+
+/// A conductor with all that it works with, stepped by hand.
+struct SmallDaemon {
+  explicit SmallDaemon(DaemonConfig setup, RigOptions options = {}, StopAsked stop = {})
+      : config(std::move(setup)),
+        store(SessionStore::open(config.recording.folder, {.min_free_bytes = 0}).value()),
+        rig(Rig::open(config.rig, std::move(options)).value()),
+        geometry(Geometry::of(config.rig, *rig).value()),
+        reconstruction({}, board),
+        conductor(std::in_place,
+                  ConductorParts{*rig, geometry, config, store, reconstruction, transcoder, board},
+                  std::move(stop)) {}
+
+  /// Works until `done`, or for so many slices.
+  bool work_until(const std::function<bool()>& done, int slices = 2000) {
+    for (int i = 0; i < slices && !done(); ++i) conductor->work();
+    return done();
+  }
+  bool reach(v1::Phase phase, int slices = 2000) {
+    return work_until([&] { return conductor->phase() == phase; }, slices);
+  }
+  [[nodiscard]] const v1::Fault* fault(v1::Fault::Kind kind) {
+    status = conductor->status();
+    for (const v1::Fault& fault : status.faults())
+      if (fault.kind() == kind) return &fault;
+    return nullptr;
+  }
+
+  DaemonConfig config;
+  Board board;
+  SessionStore store;
+  std::unique_ptr<Rig> rig;
+  Geometry geometry;
+  ReconstructionChild reconstruction;
+  Transcoder transcoder;
+  std::optional<Conductor> conductor;
+  v1::DaemonStatus status;
+};
+
+}  // namespace emberlock::test

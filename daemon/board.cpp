@@ -71,12 +71,15 @@ void Board::show(std::shared_ptr<const v1::IterationPreview> preview) {
     if (!iterations_.empty()) {
       if (iterations_.back()->reconstruction() != preview->reconstruction()) {
         iterations_.clear();
-      } else {
-        v1::IterationPreview numbers = *iterations_.back();
-        numbers.clear_captured_jpeg();
-        numbers.clear_rendered_jpeg();
-        numbers.clear_volume();
-        iterations_.back() = std::make_shared<const v1::IterationPreview>(std::move(numbers));
+      } else if (preview->has_volume() || !preview->rendered_jpeg().empty()) {
+        for (auto& earlier : iterations_) {
+          if (!earlier->has_volume() && earlier->rendered_jpeg().empty()) continue;
+          v1::IterationPreview numbers = *earlier;
+          numbers.clear_captured_jpeg();
+          numbers.clear_rendered_jpeg();
+          numbers.clear_volume();
+          earlier = std::make_shared<const v1::IterationPreview>(std::move(numbers));
+        }
       }
     }
     iterations_.push_back(std::move(preview));

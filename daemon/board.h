@@ -57,7 +57,7 @@ class Board {
   /// Forgets those of another reconstruction.
   void show(std::shared_ptr<const v1::IterationPreview> preview);
   /// Of the running or last reconstruction those from the `from`th on (counted from 0), in order; only the
-  /// newest has pictures and volume.
+  /// newest that came with pictures and volume still has them.
   [[nodiscard]] std::vector<std::shared_ptr<const v1::IterationPreview>> iterations(std::size_t from) const;
 
   /// `changed` is called after each change, from whichever thread makes it: it must return at once, and call

@@ -241,7 +241,9 @@ void Conductor::end_alignment() {
 void Conductor::begin_recording() {
   const TimePoint now = parts_.rig.clock().now();
   record_began_ = now;
+  spread_.reset();
   if (state_.lock == Lock::held) {
+    spread_ = alignment_->worst_pair(now);
     // A flash that was under way may show in the two frames that follow.
     if (const Status dark = alignment_->darken(); !dark.ok())
       parts_.board.notice(v1::AMBER, dark.error().message());
@@ -273,6 +275,7 @@ void Conductor::finish_recording() {
   v1::RecordingStatus status = recorder_->finish(counts(), parts_.rig.clock().now());
   recorder_.reset();
   if (status.state() == v1::RecordingStatus::FAILED) static_cast<void>(salvage(record_folder_));
+  if (spread_) status.set_spread_s(spread_->value());
   parts_.transcoder.resume();
   if (parts_.config.recording.transcode == RecordingConfig::Transcode::when_idle &&
       is_uncompressed(record_folder_))

@@ -115,6 +115,7 @@ class Conductor {
   std::filesystem::path record_folder_;
   std::optional<v1::RecordingStatus> recording_;  ///< the last that ended
   TimePoint record_began_;
+  std::optional<Seconds> spread_;  ///< between two cameras when it began, as the lock knew it
   std::optional<TimePoint> last_frame_;
   std::vector<bool> ended_;  ///< recordings that are replayed have ends
   v1::ReconstructRequest reconstruct_request_;

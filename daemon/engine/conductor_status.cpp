@@ -104,6 +104,7 @@ v1::DaemonStatus Conductor::status() const {
   if (alignment_ || !history_.empty()) describe_alignment(*status.mutable_alignment());
   if (recorder_) {
     *status.mutable_recording() = recorder_->status(now);
+    if (spread_) status.mutable_recording()->set_spread_s(spread_->value());
     if (state_.phase == v1::FINISHING) status.mutable_recording()->set_state(v1::RecordingStatus::FINISHING);
   } else if (recording_) {
     *status.mutable_recording() = *recording_;
@@ -162,7 +163,8 @@ void Conductor::describe_cameras(v1::DaemonStatus& status) const {
       if (const auto drift = alignment_->drift(i)) camera.set_drift_ppm(drift->value());
       if (const auto& clock = alignment_->row_clocks()[i]) camera.set_row_time_s(clock->row_time.value());
       camera.set_resets(static_cast<std::uint32_t>(alignment_->state().cameras[i].resets));
-      if (state_.phase == v1::ALIGNING || state_.phase == v1::CALIBRATING) camera.set_light(v1::AMBER);
+      const Seconds tolerance = alignment_->options().tolerance.in_time(alignment_->options().row_time);
+      if (!decision.error || abs(*decision.error) > tolerance) camera.set_light(v1::AMBER);
     }
     if (states[i] == v1::CameraStatus::LOST || states[i] == v1::CameraStatus::QUARANTINED) {
       camera.set_light(v1::RED);

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "base/clock.h"
+#include "drivers/driver.h"
+
+// Cameras of a driver "v4l2" that a test plugs in and out, by their ids: 100 small frames a second while they
+// are in.
+namespace emberlock::test {
+
+struct Sockets {
+  std::mutex mutex;
+  std::set<std::string> plugged;
+};
+inline Sockets& sockets() {
+  static Sockets all;
+  return all;
+}
+inline bool is_plugged(const std::string& id) {
+  const std::lock_guard lock(sockets().mutex);
+  return sockets().plugged.count(id) > 0;
+}
+inline void plug_in(const std::string& id) {
+  const std::lock_guard lock(sockets().mutex);
+  sockets().plugged.insert(id);
+}
+inline void unplug(const std::string& id) {
+  const std::lock_guard lock(sockets().mutex);
+  sockets().plugged.erase(id);
+}
+
+class SocketCamera final : public Camera {
+ public:
+  explicit SocketCamera(std::string id) {
+    info_.id = std::move(id);
+    info_.model = "socket camera";
+    info_.layout.size = {64, 48};
+    info_.frame_rate = Hertz(100);
+  }
+  [[nodiscard]] const CameraInfo& info() const override { return info_; }
+  [[nodiscard]] FrameCounts counts() const override { return counts_; }
+  Status start() override {
+    if (!is_plugged(info_.id)) return Error{ErrorKind::device, "it isn't there", info_.id, "plug it in"};
+    return {};
+  }
+  void stop() override {}
+  Result<Frame> next_frame(Seconds /*deadline*/) override {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    if (!is_plugged(info_.id)) return Error{ErrorKind::device, "it went away", info_.id, "plug it in"};
+    Frame frame;
+    frame.stamp.frame_id = counts_.delivered++;
+    frame.stamp.monotonic_time = SteadyClock().now();
+    frame.image = std::make_shared<Image>(info_.layout);
+    return frame;
+  }
+  std::uint64_t pass_over(TimePoint /*until*/) override { return 0; }
+  Status reset_shutter(TimePoint /*at*/) override {
+    return Error{ErrorKind::device, "it can't", info_.id, {}};
+  }
+  Status trim_rate(PartsPerMillion /*trim*/) override {
+    return Error{ErrorKind::device, "it can't", info_.id, {}};
+  }
+
+ private:
+  CameraInfo info_;
+  FrameCounts counts_;
+};
+
+inline std::vector<CameraDriver> socket_drivers() {
+  return {{"v4l2", [] { return Result<std::vector<CameraFound>>(std::vector<CameraFound>{}); },
+           [](const std::string& id, const CameraRequest& /*request*/) -> Result<std::unique_ptr<Camera>> {
+             if (!is_plugged(id))
+               return Error{ErrorKind::device, "there is no such camera", id, "plug it in"};
+             return std::unique_ptr<Camera>(std::make_unique<SocketCamera>(id));
+           }}};
+}
+
+}  // namespace emberlock::test

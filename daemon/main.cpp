@@ -70,7 +70,8 @@ Status serve(const DaemonConfig& config) {
   EMBERLOCK_ASSIGN_OR_RETURN(GrpcServerOptions grpc, grpc_options(config.server));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Token> token, token_of(config.server));
   // A second daemon ends here, before it touches a device.
-  EMBERLOCK_ASSIGN_OR_RETURN(grpc.lock, SocketLock::take(config.server.socket));
+  EMBERLOCK_ASSIGN_OR_RETURN(SocketLock lock, SocketLock::take(config.server.socket));
+  grpc.lock = std::make_shared<const SocketLock>(std::move(lock));
 
   Board board;
   Pictures pictures(board,

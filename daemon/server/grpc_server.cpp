@@ -98,7 +98,7 @@ struct GrpcServer::Parts {
         pump(options.watchers),
         services({api, workers, jobs, pump}) {}
 
-  Status listen(GrpcServerOptions& options);
+  Status listen(const GrpcServerOptions& options);
   void follow(Board& board);
 
   // The server goes first; while it does, the rest still serves.
@@ -106,21 +106,22 @@ struct GrpcServer::Parts {
   Workers jobs;
   StreamPump pump;
   GrpcServices services;
-  std::optional<SocketLock> lock;
+  std::shared_ptr<const SocketLock> lock;
   int tcp_port = 0;
   std::atomic<bool> serving = false;
   std::unique_ptr<grpc::Server> server;
   Subscription subscription;
 };
 
-Status GrpcServer::Parts::listen(GrpcServerOptions& options) {
+Status GrpcServer::Parts::listen(const GrpcServerOptions& options) {
   grpc::ServerBuilder builder;
   set_limits(builder, options);
   services.add_to(builder);
   if (!options.socket.empty()) {
-    lock = std::move(options.lock);
+    lock = options.lock;
     if (!lock) {
-      EMBERLOCK_ASSIGN_OR_RETURN(lock, SocketLock::take(options.socket));
+      EMBERLOCK_ASSIGN_OR_RETURN(SocketLock taken, SocketLock::take(options.socket));
+      lock = std::make_shared<const SocketLock>(std::move(taken));
     }
     builder.AddListeningPort("unix:" + options.socket.string(), grpc::InsecureServerCredentials());
   }

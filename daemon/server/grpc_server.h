@@ -17,7 +17,7 @@ struct GrpcServerOptions {
   /// Unix socket; its folder says who may use it. Empty: none.
   std::filesystem::path socket = {};
   /// Of the socket, for who took it before it opened devices; else it is taken at the start.
-  std::optional<SocketLock> lock = {};
+  std::shared_ptr<const SocketLock> lock = {};
   /// "192.168.0.5:7410", "0.0.0.0:7410", "[::]:7410": clients from elsewhere, who need TLS and the token.
   /// Empty: none.
   std::string tcp_address = {};

@@ -1,0 +1,140 @@
+// The programs as an operator runs them: emberlockd, killed and started again, and `emberlock` as its client.
+#include <chrono>
+#include <csignal>
+#include <fstream>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "session/reader.h"
+#include "session/verify.h"
+#include "tests/support/recording.h"
+#include "tests/support/shell.h"
+
+namespace emberlock {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// emberlockd, on a configuration of its own.
+class Program {
+ public:
+  explicit Program(const std::string& config) {
+    pid_ = ::fork();
+    if (pid_ != 0) return;
+    ::execl(EMBERLOCKD_PROGRAM, "emberlockd", "--config", config.c_str(), nullptr);
+    ::_exit(127);
+  }
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+  ~Program() {
+    if (pid_ > 0) end(SIGKILL);
+  }
+  /// Its exit status, or minus the signal that ended it.
+  int end(int signal) {
+    ::kill(pid_, signal);
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    pid_ = -1;
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
+  }
+
+ private:
+  pid_t pid_ = -1;
+};
+
+class DaemonProgram : public ::testing::Test {
+ protected:
+  DaemonProgram() {
+    std::ofstream(config())
+        << "[rig]\nname = \"test\"\n[[rig.camera]]\ndriver = \"virtual\"\ncount = 4\nsize = \"320x240\"\n"
+        << "[rig.strobe]\ndriver = \"virtual\"\n[recording]\nfolder = \"" << sessions().string()
+        << "\"\nfree_space_floor_mib = 0\nencoding = \"raw\"\ntranscode = \"never\"\n[server]\nsocket = \""
+        << (temp_ / "run" / "d.sock").string() << "\"\nhttp_listen = \"\"\n";
+  }
+  [[nodiscard]] std::filesystem::path sessions() const { return temp_ / "sessions"; }
+  [[nodiscard]] std::string config() const { return (temp_ / "d.toml").string(); }
+  [[nodiscard]] Shell client(const std::string& words) const {
+    return shell(std::string(EMBERLOCK_PROGRAM) + " " + words +
+                 " --daemon unix:" + (temp_ / "run" / "d.sock").string());
+  }
+  /// Asks until the answer has `words`.
+  [[nodiscard]] bool answers(const std::string& question, const std::string& words) const {
+    for (int i = 0; i < 100; ++i) {
+      if (client(question).output.find(words) != std::string::npos) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    return false;
+  }
+  test::TempFolder temp_;
+};
+
+TEST_F(DaemonProgram, KilledInMidRecordingItLosesASecondAtMostAndTheNextOneSalvagesTheRest) {
+  std::uint64_t before = 0;
+  {
+    Program daemon(config());
+    ASSERT_TRUE(answers("status", "filming"));
+    std::thread recording([&] { static_cast<void>(client("record killed --unlocked")); });
+    ASSERT_TRUE(answers("status", "recording  killed"));
+    std::this_thread::sleep_for(std::chrono::seconds(2));
+    before = static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
+    EXPECT_EQ(daemon.end(SIGKILL), -SIGKILL);
+    recording.join();
+  }
+  Program again(config());
+  ASSERT_TRUE(answers("status", "filming"));
+  const auto check = verify_session(sessions() / "killed");
+  ASSERT_TRUE(check.ok()) << check.error().message();
+  EXPECT_TRUE(check->whole()) << check->to_do;
+  EXPECT_EQ(check->state, v1::Manifest::SALVAGED);
+  auto session = SessionReader::open(sessions() / "killed").value();
+  for (std::size_t camera = 0; camera < 4; ++camera) {
+    const auto& stamps = session.stamps(camera);
+    ASSERT_FALSE(stamps.empty());
+    // The stamps are of the machine's monotonic clock.
+    EXPECT_LT(static_cast<double>(before) - static_cast<double>(stamps.back().monotonic_time.ns), 1e9);
+  }
+}
+
+TEST_F(DaemonProgram, ASecondOneEndsAtOnceAndNamesTheFirst) {
+  Program daemon(config());
+  ASSERT_TRUE(answers("status", "filming"));
+  const Shell second = shell(std::string(EMBERLOCKD_PROGRAM) + " --config " + config());
+  EXPECT_NE(second.status, 0);
+  EXPECT_THAT(second.output, HasSubstr("pid"));
+  EXPECT_EQ(client("status").status, 0);
+}
+
+TEST_F(DaemonProgram, AskedToEndItFinishesItsRecording) {
+  Program daemon(config());
+  ASSERT_TRUE(answers("status", "filming"));
+  std::thread recording([&] { static_cast<void>(client("record ended --unlocked")); });
+  ASSERT_TRUE(answers("status", "recording  ended"));
+  EXPECT_EQ(daemon.end(SIGTERM), 0);
+  recording.join();
+  const auto check = verify_session(sessions() / "ended");
+  ASSERT_TRUE(check.ok()) << check.error().message();
+  EXPECT_EQ(check->state, v1::Manifest::COMPLETE);
+  EXPECT_TRUE(check->whole());
+}
+
+TEST_F(DaemonProgram, FromColdToALockedRecordingByTheCommandLine) {
+  Program daemon(config());
+  ASSERT_TRUE(answers("status", "filming"));
+  const Shell align = client("align --tolerance 60rows");
+  ASSERT_EQ(align.status, 0) << align.output;
+  const Shell record = client("record take --seconds 1");
+  EXPECT_EQ(record.status, 0) << record.output;
+  EXPECT_THAT(record.output, HasSubstr("none lost"));
+  EXPECT_EQ(client("sessions verify take").status, 0);
+  const Shell refused = client("record take --seconds 1");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_THAT(refused.output, HasSubstr("take"));
+}
+
+}  // namespace
+}  // namespace emberlock

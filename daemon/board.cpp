@@ -10,6 +10,13 @@
 #include "base/clock.h"
 
 namespace emberlock {
+namespace {
+
+bool has_pictures(const v1::IterationPreview& preview) {
+  return preview.has_volume() || !preview.captured_jpeg().empty() || !preview.rendered_jpeg().empty();
+}
+
+}  // namespace
 
 std::string utc_now() {
   const std::int64_t ms = wall_clock().ns / 1'000'000;
@@ -71,9 +78,9 @@ void Board::show(std::shared_ptr<const v1::IterationPreview> preview) {
     if (!iterations_.empty()) {
       if (iterations_.back()->reconstruction() != preview->reconstruction()) {
         iterations_.clear();
-      } else if (preview->has_volume() || !preview->rendered_jpeg().empty()) {
+      } else if (has_pictures(*preview)) {
         for (auto& earlier : iterations_) {
-          if (!earlier->has_volume() && earlier->rendered_jpeg().empty()) continue;
+          if (!has_pictures(*earlier)) continue;
           v1::IterationPreview numbers = *earlier;
           numbers.clear_captured_jpeg();
           numbers.clear_rendered_jpeg();

@@ -75,6 +75,17 @@ TEST(Board, OnlyTheNewestIterationHasPicturesAndAnotherReconstructionBeginsAnew)
   EXPECT_THAT(board.iterations(0), SizeIs(1));
 }
 
+TEST(Board, IterationsWithoutPicturesLeaveTheNewestPicturesStanding) {
+  Board board;
+  board.show(iteration_of("one", 1));
+  auto numbers = std::make_shared<v1::IterationPreview>(*iteration_of("one", 2));
+  numbers->clear_captured_jpeg();
+  numbers->clear_rendered_jpeg();
+  numbers->clear_volume();
+  board.show(numbers);
+  EXPECT_EQ(board.iterations(0).front()->captured_jpeg(), "captured");
+}
+
 TEST(Board, NobodyIsToldAfterItsSubscriptionEnded) {
   Board board;
   std::vector<Board::Topic> told;

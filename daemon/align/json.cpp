@@ -98,7 +98,10 @@ AlignRunOptions options_from(const json& object) {
   }
   options.align.max_rounds = integer(object, "max_rounds");
   options.align.max_looks = integer(object, "max_looks");
-  if (object.value("reset_by", "orders") == "anybody") options.align.reset_by = ResetBy::anybody;
+  // Before people were asked there was no such key.
+  const auto reset_by = object.value("reset_by", std::string("orders"));
+  if (reset_by != "orders" && reset_by != "anybody") throw std::invalid_argument("reset_by is unknown");
+  if (reset_by == "anybody") options.align.reset_by = ResetBy::anybody;
   options.align.strobe_step = strobe_step_from(object);
   options.measure_row_time = object.at("measure_row_time").get<bool>();
   options.comb_rate = Hertz(number(object, "comb_rate_hz"));

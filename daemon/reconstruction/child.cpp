@@ -27,7 +27,6 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
-constexpr Seconds kKillTime{2};                 // a killed process is gone by then
 constexpr std::uint32_t kLargestVoxels = 1024;  // as `emberlock reconstruct --voxels` takes them
 
 Steady::duration duration(Seconds seconds) {

@@ -87,7 +87,8 @@ std::string bash_completion(const CLI::App& app) {
     for (const CLI::Option* option : options_of(verb)) {
       for (const std::string& name : option->get_lnames()) {
         words += " --" + name;
-        if (takes_value(*option)) valued += (valued.empty() ? "'" : " | '") + path + " --" + name + "'";
+        if (takes_value(*option))
+          valued += fmt::format("{}{} --{}'", valued.empty() ? "'" : " | '", path, name);
       }
     }
     offers +=

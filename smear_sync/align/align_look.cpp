@@ -128,7 +128,7 @@ void watch_moves(AlignState& state, const AlignContext& c) {
 
 /// The shutter's phase was drawn anew, or may have been; `before` is kept where a shift is to be learnt.
 void forget(CameraTrack& track, std::optional<Drift> before) {
-  track.before_hand = std::move(before);
+  track.before_hand = before;
   track.phase.forget_phase();
   track.sighted.reset();
   track.moved = false;

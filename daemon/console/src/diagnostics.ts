@@ -43,7 +43,8 @@ export class Diagnostics {
     for (const {camera_id, monotonic_ns} of pictures) {
       const list = this.shown.get(camera_id) ?? [];
       this.shown.set(camera_id, list);
-      list.push({at, monotonic_ns, latency: offset === undefined ? undefined : at + offset - monotonic_ns / 1e6});
+      // Nothing is shown before it came: below 0 it is the clocks that aren't known better.
+      list.push({at, monotonic_ns, latency: offset === undefined ? undefined : Math.max(0, at + offset - monotonic_ns / 1e6)});
       while (at - list[0]!.at > kWindow) list.shift();
     }
   }

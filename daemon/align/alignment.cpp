@@ -37,11 +37,12 @@ Seconds wanted_of_sweeps(const AlignOptions& options) {
   return std::max(wanted, kSweptLeast);
 }
 
-/// Of the progress, before the end.
-constexpr double kNeverDone = 0.999;
-
 /// While cameras are held they are filmed at least this often, however long they promise to stay.
 constexpr Seconds kLongestWait{600};
+/// A check comes so much of the promised time before its end, so that whoever is due is reset within it.
+constexpr double kAhead = 0.05;
+/// Where people press shutters they are filmed at least this often: what a press does is seen at once.
+constexpr Seconds kLongestWaitForPeople{0.25};
 
 ResetMethod method_of(ShutterReset reset) {
   switch (reset) {
@@ -219,7 +220,7 @@ Status Alignment::round() {
     bench_.sensor(i).begin_round(own_beat(state_, i, beat_.value_or(expected), result_.options));
   EMBERLOCK_RETURN_IF_ERROR(bench_.sweep(flashes_, wanted_of_sweeps(result_.options), progress_, reached_));
   adopt_sensors(rig_, bench_, options_, result_);
-  report(progress_, std::min(reached_, kNeverDone),
+  report(progress_, std::min(reached_, kNearlyDone),
          fmt::format("round {}, {} resets", state_.rounds + 1, state_.resets));
   EMBERLOCK_ASSIGN_OR_RETURN(const Film film, bench_.film_all(options_.frames_per_round));
   if (stopped_) return {};
@@ -290,8 +291,14 @@ Seconds Alignment::time_left(TimePoint now) const {
 
 Seconds Alignment::next_check(TimePoint now) const {
   if (last().verdict != AlignVerdict::aligned) return Seconds(0);
-  const Seconds promised = last().next_check.value_or(kLongestWait) - result_.options.round_time;
-  return std::max(std::min(promised, kLongestWait) - (now - at_), Seconds(0));
+  const Seconds promised = std::min(last().next_check.value_or(kLongestWait), kLongestWait);
+  const Seconds ahead = std::max(kAhead * promised, result_.options.round_time);
+  const bool pressed = result_.options.reset_by == ResetBy::anybody &&
+                       std::any_of(cameras_.begin(), cameras_.end(), [](const AlignCamera& camera) {
+                         return camera.method == ResetMethod::by_hand;
+                       });
+  const Seconds wait = pressed ? std::min(promised - ahead, kLongestWaitForPeople) : promised - ahead;
+  return std::max(wait - (now - at_), Seconds(0));
 }
 
 std::optional<Seconds> Alignment::worst_pair(TimePoint now) const {

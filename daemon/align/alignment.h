@@ -13,7 +13,9 @@ namespace emberlock {
 
 /// One alignment, round by round, for a caller that has other things to do between them: start() once, then
 /// round() until last() says aligned, and again whenever next_check() has passed, for as long as the lock is
-/// held. What was learnt (row times, rates, delays) is kept from round to round. Not thread-safe.
+/// held. Cameras that would leave tolerance are reset by such a round while all are in it: last().renews, and
+/// for the rounds until they are seen again nothing is locked. What was learnt (row times, rates, delays) is
+/// kept from round to round. Not thread-safe.
 ///
 /// Between two rounds the caller may film with the cameras itself: darken() before, if flashes shan't be
 /// seen, and pass_over() after it. The next round sets the strobe again.
@@ -73,8 +75,8 @@ class Alignment {
   /// How long until the first camera may leave tolerance (95 %); 0 when it may have, or isn't aligned.
   /// Infinite where none ever does.
   [[nodiscard]] Seconds time_left(TimePoint now) const;
-  /// How long round() may wait to come in time: at most until ten minutes after the last one. 0 when not
-  /// aligned.
+  /// How long round() may wait to come in time: at most until ten minutes after the last one; a quarter of a
+  /// second where people press shutters and say nothing. 0 when not aligned.
   [[nodiscard]] Seconds next_check(TimePoint now) const;
   /// The largest difference between two cameras; absent while phases are missing.
   [[nodiscard]] std::optional<Seconds> worst_pair(TimePoint now) const;

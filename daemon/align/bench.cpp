@@ -193,10 +193,14 @@ Seconds AlignBench::deadline(std::size_t camera) const {
 }
 
 Result<Frame> AlignBench::next_frame(std::size_t camera) {
-  for (Seconds left = deadline(camera);; left -= kWaitStep) {
+  const Seconds whole = deadline(camera);
+  for (Seconds left = whole;; left -= kWaitStep) {
     Result<Frame> frame = rig_.cameras[camera]->next_frame(stop_ ? std::min(left, kWaitStep) : left);
-    const bool late = !frame.ok() && frame.error().kind == ErrorKind::timed_out;
-    if (!late || !stop_ || left <= kWaitStep || stopped()) return frame;
+    if (frame.ok() || frame.error().kind != ErrorKind::timed_out) return frame;
+    if (stop_ && left > kWaitStep + nanoseconds(1) && !stopped()) continue;
+    Error late = frame.error();
+    late.what = fmt::format("no frame within {:.3g} s", whole.value());
+    return late;
   }
 }
 

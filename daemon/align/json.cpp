@@ -173,6 +173,7 @@ ordered_json round_json(const AlignRoundReport& report) {
   line["effort"] = decision.effort ? effort_json(*decision.effort) : nullptr;
   line["offers"] = offers_json(decision.offers, row);
   line["reason"] = decision.reason;
+  if (decision.renews) line["renews"] = true;
   if (decision.reset_next) line["reset_next"] = report.cameras[*decision.reset_next].id;
   for (const std::size_t camera : decision.jumped) line["jumped"].push_back(report.cameras[camera].id);
   return line;

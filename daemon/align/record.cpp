@@ -1,10 +1,9 @@
 #include "daemon/align/record.h"
 
-#include <chrono>
-#include <ctime>
 #include <string>
 #include <utility>
 
+#include "base/clock.h"
 #include "base/file.h"
 #include "daemon/align/json.h"
 #include "drivers/replay/record.h"
@@ -32,15 +31,6 @@ class RecordedAnswers final : public Clock {
   std::vector<TimePoint> answers_;
   mutable std::size_t next_ = 0;
 };
-
-std::string utc_now() {
-  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
-  std::tm parts{};
-  ::gmtime_r(&now, &parts);
-  char text[32];
-  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
-  return text;
-}
 
 Status append_note(SessionWriter& writer, const Clock& clock, std::string text) {
   v1::Event event;

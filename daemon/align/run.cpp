@@ -10,9 +10,6 @@
 namespace emberlock {
 namespace {
 
-/// Of the progress, before the end.
-constexpr double kNeverDone = 0.999;
-
 /// After a round that found the cameras aligned: keeps them so for `time`, or until it is stopped, and as
 /// long as they can be.
 Status hold(Alignment& alignment, Seconds time, const Progress& progress) {
@@ -24,7 +21,7 @@ Status hold(Alignment& alignment, Seconds time, const Progress& progress) {
     if (verdict == AlignVerdict::aligned) {
       const Seconds pause = std::min(alignment.next_check(alignment.at()), left());
       report(
-          progress, std::min((alignment.at() - began) / time, kNeverDone),
+          progress, std::min((alignment.at() - began) / time, kNearlyDone),
           fmt::format("held for {} by {} checks and {} resets, checks again in {}",
                       words(alignment.at() - began), alignment.checks(), alignment.resets(), words(pause)));
       alignment.wait(alignment.at() + pause);

@@ -39,6 +39,7 @@ struct VirtualCameraOptions {
   Seconds reset_jitter = milliseconds(0.2);   ///< RMS of the latency when on_command, 0..1 s
   std::optional<FrameRateTrim> trim{};  ///< range up to 1000 ppm; in force from the read phase nearest to its
                                         ///< latency after the order
+  PartsPerMillion wander{0};  ///< of its crystal, as temperature goes: RMS change within an hour, 0..20
   std::optional<Seconds> first_phase{};  ///< from the first start() to the first read phase; drawn if absent
 };
 

@@ -16,7 +16,7 @@ constexpr double kOverflowLevel = 300;  // above white
 constexpr double kWhite = 255;
 constexpr double kRoomReach = 0.6;  // of the image's width, over which the room's light falls to 1 / e
 
-enum Stream : std::uint64_t { kNoiseStream = 1, kHotPixelStream = 2 };
+enum SensorStream : std::uint64_t { kNoiseStream = 1, kHotPixelStream = 2 };
 
 /// The part of [x - reach, x + reach] by [y - up, y + down] that the image has.
 Stamp stamp_about(const VirtualLamp& lamp, double reach, double up, double down, ImageSize size) {

@@ -12,8 +12,14 @@
 namespace emberlock {
 namespace {
 
-enum Stream : std::uint64_t { kPhaseStream = 11, kJitterStream = 12, kDeviceClockStream = 13 };
+enum CameraStream : std::uint64_t {
+  kPhaseStream = 11,
+  kJitterStream = 12,
+  kDeviceClockStream = 13,
+  kCrystalStream = 14
+};
 
+constexpr double kRounding = 1e-6;    // of periods counted: instants are whole nanoseconds
 constexpr Seconds kLongestWait{1e8};  // keeps instants within 64 bits
 
 std::string_view model(SensorKind kind) {
@@ -59,6 +65,7 @@ VirtualCamera::VirtualCamera(VirtualCameraOptions options, int number, const Vir
             options_.sensor},
       sensor_(options_, number, rig.seed),
       seed_(stream_seed(rig.seed, options_.id)),
+      crystal_(options_.wander, mix64(seed_ ^ kCrystalStream)),
       queue_frames_(static_cast<std::uint64_t>(rig.queue_frames)),
       wall_at_zero_(rig.wall_at_zero),
       device_origin_(1000 * random_uniform(seed_, kDeviceClockStream, 0)),
@@ -109,9 +116,8 @@ Status VirtualCamera::trim_rate(PartsPerMillion trim) {
   if (cycles_.empty()) return {};
   const Cycle now = cycles_.back();
   const TimePoint from = room_->clock().now() + info_.trim->latency - now.period / 2;
-  const double reads = std::max(0.0, std::ceil((from - now.start) / now.period));
-  cycles_.push_back(
-      {now.start + now.period * reads, now.first_id + static_cast<std::uint64_t>(reads), period_});
+  const double reads = std::max(0.0, std::ceil(counted(now.start, from) / now.period));
+  cycles_.push_back({read_start(now, reads), now.first_id + static_cast<std::uint64_t>(reads), period_});
   log(LogCategory::drivers).debug("{}: trimmed by {} ppm", info_.id, rounded);
   return {};
 }
@@ -119,6 +125,19 @@ Status VirtualCamera::trim_rate(PartsPerMillion trim) {
 void VirtualCamera::begin_cycle(TimePoint start, std::uint64_t first_id) {
   cycles_.push_back({start, first_id, period_});
   next_id_ = first_id;
+}
+
+Seconds VirtualCamera::counted(TimePoint from, TimePoint to) const {
+  return to - from + (crystal_.steady() ? Seconds(0) : crystal_.ahead(to) - crystal_.ahead(from));
+}
+
+TimePoint VirtualCamera::read_start(const Cycle& cycle, double i) const {
+  const TimePoint by_count = cycle.start + cycle.period * i;
+  if (crystal_.steady()) return by_count;
+  // Rates differ by millionths, so that each step mends all but a millionth of what the one before left.
+  TimePoint at = by_count;
+  for (int step = 0; step < 3; ++step) at = by_count - (crystal_.ahead(at) - crystal_.ahead(cycle.start));
+  return at;
 }
 
 TimePoint VirtualCamera::read_start(std::uint64_t frame_id) const {
@@ -130,9 +149,8 @@ TimePoint VirtualCamera::read_start(std::uint64_t frame_id) const {
 
 TimePoint VirtualCamera::read_start_after(TimePoint after) const {
   if (cycles_.empty()) return {};
-  const Seconds period = cycles_.back().period;
-  const double frames = std::ceil((after - cycles_.back().start) / period);
-  return cycles_.back().start + period * std::max(0.0, frames);
+  const Cycle& cycle = cycles_.back();
+  return read_start(cycle, std::max(0.0, std::ceil(counted(cycle.start, after) / cycle.period)));
 }
 
 TimePoint VirtualCamera::read_end(std::uint64_t frame_id) const { return read_start(frame_id) + shifting(); }
@@ -142,7 +160,7 @@ std::uint64_t VirtualCamera::delivered_by(TimePoint t) const {
   std::uint64_t end = std::numeric_limits<std::uint64_t>::max();
   for (auto cycle = cycles_.rbegin(); cycle != cycles_.rend(); ++cycle) {
     const auto read_end = [&](std::uint64_t id) { return read_start(*cycle, id) + shifting(); };
-    const double periods = std::floor((t - read_end(cycle->first_id)) / cycle->period);
+    const double periods = std::floor(counted(read_end(cycle->first_id), t) / cycle->period - kRounding);
     auto next = cycle->first_id + static_cast<std::uint64_t>(std::max(0.0, periods));
     while (read_end(next) <= t) ++next;  // instants are rounded to nanoseconds: settle the border
     if (next > cycle->first_id) return std::min(next, end);
@@ -213,7 +231,7 @@ Frame VirtualCamera::draw(std::uint64_t frame_id) {
   const double own_rate = 1 / (options_.nominal_rate * options_.timing.frame_period);
   FrameStamp stamp;
   stamp.frame_id = frame_id;
-  stamp.device_time = TimePoint{} + (device_origin_ + (begin - room_->opened()) * own_rate);
+  stamp.device_time = TimePoint{} + (device_origin_ + counted(room_->opened(), begin) * own_rate);
   stamp.system_time = {wall_at_zero_.ns + arrival.ns};
   stamp.monotonic_time = arrival;
   return {stamp, std::make_shared<const Image>(std::move(image))};

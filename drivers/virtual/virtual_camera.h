@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "drivers/camera.h"
+#include "drivers/virtual/crystal.h"
 #include "drivers/virtual/options.h"
 #include "drivers/virtual/sensor.h"
 #include "drivers/virtual/strobe_timeline.h"
@@ -58,12 +59,13 @@ class VirtualCamera final : public Camera {
   [[nodiscard]] const VirtualCameraOptions& truth() const { return options_; }
   [[nodiscard]] TimePoint read_start(std::uint64_t frame_id) const;
   [[nodiscard]] TimePoint read_start_after(TimePoint after) const;
+  [[nodiscard]] const Crystal& crystal() const { return crystal_; }
   [[nodiscard]] std::vector<LightPulse> light_on(std::uint64_t frame_id) const;
   [[nodiscard]] std::shared_ptr<const VirtualScene> scene_of(std::uint64_t frame_id) const;
 
  private:
-  /// Read phases at `start` + i `period`; that of i >= 1 delivers frame first_id + i - 1. The image of i = 0
-  /// is kept back after a reset, and the last of the cycle before after a trim.
+  /// Read phases at `start` + i `period`, by the camera's crystal; that of i >= 1 delivers frame first_id + i
+  /// - 1. The image of i = 0 is kept back after a reset, and the last of the cycle before after a trim.
   struct Cycle {
     TimePoint start;
     std::uint64_t first_id = 0;
@@ -73,8 +75,12 @@ class VirtualCamera final : public Camera {
   [[nodiscard]] TimePoint read_end(std::uint64_t frame_id) const;
   /// The first frame that hasn't been delivered by `t`.
   [[nodiscard]] std::uint64_t delivered_by(TimePoint t) const;
+  /// What its crystal counted from one instant to the other.
+  [[nodiscard]] Seconds counted(TimePoint from, TimePoint to) const;
+  /// The start of read phase i.
+  [[nodiscard]] TimePoint read_start(const Cycle& cycle, double i) const;
   [[nodiscard]] TimePoint read_start(const Cycle& cycle, std::uint64_t frame_id) const {
-    return cycle.start + cycle.period * static_cast<double>(frame_id - cycle.first_id + 1);
+    return read_start(cycle, static_cast<double>(frame_id - cycle.first_id + 1));
   }
   [[nodiscard]] Seconds shifting() const { return Rows(options_.timing.shifts) * options_.timing.row_time; }
   void begin_cycle(TimePoint start, std::uint64_t first_id);
@@ -87,6 +93,7 @@ class VirtualCamera final : public Camera {
   CameraInfo info_;
   VirtualSensor sensor_;
   std::uint64_t seed_;  // of phases and latencies
+  Crystal crystal_;
   std::uint64_t draws_ = 0;
   std::uint64_t queue_frames_;
   TimePoint wall_at_zero_;

@@ -10,6 +10,7 @@
 #include "smear_sync/align/align_choice.h"
 #include "smear_sync/align/align_context.h"
 #include "smear_sync/align/align_forecast.h"
+#include "smear_sync/align/align_hold.h"
 #include "smear_sync/align/align_look.h"
 #include "smear_sync/align/align_trim.h"
 #include "smear_sync/align/align_words.h"
@@ -20,9 +21,6 @@ namespace {
 
 /// A tolerance of fewer standard errors of a phase can't be told.
 constexpr double kTellable = 2;
-
-/// The next check comes before any of the cameras leaves by so many standard errors.
-constexpr double kScheduleSigmas = 3;
 
 std::vector<std::optional<RateTrim>> trims_of(const std::vector<AlignCamera>& cameras) {
   std::vector<std::optional<RateTrim>> trims;
@@ -37,7 +35,7 @@ AlignScene scene_of(const AlignState& state, const std::vector<Drift>& drifts, c
   const Seconds jitter = learnt_jitter(state, c.options);
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     scene.tau.push_back(drifts[i].tau);
-    Landing landing{c.cameras[i].method, std::nullopt, state.cameras[i].hand_shifts};
+    ResetLanding landing{c.cameras[i].method, std::nullopt, state.cameras[i].hand_shifts};
     if (const auto delay = expected_delay(state, c.cameras, c.options, i))
       landing.aim = Seconds(std::hypot(delay->sigma.value(), jitter.value()));
     scene.landings.push_back(landing);
@@ -47,8 +45,9 @@ AlignScene scene_of(const AlignState& state, const std::vector<Drift>& drifts, c
 
 /// Timed resets: each at its moment where the delay is known; else untimed, to teach it. A model is taught by
 /// one of its cameras, and the others wait.
-void time_resets(const AlignState& state, AlignDecision& decision, const AlignContext& c,
-                 const AlignScene& scene) {
+void time_resets(const AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
+                 const AlignContext& c, const AlignScene& scene) {
+  const std::vector<Drift> courses = courses_of(state, decision, drifts, c);
   std::vector<std::string> teaching;
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
@@ -56,8 +55,12 @@ void time_resets(const AlignState& state, AlignDecision& decision, const AlignCo
     if (!camera.reset || !scene.timed(i) || !c.round.cameras[i].stamp) continue;
     if (const auto delay = expected_delay(state, c.cameras, c.options, i)) {
       // t_start shall move by tau - tau_target, and the stamps move with it.
-      camera.moment = *c.round.cameras[i].stamp + *camera.error - delay->mean;
-      camera.reason += " at the moment that lands it on the target";
+      const Seconds aim = state.held && c.reach == Seconds(0)
+                              ? aim_of(courses[i], scene.landings[i].aim.value_or(c.tolerance), c)
+                              : Seconds(0);
+      camera.moment = *c.round.cameras[i].stamp + *camera.error - aim - delay->mean;
+      camera.reason += aim == Seconds(0) ? " at the moment that lands it on the target"
+                                         : " at the moment that lets it drift through the tolerance";
     } else if (std::find(teaching.begin(), teaching.end(), who.model) == teaching.end()) {
       teaching.push_back(who.model);
       camera.reason += ", which teaches how long its reset takes";
@@ -147,47 +150,6 @@ bool can_be_met(AlignState& state, AlignDecision& decision, const AlignContext& 
   return false;
 }
 
-/// How long every camera stays in tolerance of a target that moves as the middle of them does, or as the
-/// reference does; and when to film again.
-void foresee(const AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
-             const AlignContext& c) {
-  std::vector<double> rates;
-  for (std::size_t i = 0; i < drifts.size(); ++i) {
-    const PhaseTrack& phase = state.cameras[i].phase;
-    const TimePoint later = c.round.at + Seconds(1e6);  // when all that was ordered is in force
-    rates.push_back((drifts[i].rate + decision.cameras[i].trim.value_or(phase.trim(later))).value());
-  }
-  const auto [slowest, fastest] = std::minmax_element(rates.begin(), rates.end());
-  const bool fixed = c.options.policy == AlignPolicy::fixed_reference;
-  const double common = state.target ? state.target->rate.value()
-                        : fixed      ? rates[c.options.reference]
-                                     : (*slowest + *fastest) / 2;
-  const double common_sigma = fixed ? drifts[c.options.reference].rate_sigma.value() : 0;
-  Seconds soonest(std::numeric_limits<double>::infinity());
-  std::size_t first = 0;
-  for (std::size_t i = 0; i < drifts.size(); ++i) {
-    Drift error = drifts[i];
-    error.tau = wrap_positive(*decision.cameras[i].error, c.options.period);
-    error.rate = PartsPerMillion(rates[i] - common);
-    error.rate_sigma = PartsPerMillion(std::hypot(drifts[i].rate_sigma.value(), common_sigma));
-    if (fixed && i == c.options.reference) error.rate_sigma = PartsPerMillion(0);
-    TimeLeftOptions left{
-        .tolerance = c.tolerance, .period = c.options.period, .wander_per_minute = c.options.rate_wander};
-    decision.cameras[i].time_left = time_left(error, c.round.at, left);
-    left.sigmas = kScheduleSigmas;
-    const Seconds sure = time_left(error, c.round.at, left).earliest;
-    if (sure >= soonest) continue;
-    soonest = sure;
-    first = i;
-  }
-  if (decision.verdict != AlignVerdict::aligned) return;
-  decision.next_check = soonest;
-  if (std::isfinite(soonest.value())) {
-    decision.reason += "; film the strobe again within " + words(soonest) + ", before " +
-                       c.cameras[first].id + " may have drifted out";
-  }
-}
-
 /// The camera that stands for the target.
 std::size_t nearest(const AlignDecision& decision, const AlignOptions& options) {
   if (options.policy == AlignPolicy::fixed_reference) return options.reference;
@@ -198,22 +160,41 @@ std::size_t nearest(const AlignDecision& decision, const AlignOptions& options) 
   return static_cast<std::size_t>(std::min_element(cameras.begin(), cameras.end(), closer) - cameras.begin());
 }
 
+/// The target that is trimmed to or held, while no camera is out of reach of it; of timed resets, while most
+/// are within tolerance: the others are brought back to it.
+std::optional<Seconds> keep_target(AlignState& state, const AlignContext& c, const AlignScene& scene) {
+  if (!state.target) return std::nullopt;
+  const Seconds target = target_at(*state.target, c.round.at, c.options.period);
+  std::size_t out = 0;
+  for (std::size_t i = 0; i < scene.tau.size(); ++i) out += scene.within(i, target) ? 0 : 1;
+  if (out <= (c.reach > Seconds(0) ? 0 : scene.tau.size() / 2)) return target;
+  state.target.reset();
+  return std::nullopt;
+}
+
+/// Cameras that are all reset for a moment are held about a target that goes as the middle of them does.
+void hold_target(AlignState& state, const std::vector<Drift>& drifts, const AlignContext& c,
+                 const AlignScene& scene, Seconds target) {
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    if (!scene.timed(i)) return;
+  }
+  const auto [slowest, fastest] = std::minmax_element(
+      drifts.begin(), drifts.end(), [](const Drift& a, const Drift& b) { return a.rate < b.rate; });
+  state.target = AlignTarget{c.round.at, target, 0.5 * (slowest->rate + fastest->rate)};
+}
+
+/// Blind cameras that are held are brought out by the next check.
+void look_for_blind(AlignDecision& decision, const AlignContext& c) {
+  const auto blind = [](const CameraView& view) { return view.phase.state == PhaseState::blind; };
+  if (std::any_of(c.round.cameras.begin(), c.round.cameras.end(), blind))
+    decision.strobe_phase = next_look(c);
+}
+
 void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
            const AlignContext& c) {
   const int looks = std::exchange(state.looks, 0);
   const AlignScene scene = scene_of(state, drifts, c);
-  const auto far = [&](Seconds target) {
-    for (std::size_t i = 0; i < drifts.size(); ++i) {
-      if (!scene.within(i, target)) return true;
-    }
-    return false;
-  };
-  Seconds target = choose_target(scene);
-  if (state.target && !far(target_at(*state.target, c.round.at, c.options.period))) {
-    target = target_at(*state.target, c.round.at, c.options.period);
-  } else {
-    state.target.reset();
-  }
+  const Seconds target = keep_target(state, c, scene).value_or(choose_target(scene));
   decision.target = wrap_positive(target + c.round.strobe_phase, c.options.period);
   decision.worst_pair = Seconds(0);
   std::size_t out = 0;
@@ -231,8 +212,9 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
   }
   decision.reference = nearest(decision, c.options);
   if (!can_be_met(state, decision, c, scene, drifts)) return;
+  if (state.target && c.reach == Seconds(0)) hold_target(state, drifts, c, scene, target);
   order_resets(decision, c, scene, target);
-  time_resets(state, decision, c, scene);
+  time_resets(state, decision, drifts, c, scene);
 
   if (!stuck.empty()) {
     decision.verdict = AlignVerdict::given_up;
@@ -240,24 +222,29 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
         stuck + " can't be reset and lies out of tolerance: make it the reference, or widen the tolerance";
   } else if (out > 0) {
     decision.reason = plural(out, "camera") + (c.reach > Seconds(0) ? " out of reach" : " out of tolerance");
+  } else if (c.reach == Seconds(0) && state.held &&
+             renew(state, decision, courses_of(state, decision, drifts, c), c, scene)) {
+    time_resets(state, decision, drifts, c, scene);
   } else if (c.reach == Seconds(0)) {
     decision.verdict = AlignVerdict::aligned;
     decision.reason = "every camera lies within tolerance of the target";
+    hold_target(state, drifts, c, scene, target);
   } else if (trim_rates(state, decision, c.round, c.cameras, c.options)) {
     decision.verdict = AlignVerdict::aligned;
     decision.reason = "every camera is locked within tolerance of the target";
   } else {
-    time_resets(state, decision, c, scene);
+    time_resets(state, decision, drifts, c, scene);
     decision.reason = "trims bring the cameras to the target";
     // Where a dot is missing trims go by what was foretold; that ages.
     for (std::size_t i = 0; i < c.cameras.size(); ++i) {
       const bool blind = c.round.cameras[i].phase.state == PhaseState::blind;
-      if (blind && state.cameras[i].phase.aged(c.round.at) > kMemoryPart * c.tolerance)
+      if (blind && state.cameras[i].phase.aged(c.round.at, c.track) > kMemoryPart * c.tolerance)
         decision.strobe_phase = next_look(c);
     }
   }
   ask_for_one(state, decision, c);
   ask_for_moves(state, decision, c, looks);
+  if (decision.verdict == AlignVerdict::aligned) look_for_blind(decision, c);
   decision.reference = nearest(decision, c.options);
   foresee(state, decision, drifts, c);
 }
@@ -308,6 +295,8 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   } else {
     judge(state, decision, drifts, c);
   }
+  follow_renewal(state, decision, c);
+  state.held = decision.verdict == AlignVerdict::aligned || decision.renews;
   state.last_round = round.at;
 
   // People take their time, and may be gone.
@@ -322,7 +311,7 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
                       ": " + decision.reason;
   }
   if (decision.verdict != AlignVerdict::go_on) {
-    decision.strobe_phase.reset();
+    if (decision.verdict != AlignVerdict::aligned) decision.strobe_phase.reset();
     decision.reset_next.reset();
     for (CameraDecision& camera : decision.cameras) {
       camera.reset = false;

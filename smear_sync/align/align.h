@@ -25,7 +25,9 @@ namespace emberlock {
 enum class AlignPolicy {
   fixed_reference,  ///< the paper's: one camera stays, the others are reset until each lies within tolerance
   densest,  ///< the target is chosen anew each round: the middle of the cameras that take the fewest resets
-  timed,    ///< as densest, and each reset is ordered for the moment that lands it on the target
+  timed,    ///< as densest, and each reset is ordered for the moment that lands it on the target, or so far
+            ///< before it that its drift leads it through the whole tolerance; cameras that are held are
+            ///< reset before they leave it
   trimmed,  ///< as timed until all are within reach of their trims; then frame rates are trimmed (a
             ///< phase-locked loop), towards the phase that the last camera reaches soonest
 };
@@ -167,8 +169,9 @@ struct CameraTrack {
   std::optional<Sighting> sighted;  ///< the newest
   bool moved = false;               ///< its dot was seen to move with the strobe
   std::optional<Seconds> rough;  ///< seen at two places of the strobe, but only to this: too roughly to tell
-  std::string doubt;  ///< why what is seen isn't taken for its dot: it moved otherwise; empty if it is
-  bool away = false;  ///< in the last round
+  std::string doubt;     ///< why what is seen isn't taken for its dot: it moved otherwise; empty if it is
+  bool away = false;     ///< in the last round
+  bool renewed = false;  ///< reset in the renewal under way
 };
 
 /// The phase to which cameras are brought, strobe_phase taken out: it moves as a camera of this rate would.
@@ -188,7 +191,9 @@ struct AlignState {
   int jitter_samples = 0;
   bool affordable = false;  ///< the limits have been looked at, and hold
   std::optional<TimePoint> last_round;
-  std::optional<AlignTarget> target;  ///< of trims, once they have begun
+  std::optional<AlignTarget> target;  ///< of trims, once they have begun; of timed resets, once all are held
+  bool held = false;  ///< the last round found all within tolerance, or resets those that would leave it
+  int renewal = 0;  ///< rounds since cameras were last reset before they left tolerance; 0: none is under way
   std::optional<TimePoint> trimming;  ///< since when, until aligned
   std::optional<std::size_t> asked;   ///< the camera that somebody was asked to reset
   std::vector<CameraTrack> cameras;
@@ -224,8 +229,11 @@ struct AlignDecision {
   std::optional<Seconds>
       worst_pair;  ///< largest difference between two cameras; absent while phases are missing
   std::optional<Seconds> strobe_phase;  ///< the delay to which the strobe shall be moved, in [0, T): to bring
-                                        ///< blind cameras out, or to see that dots move with it
+                                        ///< blind cameras out, or to see that dots move with it; once aligned
+                                        ///< by the next check
   int resets_so_far = 0;                ///< before this decision's
+  /// Nobody has left tolerance: cameras that would have before long are being reset meanwhile.
+  bool renews = false;
   std::optional<std::size_t> reset_next;  ///< of ResetBy::anybody: the camera that somebody must reset now
   std::vector<std::size_t> jumped;        ///< likewise: those that somebody has reset, as this round shows
   std::optional<Seconds> next_check;  ///< once aligned: film again by then, before the drift may have led a

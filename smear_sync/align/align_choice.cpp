@@ -14,7 +14,7 @@ constexpr double kNever = 1e6;
 }  // namespace
 
 double chance(const AlignScene& scene, std::size_t camera, Seconds target) {
-  const Landing& landing = scene.landings[camera];
+  const ResetLanding& landing = scene.landings[camera];
   switch (landing.method) {
     case ResetMethod::none:
       return 0;

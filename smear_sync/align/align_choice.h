@@ -18,7 +18,7 @@ namespace emberlock {
 inline std::int64_t in_picoseconds(Seconds t) { return std::llround(t.value() * 1e12); }
 
 /// What a camera's next reset does.
-struct Landing {
+struct ResetLanding {
   ResetMethod method = ResetMethod::on_command;
   std::optional<Seconds> aim;  ///< standard error of where a timed reset lands; absent: it can't be timed
   std::span<const Seconds> shifts;  ///< by which resets by hand have moved tau
@@ -31,7 +31,7 @@ struct AlignScene {
   Seconds tolerance;          ///< to the target, that resets have to reach
   std::size_t reference = 0;  ///< of fixed_reference
   std::vector<Seconds> tau;
-  std::vector<Landing> landings;
+  std::vector<ResetLanding> landings;
 
   [[nodiscard]] Seconds error(std::size_t camera, Seconds target) const {
     return wrap_symmetric(tau[camera] - target, period);

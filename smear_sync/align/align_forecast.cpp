@@ -13,7 +13,7 @@ constexpr std::uint64_t kSeed = 0x0ff3;
 /// What a timed reset of a camera that nothing has been learnt of errs by, once another has been taught.
 constexpr Seconds kUntaughtSpread = milliseconds(5);
 /// Rounds of filming that trims take to stop cleanly.
-constexpr double kSettlingRounds = 3;
+constexpr double kForetoldSettling = 3;
 
 struct Play {
   int resets = 0;
@@ -23,7 +23,7 @@ struct Play {
 
 /// Draws what the reset of one camera does to it.
 Seconds landed(const AlignScene& scene, std::size_t camera, Seconds target, RandomStream& random) {
-  const Landing& landing = scene.landings[camera];
+  const ResetLanding& landing = scene.landings[camera];
   if (scene.timed(camera) && landing.aim) return target + Seconds(random.normal(0, landing.aim->value()));
   const Seconds even = scene.period * random.uniform();
   if (landing.shifts.empty()) return even;
@@ -47,7 +47,7 @@ int carry_out(AlignScene& scene, const std::vector<bool>& chosen, Seconds target
     ++resets;
   }
   if (teaching) {
-    for (Landing& landing : scene.landings) {
+    for (ResetLanding& landing : scene.landings) {
       if (!landing.aim) landing.aim = kUntaughtSpread;
     }
   }
@@ -84,7 +84,7 @@ Play play(const Prospect& prospect, AlignPolicy policy, Seconds tolerance, const
       Seconds farthest;
       for (std::size_t i = 0; i < scene.tau.size(); ++i)
         farthest = std::max(farthest, abs(scene.error(i, target)));
-      result.seconds += farthest / reach * options.trim_time.value() + kSettlingRounds * seconds;
+      result.seconds += farthest / reach * options.trim_time.value() + kForetoldSettling * seconds;
     }
     const int resets = carry_out(scene, chosen, target, prospect.jitter, random);
     result.resets += resets;
@@ -114,7 +114,7 @@ bool within_limits(const AlignEffort& effort, const AlignOptions& options) {
 
 bool possible(const Prospect& prospect, AlignPolicy policy, const AlignOptions& options) {
   const auto& landings = prospect.scene.landings;
-  const bool on_command = std::all_of(landings.begin(), landings.end(), [](const Landing& landing) {
+  const bool on_command = std::all_of(landings.begin(), landings.end(), [](const ResetLanding& landing) {
     return landing.method == ResetMethod::on_command;
   });
   if (policy == AlignPolicy::timed) return on_command;

@@ -202,7 +202,8 @@ std::vector<std::size_t> remember(AlignState& state, const AlignContext& c) {
 
 std::optional<Drift> where(const CameraTrack& track, const AlignContext& c) {
   if (!track.doubt.empty()) return std::nullopt;
-  if (!track.phase.phase_known() || track.phase.aged(c.round.at) > c.remembered()) return std::nullopt;
+  if (!track.phase.phase_known() || track.phase.aged(c.round.at, c.track) > c.remembered())
+    return std::nullopt;
   return track.phase.at(c.round.at, c.track);
 }
 

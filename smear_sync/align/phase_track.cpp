@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/square.h"
+
 namespace emberlock {
 namespace {
 
@@ -10,7 +12,10 @@ constexpr double kImpossible = 6;  // standard errors
 /// Whole-row shifts err alike while the dot stays in its row: more samples than four don't make it surer.
 constexpr double kAveragedAtMost = 4;
 
-double square(double x) { return x * x; }
+/// Of a rate, after t seconds.
+double wander_variance(double t, const TrackOptions& options) {
+  return square(options.rate_wander.value() * 1e-6) / 60 * t;
+}
 
 }  // namespace
 
@@ -35,7 +40,7 @@ PartsPerMillion PhaseTrack::trim(TimePoint at) const {
 PhaseTrack::Belief PhaseTrack::predict(TimePoint at, const TrackOptions& options) const {
   Belief b = belief_;
   const double t = (at - seen_).value();
-  const double wander = square(options.rate_wander.value() * 1e-6) / 60 * std::abs(t);
+  const double wander = wander_variance(std::abs(t), options);
   b.tau += b.rate * t + trimmed_way(seen_, at);
   b.tau_variance += 2 * t * b.covariance + t * t * b.rate_variance + wander * t * t / 3;
   b.covariance += t * b.rate_variance + wander * t / 2;
@@ -55,8 +60,9 @@ Drift PhaseTrack::at(TimePoint at, const TrackOptions& options) const {
   return drift;
 }
 
-Seconds PhaseTrack::aged(TimePoint at) const {
-  return Seconds(std::abs((at - seen_).value()) * std::sqrt(belief_.rate_variance));
+Seconds PhaseTrack::aged(TimePoint at, const TrackOptions& options) const {
+  const double t = std::abs((at - seen_).value());
+  return Seconds(t * std::sqrt(belief_.rate_variance + wander_variance(t, options) / 3));
 }
 
 void PhaseTrack::observe(TimePoint at, const Phase& phase, const Beat& beat, const TrackOptions& options) {

@@ -42,7 +42,7 @@ class PhaseTrack {
   /// Where it stands at an instant not before the last phase seen, and how fast it moves untrimmed.
   [[nodiscard]] Drift at(TimePoint at, const TrackOptions& options) const;
   /// What its standard error has grown by since it was seen last.
-  [[nodiscard]] Seconds aged(TimePoint at) const;
+  [[nodiscard]] Seconds aged(TimePoint at, const TrackOptions& options) const;
 
  private:
   struct Order {

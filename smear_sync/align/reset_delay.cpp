@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/square.h"
+
 namespace emberlock {
 namespace {
 
@@ -11,8 +13,6 @@ constexpr double kToldJitterCounts = 4;  // resets
 constexpr double kEvenDrawCounts = 8;    // shifts by hand
 constexpr double kSmallestSpread = 0.05e-3;
 constexpr int kSpreads = 9;  // each twice the one before
-
-double square(double x) { return x * x; }
 
 /// A delay taught by one camera: seconds beside the first one's, and the variance of its mean.
 struct Taught {

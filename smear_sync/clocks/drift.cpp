@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/square.h"
 #include "smear_sync/clocks/staircase.h"
 #include "smear_sync/clocks/weighted_line.h"
 
@@ -17,9 +18,7 @@ namespace {
 constexpr double kHuber = 1.345;  // 95 % efficient on normal errors
 constexpr int kRobustRounds = 8;
 
-double square(double x) { return x * x; }
-
-struct Point {
+struct Sample {
   double t;  ///< seconds from the first sample
   double tau;
   double sigma;
@@ -27,11 +26,11 @@ struct Point {
 
 /// The rate under which the points gather best: the largest resultant of tau - rate t on the circle. A coarse
 /// search over all rates, then a fine one about its best.
-double gathering_rate(const std::vector<Point>& points, double span, const DriftOptions& options) {
+double gathering_rate(const std::vector<Sample>& points, double span, const DriftOptions& options) {
   const double period = options.period.value();
   const auto resultant = [&](double rate) {
     std::complex<double> sum = 0;
-    for (const Point& p : points) {
+    for (const Sample& p : points) {
       sum += std::polar(1 / square(p.sigma), 2 * std::numbers::pi * (p.tau - rate * p.t) / period);
     }
     return std::abs(sum);
@@ -63,16 +62,16 @@ double median(std::vector<double> v) {
 }
 
 /// Iteratively reweighted least squares. The scatter may be wider than the sigmas say, never narrower.
-WeightedLine robust_line(const std::vector<Point>& points) {
+WeightedLine robust_line(const std::vector<Sample>& points) {
   std::vector<LinePoint> weighted;
   weighted.reserve(points.size());
-  for (const Point& p : points) weighted.push_back({p.t, p.tau, 1 / square(p.sigma)});
+  for (const Sample& p : points) weighted.push_back({p.t, p.tau, 1 / square(p.sigma)});
   std::vector<double> deviations(points.size());
   WeightedLine line = weighted_line(weighted);
   double scale = 1;
   for (int round = 0; round < kRobustRounds; ++round) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const Point& p = points[i];
+      const Sample& p = points[i];
       deviations[i] = std::abs(p.tau - line.level - line.rate * (p.t - line.middle)) / p.sigma;
     }
     scale = std::max(1.0, 1.4826 * median(deviations));
@@ -100,7 +99,7 @@ double first_reached(double error, double rate, double curve, double tolerance) 
 }  // namespace
 
 Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions& options) {
-  std::vector<Point> points;
+  std::vector<Sample> points;
   TimePoint first;
   double span = 0;
   for (const PhaseSample& s : samples) {
@@ -112,7 +111,7 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
   }
   if (!points.empty()) {
     const auto [low, high] = std::minmax_element(points.begin(), points.end(),
-                                                 [](const Point& a, const Point& b) { return a.t < b.t; });
+                                                 [](const Sample& a, const Sample& b) { return a.t < b.t; });
     span = high->t - low->t;
   }
   if (points.size() < 3 || span <= 0) {
@@ -123,10 +122,10 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
   const double period = options.period.value();
   const double gathered = gathering_rate(points, span, options);
   std::complex<double> sum = 0;
-  for (const Point& p : points)
+  for (const Sample& p : points)
     sum += std::polar(1 / square(p.sigma), 2 * std::numbers::pi * (p.tau - gathered * p.t) / period);
   const double centre = std::arg(sum) / (2 * std::numbers::pi) * period;
-  for (Point& p : points) p.tau = wrap_symmetric(p.tau - gathered * p.t - centre, period);
+  for (Sample& p : points) p.tau = wrap_symmetric(p.tau - gathered * p.t - centre, period);
   WeightedLine line = robust_line(points);
   line.level += centre + gathered * line.middle;
   line.rate += gathered;

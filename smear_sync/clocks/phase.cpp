@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "base/one_to_one.h"
+#include "base/square.h"
 #include "smear_sync/clocks/staircase.h"
 #include "smear_sync/clocks/weighted_line.h"
 
@@ -19,18 +20,16 @@ constexpr OneToOne<PhaseState, std::string_view, 3> kPhaseNames{
 
 constexpr double kOutlierSigmas = 5;
 
-double square(double x) { return x * x; }
-
 /// A frame that shows a dot, as a point on the circle at a common instant.
-struct Point {
+struct TimedTau {
   double seconds;  ///< when the frame came, against that instant
   double tau;
   double sigma;
 };
 
-std::vector<Point> points_at(std::span<const PhaseSample> samples, TimePoint at,
-                             const CircleOptions& options) {
-  std::vector<Point> points;
+std::vector<TimedTau> points_at(std::span<const PhaseSample> samples, TimePoint at,
+                                const CircleOptions& options) {
+  std::vector<TimedTau> points;
   for (const PhaseSample& s : samples) {
     if (s.phase.state != PhaseState::known) continue;
     const double elapsed = (at - s.at).value();
@@ -42,12 +41,12 @@ std::vector<Point> points_at(std::span<const PhaseSample> samples, TimePoint at,
 }
 
 /// The point that is nearest to all the others: a median that knows no beginning of the circle.
-double circular_median(const std::vector<Point>& points, double period) {
+double circular_median(const std::vector<TimedTau>& points, double period) {
   double best = 0;
   double best_sum = std::numeric_limits<double>::infinity();
-  for (const Point& candidate : points) {
+  for (const TimedTau& candidate : points) {
     double sum = 0;
-    for (const Point& p : points) sum += std::abs(wrap_symmetric(p.tau - candidate.tau, period));
+    for (const TimedTau& p : points) sum += std::abs(wrap_symmetric(p.tau - candidate.tau, period));
     if (sum < best_sum) {
       best_sum = sum;
       best = candidate.tau;
@@ -57,10 +56,10 @@ double circular_median(const std::vector<Point>& points, double period) {
 }
 
 /// The points, as offsets from the centre, without those that disagree with it.
-std::vector<Point> offsets_that_agree(std::vector<Point> points, double centre, double period) {
-  for (Point& p : points) p.tau = wrap_symmetric(p.tau - centre, period);
+std::vector<TimedTau> offsets_that_agree(std::vector<TimedTau> points, double centre, double period) {
+  for (TimedTau& p : points) p.tau = wrap_symmetric(p.tau - centre, period);
   // The centre is itself one of the points, with an error of its own.
-  std::erase_if(points, [](const Point& p) {
+  std::erase_if(points, [](const TimedTau& p) {
     return std::abs(p.tau) > kOutlierSigmas * std::numbers::sqrt2 * p.sigma;
   });
   return points;
@@ -75,7 +74,7 @@ struct Slope {
 
 std::optional<Slope> slope_of(std::span<const PhaseSample> samples, TimePoint at,
                               const CircleOptions& options) {
-  std::vector<Point> points = points_at(samples, at, options);
+  std::vector<TimedTau> points = points_at(samples, at, options);
   if (points.size() < 3) return std::nullopt;
   const double period = options.period.value();
   const double centre = circular_median(points, period);
@@ -83,11 +82,12 @@ std::optional<Slope> slope_of(std::span<const PhaseSample> samples, TimePoint at
   if (points.size() < 3) return std::nullopt;
   std::vector<LinePoint> weighted;
   weighted.reserve(points.size());
-  for (const Point& p : points) weighted.push_back({p.seconds, p.tau, 1 / square(p.sigma)});
+  for (const TimedTau& p : points) weighted.push_back({p.seconds, p.tau, 1 / square(p.sigma)});
   const WeightedLine line = weighted_line(weighted);
   if (!std::isfinite(line.rate_variance)) return std::nullopt;
-  const auto [first, last] = std::minmax_element(
-      points.begin(), points.end(), [](const Point& a, const Point& b) { return a.seconds < b.seconds; });
+  const auto [first, last] =
+      std::minmax_element(points.begin(), points.end(),
+                          [](const TimedTau& a, const TimedTau& b) { return a.seconds < b.seconds; });
   const double span = last->seconds - first->seconds;
   return Slope{line.rate,
                line.rate_variance + square(staircase_rate_error(options.resolution, Seconds(span)))};
@@ -185,18 +185,18 @@ Beat expected_beat(Hertz strobe_rate, Seconds period, PartsPerMillion sigma) {
 
 Phase combine(std::span<const PhaseSample> samples, TimePoint at, const CircleOptions& options) {
   if (samples.empty()) return {PhaseState::unusable, {}, {}, "no frames came"};
-  const std::vector<Point> points = points_at(samples, at, options);
+  const std::vector<TimedTau> points = points_at(samples, at, options);
   if (points.empty() || points.size() * 2 < samples.size()) return majority_of_unknown(samples);
 
   const double period = options.period.value();
   const double centre = circular_median(points, period);
-  const std::vector<Point> agreeing = offsets_that_agree(points, centre, period);
+  const std::vector<TimedTau> agreeing = offsets_that_agree(points, centre, period);
   if (agreeing.size() * 2 <= points.size()) {
     return {PhaseState::unusable, {}, {}, "its dots stand at different rows from frame to frame"};
   }
   double weights = 0;
   double moment = 0;
-  for (const Point& p : agreeing) {
+  for (const TimedTau& p : agreeing) {
     const double w = 1 / square(p.sigma);
     weights += w;
     moment += w * p.tau;

@@ -12,13 +12,15 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
+#include "base/square.h"
+
 namespace emberlock {
 namespace {
 
 constexpr double kRowScatter = 0.35;  // of one dot: whole rows, and the fit of a faint dot
 constexpr double kReadScatter = 0.2;  // the latter alone
 constexpr std::size_t kHarmonics = 12;
-constexpr double kStray = 1.5;      // rows off its walk: not a dot of this strobe
+constexpr double kStrayRows = 1.5;  // rows off its walk: not a dot of this strobe
 constexpr double kLeastPart = 0.7;  // of the dots that must follow
 constexpr double kDecisive = 25;    // difference of chi squares: five standard deviations
 constexpr std::size_t kFewestDots = 4;
@@ -27,9 +29,7 @@ constexpr int kFewestFrames = 3;
 constexpr double kShiftSigmas = 4;
 constexpr double kRateSigmas = 3;
 
-double square(double x) { return x * x; }
-
-struct Dot {
+struct SeenDot {
   double frame = 0;  ///< against the middle one
   double below = 0;  ///< the lamp, rows; negative above
   double sigma = 0;
@@ -46,12 +46,12 @@ struct Walk {
   double residual = 0;     ///< RMS, rows
 };
 
-std::vector<Dot> dots_of(std::span<const FrameReading> frames) {
+std::vector<SeenDot> dots_of(std::span<const FrameReading> frames) {
   std::vector<double> lamps;
   for (const FrameReading& f : frames) {
     if (f.reading.lamp && !f.reading.dots.empty()) lamps.push_back(f.reading.lamp->y.value());
   }
-  std::vector<Dot> dots;
+  std::vector<SeenDot> dots;
   if (lamps.empty()) return dots;
   // The lamp stands still: its median errs less than each frame's.
   const auto middle = lamps.begin() + static_cast<std::ptrdiff_t>(lamps.size() / 2);
@@ -68,9 +68,9 @@ std::vector<Dot> dots_of(std::span<const FrameReading> frames) {
   return dots;
 }
 
-class Fit {
+class SeenFit {
  public:
-  Fit(const std::vector<Dot>& dots, const ReadModeOptions& o)
+  SeenFit(const std::vector<SeenDot>& dots, const ReadModeOptions& o)
       : dots_(dots),
         row_time_(o.row_time.value()),
         period_(1 / o.frame_rate.value()),
@@ -78,7 +78,7 @@ class Fit {
         rate_sigma_(o.rate_sigma.value() * 1e-6 * period_) {
     double first = 0;
     double last = 0;
-    for (const Dot& d : dots) {
+    for (const SeenDot& d : dots) {
       first = std::min(first, d.frame);
       last = std::max(last, d.frame);
     }
@@ -94,19 +94,22 @@ class Fit {
       const std::complex<double> sum = gathered(direction, side, change);
       walk.place[static_cast<std::size_t>(side)] = std::arg(sum) / (2 * std::numbers::pi) * flash_period_;
     }
-    for (int round = 0; round < 4; ++round) straighten(direction, round == 0 ? 4 * kStray : kStray, walk);
+    for (int round = 0; round < 4; ++round)
+      straighten(direction, round == 0 ? 4 * kStrayRows : kStrayRows, walk);
     state_errors(direction, walk);
     return walk;
   }
 
  private:
-  [[nodiscard]] static int side(const Dot& dot, int direction) { return direction * dot.below < 0 ? 1 : 0; }
-  [[nodiscard]] double seconds(const Dot& dot, int direction) const {
+  [[nodiscard]] static int side(const SeenDot& dot, int direction) {
+    return direction * dot.below < 0 ? 1 : 0;
+  }
+  [[nodiscard]] double seconds(const SeenDot& dot, int direction) const {
     return direction * dot.below * row_time_ + dot.frame * period_;
   }
   [[nodiscard]] std::complex<double> gathered(int direction, int which, double change) const {
     std::complex<double> sum = 0;
-    for (const Dot& dot : dots_) {
+    for (const SeenDot& dot : dots_) {
       if (side(dot, direction) != which) continue;
       sum += std::polar(
           1.0, 2 * std::numbers::pi * (seconds(dot, direction) + dot.frame * change) / flash_period_);
@@ -136,11 +139,11 @@ class Fit {
     walk.dots = {};
     double squares = 0;
     double cost = 0;
-    for (const Dot& dot : dots_) {
+    for (const SeenDot& dot : dots_) {
       const auto s = static_cast<std::size_t>(side(dot, direction));
       const double at = seconds(dot, direction) + dot.frame * walk.frame_period_change;
       const double off = wrap_symmetric(at - walk.place[s], flash_period_);
-      cost += std::min(square(off / row_time_), square(kStray)) / square(kRowScatter);
+      cost += std::min(square(off / row_time_), square(kStrayRows)) / square(kRowScatter);
       if (std::abs(off) > stray * row_time_) continue;
       Eigen::Vector3d v(s == 0 ? 1 : 0, s == 1 ? 1 : 0, -dot.frame);
       matrix += v * v.transpose();
@@ -162,11 +165,11 @@ class Fit {
     Eigen::Matrix3d matrix = known_before();
     std::vector<std::pair<Eigen::Vector3d, double>>
         used;  // and the row that the walk says, with its fraction
-    for (const Dot& dot : dots_) {
+    for (const SeenDot& dot : dots_) {
       const int s = side(dot, direction);
       const double at = seconds(dot, direction) + dot.frame * walk.frame_period_change;
       const double off = wrap_symmetric(at - walk.place[static_cast<std::size_t>(s)], flash_period_);
-      if (std::abs(off) > kStray * row_time_) continue;
+      if (std::abs(off) > kStrayRows * row_time_) continue;
       used.push_back(
           {{s == 0 ? 1.0 : 0.0, s == 1 ? 1.0 : 0.0, -dot.frame}, direction * dot.below - off / row_time_});
       matrix += used.back().first * used.back().first.transpose();
@@ -209,7 +212,7 @@ class Fit {
     return Eigen::Vector3d(1e-9, 1e-9, square(kRowScatter * row_time_ / rate_sigma_)).asDiagonal();
   }
 
-  const std::vector<Dot>& dots_;
+  const std::vector<SeenDot>& dots_;
   double row_time_, period_, flash_period_, rate_sigma_;
   double span_ = 0;
 };
@@ -309,11 +312,11 @@ void find_shifts(const Walk& walk, const ReadModeOptions& o, ReadMode& mode) {
 Result<ReadMode> find_read_mode(std::span<const FrameReading> frames, const ReadModeOptions& options) {
   EMBERLOCK_RETURN_IF_ERROR(check(options));
   ReadMode mode;
-  const std::vector<Dot> dots = dots_of(frames);
+  const std::vector<SeenDot> dots = dots_of(frames);
   std::set<double> shown;
-  for (const Dot& dot : dots) shown.insert(dot.frame);
+  for (const SeenDot& dot : dots) shown.insert(dot.frame);
   mode.frames = static_cast<int>(shown.size());
-  const Fit fit(dots, options);
+  const SeenFit fit(dots, options);
   const Walk down = fit.along(+1);
   const Walk up = fit.along(-1);
   decide_direction(down, up, dots.size(), mode.frames, options, mode);

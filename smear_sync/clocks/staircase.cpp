@@ -9,23 +9,22 @@
 
 #include "base/quantity.h"
 #include "base/random.h"
+#include "base/square.h"
 
 namespace emberlock {
 namespace {
 
 constexpr double kLeastOrder =
-    0.3;                         // resultant of the dots' fractions of a row below which no stairs are seen
-constexpr double kStray = 3.5;   // a dot further off its step, in its own sigmas, is of no use
-constexpr double kFloor = 0.01;  // no dot is placed better than this, rows
-constexpr double kFirstBlur = 0.5;  // rows
-constexpr double kSharpen = 0.6;    // from round to round
+    0.3;  // resultant of the dots' fractions of a row below which no stairs are seen
+constexpr double kStraySigmas = 3.5;  // a dot further off its step, in its own sigmas, is of no use
+constexpr double kFloor = 0.01;       // no dot is placed better than this, rows
+constexpr double kFirstBlur = 0.5;    // rows
+constexpr double kSharpen = 0.6;      // from round to round
 constexpr int kRounds = 32;
 constexpr int kDraws = 150;  // for each number of the line
 constexpr int kLastDraws = 600;
 constexpr double kLeastShare = 12;  // of the draws, for each number of the line, that must carry the weight
 constexpr double kReach = 3.5;      // deviations about the mean that are drawn from, evenly
-
-double square(double x) { return x * x; }
 
 class Stairs {
  public:
@@ -51,7 +50,7 @@ class Stairs {
     for (const StairPoint& p : points_) {
       const double off = miss(p, line);
       deviations.push_back(std::abs(off) / own(p));
-      if (std::abs(off) > kStray * scale(p)) continue;
+      if (std::abs(off) > kStraySigmas * scale(p)) continue;
       sum += off / square(scale(p));
       weights += 1 / square(scale(p));
     }
@@ -67,7 +66,8 @@ class Stairs {
 
   [[nodiscard]] double log_likelihood(const StairLine& line) const {
     double sum = 0;
-    for (const StairPoint& p : points_) sum -= std::min(square(miss(p, line) / scale(p)), square(kStray)) / 2;
+    for (const StairPoint& p : points_)
+      sum -= std::min(square(miss(p, line) / scale(p)), square(kStraySigmas)) / 2;
     return sum;
   }
   /// Of the lamp's error, which moves the first number with it.

@@ -42,13 +42,13 @@ std::vector<float> collapse(const Column& c, int lane, double radius, double& po
   return out;
 }
 
-enum class Rows {
+enum class RowsWanted {
   all,    ///< where part of the profile is hidden, by its visible rows
   whole,  ///< only where the whole profile lies in the frame; 0 elsewhere
 };
 
 /// For each row the amplitude of the profile on a free level, over its noise: a filter of mean zero.
-std::vector<float> response(const Column& c, int lane, double radius, Rows rows) {
+std::vector<float> response(const Column& c, int lane, double radius, RowsWanted rows) {
   const int height = c.patch.height;
   double across_power = 0;
   const std::vector<float> collapsed = collapse(c, lane, radius, across_power);
@@ -68,7 +68,7 @@ std::vector<float> response(const Column& c, int lane, double radius, Rows rows)
     kernel.push_back(static_cast<float>(h * norm * (t == 0 ? 0.5 : 1)));
   }
   filter_rows(collapsed.data(), height, kernel.data(), reach, z.data());
-  if (rows == Rows::whole) return z;
+  if (rows == RowsWanted::whole) return z;
   const auto by_visible_rows = [&](int y) {
     double n = 0;
     double sh = 0;
@@ -116,7 +116,7 @@ void compare_lanes(const Column& c, double radius, Responses& r) {
   }
   for (int lane = 0; lane < Column::kLanes; ++lane) {
     if (lane == kOwn || !c.lane_inside(lane)) continue;
-    std::vector<float> z = response(c, lane, radius, Rows::whole);
+    std::vector<float> z = response(c, lane, radius, RowsWanted::whole);
     for (const std::size_t y : hidden) z[y] = 0;
     for (std::size_t y = 0; y < z.size(); y += kApart) {
       if (z[y] != 0) sample.push_back(z[y]);
@@ -138,8 +138,8 @@ Responses search_lanes(const Column& c, double min_snr) {
   const double radius = std::max(1.0, c.radius);
   const double small = std::max(1.0, kPart * c.radius);
   compare_lanes(c, radius, r);
-  const std::vector<float> as_lamp = response(c, kOwn, radius, Rows::all);
-  const std::vector<float> smaller = response(c, kOwn, small, Rows::all);
+  const std::vector<float> as_lamp = response(c, kOwn, radius, RowsWanted::all);
+  const std::vector<float> smaller = response(c, kOwn, small, RowsWanted::all);
   const auto best = [&](int y) {
     return std::max(as_lamp[static_cast<std::size_t>(y)], smaller[static_cast<std::size_t>(y)]);
   };

@@ -7,7 +7,7 @@
 namespace emberlock {
 namespace {
 
-constexpr std::size_t kFewest = 4;
+constexpr std::size_t kFewestDelays = 4;
 constexpr int kFirstDelays = 24;  // over the period: an exposure of a tenth of it is met twice
 constexpr int kSteps = 4;         // until one of 1/192 of it is
 constexpr int kStride = 7;        // between delays that are filmed one after the other; no divisor of theirs
@@ -61,15 +61,15 @@ Result<Levels> levels_of(const std::vector<SweepSample>& samples, const SweepOpt
 }
 
 /// An edge of the window, between a sample on either side.
-struct Edge {
+struct WindowEdge {
   double place = 0;
   double sigma = 0;
 };
 
 /// `out` and `in` are the last dark and the first lit delay (or reversed, at the end), `sign` +1 where the
 /// window begins.
-Edge place_edge(const SweepSample& out, const SweepSample& in, double sign, const Levels& levels,
-                const SweepOptions& options, bool saturated) {
+WindowEdge place_edge(const SweepSample& out, const SweepSample& in, double sign, const Levels& levels,
+                      const SweepOptions& options, bool saturated) {
   const double period = options.period.value();
   const double width = options.flash_width.value();
   const double gap = wrap_symmetric(in.delay.value() - out.delay.value(), period);
@@ -104,7 +104,7 @@ std::vector<SweepSample> in_order(std::span<const SweepSample> samples, Seconds 
 }  // namespace
 
 Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const SweepOptions& options) {
-  if (samples.size() < kFewest)
+  if (samples.size() < kFewestDelays)
     return refuse("fewer than four delays were filmed", "sweep over the whole period");
   const std::vector<SweepSample> sorted = in_order(samples, options.period);
   EMBERLOCK_ASSIGN_OR_RETURN(const Levels levels, levels_of(sorted, options));
@@ -121,8 +121,8 @@ Result<ExposureWindow> fit_exposure(std::span<const SweepSample> samples, const 
     const bool a_lit = levels.part(a.level) >= 0.5;
     const bool b_lit = levels.part(b.level) >= 0.5;
     if (a_lit == b_lit) continue;
-    const Edge edge = b_lit ? place_edge(a, b, +1, levels, options, window.saturated)
-                            : place_edge(b, a, -1, levels, options, window.saturated);
+    const WindowEdge edge = b_lit ? place_edge(a, b, +1, levels, options, window.saturated)
+                                  : place_edge(b, a, -1, levels, options, window.saturated);
     (b_lit ? window.begin : window.end) = wrap_positive(Seconds(edge.place), options.period);
     (b_lit ? window.begin_sigma : window.end_sigma) = Seconds(edge.sigma);
     begins += b_lit ? 1 : 0;
@@ -149,7 +149,7 @@ int even_delay_count() { return kFirstDelays << (kSteps - 1); }
 
 std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const SweepOptions& options,
                                  Seconds resolution, SweepEdges edges) {
-  if (samples.size() < kFewest) return even_delays(0, options.period);
+  if (samples.size() < kFewestDelays) return even_delays(0, options.period);
   std::vector<Seconds> delays;
   const std::vector<SweepSample> sorted = in_order(samples, options.period);
   const auto levels = levels_of(sorted, options);

@@ -9,11 +9,11 @@
 namespace emberlock {
 namespace {
 
-constexpr std::size_t kFewest = 6;
+constexpr std::size_t kFewestSweptEdges = 6;
 constexpr double kWholeRow = 0.2887;  // rows RMS: what rounding to whole rows leaves
 constexpr double kOutlier = 3;        // rows
 
-Error refuse(std::string what, std::string remedy) {
+Error refuse_bands(std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), "row time of a rolling shutter", std::move(remedy)};
 }
 
@@ -61,12 +61,12 @@ Line fit(const std::vector<Point>& points) {
 }  // namespace
 
 Result<RowClock> fit_swept_row_clock(std::span<const SweptEdge> edges, Seconds period) {
-  if (edges.size() < kFewest)
-    return refuse("fewer than six edges were seen", "sweep the strobe's phase over the whole period");
+  if (edges.size() < kFewestSweptEdges)
+    return refuse_bands("fewer than six edges were seen", "sweep the strobe's phase over the whole period");
   const double guess = slope_of({edges.begin(), edges.end()});
   if (!(guess > 0)) {
-    return refuse("its bands move against the flashes' delay",
-                  "give it the other read direction: it reads from the other end of the picture");
+    return refuse_bands("its bands move against the flashes' delay",
+                        "give it the other read direction: it reads from the other end of the picture");
   }
   // Turns are counted from the edge that most others agree with.
   std::vector<Point> points;
@@ -85,9 +85,9 @@ Result<RowClock> fit_swept_row_clock(std::span<const SweptEdge> edges, Seconds p
   std::erase_if(points, [&](const Point& p) {
     return std::abs(p.row * line.row_time - line.tau - line.rate * p.at - p.delay) > kOutlier * line.row_time;
   });
-  if (points.size() < kFewest || 3 * points.size() < 2 * edges.size()) {
-    return refuse("its bands don't move in step with the flashes' delay",
-                  "leave camera and strobe alone during the sweep");
+  if (points.size() < kFewestSweptEdges || 3 * points.size() < 2 * edges.size()) {
+    return refuse_bands("its bands don't move in step with the flashes' delay",
+                        "leave camera and strobe alone during the sweep");
   }
   line = fit(points);
   double mean = 0;

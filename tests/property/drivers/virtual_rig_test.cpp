@@ -5,30 +5,30 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "tests/support/properties.h"
 #include "tests/support/virtual_cameras.h"
 
 namespace emberlock {
 namespace {
 
 using namespace testing_support;  // NOLINT(google-build-using-namespace)
-
-int any_int(int low, int high) { return *rc::gen::resize(rc::kNominalSize, rc::gen::inRange(low, high)); }
-double between(double low, double high) { return low + (high - low) * any_int(0, 1000001) * 1e-6; }
+using test::any_int;
+using test::any_real;
 
 VirtualCameraOptions any_camera() {
   VirtualCameraOptions c =
       small_camera(*rc::gen::element(ReadDirection::top_first, ReadDirection::bottom_first),
                    *rc::gen::element(120, 140, 166));
-  c.timing.frame_period = c.timing.frame_period * (1 + between(-1e-4, 1e-4));
-  c.lamp = {.x = between(10, 54), .y = Rows(between(10, 110)), .radius = between(2, 4)};
-  c.first_phase = Seconds(between(0, 1.0 / 24));
+  c.timing.frame_period = c.timing.frame_period * (1 + any_real(-1e-4, 1e-4));
+  c.lamp = {.x = any_real(10, 54), .y = Rows(any_real(10, 110)), .radius = any_real(2, 4)};
+  c.first_phase = Seconds(any_real(0, 1.0 / 24));
   return c;
 }
 
 RC_GTEST_PROP(VirtualRigLaws, EveryIsolatedDotIsSeenWhereTheTruthSays, ()) {
   const VirtualCameraOptions c = any_camera();
   const auto rig = small_rig({c}, {Pass::smear});
-  RC_ASSERT(rig->strobe().apply({.output = StrobeOutput::flashing, .rate = Hertz(between(20, 100))}).ok());
+  RC_ASSERT(rig->strobe().apply({.output = StrobeOutput::flashing, .rate = Hertz(any_real(20, 100))}).ok());
   RC_ASSERT(rig->camera(0).start().ok());
   for (int i = 0; i < 6; ++i) {
     const Frame f = rig->camera(0).next_frame(Seconds(1)).value();
@@ -49,7 +49,7 @@ RC_GTEST_PROP(VirtualRigLaws, EveryIsolatedDotIsSeenWhereTheTruthSays, ()) {
 RC_GTEST_PROP(VirtualRigLaws, ADotGivesTheFlashsPhaseBackWithinARow, ()) {
   const VirtualCameraOptions c = any_camera();
   const auto rig = small_rig({c}, {});
-  RC_ASSERT(rig->strobe().apply({.output = StrobeOutput::flashing, .rate = Hertz(between(20, 300))}).ok());
+  RC_ASSERT(rig->strobe().apply({.output = StrobeOutput::flashing, .rate = Hertz(any_real(20, 300))}).ok());
   RC_ASSERT(rig->camera(0).start().ok());
   for (int i = 0; i < 4; ++i) {
     const auto id = rig->camera(0).next_frame(Seconds(1)).value().stamp.frame_id;
@@ -74,7 +74,7 @@ RC_GTEST_PROP(VirtualRigLaws, TheDotsOfAFrameAreTheFlashesThatTheFormulaShows, (
   // As short as the strobe can, so that hardly a flash spans two rows.
   RC_ASSERT(
       rig->strobe()
-          .apply({.output = StrobeOutput::flashing, .rate = Hertz(between(20, 300)), .width = Seconds(1e-7)})
+          .apply({.output = StrobeOutput::flashing, .rate = Hertz(any_real(20, 300)), .width = Seconds(1e-7)})
           .ok());
   const double rate = rig->strobe().read_back().value().rate.value();
   RC_ASSERT(rig->camera(0).start().ok());
@@ -110,7 +110,7 @@ RC_GTEST_PROP(VirtualRigLaws, ResetsKeepFrameNumbersAndArrivalTimesInOrder, ()) 
   for (int i = 0; i < 20; ++i) {
     if (any_int(0, 3) == 0) {
       rig->set_reset(*rc::gen::element(ShutterReset::by_hand, ShutterReset::on_command));
-      RC_ASSERT(rig->camera(0).reset_shutter(rig->clock().now() + Seconds(between(-0.1, 0.3))).ok());
+      RC_ASSERT(rig->camera(0).reset_shutter(rig->clock().now() + Seconds(any_real(-0.1, 0.3))).ok());
     }
     const Frame f = rig->camera(0).next_frame(Seconds(2)).value();
     RC_ASSERT(i == 0 || f.stamp.frame_id > last_id);

@@ -8,8 +8,13 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "tests/support/properties.h"
+
 namespace emberlock {
 namespace {
+
+using test::any_int;
+using test::any_real;
 
 /// The oracle: a vertical shift register of n cells that really moves its charge, row by row, for three
 /// frames. Cell 0 stands at the output. Packets are labelled with the image that they carry when they leave.
@@ -55,15 +60,11 @@ class ShiftRegister {
   std::map<std::pair<int, int>, double> image_;
 };
 
-/// Uniform whatever the size that RapidCheck has reached; low <= result < high.
-int any_int(int low, int high) { return *rc::gen::resize(rc::kNominalSize, rc::gen::inRange(low, high)); }
-double between(double low, double high) { return low + (high - low) * any_int(0, 1000001) * 1e-6; }
-
 CcdTiming any_timing() {
   CcdTiming t;
   t.rows = any_int(1, 120);
-  t.row_time = microseconds_per_row(between(20, 90));
-  t.frame_period = Rows(t.rows + 20 + between(0, 30)) * t.row_time;
+  t.row_time = microseconds_per_row(any_real(20, 90));
+  t.frame_period = Rows(t.rows + 20 + any_real(0, 30)) * t.row_time;
   const int most = static_cast<int>(std::floor((t.frame_period / t.row_time).value()));
   t.shifts = *rc::gen::element(t.rows, t.rows + 20, most);
   t.direction = *rc::gen::element(ReadDirection::top_first, ReadDirection::bottom_first);
@@ -77,9 +78,9 @@ TEST(CcdModelLaws, AgreesWithARegisterThatMovesItsCharge) {
       RC_ASSERT(check(t).ok());
       const auto sweep_out = *rc::gen::element(SweepOut::none, SweepOut::before_transfer);
       const int lamp = any_int(0, t.rows);
-      const Seconds width = t.row_time * Rows(between(0.01, *rc::gen::element(0.5, 3.0, 40.0)));
+      const Seconds width = t.row_time * Rows(any_real(0.01, *rc::gen::element(0.5, 3.0, 40.0)));
       // Begin within frames -1 and 0; the oracle ends with frame 1.
-      const Seconds centre = t.frame_period * between(-0.99, 0.99) + width / 2;
+      const Seconds centre = t.frame_period * any_real(-0.99, 0.99) + width / 2;
       const Flash flash{centre, width};
 
       auto expected =
@@ -97,9 +98,9 @@ TEST(CcdModelLaws, AgreesWithARegisterThatMovesItsCharge) {
 
 RC_GTEST_PROP(CcdModelLaws, FractionsOfASplitSumToOne, ()) {
   const CcdTiming t = any_timing();
-  const Seconds width = t.frame_period * between(0, 3);
+  const Seconds width = t.frame_period * any_real(0, 3);
   double sum = 0;
-  for (const FlashPart& p : split(t, {t.frame_period * between(-5, 5), width})) sum += p.fraction;
+  for (const FlashPart& p : split(t, {t.frame_period * any_real(-5, 5), width})) sum += p.fraction;
   RC_ASSERT(std::abs(sum - 1) < 1e-9);
 }
 
@@ -107,7 +108,7 @@ RC_GTEST_PROP(CcdModelLaws, AFrameLaterEverythingIsTheSameAnImageLater, ()) {
   const CcdTiming t = any_timing();
   const int lamp = any_int(0, t.rows);
   // In the middle of a standstill, so that rounding can't move it over a border.
-  const Seconds centre = Rows(any_int(0, t.shifts) + between(0.1, 0.9)) * t.row_time;
+  const Seconds centre = Rows(any_int(0, t.shifts) + any_real(0.1, 0.9)) * t.row_time;
   const auto now = smear_deposits(t, lamp, {centre, Seconds(0)});
   const auto later = smear_deposits(t, lamp, {centre + t.frame_period * 3, Seconds(0)});
   RC_ASSERT(now.size() == later.size());

@@ -5,26 +5,26 @@
 
 #include "smear_sync/align/align.h"
 #include "smear_sync/clocks/phase.h"
+#include "tests/support/properties.h"
 #include "tests/support/shift_register.h"
 
 namespace emberlock {
 namespace {
 
+using test::any_real;
+using test::law;
+
 const Seconds kPeriod(1 / 23.976);
 
-double any(double low, double high) { return low + (high - low) * *rc::gen::inRange(0, 1'000'000) / 1e6; }
-
-Seconds any_tau() { return Seconds(any(0, kPeriod.value())); }
+Seconds any_tau() { return Seconds(any_real(0, kPeriod.value())); }
 
 Phase known(Seconds tau) { return {PhaseState::known, wrap_positive(tau, kPeriod), microseconds(10), {}}; }
 
 bool same(Seconds a, Seconds b) { return abs(wrap_symmetric(a - b, kPeriod)) < nanoseconds(1); }
 
-void law(const char* description, auto check) { EXPECT_TRUE(rc::check(description, check)); }
-
 TEST(PhaseLaws, WrapIsCircular) {
   law("whole periods change nothing", [] {
-    const Seconds tau(any(-10, 10));
+    const Seconds tau(any_real(-10, 10));
     const int turns = *rc::gen::inRange(-50, 50);
     RC_ASSERT(same(wrap_symmetric(tau + turns * kPeriod, kPeriod), tau));
     const Seconds w = wrap_symmetric(tau, kPeriod);
@@ -47,12 +47,12 @@ TEST(PhaseLaws, PhaseInvertsTheShiftRegister) {
     CcdTiming timing;
     timing.rows = *rc::gen::inRange(10, 200);
     timing.shifts = timing.rows + *rc::gen::element(0, 1, 20);
-    timing.row_time = microseconds_per_row(any(10, 100));
-    timing.frame_period = Rows(timing.shifts + any(0, 60)) * timing.row_time;
+    timing.row_time = microseconds_per_row(any_real(10, 100));
+    timing.frame_period = Rows(timing.shifts + any_real(0, 60)) * timing.row_time;
     timing.direction = *rc::gen::element(ReadDirection::top_first, ReadDirection::bottom_first);
     const int lamp = *rc::gen::inRange(0, timing.rows);
     const int k = *rc::gen::inRange(0, timing.shifts);
-    const auto dot = test::shift_register(timing, lamp, Rows(k + any(0.01, 0.99)) * timing.row_time);
+    const auto dot = test::shift_register(timing, lamp, Rows(k + any_real(0.01, 0.99)) * timing.row_time);
     RC_PRE(dot.has_value());
     const Phase phase = phase_of(test::reading_of(*dot, lamp), timing, microseconds(1));
     RC_ASSERT(abs(phase.tau - Rows(k + 0.5) * timing.row_time) < nanoseconds(1));

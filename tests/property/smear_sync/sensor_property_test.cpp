@@ -9,34 +9,34 @@
 #include "smear_sync/clocks/read_mode.h"
 #include "smear_sync/clocks/staircase.h"
 #include "tests/support/clock_film.h"
+#include "tests/support/properties.h"
 #include "tests/support/shutters.h"
 
 namespace emberlock {
 namespace {
 
-double any(double low, double high) { return low + (high - low) * *rc::gen::inRange(0, 1'000'000) / 1e6; }
+using test::any_real;
+using test::law;
 
 ReadDirection any_direction() {
   return *rc::gen::element(ReadDirection::top_first, ReadDirection::bottom_first);
 }
-
-void law(const char* description, auto check) { EXPECT_TRUE(rc::check(description, check)); }
 
 TEST(ReadModeLaws, ADirectionThatIsToldIsTheCameras) {
   int films = 0;
   int told = 0;
   int shifts_told = 0;
   law("whatever strobe, lamp and crystal", [&] {
-    test::ClockFilm f{.flash_rate = 23.976 * any(0.985, 1.015),
-                      .first_flash = any(0, 0.04),
+    test::ClockFilm f{.flash_rate = 23.976 * any_real(0.985, 1.015),
+                      .first_flash = any_real(0, 0.04),
                       .frames = *rc::gen::inRange(20, 200),
-                      .lamp = any(180, 540),
+                      .lamp = any_real(180, 540),
                       .seed = static_cast<std::uint64_t>(*rc::gen::inRange(0, 1'000'000))};
     f.timing.direction = any_direction();
     f.timing.shifts = *rc::gen::element(720, 740, 772);
-    f.timing.frame_period = Seconds(1 / 23.976 * (1 + any(-40e-6, 40e-6)));
-    f.dot_noise = any(0, 0.2);
-    f.miss = any(0, 0.2);
+    f.timing.frame_period = Seconds(1 / 23.976 * (1 + any_real(-40e-6, 40e-6)));
+    f.dot_noise = any_real(0, 0.2);
+    f.miss = any_real(0, 0.2);
     const auto mode =
         find_read_mode(film(f), {.flash_rate = Hertz(f.flash_rate), .row_time = f.timing.row_time});
     RC_ASSERT(mode.ok());
@@ -61,11 +61,11 @@ TEST(ReadModeLaws, ADirectionThatIsToldIsTheCameras) {
 
 TEST(StaircaseLaws, StairsClimbARowARowAndAreInvertedToTheirOwnRow) {
   law("stair(x + 1) = stair(x) + 1; never down; its inverse is within the step", [] {
-    const double width = any(0, 1.5);
-    const double x = any(2, 700);
+    const double width = any_real(0, 1.5);
+    const double x = any_real(2, 700);
     const double u = stair(x, width);
     RC_ASSERT(std::abs(stair(x + 1, width) - u - 1) < 1e-9);
-    RC_ASSERT(stair(x + any(0, 1), width) >= u - 1e-12);
+    RC_ASSERT(stair(x + any_real(0, 1), width) >= u - 1e-12);
     RC_ASSERT(std::abs(u - (x - 0.5)) <= 0.5 + 1e-9);
     const StairMoments back = invert_stair(u, 0.01, width);
     RC_ASSERT(std::abs(back.mean - x) <= 0.55);
@@ -80,8 +80,8 @@ TEST(FrameCodeLaws, FramesAreNumberedAsTheFlashesThatLitThem) {
   int films = 0;
   int numbered = 0;
   law("numbers are right or not given, though frames were misread", [&] {
-    const double step = 1 + any(-2e-4, 2e-4);
-    const double start = any(0, code.flashes());
+    const double step = 1 + any_real(-2e-4, 2e-4);
+    const double start = any_real(0, code.flashes());
     const int frames = *rc::gen::inRange(60, 500);
     const auto seed = static_cast<std::uint64_t>(*rc::gen::inRange(0, 1'000'000));
     std::vector<CodeFrame> seen;
@@ -113,12 +113,12 @@ TEST(RollingBandLaws, APhaseThatIsToldIsTheFlashs) {
   law("whatever exposure, direction, light and phase", [] {
     test::Roller r;
     r.timing.direction = any_direction();
-    r.exposure = any(0.5e-3, 30e-3);
-    r.ambient = any(0, 60);
-    r.flash = any(10, 100);
-    r.noise = any(0.01, 0.4);
+    r.exposure = any_real(0.5e-3, 30e-3);
+    r.ambient = any_real(0, 60);
+    r.flash = any_real(10, 100);
+    r.noise = any_real(0.01, 0.4);
     r.seed = static_cast<std::uint64_t>(*rc::gen::inRange(0, 1'000'000));
-    const double tau = any(0, r.timing.frame_period.value());
+    const double tau = any_real(0, r.timing.frame_period.value());
     r.first_flash = tau;
     const BandReading bands = r.read(3);
     const Phase phase = phase_of(bands.reading, r.timing, Seconds(r.flash_width));
@@ -135,11 +135,11 @@ TEST(RollingBandLaws, APhaseThatIsToldIsTheFlashs) {
 TEST(ExposureSweepLaws, AWindowThatIsToldIsTheShutters) {
   law("whatever shutter and light", [] {
     test::Shutter s;
-    s.end = any(0, test::kShutterPeriod);
-    s.exposure = any(0.01, 0.97) * test::kShutterPeriod;
-    s.ambient = any(0, 60);
-    s.flash = any(10, 100);
-    s.noise = any(0.01, 0.5);
+    s.end = any_real(0, test::kShutterPeriod);
+    s.exposure = any_real(0.01, 0.97) * test::kShutterPeriod;
+    s.ambient = any_real(0, 60);
+    s.flash = any_real(10, 100);
+    s.noise = any_real(0.01, 0.5);
     s.seed = static_cast<std::uint64_t>(*rc::gen::inRange(0, 1'000'000));
     const auto window = fit_exposure(s.sweep(microseconds(2)), s.options());
     RC_ASSERT(window.ok());

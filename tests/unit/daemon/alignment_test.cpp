@@ -110,6 +110,60 @@ TEST_F(AlignmentTest, ALockThatNobodyChecksEndsBeforeACameraLeaves) {
   EXPECT_GT(alignment->checks(), 0);
 }
 
+TEST_F(AlignmentTest, CamerasAreResetBeforeTheyLeaveAndTheLockIsMissedForSecondsOnly) {
+  align();
+  const TimePoint began = bench.align.clock->now();
+  const SecondsPerRow row = alignment->options().row_time;
+  Seconds unlocked;
+  int renewals = 0;
+  while (bench.align.clock->now() - began < Seconds(1800)) {
+    const TimePoint now = bench.align.clock->now();
+    if (const Seconds left = alignment->next_check(now); left >= milliseconds(1)) {
+      ASSERT_TRUE(alignment->locked(now + left));
+      alignment->wait(now + left);
+    } else {
+      ASSERT_TRUE(alignment->round().ok());
+      renewals += alignment->last().renews && alignment->state().renewal == 1 ? 1 : 0;
+      if (!alignment->locked(bench.align.clock->now())) unlocked += bench.align.clock->now() - now;
+      ASSERT_TRUE(alignment->last().renews || alignment->last().verdict == AlignVerdict::aligned)
+          << alignment->last().reason;
+    }
+    if (!alignment->locked(bench.align.clock->now())) continue;
+    EXPECT_LE(bench.true_error(row), alignment->options().tolerance.in_rows(row));
+  }
+  EXPECT_GT(renewals, 3) << "50 ppm lead through +-30 rows of 150 us in three minutes";
+  EXPECT_LT(unlocked, Seconds(1.5 * renewals + 5));
+}
+
+TEST_F(AlignmentTest, APressOfAShutterIsSeenWithinASecondWhetherAwaitedOrNot) {
+  bench.options.align.reset_by = ResetBy::anybody;
+  align();
+  bench.rig->set_reset(ShutterReset::by_hand);
+  auto made = Alignment::create(bench.align, bench.options);
+  ASSERT_TRUE(made.ok());
+  alignment = std::move(made).value();
+  align();
+  for (int press = 0; press < 6; ++press) {
+    const int before = alignment->resets();
+    const bool awaited = alignment->last().reset_next.has_value();
+    const std::size_t camera = alignment->last().reset_next.value_or(1);
+    const TimePoint pressed = bench.align.clock->now();
+    ASSERT_TRUE(bench.rig->camera(static_cast<int>(camera)).reset_shutter(pressed).ok());
+    while (alignment->resets() == before && alignment->last().jumped.empty()) {
+      const TimePoint now = bench.align.clock->now();
+      ASSERT_LT(now - pressed, Seconds(5));
+      if (const Seconds left = alignment->next_check(now); left >= milliseconds(1)) {
+        alignment->wait(now + left);
+      } else {
+        ASSERT_TRUE(alignment->round().ok());
+      }
+    }
+    EXPECT_LE(bench.align.clock->now() - pressed, Seconds(1)) << press << (awaited ? " awaited" : "");
+    EXPECT_FALSE(alignment->locked(bench.align.clock->now()));
+    for (int i = 0; i < 4; ++i) ASSERT_TRUE(alignment->round().ok());  // until it is asked for again
+  }
+}
+
 TEST_F(AlignmentTest, AFlameIsFilmedInTheDarkBetweenTwoChecks) {
   align();
   const int before = alignment->last().round;
@@ -193,6 +247,33 @@ TEST(CameraSight, ATargetWhereADotWouldNotShowIsAbsent) {
   EXPECT_FALSE(target(261)) << "the register rests";
   EXPECT_FALSE(
       sight_of(reading, SensorKind::rolling_shutter, timing, Seconds(0.01), milliseconds(3)).target_row);
+}
+
+TEST(CameraSight, TheBandHoldsJustTheDotsThatAreInToleranceWhereverTheyWrap) {
+  SmearReading reading;
+  reading.lamp = LampReading{.x = 10, .y = Rows(100)};
+  for (const ReadDirection direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+    const CcdTiming timing{.rows = 240,
+                           .shifts = 260,
+                           .frame_period = Rows(271) * microseconds_per_row(150),
+                           .row_time = microseconds_per_row(150),
+                           .direction = direction};
+    const Rows tolerance(30);
+    for (int target = 0; target < 271; target += 7) {
+      const CameraSight sight = sight_of(reading, SensorKind::ccd, timing, Rows(target) * timing.row_time,
+                                         tolerance * timing.row_time);
+      for (int k = 0; k < timing.shifts; ++k) {
+        const auto dot = smear_centre(timing, reading.lamp->y, {0, k, 1});
+        if (!dot) continue;
+        const bool in_tolerance = abs(wrap_symmetric(Rows(k + 0.5 - target), Rows(271))) <= tolerance;
+        const bool in_band = std::any_of(sight.band.begin(), sight.band.end(), [&](const RowSpan& span) {
+          return span.first <= dot->row && dot->row <= span.last;
+        });
+        EXPECT_EQ(in_band, in_tolerance) << "target " << target << ", dot at " << dot->row.value();
+      }
+      EXPECT_LE(sight.band.size(), 3U);
+    }
+  }
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 namespace emberlock {
 namespace {
 
-const Seconds kPeriod(1 / 23.976);
-const SecondsPerRow kRow = microseconds_per_row(54);
+const Seconds kDriftPeriod(1 / 23.976);
+const SecondsPerRow kDriftRow = microseconds_per_row(54);
 
 struct Walk {
   double tau0 = 0.02;
@@ -21,24 +21,25 @@ struct Walk {
   std::uint64_t seed = 1;
 };
 
-std::vector<PhaseSample> film(const Walk& walk) {
+std::vector<PhaseSample> samples_of(const Walk& walk) {
   std::vector<PhaseSample> samples;
   for (int i = 0; i < walk.frames; ++i) {
     const double t = walk.seconds * i / (walk.frames - 1);
     const double noise = walk.noise_rows * random_normal(walk.seed, 3, static_cast<std::uint64_t>(i));
-    const Seconds tau = wrap_positive(Seconds(walk.tau0 + walk.ppm * 1e-6 * t) + Rows(noise) * kRow, kPeriod);
+    const Seconds tau =
+        wrap_positive(Seconds(walk.tau0 + walk.ppm * 1e-6 * t) + Rows(noise) * kDriftRow, kDriftPeriod);
     samples.push_back({TimePoint{1'000'000'000} + Seconds(t),
-                       {PhaseState::known, tau, Rows(std::max(walk.noise_rows, 0.01)) * kRow, {}}});
+                       {PhaseState::known, tau, Rows(std::max(walk.noise_rows, 0.01)) * kDriftRow, {}}});
   }
   return samples;
 }
 
-DriftOptions options() { return {.period = kPeriod}; }
+DriftOptions options() { return {.period = kDriftPeriod}; }
 
 TEST(Drift, FindsTheRateWithinItsStandardError) {
   int outside = 0;
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    const auto drift = fit_drift(film({.ppm = -17.3, .seed = seed}), options());
+    const auto drift = fit_drift(samples_of({.ppm = -17.3, .seed = seed}), options());
     ASSERT_TRUE(drift.ok());
     if (std::abs(drift->rate.value() + 17.3) > 2 * drift->rate_sigma.value()) ++outside;
   }
@@ -48,14 +49,15 @@ TEST(Drift, FindsTheRateWithinItsStandardError) {
 }
 
 TEST(Drift, CrossesTheWrapManyTimes) {
-  const auto drift = fit_drift(film({.tau0 = 0.0416, .ppm = 410, .seconds = 600, .frames = 400}), options());
+  const auto drift =
+      fit_drift(samples_of({.tau0 = 0.0416, .ppm = 410, .seconds = 600, .frames = 400}), options());
   ASSERT_TRUE(drift.ok());
   EXPECT_NEAR(drift->rate.value(), 410, 4 * drift->rate_sigma.value());
   EXPECT_LT(drift->rate_sigma, PartsPerMillion(0.05));
 }
 
 TEST(Drift, OneFrameInFiveIsWildAndBlindFramesArePassedOver) {
-  auto samples = film({.ppm = 5});
+  auto samples = samples_of({.ppm = 5});
   for (std::size_t i = 0; i < samples.size(); i += 5)
     samples[i].phase.tau = Seconds(random_uniform(9, 0, i) * 0.0417);
   for (std::size_t i = 2; i < samples.size(); i += 9)
@@ -69,15 +71,15 @@ TEST(Drift, OneFrameInFiveIsWildAndBlindFramesArePassedOver) {
 TEST(Drift, StaircaseOfASlowDrift) {
   int outside = 0;
   for (int i = 0; i < 50; ++i) {
-    auto samples = film({.tau0 = 0.01 + 2e-6 * i, .ppm = 2, .seconds = 10, .noise_rows = 0});
+    auto samples = samples_of({.tau0 = 0.01 + 2e-6 * i, .ppm = 2, .seconds = 10, .noise_rows = 0});
     for (PhaseSample& s : samples) {
-      const Rows k(std::floor((s.phase.tau / kRow).value()));
-      s.phase.tau = (k + Rows(0.5)) * kRow;
-      s.phase.sigma = Rows(0.29) * kRow;
+      const Rows k(std::floor((s.phase.tau / kDriftRow).value()));
+      s.phase.tau = (k + Rows(0.5)) * kDriftRow;
+      s.phase.sigma = Rows(0.29) * kDriftRow;
       s.shifted = ShiftedRows{k, Rows(0.05)};
     }
     auto with = options();
-    with.row_time = kRow;
+    with.row_time = kDriftRow;
     with.flash_width = Seconds(0);
     const auto drift = fit_drift(samples, with);
     ASSERT_TRUE(drift.ok());
@@ -88,20 +90,20 @@ TEST(Drift, StaircaseOfASlowDrift) {
 }
 
 TEST(Drift, ThermalDriftIsFollowedByItsMeanRateWithAWiderError) {
-  auto samples = film({.ppm = 0, .seconds = 600});
+  auto samples = samples_of({.ppm = 0, .seconds = 600});
   for (PhaseSample& s : samples) {
     const double t = (s.at - samples.front().at).value();
-    s.phase.tau = wrap_positive(s.phase.tau + Seconds(1e-8 * t * t), kPeriod);  // 0 to 12 ppm
+    s.phase.tau = wrap_positive(s.phase.tau + Seconds(1e-8 * t * t), kDriftPeriod);  // 0 to 12 ppm
   }
   const auto curved = fit_drift(samples, options());
-  const auto straight = fit_drift(film({.ppm = 6, .seconds = 600}), options());
+  const auto straight = fit_drift(samples_of({.ppm = 6, .seconds = 600}), options());
   ASSERT_TRUE(curved.ok() && straight.ok());
   EXPECT_NEAR(curved->rate.value(), 6, 0.5);
   EXPECT_GT(curved->rate_sigma, 3 * straight->rate_sigma);
 }
 
 TEST(Drift, TooFewFramesAreAnErrorWithARemedy) {
-  auto samples = film({.frames = 2});
+  auto samples = samples_of({.frames = 2});
   EXPECT_EQ(fit_drift(samples, options()).error().kind, ErrorKind::bad_input);
   samples.push_back(samples.back());
   for (PhaseSample& s : samples) s.at = TimePoint{};
@@ -110,13 +112,13 @@ TEST(Drift, TooFewFramesAreAnErrorWithARemedy) {
 
 Drift drift_of(double rows, double ppm, double ppm_sigma) {
   Drift drift;
-  drift.tau = wrap_positive(Rows(rows) * kRow, kPeriod);
+  drift.tau = wrap_positive(Rows(rows) * kDriftRow, kDriftPeriod);
   drift.rate = PartsPerMillion(ppm);
   drift.rate_sigma = PartsPerMillion(ppm_sigma);
   return drift;
 }
 
-const TimeLeftOptions kTolerance{.tolerance = Rows(100) * kRow, .period = kPeriod};
+const TimeLeftOptions kTolerance{.tolerance = Rows(100) * kDriftRow, .period = kDriftPeriod};
 
 TEST(TimeLeft, ClosedForm) {
   // 54 ppm is one row a second: from +30 rows to +100 in 70 s, from -30 in 130 s.

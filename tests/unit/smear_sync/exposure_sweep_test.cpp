@@ -14,17 +14,18 @@ namespace {
 using test::Shutter;
 using testing::HasSubstr;
 
-constexpr double kPeriod = test::kShutterPeriod;
+constexpr double kSweepPeriod = test::kShutterPeriod;
 
-double off(Seconds a, double b) { return wrap_symmetric(a.value() - b, kPeriod); }
+double off(Seconds a, double b) { return wrap_symmetric(a.value() - b, kSweepPeriod); }
 
 TEST(ExposureSweep, BothEdgesWithinTheirSigmas) {
   int inside = 0;
   int count = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
     RandomStream random(seed, 8);
-    Shutter s{
-        .end = random.uniform(0, kPeriod), .exposure = random.uniform(0.1, 0.9) * kPeriod, .seed = seed};
+    Shutter s{.end = random.uniform(0, kSweepPeriod),
+              .exposure = random.uniform(0.1, 0.9) * kSweepPeriod,
+              .seed = seed};
     const auto samples = s.sweep(microseconds(2));
     EXPECT_LT(samples.size(), 60U);
     const auto window = fit_exposure(samples, s.options());
@@ -48,7 +49,7 @@ TEST(ExposureSweep, TheEndAloneIsLookedForWhereItIsThePhase) {
   ASSERT_TRUE(window.ok());
   EXPECT_LE(window->end_sigma, microseconds(2));
   EXPECT_LT(std::abs(off(window->end, s.end)), 4 * window->end_sigma.value());
-  EXPECT_GT(window->begin_sigma.value(), kPeriod / 24 / 4) << "as the even delays left it";
+  EXPECT_GT(window->begin_sigma.value(), kSweepPeriod / 24 / 4) << "as the even delays left it";
 }
 
 TEST(ExposureSweep, ACoarseSweepSaysHowCoarse) {
@@ -57,7 +58,7 @@ TEST(ExposureSweep, ACoarseSweepSaysHowCoarse) {
   for (const Seconds d : next_delays({}, s.options(), {})) samples.push_back(s.film(d));
   const auto window = fit_exposure(samples, s.options());
   ASSERT_TRUE(window.ok());
-  EXPECT_NEAR(window->end_sigma.value(), kPeriod / 24 / std::sqrt(12.0), 1e-5);
+  EXPECT_NEAR(window->end_sigma.value(), kSweepPeriod / 24 / std::sqrt(12.0), 1e-5);
   EXPECT_LT(std::abs(off(window->end, s.end)), 2 * window->end_sigma.value());
 }
 
@@ -71,7 +72,7 @@ TEST(ExposureSweep, TheWindowLiesAcrossTheWrap) {
 TEST(ExposureSweep, SaturatedPicturesTellEdgesBetweenDelaysOnly) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     RandomStream random(seed, 8);
-    const Shutter s{.end = random.uniform(0, kPeriod), .white = random.uniform(15, 90), .seed = seed};
+    const Shutter s{.end = random.uniform(0, kSweepPeriod), .white = random.uniform(15, 90), .seed = seed};
     const auto samples = s.sweep(microseconds(2));
     EXPECT_LT(samples.size(), 60U) << "what can't be told finer isn't filmed again and again";
     const auto window = fit_exposure(samples, s.options());
@@ -84,7 +85,7 @@ TEST(ExposureSweep, SaturatedPicturesTellEdgesBetweenDelaysOnly) {
 }
 
 TEST(ExposureSweep, AnExposureOfThePeriodOrAFlashOutOfViewIsRefused) {
-  for (const Shutter& s : {Shutter{.exposure = kPeriod}, Shutter{.flash = 0}}) {
+  for (const Shutter& s : {Shutter{.exposure = kSweepPeriod}, Shutter{.flash = 0}}) {
     const auto window = fit_exposure(s.sweep(microseconds(5)), s.options());
     ASSERT_FALSE(window.ok());
     EXPECT_THAT(window.error().remedy, HasSubstr("shorten an exposure"));
@@ -109,8 +110,8 @@ TEST(ExposureSweep, PhasesOfTwoShuttersCompareLikeAnyOthers) {
   const auto wb = fit_exposure(b.sweep(microseconds(2)), b.options());
   ASSERT_TRUE(wa.ok() && wb.ok());
   const Seconds delay(0.009);
-  const Seconds error = phase_error(phase_of(*wa, delay, Seconds(kPeriod)),
-                                    phase_of(*wb, delay, Seconds(kPeriod)), Seconds(kPeriod));
+  const Seconds error = phase_error(phase_of(*wa, delay, Seconds(kSweepPeriod)),
+                                    phase_of(*wb, delay, Seconds(kSweepPeriod)), Seconds(kSweepPeriod));
   EXPECT_NEAR(error.value(), 0.0007, 5e-6);  // a reads earlier
 }
 

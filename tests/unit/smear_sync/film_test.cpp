@@ -13,27 +13,29 @@ namespace {
 
 using test::SmearScene;
 
-constexpr double kLampX = 81.3;
-constexpr double kLampY = 180.4;
+constexpr double kFilmLampX = 81.3;
+constexpr double kFilmLampY = 180.4;
 
-SmearScene lamp_scene(double bright = 3000) { return SmearScene(160, 360).disk(kLampX, kLampY, 4, bright); }
+SmearScene film_scene(double bright = 3000) {
+  return SmearScene(160, 360).disk(kFilmLampX, kFilmLampY, 4, bright);
+}
 
 TEST(Film, UnsaturatedFramesTellTheLampsRow) {
   std::vector<SmearReading> film;
   for (std::uint64_t i = 0; i < 40; ++i) {
     // A bloom drags the saturated lamp down.
     const bool saturated = i % 4 != 0;
-    SmearScene scene = lamp_scene(saturated ? 3000 : 180);
-    if (saturated) scene.bloom(kLampX, kLampY, 2.5, 0, 60, 800);
+    SmearScene scene = film_scene(saturated ? 3000 : 180);
+    if (saturated) scene.bloom(kFilmLampX, kFilmLampY, 2.5, 0, 60, 800);
     film.push_back(detect(scene.image({.seed = i}).view()));
   }
   const auto lamp = combine_lamps(film);
   ASSERT_TRUE(lamp);
   EXPECT_FALSE(lamp->saturated);
-  EXPECT_NEAR(lamp->y.value(), kLampY, 0.02);
-  EXPECT_NEAR(lamp->x, kLampX, 0.02);
+  EXPECT_NEAR(lamp->y.value(), kFilmLampY, 0.02);
+  EXPECT_NEAR(lamp->x, kFilmLampX, 0.02);
   EXPECT_LT(lamp->sigma.value(), 0.02);
-  EXPECT_GE(lamp->sigma.value() * 5, std::abs(lamp->y.value() - kLampY));
+  EXPECT_GE(lamp->sigma.value() * 5, std::abs(lamp->y.value() - kFilmLampY));
 
   film[1].lamp->y += Rows(3);  // as if the camera had been bumped
   const std::vector<SmearReading> shared = share_lamp(film);
@@ -47,8 +49,8 @@ TEST(Film, AWalkJustLongEnoughToTellLosesNoDot) {
   for (const double travel : {2.0, 3.0, 3.9, 4.2, 6.0}) {
     std::vector<SmearReading> film;
     for (int i = 0; i < 40; ++i) {
-      SmearScene scene = lamp_scene();
-      scene.disk(kLampX, kLampY - 30 - travel * i / 39, 4, 20);
+      SmearScene scene = film_scene();
+      scene.disk(kFilmLampX, kFilmLampY - 30 - travel * i / 39, 4, 20);
       film.push_back(detect(scene.image({.seed = static_cast<std::uint64_t>(i)}).view()));
     }
     for (const SmearReading& r : settle(film))
@@ -58,7 +60,7 @@ TEST(Film, AWalkJustLongEnoughToTellLosesNoDot) {
 
 TEST(Film, ManySaturatedFramesDontHideTheirCommonError) {
   std::vector<SmearReading> film;
-  for (std::uint64_t i = 0; i < 30; ++i) film.push_back(detect(lamp_scene().image({.seed = i}).view()));
+  for (std::uint64_t i = 0; i < 30; ++i) film.push_back(detect(film_scene().image({.seed = i}).view()));
   const auto lamp = combine_lamps(film);
   ASSERT_TRUE(lamp);
   EXPECT_TRUE(lamp->saturated);
@@ -71,14 +73,14 @@ std::vector<SmearReading> film_of(double reflection, double aside, int first_shi
                                   const std::vector<double>& hot) {
   std::vector<SmearReading> film;
   for (int i = 0; i < 12; ++i) {
-    SmearScene scene = lamp_scene();
+    SmearScene scene = film_scene();
     const double shift = first_shift + rows_a_frame * i;
-    scene.disk(kLampX, kLampY - shift, 4, 20);
+    scene.disk(kFilmLampX, kFilmLampY - shift, 4, 20);
     if (reflection > 0) {
-      scene.disk(kLampX + aside, kLampY + reflection, 4, 3000);
-      scene.disk(kLampX + aside, kLampY + reflection - shift, 4, 20);
+      scene.disk(kFilmLampX + aside, kFilmLampY + reflection, 4, 3000);
+      scene.disk(kFilmLampX + aside, kFilmLampY + reflection - shift, 4, 20);
     }
-    for (const double row : hot) scene.disk(kLampX, row, 4, 20);
+    for (const double row : hot) scene.disk(kFilmLampX, row, 4, 20);
     film.push_back(detect(scene.image({.seed = static_cast<std::uint64_t>(i)}).view()));
   }
   return film;
@@ -103,7 +105,7 @@ TEST(Film, ASpotThatStandsWhileTheDotWalksIsNone) {
   for (std::size_t i = 0; i < settled.size(); ++i) {
     ASSERT_EQ(settled[i].state, SmearState::dot) << settled[i].reason;
     ASSERT_EQ(settled[i].dots.size(), 1U);
-    EXPECT_NEAR(settled[i].dots[0].y.value(), kLampY - 30 - 3.0 * static_cast<double>(i), 0.3);
+    EXPECT_NEAR(settled[i].dots[0].y.value(), kFilmLampY - 30 - 3.0 * static_cast<double>(i), 0.3);
   }
 }
 
@@ -111,10 +113,10 @@ TEST(Film, ASpotThatStandsWhileTheDotWalksIsNone) {
 TEST(Film, ACombThatStandsStaysAComb) {
   std::vector<SmearReading> film;
   for (int i = 0; i < 12; ++i) {
-    SmearScene scene = lamp_scene();
-    for (int tooth = 1; tooth <= 4; ++tooth) scene.disk(kLampX, kLampY - 30 * tooth, 4, 20);
-    if (i % 3 == 0) scene.disk(kLampX, kLampY + 30, 4, 20);
-    if (i % 3 == 1) scene.disk(kLampX, kLampY + 60, 4, 20);
+    SmearScene scene = film_scene();
+    for (int tooth = 1; tooth <= 4; ++tooth) scene.disk(kFilmLampX, kFilmLampY - 30 * tooth, 4, 20);
+    if (i % 3 == 0) scene.disk(kFilmLampX, kFilmLampY + 30, 4, 20);
+    if (i % 3 == 1) scene.disk(kFilmLampX, kFilmLampY + 60, 4, 20);
     film.push_back(detect(scene.image({.seed = static_cast<std::uint64_t>(i)}).view()));
     ASSERT_EQ(film.back().state, SmearState::comb) << film.back().reason;
   }

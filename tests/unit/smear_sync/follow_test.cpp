@@ -12,17 +12,17 @@ namespace {
 
 using test::SmearScene;
 
-constexpr double kLampX = 161.3;
-constexpr double kLampY = 200.4;
+constexpr double kFollowedX = 161.3;
+constexpr double kFollowedY = 200.4;
 
-SmearScene lamp_scene() { return SmearScene(320, 360).disk(kLampX, kLampY, 4, 3000); }
+SmearScene followed_scene() { return SmearScene(320, 360).disk(kFollowedX, kFollowedY, 4, 3000); }
 
 TEST(Follow, EveryFrameReadsAsItDoesAlone) {
   FollowingDetector detector;
   for (std::uint64_t i = 0; i < 150; ++i) {
-    SmearScene scene = lamp_scene();
+    SmearScene scene = followed_scene();
     const double row = 20 + static_cast<double>(i);
-    if (std::abs(row - kLampY) > 20 && i % 5 != 0) scene.disk(kLampX, row, 4, 15);
+    if (std::abs(row - kFollowedY) > 20 && i % 5 != 0) scene.disk(kFollowedX, row, 4, 15);
     const Image image = scene.image({.seed = i});
     const SmearReading followed = detector.read(image.view());
     const SmearReading alone = detect(image.view());
@@ -36,7 +36,7 @@ TEST(Follow, EveryFrameReadsAsItDoesAlone) {
 
 TEST(Follow, TheLampGoesOutAndComesBackElsewhere) {
   FollowingDetector detector;
-  const Image lit = lamp_scene().image({});
+  const Image lit = followed_scene().image({});
   const Image dark = SmearScene(320, 360).image({});
   const Image moved = SmearScene(320, 360).disk(80.2, 120.1, 4, 3000).disk(80.2, 180.1, 4, 20).image({});
   EXPECT_EQ(detector.read(lit.view()).state, SmearState::no_dot);
@@ -49,16 +49,16 @@ TEST(Follow, TheLampGoesOutAndComesBackElsewhere) {
 
 TEST(Follow, ASaturatedLampIsMeasuredAgainOnceItMovesByAFractionOfAPixel) {
   FollowingDetector detector;
-  const Rows before = detector.read(lamp_scene().image({.seed = 1}).view()).lamp->y;
-  EXPECT_EQ(detector.read(lamp_scene().image({.seed = 2}).view()).lamp->y, before);
-  const Image moved = SmearScene(320, 360).disk(kLampX, kLampY + 0.3, 4, 3000).image({.seed = 3});
+  const Rows before = detector.read(followed_scene().image({.seed = 1}).view()).lamp->y;
+  EXPECT_EQ(detector.read(followed_scene().image({.seed = 2}).view()).lamp->y, before);
+  const Image moved = SmearScene(320, 360).disk(kFollowedX, kFollowedY + 0.3, 4, 3000).image({.seed = 3});
   EXPECT_EQ(detector.read(moved.view()).lamp->y, detect(moved.view()).lamp->y);
 }
 
 TEST(Follow, AReflectionThatAppearsInTheLampsColumnIsNoDot) {
   FollowingDetector detector;
-  EXPECT_EQ(detector.read(lamp_scene().image({}).view()).state, SmearState::no_dot);
-  const Image image = lamp_scene().disk(kLampX, 280.3, 4, 3000).image({});
+  EXPECT_EQ(detector.read(followed_scene().image({}).view()).state, SmearState::no_dot);
+  const Image image = followed_scene().disk(kFollowedX, 280.3, 4, 3000).image({});
   const SmearReading r = detector.read(image.view());
   EXPECT_EQ(r.state, SmearState::ambiguous) << r.reason;
   EXPECT_TRUE(r.dots.empty());
@@ -66,10 +66,13 @@ TEST(Follow, AReflectionThatAppearsInTheLampsColumnIsNoDot) {
 
 TEST(Follow, ASecondLampInAnotherColumnIsSeenWithinSixteenFrames) {
   FollowingDetector detector;
-  detector.read(lamp_scene().image({}).view());
+  detector.read(followed_scene().image({}).view());
   // With another dot than the first one's: the two disagree.
-  const Image image =
-      lamp_scene().disk(kLampX, 280.4, 4, 20).disk(60.4, 90.2, 4, 3000).disk(60.4, 140.2, 4, 20).image({});
+  const Image image = followed_scene()
+                          .disk(kFollowedX, 280.4, 4, 20)
+                          .disk(60.4, 90.2, 4, 3000)
+                          .disk(60.4, 140.2, 4, 20)
+                          .image({});
   SmearState state = SmearState::dot;
   for (int i = 0; i < 16 && state != SmearState::ambiguous; ++i) state = detector.read(image.view()).state;
   EXPECT_EQ(state, SmearState::ambiguous);
@@ -77,7 +80,7 @@ TEST(Follow, ASecondLampInAnotherColumnIsSeenWithinSixteenFrames) {
 
 TEST(Follow, OtherFormatsAndMalformedFramesBetween) {
   FollowingDetector detector;
-  const SmearScene scene = lamp_scene().disk(kLampX, 280.4, 4, 20);
+  const SmearScene scene = followed_scene().disk(kFollowedX, 280.4, 4, 20);
   EXPECT_EQ(detector.read(scene.image({}).view()).state, SmearState::dot);
   EXPECT_EQ(detector.read(ImageView{}).state, SmearState::no_lamp);
   for (const PixelFormat format : {PixelFormat::bayer_rggb8, PixelFormat::rgb8, PixelFormat::gray8}) {

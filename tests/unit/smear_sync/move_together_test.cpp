@@ -13,7 +13,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr Seconds kPeriod{1 / 23.976};
+constexpr Seconds kCommonPeriod{1 / 23.976};
 const Seconds kMoved = milliseconds(2);
 constexpr auto kWith = DotMotion::with_all;
 
@@ -23,7 +23,7 @@ DotMove moved_by(double ms, double sigma_ms = 0.02) {
 }
 
 std::vector<DotMotion> motions_of(const std::vector<std::optional<DotMove>>& cameras) {
-  return move_together(cameras, kPeriod);
+  return move_together(cameras, kCommonPeriod);
 }
 
 TEST(MoveTogether, ASpotThatStandsOrMovesOtherwiseIsFound) {
@@ -45,8 +45,8 @@ TEST(MoveTogether, WhatAllCamerasShareSpeaksAgainstNone) {
 
 TEST(MoveTogether, AMoveGoesRoundTheFramePeriod) {
   DotMove across = moved_by(2);
-  across.strobe = across.strobe - kPeriod;
-  across.seen = across.seen + kPeriod;
+  across.strobe = across.strobe - kCommonPeriod;
+  across.seen = across.seen + kCommonPeriod;
   EXPECT_THAT(motions_of({across, moved_by(2)}), ElementsAre(kWith, kWith));
 }
 
@@ -70,7 +70,8 @@ class ThreeCameras {
     round.strobe_phase = strobe_;
     for (const double gain : gains_) {
       const Seconds tau = milliseconds(16) + gain * strobe_;
-      round.cameras.push_back({{PhaseState::known, wrap_positive(tau, kPeriod), microseconds(16), {}}, {}});
+      round.cameras.push_back(
+          {{PhaseState::known, wrap_positive(tau, kCommonPeriod), microseconds(16), {}}, {}});
     }
     if (rough_ > Seconds(0)) round.cameras[2].phase.sigma = rough_;
     AlignStep step = align_step(state_, round, cameras_, {});

@@ -7,7 +7,7 @@
 namespace emberlock {
 namespace {
 
-const AlignOptions kOptions;
+const AlignOptions kAlignOptions;
 
 /// A state in which cameras 0.. have shown these delays, ms; camera n is the next one.
 struct Taught {
@@ -18,10 +18,11 @@ struct Taught {
       cameras.push_back({"cam" + std::to_string(i), "ccd", ResetMethod::on_command, {}, {}});
     state.cameras.resize(cameras.size());
     for (std::size_t i = 0; i < delays.size(); ++i)
-      learn_delay(state, cameras, kOptions, i, wrap_positive(milliseconds(delays[i]), kOptions.period));
+      learn_delay(state, cameras, kAlignOptions, i,
+                  wrap_positive(milliseconds(delays[i]), kAlignOptions.period));
   }
   [[nodiscard]] std::optional<ResetDelay> next() const {
-    return expected_delay(state, cameras, kOptions, cameras.size() - 1);
+    return expected_delay(state, cameras, kAlignOptions, cameras.size() - 1);
   }
 };
 
@@ -41,10 +42,10 @@ TEST(ResetDelay, CamerasThatDifferSayThatTheNextMayToo) {
 }
 
 TEST(ResetDelay, DelaysAboutTheWrapAreNeighbours) {
-  const double period = in_milliseconds(kOptions.period);
+  const double period = in_milliseconds(kAlignOptions.period);
   const auto next = Taught({0.05, period - 0.05, 0.02}).next();
   ASSERT_TRUE(next);
-  EXPECT_LT(abs(wrap_symmetric(next->mean, kOptions.period)), milliseconds(0.1));
+  EXPECT_LT(abs(wrap_symmetric(next->mean, kAlignOptions.period)), milliseconds(0.1));
 }
 
 // Every camera was told a delay that is 3 ms too short: the first two that show it correct the others.
@@ -58,21 +59,21 @@ TEST(ResetDelay, ABiasOfAllThatWasToldIsLearntFromTheFirst) {
                            {}});
   }
   rig.state.cameras.resize(4);
-  learn_delay(rig.state, rig.cameras, kOptions, 1, milliseconds(8));
-  learn_delay(rig.state, rig.cameras, kOptions, 2, milliseconds(9));
-  EXPECT_NEAR(in_milliseconds(expected_delay(rig.state, rig.cameras, kOptions, 3)->mean), 10, 0.2);
+  learn_delay(rig.state, rig.cameras, kAlignOptions, 1, milliseconds(8));
+  learn_delay(rig.state, rig.cameras, kAlignOptions, 2, milliseconds(9));
+  EXPECT_NEAR(in_milliseconds(expected_delay(rig.state, rig.cameras, kAlignOptions, 3)->mean), 10, 0.2);
 }
 
 TEST(ResetDelay, JitterIsLearntFromRepeatedResets) {
   Taught rig({});
   RandomStream random(5, 1);
   for (int i = 0; i < 60; ++i)
-    learn_delay(rig.state, rig.cameras, kOptions, 0, milliseconds(20 + random.normal(0, 0.6)));
-  EXPECT_NEAR(in_milliseconds(learnt_jitter(rig.state, kOptions)), 0.6, 0.12);
+    learn_delay(rig.state, rig.cameras, kAlignOptions, 0, milliseconds(20 + random.normal(0, 0.6)));
+  EXPECT_NEAR(in_milliseconds(learnt_jitter(rig.state, kAlignOptions)), 0.6, 0.12);
 }
 
 TEST(ResetDelay, HandsDrawEvenlyUntilTheirShiftsShowOtherwise) {
-  const Seconds period = kOptions.period;
+  const Seconds period = kAlignOptions.period;
   const Seconds tolerance = milliseconds(2);
   const double even = chance_by_hand({}, milliseconds(9), tolerance, period);
   EXPECT_NEAR(even, 2 * (tolerance / period), 1e-12);

@@ -27,8 +27,8 @@ struct Camera {
   int frames = 240;
 };
 
-constexpr double kRowTime = 54e-6;
-constexpr int kRows = 720;
+constexpr double kClipRowTime = 54e-6;
+constexpr int kClipRows = 720;
 double period_of(const Camera& c) { return (1 + c.ppm * 1e-6) / 23.976; }
 
 struct Strobe {
@@ -46,11 +46,11 @@ ClipReading film(const Camera& camera, const Strobe& strobe, const std::string& 
     const long n = strobe.code.flashes();
     return !strobe.coded || pattern[static_cast<std::size_t>(((j % n) + n) % n)];
   };
-  const double order = camera.direction > 0 ? camera.lamp : kRows - 1 - camera.lamp;
+  const double order = camera.direction > 0 ? camera.lamp : kClipRows - 1 - camera.lamp;
   RandomStream random(seed, 5);
   ClipReading clip;
   clip.file = clip.name = name;
-  clip.rows = kRows;
+  clip.rows = kClipRows;
   clip.claimed_rate = Hertz(23.976);
   for (int i = 0; static_cast<int>(clip.frames.size()) < camera.frames; ++i) {
     const double begin = camera.start + i * period_of(camera);
@@ -62,11 +62,11 @@ ClipReading film(const Camera& camera, const Strobe& strobe, const std::string& 
       const double after = static_cast<double>(j) * flashes - begin;
       if (after < 0 && after >= -period_of(camera)) lit = true;
       for (const int earlier : {0, 1}) {
-        const double k = std::floor((after + earlier * period_of(camera)) / kRowTime);
+        const double k = std::floor((after + earlier * period_of(camera)) / kClipRowTime);
         if (k < 0 || k >= camera.shifts) continue;
         const double packet = order + k - earlier * camera.shifts;
-        const bool here = earlier == 0 ? packet <= kRows - 1 : packet >= 0;
-        const double row = camera.direction > 0 ? packet : kRows - 1 - packet;
+        const bool here = earlier == 0 ? packet <= kClipRows - 1 : packet >= 0;
+        const double row = camera.direction > 0 ? packet : kClipRows - 1 - packet;
         if (here && std::abs(row - camera.lamp) > 12) dots.push_back(row);
       }
     }
@@ -93,7 +93,7 @@ ClipReading film(const Camera& camera, const Strobe& strobe, const std::string& 
 VerifyOptions options_of(const Strobe& strobe) {
   VerifyOptions options;
   options.clip.flash_rate = Hertz(strobe.rate);
-  options.clip.row_time = SecondsPerRow(kRowTime);
+  options.clip.row_time = SecondsPerRow(kClipRowTime);
   options.clip.code = strobe.code;
   return options;
 }

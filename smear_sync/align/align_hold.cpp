@@ -1,0 +1,172 @@
+#include "smear_sync/align/align_hold.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "smear_sync/align/align_look.h"
+#include "smear_sync/align/align_words.h"
+
+namespace emberlock {
+namespace {
+
+/// The next check comes before any of the cameras leaves by so many standard errors, and by so much more than
+/// its rate usually wanders.
+constexpr double kScheduleSigmas = 3;
+constexpr double kScheduleWander = 2;
+
+/// Resets aim to land within tolerance by so many standard errors and this part of it.
+constexpr double kAimSigmas = 4;
+constexpr double kAimPart = 0.1;
+/// One whose landing is known to less than this part of it can't be aimed.
+constexpr double kAimedPart = 0.2;
+/// A rate is believed but for so many standard errors; what drifts through half of the tolerance in longer
+/// than this, it will do otherwise by then.
+constexpr double kBelievedSigmas = 2;
+constexpr Seconds kForeseeable{1800};
+
+/// A camera is reset when less is left of its stay than this part of what a reset would give it, or than so
+/// many rounds.
+constexpr double kDuePart = 0.08;
+constexpr double kDueRounds = 2;
+/// One that would leave before the next reset can be needed goes with it if that gives it so much more.
+constexpr double kWorthwhile = 1.1;
+/// Rounds after which a renewal isn't one any more.
+constexpr int kLongestRenewal = 12;
+
+TimeLeftOptions schedule(const AlignContext& c) {
+  return {.tolerance = c.tolerance,
+          .period = c.options.period,
+          .sigmas = kScheduleSigmas,
+          .wander_per_minute = kScheduleWander * c.options.rate_wander};
+}
+
+Seconds sure_stay(const Drift& course, const AlignContext& c) {
+  return time_left(course, c.round.at, schedule(c)).earliest;
+}
+
+/// How long it would if it stood at this error.
+Seconds stay_from(Drift course, Seconds error, Seconds sigma, const AlignContext& c) {
+  course.tau = wrap_positive(error, c.options.period);
+  course.tau_sigma = sigma;
+  return sure_stay(course, c);
+}
+
+}  // namespace
+
+std::vector<Drift> courses_of(const AlignState& state, const AlignDecision& decision,
+                              const std::vector<Drift>& drifts, const AlignContext& c) {
+  std::vector<double> rates;
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    const PhaseTrack& phase = state.cameras[i].phase;
+    const TimePoint later = c.round.at + Seconds(1e6);  // when all that was ordered is in force
+    rates.push_back((drifts[i].rate + decision.cameras[i].trim.value_or(phase.trim(later))).value());
+  }
+  const auto [slowest, fastest] = std::minmax_element(rates.begin(), rates.end());
+  const bool fixed = c.options.policy == AlignPolicy::fixed_reference;
+  const double common = state.target ? state.target->rate.value()
+                        : fixed      ? rates[c.options.reference]
+                                     : (*slowest + *fastest) / 2;
+  const double common_sigma = fixed ? drifts[c.options.reference].rate_sigma.value() : 0;
+  std::vector<Drift> courses = drifts;
+  for (std::size_t i = 0; i < drifts.size(); ++i) {
+    Drift& course = courses[i];
+    course.tau = wrap_positive(*decision.cameras[i].error, c.options.period);
+    course.rate = PartsPerMillion(rates[i] - common);
+    course.rate_sigma = PartsPerMillion(std::hypot(drifts[i].rate_sigma.value(), common_sigma));
+    if (fixed && i == c.options.reference) course.rate_sigma = PartsPerMillion(0);
+  }
+  return courses;
+}
+
+Seconds aim_of(const Drift& course, Seconds landing, const AlignContext& c) {
+  const Seconds room = std::max((1 - kAimPart) * c.tolerance - kAimSigmas * landing, Seconds(0));
+  const double believed =
+      std::max(std::abs(course.rate.value()) - kBelievedSigmas * course.rate_sigma.value(), 0.0);
+  const Seconds before = std::min(room, kForeseeable * (believed * 1e-6));
+  return course.rate > PartsPerMillion(0) ? -before : before;
+}
+
+bool renew(AlignState& state, AlignDecision& decision, const std::vector<Drift>& courses,
+           const AlignContext& c, const AlignScene& scene) {
+  std::vector<Seconds> stays;
+  std::vector<Seconds> fresh;  // stays after a reset
+  std::vector<bool> aimed;
+  Seconds soonest(std::numeric_limits<double>::infinity());  // that one which is aimed is needed again
+  bool due = false;
+  for (std::size_t i = 0; i < courses.size(); ++i) {
+    const auto& landing = scene.landings[i].aim;
+    aimed.push_back(scene.timed(i) && landing && *landing < kAimedPart * c.tolerance);
+    stays.push_back(sure_stay(courses[i], c));
+    fresh.push_back(stay_from(courses[i], aimed[i] ? aim_of(courses[i], *landing, c) : Seconds(0),
+                              aimed[i] ? *landing : courses[i].tau_sigma, c));
+    if (aimed[i]) soonest = std::min(soonest, fresh[i]);
+    const Seconds rounds = kDueRounds * c.options.round_time;
+    const Seconds least = aimed[i] ? std::max(rounds, kDuePart * fresh[i]) : rounds;
+    // Where nothing is surer after a reset than before there is no use in it.
+    const bool now = scene.movable(i) && stays[i] < least && fresh[i] > kWorthwhile * stays[i];
+    decision.cameras[i].reset = now;
+    due = due || now;
+  }
+  if (!due) return false;
+  decision.renews = true;
+  std::string who;
+  for (std::size_t i = 0; i < courses.size(); ++i) {
+    CameraDecision& camera = decision.cameras[i];
+    if (aimed[i] && stays[i] < soonest && fresh[i] > kWorthwhile * stays[i]) camera.reset = true;
+    if (!camera.reset) continue;
+    // One that is drawn at random may take long to come back.
+    decision.renews = decision.renews && scene.timed(i);
+    state.cameras[i].renewed = true;
+    who += (who.empty() ? "" : ", ") + c.cameras[i].id;
+    camera.reason = standing(*camera.error, c.options.row_time) + ", and may leave tolerance in " +
+                    words(stays[i]) +
+                    (c.cameras[i].method == ResetMethod::by_hand ? ": reset its shutter by hand"
+                                                                 : ": its shutter is reset before");
+  }
+  decision.reason = "every camera lies within tolerance; " + who + " would leave it before long";
+  if (decision.renews) state.renewal = 1;
+  return true;
+}
+
+void follow_renewal(AlignState& state, AlignDecision& decision, const AlignContext& c) {
+  if (decision.renews) return;  // it has just begun
+  bool on = state.renewal > 0 && ++state.renewal <= kLongestRenewal &&
+            decision.verdict == AlignVerdict::go_on && decision.jumped.empty();
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    const CameraTrack& track = state.cameras[i];
+    const std::optional<Seconds>& error = decision.cameras[i].error;
+    const bool in = where(track, c) && (!error || abs(*error) <= c.tolerance);
+    on = on && !track.away && (track.renewed || in);
+  }
+  decision.renews = on;
+  if (on) return;
+  state.renewal = 0;
+  for (CameraTrack& track : state.cameras) track.renewed = false;
+}
+
+void foresee(const AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
+             const AlignContext& c) {
+  const std::vector<Drift> courses = courses_of(state, decision, drifts, c);
+  Seconds soonest(std::numeric_limits<double>::infinity());
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < courses.size(); ++i) {
+    decision.cameras[i].time_left = time_left(
+        courses[i], c.round.at,
+        {.tolerance = c.tolerance, .period = c.options.period, .wander_per_minute = c.options.rate_wander});
+    const Seconds sure = sure_stay(courses[i], c);
+    if (sure >= soonest) continue;
+    soonest = sure;
+    first = i;
+  }
+  if (decision.verdict != AlignVerdict::aligned) return;
+  decision.next_check = soonest;
+  if (std::isfinite(soonest.value())) {
+    decision.reason += "; film the strobe again within " + words(soonest) + ", before " +
+                       c.cameras[first].id + " may have drifted out";
+  }
+}
+
+}  // namespace emberlock

@@ -9,6 +9,7 @@ extern "C" {
 #include <limits>
 #include <utility>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 #include "session/files.h"
@@ -144,7 +145,20 @@ Status SegmentWriter::put_packet() {
   av_packet_unref(packet_.get());
   if (code >= 0) code = file_->io()->error;
   if (code < 0) return failure(code, "cannot write");
+  start_writeback();
   return {};
+}
+
+/// Left to itself the kernel keeps seconds of frames in memory, and flushing them when the segment is closed,
+/// of all cameras at once, would fill the queues.
+void SegmentWriter::start_writeback() {
+  constexpr std::uint64_t kStep = std::uint64_t{8} << 20;
+  const std::uint64_t written = bytes();
+  if (written - on_its_way_ < kStep) return;
+  // Where it isn't known how to, the flush at the end does it all.
+  ::sync_file_range(file_->fd(), static_cast<off64_t>(on_its_way_),
+                    static_cast<off64_t>(written - on_its_way_), SYNC_FILE_RANGE_WRITE);
+  on_its_way_ = written;
 }
 
 Status SegmentWriter::close() {

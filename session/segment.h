@@ -38,6 +38,7 @@ class SegmentWriter {
   Status put_uncompressed(const Image& image, std::uint32_t milliseconds);
   Status drain();
   Status put_packet();
+  void start_writeback();
   [[nodiscard]] Error failure(int code, const char* action) const;
 
   ImageLayout layout_;
@@ -47,6 +48,7 @@ class SegmentWriter {
   AvPtr<AVCodecContext> encoder_;
   AvPtr<AVFrame> frame_;
   AvPtr<AVPacket> packet_;
+  std::uint64_t on_its_way_ = 0;  ///< bytes that the kernel has been told to write
 };
 
 /// Decodes frames of one segment file by their time stamps.

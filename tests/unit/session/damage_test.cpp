@@ -31,7 +31,7 @@ using test::record;
 using test::small_disk_options;
 using test::TempFolder;
 
-const ImageLayout kLayout{{48, 32}, PixelFormat::gray8, 8};
+const ImageLayout kDamagedLayout{{48, 32}, PixelFormat::gray8, 8};
 
 /// Reads every frame: those that come must be those recorded. Returns how many came.
 std::size_t count_good(SessionReader& reader, const ImageLayout& layout) {
@@ -52,11 +52,11 @@ TEST(DamagedSession, AMissingSegmentCostsItsOwnFramesAlone) {
   const TempFolder temp;
   WriterOptions options = small_disk_options();
   options.frames_per_segment = 3;
-  record(temp / "s", kLayout, 9, options);
+  record(temp / "s", kDamagedLayout, 9, options);
   std::filesystem::remove(temp / "s/cam0/000001.mkv");
   auto reader = SessionReader::open(temp / "s");
   ASSERT_TRUE(reader);
-  EXPECT_EQ(count_good(*reader, kLayout), 6U);
+  EXPECT_EQ(count_good(*reader, kDamagedLayout), 6U);
   const auto lost = reader->read(0, 4);
   ASSERT_FALSE(lost);
   EXPECT_NE(lost.error().message().find("000001.mkv"), std::string::npos);
@@ -66,7 +66,7 @@ class FlippedBytes : public testing::TestWithParam<Encoding> {};
 
 TEST_P(FlippedBytes, InASegmentAreReportedAndNeverHandedOnAsGood) {
   const TempFolder temp;
-  record(temp / "s", kLayout, 6, small_disk_options(GetParam()));
+  record(temp / "s", kDamagedLayout, 6, small_disk_options(GetParam()));
   const auto path = find_segment(temp / "s", "cam0", 0);
   const std::string whole = bytes_of(path);
   std::size_t worst = 6;
@@ -76,14 +76,14 @@ TEST_P(FlippedBytes, InASegmentAreReportedAndNeverHandedOnAsGood) {
     put_bytes(path, bytes);
     auto reader = SessionReader::open(temp / "s");
     ASSERT_TRUE(reader);
-    worst = std::min(worst, count_good(*reader, kLayout));
+    worst = std::min(worst, count_good(*reader, kDamagedLayout));
   }
   EXPECT_LT(worst, 6U) << "no flip was noticed at all";
 }
 
 TEST_P(FlippedBytes, InPixelDataCostOneFrame) {
   const TempFolder temp;
-  record(temp / "s", kLayout, 6, small_disk_options(GetParam()));
+  record(temp / "s", kDamagedLayout, 6, small_disk_options(GetParam()));
   const auto path = find_segment(temp / "s", "cam0", 0);
   std::string bytes = bytes_of(path);
   const std::size_t middle = bytes.size() / 2;  // noise doesn't compress: far from any header
@@ -91,37 +91,37 @@ TEST_P(FlippedBytes, InPixelDataCostOneFrame) {
   put_bytes(path, bytes);
   auto reader = SessionReader::open(temp / "s");
   ASSERT_TRUE(reader);
-  EXPECT_EQ(count_good(*reader, kLayout), 5U);
+  EXPECT_EQ(count_good(*reader, kDamagedLayout), 5U);
 }
 
 INSTANTIATE_TEST_SUITE_P(DamagedSession, FlippedBytes, testing::Values(Encoding::ffv1, Encoding::raw_nut));
 
 TEST(DamagedSession, ATruncatedSegmentKeepsTheFramesBeforeTheCut) {
   const TempFolder temp;
-  record(temp / "s", kLayout, 8, small_disk_options(Encoding::raw_nut));
+  record(temp / "s", kDamagedLayout, 8, small_disk_options(Encoding::raw_nut));
   const auto path = find_segment(temp / "s", "cam0", 0);
   std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
   auto reader = SessionReader::open(temp / "s");
   ASSERT_TRUE(reader);
-  const std::size_t good = count_good(*reader, kLayout);
+  const std::size_t good = count_good(*reader, kDamagedLayout);
   EXPECT_GE(good, 3U);
   EXPECT_LE(good, 4U);
 }
 
 TEST(DamagedSession, ASegmentOfAnotherCameraIsNotTakenForThisOne) {
   const TempFolder temp;
-  record(temp / "a", kLayout, 3, small_disk_options());
+  record(temp / "a", kDamagedLayout, 3, small_disk_options());
   record(temp / "b", {{32, 48}, PixelFormat::gray8, 8}, 3, small_disk_options());
   std::filesystem::copy_file(temp / "b/cam0/000000.mkv", temp / "a/cam0/000000.mkv",
                              std::filesystem::copy_options::overwrite_existing);
   auto reader = SessionReader::open(temp / "a");
   ASSERT_TRUE(reader);
-  EXPECT_EQ(count_good(*reader, kLayout), 0U);
+  EXPECT_EQ(count_good(*reader, kDamagedLayout), 0U);
 }
 
 TEST(DamagedSession, AnIndexWithABadRecordIsRefusedUntilSalvaged) {
   const TempFolder temp;
-  record(temp / "s", kLayout, 5, small_disk_options());
+  record(temp / "s", kDamagedLayout, 5, small_disk_options());
   const auto path = index_path(temp / "s", "cam0");
   std::string bytes = bytes_of(path);
   bytes[kIndexHeaderBytes + 2 * kIndexRecordBytes] ^= 1;
@@ -136,12 +136,12 @@ TEST(DamagedSession, AnIndexWithABadRecordIsRefusedUntilSalvaged) {
   auto reader = SessionReader::open(temp / "s");
   ASSERT_TRUE(reader) << reader.error().message();
   EXPECT_EQ(reader->manifest().state(), v1::Manifest::SALVAGED);
-  EXPECT_EQ(count_good(*reader, kLayout), 4U);
+  EXPECT_EQ(count_good(*reader, kDamagedLayout), 4U);
 }
 
 TEST(DamagedSession, TornEventsAreRefusedUntilSalvaged) {
   const TempFolder temp;
-  auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options());
+  auto writer = SessionWriter::create(temp / "s", manifest_of({kDamagedLayout}), small_disk_options());
   ASSERT_TRUE(writer);
   v1::Event event;
   event.set_note("kept");
@@ -162,7 +162,7 @@ TEST(DamagedSession, TornEventsAreRefusedUntilSalvaged) {
 
 TEST(Salvage, LeavesAFinishedSessionAlone) {
   const TempFolder temp;
-  record(temp / "s", kLayout, 5, small_disk_options());
+  record(temp / "s", kDamagedLayout, 5, small_disk_options());
   const std::string before = bytes_of(manifest_path(temp / "s"));
   const auto report = salvage(temp / "s");
   ASSERT_TRUE(report);
@@ -172,7 +172,7 @@ TEST(Salvage, LeavesAFinishedSessionAlone) {
 
 TEST(Salvage, OfASessionThatIsStillRecordedIsRefused) {
   const TempFolder temp;
-  auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options());
+  auto writer = SessionWriter::create(temp / "s", manifest_of({kDamagedLayout}), small_disk_options());
   ASSERT_TRUE(writer);
   const auto report = salvage(temp / "s");
   ASSERT_FALSE(report);
@@ -181,7 +181,10 @@ TEST(Salvage, OfASessionThatIsStillRecordedIsRefused) {
 
 TEST(Salvage, OfAWriterThatWentAwayBeforeItsFirstFrame) {
   const TempFolder temp;
-  { ASSERT_TRUE(SessionWriter::create(temp / "s", manifest_of({kLayout, kLayout}), small_disk_options())); }
+  {
+    ASSERT_TRUE(SessionWriter::create(temp / "s", manifest_of({kDamagedLayout, kDamagedLayout}),
+                                      small_disk_options()));
+  }
   std::filesystem::remove_all(temp / "s/cam1");
   const auto report = salvage(temp / "s");
   ASSERT_TRUE(report) << report.error().message();
@@ -196,12 +199,12 @@ constexpr std::size_t kCameras = 11;
 [[noreturn]] void record_until_killed(const std::filesystem::path& folder, Encoding encoding, int progress) {
   WriterOptions options = small_disk_options(encoding);
   options.frames_per_segment = 150;
-  auto session = SessionWriter::create(folder, manifest_of(std::vector(kCameras, kLayout)), options);
+  auto session = SessionWriter::create(folder, manifest_of(std::vector(kCameras, kDamagedLayout)), options);
   if (!session) ::_exit(1);
   AsyncWriter writer(std::move(session).value());
   for (std::uint64_t i = 0; i <= 400; ++i) {
     for (std::size_t c = 0; c < kCameras; ++c) {
-      if (!writer.push(c, noise_frame(kLayout, i, c))) ::_exit(1);
+      if (!writer.push(c, noise_frame(kDamagedLayout, i, c))) ::_exit(1);
     }
     for (std::size_t c = 0; c < kCameras; ++c) {
       while (writer.progress(c).counts.recorded() <= i) std::this_thread::yield();
@@ -221,7 +224,7 @@ void expect_a_player_opens(const std::filesystem::path& file) {
   int width = 0;
   int frames = 0;
   EXPECT_EQ(std::sscanf(probed.output.c_str(), "%d,%d", &width, &frames), 2) << probed.output;
-  EXPECT_EQ(width, kLayout.size.width);
+  EXPECT_EQ(width, kDamagedLayout.size.width);
   EXPECT_GT(frames, 25) << file;
 }
 
@@ -260,7 +263,7 @@ TEST_P(KilledRecorder, LosesAtMostHalfASecondOfEachOfElevenCameras) {
     const std::size_t kept = reader->stamps(c).size();
     EXPECT_GE(kept + 50, written);
     EXPECT_EQ(kept, report->cameras.at(c).kept);
-    EXPECT_EQ(*reader->read(c, kept - 1)->image, *noise_frame(kLayout, kept - 1, c).image);
+    EXPECT_EQ(*reader->read(c, kept - 1)->image, *noise_frame(kDamagedLayout, kept - 1, c).image);
     EXPECT_EQ(reader->manifest().cameras(static_cast<int>(c)).segments_size(), 3);
   }
 }

@@ -27,8 +27,8 @@ using test::noise_frame;
 using test::small_disk_options;
 using test::TempFolder;
 
-const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
-constexpr std::uint64_t kFrames = 2000;  // 6 MB a camera
+const ImageLayout kFullDiskLayout{{64, 48}, PixelFormat::gray8, 8};
+constexpr std::uint64_t kManyFrames = 2000;  // 6 MB a camera
 constexpr int kNoNamespace = 77;
 
 /// Runs `body` in a child process; it says by its text what went wrong. Returns the exit code.
@@ -56,11 +56,12 @@ std::string mount_small_disk(const std::filesystem::path& at, int megabytes) {
 
 /// Records two cameras until all frames were offered; says what doesn't add up.
 std::string record_all(const std::filesystem::path& folder, Encoding encoding, std::uint64_t& lost) {
-  auto session = SessionWriter::create(folder, manifest_of({kLayout, kLayout}), small_disk_options(encoding));
+  auto session = SessionWriter::create(folder, manifest_of({kFullDiskLayout, kFullDiskLayout}),
+                                       small_disk_options(encoding));
   if (!session) return session.error().message();
-  AsyncWriter writer(std::move(session).value(), {.queue_frames = kFrames});
-  for (std::uint64_t i = 0; i < kFrames; ++i) {
-    for (const std::size_t camera : {0, 1}) writer.push(camera, noise_frame(kLayout, i, camera));
+  AsyncWriter writer(std::move(session).value(), {.queue_frames = kManyFrames});
+  for (std::uint64_t i = 0; i < kManyFrames; ++i) {
+    for (const std::size_t camera : {0, 1}) writer.push(camera, noise_frame(kFullDiskLayout, i, camera));
   }
   const auto manifest = writer.finish();
   if (!manifest) return manifest.error().message();
@@ -68,7 +69,8 @@ std::string record_all(const std::filesystem::path& folder, Encoding encoding, s
   if (!writer.failure()) return "nobody was told";
   lost = 0;
   for (const v1::CameraStream& camera : manifest->cameras()) {
-    if (camera.counts().recorded() + camera.counts().disk() != kFrames) return "a frame is unaccounted for";
+    if (camera.counts().recorded() + camera.counts().disk() != kManyFrames)
+      return "a frame is unaccounted for";
     if (camera.counts().recorded() < 100) return "what was written before isn't kept";
     lost += camera.counts().disk();
   }
@@ -87,7 +89,7 @@ TEST_P(FullDisk, InMidRecordingKeepsWhatIsWrittenFinishesTheManifestAndCountsThe
     if (std::string wrong = mount_small_disk(temp.path(), 5); !wrong.empty()) return wrong;
     std::uint64_t lost = 0;
     std::string wrong = record_all(temp / "s", GetParam(), lost);
-    return wrong.empty() && lost < kFrames ? "the disk held more than it can" : wrong;
+    return wrong.empty() && lost < kManyFrames ? "the disk held more than it can" : wrong;
   });
   ASSERT_NE(code, kNoNamespace) << "nobody may mount here: run as root, or allow user namespaces";
   EXPECT_EQ(code, 0);
@@ -97,15 +99,16 @@ TEST_P(FullDisk, ThatHasRoomAgainIsRecordedToInANewSegment) {
   const TempFolder temp;
   const int code = in_a_process([&]() -> std::string {
     if (std::string wrong = mount_small_disk(temp.path(), 6); !wrong.empty()) return wrong;
-    auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options(GetParam()));
+    auto writer =
+        SessionWriter::create(temp / "s", manifest_of({kFullDiskLayout}), small_disk_options(GetParam()));
     if (!writer) return writer.error().message();
     test::put_bytes(temp / "other", std::string(std::size_t{4} << 20, 'x'));
     std::uint64_t i = 0;
-    while (i < kFrames && writer->write(0, noise_frame(kLayout, i, 0)).ok()) ++i;
-    if (i == kFrames) return "the disk wasn't full";
+    while (i < kManyFrames && writer->write(0, noise_frame(kFullDiskLayout, i, 0)).ok()) ++i;
+    if (i == kManyFrames) return "the disk wasn't full";
     std::filesystem::remove(temp / "other");
     const std::uint64_t full_at = i;
-    while (i < full_at + 300) static_cast<void>(writer->write(0, noise_frame(kLayout, ++i, 0)));
+    while (i < full_at + 300) static_cast<void>(writer->write(0, noise_frame(kFullDiskLayout, ++i, 0)));
     const auto manifest = writer->finish();
     if (!manifest) return manifest.error().message();
     const v1::CameraStream& camera = manifest->cameras(0);

@@ -11,7 +11,7 @@ namespace {
 
 using test::TempFolder;
 
-const ImageLayout kLayout{{640, 480}, PixelFormat::rgb16, 12};
+const ImageLayout kDescribedLayout{{640, 480}, PixelFormat::rgb16, 12};
 
 std::string manifest_with(const std::string& camera_fields, const std::string& more = "") {
   return R"({"format_version": 1, "state": "COMPLETE", "cameras": [{"camera_id": "cam0", "format": "GRAY8",
@@ -21,7 +21,7 @@ std::string manifest_with(const std::string& camera_fields, const std::string& m
 
 TEST(Manifest, ComesBackAsItWasWritten) {
   const TempFolder temp;
-  v1::Manifest manifest = test::manifest_of({kLayout});
+  v1::Manifest manifest = test::manifest_of({kDescribedLayout});
   manifest.set_format_version(kSessionFormatVersion);
   manifest.mutable_cameras(0)->set_frame_rate_hz(0.1 + 0.2);
   for (int i = 0; i < 12; ++i)
@@ -30,7 +30,7 @@ TEST(Manifest, ComesBackAsItWasWritten) {
   const auto read = read_manifest(temp.path());
   ASSERT_TRUE(read) << read.error().message();
   EXPECT_EQ(read->SerializeAsString(), manifest.SerializeAsString());
-  EXPECT_EQ(*layout_of(read->cameras(0)), kLayout);
+  EXPECT_EQ(*layout_of(read->cameras(0)), kDescribedLayout);
 }
 
 TEST(Manifest, AnErrorNamesFileAndField) {

@@ -19,21 +19,21 @@ using test::put_bytes;
 using test::small_disk_options;
 using test::TempFolder;
 
-const ImageLayout kLayout{{48, 32}, PixelFormat::gray8, 8};
+const ImageLayout kVerifiedLayout{{48, 32}, PixelFormat::gray8, 8};
 constexpr std::uint64_t kFrames = 9;
 
 /// Two cameras, nine frames in three segments each, and an event.
 void record_two(const std::filesystem::path& folder, Encoding encoding = Encoding::ffv1) {
   WriterOptions options = small_disk_options(encoding);
   options.frames_per_segment = 3;
-  auto writer = SessionWriter::create(folder, manifest_of({kLayout, kLayout}), options);
+  auto writer = SessionWriter::create(folder, manifest_of({kVerifiedLayout, kVerifiedLayout}), options);
   ASSERT_TRUE(writer);
   v1::Event event;
   event.set_note("lit");
   ASSERT_TRUE(writer->append(event));
   for (std::uint64_t i = 0; i < kFrames; ++i) {
     for (const std::size_t camera : {0, 1})
-      ASSERT_TRUE(writer->write(camera, noise_frame(kLayout, i, camera)));
+      ASSERT_TRUE(writer->write(camera, noise_frame(kVerifiedLayout, i, camera)));
   }
   ASSERT_TRUE(writer->finish());
 }
@@ -61,7 +61,7 @@ void expect_all_good(const std::filesystem::path& folder) {
     for (std::size_t i = 0; i < reader->stamps(c).size(); ++i) {
       const auto frame = reader->read(c, i);
       ASSERT_TRUE(frame) << frame.error().message();
-      EXPECT_EQ(*frame->image, *noise_frame(kLayout, frame->stamp.frame_id, c).image);
+      EXPECT_EQ(*frame->image, *noise_frame(kVerifiedLayout, frame->stamp.frame_id, c).image);
     }
   }
 }
@@ -168,7 +168,7 @@ TEST(Verify, TornEventsAListOfOtherSegmentsAndWrongCountsAreFound) {
 
 TEST(Verify, OfASessionInRecordingSaysSoAndRepairWaitsForItsRecorder) {
   const TempFolder temp;
-  auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options());
+  auto writer = SessionWriter::create(temp / "s", manifest_of({kVerifiedLayout}), small_disk_options());
   ASSERT_TRUE(writer);
   const SessionCheck check = verified(temp / "s");
   EXPECT_FALSE(check.whole());
@@ -176,7 +176,7 @@ TEST(Verify, OfASessionInRecordingSaysSoAndRepairWaitsForItsRecorder) {
   const auto refused = repair_session(temp / "s");
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().kind, ErrorKind::refused);
-  for (std::uint64_t i = 0; i < 40; ++i) ASSERT_TRUE(writer->write(0, noise_frame(kLayout, i, 0)));
+  for (std::uint64_t i = 0; i < 40; ++i) ASSERT_TRUE(writer->write(0, noise_frame(kVerifiedLayout, i, 0)));
   writer = Error{};  // killed
   const auto report = repair_session(temp / "s");
   ASSERT_TRUE(report) << report.error().message();

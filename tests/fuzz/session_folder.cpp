@@ -1,0 +1,87 @@
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include <unistd.h>
+
+#include "session/reader.h"
+#include "session/salvage.h"
+#include "session/verify.h"
+
+// A whole session, damaged: everything that reads one says what is good or why it can't, and agrees. The
+// input is the five files of a session one after the other, each behind its length as three bytes,
+// little-endian; what is left of the input belongs to the last. Frames that come are compared with their
+// hashes by the reader itself; what repair leaves must be whole.
+namespace {
+
+namespace fs = std::filesystem;
+using namespace emberlock;
+
+constexpr const char* kFiles[] = {"manifest.json", "events.binpb", "cam0/index.bin", "cam0/000000.mkv",
+                                  "cam0/000001.nut"};
+
+const fs::path& folder() {
+  static const fs::path path = [] {
+    const bool memory = ::access("/dev/shm", W_OK) == 0;
+    std::string name =
+        ((memory ? fs::path("/dev/shm") : fs::temp_directory_path()) / "emberlock-fuzz-XXXXXX").string();
+    if (::mkdtemp(name.data()) == nullptr) std::abort();
+    static const std::string made = name;
+    std::atexit([] {
+      std::error_code ec;
+      fs::remove_all(made, ec);
+    });
+    return fs::path(name) / "s";
+  }();
+  return path;
+}
+
+void unpack(std::string_view bytes) {
+  std::error_code ec;
+  fs::remove_all(folder(), ec);
+  fs::create_directories(folder() / "cam0", ec);
+  for (const char* file : kFiles) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < 3 && i < bytes.size(); ++i) {
+      length |= std::size_t{static_cast<unsigned char>(bytes[i])} << (8 * i);
+    }
+    bytes.remove_prefix(std::min<std::size_t>(3, bytes.size()));
+    length = std::min(length, bytes.size());
+    if (length > 0) std::ofstream(folder() / file, std::ios::binary) << bytes.substr(0, length);
+    bytes.remove_prefix(length);
+  }
+}
+
+void expect(bool holds) {
+  if (!holds) std::abort();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  unpack({reinterpret_cast<const char*>(data), size});
+  const auto check = verify_session(folder());
+  auto reader = SessionReader::open(folder());
+  if (check && check->whole()) expect(reader.ok());
+  if (reader.ok()) {
+    expect(check.ok());
+    for (std::size_t c = 0; c < reader->camera_count(); ++c) {
+      std::uint64_t good = 0;
+      for (std::size_t i = 0; i < reader->stamps(c).size(); ++i) good += reader->read(c, i).ok() ? 1 : 0;
+      expect(good == check->cameras.at(c).good);
+    }
+  }
+  if (!check) return 0;
+  const auto repaired = repair_session(folder());
+  if (!repaired) return 0;
+  const auto after = verify_session(folder());
+  expect(after.ok() && after->whole());
+  for (std::size_t c = 0; c < check->cameras.size(); ++c) {
+    expect(after->cameras.at(c).good == repaired->cameras.at(c).kept);
+  }
+  return 0;
+}

@@ -113,6 +113,33 @@ std::optional<std::size_t> nearest_complete(const std::vector<FrameStamp>& stamp
   return best;
 }
 
+/// The complete frame of a camera within one frame period of `t`.
+std::optional<std::size_t> frame_at(const SessionReader& reader, std::size_t camera, TimePoint t) {
+  const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
+  const auto nearest = nearest_complete(reader.stamps(camera), t);
+  if (!nearest ||
+      abs(reader.stamps(camera)[*nearest].monotonic_time - t).value() > (rate > 0 ? 1 / rate : INFINITY))
+    return std::nullopt;
+  return nearest;
+}
+
+/// The first camera's frame nearest to the middle of which all cameras have the instant; the middle one where
+/// there is none.
+std::size_t middle_frame(const SessionReader& reader) {
+  const std::vector<FrameStamp>& first = reader.stamps(0);
+  const auto whole = [&](std::size_t frame) {
+    for (std::size_t i = 0; i < reader.camera_count(); ++i)
+      if (!frame_at(reader, i, first[frame].monotonic_time)) return false;
+    return true;
+  };
+  const std::size_t middle = first.size() / 2;
+  for (std::size_t away = 0; away <= middle; ++away) {
+    if (middle + away < first.size() && whole(middle + away)) return middle + away;
+    if (whole(middle - away)) return middle - away;
+  }
+  return middle;
+}
+
 Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
   EMBERLOCK_ASSIGN_OR_RETURN(SessionReader reader, SessionReader::open(folder));
   const v1::Manifest& manifest = reader.manifest();
@@ -126,7 +153,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
                "Record between 1 and 64 cameras");
   }
   const std::vector<FrameStamp>& first = reader.stamps(0);
-  const std::size_t frame = options.frame.value_or(first.size() / 2);
+  const std::size_t frame = options.frame ? *options.frame : first.empty() ? 0 : middle_frame(reader);
   if (frame >= first.size()) {
     return bad(
         folder.string() + ": frame " + std::to_string(frame),
@@ -140,9 +167,8 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
     view.name = stream.camera_id();
     EMBERLOCK_ASSIGN_OR_RETURN(view.camera,
                                camera_of(stream, manifest_name + ": cameras[" + std::to_string(i) + "]"));
-    const auto nearest = nearest_complete(reader.stamps(i), instant);
-    const double limit = stream.frame_rate_hz() > 0 ? 1 / stream.frame_rate_hz() : INFINITY;
-    if (!nearest || abs(reader.stamps(i)[*nearest].monotonic_time - instant).value() > limit) {
+    const auto nearest = frame_at(reader, i, instant);
+    if (!nearest) {
       return bad(folder.string() + ": camera " + stream.camera_id(),
                  "has no complete frame within a frame period of frame " + std::to_string(frame),
                  "Choose another --frame; the index tells which frames were lost");

@@ -12,7 +12,8 @@ namespace emberlock {
 
 struct SceneOptions {
   std::optional<Box> box;            ///< stands before the input's own
-  std::optional<std::size_t> frame;  ///< of a session: frame of its first camera; the middle one otherwise
+  std::optional<std::size_t> frame;  ///< of a session: frame of its first camera; else the one nearest to the
+                                     ///< middle of which every camera has a complete frame
 };
 
 /// A transforms.json (a file) or a recorded session (a folder with a manifest): views in the order of the

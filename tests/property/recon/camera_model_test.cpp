@@ -1,15 +1,16 @@
 #include "recon/calibrate/camera_model.h"
 
-#include <functional>
-
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
 #include "recon/calibrate/pose.h"
+#include "tests/support/properties.h"
 
 namespace emberlock {
 namespace {
+
+using test::law;
 
 double real(double low, double high) {
   return low + (high - low) * *rc::gen::resize(rc::kNominalSize, rc::gen::inRange(0, 1 << 30)) /
@@ -34,8 +35,6 @@ CameraModel camera() {
   RC_PRE(distortion_inverts(lens));
   return model;
 }
-
-void law(const char* name, const std::function<void()>& property) { EXPECT_TRUE(rc::check(name, property)); }
 
 TEST(CameraModelLaws, ARayProjectsBackOntoItsPixel) {
   law("project(ray(pixel)) == pixel", [] {

@@ -1,15 +1,17 @@
 // Laws of the march whose emission and extinction are both unknown, and of the step that it feeds.
 #include <cmath>
-#include <functional>
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
 #include "tests/support/devices.h"
 #include "tests/support/march_case.h"
+#include "tests/support/properties.h"
 
 namespace emberlock {
 namespace {
+
+using test::law;
 
 ON_EACH_DEVICE(FieldLaw);
 
@@ -30,8 +32,6 @@ MarchCase some_case() {
   options.seed = *rc::gen::inRange<std::uint64_t>(0, 1000);
   return march_case(options);
 }
-
-void law(const char* name, const std::function<void()>& property) { EXPECT_TRUE(rc::check(name, property)); }
 
 Values moved(const Values& x, double by, const Values& direction) {
   Values out = x;

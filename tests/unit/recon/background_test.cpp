@@ -28,7 +28,7 @@ CameraModel camera_at(const Eigen::Vector3d& center, ImageSize size, double foca
                  Eigen::Vector3d::Zero());
 }
 
-double pixel(const RadianceImage& image, int x, int y, int c) {
+double value(const RadianceImage& image, int x, int y, int c) {
   const int at = 3 * (y * image.size.width + x) + c;
   return static_cast<double>(image.rgb[static_cast<std::size_t>(at)]);
 }
@@ -50,7 +50,7 @@ TEST_P(BackgroundTest, SlabHasTheClosedFormForAnyExtinction) {
     const double emitted = sigma == 0 ? 1000 * 0.2 : -1000 * std::expm1(-sigma * 0.2) / sigma;
     for (int c = 0; c < 3; ++c) {
       const double expected = emitted + kBack[c] * std::exp(-sigma * 0.2);
-      EXPECT_NEAR(pixel(image, 1, 1, c) / expected, 1, 2e-5) << sigma;
+      EXPECT_NEAR(value(image, 1, 1, c) / expected, 1, 2e-5) << sigma;
     }
   }
 }
@@ -104,11 +104,11 @@ TEST_P(BackgroundTest, ImageBehindAMediumWithHolesAgreesWithBruteForceInDouble) 
         const double length = holes.length(holes.camera.ray({x + 0.5, y + 0.5}));
         const double emitted = sigma == 0 ? 500 * length : -500 * std::expm1(-sigma * length) / sigma;
         for (int c = 0; c < 3; ++c) {
-          const double seen = pixel(back, x, y, c);
-          EXPECT_NEAR(pixel(image, x, y, c), emitted + seen * std::exp(-sigma * length), 0.3)
+          const double seen = value(back, x, y, c);
+          EXPECT_NEAR(value(image, x, y, c), emitted + seen * std::exp(-sigma * length), 0.3)
               << x << ", " << y;
           if (length == 0) {
-            EXPECT_NEAR(pixel(image, x, y, c), seen, 0.3);
+            EXPECT_NEAR(value(image, x, y, c), seen, 0.3);
           }
         }
         crossed += length > 0 ? 1 : 0;
@@ -126,7 +126,7 @@ TEST_P(BackgroundTest, ShowsUnchangedWhereNoMediumIsInFront) {
   options.background = &back;
   const Effects effects = before(Background::Kind::image, PerMeter(15));
   const RadianceImage image = render_view(holes.volume, holes.medium, effects, holes.camera, options);
-  for (int c = 0; c < 3; ++c) EXPECT_EQ(pixel(image, 0, 0, c), pixel(back, 0, 0, c));
+  for (int c = 0; c < 3; ++c) EXPECT_EQ(value(image, 0, 0, c), value(back, 0, 0, c));
   holes.medium.count = 0;
   std::fill(holes.medium.inside.begin(), holes.medium.inside.end(), std::uint8_t{0});
   EXPECT_EQ(render_view(holes.volume, holes.medium, effects, holes.camera, options).rgb, back.rgb);
@@ -135,7 +135,7 @@ TEST_P(BackgroundTest, ShowsUnchangedWhereNoMediumIsInFront) {
 TEST_P(BackgroundTest, BlackIsTheDefaultAndWhatAnAbsentPictureMeans) {
   const Holes holes;
   const RadianceImage black = render_view(holes.volume, holes.medium, absorbing(PerMeter(15)), holes.camera);
-  EXPECT_EQ(pixel(black, 0, 0, 0), 0);
+  EXPECT_EQ(value(black, 0, 0, 0), 0);
   EXPECT_EQ(
       render_view(holes.volume, holes.medium, before(Background::Kind::image, PerMeter(15)), holes.camera)
           .rgb,

@@ -9,19 +9,14 @@
 
 #include "recon/adjust/engine.h"
 #include "recon/render/render.h"
+#include "tests/support/camera_at.h"
 #include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 
 namespace emberlock {
 namespace {
 
-CameraModel camera_at(const Eigen::Vector3d& center, const Eigen::Vector3d& target, ImageSize size,
-                      double focal) {
-  const Eigen::Vector3d up = std::abs((target - center).normalized().z()) > 0.9 ? Eigen::Vector3d::UnitY()
-                                                                                : Eigen::Vector3d::UnitZ();
-  return look_at({size, focal, focal, size.width / 2.0, size.height / 2.0, {}}, center, target, up);
-}
-
+using test::camera_at;
 Hull cube(int voxels) {
   return whole_grid(grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, voxels));
 }

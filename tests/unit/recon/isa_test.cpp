@@ -9,7 +9,7 @@ namespace emberlock {
 namespace {
 
 template <class Real>
-constexpr double kBound = sizeof(Real) == sizeof(float) ? 1e-5 : 1e-12;
+constexpr double kLargestDifference = sizeof(Real) == sizeof(float) ? 1e-5 : 1e-12;
 
 template <class Real>
 void expect_same(const std::vector<Quad<Real>>& a, const std::vector<Quad<Real>>& b, const char* what) {
@@ -21,7 +21,7 @@ void expect_same(const std::vector<Quad<Real>>& a, const std::vector<Quad<Real>>
       largest = std::max(largest, std::abs(static_cast<double>(b[i].c[c])));
     }
   EXPECT_GT(largest, 0) << what;
-  EXPECT_LE(difference, kBound<Real> * largest) << what;
+  EXPECT_LE(difference, kLargestDifference<Real> * largest) << what;
 }
 
 template <class Real>

@@ -71,7 +71,7 @@ void expect_gathered(const RayList& list) {
 
   const Marcher<float> march(list);
   const ConstantExtinction<float> extinction{0.1F};
-  launch(list.runs.size(), Adjoint<float, ConstantExtinction<float>, Path, LayAside<float>>{
+  launch(list.runs.size(), emberlock::Adjoint<float, ConstantExtinction<float>, Path, LayAside<float>>{
                                list.table(), residual.data(), extinction, aside});
   gather(Trilinear{});
   expect_near(gradient, march.adjoint(Absorb::constant, residual, 0.1F));

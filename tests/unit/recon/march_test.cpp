@@ -8,19 +8,14 @@
 #include "recon/hull/hull.h"
 #include "recon/kernels/clip.h"
 #include "recon/render/render.h"
+#include "tests/support/camera_at.h"
 #include "tests/support/devices.h"
 
 namespace emberlock {
 namespace {
 
+using test::camera_at;
 ON_EACH_DEVICE(March);
-
-CameraModel camera_at(const Eigen::Vector3d& center, const Eigen::Vector3d& target, ImageSize size,
-                      double focal) {
-  const Eigen::Vector3d up = std::abs((target - center).normalized().z()) > 0.9 ? Eigen::Vector3d::UnitY()
-                                                                                : Eigen::Vector3d::UnitZ();
-  return look_at({size, focal, focal, size.width / 2.0, size.height / 2.0, {}}, center, target, up);
-}
 
 Volume filled(const Grid& grid, float emission) {
   return {grid, std::vector<float>(3 * grid.size(), emission), {}};

@@ -14,6 +14,7 @@
 #include "recon/pipeline/reconstruct.h"
 #include "recon/preprocess/flame_mask.h"
 #include "session/frame_file.h"
+#include "tests/support/counting_clock.h"
 #include "tests/support/devices.h"
 
 namespace emberlock {
@@ -21,6 +22,7 @@ namespace {
 
 ON_EACH_DEVICE(Reconstruct);
 namespace fs = std::filesystem;
+using test::CountingClock;
 using testing::HasSubstr;
 
 /// Seven cameras on a circle of 0.5 m around a Gaussian ball of light (sigma 2 cm) in a 20 cm box: every
@@ -61,16 +63,6 @@ ReconstructOptions quick() {
   options.solve.compute.device = device_here();
   return options;
 }
-
-/// Time that passes by a millisecond at every look.
-class CountingClock final : public Clock {
- public:
-  [[nodiscard]] TimePoint now() const override { return {1000000 * ++looks_}; }
-  void sleep_until(TimePoint) override {}
-
- private:
-  mutable std::int64_t looks_ = 0;
-};
 
 TEST(GridChoice, ThePapersRuleOnAFrontalView) {
   // An edge of 0.2 m, 0.4 m in front of the camera, covers 100 * 0.2 / 0.4 = 50 pixels: 50 / 1.5 voxels.

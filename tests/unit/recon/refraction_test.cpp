@@ -190,13 +190,13 @@ TEST(Refraction, DarkGasIsAssumedCooler) {
   EXPECT_NEAR(dark, 293 + 1507 / 5.0, 10);
 }
 
-// From here on rays meet a medium: a box of 16 voxels in gas whose index rises by `kLens` in the middle, a
-// hundred times more than a flame's falls.
-constexpr double kLens = 0.03;
+// From here on rays meet a medium: a box of 16 voxels in gas whose index rises by `kLensRise` in the middle,
+// a hundred times more than a flame's falls.
+constexpr double kLensRise = 0.03;
 constexpr double kLensWidth = 0.06;  // metres
 constexpr Kelvin kAmbient(293);
 
-double lens(const Vector3d& r) { return kLens * std::exp(-r.squaredNorm() / (kLensWidth * kLensWidth)); }
+double lens(const Vector3d& r) { return kLensRise * std::exp(-r.squaredNorm() / (kLensWidth * kLensWidth)); }
 
 GasTemperature lens_gas() {
   GasTemperature gas{grid_over({Vector3d::Zero(), Vector3d::Constant(0.4)}, 80), {}};

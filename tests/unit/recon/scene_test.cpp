@@ -112,7 +112,7 @@ TEST_F(SceneTest, HoldingOutChangesRoles) {
 }
 
 /// Three cameras of a session: grey, mosaic and colour, 8 and 12 bits, five frames 10 ms apart; the second
-/// camera starts 1 ms late and lost its frame 3.
+/// camera starts 1 ms late and lost a frame.
 class SessionSceneTest : public SceneTest {
  protected:
   static constexpr PixelFormat kFormats[] = {PixelFormat::gray16, PixelFormat::bayer_rggb8,
@@ -145,15 +145,16 @@ class SessionSceneTest : public SceneTest {
     return m;
   }
 
-  /// Frame f of every camera is evenly filled with 10 + f of 255 (of 4095 in the first: 16.06 times that).
-  [[nodiscard]] fs::path record(const v1::Manifest& m) const {
+  /// The second camera lost frame `lost`. Frame f of every camera is evenly filled with 10 + f of 255 (of
+  /// 4095 in the first: 16.06 times that).
+  [[nodiscard]] fs::path record(const v1::Manifest& m, std::uint64_t lost = 3) const {
     fs::path folder = root_ / "session";
     fs::remove_all(folder);
     auto writer = SessionWriter::create(folder, m, {.min_free_bytes = 0});
     EXPECT_TRUE(writer.ok()) << writer.error().message();
     for (std::size_t camera = 0; camera < 3; ++camera) {
       for (std::uint64_t f = 0; f < 5; ++f) {
-        if (camera == 1 && f == 3) continue;
+        if (camera == 1 && f == lost) continue;
         auto image = std::make_shared<Image>(ImageLayout{{16, 8}, kFormats[camera], camera == 0 ? 12 : 8});
         // Three rows of light above a black level of 4.
         for (int y = 0; y < 8; ++y) {
@@ -210,6 +211,14 @@ TEST_F(SessionSceneTest, WithoutAFrameTheMiddleOneIsTaken) {
   const auto scene = load_scene(record(manifest()));
   ASSERT_TRUE(scene.ok()) << scene.error().message();
   EXPECT_NEAR(scene->views[0].image.rgb[0], 12 - 4, 0.1);
+}
+
+TEST_F(SessionSceneTest, WhereACameraLostTheMiddleTheNearestInstantThatAllHaveIsTaken) {
+  v1::Manifest m = manifest();
+  m.mutable_cameras(1)->set_frame_rate_hz(120);  // a period of 8.3 ms: a neighbour 9 ms off is too far
+  const auto scene = load_scene(record(m, 2));
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  for (const View& view : scene->views) EXPECT_NEAR(view.image.rgb[0], 13 - 4, 0.1) << view.name;
 }
 
 TEST_F(SessionSceneTest, ACameraWithoutCalibrationIsNamed) {

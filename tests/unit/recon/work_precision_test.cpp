@@ -12,6 +12,7 @@
 #include "recon/pipeline/shipped_front.h"
 #include "recon/pipeline/sweep.h"
 #include "recon/preprocess/flame_mask.h"
+#include "tests/support/counting_clock.h"
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
@@ -19,6 +20,7 @@ namespace emberlock {
 namespace {
 
 ON_EACH_DEVICE(Sweep);
+using test::CountingClock;
 using testing::HasSubstr;
 
 WorkPoint point(double seconds, double error, int voxels = 64) {
@@ -210,16 +212,6 @@ TEST(Sweep, RunsVaryOneSettingAroundTheBaseAndCrossVoxelsWithEffects) {
   for (const Settings& s : runs)
     EXPECT_EQ(s.iterations, s.solver == Solver::paper ? 4 * kPaperIterations : 4);
 }
-
-/// Time that passes by a millisecond at every look.
-class CountingClock final : public Clock {
- public:
-  [[nodiscard]] TimePoint now() const override { return {1000000 * ++looks_}; }
-  void sleep_until(TimePoint) override {}
-
- private:
-  mutable std::int64_t looks_ = 0;
-};
 
 SweepOptions small_sweep() {
   SweepOptions options;

@@ -23,21 +23,20 @@
 #include "base/file.h"
 #include "base/unique_fd.h"
 #include "cli/commands.h"
+#include "cli/tls_check.h"
 #include "emberlock/v1/services.grpc.pb.h"
 
 namespace emberlock::cli {
 namespace {
 
-using std::chrono::milliseconds;
-using std::chrono::seconds;
-
-constexpr seconds kConnect{5};
-constexpr seconds kCall{15};     // what answers at once, devices included
-constexpr seconds kQueues{180};  // what waits for queues to reach the disk
-constexpr milliseconds kAskStop{50};
+constexpr std::chrono::seconds kConnect{5};
+constexpr std::chrono::seconds kCall{15};     // what answers at once, devices included
+constexpr std::chrono::seconds kQueues{180};  // what waits for queues to reach the disk
+constexpr std::chrono::milliseconds kAskStop{50};
 constexpr int kLargestAnswer = 64 << 20;  // bytes
 constexpr int kKeepaliveMs = 20'000;
 
+const char* const kDaemonGroup = "The daemon";
 const char* const kRemedy =
     "Is it running? `systemctl status emberlockd` says, `sudo systemctl start emberlockd` starts it; "
     "--daemon names "
@@ -73,22 +72,34 @@ Result<std::string> read_secret(const std::filesystem::path& file, const char* o
   return text;
 }
 
+Result<ClientTls> read_tls(const DaemonAddress& address) {
+  ClientTls tls;
+  EMBERLOCK_ASSIGN_OR_RETURN(tls.ca, read_file(address.tls_ca, std::size_t{1} << 20));
+  if (address.tls_certificate.empty() != address.tls_key.empty())
+    return Error{ErrorKind::bad_input, "a certificate goes with its key", address.address,
+                 "Give both --tls-certificate and --tls-key"};
+  if (address.tls_certificate.empty()) return tls;
+  EMBERLOCK_ASSIGN_OR_RETURN(tls.identity, TlsIdentity::read(address.tls_certificate, address.tls_key));
+  return tls;
+}
+
 Result<std::shared_ptr<grpc::ChannelCredentials>> network_credentials(const DaemonAddress& address) {
-  if (address.ca.empty() || address.token_file.empty()) {
+  if (address.tls_ca.empty() || address.token_file.empty()) {
     return Error{ErrorKind::bad_input, "a daemon elsewhere is asked over TLS, with its token",
-                 address.address, "Give --ca with its certificate and --token-file with its token"};
+                 address.address, "Give --tls-ca with its certificate and --token-file with its token"};
   }
-  grpc::SslCredentialsOptions tls;
-  EMBERLOCK_ASSIGN_OR_RETURN(tls.pem_root_certs, read_file(address.ca, std::size_t{1} << 20));
+  EMBERLOCK_ASSIGN_OR_RETURN(const ClientTls tls, read_tls(address));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string token, read_secret(address.token_file, "--token-file"));
-  return grpc::CompositeChannelCredentials(grpc::SslCredentials(tls), grpc::AccessTokenCredentials(token));
+  EMBERLOCK_RETURN_IF_ERROR(check_tls(address.address, tls));
+  return grpc::CompositeChannelCredentials(
+      grpc::SslCredentials({tls.ca, tls.identity.key, tls.identity.certificate}),
+      grpc::AccessTokenCredentials(token));
 }
 
 ErrorKind kind_of(grpc::StatusCode code) {
   switch (code) {
     case grpc::StatusCode::INVALID_ARGUMENT:
     case grpc::StatusCode::NOT_FOUND:
-    case grpc::StatusCode::UNAUTHENTICATED:
       return ErrorKind::bad_input;
     case grpc::StatusCode::FAILED_PRECONDITION:
     case grpc::StatusCode::RESOURCE_EXHAUSTED:
@@ -155,12 +166,15 @@ struct Client::Parts {
     if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
       return {ErrorKind::timed_out, "the daemon didn't answer in time", where,
               "`journalctl -u emberlockd` may say why"};
+    if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED)
+      return {ErrorKind::bad_input, "the daemon doesn't know the token", where,
+              "Give --token-file what the daemon's token_file holds"};
     return {kind_of(status.error_code()), status.error_message()};
   }
 
   template <class Stub, class Request, class Response>
   Result<Response> call(grpc::Status (Stub::*method)(grpc::ClientContext*, const Request&, Response*),
-                        Stub& stub, const Request& request, seconds limit = kCall) {
+                        Stub& stub, const Request& request, std::chrono::seconds limit = kCall) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + limit);
     Response response;
@@ -226,7 +240,7 @@ Result<Client> Client::connect(const DaemonAddress& address) {
   }
   auto channel = grpc::CreateCustomChannel(address.address, credentials, arguments);
   if (!channel->WaitForConnected(std::chrono::system_clock::now() + kConnect))
-    return unreachable(address.address, "it doesn't answer, or isn't whom --ca vouches for");
+    return unreachable(address.address, "it doesn't answer");
   return Client(std::make_unique<Parts>(std::move(channel), address.address));
 }
 
@@ -297,15 +311,25 @@ std::string usual_daemon() {
 }
 
 CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address) {
-  verb.add_option("--ca", address.ca, "Of HOST:PORT: file (PEM) of who vouches for the daemon")
-      ->envname("EMBERLOCK_CA");
-  verb.add_option("--token-file", address.token_file, "Of HOST:PORT: file that holds the daemon's token")
-      ->envname("EMBERLOCK_TOKEN_FILE");
-  return verb
-      .add_option("--daemon", address.address,
-                  "Where emberlockd is: unix:PATH or HOST:PORT; EMBERLOCK_DAEMON names another")
-      ->capture_default_str();
+  const auto file = [&verb](const char* name, std::filesystem::path& path, const char* words,
+                            const char* environment) {
+    verb.add_option(name, path, words)->envname(environment)->type_name("FILE")->group(kDaemonGroup);
+  };
+  CLI::Option* where =
+      verb.add_option("--daemon", address.address,
+                      "Where emberlockd is: unix:PATH or HOST:PORT; EMBERLOCK_DAEMON names another")
+          ->capture_default_str()
+          ->group(kDaemonGroup);
+  file("--tls-ca", address.tls_ca, "Of HOST:PORT: PEM of who vouches for the daemon", "EMBERLOCK_TLS_CA");
+  file("--token-file", address.token_file, "Of HOST:PORT: holds the daemon's token", "EMBERLOCK_TOKEN_FILE");
+  file("--tls-certificate", address.tls_certificate,
+       "Of HOST:PORT: PEM of this client, where the daemon wants one (tls_clients)",
+       "EMBERLOCK_TLS_CERTIFICATE");
+  file("--tls-key", address.tls_key, "Of HOST:PORT: PEM of its key", "EMBERLOCK_TLS_KEY");
+  return where;
 }
+
+bool is_daemon_option(const CLI::Option& option) { return option.get_group() == kDaemonGroup; }
 
 Client connect_or_leave(const DaemonAddress& address) {
   auto client = Client::connect(address);

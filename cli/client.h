@@ -20,12 +20,16 @@ std::string usual_daemon();
 /// Where the daemon is, and what it wants to see.
 struct DaemonAddress {
   std::string address = usual_daemon();  ///< "unix:PATH", or "HOST:PORT" elsewhere
-  std::filesystem::path ca;              ///< of HOST:PORT: PEM of who vouches for the daemon
-  std::filesystem::path token_file;      ///< of HOST:PORT: holds the daemon's token alone
+  // Of HOST:PORT, in PEM:
+  std::filesystem::path tls_ca;                    ///< who vouches for the daemon
+  std::filesystem::path tls_certificate, tls_key;  ///< of this client, where the daemon wants one; or empty
+  std::filesystem::path token_file;                ///< of HOST:PORT: holds the daemon's token alone
 };
 
-/// --daemon (which it returns), --ca and --token-file.
+/// --daemon (which it returns), --tls-ca, --tls-certificate, --tls-key and --token-file.
 CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address);
+/// Whether it is one of these.
+bool is_daemon_option(const CLI::Option& option);
 
 /// emberlockd, as a verb asks it. Every call has a deadline; streams last until the daemon ends them, `take`
 /// returns false, or `stop`, asked some times a second, returns true: both are ends without an error. Errors

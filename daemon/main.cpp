@@ -1,6 +1,7 @@
 // emberlockd: the daemon.
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <ctime>
 #include <memory>
 #include <string>
@@ -8,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <systemd/sd-daemon.h>
 
+#include "base/log.h"
 #include "daemon/config/config.h"
 #include "daemon/config/preflight.h"
 #include "daemon/engine/engine.h"
@@ -45,21 +47,53 @@ void stay(const Engine& engine) {
   }
 }
 
-Result<std::optional<Token>> token_of(const ServerConfig& config) {
-  if (config.token_file.empty()) return std::optional<Token>();
-  EMBERLOCK_ASSIGN_OR_RETURN(Token token, Token::read(config.token_file));
-  return std::optional<Token>(std::move(token));
+/// EMBERLOCK_LOG goes before the configuration's level.
+void set_log(const LogConfig& config) {
+  static_cast<void>(log(LogCategory::daemon));  // makes all categories
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing of ours changes the environment.
+  if (std::getenv("EMBERLOCK_LOG") == nullptr) spdlog::set_level(spdlog::level::from_str(config.level));
+  if (config.format == LogConfig::Format::json) {
+    set_log_format(LogFormat::json);
+  } else if (logs_to_journal()) {
+    set_log_format(LogFormat::journal);
+  }
 }
 
-Result<GrpcServerOptions> grpc_options(const ServerConfig& config) {
+/// What those need who come by network.
+struct Access {
+  std::optional<Token> token;
+  std::optional<ServerTls> tls;
+};
+Result<Access> access_of(const ServerConfig& config) {
+  Access access;
+  if (!config.token_file.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(access.token, Token::read(config.token_file));
+  }
+  if (!config.tls_certificate.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(access.tls,
+                               ServerTls::read(config.tls_certificate, config.tls_key, config.tls_clients));
+  }
+  return access;
+}
+
+GrpcServerOptions grpc_options(const ServerConfig& config, const Access& access) {
   GrpcServerOptions options;
   options.socket = config.socket;
   options.tcp_address = config.listen;
-  EMBERLOCK_ASSIGN_OR_RETURN(options.token, token_of(config));
+  options.token = access.token;
+  options.tls = access.tls;
   options.largest_request = static_cast<int>(config.message_bytes);
-  if (!config.listen.empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(options.tls, TlsIdentity::read(config.tls_certificate, config.tls_key));
-  }
+  return options;
+}
+
+HttpServerOptions http_options(const ServerConfig& config, const Access& access) {
+  HttpServerOptions options;
+  options.listen = config.http_listen;
+  options.token = access.token;
+  options.tls = access.tls;
+  options.console = config.console;
+  options.viewers = static_cast<std::size_t>(config.viewers);
+  options.largest_body = config.message_bytes;
   return options;
 }
 
@@ -67,8 +101,8 @@ Status serve(const DaemonConfig& config) {
   const sigset_t ending = ending_signals();
   ::pthread_sigmask(SIG_BLOCK, &ending, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
-  EMBERLOCK_ASSIGN_OR_RETURN(GrpcServerOptions grpc, grpc_options(config.server));
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Token> token, token_of(config.server));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Access access, access_of(config.server));
+  GrpcServerOptions grpc = grpc_options(config.server, access);
   // A second daemon ends here, before it touches a device.
   EMBERLOCK_ASSIGN_OR_RETURN(SocketLock lock, SocketLock::take(config.server.socket));
   grpc.lock = std::make_shared<const SocketLock>(std::move(lock));
@@ -85,14 +119,10 @@ Status serve(const DaemonConfig& config) {
                              GrpcServer::start(*engine, std::move(grpc)));
   std::unique_ptr<HttpServer> http_server;
   if (!config.server.http_listen.empty()) {
-    HttpServerOptions options;
-    options.listen = config.server.http_listen;
-    options.token = token;
-    options.console = config.server.console;
-    options.viewers = static_cast<std::size_t>(config.server.viewers);
+    HttpServerOptions options = http_options(config.server, access);
     options.other_watchers = [&grpc_server] { return grpc_server->watchers(); };
     EMBERLOCK_ASSIGN_OR_RETURN(http_server, HttpServer::start(*engine, std::move(options)));
-    std::fprintf(stderr, "emberlockd: the console is at http://%s\n", config.server.http_listen.c_str());
+    log(LogCategory::daemon).info("the console is at {}", http_server->url());
   }
   ::sd_notify(0, "READY=1");
   stay(*engine);
@@ -139,6 +169,7 @@ int main(int argc, char** argv) {
   }
   const auto config = load_config(config_path);
   if (!config.ok()) return fail(config.error());
+  set_log(config->log);
   const Status served = serve(*config);
   return served.ok() ? 0 : fail(served.error());
 }

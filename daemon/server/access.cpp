@@ -30,6 +30,8 @@ Error os_error(const fs::path& path, std::string_view doing, std::string remedy 
           path.string(), std::move(remedy)};
 }
 
+constexpr std::size_t kLargestPem = 1 << 20;
+
 bool fit_for_a_token(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
          std::string_view("-._~+/=").find(c) != std::string_view::npos;
@@ -50,6 +52,17 @@ Bio bio_of(const std::string& pem) { return Bio(BIO_new_mem_buf(pem.data(), stat
 
 /// A daemon that runs without a terminal can't be asked for a key's password.
 int no_password(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*user*/) { return 0; }
+
+/// The first in the file.
+Result<Certificate> parse_certificate(const std::string& pem, const fs::path& file) {
+  Certificate first(PEM_read_bio_X509(bio_of(pem).get(), nullptr, no_password, nullptr));
+  if (!first)
+    return Error{ErrorKind::bad_input, "holds no certificate in PEM", file.string(),
+                 "its first line is -----BEGIN CERTIFICATE-----"};
+  if (X509_cmp_current_time(X509_get0_notAfter(first.get())) <= 0)
+    return Error{ErrorKind::bad_input, "has run out", file.string(), "renew the certificate"};
+  return first;
+}
 
 }  // namespace
 
@@ -100,13 +113,9 @@ Status make_token(const fs::path& file) {
 
 Result<TlsIdentity> TlsIdentity::read(const fs::path& certificate, const fs::path& key) {
   TlsIdentity identity;
-  EMBERLOCK_ASSIGN_OR_RETURN(identity.certificate, read_file(certificate, std::size_t{1} << 20));
-  EMBERLOCK_ASSIGN_OR_RETURN(identity.key, read_file(key, std::size_t{1} << 20));
-  const Certificate shown(
-      PEM_read_bio_X509(bio_of(identity.certificate).get(), nullptr, no_password, nullptr));
-  if (!shown)
-    return Error{ErrorKind::bad_input, "holds no certificate in PEM", certificate.string(),
-                 "its first line is -----BEGIN CERTIFICATE-----"};
+  EMBERLOCK_ASSIGN_OR_RETURN(identity.certificate, read_file(certificate, kLargestPem));
+  EMBERLOCK_ASSIGN_OR_RETURN(identity.key, read_file(key, kLargestPem));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Certificate shown, parse_certificate(identity.certificate, certificate));
   const Key secret(PEM_read_bio_PrivateKey(bio_of(identity.key).get(), nullptr, no_password, nullptr));
   if (!secret)
     return Error{ErrorKind::bad_input, "holds no private key in PEM, or one with a password", key.string(),
@@ -114,9 +123,16 @@ Result<TlsIdentity> TlsIdentity::read(const fs::path& certificate, const fs::pat
   if (X509_check_private_key(shown.get(), secret.get()) != 1)
     return Error{ErrorKind::bad_input, fmt::format("is not the key of {}", certificate.string()),
                  key.string(), "name the key that the certificate was made with"};
-  if (X509_cmp_current_time(X509_get0_notAfter(shown.get())) <= 0)
-    return Error{ErrorKind::bad_input, "has run out", certificate.string(), "renew the certificate"};
   return identity;
+}
+
+Result<ServerTls> ServerTls::read(const fs::path& certificate, const fs::path& key, const fs::path& clients) {
+  ServerTls tls;
+  EMBERLOCK_ASSIGN_OR_RETURN(tls.identity, TlsIdentity::read(certificate, key));
+  if (clients.empty()) return tls;
+  EMBERLOCK_ASSIGN_OR_RETURN(tls.clients, read_file(clients, kLargestPem));
+  EMBERLOCK_RETURN_IF_ERROR(parse_certificate(tls.clients, clients));
+  return tls;
 }
 
 namespace {

@@ -33,13 +33,23 @@ class Token {
 /// Writes a new token, of 256 random bits, that only its owner can read. Error bad_input: the file exists.
 Status make_token(const std::filesystem::path& file);
 
-/// What the daemon shows to prove who it is, as PEM.
+/// What one side of TLS shows to prove who it is, as PEM.
 struct TlsIdentity {
   std::string certificate;  ///< with those that vouch for it, if any
   std::string key;
 
   /// Errors say what is wrong with which file: absent, no PEM, the key of another certificate, out of date.
   static Result<TlsIdentity> read(const std::filesystem::path& certificate, const std::filesystem::path& key);
+};
+
+/// How the daemon speaks TLS, to all who come by network.
+struct ServerTls {
+  TlsIdentity identity;
+  std::string clients = {};  ///< PEM of who signs clients' certificates, demanded then; empty: none are
+
+  /// `clients` may be empty. Errors as those of TlsIdentity.
+  static Result<ServerTls> read(const std::filesystem::path& certificate, const std::filesystem::path& key,
+                                const std::filesystem::path& clients);
 };
 
 /// The right to listen on a Unix socket: a lock on `socket`.lock, held until it goes, or until the process

@@ -5,6 +5,26 @@
 
 namespace emberlock {
 
+v1::DaemonStatus without_history(const v1::DaemonStatus& status) {
+  v1::DaemonStatus brief = status;
+  if (brief.has_alignment()) brief.mutable_alignment()->clear_history();
+  return brief;
+}
+
+Next<v1::DaemonStatus> HistoryFeed::next(TimePoint /*now*/) {
+  auto status = board_.status();
+  const auto& history = status->alignment().history();
+  Last last{.rounds = history.size()};
+  if (!history.empty()) {
+    const v1::RoundPoint& newest = *history.rbegin();
+    last.round = newest.round();
+    last.at_s = newest.at_s();
+  }
+  if (last == told_) return {};
+  told_ = last;
+  return {.message = std::move(status)};
+}
+
 Next<v1::DaemonStatus> StatusFeed::next(TimePoint now) {
   auto status = board_.status();
   if (revision_ == status->revision()) return {};

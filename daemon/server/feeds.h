@@ -23,6 +23,27 @@ struct Next {
       {};  ///< of no message: when there will be one without a change of the board
 };
 
+/// What watchers are told ten times a second: without what is long and seldom changes, the rounds' history.
+v1::DaemonStatus without_history(const v1::DaemonStatus& status);
+
+/// A status whose history changed, whenever that did.
+class HistoryFeed {
+ public:
+  explicit HistoryFeed(const Board& board) : board_(board) {}
+  Next<v1::DaemonStatus> next(TimePoint now);
+
+ private:
+  /// Tells histories apart: each alignment begins its own, and a round is added at their end alone.
+  struct Last {
+    int rounds = 0;
+    std::uint32_t round = 0;
+    double at_s = 0;
+    bool operator==(const Last&) const = default;
+  };
+  const Board& board_;
+  Last told_;
+};
+
 /// The status when it changed, ten times a second at most.
 class StatusFeed {
  public:

@@ -83,7 +83,11 @@ void set_limits(grpc::ServerBuilder& builder, const GrpcServerOptions& options) 
 
 std::shared_ptr<grpc::ServerCredentials> network_credentials(const GrpcServerOptions& options) {
   grpc::SslServerCredentialsOptions ssl;
-  ssl.pem_key_cert_pairs.push_back({options.tls->key, options.tls->certificate});
+  ssl.pem_key_cert_pairs.push_back({options.tls->identity.key, options.tls->identity.certificate});
+  if (!options.tls->clients.empty()) {
+    ssl.pem_root_certs = options.tls->clients;
+    ssl.client_certificate_request = GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY;
+  }
   auto credentials = grpc::SslServerCredentials(ssl);
   credentials->SetAuthMetadataProcessor(std::make_shared<TokenCheck>(*options.token));
   return credentials;

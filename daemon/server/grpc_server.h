@@ -21,7 +21,7 @@ struct GrpcServerOptions {
   /// "192.168.0.5:7410", "0.0.0.0:7410", "[::]:7410": clients from elsewhere, who need TLS and the token.
   /// Empty: none.
   std::string tcp_address = {};
-  std::optional<TlsIdentity> tls = {};
+  std::optional<ServerTls> tls = {};
   std::optional<Token> token = {};
 
   std::size_t workers = 4;   ///< calls at a time

@@ -56,6 +56,20 @@ grpc::ServerWriteReactor<v1::JobProgress>* start_job(const GrpcBackend& backend,
   return stream;
 }
 
+/// Who wants the history asks for the status.
+class BriefStatusFeed {
+ public:
+  explicit BriefStatusFeed(const Board& board) : whole_(board) {}
+  Next<v1::DaemonStatus> next(TimePoint now) {
+    auto next = whole_.next(now);
+    if (next.message) next.message = std::make_shared<const v1::DaemonStatus>(without_history(*next.message));
+    return next;
+  }
+
+ private:
+  StatusFeed whole_;
+};
+
 class DaemonService final : public v1::Daemon::CallbackService {
  public:
   explicit DaemonService(GrpcBackend backend) : backend_(backend) {}
@@ -68,7 +82,7 @@ class DaemonService final : public v1::Daemon::CallbackService {
   }
   grpc::ServerWriteReactor<v1::DaemonStatus>* WatchStatus(Context* /*context*/,
                                                           const v1::Empty* /*request*/) override {
-    return watch<v1::DaemonStatus>(backend_, StatusFeed(backend_.api.board()));
+    return watch<v1::DaemonStatus>(backend_, BriefStatusFeed(backend_.api.board()));
   }
   grpc::ServerWriteReactor<v1::Notice>* WatchNotices(Context* /*context*/,
                                                      const v1::WatchNoticesRequest* request) override {

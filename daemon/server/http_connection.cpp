@@ -3,12 +3,15 @@
 #include <utility>
 
 #include <boost/asio/post.hpp>
+#include <boost/asio/ssl/error.hpp>
 #include <boost/asio/write.hpp>
 #include <boost/beast/http/chunk_encode.hpp>
 #include <boost/beast/http/read.hpp>
 #include <boost/beast/http/write.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
 #include <fmt/format.h>
+#include <openssl/err.h>
+#include <openssl/sslerr.h>
 
 #include "daemon/server/errors.h"
 #include "daemon/server/metrics.h"
@@ -30,16 +33,21 @@ constexpr const char* kPolicy =
     "worker-src 'self' "
     "blob:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+constexpr std::chrono::seconds kGoodbye{1};  // for the other side to say it too
+constexpr std::string_view kSpeakTls =
+    "HTTP/1.1 400 Bad Request\r\nContent-Type: text/plain\r\nContent-Length: 50\r\nConnection: close\r\n\r\n"
+    "TLS is spoken here: the address begins https://.\r\n";
+
 std::string_view view(beast::string_view text) { return {text.data(), text.size()}; }
 beast::string_view view(std::string_view text) { return {text.data(), text.size()}; }
 
 }  // namespace
 
 HttpConnection::HttpConnection(HttpContext& context, asio::ip::tcp::socket socket)
-    : context_(context), stream_(std::move(socket)) {
+    : context_(context), stream_(std::move(socket), context.tls.get()) {
   ++context_.connection_count;
   beast::error_code ignored;
-  stream_.socket().set_option(asio::ip::tcp::no_delay(true), ignored);
+  stream_.next_layer().socket().set_option(asio::ip::tcp::no_delay(true), ignored);
 }
 
 HttpConnection::~HttpConnection() {
@@ -47,17 +55,41 @@ HttpConnection::~HttpConnection() {
   end_job();
 }
 
-void HttpConnection::close() {
-  beast::error_code ignored;
-  stream_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, ignored);
-  stream_.close();
+void HttpConnection::close() { stream_.next_layer().close(); }
+
+void HttpConnection::end() {
+  stream_.next_layer().expires_after(kGoodbye);
+  stream_.async_shutdown([self = shared_from_this()](beast::error_code /*error*/) { self->close(); });
+}
+
+void HttpConnection::run() {
+  if (!stream_.is_tls()) return read_header();
+  stream_.next_layer().expires_after(context_.patience());
+  stream_.async_handshake([self = shared_from_this()](beast::error_code error) {
+    if (!error) return self->read_header();
+    if (error.category() == asio::error::get_ssl_category() &&
+        ERR_GET_REASON(static_cast<unsigned long>(error.value())) == SSL_R_HTTP_REQUEST)
+      return self->point_to_tls();
+    self->close();
+  });
+}
+
+void HttpConnection::point_to_tls() {
+  stream_.next_layer().expires_after(context_.patience());
+  asio::async_write(stream_.next_layer(), asio::buffer(kSpeakTls),
+                    [self = shared_from_this()](beast::error_code /*error*/, std::size_t /*bytes*/) {
+                      beast::error_code ignored;
+                      self->stream_.next_layer().socket().shutdown(asio::ip::tcp::socket::shutdown_send,
+                                                                   ignored);
+                      self->close();
+                    });
 }
 
 void HttpConnection::read_header() {
   parser_.emplace();
   parser_->header_limit(context_.options.largest_header);
   parser_->body_limit(context_.options.largest_body);
-  stream_.expires_after(context_.patience());
+  stream_.next_layer().expires_after(context_.patience());
   http::async_read_header(
       stream_, buffer_, *parser_,
       [self = shared_from_this()](beast::error_code error, std::size_t /*bytes*/) {
@@ -69,7 +101,7 @@ void HttpConnection::read_header() {
         if (error.category() == make_error_code(http::error::bad_method).category() &&
             error != http::error::end_of_stream && error != http::error::partial_message)
           return self->respond_error(400, "INVALID_ARGUMENT", "this is no HTTP", Next::end);
-        self->close();
+        error == http::error::end_of_stream ? self->end() : self->close();
       });
 }
 
@@ -89,7 +121,7 @@ void HttpConnection::judge() {
     case HttpVerdict::give_cookie: {
       Response moved = response(303, kText, "");
       moved.set(http::field::location, view(std::string_view(target_.path)));
-      moved.set(http::field::set_cookie, HttpGate::cookie_of(target_.token));
+      moved.set(http::field::set_cookie, context_.gate.cookie_of(target_.token));
       return respond(std::move(moved), Next::end);
     }
     case HttpVerdict::wrong_host:
@@ -110,7 +142,7 @@ void HttpConnection::judge() {
 }
 
 void HttpConnection::read_body() {
-  stream_.expires_after(context_.patience());
+  stream_.next_layer().expires_after(context_.patience());
   http::async_read(stream_, buffer_, *parser_,
                    [self = shared_from_this()](beast::error_code error, std::size_t /*bytes*/) {
                      if (!error) return self->answer();
@@ -121,7 +153,7 @@ void HttpConnection::read_body() {
 }
 
 void HttpConnection::answer() {
-  stream_.expires_never();  // calls may take as long as devices do
+  stream_.next_layer().expires_never();  // calls may take as long as devices do
   const http::verb method = parser_->get().method();
   const std::string_view path = target_.path;
   if (path == kWatchPath) return watch();
@@ -209,12 +241,12 @@ void HttpConnection::start_job(const JsonMethod& method) {
 
 /// Keeps the connection while its job runs, and ends the job when the client goes.
 void HttpConnection::notice_end() {
-  stream_.socket().async_wait(asio::ip::tcp::socket::wait_read,
-                              [self = shared_from_this()](beast::error_code error) {
-                                if (error) return;
-                                self->end_job();
-                                self->close();
-                              });
+  stream_.next_layer().socket().async_wait(asio::ip::tcp::socket::wait_read,
+                                           [self = shared_from_this()](beast::error_code error) {
+                                             if (error || !self->job_) return;  // the next request, then
+                                             self->end_job();
+                                             self->close();
+                                           });
 }
 
 void HttpConnection::end_job() {
@@ -231,10 +263,10 @@ void HttpConnection::write_progress() {
   if (!ended) return;
   end_job();
   if (!head_sent_ && !ended->ok()) return respond_error(ended->error());
-  stream_.expires_after(context_.patience());
+  stream_.next_layer().expires_after(context_.patience());
   asio::async_write(
       stream_, http::make_chunk_last(),
-      [self = shared_from_this()](beast::error_code /*error*/, std::size_t /*bytes*/) { self->close(); });
+      [self = shared_from_this()](beast::error_code /*error*/, std::size_t /*bytes*/) { self->end(); });
 }
 
 void HttpConnection::write_line(const std::string& json) {
@@ -247,7 +279,7 @@ void HttpConnection::write_line(const std::string& json) {
   }
   bytes += fmt::format("{:x}\r\n{}\r\n", json.size(), json);
   line_ = std::make_shared<const std::string>(std::move(bytes));
-  stream_.expires_after(context_.patience());
+  stream_.next_layer().expires_after(context_.patience());
   asio::async_write(stream_, asio::buffer(*line_),
                     [self = shared_from_this()](beast::error_code error, std::size_t /*bytes*/) {
                       self->line_.reset();
@@ -255,7 +287,7 @@ void HttpConnection::write_line(const std::string& json) {
                         self->end_job();
                         return self->close();
                       }
-                      self->stream_.expires_never();
+                      self->stream_.next_layer().expires_never();
                       self->write_progress();
                     });
 }
@@ -280,11 +312,12 @@ void HttpConnection::respond(Response response, Next next) {
   response.content_length(response.body().size());
   if (only_head) response.body().clear();
   answer_ = std::make_shared<const Response>(std::move(response));
-  stream_.expires_after(context_.patience());
+  stream_.next_layer().expires_after(context_.patience());
   http::async_write(stream_, *answer_,
                     [self = shared_from_this(), ends](beast::error_code error, std::size_t /*bytes*/) {
                       self->answer_.reset();
-                      if (error || ends) return self->close();
+                      if (error) return self->close();
+                      if (ends) return self->end();
                       self->read_header();
                     });
 }

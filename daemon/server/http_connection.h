@@ -8,7 +8,6 @@
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/empty_body.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/parser.hpp>
@@ -16,6 +15,7 @@
 #include <boost/beast/http/string_body.hpp>
 
 #include "daemon/server/http_context.h"
+#include "daemon/server/http_stream.h"
 #include "daemon/server/json_api.h"
 
 namespace emberlock {
@@ -29,13 +29,15 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   HttpConnection& operator=(const HttpConnection&) = delete;
   ~HttpConnection();
 
-  void run() { read_header(); }
+  void run();
 
  private:
   using Body = boost::beast::http::string_body;
   using Response = boost::beast::http::response<Body>;
   enum class Next { go_on, end };
 
+  /// Who spoke plain HTTP hears, in plain HTTP, that TLS is spoken.
+  void point_to_tls();
   void read_header();
   /// Refuses by the head alone, before a body is read.
   void judge();
@@ -57,10 +59,12 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void respond_error(unsigned status, std::string_view code, std::string_view message,
                      Next next = Next::go_on);
   void respond_error(const Error& error);
+  /// Says so to the other side first.
+  void end();
   void close();
 
   HttpContext& context_;
-  boost::beast::tcp_stream stream_;
+  HttpStream stream_;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<Body>> parser_;
   HttpTarget target_;

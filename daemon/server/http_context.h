@@ -8,6 +8,7 @@
 #include <set>
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ssl/context.hpp>
 #include <boost/asio/steady_timer.hpp>
 
 #include "base/time_point.h"
@@ -37,7 +38,8 @@ struct HttpContext {
   const HttpServerOptions options;
   const HttpGate gate;
   const ConsoleFiles console;
-  ViewerMessages messages;  ///< what viewers have in common is made once
+  std::shared_ptr<boost::asio::ssl::context> tls;  ///< null: plain
+  ViewerMessages messages;                         ///< what viewers have in common is made once
   std::set<Viewer*> viewers;
   std::set<std::shared_ptr<Job>> jobs;  ///< that run
   std::atomic<std::size_t> viewer_count = 0;

@@ -104,8 +104,9 @@ HttpVerdict HttpGate::judge(const HttpHead& head, const HttpTarget& target) cons
   return token_->matches(cookie_value(head.cookie)) ? HttpVerdict::welcome : HttpVerdict::no_token;
 }
 
-std::string HttpGate::cookie_of(std::string_view token) {
-  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age=31536000", kCookie, token);
+std::string HttpGate::cookie_of(std::string_view token) const {
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age=31536000{}", kCookie, token,
+                     transport_ == Transport::tls ? "; Secure" : "");
 }
 
 }  // namespace emberlock

@@ -37,14 +37,17 @@ enum class HttpVerdict {
 /// ?token=T, then as the cookie that this sets.
 class HttpGate {
  public:
+  enum class Transport { plain, tls };
   /// `token`: demanded of everybody; absent: of nobody.
-  explicit HttpGate(std::optional<Token> token) : token_(std::move(token)) {}
+  explicit HttpGate(std::optional<Token> token, Transport transport = Transport::plain)
+      : token_(std::move(token)), transport_(transport) {}
   [[nodiscard]] HttpVerdict judge(const HttpHead& head, const HttpTarget& target) const;
   /// The value of Set-Cookie for a token that is right.
-  static std::string cookie_of(std::string_view token);
+  [[nodiscard]] std::string cookie_of(std::string_view token) const;
 
  private:
   std::optional<Token> token_;
+  Transport transport_;
 };
 
 }  // namespace emberlock

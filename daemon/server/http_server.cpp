@@ -93,9 +93,18 @@ Result<std::unique_ptr<HttpServer>> HttpServer::start(Api& api, HttpServerOption
     return Error{ErrorKind::bad_input, "whoever reaches this address must show a token, and there is none",
                  options.listen,
                  "make one with `emberlockd --make-token FILE` and name the file, or listen at 127.0.0.1"};
-  HttpGate gate(this_machine_alone ? std::nullopt : options.token);
+  if (!this_machine_alone && !options.tls)
+    return Error{ErrorKind::bad_input, "beyond this machine only TLS is spoken, and there is no certificate",
+                 options.listen, "name a certificate and its key, or listen at 127.0.0.1"};
+  std::shared_ptr<asio::ssl::context> tls;
+  if (!this_machine_alone) {
+    EMBERLOCK_ASSIGN_OR_RETURN(tls, make_tls_context(*options.tls));
+  }
+  HttpGate gate =
+      this_machine_alone ? HttpGate(std::nullopt) : HttpGate(options.token, HttpGate::Transport::tls);
   ConsoleFiles console = read_console(options.console);
   auto parts = std::make_unique<Parts>(api, std::move(options), std::move(gate), std::move(console));
+  parts->context.tls = std::move(tls);
   EMBERLOCK_RETURN_IF_ERROR(listen_at(parts->acceptor, endpoint));
   parts->port = parts->acceptor.local_endpoint().port();
   parts->accept();
@@ -115,6 +124,11 @@ HttpServer::~HttpServer() {
 }
 
 int HttpServer::port() const { return parts_->port; }
+std::string HttpServer::url() const {
+  const std::string& listen = parts_->context.options.listen;
+  return fmt::format("{}://{}:{}", parts_->context.tls ? "https" : "http",
+                     listen.substr(0, listen.rfind(':')), parts_->port);
+}
 std::size_t HttpServer::viewers() const { return parts_->context.viewer_count; }
 
 }  // namespace emberlock

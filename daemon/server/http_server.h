@@ -16,8 +16,10 @@ namespace emberlock {
 
 struct HttpServerOptions {
   std::string listen = "127.0.0.1:7140";  ///< "address:port", "[::1]:7140"; port 0: any that is free
-  /// Demanded of everybody if `listen` isn't of this machine alone; then it must be there.
+  /// Demanded of everybody and spoken to everybody if `listen` isn't of this machine alone; then both must be
+  /// there.
   std::optional<Token> token = {};
+  std::optional<ServerTls> tls = {};
   std::filesystem::path console =
       {};  ///< its files; where there are none the API is served alone, and a page that says so
   std::size_t viewers = 64;       ///< WebSockets; beyond it 503
@@ -29,13 +31,13 @@ struct HttpServerOptions {
   std::uint32_t largest_header = 16 << 10;  ///< bytes
   std::uint64_t largest_body = 1 << 20;     ///< bytes
   std::size_t largest_wish = 64 << 10;      ///< bytes of a message from a viewer
-  Seconds patience{
-      15};  ///< for a whole header or body, for a client to take an answer, for a sign of life of a viewer
+  Seconds patience{15};  ///< for TLS to begin, for a whole header or body, for a client to take an answer,
+                         ///< for a sign of life of a viewer
   std::function<std::size_t()> other_watchers =
       {};  ///< for /metrics: those that aren't viewers here (gRPC's)
 };
 
-/// The console and the API over HTTP/1.1, from one thread:
+/// The console and the API over HTTP/1.1, beyond this machine over TLS, from one thread:
 ///   GET /, /assets/...           the console
 ///   POST /api/v1/<Service>/<Method>  json_api.h; jobs answer with one JSON object a line, as they go
 ///   GET /api/v1/watch            WebSocket: watch_messages.h
@@ -43,7 +45,7 @@ struct HttpServerOptions {
 /// Serves while it lives; the Api must outlive it.
 class HttpServer {
  public:
-  /// Errors: bad_input for an address that is none or that needs a token, io where the port is taken.
+  /// Errors: bad_input for an address that is none or that needs token and TLS, io where the port is taken.
   static Result<std::unique_ptr<HttpServer>> start(Api& api, HttpServerOptions options);
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
@@ -51,6 +53,8 @@ class HttpServer {
   ~HttpServer();
 
   [[nodiscard]] int port() const;
+  /// "https://0.0.0.0:7140"
+  [[nodiscard]] std::string url() const;
   [[nodiscard]] std::size_t viewers() const;
 
  private:

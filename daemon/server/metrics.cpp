@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <sstream>
 #include <string_view>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -50,7 +52,7 @@ class Exposition {
         text_ += fmt::format("{}{}=\"{}\"", text_.back() == '{' ? "" : ",", label, escaped(text));
       text_ += '}';
     }
-    text_ += fmt::format(" {}\n", value);
+    text_ += ' ' + written(value) + '\n';
   }
   template <class Number>
   void single(std::string_view name, std::string_view type, std::string_view help, Number value) {
@@ -75,6 +77,15 @@ class Exposition {
   std::string take() { return std::move(text_); }
 
  private:
+  template <class Number>
+  static std::string written(Number value) {
+    if constexpr (std::is_floating_point_v<Number>) {
+      if (std::isnan(value)) return "NaN";
+      if (std::isinf(value)) return value > 0 ? "+Inf" : "-Inf";
+    }
+    return fmt::format("{}", value);
+  }
+
   std::string name_;
   std::string text_;
 };

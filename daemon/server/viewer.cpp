@@ -28,9 +28,10 @@ void keep_kernel_queue_short(int socket) {
 
 }  // namespace
 
-Viewer::Viewer(HttpContext& context, beast::tcp_stream stream)
+Viewer::Viewer(HttpContext& context, HttpStream stream)
     : context_(context),
       socket_(std::move(stream)),
+      history_(context.api.board()),
       status_(context.api.board()),
       notices_(context.api.board(), 0),
       iterations_(context.api.board()) {
@@ -96,6 +97,7 @@ ViewerMessages::Shared Viewer::next(TimePoint now, std::optional<TimePoint>& aga
     if (next.again) again = std::min(again.value_or(*next.again), *next.again);
     return next.message;
   };
+  if (const auto status = newest(history_)) return context_.messages.history_of(status);
   if (const auto status = newest(status_)) return context_.messages.of(status);
   if (const auto notice = newest(notices_))
     return std::make_shared<const WatchMessage>(watch_message(*notice));

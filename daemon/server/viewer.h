@@ -5,13 +5,13 @@
 #include <optional>
 
 #include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/core/tcp_stream.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
 #include <boost/beast/websocket/stream.hpp>
 
 #include "daemon/server/feeds.h"
 #include "daemon/server/http_context.h"
+#include "daemon/server/http_stream.h"
 
 namespace emberlock {
 
@@ -22,7 +22,7 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
  public:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
-  Viewer(HttpContext& context, boost::beast::tcp_stream stream);
+  Viewer(HttpContext& context, HttpStream stream);
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
   ~Viewer();
@@ -40,12 +40,13 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
   [[nodiscard]] ViewerMessages::Shared next(TimePoint now, std::optional<TimePoint>& again);
 
   HttpContext& context_;
-  boost::beast::websocket::stream<boost::beast::tcp_stream> socket_;
+  boost::beast::websocket::stream<HttpStream> socket_;
   boost::beast::flat_buffer heard_;
   std::shared_ptr<const Request> request_;
   ViewerMessages::Shared in_flight_;  ///< null: none
   bool open_ = false;
 
+  HistoryFeed history_;
   StatusFeed status_;
   NoticeFeed notices_;
   IterationFeed iterations_;

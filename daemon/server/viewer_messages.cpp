@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "daemon/server/feeds.h"
+
 namespace emberlock {
 namespace {
 
@@ -12,8 +14,13 @@ ViewerMessages::Shared shared(WatchMessage message) {
 }  // namespace
 
 ViewerMessages::Shared ViewerMessages::of(const std::shared_ptr<const v1::DaemonStatus>& status) {
-  if (status_.of != status) status_ = {status, shared(watch_message(*status))};
+  if (status_.of != status) status_ = {status, shared(watch_message(without_history(*status)))};
   return status_.made;
+}
+
+ViewerMessages::Shared ViewerMessages::history_of(const std::shared_ptr<const v1::DaemonStatus>& status) {
+  if (history_.of != status) history_ = {status, shared(history_message(*status))};
+  return history_.made;
 }
 
 ViewerMessages::Shared ViewerMessages::of(const std::shared_ptr<const v1::Picture>& picture) {

@@ -15,6 +15,7 @@ class ViewerMessages {
   using Shared = std::shared_ptr<const WatchMessage>;
 
   Shared of(const std::shared_ptr<const v1::DaemonStatus>& status);
+  Shared history_of(const std::shared_ptr<const v1::DaemonStatus>& status);
   Shared of(const std::shared_ptr<const v1::Picture>& picture);
   std::vector<Shared> of(const std::shared_ptr<const v1::IterationPreview>& preview);
   /// Nobody watches: nothing is kept.
@@ -26,7 +27,7 @@ class ViewerMessages {
     std::shared_ptr<const Message> of;
     Made made;
   };
-  Last<v1::DaemonStatus, Shared> status_;
+  Last<v1::DaemonStatus, Shared> status_, history_;
   std::map<std::string, Last<v1::Picture, Shared>> pictures_;
   Last<v1::IterationPreview, std::vector<Shared>> iteration_;
 };

@@ -29,6 +29,11 @@ WatchMessage binary_of(const nlohmann::json& header, std::string_view bytes) {
 }  // namespace
 
 WatchMessage watch_message(const v1::DaemonStatus& status) { return text_of("status", status); }
+WatchMessage history_message(const v1::DaemonStatus& status) {
+  v1::AlignmentStatus rounds;
+  *rounds.mutable_history() = status.alignment().history();
+  return text_of("rounds", rounds);
+}
 WatchMessage watch_message(const v1::Notice& notice) { return text_of("notice", notice); }
 
 WatchMessage watch_message(const v1::Picture& picture) {

@@ -10,7 +10,8 @@
 #include "emberlock/v1/services.pb.h"
 #include "emberlock/v1/status.pb.h"
 
-// What goes over the console's WebSocket. From the daemon, as text: {"status": DaemonStatus}, {"notice":
+// What goes over the console's WebSocket. From the daemon, as text: {"rounds": AlignmentStatus with its
+// history alone} at the beginning and when that changed, {"status": DaemonStatus without it}, {"notice":
 // Notice},
 // {"iteration": IterationPreview without bytes}; as binary, what has bytes: the length of a header (u32,
 // little-endian), the header, which is JSON with a "kind", then the bytes. From the console, as text:
@@ -25,6 +26,7 @@ struct WatchMessage {
 };
 
 WatchMessage watch_message(const v1::DaemonStatus& status);
+WatchMessage history_message(const v1::DaemonStatus& status);
 WatchMessage watch_message(const v1::Notice& notice);
 /// {"kind": "picture", "camera_id", "frame_id", "monotonic_ns", "width", "height"} and the JPEG.
 WatchMessage watch_message(const v1::Picture& picture);

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <functional>
 #include <mutex>
 #include <string>
+#include <thread>
 #include <type_traits>
 #include <vector>
 
@@ -111,6 +114,34 @@ class FakeApi : public Api {
   Board board_;
   mutable std::mutex mutex_;
   std::vector<std::string> calls_;
+};
+
+/// Jobs, for on_job. This one tells its progress as often as that, and then that it is done.
+inline std::function<Status(const JobObserver&)> job_that_tells(int times) {
+  return [times](const JobObserver& observer) {
+    v1::JobProgress progress;
+    for (int i = 0; i < times; ++i) observer(progress);
+    progress.set_done(true);
+    progress.set_report("{}");
+    observer(progress);
+    return Status();
+  };
+}
+
+/// Goes on until nobody listens.
+class EndlessJob {
+ public:
+  [[nodiscard]] bool begun() const { return begun_; }
+  [[nodiscard]] bool ended() const { return ended_; }
+  Status operator()(const JobObserver& observer) {
+    begun_ = true;
+    while (observer({})) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    ended_ = true;
+    return {};
+  }
+
+ private:
+  std::atomic<bool> begun_ = false, ended_ = false;
 };
 
 }  // namespace emberlock::test

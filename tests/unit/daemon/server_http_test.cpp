@@ -51,6 +51,15 @@ class ServerHttpTest : public testing::Test {
     status.set_phase(phase);
     api.board().show(status);
   }
+  /// Asks for a job, and returns once it runs.
+  UniqueFd begin(test::EndlessJob& job) {
+    api.on_job = std::ref(job);
+    UniqueFd client = test::connect_to(port);
+    test::send_all(client,
+                   "POST /api/v1/Sessions/Export HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+    EXPECT_TRUE(wait_until([&] { return job.begun(); }));
+    return client;
+  }
 
   test::TempFolder folder;
   test::FakeApi api;
@@ -219,44 +228,8 @@ TEST_F(ServerHttpTest, AnotherSitesPageAndAForeignNameAreTurnedAway) {
   EXPECT_EQ(api.calls().size(), 3U);
 }
 
-TEST_F(ServerHttpTest, BeyondThisMachineItStartsOnlyWithAToken) {
-  const auto started = HttpServer::start(api, {.listen = "0.0.0.0:0"});
-  ASSERT_FALSE(started.ok());
-  EXPECT_THAT(started.error().message(), HasSubstr("--make-token"));
-  for (const char* nowhere :
-       {"", "7140", "localhost", "lab:7140", "127.0.0.1:", "127.0.0.1:99999", "127.0.0.1:71x"})
-    EXPECT_FALSE(HttpServer::start(api, {.listen = nowhere}).ok()) << nowhere;
-}
-
-TEST_F(ServerHttpTest, ATokenIsShownAsHeaderOrCookieAndAnAddressWithItGivesTheCookie) {
-  serve({.listen = "0.0.0.0:0", .token = *Token::parse("0123456789abcdef")});
-  const auto get = [&](const std::string& target, const std::string& headers) {
-    return ask(port, "GET", target, "", "Host: lab:7140\r\n" + headers);
-  };
-  EXPECT_EQ(get("/", "").status, 200);  // the page, which asks for it
-  EXPECT_EQ(get("/metrics", "").status, 401);
-  EXPECT_EQ(ask(port, "POST", "/api/v1/Daemon/GetStatus", "", "Host: lab:7140\r\n").status, 401);
-  EXPECT_EQ(get("/metrics", "Authorization: Bearer 0123456789abcdeX\r\n").status, 401);
-  EXPECT_EQ(get("/?token=wrong", "Cookie: emberlock_token=wrong\r\n").status, 401);
-  EXPECT_EQ(get("/metrics", "Authorization: Bearer 0123456789abcdef\r\n").status, 200);
-  EXPECT_EQ(get("/healthz", "").status, 503);  // tells nothing but that
-  const HttpAnswer moved = get("/?token=0123456789abcde%66", "");
-  EXPECT_EQ(moved.status, 303);
-  EXPECT_THAT(moved.head, HasSubstr("Location: /\r\n"));
-  EXPECT_THAT(moved.head,
-              HasSubstr("Set-Cookie: emberlock_token=0123456789abcdef; Path=/; HttpOnly; SameSite=Strict"));
-  EXPECT_EQ(get("/", "Cookie: theme=dark; emberlock_token=0123456789abcdef\r\n").status, 200);
-}
-
 TEST_F(ServerHttpTest, AJobTellsALineForEachProgressAndItsLast) {
-  api.on_job = [](const JobObserver& observer) {
-    v1::JobProgress progress;
-    for (int i = 0; i < 100; ++i) observer(progress);
-    progress.set_done(true);
-    progress.set_report("{}");
-    observer(progress);
-    return Status();
-  };
+  api.on_job = test::job_that_tells(100);
   serve();
   const HttpAnswer answer = ask(port, "POST", "/api/v1/Sessions/Verify", R"({"session": "s"})");
   EXPECT_EQ(answer.status, 200);
@@ -272,36 +245,18 @@ TEST_F(ServerHttpTest, AJobThatCannotBeginIsAnError) {
 }
 
 TEST_F(ServerHttpTest, AJobEndsWhenItsClientGoesInMidStream) {
-  std::atomic<bool> begun = false, ended = false;
-  api.on_job = [&](const JobObserver& observer) {
-    begun = true;
-    while (observer({})) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    ended = true;
-    return Status();
-  };
+  test::EndlessJob endless;
   serve();
-  {
-    const UniqueFd client = test::connect_to(port);
-    test::send_all(client,
-                   "POST /api/v1/Sessions/Export HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
-    ASSERT_TRUE(wait_until([&] { return begun.load(); }));
-  }
-  EXPECT_TRUE(wait_until([&] { return ended.load(); }));
+  { const UniqueFd client = begin(endless); }
+  EXPECT_TRUE(wait_until([&] { return endless.ended(); }));
 }
 
 TEST_F(ServerHttpTest, TheServerGoesWhileJobsRun) {
-  std::atomic<bool> begun = false;
-  api.on_job = [&](const JobObserver& observer) {
-    begun = true;
-    while (observer({})) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    return Status();
-  };
+  test::EndlessJob endless;
   serve();
-  const UniqueFd client = test::connect_to(port);
-  test::send_all(client,
-                 "POST /api/v1/Sessions/Export HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
-  ASSERT_TRUE(wait_until([&] { return begun.load(); }));
+  const UniqueFd client = begin(endless);
   server.reset();
+  EXPECT_TRUE(endless.ended());
 }
 
 TEST_F(ServerHttpTest, HealthAndMetricsFollowTheEngine) {

@@ -71,14 +71,42 @@ class ServerWatchTest : public testing::Test {
   std::unique_ptr<HttpServer> server;
 };
 
+TEST_F(ServerWatchTest, TheHistoryOfRoundsIsToldWhenItChangedAndNotWithEveryStatus) {
+  v1::DaemonStatus status;
+  const auto add_round = [&](std::uint32_t round) {
+    v1::RoundPoint& point = *status.mutable_alignment()->add_history();
+    point.set_round(round);
+    point.set_at_s(round);
+  };
+  add_round(1);
+  add_round(2);
+  api.board().show(status);
+  serve();
+  WatchClient console(server->port());
+  EXPECT_EQ(text(console)["rounds"]["history"].size(), 2U);
+  const json first = text(console);
+  EXPECT_TRUE(first.contains("status"));
+  EXPECT_FALSE(first["status"]["alignment"].contains("history"));
+  status.set_reason("Nothing new of rounds.");
+  api.board().show(status);
+  EXPECT_EQ(text(console)["status"]["reason"], "Nothing new of rounds.");
+  add_round(3);
+  api.board().show(status);
+  EXPECT_EQ(text(console)["rounds"]["history"][2]["round"], 3);
+  EXPECT_TRUE(text(console).contains("status"));
+  status.mutable_alignment()->clear_history();  // as the next alignment begins
+  api.board().show(status);
+  EXPECT_EQ(text(console)["rounds"], json::object());
+}
+
 TEST_F(ServerWatchTest, AConsoleIsToldWhatIsAndWhatChanges) {
   show(v1::IDLE);
-  api.board().notice(v1::GREEN, "started");
+  api.board().notice(v1::GREEN, "Started.");
   serve();
   WatchClient console(server->port());
   ASSERT_TRUE(console.open());
   EXPECT_EQ(text(console)["status"]["phase"], "IDLE");
-  EXPECT_EQ(text(console)["notice"]["text"], "started");
+  EXPECT_EQ(text(console)["notice"]["text"], "Started.");
   show(v1::ALIGNING);
   EXPECT_EQ(text(console)["status"]["phase"], "ALIGNING");
 }

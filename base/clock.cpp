@@ -1,7 +1,11 @@
 #include "base/clock.h"
 
 #include <chrono>
+#include <ctime>
 #include <thread>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
 
 namespace emberlock {
 
@@ -17,6 +21,11 @@ void SteadyClock::sleep_until(TimePoint t) {
 TimePoint wall_clock() {
   const auto t = std::chrono::system_clock::now().time_since_epoch();
   return {std::chrono::duration_cast<std::chrono::nanoseconds>(t).count()};
+}
+
+std::string utc_now() {
+  const std::int64_t ms = wall_clock().ns / 1'000'000;
+  return fmt::format("{:%FT%T}.{:03}Z", fmt::gmtime(static_cast<std::time_t>(ms / 1000)), ms % 1000);
 }
 
 }  // namespace emberlock

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "base/time_point.h"
 
 namespace emberlock {
@@ -23,5 +25,8 @@ class SteadyClock final : public Clock {
 
 /// Now by the wall clock, since 1970-01-01 UTC. It may jump.
 TimePoint wall_clock();
+
+/// The same in words, as ISO 8601 in UTC with milliseconds: "2026-11-22T02:50:00.123Z".
+std::string utc_now();
 
 }  // namespace emberlock

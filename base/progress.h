@@ -12,6 +12,9 @@ namespace emberlock {
 /// works.
 using Progress = std::function<void(double fraction, std::string_view what)>;
 
+/// The most that is reported before the end.
+inline constexpr double kNearlyDone = 0.999;
+
 inline void report(const Progress& progress, double fraction, std::string_view what) {
   if (progress) progress(fraction, what);
 }

@@ -1,11 +1,9 @@
 #include "daemon/board.h"
 
 #include <algorithm>
-#include <ctime>
+#include <cctype>
+#include <string_view>
 #include <utility>
-
-#include <fmt/chrono.h>
-#include <fmt/format.h>
 
 #include "base/clock.h"
 
@@ -16,14 +14,36 @@ bool has_pictures(const v1::IterationPreview& preview) {
   return preview.has_volume() || !preview.captured_jpeg().empty() || !preview.rendered_jpeg().empty();
 }
 
-}  // namespace
-
-std::string utc_now() {
-  const std::int64_t ms = wall_clock().ns / 1'000'000;
-  return fmt::format("{:%FT%T}.{:03}Z", fmt::gmtime(static_cast<std::time_t>(ms / 1000)), ms % 1000);
+/// What is told inside is clauses, that others build on; what people are shown begins and ends as a sentence.
+/// A first word that isn't one, as "virtual-02" and "raw:", stays as it is.
+std::string sentence(std::string text) {
+  const auto word = std::find(text.begin(), text.end(), ' ');
+  const auto in_words = [](unsigned char c) { return std::islower(c) != 0 || c == '\'' || c == ','; };
+  if (word != text.begin() && std::all_of(text.begin(), word, in_words))
+    text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  if (!text.empty() && std::string_view(".!?").find(text.back()) == std::string_view::npos) text += '.';
+  return text;
 }
 
+void write_sentences(v1::DaemonStatus& status) {
+  const auto mend = [](std::string* text) { *text = sentence(std::move(*text)); };
+  mend(status.mutable_reason());
+  mend(status.mutable_next_step());
+  for (v1::Fault& fault : *status.mutable_faults()) {
+    mend(fault.mutable_what());
+    mend(fault.mutable_remedy());
+  }
+  for (v1::CameraStatus& camera : *status.mutable_cameras()) mend(camera.mutable_reason());
+  if (status.has_strobe()) mend(status.mutable_strobe()->mutable_reason());
+  if (status.has_alignment()) mend(status.mutable_alignment()->mutable_reason());
+  if (status.has_recording()) mend(status.mutable_recording()->mutable_verdict());
+  if (status.has_reconstruction()) mend(status.mutable_reconstruction()->mutable_error());
+}
+
+}  // namespace
+
 void Board::show(v1::DaemonStatus status) {
+  write_sentences(status);
   {
     const std::lock_guard lock(mutex_);
     status.set_revision(++revision_);
@@ -42,7 +62,7 @@ void Board::notice(v1::Light light, const std::string& text) {
     v1::Notice notice;
     notice.set_light(light);
     notice.set_utc(utc_now());
-    notice.set_text(text);
+    notice.set_text(sentence(text));
     const std::lock_guard lock(mutex_);
     notice.set_id(next_notice_++);
     notices_.push_back(std::move(notice));

@@ -40,7 +40,7 @@ class Board {
   enum class Topic { status, notices, pictures, iterations };
   static constexpr std::size_t kNotices = 1000;  ///< so many are kept
 
-  /// Gives it the next revision.
+  /// Gives it the next revision. What it says in words is shown as sentences, as notices are.
   void show(v1::DaemonStatus status);
   /// Never null.
   [[nodiscard]] std::shared_ptr<const v1::DaemonStatus> status() const;
@@ -83,8 +83,5 @@ class Board {
   std::map<std::uint64_t, std::function<void(Topic)>> subscribers_;
   std::uint64_t next_subscriber_ = 0;
 };
-
-/// Now, as ISO 8601 in UTC with milliseconds: "2026-11-22T02:50:00.123Z".
-std::string utc_now();
 
 }  // namespace emberlock

@@ -89,6 +89,8 @@ class Conductor {
   [[nodiscard]] std::vector<FrameCounts> counts() const;
   [[nodiscard]] std::vector<v1::CameraStatus::State> camera_states() const;
   void remember(const AlignRoundReport& round);
+  /// Of the alignment's last round.
+  [[nodiscard]] v1::AlignmentStatus::Verdict verdict() const;
   void describe_cameras(v1::DaemonStatus& status) const;
   void describe_alignment(v1::AlignmentStatus& status) const;
 

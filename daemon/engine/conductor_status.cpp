@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "base/clock.h"
 #include "daemon/engine/conductor.h"
 #include "drivers/replay/record.h"
 #include "smear_sync/align/align_words.h"
@@ -34,6 +35,11 @@ void show_sight(const CameraSight& sight, v1::CameraStatus& camera) {
   for (const DotReading& dot : sight.dots) *camera.add_dots() = point(dot.x, dot.y);
   if (sight.target_row) camera.set_target_row(sight.target_row->value());
   if (sight.tolerance) camera.set_tolerance_rows(sight.tolerance->value());
+  for (const RowSpan& span : sight.band) {
+    v1::RowSpan& shown = *camera.add_band();
+    shown.set_first(span.first.value());
+    shown.set_last(span.last.value());
+  }
 }
 
 void show_decision(const CameraDecision& decision, SecondsPerRow row, v1::CameraStatus& camera) {
@@ -46,20 +52,6 @@ void show_decision(const CameraDecision& decision, SecondsPerRow row, v1::Camera
   }
   camera.set_reset_next(decision.reset);
   if (decision.trim) camera.set_trim_ppm(decision.trim->value());
-}
-
-v1::AlignmentStatus::Verdict verdict_of(AlignVerdict verdict) {
-  switch (verdict) {
-    case AlignVerdict::go_on:
-      return v1::AlignmentStatus::GO_ON;
-    case AlignVerdict::aligned:
-      return v1::AlignmentStatus::ALIGNED;
-    case AlignVerdict::refused:
-      return v1::AlignmentStatus::REFUSED;
-    case AlignVerdict::given_up:
-      return v1::AlignmentStatus::GIVEN_UP;
-  }
-  return v1::AlignmentStatus::VERDICT_UNSPECIFIED;
 }
 
 /// What the operator does now, by what stands most in the way.
@@ -191,7 +183,7 @@ void Conductor::describe_alignment(v1::AlignmentStatus& status) const {
   status.set_checks(static_cast<std::uint32_t>(alignment_->checks()));
   status.set_reason(last.reason);
   if (last.round == 0) return;
-  status.set_verdict(verdict_of(last.verdict));
+  status.set_verdict(verdict());
   if (const auto worst = alignment_->worst_pair(now)) status.set_worst_pair_s(worst->value());
   if (last.verdict == AlignVerdict::aligned) {
     status.set_next_check_s(alignment_->next_check(now).value());

@@ -30,10 +30,6 @@ Happening mended(State::State state, const std::string& id) {
   return FaultMended{{state == State::LOST ? v1::Fault::CAMERA_LOST : v1::Fault::CAMERA_HANGS, id}};
 }
 
-std::uint64_t made(const FrameCounts& counts) {
-  return counts.delivered + counts.damaged + counts.passed_over + counts.lost();
-}
-
 }  // namespace
 
 DeviceWatch::DeviceWatch(std::vector<std::string> camera_ids)
@@ -67,14 +63,14 @@ std::vector<Happening> DeviceWatch::cameras(const std::vector<v1::CameraStatus::
 std::vector<Happening> DeviceWatch::strobe(const std::string& id, const Status& answer) {
   const FaultKey key{v1::Fault::STROBE_SILENT, id};
   if (answer.ok()) {
-    if (!std::exchange(strobe_silent_, false)) return {};
+    if (!std::exchange(strobe_trouble_, {})) return {};
     return {FaultMended{key}};
   }
-  strobe_silent_ = true;
-  const std::string& remedy = answer.error().remedy;
-  return {FaultRaised{
-      key, v1::RED, answer.error().what,
-      remedy.empty() ? "See to its power and its cable: it is asked again every second" : remedy}};
+  const Error& trouble = answer.error();
+  if (strobe_trouble_ == trouble.what) return {};
+  strobe_trouble_ = trouble.what;
+  const std::string usual = "See to its power and its cable: it is asked again every second";
+  return {FaultRaised{key, v1::RED, trouble.what, trouble.remedy.empty() ? usual : trouble.remedy}};
 }
 
 std::vector<Happening> DeviceWatch::clocks(TimePoint monotonic, TimePoint wall) {
@@ -86,15 +82,16 @@ std::vector<Happening> DeviceWatch::clocks(TimePoint monotonic, TimePoint wall) 
       {v1::Fault::CLOCK_STEPPED},
       v1::AMBER,
       fmt::format("the wall clock was moved by {:+.1f} s", step.value()),
-      "Nothing is lost: frames are ordered by a clock that can't be moved. Times of day in a recording "
-      "that runs are off by that from here on"}};
+      "See to what sets it (timedatectl). No frame is lost or misplaced: they are ordered "
+      "by a clock that can't be moved; the times of day in a recording that runs are off by that from here "
+      "on"}};
 }
 
 void DeviceWatch::frames(const std::vector<FrameCounts>& counts, TimePoint now) {
   const Seconds span = counted_ ? now - *counted_ : kRateSpan;
   if (span < kRateSpan) return;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    const std::uint64_t total = made(counts[i]);
+    const std::uint64_t total = counts[i].made();
     if (counted_) rates_[i] = static_cast<double>(total - made_[i]) / span.value();
     made_[i] = total;
   }

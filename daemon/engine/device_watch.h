@@ -35,7 +35,7 @@ class DeviceWatch {
   std::vector<std::string> ids_;
   std::vector<v1::CameraStatus::State> states_;
   bool all_lost_ = false;
-  bool strobe_silent_ = false;
+  std::optional<std::string> strobe_trouble_;  ///< as it was told last
   std::optional<Seconds> wall_ahead_;
   std::vector<double> rates_;
   std::vector<std::uint64_t> made_;

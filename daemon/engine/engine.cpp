@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "base/clock.h"
+#include "base/priority.h"
 #include "daemon/devices/device_list.h"
 #include "daemon/recordings/json.h"
 #include "session/export.h"
@@ -19,10 +20,6 @@ constexpr auto kPause = std::chrono::milliseconds(4);     ///< between two looks
 constexpr Seconds kShown{0.1};                            ///< between two statuses
 constexpr Seconds kLongestSilence{10};                    ///< of the thread or of a camera that says it films
 constexpr auto kLongestFinish = std::chrono::minutes(5);  ///< of queues that drain to a slow disk
-
-std::uint64_t made(const FrameCounts& counts) {
-  return counts.delivered + counts.damaged + counts.passed_over + counts.lost();
-}
 
 ReconstructionOptions reconstruction_options(const DaemonConfig& config) {
   ReconstructionOptions options;
@@ -40,15 +37,19 @@ ReconstructionOptions reconstruction_options(const DaemonConfig& config) {
   return options;
 }
 
-/// Runs a job to its end; the last that `observer` is told is what came of it.
+/// Runs a job to its end, beside a recording if need be; the last that `observer` is told is what came of it.
 template <class Job, class Good>
 Status run_job(const JobObserver& observer, const Job& job, const Good& good) {
-  auto outcome = job(Observer([&](double fraction, std::string_view doing) {
+  const Observer told([&](double fraction, std::string_view doing) {
     v1::JobProgress progress;
     progress.set_fraction(fraction);
     progress.set_doing(std::string(doing));
     return observer(progress);
-  }));
+  });
+  auto outcome = std::async(std::launch::async, [&] {
+                   give_way();
+                   return job(told);
+                 }).get();
   if (!outcome.ok()) return outcome.error();
   v1::JobProgress last;
   last.set_fraction(1);
@@ -81,8 +82,10 @@ Result<std::unique_ptr<Engine>> Engine::start(const DaemonConfig& config, Board&
   EMBERLOCK_ASSIGN_OR_RETURN(std::unique_ptr<Rig> rig, Rig::open(config.rig, std::move(rig_options)));
   for (std::size_t i = 0; i < rig->size(); ++i) ids->push_back(rig->camera(i).info().id);
   EMBERLOCK_ASSIGN_OR_RETURN(Geometry geometry, Geometry::of(config.rig, *rig));
-  return std::unique_ptr<Engine>(
+  std::unique_ptr<Engine> engine(
       new Engine(config, board, std::move(store), std::move(rig), std::move(geometry)));
+  engine->take_up_compression();
+  return engine;
 }
 
 Engine::Engine(const DaemonConfig& config, Board& board, SessionStore store, std::unique_ptr<Rig> rig,
@@ -97,6 +100,17 @@ Engine::Engine(const DaemonConfig& config, Board& board, SessionStore store, std
         post([session, outcome](Conductor& c) { c.transcoded(session, outcome); });
       }),
       thread_([this] { run(); }) {}
+
+/// What an earlier daemon left uncompressed, or salvage just made whole.
+void Engine::take_up_compression() {
+  if (config_.recording.transcode != RecordingConfig::Transcode::when_idle) return;
+  const v1::ListSessionsResponse all = store_.list();
+  for (const auto& entry : all.sessions()) {
+    const auto folder = store_.path_of(entry.session());
+    if (entry.state() != v1::Manifest::RECORDING && folder.ok() && is_uncompressed(*folder))
+      transcoder_.add(*folder);
+  }
+}
 
 Engine::~Engine() {
   ending_ = true;
@@ -129,11 +143,15 @@ void Engine::run() {
     const TimePoint now = SteadyClock().now();
     if (calls.empty() && now - shown < kShown) continue;
     shown = now;
-    board_.show(conductor.status());
-    shown_.notify_all();
+    show(conductor);
   }
   const std::lock_guard lock(mutex_);
   calls_.clear();  // their promises break: whoever waits is told
+}
+
+void Engine::show(const Conductor& conductor) {
+  board_.show(conductor.status());
+  shown_.notify_all();
 }
 
 void Engine::post(std::function<void(Conductor&)> call) {
@@ -152,7 +170,9 @@ Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call
   if (urgent) ++urgent_;
   post([this, urgent, promise = std::move(promise), call = std::move(call)](Conductor& conductor) {
     if (urgent) --urgent_;
-    promise->set_value(call(conductor));
+    Answer made = call(conductor);
+    show(conductor);  // whoever has the answer finds in the status what it did, however long the round lasts
+    promise->set_value(std::move(made));
   });
   try {
     return answer.get();
@@ -169,7 +189,7 @@ bool Engine::alive() const {
   progress_.resize(rig_->size());
   bool all = true;
   for (std::size_t i = 0; i < rig_->size(); ++i) {
-    const std::uint64_t frames = made(rig_->counts(i));
+    const std::uint64_t frames = rig_->counts(i).made();
     if (rig_->state(i) != CameraThread::State::filming || frames != progress_[i].frames ||
         progress_[i].at == TimePoint{})
       progress_[i] = {frames, now};

@@ -22,8 +22,9 @@ class Engine final : public Api {
   /// Sees every frame, by its camera's id, on that camera's thread: it must return at once.
   using OnFrame = std::function<void(const std::string& camera_id, const Frame& frame)>;
 
-  /// Opens the sessions' folder (salvaging what a killed recorder left) and the rig. Devices that aren't
-  /// there don't keep it from starting. `board` outlives it. Errors: bad_input and io.
+  /// Opens the sessions' folder and the rig. What a killed recorder left is salvaged; what is uncompressed
+  /// waits for the transcoder, where one is configured. Devices that aren't there don't keep it from
+  /// starting. `board` outlives it. Errors: bad_input and io.
   static Result<std::unique_ptr<Engine>> start(const DaemonConfig& config, Board& board,
                                                OnFrame on_frame = {}, RigOptions rig_options = {});
   ~Engine() override;
@@ -59,7 +60,9 @@ class Engine final : public Api {
 
   Engine(const DaemonConfig& config, Board& board, SessionStore store, std::unique_ptr<Rig> rig,
          Geometry geometry);
+  void take_up_compression();
   void run();
+  void show(const Conductor& conductor);
   /// Has it done on the thread, and waits for that.
   void post(std::function<void(Conductor&)> call);
   template <class Answer>

@@ -33,6 +33,8 @@ class Stepper {
   void operator()(const AskRecord& asked) {
     if (records(now().phase))
       return refuse(fmt::format("{} is being recorded", now().session), "stop it first");
+    if (now().renews)
+      return refuse("cameras are being reset before they leave tolerance", "ask again in a second or two");
     if (aligns(now().phase))
       return refuse("the cameras are being aligned", "wait until they are locked, or stop that");
     if (now().phase != v1::LOCKED && !asked.unlocked) {
@@ -93,7 +95,7 @@ class Stepper {
       case v1::AlignmentStatus::ALIGNED:
         mend({v1::Fault::LOCK_LOST});
         mend({v1::Fault::NOT_ALIGNED});
-        if (now().phase != v1::LOCKED) remark(v1::GREEN, "locked: " + happened.reason);
+        if (now().phase != v1::LOCKED && !now().renews) remark(v1::GREEN, "Locked: " + happened.reason);
         enter(v1::LOCKED, happened.reason);
         return;
       case v1::AlignmentStatus::REFUSED:
@@ -107,13 +109,15 @@ class Stepper {
         act(Action::end_alignment);
         return;
       default:
-        if (now().phase == v1::LOCKED) {
+        const bool held = now().phase == v1::LOCKED || now().renews;
+        if (held && !happened.renews) {
           raise({{v1::Fault::LOCK_LOST},
                  v1::AMBER,
                  happened.reason,
                  "Wait: the cameras are being aligned again"});
         }
         enter(v1::ALIGNING, happened.reason);
+        now().renews = held && happened.renews;
     }
   }
 
@@ -191,6 +195,7 @@ class Stepper {
   }
   void enter(v1::Phase phase, std::string reason) {
     now().phase = phase;
+    now().renews = false;
     now().reason = std::move(reason);
   }
   void finish(const std::string& reason) {
@@ -254,7 +259,7 @@ class Stepper {
       if ((any || same(fault, key)) && !fault.over()) {
         fault.set_over(true);
         remark(v1::GREEN,
-               "over: " + (fault.subject().empty() ? fault.what() : fault.subject() + ": " + fault.what()));
+               "Over: " + (fault.subject().empty() ? fault.what() : fault.subject() + ": " + fault.what()));
       }
     }
   }

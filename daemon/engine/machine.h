@@ -23,15 +23,18 @@ namespace emberlock {
 //    │  all written       ▼ (any of them)                                  ▼
 //    └──── FINISHING ◄── CAPTURING ◄───────────────────────────────────────┘
 //
-// FINISHING leads back to where the recording began. A reconstruction runs beside all of it.
+// FINISHING leads back to where the recording began. A reconstruction runs beside all of it. Cameras that
+// would leave tolerance before long are reset in time: for the second or so that this takes it is ALIGNING,
+// but no lock is lost.
 
 enum class Lock { absent, held };
 
 struct MachineState {
   v1::Phase phase = v1::IDLE;
   std::string reason = "nothing is asked for";
-  Lock lock = Lock::absent;        ///< of CAPTURING and FINISHING: whether it began locked
-  std::string session;             ///< of CAPTURING and FINISHING
+  bool renews = false;       ///< of ALIGNING: nobody left tolerance, those that would have are being reset
+  Lock lock = Lock::absent;  ///< of CAPTURING and FINISHING: whether it began locked
+  std::string session;       ///< of CAPTURING and FINISHING
   bool reconstruct_after = false;  ///< the recording is handed on once it is finished
   std::string reconstructing;      ///< the session of the running reconstruction; empty: none runs
   std::vector<v1::Fault> faults;   ///< by id; those that are over stay until acknowledged
@@ -66,6 +69,7 @@ struct RowTimeMeasured {};
 struct RoundDone {
   v1::AlignmentStatus::Verdict verdict = v1::AlignmentStatus::VERDICT_UNSPECIFIED;
   std::string reason;
+  bool renews = false;  ///< of GO_ON: nobody has left tolerance, those that would are being reset
 };
 /// The alignment stopped for a reason that isn't its own: a device. It begins again once `Recovered`.
 struct AlignmentBroken {

@@ -15,6 +15,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "base/clock.h"
 #include "daemon/reconstruction/messages.h"
 #include "daemon/reconstruction/process.h"
 #include "recon/compute/device.h"

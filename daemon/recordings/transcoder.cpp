@@ -4,26 +4,11 @@
 #include <system_error>
 #include <utility>
 
-#include <sys/resource.h>
-#include <unistd.h>
-
-#include "base/log.h"
+#include "base/priority.h"
 #include "session/salvage.h"
 
 namespace emberlock {
 namespace fs = std::filesystem;
-namespace {
-
-constexpr int kLowestPriority = 19;
-
-/// On Linux a priority is a thread's own.
-void yield_to_everybody() {
-  if (::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowestPriority) != 0) {
-    log(LogCategory::daemon).warn("transcoding goes on at normal priority");
-  }
-}
-
-}  // namespace
 
 bool is_uncompressed(const fs::path& session) {
   std::error_code ec;
@@ -102,7 +87,7 @@ bool Transcoder::go_on(double fraction) {
 }
 
 void Transcoder::work() {
-  yield_to_everybody();
+  give_way();
   while (const auto session = next()) {
     const Status outcome =
         is_uncompressed(*session)

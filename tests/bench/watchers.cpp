@@ -19,6 +19,7 @@
 #include "base/clock.h"
 #include "base/random.h"
 #include "daemon/server/http_server.h"
+#include "daemon/server/json_api.h"
 #include "daemon/server/metrics.h"
 #include "daemon/server/pictures.h"
 #include "tests/support/fake_api.h"
@@ -44,9 +45,39 @@ std::shared_ptr<const Image> dark_room(std::uint64_t seed) {
   return image;
 }
 
+constexpr int kRounds = 500;
+constexpr std::uint64_t kFramesPerRound = 24;
+
+void add_round(v1::DaemonStatus& status, std::uint32_t round) {
+  auto& history = *status.mutable_alignment()->mutable_history();
+  v1::RoundPoint& point = *history.Add();
+  point.set_round(round);
+  point.set_at_s(round * kFramesPerRound / kFrameRate);
+  for (int i = 0; i < kCameras; ++i) point.add_error_rows(12.3456789 / (i + round));
+  point.set_resets(round / 2);
+  if (history.size() > kRounds) history.erase(history.begin());
+}
+
+/// With as long a history as there is.
+v1::DaemonStatus long_aligned() {
+  v1::DaemonStatus status;
+  status.set_phase(v1::ALIGNING);
+  for (std::uint32_t round = 0; round < kRounds; ++round) add_round(status, round);
+  for (int i = 0; i < kCameras; ++i) {
+    v1::CameraStatus& camera = *status.add_cameras();
+    camera.set_id(fmt::format("camera {}", i));
+    camera.set_state(v1::CameraStatus::FILMING);
+    camera.set_error_rows(1.2345678 * i);
+    camera.set_reason("films");
+    camera.mutable_counts()->set_delivered(1000);
+  }
+  return status;
+}
+
 struct Seen {
   double slowest_hz = 0;  ///< of all consoles that read and all cameras
   double late_ms = 0;     ///< from a frame's arrival to its picture, the 95th percentile
+  double text_bytes = 0;  ///< a second, of status and rounds, to one console
 };
 
 /// The consoles' process: reads for a while, and counts.
@@ -57,6 +88,7 @@ Seen watch(int port, int consoles, int stalled) {
   for (int i = stalled; i < consoles; ++i) sockets.push_back({all[i].descriptor(), POLLIN, 0});
   std::vector<std::map<std::string, int>> counts(sockets.size());
   std::vector<double> late_ms;
+  double text_bytes = 0;
   const SteadyClock clock;
   const TimePoint settled = clock.now() + Seconds(1);
   while (clock.now() < settled + kDuration) {
@@ -64,14 +96,16 @@ Seen watch(int port, int consoles, int stalled) {
     for (std::size_t i = 0; i < sockets.size(); ++i) {
       if (sockets[i].revents == 0) continue;
       while (const auto message = all[i + static_cast<std::size_t>(stalled)].hear_now()) {
-        if (message->opcode != 2 || clock.now() < settled) continue;
+        if (clock.now() < settled) continue;
+        if (message->opcode == 1) text_bytes += static_cast<double>(message->bytes.size());
+        if (message->opcode != 2) continue;
         const auto header = nlohmann::json::parse(message->bytes.substr(4, message->bytes.find('}', 4) - 3));
         ++counts[i][header["camera_id"]];
         late_ms.push_back(in_milliseconds(clock.now() - TimePoint{header["monotonic_ns"]}));
       }
     }
   }
-  Seen seen{1e9, 0};
+  Seen seen{1e9, 0, text_bytes / kDuration.value() / static_cast<double>(counts.size())};
   for (const auto& console : counts) {
     if (console.size() < kCameras) seen.slowest_hz = 0;
     for (const auto& [camera, pictures] : console)
@@ -97,6 +131,7 @@ void measure(int consoles, int stalled) {
   if (!server) return;
   Pictures pictures(api.board(), {});
   std::atomic<bool> over = false;
+  v1::DaemonStatus status = long_aligned();
   std::thread cameras([&] {
     SteadyClock clock;
     std::vector<Frame> frames;
@@ -104,6 +139,9 @@ void measure(int consoles, int stalled) {
     const TimePoint begun = clock.now();
     for (std::uint64_t n = 0; !over; ++n) {
       clock.sleep_until(begun + Seconds(static_cast<double>(n) / kFrameRate));
+      status.set_now_ns(clock.now().ns);
+      if (n % kFramesPerRound == 0) add_round(status, static_cast<std::uint32_t>(kRounds + n));
+      api.board().show(status);
       for (int i = 0; i < kCameras; ++i) {
         frames[i].stamp.frame_id = n;
         frames[i].stamp.monotonic_time = clock.now();
@@ -124,9 +162,9 @@ void measure(int consoles, int stalled) {
   fmt::print(
       "{:3} consoles ({} stalled): {:5.1f} pictures/s of the slowest camera, {:4.0f} ms late (95 %), daemon "
       "{:5.1f} % of a "
-      "core, {} MB\n",
+      "core, {} MB; {:.0f} kB/s of status and rounds a console (a status with its rounds: {:.0f} kB)\n",
       consoles, stalled, seen.slowest_hz, seen.late_ms, 100 * (usage.cpu_s - cpu) / (kDuration.value() + 1),
-      usage.resident_bytes >> 20);
+      usage.resident_bytes >> 20, seen.text_bytes / 1000, static_cast<double>(to_json(status).size()) / 1000);
   std::fflush(stdout);
 }
 

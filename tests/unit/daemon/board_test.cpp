@@ -41,6 +41,31 @@ TEST(Board, TheStatusShownLastIsTheOneThatIsRead) {
   EXPECT_EQ(api.board().status()->revision(), 2U);
 }
 
+TEST(Board, WhatPeopleReadAreSentences) {
+  Board board;
+  v1::DaemonStatus status;
+  status.set_reason("every camera lies within tolerance of the target");
+  status.set_next_step("virtual-02: See to its cable.");
+  status.add_cameras()->set_reason("films");
+  status.add_cameras();
+  v1::Fault& fault = *status.add_faults();
+  fault.set_what("the camera doesn't answer any more");
+  fault.set_remedy("Is it plugged in?");
+  status.mutable_recording()->set_verdict("12 frames of 2 cameras written, none lost");
+  board.show(status);
+  const auto shown = board.status();
+  EXPECT_EQ(shown->reason(), "Every camera lies within tolerance of the target.");
+  EXPECT_EQ(shown->next_step(), "virtual-02: See to its cable.");
+  EXPECT_EQ(shown->cameras(0).reason(), "Films.");
+  EXPECT_EQ(shown->cameras(1).reason(), "") << "what isn't said stays so";
+  EXPECT_EQ(shown->faults(0).what(), "The camera doesn't answer any more.");
+  EXPECT_EQ(shown->faults(0).remedy(), "Is it plugged in?");
+  EXPECT_EQ(shown->recording().verdict(), "12 frames of 2 cameras written, none lost.");
+  EXPECT_FALSE(shown->has_strobe());
+  board.notice(v1::GREEN, "raw: compressed, as it was asked");
+  EXPECT_EQ(board.notices(0).front().text(), "raw: compressed, as it was asked.") << "a name stays";
+}
+
 TEST(Board, OfTheJournalTheLastThousandAreKept) {
   Board board;
   for (std::size_t i = 0; i < Board::kNotices + 5; ++i) board.notice(v1::GREEN, "line");

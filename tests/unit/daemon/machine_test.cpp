@@ -49,6 +49,32 @@ TEST(Machine, AlignsByWayOfTheRowTime) {
   EXPECT_EQ(light(run.state()), v1::GREEN);
 }
 
+TEST(Machine, CamerasThatAreResetBeforeTheyLeaveLoseNoLockButARecordingWaits) {
+  Walk run(kToLocked);
+  run.go(RoundDone{v1::AlignmentStatus::GO_ON, "b would leave before long", true});
+  EXPECT_EQ(run.state().phase, v1::ALIGNING) << "it isn't locked for that moment";
+  EXPECT_EQ(run.state().reason, "b would leave before long");
+  EXPECT_EQ(light(run.state()), v1::AMBER);
+  EXPECT_THAT(run.state().faults, IsEmpty());
+  for (const bool unlocked : {false, true}) {
+    const MachineStep asked = run.go(AskRecord{"flame", unlocked, false});
+    ASSERT_TRUE(asked.refusal);
+    EXPECT_THAT(asked.refusal->message(), HasSubstr("Ask again"));
+  }
+  run.go(kAligned);
+  EXPECT_EQ(light(run.state()), v1::GREEN);
+  EXPECT_FALSE(run.go(AskRecord{"flame", false, false}).refusal);
+}
+
+TEST(Machine, ARenewalThatLosesACameraIsALostLock) {
+  Walk run(kToLocked);
+  run.go(RoundDone{v1::AlignmentStatus::GO_ON, "b would leave before long", true});
+  run.go(kCameraOut);
+  EXPECT_EQ(run.state().phase, v1::ALIGNING);
+  ASSERT_EQ(run.state().faults.size(), 1);
+  EXPECT_EQ(run.state().faults[0].kind(), v1::Fault::LOCK_LOST);
+}
+
 TEST(Machine, ACheckThatFindsACameraOutSaysSoAndAlignsAgain) {
   Walk run(kToLocked);
   run.go(kCameraOut);

@@ -16,28 +16,28 @@ using test::record;
 using test::small_disk_options;
 using test::TempFolder;
 
-const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
+const ImageLayout kStoredLayout{{64, 48}, PixelFormat::gray8, 8};
 constexpr TimePoint kNow{1'795'317'309'000'000'000};  // 2026-11-22 03:15:09
 
 SessionStore store_in(const TempFolder& temp) { return SessionStore::open(temp / "store").value(); }
 
 /// A session as a killed recorder leaves it.
 void leave_unfinished(const std::filesystem::path& folder) {
-  auto writer = SessionWriter::create(folder, manifest_of({kLayout}), small_disk_options());
-  for (std::uint64_t i = 0; i < 40; ++i) ASSERT_TRUE(writer->write(0, noise_frame(kLayout, i)));
+  auto writer = SessionWriter::create(folder, manifest_of({kStoredLayout}), small_disk_options());
+  for (std::uint64_t i = 0; i < 40; ++i) ASSERT_TRUE(writer->write(0, noise_frame(kStoredLayout, i)));
 }
 
 TEST(SessionStore, ListsTheNewestFirstAndTellsOfThoseThatCannotBeRead) {
   const TempFolder temp;
   const SessionStore store = store_in(temp);
   EXPECT_EQ(store.list().sessions_size(), 0);
-  record(store.folder() / "old", kLayout, 5, small_disk_options());
-  auto manifest = manifest_of({kLayout, kLayout});
+  record(store.folder() / "old", kStoredLayout, 5, small_disk_options());
+  auto manifest = manifest_of({kStoredLayout, kStoredLayout});
   manifest.set_created_utc("2026-11-22T03:00:00Z");
   auto writer = SessionWriter::create(store.folder() / "new", manifest, small_disk_options());
   ASSERT_TRUE(writer);
   writer->count_lost(1, LossCause::disk, 0);
-  for (std::uint64_t i = 0; i < 7; ++i) ASSERT_TRUE(writer->write(1, noise_frame(kLayout, i * 2)));
+  for (std::uint64_t i = 0; i < 7; ++i) ASSERT_TRUE(writer->write(1, noise_frame(kStoredLayout, i * 2)));
   ASSERT_TRUE(writer->finish());
   std::filesystem::create_directories(store.folder() / "broken");
   test::put_bytes(manifest_path(store.folder() / "broken"), "{");
@@ -62,7 +62,7 @@ TEST(SessionStore, ListsTheNewestFirstAndTellsOfThoseThatCannotBeRead) {
 TEST(SessionStore, ASessionWithEveryCalibrationAndItsBoxCanBeReconstructed) {
   const TempFolder temp;
   const SessionStore store = store_in(temp);
-  auto manifest = manifest_of({kLayout});
+  auto manifest = manifest_of({kStoredLayout});
   for (const double v : {0.0, 0.0, 0.0}) manifest.mutable_box()->add_center(v);
   for (const double v : {1.0, 1.0, 1.0}) manifest.mutable_box()->add_size(v);
   v1::Calibration& calibration = *manifest.mutable_cameras(0)->mutable_calibration();
@@ -78,7 +78,7 @@ TEST(SessionStore, ASessionWithEveryCalibrationAndItsBoxCanBeReconstructed) {
 TEST(SessionStore, NamesThatLeadElsewhereAreRefusedForOldAndNewSessions) {
   const TempFolder temp;
   const SessionStore store = store_in(temp);
-  record(temp / "outside", kLayout, 1, small_disk_options());
+  record(temp / "outside", kStoredLayout, 1, small_disk_options());
   for (const std::string& name : {std::string(".."), std::string("../outside"), std::string("/etc"),
                                   std::string("a/b"), std::string("a\0b", 3), std::string(".hidden")}) {
     const auto old = store.path_of(name);
@@ -95,7 +95,7 @@ TEST(SessionStore, NewSessionsAreNamedByTimeAndNeverTakeATakenName) {
   const auto first = store.path_for_new("", kNow);
   ASSERT_TRUE(first);
   EXPECT_EQ(first->filename(), "2026-11-22 03-15-09");
-  record(*first, kLayout, 1, small_disk_options());
+  record(*first, kStoredLayout, 1, small_disk_options());
   const auto second = store.path_for_new("", kNow);
   ASSERT_TRUE(second);
   EXPECT_EQ(second->filename(), "2026-11-22 03-15-09 2");
@@ -140,10 +140,10 @@ TEST(SessionStore, BytesASecondBoundWhatNoiseTakesOnTheDisk) {
 TEST(SessionStore, AtStartUpSalvagesWhatAKilledRecorderLeftAndNothingElse) {
   const TempFolder temp;
   const SessionStore store = store_in(temp);
-  record(store.folder() / "finished", kLayout, 5, small_disk_options());
+  record(store.folder() / "finished", kStoredLayout, 5, small_disk_options());
   leave_unfinished(store.folder() / "killed");
-  auto alive =
-      SessionWriter::create(store.folder() / "recorded now", manifest_of({kLayout}), small_disk_options());
+  auto alive = SessionWriter::create(store.folder() / "recorded now", manifest_of({kStoredLayout}),
+                                     small_disk_options());
   ASSERT_TRUE(alive);
   const auto list = store.list();
   EXPECT_EQ(list.sessions(1).session(), "killed");

@@ -17,18 +17,18 @@ using test::record;
 using test::small_disk_options;
 using test::TempFolder;
 
-const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
+const ImageLayout kTranscodedLayout{{64, 48}, PixelFormat::gray8, 8};
 constexpr std::uint64_t kFrames = 60;
 
 void record_raw(const std::filesystem::path& folder) {
-  record(folder, kLayout, kFrames, small_disk_options(Encoding::raw_nut));
+  record(folder, kTranscodedLayout, kFrames, small_disk_options(Encoding::raw_nut));
 }
 
 TEST(Transcoder, CompressesWhatIsAddedAndTellsOfEach) {
   const TempFolder temp;
   record_raw(temp / "a");
   record_raw(temp / "b");
-  record(temp / "compressed already", kLayout, 3, small_disk_options());
+  record(temp / "compressed already", kTranscodedLayout, 3, small_disk_options());
   std::map<std::string, bool> outcomes;
   Transcoder transcoder(
       [&](const std::string& session, const Status& outcome) { outcomes[session] = outcome.ok(); });

@@ -5,9 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
-#include <functional>
 #include <memory>
-#include <mutex>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -16,11 +14,14 @@
 #include "daemon/align/alignment.h"
 #include "daemon/align/record.h"
 #include "tests/support/small_rig.h"
+#include "tests/support/socket_cameras.h"
+#include "tests/support/wait.h"
 
 namespace emberlock {
 namespace {
 
-using State = CameraThread::State;
+using Thread = CameraThread::State;
+using test::wait_until;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -39,74 +40,13 @@ RigConfig fast_rig(int cameras) {
   return config;
 }
 
-/// What is plugged into this computer, as far as the driver "v4l2" of these tests knows.
-struct Sockets {
-  std::mutex mutex;
-  bool plugged = false;
-  int opened = 0;
-};
-Sockets& sockets() {
-  static Sockets all;
-  return all;
-}
-
-/// Films 100 small frames a second while it is plugged in.
-class SocketCamera final : public Camera {
- public:
-  explicit SocketCamera(std::string id) {
-    info_.id = std::move(id);
-    info_.model = "socket camera";
-    info_.layout.size = {64, 48};
-    info_.frame_rate = Hertz(100);
-  }
-  [[nodiscard]] const CameraInfo& info() const override { return info_; }
-  [[nodiscard]] FrameCounts counts() const override { return counts_; }
-  Status start() override {
-    const std::lock_guard lock(sockets().mutex);
-    if (!sockets().plugged) return Error{ErrorKind::device, "it isn't there", info_.id, {}};
-    return {};
-  }
-  void stop() override {}
-  Result<Frame> next_frame(Seconds /*deadline*/) override {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    const std::lock_guard lock(sockets().mutex);
-    if (!sockets().plugged) return Error{ErrorKind::device, "it went away", info_.id, {}};
-    Frame frame;
-    frame.stamp.frame_id = counts_.delivered++;
-    frame.stamp.monotonic_time = SteadyClock().now();
-    frame.image = std::make_shared<Image>(info_.layout);
-    return frame;
-  }
-  std::uint64_t pass_over(TimePoint /*until*/) override { return 0; }
-  Status reset_shutter(TimePoint /*at*/) override { return {}; }
-  Status trim_rate(PartsPerMillion /*trim*/) override { return {}; }
-
- private:
-  CameraInfo info_;
-  FrameCounts counts_;
-};
-
-Result<std::vector<CameraFound>> find_nothing() { return std::vector<CameraFound>{}; }
-Result<std::unique_ptr<Camera>> open_socket(const std::string& id, const CameraRequest& /*request*/) {
-  const std::lock_guard lock(sockets().mutex);
-  if (!sockets().plugged) return Error{ErrorKind::device, "there is no such camera", id, "plug it in"};
-  ++sockets().opened;
-  return std::unique_ptr<Camera>(std::make_unique<SocketCamera>(id));
-}
-constexpr CameraDriver kSocketDriver{"v4l2", find_nothing, open_socket};
-
-bool soon(const std::function<bool()>& holds) {
-  for (int i = 0; i < 5000 && !holds(); ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  return holds();
-}
-
 TEST(Rig, FastVirtualCamerasAlignOnTheirOwnClock) {
   RigConfig config = fast_rig(3);
   auto rig = Rig::open(config);
   ASSERT_TRUE(rig.ok()) << rig.error().message();
   EXPECT_EQ((*rig)->pace(), Rig::Pace::fast);
   EXPECT_EQ((*rig)->driver(0), "virtual");
-  EXPECT_EQ((*rig)->state(0), State::idle);
+  EXPECT_EQ((*rig)->state(0), Thread::idle);
   AlignmentConfig alignment;
   alignment.run.hold.reset();
   alignment.run.align.tolerance.amount = Rows(30);
@@ -117,7 +57,7 @@ TEST(Rig, FastVirtualCamerasAlignOnTheirOwnClock) {
   const auto result = run_align((*rig)->devices(), *options);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
-  EXPECT_EQ((*rig)->state(0), State::filming);
+  EXPECT_EQ((*rig)->state(0), Thread::filming);
   EXPECT_GT((*rig)->clock().now().ns, 0);
 }
 
@@ -190,12 +130,7 @@ TEST(Rig, WhatCantBeTogetherIsRefused) {
 
 class RigInRealTime : public testing::Test {
  protected:
-  RigInRealTime() { plug(false); }
-  static void plug(bool in) {
-    const std::lock_guard lock(sockets().mutex);
-    sockets().plugged = in;
-    sockets().opened = 0;
-  }
+  RigInRealTime() { test::unplug("c1"); }
   static RigConfig config() {
     RigConfig rig;
     rig.cameras = {virtual_cameras(2, {64, 48})};
@@ -207,7 +142,8 @@ class RigInRealTime : public testing::Test {
     rig.strobe.source = StrobeSource::virtual_;
     return rig;
   }
-  RigOptions options{.drivers = {&kSocketDriver, 1}};
+  std::vector<CameraDriver> drivers = test::socket_drivers();
+  RigOptions options{.drivers = drivers};
 };
 
 TEST_F(RigInRealTime, ACameraThatIsAbsentAtStartIsLostUntilItComes) {
@@ -217,32 +153,32 @@ TEST_F(RigInRealTime, ACameraThatIsAbsentAtStartIsLostUntilItComes) {
   Camera& late = (*rig)->camera(2);
   EXPECT_EQ(late.info().layout.size, (ImageSize{0, 0})) << "not known yet";
   for (std::size_t i = 0; i < 3; ++i) ASSERT_TRUE((*rig)->camera(i).start().ok()) << i;
-  EXPECT_EQ((*rig)->state(0), State::filming);
-  EXPECT_EQ((*rig)->state(2), State::lost);
+  EXPECT_EQ((*rig)->state(0), Thread::filming);
+  EXPECT_EQ((*rig)->state(2), Thread::lost);
   ASSERT_TRUE((*rig)->trouble(2));
   EXPECT_THAT((*rig)->trouble(2)->message(), HasSubstr("there is no such camera"));
   EXPECT_EQ(late.next_frame(Seconds(0)).error().kind, ErrorKind::device) << "said once";
   EXPECT_EQ(late.next_frame(Seconds(0)).error().kind, ErrorKind::timed_out);
   EXPECT_TRUE((*rig)->camera(0).next_frame(Seconds(5)).ok()) << "the others film";
 
-  plug(true);
+  test::plug_in("c1");
   const auto frame = late.next_frame(Seconds(5));
   ASSERT_TRUE(frame.ok()) << frame.error().message();
-  EXPECT_EQ((*rig)->state(2), State::filming);
+  EXPECT_EQ((*rig)->state(2), Thread::filming);
   EXPECT_FALSE((*rig)->trouble(2));
   EXPECT_EQ(late.info().layout.size, (ImageSize{64, 48})) << "learnt";
   EXPECT_EQ(late.info().model, "socket camera");
   EXPECT_EQ(late.info().reset, ShutterReset::by_hand) << "configured";
   EXPECT_EQ((*rig)->timing()[2].rows, 48);
 
-  plug(false);
-  EXPECT_TRUE(soon([&] { return (*rig)->state(2) == State::lost; }));
-  plug(true);
-  EXPECT_TRUE(soon([&] { return (*rig)->state(2) == State::filming; }));
+  test::unplug("c1");
+  EXPECT_TRUE(wait_until([&] { return (*rig)->state(2) == Thread::lost; }));
+  test::plug_in("c1");
+  EXPECT_TRUE(wait_until([&] { return (*rig)->state(2) == Thread::filming; }));
 }
 
 TEST_F(RigInRealTime, EveryFrameIsShownAlsoThoseThatNobodyTakes) {
-  plug(true);
+  test::plug_in("c1");
   std::array<std::atomic<int>, 3> shown{};
   options.on_frame = [&](std::size_t camera, const Frame& frame) {
     if (frame.image) ++shown.at(camera);
@@ -250,10 +186,10 @@ TEST_F(RigInRealTime, EveryFrameIsShownAlsoThoseThatNobodyTakes) {
   {
     auto rig = Rig::open(config(), options).value();
     for (std::size_t i = 0; i < 3; ++i) ASSERT_TRUE(rig->camera(i).start().ok());
-    EXPECT_TRUE(soon([&] { return shown[0] > 3 && shown[1] > 3 && shown[2] > 3; }));
+    EXPECT_TRUE(wait_until([&] { return shown[0] > 3 && shown[1] > 3 && shown[2] > 3; }));
     rig->camera(0).pass_over(rig->clock().now() + Seconds(60));
     const int before = shown[0];
-    EXPECT_TRUE(soon([&] { return shown[0] > before + 2; })) << "passed over";
+    EXPECT_TRUE(wait_until([&] { return shown[0] > before + 2; })) << "passed over";
   }
   const int after = shown[0];
   std::this_thread::sleep_for(std::chrono::milliseconds(100));
@@ -287,10 +223,10 @@ TEST_F(RigOfARecording, RunsOnItsOwnClockWhenAllOfItIsRecorded) {
   EXPECT_EQ((*rig)->pace(), Rig::Pace::recorded);
   ASSERT_EQ((*rig)->size(), 2U);
   ASSERT_TRUE((*rig)->camera(0).start().ok());
-  EXPECT_EQ((*rig)->state(0), State::filming);
+  EXPECT_EQ((*rig)->state(0), Thread::filming);
   while ((*rig)->camera(0).next_frame(Seconds(1)).ok()) {
   }
-  EXPECT_EQ((*rig)->state(0), State::idle) << "the recording has ended";
+  EXPECT_EQ((*rig)->state(0), Thread::idle) << "the recording has ended";
   config.cameras[0].id = "nobody";
   EXPECT_THAT(Rig::open(config).error().message(), HasSubstr("the session has no such camera"));
 }

@@ -1,0 +1,17 @@
+#include "base/priority.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include "base/log.h"
+
+namespace emberlock {
+
+void give_way() {
+  constexpr int kLowest = 19;
+  // On Linux a priority is a thread's own, and its turn at the disk goes by it too.
+  if (::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowest) != 0)
+    log(LogCategory::base).warn("a thread that should give way runs at normal priority");
+}
+
+}  // namespace emberlock

@@ -1,0 +1,7 @@
+#pragma once
+
+namespace emberlock {
+
+constexpr double square(double x) { return x * x; }
+
+}  // namespace emberlock

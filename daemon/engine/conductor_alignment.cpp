@@ -1,0 +1,149 @@
+// Aligning the cameras, and holding what was reached.
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "daemon/align/record.h"
+#include "daemon/engine/conductor.h"
+#include "drivers/replay/record.h"
+
+namespace emberlock {
+namespace {
+
+constexpr std::size_t kHistory = 500;
+
+v1::RoundPoint point_of(const AlignRoundReport& report, TimePoint began) {
+  v1::RoundPoint point;
+  point.set_round(static_cast<std::uint32_t>(report.decision.round));
+  point.set_at_s((report.round.at - began).value());
+  point.set_resets(static_cast<std::uint32_t>(report.decision.resets_so_far));
+  for (const CameraDecision& camera : report.decision.cameras) {
+    point.add_error_rows(camera.error ? (*camera.error / report.options.row_time).value()
+                                      : std::numeric_limits<double>::quiet_NaN());
+  }
+  return point;
+}
+
+Result<AlignRunOptions> options_of(const v1::AlignRequest& request, const AlignmentConfig& config, Rig& rig) {
+  EMBERLOCK_ASSIGN_OR_RETURN(AlignRunOptions options, rig.align_options(config));
+  if (!request.tolerance().empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, parse_tolerance(request.tolerance()));
+  }
+  if (!request.policy().empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.align.policy, parse_align_policy(request.policy()));
+  }
+  if (request.anyway()) options.align.limits.reset();
+  return options;
+}
+
+}  // namespace
+
+Status Conductor::align(const v1::AlignRequest& request) {
+  if (devices_.strobe == nullptr) {
+    return Error{ErrorKind::refused, "the rig has no strobe, so nothing tells the shutters' phases",
+                 "[rig.strobe]", "Configure one"};
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(AlignRunOptions options,
+                             options_of(request, parts_.config.alignment, parts_.rig));
+  std::swap(options, align_options_);
+  Status asked = happen(AskAlign{});
+  if (!asked.ok()) std::swap(options, align_options_);
+  return asked;
+}
+
+Status Conductor::stop_sync() { return happen(AskIdle{}); }
+
+void Conductor::begin_alignment() {
+  alignment_.reset();
+  history_.clear();
+  foretold_.reset();
+  align_began_ = parts_.rig.clock().now();
+  auto alignment = Alignment::create(
+      devices_, align_options_, [this](const AlignRoundReport& round) { remember(round); }, {}, stop_);
+  if (!alignment.ok()) {
+    static_cast<void>(happen(RoundDone{v1::AlignmentStatus::REFUSED, alignment.error().message()}));
+    return;
+  }
+  alignment_ = std::move(*alignment);
+}
+
+void Conductor::end_alignment() {
+  if (!alignment_) return;
+  if (!parts_.config.alignment.delays.empty()) {
+    const AlignRunResult result = alignment_->result();
+    if (const Status kept = write_delays(parts_.config.alignment.delays, devices_, result.delays); !kept.ok())
+      parts_.board.notice(v1::AMBER, kept.error().message());
+  }
+  alignment_.reset();
+  v1::StrobeState off = strobe_event({}, strobe_settings_).strobe();
+  off.set_output(v1::StrobeState::OFF);
+  if (const auto applied = apply_strobe(off); !applied.ok())
+    parts_.board.notice(v1::AMBER, applied.error().message());
+}
+
+void Conductor::measure_row_time() {
+  if (!alignment_) {  // a device is waited for
+    drain();
+    const bool strobe_answers = strobe_status_.ok();
+    if (watch_.all_film() && strobe_answers) static_cast<void>(happen(Recovered{}));
+    return;
+  }
+  const Status started = alignment_->start();
+  if (!started.ok()) return explain_failure(started.error());
+  if (!alignment_->stopped()) static_cast<void>(happen(RowTimeMeasured{}));
+}
+
+void Conductor::film_round() {
+  const bool check = std::exchange(check_now_, false);
+  const Status filmed = alignment_->round();
+  if (!filmed.ok()) return explain_failure(filmed.error());
+  if (alignment_->stopped()) {
+    check_now_ = check;
+    return;
+  }
+  expired_ = false;
+  static_cast<void>(happen(RoundDone{verdict(), alignment_->last().reason, alignment_->last().renews}));
+}
+
+void Conductor::hold() {
+  const TimePoint now = parts_.rig.clock().now();
+  const Seconds left = alignment_->next_check(now);
+  if (check_now_ || left < milliseconds(1)) return film_round();  // clocks count whole nanoseconds
+  if (real_time()) return drain();
+  alignment_->wait(now + left);
+}
+
+void Conductor::break_alignment(const std::string& reason) {
+  alignment_.reset();
+  static_cast<void>(happen(AlignmentBroken{reason}));
+}
+
+void Conductor::explain_failure(const Error& error) {
+  heed_devices();
+  if (!alignment_) return;
+  if (!watch_.all_film()) return break_alignment("waiting for a camera that went away");
+  if (!strobe().ok()) return break_alignment("waiting for the strobe");
+  static_cast<void>(happen(RoundDone{v1::AlignmentStatus::GIVEN_UP, error.message()}));
+}
+
+void Conductor::remember(const AlignRoundReport& round) {
+  if (round.decision.effort && !foretold_) foretold_ = round.decision.effort;
+  history_.push_back(point_of(round, align_began_));
+  if (history_.size() > kHistory) history_.pop_front();
+}
+
+v1::AlignmentStatus::Verdict Conductor::verdict() const {
+  switch (alignment_->last().verdict) {
+    case AlignVerdict::go_on:
+      return v1::AlignmentStatus::GO_ON;
+    case AlignVerdict::aligned:
+      return v1::AlignmentStatus::ALIGNED;
+    case AlignVerdict::refused:
+      return v1::AlignmentStatus::REFUSED;
+    case AlignVerdict::given_up:
+      return v1::AlignmentStatus::GIVEN_UP;
+  }
+  return v1::AlignmentStatus::VERDICT_UNSPECIFIED;
+}
+
+}  // namespace emberlock

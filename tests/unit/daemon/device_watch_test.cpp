@@ -1,0 +1,116 @@
+#include "daemon/engine/device_watch.h"
+
+#include <variant>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace emberlock {
+namespace {
+
+using Shown = v1::CameraStatus;
+using ::testing::DoubleNear;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+/// "raised KIND SUBJECT" or "mended KIND SUBJECT"; every raised fault says what happened and what to do.
+std::vector<std::string> in_short(const std::vector<Happening>& happenings) {
+  std::vector<std::string> all;
+  for (const Happening& happening : happenings) {
+    if (const auto* raised = std::get_if<FaultRaised>(&happening)) {
+      EXPECT_THAT(raised->what, Not(IsEmpty()));
+      EXPECT_THAT(raised->remedy, Not(IsEmpty()));
+      all.push_back("raised " + v1::Fault::Kind_Name(raised->key.kind) + " " + raised->key.subject);
+    } else {
+      const FaultKey key = std::get<FaultMended>(happening).key;
+      all.push_back("mended " + v1::Fault::Kind_Name(key.kind) + " " + key.subject);
+    }
+  }
+  return all;
+}
+
+TimePoint at(double seconds) { return TimePoint{static_cast<std::int64_t>(seconds * 1e9)}; }
+
+class Watching : public ::testing::Test {
+ protected:
+  std::vector<std::string> cameras(const std::vector<Shown::State>& states) {
+    return in_short(watch_.cameras(states));
+  }
+  DeviceWatch watch_{{"left", "right"}};
+};
+
+TEST_F(Watching, ACameraThatGoesAndComesBackIsToldOnceEachTime) {
+  EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), IsEmpty());
+  EXPECT_THAT(cameras({Shown::LOST, Shown::FILMING}), ElementsAre("raised CAMERA_LOST left"));
+  EXPECT_THAT(cameras({Shown::LOST, Shown::FILMING}), IsEmpty());
+  EXPECT_FALSE(watch_.all_film());
+  EXPECT_FALSE(watch_.none_films());
+  EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), ElementsAre("mended CAMERA_LOST left"));
+  EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), IsEmpty());
+  EXPECT_TRUE(watch_.all_film());
+}
+
+TEST_F(Watching, ALostCameraThatComesBackHangingIsAnotherFault) {
+  cameras({Shown::FILMING, Shown::LOST});
+  EXPECT_THAT(cameras({Shown::FILMING, Shown::QUARANTINED}),
+              ElementsAre("mended CAMERA_LOST right", "raised CAMERA_HANGS right"));
+  EXPECT_THAT(cameras({Shown::FILMING, Shown::QUARANTINED}), IsEmpty());
+  EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), ElementsAre("mended CAMERA_HANGS right"));
+}
+
+TEST_F(Watching, WithTheLastCameraAllAreLostUntilTheFirstIsBack) {
+  cameras({Shown::LOST, Shown::FILMING});
+  EXPECT_THAT(cameras({Shown::LOST, Shown::QUARANTINED}),
+              ElementsAre("raised CAMERA_HANGS right", "raised ALL_CAMERAS_LOST "));
+  EXPECT_TRUE(watch_.none_films());
+  EXPECT_THAT(cameras({Shown::LOST, Shown::QUARANTINED}), IsEmpty());
+  EXPECT_THAT(cameras({Shown::FILMING, Shown::QUARANTINED}),
+              ElementsAre("mended CAMERA_LOST left", "mended ALL_CAMERAS_LOST "));
+}
+
+TEST_F(Watching, ACameraThatIsStoppedOnPurposeIsNotLost) {
+  EXPECT_THAT(cameras({Shown::STOPPED, Shown::STOPPED}), IsEmpty());
+  EXPECT_FALSE(watch_.none_films());
+}
+
+TEST_F(Watching, ASilentStrobeIsToldOnceAndAgainWhenItsTroubleChanges) {
+  const Error silent{ErrorKind::timed_out, "no answer within 1 s", "ttyUSB0", {}};
+  const Error gone{ErrorKind::device, "there is no such port", "ttyUSB0", "Plug it in"};
+  EXPECT_THAT(in_short(watch_.strobe("ttyUSB0", {})), IsEmpty());
+  EXPECT_THAT(in_short(watch_.strobe("ttyUSB0", silent)), ElementsAre("raised STROBE_SILENT ttyUSB0"));
+  EXPECT_THAT(in_short(watch_.strobe("ttyUSB0", silent)), IsEmpty());
+  const auto told = watch_.strobe("ttyUSB0", gone);
+  ASSERT_THAT(in_short(told), ElementsAre("raised STROBE_SILENT ttyUSB0"));
+  EXPECT_EQ(std::get<FaultRaised>(told.front()).remedy, "Plug it in");
+  EXPECT_THAT(in_short(watch_.strobe("ttyUSB0", {})), ElementsAre("mended STROBE_SILENT ttyUSB0"));
+  EXPECT_THAT(in_short(watch_.strobe("ttyUSB0", {})), IsEmpty());
+  EXPECT_THAT(in_short(watch_.strobe("ttyUSB0", gone)), ElementsAre("raised STROBE_SILENT ttyUSB0"));
+}
+
+TEST_F(Watching, AWallClockThatIsMovedIsToldOnceByHowMuchAndWhatToDo) {
+  EXPECT_THAT(in_short(watch_.clocks(at(10), at(1000))), IsEmpty());
+  EXPECT_THAT(in_short(watch_.clocks(at(11), at(1001.4))), IsEmpty());  // slewed, as time servers do
+  const auto back = watch_.clocks(at(12), at(402.4));
+  ASSERT_THAT(in_short(back), ElementsAre("raised CLOCK_STEPPED "));
+  EXPECT_THAT(std::get<FaultRaised>(back.front()).what, HasSubstr("-600.0 s"));
+  EXPECT_THAT(std::get<FaultRaised>(back.front()).remedy, HasSubstr("timedatectl"));
+  EXPECT_THAT(in_short(watch_.clocks(at(13), at(403.4))), IsEmpty());
+  EXPECT_THAT(in_short(watch_.clocks(at(14), at(1004.4))), ElementsAre("raised CLOCK_STEPPED "));
+}
+
+TEST_F(Watching, RatesCountEveryFrameThatTheCameraMadeOverTwoSeconds) {
+  watch_.frames({{}, {}}, at(0));
+  FrameCounts left;
+  left.delivered = 40;
+  left.transport = 8;
+  watch_.frames({left, {}}, at(1));
+  EXPECT_EQ(watch_.rate(0), 0);  // too early to tell
+  watch_.frames({left, {}}, at(2));
+  EXPECT_THAT(watch_.rate(0), DoubleNear(24, 1e-9));
+  EXPECT_EQ(watch_.rate(1), 0);
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -118,15 +118,14 @@ void check_server(const Together& t) {
     t.problem(place(t.root, key), fmt::format("{} needs {}", who, what),
               fmt::format("give {} in [server]", what));
   };
-  if (host(server.listen, "server.listen")) {
-    needs("server.listen", "listen", server.tls_certificate, "tls_certificate");
-    needs("server.listen", "listen", server.tls_key, "tls_key");
-    needs("server.listen", "listen", server.token_file, "token_file");
-  }
+  const auto needs_tls_and_token = [&](const char* key, const char* who) {
+    needs(key, who, server.tls_certificate, "tls_certificate");
+    needs(key, who, server.tls_key, "tls_key");
+    needs(key, who, server.token_file, "token_file");
+  };
+  if (host(server.listen, "server.listen")) needs_tls_and_token("server.listen", "listen");
   const auto http = host(server.http_listen, "server.http_listen");
-  if (http && !is_local(*http)) {
-    needs("server.http_listen", "http_listen beyond localhost", server.token_file, "token_file");
-  }
+  if (http && !is_local(*http)) needs_tls_and_token("server.http_listen", "http_listen beyond localhost");
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ struct ServerConfig {
   std::filesystem::path socket = "/run/emberlock/emberlockd.sock";  ///< gRPC
   std::string listen;  ///< gRPC over TLS, "host:port"; empty: nowhere. Needs certificate, key and token
   std::string http_listen =
-      "127.0.0.1:7140";  ///< console and JSON API; empty: nowhere. Beyond localhost needs a token
+      "127.0.0.1:7140";  ///< console and JSON API; empty: nowhere. Beyond localhost as `listen`
   std::filesystem::path tls_certificate, tls_key;  ///< PEM
   std::filesystem::path
       tls_clients;  ///< PEM of the authority that signs clients' certificates; empty: none asked for

@@ -377,14 +377,17 @@ Section<DaemonConfig> make_server_section() {
        text<C>("listen", EMBERLOCK_AT(server.listen), kAddress,
                "The API over TCP; needs tls_certificate, tls_key and token_file. Nowhere if empty.",
                "\"0.0.0.0:7141\""),
-       text<C>("http_listen", EMBERLOCK_AT(server.http_listen), kAddress,
-               "The console and the JSON API; beyond localhost it needs token_file. Nowhere if empty."),
-       text<C>("tls_certificate", EMBERLOCK_AT(server.tls_certificate), kPath, "PEM, with its chain.",
-               "\"server.crt\""),
+       text<C>(
+           "http_listen", EMBERLOCK_AT(server.http_listen), kAddress,
+           "The console and the JSON API; beyond localhost over TLS: it needs tls_certificate, tls_key and "
+           "token_file then. Nowhere if empty."),
+       text<C>("tls_certificate", EMBERLOCK_AT(server.tls_certificate), kPath,
+               "Of listen and http_listen. PEM, with its chain.", "\"server.crt\""),
        text<C>("tls_key", EMBERLOCK_AT(server.tls_key), kPath, "PEM; nobody else may read it.",
                "\"server.key\""),
        text<C>("tls_clients", EMBERLOCK_AT(server.tls_clients), kPath,
-               "PEM of the authority that signs clients' certificates: with it each client must have one.",
+               "PEM of the authority that signs clients' certificates: with it each client that comes by TLS "
+               "must have one, browsers too.",
                "\"clients.crt\""),
        text<C>("token_file", EMBERLOCK_AT(server.token_file), kPath,
                "Its first line is the token that clients show; nobody else may read it.", "\"token\""),

@@ -190,9 +190,13 @@ TEST(Config, WhatDoesNotFitTogetherIsAnError) {
 }
 
 TEST(Config, ANetworkAddressNeedsItsTokenAndTls) {
-  EXPECT_EQ(problem("[server]\nhttp_listen = \"0.0.0.0:7140\"\n"),
-            "lab.toml:2:15: http_listen beyond localhost needs token_file. Give token_file in [server]");
-  EXPECT_EQ(problem("[server]\nhttp_listen = \"0.0.0.0:7140\"\ntoken_file = \"t\"\n"), "");
+  const std::string beyond = "[server]\nhttp_listen = \"0.0.0.0:7140\"\n";
+  EXPECT_EQ(
+      problem(beyond),
+      "lab.toml:2:15: http_listen beyond localhost needs tls_certificate. Give tls_certificate in [server]");
+  EXPECT_EQ(read_config(beyond, "lab.toml").problems.size(), 3u);
+  EXPECT_THAT(problem(beyond + "token_file = \"t\"\ntls_certificate = \"c\"\n"), HasSubstr("needs tls_key"));
+  EXPECT_EQ(problem(beyond + "token_file = \"t\"\ntls_certificate = \"c\"\ntls_key = \"k\"\n"), "");
   for (const char* local : {"127.0.0.1:80", "localhost:7140", "[::1]:7140", ""})
     EXPECT_EQ(problem("[server]\nhttp_listen = \"" + std::string(local) + "\"\n"), "") << local;
   for (const char* wrong : {"7140", ":7140", "localhost:", "localhost:70000", "::1:80", "localhost:80x"})

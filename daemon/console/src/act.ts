@@ -1,5 +1,6 @@
 // What an operator orders: carried out, and told when it fails; and orders that need a second press.
 import {el, set, setText} from './dom';
+import {sentence} from './format';
 import {Sign} from './light';
 import {ApiError} from './wire';
 
@@ -8,7 +9,7 @@ export const toastArea = toasts;
 
 /** Shows what went wrong until it is dismissed; at most four. */
 export function complain(message: string): void {
-  const toast = el('div', {class: 'toast'}, new Sign('RED').root, el('p', {}, message),
+  const toast = el('div', {class: 'toast'}, new Sign('RED').root, el('p', {}, sentence(message)),
     el('button', {'aria-label': 'Dismiss', onclick: () => toast.remove()}, '✕'));
   toasts.append(toast);
   while (toasts.children.length > 4) toasts.firstElementChild!.remove();

@@ -32,7 +32,8 @@ export class Cameras {
   private readonly summary = el('span', {class: 'note'});
   readonly root = el('section', {id: 'cameras', 'aria-label': 'Cameras'}, el('h2', {class: 'hidden'}, 'Cameras ', this.summary), this.grid, this.none);
   readonly enlarged = new Enlarged(() => this.wish());
-  private readonly tiles = new Keyed<DaemonStatus['cameras'][number], Tile>(this.grid, id => this.make(id), (tile, camera) => tile.show(camera, this.status?.alignment?.tolerance_s || undefined));
+  private readonly tiles = new Keyed<DaemonStatus['cameras'][number], Tile>(this.grid, id => this.make(id), (tile, camera) =>
+    tile.show(camera, this.status?.alignment?.tolerance_s || undefined, camera.id === this.status?.alignment?.reset_next));
   private readonly visible = new Set<string>();
   private readonly sight = new IntersectionObserver(entries => {
     for (const entry of entries) {
@@ -52,8 +53,9 @@ export class Cameras {
 
   show(status: DaemonStatus): void {
     this.status = status;
-    // Who is to be reset comes first; the others stay where they are.
-    const cameras = [...status.cameras].sort((a, b) => Number(b.reset_next) - Number(a.reset_next));
+    // Who is to be reset by hand comes first; the others stay where they are.
+    const next = status.alignment?.reset_next;
+    const cameras = [...status.cameras].sort((a, b) => Number(b.id === next) - Number(a.id === next));
     this.tiles.show(cameras, camera => camera.id);
     const known = new Set(cameras.map(camera => camera.id));
     for (const id of this.visible) if (!known.has(id)) this.visible.delete(id);

@@ -1,7 +1,7 @@
 // One camera over the whole page, with every number known of it.
 import type {CameraStatus, DaemonStatus} from './api.gen';
 import {el, setText} from './dom';
-import {count, fixed, known, offset, ppm, rows, short, span} from './format';
+import {count, fixed, known, micros, ppm, rows, short, span} from './format';
 import {cameraWord, showSign, Sign} from './light';
 import {Gauge, Overlay} from './overlay';
 import {LivePicture} from './picture';
@@ -12,7 +12,7 @@ const sensorWords = {CCD: 'CCD', ROLLING_SHUTTER: 'rolling shutter', GLOBAL_SHUT
 /** Every number of a camera with its name. */
 export function facts(c: CameraStatus, tolerance: number | undefined): [string, string][] {
   const list: [string, string][] = [
-    ['error', known(c.error_rows) ? `${rows(c.error_rows)} = ${offset(c.error_s)}` : '–'],
+    ['error', known(c.error_rows) ? `${rows(c.error_rows)} = ${micros(c.error_s)}` : '–'],
     ['known to', known(c.sigma_rows) ? `± ${fixed(c.sigma_rows, 1)} rows` : '–'],
     ['tolerance', known(tolerance) ? `± ${short(tolerance)}` : '–'],
     ['drift', ppm(c.drift_ppm)],
@@ -100,7 +100,7 @@ export class Enlarged {
     const tolerance = status.alignment?.tolerance_s || undefined;
     setText(this.title, camera.id);
     showSign(this.sign, this.word, camera.light, cameraWord(camera, tolerance));
-    setText(this.error, known(camera.error_rows) ? `${rows(camera.error_rows)} · ${offset(camera.error_s)}` : short(undefined));
+    setText(this.error, known(camera.error_rows) ? `${rows(camera.error_rows)} · ${micros(camera.error_s)}` : short(undefined));
     this.gauge.show(camera.error_s, tolerance);
     setText(this.reason, camera.reason);
     this.overlay.show(camera);

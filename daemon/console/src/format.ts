@@ -21,18 +21,20 @@ export function rows(value: number | undefined): string {
   return known(value) ? `${signed(value, Math.abs(value) >= 99.5 ? 0 : 1)} rows` : kNone;
 }
 
-/** A short time with its sign: "+664 µs", "−5.40 ms". */
-export function offset(seconds: number | undefined): string {
+/** An offset as one compares it between cameras, in one unit: "−13 834 µs". */
+export function micros(seconds: number | undefined): string {
+  if (!known(seconds)) return kNone;
+  const whole = Math.round(seconds * 1e6);
+  return `${whole < 0 ? '−' : whole > 0 ? '+' : ''}${count(Math.abs(whole))} µs`;
+}
+
+/** A short time: "20 µs", "−5.40 ms". */
+export function short(seconds: number | undefined): string {
   if (!known(seconds)) return kNone;
   const size = Math.abs(seconds);
   const [scale, unit] = size < 0.9995e-3 ? [1e6, 'µs'] : size < 0.9995 ? [1e3, 'ms'] : [1, 's'];
   const value = seconds * scale;
-  return `${signed(value, unit === 'µs' ? 0 : digits(value))} ${unit}`;
-}
-
-/** A short time without a sign: "20 µs", "41.3 ms". */
-export function short(seconds: number | undefined): string {
-  return offset(seconds).replace('+', '');
+  return `${signed(value, unit === 'µs' ? 0 : digits(value)).replace('+', '')} ${unit}`;
 }
 
 /** A length of time that one waits for: "48 s", "3 min 20 s", "2 h 05 min". */
@@ -77,6 +79,12 @@ export function percent(fraction: number): string {
 
 export function plural(value: number, one: string, many = `${one}s`): string {
   return `${count(value)} ${value === 1 ? one : many}`;
+}
+
+/** With a capital and a full stop, as the daemon writes what it shows. A first word that is a name ("cam-2") stays as it is. */
+export function sentence(text: string): string {
+  const begun = /^[a-z',]+( |$)/.test(text) ? text[0]!.toUpperCase() + text.slice(1) : text;
+  return begun.replace(/[^.!?]$/, '$&.');
 }
 
 /** "2026-11-22T02:50:00.123Z" as the local time of day. */

@@ -85,12 +85,13 @@ export class Header {
     show(this.clock, status.phase === 'CAPTURING');
     setText(this.clock, clock(status.recording?.seconds ?? 0));
     setText(this.reason, status.reason);
-    const camera = status.alignment?.reset_next || status.cameras.find(each => each.reset_next)?.id;
+    const camera = status.alignment?.reset_next;
     const why = resetWhy(status.cameras.find(each => each.id === camera), status.alignment?.tolerance_rows);
-    show(this.nextBox, status.next_step !== '' || Boolean(camera));
+    const others = camera ? [] : status.cameras.filter(each => each.reset_next).map(each => each.id);  // by command: nobody has to move
+    show(this.nextBox, status.next_step !== '' || Boolean(camera) || others.length > 0);
     set(this.nextBox, 'data-reset', Boolean(camera));
-    setText(this.nextTitle, camera ? `Reset ${camera}` : 'Next');
-    setText(this.next, [status.next_step.replace(/[^.!?]$/, '$&.'), why].filter(Boolean).join(' '));
+    setText(this.nextTitle, camera ? `Reset ${camera}` : others.length > 0 ? 'Wait' : 'Next');
+    setText(this.next, [status.next_step, why, others.length > 0 && `${others.join(', ')} ${others.length > 1 ? 'are' : 'is'} being reset by command.`].filter(Boolean).join(' '));
     setText(this.rig, [status.rig, status.version && `emberlockd ${status.version}`].filter(Boolean).join(' · '));
     const storage = status.storage;
     setText(this.disk, storage ? `disk ${storage.minutes_left >= 120 ? `${fixed(storage.minutes_left / 60, 1)} h` : `${fixed(storage.minutes_left, 0)} min`}` : '');

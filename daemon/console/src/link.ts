@@ -1,5 +1,5 @@
 // The WebSocket: what the daemon tells, as it tells it; and again from the start when the connection was lost.
-import type {DaemonStatus, IterationPreview, Notice} from './api.gen';
+import type {AlignmentStatus, DaemonStatus, IterationPreview, Notice, RoundPoint} from './api.gen';
 import {ApiError, type BinaryHeader, call, decode, unpack} from './wire';
 
 export type Connection = 'connecting' | 'open' | 'lost' | 'token';
@@ -19,6 +19,7 @@ const ask = () => call('Daemon/GetStatus', {}, AbortSignal.timeout(2000));
 
 export class Link {
   private socket?: WebSocket;
+  private history?: RoundPoint[];
   private wait = 250;
   private heard = 0;
   private asking = false;
@@ -54,6 +55,7 @@ export class Link {
     const socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/api/v1/watch`);
     socket.binaryType = 'arraybuffer';
     this.socket = socket;
+    this.history = undefined;
     this.heard = performance.now();
     socket.onopen = () => {
       this.wait = 250;
@@ -70,10 +72,17 @@ export class Link {
       this.listener.bytes(...unpack(data));
       return;
     }
-    const message = JSON.parse(data) as {status?: unknown; notice?: unknown; iteration?: unknown};
-    if (message.status) this.listener.status(decode('DaemonStatus', message.status) as DaemonStatus);
+    const message = JSON.parse(data) as {rounds?: unknown; status?: unknown; notice?: unknown; iteration?: unknown};
+    if (message.rounds) this.history = (decode('AlignmentStatus', message.rounds) as AlignmentStatus).history;
+    if (message.status) this.listener.status(this.whole(decode('DaemonStatus', message.status) as DaemonStatus));
     if (message.notice) this.listener.notice(decode('Notice', message.notice) as Notice);
     if (message.iteration) this.listener.iteration(decode('IterationPreview', message.iteration) as IterationPreview);
+  }
+
+  // The history of rounds is long: it comes by itself, when it changed.
+  private whole(status: DaemonStatus): DaemonStatus {
+    if (status.alignment && this.history) status.alignment.history = this.history;
+    return status;
   }
 
   private sendWatch(): void {

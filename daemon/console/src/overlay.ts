@@ -4,23 +4,24 @@ import {set, show, svg} from './dom';
 import {known} from './format';
 
 export class Overlay {
-  private readonly band = svg('rect', {class: 'band', x: 0});
+  private readonly bands = svg('g', {class: 'bands'});
   private readonly target = svg('line', {class: 'target', x1: 0});
   private readonly lamp = svg('circle', {class: 'lamp'});
   private readonly dots = svg('g', {class: 'dots'});
-  readonly root = svg('svg', {class: 'overlay', 'aria-hidden': 'true'}, this.band, this.target, this.lamp, this.dots);
+  readonly root = svg('svg', {class: 'overlay', 'aria-hidden': 'true'}, this.bands, this.target, this.lamp, this.dots);
 
   show(camera: CameraStatus): void {
-    const {width, height, target_row: row, tolerance_rows: tolerance, lamp, lamp_radius: radius, dots} = camera;
+    const {width, height, target_row: row, band, lamp, lamp_radius: radius, dots} = camera;
     set(this.root, 'viewBox', `0 0 ${width || 16} ${height || 9}`);
     show(this.target, known(row));
-    show(this.band, known(row) && known(tolerance));
     if (known(row)) {
       for (const [name, value] of [['x2', width], ['y1', row + 0.5], ['y2', row + 0.5]] as const) set(this.target, name, value);
-      if (known(tolerance)) {
-        for (const [name, value] of [['width', width], ['y', row + 0.5 - tolerance], ['height', 2 * tolerance]] as const) set(this.band, name, value);
-      }
     }
+    while (this.bands.children.length > band.length) this.bands.lastElementChild!.remove();
+    while (this.bands.children.length < band.length) this.bands.append(svg('rect', {class: 'band', x: 0}));
+    band.forEach(({first, last}, place) => {
+      for (const [name, value] of [['width', width], ['y', first + 0.5], ['height', last - first]] as const) set(this.bands.children[place]!, name, value);
+    });
     show(this.lamp, lamp !== undefined);
     if (lamp) {
       for (const [name, value] of [['cx', lamp.x + 0.5], ['cy', lamp.y + 0.5], ['r', radius ?? 4]] as const) set(this.lamp, name, value);

@@ -51,10 +51,10 @@ export class Reconstruction {
       el('div', {class: 'progress'}, this.latest, this.plot.root, this.chosen, this.advised, this.result),
       el('div', {class: 'turn'}, this.place, this.volumeNote));
     this.place.addEventListener('keydown', event => {
-      const degrees = {ArrowLeft: -10, ArrowRight: 10}[event.key];
-      if (degrees === undefined || !this.volume) return;
+      const by = {ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, 10], ArrowDown: [0, -10]}[event.key];
+      if (by === undefined || !this.volume) return;
       event.preventDefault();
-      void this.volume.then(view => view.turn(degrees));
+      void this.volume.then(view => view.turn(by[0]!, by[1]!));
     });
     this.root = el('section', {id: 'reconstruction', class: 'panel', 'aria-labelledby': 'reconstruction-title'},
       el('header', {}, this.sign.root, el('h2', {id: 'reconstruction-title'}, 'Reconstruction'), this.word, this.doing, this.bar, this.cancel),

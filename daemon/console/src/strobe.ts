@@ -11,8 +11,10 @@ const outputs: [StrobeState_Output, string][] = [['OFF', 'Off'], ['FLASHING', 'F
 /** "23.976 Hz, phase 0 µs, width 20 µs, flashing". */
 export function strobeWords(s: StrobeState): string {
   const output = outputs.find(([value]) => value === s.output)?.[1].toLowerCase() ?? 'unknown';
-  const skips = s.code.some(flash => !flash) ? `, code of ${s.code.length}` : '';
-  return s.output === 'FLASHING' ? `${fixed(s.rate_hz, 3)} Hz, phase ${short(s.phase_s)}, width ${short(s.width_s)}${skips}, ${output}` : output;
+  if (s.output !== 'FLASHING') return output;
+  const flashes = s.code.filter(Boolean).length;
+  const code = flashes === s.code.length ? output : flashes === 0 ? 'held dark' : `${output} ${flashes} of ${s.code.length} times`;
+  return `${fixed(s.rate_hz, 3)} Hz, phase ${short(s.phase_s)}, width ${short(s.width_s)}, ${code}`;
 }
 
 export class Strobe {
@@ -57,10 +59,10 @@ export class Strobe {
 
   private fill(s: StrobeState): void {
     this.code = s.code;
-    const put = (input: HTMLInputElement, value: number) => { if (document.activeElement !== input) input.value = String(Number(value.toPrecision(9))); };
-    put(this.rate, s.rate_hz);
-    put(this.phase, s.phase_s * 1e3);
-    put(this.width, s.width_s * 1e6);
+    const put = (input: HTMLInputElement, value: number, digits: number) => { if (document.activeElement !== input) input.value = String(Number(value.toFixed(digits))); };
+    put(this.rate, s.rate_hz, 4);
+    put(this.phase, s.phase_s * 1e3, 3);
+    put(this.width, s.width_s * 1e6, 1);
     for (const input of this.outputs) input.checked = input.value === s.output;
   }
 

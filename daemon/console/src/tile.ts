@@ -1,7 +1,7 @@
 // One camera: its live picture with what alignment saw, and the numbers that an operator acts on.
 import type {CameraStatus} from './api.gen';
 import {el, set, setText, show} from './dom';
-import {count, known, offset, ppm, rows, span} from './format';
+import {count, known, micros, ppm, rows, span} from './format';
 import {cameraWord, lostFrames, showSign, Sign} from './light';
 import {Gauge, Overlay} from './overlay';
 import {LivePicture} from './picture';
@@ -43,19 +43,20 @@ export class Tile {
     });
   }
 
-  show(camera: CameraStatus, tolerance: number | undefined): void {
+  /** `next`: somebody is to reset it now. */
+  show(camera: CameraStatus, tolerance: number | undefined, next: boolean): void {
     this.camera = camera;
     const word = cameraWord(camera, tolerance);
     showSign(this.sign, this.word, camera.light, word);
     set(this.root, 'data-light', camera.light);
     set(this.root, 'data-state', camera.state);
-    set(this.root, 'data-next', camera.reset_next);
+    set(this.root, 'data-next', next);
     show(this.nextMark, camera.reset_next);
-    setText(this.nextMark, camera.reset === 'BY_HAND' ? 'Reset this camera now' : 'Reset next');
+    setText(this.nextMark, next ? 'Reset this camera now' : camera.reset === 'BY_HAND' ? 'Reset after that' : 'Being reset');
     this.overlay.show(camera);
     this.gauge.show(camera.error_s, tolerance);
     setText(this.error, known(camera.error_rows) ? rows(camera.error_rows) : '– rows');
-    setText(this.time, known(camera.error_s) ? offset(camera.error_s) : '');
+    setText(this.time, known(camera.error_s) ? micros(camera.error_s) : '');
     setText(this.drift, ppm(camera.drift_ppm));
     setText(this.left, span(camera.time_left_s));
     setText(this.trials, count(camera.resets));
@@ -63,6 +64,6 @@ export class Tile {
     setText(this.lost, count(lost));
     set(this.lost.parentElement!, 'data-bad', lost > 0);
     setText(this.reason, camera.reason);
-    set(this.root, 'aria-label', `Camera ${camera.id}: ${word}${camera.reset_next ? ', to be reset now' : ''}. ${camera.reason}`);
+    set(this.root, 'aria-label', `Camera ${camera.id}: ${word}${next ? ', to be reset now' : ''}. ${camera.reason}`);
   }
 }

@@ -70,9 +70,13 @@ export class VolumeView {
     this.window.getRenderWindow().render();
   }
 
-  turn(degrees: number): void {
+  /** By degrees, around the upright axis and over it. */
+  turn(azimuth: number, elevation: number): void {
     const renderer = this.window.getRenderer();
-    renderer.getActiveCamera().azimuth(degrees);
+    const camera = renderer.getActiveCamera();
+    camera.azimuth(azimuth);
+    camera.elevation(elevation);
+    camera.orthogonalizeViewUp();
     renderer.resetCameraClippingRange();
     this.window.getRenderWindow().render();
   }

@@ -82,6 +82,19 @@ describe('what is shown', () => {
     expect(await page.evaluate(() => (document.activeElement as HTMLElement).dataset.camera)).toBe('virtual-04');
   });
 
+  test('cameras that are reset by command call nobody, and all stay on the screen', async () => {
+    const byCommand = aligning(9);
+    mock.status = {...byCommand, next_step: '', alignment: {...byCommand.alignment!, reset_next: ''},
+                   cameras: byCommand.cameras!.map((each, index) => ({...each, reset: 'ON_COMMAND', reset_next: index === 4 || index === 5}))};
+    const page = await open();
+    await page.waitForSelector('.tile .next-mark:not([hidden])');
+    expect(await page.locator('.tile .next-mark:visible').allInnerTexts()).toEqual(['Being reset', 'Being reset']);
+    expect(await page.locator('[data-next], [data-reset]').count()).toBe(0);
+    expect(await text(page, '.next')).toBe('Wait\n\nvirtual-04, virtual-05 are being reset by command.');
+    for (const bottom of await page.locator('.tile').evaluateAll(tiles => tiles.map(tile => tile.getBoundingClientRect().bottom))) expect(bottom).toBeLessThanOrEqual(kScreen.height);
+    await screenshot(page, 'by-command-1920');
+  });
+
   test('a tile tells error in rows and time, drift, time left, trials and losses', async () => {
     mock.status = {...locked(), cameras: [seen(0, 30, false, {
       error_rows: -21.44, error_s: -1.158e-3, drift_ppm: 2.31, time_left_s: 412, resets: 3,
@@ -90,7 +103,7 @@ describe('what is shown', () => {
     const page = await open();
     const tile = page.locator('.tile');
     expect(await tile.locator('.error-rows').innerText()).toBe('−21.4 rows');
-    expect(await tile.locator('.error-time').innerText()).toBe('−1.16 ms');
+    expect(await tile.locator('.error-time').innerText()).toBe('−1 158 µs');
     expect(await tile.locator('dd').allInnerTexts()).toEqual(['+2.3 ppm', '6 min 52 s', '3', '5']);
     expect(await tile.locator('.word').innerText()).toBe('in tolerance');
   });
@@ -110,7 +123,7 @@ describe('what is shown', () => {
   });
 
   test('lamp, dot, target row and band are drawn where the daemon says, in the picture’s own pixels', async () => {
-    mock.status = {...locked(), cameras: [seen(0, 30, false, {width: 640, height: 480, lamp: {x: 320, y: 400}, lamp_radius: 26, dots: [{x: 320, y: 240}], target_row: 120, tolerance_rows: 20})]};
+    mock.status = {...locked(), cameras: [seen(0, 30, false, {width: 640, height: 480, lamp: {x: 320, y: 400}, lamp_radius: 26, dots: [{x: 320, y: 240}], target_row: 120, band: [{first: 100, last: 140}, {first: 440, last: 479.5}]})]};
     const page = await open();
     await page.waitForFunction(() => window.emberlockDiagnostics.shown.size === 1);
     const where = await page.evaluate(() => {
@@ -123,20 +136,30 @@ describe('what is shown', () => {
       const dot = box('.dots path');
       return {lamp: [(lamp.left + lamp.width / 2 - left) / scale, (lamp.top + lamp.height / 2 - top) / scale, lamp.width / scale / 2],
               dot: (dot.top + dot.height / 2 - top) / scale, target: (box('.target').top - top) / scale,
-              band: [(box('.band').top - top) / scale, box('.band').height / scale]};
+              bands: [...document.querySelectorAll('.tile .overlay .band')].map(each => each.getBoundingClientRect()).map(each => [(each.top - top) / scale, each.height / scale])};
     });
     expect(where.lamp[0]).toBeCloseTo(320.5, 0);
     expect(where.lamp[1]).toBeCloseTo(400.5, 0);
     expect(where.lamp[2]).toBeCloseTo(26, 0);
     expect(where.dot).toBeCloseTo(240.5, 0);
     expect(where.target).toBeCloseTo(120.5, 0);
-    expect(where.band[0]).toBeCloseTo(100.5, 0);
-    expect(where.band[1]).toBeCloseTo(40, 0);
+    expect(where.bands.flat()).toEqual([100.5, 40, 440.5, 39.5].map(rows => expect.closeTo(rows, 0)));  // a band that wraps is two
     const colour = await page.evaluate(() => {
       const canvas = document.querySelector<HTMLCanvasElement>('.tile canvas')!;
       return [...canvas.getContext('2d')!.getImageData(320, 400, 1, 1).data.slice(0, 3)];
     });
     expect(Math.min(...colour)).toBeGreaterThan(240);  // the lamp itself
+  });
+
+  test('rounds are plotted though they come apart from the status, and go as the next alignment begins', async () => {
+    mock.status = aligning(12);
+    const page = await open();
+    await page.waitForSelector('#alignment .plot:not([hidden]) canvas');
+    mock.tell({status: {...mock.status, alignment: {...mock.status.alignment, history: []}}});  // as nothing is new of them
+    await page.waitForTimeout(200);
+    expect(await page.locator('#alignment .plot').isVisible()).toBe(true);
+    mock.show({alignment: alignment(0, {history: []})});
+    await page.waitForSelector('#alignment .plot', {state: 'hidden'});
   });
 
   test('numbers not known yet are dashes, never zeros or NaN', async () => {

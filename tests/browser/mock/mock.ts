@@ -80,7 +80,7 @@ export class Mock {
 
   show(change: Partial<DaemonStatus> = {}): void {
     Object.assign(this.status, change, {revision: String(++this.revision), now_ns: String(process.hrtime.bigint()), now_utc: new Date().toISOString()});
-    this.tell({status: this.status});
+    for (const message of this.told()) this.tell(message);
   }
 
   notice(light: Light, text: string): void {
@@ -101,12 +101,19 @@ export class Mock {
     return [...this.watchers].map(watcher => watcher.wanted);
   }
 
+  /** The rounds come by themselves, and a status without them. */
+  private told(): object[] {
+    const {alignment} = this.status;
+    const status = {...this.status, now_ns: String(process.hrtime.bigint()), ...(alignment && {alignment: {...alignment, history: []}})};
+    return [{rounds: {history: alignment?.history ?? []}}, {status}];
+  }
+
   private welcome(socket: WebSocket): void {
     const watcher: Watcher = {socket, wanted: null, due: 0};
     this.watchers.add(watcher);
     socket.on('close', () => this.watchers.delete(watcher));
     socket.on('message', data => { watcher.wanted = (JSON.parse(String(data)) as {watch: Watcher['wanted']}).watch; });
-    socket.send(JSON.stringify({status: {...this.status, now_ns: String(process.hrtime.bigint())}}));
+    for (const message of this.told()) socket.send(JSON.stringify(message));
     for (const notice of this.notices) socket.send(JSON.stringify({notice}));
   }
 

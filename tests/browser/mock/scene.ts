@@ -19,7 +19,7 @@ export function errorAfter(index: number, round: number): number {
 export function camera(index: number, change: Wire<CameraStatus> = {}): CameraStatus {
   return {
     id: cameraId(index), model: 'virtual CCD', driver: 'virtual', state: 'FILMING', light: 'GREEN', reason: 'Films.', width: 640, height: 480,
-    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [],
+    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [],
     counts: {delivered: 7321, damaged: 0, camera_gap: 0, transport: 0, resend: 0, underrun: 0, queue: 0, passed_over: 240},
     ...change,
   };
@@ -34,7 +34,7 @@ export function seen(index: number, round: number, next: boolean, change: Wire<C
     reason: inside ? 'In tolerance.' : next ? 'Press its power button twice; it comes back by itself.' : 'Waits for its turn.',
     error_rows: error, error_s: error * kRowTime, sigma_rows: 0.4, drift_ppm: 3 * Math.sin(index), time_left_s: inside ? 400 + 13 * index : 0,
     resets: inside ? 1 + (index % 4) : 0, reset_next: next, lamp: {x: 320, y: 400}, lamp_radius: 26,
-    dots: [{x: 320, y: 210 - error / 5}], target_row: 210, tolerance_rows: kTolerance / 5, row_time_s: kRowTime, ...change,
+    dots: [{x: 320, y: 210 - error / 5}], target_row: 210, tolerance_rows: kTolerance / 5, band: [{first: 210 - kTolerance / 5, last: 210 + kTolerance / 5}], row_time_s: kRowTime, ...change,
   });
 }
 
@@ -65,7 +65,7 @@ export function alignment(round: number, change: Wire<AlignmentStatus> = {}): Al
 export function aligning(round: number): Wire<DaemonStatus> {
   const next = Array.from({length: kCameras}, (_, index) => index).find(index => Math.abs(errorAfter(index, round)) > kTolerance);
   return {...base, phase: 'ALIGNING', light: 'AMBER', reason: `${Array.from({length: kCameras}, (_, i) => errorAfter(i, round)).filter(e => Math.abs(e) <= kTolerance).length} of 11 cameras are in tolerance.`,
-          next_step: next === undefined ? '' : `Press the shutter of ${cameraId(next)}`,
+          next_step: next === undefined ? '' : `Press the shutter of ${cameraId(next)}.`,
           strobe: flashing, cameras: Array.from({length: kCameras}, (_, index) => seen(index, round, index === next)),
           alignment: alignment(round, {reset_next: next === undefined ? '' : cameraId(next)})};
 }

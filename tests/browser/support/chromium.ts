@@ -1,5 +1,5 @@
 // Debian's Chromium, driven by Playwright.
-import {mkdirSync} from 'node:fs';
+import {mkdirSync, writeFileSync} from 'node:fs';
 
 import {type Browser, chromium, type Page} from 'playwright-core';
 
@@ -37,18 +37,25 @@ export async function openPage(browser: Browser, url: string, size: {width: numb
   return {page, complaints};
 }
 
-/** Into EMBERLOCK_SCREENSHOTS, if that is set. */
+/** As WebP into EMBERLOCK_SCREENSHOTS, if that is set. */
 export async function screenshot(page: Page, name: string, fullPage = false): Promise<void> {
   const folder = process.env.EMBERLOCK_SCREENSHOTS;
   if (!folder) return;
+  const png = (await page.screenshot({fullPage, timeout: 60_000})).toString('base64');
+  const bytes = await page.evaluate(async data => {
+    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), letter => letter.charCodeAt(0))]));
+    const canvas = new OffscreenCanvas(bitmap.width, bitmap.height);
+    canvas.getContext('2d')!.drawImage(bitmap, 0, 0);
+    return [...new Uint8Array(await (await canvas.convertToBlob({type: 'image/webp', quality: 0.8})).arrayBuffer())];
+  }, png);
   mkdirSync(folder, {recursive: true});
-  await page.screenshot({path: `${folder}/${name}.png`, fullPage, timeout: 60_000});
+  writeFileSync(`${folder}/${name}.webp`, Uint8Array.from(bytes));
 }
 
 /** Waits until what is read is as wanted; what it was at last stands in the message. */
 export async function until<T>(read: () => Promise<T> | T, wanted: (value: T) => boolean, words: string, seconds = 8): Promise<T> {
   let value = await read();
   for (const end = Date.now() + 1000 * seconds; !wanted(value) && Date.now() < end; value = await read()) await new Promise(resolve => setTimeout(resolve, 30));
-  if (!wanted(value)) throw new Error(`not so within ${seconds} s: ${words}; it is ${JSON.stringify(value)}`);
+  if (!wanted(value)) throw new Error(`not so within ${seconds} s: ${words}; it is ${JSON.stringify(value)?.slice(0, 4000)}`);
   return value;
 }

@@ -5,6 +5,10 @@ import {createServer} from 'node:net';
 import {tmpdir} from 'node:os';
 import {join} from 'node:path';
 
+import type {DaemonStatus} from '../../../daemon/console/src/api.gen';
+import {decode} from '../../../daemon/console/src/wire';
+import {until} from './chromium';
+
 async function freePort(): Promise<number> {
   return new Promise(resolve => {
     const server = createServer().listen(0, '127.0.0.1', () => {
@@ -25,7 +29,8 @@ export class Daemon {
   async start(bin: string, console: string, rig: string): Promise<void> {
     const port = await freePort();
     this.url = `http://127.0.0.1:${port}/`;
-    writeFileSync(join(this.folder, 'emberlock.toml'), `${rig}
+    const configuration = join(this.folder, 'emberlock.toml');
+    writeFileSync(configuration, `${rig}
 [recording]
 folder = "${this.folder}/sessions"
 [reconstruction]
@@ -36,19 +41,23 @@ socket = "${this.folder}/emberlockd.sock"
 http_listen = "127.0.0.1:${port}"
 console = "${console}"
 `);
-    this.child = spawn(`${bin}/emberlockd`, ['--config', join(this.folder, 'emberlock.toml')], {stdio: ['ignore', 'pipe', 'pipe']});
+    // It goes with whoever runs the tests, even where that is killed.
+    this.child = spawn('setpriv', ['--pdeathsig', 'KILL', `${bin}/emberlockd`, '--config', configuration], {stdio: ['ignore', 'pipe', 'pipe']});
     for (const stream of [this.child.stdout!, this.child.stderr!]) stream.on('data', (data: Buffer) => { this.said += data.toString(); });
     this.child.on('exit', () => { this.ended = true; });
-    for (const end = Date.now() + 20_000; ; await new Promise(resolve => setTimeout(resolve, 50))) {
-      if (await fetch(`${this.url}healthz`).then(answer => answer.ok, () => false)) return;
-      if (this.ended || Date.now() > end) throw new Error(`emberlockd did not get ready: ${this.said}`);
-    }
+    const ready = () => fetch(`${this.url}healthz`).then(answer => answer.ok, () => false);
+    await until(async () => this.ended || (await ready()), Boolean, 'emberlockd answers', 60);
+    if (this.ended) throw new Error(`emberlockd ended: ${this.said}`);
   }
 
   async call<T>(method: string, request: object = {}): Promise<T> {
     const answer = await fetch(`${this.url}api/v1/${method}`, {method: 'POST', headers: {'Content-Type': 'application/json'}, body: JSON.stringify(request)});
     if (!answer.ok) throw new Error(`${method}: ${await answer.text()}`);
     return (await answer.json()) as T;
+  }
+
+  async status(): Promise<DaemonStatus> {
+    return decode('DaemonStatus', await this.call('Daemon/GetStatus')) as DaemonStatus;
   }
 
   get log(): string {
@@ -62,8 +71,7 @@ console = "${console}"
   async stop(): Promise<void> {
     if (this.child && !this.ended) {
       this.child.kill('SIGTERM');
-      for (const end = Date.now() + 10_000; !this.ended && Date.now() < end;) await new Promise(resolve => setTimeout(resolve, 50));
-      this.child.kill('SIGKILL');
+      await until(() => this.ended, Boolean, 'emberlockd ended', 20).catch(() => this.kill());
     }
     rmSync(this.folder, {recursive: true, force: true});
   }

@@ -1,11 +1,11 @@
 import {expect, test} from 'vitest';
 
-import {bytes, clock, count, offset, percent, ppm, rows, short, span} from '../../../daemon/console/src/format';
+import {bytes, clock, count, micros, percent, ppm, rows, sentence, short, span} from '../../../daemon/console/src/format';
 
 test('errors carry their sign and no more digits than matter', () => {
   expect([12.34, -0.26, 0, -0.04, 841.4, -99.46, 99.6].map(rows)).toEqual(['+12.3 rows', '−0.3 rows', '0.0 rows', '0.0 rows', '+841 rows', '−99.5 rows', '+100 rows']);
-  expect([664e-6, -5.4e-3, 0.0412, 1.5, 0, 999.6e-6].map(offset)).toEqual(['+664 µs', '−5.40 ms', '+41.2 ms', '+1.50 s', '0 µs', '+1.00 ms']);
-  expect(short(20e-6)).toBe('20 µs');
+  expect([664e-6, -5.4e-3, 0.0412, 1.5, 0, 999.6e-6].map(short)).toEqual(['664 µs', '−5.40 ms', '41.2 ms', '1.50 s', '0 µs', '1.00 ms']);
+  expect([664e-6, -13.8344e-3, 0, -0.4e-6].map(micros)).toEqual(['+664 µs', '−13 834 µs', '0 µs', '0 µs']);
   expect(ppm(-2.34)).toBe('−2.3 ppm');
 });
 
@@ -20,6 +20,10 @@ test('amounts', () => {
   expect(percent(0.834)).toBe('83 %');
 });
 
+test('what is told begins and ends as a sentence', () => {
+  expect(['it went away', 'cam-2: look at its cable.', 'Is it on?', ''].map(sentence)).toEqual(['It went away.', 'cam-2: look at its cable.', 'Is it on?', '']);
+});
+
 test('what is not known is a dash', () => {
-  for (const format of [rows, offset, short, span, ppm]) expect([undefined, NaN, Infinity].map(format)).toEqual(['–', '–', '–']);
+  for (const format of [rows, micros, short, span, ppm]) expect([undefined, NaN, Infinity].map(format)).toEqual(['–', '–', '–']);
 });

@@ -178,10 +178,9 @@ void align(const AlignArguments& arguments) {
 
 /// What the daemon can be asked for; the rest is its configuration's.
 DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App& verb) {
-  static const std::set<std::string> kAskable = {"--tolerance", "--policy", "--anyway", "--stop",
-                                                 "--json",      "--daemon", "--ca",     "--token-file"};
+  static const std::set<std::string> kAskable = {"--tolerance", "--policy", "--anyway", "--stop", "--json"};
   for (const CLI::Option* option : verb.get_options()) {
-    if (option->count() > 0 && kAskable.count(option->get_name()) == 0) {
+    if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
       fail({ErrorKind::bad_input, "is for a rig of its own", option->get_name(),
             "Give --rig too, or leave it to the daemon's configuration"});
     }

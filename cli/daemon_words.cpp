@@ -47,7 +47,7 @@ std::string strobe_line(const v1::StrobeStatus& strobe) {
                                  in_words(v1::StrobeState::Output_Name(settings.output())));
   if (settings.output() == v1::StrobeState::FLASHING)
     text += fmt::format(" at {:.6g} Hz, {:.4g} us", settings.rate_hz(), settings.width_s() * 1e6);
-  return strobe.reason().empty() ? text : text + ", " + strobe.reason();
+  return strobe.reason().empty() ? text : text + ". " + strobe.reason();
 }
 
 std::string reconstruction_line(const v1::ReconstructionStatus& reconstruction) {
@@ -61,7 +61,7 @@ std::string reconstruction_line(const v1::ReconstructionStatus& reconstruction) 
       return text + fmt::format(" after {}, in {}", seconds_in_words(reconstruction.seconds()),
                                 reconstruction.result());
     case v1::ReconstructionStatus::FAILED:
-      return text + ", " + reconstruction.error();
+      return text + ". " + reconstruction.error();
     default:
       return text;
   }
@@ -138,8 +138,8 @@ std::string iteration_line(const v1::Iteration& iteration) {
 
 std::string round_table(const v1::DaemonStatus& status) {
   const v1::AlignmentStatus& alignment = status.alignment();
-  std::string text = fmt::format("round {}: {}; {} resets so far", alignment.round(), alignment.reason(),
-                                 alignment.resets());
+  std::string text =
+      fmt::format("round {}: {} {} resets so far", alignment.round(), alignment.reason(), alignment.resets());
   if (alignment.has_worst_pair_s())
     text += fmt::format("; worst pair {:.3f} ms", alignment.worst_pair_s() * 1e3);
   text += "\n";

@@ -9,7 +9,7 @@
 namespace emberlock::cli {
 namespace {
 
-struct Arguments {
+struct DemoArguments {
   DemoOptions demo;
   std::string out;
   std::string image = "1280x720";
@@ -38,7 +38,7 @@ void print_summary(const DemoResult& r, const std::string& out) {
   std::printf("look at          %s/report.html\n", out.c_str());
 }
 
-void demo_command(Arguments arguments) {
+void demo_command(DemoArguments arguments) {
   arguments.demo.image = parse_size(arguments.image);
   AtomicDirectory folder = or_fail(AtomicDirectory::create(arguments.out, "report.html"));
   const DemoResult result = or_fail(run_demo(arguments.demo, folder.path(), progress_bar));
@@ -50,11 +50,11 @@ void demo_command(Arguments arguments) {
 }  // namespace
 
 void add_demo(CLI::App& app) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DemoArguments>();
   CLI::App* verb = app.add_subcommand(
       "demo",
       "From strobe to volume on simulated cameras: align, record, reconstruct, and a report to look at");
-  Arguments& a = *arguments;
+  DemoArguments& a = *arguments;
   verb->add_option("--out", a.out, "Folder for report.html, summary.png, the sessions and the reconstruction")
       ->required();
   verb->add_option("--cameras", a.demo.cameras, "How many; the middle one is held out")

@@ -11,10 +11,7 @@ namespace emberlock::cli {
 /// The manual page emberlock(1): every verb and option, in roff.
 std::string manual_page(const CLI::App& app, std::string_view version);
 
-/// A script for bash that completes verbs and options; values as file names.
-std::string bash_completion(const CLI::App& app);
-
-/// The hidden verbs `completion bash` and `man PAGE`, which the build and packagers call.
+/// The hidden verbs `completion SHELL` (completion.h) and `man PAGE`, which the build and packagers call.
 void add_manual(CLI::App& app, const std::string& version);
 
 }  // namespace emberlock::cli

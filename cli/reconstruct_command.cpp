@@ -23,7 +23,7 @@ namespace emberlock::cli {
 namespace {
 
 /// The command line as typed, before its words mean anything.
-struct Arguments {
+struct ReconstructArguments {
   std::string input;
   std::string out;
   std::string box;
@@ -71,7 +71,7 @@ Result<Box> parse_box(const std::string& text) {
 namespace {
 
 /// Like parse_box: the words' meaning, or the first that has none.
-Result<ReconstructOptions> options_of(const Arguments& arguments) {
+Result<ReconstructOptions> options_of(const ReconstructArguments& arguments) {
   ReconstructOptions options;
   options.voxels = arguments.voxels;
   if (!arguments.effects.empty()) {
@@ -137,7 +137,7 @@ struct Watchers {
   ProgressStream* stream = nullptr;
 };
 
-Result<Outcome> reconstruct_files(const Arguments& arguments, const Watchers& watchers) {
+Result<Outcome> reconstruct_files(const ReconstructArguments& arguments, const Watchers& watchers) {
   EMBERLOCK_ASSIGN_OR_RETURN(const ReconstructOptions options, options_of(arguments));
   SceneOptions scene_options;
   scene_options.frame = arguments.frame;
@@ -165,12 +165,11 @@ Result<Outcome> reconstruct_files(const Arguments& arguments, const Watchers& wa
 }
 
 /// What the daemon can be asked for; the rest is its configuration's.
-DaemonReconstruction asked_of_daemon(const Arguments& arguments, const CLI::App& verb) {
-  static const std::set<std::string> kAskable = {"input",    "--daemon",   "--ca",    "--token-file",
-                                                 "--cancel", "--json",     "--frame", "--budget",
-                                                 "--voxels", "--hold-out", "--device"};
+DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, const CLI::App& verb) {
+  static const std::set<std::string> kAskable = {"input",    "--cancel", "--json",     "--frame",
+                                                 "--budget", "--voxels", "--hold-out", "--device"};
   for (const CLI::Option* option : verb.get_options()) {
-    if (option->count() > 0 && kAskable.count(option->get_name()) == 0) {
+    if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
       fail({ErrorKind::bad_input, "isn't the daemon's to be asked", option->get_name(),
             "Leave it away, or reconstruct here, without --daemon"});
     }
@@ -187,7 +186,7 @@ DaemonReconstruction asked_of_daemon(const Arguments& arguments, const CLI::App&
   return wanted;
 }
 
-void reconstruct_command(const Arguments& arguments) {
+void reconstruct_command(const ReconstructArguments& arguments) {
   if (arguments.input.empty()) throw CLI::RequiredError("input");
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
   if (!arguments.progress_fd) {
@@ -206,10 +205,10 @@ void reconstruct_command(const Arguments& arguments) {
 }  // namespace
 
 void add_reconstruct(CLI::App& app) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReconstructArguments>();
   CLI::App* verb = app.add_subcommand("reconstruct",
                                       "Reconstruct the flame's volume from calibrated pictures or a session");
-  Arguments& a = *arguments;
+  ReconstructArguments& a = *arguments;
   verb->add_option(
       "input", a.input,
       "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder; with --daemon a "
@@ -246,7 +245,8 @@ void add_reconstruct(CLI::App& app) {
           "--threshold", a.threshold,
           "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
       ->check(CLI::Range(0.0, 255.0));
-  verb->add_option("--frame", a.frame, "Of a session: the frame of its first camera [the middle one]")
+  verb->add_option("--frame", a.frame,
+                   "Of a session: the frame of its first camera [the middle one that all cameras have]")
       ->check(CLI::NonNegativeNumber);
   verb->add_option("--seed", a.seed, "Of the random numbers in the paper's solver")
       ->check(CLI::NonNegativeNumber)

@@ -22,7 +22,7 @@ struct SmearArguments {
 /// NaN and infinity have no JSON; rounding to a millionth keeps lines readable.
 double rounded(double v) { return std::isfinite(v) ? std::round(v * 1e6) / 1e6 : 0; }
 
-std::string json_line(const std::string& file, int frame, const SmearReading& reading) {
+std::string reading_line(const std::string& file, int frame, const SmearReading& reading) {
   nlohmann::ordered_json line;
   line["file"] = file;
   line["frame"] = frame;
@@ -62,7 +62,7 @@ Status read_frames(const std::string& path, bool json) {
       return image.error();
     }
     const SmearReading reading = detect(image->view());
-    const std::string line = json ? json_line(path, frame, reading) : text_line(path, frame, reading);
+    const std::string line = json ? reading_line(path, frame, reading) : text_line(path, frame, reading);
     std::fprintf(stdout, "%s\n", line.c_str());
     std::fflush(stdout);
   }

@@ -12,7 +12,7 @@ namespace emberlock::cli {
 namespace {
 
 /// The command line as typed.
-struct Arguments {
+struct SyncArguments {
   SyncTradeoffOptions options;
   std::vector<double> tolerances;
   std::vector<std::string> policies;
@@ -29,7 +29,7 @@ struct Arguments {
   bool json = false;
 };
 
-Result<SyncTradeoffOptions> options_of(const Arguments& a) {
+Result<SyncTradeoffOptions> options_of(const SyncArguments& a) {
   SyncTradeoffOptions options = a.options;
   for (const double rows : a.tolerances) options.tolerances.emplace_back(rows);
   for (const std::string& word : a.policies) {
@@ -48,7 +48,7 @@ Result<SyncTradeoffOptions> options_of(const Arguments& a) {
   return options;
 }
 
-void tradeoff_sync(const Arguments& arguments) {
+void tradeoff_sync(const SyncArguments& arguments) {
   const SyncTradeoffOptions options = or_fail(options_of(arguments));
   or_fail(check_tradeoff_output(arguments.out));
   const SyncTradeoff tradeoff = or_fail(measure_sync_tradeoff(options, progress_bar("tradeoff")));
@@ -64,10 +64,10 @@ void tradeoff_sync(const Arguments& arguments) {
 }  // namespace
 
 void add_tradeoff_sync(CLI::App& parent) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SyncArguments>();
   CLI::App* verb = parent.add_subcommand(
       "sync", "Resets and minutes against the cameras' tolerance, and what it does to a rising flame");
-  Arguments& a = *arguments;
+  SyncArguments& a = *arguments;
   SyncTradeoffOptions& o = a.options;
   verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html")->required();
   verb->add_option("--cameras", o.cameras, "Cameras of the rig")->capture_default_str();

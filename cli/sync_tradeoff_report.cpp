@@ -14,7 +14,7 @@ constexpr int kPlotHeight = 300;
 constexpr int kPlotWidth = 1000;
 
 /// What the diagram needs where no page brings it: a page's own style has the same.
-constexpr const char* kStyle = R"(<style>
+constexpr const char* kPlotStyle = R"(<style>
 .sync { --ink: #222; --line: #ddd; }
 @media (prefers-color-scheme: dark) { .sync { --ink: #ddd; --line: #444; } }
 .sync text { fill: var(--ink); font: 12px system-ui, sans-serif; } .sync .grid { stroke: var(--line); }
@@ -145,7 +145,7 @@ std::string sync_tradeoff_svg(const SyncTradeoff& t) {
       fmt::format(R"(<svg xmlns="http://www.w3.org/2000/svg" class="sync" viewBox="0 0 {0} {1}" )"
                   R"(width="{0}" height="{1}" role="img" aria-label="What synchrony costs">)",
                   kPlotWidth, kPlotHeight * static_cast<int>(parts.size()));
-  svg += kStyle;
+  svg += kPlotStyle;
   for (std::size_t i = 0; i < parts.size(); ++i)
     svg += fmt::format(R"svg(<g transform="translate(0 {})">{}</g>)svg", kPlotHeight * static_cast<int>(i),
                        parts[i]);

@@ -21,7 +21,7 @@ namespace emberlock::cli {
 namespace {
 
 /// The command line as typed, before its words mean anything.
-struct Arguments {
+struct SweepArguments {
   std::string input;
   std::string out;
   std::string ship;
@@ -60,7 +60,7 @@ std::vector<std::string> split_effects(const std::vector<std::string>& words) {
   return result;
 }
 
-Result<SweepOptions> options_of(const Arguments& arguments) {
+Result<SweepOptions> options_of(const SweepArguments& arguments) {
   SweepOptions options;
   options.voxels = arguments.voxels;
   options.views = arguments.views;
@@ -82,7 +82,7 @@ Result<SweepOptions> options_of(const Arguments& arguments) {
 }
 
 /// What every point's command has in common.
-std::string common_options(const Arguments& arguments) {
+std::string common_options(const SweepArguments& arguments) {
   std::string words = "--hold-out ";
   for (std::size_t i = 0; i < arguments.held_out.size(); ++i)
     words += (i > 0 ? "," : "") + std::to_string(arguments.held_out[i]);
@@ -94,7 +94,7 @@ std::string common_options(const Arguments& arguments) {
 }
 
 /// The processor and how many threads run on it.
-std::string machine(const Arguments& arguments) {
+std::string machine(const SweepArguments& arguments) {
   std::ifstream in("/proc/cpuinfo");
   std::string model = "this machine";
   for (std::string line; std::getline(in, line);) {
@@ -117,14 +117,14 @@ void print_summary(const Tradeoff& tradeoff, const std::string& out) {
   std::printf("written to %s\n", (std::filesystem::path(out) / "index.html").c_str());
 }
 
-void ship(const Arguments& arguments, const ComputeOptions& compute) {
+void ship(const SweepArguments& arguments, const ComputeOptions& compute) {
   SteadyClock clock;
   const std::string source = or_fail(measure_shipped_source(compute, clock, progress_bar("tradeoff")));
   or_fail(write_file_atomically(arguments.ship, source));
   std::printf("written to %s; build again to ship it\n", arguments.ship.c_str());
 }
 
-void tradeoff_recon(const Arguments& arguments) {
+void tradeoff_recon(const SweepArguments& arguments) {
   const SweepOptions options = or_fail(options_of(arguments));
   if (!arguments.ship.empty()) {
     ship(arguments, options.compute);
@@ -148,10 +148,10 @@ void tradeoff_recon(const Arguments& arguments) {
 }
 
 void add_recon(CLI::App& parent) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SweepArguments>();
   CLI::App* verb = parent.add_subcommand(
       "recon", "Held-out error against seconds over settings of `reconstruct`, with the Pareto front");
-  Arguments& a = *arguments;
+  SweepArguments& a = *arguments;
   verb->add_option("input", a.input, "transforms.json, or a recorded session's folder");
   verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html");
   verb->add_option("--hold-out", a.held_out, "Views, counted from 0, that judge every point: i,j,...")

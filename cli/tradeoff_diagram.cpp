@@ -184,7 +184,7 @@ std::string legend(const std::vector<WorkPoint>& points) {
   return svg;
 }
 
-constexpr const char* kStyle = R"(<style>
+constexpr const char* kDiagramStyle = R"(<style>
 .work { --ink: #222; --line: #ddd; --paper: #fff; }
 @media (prefers-color-scheme: dark) { .work { --ink: #ddd; --line: #444; --paper: #151515; } }
 .work text { fill: var(--ink); font: 13px system-ui, sans-serif; }
@@ -208,7 +208,7 @@ std::string tradeoff_svg(const std::vector<WorkPoint>& points) {
              R"(<svg xmlns="http://www.w3.org/2000/svg" class="work" viewBox="0 0 {0} {1}" width="{0}" )"
              R"(height="{1}" role="img" aria-label="Held-out error against seconds">)",
              kWidth, kHeight) +
-         kStyle + axes(x, y) + runs(points, x, y) + front(points, x, y) + legend(points) + "</svg>";
+         kDiagramStyle + axes(x, y) + runs(points, x, y) + front(points, x, y) + legend(points) + "</svg>";
 }
 
 }  // namespace emberlock::cli

@@ -110,13 +110,13 @@ TEST(DaemonVerbsAlone, WhatOnlyARigOfItsOwnKnowsIsNotAskedOfTheDaemon) {
 
 TEST_F(DaemonVerbs, StatusIsAScreenForPeopleAndJsonForPrograms) {
   v1::DaemonStatus status = status_in(v1::LOCKED, v1::AMBER, "cam1 drifts");
-  status.set_next_step("look at cam1");
+  status.set_next_step("Look at cam1.");
   v1::Fault& fault = *status.add_faults();
   fault.set_kind(v1::Fault::CAMERA_LOST);
   fault.set_light(v1::AMBER);
   fault.set_subject("cam2");
   fault.set_what("its cable came off");
-  fault.set_remedy("Plug it in");
+  fault.set_remedy("Plug it in.");
   v1::CameraStatus& camera = *status.add_cameras();
   camera.set_id("cam1");
   camera.set_state(v1::CameraStatus::FILMING);
@@ -124,13 +124,13 @@ TEST_F(DaemonVerbs, StatusIsAScreenForPeopleAndJsonForPrograms) {
   api_.board().show(status);
   const test::VerbRun screen = run(add_status, {"status"});
   EXPECT_EQ(screen.exit_code, 0) << screen.err;
-  for (const char* words : {"bench", "locked, amber: cam1 drifts", "look at cam1", "camera lost cam2",
-                            "Plug it in", "cam1", "-3.2 rows"}) {
+  for (const char* words : {"bench", "locked, amber: cam1 drifts", "Look at cam1.", "camera lost cam2",
+                            "Plug it in.", "cam1", "-3.2 rows"}) {
     EXPECT_THAT(screen.out, HasSubstr(words));
   }
   const json printed = json::parse(run(add_status, {"status", "--json"}).out);
-  EXPECT_EQ(printed["faults"][0]["remedy"], "Plug it in");
-  EXPECT_EQ(printed["next_step"], "look at cam1") << "named as in the .proto";
+  EXPECT_EQ(printed["faults"][0]["remedy"], "Plug it in.");
+  EXPECT_EQ(printed["next_step"], "Look at cam1.") << "named as in the .proto";
 }
 
 TEST_F(DaemonVerbs, AStatusThatIsRedIsTheExitCodeToo) {
@@ -145,12 +145,12 @@ TEST_F(DaemonVerbs, AlignShowsItsRoundsUntilItIsLocked) {
   v1::DaemonStatus round = status_in(v1::ALIGNING);
   round.mutable_alignment()->set_round(1);
   round.mutable_alignment()->set_reason("cam3 is to be reset");
-  round.set_next_step("reset cam3");
+  round.set_next_step("Reset cam3.");
   v1::DaemonStatus second = round;
   second.mutable_alignment()->set_round(2);
   v1::DaemonStatus locked = second;
   locked.set_phase(v1::LOCKED);
-  locked.set_reason("all within 40 rows");
+  locked.set_reason("All within 40 rows.");
   api_.on_align = [&](const v1::AlignRequest&) {
     show_soon({round, second, locked});
     return Status();
@@ -158,9 +158,9 @@ TEST_F(DaemonVerbs, AlignShowsItsRoundsUntilItIsLocked) {
   const test::VerbRun result = run(add_align, {"align", "--tolerance", "50rows"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("round 1: cam3 is to be reset"));
-  EXPECT_THAT(result.out, HasSubstr("next: reset cam3"));
+  EXPECT_THAT(result.out, HasSubstr("next: Reset cam3."));
   EXPECT_THAT(result.out, HasSubstr("round 2"));
-  EXPECT_THAT(result.out, HasSubstr("locked: all within 40 rows"));
+  EXPECT_THAT(result.out, HasSubstr("locked: All within 40 rows."));
   EXPECT_THAT(api_.calls(), ElementsAre("align tolerance: \"50rows\""));
 }
 
@@ -190,7 +190,7 @@ v1::DaemonStatus recording(v1::RecordingStatus::State state, std::uint64_t frame
   status.mutable_recording()->set_session("candle");
   status.mutable_recording()->set_state(state);
   status.mutable_recording()->set_frames(frames);
-  if (state != v1::RecordingStatus::RECORDING) status.mutable_recording()->set_verdict("the books agree");
+  if (state != v1::RecordingStatus::RECORDING) status.mutable_recording()->set_verdict("The books agree.");
   return status;
 }
 
@@ -203,7 +203,7 @@ TEST_F(DaemonVerbs, RecordFollowsToTheVerdict) {
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("24 frames"));
   EXPECT_THAT(result.out, HasSubstr("48 frames, none lost"));
-  EXPECT_THAT(result.out, HasSubstr("the books agree"));
+  EXPECT_THAT(result.out, HasSubstr("The books agree."));
   EXPECT_THAT(api_.calls().front(), HasSubstr("name: \"candle\""));
   EXPECT_THAT(api_.calls().front(), HasSubstr("seconds: 2"));
   EXPECT_THAT(api_.calls().front(), HasSubstr("reconstruct: true"));
@@ -255,13 +255,13 @@ TEST_F(DaemonVerbs, WatchFollowsStatusJournalAndIterations) {
   preview.set_rendered_jpeg("bytes");
   soon({[&] { api_.board().notice(v1::AMBER, "cam2 is slow"); },
         [&] { api_.board().show(std::make_shared<const v1::IterationPreview>(preview)); },
-        [&] { api_.board().show(status_in(v1::LOCKED, v1::GREEN, "all in tolerance")); }});
+        [&] { api_.board().show(status_in(v1::LOCKED, v1::GREEN, "All in tolerance.")); }});
   const test::VerbRun result = run(add_watch, {"watch", "--seconds", "1.5", "--json"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("cam2 is slow"));
   EXPECT_THAT(result.out, HasSubstr("{\"iteration\":"));
   EXPECT_THAT(result.out, Not(HasSubstr("rendered_jpeg")));
-  EXPECT_THAT(result.out, HasSubstr("all in tolerance"));
+  EXPECT_THAT(result.out, HasSubstr("All in tolerance."));
   std::istringstream lines(result.out);
   for (std::string line; std::getline(lines, line);) EXPECT_TRUE(json::accept(line)) << line;
 }

@@ -14,11 +14,11 @@ TEST(DevicesVerb, ProbingAVirtualCameraTellsItsRateAndItsResets) {
   const auto run = test::run_verb(add_devices, {"devices", "probe", "virtual-00", "--rig", "virtual:1",
                                                 "--seconds", "1", "--resets", "2", "--json"});
   EXPECT_EQ(run.exit_code, 0) << run.err;
-  const auto json = nlohmann::json::parse(run.out);
-  EXPECT_EQ(json["id"], "virtual-00");
-  EXPECT_EQ(json["counts"]["camera_gap"], 0);
-  EXPECT_NEAR(json["frame_rate_hz"].get<double>(), 23.976, .01);
-  EXPECT_GT(json["reset_mean_s"].get<double>(), .1);
+  const auto told = nlohmann::json::parse(run.out);
+  EXPECT_EQ(told["id"], "virtual-00");
+  EXPECT_EQ(told["counts"]["camera_gap"], 0);
+  EXPECT_NEAR(told["frame_rate_hz"].get<double>(), 23.976, .01);
+  EXPECT_GT(told["reset_mean_s"].get<double>(), .1);
 }
 
 TEST(DevicesVerb, WhatCannotBeProbedIsSaid) {

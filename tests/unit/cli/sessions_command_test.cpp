@@ -32,10 +32,10 @@ TEST(SessionsVerb, ListsWhatLiesInAFolder) {
   EXPECT_EQ(table.exit_code, 0) << table.err;
   EXPECT_THAT(table.out, HasSubstr("flame 1"));
   EXPECT_THAT(table.out, HasSubstr("COMPLETE"));
-  const auto json =
+  const auto listed =
       nlohmann::json::parse(run_verb(add_sessions, {"sessions", "list", temp.path().string(), "--json"}).out);
-  EXPECT_EQ(json["sessions"][0]["session"], "flame 1");
-  EXPECT_EQ(json["sessions"][0]["frames"], "5");
+  EXPECT_EQ(listed["sessions"][0]["session"], "flame 1");
+  EXPECT_EQ(listed["sessions"][0]["frames"], "5");
   EXPECT_EQ(run_verb(add_sessions, {"sessions", "list", (temp / "absent").string()}).exit_code, 2);
   EXPECT_FALSE(std::filesystem::exists(temp / "absent"));
 }

@@ -54,6 +54,7 @@ struct FrameCounts {
   std::uint64_t passed_over = 0;  ///< dropped by stop(), pass_over() or a reset, as nobody wanted it
 
   [[nodiscard]] std::uint64_t lost() const { return camera_gap + transport + resend + underrun + queue; }
+  [[nodiscard]] std::uint64_t made() const { return delivered + damaged + passed_over + lost(); }
   friend bool operator==(const FrameCounts&, const FrameCounts&) = default;
 };
 

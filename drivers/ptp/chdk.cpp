@@ -23,7 +23,7 @@ constexpr std::size_t kLargestLiveView = std::size_t{32} << 20;
 constexpr Seconds kScriptPause = milliseconds(2);
 constexpr int kMostStaleMessages = 64;
 
-Error malformed(std::string what) {
+Error malformed_answer(std::string what) {
   return {ErrorKind::device, std::move(what), {}, "switch the camera off and on again"};
 }
 
@@ -35,7 +35,8 @@ std::string text_of(const ChdkValue& value) {
 Result<ChdkValue> parse_value(std::uint32_t type, std::span<const std::byte> data) {
   if (type == kNil) return ChdkValue();
   if (type == kBoolean || type == kInteger) {
-    if (data.size() != 4) return malformed(fmt::format("its script sent a number of {} bytes", data.size()));
+    if (data.size() != 4)
+      return malformed_answer(fmt::format("its script sent a number of {} bytes", data.size()));
     const std::int32_t number = PtpReader(data).i32();
     return type == kBoolean ? ChdkValue(number != 0) : ChdkValue(number);
   }
@@ -47,9 +48,10 @@ Result<ChdkValue> parse_value(std::uint32_t type, std::span<const std::byte> dat
 Result<ChdkMessage> parse_chdk_message(const PtpAnswer& answer) {
   const std::uint32_t type = answer.param(0);
   const std::uint32_t length = answer.param(3);
-  if (type > 3) return malformed(fmt::format("its script sent a message of type {}", type));
+  if (type > 3) return malformed_answer(fmt::format("its script sent a message of type {}", type));
   if (length > answer.data.size()) {
-    return malformed(fmt::format("its script's message has {} bytes of {}", answer.data.size(), length));
+    return malformed_answer(
+        fmt::format("its script's message has {} bytes of {}", answer.data.size(), length));
   }
   ChdkMessage message{static_cast<ChdkMessageType>(type), answer.param(2)};
   if (message.type == ChdkMessageType::none) return message;

@@ -29,7 +29,7 @@ namespace {
 constexpr std::uint32_t kPart = 1u << 20;
 constexpr std::uint32_t kCompared = 1u << 16;  // of an interrupted download, before it goes on
 constexpr Seconds kPartDeadline{10};
-constexpr Seconds kPollPause = milliseconds(20);
+constexpr Seconds kChangePause = milliseconds(20);
 constexpr double kSlowestBytesPerSecond = 200e3;
 constexpr std::uint32_t kTooLarge = 0xffffffff;
 constexpr std::uint16_t kFolder = 0x3001;
@@ -97,7 +97,7 @@ Status wait_for(Chdk& chdk, Clock& clock, ChdkMovie wanted, Seconds deadline) {
                    {},
                    "see what its screen says: its card may be full or locked"};
     }
-    clock.sleep_until(clock.now() + kPollPause);
+    clock.sleep_until(clock.now() + kChangePause);
   }
 }
 

@@ -11,10 +11,10 @@
 namespace emberlock {
 namespace {
 
-constexpr std::int32_t kVersion = 2;
+constexpr std::int32_t kViewVersion = 2;
 constexpr std::int32_t kLargestSide = 8192;
 
-Error malformed(std::string what) {
+Error malformed_view(std::string what) {
   return {ErrorKind::device, "its live view " + std::move(what), {}, "switch the camera off and on again"};
 }
 
@@ -65,10 +65,10 @@ Result<std::optional<LiveView>> parse_live_view(std::span<const std::byte> bytes
   in.skip(4 * 4);  // minor version, aspect ratio, palette
   const std::uint32_t viewport = in.u32();
   EMBERLOCK_RETURN_IF_ERROR(in.check("live view"));
-  if (version != kVersion)
-    return malformed(fmt::format("is of version {}, only {} is known", version, kVersion));
+  if (version != kViewVersion)
+    return malformed_view(fmt::format("is of version {}, only {} is known", version, kViewVersion));
   if (viewport > bytes.size())
-    return malformed(fmt::format("has its description at {}, behind its end", viewport));
+    return malformed_view(fmt::format("has its description at {}, behind its end", viewport));
 
   PtpReader description(bytes.subspan(viewport));
   const std::int32_t type = description.i32();
@@ -81,19 +81,19 @@ Result<std::optional<LiveView>> parse_live_view(std::span<const std::byte> bytes
   if (start == 0) return std::optional<LiveView>();
 
   // 0 is UYVYYY; 2 and 3 are UYVY; the others are overlays.
-  if (type != 0 && type != 2 && type != 3) return malformed(fmt::format("has pixels of type {}", type));
+  if (type != 0 && type != 2 && type != 3) return malformed_view(fmt::format("has pixels of type {}", type));
   view.packing = type == 0 ? LiveViewPacking::uyvyyy : LiveViewPacking::uyvy;
   const Group group = group_of(view.packing);
   if (view.size.width < 1 || view.size.height < 1 || view.size.height > kLargestSide ||
       buffer_width > kLargestSide || buffer_width < view.size.width || buffer_width % group.pixels != 0) {
-    return malformed(
+    return malformed_view(
         fmt::format("says to be {} x {} in rows of {}", view.size.width, view.size.height, buffer_width));
   }
   view.stride = static_cast<std::size_t>(buffer_width) / static_cast<std::size_t>(group.pixels) *
                 static_cast<std::size_t>(group.bytes);
   const std::size_t size = view.stride * static_cast<std::size_t>(view.size.height);
   if (start > bytes.size() || bytes.size() - start < size) {
-    return malformed(fmt::format("has {} bytes, but its pixels end at {}", bytes.size(), start + size));
+    return malformed_view(fmt::format("has {} bytes, but its pixels end at {}", bytes.size(), start + size));
   }
   view.bytes = bytes.subspan(start, size);
   return std::optional(view);

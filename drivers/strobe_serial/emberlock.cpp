@@ -15,11 +15,11 @@ namespace wire = emberlock_controller;
 
 constexpr double kNanoseconds = 1e9;
 constexpr std::size_t kBitsPerLine = 4 * wire::kCodeDigits;
-constexpr Limits kLimits{.device = "Emberlock's controller",
-                         .narrowest = microseconds(1),
-                         .widest = Seconds(2),
-                         .longest_code = wire::kLongestCode,
-                         .steady = Limits::Steady::yes};
+constexpr Limits kControllerLimits{.device = "Emberlock's controller",
+                                   .narrowest = microseconds(1),
+                                   .widest = Seconds(2),
+                                   .longest_code = wire::kLongestCode,
+                                   .steady = Limits::Steady::yes};
 constexpr std::array<std::string_view, 3> kOutputs{"off", "flash", "steady"};
 
 /// Eight flashes to a byte, the first in its highest bit; the last byte ends in skips.
@@ -124,7 +124,7 @@ class Controller final : public Dialect {
 
   Result<std::vector<Command>> apply(const StrobeSettings& to,
                                      const std::optional<StrobeSettings>& now) const override {
-    EMBERLOCK_RETURN_IF_ERROR(check(to, kLimits));
+    EMBERLOCK_RETURN_IF_ERROR(check(to, kControllerLimits));
     std::vector<Command> commands;
     const std::string code = packed(to.code);
     if (!now || now->code != to.code) {

@@ -12,10 +12,10 @@ namespace emberlock::strobe_serial {
 namespace {
 
 constexpr Seconds kShortestDelay = milliseconds(0.01), kLongestDelay = milliseconds(999);
-constexpr Limits kLimits{.device = "a Gardasoft controller",
-                         .narrowest = milliseconds(0.01),
-                         .widest = milliseconds(999),
-                         .steady = Limits::Steady::yes};
+constexpr Limits kGardasoftLimits{.device = "a Gardasoft controller",
+                                  .narrowest = milliseconds(0.01),
+                                  .widest = milliseconds(999),
+                                  .steady = Limits::Steady::yes};
 
 using Fields = std::map<std::string, std::string, std::less<>>;
 
@@ -63,7 +63,7 @@ class Gardasoft final : public Dialect {
 
   Result<std::vector<Command>> apply(const StrobeSettings& to,
                                      const std::optional<StrobeSettings>& now) const override {
-    EMBERLOCK_RETURN_IF_ERROR(check(to, kLimits));
+    EMBERLOCK_RETURN_IF_ERROR(check(to, kGardasoftLimits));
     const Seconds delay = to.phase + kShortestDelay;
     if (delay > kLongestDelay) {
       return Error{ErrorKind::bad_input,

@@ -14,11 +14,11 @@ namespace emberlock::strobe_serial {
 namespace {
 
 constexpr double kDutySteps = 1000;
-constexpr Limits kLimits{.device = "a Schott light source",
-                         .slowest = Hertz(6),
-                         .narrowest = microseconds(1),
-                         .widest = Seconds(1),
-                         .steady = Limits::Steady::yes};
+constexpr Limits kSchottLimits{.device = "a Schott light source",
+                               .slowest = Hertz(6),
+                               .narrowest = microseconds(1),
+                               .widest = Seconds(1),
+                               .steady = Limits::Steady::yes};
 
 class Schott final : public Dialect {
  public:
@@ -36,7 +36,7 @@ class Schott final : public Dialect {
 
   Result<std::vector<Command>> apply(const StrobeSettings& to,
                                      const std::optional<StrobeSettings>& /*now*/) const override {
-    EMBERLOCK_RETURN_IF_ERROR(check(to, kLimits));
+    EMBERLOCK_RETURN_IF_ERROR(check(to, kSchottLimits));
     if (to.phase != Seconds(0)) {
       return Error{ErrorKind::bad_input,
                    fmt::format("the phase is {} s", to.phase.value()),

@@ -13,7 +13,8 @@
 namespace emberlock::strobe_serial {
 namespace {
 
-constexpr Limits kLimits{.device = "a pulse generator", .narrowest = nanoseconds(10), .widest = Seconds(2)};
+constexpr Limits kScpiLimits{
+    .device = "a pulse generator", .narrowest = nanoseconds(10), .widest = Seconds(2)};
 
 Result<double> value(std::string_view reply, std::string_view what) {
   if (const auto number = number_in(reply)) return *number;
@@ -42,7 +43,7 @@ class Scpi final : public Dialect {
 
   Result<std::vector<Command>> apply(const StrobeSettings& to,
                                      const std::optional<StrobeSettings>& now) const override {
-    EMBERLOCK_RETURN_IF_ERROR(check(to, kLimits));
+    EMBERLOCK_RETURN_IF_ERROR(check(to, kScpiLimits));
     // What others left in the queue of errors isn't ours.
     std::vector<Command> commands{{"*CLS"}};
     if (to.output == StrobeOutput::off) commands.push_back({output_ + " OFF"});

@@ -11,7 +11,8 @@
 namespace emberlock::strobe_serial {
 namespace {
 
-constexpr Limits kLimits{.device = "a pulse generator", .narrowest = nanoseconds(100), .widest = Seconds(2)};
+constexpr Limits kSiglentLimits{
+    .device = "a pulse generator", .narrowest = nanoseconds(100), .widest = Seconds(2)};
 
 class Siglent final : public Dialect {
  public:
@@ -33,7 +34,7 @@ class Siglent final : public Dialect {
 
   Result<std::vector<Command>> apply(const StrobeSettings& to,
                                      const std::optional<StrobeSettings>& /*now*/) const override {
-    EMBERLOCK_RETURN_IF_ERROR(check(to, kLimits));
+    EMBERLOCK_RETURN_IF_ERROR(check(to, kSiglentLimits));
     const std::string pulse = fmt::format("WIDTH,{:.9g},DLY,{:.9g}", to.width.value(), to.phase.value());
     std::vector<Command> commands;
     if (to.output == StrobeOutput::off) commands.push_back({channel_ + "OUTP OFF"});

@@ -41,13 +41,11 @@ struct SmallBench {
   /// cameras differ by.
   [[nodiscard]] Rows true_error(SecondsPerRow row_time) const {
     const Seconds period = rig->truth(0).timing.frame_period;
-    const TimePoint now = rig->clock().now();
+    std::vector<TimePoint> starts;
+    for (int i = 0; i < rig->size(); ++i) starts.push_back(rig->read_start_after(i, rig->clock().now()));
     Seconds worst;
-    for (int a = 0; a < rig->size(); ++a) {
-      for (int b = 0; b < a; ++b) {
-        const Seconds apart = rig->read_start_after(a, now) - rig->read_start_after(b, now);
-        worst = std::max(worst, abs(wrap_symmetric(apart, period)));
-      }
+    for (const TimePoint a : starts) {
+      for (const TimePoint b : starts) worst = std::max(worst, abs(wrap_symmetric(a - b, period)));
     }
     return worst / row_time / 2;
   }

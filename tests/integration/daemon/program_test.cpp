@@ -2,14 +2,18 @@
 #include <chrono>
 #include <csignal>
 #include <fstream>
+#include <sstream>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "session/reader.h"
 #include "session/verify.h"
 #include "tests/support/recording.h"
@@ -134,6 +138,25 @@ TEST_F(DaemonProgram, FromColdToALockedRecordingByTheCommandLine) {
   const Shell refused = client("record take --seconds 1");
   EXPECT_EQ(refused.status, 2);
   EXPECT_THAT(refused.output, HasSubstr("take"));
+}
+
+TEST_F(DaemonProgram, ItsLogIsAsTheConfigurationSays) {
+  std::string text = *read_file(config());
+  constexpr std::string_view kNowhere = "http_listen = \"\"\n";
+  text.replace(text.find(kNowhere), kNowhere.size(),
+               "http_listen = \"127.0.0.1:0\"\n[log]\nformat = \"json\"\n");
+  std::ofstream(config()) << text;
+  const Shell run = shell("timeout --preserve-status -s TERM 2 " EMBERLOCKD_PROGRAM " --config " + config());
+  EXPECT_EQ(run.status, 0);
+  std::istringstream lines(run.output);
+  bool says_where = false;
+  for (std::string line; std::getline(lines, line);) {
+    const auto told = nlohmann::json::parse(line, nullptr, false);
+    ASSERT_TRUE(told.is_object()) << line;
+    says_where =
+        says_where || told["message"].get<std::string>().find("http://127.0.0.1:") != std::string::npos;
+  }
+  EXPECT_TRUE(says_where);
 }
 
 }  // namespace

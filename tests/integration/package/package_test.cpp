@@ -32,11 +32,13 @@ class Installed : public ::testing::Test {
 };
 
 TEST_F(Installed, NothingIsMissing) {
-  for (const char* file : {"bin/emberlock", "sbin/emberlockd", "etc/emberlock/emberlockd.toml",
-                           "lib/systemd/system/emberlockd.service", "lib/sysusers.d/emberlock.conf",
-                           "lib/udev/rules.d/72-emberlock.rules", "share/man/man1/emberlock.1.gz",
-                           "share/man/man5/emberlockd.toml.5.gz", "share/man/man8/emberlockd.8.gz",
-                           "share/bash-completion/completions/emberlock"}) {
+  for (const char* file :
+       {"bin/emberlock", "sbin/emberlockd", "etc/emberlock/emberlockd.toml",
+        "lib/systemd/system/emberlockd.service", "lib/sysusers.d/emberlock.conf",
+        "lib/udev/rules.d/72-emberlock.rules", "share/man/man1/emberlock.1.gz",
+        "share/man/man5/emberlockd.toml.5.gz", "share/man/man8/emberlockd.8.gz",
+        "share/bash-completion/completions/emberlock", "share/zsh/vendor-completions/_emberlock",
+        "share/fish/vendor_completions.d/emberlock.fish"}) {
     EXPECT_TRUE(fs::exists(prefix() / file)) << file;
   }
 }

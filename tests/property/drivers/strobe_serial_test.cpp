@@ -5,16 +5,16 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include "tests/support/properties.h"
 #include "tests/support/strobe_bench.h"
 
 namespace emberlock {
 namespace {
 
+using test::any_int;
+using test::any_real;
 using test::Fault;
 using test::StrobeBench;
-
-int any_int(int low, int high) { return *rc::gen::resize(rc::kNominalSize, rc::gen::inRange(low, high)); }
-double between(double low, double high) { return low + (high - low) * any_int(0, 1000001) * 1e-6; }
 
 struct Steps {
   double slowest, narrowest;
@@ -41,12 +41,12 @@ StrobeSettings any_settings(StrobeDialect dialect) {
   StrobeSettings s;
   s.output = *rc::gen::element(StrobeOutput::off, StrobeOutput::flashing);
   // As many slow ones as fast ones.
-  s.rate = Hertz(std::exp(between(std::log(steps(dialect, 1).slowest), std::log(333.0))));
+  s.rate = Hertz(std::exp(any_real(std::log(steps(dialect, 1).slowest), std::log(333.0))));
   const Steps step = steps(dialect, s.rate.value());
   const double longest = 0.9 / s.rate.value();
-  s.width = Seconds(std::exp(between(std::log(step.narrowest), std::log(longest))));
+  s.width = Seconds(std::exp(any_real(std::log(step.narrowest), std::log(longest))));
   if (dialect != StrobeDialect::schott_cv_ls)
-    s.phase = Seconds(between(0, std::min(0.99 / s.rate.value(), 0.9)));
+    s.phase = Seconds(any_real(0, std::min(0.99 / s.rate.value(), 0.9)));
   if (dialect == StrobeDialect::emberlock) {
     s.code.resize(static_cast<std::size_t>(any_int(0, 600)));
     for (auto&& bit : s.code) bit = any_int(0, 2) == 1;

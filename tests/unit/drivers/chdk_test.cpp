@@ -131,12 +131,13 @@ TEST(ChdkMessage, NumbersOfTheWrongLengthAndMissingDataAreRefused) {
   EXPECT_EQ(parse_chdk_message({0x2001, {}, {}})->type, ChdkMessageType::none);
 }
 
-struct Camera {
+struct ChdkModel {
   const char* name;
   int type;
 };
-class ChdkLiveView : public testing::TestWithParam<Camera> {};
-INSTANTIATE_TEST_SUITE_P(Cameras, ChdkLiveView, testing::Values(Camera{"Digic4", 0}, Camera{"Digic6", 3}),
+class ChdkLiveView : public testing::TestWithParam<ChdkModel> {};
+INSTANTIATE_TEST_SUITE_P(Cameras, ChdkLiveView,
+                         testing::Values(ChdkModel{"Digic4", 0}, ChdkModel{"Digic6", 3}),
                          [](const auto& shown) { return shown.param.name; });
 
 TEST_P(ChdkLiveView, ComesAsBrightnessAndAsColour) {

@@ -145,18 +145,19 @@ TEST(PtpSession, ALateAnswerMayBeWaitedForInParts) {
 }
 
 // Each of these answers is refused with an error, and the camera is well again afterwards.
-struct Malformed {
+struct MalformedAnswer {
   const char* name;
   int Faults::*fault;
   const char* words;
 };
-class PtpSessionMalformed : public testing::TestWithParam<Malformed> {};
+class PtpSessionMalformed : public testing::TestWithParam<MalformedAnswer> {};
 INSTANTIATE_TEST_SUITE_P(
     Answers, PtpSessionMalformed,
-    testing::Values(Malformed{"WrongTransaction", &Faults::wrong_transaction, "transaction"},
-                    Malformed{"MoreAnnouncedThanComes", &Faults::long_length, "too soon"},
-                    Malformed{"LessAnnouncedThanComes", &Faults::short_length, "more data"},
-                    Malformed{"Garbage", &Faults::garbage, ""}, Malformed{"Stall", &Faults::stall, ""}),
+    testing::Values(MalformedAnswer{"WrongTransaction", &Faults::wrong_transaction, "transaction"},
+                    MalformedAnswer{"MoreAnnouncedThanComes", &Faults::long_length, "too soon"},
+                    MalformedAnswer{"LessAnnouncedThanComes", &Faults::short_length, "more data"},
+                    MalformedAnswer{"Garbage", &Faults::garbage, ""},
+                    MalformedAnswer{"Stall", &Faults::stall, ""}),
     [](const auto& shown) { return shown.param.name; });
 
 TEST_P(PtpSessionMalformed, IsAnErrorAndTheNextQuestionIsAnswered) {

@@ -16,7 +16,7 @@ using test::StrobeBench;
 using testing::AnyOf;
 using testing::HasSubstr;
 
-constexpr StrobeSettings kSettings{
+constexpr StrobeSettings kAsked{
     .output = StrobeOutput::flashing, .rate = Hertz(25), .width = milliseconds(4)};
 
 class SerialStrobeTest : public testing::TestWithParam<StrobeDialect> {
@@ -37,16 +37,16 @@ TEST_P(SerialStrobeTest, SaysItsModelAndTakesSettingsThatReadBack) {
   ASSERT_TRUE(model.ok()) << model.error().message();
   EXPECT_THAT(*model, AnyOf(HasSubstr("33509B"), HasSubstr("SDG2042X"), HasSubstr("RT260F"),
                             HasSubstr("SCHOTT"), HasSubstr("uno E7531")));
-  const Status applied = bench_.strobe.apply(kSettings);
+  const Status applied = bench_.strobe.apply(kAsked);
   ASSERT_TRUE(applied.ok()) << applied.error().message();
   const auto told = bench_.strobe.read_back();
   ASSERT_TRUE(told.ok()) << told.error().message();
-  expect_same(*told, kSettings);
+  expect_same(*told, kAsked);
 }
 
 TEST_P(SerialStrobeTest, GoesDarkAndLightAgain) {
   for (const StrobeOutput output : {StrobeOutput::flashing, StrobeOutput::off, StrobeOutput::flashing}) {
-    StrobeSettings s = kSettings;
+    StrobeSettings s = kAsked;
     s.output = output;
     ASSERT_TRUE(bench_.strobe.apply(s).ok());
     EXPECT_EQ(bench_.strobe.read_back().value().output, output);
@@ -65,33 +65,33 @@ TEST_P(SerialStrobeTest, GoesFromLongFlashesOfASlowRateToShortOnesOfAFastOneAndB
 }
 
 TEST_P(SerialStrobeTest, OneAnswerThatGoesWrongCostsATimeButNoError) {
-  ASSERT_TRUE(bench_.strobe.apply(kSettings).ok());
+  ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   for (const Fault fault : {Fault::silent, Fault::garbled, Fault::truncated, Fault::late, Fault::chatter}) {
     bench_.spoil({fault});
     const double begin = bench_.seconds();
     const auto told = bench_.strobe.read_back();
     ASSERT_TRUE(told.ok()) << static_cast<int>(fault) << " " << told.error().message();
-    expect_same(*told, kSettings);
+    expect_same(*told, kAsked);
     EXPECT_LT(bench_.seconds() - begin, 2) << static_cast<int>(fault);
   }
 }
 
 TEST_P(SerialStrobeTest, ALateAnswerIsNeverTakenForTheNextOnes) {
-  ASSERT_TRUE(bench_.strobe.apply(kSettings).ok());
+  ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   for (int lead = 0; lead < 4; ++lead) {
     bench_.spoil({Fault::none, Fault::none, Fault::none});
     bench_.faults.resize(static_cast<std::size_t>(lead));
     bench_.faults.insert(bench_.faults.end(), {Fault::late, Fault::late, Fault::silent});
-    if (const auto told = bench_.strobe.read_back(); told.ok()) expect_same(*told, kSettings);
+    if (const auto told = bench_.strobe.read_back(); told.ok()) expect_same(*told, kAsked);
     bench_.faults.clear();
     const auto told = bench_.strobe.read_back();
     ASSERT_TRUE(told.ok()) << told.error().message();
-    expect_same(*told, kSettings);
+    expect_same(*told, kAsked);
   }
 }
 
 TEST_P(SerialStrobeTest, ASilentDeviceIsAnErrorWithinTwoSecondsThatSaysWhatToDo) {
-  ASSERT_TRUE(bench_.strobe.apply(kSettings).ok());
+  ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   bench_.spoil_all(Fault::silent);
   const double begin = bench_.seconds();
   const auto told = bench_.strobe.read_back();
@@ -100,14 +100,14 @@ TEST_P(SerialStrobeTest, ASilentDeviceIsAnErrorWithinTwoSecondsThatSaysWhatToDo)
   EXPECT_EQ(told.error().where, "strobe bench");
   EXPECT_THAT(told.error().remedy, HasSubstr("baud rate"));
   EXPECT_LT(bench_.seconds() - begin, 2);
-  EXPECT_EQ(bench_.strobe.apply(kSettings).error().kind, ErrorKind::timed_out);
+  EXPECT_EQ(bench_.strobe.apply(kAsked).error().kind, ErrorKind::timed_out);
 
   bench_.spoil_all(Fault::none);
   EXPECT_TRUE(bench_.strobe.read_back().ok());
 }
 
 TEST_P(SerialStrobeTest, AGarblingDeviceIsAnErrorAndNeverAGuess) {
-  ASSERT_TRUE(bench_.strobe.apply(kSettings).ok());
+  ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   for (const Fault fault : {Fault::garbled, Fault::truncated, Fault::chatter}) {
     bench_.spoil_all(fault);
     const double begin = bench_.seconds();
@@ -117,16 +117,16 @@ TEST_P(SerialStrobeTest, AGarblingDeviceIsAnErrorAndNeverAGuess) {
     EXPECT_FALSE(told.error().remedy.empty());
     EXPECT_LT(bench_.seconds() - begin, 4);
     bench_.spoil_all(Fault::none);
-    expect_same(bench_.strobe.read_back().value(), kSettings);
+    expect_same(bench_.strobe.read_back().value(), kAsked);
   }
 }
 
 TEST_P(SerialStrobeTest, AnUnpluggedDeviceIsAnErrorAtOnceAndIsFoundAgainByTheNextCall) {
-  ASSERT_TRUE(bench_.strobe.apply(kSettings).ok());
+  ASSERT_TRUE(bench_.strobe.apply(kAsked).ok());
   bench_.plugged = false;
   const double begin = bench_.seconds();
   EXPECT_EQ(bench_.strobe.read_back().error().kind, ErrorKind::device);
-  EXPECT_EQ(bench_.strobe.apply(kSettings).error().kind, ErrorKind::device);
+  EXPECT_EQ(bench_.strobe.apply(kAsked).error().kind, ErrorKind::device);
   EXPECT_LT(bench_.seconds() - begin, 0.1);
   bench_.plugged = true;
   EXPECT_TRUE(bench_.strobe.read_back().ok());
@@ -136,7 +136,7 @@ TEST_P(SerialStrobeTest, AnUnpluggedDeviceIsAnErrorAtOnceAndIsFoundAgainByTheNex
 TEST_P(SerialStrobeTest, ADeviceThatBootsWhenItsPortIsOpenedIsWaitedFor) {
   bench_.spoil({Fault::silent, Fault::garbled, Fault::silent, Fault::none});
   EXPECT_TRUE(bench_.strobe.greet(Seconds(3)).ok());
-  EXPECT_TRUE(bench_.strobe.apply(kSettings).ok());
+  EXPECT_TRUE(bench_.strobe.apply(kAsked).ok());
 }
 
 TEST_P(SerialStrobeTest, WhatCantBeIsRefusedWithoutAWordToTheDevice) {
@@ -159,22 +159,22 @@ TEST_P(SerialStrobeTest, WhatCantBeIsRefusedWithoutAWordToTheDevice) {
 
 TEST_P(SerialStrobeTest, ARateThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesBoth) {
   bench_.device->silent_most_rate = 20;
-  const Status status = bench_.strobe.apply(kSettings);
+  const Status status = bench_.strobe.apply(kAsked);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().kind, ErrorKind::device);
   EXPECT_THAT(status.error().what, HasSubstr("its rate is 20 flashes a second, asked for 25"));
-  StrobeSettings slower = kSettings;
+  StrobeSettings slower = kAsked;
   slower.rate = Hertz(20);
   EXPECT_TRUE(bench_.strobe.apply(slower).ok());
 }
 
 TEST_P(SerialStrobeTest, AWidthThatTheDeviceClampsWithoutAWordIsAnErrorThatNamesBoth) {
   bench_.device->silent_widest = 0.003;
-  const Status status = bench_.strobe.apply(kSettings);
+  const Status status = bench_.strobe.apply(kAsked);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().kind, ErrorKind::device);
   EXPECT_THAT(status.error().what, HasSubstr("its flash width is 0.003 s, asked for 0.004 s"));
-  StrobeSettings dark = kSettings;
+  StrobeSettings dark = kAsked;
   dark.output = StrobeOutput::off;
   EXPECT_TRUE(bench_.strobe.apply(dark).ok()) << "no flash that could be too short";
 }
@@ -188,11 +188,11 @@ INSTANTIATE_TEST_SUITE_P(Dialects, SerialStrobeTest, testing::ValuesIn(test::kAl
 
 TEST(SerialStrobeNumbered, AnAnswerWithAWrongChecksumOrNumberIsAskedForAgain) {
   StrobeBench bench(StrobeDialect::emberlock);
-  ASSERT_TRUE(bench.strobe.apply(kSettings).ok());
+  ASSERT_TRUE(bench.strobe.apply(kAsked).ok());
   for (const Fault fault : {Fault::flipped, Fault::renumbered, Fault::twice, Fault::silent}) {
     const std::uint8_t before = bench.as<test::ControllerDevice>().controller.changes();
     bench.spoil({Fault::none, fault, fault == Fault::twice ? fault : Fault::none});
-    StrobeSettings s = kSettings;
+    StrobeSettings s = kAsked;
     s.phase = milliseconds(1 + static_cast<int>(fault));
     ASSERT_TRUE(bench.strobe.apply(s).ok()) << static_cast<int>(fault);
     EXPECT_EQ(bench.strobe.read_back().value().phase, s.phase);
@@ -203,7 +203,7 @@ TEST(SerialStrobeNumbered, AnAnswerWithAWrongChecksumOrNumberIsAskedForAgain) {
 
 TEST(SerialStrobeNumbered, AlwaysWrongChecksumsAreAnError) {
   StrobeBench bench(StrobeDialect::emberlock);
-  ASSERT_TRUE(bench.strobe.apply(kSettings).ok());
+  ASSERT_TRUE(bench.strobe.apply(kAsked).ok());
   bench.spoil_all(Fault::flipped);
   const auto told = bench.strobe.read_back();
   ASSERT_FALSE(told.ok());
@@ -214,7 +214,7 @@ TEST(SerialStrobeNumbered, AlwaysWrongChecksumsAreAnError) {
 TEST(SerialStrobeNumbered, PlaysACodeAsLongAsTheFrameCodes) {
   StrobeBench bench(StrobeDialect::emberlock);
   for (const std::size_t length : {1, 7, 8, 31, 256, 257, 3720, 4096}) {
-    StrobeSettings s = kSettings;
+    StrobeSettings s = kAsked;
     for (std::size_t i = 0; i < length; ++i) s.code.push_back(i % 3 != 1 && i % 7 != 2);
     const Status applied = bench.strobe.apply(s);
     ASSERT_TRUE(applied.ok()) << length << " " << applied.error().message();
@@ -235,7 +235,7 @@ TEST(SerialStrobeNumbered, PlaysACodeAsLongAsTheFrameCodes) {
 TEST(SerialStrobeDevices, AnInterlockThatKeepsTheLightOffIsAnError) {
   StrobeBench bench(StrobeDialect::scpi);
   bench.as<test::ScpiDevice>().takes_settings = false;
-  const Status status = bench.strobe.apply(kSettings);
+  const Status status = bench.strobe.apply(kAsked);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().kind, ErrorKind::device);
   EXPECT_THAT(status.error().remedy, HasSubstr("interlock"));
@@ -244,14 +244,14 @@ TEST(SerialStrobeDevices, AnInterlockThatKeepsTheLightOffIsAnError) {
 TEST(SerialStrobeDevices, OldErrorsInAnInstrumentsQueueAreNotOurs) {
   StrobeBench bench(StrobeDialect::scpi);
   bench.as<test::ScpiDevice>().errors = {"-410,\"Query INTERRUPTED\"", "-113,\"Undefined header\""};
-  EXPECT_TRUE(bench.strobe.apply(kSettings).ok());
+  EXPECT_TRUE(bench.strobe.apply(kAsked).ok());
   EXPECT_TRUE(bench.as<test::ScpiDevice>().errors.empty());
 }
 
 TEST(SerialStrobeDevices, WhatAnInstrumentRefusesIsToldWithItsOwnWords) {
   StrobeBench bench(StrobeDialect::scpi);
   bench.as<test::ScpiDevice>().most_rate = 20;
-  const Status status = bench.strobe.apply(kSettings);
+  const Status status = bench.strobe.apply(kAsked);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().kind, ErrorKind::bad_input);
   EXPECT_THAT(status.error().what, HasSubstr("-222,\"Data out of range\""));
@@ -260,7 +260,7 @@ TEST(SerialStrobeDevices, WhatAnInstrumentRefusesIsToldWithItsOwnWords) {
 TEST(SerialStrobeDevices, ADelayThatAGeneratorIgnoresIsAnError) {
   StrobeBench bench(StrobeDialect::siglent_bswv);
   bench.as<test::SiglentDevice>().takes_delay = false;
-  StrobeSettings s = kSettings;
+  StrobeSettings s = kAsked;
   s.phase = milliseconds(39.5);
   const Status status = bench.strobe.apply(s);
   ASSERT_FALSE(status.ok());
@@ -277,7 +277,7 @@ TEST(SerialStrobeDevices, AGeneratorThatMakesNoPulsesIsNoStrobeUntilItIsSetUp) {
     else
       bench.as<test::SiglentDevice>().on = true;
     EXPECT_THAT(bench.strobe.read_back().error().message(), HasSubstr("no pulses"));
-    EXPECT_TRUE(bench.strobe.apply(kSettings).ok());
+    EXPECT_TRUE(bench.strobe.apply(kAsked).ok());
   }
 }
 
@@ -297,18 +297,18 @@ TEST(SerialStrobeDevices, SomebodyElsesDeviceIsNotGreeted) {
 TEST(SerialStrobeDevices, AGardasoftMayEchoAndWhatItAdjustsIsAnError) {
   StrobeBench bench(StrobeDialect::gardasoft_rt);
   bench.as<test::GardasoftDevice>().echoes = true;
-  ASSERT_TRUE(bench.strobe.apply(kSettings).ok());
+  ASSERT_TRUE(bench.strobe.apply(kAsked).ok());
   bench.as<test::GardasoftDevice>().widest = 3;
-  EXPECT_THAT(bench.strobe.apply(kSettings).error().what, HasSubstr("0.003 s, asked for 0.004 s"));
+  EXPECT_THAT(bench.strobe.apply(kAsked).error().what, HasSubstr("0.003 s, asked for 0.004 s"));
   EXPECT_NEAR(bench.strobe.read_back().value().width.value(), 0.003, 1e-9);
 }
 
 TEST(SerialStrobeDevices, AGardasoftThatReportsAFaultOfItsLightIsAnError) {
   StrobeBench bench(StrobeDialect::gardasoft_rt);
   bench.as<test::GardasoftDevice>().event = 34;
-  EXPECT_TRUE(bench.strobe.apply(kSettings).ok()) << "a fault of the past is cleared first";
+  EXPECT_TRUE(bench.strobe.apply(kAsked).ok()) << "a fault of the past is cleared first";
   bench.as<test::GardasoftDevice>().lamp_fails = true;
-  const Status status = bench.strobe.apply(kSettings);
+  const Status status = bench.strobe.apply(kAsked);
   ASSERT_FALSE(status.ok());
   EXPECT_EQ(status.error().kind, ErrorKind::device);
   EXPECT_THAT(status.error().what, HasSubstr("Evt1,34"));
@@ -317,7 +317,7 @@ TEST(SerialStrobeDevices, AGardasoftThatReportsAFaultOfItsLightIsAnError) {
 TEST(SerialStrobeDevices, SteadyLightIsForThoseThatCan) {
   for (const StrobeDialect dialect : test::kAllDialects) {
     StrobeBench bench(dialect);
-    StrobeSettings s = kSettings;
+    StrobeSettings s = kAsked;
     s.output = StrobeOutput::steady;
     const Status status = bench.strobe.apply(s);
     if (dialect == StrobeDialect::scpi || dialect == StrobeDialect::siglent_bswv) {

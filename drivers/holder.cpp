@@ -3,6 +3,7 @@
 #include <fstream>
 #include <system_error>
 
+#include <fcntl.h>
 #include <unistd.h>
 
 namespace emberlock {
@@ -15,11 +16,19 @@ std::optional<int> pid_of(const fs::path& proc_entry) {
   return std::stoi(name);
 }
 
+/// A descriptor that only names a file (O_PATH), as udev has one of a device while it sets its rights.
+bool only_names(const fs::path& process, const fs::path& fd) {
+  std::ifstream info(process / "fdinfo" / fd.filename());
+  std::string key;
+  unsigned flags = 0;
+  return info >> key >> key && info >> key >> std::oct >> flags && (flags & O_PATH) != 0;
+}
+
 bool has_open(const fs::path& process, const fs::path& file) {
   std::error_code error;
   for (fs::directory_iterator fd(process / "fd", error), end; !error && fd != end; fd.increment(error)) {
     std::error_code gone;
-    if (fs::read_symlink(fd->path(), gone) == file) return true;
+    if (fs::read_symlink(fd->path(), gone) == file && !only_names(process, fd->path())) return true;
   }
   return false;
 }

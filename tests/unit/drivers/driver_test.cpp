@@ -71,31 +71,65 @@ TEST(ChooseMode, ARefusalSaysWhatTheCameraCanDo) {
   EXPECT_FALSE(choose_mode({}, {}, "cam").ok());
 }
 
-TEST(HolderOf, AnotherProcessIsNamedOurselvesAreNot) {
-  const std::filesystem::path file =
-      std::filesystem::temp_directory_path() / ("emberlock_held_" + std::to_string(::getpid()));
-  int ready[2];
-  ASSERT_EQ(::pipe(ready), 0);
-  const pid_t child = ::fork();
-  if (child == 0) {
-    if (::open(file.c_str(), O_RDWR | O_CREAT, 0600) < 0 || ::write(ready[1], "x", 1) != 1) ::_exit(1);
-    ::pause();
-    ::_exit(0);
+/// Another process that opens a file so, until it is destroyed.
+class Opener {
+ public:
+  Opener(const std::filesystem::path& file, int flags) {
+    int ready[2];
+    if (::pipe(ready) != 0) return;
+    pid_ = ::fork();
+    if (pid_ == 0) {
+      if (::open(file.c_str(), flags) < 0 || ::write(ready[1], "x", 1) != 1) ::_exit(1);
+      ::pause();
+      ::_exit(0);
+    }
+    ::close(ready[1]);
+    char byte = 0;
+    opened_ = ::read(ready[0], &byte, 1) == 1;
+    ::close(ready[0]);
   }
-  char byte = 0;
-  ASSERT_EQ(::read(ready[0], &byte, 1), 1);
-  const auto held = holder_of(file);
-  ::kill(child, SIGKILL);
-  ::waitpid(child, nullptr, 0);
-  ASSERT_TRUE(held);
-  EXPECT_EQ(held->pid, child);
-  EXPECT_FALSE(held->program.empty());
+  ~Opener() {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Opener(const Opener&) = delete;
+  Opener& operator=(const Opener&) = delete;
+  bool opened() const { return opened_; }
+  pid_t pid() const { return pid_; }
 
-  const UniqueFd ours(::open(file.c_str(), O_RDONLY));
-  EXPECT_FALSE(holder_of(file));
-  EXPECT_THAT(held_error(file, "camera c7").message(), HasSubstr("another process"));
-  std::filesystem::remove(file);
-  EXPECT_FALSE(holder_of(file));
+ private:
+  pid_t pid_ = -1;
+  bool opened_ = false;
+};
+
+class HolderOf : public testing::Test {
+ protected:
+  void SetUp() override { ASSERT_TRUE(UniqueFd(::open(file_.c_str(), O_RDWR | O_CREAT, 0600))); }
+  void TearDown() override { std::filesystem::remove(file_); }
+  const std::filesystem::path file_ =
+      std::filesystem::temp_directory_path() / ("emberlock_held_" + std::to_string(::getpid()));
+};
+
+TEST_F(HolderOf, AnotherProcessIsNamedOurselvesAreNot) {
+  {
+    const Opener other(file_, O_RDWR);
+    ASSERT_TRUE(other.opened());
+    const auto held = holder_of(file_);
+    ASSERT_TRUE(held);
+    EXPECT_EQ(held->pid, other.pid());
+    EXPECT_FALSE(held->program.empty());
+  }
+  const UniqueFd ours(::open(file_.c_str(), O_RDONLY));
+  EXPECT_FALSE(holder_of(file_));
+  EXPECT_THAT(held_error(file_, "camera c7").message(), HasSubstr("another process"));
+  std::filesystem::remove(file_);
+  EXPECT_FALSE(holder_of(file_));
+}
+
+TEST_F(HolderOf, OneThatOnlyNamesItIsNone) {
+  const Opener udev(file_, O_PATH);
+  ASSERT_TRUE(udev.opened());
+  EXPECT_FALSE(holder_of(file_));
 }
 
 }  // namespace

@@ -98,7 +98,8 @@ TEST_F(StrobeOnTheUsb, IsFoundByItsSerialNumberWithItsMakersWords) {
   const auto strobe = found();
   EXPECT_EQ(strobe->model, "Emberlock strobe controller");
   EXPECT_THAT(strobe->address, HasSubstr("/dev/ttyACM"));
-  EXPECT_FALSE(strobe->holder);
+  // Who sees a new line's end first may open it for a moment.
+  EXPECT_TRUE(within(5, [] { return !found()->holder; }));
   // The place will do as well.
   EXPECT_TRUE(open_serial_strobe("usb-dummy_hcd.0-1:1.0", {}).ok());
   EXPECT_THAT(open_serial_strobe("E0", {}).error().message(), HasSubstr("strobe E0: it isn't plugged in"));

@@ -114,7 +114,7 @@ void Conductor::carry_out(Action action) {
     case Action::begin_recording:
       return begin_recording();
     case Action::finish_recording:
-      return;  // work() drains and finishes, so that whoever asked needn't wait
+      return end_recording();
     case Action::begin_reconstruction:
       return begin_reconstruction();
     case Action::cancel_reconstruction:
@@ -148,7 +148,8 @@ void Conductor::work() {
       return capture();
     case v1::FINISHING:
       drain();
-      return finish_recording();
+      if (all_have_come()) finish_recording();
+      return;
     default:
       if (real_time()) drain();
   }

@@ -79,6 +79,8 @@ class Conductor {
   void film_round();
   void hold();
   void capture();
+  void end_recording();
+  [[nodiscard]] bool all_have_come() const;
   void drain();
   void heed_devices();
   void heed_disk();
@@ -117,6 +119,7 @@ class Conductor {
   std::filesystem::path record_folder_;
   std::optional<v1::RecordingStatus> recording_;  ///< the last that ended
   TimePoint record_began_;
+  TimePoint record_ended_;
   std::optional<Seconds> spread_;  ///< between two cameras when it began, as the lock knew it
   std::optional<TimePoint> last_frame_;
   std::vector<bool> ended_;  ///< recordings that are replayed have ends

@@ -14,6 +14,7 @@ namespace {
 
 /// A recording without a frame from any camera for so long ends.
 constexpr Seconds kNobodyFilms{10};
+constexpr Seconds kLongestWay{3};  // of frames that were filmed before a recording's end
 constexpr Seconds kDiskInterval{1};
 /// With fewer on the disk the operator is told.
 constexpr double kMinutesWanted = 5;
@@ -72,6 +73,24 @@ void Conductor::begin_recording() {
   expired_ = false;
   ended_.assign(devices_.cameras.size(), false);
   static_cast<void>(happen(RecordingBegun{}));
+}
+
+/// work() takes what is still on its way and finishes, so that whoever asked needn't wait.
+void Conductor::end_recording() {
+  const double seconds = record_request_.seconds();
+  record_ended_ = parts_.rig.clock().now();
+  if (seconds > 0) record_ended_ = std::min(record_ended_, record_began_ + Seconds(seconds));
+  recorder_->end(record_ended_);
+}
+
+/// Whether each camera's frames until the recording's end have been taken, or needn't be waited for.
+bool Conductor::all_have_come() const {
+  if (parts_.rig.clock().now() - record_ended_ > kLongestWay) return true;
+  for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
+    if (parts_.rig.state(i) == CameraThread::State::filming && !ended_[i] && !recorder_->has_all(i))
+      return false;
+  }
+  return true;
 }
 
 void Conductor::finish_recording() {

@@ -27,9 +27,10 @@ std::uint64_t lost(const v1::Counts& counts) {
 std::string words(const v1::Counts& sum, std::size_t cameras) {
   std::string text = fmt::format("{} frames of {} cameras written", sum.recorded(), cameras);
   if (lost(sum) == 0) return text + ", none lost";
-  text += fmt::format(", {} lost:", lost(sum));
+  text += fmt::format(", {} lost: ", lost(sum));
+  const char* separator = "";
   const auto cause = [&](std::uint64_t frames, const char* by) {
-    if (frames > 0) text += fmt::format(" {} {}", frames, by);
+    if (frames > 0) text += fmt::format("{}{} {}", std::exchange(separator, ", "), frames, by);
   };
   cause(sum.camera_gap(), "by cameras");
   cause(sum.transport(), "on the way");
@@ -85,13 +86,16 @@ Recorder::Recorder(SessionWriter writer, const RecorderOptions& options, std::st
     : writer_(std::move(writer), options.queue),
       session_(std::move(session)),
       purpose_(std::move(purpose)),
-      began_(now) {
+      began_(now),
+      past_end_(before.size(), false) {
   for (const FrameCounts& counts : before) books_.push_back({.before = counts, .after = {}, .arrivals = {}});
 }
 
 void Recorder::take(std::size_t camera, Frame frame) {
   CameraBooks& books = books_[camera];
-  if (frame.stamp.monotonic_time < began_) {
+  const bool past_end = ended_ && frame.stamp.monotonic_time > *ended_;
+  if (past_end) past_end_[camera] = true;
+  if (past_end || frame.stamp.monotonic_time < began_) {
     ++books.left_out;
     return;
   }
@@ -105,7 +109,7 @@ v1::RecordingStatus Recorder::status(TimePoint now) const {
   status.set_session(session_);
   status.set_purpose(purpose_);
   status.set_state(v1::RecordingStatus::RECORDING);
-  const double seconds = (now - began_).value();
+  const double seconds = std::max((std::min(now, ended_.value_or(now)) - began_).value(), 0.0);
   status.set_seconds(seconds);
   status.set_bytes(bytes_);
   if (seconds > 0) status.set_bytes_per_s(static_cast<double>(bytes_) / seconds);

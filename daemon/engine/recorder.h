@@ -20,7 +20,7 @@ namespace emberlock {
 struct CameraBooks {
   FrameCounts before;          ///< the driver's, when it began
   FrameCounts after;           ///< and when it ended
-  std::uint64_t left_out = 0;  ///< delivered in that time, but filmed before it began
+  std::uint64_t left_out = 0;  ///< delivered in that time, but filmed before it began or after it ended
   Arrivals arrivals;           ///< what was handed to the recorder
 };
 
@@ -51,8 +51,12 @@ class Recorder {
                                                  const v1::Manifest& manifest, const RecorderOptions& options,
                                                  const std::vector<FrameCounts>& before, TimePoint now);
 
-  /// Never waits. Frames that came before it began are left out.
+  /// Never waits. Frames that came before it began or after it ended are left out.
   void take(std::size_t camera, Frame frame);
+  /// It holds what was filmed until then; frames of that time may still be on their way.
+  void end(TimePoint at) { ended_ = at; }
+  /// Whether a frame has come that this camera filmed after the end.
+  [[nodiscard]] bool has_all(std::size_t camera) const { return past_end_[camera]; }
   Status append(const v1::Event& event) { return writer_.append(event); }
   /// The disk's first refusal: nothing that comes later is sure to be kept.
   [[nodiscard]] std::optional<Error> failure() const { return writer_.failure(); }
@@ -69,6 +73,8 @@ class Recorder {
   std::string session_;
   std::string purpose_;
   TimePoint began_;
+  std::optional<TimePoint> ended_;
+  std::vector<bool> past_end_;  ///< by camera
   std::vector<CameraBooks> books_;
   std::uint64_t bytes_ = 0;
 };

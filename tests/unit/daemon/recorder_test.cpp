@@ -79,6 +79,26 @@ TEST_F(Recording, FramesFilmedBeforeItBeganAreLeftOut) {
   EXPECT_EQ(session->read(1, 6)->image->bytes(), test::noise_frame(kLayout, 9).image->bytes());
 }
 
+TEST_F(Recording, ItEndsAtTheSameInstantForAllHoweverLateTheirFramesCome) {
+  auto recorder = begin({});
+  const TimePoint end = test::noise_frame(kLayout, 6).stamp.monotonic_time;
+  recorder->take(1, test::noise_frame(kLayout, 0));
+  recorder->end(end);
+  for (std::uint64_t i = 0; i < 8; ++i) recorder->take(0, test::noise_frame(kLayout, i));
+  for (std::uint64_t i = 1; i < 7; ++i) recorder->take(1, test::noise_frame(kLayout, i));
+  EXPECT_TRUE(recorder->has_all(0));
+  EXPECT_FALSE(recorder->has_all(1));
+  recorder->take(1, test::noise_frame(kLayout, 7));
+  EXPECT_TRUE(recorder->has_all(1));
+  std::vector<FrameCounts> after(2);
+  after[0].delivered = after[1].delivered = 8;
+  const v1::RecordingStatus status = recorder->finish(after, end + Seconds(1));
+  EXPECT_EQ(status.state(), v1::RecordingStatus::COMPLETE) << status.verdict();
+  EXPECT_EQ(status.cameras(0).recorded(), 7);
+  EXPECT_EQ(status.cameras(1).recorded(), 7);
+  EXPECT_EQ(status.seconds(), (end - TimePoint{}).value());
+}
+
 TEST_F(Recording, EveryLossStandsInTheManifestUnderItsCause) {
   std::vector<FrameCounts> counts(2);
   counts[0].transport = 7;  // from before
@@ -92,7 +112,7 @@ TEST_F(Recording, EveryLossStandsInTheManifestUnderItsCause) {
   EXPECT_EQ(status.state(), v1::RecordingStatus::COMPLETE) << status.verdict();
   EXPECT_EQ(status.cameras(0).transport(), 1);
   EXPECT_EQ(status.cameras(0).camera_gap(), 1);
-  EXPECT_THAT(status.verdict(), HasSubstr("2 lost: 1 by cameras 1 on the way"));
+  EXPECT_THAT(status.verdict(), HasSubstr("2 lost: 1 by cameras, 1 on the way"));
 }
 
 TEST_F(Recording, AFrameThatTheDriverCountedAndNobodyTookIsRed) {

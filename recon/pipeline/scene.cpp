@@ -113,23 +113,46 @@ std::optional<std::size_t> nearest_complete(const std::vector<FrameStamp>& stamp
   return best;
 }
 
-/// The complete frame of a camera within one frame period of `t`.
-std::optional<std::size_t> frame_at(const SessionReader& reader, std::size_t camera, TimePoint t) {
+/// How far from an instant a camera's frame may be to stand for it: a frame period, anything where that isn't
+/// known.
+Seconds reach_of(const SessionReader& reader, std::size_t camera) {
   const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
+  return Seconds(rate > 0 ? 1 / rate : INFINITY);
+}
+
+/// The complete frame of a camera within its reach of `t`.
+std::optional<std::size_t> frame_at(const SessionReader& reader, std::size_t camera, TimePoint t) {
   const auto nearest = nearest_complete(reader.stamps(camera), t);
-  if (!nearest ||
-      abs(reader.stamps(camera)[*nearest].monotonic_time - t).value() > (rate > 0 ? 1 / rate : INFINITY))
+  if (!nearest || abs(reader.stamps(camera)[*nearest].monotonic_time - t) > reach_of(reader, camera))
     return std::nullopt;
   return nearest;
+}
+
+/// When a camera's complete frames came, rising.
+std::vector<TimePoint> complete_times(const std::vector<FrameStamp>& stamps) {
+  std::vector<TimePoint> times;
+  for (const FrameStamp& stamp : stamps)
+    if (stamp.status == FrameStatus::complete) times.push_back(stamp.monotonic_time);
+  std::sort(times.begin(), times.end());
+  return times;
+}
+
+bool any_within(const std::vector<TimePoint>& rising, TimePoint t, Seconds reach) {
+  const auto after = std::lower_bound(rising.begin(), rising.end(), t);
+  return (after != rising.end() && abs(*after - t) <= reach) ||
+         (after != rising.begin() && abs(*std::prev(after) - t) <= reach);
 }
 
 /// The first camera's frame nearest to the middle of which all cameras have the instant; the middle one where
 /// there is none.
 std::size_t middle_frame(const SessionReader& reader) {
+  std::vector<std::vector<TimePoint>> complete;
+  for (std::size_t i = 0; i < reader.camera_count(); ++i)
+    complete.push_back(complete_times(reader.stamps(i)));
   const std::vector<FrameStamp>& first = reader.stamps(0);
   const auto whole = [&](std::size_t frame) {
-    for (std::size_t i = 0; i < reader.camera_count(); ++i)
-      if (!frame_at(reader, i, first[frame].monotonic_time)) return false;
+    for (std::size_t i = 0; i < complete.size(); ++i)
+      if (!any_within(complete[i], first[frame].monotonic_time, reach_of(reader, i))) return false;
     return true;
   };
   const std::size_t middle = first.size() / 2;

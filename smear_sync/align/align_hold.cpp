@@ -126,7 +126,7 @@ bool renew(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
                     (c.cameras[i].method == ResetMethod::by_hand ? ": reset its shutter by hand"
                                                                  : ": its shutter is reset before");
   }
-  decision.reason = "every camera lies within tolerance; " + who + " would leave it before long";
+  decision.reason = who + " would leave tolerance before long";
   if (decision.renews) state.renewal = 1;
   return true;
 }

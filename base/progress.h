@@ -8,8 +8,8 @@
 
 namespace emberlock {
 
-/// How far a long step has come: fraction in 0..1 and a few words. May be empty. Called from the thread that
-/// works.
+/// How far a long step has come: fraction in 0..1 and a few words. May be empty. Called by a thread that
+/// works, one at a time.
 using Progress = std::function<void(double fraction, std::string_view what)>;
 
 /// The most that is reported before the end.

@@ -2,6 +2,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/in_parallel.h"
 #include "session/camera_reader.h"
 #include "session/events.h"
 #include "session/files.h"
@@ -61,11 +62,10 @@ Status transcode(const fs::path& folder, const Observer& observer) {
   if (manifest.state() == v1::Manifest::RECORDING) {
     return Error{ErrorKind::bad_input, "the recording isn't finished", folder.string(), "Salvage it first"};
   }
-  const double cameras = manifest.cameras_size();
-  for (int i = 0; i < manifest.cameras_size(); ++i) {
-    EMBERLOCK_RETURN_IF_ERROR(transcode_camera(folder, *manifest.mutable_cameras(i),
-                                               part_of(observer, i / cameras, (i + 1) / cameras)));
-  }
+  const auto cameras = static_cast<std::size_t>(manifest.cameras_size());
+  EMBERLOCK_RETURN_IF_ERROR(in_parallel(cameras, observer, [&](std::size_t i, const Observer& seen) {
+    return transcode_camera(folder, *manifest.mutable_cameras(static_cast<int>(i)), seen);
+  }));
   EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder, manifest));
   static_cast<void>(observe(observer, 1, "compressed"));
   return {};

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "base/file.h"
+#include "base/in_parallel.h"
 #include "session/camera_reader.h"
 #include "session/events.h"
 #include "session/files.h"
@@ -123,13 +124,13 @@ Result<SessionCheck> verify_session(const fs::path& folder, const Observer& obse
   EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest, read_manifest(folder));
   SessionCheck check;
   check.state = manifest.state();
-  const double cameras = manifest.cameras_size();
-  for (int i = 0; i < manifest.cameras_size(); ++i) {
-    EMBERLOCK_ASSIGN_OR_RETURN(CameraCheck camera,
-                               check_camera(folder, manifest, manifest.cameras(i),
-                                            part_of(observer, i / cameras, (i + 1) / cameras)));
-    check.cameras.push_back(std::move(camera));
-  }
+  check.cameras.resize(static_cast<std::size_t>(manifest.cameras_size()));
+  EMBERLOCK_RETURN_IF_ERROR(
+      in_parallel(check.cameras.size(), observer, [&](std::size_t i, const Observer& seen) -> Status {
+        EMBERLOCK_ASSIGN_OR_RETURN(
+            check.cameras[i], check_camera(folder, manifest, manifest.cameras(static_cast<int>(i)), seen));
+        return {};
+      }));
   check_events(folder, check);
   if (check.state == v1::Manifest::RECORDING) {
     check.problems.emplace_back(

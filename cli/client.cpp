@@ -189,9 +189,12 @@ struct Client::Parts {
                 Stub& stub, const Request& request, const Take<Response>& take, const Stop& stop) {
     grpc::ClientContext context;
     const auto reader = (stub.*method)(&context, request);
-    std::atomic<bool> ours = false;  // it was ended from here
+    std::atomic<bool> ours = false;  // it was ended from here, by `take` or by `stop`
     {
-      const Stopper stopper(context, [&] { return ours = stop && stop(); });
+      const Stopper stopper(context, [&] {
+        if (stop && stop()) ours = true;
+        return ours.load();
+      });
       for (Response response; !ours && reader->Read(&response);) {
         if (take(response)) continue;
         ours = true;

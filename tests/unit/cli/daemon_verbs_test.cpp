@@ -273,6 +273,15 @@ TEST_F(DaemonVerbs, ADaemonThatGoesAwayWhileItIsWatchedIsToldApart) {
   EXPECT_THAT(result.err, HasSubstr("went away"));
 }
 
+TEST_F(DaemonVerbs, AWatchThatHasSeenEnoughEndsWell) {
+  Client client = Client::connect({.address = "unix:" + (folder_ / "socket").string()}).value();
+  for (int i = 0; i < 200; ++i) {  // its end meets its beginning in every way
+    const Status watched = client.watch_status([](const v1::DaemonStatus&) { return false; }, {});
+    ASSERT_TRUE(watched.ok()) << i << ": " << watched.error().message();
+    ASSERT_FALSE(client.lost());
+  }
+}
+
 TEST_F(DaemonVerbs, StrobeChangesWhatItIsToldAlone) {
   v1::StrobeState state;
   state.set_output(v1::StrobeState::OFF);

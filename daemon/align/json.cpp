@@ -104,7 +104,7 @@ AlignRunOptions options_from(const json& object) {
   if (reset_by == "anybody") options.align.reset_by = ResetBy::anybody;
   options.align.strobe_step = strobe_step_from(object);
   options.measure_row_time = object.at("measure_row_time").get<bool>();
-  options.comb_rate = Hertz(number(object, "comb_rate_hz"));
+  if (!object.at("comb_rate_hz").is_null()) options.comb_rate = Hertz(number(object, "comb_rate_hz"));
   options.comb_frames = integer(object, "comb_frames");
   options.frames_per_round = integer(object, "frames_per_round");
   options.flash_width = Seconds(number(object, "flash_width_s"));
@@ -238,7 +238,7 @@ ordered_json options_json(const AlignRunOptions& options) {
           {"reset_by", align.reset_by == ResetBy::anybody ? "anybody" : "orders"},
           {"strobe_step_s", align.strobe_step.value()},
           {"measure_row_time", options.measure_row_time},
-          {"comb_rate_hz", options.comb_rate.value()},
+          {"comb_rate_hz", options.comb_rate ? ordered_json(options.comb_rate->value()) : ordered_json()},
           {"comb_frames", options.comb_frames},
           {"frames_per_round", options.frames_per_round},
           {"flash_width_s", options.flash_width.value()},

@@ -1,6 +1,7 @@
 #include "daemon/align/row_times.h"
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include <fmt/format.h>
@@ -11,6 +12,16 @@ namespace emberlock {
 namespace {
 
 constexpr int kCombAttempts = 2;
+
+/// Ten flashes or a few more in a frame stand far enough apart to be told from each other, and leave three on
+/// one side of any lamp. Faster than the rate for the paper's cameras not every strobe flashes.
+Hertz usual_comb_rate(const std::vector<CcdTiming>& timing) {
+  constexpr double kFlashesPerFrame = 12.5;
+  constexpr double kMost = 300;
+  Seconds longest(0);
+  for (const CcdTiming& camera : timing) longest = std::max(longest, camera.frame_period);
+  return Hertz(std::min(std::round(kFlashesPerFrame / longest.value()), kMost));
+}
 
 }  // namespace
 
@@ -29,8 +40,8 @@ Status measure_row_times(const AlignRig& rig, AlignBench& bench, const AlignRunO
                          AlignRunResult& result, const Progress& progress) {
   const std::vector<std::size_t> cameras = bench.cameras_with(SensorKind::ccd);
   if (cameras.empty()) return {};
-  StrobeSettings comb{
-      .output = StrobeOutput::flashing, .rate = options.comb_rate, .width = options.flash_width};
+  const Hertz comb_rate = options.comb_rate.value_or(usual_comb_rate(options.timing));
+  StrobeSettings comb{.output = StrobeOutput::flashing, .rate = comb_rate, .width = options.flash_width};
   for (int attempt = 0; attempt < kCombAttempts; ++attempt) {
     report(progress, 0.1 * attempt, "measuring the row time");
     EMBERLOCK_RETURN_IF_ERROR(bench.set_strobe(comb));
@@ -53,11 +64,11 @@ Status measure_row_times(const AlignRig& rig, AlignBench& bench, const AlignRunO
       return Error{ErrorKind::device, "no camera shows a comb of dots that a row time can be fitted to",
                    "measuring the row time",
                    fmt::format("check that the strobe flashes at {}/s and is in view of the cameras",
-                               options.comb_rate.value())};
+                               comb_rate.value())};
     }
     result.options.row_time = *mean.value();
     if (!near_integer) break;
-    comb.rate = options.comb_rate * 0.983;  // another pitch, off the whole number
+    comb.rate = comb_rate * 0.983;  // another pitch, off the whole number
   }
   for (const std::size_t i : cameras) {
     bench.sensor(i).set_row_time(result.row_clocks[i] ? result.row_clocks[i]->row_time

@@ -37,10 +37,10 @@ struct AlignRunOptions {
   std::vector<CcdTiming> timing;
   /// By camera, or empty: what is known of the resets' delay from an earlier run.
   std::vector<std::optional<ResetDelay>> delays;
-  bool measure_row_time = true;  ///< of CCDs from a comb, before the first round
-  Hertz comb_rate{300};
-  int comb_frames = 24;      ///< of each camera
-  int frames_per_round = 4;  ///< of each camera, > 0
+  bool measure_row_time = true;    ///< of CCDs from a comb, before the first round
+  std::optional<Hertz> comb_rate;  ///< flashes a second; if absent about ten a frame
+  int comb_frames = 24;            ///< of each camera
+  int frames_per_round = 4;        ///< of each camera, > 0
   Seconds flash_width = microseconds(20);
   Seconds frame_deadline{3};              ///< longest wait for a frame, a reset's latency included
   Seconds reset_lead = milliseconds(20);  ///< between ordering a reset and its earliest moment

@@ -285,7 +285,7 @@ Section<DaemonConfig> make_alignment_section() {
                  {{"measured", true}, {"configured", false}},
                  "Whether a comb of flashes measures it first, or row_time_us of each camera holds."),
        number<C>("comb_rate_hz", EMBERLOCK_AT(alignment.run.comb_rate), {30, 333},
-                 "Flashes a second of that comb."),
+                 "Flashes a second of that comb; about ten a frame if absent.", "300"),
        number<C>("comb_frames", EMBERLOCK_AT(alignment.run.comb_frames), {1, 1000},
                  "Frames of it, of each camera."),
        number<C>("frame_deadline_s", EMBERLOCK_AT(alignment.run.frame_deadline), {0.1, 60},

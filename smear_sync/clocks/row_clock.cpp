@@ -346,7 +346,7 @@ Result<RowClock> fit_row_clock(std::span<const SmearReading> frames, Hertz flash
   for (const Comb& c : all) longest = std::max({longest, c.above.size(), c.below.size()});
   if (longest < 3) {
     return Error{ErrorKind::bad_input, "no frame shows three dots or more on one side of the lamp", "comb",
-                 "raise the strobe's rate to about ten flashes a frame"};
+                 "set the strobe's rate to about ten flashes a frame"};
   }
   const double start = first_pitch(all);
   if (start <= 0) {

@@ -95,8 +95,7 @@ class Daemon {
     std::ofstream(config) << fmt::format(
         "[rig]\nname = \"soak\"\n[rig.virtual]\nscene = \"flame\"\nseed = 1\n"
         "[[rig.camera]]\ndriver = \"virtual\"\ncount = {}\nsize = \"320x240\"\nrate_hz = {}\n"
-        "[rig.strobe]\ndriver = \"virtual\"\n[alignment]\ntolerance = \"60rows\"\ncomb_rate_hz = "
-        "300\nframe_deadline_s = 30\n"
+        "[rig.strobe]\ndriver = \"virtual\"\n[alignment]\ntolerance = \"60rows\"\nframe_deadline_s = 30\n"
         "[recording]\nfolder = \"{}\"\nencoding = \"raw\"\ntranscode = \"when-idle\"\n"
         "[reconstruction]\nprogram = \"{}\"\ndevice = \"cpu\"\nvoxels = 16\nbudget_s = 2\n"
         "[server]\nsocket = \"{}\"\nhttp_listen = \"127.0.0.1:{}\"\n",

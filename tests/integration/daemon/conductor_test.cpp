@@ -60,6 +60,16 @@ TEST_F(Daemon, FromColdToLocked) {
   }
 }
 
+TEST_F(Daemon, SlowCamerasAreLockedToo) {
+  DaemonConfig config = small_config(temp_.path());
+  config.rig.cameras[0].request.frame_rate = Hertz(10);
+  SmallDaemon daemon(std::move(config));
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  const double tolerance = daemon.conductor->status().alignment().tolerance_s();
+  EXPECT_LE(true_spread(*daemon.rig->virtual_rig()).value(), 2 * tolerance);
+}
+
 TEST_F(Daemon, PicturesAreToldWhereLampDotAndTargetAre) {
   SmallDaemon daemon(small_config(temp_.path()));
   ASSERT_TRUE(daemon.conductor->align({}).ok());

@@ -102,7 +102,8 @@ void Conductor::film_round() {
     return;
   }
   expired_ = false;
-  static_cast<void>(happen(RoundDone{verdict(), alignment_->last().reason, alignment_->last().renews}));
+  const AlignDecision& last = alignment_->last();
+  static_cast<void>(happen(RoundDone{verdict(), last.reason, last.renews, last.in_time}));
 }
 
 void Conductor::hold() {

@@ -110,7 +110,9 @@ class Stepper {
         return;
       default:
         const bool held = now().phase == v1::LOCKED || now().renews;
-        if (held && !happened.renews) {
+        if (held && !happened.renews && happened.in_time) {
+          remark(v1::AMBER, "Aligning anew before the lock is lost: " + happened.reason);
+        } else if (held && !happened.renews) {
           raise({{v1::Fault::LOCK_LOST},
                  v1::AMBER,
                  happened.reason,

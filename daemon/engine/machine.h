@@ -69,7 +69,8 @@ struct RowTimeMeasured {};
 struct RoundDone {
   v1::AlignmentStatus::Verdict verdict = v1::AlignmentStatus::VERDICT_UNSPECIFIED;
   std::string reason;
-  bool renews = false;  ///< of GO_ON: nobody has left tolerance, those that would are being reset
+  bool renews = false;   ///< of GO_ON: nobody has left tolerance, those that would are being reset
+  bool in_time = false;  ///< of GO_ON: that begins, and without `renews` nobody knows how long it takes
 };
 /// The alignment stopped for a reason that isn't its own: a device. It begins again once `Recovered`.
 struct AlignmentBroken {

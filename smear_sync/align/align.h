@@ -234,6 +234,9 @@ struct AlignDecision {
   int resets_so_far = 0;                ///< before this decision's
   /// Nobody has left tolerance: cameras that would have before long are being reset meanwhile.
   bool renews = false;
+  /// In this round that begins; without `renews` shutters are drawn at random, and nobody knows how long it
+  /// takes.
+  bool in_time = false;
   std::optional<std::size_t> reset_next;  ///< of ResetBy::anybody: the camera that somebody must reset now
   std::vector<std::size_t> jumped;        ///< likewise: those that somebody has reset, as this round shows
   std::optional<Seconds> next_check;  ///< once aligned: film again by then, before the drift may have led a

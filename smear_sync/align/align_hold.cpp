@@ -111,7 +111,7 @@ bool renew(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
     due = due || now;
   }
   if (!due) return false;
-  decision.renews = true;
+  decision.renews = decision.in_time = true;
   std::string who;
   for (std::size_t i = 0; i < courses.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];

@@ -14,6 +14,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::SizeIs;
 
 constexpr const char* kUtc = "2026-01-02T03:04:05.678Z";
 
@@ -64,6 +65,22 @@ TEST(Machine, CamerasThatAreResetBeforeTheyLeaveLoseNoLockButARecordingWaits) {
   run.go(kAligned);
   EXPECT_EQ(light(run.state()), v1::GREEN);
   EXPECT_FALSE(run.go(AskRecord{"flame", false, false}).refusal);
+}
+
+TEST(Machine, ALockThatIsGivenUpInTimeIsNoFault) {
+  Walk run(kToLocked);
+  const MachineStep given_up =
+      run.go(RoundDone{v1::AlignmentStatus::GO_ON, "b would leave before long", false, true});
+  EXPECT_EQ(run.state().phase, v1::ALIGNING);
+  EXPECT_EQ(light(run.state()), v1::AMBER);
+  EXPECT_THAT(run.state().faults, IsEmpty());
+  ASSERT_THAT(given_up.remarks, SizeIs(1));
+  EXPECT_THAT(given_up.remarks[0].text, HasSubstr("before the lock is lost: b would leave"));
+  EXPECT_THAT(run.go(AskRecord{"flame", true, false}).refusal->message(), HasSubstr("being aligned"));
+  run.go(kCameraOut);  // b's shutter, drawn anew
+  EXPECT_THAT(run.state().faults, IsEmpty());
+  run.go(kAligned);
+  EXPECT_EQ(light(run.state()), v1::GREEN);
 }
 
 TEST(Machine, ARenewalThatLosesACameraIsALostLock) {

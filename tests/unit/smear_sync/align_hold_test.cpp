@@ -157,6 +157,7 @@ TEST_F(HeldCameras, OneThatIsResetByHandIsAskedForBeforeItLeaves) {
   const AlignDecision soon = film_drifting(1024);
   EXPECT_EQ(soon.verdict, AlignVerdict::go_on);
   EXPECT_FALSE(soon.renews) << "nobody knows how long that takes";
+  EXPECT_TRUE(soon.in_time);
   ASSERT_TRUE(soon.reset_next);
   EXPECT_EQ(*soon.reset_next, 2U);
 }

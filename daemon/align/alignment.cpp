@@ -191,8 +191,8 @@ Alignment::Alignment(const AlignRig& rig, const AlignRunOptions& options, Second
     result_.options.round_time += (1 + kLooks * static_cast<double>(swept.size())) * look;
     result_.options.sweep_time = kSweepLooks * look;
   }
-  result_.timing = options.timing;
-  for (CcdTiming& timing : result_.timing) timing.frame_period = period;
+  for (CcdTiming& timing : options_.timing) timing.frame_period = period;
+  result_.timing = options_.timing;
   result_.row_clocks.resize(rig.cameras.size());
   for (const Camera* camera : rig.cameras) sensors_.push_back(camera->info().sensor);
   flashes_ = {.output = StrobeOutput::flashing, .rate = rate(period), .width = options.flash_width};

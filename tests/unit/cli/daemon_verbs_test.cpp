@@ -274,7 +274,9 @@ TEST_F(DaemonVerbs, ADaemonThatGoesAwayWhileItIsWatchedIsToldApart) {
 }
 
 TEST_F(DaemonVerbs, AWatchThatHasSeenEnoughEndsWell) {
-  Client client = Client::connect({.address = "unix:" + (folder_ / "socket").string()}).value();
+  DaemonAddress address;
+  address.address = "unix:" + (folder_ / "socket").string();
+  Client client = Client::connect(address).value();
   for (int i = 0; i < 200; ++i) {  // its end meets its beginning in every way
     const Status watched = client.watch_status([](const v1::DaemonStatus&) { return false; }, {});
     ASSERT_TRUE(watched.ok()) << i << ": " << watched.error().message();

@@ -7,6 +7,7 @@
 #include "base/clock.h"
 #include "daemon/align/record.h"
 #include "drivers/virtual/virtual_clock.h"
+#include "recon/calibrate/rig.h"
 #include "recon/pipeline/scene.h"
 #include "session/async_writer.h"
 
@@ -169,7 +170,7 @@ Status record_flame(Rig& rig, const Stage& stage, DemoResult& result, const std:
   v1::Manifest manifest;
   manifest.set_session_id("demo-flame");
   manifest.set_purpose("flame");
-  *manifest.mutable_box() = describe(stage.box);
+  *manifest.mutable_box() = message_of(stage.box);
   const auto cameras = static_cast<std::size_t>(rig.rig->size());
   for (std::size_t i = 0; i < cameras; ++i) {
     *manifest.add_cameras() = describe(rig.rig->camera(static_cast<int>(i)).info(), stage.cameras[i]);

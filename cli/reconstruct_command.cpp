@@ -26,6 +26,7 @@ namespace {
 struct ReconstructArguments {
   std::string input;
   std::string out;
+  std::string rig;
   std::string box;
   std::string solver = "default";
   std::string effects;
@@ -144,6 +145,7 @@ Result<Outcome> reconstruct_files(const ReconstructArguments& arguments, const W
   if (!arguments.box.empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(scene_options.box, parse_box(arguments.box));
   }
+  if (!arguments.rig.empty()) scene_options.rig = arguments.rig;
   EMBERLOCK_RETURN_IF_ERROR(check_output(arguments.out));
   if (watchers.stream != nullptr) {
     EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
@@ -214,6 +216,8 @@ void add_reconstruct(CLI::App& app) {
       "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder; with --daemon a "
       "session's name");
   verb->add_option("--out", a.out, "Folder for volume.vdb, views/ and report.json");
+  verb->add_option("--rig", a.rig,
+                   "Of a session: the rig.json of `calibrate cameras`, which stands before its own calibration");
   verb->add_option("--box", a.box,
                    "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's box]");
   verb->add_option("--voxels", a.voxels, "Voxels along the longest edge [two for three pixels, at most 256]")

@@ -30,24 +30,7 @@ bool all_finite(const Values& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
 }
 
-Status check_calibration(const v1::Calibration& c, const std::string& where) {
-  const bool whole = c.camera_from_world_size() == 0 || c.camera_from_world_size() == 12;
-  const std::initializer_list<double> intrinsics = {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(),
-                                                    c.k2(), c.p1(), c.p2(), c.k3()};
-  if (whole && all_finite(c.camera_from_world()) && all_finite(intrinsics)) return {};
-  return Error{ErrorKind::bad_input, "a number isn't finite, or camera_from_world hasn't 12 of them",
-               where + ".calibration", "Mend or remove the calibration"};
-}
-
-Status check_box(const v1::Box& box, const std::string& where) {
-  const bool positive = std::all_of(box.size().begin(), box.size().end(), [](double v) { return v > 0; });
-  if (box.center_size() == 3 && box.size_size() == 3 && all_finite(box.center()) && all_finite(box.size()) &&
-      positive) {
-    return {};
-  }
-  return Error{ErrorKind::bad_input, "center and size must be three finite numbers each, sizes above 0",
-               where + ": box", "Mend or remove the box"};
-}
+bool is_spread(double sigma) { return std::isfinite(sigma) && sigma >= 0; }
 
 }  // namespace
 
@@ -118,6 +101,31 @@ Status check_manifest(const v1::Manifest& manifest, const std::string& where) {
   }
   if (manifest.has_box()) EMBERLOCK_RETURN_IF_ERROR(check_box(manifest.box(), where));
   return {};
+}
+
+Status check_calibration(const v1::Calibration& c, const std::string& where) {
+  const bool whole = c.camera_from_world_size() == 0 || c.camera_from_world_size() == 12;
+  const std::initializer_list<double> intrinsics = {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(),
+                                                    c.k2(), c.p1(), c.p2(), c.k3()};
+  const bool certain = (c.sigma_size() == 0 || c.sigma_size() == kCalibrationSigmas) &&
+                       std::all_of(c.sigma().begin(), c.sigma().end(), is_spread) && is_spread(c.corner_sigma());
+  if (!certain) {
+    return Error{ErrorKind::bad_input, "sigma is neither absent nor 15 finite numbers of 0 or more",
+                 where + ".calibration.sigma", "Remove it, or calibrate again"};
+  }
+  if (whole && all_finite(c.camera_from_world()) && all_finite(intrinsics)) return {};
+  return Error{ErrorKind::bad_input, "a number isn't finite, or camera_from_world hasn't 12 of them",
+               where + ".calibration", "Mend or remove the calibration"};
+}
+
+Status check_box(const v1::Box& box, const std::string& where) {
+  const bool positive = std::all_of(box.size().begin(), box.size().end(), [](double v) { return v > 0; });
+  if (box.center_size() == 3 && box.size_size() == 3 && all_finite(box.center()) && all_finite(box.size()) &&
+      positive) {
+    return {};
+  }
+  return Error{ErrorKind::bad_input, "center and size must be three finite numbers each, sizes above 0",
+               where + ": box", "Mend or remove the box"};
 }
 
 Result<v1::Manifest> read_manifest(const fs::path& folder) {

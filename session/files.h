@@ -12,6 +12,7 @@
 namespace emberlock {
 
 inline constexpr std::uint32_t kSessionFormatVersion = 1;
+inline constexpr int kCalibrationSigmas = 15;  ///< numbers of Calibration.sigma, or none
 
 std::filesystem::path manifest_path(const std::filesystem::path& folder);
 std::filesystem::path events_path(const std::filesystem::path& folder);
@@ -28,6 +29,9 @@ Result<v1::Manifest> read_manifest(const std::filesystem::path& folder);
 /// What a reader and a writer rely on: version, camera ids fit for folder names and unique, layouts, finite
 /// numbers.
 Status check_manifest(const v1::Manifest& manifest, const std::string& where);
+/// Of a calibration: finite, whole. Of a box: three finite numbers each, sizes above 0. `where` names what holds it.
+Status check_calibration(const v1::Calibration& calibration, const std::string& where);
+Status check_box(const v1::Box& box, const std::string& where);
 Status write_manifest(const std::filesystem::path& folder, const v1::Manifest& manifest);
 
 /// Keeps room on the disk for the finished manifest, so that a session ends well on a full one; and gives it

@@ -6,6 +6,7 @@
 
 #include "daemon/devices/stage.h"
 #include "drivers/replay/record.h"
+#include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
 #include "session/files.h"
 
@@ -48,7 +49,7 @@ Status Geometry::read_transforms_of(const RigConfig& config, Rig& rig) {
     calibrations_[info.id] =
         emberlock::describe(info, CameraModel{lens, frame->camera_from_world}).calibration();
   }
-  if (transforms.box) box_ = emberlock::describe(*transforms.box);
+  if (transforms.box) box_ = message_of(*transforms.box);
   return {};
 }
 
@@ -66,7 +67,7 @@ Status Geometry::set_the_stage(Rig& rig) {
     calibrations_[info.id] =
         emberlock::describe(info, stage.cameras[static_cast<std::size_t>(i)]).calibration();
   }
-  box_ = emberlock::describe(stage.box);
+  box_ = message_of(stage.box);
   return {};
 }
 

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "drivers/replay/record.h"
+#include "recon/calibrate/rig.h"
 #include "recon/render/render.h"
 
 namespace emberlock {
@@ -55,33 +56,8 @@ void StillFlame::add_radiance(int camera, TimePoint /*exposure_start*/, Seconds 
 
 v1::CameraStream describe(const CameraInfo& info, const CameraModel& calibration) {
   v1::CameraStream stream = to_proto(info);
-  const Intrinsics& in = calibration.intrinsics;
-  v1::Calibration& c = *stream.mutable_calibration();
-  c.set_fx(in.fx);
-  c.set_fy(in.fy);
-  c.set_cx(in.cx);
-  c.set_cy(in.cy);
-  c.set_k1(in.distortion.k1);
-  c.set_k2(in.distortion.k2);
-  c.set_p1(in.distortion.p1);
-  c.set_p2(in.distortion.p2);
-  c.set_k3(in.distortion.k3);
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      c.add_camera_from_world(calibration.camera_from_world.rotation(row, column));
-    }
-    c.add_camera_from_world(calibration.camera_from_world.translation(row));
-  }
+  *stream.mutable_calibration() = calibration_of(calibration);
   return stream;
-}
-
-v1::Box describe(const Box& box) {
-  v1::Box message;
-  for (int axis = 0; axis < 3; ++axis) {
-    message.add_center(box.center(axis));
-    message.add_size(box.size(axis));
-  }
-  return message;
 }
 
 }  // namespace emberlock

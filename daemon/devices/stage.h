@@ -52,6 +52,5 @@ class StillFlame final : public LightField {
 
 /// The manifest's stream of a camera: identity and layout from the driver, geometry from its calibration.
 v1::CameraStream describe(const CameraInfo& info, const CameraModel& calibration);
-v1::Box describe(const Box& box);
 
 }  // namespace emberlock

@@ -7,6 +7,16 @@
 
 namespace emberlock {
 
+/// Where Brown-Conrady distortion moves normalised image coordinates; numbers may be double, or carry derivatives.
+/// Arguments by value: the target may be the source.
+template <class T>
+HOST_DEVICE inline void brown_conrady(T k1, T k2, T p1, T p2, T k3, T x, T y, T& to_x, T& to_y) {
+  const T r2 = x * x + y * y;
+  const T radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  to_x = x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x);
+  to_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
+}
+
 /// Brown-Conrady distortion of normalised image coordinates, as OpenCV's first five coefficients.
 struct Distortion {
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
@@ -14,12 +24,8 @@ struct Distortion {
   [[nodiscard]] HOST_DEVICE inline bool none() const {
     return k1 == 0 && k2 == 0 && p1 == 0 && p2 == 0 && k3 == 0;
   }
-  /// Arguments by value: the target may be the source.
   HOST_DEVICE inline void distort(double x, double y, double& to_x, double& to_y) const {
-    const double r2 = x * x + y * y;
-    const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    to_x = x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x);
-    to_y = y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y;
+    brown_conrady(k1, k2, p1, p2, k3, x, y, to_x, to_y);
   }
   /// By fixed-point iteration.
   HOST_DEVICE inline void undistort(double& x, double& y) const {

@@ -5,7 +5,7 @@
 #include <string>
 #include <system_error>
 
-#include "recon/calibrate/pose.h"
+#include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
 #include "recon/preprocess/radiance.h"
 #include "session/frame_file.h"
@@ -30,6 +30,7 @@ Result<Box> choose_box(const std::optional<Box>& asked, const std::optional<Box>
 
 Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options) {
   if (options.frame) return bad(path.string(), "has one instant only", "Leave --frame out");
+  if (options.rig) return bad(path.string(), "holds its own calibration", "Leave --rig out");
   EMBERLOCK_ASSIGN_OR_RETURN(const Transforms transforms, read_transforms(path));
   Scene scene;
   EMBERLOCK_ASSIGN_OR_RETURN(scene.box, choose_box(options.box, transforms.box, path));
@@ -47,60 +48,6 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
     scene.views.push_back(std::move(view));
   }
   return scene;
-}
-
-Result<CameraModel> camera_of(const v1::CameraStream& stream, const std::string& where) {
-  const auto& c = stream.calibration();
-  if (!stream.has_calibration() || c.camera_from_world_size() != 12) {
-    return bad(
-        where + ".calibration", "camera " + stream.camera_id() + " is not calibrated",
-        "Calibrate it and add calibration (fx, fy, cx, cy, camera_from_world of 12 numbers) to the manifest");
-  }
-  CameraModel camera;
-  camera.intrinsics = {{static_cast<int>(stream.width()), static_cast<int>(stream.height())},
-                       c.fx(),
-                       c.fy(),
-                       c.cx(),
-                       c.cy(),
-                       {c.k1(), c.k2(), c.p1(), c.p2(), c.k3()}};
-  for (const double value : {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(), c.k2(), c.p1(), c.p2(), c.k3()}) {
-    if (!std::isfinite(value))
-      return bad(where + ".calibration", "is not finite", "Calibrate the camera again");
-  }
-  if (c.fx() <= 0 || c.fy() <= 0) {
-    return bad(where + ".calibration.fx, fy", "a focal length is not above 0",
-               "Give focal lengths in pixels");
-  }
-  if (!distortion_inverts(camera.intrinsics)) {
-    return bad(where + ".calibration.k1, k2, p1, p2, k3", "the distortion folds the picture",
-               "Calibrate the camera again with more of the picture covered");
-  }
-  Eigen::Matrix<double, 3, 4> pose;
-  for (int i = 0; i < 12; ++i) pose(i / 4, i % 4) = c.camera_from_world(i);
-  const auto rotation = nearest_rotation(pose.leftCols<3>());
-  if (!rotation)
-    return bad(where + ".calibration.camera_from_world", rotation.error().what, rotation.error().remedy);
-  if (!pose.allFinite()) {
-    return bad(where + ".calibration.camera_from_world", "is not finite", "Calibrate the camera again");
-  }
-  camera.camera_from_world = {*rotation, pose.col(3)};
-  return camera;
-}
-
-Result<std::optional<Box>> box_of(const v1::Manifest& manifest, const fs::path& folder) {
-  if (!manifest.has_box()) return std::optional<Box>();
-  const auto& from = manifest.box();
-  Box box;
-  const bool shaped = from.center_size() == 3 && from.size_size() == 3;
-  for (int i = 0; shaped && i < 3; ++i) {
-    box.center[i] = from.center(i);
-    box.size[i] = from.size(i);
-  }
-  if (!shaped || !box.center.allFinite() || !box.size.allFinite() || box.size.minCoeff() <= 0) {
-    return bad((folder / "manifest.json").string() + ": box",
-               "needs three finite numbers each, sizes above 0", "Correct the manifest's box");
-  }
-  return std::optional<Box>(box);
 }
 
 /// The complete frame nearest to `t`; all cameras' monotonic stamps are on one clock.
@@ -165,9 +112,16 @@ std::size_t middle_frame(const SessionReader& reader) {
 
 Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
   EMBERLOCK_ASSIGN_OR_RETURN(SessionReader reader, SessionReader::open(folder));
-  const v1::Manifest& manifest = reader.manifest();
+  v1::Manifest manifest = reader.manifest();
   const std::string manifest_name = (folder / "manifest.json").string();
-  EMBERLOCK_ASSIGN_OR_RETURN(const auto own_box, box_of(manifest, folder));
+  if (options.rig) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, read_rig(*options.rig));
+    EMBERLOCK_RETURN_IF_ERROR(apply_rig(manifest, rig, options.rig->string()));
+  }
+  std::optional<Box> own_box;
+  if (manifest.has_box()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(own_box, box_of(manifest.box(), manifest_name));
+  }
   Scene scene;
   EMBERLOCK_ASSIGN_OR_RETURN(scene.box, choose_box(options.box, own_box, folder));
   if (reader.camera_count() == 0 || reader.camera_count() > kMaxViews) {
@@ -188,8 +142,10 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
     const v1::CameraStream& stream = manifest.cameras(static_cast<int>(i));
     View view;
     view.name = stream.camera_id();
+    const ImageSize size{static_cast<int>(stream.width()), static_cast<int>(stream.height())};
     EMBERLOCK_ASSIGN_OR_RETURN(view.camera,
-                               camera_of(stream, manifest_name + ": cameras[" + std::to_string(i) + "]"));
+                               camera_model_of(stream.calibration(), size, stream.camera_id(),
+                                               manifest_name + ": cameras[" + std::to_string(i) + "]"));
     const auto nearest = frame_at(reader, i, instant);
     if (!nearest) {
       return bad(folder.string() + ": camera " + stream.camera_id(),

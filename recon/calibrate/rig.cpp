@@ -1,0 +1,118 @@
+#include "recon/calibrate/rig.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "recon/calibrate/pose.h"
+#include "session/files.h"
+
+namespace emberlock {
+namespace {
+
+Error bad_rig(std::string where, std::string what, std::string remedy) {
+  return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
+}
+
+std::string words_of(std::uint32_t width, std::uint32_t height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+}  // namespace
+
+Result<CameraModel> camera_model_of(const v1::Calibration& c, ImageSize size, const std::string& camera_id,
+                                    const std::string& where) {
+  if (c.camera_from_world_size() != 12) {
+    return bad_rig(where + ".calibration", "camera " + camera_id + " is not calibrated",
+                   "Calibrate it with `emberlock calibrate cameras`, and give --rig rig.json; or add calibration (fx, "
+                   "fy, cx, cy, camera_from_world of 12 numbers) to the manifest");
+  }
+  CameraModel camera;
+  camera.intrinsics = {size, c.fx(), c.fy(), c.cx(), c.cy(), {c.k1(), c.k2(), c.p1(), c.p2(), c.k3()}};
+  for (const double value : {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(), c.k2(), c.p1(), c.p2(), c.k3()}) {
+    if (!std::isfinite(value))
+      return bad_rig(where + ".calibration", "is not finite", "Calibrate the camera again");
+  }
+  if (c.fx() <= 0 || c.fy() <= 0) {
+    return bad_rig(where + ".calibration.fx, fy", "a focal length is not above 0", "Give focal lengths in pixels");
+  }
+  if (!distortion_inverts(camera.intrinsics)) {
+    return bad_rig(where + ".calibration.k1, k2, p1, p2, k3", "the distortion folds the picture",
+                   "Calibrate the camera again with more of the picture covered");
+  }
+  Eigen::Matrix<double, 3, 4> pose;
+  for (int i = 0; i < 12; ++i) pose(i / 4, i % 4) = c.camera_from_world(i);
+  const auto rotation = nearest_rotation(pose.leftCols<3>());
+  if (!rotation)
+    return bad_rig(where + ".calibration.camera_from_world", rotation.error().what, rotation.error().remedy);
+  if (!pose.allFinite())
+    return bad_rig(where + ".calibration.camera_from_world", "is not finite", "Calibrate the camera again");
+  camera.camera_from_world = {*rotation, pose.col(3)};
+  return camera;
+}
+
+v1::Calibration calibration_of(const CameraModel& camera) {
+  const Intrinsics& in = camera.intrinsics;
+  v1::Calibration c;
+  c.set_fx(in.fx);
+  c.set_fy(in.fy);
+  c.set_cx(in.cx);
+  c.set_cy(in.cy);
+  c.set_k1(in.distortion.k1);
+  c.set_k2(in.distortion.k2);
+  c.set_p1(in.distortion.p1);
+  c.set_p2(in.distortion.p2);
+  c.set_k3(in.distortion.k3);
+  const Rigid3& pose = camera.camera_from_world;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) c.add_camera_from_world(pose.rotation(row, column));
+    c.add_camera_from_world(pose.translation(row));
+  }
+  return c;
+}
+
+Result<Box> box_of(const v1::Box& message, const std::string& where) {
+  EMBERLOCK_RETURN_IF_ERROR(check_box(message, where));
+  Box box;
+  for (int i = 0; i < 3; ++i) {
+    box.center[i] = message.center(i);
+    box.size[i] = message.size(i);
+  }
+  return box;
+}
+
+v1::Box message_of(const Box& box) {
+  v1::Box message;
+  for (int i = 0; i < 3; ++i) {
+    message.add_center(box.center[i]);
+    message.add_size(box.size[i]);
+  }
+  return message;
+}
+
+Status apply_rig(v1::Manifest& manifest, const v1::Rig& rig, const std::string& where) {
+  v1::Manifest applied = manifest;  // whole or not at all
+  for (v1::CameraStream& stream : *applied.mutable_cameras()) {
+    const auto camera = std::find_if(rig.cameras().begin(), rig.cameras().end(), [&](const v1::RigCamera& c) {
+      return c.camera_id() == stream.camera_id();
+    });
+    if (camera == rig.cameras().end()) {
+      std::string known;
+      for (const v1::RigCamera& c : rig.cameras()) known += (known.empty() ? "" : ", ") + c.camera_id();
+      return bad_rig(where, "knows no camera " + stream.camera_id() + ", only " + known,
+                     "Calibrate that camera too, or name cameras alike in calibration and recording");
+    }
+    if (camera->width() != stream.width() || camera->height() != stream.height()) {
+      return bad_rig(where + ": camera " + stream.camera_id(),
+                     "calibrated with pictures of " + words_of(camera->width(), camera->height()) +
+                         " pixels, recorded with " + words_of(stream.width(), stream.height()),
+                     "Calibrate in the mode that records");
+    }
+    if (camera->has_calibration()) *stream.mutable_calibration() = camera->calibration();
+    if (camera->has_colour()) *stream.mutable_colour() = camera->colour();
+  }
+  if (rig.has_box()) *applied.mutable_box() = rig.box();
+  manifest = std::move(applied);
+  return {};
+}
+
+}  // namespace emberlock

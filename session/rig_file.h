@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "base/result.h"
+#include "emberlock/v1/rig.pb.h"
+
+// rig.json: what calibration knows of a rig's cameras, apart from any recording.
+namespace emberlock {
+
+inline constexpr std::uint32_t kRigFormatVersion = 1;
+
+/// Version, camera ids unique and fit for folder names, sizes, finite numbers. `where` names the file. A camera
+/// may lack its calibration (its colour alone is known), or the calibration its pose.
+Status check_rig(const v1::Rig& rig, const std::string& where);
+/// Parses and checks; errors name the field.
+Result<v1::Rig> parse_rig(std::string_view json, const std::string& where);
+Result<v1::Rig> read_rig(const std::filesystem::path& path);
+/// The JSON that parse_rig() reads, indented.
+Result<std::string> rig_json(const v1::Rig& rig);
+/// Checks, then writes atomically.
+Status write_rig(const std::filesystem::path& path, const v1::Rig& rig);
+
+}  // namespace emberlock

@@ -216,8 +216,9 @@ void add_reconstruct(CLI::App& app) {
       "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder; with --daemon a "
       "session's name");
   verb->add_option("--out", a.out, "Folder for volume.vdb, views/ and report.json");
-  verb->add_option("--rig", a.rig,
-                   "Of a session: the rig.json of `calibrate cameras`, which stands before its own calibration");
+  verb->add_option(
+      "--rig", a.rig,
+      "Of a session: the rig.json of `calibrate cameras`, which stands before its own calibration");
   verb->add_option("--box", a.box,
                    "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's box]");
   verb->add_option("--voxels", a.voxels, "Voxels along the longest edge [two for three pixels, at most 256]")

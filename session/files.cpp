@@ -108,7 +108,8 @@ Status check_calibration(const v1::Calibration& c, const std::string& where) {
   const std::initializer_list<double> intrinsics = {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(),
                                                     c.k2(), c.p1(), c.p2(), c.k3()};
   const bool certain = (c.sigma_size() == 0 || c.sigma_size() == kCalibrationSigmas) &&
-                       std::all_of(c.sigma().begin(), c.sigma().end(), is_spread) && is_spread(c.corner_sigma());
+                       std::all_of(c.sigma().begin(), c.sigma().end(), is_spread) &&
+                       is_spread(c.corner_sigma());
   if (!certain) {
     return Error{ErrorKind::bad_input, "sigma is neither absent nor 15 finite numbers of 0 or more",
                  where + ".calibration.sigma", "Remove it, or calibrate again"};

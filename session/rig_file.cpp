@@ -36,7 +36,8 @@ Status check_rig(const v1::Rig& rig, const std::string& where) {
                  where + ", field format_version", "Use the Emberlock that calibrated it"};
   }
   if (rig.cameras().empty()) {
-    return Error{ErrorKind::bad_input, "no cameras", where + ", field cameras", "Calibrate at least one camera"};
+    return Error{ErrorKind::bad_input, "no cameras", where + ", field cameras",
+                 "Calibrate at least one camera"};
   }
   std::set<std::string> ids;
   for (const v1::RigCamera& camera : rig.cameras()) {
@@ -46,11 +47,13 @@ Status check_rig(const v1::Rig& rig, const std::string& where) {
                    "Use letters, digits, space and . _ : - alone, no point in front, at most 200"};
     }
     if (!ids.insert(camera.camera_id()).second)
-      return Error{ErrorKind::bad_input, "the camera id is there twice", field, "Give each camera an id of its own"};
+      return Error{ErrorKind::bad_input, "the camera id is there twice", field,
+                   "Give each camera an id of its own"};
     const auto side_fits = [](std::uint32_t side) { return side > 0 && side <= kMaxRigSide; };
     if (!side_fits(camera.width()) || !side_fits(camera.height())) {
       return Error{ErrorKind::bad_input,
-                   "pictures of " + std::to_string(camera.width()) + " x " + std::to_string(camera.height()) + " pixels",
+                   "pictures of " + std::to_string(camera.width()) + " x " + std::to_string(camera.height()) +
+                       " pixels",
                    field + ", fields width and height", "Give the size of the pictures that calibrated it"};
     }
     if (camera.has_calibration()) EMBERLOCK_RETURN_IF_ERROR(check_calibration(camera.calibration(), field));

@@ -12,8 +12,8 @@ namespace emberlock {
 
 inline constexpr std::uint32_t kRigFormatVersion = 1;
 
-/// Version, camera ids unique and fit for folder names, sizes, finite numbers. `where` names the file. A camera
-/// may lack its calibration (its colour alone is known), or the calibration its pose.
+/// Version, camera ids unique and fit for folder names, sizes, finite numbers. `where` names the file. A
+/// camera may lack its calibration (its colour alone is known), or the calibration its pose.
 Status check_rig(const v1::Rig& rig, const std::string& where);
 /// Parses and checks; errors name the field.
 Result<v1::Rig> parse_rig(std::string_view json, const std::string& where);

@@ -22,9 +22,10 @@ std::string words_of(std::uint32_t width, std::uint32_t height) {
 Result<CameraModel> camera_model_of(const v1::Calibration& c, ImageSize size, const std::string& camera_id,
                                     const std::string& where) {
   if (c.camera_from_world_size() != 12) {
-    return bad_rig(where + ".calibration", "camera " + camera_id + " is not calibrated",
-                   "Calibrate it with `emberlock calibrate cameras`, and give --rig rig.json; or add calibration (fx, "
-                   "fy, cx, cy, camera_from_world of 12 numbers) to the manifest");
+    return bad_rig(
+        where + ".calibration", "camera " + camera_id + " is not calibrated",
+        "Calibrate it with `emberlock calibrate cameras`, and give --rig rig.json; or add calibration (fx, "
+        "fy, cx, cy, camera_from_world of 12 numbers) to the manifest");
   }
   CameraModel camera;
   camera.intrinsics = {size, c.fx(), c.fy(), c.cx(), c.cy(), {c.k1(), c.k2(), c.p1(), c.p2(), c.k3()}};
@@ -33,7 +34,8 @@ Result<CameraModel> camera_model_of(const v1::Calibration& c, ImageSize size, co
       return bad_rig(where + ".calibration", "is not finite", "Calibrate the camera again");
   }
   if (c.fx() <= 0 || c.fy() <= 0) {
-    return bad_rig(where + ".calibration.fx, fy", "a focal length is not above 0", "Give focal lengths in pixels");
+    return bad_rig(where + ".calibration.fx, fy", "a focal length is not above 0",
+                   "Give focal lengths in pixels");
   }
   if (!distortion_inverts(camera.intrinsics)) {
     return bad_rig(where + ".calibration.k1, k2, p1, p2, k3", "the distortion folds the picture",

@@ -11,8 +11,8 @@
 namespace emberlock {
 
 /// A camera from its file's numbers. `where` names what holds the calibration ("manifest.json: cameras[2]"),
-/// `camera_id` the camera. Errors: not calibrated (no pose), not finite, no focal length, a distortion that folds
-/// the picture, a pose that is no rotation.
+/// `camera_id` the camera. Errors: not calibrated (no pose), not finite, no focal length, a distortion that
+/// folds the picture, a pose that is no rotation.
 Result<CameraModel> camera_model_of(const v1::Calibration& calibration, ImageSize size,
                                     const std::string& camera_id, const std::string& where);
 /// The other way, without uncertainties.
@@ -22,9 +22,9 @@ v1::Calibration calibration_of(const CameraModel& camera);
 Result<Box> box_of(const v1::Box& box, const std::string& where);
 v1::Box message_of(const Box& box);
 
-/// Gives a session's cameras what the rig knows of them, by camera id: geometry, colour, and the box where the rig
-/// has one. What the rig doesn't know stays as it was. `where` names the rig. Errors: a camera of the session
-/// that the rig lacks; pictures of another size than calibrated (names both).
+/// Gives a session's cameras what the rig knows of them, by camera id: geometry, colour, and the box where
+/// the rig has one. What the rig doesn't know stays as it was. `where` names the rig. Errors: a camera of the
+/// session that the rig lacks; pictures of another size than calibrated (names both).
 Status apply_rig(v1::Manifest& manifest, const v1::Rig& rig, const std::string& where);
 
 }  // namespace emberlock

@@ -7,8 +7,8 @@
 
 namespace emberlock {
 
-/// Where Brown-Conrady distortion moves normalised image coordinates; numbers may be double, or carry derivatives.
-/// Arguments by value: the target may be the source.
+/// Where Brown-Conrady distortion moves normalised image coordinates; numbers may be double, or carry
+/// derivatives. Arguments by value: the target may be the source.
 template <class T>
 HOST_DEVICE inline void brown_conrady(T k1, T k2, T p1, T p2, T k3, T x, T y, T& to_x, T& to_y) {
   const T r2 = x * x + y * y;

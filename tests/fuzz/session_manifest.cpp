@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -6,13 +7,22 @@
 #include "session/events.h"
 #include "session/files.h"
 #include "session/layout.h"
+#include "session/shutter_times.h"
 
-// The two protobuf files of a session: the manifest as JSON, and the events on the wire.
+// The protobuf files of a session: manifest and shutter times as JSON, and the events on the wire.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   if (const auto manifest = emberlock::parse_manifest(bytes, "input"); manifest.ok()) {
     for (const auto& camera : manifest->cameras()) {
       if (!emberlock::layout_of(camera).ok()) std::abort();
+    }
+  }
+  if (const auto times = emberlock::parse_shutter_times(bytes, "input"); times.ok()) {
+    for (const auto& camera : times->cameras()) {
+      for (const double late : camera.late_s()) {
+        if (!std::isfinite(late)) std::abort();
+      }
+      if (!(camera.sigma_s() >= 0)) std::abort();
     }
   }
   if (emberlock::parse_events(bytes).valid_bytes > size) std::abort();

@@ -23,6 +23,13 @@ constexpr int kClusterMilliseconds = 250;
 constexpr int kClusterBytes = 4 << 20;
 constexpr int kSmallestSliced = 16;
 
+AVCodecID codec_of(const ImageLayout& layout, Encoding encoding) {
+  if (encoding == Encoding::ffv1) return AV_CODEC_ID_FFV1;
+  const bool wide = bytes_per_sample(layout.format) > 1;
+  if (encoding == Encoding::raw_nut || wide) return AV_CODEC_ID_RAWVIDEO;
+  return layout.format == PixelFormat::rgb8 ? AV_CODEC_ID_UTVIDEO : AV_CODEC_ID_FFVHUFF;
+}
+
 AVRational as_rational(Hertz rate) {
   return rate.value() > 0 ? av_d2q(rate.value(), 1'000'000) : AVRational{25, 1};
 }
@@ -47,8 +54,7 @@ Error SegmentWriter::failure(int code, const char* action) const {
 
 Status SegmentWriter::open(const std::filesystem::path& path, Hertz frame_rate) {
   EMBERLOCK_ASSIGN_OR_RETURN(file_, AvFile::open(path, AvFile::Mode::create));
-  const AVCodec* codec =
-      avcodec_find_encoder(encoding_ == Encoding::ffv1 ? AV_CODEC_ID_FFV1 : AV_CODEC_ID_RAWVIDEO);
+  const AVCodec* codec = avcodec_find_encoder(codec_of(layout_, encoding_));
   if (codec == nullptr) return failure(AVERROR_ENCODER_NOT_FOUND, "cannot encode");
   encoder_.reset(avcodec_alloc_context3(codec));
   AVCodecContext& c = *encoder_;
@@ -66,8 +72,10 @@ Status SegmentWriter::open(const std::filesystem::path& path, Hertz frame_rate) 
     if (c.width < kSmallestSliced || c.height < kSmallestSliced) c.slices = 1;
     c.color_range = AVCOL_RANGE_JPEG;
     av_opt_set_int(c.priv_data, "slicecrc", 1, 0);
-  } else {
+  } else if (uncompressed()) {
     c.codec_tag = avcodec_pix_fmt_to_codec_tag(c.pix_fmt);
+  } else {
+    av_opt_set(c.priv_data, "pred", "median", 0);
   }
   if (const int code = avcodec_open2(&c, codec, nullptr); code < 0) return failure(code, "cannot encode");
 
@@ -103,7 +111,7 @@ Status SegmentWriter::write_header(Hertz frame_rate) {
     format_.reset();
     return failure(code, "cannot write");
   }
-  file_->io()->direct = encoding_ == Encoding::raw_nut ? 1 : 0;  // pixels go from the image to the kernel
+  file_->io()->direct = uncompressed() ? 1 : 0;  // pixels go from the image to the kernel
   return {};
 }
 
@@ -118,7 +126,7 @@ Status SegmentWriter::put_uncompressed(const Image& image, std::uint32_t millise
 }
 
 Status SegmentWriter::write(const Image& image, std::uint32_t milliseconds) {
-  if (encoding_ == Encoding::raw_nut) return put_uncompressed(image, milliseconds);
+  if (uncompressed()) return put_uncompressed(image, milliseconds);
   if (const int code = av_frame_make_writable(frame_.get()); code < 0) return failure(code, "cannot encode");
   to_av(image, *frame_);
   frame_->pts = milliseconds;
@@ -172,6 +180,8 @@ Status SegmentWriter::close() {
   if (::fdatasync(file_->fd()) != 0) return errno_error(file_->path(), "cannot flush");
   return {};
 }
+
+bool SegmentWriter::uncompressed() const { return codec_of(layout_, encoding_) == AV_CODEC_ID_RAWVIDEO; }
 
 std::uint64_t SegmentWriter::bytes() const { return static_cast<std::uint64_t>(avio_tell(file_->io())); }
 
@@ -248,7 +258,8 @@ Result<Image> SegmentReader::decode() {
   if (code >= 0) code = avcodec_receive_frame(input_.decoder.get(), frame_.get());
   if (code < 0) return damaged("the frame doesn't decode: " + av_message(code));
   const bool known = frame_->format == coded_format(layout_, Encoding::ffv1) ||
-                     frame_->format == coded_format(layout_, Encoding::raw_nut);
+                     frame_->format == coded_format(layout_, Encoding::raw_nut) ||
+                     frame_->format == coded_format(layout_, Encoding::huffman_nut);
   if (!known || frame_->width != layout_.size.width || frame_->height != layout_.size.height) {
     return damaged("the frame has another size or format than the manifest says");
   }

@@ -38,6 +38,7 @@ class SegmentWriter {
   Status put_uncompressed(const Image& image, std::uint32_t milliseconds);
   Status drain();
   Status put_packet();
+  [[nodiscard]] bool uncompressed() const;
   void start_writeback();
   [[nodiscard]] Error failure(int code, const char* action) const;
 

@@ -16,6 +16,7 @@ AVPixelFormat coded_format(const ImageLayout& layout, Encoding encoding) {
     case PixelFormat::bayer_rggb16:
       return AV_PIX_FMT_GRAY16LE;
     case PixelFormat::rgb8:
+      if (encoding == Encoding::huffman_nut) return AV_PIX_FMT_GBRP;
       return encoding == Encoding::ffv1 ? AV_PIX_FMT_BGR0 : AV_PIX_FMT_RGB24;
     case PixelFormat::rgb16:
       return encoding == Encoding::ffv1 ? AV_PIX_FMT_GBRP16LE : AV_PIX_FMT_RGB48LE;
@@ -30,6 +31,30 @@ constexpr std::array<std::size_t, 3> kPlaneOf{2, 0, 1};
 
 std::uint8_t* row(const AVFrame& frame, std::size_t plane, int y) {
   return frame.data[plane] + std::ptrdiff_t{y} * frame.linesize[plane];
+}
+
+template <class Sample>
+void to_planes(const Sample* in, const AVFrame& frame, int y) {
+  Sample* red = reinterpret_cast<Sample*>(row(frame, kPlaneOf[0], y));
+  Sample* green = reinterpret_cast<Sample*>(row(frame, kPlaneOf[1], y));
+  Sample* blue = reinterpret_cast<Sample*>(row(frame, kPlaneOf[2], y));
+  for (int x = 0; x < frame.width; ++x, in += 3) {
+    red[x] = in[0];
+    green[x] = in[1];
+    blue[x] = in[2];
+  }
+}
+
+template <class Sample>
+void from_planes(const AVFrame& frame, int y, Sample* out) {
+  const Sample* red = reinterpret_cast<const Sample*>(row(frame, kPlaneOf[0], y));
+  const Sample* green = reinterpret_cast<const Sample*>(row(frame, kPlaneOf[1], y));
+  const Sample* blue = reinterpret_cast<const Sample*>(row(frame, kPlaneOf[2], y));
+  for (int x = 0; x < frame.width; ++x, out += 3) {
+    out[0] = red[x];
+    out[1] = green[x];
+    out[2] = blue[x];
+  }
 }
 
 }  // namespace
@@ -48,11 +73,9 @@ void to_av(const Image& image, AVFrame& frame) {
         out[3] = 0;
       }
     } else if (frame.format == AV_PIX_FMT_GBRP16LE) {
-      const auto* in = view.row_as<std::uint16_t>(y);
-      for (std::size_t c = 0; c < kPlaneOf.size(); ++c) {
-        auto* out = reinterpret_cast<std::uint16_t*>(row(frame, kPlaneOf[c], y));
-        for (int x = 0; x < width; ++x) out[x] = in[static_cast<std::size_t>(x) * 3 + c];
-      }
+      to_planes(view.row_as<std::uint16_t>(y), frame, y);
+    } else if (frame.format == AV_PIX_FMT_GBRP) {
+      to_planes(view.row_as<std::uint8_t>(y), frame, y);
     } else {
       std::memcpy(row(frame, 0, y), view.row(y), view.layout.row_bytes());
     }
@@ -71,11 +94,9 @@ void from_av(const AVFrame& frame, Image& image) {
         out[2] = in[0];
       }
     } else if (frame.format == AV_PIX_FMT_GBRP16LE) {
-      auto* out = image.row_as<std::uint16_t>(y);
-      for (std::size_t c = 0; c < kPlaneOf.size(); ++c) {
-        const auto* in = reinterpret_cast<const std::uint16_t*>(row(frame, kPlaneOf[c], y));
-        for (int x = 0; x < width; ++x) out[static_cast<std::size_t>(x) * 3 + c] = in[x];
-      }
+      from_planes(frame, y, image.row_as<std::uint16_t>(y));
+    } else if (frame.format == AV_PIX_FMT_GBRP) {
+      from_planes(frame, y, image.row_as<std::uint8_t>(y));
     } else {
       std::memcpy(image.row_as<std::byte>(y), row(frame, 0, y), image.layout().row_bytes());
     }

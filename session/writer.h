@@ -14,10 +14,12 @@ namespace emberlock {
 class CameraWriter;
 class EventLog;
 
-/// How pixels lie in the segments. Both are lossless.
+/// How pixels lie in the segments. All are lossless; `transcode` turns the others into ffv1 later.
 enum class Encoding {
-  ffv1,     ///< FFV1 version 3 with slice CRCs in Matroska
-  raw_nut,  ///< uncompressed in NUT, where the encoder can't keep up; `transcode` turns it into ffv1 later
+  ffv1,         ///< FFV1 version 3 with slice CRCs in Matroska
+  raw_nut,      ///< uncompressed in NUT, where the encoder can't keep up
+  huffman_nut,  ///< in NUT: RGB of 8 bits as Ut Video, grey and Bayer of 8 as FFVHUFF, six times as fast as
+                ///< FFV1 and a sixth larger; wider samples uncompressed
 };
 
 struct WriterOptions {

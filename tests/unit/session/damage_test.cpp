@@ -94,7 +94,8 @@ TEST_P(FlippedBytes, InPixelDataCostOneFrame) {
   EXPECT_EQ(count_good(*reader, kDamagedLayout), 5U);
 }
 
-INSTANTIATE_TEST_SUITE_P(DamagedSession, FlippedBytes, testing::Values(Encoding::ffv1, Encoding::raw_nut));
+INSTANTIATE_TEST_SUITE_P(DamagedSession, FlippedBytes,
+                         testing::Values(Encoding::ffv1, Encoding::raw_nut, Encoding::huffman_nut));
 
 TEST(DamagedSession, ATruncatedSegmentKeepsTheFramesBeforeTheCut) {
   const TempFolder temp;

@@ -64,11 +64,15 @@ TEST_P(EveryLayout, ComesBackBitForBit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Recording, EveryLayout,
-                         testing::Combine(testing::Values(Encoding::ffv1, Encoding::raw_nut),
+                         testing::Combine(testing::Values(Encoding::ffv1, Encoding::raw_nut,
+                                                          Encoding::huffman_nut),
                                           testing::ValuesIn(every_layout())),
                          [](const auto& param) {
-                           const bool ffv1 = std::get<0>(param.param) == Encoding::ffv1;
-                           return (ffv1 ? "ffv1_" : "raw_") + words(std::get<1>(param.param));
+                           const Encoding encoding = std::get<0>(param.param);
+                           return (encoding == Encoding::ffv1      ? "ffv1_"
+                                   : encoding == Encoding::raw_nut ? "raw_"
+                                                                   : "huffman_") +
+                                  words(std::get<1>(param.param));
                          });
 
 const ImageLayout kSmall{{48, 32}, PixelFormat::gray8, 8};

@@ -292,7 +292,13 @@ void Predictor::choose_saturation() {
   if (by_hand() && asked_.sensor.clipping == Sensor::Clipping::none) return leave_out("saturation", "");
   const double told = asked_.sensor.white;
   const double white = by_hand() ? told : clip_level(flame_.scene, boxes_, told);
-  if (white <= 0) return leave_out("saturation", "no pixels pile up at white");
+  if (white <= 0) {
+    const std::vector<View>& views = flame_.scene.views;
+    const bool marked =
+        std::any_of(views.begin(), views.end(), [](const View& view) { return !view.bounds.empty(); });
+    return leave_out("saturation",
+                     marked ? "saturated pixels are bounds already" : "no pixels pile up at white");
+  }
   const ClippedPixels clipped = clipped_pixels(flame_.scene, boxes_, white);
   const std::string what = fmt::format(
       "what is missing in the {:.2g} % of the flame's pixels at white ({:.4g})", 100 * clipped.share, white);

@@ -81,10 +81,12 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
   find_active(problem.crop.hull, problem.active, problem.row_span);
   problem.seen.resize(problem.list.rays.size());
   for (std::size_t r = 0; r < problem.seen.size(); ++r) {
-    const float* rgb =
-        &views[problem.list.rays[r].view]->image.rgb[3 * static_cast<std::size_t>(problem.list.pixels[r])];
+    const View& view = *views[problem.list.rays[r].view];
+    const std::size_t pixel = problem.list.pixels[r];
+    const float* rgb = &view.image.rgb[3 * pixel];
+    const float bounds = view.bounds.empty() ? 0.F : static_cast<float>(view.bounds[pixel]);
     if (static_cast<double>(std::max({rgb[0], rgb[1], rgb[2]})) > options.black_below)
-      problem.seen[r] = Rgba{{rgb[0], rgb[1], rgb[2], 0}};
+      problem.seen[r] = Rgba{{rgb[0], rgb[1], rgb[2], bounds}};
   }
   problem.background = behind_rays(options.background, problem.list, views);
   problem.slabs.resize(static_cast<std::size_t>(options.subsets));

@@ -26,7 +26,7 @@ struct SlabRuns {
 struct Problem {
   CroppedHull crop;
   RayList list;
-  std::vector<Rgba> seen;            ///< the pixel of each ray, grey levels
+  std::vector<Rgba> seen;            ///< the pixel of each ray, grey levels; lane 3: its View::bounds
   std::vector<Rgba> background;      ///< behind each ray, grey levels; empty where it is black
   std::vector<std::uint8_t> active;  ///< key points of the hull's voxels, 1 or 0
   std::vector<Slice> row_span;       ///< for each row (j, k) of key points: first active i, last + 1

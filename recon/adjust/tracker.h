@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -32,6 +34,8 @@ struct SolverSetup {
     if (field) optics.absorb = Absorb::field;
     if (effects.sensor.clipping == Sensor::Clipping::at_white)
       optics.white = static_cast<float>(effects.sensor.white);
+    else if (std::any_of(views.begin(), views.end(), [](const View* v) { return !v->bounds.empty(); }))
+      optics.white = std::numeric_limits<float>::infinity();
     optics.exposure = effects.exposure;
     return optics;
   }

@@ -34,6 +34,13 @@ ordered_json effects_json(const Report& report) {
   return effects;
 }
 
+ordered_json preprocessing_json(const Report& report) {
+  auto steps = ordered_json::array();
+  for (const PreprocessStep& step : report.preprocessing)
+    steps.push_back({{"step", step.name}, {"on", step.on}, {"reason", step.reason}});
+  return steps;
+}
+
 ordered_json views_json(const Report& report) {
   auto views = ordered_json::array();
   for (const ViewReport& view : report.views) {
@@ -92,6 +99,7 @@ std::string to_json(const Report& report) {
                      {"render", report.render_time.value()},
                      {"total", report.total_time.value()}};
   json["plan"] = plan_json(report.plan);
+  json["preprocessing"] = preprocessing_json(report);
   json["effects"] = effects_json(report);
   json["views"] = views_json(report);
   json["trace"] = trace_json(report);

@@ -62,12 +62,14 @@ struct Report {
   int iterations = 0;
   std::vector<TracePoint> trace;
   std::vector<EffectReport> effects;
+  std::vector<PreprocessStep> preprocessing;  ///< Scene::preprocessing
   std::vector<std::string> warnings;
   std::optional<PlanReport> plan;  ///< with a budget or a target
 };
 
 /// As report.json: `heldout_rmse`, `input_rmse`, `voxels` [nx, ny, nz], `seconds` {effects, hull, solve,
-/// render, total}, `iterations`, `effects` [{name, on, predicted_change, seconds, reason}], `trace`
+/// render, total}, `iterations`, `effects` [{name, on, predicted_change, seconds, reason}],
+/// `preprocessing` [{step, on, reason}], `trace`
 /// [{seconds, iteration, input_rmse, heldout_rmse}], `views` [{index, name, role, rmse}] `plan` (null without
 /// a budget or target) and what describes the run. Held-out errors are null when nothing is held out.
 std::string to_json(const Report& report);

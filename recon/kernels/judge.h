@@ -10,10 +10,12 @@ namespace emberlock {
 /// for all rays.
 template <class Real>
 struct Judge {
-  const Rgba* seen = nullptr;        ///< captured radiance, one a ray
+  const Rgba* seen =
+      nullptr;  ///< captured radiance, one a ray; lane 3: View::bounds, looked at where white > 0
   const Rgba* background = nullptr;  ///< radiance behind the medium, one a ray
   const Rgba* offset = nullptr;  ///< added to the rendered radiance: what another pass has found, one a ray
-  Real white = 0;  ///< captured values from here on are bounds: more light explains them; 0: none are
+  Real white = 0;  ///< captured values from here on are bounds: more light explains them; 0: none are;
+                   ///< infinite: those that lane 3 of `seen` marks
 
   /// The residual in lanes 0..2 and its product with the background in lane 3, from radiance and
   /// transmittance.
@@ -26,10 +28,15 @@ struct Judge {
       for (int c = 0; c < 3; ++c) residual.c[c] += Real(offset[ray].c[c]);
     if (white > 0)
       for (int c = 0; c < 3; ++c)
-        if (Real(seen[ray].c[c]) >= white && residual.c[c] > 0) residual.c[c] = 0;
+        if (residual.c[c] > 0 && (Real(seen[ray].c[c]) >= white || is_bound(ray, c))) residual.c[c] = 0;
     if (background != nullptr)
       for (int c = 0; c < 3; ++c) residual.c[3] += residual.c[c] * Real(background[ray].c[c]);
     return residual;
+  }
+
+ private:
+  [[nodiscard]] HOST_DEVICE bool is_bound(std::size_t ray, int channel) const {
+    return (static_cast<int>(seen[ray].c[3]) >> channel & 1) != 0;
   }
 };
 

@@ -7,6 +7,7 @@
 
 #include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
+#include "recon/pipeline/clean_frames.h"
 #include "recon/preprocess/radiance.h"
 #include "session/frame_file.h"
 #include "session/reader.h"
@@ -33,6 +34,7 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
   if (options.rig) return bad(path.string(), "holds its own calibration", "Leave --rig out");
   EMBERLOCK_ASSIGN_OR_RETURN(const Transforms transforms, read_transforms(path));
   Scene scene;
+  scene.preprocessing = {{"all", false, "pictures of a transforms.json are taken as they are"}};
   EMBERLOCK_ASSIGN_OR_RETURN(scene.box, choose_box(options.box, transforms.box, path));
   for (const TransformsFrame& frame : transforms.frames) {
     const auto image = read_image(frame.image);
@@ -138,6 +140,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
         "Choose a smaller --frame");
   }
   const TimePoint instant = first[frame].monotonic_time;
+  std::vector<std::pair<std::string, std::vector<PreprocessStep>>> steps;
   for (std::size_t i = 0; i < reader.camera_count(); ++i) {
     const v1::CameraStream& stream = manifest.cameras(static_cast<int>(i));
     View view;
@@ -152,11 +155,13 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
                  "has no complete frame within a frame period of frame " + std::to_string(frame),
                  "Choose another --frame; the index tells which frames were lost");
     }
-    EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(i, *nearest));
-    view.image = to_radiance(picture.image->view());
-    subtract_background(view.image);  // a camera's own frames; whoever writes a transforms.json has done it
+    EMBERLOCK_ASSIGN_OR_RETURN(CleanPicture picture, clean_frame(reader, i, *nearest, options.frames));
+    view.image = std::move(picture.image);
+    view.bounds = std::move(picture.bounds);
+    steps.emplace_back(view.name, std::move(picture.steps));
     scene.views.push_back(std::move(view));
   }
+  scene.preprocessing = together(steps);
   return scene;
 }
 

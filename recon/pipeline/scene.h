@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "recon/pipeline/clean_frames.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock {
@@ -16,6 +17,7 @@ struct SceneOptions {
                                      ///< middle of which every camera has a complete frame
   std::optional<std::filesystem::path> rig =
       {};  ///< of a session: a rig.json that stands before its calibration
+  FrameOptions frames = {};          ///< of a session: how its frames become pictures
 };
 
 /// A transforms.json (a file) or a recorded session (a folder with a manifest): views in the order of the

@@ -57,7 +57,7 @@ std::vector<ViewReport> judge(const Scene& scene, const std::vector<FlameMask>& 
   std::vector<ViewReport> reports;
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     const View& view = scene.views[i];
-    reports.push_back({view.name, view.role, rmse(view.image, renders[i], masks[i].box)});
+    reports.push_back({view.name, view.role, rmse(view, renders[i], masks[i].box)});
   }
   return reports;
 }
@@ -75,6 +75,7 @@ Report describe(const Scene& scene, const Grid& grid, const SolveOptions& option
   report.voxel_edge = Meters(static_cast<double>(grid.edge));
   report.finest_voxels = voxels_by_the_paper(scene);
   report.warnings = coverage_warnings(scene);
+  report.preprocessing = scene.preprocessing;
   return report;
 }
 

@@ -52,9 +52,38 @@ Status check_view(const View& view) {
   if (!finite(view.camera))
     return Error{ErrorKind::bad_input, "the camera has a NaN, an infinite or a zero coefficient", view.name,
                  "Calibrate this camera again"};
+  if (!view.bounds.empty() && view.bounds.size() != view.image.rgb.size() / 3) {
+    return Error{ErrorKind::bad_input,
+                 std::to_string(view.bounds.size()) + " marks of saturated pixels for " +
+                     std::to_string(view.image.rgb.size() / 3) + " pixels",
+                 view.name, "Give a mark for each pixel, or none at all"};
+  }
   EMBERLOCK_RETURN_IF_ERROR(check_pixels(view.image, "pixel", view.name));
   if (view.background) return check_pixels(*view.background, "the background's pixel", view.name);
   return {};
+}
+
+/// `judged(pixel, channel, a - b)` is what counts of a difference.
+template <class Judged>
+std::array<double, 3> rmse_over(const RadianceImage& a, const RadianceImage& b, const PixelBox& box,
+                                const Judged& judged) {
+  const PixelBox all = box.empty() ? PixelBox{0, 0, a.size.width, a.size.height} : box;
+  std::array<double, 3> sum = {};
+  for (int y = all.y0; y < all.y1; ++y) {
+    for (int x = all.x0; x < all.x1; ++x) {
+      const std::size_t p =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(a.size.width) + static_cast<std::size_t>(x);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const double d =
+            judged(p, c, static_cast<double>(a.rgb[3 * p + c]) - static_cast<double>(b.rgb[3 * p + c]));
+        sum[c] += d * d;
+      }
+    }
+  }
+  const double pixels =
+      std::max(1.0, static_cast<double>(all.x1 - all.x0) * static_cast<double>(all.y1 - all.y0));
+  for (double& s : sum) s = std::sqrt(s / pixels);
+  return sum;
 }
 
 }  // namespace
@@ -152,22 +181,14 @@ Status check_scene(const Scene& scene) {
 }
 
 std::array<double, 3> rmse(const RadianceImage& a, const RadianceImage& b, const PixelBox& box) {
-  const PixelBox all = box.empty() ? PixelBox{0, 0, a.size.width, a.size.height} : box;
-  std::array<double, 3> sum = {};
-  for (int y = all.y0; y < all.y1; ++y) {
-    for (int x = all.x0; x < all.x1; ++x) {
-      const std::size_t p = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(a.size.width) +
-                                 static_cast<std::size_t>(x));
-      for (std::size_t c = 0; c < 3; ++c) {
-        const double d = static_cast<double>(a.rgb[p + c]) - static_cast<double>(b.rgb[p + c]);
-        sum[c] += d * d;
-      }
-    }
-  }
-  const double pixels =
-      std::max(1.0, static_cast<double>(all.x1 - all.x0) * static_cast<double>(all.y1 - all.y0));
-  for (double& s : sum) s = std::sqrt(s / pixels);
-  return sum;
+  return rmse_over(a, b, box, [](std::size_t, std::size_t, double d) { return d; });
+}
+
+std::array<double, 3> rmse(const View& view, const RadianceImage& rendered, const PixelBox& box) {
+  if (view.bounds.empty()) return rmse(view.image, rendered, box);
+  return rmse_over(view.image, rendered, box, [&](std::size_t pixel, std::size_t c, double d) {
+    return d < 0 && (view.bounds[pixel] >> c & 1) != 0 ? 0.0 : d;
+  });
 }
 
 double all_channels(const std::array<double, 3>& rmse) {

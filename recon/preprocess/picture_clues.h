@@ -22,7 +22,8 @@ std::optional<BorderLevel> border_level(const Scene& scene, const std::vector<Fl
 
 /// Where pictures end: the lowest value that 16 pixels of a channel of an input view share, as its brightest,
 /// within 16 grey levels below `white` (a black level may have been taken out) or above it. 0 where none
-/// does. `boxes`: of the flame, one a view.
+/// does. `boxes`: of the flame, one a view. Views that mark their saturated pixels (View::bounds) aren't
+/// asked.
 double clip_level(const Scene& scene, const std::vector<PixelBox>& boxes, double white);
 
 struct ClippedPixels {

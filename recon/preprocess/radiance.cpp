@@ -4,47 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "recon/preprocess/samples.h"
+
 namespace emberlock {
-namespace {
-
-/// Channel (0 R, 1 G, 2 B) that an RGGB mosaic measures at a pixel.
-constexpr int bayer_channel(int x, int y) { return (x & 1) + (y & 1); }
-
-/// Bilinear interpolation written as a normalised convolution with (1 2 1) x (1 2 1) over the samples of one
-/// channel: the same weights inside, and at the border the neighbours that exist share them.
-float demosaic(const ImageView& image, int x, int y, int channel) {
-  if (bayer_channel(x, y) == channel) return static_cast<float>(image.sample(x, y));
-  int sum = 0;
-  int weights = 0;
-  for (int v = std::max(0, y - 1); v <= std::min(image.height() - 1, y + 1); ++v) {
-    for (int u = std::max(0, x - 1); u <= std::min(image.width() - 1, x + 1); ++u) {
-      if (bayer_channel(u, v) != channel) continue;
-      const int weight = (u == x ? 2 : 1) * (v == y ? 2 : 1);
-      sum += weight * image.sample(u, v);
-      weights += weight;
-    }
-  }
-  return weights == 0 ? 0.0F : static_cast<float>(sum) / static_cast<float>(weights);
-}
-
-}  // namespace
-
-RadianceImage to_radiance(const ImageView& image) {
-  RadianceImage radiance(image.layout.size);
-  const float scale = 255.0F / static_cast<float>(image.layout.white());
-  const bool bayer = is_bayer(image.layout.format);
-  const bool colour = channels(image.layout.format) == 3;
-  float* out = radiance.rgb.data();
-  for (int y = 0; y < image.height(); ++y) {
-    for (int x = 0; x < image.width(); ++x) {
-      for (int c = 0; c < 3; ++c) {
-        *out++ = scale *
-                 (bayer ? demosaic(image, x, y, c) : static_cast<float>(image.sample(x, y, colour ? c : 0)));
-      }
-    }
-  }
-  return radiance;
-}
+RadianceImage to_radiance(const ImageView& image) { return to_picture(samples_of(image)); }
 
 void subtract_background(RadianceImage& image) {
   const std::size_t pixels = image.rgb.size() / 3;

@@ -6,8 +6,9 @@
 namespace emberlock {
 
 /// A picture as linear radiance: the sensor's white becomes 255 whatever its bit depth, grey fills all three
-/// channels, Bayer mosaics are interpolated bilinearly (a measured sample stays what it is, so the data stay
-/// linear). The samples must be linear in light: a gamma-coded file (most JPEGs) has to be linearised before.
+/// channels, Bayer mosaics are interpolated (to_picture(); a measured sample stays what it is, so the data
+/// stay linear). The samples must be linear in light: a gamma-coded file (most JPEGs) has to be linearised
+/// before.
 RadianceImage to_radiance(const ImageView& image);
 
 /// Takes the camera's black level and even stray light out: each channel's median over the darker half of the

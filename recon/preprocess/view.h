@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,12 +31,24 @@ struct View {
   ViewRole role = ViewRole::input;
   /// What lies behind the flame, of the image's size; absent is black.
   std::optional<RadianceImage> background = {};
+  /// Where the sensor was saturated and the image's value is a lower bound: one a pixel, bits 1, 2 and 4 for
+  /// R, G and B. Empty where no pixel is. Unlike Sensor::Clipping's one white for all views, it holds after
+  /// gains and vignetting have been taken out.
+  std::vector<std::uint8_t> bounds = {};
+};
+
+/// A step of preparing the pictures: whether it ran, and why.
+struct PreprocessStep {
+  std::string name;
+  bool on = false;
+  std::string reason;
 };
 
 /// What a reconstruction starts from.
 struct Scene {
   std::vector<View> views;
   Box box;
+  std::vector<PreprocessStep> preprocessing = {};  ///< what was done to the pictures, in order
 };
 
 }  // namespace emberlock

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "base/result.h"
+#include "recon/preprocess/clean.h"
+#include "session/reader.h"
+
+namespace emberlock {
+
+/// How a session's frames become pictures.
+struct FrameOptions {
+  enum class Background {
+    automatic,  ///< the first or last frames of each camera, where the flame isn't burning in them; else
+                ///< `level`
+    level,      ///< of the picture's own darker half
+    frames,     ///< the median of `dark`
+  };
+  Background background = Background::automatic;
+  std::pair<std::size_t, std::size_t> dark = {};  ///< first and last frame of each camera, 33 at most
+  CleanOptions clean = {};
+};
+
+/// "auto", "level" or "FIRST-LAST", in frames of each camera.
+Status parse_background(const std::string& text, FrameOptions& options);
+/// "auto", "off", or a fraction of every row's light such as 2e-4; FRACTION:above and FRACTION:below count
+/// the rows on that side alone.
+Status parse_smear(const std::string& text, FrameOptions& options);
+
+/// Frame `frame` of a camera as radiance, by the manifest's colour and sensor. Reads up to two frames to see
+/// whether there is a part without flame, and eight of it. Errors: those of SessionReader::read() and
+/// read_colour(); dark frames that the camera doesn't have.
+Result<CleanPicture> clean_frame(SessionReader& reader, std::size_t camera, std::size_t frame,
+                                 const FrameOptions& options);
+
+}  // namespace emberlock

@@ -1,0 +1,134 @@
+#include "recon/preprocess/clean.h"
+
+#include <algorithm>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "recon/preprocess/dark_part.h"
+#include "recon/preprocess/hot_pixels.h"
+#include "recon/preprocess/radiance.h"
+#include "recon/preprocess/samples.h"
+
+namespace emberlock {
+namespace {
+
+PreprocessStep linearised(const std::optional<Colour>& colour) {
+  if (!colour) return {"linearise", false, "no colour calibration: samples are taken to be linear in light"};
+  if (colour->response.empty()) return {"linearise", false, "calibrated as linear in light"};
+  return {"linearise", true, "by the calibrated response"};
+}
+
+PreprocessStep take_hot_pixels_out(Samples& samples, const std::optional<Samples>& dark,
+                                   const std::optional<Colour>& colour) {
+  std::vector<std::uint32_t> hot = dark ? hot_pixels_of_dark(*dark) : hot_pixels_of_picture(samples);
+  const char* by = dark ? "stand out in the frames without flame" : "stand out in the picture";
+  if (colour && !colour->hot_pixels.empty()) {
+    std::vector<std::uint32_t> all;
+    std::set_union(hot.begin(), hot.end(), colour->hot_pixels.begin(), colour->hot_pixels.end(),
+                   std::back_inserter(all));
+    hot.swap(all);
+    by = "are calibrated as hot, or stand out";
+  }
+  if (hot.empty()) return {"hot pixels", false, "none stand out"};
+  replace_hot_pixels(samples, hot);
+  return {"hot pixels", true, fmt::format("{} {}", hot.size(), by)};
+}
+
+PreprocessStep take_smear_out(Samples& samples, SensorKind sensor, const CleanOptions& options) {
+  PreprocessStep step{"smear", false, {}};
+  if (options.smear_removal == CleanOptions::SmearRemoval::off) {
+    step.reason = "switched off";
+  } else if (options.smear_removal == CleanOptions::SmearRemoval::told) {
+    remove_smear(samples, options.smear);
+    step.on = true;
+    step.reason = "as told";
+  } else if (sensor != SensorKind::ccd) {
+    step.reason = "the sensor is no CCD";
+  } else if (const auto smear = find_smear(samples, &step.reason)) {
+    remove_smear(samples, *smear);
+    step.on = true;
+  }
+  return step;
+}
+
+PreprocessStep saturated(const std::vector<std::uint8_t>& bounds) {
+  const auto count = std::count_if(bounds.begin(), bounds.end(), [](std::uint8_t b) { return b != 0; });
+  if (count == 0) return {"saturated pixels", false, "none"};
+  return {"saturated pixels", true, fmt::format("{} are bounds: more light explains them", count)};
+}
+
+PreprocessStep equalised(const std::optional<Colour>& colour) {
+  if (!colour) return {"gain and vignetting", false, "no colour calibration: cameras are taken to be alike"};
+  return {"gain and vignetting", true, "as calibrated"};
+}
+
+/// "3 of 11 cameras, first cam2: REASON".
+std::string counted(std::size_t count, std::size_t all, const std::string& first, const std::string& reason) {
+  return fmt::format("{} of {} cameras, {}{}: {}", count, all, count == 1 ? "" : "first ", first, reason);
+}
+
+}  // namespace
+
+CleanPicture clean(const CameraFrame& camera, const CleanOptions& options) {
+  const Colour* colour = camera.colour ? &*camera.colour : nullptr;
+  CleanPicture out;
+  Samples samples = samples_of(camera.frame, colour);
+  std::optional<Samples> dark;
+  if (!camera.dark.empty()) {
+    std::vector<Samples> frames;
+    frames.reserve(camera.dark.size());
+    for (const ImageView& frame : camera.dark) frames.push_back(samples_of(frame, colour));
+    dark = median_of(frames);
+  }
+  out.steps.push_back(linearised(camera.colour));
+  out.steps.push_back(take_hot_pixels_out(samples, dark, camera.colour));
+  if (dark) {
+    subtract(samples, *dark);
+    out.steps.push_back(
+        {"background", true, fmt::format("the median of {} frames without flame", camera.dark.size())});
+  } else {
+    out.steps.push_back(
+        {"background", false, "no frames without flame: the level of the picture's darker half instead"});
+  }
+  out.steps.push_back(take_smear_out(samples, camera.sensor, options));
+  const bool mosaic = samples.layout == SampleLayout::mosaic;
+  out.steps.push_back({"demosaic", mosaic, mosaic ? "gradient-corrected, samples kept" : "no mosaic"});
+  out.image = to_picture(samples, &out.bounds);
+  out.steps.push_back(saturated(out.bounds));
+  if (!dark) subtract_background(out.image);
+  if (colour != nullptr) equalise(out.image, *colour);
+  out.steps.push_back(equalised(camera.colour));
+  return out;
+}
+
+std::vector<PreprocessStep> together(
+    const std::vector<std::pair<std::string, std::vector<PreprocessStep>>>& cameras) {
+  std::vector<PreprocessStep> out;
+  if (cameras.empty()) return out;
+  for (std::size_t step = 0; step < cameras.front().second.size(); ++step) {
+    PreprocessStep all = cameras.front().second[step];
+    const auto differs = [&](const auto& camera) {
+      return camera.second[step].on != all.on || camera.second[step].reason != all.reason;
+    };
+    if (std::none_of(cameras.begin(), cameras.end(), differs)) {
+      out.push_back(std::move(all));
+      continue;
+    }
+    std::string reason;
+    for (const bool on : {true, false}) {
+      const auto is = [&](const auto& camera) { return camera.second[step].on == on; };
+      const auto first = std::find_if(cameras.begin(), cameras.end(), is);
+      if (first == cameras.end()) continue;
+      const auto count = static_cast<std::size_t>(std::count_if(cameras.begin(), cameras.end(), is));
+      reason += (reason.empty() ? "" : "; ") +
+                counted(count, cameras.size(), first->first, first->second[step].reason);
+      all.on = all.on || on;
+    }
+    all.reason = std::move(reason);
+    out.push_back(std::move(all));
+  }
+  return out;
+}
+
+}  // namespace emberlock

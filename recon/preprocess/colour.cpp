@@ -1,0 +1,89 @@
+#include "recon/preprocess/colour.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace emberlock {
+namespace {
+
+constexpr double kLeastLight = 0.02;  // of the middle's: less is no lens
+
+template <class List>
+bool all_finite(const List& list) {
+  return std::all_of(list.begin(), list.end(), [](double v) { return std::isfinite(v); });
+}
+
+Error bad_field(const std::string& where, const char* field, std::string what) {
+  return {ErrorKind::bad_input, std::move(what), where + ".colour." + field,
+          "Calibrate the colours again, or take the field out"};
+}
+
+Status read_three(const google::protobuf::RepeatedField<double>& from, std::array<double, 3>& to,
+                  const std::string& where, const char* field) {
+  if (from.empty()) return {};
+  if (from.size() != 3 || !all_finite(from)) return bad_field(where, field, "is not three finite numbers");
+  std::copy(from.begin(), from.end(), to.begin());
+  return {};
+}
+
+Status check_response(const std::vector<double>& response, const std::string& where) {
+  if (response.empty()) return {};
+  if (response.size() < 2 || !all_finite(response))
+    return bad_field(where, "response", "is not two or more finite numbers");
+  if (std::abs(response.front()) > 1e-9 || std::abs(response.back() - 1) > 1e-9)
+    return bad_field(where, "response", "doesn't lead from 0 to 1");
+  if (std::adjacent_find(response.begin(), response.end(), std::greater_equal<>()) != response.end())
+    return bad_field(where, "response", "doesn't rise everywhere");
+  return {};
+}
+
+}  // namespace
+
+double exposure_of(const Colour& colour, double sample) {
+  if (colour.response.empty()) return sample;
+  const double place = std::clamp(sample, 0.0, 1.0) * static_cast<double>(colour.response.size() - 1);
+  const auto below = std::min(static_cast<std::size_t>(place), colour.response.size() - 2);
+  const double part = place - static_cast<double>(below);
+  return (1 - part) * colour.response[below] + part * colour.response[below + 1];
+}
+
+double radius_squared(ImageSize size, double x, double y) {
+  const double dx = x - 0.5 * size.width;
+  const double dy = y - 0.5 * size.height;
+  return 4 * (dx * dx + dy * dy) /
+         (static_cast<double>(size.width) * size.width + static_cast<double>(size.height) * size.height);
+}
+
+Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std::string& where) {
+  Colour colour;
+  colour.response.assign(message.response().begin(), message.response().end());
+  EMBERLOCK_RETURN_IF_ERROR(check_response(colour.response, where));
+  EMBERLOCK_RETURN_IF_ERROR(read_three(message.dark(), colour.dark, where, "dark"));
+  EMBERLOCK_RETURN_IF_ERROR(read_three(message.gain(), colour.gain, where, "gain"));
+  EMBERLOCK_RETURN_IF_ERROR(read_three(message.vignetting(), colour.vignetting, where, "vignetting"));
+  if (*std::min_element(colour.gain.begin(), colour.gain.end()) <= 0)
+    return bad_field(where, "gain", "is not above 0");
+  constexpr int kRadii = 64;
+  for (int i = 0; i <= kRadii; ++i)
+    if (falloff(colour.vignetting, static_cast<double>(i) / kRadii) < kLeastLight)
+      return bad_field(where, "vignetting", "leaves a part of the picture without light");
+  const auto pixels = static_cast<std::uint64_t>(size.width) * static_cast<std::uint64_t>(size.height);
+  for (const std::uint32_t pixel : message.hot()) {
+    if (pixel >= pixels) return bad_field(where, "hot", "names a pixel outside the picture");
+    colour.hot_pixels.push_back(pixel);
+  }
+  std::sort(colour.hot_pixels.begin(), colour.hot_pixels.end());
+  return colour;
+}
+
+v1::Colour to_message(const Colour& colour) {
+  v1::Colour message;
+  for (const double v : colour.response) message.add_response(v);
+  for (const double v : colour.dark) message.add_dark(v);
+  for (const double v : colour.gain) message.add_gain(v);
+  for (const double v : colour.vignetting) message.add_vignetting(v);
+  for (const std::uint32_t pixel : colour.hot_pixels) message.add_hot(pixel);
+  return message;
+}
+
+}  // namespace emberlock

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "emberlock/v1/session.pb.h"
+
+namespace emberlock {
+
+/// How a camera's samples tell radiance: (response(sample / white) - dark) * gain / vignetting. By default
+/// nothing changes. Immutable in use; what `read` gives is valid.
+struct Colour {
+  std::vector<double> response = {};           ///< exposure 0..1 at even samples 0..1, rising; empty: linear
+  std::array<double, 3> dark = {};             ///< exposure without light
+  std::array<double, 3> gain = {1, 1, 1};      ///< radiance of an exposure of 1
+  std::array<double, 3> vignetting = {};       ///< k2, k4, k6
+  std::vector<std::uint32_t> hot_pixels = {};  ///< y * width + x, rising
+};
+
+/// Relative exposure 0..1 of a sample 0..1, linear between the response's points.
+double exposure_of(const Colour& colour, double sample);
+
+/// The share of the light that a pixel gets, 1 in the middle: 1 + k2 r^2 + k4 r^4 + k6 r^6, `r_squared` in
+/// half diagonals.
+inline double falloff(const std::array<double, 3>& k, double r_squared) {
+  return 1 + r_squared * (k[0] + r_squared * (k[1] + r_squared * k[2]));
+}
+
+/// How far a point (pixel centres at +0.5) lies from the picture's middle: squared, in half diagonals.
+double radius_squared(ImageSize size, double x, double y);
+
+/// The message's meaning for pictures of `size`. Errors name the field below `where`: numbers that aren't
+/// finite, a response that doesn't rise from 0 to 1, other than three gains or dark levels, gains not above
+/// 0, a vignetting that leaves no light, hot pixels outside.
+Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std::string& where);
+v1::Colour to_message(const Colour& colour);
+
+}  // namespace emberlock

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "recon/preprocess/samples.h"
+
+namespace emberlock {
+
+/// How many frames without flame make a background: their median has 1 / 2.3 of a frame's noise.
+inline constexpr std::size_t kDarkFrames = 8;
+
+/// How a frame differs from another of the same camera, by means of blocks of 8 x 8 pixels against their
+/// noise.
+enum class LightChange {
+  none,    ///< everywhere within six sigma and half a grey level
+  dimmer,  ///< only darker: a flame has gone out
+  other,
+};
+LightChange light_change(const Samples& from, const Samples& to);
+
+/// Sample by sample, of frames of one size and layout; at least one.
+Samples median_of(const std::vector<Samples>& frames);
+
+/// Takes a background out. Saturated samples stay marked: what they have above it is still a lower bound.
+void subtract(Samples& samples, const Samples& background);
+
+}  // namespace emberlock

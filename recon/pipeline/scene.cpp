@@ -7,7 +7,7 @@
 
 #include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
-#include "recon/pipeline/clean_frames.h"
+#include "recon/pipeline/session_picture.h"
 #include "recon/preprocess/radiance.h"
 #include "session/frame_file.h"
 #include "session/reader.h"
@@ -155,7 +155,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
                  "has no complete frame within a frame period of frame " + std::to_string(frame),
                  "Choose another --frame; the index tells which frames were lost");
     }
-    EMBERLOCK_ASSIGN_OR_RETURN(CleanPicture picture, clean_frame(reader, i, *nearest, options.frames));
+    EMBERLOCK_ASSIGN_OR_RETURN(DevelopedPicture picture, develop_frame(reader, i, *nearest, options.frames));
     view.image = std::move(picture.image);
     view.bounds = std::move(picture.bounds);
     steps.emplace_back(view.name, std::move(picture.steps));

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "base/result.h"
-#include "recon/pipeline/clean_frames.h"
+#include "recon/pipeline/session_picture.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock {

@@ -1,4 +1,4 @@
-#include "recon/preprocess/clean.h"
+#include "recon/preprocess/develop.h"
 
 #include <algorithm>
 #include <string>
@@ -35,11 +35,11 @@ PreprocessStep take_hot_pixels_out(Samples& samples, const std::optional<Samples
   return {"hot pixels", true, fmt::format("{} {}", hot.size(), by)};
 }
 
-PreprocessStep take_smear_out(Samples& samples, SensorKind sensor, const CleanOptions& options) {
+PreprocessStep take_smear_out(Samples& samples, SensorKind sensor, const DevelopOptions& options) {
   PreprocessStep step{"smear", false, {}};
-  if (options.smear_removal == CleanOptions::SmearRemoval::off) {
+  if (options.smear_removal == DevelopOptions::SmearRemoval::off) {
     step.reason = "switched off";
-  } else if (options.smear_removal == CleanOptions::SmearRemoval::told) {
+  } else if (options.smear_removal == DevelopOptions::SmearRemoval::told) {
     remove_smear(samples, options.smear);
     step.on = true;
     step.reason = "as told";
@@ -70,9 +70,9 @@ std::string counted(std::size_t count, std::size_t all, const std::string& first
 
 }  // namespace
 
-CleanPicture clean(const CameraFrame& camera, const CleanOptions& options) {
+DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& options) {
   const Colour* colour = camera.colour ? &*camera.colour : nullptr;
-  CleanPicture out;
+  DevelopedPicture out;
   Samples samples = samples_of(camera.frame, colour);
   std::optional<Samples> dark;
   if (!camera.dark.empty()) {

@@ -1,4 +1,4 @@
-#include "recon/pipeline/clean_frames.h"
+#include "recon/pipeline/session_picture.h"
 
 #include <cmath>
 #include <cstdlib>
@@ -104,10 +104,10 @@ Status parse_background(const std::string& text, FrameOptions& options) {
 }
 
 Status parse_smear(const std::string& text, FrameOptions& options) {
-  using Removal = CleanOptions::SmearRemoval;
-  CleanOptions& clean = options.clean;
+  using Removal = DevelopOptions::SmearRemoval;
+  DevelopOptions& develop = options.develop;
   if (text == "auto" || text == "off") {
-    clean.smear_removal = text == "auto" ? Removal::automatic : Removal::off;
+    develop.smear_removal = text == "auto" ? Removal::automatic : Removal::off;
     return {};
   }
   const std::size_t colon = text.find(':');
@@ -123,15 +123,15 @@ Status parse_smear(const std::string& text, FrameOptions& options) {
         "Give auto, off, or the share of every row's light, above 0 and below 0.1, with :above or :below for "
         "the rows on one side"};
   }
-  clean.smear_removal = Removal::told;
-  clean.smear.fraction = {fraction, fraction, fraction};
-  clean.smear.path = side == "above"   ? SmearPath::rows_above
+  develop.smear_removal = Removal::told;
+  develop.smear.fraction = {fraction, fraction, fraction};
+  develop.smear.path = side == "above"   ? SmearPath::rows_above
                      : side == "below" ? SmearPath::rows_below
                                        : SmearPath::whole_column;
   return {};
 }
 
-Result<CleanPicture> clean_frame(SessionReader& reader, std::size_t camera, std::size_t frame,
+Result<DevelopedPicture> develop_frame(SessionReader& reader, std::size_t camera, std::size_t frame,
                                  const FrameOptions& options) {
   const v1::CameraStream& stream = reader.manifest().cameras(static_cast<int>(camera));
   EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(camera, frame));
@@ -150,7 +150,7 @@ Result<CleanPicture> clean_frame(SessionReader& reader, std::size_t camera, std:
     EMBERLOCK_ASSIGN_OR_RETURN(dark, told_dark(reader, camera, options));
   }
   for (const Frame& f : dark) from.dark.push_back(f.image->view());
-  return clean(from, options.clean);
+  return develop(from, options.develop);
 }
 
 }  // namespace emberlock

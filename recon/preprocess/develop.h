@@ -11,7 +11,7 @@
 
 namespace emberlock {
 
-struct CleanOptions {
+struct DevelopOptions {
   enum class SmearRemoval { automatic, off, told };
   SmearRemoval smear_removal =
       SmearRemoval::automatic;  ///< automatic: where the sensor is a CCD and shows it
@@ -27,7 +27,7 @@ struct CameraFrame {
   SensorKind sensor = SensorKind::ccd;
 };
 
-struct CleanPicture {
+struct DevelopedPicture {
   RadianceImage image;
   std::vector<std::uint8_t> bounds;  ///< View::bounds
   std::vector<PreprocessStep> steps;
@@ -36,7 +36,7 @@ struct CleanPicture {
 /// From samples to radiance: linearise, hot pixels, background, smear, demosaic, level, gain and vignetting,
 /// in this order: what adds up in the sensor is taken out before anything is multiplied or interpolated. Each
 /// step says whether it ran and why. Dark frames have the frame's layout.
-CleanPicture clean(const CameraFrame& camera, const CleanOptions& options = {});
+DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& options = {});
 
 /// The steps of several cameras as one list: on where any camera's is; where they differ, the reason counts
 /// them and names the first of each.

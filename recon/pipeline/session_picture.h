@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "base/result.h"
-#include "recon/preprocess/clean.h"
+#include "recon/preprocess/develop.h"
 #include "session/reader.h"
 
 namespace emberlock {
@@ -21,7 +21,7 @@ struct FrameOptions {
   };
   Background background = Background::automatic;
   std::pair<std::size_t, std::size_t> dark = {};  ///< first and last frame of each camera, 33 at most
-  CleanOptions clean = {};
+  DevelopOptions develop = {};
 };
 
 /// "auto", "level" or "FIRST-LAST", in frames of each camera.
@@ -33,7 +33,7 @@ Status parse_smear(const std::string& text, FrameOptions& options);
 /// Frame `frame` of a camera as radiance, by the manifest's colour and sensor. Reads up to two frames to see
 /// whether there is a part without flame, and eight of it. Errors: those of SessionReader::read() and
 /// read_colour(); dark frames that the camera doesn't have.
-Result<CleanPicture> clean_frame(SessionReader& reader, std::size_t camera, std::size_t frame,
+Result<DevelopedPicture> develop_frame(SessionReader& reader, std::size_t camera, std::size_t frame,
                                  const FrameOptions& options);
 
 }  // namespace emberlock

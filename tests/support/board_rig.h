@@ -17,12 +17,12 @@ namespace emberlock::test {
 /// lenses differ and distort.
 struct BoardRigOptions {
   int cameras = 11;
-  int instants = 66;
+  int instants = 160;
   double noise = 0.2;   ///< pixels, each coordinate
   double wrong = 0.05;  ///< share of corners that are wrong, by up to 20 pixels in each coordinate
   std::uint64_t seed = 1;
   ImageSize image = {640, 480};
-  Board board = {BoardKind::chessboard, 9, 6, Meters(0.018)};
+  Board board = {BoardKind::chessboard, 16, 11, Meters(0.014)};
 };
 
 struct BoardRig {
@@ -62,9 +62,9 @@ inline std::vector<CameraModel> ring_cameras(const BoardRigOptions& options, Ran
   return cameras;
 }
 
-/// The board somewhere near the origin, its face towards `azimuth` (radians), tilted by up to 35 degrees.
+/// The board somewhere near the origin, its face towards `azimuth` (radians), tilted by up to 45 degrees.
 inline Rigid3 carried_board(const Board& board, double azimuth, RandomStream& random) {
-  const Eigen::Vector3d out = on_ring(1, azimuth + random.uniform(-0.3, 0.3), random.uniform(-0.6, 0.6));
+  const Eigen::Vector3d out = on_ring(1, azimuth + random.uniform(-0.3, 0.3), random.uniform(-0.8, 0.8));
   const Eigen::Vector3d right = Eigen::Vector3d::UnitZ().cross(out).normalized();
   Eigen::Matrix3d rotation;
   rotation << right, out.cross(right), out;

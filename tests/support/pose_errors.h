@@ -13,7 +13,9 @@ namespace emberlock::test {
 
 struct PoseErrors {
   double place = 0;  ///< metres, of the worst camera's centre
-  double turn = 0;   ///< radians, of the worst camera
+  double turn = 0;   ///< radians, of the worst camera's axes
+  double rays = 0;   ///< radians: the turn of the worst camera's rays, seen over its whole picture. A turn of the
+                     ///< axes that the principal point takes back moves no ray, and no reconstruction
   double chi2 = 0;   ///< e' C^-1 e of all placed cameras' centres and turns, in the world's frame
   int freedom = 0;   ///< of chi2
 };
@@ -25,6 +27,19 @@ inline Eigen::Matrix<double, 6, 1> pose_error(const CameraModel& found, const Ca
   Eigen::Matrix<double, 6, 1> error;
   error << found.center() - truth.center(), turn.angle() * turn.axis();
   return error;
+}
+
+/// The angle of the rotation that best takes a camera's rays to the true ones, pixel by pixel.
+inline double turn_of_rays(const CameraModel& found, const CameraModel& truth) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  for (int y = 0; y <= 6; ++y) {
+    for (int x = 0; x <= 8; ++x) {
+      const Eigen::Vector2d pixel(truth.intrinsics.size.width * x / 8.0, truth.intrinsics.size.height * y / 6.0);
+      sum += truth.ray(pixel).direction * found.ray(pixel).direction.transpose();
+    }
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return Eigen::AngleAxisd(Eigen::Matrix3d(svd.matrixU() * svd.matrixV().transpose())).angle();
 }
 
 inline PoseErrors worst_of(const std::vector<Eigen::Matrix<double, 6, 1>>& errors) {
@@ -75,12 +90,16 @@ inline PoseErrors errors_among_cameras(const RigCalibration& found, const std::v
   const Eigen::Matrix3d rotation = svd.matrixU() * svd.matrixV().transpose();
   const Rigid3 true_from_found{rotation, true_middle - rotation * found_middle};
   std::vector<Eigen::Matrix<double, 6, 1>> errors;
+  double rays = 0;
   for (std::size_t i = 0; i < found.bundle.cameras.size(); ++i) {
     CameraModel moved = found.bundle.cameras[i].model;
     moved.camera_from_world = chain(moved.camera_from_world, true_from_found.inverse());
     errors.push_back(pose_error(moved, truth[found.bundle_camera[i]]));
+    rays = std::max(rays, turn_of_rays(moved, truth[found.bundle_camera[i]]));
   }
-  return worst_of(errors);
+  PoseErrors result = worst_of(errors);
+  result.rays = rays;
+  return result;
 }
 
 }  // namespace emberlock::test

@@ -16,6 +16,8 @@ void add_verify(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 /// `tradeoff sync`; `parent` is the verb tradeoff.
 void add_tradeoff_sync(CLI::App& parent);
+/// `calibrate cameras`, `check` and `convert`.
+void add_calibrate(CLI::App& app);
 void add_demo(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_sessions(CLI::App& app);

@@ -103,7 +103,7 @@ std::string coverage_svg(const RigCalibration& calibration, std::size_t camera, 
 
 std::string residual_plot(const RigCalibration& calibration, std::size_t camera) {
   const Bundle& bundle = calibration.bundle;
-  Series series{"", {}, {}};
+  Series series{"corners", {}, {}};
   series.mark = Mark::points;
   for (const BundleView& view : bundle.views) {
     if (view.camera != camera) continue;

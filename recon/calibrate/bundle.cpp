@@ -4,48 +4,16 @@
 #include <cmath>
 #include <memory>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <Eigen/QR>
 #include <ceres/ceres.h>
-#include <ceres/rotation.h>
 #include <glog/logging.h>
+
+#include "recon/calibrate/corner_cost.h"
 
 namespace emberlock {
 namespace {
-
-/// A pose's block: a turn (angle times axis) on top of where it was linearised, and a place.
-using PoseBlock = std::array<double, kPoseUnknowns>;
-using LensBlock = std::array<double, kLensUnknowns>;
-
-constexpr double kNearest = 1e-6;  // metres in front of a camera
-
-/// One corner: residuals in standard deviations of its noise. Poses turn about where they were linearised, so
-/// their three angles are small and have no singularity.
-struct CornerCost {
-  const Eigen::Matrix3d* camera_rotation;  ///< camera_from_world
-  const Eigen::Matrix3d* board_rotation;   ///< world_from_board
-  Eigen::Vector3d corner;                  ///< board
-  Eigen::Vector2d pixel;
-  double weight;
-
-  template <class T>
-  bool operator()(const T* lens, const T* camera, const T* board, T* out) const {
-    using Vector = Eigen::Matrix<T, 3, 1>;
-    const Vector turned = (*board_rotation * corner).template cast<T>();
-    Vector world;
-    ceres::AngleAxisRotatePoint(board, turned.data(), world.data());
-    for (int a = 0; a < 3; ++a) world[a] += board[3 + a] - camera[3 + a];
-    const Vector straight = camera_rotation->template cast<T>() * world;
-    Vector p;
-    ceres::AngleAxisRotatePoint(camera, straight.data(), p.data());
-    if (!(p[2] > T(kNearest))) return false;
-    T x;
-    T y;
-    brown_conrady(lens[4], lens[5], lens[6], lens[7], lens[8], T(p[0] / p[2]), T(p[1] / p[2]), x, y);
-    out[0] = weight * (lens[0] * x + lens[2] - pixel.x());
-    out[1] = weight * (lens[1] * y + lens[3] - pixel.y());
-    return true;
-  }
-};
 
 /// The bundle's numbers as Ceres moves them.
 struct Blocks {
@@ -92,24 +60,31 @@ struct Blocks {
   }
 };
 
+enum class Weigh { by_noise, by_inflated_noise };
+
 bool holds_lens(Held held) { return held == Held::lens || held == Held::both; }
 bool holds_pose(Held held) { return held == Held::pose || held == Held::both; }
 
+/// One corner's residuals, `weight` a pixel.
+std::unique_ptr<ceres::CostFunction> corner_cost(const Bundle& bundle, const BundleView& view, std::size_t i,
+                                                 double weight) {
+  using Cost = ceres::AutoDiffCostFunction<CornerCost, 2, kLensUnknowns, kPoseUnknowns, kPoseUnknowns>;
+  return std::make_unique<Cost>(new CornerCost{&bundle.cameras[view.camera].model.camera_from_world.rotation,
+                                               &bundle.boards[view.board].world_from_board.rotation,
+                                               bundle.board.point(view.corners[i].id), view.corners[i].pixel, weight});
+}
+
 /// The problem over `blocks`, which must outlive it. Cameras and boards that no used corner shows are left
 /// out.
-std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks, BundleLoss loss) {
+std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks, BundleLoss loss,
+                                           Weigh weigh = Weigh::by_noise) {
   auto problem = std::make_unique<ceres::Problem>();
   for (const BundleView& view : bundle.views) {
     const BundleCamera& camera = bundle.cameras[view.camera];
     for (std::size_t i = 0; i < view.corners.size(); ++i) {
       if (view.use[i] != CornerUse::used) continue;
-      auto* cost =
-          new ceres::AutoDiffCostFunction<CornerCost, 2, kLensUnknowns, kPoseUnknowns, kPoseUnknowns>(
-              new CornerCost{&camera.model.camera_from_world.rotation,
-                             &bundle.boards[view.board].world_from_board.rotation,
-                             bundle.board.point(view.corners[i].id), view.corners[i].pixel,
-                             1 / camera.noise});
-      problem->AddResidualBlock(cost, loss == BundleLoss::cauchy ? new ceres::CauchyLoss(2) : nullptr,
+      const double noise = camera.noise * (weigh == Weigh::by_noise ? 1 : camera.inflation);
+      problem->AddResidualBlock(corner_cost(bundle, view, i, 1 / noise).release(), loss == BundleLoss::cauchy ? new ceres::CauchyLoss(2) : nullptr,
                                 blocks.lenses[view.camera].data(), blocks.cameras[view.camera].data(),
                                 blocks.boards[view.board].data());
     }
@@ -132,6 +107,39 @@ std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks,
 
 /// Ceres tells its log what the results tell their callers.
 void quieten_ceres() { FLAGS_minloglevel = google::GLOG_FATAL; }
+
+constexpr std::size_t kFewestForPose = 4;       // corners
+constexpr std::size_t kFewestForJackknife = 6;  // views
+constexpr double kChance = 3;                   // standard deviations
+
+/// A view's residuals and how they change with the lens and with the board's pose.
+struct ViewEquations {
+  Eigen::VectorXd residuals;
+  Eigen::MatrixXd lens;
+  Eigen::MatrixXd board;
+};
+
+ViewEquations equations_of(const Bundle& bundle, const BundleView& view, const Blocks& blocks) {
+  const auto rows = static_cast<Eigen::Index>(2 * view.used());
+  ViewEquations result{Eigen::VectorXd(rows), Eigen::MatrixXd(rows, kLensUnknowns), Eigen::MatrixXd(rows, kPoseUnknowns)};
+  Eigen::Index row = 0;
+  for (std::size_t i = 0; i < view.corners.size(); ++i) {
+    if (view.use[i] != CornerUse::used) continue;
+    const auto cost = corner_cost(bundle, view, i, 1 / bundle.cameras[view.camera].noise);
+    Eigen::Matrix<double, 2, kLensUnknowns, Eigen::RowMajor> by_lens;
+    Eigen::Matrix<double, 2, kPoseUnknowns, Eigen::RowMajor> by_board;
+    Eigen::Vector2d residuals = Eigen::Vector2d::Zero();
+    const std::array<const double*, 3> at = {blocks.lenses[view.camera].data(), blocks.cameras[view.camera].data(),
+                                             blocks.boards[view.board].data()};
+    std::array<double*, 3> by = {by_lens.data(), nullptr, by_board.data()};
+    cost->Evaluate(at.data(), residuals.data(), by.data());
+    result.residuals.segment<2>(row) = residuals;
+    result.lens.middleRows<2>(row) = by_lens;
+    result.board.middleRows<2>(row) = by_board;
+    row += 2;
+  }
+  return result;
+}
 
 bool is_free(const ceres::Problem& problem, const double* block) {
   return problem.HasParameterBlock(block) && !problem.IsParameterBlockConstant(block);
@@ -185,7 +193,7 @@ Eigen::Vector2d residual(const Bundle& bundle, const BundleView& view, std::size
 std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle) {
   quieten_ceres();
   Blocks blocks(bundle);
-  const auto problem = problem_of(bundle, blocks, BundleLoss::squares);
+  const auto problem = problem_of(bundle, blocks, BundleLoss::squares, Weigh::by_inflated_noise);
   std::vector<const double*> free;
   std::vector<Eigen::Index> rows;  // of each free unknown, in the answer
   const auto add = [&](const double* block, Eigen::Index at, std::initializer_list<int> order) {
@@ -214,6 +222,36 @@ std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle) {
       result(rows[static_cast<std::size_t>(r)], rows[static_cast<std::size_t>(c)]) = dense(r, c);
   if (!result.allFinite() || result.diagonal().minCoeff() < 0) return std::nullopt;
   return result;
+}
+
+double jackknife_inflation(const Bundle& bundle) {
+  const BundleCamera& camera = bundle.cameras.front();
+  const Blocks blocks(bundle);
+  const Eigen::Index unknowns = camera.k3 == ThirdRadial::free ? kLensUnknowns : kLensUnknowns - 1;
+  std::vector<Eigen::MatrixXd> normals;  // of each view, its board's pose eliminated
+  std::vector<Eigen::VectorXd> gradients;
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  for (const BundleView& view : bundle.views) {
+    if (view.used() < kFewestForPose) continue;
+    const ViewEquations equations = equations_of(bundle, view, blocks);
+    const Eigen::MatrixXd lens = equations.lens.leftCols(unknowns);
+    const Eigen::HouseholderQR<Eigen::MatrixXd> pose(equations.board);
+    const Eigen::MatrixXd kept = pose.householderQ() * Eigen::MatrixXd::Identity(lens.rows(), kPoseUnknowns);
+    const Eigen::MatrixXd across = lens - kept * (kept.transpose() * lens);
+    normals.emplace_back(across.transpose() * across);
+    gradients.emplace_back(across.transpose() * equations.residuals);
+    all += normals.back();
+  }
+  if (normals.size() < kFewestForJackknife) return 1;
+  const auto views = static_cast<double>(normals.size());
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(unknowns);
+  for (std::size_t v = 0; v < normals.size(); ++v) {
+    const Eigen::VectorXd moved = (all - normals[v]).ldlt().solve(gradients[v]);
+    variance += (views - 1) / views * moved.cwiseAbs2();
+  }
+  const Eigen::VectorXd independent = all.ldlt().solve(Eigen::MatrixXd::Identity(unknowns, unknowns)).diagonal();
+  const double ratio = variance.cwiseQuotient(independent).mean();
+  return ratio > 1 + kChance * std::sqrt(2 / views) ? std::sqrt(ratio) : 1;
 }
 
 double rms_of(const Bundle& bundle, std::optional<std::size_t> camera) {

@@ -37,8 +37,9 @@ struct BundleCamera {
   CameraModel model;
   Held held = Held::none;
   ThirdRadial k3 = ThirdRadial::held;
-  double noise =
-      1;  ///< pixels: standard deviation of a corner's coordinate, by which its residuals are weighed
+  /// Pixels: standard deviation of a corner's coordinate, by which its residuals are weighed.
+  double noise = 1;
+  double inflation = 1;  ///< of the standard deviations: a view's corners err together (jackknife_inflation)
 };
 
 struct BundleBoard {
@@ -78,8 +79,14 @@ Status adjust(Bundle& bundle, BundleLoss loss);
 /// Where corner `i` of a view is drawn less where it was seen, pixels; not finite behind the camera.
 Eigen::Vector2d residual(const Bundle& bundle, const BundleView& view, std::size_t i);
 
+/// By what factor a lens's standard deviations exceed those of independent corners: corners of one view err together
+/// where a board isn't quite flat or blur shifts them. By the jackknife over views, one step each (Efron 1982), on
+/// average over the lens's unknowns; 1 where chance explains it (3 standard deviations), and below 6 views. Of a
+/// bundle of one camera.
+double jackknife_inflation(const Bundle& bundle);
+
 /// Covariance of all cameras' unknowns at the solution, kCameraUnknowns rows a camera, zero for what is held;
-/// for residuals of the stated noise. None where the views don't determine them.
+/// for residuals of the stated, inflated noise. None where the views don't determine them.
 std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle);
 
 /// RMS distance of the used corners of a camera (of all of them, if none is given), pixels.

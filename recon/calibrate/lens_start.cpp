@@ -223,7 +223,7 @@ Result<LensStart> start_lens(const BoardSightings& sightings, std::size_t camera
   }
   Bundle& bundle = start.bundle;
   bundle.board = sightings.board;
-  bundle.cameras.push_back({{*lens, {}}, Held::pose, ThirdRadial::held, 1});
+  bundle.cameras.push_back({{*lens, {}}, Held::pose, ThirdRadial::held});
   std::vector<std::size_t> kept;
   for (const std::size_t v : start.sightings) {
     const auto& sighting = sightings.sightings[v];
@@ -243,6 +243,7 @@ Result<LensStart> start_lens(const BoardSightings& sightings, std::size_t camera
     return too_few(start.sightings.size() - start.rejected.size());
   start.tilt = widest_tilt(bundle);
   EMBERLOCK_RETURN_IF_ERROR(choose_k3(bundle));
+  bundle.cameras[0].inflation = jackknife_inflation(bundle);
   EMBERLOCK_RETURN_IF_ERROR(check_determined(sightings, camera, start));
   return start;
 }

@@ -155,7 +155,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
                  "has no complete frame within a frame period of frame " + std::to_string(frame),
                  "Choose another --frame; the index tells which frames were lost");
     }
-    EMBERLOCK_ASSIGN_OR_RETURN(DevelopedPicture picture, develop_frame(reader, i, *nearest, options.frames));
+    EMBERLOCK_ASSIGN_OR_RETURN(DevelopedPicture picture, develop_frame(reader, {i, *nearest, stream}, options.frames));
     view.image = std::move(picture.image);
     view.bounds = std::move(picture.bounds);
     steps.emplace_back(view.name, std::move(picture.steps));

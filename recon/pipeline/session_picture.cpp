@@ -131,23 +131,20 @@ Status parse_smear(const std::string& text, FrameOptions& options) {
   return {};
 }
 
-Result<DevelopedPicture> develop_frame(SessionReader& reader, std::size_t camera, std::size_t frame,
-                                 const FrameOptions& options) {
-  const v1::CameraStream& stream = reader.manifest().cameras(static_cast<int>(camera));
-  EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(camera, frame));
+Result<DevelopedPicture> develop_frame(SessionReader& reader, const SessionFrame& which, const FrameOptions& options) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(which.camera, which.frame));
   CameraFrame from;
   from.frame = picture.image->view();
-  from.sensor = sensor_of(stream);
-  if (stream.has_colour()) {
-    const std::string where =
-        (reader.folder() / "manifest.json").string() + ": cameras[" + std::to_string(camera) + "]";
-    EMBERLOCK_ASSIGN_OR_RETURN(from.colour, read_colour(stream.colour(), from.frame.layout.size, where));
+  from.sensor = sensor_of(which.stream);
+  if (which.stream.has_colour()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(from.colour, read_colour(which.stream.colour(), from.frame.layout.size,
+                                                        "camera " + which.stream.camera_id()));
   }
   Frames dark;
   if (options.background == FrameOptions::Background::automatic) {
-    EMBERLOCK_ASSIGN_OR_RETURN(dark, find_dark(reader, camera, frame, from.frame));
+    EMBERLOCK_ASSIGN_OR_RETURN(dark, find_dark(reader, which.camera, which.frame, from.frame));
   } else if (options.background == FrameOptions::Background::frames) {
-    EMBERLOCK_ASSIGN_OR_RETURN(dark, told_dark(reader, camera, options));
+    EMBERLOCK_ASSIGN_OR_RETURN(dark, told_dark(reader, which.camera, options));
   }
   for (const Frame& f : dark) from.dark.push_back(f.image->view());
   return develop(from, options.develop);

@@ -30,10 +30,16 @@ Status parse_background(const std::string& text, FrameOptions& options);
 /// the rows on that side alone.
 Status parse_smear(const std::string& text, FrameOptions& options);
 
-/// Frame `frame` of a camera as radiance, by the manifest's colour and sensor. Reads up to two frames to see
-/// whether there is a part without flame, and eight of it. Errors: those of SessionReader::read() and
-/// read_colour(); dark frames that the camera doesn't have.
-Result<DevelopedPicture> develop_frame(SessionReader& reader, std::size_t camera, std::size_t frame,
-                                 const FrameOptions& options);
+/// A frame of a session, and its camera as it is known by now: the manifest's, or a rig's.
+struct SessionFrame {
+  std::size_t camera = 0;
+  std::size_t frame = 0;
+  const v1::CameraStream& stream;
+};
+
+/// A frame as radiance, by its camera's colour and sensor. Reads up to two frames to see whether there is a part
+/// without flame, and eight of it. Errors: those of SessionReader::read() and read_colour(); dark frames that the
+/// camera doesn't have.
+Result<DevelopedPicture> develop_frame(SessionReader& reader, const SessionFrame& which, const FrameOptions& options);
 
 }  // namespace emberlock

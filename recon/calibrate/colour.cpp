@@ -1,0 +1,398 @@
+#include "recon/calibrate/colour.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <set>
+
+#include <fmt/format.h>
+
+#include "recon/calibrate/colour_fit.h"
+
+namespace emberlock {
+namespace {
+
+constexpr double kDarkest = 0.03;       // samples: below, noise and quantisation bend what the mean tells
+constexpr double kMostSaturated = 0.0;  // share of a patch: one clipped sample drags its mean
+constexpr double kBrightest = 0.985;
+constexpr double kLeastRatio = 1.3;     // of exposures that tell a response
+constexpr int kResponsePoints = 256;
+
+Error bad_target(std::string where, std::string what, std::string remedy) {
+  return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
+}
+
+using RadianceKey = std::pair<std::string, std::size_t>;
+
+/// Equations from readings, and what they came from.
+struct Equations {
+  std::vector<ColourEquation> all;
+  std::vector<std::size_t> reading;  ///< of each
+  std::vector<ColourResidual> left_out;
+  std::map<RadianceKey, std::size_t> lights;
+};
+
+double dark_exposure(const DarkReading& dark, std::size_t channel,
+                     const std::array<double, ResponseCurve::kParameters>& response) {
+  double sum = 0;
+  const std::vector<double>& shares = dark.histogram[channel];
+  for (std::size_t i = 0; i < shares.size(); ++i)
+    sum += shares[i] * ResponseCurve::exposure(response, static_cast<double>(i) / 255);
+  return sum;
+}
+
+double dark_sample(const DarkReading& dark, std::size_t channel) {
+  double sum = 0;
+  const std::vector<double>& shares = dark.histogram[channel];
+  for (std::size_t i = 0; i < shares.size(); ++i) sum += shares[i] * static_cast<double>(i) / 255;
+  return sum;
+}
+
+double mean_sigma(const PatchReading& reading, std::size_t c, double step) {
+  const double spread = std::sqrt(reading.variance[c]);
+  // Noise of half a step makes quantisation one more noise; without it the whole patch is off by the same.
+  const double rounding = spread > 0.4 * step ? 0 : step / std::sqrt(12.0);
+  return std::hypot(spread / std::sqrt(static_cast<double>(reading.count[c])), rounding);
+}
+
+Equations equations_of(const ColourReadings& readings) {
+  Equations out;
+  for (std::size_t i = 0; i < readings.patches.size(); ++i) {
+    const PatchReading& p = readings.patches[i];
+    const ColourCamera& camera = readings.cameras[p.camera];
+    const auto known = readings.radiance.find(p.patch);
+    for (std::size_t c = 0; c < 3; ++c) {
+      if (p.count[c] == 0) continue;
+      if (p.saturated[c] > kMostSaturated || p.mean[c] > kBrightest) {
+        out.left_out.push_back({i, c, 0, 0, ReadingUse::saturated});
+        continue;
+      }
+      if (p.mean[c] < std::max(kDarkest, 1.5 * dark_sample(camera.dark, c)) ||
+          std::sqrt(p.variance[c]) > 0.3 * p.mean[c]) {
+        out.left_out.push_back({i, c, 0, 0, ReadingUse::dark});
+        continue;
+      }
+      ColourEquation e;
+      e.camera = p.camera;
+      e.channel = c;
+      e.known = std::log(p.exposure);
+      const std::string name = known == readings.radiance.end() ? "patch:" + p.patch + "@" + p.light : "light:" + p.light;
+      if (known != readings.radiance.end()) e.known += std::log(known->second[c]);
+      e.light = out.lights.emplace(RadianceKey{name, c}, out.lights.size()).first->second;
+      e.sample = p.mean[c];
+      e.variance = p.variance[c];
+      e.sample_sigma = mean_sigma(p, c, camera.step);
+      e.radius_squared = radius_squared(camera.size, p.x, p.y);
+      out.all.push_back(e);
+      out.reading.push_back(i);
+    }
+  }
+  return out;
+}
+
+/// Dark pictures brighter than every patch are swapped, or taken with the light on.
+Status check_dark(const ColourReadings& readings) {
+  for (std::size_t camera = 0; camera < readings.cameras.size(); ++camera) {
+    const ColourCamera& from = readings.cameras[camera];
+    if (from.dark.histogram[1].empty()) continue;
+    double brightest = 0;
+    for (const PatchReading& p : readings.patches)
+      if (p.camera == camera) brightest = std::max(brightest, p.mean[1]);
+    if (brightest > 0 && dark_sample(from.dark, 1) >= brightest) {
+      return bad_target("camera " + from.id, "its dark pictures are brighter than the target",
+                        "Take them with the lens covered; check that dark* and target* aren't exchanged");
+    }
+  }
+  return {};
+}
+
+/// The same radiance with more exposure must give a larger sample.
+Status check_rising(const ColourReadings& readings, const Equations& equations) {
+  using Key = std::tuple<std::size_t, std::size_t, std::size_t, double, double>;  // camera, light, channel, place
+  std::map<Key, std::vector<std::pair<double, std::size_t>>> series;
+  for (std::size_t i = 0; i < equations.all.size(); ++i) {
+    const ColourEquation& e = equations.all[i];
+    const PatchReading& p = readings.patches[equations.reading[i]];
+    series[{e.camera, e.light, e.channel, p.x, p.y}].emplace_back(e.known, i);
+  }
+  for (auto& [key, steps] : series) {
+    std::sort(steps.begin(), steps.end());
+    for (std::size_t i = 1; i < steps.size(); ++i) {
+      const ColourEquation& low = equations.all[steps[i - 1].second];
+      const ColourEquation& high = equations.all[steps[i].second];
+      const double margin = 6 * std::hypot(low.sample_sigma, high.sample_sigma) + 0.01;
+      if (high.known - low.known < std::log(kLeastRatio) || high.sample > low.sample - margin) continue;
+      const PatchReading& p = readings.patches[equations.reading[steps[i].second]];
+      return bad_target("camera " + readings.cameras[low.camera].id + ": patch " + p.patch,
+                        fmt::format("more exposure makes it darker: {:.3g} of white in {}, {:.3g} in {}", low.sample,
+                                    readings.patches[equations.reading[steps[i - 1].second]].picture, high.sample,
+                                    p.picture),
+                        "Check the exposures told; switch the camera's automatic exposure and tone off");
+    }
+  }
+  return {};
+}
+
+/// Whether anything says how samples grow with light: one radiance, up to known factors, seen at two of them.
+bool response_told(const std::vector<ColourEquation>& equations) {
+  std::map<std::tuple<std::size_t, std::size_t>, std::pair<double, double>> range;  // camera, light
+  for (const ColourEquation& e : equations) {
+    const auto at = range.emplace(std::tuple(e.camera, e.light), std::pair(e.known, e.known)).first;
+    at->second.first = std::min(at->second.first, e.known);
+    at->second.second = std::max(at->second.second, e.known);
+  }
+  return std::any_of(range.begin(), range.end(), [](const auto& entry) {
+    return entry.second.second - entry.second.first > std::log(kLeastRatio);
+  });
+}
+
+/// Which cameras see a common radiance, directly or by others, in one channel: each one's group by its first camera.
+std::vector<std::size_t> groups_of(const std::vector<ColourEquation>& equations, std::size_t cameras,
+                                   std::size_t channel) {
+  std::vector<std::size_t> parent(cameras);
+  std::iota(parent.begin(), parent.end(), std::size_t{0});
+  const auto root = [&](std::size_t i) {
+    while (parent[i] != i) i = parent[i];
+    return i;
+  };
+  std::map<std::size_t, std::size_t> seen_by;
+  for (const ColourEquation& e : equations) {
+    if (e.channel != channel || e.outlier) continue;
+    const auto [at, fresh] = seen_by.emplace(e.light, e.camera);
+    if (fresh) continue;
+    const std::size_t a = root(at->second);
+    const std::size_t b = root(e.camera);
+    parent[std::max(a, b)] = std::min(a, b);
+  }
+  for (std::size_t i = 0; i < cameras; ++i) parent[i] = root(i);
+  return parent;
+}
+
+/// Largest group; the first of equals.
+std::size_t main_group(const std::vector<std::size_t>& groups) {
+  std::size_t best = 0;
+  std::ptrdiff_t most = 0;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto size = std::count(groups.begin(), groups.end(), g);
+    if (size > most) {
+      most = size;
+      best = g;
+    }
+  }
+  return best;
+}
+
+/// The lens's falloff needs a radiance at three or more distances that differ by much.
+bool vignetting_told(const std::vector<ColourEquation>& equations, std::size_t camera) {
+  std::map<std::size_t, std::set<int>> places;  // by light: tenths of r^2
+  for (const ColourEquation& e : equations)
+    if (e.camera == camera) places[e.light].insert(static_cast<int>(10 * e.radius_squared));
+  std::set<int> all;
+  for (const auto& [light, tenths] : places)
+    if (tenths.size() > 1) all.insert(tenths.begin(), tenths.end());
+  return all.size() >= 3 && *all.rbegin() - *all.begin() >= 3;
+}
+
+ColourFit start_of(const Equations& equations, std::size_t cameras, const ColourOptions& options) {
+  ColourFit fit;
+  fit.cameras.resize(cameras);
+  for (ColourUnknowns& c : fit.cameras) c.response = {options.gamma.value_or(2), 0, 0, 0};
+  fit.log_light.resize(equations.lights.size());
+  std::vector<double> count(fit.log_light.size());
+  for (const ColourEquation& e : equations.all) {
+    fit.log_light[e.light] += options.gamma.value_or(2) * std::log(e.sample) - e.known;
+    count[e.light] += 1;
+  }
+  for (std::size_t i = 0; i < count.size(); ++i) fit.log_light[i] /= std::max(1.0, count[i]);
+  return fit;
+}
+
+/// Corner's light and its standard deviation.
+void tell_corner(const ColourFit& fit, std::size_t camera, CalibratedColour& out) {
+  const auto at = static_cast<Eigen::Index>(10 * camera + 7);
+  const Eigen::Vector3d ones = Eigen::Vector3d::Ones();
+  out.corner = falloff(out.colour.vignetting, 1);
+  out.corner_sigma = std::sqrt(std::max(0.0, ones.dot(fit.covariance.block<3, 3>(at, at) * ones)));
+}
+
+/// Gains so that the geometric mean of those that share patches is 1, and their standard deviations against it.
+void tell_gains(const ColourFit& fit, const std::vector<std::size_t>& groups, std::size_t channel,
+                std::vector<CalibratedColour>& out) {
+  const std::size_t group = main_group(groups);
+  std::vector<std::size_t> members;
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    if (groups[i] == group) members.push_back(i);
+  const auto n = static_cast<double>(members.size());
+  const auto place = [&](std::size_t camera) { return static_cast<Eigen::Index>(10 * camera + 4 + channel); };
+  double mean = 0;
+  for (const std::size_t i : members) mean += fit.cameras[i].log_gain[channel] / n;
+  Eigen::VectorXd average = Eigen::VectorXd::Zero(fit.covariance.rows());
+  for (const std::size_t i : members) average[place(i)] = 1 / n;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (groups[i] != group) {
+      out[i].shares_patches = false;
+      continue;
+    }
+    Eigen::VectorXd own = -average;
+    own[place(i)] += 1;
+    out[i].colour.gain[channel] = std::exp(fit.cameras[i].log_gain[channel] - mean);
+    out[i].gain_sigma[channel] = std::sqrt(std::max(0.0, own.dot(fit.covariance * own)));
+  }
+}
+
+std::vector<double> response_table(const std::array<double, ResponseCurve::kParameters>& p) {
+  std::vector<double> table;
+  for (int i = 0; i < kResponsePoints; ++i)
+    table.push_back(ResponseCurve::exposure(p, static_cast<double>(i) / (kResponsePoints - 1)));
+  table.back() = 1;
+  return table;
+}
+
+void tell_residuals(const Equations& equations, const ColourFit& fit, ColourCalibration& out) {
+  double squares = 0;
+  int used = 0;
+  std::vector<double> by_camera(out.cameras.size());
+  std::vector<int> count(out.cameras.size());
+  for (std::size_t i = 0; i < equations.all.size(); ++i) {
+    const ColourEquation& e = equations.all[i];
+    CalibratedColour& camera = out.cameras[e.camera];
+    const double whole =
+        std::exp(ResponseCurve::log_exposure(fit.cameras[e.camera].response.data(), e.sample, e.variance));
+    const ReadingUse use = e.outlier ? ReadingUse::outlier : ReadingUse::used;
+    out.residuals.push_back({equations.reading[i], e.channel, whole - e.dark, std::expm1(e.residual), use});
+    ++camera.uses[static_cast<std::size_t>(use)];
+    if (e.outlier) continue;
+    camera.darkest = std::min(camera.darkest, e.sample);
+    camera.brightest = std::max(camera.brightest, e.sample);
+    by_camera[e.camera] += e.residual * e.residual;
+    ++count[e.camera];
+    squares += e.residual * e.residual;
+    ++used;
+  }
+  for (std::size_t i = 0; i < by_camera.size(); ++i)
+    out.cameras[i].rms = std::sqrt(by_camera[i] / std::max(1, count[i]));
+  out.rms = std::sqrt(squares / std::max(1, used));
+}
+
+/// What would help most comes first: each is weighed by the error that it would take away.
+void advise(ColourCalibration& out) {
+  std::vector<std::pair<double, std::string>> wishes;
+  for (const CalibratedColour& c : out.cameras) {
+    if (!c.shares_patches) {
+      wishes.emplace_back(1, "camera " + c.camera + ": a picture of the shared target with patches between a tenth and "
+                                                     "nine tenths of white");
+      continue;
+    }
+    if (!c.vignetting_known)
+      wishes.emplace_back(0.3, "camera " + c.camera + ": the target in the middle, half way out and in a corner, or a flat picture");
+    else if (c.corner_sigma > 0.005 * c.corner)
+      wishes.emplace_back(c.corner_sigma / c.corner,
+                          fmt::format("camera {}: the target nearer to the corners, or a flat picture (light there is {:.2f} +- {:.2f})",
+                                      c.camera, c.corner, c.corner_sigma));
+    const double gain = *std::max_element(c.gain_sigma.begin(), c.gain_sigma.end());
+    if (gain > 0.005)
+      wishes.emplace_back(gain, fmt::format("camera {}: more patches or lights (its gain is known to {:.1f} %)", c.camera, 100 * gain));
+    if (c.brightest < 0.7)
+      wishes.emplace_back(0.02, fmt::format("camera {}: a brighter patch or longer exposure (the brightest is {:.2f} of white)", c.camera, c.brightest));
+    if (c.darkest > 0.3)
+      wishes.emplace_back(0.02, fmt::format("camera {}: a darker patch or shorter exposure (the darkest is {:.2f} of white)", c.camera, c.darkest));
+  }
+  std::stable_sort(wishes.begin(), wishes.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  for (auto& wish : wishes) out.advice.push_back(std::move(wish.second));
+}
+
+void warn(const ColourReadings& readings, ColourCalibration& out) {
+  for (std::size_t i = 0; i < out.cameras.size(); ++i) {
+    const CalibratedColour& c = out.cameras[i];
+    const int used = c.uses[0];
+    if (!c.shares_patches)
+      out.warnings.push_back(fmt::format("camera {} shares no usable patch with the others{}: its gain is left at 1 and isn't known",
+                                         c.camera, used == 0 ? " (all its patches are saturated or dark)" : ""));
+    if (!c.vignetting_known) out.warnings.push_back("camera " + c.camera + ": too few places tell its vignetting, which is left out");
+    if (readings.cameras[i].dark.histogram[1].empty())
+      out.warnings.push_back("camera " + c.camera + ": no dark pictures, its dark level is taken to be 0");
+    if (c.uses[3] > 0.1 * (used + c.uses[3]))
+      out.warnings.push_back(fmt::format("camera {}: {} of {} readings don't fit and were left out", c.camera, c.uses[3], used + c.uses[3]));
+  }
+}
+
+Status check_colour_options(const ColourOptions& options) {
+  if (options.gamma && !(*options.gamma >= 0.3 && *options.gamma <= 5))
+    return bad_target("--gamma", "is out of range", "Give 0.3 to 5");
+  return {};
+}
+
+}  // namespace
+
+Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const ColourOptions& options) {
+  EMBERLOCK_RETURN_IF_ERROR(check_colour_options(options));
+  EMBERLOCK_RETURN_IF_ERROR(check_dark(readings));
+  Equations equations = equations_of(readings);
+  if (equations.all.empty()) {
+    const auto saturated = std::count_if(equations.left_out.begin(), equations.left_out.end(),
+                                         [](const ColourResidual& r) { return r.use == ReadingUse::saturated; });
+    return bad_target("target pictures",
+                      fmt::format("no patch can be used: of {} readings {} are saturated, the others too dark",
+                                  equations.left_out.size(), saturated),
+                      "Take pictures with the patches between a tenth and nine tenths of white");
+  }
+  EMBERLOCK_RETURN_IF_ERROR(check_rising(readings, equations));
+  if (!options.gamma && !response_told(equations.all)) {
+    return bad_target("target pictures", "nothing tells the cameras' response",
+                      "Add a series of exposures of one camera (target_LIGHT_SECONDSs.png), or the patches' radiances in "
+                      "colour.json, or give --gamma");
+  }
+  const std::size_t cameras = readings.cameras.size();
+  ColourHeld held{options.gamma.has_value(), std::vector<std::array<bool, 3>>(cameras), std::vector<bool>(cameras)};
+  std::array<std::vector<std::size_t>, 3> groups;
+  for (std::size_t c = 0; c < 3; ++c) {
+    groups[c] = groups_of(equations.all, cameras, c);
+    for (std::size_t i = 0; i < cameras; ++i) held.gain[i][c] = groups[c][i] == i;
+  }
+  for (std::size_t i = 0; i < cameras; ++i) held.vignetting[i] = !vignetting_told(equations.all, i);
+
+  ColourFit fit = start_of(equations, cameras, options);
+  constexpr int kDarkRounds = 3;  // what dark samples mean depends on the response
+  for (int round = 0; round < kDarkRounds; ++round) {
+    for (ColourEquation& e : equations.all)
+      e.dark = dark_exposure(readings.cameras[e.camera].dark, e.channel, fit.cameras[e.camera].response);
+    auto better = fit_colour(equations.all, std::move(fit), held, options.floor);
+    if (!better)
+      return bad_target("target pictures", "don't determine the cameras' colours",
+                        "Take more pictures of more patches by all cameras");
+    fit = std::move(*better);
+  }
+
+  ColourCalibration out;
+  for (std::size_t i = 0; i < cameras; ++i) {
+    CalibratedColour camera;
+    camera.camera = readings.cameras[i].id;
+    const ColourUnknowns& found = fit.cameras[i];
+    camera.gamma = found.response[0];
+    camera.colour.response = response_table(found.response);
+    camera.colour.vignetting = found.vignetting;
+    camera.colour.hot_pixels = readings.cameras[i].dark.hot_pixels;
+    for (std::size_t c = 0; c < 3; ++c)
+      camera.colour.dark[c] = dark_exposure(readings.cameras[i].dark, c, found.response);
+    camera.vignetting_known = !held.vignetting[i];
+    tell_corner(fit, i, camera);
+    out.cameras.push_back(std::move(camera));
+    if (std::adjacent_find(out.cameras[i].colour.response.begin(), out.cameras[i].colour.response.end(),
+                           std::greater_equal<>()) != out.cameras[i].colour.response.end()) {
+      return bad_target("camera " + readings.cameras[i].id, "its samples don't rise with light everywhere",
+                        "Check the exposures told; switch automatic exposure and tone off");
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c) tell_gains(fit, groups[c], c, out.cameras);
+  tell_residuals(equations, fit, out);
+  for (const ColourResidual& r : equations.left_out) {
+    out.residuals.push_back(r);
+    ++out.cameras[readings.patches[r.reading].camera].uses[static_cast<std::size_t>(r.use)];
+  }
+  warn(readings, out);
+  advise(out);
+  return out;
+}
+
+}  // namespace emberlock

@@ -1,0 +1,341 @@
+#include "recon/calibrate/colour_readings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <set>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "base/file.h"
+#include "recon/preprocess/dark_part.h"
+#include "recon/preprocess/hot_pixels.h"
+#include "session/frame_file.h"
+
+namespace emberlock {
+namespace fs = std::filesystem;
+namespace {
+
+using PlanJson = nlohmann::json;
+
+constexpr std::size_t kLargestPlan = std::size_t{16} << 20;
+constexpr int kFlatBlocks = 12;  // along each side
+
+Error bad_plan(std::string where, std::string what, std::string remedy) {
+  return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
+}
+
+Result<PatchPlace> parse_place(const PlanJson& json, const std::string& where) {
+  constexpr int kMost = 65536;
+  std::array<int, 4> v = {};
+  const bool shaped = json.is_array() && json.size() == 4 &&
+                      std::all_of(json.begin(), json.end(), [](const PlanJson& n) {
+                        return n.is_number_integer() && n >= 0 && n <= kMost;
+                      });
+  if (shaped) std::transform(json.begin(), json.end(), v.begin(), [](const PlanJson& n) { return n.get<int>(); });
+  if (!shaped || v[2] < 1 || v[3] < 1)
+    return bad_plan(where, "is no rectangle of whole pixels", "Give [x, y, width, height]");
+  return PatchPlace{v[0], v[1], v[2], v[3]};
+}
+
+Result<std::map<std::string, ColourPlan::Places>> parse_places(const PlanJson& json, const std::string& where) {
+  std::map<std::string, ColourPlan::Places> out;
+  if (!json.is_object()) return bad_plan(where, "is no object", "Give rectangles by patch, by camera");
+  for (const auto& [owner, places] : json.items()) {
+    if (!places.is_object()) return bad_plan(where + "." + owner, "is no object", "Give rectangles by patch");
+    for (const auto& [patch, place] : places.items()) {
+      EMBERLOCK_ASSIGN_OR_RETURN(out[owner][patch], parse_place(place, where + "." + owner + "." + patch));
+    }
+  }
+  return out;
+}
+
+Result<std::array<double, 3>> parse_radiance(const PlanJson& json, const std::string& where) {
+  std::array<double, 3> out = {};
+  const auto good = [](const PlanJson& n) { return n.is_number() && n.get<double>() > 0 && n.get<double>() < 1e9; };
+  if (good(json)) {
+    out.fill(json.get<double>());
+    return out;
+  }
+  if (!json.is_array() || json.size() != 3 || !std::all_of(json.begin(), json.end(), good))
+    return bad_plan(where, "is no radiance", "Give a number above 0, or three: [R, G, B]");
+  for (std::size_t c = 0; c < 3; ++c) out[c] = json[c].get<double>();
+  return out;
+}
+
+struct ChannelSamples {
+  std::vector<int> value;
+  int saturated = 0;
+};
+
+PatchReading summarise(const std::array<ChannelSamples, 3>& samples, int white) {
+  PatchReading out;
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::vector<int> v = samples[c].value;
+    if (v.empty()) continue;
+    std::sort(v.begin(), v.end());
+    const int median = v[v.size() / 2];
+    std::vector<int> off(v.size());
+    std::transform(v.begin(), v.end(), off.begin(), [&](int x) { return std::abs(x - median); });
+    std::nth_element(off.begin(), off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2), off.end());
+    const double limit = std::max(2.5, 5 * 1.4826 * (off[off.size() / 2] + 0.5));
+    double sum = 0;
+    double squares = 0;
+    for (const int x : v) {
+      if (std::abs(x - median) > limit) continue;
+      sum += x;
+      squares += static_cast<double>(x) * x;
+      ++out.count[c];
+    }
+    const double mean = sum / out.count[c];
+    out.mean[c] = mean / white;
+    out.variance[c] = std::max(0.0, squares / out.count[c] - mean * mean) / (static_cast<double>(white) * white);
+    out.saturated[c] = samples[c].saturated / static_cast<double>(v.size());
+  }
+  return out;
+}
+
+enum class Purpose { dark, flat, target };
+struct PicturePath {
+  fs::path path;
+  Purpose purpose = Purpose::target;
+  std::string light;
+  std::optional<double> exposure;
+};
+
+/// A file by its name; nothing for others.
+std::optional<PicturePath> by_name(const fs::path& path) {
+  const std::string stem = path.stem().string();
+  PicturePath out{path, Purpose::target, {}, {}};
+  if (stem.rfind("dark", 0) == 0) {
+    out.purpose = Purpose::dark;
+  } else if (stem.rfind("flat", 0) == 0) {
+    out.purpose = Purpose::flat;
+  } else if (stem.rfind("target", 0) != 0) {
+    return std::nullopt;
+  }
+  std::size_t at = stem.find('_');
+  while (at != std::string::npos) {
+    const std::size_t next = stem.find('_', at + 1);
+    const std::string word = stem.substr(at + 1, next == std::string::npos ? next : next - at - 1);
+    char* end = nullptr;
+    const double number = std::strtod(word.c_str(), &end);
+    if (word.size() > 1 && end == word.c_str() + word.size() - 1 && *end == 's' && number > 0 && std::isfinite(number))
+      out.exposure = number;
+    else
+      out.light += (out.light.empty() ? "" : "_") + word;
+    at = next;
+  }
+  return out;
+}
+
+/// Reads one camera's pictures into `readings`.
+class CameraPictures {
+ public:
+  CameraPictures(const ColourPlan& plan, const fs::path& folder, ColourReadings& readings)
+      : plan_(plan), folder_(folder), readings_(readings), index_(readings.cameras.size()) {
+    readings_.cameras.push_back({folder.filename().string(), {}, 1.0 / 255, {}});
+  }
+
+  Status add(const PicturePath& picture) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const Image image, read_image(picture.path));
+    ColourCamera& camera = readings_.cameras[index_];
+    if (camera.size == ImageSize{}) {
+      camera.size = image.layout().size;
+      camera.step = 1.0 / image.layout().white();
+      layout_ = image.layout();
+    } else if (image.layout() != layout_) {
+      return bad_plan(picture.path.string(),
+                      fmt::format("is {} x {} ({}), other pictures of camera {} are {} x {} ({})",
+                                  image.layout().size.width, image.layout().size.height, name(image.layout().format),
+                                  camera.id, camera.size.width, camera.size.height, name(layout_.format)),
+                      "Take all pictures of a camera with the settings it films with");
+    }
+    if (picture.purpose == Purpose::dark) return add_dark(image);
+    if (picture.purpose == Purpose::flat) return add_flat(image, picture);
+    return add_target(image, picture);
+  }
+
+  void finish() {
+    if (dark_.empty()) return;
+    DarkReading& dark = readings_.cameras[index_].dark;
+    std::vector<Samples> frames;
+    frames.reserve(dark_.size());
+    for (const Image& image : dark_) frames.push_back(samples_of(image.view()));
+    dark.hot_pixels = hot_pixels_of_dark(median_of(frames));
+    for (auto& histogram : dark.histogram) histogram.assign(256, 0);
+    std::array<double, 3> count = {};
+    for (const Samples& s : frames) {
+      const auto channels = static_cast<std::size_t>(s.channels());
+      for (std::size_t i = 0; i < s.value.size(); ++i) {
+        const auto pixel = i / channels;
+        const auto x = static_cast<int>(pixel % static_cast<std::size_t>(s.size.width));
+        const auto y = static_cast<int>(pixel / static_cast<std::size_t>(s.size.width));
+        const auto bin = static_cast<std::size_t>(std::clamp(std::lround(s.value[i]), 0L, 255L));
+        for (std::size_t c = 0; c < 3; ++c) {
+          const bool sees = s.layout == SampleLayout::grey || (s.layout == SampleLayout::rgb && i % 3 == c) ||
+                            (s.layout == SampleLayout::mosaic && mosaic_channel(x, y) == static_cast<int>(c));
+          if (!sees) continue;
+          dark.histogram[c][bin] += 1;
+          count[c] += 1;
+        }
+      }
+    }
+    for (std::size_t c = 0; c < 3; ++c)
+      for (double& share : dark.histogram[c]) share /= std::max(1.0, count[c]);
+  }
+
+ private:
+  Status add_dark(const Image& image) {
+    constexpr std::size_t kMost = 16;
+    if (dark_.size() < kMost) dark_.push_back(image);
+    return {};
+  }
+  Status add_flat(const Image& image, const PicturePath& picture) {
+    const ImageSize size = image.layout().size;
+    const int width = std::max(2, size.width / kFlatBlocks);
+    const int height = std::max(2, size.height / kFlatBlocks);
+    for (int y = 0; y + height <= size.height; y += height)
+      for (int x = 0; x + width <= size.width; x += width)
+        keep(image, picture, {x, y, width, height}, "flat:" + picture_name(picture));
+    return {};
+  }
+  Status add_target(const Image& image, const PicturePath& picture) {
+    const auto own = plan_.pictures.find(picture_name(picture));
+    const auto usual = plan_.patches.find(folder_.filename().string());
+    if (own == plan_.pictures.end() && usual == plan_.patches.end()) {
+      return bad_plan("colour.json: patches." + folder_.filename().string(), "is absent",
+                      "Say where this camera's pictures show the patches");
+    }
+    for (const auto& [patch, place] : own != plan_.pictures.end() ? own->second : usual->second) {
+      if (place.x + place.width > image.layout().size.width || place.y + place.height > image.layout().size.height) {
+        return bad_plan(picture.path.string(), "patch " + patch + " lies outside the picture",
+                        "Correct its rectangle in colour.json");
+      }
+      keep(image, picture, place, patch);
+    }
+    return {};
+  }
+  void keep(const Image& image, const PicturePath& picture, const PatchPlace& place, std::string patch) {
+    PatchReading reading = read_patch(image.view(), place);
+    reading.camera = index_;
+    reading.patch = std::move(patch);
+    reading.light = picture.light;
+    reading.picture = picture_name(picture);
+    reading.exposure = picture.exposure.value_or(1);
+    readings_.patches.push_back(std::move(reading));
+  }
+  [[nodiscard]] std::string picture_name(const PicturePath& picture) const {
+    return folder_.filename().string() + "/" + picture.path.filename().string();
+  }
+
+  const ColourPlan& plan_;
+  fs::path folder_;
+  ColourReadings& readings_;
+  std::size_t index_;
+  ImageLayout layout_;
+  std::vector<Image> dark_;
+};
+
+Result<std::vector<PicturePath>> pictures_in(const fs::path& folder) {
+  std::vector<PicturePath> out;
+  std::error_code ec;
+  for (const auto& entry : fs::directory_iterator(folder, ec)) {
+    if (!entry.is_regular_file()) continue;
+    if (auto picture = by_name(entry.path())) out.push_back(std::move(*picture));
+  }
+  if (ec) return Error{ErrorKind::io, ec.message(), folder.string(), "Check that it can be read"};
+  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.path < b.path; });
+  return out;
+}
+
+/// A picture without a told exposure among others with one would count as one second.
+Status check_exposures(const std::vector<PicturePath>& pictures) {
+  const PicturePath* told = nullptr;
+  const PicturePath* silent = nullptr;
+  for (const PicturePath& p : pictures)
+    if (p.purpose == Purpose::target) (p.exposure ? told : silent) = &p;
+  if (told == nullptr || silent == nullptr) return {};
+  return bad_plan(silent->path.string(), "doesn't tell its exposure, and " + told->path.filename().string() + " does",
+                  "Name every target picture's exposure, as target_LIGHT_0.01s.png, or none's");
+}
+
+}  // namespace
+
+PatchReading read_patch(const ImageView& picture, const PatchPlace& place) {
+  std::array<ChannelSamples, 3> samples;
+  const int white = picture.layout.white();
+  const bool mosaic = is_bayer(picture.layout.format);
+  const int channels = emberlock::channels(picture.layout.format);
+  for (int y = place.y; y < place.y + place.height; ++y) {
+    for (int x = place.x; x < place.x + place.width; ++x) {
+      for (int c = 0; c < 3; ++c) {
+        if (mosaic && mosaic_channel(x, y) != c) continue;
+        const int value = picture.sample(x, y, channels == 3 ? c : 0);
+        ChannelSamples& into = samples[static_cast<std::size_t>(c)];
+        into.value.push_back(value);
+        if (value >= white) ++into.saturated;
+      }
+    }
+  }
+  PatchReading out = summarise(samples, white);
+  out.x = place.x + 0.5 * place.width;
+  out.y = place.y + 0.5 * place.height;
+  return out;
+}
+
+Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& where) {
+  const PlanJson json = PlanJson::parse(text, nullptr, false);
+  if (!json.is_object()) return bad_plan(where, "is no JSON object", "See `emberlock calibrate colour --help`");
+  ColourPlan plan;
+  for (const auto& [key, value] : json.items()) {
+    const std::string field = where + ": " + key;
+    if (key == "patches") {
+      EMBERLOCK_ASSIGN_OR_RETURN(plan.patches, parse_places(value, field));
+    } else if (key == "pictures") {
+      EMBERLOCK_ASSIGN_OR_RETURN(plan.pictures, parse_places(value, field));
+    } else if (key == "radiance") {
+      if (!value.is_object()) return bad_plan(field, "is no object", "Give radiances by patch");
+      for (const auto& [patch, radiance] : value.items()) {
+        EMBERLOCK_ASSIGN_OR_RETURN(plan.radiance[patch], parse_radiance(radiance, field + "." + patch));
+      }
+    } else {
+      return bad_plan(field, "is no key of colour.json", "Keys are patches, pictures and radiance");
+    }
+  }
+  return plan;
+}
+
+Result<ColourReadings> read_colour_folder(const fs::path& folder, const Progress& progress) {
+  std::error_code ec;
+  if (!fs::is_directory(folder, ec))
+    return bad_plan(folder.string(), "is no folder", "Name the folder that holds colour.json and a folder for each camera");
+  const fs::path plan_path = folder / "colour.json";
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(plan_path, kLargestPlan));
+  EMBERLOCK_ASSIGN_OR_RETURN(const ColourPlan plan, parse_colour_plan(text, plan_path.string()));
+  std::set<fs::path> cameras;
+  for (const auto& entry : fs::directory_iterator(folder, ec))
+    if (entry.is_directory()) cameras.insert(entry.path());
+  ColourReadings readings;
+  std::size_t done = 0;
+  for (const fs::path& camera : cameras) {
+    report(progress, static_cast<double>(done++) / static_cast<double>(cameras.size()),
+           "reading " + camera.filename().string());
+    EMBERLOCK_ASSIGN_OR_RETURN(const auto pictures, pictures_in(camera));
+    if (pictures.empty()) continue;
+    EMBERLOCK_RETURN_IF_ERROR(check_exposures(pictures));
+    CameraPictures into(plan, camera, readings);
+    for (const PicturePath& picture : pictures) EMBERLOCK_RETURN_IF_ERROR(into.add(picture));
+    into.finish();
+  }
+  if (readings.cameras.empty()) {
+    return bad_plan(folder.string(), "no camera's folder holds a target*, flat* or dark* picture",
+                    "Give each camera a folder with its pictures in it");
+  }
+  readings.radiance = plan.radiance;
+  return readings;
+}
+
+}  // namespace emberlock

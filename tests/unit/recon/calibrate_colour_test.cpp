@@ -1,0 +1,190 @@
+#include "recon/calibrate/colour.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/support/colour_rig.h"
+
+namespace emberlock {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(CalibrateColour, ElevenUnlikeCamerasShowNewPatchesAlikeToOnePercent) {
+  const auto rig = test::colour_rig(11, 1);
+  const auto calibration = calibrate_colour(test::film_target(rig, 1));
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_TRUE(calibration->warnings.empty()) << calibration->warnings.front();
+  const test::PatchSpread before = test::held_out_spread(rig, nullptr, 2);
+  const test::PatchSpread after = test::held_out_spread(rig, &*calibration, 2);
+  EXPECT_GT(before.worst_pair, 1.0) << "the cameras are unlike";
+  EXPECT_GT(after.compared, 60);
+  EXPECT_LE(after.worst, 0.01);
+  EXPECT_LE(after.rms, 0.003);
+  EXPECT_GT(after.saturated, 10);
+  EXPECT_EQ(after.unmarked, 0);
+}
+
+TEST(CalibrateColour, GainsLieWithinTheirStatedUncertaintyAndHaveTheMeanOne) {
+  const auto rig = test::colour_rig(4, 3);
+  const auto calibration = calibrate_colour(test::film_target(rig, 3));
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  for (std::size_t c = 0; c < 3; ++c) {
+    double mean = 0;
+    double product = 1;
+    for (std::size_t i = 0; i < rig.size(); ++i) {
+      mean += std::log(rig[i].gain[c]) / 4;
+      product *= calibration->cameras[i].colour.gain[c];
+    }
+    EXPECT_NEAR(product, 1, 1e-9);
+    for (std::size_t i = 0; i < rig.size(); ++i) {
+      const CalibratedColour& camera = calibration->cameras[i];
+      EXPECT_NEAR(std::log(camera.colour.gain[c]), std::log(rig[i].gain[c]) - mean, 4 * camera.gain_sigma[c]);
+      EXPECT_LT(camera.gain_sigma[c], 0.01);
+    }
+  }
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    EXPECT_NEAR(calibration->cameras[i].corner, falloff(rig[i].vignetting, 1), 4 * calibration->cameras[i].corner_sigma);
+  }
+}
+
+TEST(CalibrateColour, AResponseThatIsNoPowerLawIsFound) {
+  auto rig = test::colour_rig(3, 4);
+  for (test::ColourTruth& camera : rig) camera.toe = 0.5;
+  const auto calibration = calibrate_colour(test::film_target(rig, 4));
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_LE(test::held_out_spread(rig, &*calibration, 5).worst, 0.015);
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    for (const double v : {0.2, 0.5, 0.8}) {
+      const double truth = std::pow(v, rig[i].gamma + 0.5 * (1 - v));
+      EXPECT_NEAR(exposure_of(calibration->cameras[i].colour, v) / truth, 1, 0.03) << v;
+    }
+  }
+}
+
+TEST(CalibrateColour, WrongPatchesAreLeftOut) {
+  const auto rig = test::colour_rig(3, 6);
+  ColourReadings readings = test::film_target(rig, 6);
+  for (std::size_t i = 0; i < readings.patches.size(); i += 20)
+    for (double& m : readings.patches[i].mean) m *= 0.8;  // a hand's shadow
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_LE(test::held_out_spread(rig, &*calibration, 7).worst, 0.01);
+  EXPECT_GT(calibration->cameras[0].uses[static_cast<std::size_t>(ReadingUse::outlier)], 5);
+}
+
+TEST(CalibrateColour, KnownRadiancesTellTheResponseWithoutAnExposureSeries) {
+  const auto rig = test::colour_rig(2, 8);
+  ColourReadings readings = test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true});
+  EXPECT_THAT(calibrate_colour(readings).error().message(), HasSubstr("nothing tells the cameras' response"));
+  const auto chart = test::colour_chart(8, 8);
+  for (std::size_t p = 0; p < chart.size(); ++p) readings.radiance["p" + std::to_string(p)] = chart[p];
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_LE(test::held_out_spread(rig, &*calibration, 9).worst, 0.01);
+}
+
+TEST(CalibrateColour, AToldGammaIsTaken) {
+  auto rig = test::colour_rig(2, 8);
+  for (test::ColourTruth& camera : rig) camera.gamma = 2.2;
+  const auto calibration = calibrate_colour(test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true}),
+                                            {.gamma = 2.2});
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_EQ(calibration->cameras[0].gamma, 2.2);
+  EXPECT_LE(test::held_out_spread(rig, &*calibration, 9).worst, 0.01);
+  EXPECT_THAT(calibrate_colour({}, {.gamma = 9.0}).error().message(), HasSubstr("--gamma"));
+}
+
+TEST(CalibrateColour, EveryPatchSaturatedIsSaidSo) {
+  const auto rig = test::colour_rig(2, 8);
+  ColourReadings readings = test::film_target(rig, 8);
+  for (PatchReading& p : readings.patches) p.saturated = {1, 1, 1};
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_FALSE(calibration.ok());
+  EXPECT_EQ(calibration.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(calibration.error().message(), HasSubstr("are saturated"));
+}
+
+TEST(CalibrateColour, ACameraThatSharesNoPatchIsNamedAndTheOthersAreCalibrated) {
+  const auto rig = test::colour_rig(3, 8);
+  ColourReadings readings = test::film_target(rig, 8);
+  for (PatchReading& p : readings.patches)
+    if (p.camera == 1) p.patch = "own " + p.patch;
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_FALSE(calibration->cameras[1].shares_patches);
+  EXPECT_EQ(calibration->cameras[1].colour.gain[0], 1);
+  ASSERT_FALSE(calibration->warnings.empty());
+  EXPECT_THAT(calibration->warnings.front(), HasSubstr("camera cam1 shares no usable patch"));
+  EXPECT_THAT(calibration->advice.front(), HasSubstr("camera cam1"));
+  ColourCalibration others;
+  others.cameras = {calibration->cameras[0], calibration->cameras[2]};
+  EXPECT_LE(test::held_out_spread({rig[0], rig[2]}, &others, 9).worst, 0.01);
+}
+
+TEST(CalibrateColour, SamplesThatFallWithLightAreRefused) {
+  const auto rig = test::colour_rig(2, 8);
+  ColourReadings readings = test::film_target(rig, 8);
+  for (PatchReading& p : readings.patches)
+    if (p.camera == 1) p.exposure = 1 / p.exposure;
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_FALSE(calibration.ok());
+  EXPECT_THAT(calibration.error().message(), HasSubstr("camera cam1"));
+  EXPECT_THAT(calibration.error().message(), HasSubstr("more exposure makes it darker"));
+}
+
+TEST(CalibrateColour, DarkPicturesBrighterThanTheTargetAreRefused) {
+  const auto rig = test::colour_rig(2, 8);
+  ColourReadings readings = test::film_target(rig, 8);
+  for (auto& histogram : readings.cameras[1].dark.histogram) {
+    histogram.assign(256, 0);
+    histogram[254] = 1;
+  }
+  EXPECT_THAT(calibrate_colour(readings).error().message(), HasSubstr("camera cam1: its dark pictures are brighter"));
+}
+
+TEST(CalibrateColour, OnePlaceAloneTellsNoVignetting) {
+  const auto rig = test::colour_rig(2, 8);
+  ColourReadings readings = test::film_target(rig, 8);
+  std::erase_if(readings.patches, [](const PatchReading& p) { return std::abs(p.x - 320) > 100 || std::abs(p.y - 240) > 60; });
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_FALSE(calibration->cameras[0].vignetting_known);
+  EXPECT_EQ(calibration->cameras[0].corner, 1);
+  EXPECT_THAT(calibration->warnings, testing::Contains(HasSubstr("too few places tell its vignetting")));
+}
+
+TEST(ReadPatch, LeavesDirtOutAndCountsWhatIsSaturated) {
+  Image image(ImageLayout{{20, 10}, PixelFormat::rgb8, 8});
+  for (int y = 0; y < 10; ++y)
+    for (int x = 0; x < 20; ++x) {
+      auto* rgb = image.row_as<std::uint8_t>(y) + 3 * x;
+      rgb[0] = static_cast<std::uint8_t>(100 + (x & 1));
+      rgb[1] = x < 5 ? 255 : 250;
+      rgb[2] = x == 7 && y == 3 ? 200 : 51;
+    }
+  const PatchReading reading = read_patch(image.view(), {0, 0, 20, 10});
+  EXPECT_NEAR(reading.mean[0], 100.5 / 255, 1e-12);
+  EXPECT_NEAR(reading.variance[0], 0.25 / (255 * 255), 1e-12);
+  EXPECT_EQ(reading.saturated[1], 0.25);
+  EXPECT_NEAR(reading.mean[2], 0.2, 1e-12);
+  EXPECT_EQ(reading.count[2], 199);
+  EXPECT_EQ(reading.x, 10);
+}
+
+TEST(ColourPlan, SaysWhichFieldIsWrong) {
+  const auto message = [](const char* json) {
+    const auto plan = parse_colour_plan(json, "colour.json");
+    return plan.ok() ? std::string() : plan.error().message();
+  };
+  EXPECT_EQ(message(R"({"patches": {"a": {"white": [1, 2, 3, 4]}}, "radiance": {"white": 0.9, "red": [1, 2, 3]}})"), "");
+  EXPECT_THAT(message("[]"), HasSubstr("no JSON object"));
+  EXPECT_THAT(message(R"({"patchs": {}})"), HasSubstr("patchs"));
+  EXPECT_THAT(message(R"({"patches": {"a": {"white": [1, 2, 3]}}})"), HasSubstr("patches.a.white"));
+  EXPECT_THAT(message(R"({"patches": {"a": {"white": [1, 2, 0, 4]}}})"), HasSubstr("patches.a.white"));
+  EXPECT_THAT(message(R"({"patches": {"a": {"white": [1, -2, 3, 4]}}})"), HasSubstr("patches.a.white"));
+  EXPECT_THAT(message(R"({"pictures": {"a/b.png": 3}})"), HasSubstr("pictures.a/b.png"));
+  EXPECT_THAT(message(R"({"radiance": {"white": -1}})"), HasSubstr("radiance.white"));
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -6,8 +6,10 @@
 #include <fmt/format.h>
 
 #include "recon/adjust/find_extinction.h"
+#include "recon/adjust/find_motion.h"
 #include "recon/adjust/predict_effects.h"
 #include "recon/adjust/prepared_scene.h"
+#include "recon/effects/motion.h"
 #include "recon/preprocess/picture_clues.h"
 
 namespace emberlock {
@@ -48,23 +50,98 @@ Effects told_by_the_pictures(const Scene& scene, const EffectRequest& request) {
   return known;
 }
 
+/// Decides on the motion, in two halves: where it rises before anything else is known, and the rest once the
+/// extinction is.
+class MotionChoice {
+ public:
+  MotionChoice(const Scene& scene, const Grid& grid, const EffectRequest& request,
+               const SolveOptions& options, Pool& pool, const Elapsed& elapsed)
+      : scene_(scene), grid_(grid), request_(request), options_(options), pool_(pool), elapsed_(elapsed) {}
+
+  /// None, or about how the flame rises.
+  Motion rough(const Effects& known) {
+    if (request_.fixed) return request_.fixed->motion;
+    const Seconds start = now();
+    const PreparedScene linear(scene_, known);
+    found_ = find_rise({linear.scene(), grid_, known, options_, pool_}, request_.tolerance);
+    seconds_ = now() - start;
+    on_ = found_.gain >= request_.tolerance;
+    return on_ ? found_.motion : Motion{};
+  }
+  /// The same to the last digit. `known` brings the extinction, and the rough motion.
+  Motion fine(Effects known) {
+    const Motion rough = known.motion;
+    known.motion = {};
+    const Seconds start = now();
+    if (request_.fixed) {
+      on_ = moves(scene_, rough);
+      if (on_)
+        found_ = judge_motion({PreparedScene(scene_, known).scene(), grid_, known, options_, pool_}, rough);
+      found_.motion = rough;
+    } else if (on_) {
+      const PreparedScene linear(scene_, known);
+      found_ = refine_motion({linear.scene(), grid_, known, options_, pool_}, rough);
+    }
+    seconds_ += now() - start;
+    return on_ ? found_.motion : rough;
+  }
+  [[nodiscard]] EffectReport report() const { return {"motion", on_, found_.change, seconds_, reason(), {}}; }
+
+ private:
+  [[nodiscard]] Seconds now() const { return elapsed_ ? elapsed_() : Seconds(0); }
+  [[nodiscard]] std::string reason() const {
+    if (!any_late(scene_)) return "no view is known to be late";
+    if (request_.fixed && !on_) return "left out by hand";
+    const auto& v = found_.motion.velocity;
+    const std::string what = fmt::format(
+        "{:.2f} / {:.2f} / {:.2f} m/s between the views' instants changes the pictures by {:.2g} "
+        "grey levels",
+        v[0], v[1], v[2], found_.change);
+    if (request_.fixed) return "set by hand: " + what;
+    if (found_.motion.carry == Motion::Carry::none)
+      return fmt::format(
+          "no flame is fast enough to change the pictures by {:.2g} grey levels between the "
+          "views' instants",
+          request_.tolerance);
+    const std::string gain = fmt::format(", and the held-out error by about {:.2g}", found_.gain);
+    if (!on_) return what + gain + fmt::format(", less than {:.2g}", request_.tolerance);
+    const bool averaged = std::all_of(scene_.views.begin(), scene_.views.end(), [](const View& view) {
+      return view.average || view.lateness == Seconds(0);
+    });
+    return what + gain +
+           (averaged ? "" : " (what stays where it is isn't known: pictures of other instants would tell)");
+  }
+
+  const Scene& scene_;
+  const Grid& grid_;
+  const EffectRequest& request_;
+  const SolveOptions& options_;
+  Pool& pool_;
+  const Elapsed& elapsed_;
+  FoundMotion found_;
+  Seconds seconds_{0};
+  bool on_ = false;
+};
+
 }  // namespace
 
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
                                     const SolveOptions& options, const Elapsed& elapsed) try {
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
-  const Seconds start = elapsed ? elapsed() : Seconds(0);
   Effects known;
   if (request.fixed)
     known = *request.fixed;
   else
     known = told_by_the_pictures(scene, request);
-  const PreparedScene prepared(scene, known.sensor);
+  Pool pool(options.compute.threads, device);
+  MotionChoice motion(scene, grid, request, options, pool, elapsed);
+  known.motion = motion.rough(known);
+  const Seconds start = elapsed ? elapsed() : Seconds(0);
+  const PreparedScene prepared(scene, known);
   const Scene& linear = prepared.scene();
   const std::vector<FlameMask> masks = masks_before(linear, known.background, options.flame_threshold);
   EMBERLOCK_ASSIGN_OR_RETURN(const Hull hull, carve(linear, masks, grid, options.compute));
-  Pool pool(options.compute.threads, device);
   SolverSetup setup{{}, {}, hull, known, options, pool};
   const std::vector<PixelBox> boxes = flame_boxes(linear, masks);
   for (std::size_t v = 0; v < linear.views.size(); ++v) {
@@ -102,6 +179,9 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
                              predict_effects(flame, decided, request, options.compute, elapsed));
   choice.reports.insert(choice.reports.begin(), std::move(report));
+  known.extinction = choice.effects.extinction;
+  choice.effects.motion = motion.fine(known);
+  choice.reports.push_back(motion.report());
   return choice;
 } catch (const DeviceError& e) {
   return e.error();

@@ -64,7 +64,7 @@ Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects
   const Seconds start = now();
 
   const bool paper = options.solver == Solver::paper;
-  const PreparedScene prepared(scene, effects.sensor);
+  const PreparedScene prepared(scene, effects);
   const Scene& linear = prepared.scene();
   // Errors are counted over these boxes, whatever the threshold.
   const std::vector<FlameMask> own = masks_before(linear, effects.background);

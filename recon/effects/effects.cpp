@@ -15,7 +15,7 @@ Error bad(std::string what) {
           "scattering=none|single|multiple[:albedo=VALUE][:g=VALUE], "
           "refraction=straight|curved[:flame=KELVIN][:ambient=KELVIN], "
           "background=black|image|LEVEL|RED/GREEN/BLUE, exposure=instant|SECONDS[:rise=M/S], gamma=VALUE, "
-          "saturation=none|LEVEL"};
+          "saturation=none|LEVEL, motion=none|RISE|X/Y/Z (m/s)"};
 }
 
 Error unknown(std::string_view text) { return bad("can't read '" + std::string(text) + "'"); }
@@ -105,6 +105,13 @@ bool read_refraction(Item& item, Effects& effects) {
   return true;
 }
 
+/// A/B/C
+bool read_three(std::string_view text, std::array<double, 3>& values) {
+  if (std::count(text.begin(), text.end(), '/') != 2) return false;
+  return std::all_of(values.begin(), values.end(),
+                     [&](double& value) { return read(take(text, '/'), value); });
+}
+
 bool read_background(Item& item, Effects& effects) {
   Background& background = effects.background;
   if (item.is("black")) return true;
@@ -118,10 +125,7 @@ bool read_background(Item& item, Effects& effects) {
     background.radiance.fill(grey);
     return true;
   }
-  std::string_view rest = item.choice();
-  if (std::count(rest.begin(), rest.end(), '/') != 2) return false;
-  return std::all_of(background.radiance.begin(), background.radiance.end(),
-                     [&](double& level) { return read(take(rest, '/'), level); });
+  return read_three(item.choice(), background.radiance);
 }
 
 bool read_exposure(Item& item, Effects& effects) {
@@ -147,6 +151,13 @@ bool read_saturation(Item& item, Effects& effects) {
   return true;
 }
 
+bool read_motion(Item& item, Effects& effects) {
+  if (item.is("none")) return true;
+  Motion& motion = effects.motion;
+  motion.carry = Motion::Carry::uniform;
+  return item.number(motion.velocity[2]) || read_three(item.choice(), motion.velocity);
+}
+
 struct Reader {
   std::string_view name;
   bool (*read)(Item&, Effects&);
@@ -154,7 +165,7 @@ struct Reader {
 constexpr Reader kTable[] = {
     {"extinction", read_extinction}, {"scattering", read_scattering}, {"refraction", read_refraction},
     {"background", read_background}, {"exposure", read_exposure},     {"gamma", read_gamma},
-    {"saturation", read_saturation},
+    {"saturation", read_saturation}, {"motion", read_motion},
 };
 
 Result<Effects> parse_list(std::string_view text) {
@@ -206,7 +217,7 @@ Result<EffectRequest> parse_auto(std::string_view text) {
 }  // namespace
 
 Status check(const Effects& effects) {
-  const auto& [extinction, scattering, refraction, background, exposure, sensor] = effects;
+  const auto& [extinction, scattering, refraction, background, exposure, sensor, motion] = effects;
   constexpr double kMost = 1e30;  // what a float holds with room to spare; also refuses infinity
   constexpr double kColdest = 100;
   constexpr double kHottest = 1e5;
@@ -221,6 +232,8 @@ Status check(const Effects& effects) {
     if (!within(level, 0, kMost)) return bad("background must be 0 or more");
   if (!within(exposure.time.value(), 0, 10)) return bad("exposure must lie in 0..10 s");
   if (!within(exposure.rise_speed, -20, 20)) return bad("rise must lie in -20..20 m/s");
+  for (const double speed : motion.velocity)
+    if (!within(speed, -20, 20)) return bad("motion must lie in -20..20 m/s");
   if (!within(sensor.gamma, 0.1, 10)) return bad("gamma must lie in 0.1..10");
   if (!within(sensor.white, 1e-6, kMost)) return bad("saturation must be a level above 0");
   return {};

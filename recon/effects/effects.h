@@ -63,6 +63,15 @@ struct Exposure {
   double rise_speed = 1;  ///< m/s along +z; about 1 in candles and small fires
 };
 
+/// How the flame moves while the views, each at its own instant (View::lateness), film it. Its average over
+/// the recording stays, and what differs from the average is carried along as it is (Taylor 1938, "The
+/// Spectrum of Turbulence": frozen turbulence); where no average is known, all of it is carried.
+struct Motion {
+  enum class Carry { none, uniform };
+  Carry carry = Carry::none;
+  std::array<double, 3> velocity = {};  ///< m/s in the world
+};
+
 /// From radiance to pixel values: value = white * (radiance / white)^(1 / gamma), clipped at white. A clipped
 /// pixel bounds the radiance from below and says no more.
 struct Sensor {
@@ -81,6 +90,7 @@ struct Effects {
   Background background;
   Exposure exposure;
   Sensor sensor;
+  Motion motion;
 };
 
 /// An Error that names the first value out of its range, as parse_effects states them.
@@ -122,6 +132,7 @@ struct EffectRequest {
 ///   exposure=instant|SECONDS                    0..10 s; :rise=1 (m/s, -20..20)
 ///   gamma=GAMMA                                 0.1..10; 1 is linear
 ///   saturation=none|LEVEL                       > 0; also gamma's white, 255 otherwise
+///   motion=none|RISE|X/Y/Z                      -20..20 m/s, RISE along +z; of views whose times differ
 /// An Error that says what can't be read and lists these names otherwise.
 Result<EffectRequest> parse_effects(std::string_view text);
 

@@ -104,19 +104,20 @@ Outcome finish(const Task& task, const SolveOptions& options, Reconstruction don
   const Scene& scene = task.scene;
   Outcome outcome;
   const Seconds start = task.elapsed();
+  const PreparedScene prepared(scene, done.effects);
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     report(progress,
            kSolveTo + (1 - kSolveTo) * static_cast<double>(i) / static_cast<double>(scene.views.size()),
            "rendering the views");
-    outcome.renders.push_back(render_view(done.volume, done.hull, done.effects, scene.views[i].camera,
+    outcome.renders.push_back(render_view(done.volume, done.hull, done.effects,
+                                          prepared.scene().views[i].camera,
                                           RenderOptions{.compute = options.compute}));
+    at_own_instant(outcome.renders.back(), scene, i, done.effects);
   }
   outcome.report = describe(scene, done.hull.grid, options, task.device);
   Report& result = outcome.report;
   result.hull_voxels = done.hull.count;
-  result.views =
-      judge(scene, masks_before(PreparedScene(scene, done.effects.sensor).scene(), done.effects.background),
-            outcome.renders);
+  result.views = judge(scene, masks_before(prepared.scene(), done.effects.background), outcome.renders);
   result.input_rmse = over_views(result.views, ViewRole::input).value_or(ChannelRmse{});
   result.heldout_rmse = over_views(result.views, ViewRole::held_out);
   result.hull_time = done.hull_time;

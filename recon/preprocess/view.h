@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/quantity.h"
 #include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
 
@@ -35,6 +36,10 @@ struct View {
   /// R, G and B. Empty where no pixel is. Unlike Sensor::Clipping's one white for all views, it holds after
   /// gains and vignetting have been taken out.
   std::vector<std::uint8_t> bounds = {};
+  Seconds lateness{0};        ///< by how much it was filmed after the scene's instant
+  Seconds lateness_sigma{0};  ///< standard error of that
+  /// What the camera shows on average over the recording, of the image's size; absent is not known.
+  std::optional<RadianceImage> average = {};
 };
 
 /// A step of preparing the pictures: whether it ran, and why.

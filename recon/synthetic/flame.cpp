@@ -176,6 +176,23 @@ void add_noise(RadianceImage& image, double sigma, std::uint64_t seed, std::uint
     image.rgb[i] = std::max(0.F, image.rgb[i] + static_cast<float>(sigma * random_normal(seed, view, i)));
 }
 
+/// Long before and long after `time` the flame is another one of its kind.
+void film_average(const Flame& flame, const PaperSceneOptions& options, Scene& scene) {
+  constexpr double kRate = 24;
+  constexpr int kVoxels = 96;  // an average is smooth
+  const Grid grid = grid_over(scene.box, std::min(kVoxels, options.truth_voxels));
+  for (View& view : scene.views) view.average.emplace(view.image.size);
+  const auto share = 1 / static_cast<float>(options.averaged_frames);
+  for (int frame = 0; frame < options.averaged_frames; ++frame) {
+    const Seconds time = options.time + Seconds((frame - options.averaged_frames / 2) / kRate);
+    const FlameTruth truth = flame.at(time, grid);
+    for (View& view : scene.views) {
+      const RadianceImage image = render_view(truth.volume, truth.medium, truth.effects, view.camera);
+      for (std::size_t p = 0; p < image.rgb.size(); ++p) view.average->rgb[p] += share * image.rgb[p];
+    }
+  }
+}
+
 }  // namespace
 
 Flame::Flame(const FlameOptions& options) : options_(options), noise_(std::make_unique<Noise>(options.seed)) {
@@ -266,6 +283,7 @@ Scene paper_scene(const PaperSceneOptions& options) {
         name, look_at(intrinsics, on_sphere(0.3, azimuth, elevation), Eigen::Vector3d::Zero()), {}, role};
     const std::size_t i = scene.views.size();
     const Seconds late = i < options.lateness.size() ? options.lateness[i] : Seconds(0);
+    view.lateness = late;
     std::optional<FlameTruth> moved;
     if (late != Seconds(0)) moved = flame.at(options.time + late, grid);
     const FlameTruth& truth = moved ? *moved : in_time;
@@ -276,6 +294,7 @@ Scene paper_scene(const PaperSceneOptions& options) {
   for (int i = 0; i < 10; ++i)
     film("camera " + std::to_string(i), 36.0 * i, i % 2 == 0 ? 10 : -10, ViewRole::input);
   film("test view", 90, 0, ViewRole::held_out);
+  if (options.averaged_frames > 0) film_average(flame, options, scene);
   return scene;
 }
 

@@ -69,11 +69,13 @@ struct PaperSceneOptions {
   int truth_voxels = 192;   ///< the truth's own grid, unlike any solver's
   double truth_step = 0.5;  ///< of the march that films it, in its voxel edges
   double noise = 0;         ///< standard deviation of the pixels, grey levels
+  int averaged_frames =
+      0;  ///< at 24 a second, around `time`, that make each View::average; 0: it isn't known
 };
 
 /// The paper's set-up: ten input views at intervals of 36 degrees, 30 cm from the origin, alternately
 /// somewhat above and below the plane, 60 degrees of view, around a volume of 20 cm; the eleventh view,
-/// between two of them, is held out.
+/// between two of them, is held out. The views' lateness is theirs to know.
 Scene paper_scene(const PaperSceneOptions& options = {});
 
 }  // namespace emberlock

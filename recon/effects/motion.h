@@ -1,0 +1,28 @@
+#pragma once
+
+#include "recon/effects/effects.h"
+#include "recon/preprocess/view.h"
+
+namespace emberlock {
+
+// A view that is late sees the flame carried on by velocity * lateness. A camera that is moved back by as
+// much sees what is carried as it was at the scene's instant, so no march and no solver knows of the motion.
+// What stays, the average, would move with the camera: what it shows from the one place and not from the
+// other is taken out of the picture, by the average picture itself.
+
+/// Whether the motion changes anything: it is on, and some view is late.
+[[nodiscard]] bool moves(const Scene& scene, const Motion& motion);
+
+/// The camera of a late view, moved back to see the flame of the scene's instant.
+CameraModel camera_at_instant(const View& view, const Motion& motion);
+
+/// How `picture` of a view's camera differs from what the moved camera would see of the same, for light from
+/// about the distance of `flame` (metres, world).
+RadianceImage change_of_place(const RadianceImage& picture, const View& view, const Motion& motion,
+                              const Eigen::Vector3d& flame);
+
+/// A view as it would have been filmed at the scene's instant, by the moved camera. Pictures must be linear
+/// in light. Pixels from `white` on (> 0) are bounds and stay.
+void bring_to_instant(View& view, const Motion& motion, const Eigen::Vector3d& flame, double white = 0);
+
+}  // namespace emberlock

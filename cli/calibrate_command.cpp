@@ -16,6 +16,7 @@
 #include "cli/scene_options.h"
 #include "recon/calibrate/board_pictures.h"
 #include "recon/calibrate/calibrate_rig.h"
+#include "recon/calibrate/drift.h"
 #include "recon/calibrate/next_pictures.h"
 #include "recon/calibrate/rig_formats.h"
 
@@ -161,6 +162,92 @@ void add_cameras(CLI::App& parent) {
   verb->callback([arguments] { calibrate_cameras(*arguments); });
 }
 
+const char* words_of(DriftVerdict verdict) {
+  switch (verdict) {
+    case DriftVerdict::still:
+      return "still";
+    case DriftVerdict::moved:
+      return "moved";
+    case DriftVerdict::lens:
+      return "lens";
+    case DriftVerdict::unknown:
+      return "unknown";
+  }
+  return "";
+}
+
+nlohmann::json drift_json(const DriftReport& report) {
+  nlohmann::json cameras = nlohmann::json::array();
+  for (const CameraDrift& camera : report.cameras) {
+    cameras.push_back({{"camera", camera.id},
+                       {"verdict", words_of(camera.verdict)},
+                       {"why", camera.why},
+                       {"instants", camera.instants},
+                       {"place_mm", {camera.place.x() * 1e3, camera.place.y() * 1e3, camera.place.z() * 1e3}},
+                       {"place_sigma_mm", camera.place_sigma * 1e3},
+                       {"turn_degrees", camera.turn.norm() * kDegreesOfRadian},
+                       {"turn_sigma_degrees", camera.turn_sigma * kDegreesOfRadian},
+                       {"chi2", camera.chi2},
+                       {"rms_before_pixels", camera.rms_before},
+                       {"rms_after_pixels", camera.rms_after}});
+  }
+  return {{"drifted", report.drifted()},
+          {"chi2_limit", report.limit},
+          {"rms_before_pixels", report.rms_before},
+          {"rms_after_pixels", report.rms_after},
+          {"one_of_two", report.one_of_two},
+          {"cameras", cameras}};
+}
+
+void print_drift(const DriftReport& report) {
+  std::printf("%.3f pixels RMS as calibrated, %.3f with the cameras moved that moved; a camera moved if its chi-square (6 "
+              "degrees of freedom) is above %.1f\n",
+              report.rms_before, report.rms_after, report.limit);
+  for (const CameraDrift& camera : report.cameras) {
+    if (camera.verdict == DriftVerdict::unknown || camera.verdict == DriftVerdict::lens) {
+      std::printf("%-12s %-8s %s\n", camera.id.c_str(), words_of(camera.verdict), camera.why.c_str());
+      continue;
+    }
+    std::printf("%-12s %-8s %.2f mm (+- %.2f), %.3f degrees (+- %.3f), chi-square %.1f, from %zu instants\n",
+                camera.id.c_str(), words_of(camera.verdict), camera.place.norm() * 1e3, camera.place_sigma * 1e3,
+                camera.turn.norm() * kDegreesOfRadian, camera.turn_sigma * kDegreesOfRadian, camera.chi2,
+                camera.instants);
+  }
+  if (report.drifted() && report.one_of_two)
+    std::printf("Two cameras tell only that they moved against each other, not which of them did.\n");
+  std::printf("%s\n", report.drifted() ? "The calibration doesn't hold any more: run `emberlock calibrate cameras` anew."
+                                       : "The calibration holds.");
+}
+
+void add_check(CLI::App& parent) {
+  struct Arguments {
+    std::string rig;
+    std::vector<std::string> pictures;
+    std::string board;
+    bool json = false;
+  };
+  auto arguments = std::make_shared<Arguments>();
+  CLI::App* verb = parent.add_subcommand(
+      "check", "Whether a camera moved since the calibration, from later pictures of the board; 1 if one did");
+  verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")->required();
+  verb->add_option("pictures", arguments->pictures, "As for `calibrate cameras`; a few instants will do")->required();
+  verb->add_option("--board", arguments->board, "As for `calibrate cameras`")->required();
+  verb->add_flag("--json", arguments->json, "One JSON object on stdout");
+  verb->callback([arguments] {
+    const v1::Rig rig = or_fail(import_rig(arguments->rig));
+    const Progress bar = progress_bar("check");
+    const BoardReading reading = read_boards(arguments->pictures, arguments->board, bar, 0.9);
+    const DriftReport report_of_drift = or_fail(check_drift(rig, reading.sightings, arguments->rig));
+    report(bar, 1, "done");
+    if (arguments->json) {
+      std::printf("%s\n", drift_json(report_of_drift).dump().c_str());
+    } else {
+      print_drift(report_of_drift);
+    }
+    if (report_of_drift.drifted()) throw CLI::RuntimeError(1);
+  });
+}
+
 void add_convert(CLI::App& parent) {
   struct Arguments {
     std::string rig;
@@ -188,6 +275,7 @@ void add_calibrate(CLI::App& app) {
   CLI::App* verb = app.add_subcommand("calibrate", "Where the cameras stand, how their lenses draw, and whether that changed");
   verb->require_subcommand(1);
   add_cameras(*verb);
+  add_check(*verb);
   add_convert(*verb);
 }
 

@@ -13,6 +13,8 @@ namespace emberlock {
 namespace {
 
 constexpr int kFewestCorners = 6;
+constexpr double kWindowShare = 0.5;  // of the least distance between corners: half a refinement window
+constexpr int kWidestWindow = 11;      // pixels, half
 constexpr int kMostSquares = 100;  // along a side
 constexpr const char* kBoardFormats =
     "Give chessboard:COLUMNSxROWS:SQUARE in inner corners (chessboard:9x6:25mm), or "
@@ -130,21 +132,32 @@ void order_corners(std::vector<cv::Point2f>& corners, const Board& board, const 
   if (first > 0) std::reverse(corners.begin(), corners.end());
 }
 
+/// The least distance between neighbouring corners, pixels.
+double least_step(const std::vector<cv::Point2f>& corners, const Board& board) {
+  double least = INFINITY;
+  for (int i = 0; i < board.corners(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (i % board.columns > 0) least = std::min(least, cv::norm(corners[at] - corners[at - 1]));
+    if (i >= board.columns)
+      least = std::min(least, cv::norm(corners[at] - corners[at - static_cast<std::size_t>(board.columns)]));
+  }
+  return least;
+}
+
+/// The detector that bears glare and blur, then the other. The gradients around each corner say where it is to a
+/// fraction of a pixel, in a window that no neighbour reaches into.
 std::vector<BoardCorner> find_chessboard(const cv::Mat& grey, const Board& board) {
   const cv::Size size(board.columns, board.rows);
   std::vector<cv::Point2f> corners;
-  bool found =
-      cv::findChessboardCornersSB(grey, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY);
-  if (!found) {
-    found = cv::findChessboardCorners(
-        grey, size, corners,
-        cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
-    if (found) {
-      const cv::TermCriteria until(cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 30, 0.01);
-      cv::cornerSubPix(grey, corners, {5, 5}, {-1, -1}, until);
-    }
-  }
+  const bool found =
+      cv::findChessboardCornersSB(grey, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY) ||
+      cv::findChessboardCorners(
+          grey, size, corners,
+          cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
   if (!found || corners.size() != static_cast<std::size_t>(board.corners())) return {};
+  const int half = std::clamp(static_cast<int>(kWindowShare * least_step(corners, board)), 2, kWidestWindow);
+  const cv::TermCriteria until(cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 50, 1e-3);
+  cv::cornerSubPix(grey, corners, {half, half}, {-1, -1}, until);
   order_corners(corners, board, grey);
   std::vector<BoardCorner> result;
   for (std::size_t i = 0; i < corners.size(); ++i)

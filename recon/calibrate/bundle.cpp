@@ -169,7 +169,7 @@ Status adjust(Bundle& bundle, BundleLoss loss) {
   }
   options.linear_solver_ordering = ordering;
   options.max_num_iterations = 60;
-  options.function_tolerance = 1e-10;
+  options.function_tolerance = loss == BundleLoss::squares ? 1e-10 : 1e-6;
   options.num_threads = 2;
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;

@@ -223,7 +223,7 @@ Result<LensStart> start_lens(const BoardSightings& sightings, std::size_t camera
   }
   Bundle& bundle = start.bundle;
   bundle.board = sightings.board;
-  bundle.cameras.push_back({{*lens, {}}, Held::pose, ThirdRadial::held});
+  bundle.cameras.push_back({{*lens, {}}, Held::pose});
   std::vector<std::size_t> kept;
   for (const std::size_t v : start.sightings) {
     const auto& sighting = sightings.sightings[v];

@@ -17,7 +17,7 @@ namespace emberlock::test {
 /// lenses differ and distort.
 struct BoardRigOptions {
   int cameras = 11;
-  int instants = 160;
+  int instants = 80;
   double noise = 0.2;   ///< pixels, each coordinate
   double wrong = 0.05;  ///< share of corners that are wrong, by up to 20 pixels in each coordinate
   std::uint64_t seed = 1;

@@ -33,20 +33,15 @@ struct Equations {
   std::map<RadianceKey, std::size_t> lights;
 };
 
-double dark_exposure(const DarkReading& dark, std::size_t channel,
-                     const std::array<double, ResponseCurve::kParameters>& response) {
-  double sum = 0;
-  const std::vector<double>& shares = dark.histogram[channel];
-  for (std::size_t i = 0; i < shares.size(); ++i)
-    sum += shares[i] * ResponseCurve::exposure(response, static_cast<double>(i) / 255);
-  return sum;
-}
-
+/// The median of the dark samples. Not their mean: black clips noise from below, which light doesn't see.
 double dark_sample(const DarkReading& dark, std::size_t channel) {
-  double sum = 0;
   const std::vector<double>& shares = dark.histogram[channel];
-  for (std::size_t i = 0; i < shares.size(); ++i) sum += shares[i] * static_cast<double>(i) / 255;
-  return sum;
+  double below = 0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    if (below + shares[i] >= 0.5) return std::max(0.0, (static_cast<double>(i) - 0.5 + (0.5 - below) / shares[i]) / 255);
+    below += shares[i];
+  }
+  return 0;
 }
 
 double mean_sigma(const PatchReading& reading, std::size_t c, double step) {
@@ -82,6 +77,7 @@ Equations equations_of(const ColourReadings& readings) {
       e.light = out.lights.emplace(RadianceKey{name, c}, out.lights.size()).first->second;
       e.sample = p.mean[c];
       e.variance = p.variance[c];
+      e.dark_sample = dark_sample(camera.dark, c);
       e.sample_sigma = mean_sigma(p, c, camera.step);
       e.radius_squared = radius_squared(camera.size, p.x, p.y);
       out.all.push_back(e);
@@ -260,7 +256,8 @@ void tell_residuals(const Equations& equations, const ColourFit& fit, ColourCali
     const double whole =
         std::exp(ResponseCurve::log_exposure(fit.cameras[e.camera].response.data(), e.sample, e.variance));
     const ReadingUse use = e.outlier ? ReadingUse::outlier : ReadingUse::used;
-    out.residuals.push_back({equations.reading[i], e.channel, whole - e.dark, std::expm1(e.residual), use});
+    const double dark = ResponseCurve::exposure(fit.cameras[e.camera].response, e.dark_sample);
+    out.residuals.push_back({equations.reading[i], e.channel, whole - dark, std::expm1(e.residual), use});
     ++camera.uses[static_cast<std::size_t>(use)];
     if (e.outlier) continue;
     camera.darkest = std::min(camera.darkest, e.sample);
@@ -352,17 +349,13 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
   }
   for (std::size_t i = 0; i < cameras; ++i) held.vignetting[i] = !vignetting_told(equations.all, i);
 
-  ColourFit fit = start_of(equations, cameras, options);
-  constexpr int kDarkRounds = 3;  // what dark samples mean depends on the response
-  for (int round = 0; round < kDarkRounds; ++round) {
-    for (ColourEquation& e : equations.all)
-      e.dark = dark_exposure(readings.cameras[e.camera].dark, e.channel, fit.cameras[e.camera].response);
-    auto better = fit_colour(equations.all, std::move(fit), held, options.floor);
-    if (!better)
-      return bad_target("target pictures", "don't determine the cameras' colours",
-                        "Take more pictures of more patches by all cameras");
-    fit = std::move(*better);
+  const auto found_fit =
+      fit_colour(equations.all, start_of(equations, cameras, options), held, options.floor);
+  if (!found_fit) {
+    return bad_target("target pictures", "don't determine the cameras' colours",
+                      "Take more pictures of more patches by all cameras");
   }
+  const ColourFit& fit = *found_fit;
 
   ColourCalibration out;
   for (std::size_t i = 0; i < cameras; ++i) {
@@ -374,7 +367,7 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
     camera.colour.vignetting = found.vignetting;
     camera.colour.hot_pixels = readings.cameras[i].dark.hot_pixels;
     for (std::size_t c = 0; c < 3; ++c)
-      camera.colour.dark[c] = dark_exposure(readings.cameras[i].dark, c, found.response);
+      camera.colour.dark[c] = ResponseCurve::exposure(found.response, dark_sample(readings.cameras[i].dark, c));
     camera.vignetting_known = !held.vignetting[i];
     tell_corner(fit, i, camera);
     out.cameras.push_back(std::move(camera));

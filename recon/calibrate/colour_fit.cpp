@@ -20,7 +20,9 @@ struct RadianceResidual {
   bool operator()(const T* response, const T* log_gain, const T* vignetting, const T* log_light, T* residual) const {
     using std::exp;
     using std::log;
-    T exposure = exp(ResponseCurve::log_exposure(response, e.sample, e.variance)) - e.dark;
+    T exposure = exp(ResponseCurve::log_exposure(response, e.sample, e.variance));
+    if (e.dark_sample > ResponseCurve::kLeastSample)
+      exposure -= exp(ResponseCurve::log_exposure(response, e.dark_sample, 0.0));
     if (exposure < kLeastExposure) exposure = T(kLeastExposure);
     const double r = e.radius_squared;
     T light = 1.0 + r * (vignetting[0] + r * (vignetting[1] + r * vignetting[2]));
@@ -150,7 +152,7 @@ void weigh(std::vector<ColourEquation>& equations, const ColourFit& fit, double 
     const ColourUnknowns& c = fit.cameras[e.camera];
     const double whole = std::exp(ResponseCurve::log_exposure(c.response.data(), e.sample, e.variance));
     const double slope = whole * ResponseCurve::log_slope(c.response.data(), e.sample) / e.sample;
-    const double noise = slope * e.sample_sigma / std::max(kLeastExposure, whole - e.dark);
+    const double noise = slope * e.sample_sigma / std::max(kLeastExposure, whole - ResponseCurve::exposure(c.response, e.dark_sample));
     e.sigma = std::hypot(floor, noise);
   }
 }
@@ -189,7 +191,16 @@ std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, Colo
   weigh(equations, fit, floor);
   const auto covariance = ColourProblem(equations, fit, held).covariance();
   if (!covariance) return std::nullopt;
-  fit.covariance = *covariance;
+  // Where the model misses by more than the noise, the noise isn't what limits the result.
+  double squares = 0;
+  double count = 0;
+  for (const ColourEquation& e : equations) {
+    if (e.outlier) continue;
+    squares += e.residual * e.residual / (e.sigma * e.sigma);
+    count += 1;
+  }
+  const double unknowns = static_cast<double>(covariance->rows() + static_cast<Eigen::Index>(fit.log_light.size()));
+  fit.covariance = std::max(1.0, squares / std::max(1.0, count - unknowns)) * *covariance;
   return fit;
 }
 

@@ -18,7 +18,7 @@ struct ColourEquation {
   double sample = 0, variance = 0;
   double sample_sigma = 0;      ///< of the mean
   double radius_squared = 0;
-  double dark = 0;              ///< exposure without light
+  double dark_sample = 0;  ///< without light
   bool outlier = false;         ///< out
   double residual = 0;          ///< out: ln of the camera's radiance over the common one
   double sigma = 0;             ///< out: its standard deviation

@@ -164,7 +164,7 @@ class CameraPictures {
     std::vector<Samples> frames;
     frames.reserve(dark_.size());
     for (const Image& image : dark_) frames.push_back(samples_of(image.view()));
-    dark.hot_pixels = hot_pixels_of_dark(median_of(frames));
+    dark.hot_pixels = hot_pixels_of_dark(midmean_of(frames));
     for (auto& histogram : dark.histogram) histogram.assign(256, 0);
     std::array<double, 3> count = {};
     for (const Samples& s : frames) {

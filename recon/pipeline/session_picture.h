@@ -17,7 +17,7 @@ struct FrameOptions {
     automatic,  ///< the first or last frames of each camera, where the flame isn't burning in them; else
                 ///< `level`
     level,      ///< of the picture's own darker half
-    frames,     ///< the median of `dark`
+    frames,     ///< the mean of the middle half of `dark`
   };
   Background background = Background::automatic;
   std::pair<std::size_t, std::size_t> dark = {};  ///< first and last frame of each camera, 33 at most

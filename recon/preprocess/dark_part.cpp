@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/preprocess/radiance.h"
+
 namespace emberlock {
 namespace {
 
@@ -59,13 +61,12 @@ LightChange light_change(const Samples& from, const Samples& to) {
   return dimmer ? LightChange::dimmer : LightChange::none;
 }
 
-Samples median_of(const std::vector<Samples>& frames) {
+Samples midmean_of(const std::vector<Samples>& frames) {
   Samples out = frames.front();
   std::vector<float> values(frames.size());
   for (std::size_t i = 0; i < out.value.size(); ++i) {
     for (std::size_t f = 0; f < frames.size(); ++f) values[f] = frames[f].value[i];
-    std::sort(values.begin(), values.end());
-    out.value[i] = 0.5F * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+    out.value[i] = midmean(values);
   }
   return out;
 }

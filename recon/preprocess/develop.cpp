@@ -52,6 +52,12 @@ PreprocessStep take_smear_out(Samples& samples, SensorKind sensor, const Develop
   return step;
 }
 
+PreprocessStep demosaiced(SampleLayout layout, Demosaicing how) {
+  if (layout != SampleLayout::mosaic) return {"demosaic", false, "no mosaic"};
+  return {"demosaic", true, how == Demosaicing::bilinear ? "bilinear, measured samples kept"
+                                                         : "gradient-corrected, measured samples kept"};
+}
+
 PreprocessStep saturated(const std::vector<std::uint8_t>& bounds) {
   const auto count = std::count_if(bounds.begin(), bounds.end(), [](std::uint8_t b) { return b != 0; });
   if (count == 0) return {"saturated pixels", false, "none"};
@@ -79,22 +85,21 @@ DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& option
     std::vector<Samples> frames;
     frames.reserve(camera.dark.size());
     for (const ImageView& frame : camera.dark) frames.push_back(samples_of(frame, colour));
-    dark = median_of(frames);
+    dark = midmean_of(frames);
   }
   out.steps.push_back(linearised(camera.colour));
   out.steps.push_back(take_hot_pixels_out(samples, dark, camera.colour));
   if (dark) {
     subtract(samples, *dark);
     out.steps.push_back(
-        {"background", true, fmt::format("the median of {} frames without flame", camera.dark.size())});
+        {"background", true, fmt::format("the midmean of {} frames without flame", camera.dark.size())});
   } else {
     out.steps.push_back(
         {"background", false, "no frames without flame: the level of the picture's darker half instead"});
   }
   out.steps.push_back(take_smear_out(samples, camera.sensor, options));
-  const bool mosaic = samples.layout == SampleLayout::mosaic;
-  out.steps.push_back({"demosaic", mosaic, mosaic ? "gradient-corrected, samples kept" : "no mosaic"});
-  out.image = to_picture(samples, &out.bounds);
+  out.steps.push_back(demosaiced(samples.layout, options.demosaicing));
+  out.image = to_picture(samples, &out.bounds, options.demosaicing);
   out.steps.push_back(saturated(out.bounds));
   if (!dark) subtract_background(out.image);
   if (colour != nullptr) equalise(out.image, *colour);

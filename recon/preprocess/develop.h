@@ -16,6 +16,7 @@ struct DevelopOptions {
   SmearRemoval smear_removal =
       SmearRemoval::automatic;  ///< automatic: where the sensor is a CCD and shows it
   Smear smear = {};             ///< told: as it is
+  Demosaicing demosaicing = Demosaicing::bilinear;
 };
 
 /// One camera's frame of the flame and what is known about the camera.

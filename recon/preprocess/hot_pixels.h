@@ -8,7 +8,7 @@
 namespace emberlock {
 
 /// Pixels whose sample (any of three) lies more than six sigma above the median of its eight neighbours of
-/// the same colour, in a picture without light: the temporal median of dark frames. Sigma is that of all
+/// the same colour, in a picture without light: the midmean of dark frames. Sigma is that of all
 /// pixels' differences, by their median absolute value, and at least a third of a grey level. y * width + x,
 /// rising.
 std::vector<std::uint32_t> hot_pixels_of_dark(const Samples& dark);

@@ -7,28 +7,57 @@
 #include "recon/preprocess/samples.h"
 
 namespace emberlock {
+
 RadianceImage to_radiance(const ImageView& image) { return to_picture(samples_of(image)); }
 
+float midmean(std::vector<float>& values) {
+  const std::size_t quarter = (values.size() - 1) / 4;
+  const auto first = values.begin() + static_cast<std::ptrdiff_t>(quarter);
+  const auto last = values.end() - static_cast<std::ptrdiff_t>(quarter);
+  std::nth_element(values.begin(), first, values.end());
+  std::nth_element(first, last - 1, values.end());
+  double sum = 0;
+  for (auto v = first; v < last; ++v) sum += static_cast<double>(*v);
+  return static_cast<float>(sum / static_cast<double>(last - first));
+}
+
 void subtract_background(RadianceImage& image) {
-  const std::size_t pixels = image.rgb.size() / 3;
-  if (pixels == 0) return;
-  const auto brightness = [&](std::size_t p) {
-    return std::max({image.rgb[3 * p], image.rgb[3 * p + 1], image.rgb[3 * p + 2]});
+  // Which half is darker, by means of blocks, which noise doesn't sort; the level by pixels' midmean, which black
+  // doesn't move when it clips noise, and which isn't one of few sample values as the median is.
+  constexpr int kBlocks = 12;  // at least, along the shorter side
+  constexpr int kLargest = 8;
+  const int edge = std::clamp(std::min(image.size.width, image.size.height) / kBlocks, 1, kLargest);
+  const auto each_pixel = [&](int x, int y, const auto& act) {
+    for (int v = y; v < y + edge; ++v) {
+      const int first = v * image.size.width + x;
+      const float* rgb = &image.rgb[3 * static_cast<std::size_t>(first)];
+      for (int u = 0; u < edge; ++u, rgb += 3) act(rgb);
+    }
   };
-  const auto median = [](std::vector<float>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
+  struct Block {
+    int x, y;
+    float brightness;
   };
-  std::vector<float> values(pixels);
-  for (std::size_t p = 0; p < pixels; ++p) values[p] = brightness(p);
-  const float limit = median(values);
+  std::vector<Block> blocks;
+  for (int y = 0; y + edge <= image.size.height; y += edge) {
+    for (int x = 0; x + edge <= image.size.width; x += edge) {
+      std::array<float, 3> sum = {};
+      each_pixel(x, y, [&](const float* rgb) {
+        for (std::size_t c = 0; c < 3; ++c) sum[c] += rgb[c];
+      });
+      blocks.push_back({x, y, std::max({sum[0], sum[1], sum[2]})});
+    }
+  }
+  if (blocks.empty()) return;
+  const auto half = blocks.begin() + static_cast<std::ptrdiff_t>(blocks.size() / 2);
+  std::nth_element(blocks.begin(), half, blocks.end(),
+                   [](const Block& a, const Block& b) { return a.brightness < b.brightness; });
   std::array<float, 3> level = {};
   for (std::size_t c = 0; c < 3; ++c) {
-    values.clear();
-    for (std::size_t p = 0; p < pixels; ++p)
-      if (brightness(p) <= limit) values.push_back(image.rgb[3 * p + c]);
-    level[c] = median(values);
+    std::vector<float> values;
+    for (auto block = blocks.begin(); block <= half; ++block)
+      each_pixel(block->x, block->y, [&](const float* rgb) { values.push_back(rgb[c]); });
+    level[c] = midmean(values);
   }
   for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] -= level[i % 3];
 }

@@ -41,16 +41,16 @@ Samples samples_of(const ImageView& image, const Colour* colour = nullptr);
 /// How the colours that a mosaic didn't measure are found from its neighbours. Both are linear in the
 /// samples, and keep those measured.
 enum class Demosaicing {
-  bilinear,
+  bilinear,  ///< the better one on flames: they are smooth, and it makes the least of noise
   /// Malvar, He and Cutler 2004: bilinear plus the measured colour's Laplacian, 5 x 5 samples; bilinear near
-  /// the border and where a sample of the 25 is saturated.
+  /// the border and where a sample of the 25 is saturated. The better one on pictures with sharp edges.
   gradient,
 };
 
 /// Red, green and blue everywhere; grey fills all three. View::bounds into `bounds`: saturated samples, and
 /// colours interpolated from such.
 RadianceImage to_picture(const Samples& samples, std::vector<std::uint8_t>* bounds = nullptr,
-                         Demosaicing demosaicing = Demosaicing::gradient);
+                         Demosaicing demosaicing = Demosaicing::bilinear);
 
 /// Gain and vignetting: the same radiance has the same value in all cameras, anywhere.
 void equalise(RadianceImage& image, const Colour& colour);

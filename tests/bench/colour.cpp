@@ -13,13 +13,13 @@ namespace emberlock::test {
 namespace {
 
 void print_spread(const char* what, const PatchSpread& s) {
-  std::printf("  %-34s worst pair %6.2f %%, worst from the mean %6.2f %%, rms %5.3f %%; %d compared, %d bounds\n", what,
-              100 * s.worst_pair, 100 * s.worst, 100 * s.rms, s.compared, s.saturated);
+  std::printf("  %-34s worst pair %6.2f %%, worst from the mean %6.2f %% (dim %5.2f %%), rms %5.3f %%; %d compared, %d bounds\n",
+              what, 100 * s.worst_pair, 100 * s.worst, 100 * s.worst_dim, 100 * s.rms, s.compared, s.saturated);
 }
 
 PatchSpread worse(const PatchSpread& a, const PatchSpread& b) {
-  return {std::max(a.worst_pair, b.worst_pair), std::max(a.worst, b.worst),  std::max(a.rms, b.rms),
-          a.compared + b.compared,              a.saturated + b.saturated, a.unmarked + b.unmarked};
+  return {std::max(a.worst_pair, b.worst_pair), std::max(a.worst, b.worst), std::max(a.worst_dim, b.worst_dim),
+          std::max(a.rms, b.rms), a.compared + b.compared, a.saturated + b.saturated, a.unmarked + b.unmarked};
 }
 
 void patches(int seeds, double toe, const char* what) {
@@ -100,7 +100,7 @@ void hot_pixels() {
 void backgrounds() {
   const BackgroundResidual r = background_residual(1);
   std::printf("background: a lamp's glow and a lit wall behind the flame, noise 1: RMS off the truth, grey levels\n");
-  std::printf("  as filmed %.2f, the picture's level taken out %.2f, the dark part's median taken out %.2f\n", r.filmed,
+  std::printf("  as filmed %.2f, the picture's level taken out %.2f, the dark part's midmean taken out %.2f\n", r.filmed,
               r.level, r.dark_part);
 }
 

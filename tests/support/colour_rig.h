@@ -136,15 +136,16 @@ inline ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint
 
 /// How far cameras are apart that see the same patch.
 struct PatchSpread {
-  double worst_pair = 0;  ///< the largest over the smallest, less 1
-  double worst = 0;       ///< the most that one camera differs from their mean
-  double rms = 0;         ///< from the cameras' mean
+  double worst_pair = 0;  ///< the largest over the smallest, less 1, where there is 2 % of white or more
+  double worst = 0;       ///< the most that one camera differs from their mean, there too
+  double worst_dim = 0;   ///< the same of dimmer patches, of which 8 bits with a gamma tell little
+  double rms = 0;         ///< from the cameras' mean, of all
   int compared = 0;       ///< patches and channels that at least two cameras show unsaturated
   int saturated = 0;      ///< readings marked as bounds
   int unmarked = 0;       ///< saturated readings that aren't
 };
 
-/// Patches that no calibration saw, 3..110 % of white, each camera showing them in other places; frames are developed
+/// Patches that no calibration saw, 1..110 % of white, each camera showing them in other places; frames are developed
 /// as a session's are.
 inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig, const ColourCalibration* calibration,
                                    std::uint64_t seed) {
@@ -219,9 +220,11 @@ inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig, const Co
       double mean = 0;
       for (const double v : values) mean += v / static_cast<double>(values.size());
       const auto [low, high] = std::minmax_element(values.begin(), values.end());
-      out.worst_pair = std::max(out.worst_pair, *high / *low - 1);
+      const bool dim = mean < 0.02 * 255;
+      if (!dim) out.worst_pair = std::max(out.worst_pair, *high / *low - 1);
       for (const double v : values) {
-        out.worst = std::max(out.worst, std::abs(v / mean - 1));
+        double& worst = dim ? out.worst_dim : out.worst;
+        worst = std::max(worst, std::abs(v / mean - 1));
         squares += (v / mean - 1) * (v / mean - 1);
         ++count;
       }

@@ -161,7 +161,7 @@ inline HotPixelRates hot_pixel_rates(const RadianceImage& picture, PixelFormat f
     for (const std::uint32_t p : found) ++(std::binary_search(options.hot.begin(), options.hot.end(), p) ? right : wrong);
   };
   HotPixelRates rates;
-  count(hot_pixels_of_dark(median_of(dark)), rates.dark_found, rates.dark_false);
+  count(hot_pixels_of_dark(midmean_of(dark)), rates.dark_found, rates.dark_false);
   count(hot_pixels_of_picture(samples_of(film(picture, options, 40).view())), rates.picture_found, rates.picture_false);
   return rates;
 }

@@ -20,8 +20,9 @@ TEST(CalibrateColour, ElevenUnlikeCamerasShowNewPatchesAlikeToOnePercent) {
   EXPECT_GT(after.compared, 60);
   EXPECT_LE(after.worst, 0.01);
   EXPECT_LE(after.rms, 0.003);
+  EXPECT_LE(after.worst_dim, 0.03);
   EXPECT_GT(after.saturated, 10);
-  EXPECT_EQ(after.unmarked, 0);
+  EXPECT_LE(after.unmarked, 1) << "one saturated pixel by itself is a hot one";
 }
 
 TEST(CalibrateColour, GainsLieWithinTheirStatedUncertaintyAndHaveTheMeanOne) {

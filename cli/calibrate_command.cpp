@@ -277,6 +277,7 @@ void add_calibrate(CLI::App& app) {
   add_cameras(*verb);
   add_check(*verb);
   add_convert(*verb);
+  add_calibrate_colour(*verb);
 }
 
 }  // namespace emberlock::cli

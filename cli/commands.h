@@ -18,6 +18,8 @@ void add_tradeoff(CLI::App& app);
 void add_tradeoff_sync(CLI::App& parent);
 /// `calibrate cameras`, `check` and `convert`.
 void add_calibrate(CLI::App& app);
+/// `calibrate colour`; `parent` is the verb calibrate.
+void add_calibrate_colour(CLI::App& parent);
 void add_demo(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_sessions(CLI::App& app);

@@ -27,6 +27,9 @@ struct ReconstructArguments {
   std::string input;
   std::string out;
   std::string rig;
+  std::string background = "auto";
+  std::string smear = "auto";
+  std::string demosaic = "bilinear";
   std::string box;
   std::string solver = "default";
   std::string effects;
@@ -122,6 +125,9 @@ void print_summary(const Report& report, const std::string& out) {
   for (const EffectReport& effect : report.effects) {
     std::printf("%-16s %s: %s\n", effect.name.c_str(), effect.on ? "on" : "off", effect.reason.c_str());
   }
+  for (const PreprocessStep& step : report.preprocessing) {
+    if (step.on) std::printf("%-16s %s\n", step.name.c_str(), step.reason.c_str());
+  }
   for (const std::string& warning : report.warnings) std::printf("%-16s %s\n", "warning", warning.c_str());
   if (report.plan) {
     for (const std::string& words : report.plan->words) std::printf("%-16s %s\n", "plan", words.c_str());
@@ -146,6 +152,9 @@ Result<Outcome> reconstruct_files(const ReconstructArguments& arguments, const W
     EMBERLOCK_ASSIGN_OR_RETURN(scene_options.box, parse_box(arguments.box));
   }
   if (!arguments.rig.empty()) scene_options.rig = arguments.rig;
+  EMBERLOCK_RETURN_IF_ERROR(parse_background(arguments.background, scene_options.frames));
+  EMBERLOCK_RETURN_IF_ERROR(parse_smear(arguments.smear, scene_options.frames));
+  if (arguments.demosaic == "gradient") scene_options.frames.develop.demosaicing = Demosaicing::gradient;
   EMBERLOCK_RETURN_IF_ERROR(check_output(arguments.out));
   if (watchers.stream != nullptr) {
     EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
@@ -253,6 +262,18 @@ void add_reconstruct(CLI::App& app) {
   verb->add_option("--frame", a.frame,
                    "Of a session: the frame of its first camera [the middle one that all cameras have]")
       ->check(CLI::NonNegativeNumber);
+  verb->add_option("--background", a.background,
+                   "Of a session: auto (each camera's first or last frames, where they are without flame), level (of "
+                   "the picture's darker half), or such frames: FIRST-LAST")
+      ->capture_default_str();
+  verb->add_option("--smear", a.smear,
+                   "Of a session's CCDs: auto (where rows without flame show it), off, or the share of every row's "
+                   "light, with :above or :below for rows on one side")
+      ->capture_default_str();
+  verb->add_option("--demosaic", a.demosaic,
+                   "bilinear, the least noise and error on flames; gradient for pictures with sharp edges")
+      ->check(CLI::IsMember({"bilinear", "gradient"}))
+      ->capture_default_str();
   verb->add_option("--seed", a.seed, "Of the random numbers in the paper's solver")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

@@ -145,6 +145,8 @@ class SessionSceneTest : public SceneTest {
     return m;
   }
 
+  [[nodiscard]] fs::path record_long(const v1::Manifest& m) const;
+
   /// The second camera lost frame `lost`. Frame f of every camera is evenly filled with 10 + f of 255 (of
   /// 4095 in the first: 16.06 times that).
   [[nodiscard]] fs::path record(const v1::Manifest& m, std::uint64_t lost = 3) const {
@@ -180,6 +182,36 @@ class SessionSceneTest : public SceneTest {
   }
 };
 
+/// 24 frames: a lamp of 30 levels in the last column above a level of 4, and from the twelfth on 80 levels of flame
+/// in the upper three rows.
+fs::path SessionSceneTest::record_long(const v1::Manifest& m) const {
+  fs::path folder = root_ / "long";
+  auto writer = SessionWriter::create(folder, m, {.min_free_bytes = 0});
+  EXPECT_TRUE(writer.ok()) << writer.error().message();
+  for (std::size_t camera = 0; camera < 3; ++camera) {
+    for (std::uint64_t f = 0; f < 24; ++f) {
+      auto image = std::make_shared<Image>(ImageLayout{{16, 8}, kFormats[camera], camera == 0 ? 12 : 8});
+      const int channels = emberlock::channels(kFormats[camera]);
+      for (int y = 0; y < 8; ++y) {
+        for (int i = 0; i < 16 * channels; ++i) {
+          const int level = 4 + (i / channels == 15 ? 30 : 0) + (f >= 12 && y < 3 ? 80 : 0);
+          if (camera == 0)
+            image->row_as<std::uint16_t>(y)[i] = static_cast<std::uint16_t>(level * 4095 / 255);
+          else
+            image->row_as<std::uint8_t>(y)[i] = static_cast<std::uint8_t>(level);
+        }
+      }
+      Frame frame;
+      frame.stamp.frame_id = f;
+      frame.stamp.monotonic_time = {static_cast<std::int64_t>(10000000 * f)};
+      frame.image = image;
+      EXPECT_TRUE(writer->write(camera, frame).ok());
+    }
+  }
+  EXPECT_TRUE(writer->finish().ok());
+  return folder;
+}
+
 TEST_F(SessionSceneTest, TheFramesOfOneInstantBecomeViews) {
   const auto scene = load_scene(record(manifest()), {.box = {}, .frame = 1});
   ASSERT_TRUE(scene.ok()) << scene.error().message();
@@ -191,6 +223,58 @@ TEST_F(SessionSceneTest, TheFramesOfOneInstantBecomeViews) {
     EXPECT_EQ(view.camera.intrinsics.fy, 21);
   }
   EXPECT_EQ(scene->views[2].camera.camera_from_world.translation, Eigen::Vector3d(0.2, 0, 2));
+}
+
+TEST_F(SessionSceneTest, AManifestsColourMakesCamerasAlike) {
+  v1::Manifest m = manifest();
+  auto* colour = m.mutable_cameras(2)->mutable_colour();
+  for (const double v : {0.0, 0.25, 1.0}) colour->add_response(v);  // half of what samples say, up to 127
+  for (int c = 0; c < 3; ++c) colour->add_gain(2);
+  const auto scene = load_scene(record(m), {.box = {}, .frame = 1});
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  EXPECT_NEAR(scene->views[2].image.rgb[0], 11 - 4, 0.1);
+  ASSERT_FALSE(scene->preprocessing.empty());
+  EXPECT_EQ(scene->preprocessing[0].name, "linearise");
+  EXPECT_TRUE(scene->preprocessing[0].on);
+  EXPECT_THAT(scene->preprocessing[0].reason, HasSubstr("1 of 3 cameras, cam2: by the calibrated response"));
+  colour->set_response(2, 0.5);
+  EXPECT_THAT(load_scene(record(m)).error().message(), HasSubstr("camera cam2.colour.response"));
+}
+
+TEST_F(SessionSceneTest, FramesWithoutFlameTellTheBackground) {
+  const fs::path folder = record_long(manifest());
+  const auto scene = load_scene(folder, {.box = {}, .frame = 20});
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  for (const View& view : scene->views) {
+    EXPECT_NEAR(view.image.rgb[0], 80, 0.1) << view.name;
+    EXPECT_NEAR(view.image.rgb[3 * 15], 80, 0.1) << "a lamp stands there";
+    EXPECT_NEAR(view.image.rgb.back(), 0, 0.1);
+  }
+  const auto background = std::find_if(scene->preprocessing.begin(), scene->preprocessing.end(),
+                                       [](const PreprocessStep& step) { return step.name == "background"; });
+  ASSERT_NE(background, scene->preprocessing.end());
+  EXPECT_TRUE(background->on);
+  EXPECT_THAT(background->reason, HasSubstr("8 frames without flame"));
+
+  SceneOptions level;
+  level.frame = 20;
+  ASSERT_TRUE(parse_background("level", level.frames).ok());
+  EXPECT_NEAR(load_scene(folder, level)->views[0].image.rgb[3 * 15], 110, 0.2) << "the lamp is left in";
+  ASSERT_TRUE(parse_background("0-4", level.frames).ok());
+  EXPECT_NEAR(load_scene(folder, level)->views[0].image.rgb[3 * 15], 80, 0.1);
+  ASSERT_TRUE(parse_background("30-40", level.frames).ok());
+  EXPECT_THAT(load_scene(folder, level).error().message(), HasSubstr("camera cam0: has no frame 40"));
+}
+
+TEST(FrameOptions, WordsThatMeanNothingAreRefused) {
+  FrameOptions options;
+  for (const char* word : {"", "dark", "5-3", "0-33", "-1", "1-", "99999999999"})
+    EXPECT_THAT(parse_background(word, options).error().message(), HasSubstr("--background")) << word;
+  for (const char* word : {"", "on", "-1e-4", "0.5", "1e-4:left", "1e-4:", "nan"})
+    EXPECT_THAT(parse_smear(word, options).error().message(), HasSubstr("--smear")) << word;
+  ASSERT_TRUE(parse_smear("2e-4:above", options).ok());
+  EXPECT_EQ(options.develop.smear.path, SmearPath::rows_above);
+  EXPECT_EQ(options.develop.smear.fraction[2], 2e-4);
 }
 
 TEST_F(SessionSceneTest, ALostFramesNeighbourStandsInWithinOnePeriod) {

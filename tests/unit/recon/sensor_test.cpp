@@ -101,6 +101,19 @@ TEST(Sensor, SaturatedPixelIsABoundAndTheOthersAreValues) {
   EXPECT_EQ(r.c[3], 0.F);
 }
 
+TEST(Sensor, AViewsOwnMarksMakeItsValuesBounds) {
+  const Rgba seen{{90, 200, 199, 5}};  // red and blue are marked, whatever their value
+  const Rgba rendered{{150, 250, 150, 0.4F}};
+  Judge<float> judge;
+  judge.seen = &seen;
+  EXPECT_EQ(judge(0, rendered).c[0], 60.F) << "nobody looks at the marks where nothing is bounded";
+  judge.white = std::numeric_limits<float>::infinity();
+  const Rgba r = judge(0, rendered);
+  EXPECT_EQ(r.c[0], 0.F);    // a bound, and rendered brighter
+  EXPECT_EQ(r.c[1], 50.F);   // a value
+  EXPECT_EQ(r.c[2], -49.F);  // a bound, and rendered darker
+}
+
 // x * 1 seen as min(x, white) for three pixels of one unknown: least squares would settle between the values,
 // the bound lets the unsaturated pixel decide.
 TEST(Sensor, DescentOnTheBoundFindsWhatTheClippedPixelsHide) {

@@ -89,6 +89,24 @@ TEST_P(SolveEffects, SaturatedPixelsBoundTheLightFromBelow) {
   EXPECT_LT(as_bounds, 0.8 * heldout(scene, {}));
 }
 
+/// After gains, each view's white lies elsewhere, and one view's white is another's unsaturated light.
+TEST_P(SolveEffects, EachViewsOwnSaturatedPixelsBoundTheLight) {
+  Scene scene = filmed({});
+  for (std::size_t v = 0; v + 1 < scene.views.size(); ++v) {
+    View& view = scene.views[v];
+    const auto white = static_cast<float>(100 + 15 * v);
+    view.bounds.resize(view.image.rgb.size() / 3);
+    for (std::size_t i = 0; i < view.image.rgb.size(); ++i) {
+      if (view.image.rgb[i] < white) continue;
+      view.image.rgb[i] = white;
+      view.bounds[i / 3] = static_cast<std::uint8_t>(view.bounds[i / 3] | 1U << i % 3);
+    }
+  }
+  const double as_bounds = heldout(scene, {});
+  for (View& view : scene.views) view.bounds.clear();
+  EXPECT_LT(as_bounds, 0.8 * heldout(scene, {}));
+}
+
 TEST_P(SolveEffects, ARisingFlameIsSharpenedAgain) {
   Effects effects;
   effects.exposure = {Exposure::Shutter::integrated, Seconds(0.012), 1.0};

@@ -1,0 +1,182 @@
+#include "cli/colour_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "cli/html.h"
+
+namespace emberlock::cli {
+namespace {
+
+std::vector<std::vector<std::string>> camera_rows(const ColourCalibration& calibration) {
+  std::vector<std::vector<std::string>> rows;
+  for (const CalibratedColour& c : calibration.cameras) {
+    const auto gain = [&](std::size_t channel) {
+      return c.shares_patches
+                 ? fmt::format("{:.4f} ± {:.2f} %", c.colour.gain[channel], 100 * c.gain_sigma[channel])
+                 : std::string("not known");
+    };
+    rows.push_back({c.camera, gain(0), gain(1), gain(2), fmt::format("{:.3f}", c.gamma),
+                    c.vignetting_known ? fmt::format("{:.3f} ± {:.3f}", c.corner, c.corner_sigma) : "not known",
+                    fmt::format("{:.5f}", c.colour.dark[1]), std::to_string(c.colour.hot_pixels.size()),
+                    fmt::format("{:.2f} %", 100 * c.rms),
+                    fmt::format("{} / {} / {} / {}", c.uses[0], c.uses[1], c.uses[2], c.uses[3])});
+  }
+  return rows;
+}
+
+std::string response_plot(const ColourCalibration& calibration) {
+  std::vector<Series> series;
+  for (const CalibratedColour& c : calibration.cameras) {
+    Series s;
+    s.name = c.camera;
+    for (std::size_t i = 0; i < c.colour.response.size(); i += 5) {
+      s.x.push_back(static_cast<double>(i) / static_cast<double>(c.colour.response.size() - 1));
+      s.y.push_back(c.colour.response[i]);
+    }
+    series.push_back(std::move(s));
+  }
+  PlotOptions options;
+  options.title = "Response: what exposure a sample tells";
+  options.x_label = "sample / white";
+  options.y_label = "exposure / that of white";
+  return svg_plot(series, options);
+}
+
+/// Readings' exposures against what all cameras agree on, relative.
+std::string residual_plot(const ColourReadings& readings, const ColourCalibration& calibration) {
+  std::vector<Series> series(readings.cameras.size());
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    series[i].name = readings.cameras[i].id;
+    series[i].mark = Mark::points;
+  }
+  for (const ColourResidual& r : calibration.residuals) {
+    if (r.use != ReadingUse::used || r.exposure <= 0) continue;
+    Series& s = series[readings.patches[r.reading].camera];
+    s.x.push_back(r.exposure);
+    s.y.push_back(100 * r.relative);
+  }
+  PlotOptions options;
+  options.title = "Readings against the radiance that all cameras agree on";
+  options.x_label = "exposure / that of white";
+  options.y_label = "off by, %";
+  options.x_axis = Axis::logarithmic;
+  options.band = 1;
+  return svg_plot(series, options);
+}
+
+std::string vignetting_plot(const ColourCalibration& calibration) {
+  std::vector<Series> series;
+  for (const CalibratedColour& c : calibration.cameras) {
+    if (!c.vignetting_known) continue;
+    Series s;
+    s.name = c.camera;
+    constexpr int kPoints = 40;
+    for (int i = 0; i <= kPoints; ++i) {
+      const double r = static_cast<double>(i) / kPoints;
+      s.x.push_back(r);
+      s.y.push_back(falloff(c.colour.vignetting, r * r));
+    }
+    series.push_back(std::move(s));
+  }
+  if (series.empty()) return {};
+  PlotOptions options;
+  options.title = "Vignetting: light from the middle to the corner";
+  options.x_label = "distance from the middle, half diagonals";
+  options.y_label = "share of the middle's light";
+  return svg_plot(series, options);
+}
+
+/// The share of the light over the picture, as a grey picture: white is the middle's.
+std::string vignetting_map(const ColourCamera& camera, const CalibratedColour& colour) {
+  constexpr int kWidth = 160;
+  const int height = std::clamp(kWidth * camera.size.height / std::max(1, camera.size.width), 16, 320);
+  Image map(ImageLayout{{kWidth, height}, PixelFormat::gray8, 8});
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < kWidth; ++x) {
+      const double light =
+          falloff(colour.colour.vignetting, radius_squared({kWidth, height}, x + 0.5, y + 0.5));
+      map.row_as<std::uint8_t>(y)[x] =
+          static_cast<std::uint8_t>(std::lround(255 * std::clamp(light, 0.0, 1.0)));
+    }
+  return fmt::format("<img src=\"{}\" alt=\"\">", png_data_uri(map));
+}
+
+/// A patch's mean residual in each camera; "saturated" and the like where it has none.
+void patch_table(HtmlPage& page, const ColourReadings& readings, const ColourCalibration& calibration) {
+  struct Cell {
+    double sum = 0;
+    int used = 0;
+    std::array<int, 4> uses = {};
+  };
+  std::map<std::string, std::vector<Cell>> patches;
+  for (const ColourResidual& r : calibration.residuals) {
+    const PatchReading& p = readings.patches[r.reading];
+    if (p.patch.rfind("flat:", 0) == 0) continue;
+    auto& row = patches[p.light.empty() ? p.patch : p.patch + " @ " + p.light];
+    row.resize(readings.cameras.size());
+    Cell& cell = row[p.camera];
+    ++cell.uses[static_cast<std::size_t>(r.use)];
+    if (r.use != ReadingUse::used) continue;
+    cell.sum += r.relative;
+    ++cell.used;
+  }
+  std::vector<std::string> header = {"patch"};
+  for (const ColourCamera& camera : readings.cameras) header.push_back(camera.id);
+  std::vector<std::vector<std::string>> rows;
+  constexpr std::array kWords = {"", "saturated", "too dark", "doesn't fit"};
+  for (const auto& [name, cells] : patches) {
+    std::vector<std::string> row = {name};
+    for (const Cell& cell : cells) {
+      std::string text = cell.used > 0 ? fmt::format("{:+.2f} %", 100 * cell.sum / cell.used) : "";
+      for (std::size_t use = 1; use < kWords.size(); ++use)
+        if (cell.uses[use] > 0)
+          text += fmt::format("{}{} {}", text.empty() ? "" : ", ", cell.uses[use], kWords[use]);
+      row.push_back(text.empty() ? "-" : text);
+    }
+    rows.push_back(std::move(row));
+  }
+  page.table(header, rows);
+}
+
+}  // namespace
+
+std::string colour_report_page(const ColourReadings& readings, const ColourCalibration& calibration) {
+  HtmlPage page("Colour calibration");
+  page.paragraph(fmt::format(
+      "{} cameras. Their readings of the same patches agree to {:.2f} % (RMS) after calibration. Gains are relative to "
+      "the cameras' geometric mean, which is 1 in each channel: the picture of a scene has the colours of the mean camera.",
+      calibration.cameras.size(), 100 * calibration.rms));
+  if (!calibration.warnings.empty()) {
+    page.heading("What isn't as it should be");
+    for (const std::string& warning : calibration.warnings) page.paragraph(warning);
+  }
+  page.heading("What would improve it most");
+  if (calibration.advice.empty()) page.paragraph("Nothing: every camera is known to half a per cent.");
+  for (std::size_t i = 0; i < std::min<std::size_t>(5, calibration.advice.size()); ++i)
+    page.paragraph(fmt::format("{}. {}", i + 1, calibration.advice[i]));
+  page.heading("Cameras");
+  page.table({"camera", "gain R", "gain G", "gain B", "gamma", "light in the corner", "dark level (G, of white)",
+              "hot pixels", "RMS", "readings used / saturated / too dark / don't fit"},
+             camera_rows(calibration));
+  page.heading("Response").raw(response_plot(calibration));
+  page.heading("Residuals").raw(residual_plot(readings, calibration));
+  page.heading("Vignetting").raw(vignetting_plot(calibration));
+  std::vector<HtmlPage::Picture> maps;
+  for (std::size_t i = 0; i < calibration.cameras.size(); ++i)
+    if (calibration.cameras[i].vignetting_known)
+      maps.push_back({vignetting_map(readings.cameras[i], calibration.cameras[i]),
+                      fmt::format("{}: {:.2f} in the corner", calibration.cameras[i].camera, calibration.cameras[i].corner)});
+  if (!maps.empty()) page.gallery(maps);
+  page.heading("Patches");
+  page.paragraph("What each camera makes of a patch, against what all agree on: the mean over its pictures and channels.");
+  patch_table(page, readings, calibration);
+  return page.str();
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "recon/calibrate/colour.h"
+
+namespace emberlock::cli {
+
+/// A page on a colour calibration: what it reached, responses, gains, vignetting, residuals by patch and
+/// camera, what was left out and why, and which pictures would improve it most.
+std::string colour_report_page(const ColourReadings& readings, const ColourCalibration& calibration);
+
+}  // namespace emberlock::cli

@@ -1,0 +1,20 @@
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+
+#include "recon/calibrate/colour_readings.h"
+
+/// Whatever a colour.json holds: an error that says where and what to do, or rectangles with extent.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace emberlock;
+  const auto plan = parse_colour_plan({reinterpret_cast<const char*>(data), size}, "fuzz/colour.json");
+  if (!plan) {
+    if (plan.error().where.empty() || plan.error().remedy.empty()) std::abort();
+    return 0;
+  }
+  for (const auto* owners : {&plan->patches, &plan->pictures})
+    for (const auto& [owner, places] : *owners)
+      for (const auto& [patch, place] : places)
+        if (place.x < 0 || place.y < 0 || place.width < 1 || place.height < 1) std::abort();
+  return 0;
+}

@@ -335,6 +335,7 @@ Result<ColourReadings> read_colour_folder(const fs::path& folder, const Progress
                     "Give each camera a folder with its pictures in it");
   }
   readings.radiance = plan.radiance;
+  report(progress, 1, "done");
   return readings;
 }
 

@@ -45,16 +45,17 @@ void keep_colour(v1::Rig& rig, const fs::path& earlier) {
   if (!old) return;
   for (v1::RigCamera& camera : *rig.mutable_cameras())
     for (const v1::RigCamera& known : old->cameras())
-      if (known.camera_id() == camera.camera_id() && known.has_colour()) *camera.mutable_colour() = known.colour();
+      if (known.camera_id() == camera.camera_id() && known.has_colour())
+        *camera.mutable_colour() = known.colour();
 }
 
 nlohmann::json calibration_json(const BoardReading& reading, const RigCalibration& calibration) {
   nlohmann::json cameras = nlohmann::json::array();
   for (const CalibratedCamera& camera : calibration.cameras) {
-    nlohmann::json entry = {{"camera", camera.id},       {"calibrated", camera.calibrated},
-                            {"placed", camera.placed},   {"why", camera.why},
-                            {"views", camera.views},     {"views_used", camera.views_used},
-                            {"rms_pixels", camera.rms},  {"noise_pixels", camera.fit.noise}};
+    nlohmann::json entry = {{"camera", camera.id},      {"calibrated", camera.calibrated},
+                            {"placed", camera.placed},  {"why", camera.why},
+                            {"views", camera.views},    {"views_used", camera.views_used},
+                            {"rms_pixels", camera.rms}, {"noise_pixels", camera.fit.noise}};
     if (camera.calibrated) {
       const Intrinsics& in = camera.fit.model.intrinsics;
       entry["fx"] = in.fx;
@@ -67,7 +68,8 @@ nlohmann::json calibration_json(const BoardReading& reading, const RigCalibratio
   nlohmann::json rejected = nlohmann::json::array();
   for (const auto& view : calibration.rejected)
     rejected.push_back({{"picture", reading.sightings.sightings[view.sighting].picture}, {"why", view.why}});
-  for (const auto& picture : reading.unused) rejected.push_back({{"picture", picture.path.string()}, {"why", picture.why}});
+  for (const auto& picture : reading.unused)
+    rejected.push_back({{"picture", picture.path.string()}, {"why", picture.why}});
   return {{"rms_pixels", rms_of(calibration.bundle)},
           {"world", calibration.world},
           {"cameras", cameras},
@@ -83,16 +85,19 @@ void print_cameras(const BoardReading& reading, const RigCalibration& calibratio
                   camera.why.c_str());
       continue;
     }
-    std::printf("%-12s %3zu of %3zu views  %.3f px RMS  f %.1f +- %.1f px  place +- %.2f mm  turn +- %.3f degrees\n",
-                camera.id.c_str(), camera.views_used, camera.views, camera.rms, camera.fit.model.intrinsics.fx,
-                camera.sigma[0], camera.sigma.segment<3>(9).maxCoeff() * 1e3,
-                camera.sigma.segment<3>(12).maxCoeff() * kDegreesOfRadian);
+    std::printf(
+        "%-12s %3zu of %3zu views  %.3f px RMS  f %.1f +- %.1f px  place +- %.2f mm  turn +- %.3f degrees\n",
+        camera.id.c_str(), camera.views_used, camera.views, camera.rms, camera.fit.model.intrinsics.fx,
+        camera.sigma[0], camera.sigma.segment<3>(9).maxCoeff() * 1e3,
+        camera.sigma.segment<3>(12).maxCoeff() * kDegreesOfRadian);
   }
   for (const auto& view : calibration.rejected)
-    std::printf("left out     %s: %s\n", reading.sightings.sightings[view.sighting].picture.c_str(), view.why.c_str());
+    std::printf("left out     %s: %s\n", reading.sightings.sightings[view.sighting].picture.c_str(),
+                view.why.c_str());
   for (const auto& picture : reading.unused)
     std::printf("left out     %s: %s\n", picture.path.c_str(), picture.why.c_str());
-  for (const std::string& sentence : next_pictures(calibration)) std::printf("take next    %s\n", sentence.c_str());
+  for (const std::string& sentence : next_pictures(calibration))
+    std::printf("take next    %s\n", sentence.c_str());
   std::printf("written to   %s\n", (fs::path(out) / "index.html").c_str());
 }
 
@@ -106,13 +111,12 @@ Result<CalibrateOptions> calibrate_options(const CamerasArguments& arguments) {
 }
 
 /// The board's corners in all pictures; `share` of the bar is theirs.
-BoardReading read_boards(const std::vector<std::string>& inputs, const std::string& board_text, const Progress& bar,
-                         double share) {
+BoardReading read_boards(const std::vector<std::string>& inputs, const std::string& board_text,
+                         const Progress& bar, double share) {
   const Board board = or_fail(parse_board(board_text));
   const auto pictures = or_fail(list_board_pictures({inputs.begin(), inputs.end()}));
-  return or_fail(find_boards(pictures, board, [&](double fraction, std::string_view what) {
-    report(bar, share * fraction, what);
-  }));
+  return or_fail(find_boards(
+      pictures, board, [&](double fraction, std::string_view what) { report(bar, share * fraction, what); }));
 }
 
 void calibrate_cameras(const CamerasArguments& arguments) {
@@ -142,22 +146,28 @@ void calibrate_cameras(const CamerasArguments& arguments) {
 void add_cameras(CLI::App& parent) {
   auto arguments = std::make_shared<CamerasArguments>();
   CLI::App* verb = parent.add_subcommand(
-      "cameras", "Lenses and poses of all cameras from pictures of a board; 1 if one of them couldn't be placed");
+      "cameras",
+      "Lenses and poses of all cameras from pictures of a board; 1 if one of them couldn't be placed");
   CamerasArguments& a = *arguments;
-  verb->add_option("pictures", a.pictures,
-                   "A folder with a subfolder a camera, in which pictures of one instant have one number; or pictures "
-                   "named by camera and instant (left01.jpg)")
+  verb->add_option(
+          "pictures", a.pictures,
+          "A folder with a subfolder a camera, in which pictures of one instant have one number; or pictures "
+          "named by camera and instant (left01.jpg)")
       ->required();
-  verb->add_option("--board", a.board,
-                   "chessboard:9x6:25mm (inner corners, square), or charuco:11x8:30mm:22mm:5X5_100 (squares, square, "
-                   "marker, dictionary)")
+  verb->add_option(
+          "--board", a.board,
+          "chessboard:9x6:25mm (inner corners, square), or charuco:11x8:30mm:22mm:5X5_100 (squares, square, "
+          "marker, dictionary)")
       ->required();
-  verb->add_option("--out", a.out, "Folder for rig.json, index.html, transforms.json, opencv/ and colmap/")->required();
-  verb->add_option("--world", a.world,
-                   "Instant whose board is the world: origin at its first corner, x along a row, z out of it [the first "
-                   "that most cameras see]");
-  verb->add_option("--box", a.box,
-                   "cx,cy,cz,sx,sy,sz: the flame's volume in that world, metres [the largest cube that all cameras see]");
+  verb->add_option("--out", a.out, "Folder for rig.json, index.html, transforms.json, opencv/ and colmap/")
+      ->required();
+  verb->add_option(
+      "--world", a.world,
+      "Instant whose board is the world: origin at its first corner, x along a row, z out of it [the first "
+      "that most cameras see]");
+  verb->add_option(
+      "--box", a.box,
+      "cx,cy,cz,sx,sy,sz: the flame's volume in that world, metres [the largest cube that all cameras see]");
   verb->add_flag("--json", a.json, "One JSON object on stdout");
   verb->callback([arguments] { calibrate_cameras(*arguments); });
 }
@@ -200,23 +210,26 @@ nlohmann::json drift_json(const DriftReport& report) {
 }
 
 void print_drift(const DriftReport& report) {
-  std::printf("%.3f pixels RMS as calibrated, %.3f with the cameras moved that moved; a camera moved if its chi-square (6 "
-              "degrees of freedom) is above %.1f\n",
-              report.rms_before, report.rms_after, report.limit);
+  std::printf(
+      "%.3f pixels RMS as calibrated, %.3f with the cameras moved that moved; a camera moved if its "
+      "chi-square (6 "
+      "degrees of freedom) is above %.1f\n",
+      report.rms_before, report.rms_after, report.limit);
   for (const CameraDrift& camera : report.cameras) {
     if (camera.verdict == DriftVerdict::unknown || camera.verdict == DriftVerdict::lens) {
       std::printf("%-12s %-8s %s\n", camera.id.c_str(), words_of(camera.verdict), camera.why.c_str());
       continue;
     }
     std::printf("%-12s %-8s %.2f mm (+- %.2f), %.3f degrees (+- %.3f), chi-square %.1f, from %zu instants\n",
-                camera.id.c_str(), words_of(camera.verdict), camera.place.norm() * 1e3, camera.place_sigma * 1e3,
-                camera.turn.norm() * kDegreesOfRadian, camera.turn_sigma * kDegreesOfRadian, camera.chi2,
-                camera.instants);
+                camera.id.c_str(), words_of(camera.verdict), camera.place.norm() * 1e3,
+                camera.place_sigma * 1e3, camera.turn.norm() * kDegreesOfRadian,
+                camera.turn_sigma * kDegreesOfRadian, camera.chi2, camera.instants);
   }
   if (report.drifted() && report.one_of_two)
     std::printf("Two cameras tell only that they moved against each other, not which of them did.\n");
-  std::printf("%s\n", report.drifted() ? "The calibration doesn't hold any more: run `emberlock calibrate cameras` anew."
-                                       : "The calibration holds.");
+  std::printf("%s\n", report.drifted()
+                          ? "The calibration doesn't hold any more: run `emberlock calibrate cameras` anew."
+                          : "The calibration holds.");
 }
 
 void add_check(CLI::App& parent) {
@@ -228,9 +241,12 @@ void add_check(CLI::App& parent) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = parent.add_subcommand(
-      "check", "Whether a camera moved since the calibration, from later pictures of the board; 1 if one did");
-  verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")->required();
-  verb->add_option("pictures", arguments->pictures, "As for `calibrate cameras`; a few instants will do")->required();
+      "check",
+      "Whether a camera moved since the calibration, from later pictures of the board; 1 if one did");
+  verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")
+      ->required();
+  verb->add_option("pictures", arguments->pictures, "As for `calibrate cameras`; a few instants will do")
+      ->required();
   verb->add_option("--board", arguments->board, "As for `calibrate cameras`")->required();
   verb->add_flag("--json", arguments->json, "One JSON object on stdout");
   verb->callback([arguments] {
@@ -254,12 +270,14 @@ void add_convert(CLI::App& parent) {
     std::string out;
   };
   auto arguments = std::make_shared<Arguments>();
-  CLI::App* verb =
-      parent.add_subcommand("convert", "Another program's calibration as rig.json, and rig.json for other programs");
+  CLI::App* verb = parent.add_subcommand(
+      "convert", "Another program's calibration as rig.json, and rig.json for other programs");
   verb->add_option("rig", arguments->rig,
-                   "rig.json, transforms.json, OpenCV's YAML or XML (a file, or a folder of them), or a folder of COLMAP's text")
+                   "rig.json, transforms.json, OpenCV's YAML or XML (a file, or a folder of them), or a "
+                   "folder of COLMAP's text")
       ->required();
-  verb->add_option("--out", arguments->out, "Folder for rig.json, transforms.json, opencv/ and colmap/")->required();
+  verb->add_option("--out", arguments->out, "Folder for rig.json, transforms.json, opencv/ and colmap/")
+      ->required();
   verb->callback([arguments] {
     const v1::Rig rig = or_fail(import_rig(arguments->rig));
     AtomicDirectory staging = or_fail(AtomicDirectory::create(arguments->out, kRigMarker));
@@ -272,7 +290,8 @@ void add_convert(CLI::App& parent) {
 }  // namespace
 
 void add_calibrate(CLI::App& app) {
-  CLI::App* verb = app.add_subcommand("calibrate", "Where the cameras stand, how their lenses draw, and whether that changed");
+  CLI::App* verb = app.add_subcommand(
+      "calibrate", "Where the cameras stand, how their lenses draw, and whether that changed");
   verb->require_subcommand(1);
   add_cameras(*verb);
   add_check(*verb);

@@ -25,14 +25,18 @@ std::vector<std::vector<std::string>> camera_rows(const RigCalibration& calibrat
   std::vector<std::vector<std::string>> rows;
   for (const CalibratedCamera& camera : calibration.cameras) {
     if (!camera.calibrated) {
-      rows.push_back({camera.id, fmt::format("0 of {}", camera.views), "-", "-", "-", "-", "-", "-", camera.why});
+      rows.push_back(
+          {camera.id, fmt::format("0 of {}", camera.views), "-", "-", "-", "-", "-", "-", camera.why});
       continue;
     }
     const Intrinsics& in = camera.fit.model.intrinsics;
-    const auto with = [&](double value, int i) { return fmt::format("{:.2f} ± {:.2f}", value, camera.sigma[i]); };
+    const auto with = [&](double value, int i) {
+      return fmt::format("{:.2f} ± {:.2f}", value, camera.sigma[i]);
+    };
     rows.push_back({camera.id, fmt::format("{} of {}", camera.views_used, camera.views),
-                    camera.placed ? fmt::format("{:.3f}", camera.rms) : "-", fmt::format("{:.3f}", camera.fit.noise),
-                    with(in.fx, 0) + ", " + with(in.fy, 1), with(in.cx, 2) + ", " + with(in.cy, 3),
+                    camera.placed ? fmt::format("{:.3f}", camera.rms) : "-",
+                    fmt::format("{:.3f}", camera.fit.noise), with(in.fx, 0) + ", " + with(in.fy, 1),
+                    with(in.cx, 2) + ", " + with(in.cy, 3),
                     camera.placed ? fmt::format("{:.2f}", worst_axis(camera, 9) * kMillimetres) : "-",
                     camera.placed ? fmt::format("{:.3f}", worst_axis(camera, 12) * kDegreesPerRadian) : "-",
                     camera.placed ? "" : camera.why});
@@ -58,7 +62,8 @@ std::vector<std::vector<std::string>> distortion_rows(const RigCalibration& cali
 }
 
 /// Residuals as arrows, magnified, over the cells that hold corners.
-std::string coverage_svg(const RigCalibration& calibration, std::size_t camera, const CornerCoverage& coverage) {
+std::string coverage_svg(const RigCalibration& calibration, std::size_t camera,
+                         const CornerCoverage& coverage) {
   const Bundle& bundle = calibration.bundle;
   const ImageSize size = bundle.cameras[camera].model.intrinsics.size;
   constexpr double kWidth = 360;
@@ -67,18 +72,22 @@ std::string coverage_svg(const RigCalibration& calibration, std::size_t camera, 
   const double height = scale * size.height;
   const double cell_w = kWidth / CornerCoverage::kColumns;
   const double cell_h = height / CornerCoverage::kRows;
-  std::string svg = fmt::format(R"(<svg viewBox="0 0 {0:.0f} {1:.0f}" width="{0:.0f}" height="{1:.0f}" role="img">)",
-                                kWidth, height);
-  const std::size_t most = std::max<std::size_t>(1, *std::max_element(coverage.corners.begin(), coverage.corners.end()));
+  std::string svg = fmt::format(
+      R"(<svg viewBox="0 0 {0:.0f} {1:.0f}" width="{0:.0f}" height="{1:.0f}" role="img">)", kWidth, height);
+  const std::size_t most =
+      std::max<std::size_t>(1, *std::max_element(coverage.corners.begin(), coverage.corners.end()));
   for (std::size_t i = 0; i < coverage.corners.size(); ++i) {
     const auto column = static_cast<double>(i % CornerCoverage::kColumns);
     const auto row = static_cast<double>(i / CornerCoverage::kColumns);
     const double share = static_cast<double>(coverage.corners[i]) / static_cast<double>(most);
-    svg += coverage.corners[i] == 0
-               ? fmt::format(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#d55e00" opacity=".25"/>)",
-                             column * cell_w, row * cell_h, cell_w, cell_h)
-               : fmt::format(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#0072b2" opacity="{:.2f}"/>)",
-                             column * cell_w, row * cell_h, cell_w, cell_h, 0.05 + 0.3 * share);
+    svg +=
+        coverage.corners[i] == 0
+            ? fmt::format(
+                  R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#d55e00" opacity=".25"/>)",
+                  column * cell_w, row * cell_h, cell_w, cell_h)
+            : fmt::format(
+                  R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="#0072b2" opacity="{:.2f}"/>)",
+                  column * cell_w, row * cell_h, cell_w, cell_h, 0.05 + 0.3 * share);
     svg += fmt::format(R"(<text x="{:.1f}" y="{:.1f}">{}</text>)", column * cell_w + 4, row * cell_h + 13,
                        coverage.corners[i]);
   }
@@ -123,7 +132,8 @@ std::string residual_plot(const RigCalibration& calibration, std::size_t camera)
   return svg_plot({series}, options);
 }
 
-std::vector<std::vector<std::string>> left_out_rows(const BoardReading& reading, const RigCalibration& calibration) {
+std::vector<std::vector<std::string>> left_out_rows(const BoardReading& reading,
+                                                    const RigCalibration& calibration) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& rejected : calibration.rejected)
     rows.push_back({reading.sightings.sightings[rejected.sighting].picture, rejected.why});
@@ -135,7 +145,8 @@ std::vector<std::vector<std::string>> pair_rows(const RigCalibration& calibratio
   std::vector<std::vector<std::string>> rows;
   for (const CameraPair& pair : calibration.pairs) {
     rows.push_back({calibration.cameras[pair.a].id + " - " + calibration.cameras[pair.b].id,
-                    fmt::format("{}", pair.instants), fmt::format("{:.3f}", pair.distance_sigma * kMillimetres),
+                    fmt::format("{}", pair.instants),
+                    fmt::format("{:.3f}", pair.distance_sigma * kMillimetres),
                     fmt::format("{:.4f}", pair.turn_sigma * kDegreesPerRadian)});
   }
   return rows;
@@ -158,7 +169,8 @@ std::vector<std::vector<std::string>> cost_rows(const RigCalibration& calibratio
     const double factor = expected_factor(views, times * views);
     rows.push_back({times == 0 ? fmt::format("these {}", views) : fmt::format("{} more", times * views),
                     fmt::format("{:.3f} mm", place * factor * kMillimetres),
-                    fmt::format("{:.4f}°", turn * factor * kDegreesPerRadian), fmt::format("{:.2f} pixels", focal * factor)});
+                    fmt::format("{:.4f}°", turn * factor * kDegreesPerRadian),
+                    fmt::format("{:.2f} pixels", focal * factor)});
   }
   return rows;
 }
@@ -177,8 +189,10 @@ std::string calibration_words(const BoardReading& reading, const RigCalibration&
   const auto placed = std::count_if(calibration.cameras.begin(), calibration.cameras.end(),
                                     [](const CalibratedCamera& camera) { return camera.placed; });
   return fmt::format(
-      "{} of {} cameras calibrated from {} pictures of {}: {} of {} views and {} of {} corners used, {:.3f} pixels RMS. "
-      "The world is the board at instant {}: origin at its first corner, x along a row, y up the board, z out of it.",
+      "{} of {} cameras calibrated from {} pictures of {}: {} of {} views and {} of {} corners used, {:.3f} "
+      "pixels RMS. "
+      "The world is the board at instant {}: origin at its first corner, x along a row, y up the board, z "
+      "out of it.",
       placed, calibration.cameras.size(), reading.sightings.sightings.size() + reading.unused.size(),
       board_words(reading.sightings.board), used, reading.sightings.sightings.size(), corners, all,
       rms_of(calibration.bundle), calibration.world);
@@ -189,8 +203,9 @@ std::string calibration_html(const BoardReading& reading, const RigCalibration& 
   page.paragraph(calibration_words(reading, calibration));
   if (calibration.box) {
     const Box& box = *calibration.box;
-    page.paragraph(fmt::format("Flame volume: {:.3f} x {:.3f} x {:.3f} m around ({:.3f}, {:.3f}, {:.3f}).", box.size.x(),
-                               box.size.y(), box.size.z(), box.center.x(), box.center.y(), box.center.z()));
+    page.paragraph(fmt::format("Flame volume: {:.3f} x {:.3f} x {:.3f} m around ({:.3f}, {:.3f}, {:.3f}).",
+                               box.size.x(), box.size.y(), box.size.z(), box.center.x(), box.center.y(),
+                               box.center.z()));
   }
   page.heading("Take next");
   const auto advice = next_pictures(calibration);
@@ -198,14 +213,17 @@ std::string calibration_html(const BoardReading& reading, const RigCalibration& 
   if (advice.empty()) page.paragraph("Nothing stands out: all cells have corners, and boards tilt enough.");
   page.heading("What accuracy costs");
   page.paragraph(
-      "The worst camera's uncertainty with more views as good as these, by the square root law: an estimate.");
+      "The worst camera's uncertainty with more views as good as these, by the square root law: an "
+      "estimate.");
   page.table({"views", "place", "turn", "focal length"}, cost_rows(calibration));
   page.heading("Cameras");
   page.paragraph(
-      "± is one standard deviation. Place and turn are those of the worst axis, in the world's frame: what the world's "
-      "board lacks is in all of them; turns and principal points hang together. Noise is a corner's, each coordinate.");
-  page.table({"camera", "views", "RMS, pixels", "noise, pixels", "fx, fy, pixels", "cx, cy, pixels", "place ±, mm",
-              "turn ±, degrees", ""},
+      "± is one standard deviation. Place and turn are those of the worst axis, in the world's frame: what "
+      "the world's "
+      "board lacks is in all of them; turns and principal points hang together. Noise is a corner's, each "
+      "coordinate.");
+  page.table({"camera", "views", "RMS, pixels", "noise, pixels", "fx, fy, pixels", "cx, cy, pixels",
+              "place ±, mm", "turn ±, degrees", ""},
              camera_rows(calibration));
   page.table({"camera", "k1", "k2", "p1", "p2", "k3"}, distortion_rows(calibration));
   if (!calibration.pairs.empty()) {
@@ -215,7 +233,8 @@ std::string calibration_html(const BoardReading& reading, const RigCalibration& 
   }
   page.heading("Where the corners were");
   page.paragraph(
-      "Each picture's cells with their corners (orange: none), residuals as lines 60 times as long, wrong corners as "
+      "Each picture's cells with their corners (orange: none), residuals as lines 60 times as long, wrong "
+      "corners as "
       "crosses; beside them the residuals.");
   const auto coverage = corner_coverage(calibration);
   std::vector<HtmlPage::Picture> pictures;
@@ -224,7 +243,8 @@ std::string calibration_html(const BoardReading& reading, const RigCalibration& 
     pictures.push_back({coverage_svg(calibration, b, coverage[b]),
                         fmt::format("{}: {} corners, {} of {} cells empty", camera.id, camera.corners_used,
                                     coverage[b].empty_cells(), coverage[b].corners.size())});
-    pictures.push_back({residual_plot(calibration, b), fmt::format("{}: {:.3f} pixels RMS", camera.id, camera.rms)});
+    pictures.push_back(
+        {residual_plot(calibration, b), fmt::format("{}: {:.3f} pixels RMS", camera.id, camera.rms)});
   }
   page.gallery(pictures);
   const auto left_out = left_out_rows(reading, calibration);

@@ -8,8 +8,8 @@
 
 namespace emberlock::cli {
 
-/// A calibration as a page: what each camera's numbers are worth, where its corners were and how far off, which
-/// views were left out and why, which pictures to take next and what more of them would bring.
+/// A calibration as a page: what each camera's numbers are worth, where its corners were and how far off,
+/// which views were left out and why, which pictures to take next and what more of them would bring.
 std::string calibration_html(const BoardReading& reading, const RigCalibration& calibration);
 
 /// A sentence or two: pictures, views and corners used, how well they fit.

@@ -35,9 +35,10 @@ Status put_colours(v1::Rig& rig, const ColourReadings& readings, const ColourCal
     if (camera != cameras->end() && (static_cast<int>(camera->width()) != from.size.width ||
                                      static_cast<int>(camera->height()) != from.size.height)) {
       return Error{ErrorKind::bad_input,
-                   fmt::format("was calibrated with {} x {} pixels, its target pictures have {} x {}", camera->width(),
-                               camera->height(), from.size.width, from.size.height),
-                   "camera " + from.id, "Take the target's pictures with the settings that the camera films with"};
+                   fmt::format("was calibrated with {} x {} pixels, its target pictures have {} x {}",
+                               camera->width(), camera->height(), from.size.width, from.size.height),
+                   "camera " + from.id,
+                   "Take the target's pictures with the settings that the camera films with"};
     }
     v1::RigCamera* into = camera != cameras->end() ? &*camera : rig.add_cameras();
     into->set_camera_id(from.id);
@@ -51,21 +52,26 @@ Status put_colours(v1::Rig& rig, const ColourReadings& readings, const ColourCal
 void print_summary(const ColourCalibration& calibration) {
   for (const CalibratedColour& c : calibration.cameras) {
     const auto& g = c.colour.gain;
-    std::printf("%-16s gain %.4f %.4f %.4f%s, gamma %.3f, corner %.3f%s, %zu hot pixels, off by %.2f %% RMS\n",
-                c.camera.c_str(), g[0], g[1], g[2],
-                c.shares_patches
-                    ? fmt::format(" (± {:.2f} %)", 100 * *std::max_element(c.gain_sigma.begin(), c.gain_sigma.end())).c_str()
-                    : " (not known)",
-                c.gamma, c.corner, c.vignetting_known ? "" : " (not known)", c.colour.hot_pixels.size(), 100 * c.rms);
+    std::printf(
+        "%-16s gain %.4f %.4f %.4f%s, gamma %.3f, corner %.3f%s, %zu hot pixels, off by %.2f %% RMS\n",
+        c.camera.c_str(), g[0], g[1], g[2],
+        c.shares_patches
+            ? fmt::format(" (± {:.2f} %)", 100 * *std::max_element(c.gain_sigma.begin(), c.gain_sigma.end()))
+                  .c_str()
+            : " (not known)",
+        c.gamma, c.corner, c.vignetting_known ? "" : " (not known)", c.colour.hot_pixels.size(), 100 * c.rms);
   }
-  for (const std::string& warning : calibration.warnings) std::printf("%-16s %s\n", "warning", warning.c_str());
-  if (!calibration.advice.empty()) std::printf("%-16s %s\n", "next picture", calibration.advice.front().c_str());
+  for (const std::string& warning : calibration.warnings)
+    std::printf("%-16s %s\n", "warning", warning.c_str());
+  if (!calibration.advice.empty())
+    std::printf("%-16s %s\n", "next picture", calibration.advice.front().c_str());
 }
 
 Status calibrate_folder(const ColourArguments& arguments) {
   EMBERLOCK_ASSIGN_OR_RETURN(const ColourReadings readings,
                              read_colour_folder(arguments.folder, progress_bar("calibrate colour")));
-  EMBERLOCK_ASSIGN_OR_RETURN(const ColourCalibration calibration, calibrate_colour(readings, {.gamma = arguments.gamma}));
+  EMBERLOCK_ASSIGN_OR_RETURN(const ColourCalibration calibration,
+                             calibrate_colour(readings, {.gamma = arguments.gamma}));
   v1::Rig rig;
   if (!arguments.rig.empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(rig, read_rig(arguments.rig));
@@ -77,8 +83,8 @@ Status calibrate_folder(const ColourArguments& arguments) {
   fs::create_directories(arguments.out, ec);
   if (ec) return Error{ErrorKind::io, ec.message(), arguments.out, "Give a folder that can be written"};
   EMBERLOCK_RETURN_IF_ERROR(write_rig(fs::path(arguments.out) / "rig.json", rig));
-  EMBERLOCK_RETURN_IF_ERROR(
-      write_file_atomically(fs::path(arguments.out) / "colour.html", colour_report_page(readings, calibration)));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(fs::path(arguments.out) / "colour.html",
+                                                  colour_report_page(readings, calibration)));
   print_summary(calibration);
   std::printf("%-16s %s\n", "written to", (fs::path(arguments.out) / "rig.json").c_str());
   return {};
@@ -91,13 +97,15 @@ void add_calibrate_colour(CLI::App& parent) {
   CLI::App* verb = parent.add_subcommand(
       "colour", "Responses, gains between cameras, vignetting and dark levels, from pictures of one target");
   ColourArguments& a = *arguments;
-  verb->add_option("folder", a.folder,
-                   "Holds colour.json (where the patches are) and a folder for each camera with its target[_LIGHT]"
-                   "[_SECONDSs], flat and dark pictures")
+  verb->add_option(
+          "folder", a.folder,
+          "Holds colour.json (where the patches are) and a folder for each camera with its target[_LIGHT]"
+          "[_SECONDSs], flat and dark pictures")
       ->required();
   verb->add_option("--out", a.out, "Folder for rig.json and colour.html, the report")->required();
   verb->add_option("--rig", a.rig, "A rig.json whose cameras get the colours [a new one with colours alone]");
-  verb->add_option("--gamma", a.gamma, "The cameras' response is this power law [found from exposures or radiances]")
+  verb->add_option("--gamma", a.gamma,
+                   "The cameras' response is this power law [found from exposures or radiances]")
       ->check(CLI::Range(0.3, 5.0));
   verb->callback([arguments] { or_fail(calibrate_folder(*arguments)); });
 }

@@ -21,11 +21,12 @@ std::vector<std::vector<std::string>> camera_rows(const ColourCalibration& calib
                  ? fmt::format("{:.4f} ± {:.2f} %", c.colour.gain[channel], 100 * c.gain_sigma[channel])
                  : std::string("not known");
     };
-    rows.push_back({c.camera, gain(0), gain(1), gain(2), fmt::format("{:.3f}", c.gamma),
-                    c.vignetting_known ? fmt::format("{:.3f} ± {:.3f}", c.corner, c.corner_sigma) : "not known",
-                    fmt::format("{:.5f}", c.colour.dark[1]), std::to_string(c.colour.hot_pixels.size()),
-                    fmt::format("{:.2f} %", 100 * c.rms),
-                    fmt::format("{} / {} / {} / {}", c.uses[0], c.uses[1], c.uses[2], c.uses[3])});
+    rows.push_back(
+        {c.camera, gain(0), gain(1), gain(2), fmt::format("{:.3f}", c.gamma),
+         c.vignetting_known ? fmt::format("{:.3f} ± {:.3f}", c.corner, c.corner_sigma) : "not known",
+         fmt::format("{:.5f}", c.colour.dark[1]), std::to_string(c.colour.hot_pixels.size()),
+         fmt::format("{:.2f} %", 100 * c.rms),
+         fmt::format("{} / {} / {} / {}", c.uses[0], c.uses[1], c.uses[2], c.uses[3])});
   }
   return rows;
 }
@@ -148,10 +149,12 @@ void patch_table(HtmlPage& page, const ColourReadings& readings, const ColourCal
 
 std::string colour_report_page(const ColourReadings& readings, const ColourCalibration& calibration) {
   HtmlPage page("Colour calibration");
-  page.paragraph(fmt::format(
-      "{} cameras. Their readings of the same patches agree to {:.2f} % (RMS) after calibration. Gains are relative to "
-      "the cameras' geometric mean, which is 1 in each channel: the picture of a scene has the colours of the mean camera.",
-      calibration.cameras.size(), 100 * calibration.rms));
+  page.paragraph(
+      fmt::format("{} cameras. Their readings of the same patches agree to {:.2f} % (RMS) after calibration. "
+                  "Gains are relative to "
+                  "the cameras' geometric mean, which is 1 in each channel: the picture of a scene has the "
+                  "colours of the mean camera.",
+                  calibration.cameras.size(), 100 * calibration.rms));
   if (!calibration.warnings.empty()) {
     page.heading("What isn't as it should be");
     for (const std::string& warning : calibration.warnings) page.paragraph(warning);
@@ -161,9 +164,10 @@ std::string colour_report_page(const ColourReadings& readings, const ColourCalib
   for (std::size_t i = 0; i < std::min<std::size_t>(5, calibration.advice.size()); ++i)
     page.paragraph(fmt::format("{}. {}", i + 1, calibration.advice[i]));
   page.heading("Cameras");
-  page.table({"camera", "gain R", "gain G", "gain B", "gamma", "light in the corner", "dark level (G, of white)",
-              "hot pixels", "RMS", "readings used / saturated / too dark / don't fit"},
-             camera_rows(calibration));
+  page.table(
+      {"camera", "gain R", "gain G", "gain B", "gamma", "light in the corner", "dark level (G, of white)",
+       "hot pixels", "RMS", "readings used / saturated / too dark / don't fit"},
+      camera_rows(calibration));
   page.heading("Response").raw(response_plot(calibration));
   page.heading("Residuals").raw(residual_plot(readings, calibration));
   page.heading("Vignetting").raw(vignetting_plot(calibration));
@@ -171,10 +175,13 @@ std::string colour_report_page(const ColourReadings& readings, const ColourCalib
   for (std::size_t i = 0; i < calibration.cameras.size(); ++i)
     if (calibration.cameras[i].vignetting_known)
       maps.push_back({vignetting_map(readings.cameras[i], calibration.cameras[i]),
-                      fmt::format("{}: {:.2f} in the corner", calibration.cameras[i].camera, calibration.cameras[i].corner)});
+                      fmt::format("{}: {:.2f} in the corner", calibration.cameras[i].camera,
+                                  calibration.cameras[i].corner)});
   if (!maps.empty()) page.gallery(maps);
   page.heading("Patches");
-  page.paragraph("What each camera makes of a patch, against what all agree on: the mean over its pictures and channels.");
+  page.paragraph(
+      "What each camera makes of a patch, against what all agree on: the mean over its pictures and "
+      "channels.");
   patch_table(page, readings, calibration);
   return page.str();
 }

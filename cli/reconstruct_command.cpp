@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/clock.h"
+#include "cli/box_pictures.h"
 #include "cli/commands.h"
 #include "cli/progress_stream.h"
 #include "cli/reconstruct_daemon.h"
@@ -15,7 +16,10 @@
 #include "recon/pipeline/advice.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/pipeline/reconstruct.h"
+#include "recon/pipeline/reference_run.h"
 #include "recon/pipeline/scene.h"
+#include "recon/pipeline/settled_run.h"
+#include "recon/pipeline/shipped_front.h"
 #include "recon/pipeline/sweep.h"
 #include "recon/pipeline/work_precision.h"
 
@@ -30,6 +34,7 @@ struct ReconstructArguments {
   std::string background = "auto";
   std::string smear = "auto";
   std::string demosaic = "bilinear";
+  std::string plan;
   std::string box;
   std::string solver = "default";
   std::string effects;
@@ -144,25 +149,31 @@ struct Watchers {
   ProgressStream* stream = nullptr;
 };
 
+/// The views that are asked for, of the frame that is, with roles.
+Result<Scene> load(const ReconstructArguments& arguments, const Progress& progress) {
+  SceneOptions options;
+  options.frame = arguments.frame;
+  options.progress = progress;
+  if (!arguments.box.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.box, parse_box(arguments.box));
+  }
+  if (!arguments.rig.empty()) options.rig = arguments.rig;
+  EMBERLOCK_RETURN_IF_ERROR(parse_background(arguments.background, options.frames));
+  EMBERLOCK_RETURN_IF_ERROR(parse_smear(arguments.smear, options.frames));
+  if (arguments.demosaic == "gradient") options.frames.develop.demosaicing = Demosaicing::gradient;
+  EMBERLOCK_ASSIGN_OR_RETURN(Scene scene, load_scene(arguments.input, options));
+  EMBERLOCK_RETURN_IF_ERROR(hold_out(scene, arguments.held_out));
+  return choose_views(scene, arguments.views);
+}
+
 Result<Outcome> reconstruct_files(const ReconstructArguments& arguments, const Watchers& watchers) {
   EMBERLOCK_ASSIGN_OR_RETURN(const ReconstructOptions options, options_of(arguments));
-  SceneOptions scene_options;
-  scene_options.frame = arguments.frame;
-  if (!arguments.box.empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(scene_options.box, parse_box(arguments.box));
-  }
-  if (!arguments.rig.empty()) scene_options.rig = arguments.rig;
-  EMBERLOCK_RETURN_IF_ERROR(parse_background(arguments.background, scene_options.frames));
-  EMBERLOCK_RETURN_IF_ERROR(parse_smear(arguments.smear, scene_options.frames));
-  if (arguments.demosaic == "gradient") scene_options.frames.develop.demosaicing = Demosaicing::gradient;
   EMBERLOCK_RETURN_IF_ERROR(check_output(arguments.out));
   if (watchers.stream != nullptr) {
     EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
     watchers.stream->loading(device);
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(Scene scene, load_scene(arguments.input, scene_options));
-  EMBERLOCK_RETURN_IF_ERROR(hold_out(scene, arguments.held_out));
-  EMBERLOCK_ASSIGN_OR_RETURN(scene, choose_views(scene, arguments.views));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Scene scene, load(arguments, watchers.progress));
   std::function<void(const Preview&)> preview;
   if (watchers.stream != nullptr) {
     preview = [&](const Preview& state) { watchers.stream->iteration(state, scene, options.solve.compute); };
@@ -173,6 +184,34 @@ Result<Outcome> reconstruct_files(const ReconstructArguments& arguments, const W
   EMBERLOCK_RETURN_IF_ERROR(write_outcome(outcome, arguments.out));
   if (watchers.stream != nullptr) watchers.stream->done(outcome, scene, arguments.out);
   return outcome;
+}
+
+/// The box on the pictures, and what a run would take by the shipped front, from a coarse one.
+Status plan_files(const ReconstructArguments& arguments) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const ReconstructOptions options, options_of(arguments));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Scene scene, load(arguments, progress_bar("plan")));
+  EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, choose_grid(scene, options.voxels));
+  SteadyClock clock;
+  const TimePoint start = clock.now();
+  const int finest = voxels_by_the_paper(scene);
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      const Reference reference,
+      measure_reference(scene, grid_over(scene.box, reference_voxels(finest)), Effects{}, options.solve,
+                        [&] { return clock.now() - start; }));
+  const std::vector<WorkPoint> front =
+      at_voxels(scaled(shipped_front(), finest, reference.seconds.value(), reference.error),
+                std::max({grid.nx, grid.ny, grid.nz}) - 1);
+  EMBERLOCK_RETURN_IF_ERROR(write_plan(scene, grid, arguments.plan));
+  const auto& c = scene.box.center;
+  const auto& s = scene.box.size;
+  std::printf("%-16s --box %.4g,%.4g,%.4g,%.4g,%.4g,%.4g\n", "box", c.x(), c.y(), c.z(), s.x(), s.y(), s.z());
+  std::printf("%-16s %d x %d x %d of %.2f mm; two for three pixels are %d along the longest edge\n", "voxels",
+              grid.nx - 1, grid.ny - 1, grid.nz - 1, 1e3 * static_cast<double>(grid.edge), finest);
+  if (const WorkPoint* best = best_within(front, INFINITY))
+    std::printf("%-16s about %.2g s, by the shipped front\n", "time", best->seconds);
+  std::printf("%-16s %s\n", "look at", (std::filesystem::path(arguments.plan) / "index.html").c_str());
+  return {};
 }
 
 /// What the daemon can be asked for; the rest is its configuration's.
@@ -199,6 +238,7 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
 
 void reconstruct_command(const ReconstructArguments& arguments) {
   if (arguments.input.empty()) throw CLI::RequiredError("input");
+  if (!arguments.plan.empty()) return or_fail(plan_files(arguments));
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
   if (!arguments.progress_fd) {
     const Outcome outcome = or_fail(reconstruct_files(arguments, {progress_bar("reconstruct")}));
@@ -228,8 +268,11 @@ void add_reconstruct(CLI::App& app) {
   verb->add_option(
       "--rig", a.rig,
       "Of a session: the rig.json of `calibrate cameras`, which stands before its own calibration");
+  verb->add_option(
+      "--plan", a.plan,
+      "Only show the box and the voxels on the pictures, in this folder, and what a run would take");
   verb->add_option("--box", a.box,
-                   "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's box]");
+                   "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's, or found]");
   verb->add_option("--voxels", a.voxels, "Voxels along the longest edge [two for three pixels, at most 256]")
       ->check(CLI::Range(1, kLargestVoxels));
   verb->add_option("--solver", a.solver, "default, or paper (equations 8 and 9 of the paper)")
@@ -262,13 +305,15 @@ void add_reconstruct(CLI::App& app) {
   verb->add_option("--frame", a.frame,
                    "Of a session: the frame of its first camera [the middle one that all cameras have]")
       ->check(CLI::NonNegativeNumber);
-  verb->add_option("--background", a.background,
-                   "Of a session: auto (each camera's first or last frames, where they are without flame), level (of "
-                   "the picture's darker half), or such frames: FIRST-LAST")
+  verb->add_option(
+          "--background", a.background,
+          "Of a session: auto (each camera's first or last frames, where they are without flame), level (of "
+          "the picture's darker half), or such frames: FIRST-LAST")
       ->capture_default_str();
-  verb->add_option("--smear", a.smear,
-                   "Of a session's CCDs: auto (where rows without flame show it), off, or the share of every row's "
-                   "light, with :above or :below for rows on one side")
+  verb->add_option(
+          "--smear", a.smear,
+          "Of a session's CCDs: auto (where rows without flame show it), off, or the share of every row's "
+          "light, with :above or :below for rows on one side")
       ->capture_default_str();
   verb->add_option("--demosaic", a.demosaic,
                    "bilinear, the least noise and error on flames; gradient for pictures with sharp edges")

@@ -14,8 +14,8 @@ namespace {
 
 constexpr int kFewestCorners = 6;
 constexpr double kWindowShare = 0.5;  // of the least distance between corners: half a refinement window
-constexpr int kWidestWindow = 11;      // pixels, half
-constexpr int kMostSquares = 100;  // along a side
+constexpr int kWidestWindow = 11;     // pixels, half
+constexpr int kMostSquares = 100;     // along a side
 constexpr const char* kBoardFormats =
     "Give chessboard:COLUMNSxROWS:SQUARE in inner corners (chessboard:9x6:25mm), or "
     "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY in squares (charuco:11x8:30mm:22mm:5X5_100)";
@@ -144,16 +144,16 @@ double least_step(const std::vector<cv::Point2f>& corners, const Board& board) {
   return least;
 }
 
-/// The detector that bears glare and blur, then the other. The gradients around each corner say where it is to a
-/// fraction of a pixel, in a window that no neighbour reaches into.
+/// The detector that bears glare and blur, then the other. The gradients around each corner say where it is
+/// to a fraction of a pixel, in a window that no neighbour reaches into.
 std::vector<BoardCorner> find_chessboard(const cv::Mat& grey, const Board& board) {
   const cv::Size size(board.columns, board.rows);
   std::vector<cv::Point2f> corners;
-  const bool found =
-      cv::findChessboardCornersSB(grey, size, corners, cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY) ||
-      cv::findChessboardCorners(
-          grey, size, corners,
-          cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK);
+  const bool found = cv::findChessboardCornersSB(grey, size, corners,
+                                                 cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ACCURACY) ||
+                     cv::findChessboardCorners(grey, size, corners,
+                                               cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE |
+                                                   cv::CALIB_CB_FAST_CHECK);
   if (!found || corners.size() != static_cast<std::size_t>(board.corners())) return {};
   const int half = std::clamp(static_cast<int>(kWindowShare * least_step(corners, board)), 2, kWidestWindow);
   const cv::TermCriteria until(cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 50, 1e-3);

@@ -71,7 +71,8 @@ std::unique_ptr<ceres::CostFunction> corner_cost(const Bundle& bundle, const Bun
   using Cost = ceres::AutoDiffCostFunction<CornerCost, 2, kLensUnknowns, kPoseUnknowns, kPoseUnknowns>;
   return std::make_unique<Cost>(new CornerCost{&bundle.cameras[view.camera].model.camera_from_world.rotation,
                                                &bundle.boards[view.board].world_from_board.rotation,
-                                               bundle.board.point(view.corners[i].id), view.corners[i].pixel, weight});
+                                               bundle.board.point(view.corners[i].id), view.corners[i].pixel,
+                                               weight});
 }
 
 /// The problem over `blocks`, which must outlive it. Cameras and boards that no used corner shows are left
@@ -84,7 +85,8 @@ std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks,
     for (std::size_t i = 0; i < view.corners.size(); ++i) {
       if (view.use[i] != CornerUse::used) continue;
       const double noise = camera.noise * (weigh == Weigh::by_noise ? 1 : camera.inflation);
-      problem->AddResidualBlock(corner_cost(bundle, view, i, 1 / noise).release(), loss == BundleLoss::cauchy ? new ceres::CauchyLoss(2) : nullptr,
+      problem->AddResidualBlock(corner_cost(bundle, view, i, 1 / noise).release(),
+                                loss == BundleLoss::cauchy ? new ceres::CauchyLoss(2) : nullptr,
                                 blocks.lenses[view.camera].data(), blocks.cameras[view.camera].data(),
                                 blocks.boards[view.board].data());
     }
@@ -121,7 +123,8 @@ struct ViewEquations {
 
 ViewEquations equations_of(const Bundle& bundle, const BundleView& view, const Blocks& blocks) {
   const auto rows = static_cast<Eigen::Index>(2 * view.used());
-  ViewEquations result{Eigen::VectorXd(rows), Eigen::MatrixXd(rows, kLensUnknowns), Eigen::MatrixXd(rows, kPoseUnknowns)};
+  ViewEquations result{Eigen::VectorXd(rows), Eigen::MatrixXd(rows, kLensUnknowns),
+                       Eigen::MatrixXd(rows, kPoseUnknowns)};
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < view.corners.size(); ++i) {
     if (view.use[i] != CornerUse::used) continue;
@@ -129,7 +132,8 @@ ViewEquations equations_of(const Bundle& bundle, const BundleView& view, const B
     Eigen::Matrix<double, 2, kLensUnknowns, Eigen::RowMajor> by_lens;
     Eigen::Matrix<double, 2, kPoseUnknowns, Eigen::RowMajor> by_board;
     Eigen::Vector2d residuals = Eigen::Vector2d::Zero();
-    const std::array<const double*, 3> at = {blocks.lenses[view.camera].data(), blocks.cameras[view.camera].data(),
+    const std::array<const double*, 3> at = {blocks.lenses[view.camera].data(),
+                                             blocks.cameras[view.camera].data(),
                                              blocks.boards[view.board].data()};
     std::array<double*, 3> by = {by_lens.data(), nullptr, by_board.data()};
     cost->Evaluate(at.data(), residuals.data(), by.data());
@@ -249,7 +253,8 @@ double jackknife_inflation(const Bundle& bundle) {
     const Eigen::VectorXd moved = (all - normals[v]).ldlt().solve(gradients[v]);
     variance += (views - 1) / views * moved.cwiseAbs2();
   }
-  const Eigen::VectorXd independent = all.ldlt().solve(Eigen::MatrixXd::Identity(unknowns, unknowns)).diagonal();
+  const Eigen::VectorXd independent =
+      all.ldlt().solve(Eigen::MatrixXd::Identity(unknowns, unknowns)).diagonal();
   const double ratio = variance.cwiseQuotient(independent).mean();
   return ratio > 1 + kChance * std::sqrt(2 / views) ? std::sqrt(ratio) : 1;
 }

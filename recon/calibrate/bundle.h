@@ -79,10 +79,10 @@ Status adjust(Bundle& bundle, BundleLoss loss);
 /// Where corner `i` of a view is drawn less where it was seen, pixels; not finite behind the camera.
 Eigen::Vector2d residual(const Bundle& bundle, const BundleView& view, std::size_t i);
 
-/// By what factor a lens's standard deviations exceed those of independent corners: corners of one view err together
-/// where a board isn't quite flat or blur shifts them. By the jackknife over views, one step each (Efron 1982), on
-/// average over the lens's unknowns; 1 where chance explains it (3 standard deviations), and below 6 views. Of a
-/// bundle of one camera.
+/// By what factor a lens's standard deviations exceed those of independent corners: corners of one view err
+/// together where a board isn't quite flat or blur shifts them. By the jackknife over views, one step each
+/// (Efron 1982), on average over the lens's unknowns; 1 where chance explains it (3 standard deviations), and
+/// below 6 views. Of a bundle of one camera.
 double jackknife_inflation(const Bundle& bundle);
 
 /// Covariance of all cameras' unknowns at the solution, kCameraUnknowns rows a camera, zero for what is held;

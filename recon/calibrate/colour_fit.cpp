@@ -17,7 +17,8 @@ struct RadianceResidual {
   const ColourEquation& e;
 
   template <class T>
-  bool operator()(const T* response, const T* log_gain, const T* vignetting, const T* log_light, T* residual) const {
+  bool operator()(const T* response, const T* log_gain, const T* vignetting, const T* log_light,
+                  T* residual) const {
     using std::exp;
     using std::log;
     T exposure = exp(ResponseCurve::log_exposure(response, e.sample, e.variance));
@@ -32,8 +33,8 @@ struct RadianceResidual {
   }
 };
 
-/// What cameras are like before anything is measured, so that what no picture tells stays small; and a response
-/// that falls costs much.
+/// What cameras are like before anything is measured, so that what no picture tells stays small; and a
+/// response that falls costs much.
 struct LikelyCurve {
   static constexpr int kSlopes = 16;
   static constexpr double kLeastSlope = 0.2;
@@ -129,11 +130,12 @@ class ColourProblem {
  private:
   void add_camera(std::size_t i, const ColourHeld& held) {
     ColourUnknowns& c = fit_.cameras[i];
-    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<LikelyCurve, ResponseCurve::kParameters + LikelyCurve::kSlopes,
-                                                              ResponseCurve::kParameters>(new LikelyCurve),
-                              nullptr, c.response.data());
-    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<LikelyVignetting, 3, 3>(new LikelyVignetting), nullptr,
-                              c.vignetting.data());
+    problem_.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<LikelyCurve, ResponseCurve::kParameters + LikelyCurve::kSlopes,
+                                        ResponseCurve::kParameters>(new LikelyCurve),
+        nullptr, c.response.data());
+    problem_.AddResidualBlock(new ceres::AutoDiffCostFunction<LikelyVignetting, 3, 3>(new LikelyVignetting),
+                              nullptr, c.vignetting.data());
     if (held.response) problem_.SetParameterBlockConstant(c.response.data());
     if (held.vignetting[i]) problem_.SetParameterBlockConstant(c.vignetting.data());
     for (std::size_t k = 0; k < 3; ++k)
@@ -152,7 +154,8 @@ void weigh(std::vector<ColourEquation>& equations, const ColourFit& fit, double 
     const ColourUnknowns& c = fit.cameras[e.camera];
     const double whole = std::exp(ResponseCurve::log_exposure(c.response.data(), e.sample, e.variance));
     const double slope = whole * ResponseCurve::log_slope(c.response.data(), e.sample) / e.sample;
-    const double noise = slope * e.sample_sigma / std::max(kLeastExposure, whole - ResponseCurve::exposure(c.response, e.dark_sample));
+    const double noise = slope * e.sample_sigma /
+                         std::max(kLeastExposure, whole - ResponseCurve::exposure(c.response, e.dark_sample));
     e.sigma = std::hypot(floor, noise);
   }
 }
@@ -162,8 +165,8 @@ void judge_equations(std::vector<ColourEquation>& equations, ColourFit& fit) {
   for (ColourEquation& e : equations) {
     ColourUnknowns& c = fit.cameras[e.camera];
     double residual = 0;
-    RadianceResidual{e}(c.response.data(), &c.log_gain[e.channel], c.vignetting.data(), &fit.log_light[e.light],
-                        &residual);
+    RadianceResidual{e}(c.response.data(), &c.log_gain[e.channel], c.vignetting.data(),
+                        &fit.log_light[e.light], &residual);
     e.residual = residual * e.sigma;
     off.push_back(std::abs(residual));
   }
@@ -178,8 +181,8 @@ void judge_equations(std::vector<ColourEquation>& equations, ColourFit& fit) {
 
 }  // namespace
 
-std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, ColourFit start, const ColourHeld& held,
-                                    double floor) {
+std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, ColourFit start,
+                                    const ColourHeld& held, double floor) {
   constexpr int kRounds = 3;
   ColourFit fit = std::move(start);
   for (int round = 0; round < kRounds; ++round) {
@@ -199,7 +202,8 @@ std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, Colo
     squares += e.residual * e.residual / (e.sigma * e.sigma);
     count += 1;
   }
-  const double unknowns = static_cast<double>(covariance->rows() + static_cast<Eigen::Index>(fit.log_light.size()));
+  const double unknowns =
+      static_cast<double>(covariance->rows() + static_cast<Eigen::Index>(fit.log_light.size()));
   fit.covariance = std::max(1.0, squares / std::max(1.0, count - unknowns)) * *covariance;
   return fit;
 }

@@ -13,15 +13,15 @@ namespace emberlock {
 /// One reading of one channel in the joint fit.
 struct ColourEquation {
   std::size_t camera = 0, channel = 0;
-  std::size_t light = 0;        ///< which unknown radiance
-  double known = 0;             ///< ln of exposure and of the reference radiance
+  std::size_t light = 0;  ///< which unknown radiance
+  double known = 0;       ///< ln of exposure and of the reference radiance
   double sample = 0, variance = 0;
-  double sample_sigma = 0;      ///< of the mean
+  double sample_sigma = 0;  ///< of the mean
   double radius_squared = 0;
   double dark_sample = 0;  ///< without light
-  bool outlier = false;         ///< out
-  double residual = 0;          ///< out: ln of the camera's radiance over the common one
-  double sigma = 0;             ///< out: its standard deviation
+  bool outlier = false;    ///< out
+  double residual = 0;     ///< out: ln of the camera's radiance over the common one
+  double sigma = 0;        ///< out: its standard deviation
 };
 
 struct ColourUnknowns {
@@ -44,9 +44,9 @@ struct ColourHeld {
   std::vector<bool> vignetting;           ///< by camera
 };
 
-/// The joint robust fit from `start`; nothing where the equations leave something open. Weights are renewed as the
-/// response is found.
-std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, ColourFit start, const ColourHeld& held,
-                                    double floor);
+/// The joint robust fit from `start`; nothing where the equations leave something open. Weights are renewed
+/// as the response is found.
+std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, ColourFit start,
+                                    const ColourHeld& held, double floor);
 
 }  // namespace emberlock

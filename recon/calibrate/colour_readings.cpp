@@ -30,17 +30,19 @@ Error bad_plan(std::string where, std::string what, std::string remedy) {
 Result<PatchPlace> parse_place(const PlanJson& json, const std::string& where) {
   constexpr int kMost = 65536;
   std::array<int, 4> v = {};
-  const bool shaped = json.is_array() && json.size() == 4 &&
-                      std::all_of(json.begin(), json.end(), [](const PlanJson& n) {
-                        return n.is_number_integer() && n >= 0 && n <= kMost;
-                      });
-  if (shaped) std::transform(json.begin(), json.end(), v.begin(), [](const PlanJson& n) { return n.get<int>(); });
+  const bool shaped =
+      json.is_array() && json.size() == 4 && std::all_of(json.begin(), json.end(), [](const PlanJson& n) {
+        return n.is_number_integer() && n >= 0 && n <= kMost;
+      });
+  if (shaped)
+    std::transform(json.begin(), json.end(), v.begin(), [](const PlanJson& n) { return n.get<int>(); });
   if (!shaped || v[2] < 1 || v[3] < 1)
     return bad_plan(where, "is no rectangle of whole pixels", "Give [x, y, width, height]");
   return PatchPlace{v[0], v[1], v[2], v[3]};
 }
 
-Result<std::map<std::string, ColourPlan::Places>> parse_places(const PlanJson& json, const std::string& where) {
+Result<std::map<std::string, ColourPlan::Places>> parse_places(const PlanJson& json,
+                                                               const std::string& where) {
   std::map<std::string, ColourPlan::Places> out;
   if (!json.is_object()) return bad_plan(where, "is no object", "Give rectangles by patch, by camera");
   for (const auto& [owner, places] : json.items()) {
@@ -54,7 +56,9 @@ Result<std::map<std::string, ColourPlan::Places>> parse_places(const PlanJson& j
 
 Result<std::array<double, 3>> parse_radiance(const PlanJson& json, const std::string& where) {
   std::array<double, 3> out = {};
-  const auto good = [](const PlanJson& n) { return n.is_number() && n.get<double>() > 0 && n.get<double>() < 1e9; };
+  const auto good = [](const PlanJson& n) {
+    return n.is_number() && n.get<double>() > 0 && n.get<double>() < 1e9;
+  };
   if (good(json)) {
     out.fill(json.get<double>());
     return out;
@@ -91,7 +95,8 @@ PatchReading summarise(const std::array<ChannelSamples, 3>& samples, int white) 
     }
     const double mean = sum / out.count[c];
     out.mean[c] = mean / white;
-    out.variance[c] = std::max(0.0, squares / out.count[c] - mean * mean) / (static_cast<double>(white) * white);
+    out.variance[c] =
+        std::max(0.0, squares / out.count[c] - mean * mean) / (static_cast<double>(white) * white);
     out.saturated[c] = samples[c].saturated / static_cast<double>(v.size());
   }
   return out;
@@ -122,7 +127,8 @@ std::optional<PicturePath> by_name(const fs::path& path) {
     const std::string word = stem.substr(at + 1, next == std::string::npos ? next : next - at - 1);
     char* end = nullptr;
     const double number = std::strtod(word.c_str(), &end);
-    if (word.size() > 1 && end == word.c_str() + word.size() - 1 && *end == 's' && number > 0 && std::isfinite(number))
+    if (word.size() > 1 && end == word.c_str() + word.size() - 1 && *end == 's' && number > 0 &&
+        std::isfinite(number))
       out.exposure = number;
     else
       out.light += (out.light.empty() ? "" : "_") + word;
@@ -147,11 +153,12 @@ class CameraPictures {
       camera.step = 1.0 / image.layout().white();
       layout_ = image.layout();
     } else if (image.layout() != layout_) {
-      return bad_plan(picture.path.string(),
-                      fmt::format("is {} x {} ({}), other pictures of camera {} are {} x {} ({})",
-                                  image.layout().size.width, image.layout().size.height, name(image.layout().format),
-                                  camera.id, camera.size.width, camera.size.height, name(layout_.format)),
-                      "Take all pictures of a camera with the settings it films with");
+      return bad_plan(
+          picture.path.string(),
+          fmt::format("is {} x {} ({}), other pictures of camera {} are {} x {} ({})",
+                      image.layout().size.width, image.layout().size.height, name(image.layout().format),
+                      camera.id, camera.size.width, camera.size.height, name(layout_.format)),
+          "Take all pictures of a camera with the settings it films with");
     }
     if (picture.purpose == Purpose::dark) return add_dark(image);
     if (picture.purpose == Purpose::flat) return add_flat(image, picture);
@@ -210,7 +217,8 @@ class CameraPictures {
                       "Say where this camera's pictures show the patches");
     }
     for (const auto& [patch, place] : own != plan_.pictures.end() ? own->second : usual->second) {
-      if (place.x + place.width > image.layout().size.width || place.y + place.height > image.layout().size.height) {
+      if (place.x + place.width > image.layout().size.width ||
+          place.y + place.height > image.layout().size.height) {
         return bad_plan(picture.path.string(), "patch " + patch + " lies outside the picture",
                         "Correct its rectangle in colour.json");
       }
@@ -258,7 +266,8 @@ Status check_exposures(const std::vector<PicturePath>& pictures) {
   for (const PicturePath& p : pictures)
     if (p.purpose == Purpose::target) (p.exposure ? told : silent) = &p;
   if (told == nullptr || silent == nullptr) return {};
-  return bad_plan(silent->path.string(), "doesn't tell its exposure, and " + told->path.filename().string() + " does",
+  return bad_plan(silent->path.string(),
+                  "doesn't tell its exposure, and " + told->path.filename().string() + " does",
                   "Name every target picture's exposure, as target_LIGHT_0.01s.png, or none's");
 }
 
@@ -288,7 +297,8 @@ PatchReading read_patch(const ImageView& picture, const PatchPlace& place) {
 
 Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& where) {
   const PlanJson json = PlanJson::parse(text, nullptr, false);
-  if (!json.is_object()) return bad_plan(where, "is no JSON object", "See `emberlock calibrate colour --help`");
+  if (!json.is_object())
+    return bad_plan(where, "is no JSON object", "See `emberlock calibrate colour --help`");
   ColourPlan plan;
   for (const auto& [key, value] : json.items()) {
     const std::string field = where + ": " + key;
@@ -311,7 +321,8 @@ Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& w
 Result<ColourReadings> read_colour_folder(const fs::path& folder, const Progress& progress) {
   std::error_code ec;
   if (!fs::is_directory(folder, ec))
-    return bad_plan(folder.string(), "is no folder", "Name the folder that holds colour.json and a folder for each camera");
+    return bad_plan(folder.string(), "is no folder",
+                    "Name the folder that holds colour.json and a folder for each camera");
   const fs::path plan_path = folder / "colour.json";
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(plan_path, kLargestPlan));
   EMBERLOCK_ASSIGN_OR_RETURN(const ColourPlan plan, parse_colour_plan(text, plan_path.string()));

@@ -22,11 +22,11 @@ struct PatchPlace {
 /// What a picture shows of one patch. Samples are relative to the sensor's white: 0..1.
 struct PatchReading {
   std::size_t camera = 0;
-  std::string patch;    ///< readings of one patch in one light saw one radiance, in whatever camera and place
+  std::string patch;  ///< readings of one patch in one light saw one radiance, in whatever camera and place
   std::string light = {};
   std::string picture = {};  ///< for messages
-  double exposure = 1;  ///< relative exposure time
-  double x = 0, y = 0;  ///< the patch's middle, pixel centres at +0.5
+  double exposure = 1;       ///< relative exposure time
+  double x = 0, y = 0;       ///< the patch's middle, pixel centres at +0.5
   std::array<double, 3> mean = {};
   std::array<double, 3> variance = {};   ///< of one sample
   std::array<double, 3> saturated = {};  ///< share of the samples
@@ -55,27 +55,30 @@ struct ColourReadings {
   std::map<std::string, std::array<double, 3>> radiance;
 };
 
-/// Mean and variance of a patch, by channel; samples further than five robust sigma from the median (dirt, hot
-/// pixels) are left out. `place` lies inside the picture.
+/// Mean and variance of a patch, by channel; samples further than five robust sigma from the median (dirt,
+/// hot pixels) are left out. `place` lies inside the picture.
 PatchReading read_patch(const ImageView& picture, const PatchPlace& place);
 
 /// What colour.json in a folder of target pictures says:
 ///   {"patches": {CAMERA: {PATCH: [x, y, width, height]}},
-///    "pictures": {"CAMERA/FILE": {PATCH: [x, y, width, height]}},   instead, for pictures in which the target stood elsewhere
-///    "radiance": {PATCH: L or [R, G, B]}}                           optional, of a chart: any common unit
+///    "pictures": {"CAMERA/FILE": {PATCH: [x, y, width, height]}},   instead, for pictures in which the
+///    target stood elsewhere "radiance": {PATCH: L or [R, G, B]}}                           optional, of a
+///    chart: any common unit
 struct ColourPlan {
   using Places = std::map<std::string, PatchPlace>;
   std::map<std::string, Places> patches;
   std::map<std::string, Places> pictures;
   std::map<std::string, std::array<double, 3>> radiance;
 };
-/// Errors name the field: no JSON, unknown keys, rectangles without four whole numbers or extent, radiances not above 0.
+/// Errors name the field: no JSON, unknown keys, rectangles without four whole numbers or extent, radiances
+/// not above 0.
 Result<ColourPlan> parse_colour_plan(std::string_view json, const std::string& where);
 
-/// Reads DIR/CAMERA/{dark,flat,target}*, pictures of any format that read_image() knows. A target's name tells its
-/// light and its exposure: target[_LIGHT][_SECONDSs].png; pictures of one LIGHT saw the same patches equally bright. A flat
-/// shows one radiance everywhere. Errors: no cameras, no pictures, pictures of one camera that differ in size, a
-/// patch outside its picture, a picture's exposure told where another's isn't.
+/// Reads DIR/CAMERA/{dark,flat,target}*, pictures of any format that read_image() knows. A target's name
+/// tells its light and its exposure: target[_LIGHT][_SECONDSs].png; pictures of one LIGHT saw the same
+/// patches equally bright. A flat shows one radiance everywhere. Errors: no cameras, no pictures, pictures of
+/// one camera that differ in size, a patch outside its picture, a picture's exposure told where another's
+/// isn't.
 Result<ColourReadings> read_colour_folder(const std::filesystem::path& folder, const Progress& progress = {});
 
 }  // namespace emberlock

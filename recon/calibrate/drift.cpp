@@ -24,10 +24,11 @@ constexpr double kNormalOfFalseAlarm = 3.09;  // 0.1 % on one side
 constexpr double kLensNoise = 3;              // times the calibration's noise, and
 constexpr double kLeastLensNoise = 0.3;       // pixels: blurred pictures are noisier too
 
-/// What chi-square of 6 degrees of freedom exceeds by chance in 0.1 % of checks of so many cameras (Wilson and
-/// Hilferty 1931; the tail's normal quantile grows by about ln(cameras) / 3.09).
+/// What chi-square of 6 degrees of freedom exceeds by chance in 0.1 % of checks of so many cameras (Wilson
+/// and Hilferty 1931; the tail's normal quantile grows by about ln(cameras) / 3.09).
 double chi2_limit(std::size_t cameras) {
-  const double z = kNormalOfFalseAlarm + std::log(static_cast<double>(std::max<std::size_t>(1, cameras))) / 3.4;
+  const double z =
+      kNormalOfFalseAlarm + std::log(static_cast<double>(std::max<std::size_t>(1, cameras))) / 3.4;
   const double n = kPoseUnknowns;
   return n * std::pow(1 - 2 / (9 * n) + z * std::sqrt(2 / (9 * n)), 3);
 }
@@ -38,7 +39,8 @@ struct Known {
   double noise = 0;                 ///< 0: unknown
 };
 
-Result<Known> known_camera(const v1::Rig& rig, const BoardSightings::Camera& camera, const std::string& where) {
+Result<Known> known_camera(const v1::Rig& rig, const BoardSightings::Camera& camera,
+                           const std::string& where) {
   const auto found = std::find_if(rig.cameras().begin(), rig.cameras().end(),
                                   [&](const v1::RigCamera& c) { return c.camera_id() == camera.id; });
   if (found == rig.cameras().end()) {
@@ -48,8 +50,8 @@ Result<Known> known_camera(const v1::Rig& rig, const BoardSightings::Camera& cam
   const ImageSize size{static_cast<int>(found->width()), static_cast<int>(found->height())};
   if (size != camera.size) {
     return Error{ErrorKind::bad_input,
-                 fmt::format("calibrated with pictures of {} x {} pixels, these have {} x {}", size.width, size.height,
-                             camera.size.width, camera.size.height),
+                 fmt::format("calibrated with pictures of {} x {} pixels, these have {} x {}", size.width,
+                             size.height, camera.size.width, camera.size.height),
                  where + ": camera " + camera.id, "Take pictures in the mode that was calibrated"};
   }
   Known known;
@@ -60,7 +62,8 @@ Result<Known> known_camera(const v1::Rig& rig, const BoardSightings::Camera& cam
   return known;
 }
 
-/// Each view by itself, with the calibrated lens: the camera's noise now, which corners are wrong, where the boards are.
+/// Each view by itself, with the calibrated lens: the camera's noise now, which corners are wrong, where the
+/// boards are.
 struct OwnViews {
   Bundle bundle;
   std::vector<std::size_t> sightings;
@@ -87,8 +90,8 @@ Result<OwnViews> own_views(const BoardSightings& sightings, std::size_t camera, 
 }
 
 /// All cameras as calibrated, held; a board each instant that two of them see.
-Bundle bundle_of(const BoardSightings& sightings, const std::vector<Known>& known, const std::vector<OwnViews>& own,
-                 const std::vector<bool>& usable) {
+Bundle bundle_of(const BoardSightings& sightings, const std::vector<Known>& known,
+                 const std::vector<OwnViews>& own, const std::vector<bool>& usable) {
   std::map<std::size_t, std::vector<std::pair<std::size_t, const BundleView*>>> by_instant;
   for (std::size_t c = 0; c < known.size(); ++c) {
     if (!usable[c]) continue;
@@ -128,14 +131,16 @@ double cost_of(const Bundle& bundle) {
 }
 
 Vector6 motion(const CameraModel& now, const CameraModel& calibrated) {
-  const Eigen::AngleAxisd turn(now.camera_from_world.rotation * calibrated.camera_from_world.rotation.transpose());
+  const Eigen::AngleAxisd turn(now.camera_from_world.rotation *
+                               calibrated.camera_from_world.rotation.transpose());
   Vector6 result;
   result << now.center() - calibrated.center(), turn.angle() * turn.axis();
   return result;
 }
 
 double worst_deviation(const Eigen::Matrix3d& spread) {
-  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues().maxCoeff()));
+  return std::sqrt(
+      std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues().maxCoeff()));
 }
 
 /// Frees one more camera: the bundle then, and what it says of that camera.
@@ -216,7 +221,8 @@ bool DriftReport::drifted() const {
   });
 }
 
-Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sightings, const std::string& where) {
+Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sightings,
+                                const std::string& where) {
   DriftReport report;
   report.limit = chi2_limit(sightings.cameras.size());
   std::vector<Known> known;
@@ -231,9 +237,10 @@ Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sighti
                            noise < std::max(kLensNoise * camera.noise, kLeastLensNoise);
     if (!lens_fits) {
       drift.verdict = DriftVerdict::lens;
-      drift.why = fmt::format("corners lie {:.2f} pixels off where its lens was calibrated to {:.2f}: zoom or focus "
-                              "changed, or the pictures are blurred",
-                              noise, camera.noise);
+      drift.why = fmt::format(
+          "corners lie {:.2f} pixels off where its lens was calibrated to {:.2f}: zoom or focus "
+          "changed, or the pictures are blurred",
+          noise, camera.noise);
     }
     usable.push_back(lens_fits);
     report.cameras.push_back(std::move(drift));

@@ -8,24 +8,24 @@
 namespace emberlock {
 
 enum class DriftVerdict {
-  still,        ///< what shows is explained by the corners' noise and the calibration's own uncertainty
-  moved,        ///< significantly
-  lens,         ///< its pictures don't fit its lens any more, whatever the pose
-  unknown,      ///< too little was seen of it
+  still,    ///< what shows is explained by the corners' noise and the calibration's own uncertainty
+  moved,    ///< significantly
+  lens,     ///< its pictures don't fit its lens any more, whatever the pose
+  unknown,  ///< too little was seen of it
 };
 
 struct CameraDrift {
   std::string id;
   DriftVerdict verdict = DriftVerdict::unknown;
-  std::string why = {};          ///< of lens and unknown
-  std::size_t instants = 0;      ///< shared with another camera
+  std::string why = {};                             ///< of lens and unknown
+  std::size_t instants = 0;                         ///< shared with another camera
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< metres, in the world: centre now less calibrated
   Eigen::Vector3d turn = Eigen::Vector3d::Zero();   ///< radians, about its own axes
-  double place_sigma = 0;        ///< metres, along the worst axis, the calibration's own uncertainty included
-  double turn_sigma = 0;         ///< radians, likewise
-  double chi2 = 0;               ///< of place and turn together: 6 degrees of freedom where it stood still
-  double rms_before = 0;         ///< pixels, with the calibrated poses
-  double rms_after = 0;          ///< pixels, with those that moved moved
+  double place_sigma = 0;  ///< metres, along the worst axis, the calibration's own uncertainty included
+  double turn_sigma = 0;   ///< radians, likewise
+  double chi2 = 0;         ///< of place and turn together: 6 degrees of freedom where it stood still
+  double rms_before = 0;   ///< pixels, with the calibrated poses
+  double rms_after = 0;    ///< pixels, with those that moved moved
 };
 
 struct DriftReport {
@@ -37,12 +37,14 @@ struct DriftReport {
   [[nodiscard]] bool drifted() const;
 };
 
-/// Whether cameras moved since `rig` was calibrated, from later views of the board (any place, seen by two cameras at
-/// least): which, by how much, and whether noise explains it. First every view by itself, with its old lens, tells
-/// each camera's noise. Then, all poses as calibrated, the camera whose freeing helps most is freed if its motion is
-/// significant, and again, until none is: by chi-square against its own and the calibration's stated
-/// uncertainties, 0.1 % for false alarms over all cameras. `where` names the rig. Errors: a camera that the rig
-/// lacks or calibrated with another picture size; no instant that two calibrated cameras share.
-Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sightings, const std::string& where);
+/// Whether cameras moved since `rig` was calibrated, from later views of the board (any place, seen by two
+/// cameras at least): which, by how much, and whether noise explains it. First every view by itself, with its
+/// old lens, tells each camera's noise. Then, all poses as calibrated, the camera whose freeing helps most is
+/// freed if its motion is significant, and again, until none is: by chi-square against its own and the
+/// calibration's stated uncertainties, 0.1 % for false alarms over all cameras. `where` names the rig.
+/// Errors: a camera that the rig lacks or calibrated with another picture size; no instant that two
+/// calibrated cameras share.
+Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sightings,
+                                const std::string& where);
 
 }  // namespace emberlock

@@ -10,7 +10,7 @@
 namespace emberlock {
 namespace {
 
-constexpr double kEnoughTilt = 0.5;        // radians between two of a camera's boards
+constexpr double kEnoughTilt = 0.5;         // radians between two of a camera's boards
 constexpr std::size_t kEnoughInstants = 5;  // that a pair shares
 constexpr double kDegrees = 180 / M_PI;
 
@@ -24,8 +24,7 @@ std::vector<std::string> empty_regions(const CornerCoverage& coverage) {
       if (coverage.corners[static_cast<std::size_t>(row * CornerCoverage::kColumns + column)] > 0) continue;
       const auto v = static_cast<std::size_t>(3 * (2 * row + 1) / (2 * CornerCoverage::kRows));
       const auto h = static_cast<std::size_t>(3 * (2 * column + 1) / (2 * CornerCoverage::kColumns));
-      const std::string name =
-          v == 1 && h == 1 ? "middle" : std::string(kVertical[v]) + " " + kHorizontal[h];
+      const std::string name = v == 1 && h == 1 ? "middle" : std::string(kVertical[v]) + " " + kHorizontal[h];
       if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
     }
   }
@@ -75,8 +74,8 @@ std::vector<CornerCoverage> corner_coverage(const RigCalibration& calibration) {
       const Eigen::Vector2d& p = view.corners[i].pixel;
       const int column = std::clamp(static_cast<int>(p.x() / size.width * CornerCoverage::kColumns), 0,
                                     CornerCoverage::kColumns - 1);
-      const int row =
-          std::clamp(static_cast<int>(p.y() / size.height * CornerCoverage::kRows), 0, CornerCoverage::kRows - 1);
+      const int row = std::clamp(static_cast<int>(p.y() / size.height * CornerCoverage::kRows), 0,
+                                 CornerCoverage::kRows - 1);
       ++coverage[view.camera].corners[static_cast<std::size_t>(row * CornerCoverage::kColumns + column)];
     }
   }
@@ -96,26 +95,30 @@ std::vector<std::string> next_pictures(const RigCalibration& calibration) {
   for (std::size_t b = 0; b < coverage.size(); ++b) {
     const CalibratedCamera& camera = calibration.cameras[calibration.bundle_camera[b]];
     if (coverage[b].empty_cells() > 0) {
-      advice.push_back(fmt::format(
-          "{}: {} of the picture's {} cells have no corner: hold the board {} of it. Out there the distortion is extrapolated.",
-          camera.id, coverage[b].empty_cells(), coverage[b].corners.size(), joined_words(empty_regions(coverage[b]))));
+      advice.push_back(
+          fmt::format("{}: {} of the picture's {} cells have no corner: hold the board {} of it. Out there "
+                      "the distortion is extrapolated.",
+                      camera.id, coverage[b].empty_cells(), coverage[b].corners.size(),
+                      joined_words(empty_regions(coverage[b]))));
     }
     if (camera.tilt < kEnoughTilt) {
-      advice.push_back(fmt::format(
-          "{}: its boards differ by {:.0f} degrees at most: tilt the board by 30 degrees to each side; the focal length "
-          "({:.1f} +- {:.1f} pixels) and the distance hang together otherwise.",
-          camera.id, camera.tilt * kDegrees, camera.fit.model.intrinsics.fx, camera.sigma[0]));
+      advice.push_back(
+          fmt::format("{}: its boards differ by {:.0f} degrees at most: tilt the board by 30 degrees to each "
+                      "side; the focal length "
+                      "({:.1f} +- {:.1f} pixels) and the distance hang together otherwise.",
+                      camera.id, camera.tilt * kDegrees, camera.fit.model.intrinsics.fx, camera.sigma[0]));
     }
   }
   if (const CameraPair* pair = weakest_link(calibration)) {
     const std::string& a = calibration.cameras[pair->a].id;
     const std::string& b = calibration.cameras[pair->b].id;
     const std::size_t more = std::max(3 * pair->instants, kEnoughInstants);
-    advice.push_back(fmt::format(
-        "{} and {} are the rig's weakest link: {} instants hold them together, to {:.2f} mm and {:.3f} degrees. {} more that "
-        "both see would bring it to about {:.2f} mm.",
-        a, b, pair->instants, pair->distance_sigma * 1e3, pair->turn_sigma * kDegrees, more,
-        pair->distance_sigma * 1e3 * expected_factor(pair->instants, more)));
+    advice.push_back(
+        fmt::format("{} and {} are the rig's weakest link: {} instants hold them together, to {:.2f} mm and "
+                    "{:.3f} degrees. {} more that "
+                    "both see would bring it to about {:.2f} mm.",
+                    a, b, pair->instants, pair->distance_sigma * 1e3, pair->turn_sigma * kDegrees, more,
+                    pair->distance_sigma * 1e3 * expected_factor(pair->instants, more)));
   }
   return advice;
 }

@@ -18,13 +18,13 @@ struct CornerCoverage {
 /// Of each camera of the bundle.
 std::vector<CornerCoverage> corner_coverage(const RigCalibration& calibration);
 
-/// Which pictures would help most, a sentence each, from what this calibration lacks: cameras left out, cells of
-/// pictures without corners, boards that differ little in tilt, the pair of cameras that holds the rig together
-/// worst. Empty where nothing stands out.
+/// Which pictures would help most, a sentence each, from what this calibration lacks: cameras left out, cells
+/// of pictures without corners, boards that differ little in tilt, the pair of cameras that holds the rig
+/// together worst. Empty where nothing stands out.
 std::vector<std::string> next_pictures(const RigCalibration& calibration);
 
-/// By what factor uncertainties fall with `more` views beside the `views` used, all as good as these: the square root
-/// law. An estimate: where the board is and how it tilts counts as well.
+/// By what factor uncertainties fall with `more` views beside the `views` used, all as good as these: the
+/// square root law. An estimate: where the board is and how it tilts counts as well.
 double expected_factor(std::size_t views, std::size_t more);
 
 }  // namespace emberlock

@@ -7,10 +7,13 @@
 
 #include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
+#include "recon/hull/find_box.h"
 #include "recon/pipeline/session_picture.h"
+#include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/radiance.h"
 #include "session/frame_file.h"
 #include "session/reader.h"
+#include "session/shutter_times.h"
 
 namespace emberlock {
 namespace fs = std::filesystem;
@@ -20,22 +23,12 @@ Error bad(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
 }
 
-Result<Box> choose_box(const std::optional<Box>& asked, const std::optional<Box>& own,
-                       const fs::path& input) {
-  if (asked) return *asked;
-  if (own) return *own;
-  return bad(
-      input.string() + ": box", "the input doesn't say where the flame is",
-      R"(Add "box": {"center": [x, y, z], "size": [x, y, z]} in metres, or give --box cx,cy,cz,sx,sy,sz)");
-}
-
 Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options) {
   if (options.frame) return bad(path.string(), "has one instant only", "Leave --frame out");
   if (options.rig) return bad(path.string(), "holds its own calibration", "Leave --rig out");
   EMBERLOCK_ASSIGN_OR_RETURN(const Transforms transforms, read_transforms(path));
   Scene scene;
   scene.preprocessing = {{"all", false, "pictures of a transforms.json are taken as they are"}};
-  EMBERLOCK_ASSIGN_OR_RETURN(scene.box, choose_box(options.box, transforms.box, path));
   for (const TransformsFrame& frame : transforms.frames) {
     const auto image = read_image(frame.image);
     if (!image) {
@@ -48,6 +41,11 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
     view.camera.camera_from_world = frame.camera_from_world;
     view.image = to_radiance(image->view());
     scene.views.push_back(std::move(view));
+  }
+  if (options.box || transforms.box) {
+    scene.box = options.box ? *options.box : *transforms.box;
+  } else {
+    EMBERLOCK_ASSIGN_OR_RETURN(scene.box, find_box(scene, flame_masks(scene)));
   }
   return scene;
 }
@@ -112,8 +110,84 @@ std::size_t middle_frame(const SessionReader& reader) {
   return middle;
 }
 
+/// How late a frame is. One that stands in for a lost one is late, or early, by whole periods more.
+void tell_lateness(const SessionReader& reader, std::size_t camera, std::size_t frame, TimePoint instant,
+                   const v1::ShutterTimes::Camera& times, View& view) {
+  const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
+  const Seconds after = reader.stamps(camera)[frame].monotonic_time - instant;
+  const double periods = rate > 0 ? std::round(after.value() * rate) : 0;
+  view.lateness = Seconds(times.late_s(static_cast<int>(frame)) + (rate > 0 ? periods / rate : 0));
+  view.lateness_sigma = Seconds(times.sigma_s());
+}
+
+/// A session and what it takes to develop each camera's frames.
+struct SessionPictures {
+  SessionReader reader;
+  std::vector<FrameDeveloper> developers = {};
+};
+
+/// Calls act(view, picture, taken) for `count` complete frames of each camera, spread evenly over the
+/// recording; `taken` of them where there are fewer.
+template <class Act>
+Status each_of_some_frames(SessionPictures& session, std::size_t count, const Progress& progress,
+                           const char* doing, const Act& act) {
+  SessionReader& reader = session.reader;
+  for (std::size_t i = 0; i < reader.camera_count(); ++i) {
+    std::vector<std::size_t> complete;
+    for (std::size_t f = 0; f < reader.stamps(i).size(); ++f)
+      if (reader.stamps(i)[f].status == FrameStatus::complete) complete.push_back(f);
+    const std::size_t taken = std::min(count, complete.size());
+    for (std::size_t n = 0; n < taken; ++n) {
+      report(progress,
+             (static_cast<double>(i) + static_cast<double>(n) / static_cast<double>(taken)) /
+                 static_cast<double>(reader.camera_count()),
+             doing);
+      // The middle of each of `taken` equal parts: the recording's own middle where it is one.
+      const std::size_t frame = complete[(2 * n + 1) * complete.size() / (2 * taken)];
+      EMBERLOCK_ASSIGN_OR_RETURN(const DevelopedPicture picture,
+                                 session.developers[i].develop(reader, frame));
+      act(i, picture.image, taken);
+    }
+  }
+  return {};
+}
+
+/// A box that holds the flame of some instants over the recording: each camera's masks are joined.
+Status find_box_of_session(SessionPictures& session, const Progress& progress, Scene& scene) {
+  constexpr std::size_t kInstants = 5;
+  std::vector<FlameMask> masks = flame_masks(scene);
+  EMBERLOCK_RETURN_IF_ERROR(each_of_some_frames(
+      session, kInstants, progress, "looking for the flame",
+      [&](std::size_t i, const RadianceImage& image, auto) {
+        const FlameMask other = noise_mask(image);
+        FlameMask& mask = masks[i];
+        for (std::size_t p = 0; p < mask.flame.size(); ++p) mask.flame[p] |= other.flame[p];
+        if (other.box.empty()) return;
+        mask.box = mask.box.empty()
+                       ? other.box
+                       : PixelBox{std::min(mask.box.x0, other.box.x0), std::min(mask.box.y0, other.box.y0),
+                                  std::max(mask.box.x1, other.box.x1), std::max(mask.box.y1, other.box.y1)};
+      }));
+  EMBERLOCK_ASSIGN_OR_RETURN(scene.box, find_box(scene, masks));
+  return {};
+}
+
+/// What each camera shows on average over frames of the whole recording.
+Status average(SessionPictures& session, const Progress& progress, Scene& scene) {
+  constexpr std::size_t kFrames = 32;  // leave a sixth of what changes in the average
+  for (View& view : scene.views) view.average.emplace(view.image.size);
+  return each_of_some_frames(session, kFrames, progress, "averaging the recording",
+                             [&](std::size_t i, const RadianceImage& image, std::size_t taken) {
+                               std::vector<float>& sum = scene.views[i].average->rgb;
+                               const auto share = 1 / static_cast<float>(taken);
+                               for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += share * image.rgb[p];
+                             });
+}
+
 Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
-  EMBERLOCK_ASSIGN_OR_RETURN(SessionReader reader, SessionReader::open(folder));
+  EMBERLOCK_ASSIGN_OR_RETURN(SessionReader opened, SessionReader::open(folder));
+  SessionPictures session{std::move(opened)};
+  SessionReader& reader = session.reader;
   v1::Manifest manifest = reader.manifest();
   const std::string manifest_name = (folder / "manifest.json").string();
   if (options.rig) {
@@ -124,8 +198,8 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
   if (manifest.has_box()) {
     EMBERLOCK_ASSIGN_OR_RETURN(own_box, box_of(manifest.box(), manifest_name));
   }
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto times, read_shutter_times(reader));
   Scene scene;
-  EMBERLOCK_ASSIGN_OR_RETURN(scene.box, choose_box(options.box, own_box, folder));
   if (reader.camera_count() == 0 || reader.camera_count() > kMaxViews) {
     return bad(manifest_name + ": cameras",
                std::to_string(reader.camera_count()) + " cameras, 1 to 64 are possible",
@@ -155,13 +229,24 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
                  "has no complete frame within a frame period of frame " + std::to_string(frame),
                  "Choose another --frame; the index tells which frames were lost");
     }
-    EMBERLOCK_ASSIGN_OR_RETURN(DevelopedPicture picture, develop_frame(reader, {i, *nearest, stream}, options.frames));
+    if (times) tell_lateness(reader, i, *nearest, instant, times->cameras(static_cast<int>(i)), view);
+    EMBERLOCK_ASSIGN_OR_RETURN(FrameDeveloper developer,
+                               FrameDeveloper::create(reader, i, stream, *nearest, options.frames));
+    EMBERLOCK_ASSIGN_OR_RETURN(DevelopedPicture picture, developer.develop(reader, *nearest));
+    session.developers.push_back(std::move(developer));
     view.image = std::move(picture.image);
     view.bounds = std::move(picture.bounds);
     steps.emplace_back(view.name, std::move(picture.steps));
     scene.views.push_back(std::move(view));
   }
   scene.preprocessing = together(steps);
+  if (options.box || own_box)
+    scene.box = options.box ? *options.box : *own_box;
+  else
+    EMBERLOCK_RETURN_IF_ERROR(find_box_of_session(session, options.progress, scene));
+  const bool late = std::any_of(scene.views.begin(), scene.views.end(),
+                                [](const View& v) { return abs(v.lateness) > v.lateness_sigma; });
+  if (late) EMBERLOCK_RETURN_IF_ERROR(average(session, options.progress, scene));
   return scene;
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "base/progress.h"
 #include "base/result.h"
 #include "recon/pipeline/session_picture.h"
 #include "recon/preprocess/view.h"
@@ -12,19 +13,24 @@
 namespace emberlock {
 
 struct SceneOptions {
-  std::optional<Box> box;            ///< stands before the input's own
+  std::optional<Box> box;  ///< stands before the input's own; without either it is found from the pictures
   std::optional<std::size_t> frame;  ///< of a session: frame of its first camera; else the one nearest to the
                                      ///< middle of which every camera has a complete frame
   std::optional<std::filesystem::path> rig =
-      {};  ///< of a session: a rig.json that stands before its calibration
-  FrameOptions frames = {};          ///< of a session: how its frames become pictures
+      {};                    ///< of a session: a rig.json that stands before its calibration
+  FrameOptions frames = {};  ///< of a session: how its frames become pictures
+  Progress progress = {};    ///< of a session: reading its other frames, where they are needed
 };
 
 /// A transforms.json (a file) or a recorded session (a folder with a manifest): views in the order of the
 /// input, all of role input. Errors name file, field and remedy: those of read_transforms(), read_image() and
-/// SessionReader; an input that is neither; no box in the input nor in the options; a rig that
-/// doesn't fit, a camera without calibration, more than 64 of them; a camera of the session that has no
-/// complete frame within one frame period of the chosen instant.
+/// SessionReader; an input that is neither; no box in the input nor in the options, and none to be found; a
+/// rig that doesn't fit, a camera without calibration, more than 64 of them; a camera of the session that has
+/// no complete frame within one frame period of the chosen instant.
+///
+/// A box is found (find_box()) so that it holds the flame of several instants over a session. Where a
+/// session's times.json says that cameras were late, views bring their lateness, and what each camera shows
+/// on average over frames of the whole recording.
 Result<Scene> load_scene(const std::filesystem::path& input, const SceneOptions& options = {});
 
 /// Gives the views of these indices the role held_out. Errors: no such view, none left to reconstruct from.

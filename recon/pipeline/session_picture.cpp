@@ -126,28 +126,39 @@ Status parse_smear(const std::string& text, FrameOptions& options) {
   develop.smear_removal = Removal::told;
   develop.smear.fraction = {fraction, fraction, fraction};
   develop.smear.path = side == "above"   ? SmearPath::rows_above
-                     : side == "below" ? SmearPath::rows_below
-                                       : SmearPath::whole_column;
+                       : side == "below" ? SmearPath::rows_below
+                                         : SmearPath::whole_column;
   return {};
 }
 
-Result<DevelopedPicture> develop_frame(SessionReader& reader, const SessionFrame& which, const FrameOptions& options) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(which.camera, which.frame));
+Result<FrameDeveloper> FrameDeveloper::create(SessionReader& reader, std::size_t camera,
+                                              const v1::CameraStream& stream, std::size_t flame,
+                                              const FrameOptions& options) {
+  FrameDeveloper developer;
+  developer.camera_ = camera;
+  developer.sensor_ = sensor_of(stream);
+  developer.options_ = options.develop;
+  if (stream.has_colour()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(developer.colour_, read_colour(stream.colour(), reader.layout(camera).size,
+                                                              "camera " + stream.camera_id()));
+  }
+  if (options.background == FrameOptions::Background::automatic) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(camera, flame));
+    EMBERLOCK_ASSIGN_OR_RETURN(developer.dark_, find_dark(reader, camera, flame, picture.image->view()));
+  } else if (options.background == FrameOptions::Background::frames) {
+    EMBERLOCK_ASSIGN_OR_RETURN(developer.dark_, told_dark(reader, camera, options));
+  }
+  return developer;
+}
+
+Result<DevelopedPicture> FrameDeveloper::develop(SessionReader& reader, std::size_t frame) const {
+  EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(camera_, frame));
   CameraFrame from;
   from.frame = picture.image->view();
-  from.sensor = sensor_of(which.stream);
-  if (which.stream.has_colour()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(from.colour, read_colour(which.stream.colour(), from.frame.layout.size,
-                                                        "camera " + which.stream.camera_id()));
-  }
-  Frames dark;
-  if (options.background == FrameOptions::Background::automatic) {
-    EMBERLOCK_ASSIGN_OR_RETURN(dark, find_dark(reader, which.camera, which.frame, from.frame));
-  } else if (options.background == FrameOptions::Background::frames) {
-    EMBERLOCK_ASSIGN_OR_RETURN(dark, told_dark(reader, which.camera, options));
-  }
-  for (const Frame& f : dark) from.dark.push_back(f.image->view());
-  return develop(from, options.develop);
+  from.sensor = sensor_;
+  from.colour = colour_;
+  for (const Frame& f : dark_) from.dark.push_back(f.image->view());
+  return emberlock::develop(from, options_);
 }
 
 }  // namespace emberlock

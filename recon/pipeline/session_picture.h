@@ -4,7 +4,9 @@
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "base/frame.h"
 #include "base/result.h"
 #include "recon/preprocess/develop.h"
 #include "session/reader.h"
@@ -30,16 +32,27 @@ Status parse_background(const std::string& text, FrameOptions& options);
 /// the rows on that side alone.
 Status parse_smear(const std::string& text, FrameOptions& options);
 
-/// A frame of a session, and its camera as it is known by now: the manifest's, or a rig's.
-struct SessionFrame {
-  std::size_t camera = 0;
-  std::size_t frame = 0;
-  const v1::CameraStream& stream;
-};
+/// Develops frames of one camera of a session by its colour and sensor. Its part without flame is looked for,
+/// and read, once.
+class FrameDeveloper {
+ public:
+  /// `stream`: the camera as it is known by now, by the manifest or a rig. `flame`: a frame that shows the
+  /// flame. Reads it, up to two frames to see whether there is a part without flame, and eight of that.
+  /// Errors: those of SessionReader::read() and read_colour(); dark frames that the camera doesn't have.
+  static Result<FrameDeveloper> create(SessionReader& reader, std::size_t camera,
+                                       const v1::CameraStream& stream, std::size_t flame,
+                                       const FrameOptions& options);
 
-/// A frame as radiance, by its camera's colour and sensor. Reads up to two frames to see whether there is a part
-/// without flame, and eight of it. Errors: those of SessionReader::read() and read_colour(); dark frames that the
-/// camera doesn't have.
-Result<DevelopedPicture> develop_frame(SessionReader& reader, const SessionFrame& which, const FrameOptions& options);
+  /// A frame as radiance. `reader` is that of create(). Errors: those of SessionReader::read().
+  Result<DevelopedPicture> develop(SessionReader& reader, std::size_t frame) const;
+
+ private:
+  FrameDeveloper() = default;
+  std::size_t camera_ = 0;
+  SensorKind sensor_ = SensorKind::ccd;
+  std::optional<Colour> colour_;
+  std::vector<Frame> dark_;
+  DevelopOptions options_;
+};
 
 }  // namespace emberlock

@@ -6,7 +6,8 @@
 
 namespace emberlock {
 
-/// How many frames without flame make a background: the mean of the middle four has 1 / 2.6 of a frame's noise.
+/// How many frames without flame make a background: the mean of the middle four has 1 / 2.6 of a frame's
+/// noise.
 inline constexpr std::size_t kDarkFrames = 8;
 
 /// How a frame differs from another of the same camera, by means of blocks of 8 x 8 pixels against their
@@ -18,8 +19,8 @@ enum class LightChange {
 };
 LightChange light_change(const Samples& from, const Samples& to);
 
-/// Sample by sample the mean of the middle half, of frames of one size and layout; at least one. Not of all: black
-/// clips noise from below, which moves the mean of the dark but nothing where there is light.
+/// Sample by sample the mean of the middle half, of frames of one size and layout; at least one. Not of all:
+/// black clips noise from below, which moves the mean of the dark but nothing where there is light.
 Samples midmean_of(const std::vector<Samples>& frames);
 
 /// Takes a background out. Saturated samples stay marked: what they have above it is still a lower bound.

@@ -54,8 +54,9 @@ PreprocessStep take_smear_out(Samples& samples, SensorKind sensor, const Develop
 
 PreprocessStep demosaiced(SampleLayout layout, Demosaicing how) {
   if (layout != SampleLayout::mosaic) return {"demosaic", false, "no mosaic"};
-  return {"demosaic", true, how == Demosaicing::bilinear ? "bilinear, measured samples kept"
-                                                         : "gradient-corrected, measured samples kept"};
+  return {"demosaic", true,
+          how == Demosaicing::bilinear ? "bilinear, measured samples kept"
+                                       : "gradient-corrected, measured samples kept"};
 }
 
 PreprocessStep saturated(const std::vector<std::uint8_t>& bounds) {

@@ -22,8 +22,8 @@ float midmean(std::vector<float>& values) {
 }
 
 void subtract_background(RadianceImage& image) {
-  // Which half is darker, by means of blocks, which noise doesn't sort; the level by pixels' midmean, which black
-  // doesn't move when it clips noise, and which isn't one of few sample values as the median is.
+  // Which half is darker, by means of blocks, which noise doesn't sort; the level by pixels' midmean, which
+  // black doesn't move when it clips noise, and which isn't one of few sample values as the median is.
   constexpr int kBlocks = 12;  // at least, along the shorter side
   constexpr int kLargest = 8;
   const int edge = std::clamp(std::min(image.size.width, image.size.height) / kBlocks, 1, kLargest);

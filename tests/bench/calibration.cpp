@@ -49,10 +49,12 @@ int main(int argc, char** argv) {
     const double n = world.freedom;
     const double z = (std::cbrt(world.chi2 / n) - (1 - 2 / (9 * n))) / std::sqrt(2 / (9 * n));
     std::printf(
-        "%4d  %4zu views  %zu rejected  noise %.3f px  worst %.3f mm %.4f deg rays %.4f deg in the world's frame %.3f mm "
+        "%4d  %4zu views  %zu rejected  noise %.3f px  worst %.3f mm %.4f deg rays %.4f deg in the world's "
+        "frame %.3f mm "
         "%.4f deg  chi2 %.1f of %d  %.2f s\n",
-        seed, views, found->rejected.size(), noise, among.place * 1e3, among.turn * 180 / M_PI, among.rays * 180 / M_PI,
-        world.place * 1e3, world.turn * 180 / M_PI, world.chi2, world.freedom, seconds);
+        seed, views, found->rejected.size(), noise, among.place * 1e3, among.turn * 180 / M_PI,
+        among.rays * 180 / M_PI, world.place * 1e3, world.turn * 180 / M_PI, world.chi2, world.freedom,
+        seconds);
     place = std::max(place, among.place);
     turn = std::max(turn, among.turn);
     rays = std::max(rays, among.rays);
@@ -64,7 +66,8 @@ int main(int argc, char** argv) {
   }
   std::printf("%d rigs of 11 cameras, %d instants: %d failed\n", seeds, options.instants, failures);
   std::printf(
-      "worst camera of all: %.3f mm, rays %.4f degrees, axes %.4f degrees among the cameras; %.3f mm, %.4f degrees in the world's "
+      "worst camera of all: %.3f mm, rays %.4f degrees, axes %.4f degrees among the cameras; %.3f mm, %.4f "
+      "degrees in the world's "
       "frame\n",
       place * 1e3, rays * 180 / M_PI, turn * 180 / M_PI, world_place * 1e3, world_turn * 180 / M_PI);
   std::printf(

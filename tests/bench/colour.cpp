@@ -1,10 +1,11 @@
 // What calibrating colours and preparing pictures reach, on simulated cameras whose truth is known.
 //   build/release/bin/bench_colour [seeds]
+#include "recon/calibrate/colour.h"
+
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 
-#include "recon/calibrate/colour.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/colour_rig.h"
 #include "tests/support/flame_frames.h"
@@ -13,13 +14,20 @@ namespace emberlock::test {
 namespace {
 
 void print_spread(const char* what, const PatchSpread& s) {
-  std::printf("  %-34s worst pair %6.2f %%, worst from the mean %6.2f %% (dim %5.2f %%), rms %5.3f %%; %d compared, %d bounds\n",
-              what, 100 * s.worst_pair, 100 * s.worst, 100 * s.worst_dim, 100 * s.rms, s.compared, s.saturated);
+  std::printf(
+      "  %-34s worst pair %6.2f %%, worst from the mean %6.2f %% (dim %5.2f %%), rms %5.3f %%; %d compared, "
+      "%d bounds\n",
+      what, 100 * s.worst_pair, 100 * s.worst, 100 * s.worst_dim, 100 * s.rms, s.compared, s.saturated);
 }
 
 PatchSpread worse(const PatchSpread& a, const PatchSpread& b) {
-  return {std::max(a.worst_pair, b.worst_pair), std::max(a.worst, b.worst), std::max(a.worst_dim, b.worst_dim),
-          std::max(a.rms, b.rms), a.compared + b.compared, a.saturated + b.saturated, a.unmarked + b.unmarked};
+  return {std::max(a.worst_pair, b.worst_pair),
+          std::max(a.worst, b.worst),
+          std::max(a.worst_dim, b.worst_dim),
+          std::max(a.rms, b.rms),
+          a.compared + b.compared,
+          a.saturated + b.saturated,
+          a.unmarked + b.unmarked};
 }
 
 void patches(int seeds, double toe, const char* what) {
@@ -54,12 +62,16 @@ void patches(int seeds, double toe, const char* what) {
   std::printf("%s: %d rigs of eleven cameras, patches that no calibration saw\n", what, seeds);
   print_spread("as filmed", before);
   print_spread("calibrated (worst of all rigs)", after);
-  std::printf("  saturated but not marked: %d; gains' chi-square over their number: %.2f; %.2f s a rig with filming\n",
-              after.unmarked, chi_square / std::max(1, gains), seconds / seeds);
+  std::printf(
+      "  saturated but not marked: %d; gains' chi-square over their number: %.2f; %.2f s a rig with "
+      "filming\n",
+      after.unmarked, chi_square / std::max(1, gains), seconds / seeds);
 }
 
 void smear() {
-  std::printf("smear: RMS that it adds to a picture, grey levels, and what is left; fraction found over the true one\n");
+  std::printf(
+      "smear: RMS that it adds to a picture, grey levels, and what is left; fraction found over the true "
+      "one\n");
   for (const PixelFormat format : {PixelFormat::gray8, PixelFormat::bayer_rggb8, PixelFormat::rgb8}) {
     for (const double fraction : {2e-4, 5e-4, 2e-3}) {
       for (const double peak : {180.0, 400.0}) {
@@ -87,21 +99,25 @@ void demosaicing() {
 }
 
 void hot_pixels() {
-  std::printf("hot pixels: found of 100, and false ones in 307 200, by dark frames / by the flame's picture\n");
+  std::printf(
+      "hot pixels: found of 100, and false ones in 307 200, by dark frames / by the flame's picture\n");
   for (const PixelFormat format : {PixelFormat::gray8, PixelFormat::bayer_rggb8, PixelFormat::rgb8}) {
     for (const double level : {8.0, 20.0, 60.0}) {
       const HotPixelRates r = hot_pixel_rates(format, level, 1);
-      std::printf("  %-12s %2.0f levels hot, noise 1.5: %3d, %d / %3d, %d\n", std::string(name(format)).c_str(), level,
-                  r.dark_found, r.dark_false, r.picture_found, r.picture_false);
+      std::printf("  %-12s %2.0f levels hot, noise 1.5: %3d, %d / %3d, %d\n",
+                  std::string(name(format)).c_str(), level, r.dark_found, r.dark_false, r.picture_found,
+                  r.picture_false);
     }
   }
 }
 
 void backgrounds() {
   const BackgroundResidual r = background_residual(1);
-  std::printf("background: a lamp's glow and a lit wall behind the flame, noise 1: RMS off the truth, grey levels\n");
-  std::printf("  as filmed %.2f, the picture's level taken out %.2f, the dark part's midmean taken out %.2f\n", r.filmed,
-              r.level, r.dark_part);
+  std::printf(
+      "background: a lamp's glow and a lit wall behind the flame, noise 1: RMS off the truth, grey levels\n");
+  std::printf(
+      "  as filmed %.2f, the picture's level taken out %.2f, the dark part's midmean taken out %.2f\n",
+      r.filmed, r.level, r.dark_part);
 }
 
 }  // namespace

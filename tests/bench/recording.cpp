@@ -91,7 +91,10 @@ void measure(const ImageLayout& layout, Encoding encoding) {
   std::filesystem::remove_all(folder);
   const double raw = static_cast<double>(layout.row_bytes()) * layout.size.height * kFrames;
   std::printf("%-8s %5s  %4d x %-4d  write %6.1f fps %6.1f MB/s  read %6.1f fps  ratio %.2f\n",
-              std::string(name(layout.format)).c_str(), encoding == Encoding::ffv1 ? "ffv1" : encoding == Encoding::raw_nut ? "raw" : "huff",
+              std::string(name(layout.format)).c_str(),
+              encoding == Encoding::ffv1      ? "ffv1"
+              : encoding == Encoding::raw_nut ? "raw"
+                                              : "huff",
               layout.size.width, layout.size.height, kFrames / best_write, raw / best_write / 1e6,
               kFrames / best_read, raw / static_cast<double>(bytes));
 }

@@ -58,8 +58,8 @@ inline std::vector<ColourTruth> colour_rig(std::size_t cameras, std::uint64_t se
   return rig;
 }
 
-inline PatchReading film_patch(const ColourTruth& camera, const std::array<double, 3>& radiance, double exposure,
-                               double x, double y, RandomStream& random) {
+inline PatchReading film_patch(const ColourTruth& camera, const std::array<double, 3>& radiance,
+                               double exposure, double x, double y, RandomStream& random) {
   constexpr int kEdge = 24;
   Image tile(ImageLayout{{kEdge, kEdge}, PixelFormat::rgb8, 8});
   for (int v = 0; v < kEdge; ++v)
@@ -145,8 +145,8 @@ struct PatchSpread {
   int unmarked = 0;       ///< saturated readings that aren't
 };
 
-/// Patches that no calibration saw, 1..110 % of white, each camera showing them in other places; frames are developed
-/// as a session's are.
+/// Patches that no calibration saw, 1..110 % of white, each camera showing them in other places; frames are
+/// developed as a session's are.
 inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig, const ColourCalibration* calibration,
                                    std::uint64_t seed) {
   constexpr int kAcross = 6, kDown = 4, kEdge = 30;

@@ -29,9 +29,9 @@ inline RadianceImage flame_picture(std::uint64_t seed, ImageSize size = {640, 48
 
 struct FilmOptions {
   PixelFormat format = PixelFormat::gray8;
-  double gain = 1;      ///< of the flame's grey levels
-  double level = 4;     ///< black level
-  double noise = 1;     ///< grey levels
+  double gain = 1;                      ///< of the flame's grey levels
+  double level = 4;                     ///< black level
+  double noise = 1;                     ///< grey levels
   std::vector<double> smear = {};       ///< added to each column, grey levels
   std::vector<double> background = {};  ///< by pixel, grey levels
   std::vector<std::uint32_t> hot = {};
@@ -48,14 +48,19 @@ inline Image film(const RadianceImage& picture, const FilmOptions& options, std:
       const auto pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.size.width) +
                          static_cast<std::size_t>(x);
       const double hot =
-          std::binary_search(options.hot.begin(), options.hot.end(), static_cast<std::uint32_t>(pixel)) ? options.hot_level : 0;
+          std::binary_search(options.hot.begin(), options.hot.end(), static_cast<std::uint32_t>(pixel))
+              ? options.hot_level
+              : 0;
       for (int c = 0; c < channels; ++c, ++at) {
         const int seen = is_bayer(options.format) ? mosaic_channel(x, y) : channels == 3 ? c : 1;
-        double v = options.level + options.gain * static_cast<double>(picture.rgb[3 * pixel + static_cast<std::size_t>(seen)]) + hot;
+        double v =
+            options.level +
+            options.gain * static_cast<double>(picture.rgb[3 * pixel + static_cast<std::size_t>(seen)]) + hot;
         if (!options.background.empty()) v += options.background[pixel];
         if (!options.smear.empty()) v += options.smear[static_cast<std::size_t>(x)];
         v += options.noise * random_normal(seed, 7, at);
-        image.row_as<std::uint8_t>(y)[x * channels + c] = static_cast<std::uint8_t>(std::clamp(std::lround(v), 0L, 255L));
+        image.row_as<std::uint8_t>(y)[x * channels + c] =
+            static_cast<std::uint8_t>(std::clamp(std::lround(v), 0L, 255L));
       }
     }
   }
@@ -81,8 +86,8 @@ struct SmearedFlame {
   Samples clean;  ///< without, the same noise
 };
 
-inline SmearedFlame smeared_flame(const RadianceImage& picture, PixelFormat format, double fraction, double peak,
-                                  std::uint64_t seed) {
+inline SmearedFlame smeared_flame(const RadianceImage& picture, PixelFormat format, double fraction,
+                                  double peak, std::uint64_t seed) {
   FilmOptions options;
   options.format = format;
   options.gain = peak / 230;
@@ -98,8 +103,8 @@ inline SmearedFlame smeared_flame(PixelFormat format, double fraction, double pe
   return smeared_flame(picture, format, fraction, peak, seed);
 }
 
-/// Of the means over blocks of 16 x 16 pixels, which leave noise and quantisation behind; blocks with saturated
-/// samples aside.
+/// Of the means over blocks of 16 x 16 pixels, which leave noise and quantisation behind; blocks with
+/// saturated samples aside.
 inline double rms_of(const Samples& a, const Samples& b) {
   constexpr int kEdge = 16;
   double squares = 0;
@@ -132,7 +137,9 @@ inline std::pair<double, double> demosaicing_errors(const RadianceImage& picture
   options.level = 0;
   options.noise = noise;
   const Samples mosaic = samples_of(film(picture, options, 3).view());
-  const auto error = [&](Demosaicing how) { return all_channels(rmse(to_picture(mosaic, nullptr, how), picture, box)); };
+  const auto error = [&](Demosaicing how) {
+    return all_channels(rmse(to_picture(mosaic, nullptr, how), picture, box));
+  };
   return {error(Demosaicing::bilinear), error(Demosaicing::gradient)};
 }
 inline std::pair<double, double> demosaicing_errors(std::uint64_t seed, double noise) {
@@ -143,26 +150,31 @@ struct HotPixelRates {
   int dark_found = 0, dark_false = 0, picture_found = 0, picture_false = 0;
 };
 
-inline HotPixelRates hot_pixel_rates(const RadianceImage& picture, PixelFormat format, double level, std::uint64_t seed) {
+inline HotPixelRates hot_pixel_rates(const RadianceImage& picture, PixelFormat format, double level,
+                                     std::uint64_t seed) {
   FilmOptions options;
   options.format = format;
   options.noise = 1.5;
   options.hot_level = level;
   RandomStream random(seed, 5);
-  const auto pixels = static_cast<std::uint64_t>(picture.size.width) * static_cast<std::uint64_t>(picture.size.height);
+  const auto pixels =
+      static_cast<std::uint64_t>(picture.size.width) * static_cast<std::uint64_t>(picture.size.height);
   while (options.hot.size() < 100) {
     options.hot.push_back(static_cast<std::uint32_t>(random.bits() % pixels));
     std::sort(options.hot.begin(), options.hot.end());
     options.hot.erase(std::unique(options.hot.begin(), options.hot.end()), options.hot.end());
   }
   std::vector<Samples> dark;
-  for (std::uint64_t f = 0; f < kDarkFrames; ++f) dark.push_back(samples_of(film(RadianceImage(picture.size), options, 20 + f).view()));
+  for (std::uint64_t f = 0; f < kDarkFrames; ++f)
+    dark.push_back(samples_of(film(RadianceImage(picture.size), options, 20 + f).view()));
   const auto count = [&](const std::vector<std::uint32_t>& found, int& right, int& wrong) {
-    for (const std::uint32_t p : found) ++(std::binary_search(options.hot.begin(), options.hot.end(), p) ? right : wrong);
+    for (const std::uint32_t p : found)
+      ++(std::binary_search(options.hot.begin(), options.hot.end(), p) ? right : wrong);
   };
   HotPixelRates rates;
   count(hot_pixels_of_dark(midmean_of(dark)), rates.dark_found, rates.dark_false);
-  count(hot_pixels_of_picture(samples_of(film(picture, options, 40).view())), rates.picture_found, rates.picture_false);
+  count(hot_pixels_of_picture(samples_of(film(picture, options, 40).view())), rates.picture_found,
+        rates.picture_false);
   return rates;
 }
 inline HotPixelRates hot_pixel_rates(PixelFormat format, double level, std::uint64_t seed) {
@@ -194,7 +206,8 @@ inline BackgroundResidual background_residual(const RadianceImage& picture, std:
   options.background = lit_wall(picture.size);
   const Image frame = film(picture, options, seed);
   std::vector<Image> dark;
-  for (std::uint64_t f = 0; f < kDarkFrames; ++f) dark.push_back(film(RadianceImage(picture.size), options, 100 + f));
+  for (std::uint64_t f = 0; f < kDarkFrames; ++f)
+    dark.push_back(film(RadianceImage(picture.size), options, 100 + f));
   RadianceImage truth = picture;
   for (float& v : truth.rgb) v *= 0.6F;
   CameraFrame camera;
@@ -208,6 +221,8 @@ inline BackgroundResidual background_residual(const RadianceImage& picture, std:
   out.dark_part = off();
   return out;
 }
-inline BackgroundResidual background_residual(std::uint64_t seed) { return background_residual(flame_picture(11), seed); }
+inline BackgroundResidual background_residual(std::uint64_t seed) {
+  return background_residual(flame_picture(11), seed);
+}
 
 }  // namespace emberlock::test

@@ -14,10 +14,10 @@ namespace emberlock::test {
 struct PoseErrors {
   double place = 0;  ///< metres, of the worst camera's centre
   double turn = 0;   ///< radians, of the worst camera's axes
-  double rays = 0;   ///< radians: the turn of the worst camera's rays, seen over its whole picture. A turn of the
-                     ///< axes that the principal point takes back moves no ray, and no reconstruction
-  double chi2 = 0;   ///< e' C^-1 e of all placed cameras' centres and turns, in the world's frame
-  int freedom = 0;   ///< of chi2
+  double rays = 0;   ///< radians: the turn of the worst camera's rays, seen over its whole picture. A turn of
+                    ///< the axes that the principal point takes back moves no ray, and no reconstruction
+  double chi2 = 0;  ///< e' C^-1 e of all placed cameras' centres and turns, in the world's frame
+  int freedom = 0;  ///< of chi2
 };
 
 /// A camera's centre and turn, found less true, in the order of the covariance.
@@ -34,7 +34,8 @@ inline double turn_of_rays(const CameraModel& found, const CameraModel& truth) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (int y = 0; y <= 6; ++y) {
     for (int x = 0; x <= 8; ++x) {
-      const Eigen::Vector2d pixel(truth.intrinsics.size.width * x / 8.0, truth.intrinsics.size.height * y / 6.0);
+      const Eigen::Vector2d pixel(truth.intrinsics.size.width * x / 8.0,
+                                  truth.intrinsics.size.height * y / 6.0);
       sum += truth.ray(pixel).direction * found.ray(pixel).direction.transpose();
     }
   }

@@ -1,5 +1,5 @@
-// Smear removal knows no more of a CCD than which rows lighten which; the forward model of smear_sync knows the shift
-// register. Here they meet.
+// Smear removal knows no more of a CCD than which rows lighten which; the forward model of smear_sync knows
+// the shift register. Here they meet.
 #include <gtest/gtest.h>
 
 #include "recon/preprocess/smear.h"
@@ -21,7 +21,8 @@ std::vector<double> smear_of(const CcdTiming& timing, const std::vector<double>&
       for (const SmearDeposit& d :
            smear_deposits(timing, row, {Seconds((step + 0.5) * t_row), Seconds(0)}, sweep_out))
         if (d.image == 0 && d.row != row)
-          out[static_cast<std::size_t>(d.row)] += kLeak / periods * d.fraction * light[static_cast<std::size_t>(row)];
+          out[static_cast<std::size_t>(d.row)] +=
+              kLeak / periods * d.fraction * light[static_cast<std::size_t>(row)];
   return out;
 }
 
@@ -59,11 +60,13 @@ TEST(SmearRemoval, UndoesWhatTheShiftRegisterDoes) {
     double added = 0;
     for (int y = 0; y < kRows; ++y) {
       const auto row = static_cast<std::size_t>(y);
-      worst = std::max(worst, std::abs(static_cast<double>(samples.value[samples.index(12, y)]) - light[row]));
+      worst =
+          std::max(worst, std::abs(static_cast<double>(samples.value[samples.index(12, y)]) - light[row]));
       added = std::max(added, smear[row]);
     }
     EXPECT_GT(added, 0.3);
-    // A row's own light, which a steady light can't be told from, is all that the whole column counts too much.
+    // A row's own light, which a steady light can't be told from, is all that the whole column counts too
+    // much.
     EXPECT_LT(worst, 0.15 * added) << static_cast<int>(c.path);
   }
 }

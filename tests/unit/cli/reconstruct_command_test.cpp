@@ -103,6 +103,18 @@ TEST_F(ReconstructCommandTest, WritesVolumeViewsAndReport) {
   EXPECT_THAT(result.out, HasSubstr("only 3 input views"));
 }
 
+TEST_F(ReconstructCommandTest, APlanFindsTheBoxAndShowsItOnThePictures) {
+  document_.erase("box");
+  save();
+  const Run result = run({"--plan", (root_ / "plan").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("--box "));
+  EXPECT_THAT(result.out, HasSubstr("two for three pixels"));
+  EXPECT_TRUE(fs::exists(root_ / "plan" / "index.html"));
+  EXPECT_TRUE(fs::exists(root_ / "plan" / "box" / "0004.png"));
+  EXPECT_FALSE(fs::exists(root_ / "out")) << "nothing is reconstructed";
+}
+
 /// Everything that `emberlock reconstruct --progress-fd` told.
 std::vector<v1::ChildMessage> read_messages(const fs::path& path) {
   std::vector<v1::ChildMessage> messages;

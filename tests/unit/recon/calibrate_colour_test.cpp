@@ -1,7 +1,6 @@
-#include "recon/calibrate/colour.h"
-
 #include <gmock/gmock.h>
 
+#include "recon/calibrate/colour.h"
 #include "tests/support/colour_rig.h"
 
 namespace emberlock {
@@ -44,7 +43,8 @@ TEST(CalibrateColour, GainsLieWithinTheirStatedUncertaintyAndHaveTheMeanOne) {
     }
   }
   for (std::size_t i = 0; i < rig.size(); ++i) {
-    EXPECT_NEAR(calibration->cameras[i].corner, falloff(rig[i].vignetting, 1), 4 * calibration->cameras[i].corner_sigma);
+    EXPECT_NEAR(calibration->cameras[i].corner, falloff(rig[i].vignetting, 1),
+                4 * calibration->cameras[i].corner_sigma);
   }
 }
 
@@ -87,8 +87,8 @@ TEST(CalibrateColour, KnownRadiancesTellTheResponseWithoutAnExposureSeries) {
 TEST(CalibrateColour, AToldGammaIsTaken) {
   auto rig = test::colour_rig(2, 8);
   for (test::ColourTruth& camera : rig) camera.gamma = 2.2;
-  const auto calibration = calibrate_colour(test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true}),
-                                            {.gamma = 2.2});
+  const auto calibration = calibrate_colour(
+      test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true}), {.gamma = 2.2});
   ASSERT_TRUE(calibration.ok()) << calibration.error().message();
   EXPECT_EQ(calibration->cameras[0].gamma, 2.2);
   EXPECT_LE(test::held_out_spread(rig, &*calibration, 9).worst, 0.01);
@@ -140,13 +140,15 @@ TEST(CalibrateColour, DarkPicturesBrighterThanTheTargetAreRefused) {
     histogram.assign(256, 0);
     histogram[254] = 1;
   }
-  EXPECT_THAT(calibrate_colour(readings).error().message(), HasSubstr("camera cam1: its dark pictures are brighter"));
+  EXPECT_THAT(calibrate_colour(readings).error().message(),
+              HasSubstr("camera cam1: its dark pictures are brighter"));
 }
 
 TEST(CalibrateColour, OnePlaceAloneTellsNoVignetting) {
   const auto rig = test::colour_rig(2, 8);
   ColourReadings readings = test::film_target(rig, 8);
-  std::erase_if(readings.patches, [](const PatchReading& p) { return std::abs(p.x - 320) > 100 || std::abs(p.y - 240) > 60; });
+  std::erase_if(readings.patches,
+                [](const PatchReading& p) { return std::abs(p.x - 320) > 100 || std::abs(p.y - 240) > 60; });
   const auto calibration = calibrate_colour(readings);
   ASSERT_TRUE(calibration.ok()) << calibration.error().message();
   EXPECT_FALSE(calibration->cameras[0].vignetting_known);
@@ -177,7 +179,9 @@ TEST(ColourPlan, SaysWhichFieldIsWrong) {
     const auto plan = parse_colour_plan(json, "colour.json");
     return plan.ok() ? std::string() : plan.error().message();
   };
-  EXPECT_EQ(message(R"({"patches": {"a": {"white": [1, 2, 3, 4]}}, "radiance": {"white": 0.9, "red": [1, 2, 3]}})"), "");
+  EXPECT_EQ(
+      message(R"({"patches": {"a": {"white": [1, 2, 3, 4]}}, "radiance": {"white": 0.9, "red": [1, 2, 3]}})"),
+      "");
   EXPECT_THAT(message("[]"), HasSubstr("no JSON object"));
   EXPECT_THAT(message(R"({"patchs": {}})"), HasSubstr("patchs"));
   EXPECT_THAT(message(R"({"patches": {"a": {"white": [1, 2, 3]}}})"), HasSubstr("patches.a.white"));

@@ -22,7 +22,7 @@ EffectChoice found(const Scene& scene) {
 TEST_P(EffectsTest, EmissionOnlyFlameIsFoundAsSuch) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const EffectChoice choice = found(small_flame_scene(PerMeter(0), shape));
-    ASSERT_EQ(choice.reports.size(), 8u);
+    ASSERT_EQ(choice.reports.size(), 9u);
     EXPECT_FALSE(choice.reports[0].on) << choice.reports[0].reason;
     EXPECT_EQ(choice.effects.extinction.value, PerMeter(0));
   }
@@ -71,9 +71,9 @@ TEST_P(EffectsTest, SetByHandIsTakenAndItsChangePredicted) {
 TEST(Effects, WholeTableIsParsedByName) {
   const auto request = parse_effects(
       "extinction=32.8,scattering=single:albedo=0.25:g=-0.3,background=10/11.5/12,exposure=0.004:rise=0.8,"
-      "refraction=curved:flame=1500:ambient=300,gamma=2.2,saturation=250");
+      "refraction=curved:flame=1500:ambient=300,gamma=2.2,saturation=250,motion=1.2");
   ASSERT_TRUE(request.ok()) << request.error().message();
-  const auto& [extinction, scattering, refraction, background, exposure, sensor] = *request->fixed;
+  const auto& [extinction, scattering, refraction, background, exposure, sensor, motion] = *request->fixed;
   EXPECT_EQ(extinction.model, Extinction::Model::constant);
   EXPECT_EQ(extinction.value, PerMeter(32.8));
   EXPECT_EQ(scattering.order, Scattering::Order::single);
@@ -89,6 +89,8 @@ TEST(Effects, WholeTableIsParsedByName) {
   EXPECT_EQ(refraction.ambient, Kelvin(300));
   EXPECT_EQ(sensor.response, Sensor::Response::gamma);
   EXPECT_EQ(sensor.gamma, 2.2);
+  EXPECT_EQ(motion.carry, Motion::Carry::uniform);
+  EXPECT_EQ(motion.velocity, (std::array<double, 3>{0, 0, 1.2}));
   EXPECT_EQ(sensor.clipping, Sensor::Clipping::at_white);
   EXPECT_EQ(sensor.white, 250);
 }

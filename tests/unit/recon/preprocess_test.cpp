@@ -78,7 +78,8 @@ TEST(Colour, GoesThroughTheManifestAndIsCheckedThere) {
     const auto read = read_colour(message, {10, 10}, "camera a");
     return read.ok() ? std::string() : read.error().message();
   };
-  EXPECT_THAT(message_where([](v1::Colour& m) { m.set_response(1, 1.5); }), HasSubstr("camera a.colour.response"));
+  EXPECT_THAT(message_where([](v1::Colour& m) { m.set_response(1, 1.5); }),
+              HasSubstr("camera a.colour.response"));
   EXPECT_THAT(message_where([](v1::Colour& m) { m.set_response(2, 0.9); }), HasSubstr("from 0 to 1"));
   EXPECT_THAT(message_where([](v1::Colour& m) { m.set_gain(0, 0); }), HasSubstr("colour.gain"));
   EXPECT_THAT(message_where([](v1::Colour& m) { m.add_gain(1); }), HasSubstr("three finite"));
@@ -114,7 +115,8 @@ TEST(Demosaicing, GradientKeepsSamplesAndRestoresLinearRamps) {
   const RadianceImage picture = to_picture(samples_of(image.view()), nullptr, Demosaicing::gradient);
   for (int y = 2; y < 10; ++y)
     for (int x = 2; x < 10; ++x)
-      for (int c = 0; c < 3; ++c) EXPECT_NEAR(picture.rgb[3 * (y * 12 + x) + c], ramp(x, y, c), 1e-3) << x << ' ' << y;
+      for (int c = 0; c < 3; ++c)
+        EXPECT_NEAR(picture.rgb[3 * (y * 12 + x) + c], ramp(x, y, c), 1e-3) << x << ' ' << y;
 }
 
 TEST(Smear, IsFoundAndTakenOutOfEveryLayout) {
@@ -135,13 +137,15 @@ TEST(Smear, IsFoundAndTakenOutOfEveryLayout) {
 TEST(Smear, WhereAFlameHasNoneNoneIsFound) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     std::string why;
-    EXPECT_FALSE(find_smear(test::smeared_flame(small_flame_picture(), PixelFormat::gray8, 0, 200, seed).clean, &why));
+    EXPECT_FALSE(
+        find_smear(test::smeared_flame(small_flame_picture(), PixelFormat::gray8, 0, 200, seed).clean, &why));
     EXPECT_THAT(why, HasSubstr("show none"));
   }
 }
 
 TEST(Smear, SaturatedColumnsAreTakenFromWhatTheirDarkRowsShow) {
-  const test::SmearedFlame flame = test::smeared_flame(small_flame_picture(), PixelFormat::gray8, 1e-3, 420, 1);
+  const test::SmearedFlame flame =
+      test::smeared_flame(small_flame_picture(), PixelFormat::gray8, 1e-3, 420, 1);
   const auto smear = find_smear(flame.seen);
   ASSERT_TRUE(smear.has_value());
   Samples cleaned = flame.seen;
@@ -164,7 +168,8 @@ TEST(Smear, AFrameWithoutFlameHasNoRowsToTellItFrom) {
 }
 
 TEST(HotPixels, AreFoundInDarkFramesAndInTheFlameAndReplaced) {
-  const test::HotPixelRates rates = test::hot_pixel_rates(small_flame_picture(), PixelFormat::bayer_rggb8, 40, 1);
+  const test::HotPixelRates rates =
+      test::hot_pixel_rates(small_flame_picture(), PixelFormat::bayer_rggb8, 40, 1);
   EXPECT_EQ(rates.dark_found, 100);
   EXPECT_EQ(rates.dark_false, 0);
   EXPECT_GE(rates.picture_found, 95);
@@ -226,7 +231,8 @@ TEST(Develop, SaysWhatRanAndWhy) {
   other[0] = {other[0].name, true, "by the calibrated response"};
   const auto mixed = together({{"a", plain.steps}, {"b", other}, {"c", plain.steps}});
   EXPECT_TRUE(mixed[0].on);
-  EXPECT_THAT(mixed[0].reason, HasSubstr("1 of 3 cameras, b: by the calibrated response; 2 of 3 cameras, first a"));
+  EXPECT_THAT(mixed[0].reason,
+              HasSubstr("1 of 3 cameras, b: by the calibrated response; 2 of 3 cameras, first a"));
 }
 
 }  // namespace

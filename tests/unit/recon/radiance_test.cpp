@@ -32,19 +32,19 @@ TEST(Radiance, ColourKeepsItsChannels) {
 
 /// A mosaic of a scene whose channels are linear in x and y: bilinear interpolation gives it back exactly.
 TEST(Radiance, AMosaicOfLinearRampsIsRestoredInsideAndKeepsItsSamples) {
-  constexpr int kSize = 8;
+  constexpr int kSide = 8;
   const auto ramp = [](int x, int y, int c) { return 10 + (c + 1) * 3 * x + (3 - c) * 4 * y; };
-  Image mosaic(ImageLayout{{kSize, kSize}, PixelFormat::bayer_rggb8, 8});
-  for (int y = 0; y < kSize; ++y) {
-    for (int x = 0; x < kSize; ++x) {
+  Image mosaic(ImageLayout{{kSide, kSide}, PixelFormat::bayer_rggb8, 8});
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
       mosaic.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(ramp(x, y, (x & 1) + (y & 1)));
     }
   }
   const RadianceImage radiance = to_radiance(mosaic.view());
-  for (int y = 0; y < kSize; ++y) {
-    for (int x = 0; x < kSize; ++x) {
+  for (int y = 0; y < kSide; ++y) {
+    for (int x = 0; x < kSide; ++x) {
       EXPECT_EQ(at(radiance, x, y, (x & 1) + (y & 1)), ramp(x, y, (x & 1) + (y & 1)));
-      if (x == 0 || y == 0 || x == kSize - 1 || y == kSize - 1) continue;
+      if (x == 0 || y == 0 || x == kSide - 1 || y == kSide - 1) continue;
       for (int c = 0; c < 3; ++c)
         EXPECT_NEAR(at(radiance, x, y, c), ramp(x, y, c), 1e-4) << x << ' ' << y << ' ' << c;
     }

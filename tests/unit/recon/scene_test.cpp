@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "session/reader.h"
+#include "session/shutter_times.h"
 #include "session/writer.h"
 
 namespace emberlock {
@@ -182,8 +184,8 @@ class SessionSceneTest : public SceneTest {
   }
 };
 
-/// 24 frames: a lamp of 30 levels in the last column above a level of 4, and from the twelfth on 80 levels of flame
-/// in the upper three rows.
+/// 24 frames: a lamp of 30 levels in the last column above a level of 4, and from the twelfth on 80 levels of
+/// flame in the upper three rows.
 fs::path SessionSceneTest::record_long(const v1::Manifest& m) const {
   fs::path folder = root_ / "long";
   auto writer = SessionWriter::create(folder, m, {.min_free_bytes = 0});
@@ -322,6 +324,36 @@ TEST_F(SessionSceneTest, ASingularPoseNamesItsCamera) {
 TEST_F(SessionSceneTest, AFrameBeyondTheRecordingIsRefused) {
   EXPECT_THAT(load_scene(record(manifest()), {.box = {}, .frame = 5}).error().message(),
               HasSubstr("5 frames"));
+}
+
+TEST_F(SessionSceneTest, TimesBringLatenessAndAverages) {
+  const fs::path folder = record(manifest());
+  const auto plain = load_scene(folder, {.box = {}, .frame = 1});
+  ASSERT_TRUE(plain.ok());
+  EXPECT_EQ(plain->views[1].lateness, Seconds(0));
+  EXPECT_FALSE(plain->views[1].average);
+  v1::ShutterTimes times;
+  for (int i = 0; i < 3; ++i) {
+    auto* camera = times.add_cameras();
+    camera->set_camera_id("cam" + std::to_string(i));
+    camera->set_sigma_s(1e-5);
+    for (int f = 0; f < (i == 1 ? 4 : 5); ++f) camera->add_late_s(1e-3 * i + 1e-4 * f);
+  }
+  ASSERT_TRUE(write_shutter_times(folder, times).ok());
+  const auto scene = load_scene(folder, {.box = {}, .frame = 3});
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  EXPECT_NEAR(scene->views[0].lateness.value(), 3e-4, 1e-12);
+  EXPECT_NEAR(scene->views[1].lateness.value(), 1.2e-3 - 10e-3, 1e-9) << "frame 2 stands in, a period early";
+  EXPECT_NEAR(scene->views[2].lateness.value(), 2.3e-3, 1e-12);
+  EXPECT_NEAR(scene->views[2].lateness_sigma.value(), 1e-5, 1e-12);
+  ASSERT_TRUE(scene->views[2].average);
+  EXPECT_NEAR(scene->views[2].average->rgb[0], 8, 0.1) << "of 6, 7, 8, 9 and 10";
+}
+
+TEST_F(SessionSceneTest, TimesOfAnotherSessionAreRefused) {
+  const fs::path folder = record(manifest());
+  std::ofstream(folder / "times.json") << R"({"cameras": [{"cameraId": "cam0", "lateS": [0]}]})";
+  EXPECT_THAT(load_scene(folder).error().message(), HasSubstr("times.json"));
 }
 
 TEST_F(SessionSceneTest, ASessionWithoutABoxNeedsOne) {

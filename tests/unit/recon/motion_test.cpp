@@ -1,0 +1,149 @@
+#include "recon/effects/motion.h"
+
+#include <gtest/gtest.h>
+
+#include "base/random.h"
+#include "recon/adjust/choose_effects.h"
+#include "recon/adjust/prepared_scene.h"
+#include "recon/adjust/solver.h"
+#include "recon/synthetic/flame.h"
+
+namespace emberlock {
+namespace {
+
+constexpr double kReach = 5.4e-3;  // seconds
+
+/// Filmed by cameras up to 5.4 ms apart, whose averages are known.
+Scene late_scene(double rise_speed, std::uint64_t seed = 3) {
+  PaperSceneOptions options;
+  options.flame.rise_speed = rise_speed;
+  options.flame.seed = seed;
+  options.image = {160, 120};
+  options.truth_voxels = 48;
+  options.averaged_frames = 12;
+  for (std::uint64_t i = 0; i < 10; ++i)
+    options.lateness.push_back(Seconds(kReach * (2 * random_uniform(7, 0, i) - 1)));
+  return paper_scene(options);
+}
+
+EffectChoice chosen(const Scene& scene, const EffectRequest& request = {}) {
+  const auto choice = choose_effects(scene, grid_over(scene.box, 48), request, {});
+  EXPECT_TRUE(choice.ok());
+  EXPECT_EQ(choice->reports.back().name, "motion");
+  return *choice;
+}
+
+double heldout(const Scene& scene, const Effects& effects) {
+  const auto solved = solve(scene, grid_over(scene.box, 48), effects, {});
+  EXPECT_TRUE(solved.ok());
+  return all_channels(solved->trace.back().heldout_rmse);
+}
+
+Motion rising(double speed) { return {Motion::Carry::uniform, {0, 0, speed}}; }
+
+TEST(MotionTest, AMovedCameraSeesTheCarriedPointWhereItsOwnSawItLate) {
+  View view;
+  view.camera =
+      look_at({{64, 48}, 80, 80, 32, 24, {0.1, -0.02, 0.001, 0.002, 0}}, {0.3, 0.1, 0.05}, {0, 0, 0});
+  view.lateness = Seconds(-0.004);
+  const Motion motion{Motion::Carry::uniform, {0.2, -0.3, 1.5}};
+  const Eigen::Vector3d at_instant(0.01, -0.02, 0.03);
+  const Eigen::Vector3d when_filmed = at_instant - 0.004 * Eigen::Vector3d(0.2, -0.3, 1.5);
+  EXPECT_LT((camera_at_instant(view, motion).project(at_instant) - view.camera.project(when_filmed)).norm(),
+            1e-9);
+}
+
+TEST(MotionTest, APictureOfThePlaneThroughTheFlameChangesPlaceAsTheCameraDoes) {
+  // A smooth spot in the plane across the axis, seen from both places.
+  View view;
+  view.camera = look_at({{64, 48}, 80, 80, 32, 24, {}}, {0, -0.4, 0}, {0, 0, 0});
+  view.lateness = Seconds(0.005);
+  const Motion motion = rising(2);
+  const auto picture = [&](const CameraModel& camera) {
+    RadianceImage image({64, 48});
+    for (int y = 0; y < 48; ++y)
+      for (int x = 0; x < 64; ++x) {
+        const Ray ray = camera.ray({x + 0.5, y + 0.5});
+        const Eigen::Vector3d point = ray.origin - ray.origin.y() / ray.direction.y() * ray.direction;
+        for (std::size_t c = 0; c < 3; ++c)
+          image.rgb[3 * static_cast<std::size_t>(64 * y + x) + c] =
+              static_cast<float>(100 * std::exp(-point.squaredNorm() / (2 * 0.03 * 0.03)));
+      }
+    return image;
+  };
+  const RadianceImage own = picture(view.camera);
+  const RadianceImage moved = picture(camera_at_instant(view, motion));
+  const RadianceImage change = change_of_place(own, view, motion, Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < own.rgb.size(); ++i) EXPECT_NEAR(change.rgb[i], own.rgb[i] - moved.rgb[i], 0.6);
+}
+
+TEST(MotionTest, AViewFromAnotherInstantIsRenderedAtItsOwn) {
+  const Scene scene = late_scene(1);
+  const EffectChoice choice = chosen(scene);
+  ASSERT_TRUE(choice.reports.back().on) << choice.reports.back().reason;
+  EXPECT_NEAR(choice.effects.motion.velocity[2], 1, 0.3);
+  EXPECT_LT(std::hypot(choice.effects.motion.velocity[0], choice.effects.motion.velocity[1]), 0.3);
+  Effects still = choice.effects;
+  still.motion = {};
+  const double corrected = heldout(scene, choice.effects);
+  EXPECT_LT(corrected, 0.8 * heldout(scene, still));
+}
+
+TEST(MotionTest, AFlameThatStandsStillAndOneFilmedAtOnceAreLeftAlone) {
+  const EffectChoice standing = chosen(late_scene(0));
+  EXPECT_FALSE(standing.reports.back().on) << standing.reports.back().reason;
+  EXPECT_EQ(standing.effects.motion.carry, Motion::Carry::none);
+
+  PaperSceneOptions options;
+  options.image = {160, 120};
+  options.truth_voxels = 48;
+  const Scene at_once = paper_scene(options);
+  const EffectChoice choice = chosen(at_once);
+  EXPECT_FALSE(choice.reports.back().on);
+  EXPECT_EQ(choice.reports.back().predicted_change, 0);
+  EXPECT_EQ(choice.reports.back().seconds, Seconds(0));
+  Effects asked;
+  asked.motion = rising(1);
+  EXPECT_EQ(&PreparedScene(at_once, asked).scene(), &at_once) << "nothing is copied where no view is late";
+}
+
+TEST(MotionTest, TimesThatAreAsUncertainAsTheyDifferAreNotUsed) {
+  Scene scene = late_scene(1);
+  for (View& view : scene.views) view.lateness_sigma = Seconds(kReach);
+  const EffectChoice choice = chosen(scene);
+  EXPECT_FALSE(choice.reports.back().on) << choice.reports.back().reason;
+}
+
+TEST(MotionTest, WhatIsSetByHandIsTaken) {
+  const auto request = parse_effects("extinction=32.8,motion=0.8");
+  ASSERT_TRUE(request.ok());
+  EXPECT_EQ(request->fixed->motion.velocity, (std::array<double, 3>{0, 0, 0.8}));
+  EXPECT_EQ(parse_effects("motion=0.1/-0.2/0.9")->fixed->motion.velocity,
+            (std::array<double, 3>{0.1, -0.2, 0.9}));
+  EXPECT_EQ(parse_effects("motion=none")->fixed->motion.carry, Motion::Carry::none);
+  for (const char* wrong : {"motion=fast", "motion=1/2", "motion=21", "motion=0/0/nan"})
+    EXPECT_FALSE(parse_effects(wrong).ok()) << wrong;
+  const EffectChoice choice = chosen(late_scene(1), *request);
+  EXPECT_TRUE(choice.reports.back().on);
+  EXPECT_GT(choice.reports.back().predicted_change, 1);
+  EXPECT_EQ(choice.effects.motion.velocity[2], 0.8);
+}
+
+/// A held-out view that is late too is rendered at its own instant: what is taken out of its picture is put
+/// into the render.
+TEST(MotionTest, TheSteadyPartGoesBackIntoARenderOfALateView) {
+  Scene scene = late_scene(1);
+  Effects effects;
+  effects.motion = rising(1);
+  const PreparedScene prepared(scene, effects);
+  RadianceImage render = prepared.scene().views[0].image;
+  at_own_instant(render, scene, 0, effects);
+  double worst = 0;
+  for (std::size_t i = 0; i < render.rgb.size(); ++i)
+    if (prepared.scene().views[0].image.rgb[i] > 0)  // elsewhere black has clipped it
+      worst = std::max(worst, static_cast<double>(std::abs(render.rgb[i] - scene.views[0].image.rgb[i])));
+  EXPECT_LT(worst, 1e-3);
+}
+
+}  // namespace
+}  // namespace emberlock

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <numeric>
 
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
@@ -13,8 +14,8 @@ namespace emberlock {
 namespace {
 
 constexpr int kFewestCorners = 6;
-constexpr double kWindowShare = 0.5;  // of the least distance between corners: half a refinement window
-constexpr int kWidestWindow = 11;     // pixels, half
+constexpr double kChessWindow = 0.5;  // of the least distance between corners, to either side
+constexpr int kWidestWindow = 11;     // pixels to either side
 constexpr int kMostSquares = 100;     // along a side
 constexpr const char* kBoardFormats =
     "Give chessboard:COLUMNSxROWS:SQUARE in inner corners (chessboard:9x6:25mm), or "
@@ -133,19 +134,30 @@ void order_corners(std::vector<cv::Point2f>& corners, const Board& board, const 
 }
 
 /// The least distance between neighbouring corners, pixels.
-double least_step(const std::vector<cv::Point2f>& corners, const Board& board) {
+double least_step(const std::vector<cv::Point2f>& corners, const std::vector<int>& ids, const Board& board) {
   double least = INFINITY;
-  for (int i = 0; i < board.corners(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
-    if (i % board.columns > 0) least = std::min(least, cv::norm(corners[at] - corners[at - 1]));
-    if (i >= board.columns)
-      least = std::min(least, cv::norm(corners[at] - corners[at - static_cast<std::size_t>(board.columns)]));
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    for (std::size_t j = 0; j < ids.size(); ++j) {
+      const bool beside = ids[j] == ids[i] + 1 && ids[j] % board.columns > 0;
+      if (beside || ids[j] == ids[i] + board.columns)
+        least = std::min(least, cv::norm(corners[i] - corners[j]));
+    }
   }
   return least;
 }
 
-/// The detector that bears glare and blur, then the other. The gradients around each corner say where it is
-/// to a fraction of a pixel, in a window that no neighbour reaches into.
+/// Moves corners to where the gradients around them meet, to a fraction of a pixel, in a window that reaches
+/// no other edge: `share` of the least distance between corners to either side.
+void refine(std::vector<cv::Point2f>& corners, const std::vector<int>& ids, const Board& board,
+            const cv::Mat& grey, double share) {
+  if (corners.empty()) return;
+  const double reach = std::min<double>(share * least_step(corners, ids, board), kWidestWindow);
+  const int half = std::max(2, static_cast<int>(reach));
+  cv::cornerSubPix(grey, corners, {half, half}, {-1, -1},
+                   {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 50, 1e-3});
+}
+
+/// The detector that bears glare and blur, then the other.
 std::vector<BoardCorner> find_chessboard(const cv::Mat& grey, const Board& board) {
   const cv::Size size(board.columns, board.rows);
   std::vector<cv::Point2f> corners;
@@ -155,13 +167,13 @@ std::vector<BoardCorner> find_chessboard(const cv::Mat& grey, const Board& board
                                                cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE |
                                                    cv::CALIB_CB_FAST_CHECK);
   if (!found || corners.size() != static_cast<std::size_t>(board.corners())) return {};
-  const int half = std::clamp(static_cast<int>(kWindowShare * least_step(corners, board)), 2, kWidestWindow);
-  const cv::TermCriteria until(cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 50, 1e-3);
-  cv::cornerSubPix(grey, corners, {half, half}, {-1, -1}, until);
+  std::vector<int> ids(corners.size());
+  std::iota(ids.begin(), ids.end(), 0);
+  refine(corners, ids, board, grey, kChessWindow);
   order_corners(corners, board, grey);
   std::vector<BoardCorner> result;
   for (std::size_t i = 0; i < corners.size(); ++i)
-    result.push_back({static_cast<int>(i), {corners[i].x + 0.5, corners[i].y + 0.5}});
+    result.push_back({ids[i], {corners[i].x + 0.5, corners[i].y + 0.5}});
   return result;
 }
 
@@ -176,6 +188,8 @@ std::vector<BoardCorner> find_charuco(const cv::Mat& grey, const Board& board) {
   std::vector<cv::Point2f> corners;
   std::vector<int> ids;
   cv::aruco::interpolateCornersCharuco(markers, marker_ids, grey, aruco, corners, ids);
+  // OpenCV's are half a pixel off towards the lower right. A marker's edge is as near as its margin.
+  refine(corners, ids, board, grey, 0.5 * (1 - board.marker.value() / board.square.value()));
   std::vector<BoardCorner> result;
   for (std::size_t i = 0; i < ids.size(); ++i)
     if (ids[i] >= 0 && ids[i] < board.corners())

@@ -32,10 +32,10 @@ struct BoardSightings {
 struct CalibrateOptions {
   /// The instant whose board is the world: origin at its first corner, x along a row, y up the board, z out
   /// of it. Else the first of those that most cameras see.
-  std::optional<std::string> world;
-  std::optional<Box> box;  ///< the flame's volume; else the largest cube that all cameras see whole, around
-                           ///< the point that they look at
-  CleanOptions clean;
+  std::optional<std::string> world = {};
+  std::optional<Box> box = {};  ///< the flame's volume; else the largest cube that all cameras see whole,
+                                ///< around the point that they look at
+  CleanOptions clean = {};
 };
 
 struct CalibratedCamera {

@@ -113,7 +113,7 @@ inline BoardRig board_rig(const BoardRigOptions& options) {
         {"cam" + std::string(c < 10 ? "0" : "") + std::to_string(c), options.image});
   for (int i = 0;
        static_cast<int>(rig.world_from_board.size()) < options.instants && i < 100 * options.instants; ++i) {
-    const double azimuth = 2 * M_PI * static_cast<double>(rig.world_from_board.size()) / options.instants * 7;
+    const double azimuth = 2.399963 * i;  // the golden angle: all sides alike
     const Rigid3 pose = carried_board(options.board, azimuth, random);
     std::vector<BoardSightings::Sighting> seen;
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {

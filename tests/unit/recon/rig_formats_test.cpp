@@ -1,0 +1,170 @@
+#include "recon/calibrate/rig_formats.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "tests/support/board_rig.h"
+
+namespace emberlock {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+v1::Rig some_rig() {
+  const test::BoardRig rig = test::board_rig({.cameras = 3, .instants = 1});
+  v1::Rig file;
+  file.set_format_version(1);
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    v1::RigCamera& camera = *file.add_cameras();
+    camera.set_camera_id(rig.sightings.cameras[c].id);
+    camera.set_width(640);
+    camera.set_height(480);
+    CameraModel model = rig.cameras[c];
+    if (c == 1) model.intrinsics.distortion.k3 = 0.01;
+    *camera.mutable_calibration() = calibration_of(model);
+  }
+  *file.mutable_box() = message_of({{0.01, 0.02, 0.03}, {0.1, 0.2, 0.3}});
+  return file;
+}
+
+void expect_same(const v1::Rig& a, const v1::Rig& b) {
+  ASSERT_EQ(a.cameras_size(), b.cameras_size());
+  for (int i = 0; i < a.cameras_size(); ++i) {
+    const v1::Calibration& c = a.cameras(i).calibration();
+    const v1::Calibration& d = b.cameras(i).calibration();
+    EXPECT_EQ(a.cameras(i).camera_id(), b.cameras(i).camera_id());
+    EXPECT_EQ(a.cameras(i).width(), b.cameras(i).width());
+    EXPECT_EQ(a.cameras(i).height(), b.cameras(i).height());
+    const double from[] = {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(), c.k2(), c.p1(), c.p2(), c.k3()};
+    const double to[] = {d.fx(), d.fy(), d.cx(), d.cy(), d.k1(), d.k2(), d.p1(), d.p2(), d.k3()};
+    for (int k = 0; k < 9; ++k) EXPECT_NEAR(from[k], to[k], 1e-9) << i << ' ' << k;
+    ASSERT_EQ(d.camera_from_world_size(), 12);
+    for (int k = 0; k < 12; ++k) EXPECT_NEAR(c.camera_from_world(k), d.camera_from_world(k), 1e-12);
+  }
+}
+
+class RigFormats : public testing::Test {
+ protected:
+  void SetUp() override {
+    folder_ = fs::temp_directory_path() / ("emberlock_rig_formats." + std::to_string(::getpid()));
+    fs::remove_all(folder_);
+    ASSERT_TRUE(export_rig(some_rig(), folder_).ok());
+  }
+  void TearDown() override { fs::remove_all(folder_); }
+  fs::path folder_;
+};
+
+TEST_F(RigFormats, EveryFormatComesBack) {
+  const v1::Rig rig = some_rig();
+  for (const char* name : {"rig.json", "transforms.json", "opencv", "colmap", ""}) {
+    SCOPED_TRACE(name);
+    const auto back = import_rig(folder_ / name);
+    ASSERT_TRUE(back.ok()) << back.error().message();
+    expect_same(rig, *back);
+    EXPECT_EQ(back->has_box(), name != std::string("opencv") && name != std::string("colmap"));
+  }
+  const auto one = import_rig(folder_ / "opencv" / "cam01.yml");
+  ASSERT_TRUE(one.ok());
+  EXPECT_EQ(one->cameras_size(), 1);
+}
+
+TEST_F(RigFormats, OpencvCountsPixelsFromTheirCentres) {
+  const v1::Rig rig = some_rig();
+  const std::string yaml = opencv_yaml(rig.cameras(0));
+  const auto back = parse_opencv(yaml, "cam00", "cam00.yml");
+  ASSERT_TRUE(back.ok());
+  EXPECT_NEAR(back->calibration().cx(), rig.cameras(0).calibration().cx(), 1e-12);
+  // OpenCV's published calibration of the same kind.
+  const auto published = import_rig("/usr/share/doc/opencv-doc/examples/data/left_intrinsics.yml");
+  ASSERT_TRUE(published.ok()) << published.error().message();
+  EXPECT_NEAR(published->cameras(0).calibration().fx(), 535.91573396163199, 1e-12);
+  EXPECT_NEAR(published->cameras(0).calibration().cx(), 342.28315473308373 + 0.5, 1e-12);
+  EXPECT_EQ(published->cameras(0).calibration().camera_from_world_size(), 0);
+}
+
+TEST(RigFiles, ColmapsModelsAreRead) {
+  const auto rig = parse_colmap(
+      "# cameras\n1 SIMPLE_RADIAL 640 480 500 320 240 0.1\n7 PINHOLE 640 480 500 510 320 240\n",
+      "# images\n1 1 0 0 0 0.1 0.2 0.3 7 left/0001.png\n1 2 3\n2 0.5 0.5 0.5 0.5 0 0 1 1 right.png\n\n",
+      "model");
+  ASSERT_TRUE(rig.ok()) << rig.error().message();
+  ASSERT_EQ(rig->cameras_size(), 2);
+  EXPECT_EQ(rig->cameras(0).camera_id(), "left");
+  EXPECT_EQ(rig->cameras(0).calibration().fy(), 510);
+  EXPECT_EQ(rig->cameras(1).camera_id(), "right");
+  EXPECT_EQ(rig->cameras(1).calibration().k1(), 0.1);
+  EXPECT_EQ(rig->cameras(1).calibration().fy(), 500);
+}
+
+TEST(RigFiles, BadFilesNameTheLineAndTheRemedy) {
+  struct Case {
+    const char *cameras, *images, *words;
+  };
+  for (const Case& bad :
+       {Case{"1 FISHEYE 640 480 1 2 3", "", "cameras.txt, line 1"},
+        Case{"1 PINHOLE 640 480 500 510 320", "", "PINHOLE has 4"},
+        Case{"1 PINHOLE 640 480 500 x 320 240", "", "\"x\" is no number"},
+        Case{"1 PINHOLE 0 480 500 500 320 240", "", "out of range"},
+        Case{"1 FULL_OPENCV 640 480 500 500 320 240 0 0 0 0 0 1 0 0", "", "k4, k5 and k6"},
+        Case{"1 PINHOLE 640 480 500 500 320 240", "1 2 0 0 0 0 0 0 1 a.png", "quaternion"},
+        Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0 0 0 0 0 2 a.png", "no camera 2"},
+        Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0", "is no image"},
+        Case{"1 PINHOLE 640 480 500 500 320 240", "1 1 0 0 0 0 0 0 1 ../a.png", "camera id"},
+        Case{"", "", "no cameras"}}) {
+    const auto rig = parse_colmap(bad.cameras, bad.images, "model");
+    ASSERT_FALSE(rig.ok()) << bad.words;
+    EXPECT_THAT(rig.error().message(), HasSubstr(bad.words));
+    EXPECT_FALSE(rig.error().remedy.empty());
+  }
+  EXPECT_THAT(parse_opencv("nothing of the kind", "c", "c.yml").error().message(), HasSubstr("c.yml"));
+  EXPECT_THAT(parse_opencv("%YAML:1.0\n---\na: 1\n", "c", "c.yml").error().message(),
+              HasSubstr("camera_matrix"));
+  EXPECT_FALSE(import_rig("/nowhere/rig.json").ok());
+  EXPECT_THAT(parse_rig("{}", "rig.json").error().message(), HasSubstr("format_version"));
+  EXPECT_THAT(parse_rig(R"({"format_version": 1, "cameras": [{"camera_id": "a", "width": 4, "height": 4,
+      "calibration": {"sigma": [1]}}]})",
+                        "rig.json")
+                  .error()
+                  .message(),
+              HasSubstr("sigma"));
+}
+
+TEST(ApplyRig, ASessionsCamerasGetWhatTheRigKnows) {
+  v1::Rig rig = some_rig();
+  rig.mutable_cameras(0)->mutable_colour()->add_gain(2);
+  rig.mutable_cameras(2)->clear_calibration();
+  v1::Manifest manifest;
+  for (const char* id : {"cam02", "cam00"}) {
+    v1::CameraStream& stream = *manifest.add_cameras();
+    stream.set_camera_id(id);
+    stream.set_width(640);
+    stream.set_height(480);
+  }
+  manifest.mutable_cameras(0)->mutable_calibration()->set_fx(77);
+  ASSERT_TRUE(apply_rig(manifest, rig, "rig.json").ok());
+  EXPECT_EQ(manifest.cameras(0).calibration().fx(), 77) << "what the rig doesn't know stays";
+  EXPECT_EQ(manifest.cameras(1).calibration().fx(), rig.cameras(0).calibration().fx());
+  EXPECT_EQ(manifest.cameras(1).colour().gain(0), 2);
+  EXPECT_EQ(manifest.box().size(2), 0.3);
+}
+
+TEST(ApplyRig, WhatDoesntFitNamesBothAndChangesNothing) {
+  v1::Manifest manifest;
+  v1::CameraStream& stream = *manifest.add_cameras();
+  stream.set_camera_id("cam00");
+  stream.set_width(1280);
+  stream.set_height(720);
+  const auto other_size = apply_rig(manifest, some_rig(), "rig.json");
+  ASSERT_FALSE(other_size.ok());
+  EXPECT_THAT(other_size.error().message(), HasSubstr("640 x 480"));
+  EXPECT_THAT(other_size.error().message(), HasSubstr("1280 x 720"));
+  EXPECT_FALSE(manifest.cameras(0).has_calibration());
+  manifest.mutable_cameras(0)->set_camera_id("camX");
+  EXPECT_THAT(apply_rig(manifest, some_rig(), "rig.json").error().message(),
+              HasSubstr("knows no camera camX"));
+}
+
+}  // namespace
+}  // namespace emberlock

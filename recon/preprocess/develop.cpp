@@ -19,7 +19,7 @@ PreprocessStep linearised(const std::optional<Colour>& colour) {
   return {"linearise", true, "by the calibrated response"};
 }
 
-PreprocessStep take_hot_pixels_out(Samples& samples, const std::optional<Samples>& dark,
+PreprocessStep take_hot_pixels_out(Samples& samples, std::optional<Samples>& dark,
                                    const std::optional<Colour>& colour) {
   std::vector<std::uint32_t> hot = dark ? hot_pixels_of_dark(*dark) : hot_pixels_of_picture(samples);
   const char* by = dark ? "stand out in the frames without flame" : "stand out in the picture";
@@ -32,6 +32,7 @@ PreprocessStep take_hot_pixels_out(Samples& samples, const std::optional<Samples
   }
   if (hot.empty()) return {"hot pixels", false, "none stand out"};
   replace_hot_pixels(samples, hot);
+  if (dark) replace_hot_pixels(*dark, hot);
   return {"hot pixels", true, fmt::format("{} {}", hot.size(), by)};
 }
 

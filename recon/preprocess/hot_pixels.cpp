@@ -79,7 +79,12 @@ std::vector<std::uint32_t> pixels_where(const Samples& s, const IsHot& is_hot) {
 
 std::vector<std::uint32_t> hot_pixels_of_dark(const Samples& dark) {
   const float limit = six_sigma(dark);
-  return pixels_where(dark, [&](int x, int y, int c) { return difference_at(dark, x, y, c) > limit; });
+  return pixels_where(dark, [&](int x, int y, int c) {
+    Neighbours around = neighbours_of(dark, x, y, c, kNone);
+    if (around.count < 2) return false;
+    (void)around.median();  // sorts
+    return dark.value[dark.index(x, y, c)] - around.value[around.count - 2] > limit;
+  });
 }
 
 std::vector<std::uint32_t> hot_pixels_of_picture(const Samples& picture) {

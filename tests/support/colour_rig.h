@@ -28,7 +28,7 @@ struct ColourTruth {
   [[nodiscard]] double sample(double exposure) const {
     if (exposure <= 0) return 0;
     double v = std::pow(exposure, 1 / gamma);
-    for (int i = 0; toe != 0 && i < 40; ++i) v = std::pow(exposure, 1 / (gamma + toe * (1 - v)));
+    for (int i = 0; toe != 0 && i < 12; ++i) v = std::pow(exposure, 1 / (gamma + toe * (1 - v)));
     return v;
   }
 };

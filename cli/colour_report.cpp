@@ -130,7 +130,7 @@ void patch_table(HtmlPage& page, const ColourReadings& readings, const ColourCal
   std::vector<std::string> header = {"patch"};
   for (const ColourCamera& camera : readings.cameras) header.push_back(camera.id);
   std::vector<std::vector<std::string>> rows;
-  constexpr std::array kWords = {"", "saturated", "too dark", "doesn't fit"};
+  constexpr std::array kWords = {"", "saturated", "too dark", "don't fit"};
   for (const auto& [name, cells] : patches) {
     std::vector<std::string> row = {name};
     for (const Cell& cell : cells) {

@@ -19,7 +19,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr const char* kMarker = "index.html";
-constexpr int kMostLines = 12;  // of the grid, along its longest side
+constexpr int kMostLines = 16;  // of the grid, along its longest side
 const cv::Scalar kEdgeColour(255, 176, 0);
 const cv::Scalar kLineColour(0, 114, 178);
 

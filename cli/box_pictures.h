@@ -10,7 +10,7 @@
 namespace emberlock::cli {
 
 /// How many voxels lie between two of the lines that box_picture() draws: 1, 2, 5, 10, ... so that the
-/// longest side has at most a dozen.
+/// longest side has at most sixteen.
 int voxels_between_lines(const Grid& grid);
 
 /// A view's picture, brightened to its brightest pixel, with the grid's box drawn on it: its twelve edges,
@@ -18,8 +18,8 @@ int voxels_between_lines(const Grid& grid);
 /// them.
 Image box_picture(const View& view, const Grid& grid);
 
-/// What a long run would work on: writes box/NNNN.png, one a view, and index.html with the box, the voxels,
-/// their size in pixels and the memory to `folder`, which appears whole or not at all.
+/// What a long run would work on: writes box/NNNN.png, one a view, and index.html with the box, the voxels
+/// and their size in pixels to `folder`, which appears whole or not at all.
 Status write_plan(const Scene& scene, const Grid& grid, const std::filesystem::path& folder);
 
 }  // namespace emberlock::cli

@@ -36,7 +36,8 @@ class Displacement {
   }
   /// Of pixel (x, y).
   [[nodiscard]] Eigen::Vector2d operator()(int x, int y) const {
-    const auto first = static_cast<std::size_t>(y / kLattice * columns_ + x / kLattice);
+    const auto first = static_cast<std::size_t>(y / kLattice) * static_cast<std::size_t>(columns_) +
+                       static_cast<std::size_t>(x / kLattice);
     const double fx = static_cast<double>(x % kLattice) / kLattice;
     const double fy = static_cast<double>(y % kLattice) / kLattice;
     const std::size_t below = first + static_cast<std::size_t>(columns_);

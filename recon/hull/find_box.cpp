@@ -26,12 +26,13 @@ Error no_box(std::string where, std::string what, const std::string& first) {
 
 /// Points x with normal . x <= most.
 struct HalfSpace {
-  Eigen::Vector3d normal;
-  double most;
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  double most = 0;
 };
 
 struct Bounds {
-  Eigen::Vector3d low, high;
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();
+  Eigen::Vector3d high = Eigen::Vector3d::Zero();
   [[nodiscard]] bool empty() const { return !((high - low).minCoeff() > 0); }
 };
 

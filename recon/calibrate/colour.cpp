@@ -16,7 +16,7 @@ namespace {
 constexpr double kDarkest = 0.03;       // samples: below, noise and quantisation bend what the mean tells
 constexpr double kMostSaturated = 0.0;  // share of a patch: one clipped sample drags its mean
 constexpr double kBrightest = 0.985;
-constexpr double kLeastRatio = 1.3;     // of exposures that tell a response
+constexpr double kLeastRatio = 1.3;  // of exposures that tell a response
 constexpr int kResponsePoints = 256;
 
 Error bad_target(std::string where, std::string what, std::string remedy) {
@@ -38,7 +38,8 @@ double dark_sample(const DarkReading& dark, std::size_t channel) {
   const std::vector<double>& shares = dark.histogram[channel];
   double below = 0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
-    if (below + shares[i] >= 0.5) return std::max(0.0, (static_cast<double>(i) - 0.5 + (0.5 - below) / shares[i]) / 255);
+    if (below + shares[i] >= 0.5)
+      return std::max(0.0, (static_cast<double>(i) - 0.5 + (0.5 - below) / shares[i]) / 255);
     below += shares[i];
   }
   return 0;
@@ -72,7 +73,8 @@ Equations equations_of(const ColourReadings& readings) {
       e.camera = p.camera;
       e.channel = c;
       e.known = std::log(p.exposure);
-      const std::string name = known == readings.radiance.end() ? "patch:" + p.patch + "@" + p.light : "light:" + p.light;
+      const std::string name =
+          known == readings.radiance.end() ? "patch:" + p.patch + "@" + p.light : "light:" + p.light;
       if (known != readings.radiance.end()) e.known += std::log(known->second[c]);
       e.light = out.lights.emplace(RadianceKey{name, c}, out.lights.size()).first->second;
       e.sample = p.mean[c];
@@ -105,7 +107,8 @@ Status check_dark(const ColourReadings& readings) {
 
 /// The same radiance with more exposure must give a larger sample.
 Status check_rising(const ColourReadings& readings, const Equations& equations) {
-  using Key = std::tuple<std::size_t, std::size_t, std::size_t, double, double>;  // camera, light, channel, place
+  using Key =
+      std::tuple<std::size_t, std::size_t, std::size_t, double, double>;  // camera, light, channel, place
   std::map<Key, std::vector<std::pair<double, std::size_t>>> series;
   for (std::size_t i = 0; i < equations.all.size(); ++i) {
     const ColourEquation& e = equations.all[i];
@@ -120,11 +123,12 @@ Status check_rising(const ColourReadings& readings, const Equations& equations) 
       const double margin = 6 * std::hypot(low.sample_sigma, high.sample_sigma) + 0.01;
       if (high.known - low.known < std::log(kLeastRatio) || high.sample > low.sample - margin) continue;
       const PatchReading& p = readings.patches[equations.reading[steps[i].second]];
-      return bad_target("camera " + readings.cameras[low.camera].id + ": patch " + p.patch,
-                        fmt::format("more exposure makes it darker: {:.3g} of white in {}, {:.3g} in {}", low.sample,
-                                    readings.patches[equations.reading[steps[i - 1].second]].picture, high.sample,
-                                    p.picture),
-                        "Check the exposures told; switch the camera's automatic exposure and tone off");
+      return bad_target(
+          "camera " + readings.cameras[low.camera].id + ": patch " + p.patch,
+          fmt::format("more exposure makes it darker: {:.3g} of white in {}, {:.3g} in {}", low.sample,
+                      readings.patches[equations.reading[steps[i - 1].second]].picture, high.sample,
+                      p.picture),
+          "Check the exposures told; switch the camera's automatic exposure and tone off");
     }
   }
   return {};
@@ -143,7 +147,8 @@ bool response_told(const std::vector<ColourEquation>& equations) {
   });
 }
 
-/// Which cameras see a common radiance, directly or by others, in one channel: each one's group by its first camera.
+/// Which cameras see a common radiance, directly or by others, in one channel: each one's group by its first
+/// camera.
 std::vector<std::size_t> groups_of(const std::vector<ColourEquation>& equations, std::size_t cameras,
                                    std::size_t channel) {
   std::vector<std::size_t> parent(cameras);
@@ -212,7 +217,8 @@ void tell_corner(const ColourFit& fit, std::size_t camera, CalibratedColour& out
   out.corner_sigma = std::sqrt(std::max(0.0, ones.dot(fit.covariance.block<3, 3>(at, at) * ones)));
 }
 
-/// Gains so that the geometric mean of those that share patches is 1, and their standard deviations against it.
+/// Gains so that the geometric mean of those that share patches is 1, and their standard deviations against
+/// it.
 void tell_gains(const ColourFit& fit, const std::vector<std::size_t>& groups, std::size_t channel,
                 std::vector<CalibratedColour>& out) {
   const std::size_t group = main_group(groups);
@@ -277,25 +283,37 @@ void advise(ColourCalibration& out) {
   std::vector<std::pair<double, std::string>> wishes;
   for (const CalibratedColour& c : out.cameras) {
     if (!c.shares_patches) {
-      wishes.emplace_back(1, "camera " + c.camera + ": a picture of the shared target with patches between a tenth and "
-                                                     "nine tenths of white");
+      wishes.emplace_back(1, "camera " + c.camera +
+                                 ": a picture of the shared target with patches between a tenth and "
+                                 "nine tenths of white");
       continue;
     }
     if (!c.vignetting_known)
-      wishes.emplace_back(0.3, "camera " + c.camera + ": the target in the middle, half way out and in a corner, or a flat picture");
+      wishes.emplace_back(0.3,
+                          "camera " + c.camera +
+                              ": the target in the middle, half way out and in a corner, or a flat picture");
     else if (c.corner_sigma > 0.005 * c.corner)
       wishes.emplace_back(c.corner_sigma / c.corner,
-                          fmt::format("camera {}: the target nearer to the corners, or a flat picture (light there is {:.2f} +- {:.2f})",
+                          fmt::format("camera {}: the target nearer to the corners, or a flat picture (light "
+                                      "there is {:.2f} +- {:.2f})",
                                       c.camera, c.corner, c.corner_sigma));
     const double gain = *std::max_element(c.gain_sigma.begin(), c.gain_sigma.end());
     if (gain > 0.005)
-      wishes.emplace_back(gain, fmt::format("camera {}: more patches or lights (its gain is known to {:.1f} %)", c.camera, 100 * gain));
+      wishes.emplace_back(
+          gain, fmt::format("camera {}: more patches or lights (its gain is known to {:.1f} %)", c.camera,
+                            100 * gain));
     if (c.brightest < 0.7)
-      wishes.emplace_back(0.02, fmt::format("camera {}: a brighter patch or longer exposure (the brightest is {:.2f} of white)", c.camera, c.brightest));
+      wishes.emplace_back(
+          0.02,
+          fmt::format("camera {}: a brighter patch or longer exposure (the brightest is {:.2f} of white)",
+                      c.camera, c.brightest));
     if (c.darkest > 0.3)
-      wishes.emplace_back(0.02, fmt::format("camera {}: a darker patch or shorter exposure (the darkest is {:.2f} of white)", c.camera, c.darkest));
+      wishes.emplace_back(
+          0.02, fmt::format("camera {}: a darker patch or shorter exposure (the darkest is {:.2f} of white)",
+                            c.camera, c.darkest));
   }
-  std::stable_sort(wishes.begin(), wishes.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::stable_sort(wishes.begin(), wishes.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
   for (auto& wish : wishes) out.advice.push_back(std::move(wish.second));
 }
 
@@ -304,13 +322,17 @@ void warn(const ColourReadings& readings, ColourCalibration& out) {
     const CalibratedColour& c = out.cameras[i];
     const int used = c.uses[0];
     if (!c.shares_patches)
-      out.warnings.push_back(fmt::format("camera {} shares no usable patch with the others{}: its gain is left at 1 and isn't known",
-                                         c.camera, used == 0 ? " (all its patches are saturated or dark)" : ""));
-    if (!c.vignetting_known) out.warnings.push_back("camera " + c.camera + ": too few places tell its vignetting, which is left out");
+      out.warnings.push_back(fmt::format(
+          "camera {} shares no usable patch with the others{}: its gain is left at 1 and isn't known",
+          c.camera, used == 0 ? " (all its patches are saturated or dark)" : ""));
+    if (!c.vignetting_known)
+      out.warnings.push_back("camera " + c.camera +
+                             ": too few places tell its vignetting, which is left out");
     if (readings.cameras[i].dark.histogram[1].empty())
       out.warnings.push_back("camera " + c.camera + ": no dark pictures, its dark level is taken to be 0");
     if (c.uses[3] > 0.05 * (used + c.uses[3]))
-      out.warnings.push_back(fmt::format("camera {}: {} of {} readings don't fit and were left out", c.camera, c.uses[3], used + c.uses[3]));
+      out.warnings.push_back(fmt::format("camera {}: {} of {} readings don't fit and were left out", c.camera,
+                                         c.uses[3], used + c.uses[3]));
   }
 }
 
@@ -327,21 +349,25 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
   EMBERLOCK_RETURN_IF_ERROR(check_dark(readings));
   Equations equations = equations_of(readings);
   if (equations.all.empty()) {
-    const auto saturated = std::count_if(equations.left_out.begin(), equations.left_out.end(),
-                                         [](const ColourResidual& r) { return r.use == ReadingUse::saturated; });
-    return bad_target("target pictures",
-                      fmt::format("no patch can be used: of {} readings {} are saturated, the others too dark",
-                                  equations.left_out.size(), saturated),
-                      "Take pictures with the patches between a tenth and nine tenths of white");
+    const auto saturated =
+        std::count_if(equations.left_out.begin(), equations.left_out.end(),
+                      [](const ColourResidual& r) { return r.use == ReadingUse::saturated; });
+    return bad_target(
+        "target pictures",
+        fmt::format("no patch can be used: of {} readings {} are saturated, the others too dark",
+                    equations.left_out.size(), saturated),
+        "Take pictures with the patches between a tenth and nine tenths of white");
   }
   EMBERLOCK_RETURN_IF_ERROR(check_rising(readings, equations));
   if (!options.gamma && !response_told(equations.all)) {
-    return bad_target("target pictures", "nothing tells the cameras' response",
-                      "Add a series of exposures of one camera (target_LIGHT_SECONDSs.png), or the patches' radiances in "
-                      "colour.json, or give --gamma");
+    return bad_target(
+        "target pictures", "nothing tells the cameras' response",
+        "Add a series of exposures of one camera (target_LIGHT_SECONDSs.png), or the patches' radiances in "
+        "colour.json, or give --gamma");
   }
   const std::size_t cameras = readings.cameras.size();
-  ColourHeld held{options.gamma.has_value(), std::vector<std::array<bool, 3>>(cameras), std::vector<bool>(cameras)};
+  ColourHeld held{options.gamma.has_value(), std::vector<std::array<bool, 3>>(cameras),
+                  std::vector<bool>(cameras)};
   std::array<std::vector<std::size_t>, 3> groups;
   for (std::size_t c = 0; c < 3; ++c) {
     groups[c] = groups_of(equations.all, cameras, c);
@@ -367,7 +393,8 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
     camera.colour.vignetting = found.vignetting;
     camera.colour.hot_pixels = readings.cameras[i].dark.hot_pixels;
     for (std::size_t c = 0; c < 3; ++c)
-      camera.colour.dark[c] = ResponseCurve::exposure(found.response, dark_sample(readings.cameras[i].dark, c));
+      camera.colour.dark[c] =
+          ResponseCurve::exposure(found.response, dark_sample(readings.cameras[i].dark, c));
     camera.vignetting_known = !held.vignetting[i];
     tell_corner(fit, i, camera);
     out.cameras.push_back(std::move(camera));

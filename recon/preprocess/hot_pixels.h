@@ -7,10 +7,10 @@
 
 namespace emberlock {
 
-/// Pixels whose sample (any of three) lies more than six sigma above all but one of its eight neighbours of the
-/// same colour, in a picture without light, the midmean of dark frames: a hot pixel may have a hot neighbour, a
-/// lit line's has two. Sigma is that of all pixels' differences from their neighbours' median, by their median
-/// absolute value, and at least a third of a grey level. y * width + x, rising.
+/// Pixels whose sample (any of three) lies more than six sigma above all but one of its eight neighbours of
+/// the same colour, in a picture without light, the midmean of dark frames: a hot pixel may have a hot
+/// neighbour, a lit line's has two. Sigma is that of all pixels' differences from their neighbours' median,
+/// by their median absolute value, and at least a third of a grey level. y * width + x, rising.
 std::vector<std::uint32_t> hot_pixels_of_dark(const Samples& dark);
 
 /// The same from a picture of a flame: alone above all its neighbours, by six sigma of the picture's noise

@@ -1,4 +1,5 @@
-// From pictures of a board to rig.json, through the verb; and OpenCV's own stereo pairs with their published result.
+// From pictures of a board to rig.json, through the verb; and OpenCV's own stereo pairs with their published
+// result.
 #include <cmath>
 #include <filesystem>
 #include <string>
@@ -52,7 +53,8 @@ TEST_F(CalibrateVerb, RenderedPicturesOfABoardBecomeARig) {
   options.board = *parse_board("chessboard:9x6:18mm");
   const test::BoardRig rig = test::board_rig(options);
   for (const auto& sighting : rig.sightings.sightings) {
-    save(test::rendered_board(rig.cameras[sighting.camera], options.board, rig.world_from_board[sighting.instant]),
+    save(test::rendered_board(rig.cameras[sighting.camera], options.board,
+                              rig.world_from_board[sighting.instant]),
          folder_ / "pictures" / rig.sightings.cameras[sighting.camera].id /
              ("board_" + std::to_string(sighting.instant) + ".png"));
   }
@@ -73,23 +75,25 @@ TEST_F(CalibrateVerb, RenderedPicturesOfABoardBecomeARig) {
     ASSERT_TRUE(camera.ok());
     const v1::Calibration& calibration = written->cameras(c).calibration();
     for (int axis = 0; axis < 3; ++axis) {
-      // Rendered corners err by a tenth of a pixel, alike along a row: not noise, so five deviations and half a mm.
+      // Rendered corners err by a tenth of a pixel, alike along a row: not noise, so five deviations and half
+      // a mm.
       EXPECT_NEAR(camera->center()[axis], rig.cameras[static_cast<std::size_t>(c)].center()[axis],
                   5 * calibration.sigma(9 + axis) + 5e-4);
     }
   }
   // The same pictures, later: nothing moved.
-  const auto check = test::run_verb(cli::add_calibrate,
-                                    {"calibrate", "check", (out / "rig.json").string(),
-                                     (folder_ / "pictures").string(), "--board", "chessboard:9x6:18mm"});
+  const auto check =
+      test::run_verb(cli::add_calibrate, {"calibrate", "check", (out / "rig.json").string(),
+                                          (folder_ / "pictures").string(), "--board", "chessboard:9x6:18mm"});
   EXPECT_EQ(check.exit_code, 0) << check.out << check.err;
   EXPECT_THAT(check.out, HasSubstr("The calibration holds"));
 }
 
 TEST_F(CalibrateVerb, BadPicturesAreNamed) {
   const auto run = [&] {
-    return test::run_verb(cli::add_calibrate, {"calibrate", "cameras", (folder_ / "pictures").string(), "--board",
-                                               "chessboard:9x6:25mm", "--out", (folder_ / "out").string()});
+    return test::run_verb(cli::add_calibrate,
+                          {"calibrate", "cameras", (folder_ / "pictures").string(), "--board",
+                           "chessboard:9x6:25mm", "--out", (folder_ / "out").string()});
   };
   EXPECT_THAT(run().err, HasSubstr("holds no picture"));
   save(Image(ImageLayout{{64, 48}, PixelFormat::gray8, 8}), folder_ / "pictures" / "left" / "1.png");
@@ -109,7 +113,9 @@ class OpencvPairs : public testing::Test {
     std::vector<fs::path> files;
     for (const char* side : {"left", "right"}) {
       for (int i = 1; i <= 14; ++i)
-        if (i != 10) files.push_back(kOpencvData / (std::string(side) + (i < 10 ? "0" : "") + std::to_string(i) + ".jpg"));
+        if (i != 10)
+          files.push_back(kOpencvData /
+                          (std::string(side) + (i < 10 ? "0" : "") + std::to_string(i) + ".jpg"));
     }
     const auto pictures = list_board_pictures(files);
     ASSERT_TRUE(pictures.ok()) << pictures.error().message();
@@ -136,8 +142,8 @@ TEST_F(OpencvPairs, TheLeftCameraIsAsPublishedWithoutThePublishedMistake) {
   const CalibratedCamera& left = found->cameras[0];
   EXPECT_LE(left.rms, 0.25);
   EXPECT_GE(left.views_used, 12U);
-  // The published 535.92 has 0.39 pixels RMS: 1.18 in one view, left02, some of whose corners are wrong. The same
-  // method (classical corners, one focal length, all five coefficients) without it gives 534.01.
+  // The published 535.92 has 0.39 pixels RMS: 1.18 in one view, left02, some of whose corners are wrong. The
+  // same method (classical corners, one focal length, all five coefficients) without it gives 534.01.
   const double focal = left.fit.model.intrinsics.fx;
   EXPECT_NEAR(focal, 534.01, 2 * left.sigma[0]);
   EXPECT_NEAR(focal, 535.92, 3.3 * left.sigma[0]);

@@ -47,7 +47,7 @@ class CalibrateVerb : public testing::Test {
 TEST_F(CalibrateVerb, RenderedPicturesOfABoardBecomeARig) {
   test::BoardRigOptions options;
   options.cameras = 2;
-  options.instants = 10;
+  options.instants = 8;
   options.seed = 5;
   options.image = {320, 240};
   options.board = *parse_board("chessboard:9x6:18mm");
@@ -163,8 +163,7 @@ TEST_F(OpencvPairs, DisjointHalvesAgreeOnTheBaseline) {
   RecordProperty("even_mm", std::to_string(even * 1e3));
   RecordProperty("odd_mm", std::to_string(odd * 1e3));
   EXPECT_NEAR(all, 0.0832, 0.005 * 0.0832);
-  EXPECT_NEAR(even, all, 0.01 * all);
-  EXPECT_NEAR(odd, all, 0.01 * all);
+  EXPECT_NEAR(even, odd, 0.005 * all) << "the two share no picture";
 }
 
 }  // namespace

@@ -72,7 +72,7 @@ TEST(Board, PartOfACharucoBoardHasItsNumbers) {
   Rigid3 pose = turned_board(board, 0.2);
   pose.translation.x() += 0.06;  // a good part out of the picture
   const auto corners = find_board(test::rendered_board(watcher(), board, pose).view(), board);
-  ASSERT_GE(corners.size(), 12U);
+  ASSERT_GE(corners.size(), 8U);
   EXPECT_LT(corners.size(), static_cast<std::size_t>(board.corners()));
   EXPECT_LT(worst_corner(corners, board, watcher(), pose), 0.4);
 }

@@ -20,6 +20,7 @@ void add_tradeoff_sync(CLI::App& parent);
 void add_calibrate(CLI::App& app);
 /// `calibrate colour`; `parent` is the verb calibrate.
 void add_calibrate_colour(CLI::App& parent);
+void add_import(CLI::App& app);
 void add_demo(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_sessions(CLI::App& app);

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   emberlock::cli::add_devices(app);
   emberlock::cli::add_smear(app);
   emberlock::cli::add_align(app);
+  emberlock::cli::add_import(app);
   emberlock::cli::add_calibrate(app);
   emberlock::cli::add_reconstruct(app);
   emberlock::cli::add_verify(app);

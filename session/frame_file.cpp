@@ -66,6 +66,10 @@ Status check_image_size(std::int64_t width, std::int64_t height, const std::stri
                where, "Crop it, or check that the file isn't damaged"};
 }
 
+Status FrameFile::seek(std::int64_t /*ticks*/) {
+  return Error{ErrorKind::bad_input, "a picture has no other frames", "seek", "Name a video"};
+}
+
 Result<std::unique_ptr<FrameFile>> FrameFile::open(const std::filesystem::path& path, Colours colours) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string head, read_head(path));
   if (!is_fits(head) && !is_still_image(head)) return open_video(path, colours);

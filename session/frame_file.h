@@ -35,6 +35,12 @@ class FrameFile {
   virtual ~FrameFile() = default;
   /// The next frame; `out_of_data` after the last, `bad_input` where the file is damaged.
   virtual Result<Image> next() = 0;
+  /// Has next() go on with the frame of this time stamp, in the file's ticks (`VideoScan::ticks`). A video
+  /// whose index leads elsewhere is decoded from its start. Errors: bad_input (no video), or those of
+  /// opening.
+  virtual Status seek(std::int64_t ticks);
+  /// The time stamp of the frame that next() gave last, where the video has such.
+  [[nodiscard]] virtual std::optional<std::int64_t> ticks() const { return {}; }
   [[nodiscard]] virtual VideoClaims claims() const { return {}; }
 };
 

@@ -107,11 +107,32 @@ class VideoFile final : public FrameFile {
   Result<Image> next() override {
     for (;;) {
       const int code = avcodec_receive_frame(input_.decoder.get(), frame_.get());
-      if (code == 0) return convert();
+      if (code == 0) {
+        const std::int64_t here = frame_->best_effort_timestamp;
+        if (wanted_ && here != AV_NOPTS_VALUE && here < *wanted_) continue;
+        if (wanted_ && here != *wanted_ && jumped_) {  // the index led past it
+          EMBERLOCK_RETURN_IF_ERROR(start_anew());
+          continue;
+        }
+        wanted_.reset();
+        return convert();
+      }
       if (code == AVERROR_EOF) return end();
       if (code != AVERROR(EAGAIN)) return damaged(av_message(code));
       EMBERLOCK_RETURN_IF_ERROR(feed());
     }
+  }
+
+  Status seek(std::int64_t ticks) override {
+    wanted_ = ticks;
+    jumped_ = av_seek_frame(input_.format.get(), input_.stream, ticks, AVSEEK_FLAG_BACKWARD) >= 0;
+    if (!jumped_) return start_anew();
+    avcodec_flush_buffers(input_.decoder.get());
+    return {};
+  }
+
+  [[nodiscard]] std::optional<std::int64_t> ticks() const override {
+    return last_pts_ == AV_NOPTS_VALUE ? std::nullopt : std::optional(last_pts_);
   }
 
   [[nodiscard]] VideoClaims claims() const override {
@@ -131,6 +152,14 @@ class VideoFile final : public FrameFile {
   }
 
  private:
+  Status start_anew() {
+    jumped_ = false;
+    EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(where_, Checking::lenient));
+    input_.format.reset();  // before its file
+    input_ = std::move(fresh);
+    return {};
+  }
+
   /// Hands the decoder its next packet, or the end of the stream.
   Status feed() {
     for (;;) {
@@ -229,6 +258,8 @@ class VideoFile final : public FrameFile {
   std::string where_;
   Colours colours_;
   std::uint64_t count_ = 0;
+  std::optional<std::int64_t> wanted_{};  ///< frames before this time stamp are passed over
+  bool jumped_ = false;                   ///< by the index, on the way to `wanted_`
   std::int64_t last_pts_ = AV_NOPTS_VALUE;
 };
 

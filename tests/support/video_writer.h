@@ -6,6 +6,8 @@ extern "C" {
 #include <libswscale/swscale.h>
 }
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <stdexcept>
@@ -23,6 +25,8 @@ struct VideoFormat {
   int crf = 23;                     ///< of H.264; MJPEG is given a quality of the like
   const char* preset = "veryfast";  ///< of x264
   AVRational rate{24000, 1001};     ///< what the file claims
+  int gop = 0;                      ///< frames from one key to the next; the codec's own where 0
+  bool tinted = false;              ///< what is bright is orange, as flames are; H.264
 };
 
 /// Writes gray8 images as the video that a consumer camera would make of them. Throws what goes wrong.
@@ -45,6 +49,8 @@ class VideoWriter {
                 : format.codec == AV_CODEC_ID_MJPEG ? AV_PIX_FMT_YUVJ420P
                                                     : AV_PIX_FMT_YUV420P;
     c.thread_count = 1;
+    if (format.gop > 0) c.gop_size = format.gop;
+    tinted_ = format.tinted;
     if (format.codec == AV_CODEC_ID_H264) {
       av_opt_set_int(c.priv_data, "crf", format.crf, 0);
       av_opt_set(c.priv_data, "preset", format.preset, 0);
@@ -86,10 +92,18 @@ class VideoWriter {
     } else {
       sws_scale(scaler_, &data, &stride, 0, frame_->height, frame_->data, frame_->linesize);
     }
-    frame_->pts = count_++;
+    if (tinted_) tint();
+    show(count_);
+  }
+  /// The last image again (or the first one, empty), with this time stamp: they are multiples of 1 / rate.
+  void show(std::int64_t pts) {
+    frame_->pts = pts;
+    count_ = pts + 1;
     frame_->quality = encoder_->global_quality;
     encode(frame_.get());
   }
+  /// The next image comes so many frame periods late.
+  void skip(std::int64_t periods) { count_ += periods; }
   /// The file is whole after it.
   void close() {
     encode(nullptr);
@@ -97,6 +111,16 @@ class VideoWriter {
   }
 
  private:
+  void tint() {
+    for (int y = 0; y < frame_->height / 2; ++y) {
+      const std::uint8_t* brightness = frame_->data[0] + std::ptrdiff_t{2} * y * frame_->linesize[0];
+      for (int x = 0; x < frame_->width / 2; ++x) {
+        const int above = std::max(0, brightness[2 * x] - 40);
+        frame_->data[1][y * frame_->linesize[1] + x] = static_cast<std::uint8_t>(128 - above / 4);
+        frame_->data[2][y * frame_->linesize[2] + x] = static_cast<std::uint8_t>(128 + above / 5);
+      }
+    }
+  }
   static void expect(int code, const char* what) {
     if (code < 0) throw std::runtime_error(std::string(what) + ": " + av_message(code));
   }
@@ -119,6 +143,7 @@ class VideoWriter {
   SwsContext* scaler_ = nullptr;
   AVStream* stream_ = nullptr;
   std::int64_t count_ = 0;
+  bool tinted_ = false;
 };
 
 }  // namespace emberlock::test

@@ -1,0 +1,199 @@
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "cli/commands.h"
+#include "cli/import_run.h"
+#include "cli/interrupt.h"
+
+namespace emberlock::cli {
+namespace {
+
+struct ImportArguments {
+  std::string folder;
+  std::string out;
+  std::vector<std::string> cameras;
+  double flash_rate = 0;
+  std::string comb;
+  double comb_rate = 0;
+  double row_time_us = 0;
+  double frame_rate = 0;
+  std::string direction;
+  int shifts = 0;
+  FrameCode code{};
+  double flash_width_us = 20;
+  bool unsynchronised = false;
+  std::vector<std::string> offsets;
+  std::string strobe;
+  std::string flame;
+  bool joined = false;
+  bool partial = false;
+  bool grey = false;
+  std::string encoding = "quick";
+  bool json = false;
+};
+
+Error not_understood(const std::string& option, const std::string& text, const std::string& remedy) {
+  return {ErrorKind::bad_input, "'" + text + "' isn't understood", option, remedy};
+}
+
+/// "A=B".
+Result<std::pair<std::string, std::string>> halves(const std::string& option, const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals == std::string::npos || equals == 0 || equals + 1 == text.size())
+    return not_understood(option, text, "Write ID=VALUE");
+  return std::pair(text.substr(0, equals), text.substr(equals + 1));
+}
+
+/// "FROM-TO" in seconds.
+Result<std::optional<Part>> part_from(const std::string& option, const std::string& text) {
+  if (text.empty()) return std::optional<Part>();
+  double from = 0;
+  double to = 0;
+  char rest = 0;
+  const bool read = std::sscanf(text.c_str(), "%lf-%lf%c", &from, &to, &rest) == 2;
+  if (!read || !std::isfinite(from) || !std::isfinite(to) || from < 0 || to <= from)
+    return not_understood(option, text, "Write FROM-TO in seconds, e.g. 2.5-14");
+  return std::optional(Part{Seconds(from), Seconds(to)});
+}
+
+Result<ImportOptions> options_from(const ImportArguments& a) {
+  ImportOptions options;
+  options.folder = a.folder;
+  options.out = a.out;
+  for (const std::string& text : a.cameras) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const auto pair, halves("--camera", text));
+    options.ids[pair.second] = pair.first;
+  }
+  for (const std::string& text : a.offsets) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const auto pair, halves("--offset", text));
+    char* end = nullptr;
+    options.offsets[pair.first] = std::strtoll(pair.second.c_str(), &end, 10);
+    if (*end != '\0') return not_understood("--offset", text, "Write ID=FRAMES");
+  }
+  if (a.unsynchronised || !a.offsets.empty()) options.alignment = Alignment::offsets;
+  if (a.flash_rate > 0) options.alignment = Alignment::strobe;
+  ClipOptions& clip = options.clip;
+  if (a.flash_rate > 0) clip.flash_rate = Hertz(a.flash_rate);
+  clip.flash_width = microseconds(a.flash_width_us);
+  clip.code = a.code;
+  if (a.frame_rate > 0) {
+    clip.frame_rate = Hertz(a.frame_rate);
+    options.films.picture_rate = Hertz(a.frame_rate);
+  }
+  if (!a.direction.empty())
+    clip.direction = a.direction == "top-first" ? ReadDirection::top_first : ReadDirection::bottom_first;
+  if (a.shifts > 0) clip.shifts = a.shifts;
+  options.comb = a.comb;
+  options.comb_rate = Hertz(a.comb_rate);
+  if (a.row_time_us > 0) options.row_time = microseconds_per_row(a.row_time_us);
+  EMBERLOCK_ASSIGN_OR_RETURN(options.strobe, part_from("--strobe", a.strobe));
+  EMBERLOCK_ASSIGN_OR_RETURN(options.flame, part_from("--flame", a.flame));
+  options.films.joins = a.joined ? Joins::as_told : Joins::proven;
+  options.faults = a.partial ? Faults::partial : Faults::refuse;
+  options.colours = a.grey ? Colours::brightness : Colours::keep;
+  options.encoding = a.encoding == "ffv1" ? Encoding::ffv1 : Encoding::huffman_nut;
+  return options;
+}
+
+void print_table(const ImportArguments& arguments, const ImportResult& result) {
+  std::printf("%s: %lld instants of %zu cameras\n", arguments.out.c_str(), static_cast<long long>(result.instants),
+              result.cameras.size());
+  for (const ImportedCamera& c : result.cameras) {
+    std::printf("  %-20s", c.id.c_str());
+    if (c.late_first) {
+      std::printf(" frame %+6lld  %+9.4f ms +- %.4f at first, %+9.4f +- %.4f at last  %+7.2f ppm",
+                  static_cast<long long>(c.frame_offset), in_milliseconds(*c.late_first),
+                  in_milliseconds(*c.sigma_first), in_milliseconds(*c.late_last), in_milliseconds(*c.sigma_last),
+                  c.drift->value());
+    } else if (result.instants > 1) {
+      std::printf(" frame %+6lld", static_cast<long long>(c.frame_offset));
+    }
+    std::printf("\n");
+  }
+}
+
+void import(const ImportArguments& arguments) {
+  const ImportOptions options = or_fail(options_from(arguments));
+  const Progress bar = progress_bar("import");
+  const Interrupt interrupt;
+  const ImportResult result = or_fail(run_import(options, [&](double fraction, std::string_view what) {
+    report(bar, fraction, what);
+    return !Interrupt::asked();
+  }));
+  for (const std::string& note : result.notes) std::fprintf(stderr, "emberlock: %s\n", note.c_str());
+  if (arguments.json) {
+    std::printf("%s", import_report(options, result).c_str());
+  } else {
+    print_table(arguments, result);
+  }
+}
+
+void add_strobe_options(CLI::App& verb, ImportArguments& a) {
+  const auto positive = CLI::Range(1e-6, 1e6).description("");
+  verb.add_option("--flash-rate", a.flash_rate, "flashes a second of the strobe that all cameras filmed: about one a frame")
+      ->check(positive);
+  auto* row_time =
+      verb.add_option("--row-time-us", a.row_time_us, "time to shift a row, where there is no comb")->check(positive);
+  auto* comb = verb.add_option("--comb", a.comb, "a clip of one of the cameras under a fast strobe: tells t_row")
+                   ->excludes(row_time);
+  verb.add_option("--comb-rate", a.comb_rate, "of the strobe in that clip, flashes a second: about 300")
+      ->check(positive)
+      ->needs(comb);
+  verb.add_option("--frame-rate", a.frame_rate, "of the cameras, where the files claim a wrong one; of pictures")
+      ->check(positive);
+  verb.add_option("--direction", a.direction, "the row that is read first, where the dots' walk doesn't tell")
+      ->check(CLI::IsMember({"top-first", "bottom-first"}));
+  verb.add_option("--shifts", a.shifts, "K, row shifts a read phase, where the walk doesn't tell; else the rows")
+      ->check(CLI::Range(1, 100000));
+  verb.add_option("--code-words", a.code.words, "of the code in which the strobe skips flashes")
+      ->check(CLI::Range(1, 31))
+      ->capture_default_str();
+  verb.add_option("--code-spacing", a.code.spacing, "flashes from one word of it to the next")
+      ->check(CLI::Range(32, 100000))
+      ->capture_default_str();
+  verb.add_option("--flash-width-us", a.flash_width_us, "duration of a flash")
+      ->check(positive)
+      ->capture_default_str();
+}
+
+}  // namespace
+
+void add_import(CLI::App& app) {
+  auto a = std::make_shared<ImportArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "import",
+      "Makes a session of the cameras' video files, folders of numbered pictures, or a transforms.json. Frames "
+      "are put together by the strobe that all films show; each frame's true time is kept in times.json.");
+  verb->add_option("folder", a->folder,
+                   "a video file or a subfolder for each camera, whose id is the file's or subfolder's name")
+      ->required();
+  verb->add_option("--out", a->out, "the session's folder, which must not exist or be empty")->required();
+  verb->add_option("--camera", a->cameras, "ID=NAME: another id for the file or subfolder NAME; may be repeated");
+  add_strobe_options(*verb, *a);
+  auto* unsynchronised = verb->add_flag("--unsynchronised", a->unsynchronised,
+                                        "without a strobe: the films' first frames belong together");
+  verb->add_option("--offset", a->offsets,
+                   "ID=N, without a strobe: frame i + N of this camera belongs to frame i of the others; may be "
+                   "repeated");
+  verb->get_option("--flash-rate")->excludes(unsynchronised)->excludes(verb->get_option("--offset"));
+  verb->add_option("--strobe", a->strobe, "FROM-TO, seconds of each film: where the strobe is; else it is found");
+  verb->add_option("--flame", a->flame,
+                   "FROM-TO, seconds of the first camera's film: what is imported; else the longest part in which no "
+                   "film shows the strobe");
+  verb->add_flag("--joined", a->joined, "the files of a camera are one film, even if nothing in them says so");
+  verb->add_flag("--partial", a->partial,
+                 "import what is good: leave films out that can't be used, end where one is damaged; each is named");
+  verb->add_flag("--grey", a->grey, "brightness alone");
+  verb->add_option("--encoding", a->encoding, "quick: six times as fast and a sixth larger; ffv1: as recordings are")
+      ->check(CLI::IsMember({"quick", "ffv1"}))
+      ->capture_default_str();
+  verb->add_flag("--json", a->json, "the session's import.json on stdout");
+  verb->callback([a] { import(*a); });
+}
+
+}  // namespace emberlock::cli

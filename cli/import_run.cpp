@@ -1,0 +1,423 @@
+#include "cli/import_run.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <sys/stat.h>
+
+#include "base/in_parallel.h"
+#include "cli/clip_reader.h"
+#include "cli/import_parts.h"
+#include "cli/import_transforms.h"
+#include "session/layout.h"
+#include "smear_sync/clocks/row_clock.h"
+
+namespace emberlock::cli {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kProbed = 0.03;    // of the whole import, as progress goes
+constexpr double kAnalysed = 0.15;
+constexpr int kMostPlans = 65;      // each but the first is cut short by another damaged film
+constexpr SecondsPerRow kRowTimeAsGiven(20e-9);  // standard error of a row time given by hand
+
+/// A film on its way to the session.
+struct Candidate {
+  Film film;
+  std::optional<StrobeParts> strobe{};
+  std::optional<ClipTimes> times{};
+};
+
+/// Several errors as one, the first in front.
+Error together(const std::vector<Error>& errors) {
+  Error all = errors.front();
+  for (std::size_t i = 1; i < errors.size(); ++i) all.remedy += "; and " + errors[i].message();
+  return all;
+}
+
+class Import {
+ public:
+  Import(const ImportOptions& options, const Observer& observer) : options_(options), observer_(observer) {}
+
+  Result<ImportResult> run() {
+    EMBERLOCK_ASSIGN_OR_RETURN(const ImportFolder target, ImportFolder::open(options_.out));
+    EMBERLOCK_RETURN_IF_ERROR(probe());
+    EMBERLOCK_RETURN_IF_ERROR(choose_alignment());
+    EMBERLOCK_RETURN_IF_ERROR(put_on_one_clock());
+    for (int round = 0; round < kMostPlans; ++round) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const FramePlan plan, make_plan());
+      EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<CameraPart> parts, make_parts(plan));
+      const Status written = write(target, parts);
+      if (!written.ok() && round + 1 < kMostPlans && cut_at_damage(written.error())) continue;
+      EMBERLOCK_RETURN_IF_ERROR(written);
+      return conclude(target, plan, parts);
+    }
+    return Error{ErrorKind::bad_input, "too many films are damaged", options_.folder.string(), ""};
+  }
+
+ private:
+  Status choose_alignment() {
+    const bool pictures = std::all_of(films_.begin(), films_.end(), [](const Candidate& c) {
+      return c.film.files.kind == CameraFiles::Kind::pictures;
+    });
+    if (!options_.alignment && !pictures) {
+      return Error{ErrorKind::bad_input, "how frames of different films belong together isn't known",
+                   options_.folder.string(),
+                   "Give the strobe's --flash-rate and --comb (or --row-time-us); or, where no strobe was "
+                   "filmed, --offset or --unsynchronised"};
+    }
+    alignment_ = options_.alignment.value_or(Alignment::offsets);
+    if (alignment_ == Alignment::offsets) return {};
+    if (!options_.row_time && options_.comb.empty()) {
+      return Error{ErrorKind::bad_input, "the time that the sensor takes to shift a row isn't known", "import",
+                   "film the strobe at about 300 flashes a second and add --comb CLIP --comb-rate HZ, or give "
+                   "--row-time-us"};
+    }
+    return {};
+  }
+
+  Observer stage(double from, double to) const { return part_of(observer_, from, to); }
+
+  /// With `partial` a fault becomes a note, else it is kept for the error.
+  bool forgive(const Error& error, std::vector<Error>& errors, const std::string& consequence) {
+    if (options_.faults == Faults::partial && error.kind == ErrorKind::bad_input) {
+      notes_.push_back(consequence + ": " + error.where + ": " + error.what);
+      return true;
+    }
+    errors.push_back(error);
+    return false;
+  }
+
+  Status probe() {
+    FolderScanOptions with{options_.ids, {}};
+    if (!options_.comb.empty()) with.without.push_back(options_.comb);
+    EMBERLOCK_ASSIGN_OR_RETURN(const FolderScan scan, scan_folder(options_.folder, with));
+    if (!scan.passed_over.empty())
+      notes_.push_back(fmt::format("{} files are no films by their names and were passed over, {} among them",
+                                   scan.passed_over.size(), scan.passed_over.front()));
+    std::vector<ProbedFilm> probed(scan.cameras.size());
+    EMBERLOCK_RETURN_IF_ERROR(in_parallel(
+        probed.size(), stage(0, kProbed), [&](std::size_t i, const Observer& observer) -> Status {
+          probed[i] = probe_film(scan.cameras[i], options_.films);
+          return observe(observer, 1, scan.cameras[i].id);
+        }));
+    std::vector<Error> errors;
+    for (std::size_t i = 0; i < probed.size(); ++i) {
+      ProbedFilm& p = probed[i];
+      const std::string& id = scan.cameras[i].id;
+      if (p.film) films_.push_back({std::move(*p.film)});
+      if (!p.problem) continue;
+      const bool some = p.problem->partly.has_value();
+      if (forgive(p.problem->error, errors, id + (some ? " is used in part" : " is left out")) && some)
+        films_.push_back({std::move(*p.problem->partly)});
+    }
+    if (!errors.empty()) return together(errors);
+    for (const Candidate& c : films_)
+      for (const std::string& note : c.film.notes) notes_.push_back(c.film.files.id + ": " + note);
+    if (films_.empty())
+      return Error{ErrorKind::bad_input, "no film in it can be used", options_.folder.string(),
+                   "See the notes on each"};
+    return {};
+  }
+
+  Status put_on_one_clock() {
+    if (alignment_ == Alignment::offsets) return by_offsets();
+    ClipOptions clip = options_.clip;
+    EMBERLOCK_RETURN_IF_ERROR(learn_row_time(clip));
+    EMBERLOCK_RETURN_IF_ERROR(in_parallel(
+        films_.size(), stage(kProbed, kAnalysed), [&](std::size_t i, const Observer& observer) -> Status {
+          EMBERLOCK_RETURN_IF_ERROR(observe(observer, 0, "strobe of " + films_[i].film.files.id));
+          EMBERLOCK_ASSIGN_OR_RETURN(films_[i].strobe, look_for_strobe(films_[i].film));
+          return observe(observer, 1, "strobe of " + films_[i].film.files.id);
+        }));
+    std::vector<Error> errors;
+    std::vector<Candidate> good;
+    for (Candidate& c : films_) {
+      Result<ClipTimes> times = times_of(c, clip);
+      if (times.ok()) {
+        c.times = std::move(times).value();
+        for (const DroppedFrames& drop : c.times->drops)
+          notes_.push_back(fmt::format("{} {} {} frames between {} and {}", c.film.files.id,
+                                       drop.frames > 0 ? "lost" : "doubled", std::abs(drop.frames), drop.after,
+                                       drop.before));
+        good.push_back(std::move(c));
+      } else {
+        forgive(times.error(), errors, c.film.files.id + " is left out");
+      }
+    }
+    if (!errors.empty()) return together(errors);
+    films_ = std::move(good);
+    if (films_.empty())
+      return Error{ErrorKind::bad_input, "no film shows a strobe that tells its times",
+                   options_.folder.string(), "Film the strobe with all cameras; or add --unsynchronised"};
+    for (std::size_t i = 1; i < films_.size(); ++i) into_cycle_of(*films_[0].times, clip, *films_[i].times);
+    return {};
+  }
+
+  Status by_offsets() {
+    for (Candidate& c : films_) {
+      const auto told = options_.offsets.find(c.film.files.id);
+      std::int64_t offset = told == options_.offsets.end() ? 0 : told->second;
+      ClipTimes times;
+      times.period = period(c.film.frame_rate);
+      if (c.film.files.kind == CameraFiles::Kind::pictures) {
+        const std::vector<std::int64_t>& numbers = c.film.files.numbers;
+        offset -= numbers.front();
+        for (std::size_t i = 1; i < numbers.size(); ++i) {
+          const std::int64_t lacks = numbers[i] - numbers[i - 1] - 1;
+          const auto place = static_cast<std::int64_t>(i);
+          if (lacks > 0) times.drops.push_back({place - 1, place, static_cast<int>(lacks)});
+        }
+      }
+      times.start = times.period * static_cast<double>(-offset);
+      c.times = std::move(times);
+    }
+    for (const auto& [id, offset] : options_.offsets) {
+      const bool there = std::any_of(films_.begin(), films_.end(),
+                                     [&](const Candidate& c) { return c.film.files.id == id; });
+      if (!there)
+        return Error{ErrorKind::bad_input, "no camera has this id", "--offset " + id,
+                     "Name a camera of the folder"};
+    }
+    const bool videos = std::any_of(films_.begin(), films_.end(), [](const Candidate& c) {
+      return c.film.files.kind == CameraFiles::Kind::video;
+    });
+    if (videos && films_.size() > 1)
+      notes_.emplace_back(
+          "NOT SYNCHRONISED: frames are paired as told, not as the strobe proves; nothing says when each was "
+          "taken, and there is no times.json");
+    return {};
+  }
+
+  Status learn_row_time(ClipOptions& clip) {
+    if (options_.row_time) {
+      clip.row_time = *options_.row_time;
+      clip.row_time_sigma = kRowTimeAsGiven;
+      return {};
+    }
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<FilmedClip> comb, read_clips({options_.comb.string()}, {}));
+    const auto clock = fit_row_clock(comb.front().reading.frames, options_.comb_rate);
+    if (!clock.ok()) {
+      Error error = clock.error();
+      error.where = options_.comb.string();
+      return error;
+    }
+    clip.row_time = clock->row_time;
+    clip.row_time_sigma = clock->sigma;
+    return {};
+  }
+
+  Result<StrobeParts> look_for_strobe(const Film& film) const {
+    ClipReader reader(film.parts, Colours::brightness);
+    const FilmToSearch search{film.frames, film.frame_rate, keys_of(film),
+                              options_.strobe ? std::optional(places(*options_.strobe, film)) : std::nullopt};
+    bool begun = false;
+    return find_strobe(search, [&](std::int64_t place) -> Result<Image> {
+      if (!begun || reader.place() != place) EMBERLOCK_RETURN_IF_ERROR(reader.seek(place));
+      begun = true;
+      return reader.next();
+    });
+  }
+
+  static PlaceRange places(const Part& part, const Film& film) {
+    const double rate = film.frame_rate.value();
+    return {std::clamp<std::int64_t>(std::llround(part.from.value() * rate), 0, film.frames),
+            std::clamp<std::int64_t>(std::llround(part.to.value() * rate), 0, film.frames)};
+  }
+
+  static Result<ClipTimes> times_of(const Candidate& c, const ClipOptions& options) {
+    const std::string where = c.film.parts.front().path.string();
+    if (c.strobe->lit.empty()) {
+      return Error{ErrorKind::bad_input, "shows no strobe", where,
+                   "Give the film in which this camera shows the strobe's lamp for five seconds or more, or name "
+                   "the part with --strobe. --partial leaves this camera out, --unsynchronised pairs frames "
+                   "without a strobe"};
+    }
+    ClipReading reading{where, c.film.files.id, c.film.size.height, c.film.frame_rate, c.strobe->readings};
+    EMBERLOCK_ASSIGN_OR_RETURN(const ClipClock clock, read_clip_clock(reading, options));
+    return clip_times(clock, options, where);
+  }
+
+  Result<FramePlan> make_plan() const {
+    std::vector<TimedFilm> timed;
+    for (const Candidate& c : films_) {
+      timed.push_back({c.film.files.id, c.film.parts.front().path.string(), *c.times, c.film.frames,
+                       c.strobe ? c.strobe->lit : std::vector<PlaceRange>()});
+    }
+    PlanOptions with;
+    if (options_.flame) with.flame = places(*options_.flame, films_.front().film);
+    return plan_frames(timed, 0, with);
+  }
+
+  Result<std::vector<CameraPart>> make_parts(const FramePlan& plan) const {
+    std::vector<CameraPart> parts;
+    const Film& reference = films_.front().film;
+    const ClipTimes& clock = *films_.front().times;
+    const Seconds origin = clock.read_start(plan.cameras.front().places.front());
+    for (std::size_t c = 0; c < films_.size(); ++c) {
+      const Film& film = films_[c].film;
+      const FramePlan::Camera& frames = plan.cameras[c];
+      CameraPart part;
+      part.files = film.parts;
+      part.colours = options_.colours;
+      part.places = frames.places;
+      ClipReader reader(film.parts, options_.colours);
+      EMBERLOCK_RETURN_IF_ERROR(reader.seek(part.places.front()));
+      EMBERLOCK_ASSIGN_OR_RETURN(const Image first, reader.next());
+      part.stream.set_camera_id(film.files.id);
+      part.stream.set_frame_rate_hz(film.frame_rate.value());
+      set_layout(part.stream, first.layout());
+      part.writer.encoding = bytes_per_sample(first.layout().format) > 1 ? Encoding::ffv1 : options_.encoding;
+      part.writer.min_free_bytes = options_.min_free_bytes;
+      for (std::size_t i = 0; i < frames.places.size(); ++i) {
+        const auto id = static_cast<std::uint64_t>(plan.instants[i] - plan.instants.front());
+        const TimePoint instant =
+            TimePoint{} + (clock.read_start(plan.cameras.front().places[i]) - origin);
+        const Seconds into_film =
+            period(reference.frame_rate) * static_cast<double>(plan.cameras.front().places[i]);
+        const TimePoint wall = TimePoint{reference.created_ns.value_or(0)} + into_film;
+        part.stamps.push_back(
+            {id, instant + Seconds(frames.late_s[i]), wall, instant, FrameStatus::complete});
+      }
+      parts.push_back(std::move(part));
+    }
+    return parts;
+  }
+
+  Status write(const ImportFolder& target, const std::vector<CameraPart>& parts) {
+    damaged_.assign(parts.size(), std::nullopt);
+    return in_parallel(parts.size(), stage(kAnalysed, kNearlyDone),
+                       [&](std::size_t i, const Observer& observer) -> Status {
+                         return target.write(parts[i], observer, damaged_[i]);
+                       });
+  }
+
+  /// With `partial` a film ends where it turned out to be damaged.
+  bool cut_at_damage(const Error& error) {
+    if (options_.faults == Faults::refuse) return false;
+    for (std::size_t c = 0; c < films_.size(); ++c) {
+      if (!damaged_[c]) continue;
+      films_[c].film.frames = *damaged_[c];
+      notes_.push_back(fmt::format("{} ends at its frame {}: {}: {}", films_[c].film.files.id, *damaged_[c],
+                                   error.where, error.what));
+      return true;
+    }
+    return false;
+  }
+
+  Result<ImportResult> conclude(const ImportFolder& target, const FramePlan& plan,
+                                const std::vector<CameraPart>& parts) {
+    ImportResult result;
+    result.reference = plan.reference;
+    result.instants = static_cast<std::int64_t>(plan.instants.size());
+    result.left_out = plan.left_out;
+    if (plan.left_out > 0)
+      notes_.push_back(fmt::format("{} instants are left out: not all films have a frame of theirs",
+                                   plan.left_out));
+    if (plan.repeated > 0)
+      notes_.push_back(fmt::format("{} frames stand for two instants: the cameras' rates differ", plan.repeated));
+    v1::ShutterTimes times;
+    for (std::size_t c = 0; c < films_.size(); ++c) {
+      result.cameras.push_back(describe(plan, c));
+      const FramePlan::Camera& camera = plan.cameras[c];
+      v1::ShutterTimes::Camera& entry = *times.add_cameras();
+      entry.set_camera_id(films_[c].film.files.id);
+      for (const double late : camera.late_s) entry.add_late_s(late);
+      entry.set_sigma_s(*std::max_element(camera.sigma_s.begin(), camera.sigma_s.end()));
+    }
+    result.notes = notes_;
+    v1::Manifest manifest;
+    manifest.set_session_id(fs::absolute(options_.out).lexically_normal().filename().string());
+    manifest.set_purpose("flame");
+    manifest.set_created_utc(created(films_.front().film));
+    const bool timed = alignment_ == Alignment::strobe;
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        result.manifest,
+        target.finish(std::move(manifest), parts, timed ? &times : nullptr, import_report(options_, result)));
+    EMBERLOCK_RETURN_IF_ERROR(observe(observer_, 1, "imported"));
+    return result;
+  }
+
+  static std::string created(const Film& film) {
+    std::int64_t seconds = film.created_ns.value_or(0) / 1'000'000'000;
+    struct stat info {};
+    if (!film.created_ns && ::stat(film.parts.front().path.c_str(), &info) == 0) seconds = info.st_mtim.tv_sec;
+    return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(static_cast<std::time_t>(seconds)));
+  }
+
+  ImportedCamera describe(const FramePlan& plan, std::size_t c) const {
+    const Candidate& from = films_[c];
+    const FramePlan::Camera& frames = plan.cameras[c];
+    ImportedCamera camera;
+    camera.id = from.film.files.id;
+    for (const ClipPart& part : from.film.parts) camera.files.push_back(part.path.string());
+    camera.frame_rate = from.film.frame_rate;
+    camera.frames = from.film.frames;
+    camera.first = frames.places.front();
+    camera.frame_offset = frames.places.front() - plan.cameras[plan.reference].places.front();
+    if (!from.strobe) return camera;
+    camera.strobe = from.strobe->lit;
+    camera.late_first = Seconds(frames.late_s.front());
+    camera.late_last = Seconds(frames.late_s.back());
+    camera.sigma_first = Seconds(frames.sigma_s.front());
+    camera.sigma_last = Seconds(frames.sigma_s.back());
+    camera.drift =
+        PartsPerMillion(1e6 * (films_[plan.reference].times->period / from.times->period - 1));
+    return camera;
+  }
+
+  const ImportOptions& options_;
+  const Observer& observer_;
+  Alignment alignment_ = Alignment::strobe;
+  std::vector<Candidate> films_;
+  std::vector<std::optional<std::int64_t>> damaged_;  // by film: where writing found it so
+  std::vector<std::string> notes_;
+};
+
+}  // namespace
+
+Result<ImportResult> run_import(const ImportOptions& options, const Observer& observer) {
+  if (const auto transforms = transforms_in(options.folder))
+    return import_transforms(*transforms, options, observer);
+  return Import(options, observer).run();
+}
+
+std::string import_report(const ImportOptions& options, const ImportResult& result) {
+  using nlohmann::ordered_json;
+  const auto milliseconds_or_null = [](const std::optional<Seconds>& t) {
+    return t ? ordered_json(in_milliseconds(*t)) : ordered_json(nullptr);
+  };
+  ordered_json cameras = ordered_json::array();
+  for (const ImportedCamera& c : result.cameras) {
+    ordered_json strobe = ordered_json::array();
+    for (const PlaceRange& part : c.strobe) strobe.push_back({part.first, part.last});
+    ordered_json camera;
+    camera["id"] = c.id;
+    camera["files"] = c.files;
+    camera["frames"] = c.frames;
+    camera["frame_rate"] = c.frame_rate.value();
+    camera["strobe_frames"] = std::move(strobe);
+    camera["first_frame"] = c.first;
+    camera["frame_offset"] = c.frame_offset;
+    camera["late_ms"] = {milliseconds_or_null(c.late_first), milliseconds_or_null(c.late_last)};
+    camera["sigma_ms"] = {milliseconds_or_null(c.sigma_first), milliseconds_or_null(c.sigma_last)};
+    camera["drift_ppm"] = c.drift ? ordered_json(c.drift->value()) : ordered_json(nullptr);
+    cameras.push_back(std::move(camera));
+  }
+  ordered_json json;
+  json["source"] = options.folder.string();
+  json["aligned_by"] = options.alignment == Alignment::strobe ? "strobe" : "numbers";
+  json["reference"] = result.cameras.empty() ? "" : result.cameras[result.reference].id;
+  json["instants"] = result.instants;
+  json["instants_left_out"] = result.left_out;
+  json["cameras"] = std::move(cameras);
+  json["notes"] = result.notes;
+  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace emberlock::cli

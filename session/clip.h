@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+#include "base/result.h"
+#include "session/frame_file.h"
+#include "session/video_scan.h"
+
+namespace emberlock {
+
+/// One file of a camera's film.
+struct ClipPart {
+  std::filesystem::path path;
+  VideoScan scan;
+  std::int64_t first = 0;  ///< place of its first frame within the film
+};
+
+/// A camera's film in one file or several, one after the other: a video that the camera split, or pictures.
+/// The files are only read.
+class ClipReader {
+ public:
+  explicit ClipReader(std::vector<ClipPart> parts, Colours colours);
+
+  [[nodiscard]] std::int64_t frames() const;
+  /// next() goes on with the frame at this place.
+  Status seek(std::int64_t place);
+  /// The place of the frame that next() gives.
+  [[nodiscard]] std::int64_t place() const { return place_; }
+  /// Errors: out_of_data after the last frame; bad_input where a file is damaged, with its name and frame.
+  Result<Image> next();
+
+ private:
+  [[nodiscard]] std::size_t part_of(std::int64_t place) const;
+
+  std::vector<ClipPart> parts_;
+  Colours colours_;
+  std::int64_t place_ = 0;
+  std::size_t open_ = 0;  ///< which part `file_` is
+  std::unique_ptr<FrameFile> file_;
+};
+
+}  // namespace emberlock

@@ -1,0 +1,82 @@
+#include "smear_sync/verify/clip_times.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+namespace emberlock {
+
+std::int64_t ClipTimes::count_of(std::int64_t place) const {
+  std::int64_t count = place;
+  for (const DroppedFrames& drop : drops) {
+    if (place >= drop.before) count += drop.frames;
+  }
+  return count;
+}
+
+std::optional<std::int64_t> ClipTimes::place_of(std::int64_t count) const {
+  std::int64_t place = count;
+  for (const DroppedFrames& drop : drops) {
+    if (place < drop.before) break;
+    if (place < drop.before + drop.frames) return std::nullopt;
+    place -= drop.frames;
+  }
+  return place;
+}
+
+Seconds ClipTimes::read_start(std::int64_t place) const {
+  return start + period * (static_cast<double>(count_of(place)) - at);
+}
+
+Seconds ClipTimes::sigma(std::int64_t place) const {
+  const Seconds grown = period_sigma * (static_cast<double>(count_of(place)) - at);
+  return Seconds(std::hypot(start_sigma.value(), grown.value()));
+}
+
+std::int64_t ClipTimes::nearest_count(Seconds instant) const {
+  return std::llround(at + (instant - start) / period);
+}
+
+Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options, const std::string& clip) {
+  const auto unknown = [&](const std::string& what, const std::string& remedy) {
+    return Error{ErrorKind::bad_input, what, clip, remedy};
+  };
+  if (clock.state != PhaseState::known || !clock.line) {
+    return unknown("its strobe tells no phase: " + clock.reason,
+                   "Film the strobe for ten seconds, the lamp in the picture, detuned by about 1 %");
+  }
+  if (!clock.mode.direction && !options.direction) {
+    return unknown("which row is read first isn't known: " + clock.mode.direction_reason,
+                   "Detune the strobe by about 1 %, or give --direction");
+  }
+  const auto middle_count = static_cast<double>(clock.line->at.ns) * 1e-9 / clock.believed_period.value();
+  const NumberedRun* run = clock.run_at(std::llround(middle_count));
+  if (run == nullptr) {
+    return unknown("its frames can't be numbered: " + clock.numbers.reason,
+                   "Let the strobe skip flashes in its code while all cameras film it");
+  }
+  // The place in the run that is nearest to the line's middle.
+  std::int64_t place = std::llround(middle_count) - (clock.count_of(run->first) - run->first);
+  place = std::clamp(place, run->first, run->last);
+  const Phase phase = clock.phase_of_frame(place);
+  const double in_flashes = phase.tau / clock.flash_period;
+  const double coarse = run->start + static_cast<double>(place - run->first) * run->flashes_per_frame;
+  const double flash = std::round(coarse + in_flashes);
+  ClipTimes times;
+  times.period = clock.timing.frame_period;
+  times.period_sigma = clock.period_sigma;
+  times.at = middle_count;
+  times.start_sigma = clock.line->tau_sigma;
+  times.start = clock.flash_period * flash - phase.tau +
+                times.period * (middle_count - static_cast<double>(clock.count_of(place)));
+  times.drops = clock.numbers.drops;
+  return times;
+}
+
+void into_cycle_of(const ClipTimes& reference, const ClipOptions& options, ClipTimes& times) {
+  const Seconds cycle = period(options.flash_rate) * static_cast<double>(options.code.flashes());
+  const Seconds apart = times.read_start(0) - reference.read_start(0);
+  times.start -= cycle * std::round(apart / cycle);
+}
+
+}  // namespace emberlock

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/quantity.h"
+#include "base/result.h"
+#include "smear_sync/clocks/frame_code.h"
+#include "smear_sync/verify/clip_clock.h"
+
+namespace emberlock {
+
+/// When each frame of a clip began to be read: a straight line on a clock that all clips of one strobe share,
+/// good beyond the frames that showed it. The line's two errors are independent of one another.
+struct ClipTimes {
+  double at = 0;         ///< the camera's count (ClipClock::count_of) at which the line is known best
+  Seconds start;         ///< of count `at`
+  Seconds start_sigma;   ///< standard error
+  Seconds period;        ///< from one count to the next
+  Seconds period_sigma;  ///< standard error
+  std::vector<DroppedFrames> drops{};  ///< between places of the file, at which the count jumps
+
+  [[nodiscard]] std::int64_t count_of(std::int64_t place) const;
+  /// The place of the file that holds this count; nullopt where that frame was lost.
+  [[nodiscard]] std::optional<std::int64_t> place_of(std::int64_t count) const;
+  [[nodiscard]] Seconds read_start(std::int64_t place) const;
+  /// Standard error of read_start, which grows with the distance from the frames that showed the strobe.
+  [[nodiscard]] Seconds sigma(std::int64_t place) const;
+  /// The count whose read phase starts nearest to an instant.
+  [[nodiscard]] std::int64_t nearest_count(Seconds instant) const;
+};
+
+/// The times of a clip by its own clock, in the strobe's seconds since the code's first flash, modulo the
+/// code's cycle. The read direction must be known, or given by who read the clock. Errors (bad_input), with
+/// `clip` as where: a clock without a phase, or without numbers.
+Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options, const std::string& clip);
+
+/// Moves `times` by whole cycles of the code until its film begins as near to the reference's as may be.
+void into_cycle_of(const ClipTimes& reference, const ClipOptions& options, ClipTimes& times);
+
+}  // namespace emberlock

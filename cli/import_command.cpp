@@ -101,15 +101,15 @@ Result<ImportOptions> options_from(const ImportArguments& a) {
 }
 
 void print_table(const ImportArguments& arguments, const ImportResult& result) {
-  std::printf("%s: %lld instants of %zu cameras\n", arguments.out.c_str(), static_cast<long long>(result.instants),
-              result.cameras.size());
+  std::printf("%s: %lld instants of %zu cameras\n", arguments.out.c_str(),
+              static_cast<long long>(result.instants), result.cameras.size());
   for (const ImportedCamera& c : result.cameras) {
     std::printf("  %-20s", c.id.c_str());
     if (c.late_first) {
       std::printf(" frame %+6lld  %+9.4f ms +- %.4f at first, %+9.4f +- %.4f at last  %+7.2f ppm",
                   static_cast<long long>(c.frame_offset), in_milliseconds(*c.late_first),
-                  in_milliseconds(*c.sigma_first), in_milliseconds(*c.late_last), in_milliseconds(*c.sigma_last),
-                  c.drift->value());
+                  in_milliseconds(*c.sigma_first), in_milliseconds(*c.late_last),
+                  in_milliseconds(*c.sigma_last), c.drift->value());
     } else if (result.instants > 1) {
       std::printf(" frame %+6lld", static_cast<long long>(c.frame_offset));
     }
@@ -135,20 +135,25 @@ void import(const ImportArguments& arguments) {
 
 void add_strobe_options(CLI::App& verb, ImportArguments& a) {
   const auto positive = CLI::Range(1e-6, 1e6).description("");
-  verb.add_option("--flash-rate", a.flash_rate, "flashes a second of the strobe that all cameras filmed: about one a frame")
+  verb.add_option("--flash-rate", a.flash_rate,
+                  "flashes a second of the strobe that all cameras filmed: about one a frame")
       ->check(positive);
   auto* row_time =
-      verb.add_option("--row-time-us", a.row_time_us, "time to shift a row, where there is no comb")->check(positive);
-  auto* comb = verb.add_option("--comb", a.comb, "a clip of one of the cameras under a fast strobe: tells t_row")
-                   ->excludes(row_time);
+      verb.add_option("--row-time-us", a.row_time_us, "time to shift a row, where there is no comb")
+          ->check(positive);
+  auto* comb =
+      verb.add_option("--comb", a.comb, "a clip of one of the cameras under a fast strobe: tells t_row")
+          ->excludes(row_time);
   verb.add_option("--comb-rate", a.comb_rate, "of the strobe in that clip, flashes a second: about 300")
       ->check(positive)
       ->needs(comb);
-  verb.add_option("--frame-rate", a.frame_rate, "of the cameras, where the files claim a wrong one; of pictures")
+  verb.add_option("--frame-rate", a.frame_rate,
+                  "of the cameras, where the files claim a wrong one; of pictures")
       ->check(positive);
   verb.add_option("--direction", a.direction, "the row that is read first, where the dots' walk doesn't tell")
       ->check(CLI::IsMember({"top-first", "bottom-first"}));
-  verb.add_option("--shifts", a.shifts, "K, row shifts a read phase, where the walk doesn't tell; else the rows")
+  verb.add_option("--shifts", a.shifts,
+                  "K, row shifts a read phase, where the walk doesn't tell; else the rows")
       ->check(CLI::Range(1, 100000));
   verb.add_option("--code-words", a.code.words, "of the code in which the strobe skips flashes")
       ->check(CLI::Range(1, 31))
@@ -167,29 +172,37 @@ void add_import(CLI::App& app) {
   auto a = std::make_shared<ImportArguments>();
   CLI::App* verb = app.add_subcommand(
       "import",
-      "Makes a session of the cameras' video files, folders of numbered pictures, or a transforms.json. Frames "
+      "Makes a session of the cameras' video files, folders of numbered pictures, or a transforms.json. "
+      "Frames "
       "are put together by the strobe that all films show; each frame's true time is kept in times.json.");
   verb->add_option("folder", a->folder,
                    "a video file or a subfolder for each camera, whose id is the file's or subfolder's name")
       ->required();
   verb->add_option("--out", a->out, "the session's folder, which must not exist or be empty")->required();
-  verb->add_option("--camera", a->cameras, "ID=NAME: another id for the file or subfolder NAME; may be repeated");
+  verb->add_option("--camera", a->cameras,
+                   "ID=NAME: another id for the file or subfolder NAME; may be repeated");
   add_strobe_options(*verb, *a);
   auto* unsynchronised = verb->add_flag("--unsynchronised", a->unsynchronised,
                                         "without a strobe: the films' first frames belong together");
-  verb->add_option("--offset", a->offsets,
-                   "ID=N, without a strobe: frame i + N of this camera belongs to frame i of the others; may be "
-                   "repeated");
+  verb->add_option(
+      "--offset", a->offsets,
+      "ID=N, without a strobe: frame i + N of this camera belongs to frame i of the others; may be "
+      "repeated");
   verb->get_option("--flash-rate")->excludes(unsynchronised)->excludes(verb->get_option("--offset"));
-  verb->add_option("--strobe", a->strobe, "FROM-TO, seconds of each film: where the strobe is; else it is found");
-  verb->add_option("--flame", a->flame,
-                   "FROM-TO, seconds of the first camera's film: what is imported; else the longest part in which no "
-                   "film shows the strobe");
-  verb->add_flag("--joined", a->joined, "the files of a camera are one film, even if nothing in them says so");
-  verb->add_flag("--partial", a->partial,
-                 "import what is good: leave films out that can't be used, end where one is damaged; each is named");
+  verb->add_option("--strobe", a->strobe,
+                   "FROM-TO, seconds of each film: where the strobe is; else it is found");
+  verb->add_option(
+      "--flame", a->flame,
+      "FROM-TO, seconds of the first camera's film: what is imported; else the longest part in which no "
+      "film shows the strobe");
+  verb->add_flag("--joined", a->joined,
+                 "the files of a camera are one film, even if nothing in them says so");
+  verb->add_flag(
+      "--partial", a->partial,
+      "import what is good: leave films out that can't be used, end where one is damaged; each is named");
   verb->add_flag("--grey", a->grey, "brightness alone");
-  verb->add_option("--encoding", a->encoding, "quick: six times as fast and a sixth larger; ffv1: as recordings are")
+  verb->add_option("--encoding", a->encoding,
+                   "quick: six times as fast and a sixth larger; ffv1: as recordings are")
       ->check(CLI::IsMember({"quick", "ffv1"}))
       ->capture_default_str();
   verb->add_flag("--json", a->json, "the session's import.json on stdout");

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::int64_t kBeforeACut = 16;  // frames: H.264 may lack what they are decoded from
 constexpr double kSameRate = 1e-3;
-constexpr double kSecondsRounded = 1.5;  // times of creation are whole seconds
+constexpr double kSecondsRounded = 1.5;              // times of creation are whole seconds
 constexpr std::uintmax_t kFilledUp = 1'900'000'000;  // bytes: cards' files end at 2 or 4 GB
 
 Error film_error(const std::string& what, const fs::path& file, const std::string& remedy) {
@@ -24,8 +24,8 @@ Error film_error(const std::string& what, const fs::path& file, const std::strin
 bool follows(const ClipPart& before, const ClipPart& next) {
   std::error_code ec;
   if (before.scan.created_ns && next.scan.created_ns) {
-    const double lasted = static_cast<double>(before.scan.frames()) /
-                          before.scan.frame_rate.value_or(Hertz(24)).value();
+    const double lasted =
+        static_cast<double>(before.scan.frames()) / before.scan.frame_rate.value_or(Hertz(24)).value();
     const double apart = 1e-9 * static_cast<double>(*next.scan.created_ns - *before.scan.created_ns);
     // Some cameras give all files of a film the time at which it began.
     if (apart != 0) return std::abs(apart - lasted) <= kSecondsRounded;
@@ -33,7 +33,8 @@ bool follows(const ClipPart& before, const ClipPart& next) {
   return fs::file_size(before.path, ec) >= kFilledUp;
 }
 
-std::optional<Error> joined_wrongly(const ClipPart& before, const ClipPart& next, const FilmOptions& options) {
+std::optional<Error> joined_wrongly(const ClipPart& before, const ClipPart& next,
+                                    const FilmOptions& options) {
   if (before.scan.size != next.scan.size) {
     return film_error(fmt::format("is {} x {} pixels, {} of the same camera is {} x {}", next.scan.size.width,
                                   next.scan.size.height, before.path.filename().string(),
@@ -48,9 +49,9 @@ std::optional<Error> joined_wrongly(const ClipPart& before, const ClipPart& next
                       next.path, "Leave one of them out");
   }
   if (options.joins == Joins::as_told || follows(before, next)) return {};
-  return film_error(
-      fmt::format("may not go on where {} ends: nothing in the files says so", before.path.filename().string()),
-      next.path, "Where the camera split one film, add --joined; else leave one of them out");
+  return film_error(fmt::format("may not go on where {} ends: nothing in the files says so",
+                                before.path.filename().string()),
+                    next.path, "Where the camera split one film, add --joined; else leave one of them out");
 }
 
 /// Adds the file to the film; false where the film ends with it.
@@ -60,13 +61,14 @@ bool append(Film& film, ClipPart part, std::optional<Error>& problem) {
   const VideoScan& scan = part.scan;
   film.frames = before + scan.frames();
   bool goes_on = true;
-  if (scan.irregular) {
+  const std::int64_t before_cut = std::max<std::int64_t>(0, scan.frames() - kBeforeACut);
+  if (scan.irregular && !(scan.truncated() && *scan.irregular >= before_cut)) {
     problem = film_error("its frame rate varies: " + scan.irregularity, part.path,
                          "Set the camera to a constant frame rate. --partial uses what comes before");
     film.frames = before + *scan.irregular;
     goes_on = false;
   } else if (scan.truncated()) {
-    film.frames = before + std::max<std::int64_t>(0, scan.frames() - kBeforeACut);
+    film.frames = before + before_cut;
     film.notes.push_back(fmt::format("{} is truncated: {} of {} frames are there, {} are used",
                                      part.path.filename().string(), scan.frames(), scan.promised,
                                      film.frames - before));
@@ -105,8 +107,8 @@ ProbedFilm probe_film(const CameraFiles& files, const FilmOptions& options) {
     if (problem || !append(film, std::move(part), problem)) break;
   }
   if (film.parts.size() < files.files.size() && !film.parts.empty() && !problem)
-    film.notes.push_back(fmt::format("its files after {} are not used",
-                                     film.parts.back().path.filename().string()));
+    film.notes.push_back(
+        fmt::format("its files after {} are not used", film.parts.back().path.filename().string()));
   if (!film.parts.empty()) {
     const VideoScan& first = film.parts.front().scan;
     film.size = first.size;

@@ -24,8 +24,8 @@ constexpr std::int64_t kReadOn = 48;  // frames: beyond, seeking is faster
 
 /// Everything that a camera's frames depend on; what is written under one text needn't be written again.
 std::string fingerprint(const CameraPart& part) {
-  std::string text = fmt::format("emberlock import 1\ncolours {} encoding {}\n", static_cast<int>(part.colours),
-                                 static_cast<int>(part.writer.encoding));
+  std::string text = fmt::format("emberlock import 1\ncolours {} encoding {}\n",
+                                 static_cast<int>(part.colours), static_cast<int>(part.writer.encoding));
   for (const ClipPart& file : part.files) {
     struct stat info {};
     if (::stat(file.path.c_str(), &info) != 0) info = {};
@@ -115,8 +115,8 @@ bool ImportFolder::has(const CameraPart& part) const {
   if (!mark || *mark != fingerprint(part)) return false;
   std::error_code ec;
   const std::string& id = part.stream.camera_id();
-  return read_manifest(part_folder(part)).ok() &&
-         (fs::exists(index_path(part_folder(part), id), ec) || fs::exists(index_path(work_ / "session", id), ec));
+  return read_manifest(part_folder(part)).ok() && (fs::exists(index_path(part_folder(part), id), ec) ||
+                                                   fs::exists(index_path(work_ / "session", id), ec));
 }
 
 Status ImportFolder::write(const CameraPart& part, const Observer& observer,

@@ -39,9 +39,9 @@ class ImportFolder {
 
   /// Whether this camera is there already.
   [[nodiscard]] bool has(const CameraPart& part) const;
-  /// Decodes and writes the camera's frames, unless it is there. Distinct cameras may be written from distinct
-  /// threads. Errors: bad_input where an original is damaged, with its name and frame, whose place in the
-  /// film goes to `damaged_at`; io.
+  /// Decodes and writes the camera's frames, unless it is there. Distinct cameras may be written from
+  /// distinct threads. Errors: bad_input where an original is damaged, with its name and frame, whose place
+  /// in the film goes to `damaged_at`; io.
   Status write(const CameraPart& part, const Observer& observer,
                std::optional<std::int64_t>& damaged_at) const;
   /// Puts the session together and gives it its name. `manifest` has everything but what the writer fills in.

@@ -59,14 +59,15 @@ Error nothing_in_common(std::span<const TimedFilm> films, std::size_t reference)
     const Span other = covered(film);
     if (other.from > span.to || other.to < span.from) {
       return {ErrorKind::bad_input,
-              fmt::format("was filmed at another time than {}: from {:.1f} s to {:.1f} s after that began", clock.name,
-                          (other.from - span.from).value(), (other.to - span.from).value()),
+              fmt::format("was filmed at another time than {}: from {:.1f} s to {:.1f} s after that began",
+                          clock.name, (other.from - span.from).value(), (other.to - span.from).value()),
               film.name, "Leave this film out, or give the one that belongs to the others"};
     }
   }
-  return {ErrorKind::bad_input, "no frames are common to all films and free of the strobe", clock.name,
-          "Film the flame with all cameras after (or before) they filmed the strobe, without stopping them; or "
-          "give --flame FROM-TO"};
+  return {
+      ErrorKind::bad_input, "no frames are common to all films and free of the strobe", clock.name,
+      "Film the flame with all cameras after (or before) they filmed the strobe, without stopping them; or "
+      "give --flame FROM-TO"};
 }
 
 }  // namespace
@@ -87,10 +88,11 @@ Result<FramePlan> plan_frames(std::span<const TimedFilm> films, std::size_t refe
       const bool beyond = instant > covered(film).to + film.times.period / 2 ||
                           instant < covered(film).from - film.times.period / 2;
       if (!there && beyond && options.flame) {
-        return Error{ErrorKind::bad_input,
-                     fmt::format("doesn't reach over the flame part that was asked for: it lacks frame {} of {}",
-                                 place, clock.name),
-                     film.name, "Ask for a shorter part with --flame, or leave it out"};
+        return Error{
+            ErrorKind::bad_input,
+            fmt::format("doesn't reach over the flame part that was asked for: it lacks frame {} of {}",
+                        place, clock.name),
+            film.name, "Ask for a shorter part with --flame, or leave it out"};
       }
     }
     if (places.size() < films.size()) {

@@ -16,15 +16,15 @@ namespace emberlock::cli {
 /// A camera's film on the clock that all share.
 struct TimedFilm {
   std::string id;
-  std::string name;               ///< for messages
+  std::string name;  ///< for messages
   ClipTimes times;
-  std::int64_t frames = 0;         ///< usable: it ends before this place
+  std::int64_t frames = 0;        ///< usable: it ends before this place
   std::vector<PlaceRange> lit{};  ///< parts that show the strobe
 };
 
 /// Which frame of each film belongs to which instant.
 struct FramePlan {
-  std::size_t reference = 0;  ///< its read phases are the instants
+  std::size_t reference = 0;           ///< its read phases are the instants
   std::vector<std::int64_t> instants;  ///< the reference's counts; a gap is an instant that a film lacks
   struct Camera {
     std::vector<std::int64_t> places;  ///< by instant
@@ -42,9 +42,9 @@ struct PlanOptions {
 };
 
 /// Cuts the films to their common frames: an instant is a read phase of the reference, and has of each film
-/// the frame whose read phase begins nearest. Frames within two of a strobe's flash are no flame. Pure. Errors
-/// (bad_input): films that have no instant in common, or none without the strobe, or not all of the part that
-/// was asked for, with the film that is to blame.
+/// the frame whose read phase begins nearest. Frames within two of a strobe's flash are no flame. Pure.
+/// Errors (bad_input): films that have no instant in common, or none without the strobe, or not all of the
+/// part that was asked for, with the film that is to blame.
 Result<FramePlan> plan_frames(std::span<const TimedFilm> films, std::size_t reference,
                               const PlanOptions& options);
 

@@ -21,9 +21,9 @@ namespace emberlock::cli {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kProbed = 0.03;    // of the whole import, as progress goes
+constexpr double kProbed = 0.03;  // of the whole import, as progress goes
 constexpr double kAnalysed = 0.15;
-constexpr int kMostPlans = 65;      // each but the first is cut short by another damaged film
+constexpr int kMostPlans = 65;                   // each but the first is cut short by another damaged film
 constexpr SecondsPerRow kRowTimeAsGiven(20e-9);  // standard error of a row time given by hand
 
 /// A film on its way to the session.
@@ -74,9 +74,10 @@ class Import {
     alignment_ = options_.alignment.value_or(Alignment::offsets);
     if (alignment_ == Alignment::offsets) return {};
     if (!options_.row_time && options_.comb.empty()) {
-      return Error{ErrorKind::bad_input, "the time that the sensor takes to shift a row isn't known", "import",
-                   "film the strobe at about 300 flashes a second and add --comb CLIP --comb-rate HZ, or give "
-                   "--row-time-us"};
+      return Error{
+          ErrorKind::bad_input, "the time that the sensor takes to shift a row isn't known", "import",
+          "film the strobe at about 300 flashes a second and add --comb CLIP --comb-rate HZ, or give "
+          "--row-time-us"};
     }
     return {};
   }
@@ -101,8 +102,8 @@ class Import {
       notes_.push_back(fmt::format("{} files are no films by their names and were passed over, {} among them",
                                    scan.passed_over.size(), scan.passed_over.front()));
     std::vector<ProbedFilm> probed(scan.cameras.size());
-    EMBERLOCK_RETURN_IF_ERROR(in_parallel(
-        probed.size(), stage(0, kProbed), [&](std::size_t i, const Observer& observer) -> Status {
+    EMBERLOCK_RETURN_IF_ERROR(
+        in_parallel(probed.size(), stage(0, kProbed), [&](std::size_t i, const Observer& observer) -> Status {
           probed[i] = probe_film(scan.cameras[i], options_.films);
           return observe(observer, 1, scan.cameras[i].id);
         }));
@@ -143,8 +144,8 @@ class Import {
         c.times = std::move(times).value();
         for (const DroppedFrames& drop : c.times->drops)
           notes_.push_back(fmt::format("{} {} {} frames between {} and {}", c.film.files.id,
-                                       drop.frames > 0 ? "lost" : "doubled", std::abs(drop.frames), drop.after,
-                                       drop.before));
+                                       drop.frames > 0 ? "lost" : "doubled", std::abs(drop.frames),
+                                       drop.after, drop.before));
         good.push_back(std::move(c));
       } else {
         forgive(times.error(), errors, c.film.files.id + " is left out");
@@ -233,10 +234,11 @@ class Import {
   static Result<ClipTimes> times_of(const Candidate& c, const ClipOptions& options) {
     const std::string where = c.film.parts.front().path.string();
     if (c.strobe->lit.empty()) {
-      return Error{ErrorKind::bad_input, "shows no strobe", where,
-                   "Give the film in which this camera shows the strobe's lamp for five seconds or more, or name "
-                   "the part with --strobe. --partial leaves this camera out, --unsynchronised pairs frames "
-                   "without a strobe"};
+      return Error{
+          ErrorKind::bad_input, "shows no strobe", where,
+          "Give the film in which this camera shows the strobe's lamp for five seconds or more, or name "
+          "the part with --strobe. --partial leaves this camera out, --unsynchronised pairs frames "
+          "without a strobe"};
     }
     ClipReading reading{where, c.film.files.id, c.film.size.height, c.film.frame_rate, c.strobe->readings};
     EMBERLOCK_ASSIGN_OR_RETURN(const ClipClock clock, read_clip_clock(reading, options));
@@ -276,8 +278,7 @@ class Import {
       part.writer.min_free_bytes = options_.min_free_bytes;
       for (std::size_t i = 0; i < frames.places.size(); ++i) {
         const auto id = static_cast<std::uint64_t>(plan.instants[i] - plan.instants.front());
-        const TimePoint instant =
-            TimePoint{} + (clock.read_start(plan.cameras.front().places[i]) - origin);
+        const TimePoint instant = TimePoint{} + (clock.read_start(plan.cameras.front().places[i]) - origin);
         const Seconds into_film =
             period(reference.frame_rate) * static_cast<double>(plan.cameras.front().places[i]);
         const TimePoint wall = TimePoint{reference.created_ns.value_or(0)} + into_film;
@@ -317,10 +318,11 @@ class Import {
     result.instants = static_cast<std::int64_t>(plan.instants.size());
     result.left_out = plan.left_out;
     if (plan.left_out > 0)
-      notes_.push_back(fmt::format("{} instants are left out: not all films have a frame of theirs",
-                                   plan.left_out));
+      notes_.push_back(
+          fmt::format("{} instants are left out: not all films have a frame of theirs", plan.left_out));
     if (plan.repeated > 0)
-      notes_.push_back(fmt::format("{} frames stand for two instants: the cameras' rates differ", plan.repeated));
+      notes_.push_back(
+          fmt::format("{} frames stand for two instants: the cameras' rates differ", plan.repeated));
     v1::ShutterTimes times;
     for (std::size_t c = 0; c < films_.size(); ++c) {
       result.cameras.push_back(describe(plan, c));
@@ -346,7 +348,8 @@ class Import {
   static std::string created(const Film& film) {
     std::int64_t seconds = film.created_ns.value_or(0) / 1'000'000'000;
     struct stat info {};
-    if (!film.created_ns && ::stat(film.parts.front().path.c_str(), &info) == 0) seconds = info.st_mtim.tv_sec;
+    if (!film.created_ns && ::stat(film.parts.front().path.c_str(), &info) == 0)
+      seconds = info.st_mtim.tv_sec;
     return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(static_cast<std::time_t>(seconds)));
   }
 
@@ -366,8 +369,7 @@ class Import {
     camera.late_last = Seconds(frames.late_s.back());
     camera.sigma_first = Seconds(frames.sigma_s.front());
     camera.sigma_last = Seconds(frames.sigma_s.back());
-    camera.drift =
-        PartsPerMillion(1e6 * (films_[plan.reference].times->period / from.times->period - 1));
+    camera.drift = PartsPerMillion(1e6 * (films_[plan.reference].times->period / from.times->period - 1));
     return camera;
   }
 

@@ -39,14 +39,14 @@ struct ImportOptions {
   std::filesystem::path folder;  ///< of the films, or a transforms.json, or a folder that holds one
   std::filesystem::path out;     ///< the session; must not exist, or be empty
   std::map<std::string, std::string> ids{};  ///< by name within the folder: the camera's id
-  std::optional<Alignment> alignment{};  ///< absent: by the numbers of pictures; videos must be told how
-  ClipOptions clip{};  ///< its row time is that of the comb, else `row_time`
+  std::optional<Alignment> alignment{};      ///< absent: by the numbers of pictures; videos must be told how
+  ClipOptions clip{};                        ///< its row time is that of the comb, else `row_time`
   std::optional<SecondsPerRow> row_time{};
   std::filesystem::path comb{};  ///< a clip under comb_rate flashes a second
   Hertz comb_rate{};
   std::map<std::string, std::int64_t> offsets{};  ///< by id: frame i + offset belongs to frame i of others
-  std::optional<Part> strobe{};  ///< of each film, where the strobe is; else it is found
-  std::optional<Part> flame{};   ///< of the first camera's film; else the longest without the strobe
+  std::optional<Part> strobe{};                   ///< of each film, where the strobe is; else it is found
+  std::optional<Part> flame{};  ///< of the first camera's film; else the longest without the strobe
   FilmOptions films{};
   Colours colours = Colours::keep;
   Encoding encoding = Encoding::huffman_nut;
@@ -59,10 +59,10 @@ struct ImportedCamera {
   std::string id;
   std::vector<std::string> files;
   Hertz frame_rate{};
-  std::int64_t frames = 0;             ///< of the film
-  std::vector<PlaceRange> strobe{};    ///< parts that show it
-  std::int64_t first = 0;              ///< place of the first imported frame
-  std::int64_t frame_offset = 0;       ///< its place less the reference's, of the first instant
+  std::int64_t frames = 0;                           ///< of the film
+  std::vector<PlaceRange> strobe{};                  ///< parts that show it
+  std::int64_t first = 0;                            ///< place of the first imported frame
+  std::int64_t frame_offset = 0;                     ///< its place less the reference's, of the first instant
   std::optional<Seconds> late_first{}, late_last{};  ///< of the first and the last imported frame
   std::optional<Seconds> sigma_first{}, sigma_last{};  ///< standard errors
   std::optional<PartsPerMillion> drift{};              ///< its frame rate over the reference's, less one

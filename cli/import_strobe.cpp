@@ -13,10 +13,10 @@
 namespace emberlock::cli {
 namespace {
 
-constexpr double kSampleSeconds = 0.9;   // between two looks
-constexpr double kLongestBlind = 2.5;    // seconds
-constexpr double kShortestPart = 2;      // seconds
-constexpr double kSameLamp = 4;          // pixels
+constexpr double kSampleSeconds = 0.9;     // between two looks
+constexpr double kLongestBlind = 2.5;      // seconds
+constexpr double kShortestPart = 2;        // seconds
+constexpr double kSameLamp = 1.5;          // pixels: it stands still, flames don't
 constexpr std::int64_t kLongestDark = 12;  // frames: the code skips at most nine flashes in a row
 constexpr std::int64_t kSurelyOver = 24;
 constexpr int kFewestDots = 10;
@@ -34,12 +34,13 @@ bool at(const LampPlace& lamp, const SmearReading& reading) {
   return reading.lamp && std::hypot(reading.lamp->x - lamp.x, reading.lamp->y.value() - lamp.y) <= kSameLamp;
 }
 
-/// Where most lamps with a dot stand, of those lamps with the most frames about them.
+/// Where most lamps with a dot stand; a flame seldom has one, and nowhere twice.
 std::optional<LampPlace> most_frequent_lamp(const std::map<std::int64_t, SmearReading>& readings) {
   constexpr std::size_t kMostCandidates = 400;
   std::vector<LampPlace> lamps;
   for (const auto& [place, reading] : readings) {
-    if (shows_strobe(reading)) lamps.push_back({reading.lamp->x, reading.lamp->y.value()});
+    const bool dots = reading.state == SmearState::dot || reading.state == SmearState::comb;
+    if (reading.lamp && dots) lamps.push_back({reading.lamp->x, reading.lamp->y.value()});
   }
   const std::size_t stride = 1 + lamps.size() / kMostCandidates;
   std::optional<LampPlace> best;

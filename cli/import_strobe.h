@@ -23,16 +23,16 @@ struct PlaceRange {
 
 /// Where a film shows the strobe, and what it shows there.
 struct StrobeParts {
-  std::vector<PlaceRange> lit;        ///< from the first flash to the last, in order; none: no strobe
+  std::vector<PlaceRange> lit;         ///< from the first flash to the last, in order; none: no strobe
   std::vector<SmearReading> readings;  ///< by place; outside `lit` ambiguous, which tells nothing
-  int looked_at = 0;                  ///< frames that were decoded
+  int looked_at = 0;                   ///< frames that were decoded
 };
 
 /// A film, as far as looking for the strobe needs it.
 struct FilmToSearch {
   std::int64_t frames = 0;
   Hertz frame_rate{24};
-  std::vector<std::int64_t> keys{};      ///< places at which decoding may begin, in order
+  std::vector<std::int64_t> keys{};    ///< places at which decoding may begin, in order
   std::optional<PlaceRange> within{};  ///< nowhere else
 };
 

@@ -81,9 +81,10 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
     parts.push_back(std::move(part));
   }
   std::vector<std::optional<std::int64_t>> damaged(parts.size());
-  EMBERLOCK_RETURN_IF_ERROR(in_parallel(
-      parts.size(), part_of(observer, 0, kNearlyDone),
-      [&](std::size_t i, const Observer& told) -> Status { return target.write(parts[i], told, damaged[i]); }));
+  EMBERLOCK_RETURN_IF_ERROR(in_parallel(parts.size(), part_of(observer, 0, kNearlyDone),
+                                        [&](std::size_t i, const Observer& told) -> Status {
+                                          return target.write(parts[i], told, damaged[i]);
+                                        }));
   v1::Manifest manifest;
   manifest.set_session_id(fs::absolute(options.out).lexically_normal().filename().string());
   manifest.set_purpose("flame");
@@ -94,8 +95,8 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
     }
   }
   result.instants = 1;
-  EMBERLOCK_ASSIGN_OR_RETURN(result.manifest, target.finish(std::move(manifest), parts, nullptr,
-                                                            import_report(options, result)));
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      result.manifest, target.finish(std::move(manifest), parts, nullptr, import_report(options, result)));
   EMBERLOCK_RETURN_IF_ERROR(observe(observer, 1, "imported"));
   return result;
 }

@@ -34,8 +34,8 @@ Result<Image> ClipReader::next() {
   if (!file_ || part != open_) EMBERLOCK_RETURN_IF_ERROR(seek(place_));
   const auto within = static_cast<std::size_t>(place_ - parts_[part].first);
   const auto damaged = [&](const std::string& what) {
-    return Error{ErrorKind::bad_input, what,
-                 parts_[part].path.string() + ", frame " + std::to_string(within), "Copy or record it again"};
+    return Error{ErrorKind::bad_input, what, parts_[part].path.string() + ", frame " + std::to_string(within),
+                 "Copy or record it again"};
   };
   Result<Image> image = file_->next();
   if (!image) {
@@ -43,7 +43,8 @@ Result<Image> ClipReader::next() {
     return damaged("the video ends before its time stamps do");
   }
   const auto ticks = file_->ticks();
-  if (ticks && *ticks != parts_[part].scan.ticks[within]) return damaged("a frame before this one doesn't decode");
+  if (ticks && *ticks != parts_[part].scan.ticks[within])
+    return damaged("a frame before this one doesn't decode");
   ++place_;
   return image;
 }

@@ -16,7 +16,7 @@ namespace {
 enum class FileKind { video, picture, other };
 
 FileKind kind_of(const fs::path& path) {
-  constexpr std::array<std::string_view, 11> kPictures{".png", ".jpg",  ".jpeg", ".tif", ".tiff", ".pgm",
+  constexpr std::array<std::string_view, 11> kPictures{".png", ".jpg", ".jpeg", ".tif", ".tiff", ".pgm",
                                                        ".ppm", ".pnm", ".fits", ".fit", ".fts"};
   constexpr std::array<std::string_view, 17> kOthers{"",     ".txt", ".md",   ".csv",  ".json", ".xml",
                                                      ".thm", ".lrv", ".html", ".pdf",  ".log",  ".yaml",
@@ -75,8 +75,7 @@ class Scan {
   void take_file(const fs::path& file) {
     if (left_out(file)) return;
     if (kind_of(file) != FileKind::video) return pass_over(file);
-    found_.cameras.push_back(
-        {file.stem().string(), relative(file), CameraFiles::Kind::video, {file}, {}});
+    found_.cameras.push_back({file.stem().string(), relative(file), CameraFiles::Kind::video, {file}, {}});
   }
 
   Status take_subfolder(const fs::path& folder) {

@@ -27,7 +27,7 @@ struct FolderScan {
 };
 
 struct FolderScanOptions {
-  std::map<std::string, std::string> ids{};       ///< by name within the folder: the id that it is to have
+  std::map<std::string, std::string> ids{};      ///< by name within the folder: the id that it is to have
   std::vector<std::filesystem::path> without{};  ///< files that are no camera's film
 };
 

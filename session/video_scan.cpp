@@ -17,9 +17,9 @@ extern "C" {
 namespace emberlock {
 namespace {
 
-constexpr double kUneven = 0.1;       // of an interval
-constexpr double kFarOff = 0.25;      // of a period, gathered over many frames
-constexpr double kRounding = 1.01;    // ticks
+constexpr double kUneven = 0.1;          // of an interval
+constexpr double kFarOff = 0.25;         // of a period, gathered over many frames
+constexpr double kRounding = 1.01;       // ticks
 constexpr std::int64_t kUnpromised = 3;  // frames that durations may be rounded by
 
 struct Packet {
@@ -71,10 +71,10 @@ void judge_evenness(VideoScan& scan) {
   if (even > 0 && span > 0) scan.frame_rate = Hertz(static_cast<double>(even) / span);
   if (!scan.irregular) return;
   const auto i = static_cast<std::size_t>(*scan.irregular);
-  scan.irregularity = fmt::format(
-      "frame {} follows {:.1f} ms after the one before it, most follow after {:.1f} ms", i,
-      1e3 * static_cast<double>(scan.ticks[i] - scan.ticks[i - 1]) * scan.tick.value(),
-      1e3 * interval * scan.tick.value());
+  scan.irregularity =
+      fmt::format("frame {} follows {:.1f} ms after the one before it, most follow after {:.1f} ms", i,
+                  1e3 * static_cast<double>(scan.ticks[i] - scan.ticks[i - 1]) * scan.tick.value(),
+                  1e3 * interval * scan.tick.value());
 }
 
 }  // namespace
@@ -90,7 +90,8 @@ std::optional<std::int64_t> first_irregular(const std::vector<std::int64_t>& tic
       return static_cast<std::int64_t>(i);
   }
   // Slow changes: off the even pace of all of them.
-  const double pace = static_cast<double>(ticks.back() - ticks.front()) / static_cast<double>(ticks.size() - 1);
+  const double pace =
+      static_cast<double>(ticks.back() - ticks.front()) / static_cast<double>(ticks.size() - 1);
   for (std::size_t i = 1; i < ticks.size(); ++i) {
     const double off = static_cast<double>(ticks[i] - ticks[0]) - pace * static_cast<double>(i);
     if (std::abs(off) > kFarOff * pace + 2 * kRounding) return static_cast<std::int64_t>(i);

@@ -15,13 +15,13 @@ namespace emberlock {
 /// What a video file holds, told from its packets: nothing is decoded.
 struct VideoScan {
   ImageSize size;
-  std::vector<std::int64_t> ticks;         ///< each frame's time stamp, in the order of showing
-  std::vector<std::int64_t> keys;          ///< places of the frames that are decoded without others
-  Seconds tick{};                          ///< what a time stamp counts
-  std::optional<Hertz> frame_rate{};       ///< by the time stamps; absent of fewer than two frames
-  std::optional<std::int64_t> irregular{};  ///< first frame that doesn't follow at the rate of the others
-  std::string irregularity;                ///< what is wrong there, one sentence
-  std::int64_t promised = 0;               ///< frames, by the container; 0: it doesn't say
+  std::vector<std::int64_t> ticks;           ///< each frame's time stamp, in the order of showing
+  std::vector<std::int64_t> keys;            ///< places of the frames that are decoded without others
+  Seconds tick{};                            ///< what a time stamp counts
+  std::optional<Hertz> frame_rate{};         ///< by the time stamps; absent of fewer than two frames
+  std::optional<std::int64_t> irregular{};   ///< first frame that doesn't follow at the rate of the others
+  std::string irregularity;                  ///< what is wrong there, one sentence
+  std::int64_t promised = 0;                 ///< frames, by the container; 0: it doesn't say
   std::optional<std::int64_t> created_ns{};  ///< since 1970, by the camera's clock, where the file tells
 
   [[nodiscard]] std::int64_t frames() const { return static_cast<std::int64_t>(ticks.size()); }

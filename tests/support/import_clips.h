@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "base/in_parallel.h"
 #include "base/random.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
@@ -38,16 +39,19 @@ inline void add_flame(Image& image, Seconds at) {
   const double t = at.value();
   for (int y = height / 6; y < height * 9 / 10; ++y) {
     const double up = 1 - static_cast<double>(y) / height;  // 0 at the foot
-    const double centre = width * (0.5 + 0.06 * up * std::sin(9 * up - 11 * t) + 0.02 * std::sin(31 * up - 23 * t));
+    const double centre =
+        width * (0.5 + 0.06 * up * std::sin(9 * up - 11 * t) + 0.02 * std::sin(31 * up - 23 * t));
     const double half = width * (0.02 + 0.05 * (1 - up) * (0.8 + 0.2 * std::sin(17 * up - 19 * t)));
-    const double light = 200 * std::sin(3.1416 * std::min(1.0, 1.1 * (1 - up))) * (0.75 + 0.25 * std::sin(23 * up - 41 * t));
+    const double light =
+        200 * std::sin(3.1416 * std::min(1.0, 1.1 * (1 - up))) * (0.75 + 0.25 * std::sin(23 * up - 41 * t));
     auto* row = image.row_as<std::uint8_t>(y);
     const int from = std::max(0, static_cast<int>(centre - 2.5 * half));
     const int to = std::min(width, static_cast<int>(centre + 2.5 * half));
     for (int x = from; x < to; ++x) {
       const double off = (x - centre) / half;
       const double curl = 1 + 0.15 * std::sin(0.05 * x + 40 * up - 29 * t);
-      row[x] = static_cast<std::uint8_t>(std::min(255.0, row[x] + light * curl / (1 + std::pow(off * off, 3))));
+      row[x] =
+          static_cast<std::uint8_t>(std::min(255.0, row[x] + light * curl / (1 + std::pow(off * off, 3))));
     }
   }
 }
@@ -67,16 +71,18 @@ inline std::vector<FlameClip> film_flame(const FlameFilm& film, const std::files
     if (!rig->camera(camera).start().ok()) throw std::runtime_error("a camera doesn't start");
   }
   clock->sleep_until(TimePoint{} + film.strobe_off);
-  if (!rig->strobe().apply({.output = StrobeOutput::off}).ok()) throw std::runtime_error("the strobe refuses");
+  if (!rig->strobe().apply({.output = StrobeOutput::off}).ok())
+    throw std::runtime_error("the strobe refuses");
 
   std::filesystem::create_directories(folder);
   std::vector<FlameClip> clips(rig->size());
-  for (int c = 0; c < rig->size(); ++c) {
+  const auto film_one = [&](std::size_t c, const Observer&) {
     clips[c].file = (folder / fmt::format("camera-{}{}", c, film.strobe.suffix)).string();
     VideoWriter writer(clips[c].file, options.cameras[c].layout.size, film.strobe.format);
     while (static_cast<int>(clips[c].read_starts.size()) < film.strobe.frames) {
-      const Frame frame = rig->camera(c).next_frame(Seconds(10)).value();
-      const TimePoint read = rig->read_start(c, frame.stamp.frame_id);
+      const int camera = static_cast<int>(c);
+      const Frame frame = rig->camera(camera).next_frame(Seconds(10)).value();
+      const TimePoint read = rig->read_start(camera, frame.stamp.frame_id);
       Image image = *frame.image;
       // The flame is lit a second later.
       if (read > TimePoint{} + film.strobe_off + Seconds(1)) add_flame(image, read - TimePoint{});
@@ -84,7 +90,9 @@ inline std::vector<FlameClip> film_flame(const FlameFilm& film, const std::files
       writer.write(image);
     }
     writer.close();
-  }
+    return Status{};
+  };
+  if (!in_parallel(clips.size(), {}, film_one).ok()) throw std::runtime_error("a camera fails");
   return clips;
 }
 

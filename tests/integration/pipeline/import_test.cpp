@@ -28,7 +28,7 @@ using testing::HasSubstr;
 
 const FrameCode kImportCode{.words = 8, .spacing = 60};
 
-/// Three cameras, started within a second, that filmed the strobe for eight seconds and then a flame.
+/// Three cameras, started within a second, that filmed the strobe for ten seconds and then a flame.
 class ImportFilms : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -36,13 +36,13 @@ class ImportFilms : public testing::Test {
     VirtualRigDraw model;
     model.layout.size = {320, 240};
     model.row_time = microseconds_per_row(160);
-    test::FlameFilm film{test::random_film(41, 3, model, kImportCode), Seconds(9)};
+    test::FlameFilm film{test::random_film(43, 3, model, kImportCode), Seconds(11)};
     film.strobe.format = {};
     film.strobe.format.gop = 12;
     film.strobe.format.crf = 20;
     film.strobe.suffix = ".mp4";
     film.strobe.starts = {0.3, 0.9, 0.1};
-    film.strobe.frames = 300;
+    film.strobe.frames = 340;
     clips_ = new std::vector(test::film_flame(film, *shared_ / "films"));
     comb_ = test::film_strobe(test::comb_of(film.strobe, 0, 36), shared_->path())[0].file;
     flash_rate_ = film.strobe.strobe.rate;
@@ -102,13 +102,14 @@ TEST_F(ImportFilms, BecomeASessionOfTheFramesThatBelongTogetherEachWithItsTime) 
     const auto& entry = (*times)->cameras(static_cast<int>(c));
     EXPECT_EQ(entry.camera_id(), fs::path(truth.file).stem());
     const std::int64_t first = result->cameras[c].first;
-    EXPECT_GT(truth.read_starts[first], TimePoint{} + Seconds(9)) << "still the strobe";
-    EXPECT_LT(truth.read_starts[first], TimePoint{} + Seconds(9.2)) << "flame was thrown away";
+    EXPECT_GT(truth.read_starts[first], TimePoint{} + Seconds(11)) << "still the strobe";
+    EXPECT_LT(truth.read_starts[first], TimePoint{} + Seconds(11.2)) << "flame was thrown away";
     const auto film = FrameFile::open(truth.file).value();
     for (std::int64_t i = 0; i < first; ++i) ASSERT_TRUE(film->next().ok());
     for (std::int64_t i = 0; i < result->instants; ++i) {
       const Seconds late = truth.read_starts[first + i] - reference.read_starts[result->cameras[0].first + i];
-      ASSERT_NEAR(entry.late_s(static_cast<int>(i)), late.value(), 5 * entry.sigma_s() + 1e-6) << c << " " << i;
+      ASSERT_NEAR(entry.late_s(static_cast<int>(i)), late.value(), 5 * entry.sigma_s() + 1e-6)
+          << c << " " << i;
       ASSERT_LT(std::abs(late.value()), 0.021);
       const auto frame = session->read(c, static_cast<std::size_t>(i));
       ASSERT_TRUE(frame.ok()) << frame.error().message();
@@ -122,10 +123,15 @@ TEST_F(ImportFilms, BecomeASessionOfTheFramesThatBelongTogetherEachWithItsTime) 
 }
 
 TEST_F(ImportFilms, SayByTheVerbWhatBecameOfThem) {
-  const std::vector<std::string> words{
-      "import", (*shared_ / "films").string(), "--out", (folder_ / "session").string(), "--flash-rate",
-      fmt::format("{}", flash_rate_.value()), "--comb", comb_, "--comb-rate", "300", "--code-words", "8",
-      "--code-spacing", "60", "--camera", "left=camera-1.mp4", "--grey", "--json"};
+  const std::vector<std::string> words{"import",         (*shared_ / "films").string(),
+                                       "--out",          (folder_ / "session").string(),
+                                       "--flash-rate",   fmt::format("{}", flash_rate_.value()),
+                                       "--comb",         comb_,
+                                       "--comb-rate",    "300",
+                                       "--code-words",   "8",
+                                       "--code-spacing", "60",
+                                       "--camera",       "left=camera-1.mp4",
+                                       "--grey",         "--json"};
   const auto run = test::run_verb(add_import, words);
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const auto json = nlohmann::json::parse(run.out);
@@ -139,7 +145,8 @@ TEST_F(ImportFilms, SayByTheVerbWhatBecameOfThem) {
 TEST_F(ImportFilms, GoOnWhereTheyWereKilled) {
   ImportOptions with = options();
   int seen = 0;
-  const auto ended = run_import(with, [&](double fraction, std::string_view) { return fraction < 0.7 || ++seen < 3; });
+  const auto ended =
+      run_import(with, [&](double fraction, std::string_view) { return fraction < 0.7 || ++seen < 3; });
   ASSERT_FALSE(ended.ok());
   EXPECT_EQ(ended.error().kind, ErrorKind::refused);
   EXPECT_FALSE(fs::exists(with.out));
@@ -164,7 +171,8 @@ TEST_F(ImportFilms, WithoutTheStrobeAreRefusedOrLeftOutAndNamed) {
   const Image black({.size = {320, 240}});
   for (int i = 0; i < 100; ++i) writer.write(black);
   writer.close();
-  EXPECT_THAT(refusal(with), AllOf(HasSubstr("dark.mp4"), HasSubstr("shows no strobe"), HasSubstr("--partial")));
+  EXPECT_THAT(refusal(with),
+              AllOf(HasSubstr("dark.mp4"), HasSubstr("shows no strobe"), HasSubstr("--partial")));
   with.faults = Faults::partial;
   const auto result = run_import(with, {});
   ASSERT_TRUE(result.ok()) << result.error().message();
@@ -179,16 +187,17 @@ TEST_F(ImportFilms, OfVariableFrameRateAreRefusedOrUsedUpToThere) {
   fs::remove(varying);
   const auto original = FrameFile::open((*clips_)[2].file, Colours::brightness).value();
   test::VideoWriter writer(varying, {320, 240}, {});
-  for (int i = 0; i < 300; ++i) {
-    if (i == 270) writer.skip(1);
+  for (int i = 0; i < 340; ++i) {
+    if (i == 310) writer.skip(1);
     writer.write(original->next().value());
   }
   writer.close();
-  EXPECT_THAT(refusal(with), AllOf(HasSubstr("camera-2.mp4"), HasSubstr("frame rate varies"), HasSubstr("frame 270")));
+  EXPECT_THAT(refusal(with),
+              AllOf(HasSubstr("camera-2.mp4"), HasSubstr("frame rate varies"), HasSubstr("frame 310")));
   with.faults = Faults::partial;
   const auto result = run_import(with, {});
   ASSERT_TRUE(result.ok()) << result.error().message();
-  EXPECT_EQ(result->cameras[2].frames, 270);
+  EXPECT_EQ(result->cameras[2].frames, 310);
   EXPECT_THAT(result->notes, testing::Contains(HasSubstr("camera-2 is used in part")));
 }
 
@@ -201,17 +210,17 @@ TEST_F(ImportFilms, ThatAreTruncatedEndWhereTheyDecodeAndSaySo) {
   test::VideoFormat format;
   format.gop = 12;
   test::VideoWriter writer(with.folder / "camera-1.mkv", {320, 240}, format);
-  for (int i = 0; i < 300; ++i) writer.write(original->next().value());
+  for (int i = 0; i < 340; ++i) writer.write(original->next().value());
   writer.close();
   const fs::path cut = with.folder / "camera-1.mkv";
   fs::resize_file(cut, fs::file_size(cut) * 93 / 100);
   const auto result = run_import(with, {});
   ASSERT_TRUE(result.ok()) << result.error().message();
-  EXPECT_LT(result->cameras[1].frames, 290);
+  EXPECT_LT(result->cameras[1].frames, 330);
   EXPECT_THAT(result->notes, testing::Contains(AllOf(HasSubstr("camera-1"), HasSubstr("truncated"))));
   EXPECT_TRUE(verify_session(with.out)->whole());
   with.out = folder_ / "wanted";
-  with.flame = Part{Seconds(10), Seconds(12.4)};
+  with.flame = Part{Seconds(12), Seconds(13.9)};
   EXPECT_THAT(refusal(with), AllOf(HasSubstr("camera-1.mkv"), HasSubstr("doesn't reach")));
 }
 
@@ -221,7 +230,7 @@ TEST_F(ImportFilms, AreNotPairedByGuess) {
   EXPECT_THAT(refusal(with), AllOf(HasSubstr("--flash-rate"), HasSubstr("--unsynchronised")));
   with.alignment = Alignment::offsets;
   with.offsets["camera-2"] = 14;
-  with.flame = Part{Seconds(10), Seconds(11)};
+  with.flame = Part{Seconds(12), Seconds(13)};
   const auto result = run_import(with, {});
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->cameras[2].frame_offset, 14);
@@ -233,7 +242,8 @@ TEST_F(ImportFilms, OfOneCameraInPiecesOfDifferentSizeAreRefused) {
   ImportOptions with = options();
   with.folder = own_films();
   fs::create_directories(with.folder / "cam");
-  for (const auto& [name, size] : {std::pair{"MVI_9.mp4", ImageSize{320, 240}}, {"MVI_10.mp4", ImageSize{160, 120}}}) {
+  for (const auto& [name, size] :
+       {std::pair{"MVI_9.mp4", ImageSize{320, 240}}, {"MVI_10.mp4", ImageSize{160, 120}}}) {
     test::VideoWriter writer(with.folder / "cam" / name, size, {});
     for (int i = 0; i < 30; ++i) writer.write(Image({.size = size}));
     writer.close();

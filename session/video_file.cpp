@@ -89,9 +89,11 @@ void copy_samples(const AVFrame& frame, Image& image) {
   }
 }
 
-AVPixelFormat packed_format(PixelFormat format) {
+/// What libswscale makes of a frame: planes of 8-bit RGB, which take it a quarter of the time of interleaved
+/// samples.
+AVPixelFormat scaled_format(PixelFormat format) {
   const bool wide = bytes_per_sample(format) == 2;
-  if (channels(format) == 3) return wide ? AV_PIX_FMT_RGB48LE : AV_PIX_FMT_RGB24;
+  if (channels(format) == 3) return wide ? AV_PIX_FMT_RGB48LE : AV_PIX_FMT_GBRP;
   return wide ? AV_PIX_FMT_GRAY16LE : AV_PIX_FMT_GRAY8;
 }
 
@@ -226,7 +228,7 @@ class VideoFile final : public FrameFile {
     const int flags = SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_FULL_CHR_H_INP | SWS_BITEXACT;
     scaler_.reset(sws_getCachedContext(scaler_.release(), frame_->width, frame_->height,
                                        static_cast<AVPixelFormat>(frame_->format), frame_->width,
-                                       frame_->height, packed_format(image.layout().format), flags, nullptr,
+                                       frame_->height, scaled_format(image.layout().format), flags, nullptr,
                                        nullptr, nullptr));
     if (!scaler_) return damaged("its pixel format can't be converted");
     const int matrix = frame_->colorspace == AVCOL_SPC_BT709 ? SWS_CS_ITU709 : SWS_CS_DEFAULT;
@@ -235,19 +237,38 @@ class VideoFile final : public FrameFile {
     sws_setColorspaceDetails(scaler_.get(), sws_getCoefficients(matrix), full_in,
                              sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, 1 << 16, 1 << 16);
     // libswscale may write a little past a row's end: into a row of its own, padded, then copied.
-    const std::size_t row_bytes = image.layout().row_bytes();
+    const bool planar = image.layout().format == PixelFormat::rgb8;
+    const std::size_t row_bytes = image.layout().row_bytes() / (planar ? 3 : 1);
     const std::size_t stride = (row_bytes + 127) / 64 * 64;
-    scratch_.resize(stride * static_cast<std::size_t>(frame_->height));
-    const std::array<std::uint8_t*, 4> planes{scratch_.data(), nullptr, nullptr, nullptr};
-    const std::array<int, 4> strides{static_cast<int>(stride), 0, 0, 0};
+    const std::size_t plane = stride * static_cast<std::size_t>(frame_->height);
+    scratch_.resize(plane * (planar ? 3 : 1));
+    std::array<std::uint8_t*, 4> planes{scratch_.data(), nullptr, nullptr, nullptr};
+    std::array<int, 4> strides{static_cast<int>(stride), 0, 0, 0};
+    for (std::size_t p = 1; planar && p < 3; ++p) {
+      planes[p] = scratch_.data() + p * plane;
+      strides[p] = strides[0];
+    }
     const int rows = sws_scale(scaler_.get(), frame_->data, frame_->linesize, 0, frame_->height,
                                planes.data(), strides.data());
     if (rows != frame_->height) return damaged("its pixel format can't be converted");
     for (int y = 0; y < frame_->height; ++y) {
-      std::memcpy(image.row_as<std::byte>(y), scratch_.data() + static_cast<std::size_t>(y) * stride,
-                  row_bytes);
+      const std::uint8_t* row = scratch_.data() + static_cast<std::size_t>(y) * stride;
+      if (planar) {
+        interleave(row + 2 * plane, row, row + plane, image.row_as<std::uint8_t>(y));  // G, B and R they are
+      } else {
+        std::memcpy(image.row_as<std::byte>(y), row, row_bytes);
+      }
     }
     return image;
+  }
+
+  void interleave(const std::uint8_t* red, const std::uint8_t* green, const std::uint8_t* blue,
+                  std::uint8_t* out) const {
+    for (int x = 0; x < frame_->width; ++x, out += 3) {
+      out[0] = red[x];
+      out[1] = green[x];
+      out[2] = blue[x];
+    }
   }
 
   AvInput input_;

@@ -30,6 +30,7 @@ struct ImportArguments {
   std::vector<std::string> offsets;
   std::string strobe;
   std::string flame;
+  std::string rig;
   bool joined = false;
   bool partial = false;
   bool grey = false;
@@ -93,6 +94,7 @@ Result<ImportOptions> options_from(const ImportArguments& a) {
   if (a.row_time_us > 0) options.row_time = microseconds_per_row(a.row_time_us);
   EMBERLOCK_ASSIGN_OR_RETURN(options.strobe, part_from("--strobe", a.strobe));
   EMBERLOCK_ASSIGN_OR_RETURN(options.flame, part_from("--flame", a.flame));
+  options.rig = a.rig;
   options.films.joins = a.joined ? Joins::as_told : Joins::proven;
   options.faults = a.partial ? Faults::partial : Faults::refuse;
   options.colours = a.grey ? Colours::brightness : Colours::keep;
@@ -195,6 +197,7 @@ void add_import(CLI::App& app) {
       "--flame", a->flame,
       "FROM-TO, seconds of the first camera's film: what is imported; else the longest part in which no "
       "film shows the strobe");
+  verb->add_option("--rig", a->rig, "rig.json: the calibration that the cameras get, by their ids");
   verb->add_flag("--joined", a->joined,
                  "the files of a camera are one film, even if nothing in them says so");
   verb->add_flag(

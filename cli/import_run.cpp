@@ -14,6 +14,7 @@
 #include "cli/clip_reader.h"
 #include "cli/import_parts.h"
 #include "cli/import_transforms.h"
+#include "recon/calibrate/rig.h"
 #include "session/layout.h"
 #include "smear_sync/clocks/row_clock.h"
 
@@ -51,11 +52,13 @@ class Import {
     EMBERLOCK_RETURN_IF_ERROR(put_on_one_clock());
     for (int round = 0; round < kMostPlans; ++round) {
       EMBERLOCK_ASSIGN_OR_RETURN(const FramePlan plan, make_plan());
-      EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<CameraPart> parts, make_parts(plan));
+      EMBERLOCK_ASSIGN_OR_RETURN(std::vector<CameraPart> parts, make_parts(plan));
+      v1::Manifest manifest;
+      EMBERLOCK_RETURN_IF_ERROR(calibrate(manifest, parts));
       const Status written = write(target, parts);
       if (!written.ok() && round + 1 < kMostPlans && cut_at_damage(written.error())) continue;
       EMBERLOCK_RETURN_IF_ERROR(written);
-      return conclude(target, plan, parts);
+      return conclude(target, plan, std::move(manifest), parts);
     }
     return Error{ErrorKind::bad_input, "too many films are damaged", options_.folder.string(), ""};
   }
@@ -130,12 +133,13 @@ class Import {
     if (alignment_ == Alignment::offsets) return by_offsets();
     ClipOptions clip = options_.clip;
     EMBERLOCK_RETURN_IF_ERROR(learn_row_time(clip));
-    EMBERLOCK_RETURN_IF_ERROR(in_parallel(
+    const Status searched = in_parallel(
         films_.size(), stage(kProbed, kAnalysed), [&](std::size_t i, const Observer& observer) -> Status {
           EMBERLOCK_RETURN_IF_ERROR(observe(observer, 0, "strobe of " + films_[i].film.files.id));
           EMBERLOCK_ASSIGN_OR_RETURN(films_[i].strobe, look_for_strobe(films_[i].film));
           return observe(observer, 1, "strobe of " + films_[i].film.files.id);
-        }));
+        });
+    EMBERLOCK_RETURN_IF_ERROR(searched);
     std::vector<Error> errors;
     std::vector<Candidate> good;
     for (Candidate& c : films_) {
@@ -290,6 +294,16 @@ class Import {
     return parts;
   }
 
+  /// Gives the cameras, and the manifest its box, what the rig knows.
+  Status calibrate(v1::Manifest& manifest, std::vector<CameraPart>& parts) const {
+    if (options_.rig.empty()) return {};
+    EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, read_rig(options_.rig));
+    for (const CameraPart& part : parts) *manifest.add_cameras() = part.stream;
+    EMBERLOCK_RETURN_IF_ERROR(apply_rig(manifest, rig, options_.rig.string()));
+    for (std::size_t c = 0; c < parts.size(); ++c) parts[c].stream = manifest.cameras(static_cast<int>(c));
+    return {};
+  }
+
   Status write(const ImportFolder& target, const std::vector<CameraPart>& parts) {
     damaged_.assign(parts.size(), std::nullopt);
     return in_parallel(parts.size(), stage(kAnalysed, kNearlyDone),
@@ -311,7 +325,7 @@ class Import {
     return false;
   }
 
-  Result<ImportResult> conclude(const ImportFolder& target, const FramePlan& plan,
+  Result<ImportResult> conclude(const ImportFolder& target, const FramePlan& plan, v1::Manifest manifest,
                                 const std::vector<CameraPart>& parts) {
     ImportResult result;
     result.reference = plan.reference;
@@ -333,7 +347,6 @@ class Import {
       entry.set_sigma_s(*std::max_element(camera.sigma_s.begin(), camera.sigma_s.end()));
     }
     result.notes = notes_;
-    v1::Manifest manifest;
     manifest.set_session_id(fs::absolute(options_.out).lexically_normal().filename().string());
     manifest.set_purpose("flame");
     manifest.set_created_utc(created(films_.front().film));

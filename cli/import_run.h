@@ -51,6 +51,7 @@ struct ImportOptions {
   Colours colours = Colours::keep;
   Encoding encoding = Encoding::huffman_nut;
   Faults faults = Faults::refuse;
+  std::filesystem::path rig{};  ///< rig.json, whose calibration the cameras get; or none
   std::uint64_t min_free_bytes = std::uint64_t{1} << 30;  ///< as WriterOptions
 };
 

@@ -197,15 +197,4 @@ Result<StrobeParts> find_strobe(const FilmToSearch& film, const ReadPlace& read)
   return parts;
 }
 
-std::vector<PlaceRange> unlit_parts(std::span<const PlaceRange> lit, std::int64_t frames) {
-  std::vector<PlaceRange> parts;
-  std::int64_t from = 0;
-  for (const PlaceRange& part : lit) {
-    if (part.first > from) parts.push_back({from, part.first});
-    from = part.last;
-  }
-  if (frames > from) parts.push_back({from, frames});
-  return parts;
-}
-
 }  // namespace emberlock::cli

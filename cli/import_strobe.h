@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "base/quantity.h"
@@ -44,8 +43,5 @@ using ReadPlace = std::function<Result<Image>(std::int64_t place)>;
 /// where most dots have theirs. A part is two seconds long or more, and flashes in more than half of its
 /// frames. Errors: those of `read`; frames that `read` finds damaged end the search there.
 Result<StrobeParts> find_strobe(const FilmToSearch& film, const ReadPlace& read);
-
-/// The parts of a film of `frames` frames that lie between the lit ones, or about them.
-std::vector<PlaceRange> unlit_parts(std::span<const PlaceRange> lit, std::int64_t frames);
 
 }  // namespace emberlock::cli

@@ -10,7 +10,7 @@
 #include "base/file.h"
 #include "cli/colour_report.h"
 #include "cli/commands.h"
-#include "recon/calibrate/colour.h"
+#include "recon/preprocess/colour_calibration.h"
 #include "session/rig_file.h"
 
 namespace emberlock::cli {

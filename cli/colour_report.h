@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "recon/calibrate/colour.h"
+#include "recon/preprocess/colour_calibration.h"
 
 namespace emberlock::cli {
 

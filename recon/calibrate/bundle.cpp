@@ -174,7 +174,7 @@ Status adjust(Bundle& bundle, BundleLoss loss) {
   options.linear_solver_ordering = ordering;
   options.max_num_iterations = 60;
   options.function_tolerance = loss == BundleLoss::squares ? 1e-10 : 1e-6;
-  options.num_threads = 2;
+  options.num_threads = 1;  // several would add in the order in which they finish
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, problem.get(), &summary);
@@ -215,7 +215,7 @@ std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle) {
   if (free.empty()) return result;
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::SPARSE_QR;
-  options.num_threads = 2;
+  options.num_threads = 1;
   ceres::Covariance estimate(options);
   if (!estimate.Compute(free, problem.get())) return std::nullopt;
   const auto n = static_cast<Eigen::Index>(rows.size());

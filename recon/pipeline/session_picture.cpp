@@ -40,7 +40,7 @@ Result<Frames> dark_end(SessionReader& reader, std::size_t camera, std::size_t f
   EMBERLOCK_ASSIGN_OR_RETURN(const Frames look, read_frames(reader, camera, first, 1));
   if (look.empty()) return Frames{};
   const Samples start = samples_of(look.front().image->view());
-  if (light_change(flame, start) != LightChange::dimmer) return Frames{};
+  if (light_change(flame, start) != LightChange::gone_out) return Frames{};
   EMBERLOCK_ASSIGN_OR_RETURN(Frames frames, read_frames(reader, camera, first, kDarkFrames));
   for (std::size_t i = 1; i < frames.size(); ++i)
     if (light_change(start, samples_of(frames[i].image->view())) != LightChange::none) return Frames{};

@@ -7,7 +7,7 @@
 
 #include "base/image.h"
 #include "base/result.h"
-#include "emberlock/v1/session.pb.h"
+#include "session/rig_file.h"  // v1::Colour
 
 namespace emberlock {
 

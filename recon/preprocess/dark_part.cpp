@@ -11,23 +11,32 @@ namespace {
 constexpr int kEdge = 8;  // pixels
 constexpr double kLeast = 0.5;
 
-std::vector<double> block_differences(const Samples& from, const Samples& to) {
+std::vector<double> block_means(const Samples& of) {
   std::vector<double> blocks;
-  const int across = kEdge * from.channels();
-  for (int y = 0; y + kEdge <= from.size.height; y += kEdge) {
-    for (int x = 0; x + kEdge <= from.size.width; x += kEdge) {
+  const int across = kEdge * of.channels();
+  for (int y = 0; y + kEdge <= of.size.height; y += kEdge) {
+    for (int x = 0; x + kEdge <= of.size.width; x += kEdge) {
       double sum = 0;
       for (int v = 0; v < kEdge; ++v) {
-        const std::size_t row = from.index(x, y + v);
-        for (int i = 0; i < across; ++i) {
-          const std::size_t at = row + static_cast<std::size_t>(i);
-          sum += static_cast<double>(to.value[at]) - static_cast<double>(from.value[at]);
-        }
+        const std::size_t row = of.index(x, y + v);
+        for (int i = 0; i < across; ++i)
+          sum += static_cast<double>(of.value[row + static_cast<std::size_t>(i)]);
       }
       blocks.push_back(sum / (kEdge * across));
     }
   }
   return blocks;
+}
+
+/// What the blocks hold above their median: the light of what stands out.
+double light_of(std::vector<double> blocks) {
+  if (blocks.empty()) return 0;
+  const auto middle = blocks.begin() + static_cast<std::ptrdiff_t>(blocks.size() / 2);
+  std::nth_element(blocks.begin(), middle, blocks.end());
+  const double level = *middle;
+  double light = 0;
+  for (const double block : blocks) light += std::max(0.0, block - level);
+  return light;
 }
 
 /// Of a block's mean, from how neighbouring samples' differences scatter.
@@ -51,14 +60,17 @@ double block_sigma(const Samples& from, const Samples& to) {
 
 LightChange light_change(const Samples& from, const Samples& to) {
   if (from.size != to.size || from.layout != to.layout) return LightChange::other;
-  const std::vector<double> blocks = block_differences(from, to);
+  const std::vector<double> before = block_means(from);
+  const std::vector<double> after = block_means(to);
   const double limit = std::max(kLeast, 6 * block_sigma(from, to));
-  bool dimmer = false;
-  for (const double d : blocks) {
+  double gone = 0;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const double d = after[i] - before[i];
     if (d > limit) return LightChange::other;
-    dimmer = dimmer || d < -limit;
+    if (d < -limit) gone -= d;
   }
-  return dimmer ? LightChange::dimmer : LightChange::none;
+  if (gone == 0) return LightChange::none;
+  return gone > 0.5 * light_of(before) ? LightChange::gone_out : LightChange::other;
 }
 
 Samples midmean_of(const std::vector<Samples>& frames) {

@@ -13,8 +13,9 @@ inline constexpr std::size_t kDarkFrames = 8;
 /// How a frame differs from another of the same camera, by means of blocks of 8 x 8 pixels against their
 /// noise.
 enum class LightChange {
-  none,    ///< everywhere within six sigma and half a grey level
-  dimmer,  ///< only darker: a flame has gone out
+  none,      ///< everywhere within six sigma and half a grey level
+  gone_out,  ///< only darker, by most of the light that stood out: a flame, not a lamp beside one that burns
+             ///< on
   other,
 };
 LightChange light_change(const Samples& from, const Samples& to);

@@ -1,11 +1,10 @@
 // What calibrating colours and preparing pictures reach, on simulated cameras whose truth is known.
 //   build/release/bin/bench_colour [seeds]
-#include "recon/calibrate/colour.h"
-
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 
+#include "recon/preprocess/colour_calibration.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/colour_rig.h"
 #include "tests/support/flame_frames.h"

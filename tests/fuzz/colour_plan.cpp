@@ -2,7 +2,7 @@
 #include <cstdint>
 #include <cstdlib>
 
-#include "recon/calibrate/colour_readings.h"
+#include "recon/preprocess/colour_readings.h"
 
 /// Whatever a colour.json holds: an error that says where and what to do, or rectangles with extent.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/random.h"
-#include "recon/calibrate/colour.h"
+#include "recon/preprocess/colour_calibration.h"
 #include "recon/preprocess/develop.h"
 
 namespace emberlock::test {

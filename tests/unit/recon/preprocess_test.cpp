@@ -197,7 +197,7 @@ TEST(DarkPart, AFlameThatGoesOutOnlyDims) {
   const Samples dark = samples_of(test::film(RadianceImage({320, 240}), film, 2).view());
   const Samples later = samples_of(test::film(RadianceImage({320, 240}), film, 3).view());
   const Samples other = samples_of(test::film(test::flame_picture(12, {320, 240}), film, 4).view());
-  EXPECT_EQ(light_change(lit, dark), LightChange::dimmer);
+  EXPECT_EQ(light_change(lit, dark), LightChange::gone_out);
   EXPECT_EQ(light_change(dark, later), LightChange::none);
   EXPECT_EQ(light_change(dark, lit), LightChange::other);
   EXPECT_EQ(light_change(lit, other), LightChange::other) << "flames flicker both ways";

@@ -1,4 +1,4 @@
-#include "recon/calibrate/colour.h"
+#include "recon/preprocess/colour_calibration.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "recon/calibrate/colour_fit.h"
+#include "recon/preprocess/colour_fit.h"
 
 namespace emberlock {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "recon/calibrate/colour_model.h"
+#include "recon/preprocess/colour_model.h"
 
 namespace emberlock {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "base/result.h"
-#include "recon/calibrate/colour_readings.h"
 #include "recon/preprocess/colour.h"
+#include "recon/preprocess/colour_readings.h"
 
 namespace emberlock {
 

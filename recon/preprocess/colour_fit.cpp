@@ -1,4 +1,4 @@
-#include "recon/calibrate/colour_fit.h"
+#include "recon/preprocess/colour_fit.h"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "recon/calibrate/colour_readings.h"
+#include "recon/preprocess/colour_readings.h"
 
 #include <algorithm>
 #include <cmath>

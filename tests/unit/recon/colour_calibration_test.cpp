@@ -1,6 +1,7 @@
+#include "recon/preprocess/colour_calibration.h"
+
 #include <gmock/gmock.h>
 
-#include "recon/calibrate/colour.h"
 #include "tests/support/colour_rig.h"
 
 namespace emberlock {

@@ -18,7 +18,7 @@ namespace emberlock::cli {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kMarker = "index.html";
+constexpr const char* kPlanMarker = "index.html";
 constexpr int kMostLines = 16;  // of the grid, along its longest side
 const cv::Scalar kEdgeColour(255, 176, 0);
 const cv::Scalar kLineColour(0, 114, 178);
@@ -124,7 +124,7 @@ Image box_picture(const View& view, const Grid& grid) {
 }
 
 Status write_plan(const Scene& scene, const Grid& grid, const fs::path& folder) {
-  EMBERLOCK_ASSIGN_OR_RETURN(AtomicDirectory staging, AtomicDirectory::create(folder, kMarker));
+  EMBERLOCK_ASSIGN_OR_RETURN(AtomicDirectory staging, AtomicDirectory::create(folder, kPlanMarker));
   std::error_code ec;
   fs::create_directory(staging.path() / "box", ec);
   const Box& box = scene.box;
@@ -153,7 +153,7 @@ Status write_plan(const Scene& scene, const Grid& grid, const fs::path& folder) 
          fmt::format("{}: {:.2f} pixels a voxel", html_escape(view.name), pixels_a_voxel(view, grid))});
   }
   page.gallery(pictures);
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / kMarker, page.str()));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / kPlanMarker, page.str()));
   return staging.commit();
 }
 

@@ -183,8 +183,9 @@ class Import {
       c.times = std::move(times);
     }
     for (const auto& [id, offset] : options_.offsets) {
-      const bool there = std::any_of(films_.begin(), films_.end(),
-                                     [&](const Candidate& c) { return c.film.files.id == id; });
+      const bool there = std::any_of(films_.begin(), films_.end(), [&, &wanted = id](const Candidate& c) {
+        return c.film.files.id == wanted;
+      });
       if (!there)
         return Error{ErrorKind::bad_input, "no camera has this id", "--offset " + id,
                      "Name a camera of the folder"};

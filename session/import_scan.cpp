@@ -31,8 +31,6 @@ FileKind kind_of(const fs::path& path) {
   return among(kOthers) ? FileKind::other : FileKind::video;
 }
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 std::size_t digits_from(std::string_view text, std::size_t at) {
   std::size_t end = at;
   while (end < text.size() && is_digit(text[end])) ++end;

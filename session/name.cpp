@@ -10,7 +10,6 @@ namespace {
 constexpr std::size_t kMaxNameBytes =
     200;  // file systems have 255; files made beside a folder add to its name
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
 bool allowed(char c) {

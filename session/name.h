@@ -6,6 +6,9 @@
 
 namespace emberlock {
 
+/// Whatever the locale.
+constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
 /// Whether `name` may name a camera's folder: letters, digits, space and . _ : - alone, no point in
 /// front, 1..200 bytes; so it can't lead out of the folder that it stands in.
 bool is_folder_name(std::string_view name);

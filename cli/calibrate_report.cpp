@@ -77,8 +77,9 @@ std::string coverage_svg(const RigCalibration& calibration, std::size_t camera,
   const std::size_t most =
       std::max<std::size_t>(1, *std::max_element(coverage.corners.begin(), coverage.corners.end()));
   for (std::size_t i = 0; i < coverage.corners.size(); ++i) {
+    const std::size_t rows_above = i / CornerCoverage::kColumns;
+    const auto row = static_cast<double>(rows_above);
     const auto column = static_cast<double>(i % CornerCoverage::kColumns);
-    const auto row = static_cast<double>(i / CornerCoverage::kColumns);
     const double share = static_cast<double>(coverage.corners[i]) / static_cast<double>(most);
     svg +=
         coverage.corners[i] == 0

@@ -57,7 +57,7 @@ class Import {
       EMBERLOCK_RETURN_IF_ERROR(calibrate(manifest, parts));
       const Status written = write(target, parts);
       if (!written.ok() && round + 1 < kMostPlans && cut_at_damage(written.error())) continue;
-      EMBERLOCK_RETURN_IF_ERROR(written);
+      if (!written.ok()) return written.error();
       return conclude(target, plan, std::move(manifest), parts);
     }
     return Error{ErrorKind::bad_input, "too many films are damaged", options_.folder.string(), ""};
@@ -139,7 +139,7 @@ class Import {
           EMBERLOCK_ASSIGN_OR_RETURN(films_[i].strobe, look_for_strobe(films_[i].film));
           return observe(observer, 1, "strobe of " + films_[i].film.files.id);
         });
-    EMBERLOCK_RETURN_IF_ERROR(searched);
+    if (!searched.ok()) return searched.error();
     std::vector<Error> errors;
     std::vector<Candidate> good;
     for (Candidate& c : films_) {

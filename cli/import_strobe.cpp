@@ -136,6 +136,7 @@ std::map<std::int64_t, SmearReading> read_on(Looker& looker, const LampPlace& la
 /// What single frames left open is settled by the film.
 void settle_film(std::map<std::int64_t, SmearReading>& film) {
   std::vector<SmearReading> readings;
+  readings.reserve(film.size());
   for (const auto& [place, reading] : film) readings.push_back(reading);
   readings = share_lamp(settle(readings));
   std::size_t i = 0;

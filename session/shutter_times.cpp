@@ -6,6 +6,7 @@
 #include <string>
 #include <system_error>
 
+#include <fmt/format.h>
 #include <google/protobuf/util/json_util.h>
 
 #include "base/file.h"
@@ -80,12 +81,12 @@ Result<std::optional<v1::ShutterTimes>> read_shutter_times(const SessionReader& 
     const std::string& id = session.manifest().cameras(static_cast<int>(c)).camera_id();
     const auto found = by_id.find(id);
     if (found == by_id.end())
-      return wrong_times(where + ", camera " + id, "the camera of the manifest has no times");
+      return wrong_times(fmt::format("{}, camera {}", where, id), "the camera of the manifest has no times");
     const std::size_t frames = session.stamps(c).size();
     if (static_cast<std::size_t>(found->second->late_s_size()) != frames) {
-      return wrong_times(where + ", camera " + id + ", field late_s",
-                         std::to_string(found->second->late_s_size()) + " times, but the index has " +
-                             std::to_string(frames) + " frames");
+      return wrong_times(
+          fmt::format("{}, camera {}, field late_s", where, id),
+          fmt::format("{} times, but the index has {} frames", found->second->late_s_size(), frames));
     }
     *ordered->add_cameras() = *found->second;
     by_id.erase(found);

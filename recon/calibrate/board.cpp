@@ -111,7 +111,8 @@ cv::Mat grey_of(const ImageView& picture) {
 /// Rows from the left as seen, and of the two ends that are left, the one whose inner square is black.
 void order_corners(std::vector<cv::Point2f>& corners, const Board& board, const cv::Mat& grey) {
   const auto at = [&](int column, int row) -> cv::Point2f& {
-    return corners[static_cast<std::size_t>(row * board.columns + column)];
+    return corners[static_cast<std::size_t>(row) * static_cast<std::size_t>(board.columns) +
+                   static_cast<std::size_t>(column)];
   };
   const cv::Point2f along = at(board.columns - 1, 0) - at(0, 0);
   const cv::Point2f down = at(0, board.rows - 1) - at(0, 0);

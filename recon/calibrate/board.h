@@ -30,7 +30,8 @@ struct Board {
 
   [[nodiscard]] int corners() const { return columns * rows; }
   [[nodiscard]] Eigen::Vector3d point(int corner) const {
-    return {square.value() * (corner % columns), -square.value() * (corner / columns), 0};
+    const int row = corner / columns;
+    return {square.value() * (corner % columns), -square.value() * row, 0};
   }
   /// Whether it looks the same upside down: then cameras on different sides may take its corners for each
   /// other's opposites. A chessboard does, if both of its numbers of corners are even or both odd.

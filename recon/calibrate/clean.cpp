@@ -84,6 +84,7 @@ std::optional<Suspect> suspect(const Bundle& bundle, std::size_t v, const std::v
   if (others.size() < 3) return std::nullopt;  // nothing to compare with
   const double middle = median(others);
   std::vector<double> deviations;
+  deviations.reserve(others.size());
   for (const double rms : others) deviations.push_back(std::abs(rms - middle));
   const double spread = kMadToSigma * median(std::move(deviations));
   const double own = view_rms(bundle, view);
@@ -110,6 +111,7 @@ std::vector<Suspect> worst_views(const Bundle& bundle, const std::vector<bool>& 
     if (!first && it->second.badness < found->badness) it->second = *found;
   }
   std::vector<Suspect> result;
+  result.reserve(worst.size());
   for (auto& [board, view] : worst) result.push_back(std::move(view));
   return result;
 }

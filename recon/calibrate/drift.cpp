@@ -21,7 +21,7 @@ using Vector6 = Eigen::Matrix<double, kPoseUnknowns, 1>;
 using Matrix6 = Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns>;
 
 constexpr double kNormalOfFalseAlarm = 3.09;  // 0.1 % on one side
-constexpr double kLensNoise = 3;              // times the calibration's noise, and
+constexpr double kLensNoise = 2;              // times the calibration's noise, and
 constexpr double kLeastLensNoise = 0.3;       // pixels: blurred pictures are noisier too
 
 /// What chi-square of 6 degrees of freedom exceeds by chance in 0.1 % of checks of so many cameras (Wilson
@@ -67,7 +67,18 @@ Result<Known> known_camera(const v1::Rig& rig, const BoardSightings::Camera& cam
 struct OwnViews {
   Bundle bundle;
   std::vector<std::size_t> sightings;
+  double noise = 0;  ///< pixels, by the median of all corners: those of a lens that fits no more are rejected
 };
+
+double noise_of_all(const Bundle& bundle) {
+  std::vector<double> distances;
+  for (const BundleView& view : bundle.views)
+    for (std::size_t i = 0; i < view.corners.size(); ++i)
+      distances.push_back(residual(bundle, view, i).norm());
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle / std::sqrt(2 * std::log(2));  // Rayleigh's distribution
+}
 
 Result<OwnViews> own_views(const BoardSightings& sightings, std::size_t camera, const Known& known) {
   OwnViews own;
@@ -85,6 +96,7 @@ Result<OwnViews> own_views(const BoardSightings& sightings, std::size_t camera, 
   }
   if (own.sightings.empty()) return own;
   EMBERLOCK_ASSIGN_OR_RETURN(const auto rejected, clean(own.bundle));
+  own.noise = noise_of_all(own.bundle);
   for (const RejectedView& view : rejected) own.bundle.views[view.view].corners.clear();
   return own;
 }
@@ -232,7 +244,7 @@ Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sighti
     EMBERLOCK_ASSIGN_OR_RETURN(Known camera, known_camera(rig, sightings.cameras[c], where));
     EMBERLOCK_ASSIGN_OR_RETURN(OwnViews views, own_views(sightings, c, camera));
     CameraDrift drift{.id = sightings.cameras[c].id};
-    const double noise = views.bundle.cameras[0].noise;
+    const double noise = views.noise;
     const bool lens_fits = camera.noise == 0 || views.sightings.empty() ||
                            noise < std::max(kLensNoise * camera.noise, kLeastLensNoise);
     if (!lens_fits) {

@@ -176,6 +176,7 @@ std::optional<Rigid3> board_pose(const Intrinsics& lens, const Board& board,
   const cv::Mat matrix = (cv::Mat_<double>(3, 3) << lens.fx, 0, 0, 0, lens.fx, 0, 0, 0, 1);
   // A homography that wrong corners don't move tells which corners are right.
   std::vector<cv::Point2d> flat;
+  flat.reserve(object.size());
   for (const cv::Point3d& p : object) flat.emplace_back(p.x, p.y);
   cv::Mat right;
   const double reach = 3.0 + 0.002 * std::max(lens.size.width, lens.size.height);  // pixels

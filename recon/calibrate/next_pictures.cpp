@@ -21,7 +21,7 @@ std::vector<std::string> empty_regions(const CornerCoverage& coverage) {
   std::vector<std::string> names;
   for (int row = 0; row < CornerCoverage::kRows; ++row) {
     for (int column = 0; column < CornerCoverage::kColumns; ++column) {
-      if (coverage.corners[static_cast<std::size_t>(row * CornerCoverage::kColumns + column)] > 0) continue;
+      if (coverage.corners[CornerCoverage::cell(column, row)] > 0) continue;
       const auto v = static_cast<std::size_t>(3 * (2 * row + 1) / (2 * CornerCoverage::kRows));
       const auto h = static_cast<std::size_t>(3 * (2 * column + 1) / (2 * CornerCoverage::kColumns));
       const std::string name = v == 1 && h == 1 ? "middle" : std::string(kVertical[v]) + " " + kHorizontal[h];
@@ -76,7 +76,7 @@ std::vector<CornerCoverage> corner_coverage(const RigCalibration& calibration) {
                                     CornerCoverage::kColumns - 1);
       const int row = std::clamp(static_cast<int>(p.y() / size.height * CornerCoverage::kRows), 0,
                                  CornerCoverage::kRows - 1);
-      ++coverage[view.camera].corners[static_cast<std::size_t>(row * CornerCoverage::kColumns + column)];
+      ++coverage[view.camera].corners[CornerCoverage::cell(column, row)];
     }
   }
   return coverage;

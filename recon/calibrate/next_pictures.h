@@ -13,6 +13,9 @@ struct CornerCoverage {
   static constexpr int kColumns = 6;
   static constexpr int kRows = 4;
   std::array<std::size_t, std::size_t{kColumns} * kRows> corners{};
+  static constexpr std::size_t cell(int column, int row) {
+    return static_cast<std::size_t>(row) * kColumns + static_cast<std::size_t>(column);
+  }
   [[nodiscard]] std::size_t empty_cells() const;
 };
 /// Of each camera of the bundle.

@@ -244,9 +244,10 @@ void tell_gains(const ColourFit& fit, const std::vector<std::size_t>& groups, st
 }
 
 std::vector<double> response_table(const std::array<double, ResponseCurve::kParameters>& p) {
-  std::vector<double> table;
+  std::vector<double> table(kResponsePoints);
   for (int i = 0; i < kResponsePoints; ++i)
-    table.push_back(ResponseCurve::exposure(p, static_cast<double>(i) / (kResponsePoints - 1)));
+    table[static_cast<std::size_t>(i)] =
+        ResponseCurve::exposure(p, static_cast<double>(i) / (kResponsePoints - 1));
   table.back() = 1;
   return table;
 }

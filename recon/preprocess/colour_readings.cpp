@@ -46,9 +46,11 @@ Result<std::map<std::string, ColourPlan::Places>> parse_places(const PlanJson& j
   std::map<std::string, ColourPlan::Places> out;
   if (!json.is_object()) return bad_plan(where, "is no object", "Give rectangles by patch, by camera");
   for (const auto& [owner, places] : json.items()) {
-    if (!places.is_object()) return bad_plan(where + "." + owner, "is no object", "Give rectangles by patch");
+    const std::string of_owner = fmt::format("{}.{}", where, owner);
+    if (!places.is_object()) return bad_plan(of_owner, "is no object", "Give rectangles by patch");
     for (const auto& [patch, place] : places.items()) {
-      EMBERLOCK_ASSIGN_OR_RETURN(out[owner][patch], parse_place(place, where + "." + owner + "." + patch));
+      EMBERLOCK_ASSIGN_OR_RETURN(out[owner][patch],
+                                 parse_place(place, fmt::format("{}.{}", of_owner, patch)));
     }
   }
   return out;
@@ -301,7 +303,7 @@ Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& w
     return bad_plan(where, "is no JSON object", "See `emberlock calibrate colour --help`");
   ColourPlan plan;
   for (const auto& [key, value] : json.items()) {
-    const std::string field = where + ": " + key;
+    const std::string field = fmt::format("{}: {}", where, key);
     if (key == "patches") {
       EMBERLOCK_ASSIGN_OR_RETURN(plan.patches, parse_places(value, field));
     } else if (key == "pictures") {
@@ -309,7 +311,8 @@ Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& w
     } else if (key == "radiance") {
       if (!value.is_object()) return bad_plan(field, "is no object", "Give radiances by patch");
       for (const auto& [patch, radiance] : value.items()) {
-        EMBERLOCK_ASSIGN_OR_RETURN(plan.radiance[patch], parse_radiance(radiance, field + "." + patch));
+        EMBERLOCK_ASSIGN_OR_RETURN(plan.radiance[patch],
+                                   parse_radiance(radiance, fmt::format("{}.{}", field, patch)));
       }
     } else {
       return bad_plan(field, "is no key of colour.json", "Keys are patches, pictures and radiance");

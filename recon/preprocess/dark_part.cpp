@@ -43,7 +43,7 @@ double light_of(std::vector<double> blocks) {
 double block_sigma(const Samples& from, const Samples& to) {
   std::vector<double> scatter;
   constexpr std::size_t kStep = 5;
-  const auto beside = static_cast<std::size_t>(from.pitch() * from.channels());
+  const auto beside = static_cast<std::size_t>(from.pitch()) * static_cast<std::size_t>(from.channels());
   for (std::size_t i = 0; i + beside < from.value.size(); i += kStep) {
     const double here = static_cast<double>(to.value[i]) - static_cast<double>(from.value[i]);
     const double next =

@@ -183,8 +183,9 @@ void film_average(const Flame& flame, const PaperSceneOptions& options, Scene& s
   const Grid grid = grid_over(scene.box, std::min(kVoxels, options.truth_voxels));
   for (View& view : scene.views) view.average.emplace(view.image.size);
   const auto share = 1 / static_cast<float>(options.averaged_frames);
+  const int before = options.averaged_frames / 2;
   for (int frame = 0; frame < options.averaged_frames; ++frame) {
-    const Seconds time = options.time + Seconds((frame - options.averaged_frames / 2) / kRate);
+    const Seconds time = options.time + Seconds((frame - before) / kRate);
     const FlameTruth truth = flame.at(time, grid);
     for (View& view : scene.views) {
       const RadianceImage image = render_view(truth.volume, truth.medium, truth.effects, view.camera);

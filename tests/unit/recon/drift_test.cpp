@@ -76,7 +76,7 @@ TEST(Drift, AChangedZoomIsTheLenss) {
   const test::BoardRig rig = test::board_rig(later_views(4));
   v1::Rig file = calibrated(rig);
   v1::Calibration& c = *file.mutable_cameras(1)->mutable_calibration();
-  c.set_k1(c.k1() + 0.5);
+  c.set_k1(c.k1() + 0.3);
   const auto report = check_drift(file, rig.sightings, "rig.json");
   ASSERT_TRUE(report.ok()) << report.error().message();
   EXPECT_EQ(report->cameras[1].verdict, DriftVerdict::lens);

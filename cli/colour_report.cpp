@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -12,6 +13,12 @@
 
 namespace emberlock::cli {
 namespace {
+
+std::string flat_words(const CalibratedColour& c) {
+  if (c.flat_worst == 0) return "no flat picture";
+  return fmt::format("{:.2f} % RMS, {:.1f} % at most{}", 100 * c.flat_rms, 100 * c.flat_worst,
+                     c.colour.flat.light.empty() ? ": left out, as noise" : "");
+}
 
 std::vector<std::vector<std::string>> camera_rows(const ColourCalibration& calibration) {
   std::vector<std::vector<std::string>> rows;
@@ -24,29 +31,38 @@ std::vector<std::vector<std::string>> camera_rows(const ColourCalibration& calib
     rows.push_back(
         {c.camera, gain(0), gain(1), gain(2), fmt::format("{:.3f}", c.gamma),
          c.vignetting_known ? fmt::format("{:.3f} ± {:.3f}", c.corner, c.corner_sigma) : "not known",
-         fmt::format("{:.5f}", c.colour.dark[1]), std::to_string(c.colour.hot_pixels.size()),
+         flat_words(c), fmt::format("{:.5f}", c.colour.dark[1]), std::to_string(c.colour.hot_pixels.size()),
          fmt::format("{:.2f} %", 100 * c.rms),
          fmt::format("{} / {} / {} / {}", c.uses[0], c.uses[1], c.uses[2], c.uses[3])});
   }
   return rows;
 }
 
-std::string response_plot(const ColourCalibration& calibration) {
+/// A curve a camera, `curve` at even places 0..1; those that it has no curve of are left out.
+std::string camera_curves(const ColourCalibration& calibration, const PlotOptions& options,
+                          const std::function<double(const CalibratedColour&, double)>& curve) {
+  constexpr int kPoints = 51;
   std::vector<Series> series;
   for (const CalibratedColour& c : calibration.cameras) {
     Series s;
     s.name = c.camera;
-    for (std::size_t i = 0; i < c.colour.response.size(); i += 5) {
-      s.x.push_back(static_cast<double>(i) / static_cast<double>(c.colour.response.size() - 1));
-      s.y.push_back(c.colour.response[i]);
+    for (int i = 0; i < kPoints; ++i) {
+      s.x.push_back(static_cast<double>(i) / (kPoints - 1));
+      s.y.push_back(curve(c, s.x.back()));
     }
     series.push_back(std::move(s));
   }
+  return svg_plot(series, options);
+}
+
+std::string response_plot(const ColourCalibration& calibration) {
   PlotOptions options;
   options.title = "Response: what exposure a sample tells";
   options.x_label = "sample / white";
   options.y_label = "exposure / that of white";
-  return svg_plot(series, options);
+  return camera_curves(calibration, options, [](const CalibratedColour& c, double sample) {
+    return exposure_of(c.colour, sample);
+  });
 }
 
 /// Readings' exposures against what all cameras agree on, relative.
@@ -72,38 +88,28 @@ std::string residual_plot(const ColourReadings& readings, const ColourCalibratio
 }
 
 std::string vignetting_plot(const ColourCalibration& calibration) {
-  std::vector<Series> series;
-  for (const CalibratedColour& c : calibration.cameras) {
-    if (!c.vignetting_known) continue;
-    Series s;
-    s.name = c.camera;
-    constexpr int kPoints = 40;
-    for (int i = 0; i <= kPoints; ++i) {
-      const double r = static_cast<double>(i) / kPoints;
-      s.x.push_back(r);
-      s.y.push_back(falloff(c.colour.vignetting, r * r));
-    }
-    series.push_back(std::move(s));
-  }
-  if (series.empty()) return {};
   PlotOptions options;
   options.title = "Vignetting: light from the middle to the corner";
   options.x_label = "distance from the middle, half diagonals";
   options.y_label = "share of the middle's light";
-  return svg_plot(series, options);
+  return camera_curves(calibration, options, [](const CalibratedColour& c, double r) {
+    return falloff(c.colour.vignetting, r * r);
+  });
 }
 
-/// The share of the light over the picture, as a grey picture: white is the middle's.
-std::string vignetting_map(const ColourCamera& camera, const CalibratedColour& colour) {
+/// The share of the light over the picture, vignetting and flat field: white is the middle's.
+std::string light_map(const ColourCamera& camera, const CalibratedColour& colour) {
   constexpr int kWidth = 160;
   const int height = std::clamp(kWidth * camera.size.height / std::max(1, camera.size.width), 16, 320);
-  Image map(ImageLayout{{kWidth, height}, PixelFormat::gray8, 8});
+  Image map(ImageLayout{{kWidth, height}, PixelFormat::rgb8, 8});
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < kWidth; ++x) {
-      const double light =
+      const double lens =
           falloff(colour.colour.vignetting, radius_squared({kWidth, height}, x + 0.5, y + 0.5));
-      map.row_as<std::uint8_t>(y)[x] =
-          static_cast<std::uint8_t>(std::lround(255 * std::clamp(light, 0.0, 1.0)));
+      const auto flat = light_at(colour.colour.flat, (x + 0.5) / kWidth, (y + 0.5) / height);
+      for (std::size_t c = 0; c < 3; ++c)
+        map.row_as<std::uint8_t>(y)[3 * static_cast<std::size_t>(x) + c] =
+            static_cast<std::uint8_t>(std::lround(255 * std::clamp(lens * flat[c], 0.0, 1.0)));
     }
   return fmt::format("<img src=\"{}\" alt=\"\">", png_data_uri(map));
 }
@@ -165,16 +171,16 @@ std::string colour_report_page(const ColourReadings& readings, const ColourCalib
     page.paragraph(fmt::format("{}. {}", i + 1, calibration.advice[i]));
   page.heading("Cameras");
   page.table(
-      {"camera", "gain R", "gain G", "gain B", "gamma", "light in the corner", "dark level (G, of white)",
-       "hot pixels", "RMS", "readings used / saturated / too dark / don't fit"},
+      {"camera", "gain R", "gain G", "gain B", "gamma", "light in the corner", "flat field beyond it",
+       "dark level (G, of white)", "hot pixels", "RMS", "readings used / saturated / too dark / don't fit"},
       camera_rows(calibration));
   page.heading("Response").raw(response_plot(calibration));
   page.heading("Residuals").raw(residual_plot(readings, calibration));
   page.heading("Vignetting").raw(vignetting_plot(calibration));
   std::vector<HtmlPage::Picture> maps;
   for (std::size_t i = 0; i < calibration.cameras.size(); ++i)
-    if (calibration.cameras[i].vignetting_known)
-      maps.push_back({vignetting_map(readings.cameras[i], calibration.cameras[i]),
+    if (calibration.cameras[i].vignetting_known || !calibration.cameras[i].colour.flat.light.empty())
+      maps.push_back({light_map(readings.cameras[i], calibration.cameras[i]),
                       fmt::format("{}: {:.2f} in the corner", calibration.cameras[i].camera,
                                   calibration.cameras[i].corner)});
   if (!maps.empty()) page.gallery(maps);

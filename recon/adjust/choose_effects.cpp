@@ -123,11 +123,23 @@ class MotionChoice {
   bool on_ = false;
 };
 
+/// Pictures that a calibration made linear must not be bent once more.
+Status check_gamma(const Scene& scene, const EffectRequest& request) {
+  const Effects& asked = request.fixed ? *request.fixed : request.assumed;
+  if (!scene.linearised || asked.sensor.gamma == 1) return {};
+  return Error{
+      ErrorKind::bad_input,
+      fmt::format("gamma {:.3g}, but the cameras' calibrated responses made the pictures linear already",
+                  asked.sensor.gamma),
+      "--effects", "Leave gamma out, or reconstruct with a rig that has no colour"};
+}
+
 }  // namespace
 
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
                                     const SolveOptions& options, const Elapsed& elapsed) try {
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
+  EMBERLOCK_RETURN_IF_ERROR(check_gamma(scene, request));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   Effects known;
   if (request.fixed)

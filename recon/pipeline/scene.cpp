@@ -233,6 +233,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
     EMBERLOCK_ASSIGN_OR_RETURN(FrameDeveloper developer,
                                FrameDeveloper::create(reader, i, stream, *nearest, options.frames));
     EMBERLOCK_ASSIGN_OR_RETURN(DevelopedPicture picture, developer.develop(reader, *nearest));
+    scene.linearised = scene.linearised || developer.linearises();
     session.developers.push_back(std::move(developer));
     view.image = std::move(picture.image);
     view.bounds = std::move(picture.bounds);

@@ -46,6 +46,9 @@ class FrameDeveloper {
   /// A frame as radiance. `reader` is that of create(). Errors: those of SessionReader::read().
   Result<DevelopedPicture> develop(SessionReader& reader, std::size_t frame) const;
 
+  /// Whether the camera's calibrated response makes its pictures linear in light.
+  [[nodiscard]] bool linearises() const { return colour_ && !colour_->response.empty(); }
+
  private:
   FrameDeveloper() = default;
   std::size_t camera_ = 0;

@@ -37,7 +37,52 @@ Status check_response(const std::vector<double>& response, const std::string& wh
   return {};
 }
 
+/// A coordinate between the middles of `cells` cells: the one before, the one after, and how far between.
+struct BetweenCells {
+  std::size_t before, after;
+  double part;
+};
+
+BetweenCells between_cells(double share, int cells) {
+  const double at = std::clamp(share * cells - 0.5, 0.0, static_cast<double>(cells - 1));
+  const auto before = static_cast<std::size_t>(at);
+  return {before, std::min(before + 1, static_cast<std::size_t>(cells - 1)),
+          at - static_cast<double>(before)};
+}
+
+Status read_flat(const v1::FlatField& message, FlatField& flat, const std::string& where) {
+  constexpr std::uint32_t kMostCells = 4096;  // along a side
+  const std::uint32_t columns = message.columns();
+  const std::uint32_t rows = message.rows();
+  if (columns == 0 && rows == 0 && message.light().empty()) return {};
+  if (columns == 0 || rows == 0 || columns > kMostCells || rows > kMostCells ||
+      static_cast<std::uint64_t>(message.light_size()) != std::uint64_t{3} * columns * rows)
+    return bad_field(where, "flat", "doesn't have three numbers for each of its columns and rows");
+  if (!std::all_of(message.light().begin(), message.light().end(),
+                   [](float v) { return v >= static_cast<float>(kLeastLight) && std::isfinite(v); }))
+    return bad_field(where, "flat", "leaves a part of the picture without light");
+  flat = {
+      static_cast<int>(columns), static_cast<int>(rows), {message.light().begin(), message.light().end()}};
+  return {};
+}
+
 }  // namespace
+
+std::array<double, 3> light_at(const FlatField& flat, double x, double y) {
+  std::array<double, 3> out = {1, 1, 1};
+  if (flat.light.empty()) return out;
+  const BetweenCells across = between_cells(x, flat.columns);
+  const BetweenCells down = between_cells(y, flat.rows);
+  const auto cell = [&](std::size_t column, std::size_t row, std::size_t c) {
+    return static_cast<double>(flat.light[3 * (row * static_cast<std::size_t>(flat.columns) + column) + c]);
+  };
+  for (std::size_t c = 0; c < 3; ++c)
+    out[c] = std::lerp(
+        std::lerp(cell(across.before, down.before, c), cell(across.after, down.before, c), across.part),
+        std::lerp(cell(across.before, down.after, c), cell(across.after, down.after, c), across.part),
+        down.part);
+  return out;
+}
 
 double exposure_of(const Colour& colour, double sample) {
   if (colour.response.empty()) return sample;
@@ -61,6 +106,7 @@ Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std:
   EMBERLOCK_RETURN_IF_ERROR(read_three(message.dark(), colour.dark, where, "dark"));
   EMBERLOCK_RETURN_IF_ERROR(read_three(message.gain(), colour.gain, where, "gain"));
   EMBERLOCK_RETURN_IF_ERROR(read_three(message.vignetting(), colour.vignetting, where, "vignetting"));
+  EMBERLOCK_RETURN_IF_ERROR(read_flat(message.flat(), colour.flat, where));
   if (*std::min_element(colour.gain.begin(), colour.gain.end()) <= 0)
     return bad_field(where, "gain", "is not above 0");
   constexpr int kRadii = 64;
@@ -83,6 +129,11 @@ v1::Colour to_message(const Colour& colour) {
   for (const double v : colour.gain) message.add_gain(v);
   for (const double v : colour.vignetting) message.add_vignetting(v);
   for (const std::uint32_t pixel : colour.hot_pixels) message.add_hot(pixel);
+  if (!colour.flat.light.empty()) {
+    message.mutable_flat()->set_columns(static_cast<std::uint32_t>(colour.flat.columns));
+    message.mutable_flat()->set_rows(static_cast<std::uint32_t>(colour.flat.rows));
+    message.mutable_flat()->mutable_light()->Assign(colour.flat.light.begin(), colour.flat.light.end());
+  }
   return message;
 }
 

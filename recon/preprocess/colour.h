@@ -11,13 +11,21 @@
 
 namespace emberlock {
 
-/// How a camera's samples tell radiance: (response(sample / white) - dark) * gain / vignetting. By default
-/// nothing changes. Immutable in use; what `read` gives is valid.
+/// The share of the light that vignetting leaves out of account (dust on the sensor, shading by colour): at
+/// the middles of cells that divide the picture evenly, linear between them.
+struct FlatField {
+  int columns = 0, rows = 0;
+  std::vector<float> light = {};  ///< [3 * (row * columns + column) + channel]; empty: 1 everywhere
+};
+
+/// How a camera's samples tell radiance: (response(sample / white) - dark) * gain / (vignetting * flat). By
+/// default nothing changes. Immutable in use; what `read` gives is valid.
 struct Colour {
-  std::vector<double> response = {};           ///< exposure 0..1 at even samples 0..1, rising; empty: linear
-  std::array<double, 3> dark = {};             ///< exposure without light
-  std::array<double, 3> gain = {1, 1, 1};      ///< radiance of an exposure of 1
-  std::array<double, 3> vignetting = {};       ///< k2, k4, k6
+  std::vector<double> response = {};       ///< exposure 0..1 at even samples 0..1, rising; empty: linear
+  std::array<double, 3> dark = {};         ///< exposure without light
+  std::array<double, 3> gain = {1, 1, 1};  ///< radiance of an exposure of 1
+  std::array<double, 3> vignetting = {};   ///< k2, k4, k6
+  FlatField flat = {};
   std::vector<std::uint32_t> hot_pixels = {};  ///< y * width + x, rising
 };
 
@@ -30,12 +38,16 @@ inline double falloff(const std::array<double, 3>& k, double r_squared) {
   return 1 + r_squared * (k[0] + r_squared * (k[1] + r_squared * k[2]));
 }
 
+/// A flat field's three shares at a place, x and y in 0..1 of the picture's sides.
+std::array<double, 3> light_at(const FlatField& flat, double x, double y);
+
 /// How far a point (pixel centres at +0.5) lies from the picture's middle: squared, in half diagonals.
 double radius_squared(ImageSize size, double x, double y);
 
 /// The message's meaning for pictures of `size`. Errors name the field below `where`: numbers that aren't
 /// finite, a response that doesn't rise from 0 to 1, other than three gains or dark levels, gains not above
-/// 0, a vignetting that leaves no light, hot pixels outside.
+/// 0, a vignetting or a flat field that leaves no light, a flat field whose numbers don't fill its cells, hot
+/// pixels outside.
 Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std::string& where);
 v1::Colour to_message(const Colour& colour);
 

@@ -8,14 +8,13 @@
 
 #include <fmt/format.h>
 
+#include "recon/preprocess/colour_advice.h"
 #include "recon/preprocess/colour_fit.h"
+#include "recon/preprocess/flat_field.h"
 
 namespace emberlock {
 namespace {
 
-constexpr double kDarkest = 0.03;       // samples: below, noise and quantisation bend what the mean tells
-constexpr double kMostSaturated = 0.0;  // share of a patch: one clipped sample drags its mean
-constexpr double kBrightest = 0.985;
 constexpr double kLeastRatio = 1.3;  // of exposures that tell a response
 constexpr int kResponsePoints = 256;
 
@@ -33,25 +32,6 @@ struct Equations {
   std::map<RadianceKey, std::size_t> lights;
 };
 
-/// The median of the dark samples. Not their mean: black clips noise from below, which light doesn't see.
-double dark_sample(const DarkReading& dark, std::size_t channel) {
-  const std::vector<double>& shares = dark.histogram[channel];
-  double below = 0;
-  for (std::size_t i = 0; i < shares.size(); ++i) {
-    if (below + shares[i] >= 0.5)
-      return std::max(0.0, (static_cast<double>(i) - 0.5 + (0.5 - below) / shares[i]) / 255);
-    below += shares[i];
-  }
-  return 0;
-}
-
-double mean_sigma(const PatchReading& reading, std::size_t c, double step) {
-  const double spread = std::sqrt(reading.variance[c]);
-  // Noise of half a step makes quantisation one more noise; without it the whole patch is off by the same.
-  const double rounding = spread > 0.4 * step ? 0 : step / std::sqrt(12.0);
-  return std::hypot(spread / std::sqrt(static_cast<double>(reading.count[c])), rounding);
-}
-
 Equations equations_of(const ColourReadings& readings) {
   Equations out;
   for (std::size_t i = 0; i < readings.patches.size(); ++i) {
@@ -60,13 +40,9 @@ Equations equations_of(const ColourReadings& readings) {
     const auto known = readings.radiance.find(p.patch);
     for (std::size_t c = 0; c < 3; ++c) {
       if (p.count[c] == 0) continue;
-      if (p.saturated[c] > kMostSaturated || p.mean[c] > kBrightest) {
-        out.left_out.push_back({i, c, 0, 0, ReadingUse::saturated});
-        continue;
-      }
-      if (p.mean[c] < std::max(kDarkest, 1.5 * dark_sample(camera.dark, c)) ||
-          std::sqrt(p.variance[c]) > 0.3 * p.mean[c]) {
-        out.left_out.push_back({i, c, 0, 0, ReadingUse::dark});
+      const double dark = dark_sample(camera.dark, c);
+      if (const ReadingUse use = use_of(p, c, dark); use != ReadingUse::used) {
+        out.left_out.push_back({i, c, 0, 0, use});
         continue;
       }
       ColourEquation e;
@@ -79,7 +55,7 @@ Equations equations_of(const ColourReadings& readings) {
       e.light = out.lights.emplace(RadianceKey{name, c}, out.lights.size()).first->second;
       e.sample = p.mean[c];
       e.variance = p.variance[c];
-      e.dark_sample = dark_sample(camera.dark, c);
+      e.dark_sample = dark;
       e.sample_sigma = mean_sigma(p, c, camera.step);
       e.radius_squared = radius_squared(camera.size, p.x, p.y);
       out.all.push_back(e);
@@ -279,62 +255,50 @@ void tell_residuals(const Equations& equations, const ColourFit& fit, ColourCali
   out.rms = std::sqrt(squares / std::max(1, used));
 }
 
-/// What would help most comes first: each is weighed by the error that it would take away.
-void advise(ColourCalibration& out) {
-  std::vector<std::pair<double, std::string>> wishes;
-  for (const CalibratedColour& c : out.cameras) {
-    if (!c.shares_patches) {
-      wishes.emplace_back(1, "camera " + c.camera +
-                                 ": a picture of the shared target with patches between a tenth and "
-                                 "nine tenths of white");
-      continue;
-    }
-    if (!c.vignetting_known)
-      wishes.emplace_back(0.3,
-                          "camera " + c.camera +
-                              ": the target in the middle, half way out and in a corner, or a flat picture");
-    else if (c.corner_sigma > 0.005 * c.corner)
-      wishes.emplace_back(c.corner_sigma / c.corner,
-                          fmt::format("camera {}: the target nearer to the corners, or a flat picture (light "
-                                      "there is {:.2f} +- {:.2f})",
-                                      c.camera, c.corner, c.corner_sigma));
-    const double gain = *std::max_element(c.gain_sigma.begin(), c.gain_sigma.end());
-    if (gain > 0.005)
-      wishes.emplace_back(
-          gain, fmt::format("camera {}: more patches or lights (its gain is known to {:.1f} %)", c.camera,
-                            100 * gain));
-    if (c.brightest < 0.7)
-      wishes.emplace_back(
-          0.02,
-          fmt::format("camera {}: a brighter patch or longer exposure (the brightest is {:.2f} of white)",
-                      c.camera, c.brightest));
-    if (c.darkest > 0.3)
-      wishes.emplace_back(
-          0.02, fmt::format("camera {}: a darker patch or shorter exposure (the darkest is {:.2f} of white)",
-                            c.camera, c.darkest));
+/// Each camera's flat field on top of what the fit says of its lens.
+std::vector<FoundFlat> find_flats(const ColourReadings& readings, const ColourFit& fit, double floor) {
+  std::vector<FoundFlat> flats;
+  for (std::size_t i = 0; i < readings.cameras.size(); ++i) {
+    const ColourCamera& camera = readings.cameras[i];
+    std::vector<FlatReading> own;
+    std::copy_if(readings.flats.begin(), readings.flats.end(), std::back_inserter(own),
+                 [&](const FlatReading& flat) { return flat.camera == i; });
+    flats.push_back(find_flat(own, fit.cameras[i], camera.dark, camera.step, floor));
   }
-  std::stable_sort(wishes.begin(), wishes.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
-  for (auto& wish : wishes) out.advice.push_back(std::move(wish.second));
+  return flats;
 }
 
-void warn(const ColourReadings& readings, ColourCalibration& out) {
-  for (std::size_t i = 0; i < out.cameras.size(); ++i) {
-    const CalibratedColour& c = out.cameras[i];
-    const int used = c.uses[0];
-    if (!c.shares_patches)
-      out.warnings.push_back(fmt::format(
-          "camera {} shares no usable patch with the others{}: its gain is left at 1 and isn't known",
-          c.camera, used == 0 ? " (all its patches are saturated or dark)" : ""));
-    if (!c.vignetting_known)
-      out.warnings.push_back("camera " + c.camera +
-                             ": too few places tell its vignetting, which is left out");
-    if (readings.cameras[i].dark.histogram[1].empty())
-      out.warnings.push_back("camera " + c.camera + ": no dark pictures, its dark level is taken to be 0");
-    if (c.uses[3] > 0.05 * (used + c.uses[3]))
-      out.warnings.push_back(fmt::format("camera {}: {} of {} readings don't fit and were left out", c.camera,
-                                         c.uses[3], used + c.uses[3]));
+void put_flats(const ColourReadings& readings, const std::vector<FoundFlat>& flats, Equations& equations) {
+  for (std::size_t i = 0; i < equations.all.size(); ++i) {
+    const PatchReading& patch = readings.patches[equations.reading[i]];
+    const ImageSize size = readings.cameras[patch.camera].size;
+    equations.all[i].flat = std::log(light_at(flats[patch.camera].flat, patch.x / size.width,
+                                              patch.y / size.height)[equations.all[i].channel]);
   }
+}
+
+/// What is found of all cameras together.
+struct JointFit {
+  ColourFit fit;
+  std::vector<FoundFlat> flats;
+};
+
+/// Patches behind dust would darken their cameras, so where there are flat fields, the fit is made again with
+/// them.
+std::optional<JointFit> fit_jointly(const ColourReadings& readings, Equations& equations, ColourFit start,
+                                    const ColourHeld& held, double floor) {
+  auto fit = fit_colour(equations.all, std::move(start), held, floor);
+  if (!fit) return std::nullopt;
+  std::vector<FoundFlat> flats = find_flats(readings, *fit, floor);
+  const bool any =
+      std::any_of(flats.begin(), flats.end(), [](const FoundFlat& f) { return !f.flat.light.empty(); });
+  if (any) {
+    put_flats(readings, flats, equations);
+    fit = fit_colour(equations.all, std::move(*fit), held, floor);
+    if (!fit) return std::nullopt;
+    flats = find_flats(readings, *fit, floor);
+  }
+  return JointFit{std::move(*fit), std::move(flats)};
 }
 
 Status check_colour_options(const ColourOptions& options) {
@@ -376,13 +340,13 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
   }
   for (std::size_t i = 0; i < cameras; ++i) held.vignetting[i] = !vignetting_told(equations.all, i);
 
-  const auto found_fit =
-      fit_colour(equations.all, start_of(equations, cameras, options), held, options.floor);
-  if (!found_fit) {
+  const auto joint =
+      fit_jointly(readings, equations, start_of(equations, cameras, options), held, options.floor);
+  if (!joint) {
     return bad_target("target pictures", "don't determine the cameras' colours",
                       "Take more pictures of more patches by all cameras");
   }
-  const ColourFit& fit = *found_fit;
+  const ColourFit& fit = joint->fit;
 
   ColourCalibration out;
   for (std::size_t i = 0; i < cameras; ++i) {
@@ -392,6 +356,9 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
     camera.gamma = found.response[0];
     camera.colour.response = response_table(found.response);
     camera.colour.vignetting = found.vignetting;
+    camera.colour.flat = joint->flats[i].flat;
+    camera.flat_rms = joint->flats[i].rms;
+    camera.flat_worst = joint->flats[i].worst;
     camera.colour.hot_pixels = readings.cameras[i].dark.hot_pixels;
     for (std::size_t c = 0; c < 3; ++c)
       camera.colour.dark[c] =
@@ -411,8 +378,8 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
     out.residuals.push_back(r);
     ++out.cameras[readings.patches[r.reading].camera].uses[static_cast<std::size_t>(r.use)];
   }
-  warn(readings, out);
-  advise(out);
+  warn_of_colours(readings, out);
+  advise_on_colours(out);
   return out;
 }
 

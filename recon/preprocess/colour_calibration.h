@@ -20,6 +20,8 @@ namespace emberlock {
 // (response and vignetting together); the power law in front lets three coefficients do for what cameras
 // differ by.
 //
+// What flat pictures show beyond V(r), cell by cell, is the flat field (flat_field.h).
+//
 // Known up to one factor a channel: the geometric mean of the cameras' gains is 1.
 
 struct ColourOptions {
@@ -27,8 +29,6 @@ struct ColourOptions {
       {};                ///< 0.3..5: every camera's response is this power law and isn't looked for
   double floor = 0.002;  ///< relative: what patches and light are off by whatever the noise
 };
-
-enum class ReadingUse { used, saturated, dark, outlier };
 
 struct ColourResidual {
   std::size_t reading = 0;  ///< of ColourReadings::patches
@@ -44,6 +44,7 @@ struct CalibratedColour {
   double gamma = 1;                       ///< the response's exponent
   std::array<double, 3> gain_sigma = {};  ///< relative, to the cameras' mean
   double corner = 1, corner_sigma = 0;    ///< light in the picture's corner
+  double flat_rms = 0, flat_worst = 0;    ///< relative: what flat pictures show beyond the vignetting
   double darkest = 1, brightest = 0;      ///< samples of used patches
   bool shares_patches = true;             ///< with the other cameras; else its gain is 1 and not known
   bool vignetting_known = true;           ///< else 0: too few places

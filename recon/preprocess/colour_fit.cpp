@@ -28,7 +28,7 @@ struct RadianceResidual {
     const double r = e.radius_squared;
     T light = 1.0 + r * (vignetting[0] + r * (vignetting[1] + r * vignetting[2]));
     if (light < 0.02) light = T(0.02);
-    residual[0] = (log(exposure) + log_gain[0] - log(light) - log_light[0] - e.known) / e.sigma;
+    residual[0] = (log(exposure) + log_gain[0] - log(light) - e.flat - log_light[0] - e.known) / e.sigma;
     return true;
   }
 };

@@ -18,6 +18,7 @@ struct ColourEquation {
   double sample = 0, variance = 0;
   double sample_sigma = 0;  ///< of the mean
   double radius_squared = 0;
+  double flat = 0;         ///< ln of the flat field's share of the light
   double dark_sample = 0;  ///< without light
   bool outlier = false;    ///< out
   double residual = 0;     ///< out: ln of the camera's radiance over the common one

@@ -21,7 +21,7 @@ namespace {
 using PlanJson = nlohmann::json;
 
 constexpr std::size_t kLargestPlan = std::size_t{16} << 20;
-constexpr int kFlatBlocks = 12;  // along each side
+constexpr int kFlatBlocks = 12;  // along each side, as patches of the fit
 
 Error bad_plan(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
@@ -68,39 +68,6 @@ Result<std::array<double, 3>> parse_radiance(const PlanJson& json, const std::st
   if (!json.is_array() || json.size() != 3 || !std::all_of(json.begin(), json.end(), good))
     return bad_plan(where, "is no radiance", "Give a number above 0, or three: [R, G, B]");
   for (std::size_t c = 0; c < 3; ++c) out[c] = json[c].get<double>();
-  return out;
-}
-
-struct ChannelSamples {
-  std::vector<int> value;
-  int saturated = 0;
-};
-
-PatchReading summarise(const std::array<ChannelSamples, 3>& samples, int white) {
-  PatchReading out;
-  for (std::size_t c = 0; c < 3; ++c) {
-    std::vector<int> v = samples[c].value;
-    if (v.empty()) continue;
-    std::sort(v.begin(), v.end());
-    const int median = v[v.size() / 2];
-    std::vector<int> off(v.size());
-    std::transform(v.begin(), v.end(), off.begin(), [&](int x) { return std::abs(x - median); });
-    std::nth_element(off.begin(), off.begin() + static_cast<std::ptrdiff_t>(off.size() / 2), off.end());
-    const double limit = std::max(2.5, 5 * 1.4826 * (off[off.size() / 2] + 0.5));
-    double sum = 0;
-    double squares = 0;
-    for (const int x : v) {
-      if (std::abs(x - median) > limit) continue;
-      sum += x;
-      squares += static_cast<double>(x) * x;
-      ++out.count[c];
-    }
-    const double mean = sum / out.count[c];
-    out.mean[c] = mean / white;
-    out.variance[c] =
-        std::max(0.0, squares / out.count[c] - mean * mean) / (static_cast<double>(white) * white);
-    out.saturated[c] = samples[c].saturated / static_cast<double>(v.size());
-  }
   return out;
 }
 
@@ -209,6 +176,8 @@ class CameraPictures {
     for (int y = 0; y + height <= size.height; y += height)
       for (int x = 0; x + width <= size.width; x += width)
         keep(image, picture, {x, y, width, height}, "flat:" + picture_name(picture));
+    readings_.flats.push_back(read_flat(image.view()));
+    readings_.flats.back().camera = index_;
     return {};
   }
   Status add_target(const Image& image, const PicturePath& picture) {
@@ -274,28 +243,6 @@ Status check_exposures(const std::vector<PicturePath>& pictures) {
 }
 
 }  // namespace
-
-PatchReading read_patch(const ImageView& picture, const PatchPlace& place) {
-  std::array<ChannelSamples, 3> samples;
-  const int white = picture.layout.white();
-  const bool mosaic = is_bayer(picture.layout.format);
-  const int channels = emberlock::channels(picture.layout.format);
-  for (int y = place.y; y < place.y + place.height; ++y) {
-    for (int x = place.x; x < place.x + place.width; ++x) {
-      for (int c = 0; c < 3; ++c) {
-        if (mosaic && mosaic_channel(x, y) != c) continue;
-        const int value = picture.sample(x, y, channels == 3 ? c : 0);
-        ChannelSamples& into = samples[static_cast<std::size_t>(c)];
-        into.value.push_back(value);
-        if (value >= white) ++into.saturated;
-      }
-    }
-  }
-  PatchReading out = summarise(samples, white);
-  out.x = place.x + 0.5 * place.width;
-  out.y = place.y + 0.5 * place.height;
-  return out;
-}
 
 Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& where) {
   const PlanJson json = PlanJson::parse(text, nullptr, false);

@@ -1,44 +1,17 @@
 #pragma once
 
 #include <array>
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "base/image.h"
 #include "base/progress.h"
 #include "base/result.h"
+#include "recon/preprocess/patch_reading.h"
 
 namespace emberlock {
-
-/// Pixels [x, x + width) x [y, y + height).
-struct PatchPlace {
-  int x = 0, y = 0, width = 0, height = 0;
-};
-
-/// What a picture shows of one patch. Samples are relative to the sensor's white: 0..1.
-struct PatchReading {
-  std::size_t camera = 0;
-  std::string patch;  ///< readings of one patch in one light saw one radiance, in whatever camera and place
-  std::string light = {};
-  std::string picture = {};  ///< for messages
-  double exposure = 1;       ///< relative exposure time
-  double x = 0, y = 0;       ///< the patch's middle, pixel centres at +0.5
-  std::array<double, 3> mean = {};
-  std::array<double, 3> variance = {};   ///< of one sample
-  std::array<double, 3> saturated = {};  ///< share of the samples
-  std::array<int, 3> count = {};         ///< samples; 0: the channel wasn't seen
-};
-
-/// Samples without light.
-struct DarkReading {
-  /// Shares of samples in 256 steps from 0 to white, by channel; empty without dark pictures.
-  std::array<std::vector<double>, 3> histogram = {};
-  std::vector<std::uint32_t> hot_pixels;
-};
 
 struct ColourCamera {
   std::string id;
@@ -51,19 +24,17 @@ struct ColourCamera {
 struct ColourReadings {
   std::vector<ColourCamera> cameras;
   std::vector<PatchReading> patches;
+  std::vector<FlatReading> flats = {};
   /// Of patches by name, in any unit that all channels' own light may scale.
   std::map<std::string, std::array<double, 3>> radiance;
 };
 
-/// Mean and variance of a patch, by channel; samples further than five robust sigma from the median (dirt,
-/// hot pixels) are left out. `place` lies inside the picture.
-PatchReading read_patch(const ImageView& picture, const PatchPlace& place);
-
 /// What colour.json in a folder of target pictures says:
 ///   {"patches": {CAMERA: {PATCH: [x, y, width, height]}},
-///    "pictures": {"CAMERA/FILE": {PATCH: [x, y, width, height]}},   instead, for pictures in which the
-///    target stood elsewhere "radiance": {PATCH: L or [R, G, B]}}                           optional, of a
-///    chart: any common unit
+///    "pictures": {"CAMERA/FILE": {PATCH: [x, y, width, height]}},
+///    "radiance": {PATCH: L or [R, G, B]}}
+/// `pictures` stands instead of `patches` for those in which the target stood elsewhere; `radiance`, of a
+/// chart, may be absent and has any common unit.
 struct ColourPlan {
   using Places = std::map<std::string, PatchPlace>;
   std::map<std::string, Places> patches;

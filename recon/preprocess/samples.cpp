@@ -149,15 +149,15 @@ RadianceImage to_picture(const Samples& samples, std::vector<std::uint8_t>* boun
 }
 
 void equalise(RadianceImage& image, const Colour& colour) {
-  const bool even = colour.vignetting == std::array<double, 3>{};
+  const bool even = colour.vignetting == std::array<double, 3>{} && colour.flat.light.empty();
   if (even && colour.gain == std::array<double, 3>{1, 1, 1}) return;
   float* rgb = image.rgb.data();
   for (int y = 0; y < image.size.height; ++y) {
     for (int x = 0; x < image.size.width; ++x) {
-      const double light =
-          even ? 1 : falloff(colour.vignetting, radius_squared(image.size, x + 0.5, y + 0.5));
+      const double lens = falloff(colour.vignetting, radius_squared(image.size, x + 0.5, y + 0.5));
+      const auto flat = light_at(colour.flat, (x + 0.5) / image.size.width, (y + 0.5) / image.size.height);
       for (std::size_t c = 0; c < 3; ++c, ++rgb)
-        *rgb = static_cast<float>(static_cast<double>(*rgb) * colour.gain[c] / light);
+        *rgb = static_cast<float>(static_cast<double>(*rgb) * colour.gain[c] / (lens * flat[c]));
     }
   }
 }

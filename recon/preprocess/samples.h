@@ -52,7 +52,7 @@ enum class Demosaicing {
 RadianceImage to_picture(const Samples& samples, std::vector<std::uint8_t>* bounds = nullptr,
                          Demosaicing demosaicing = Demosaicing::bilinear);
 
-/// Gain and vignetting: the same radiance has the same value in all cameras, anywhere.
+/// Gain, vignetting and flat field: the same radiance has the same value in all cameras, anywhere.
 void equalise(RadianceImage& image, const Colour& colour);
 
 }  // namespace emberlock

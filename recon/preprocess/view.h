@@ -54,6 +54,8 @@ struct Scene {
   std::vector<View> views;
   Box box;
   std::vector<PreprocessStep> preprocessing = {};  ///< what was done to the pictures, in order
+  /// They went through their cameras' calibrated responses: another gamma would bend them twice.
+  bool linearised = false;
 };
 
 }  // namespace emberlock

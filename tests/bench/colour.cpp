@@ -67,6 +67,29 @@ void patches(int seeds, double toe, const char* what) {
       after.unmarked, chi_square / std::max(1, gains), seconds / seeds);
 }
 
+void dust(int seeds) {
+  PatchSpread without;
+  PatchSpread with;
+  for (int seed = 1; seed <= seeds; ++seed) {
+    const auto number = static_cast<std::uint64_t>(seed);
+    auto rig = colour_rig(11, number);
+    for (std::size_t i = 0; i < rig.size(); ++i) put_dust(rig[i], 100 * number + i);
+    ColourReadings readings = film_target(rig, number);
+    const auto lens_alone = calibrate_colour(readings);
+    add_flats(rig, readings);
+    const auto flat = calibrate_colour(readings);
+    if (!lens_alone || !flat) {
+      std::printf("seed %d: not calibrated\n", seed);
+      continue;
+    }
+    without = worse(without, held_out_spread(rig, &*lens_alone, 100 + number));
+    with = worse(with, held_out_spread(rig, &*flat, 100 + number));
+  }
+  std::printf("dust on all sensors: %d rigs of eleven cameras\n", seeds);
+  print_spread("without flat pictures", without);
+  print_spread("a flat picture each", with);
+}
+
 void smear() {
   std::printf(
       "smear: RMS that it adds to a picture, grey levels, and what is left; fraction found over the true "
@@ -126,6 +149,7 @@ int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::max(1, std::atoi(argv[1])) : 20;
   emberlock::test::patches(seeds, 0, "power laws");
   emberlock::test::patches(std::max(1, seeds / 4), 0.5, "bent responses");
+  emberlock::test::dust(std::max(1, seeds / 2));
   emberlock::test::smear();
   emberlock::test::demosaicing();
   emberlock::test::hot_pixels();

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "base/square.h"
 #include "recon/preprocess/colour_calibration.h"
 #include "recon/preprocess/develop.h"
 
@@ -20,9 +21,17 @@ struct ColourTruth {
   double dark = 0.002;
   double toe = 0;  ///< bends the power law: exponent gamma + toe * (1 - v)
   ImageSize size{640, 480};
+  struct Dust {
+    double x = 0, y = 0, radius = 1,
+           depth = 0;  ///< pixels; the share of the light that it takes in its middle
+  };
+  std::vector<Dust> dust = {};
 
   [[nodiscard]] double exposure(double radiance, std::size_t channel, double x, double y) const {
-    return radiance * falloff(vignetting, radius_squared(size, x, y)) / gain[channel] + dark;
+    double light = falloff(vignetting, radius_squared(size, x, y));
+    for (const Dust& d : dust)
+      light *= 1 - d.depth * std::exp(-0.5 * (square(x - d.x) + square(y - d.y)) / square(d.radius));
+    return radiance * light / gain[channel] + dark;
   }
   /// 0..1, the inverse of exposure = v^(gamma + toe (1 - v)).
   [[nodiscard]] double sample(double exposure) const {
@@ -88,6 +97,26 @@ inline DarkReading film_dark(const ColourTruth& camera, RandomStream& random) {
   return dark;
 }
 
+/// Specks, some 40 pixels wide, that take up to 8 % of the light.
+inline void put_dust(ColourTruth& camera, std::uint64_t seed) {
+  RandomStream random(seed, 5);
+  for (int i = 0; i < 30; ++i)
+    camera.dust.push_back({random.uniform(0, camera.size.width), random.uniform(0, camera.size.height),
+                           random.uniform(15, 25), random.uniform(0.04, 0.08)});
+}
+
+/// A grey surface, out of focus, that fills the picture.
+inline Image film_flat(const ColourTruth& camera, RandomStream& random) {
+  constexpr double kRadiance = 0.5;
+  Image picture(ImageLayout{camera.size, PixelFormat::rgb8, 8});
+  for (int y = 0; y < camera.size.height; ++y)
+    for (int x = 0; x < camera.size.width; ++x)
+      for (std::size_t c = 0; c < 3; ++c)
+        picture.row_as<std::uint8_t>(y)[3 * static_cast<std::size_t>(x) + c] = static_cast<std::uint8_t>(
+            noisy_sample(camera, camera.exposure(kRadiance, c, x + 0.5, y + 0.5), random));
+  return picture;
+}
+
 struct TargetOptions {
   std::vector<double> exposures = {0.25, 0.5, 1};
   int patches = 8;
@@ -134,6 +163,15 @@ inline ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint
   return readings;
 }
 
+/// A flat picture of each camera.
+inline void add_flats(const std::vector<ColourTruth>& rig, ColourReadings& readings) {
+  RandomStream random(5, 6);
+  for (std::size_t i = 0; i < rig.size(); ++i) {
+    readings.flats.push_back(read_flat(film_flat(rig[i], random).view()));
+    readings.flats.back().camera = i;
+  }
+}
+
 /// How far cameras are apart that see the same patch.
 struct PatchSpread {
   double worst_pair = 0;  ///< the largest over the smallest, less 1, where there is 2 % of white or more
@@ -149,7 +187,7 @@ struct PatchSpread {
 /// developed as a session's are.
 inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig, const ColourCalibration* calibration,
                                    std::uint64_t seed) {
-  constexpr int kAcross = 6, kDown = 4, kEdge = 30;
+  constexpr int kAcross = 6, kDown = 4;
   RandomStream random(seed, 3);
   std::vector<std::array<double, 3>> patches;
   for (int p = 0; p < kAcross * kDown; ++p) {
@@ -162,13 +200,14 @@ inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig, const Co
     const ColourTruth& camera = rig[i];
     const int width = camera.size.width;
     const int height = camera.size.height;
+    const int edge = std::min(30, width / 20);  // half of the picture stays black
     Image frame(ImageLayout{camera.size, PixelFormat::rgb8, 8});
     const auto patch_at = [&](int x, int y) -> int {
       const int column = x * kAcross / width;
       const int row = y * kDown / height;
       const int dx = x - (2 * column + 1) * width / (2 * kAcross);
       const int dy = y - (2 * row + 1) * height / (2 * kDown);
-      if (std::abs(dx) > kEdge || std::abs(dy) > kEdge) return -1;
+      if (std::abs(dx) > edge || std::abs(dy) > edge) return -1;
       return (row * kAcross + column + 5 * static_cast<int>(i)) % (kAcross * kDown);
     };
     for (int y = 0; y < height; ++y)

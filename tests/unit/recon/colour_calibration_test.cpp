@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "recon/preprocess/samples.h"
 #include "tests/support/colour_rig.h"
 
 namespace emberlock {
@@ -23,6 +24,53 @@ TEST(CalibrateColour, ElevenUnlikeCamerasShowNewPatchesAlikeToOnePercent) {
   EXPECT_LE(after.worst_dim, 0.03);
   EXPECT_GT(after.saturated, 10);
   EXPECT_LE(after.unmarked, 1) << "one saturated pixel by itself is a hot one";
+}
+
+TEST(CalibrateColour, AFlatPictureTakesDustOut) {
+  auto rig = test::colour_rig(2, 2);
+  test::put_dust(rig[0], 2);
+  ColourReadings readings = test::film_target(rig, 2);
+  const auto without = calibrate_colour(readings);
+  ASSERT_TRUE(without.ok()) << without.error().message();
+  EXPECT_TRUE(without->cameras[0].colour.flat.light.empty());
+  EXPECT_GT(test::held_out_spread(rig, &*without, 3).worst, 0.01);
+  test::add_flats(rig, readings);
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_LE(test::held_out_spread(rig, &*calibration, 3).worst, 0.01);
+  EXPECT_GT(calibration->cameras[0].flat_worst, 0.06);
+  EXPECT_TRUE(calibration->cameras[1].colour.flat.light.empty()) << "there is nothing on its sensor";
+}
+
+TEST(CalibrateColour, CamerasOfDifferentResolutionsAreMatched) {
+  auto rig = test::colour_rig(3, 7);
+  rig[1].size = {320, 240};
+  rig[2].size = {800, 450};
+  const auto calibration = calibrate_colour(test::film_target(rig, 7));
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_LE(test::held_out_spread(rig, &*calibration, 8).worst, 0.01);
+}
+
+TEST(FlatField, IsLinearBetweenItsCellsAndSurvivesItsMessage) {
+  Colour colour;
+  colour.flat = {2, 1, {1, 1, 1, 0.8F, 0.9F, 1.1F}};
+  const auto read = read_colour(to_message(colour), {4, 2}, "camera a");
+  ASSERT_TRUE(read.ok()) << read.error().message();
+  EXPECT_NEAR(light_at(read->flat, 0.1, 0.5)[0], 1, 1e-6) << "outside the cells' middles as at them";
+  EXPECT_NEAR(light_at(read->flat, 0.5, 0.9)[0], 0.9, 1e-6);
+  EXPECT_NEAR(light_at(read->flat, 0.75, 0)[2], 1.1, 1e-6);
+  RadianceImage image({4, 2});
+  for (float& v : image.rgb) v = 90;
+  equalise(image, *read);
+  EXPECT_NEAR(image.rgb[1], 90, 1e-4);
+  EXPECT_NEAR(image.rgb[9], 90 / 0.8, 1e-4);
+
+  v1::Colour message = to_message(colour);
+  message.mutable_flat()->set_rows(2);
+  EXPECT_THAT(read_colour(message, {4, 2}, "camera a").error().message(), HasSubstr("camera a.colour.flat"));
+  message = to_message(colour);
+  message.mutable_flat()->set_light(4, 0);
+  EXPECT_THAT(read_colour(message, {4, 2}, "camera a").error().message(), HasSubstr("without light"));
 }
 
 TEST(CalibrateColour, GainsLieWithinTheirStatedUncertaintyAndHaveTheMeanOne) {

@@ -68,6 +68,16 @@ TEST_P(EffectsTest, SetByHandIsTakenAndItsChangePredicted) {
   EXPECT_EQ(choice->reports[0].reason, "set by hand");
 }
 
+TEST(Effects, PicturesThatACalibrationMadeLinearAreNotBentTwice) {
+  Scene scene = small_flame_scene();
+  scene.linearised = true;
+  for (const char* words : {"gamma=2.2", "auto:gamma=2.2"}) {
+    const auto choice = choose_effects(scene, grid_over(scene.box, 64), *parse_effects(words), {});
+    ASSERT_FALSE(choice.ok()) << words;
+    EXPECT_NE(choice.error().message().find("linear already"), std::string::npos) << choice.error().message();
+  }
+}
+
 TEST(Effects, WholeTableIsParsedByName) {
   const auto request = parse_effects(
       "extinction=32.8,scattering=single:albedo=0.25:g=-0.3,background=10/11.5/12,exposure=0.004:rise=0.8,"

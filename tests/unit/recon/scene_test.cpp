@@ -235,6 +235,7 @@ TEST_F(SessionSceneTest, AManifestsColourMakesCamerasAlike) {
   const auto scene = load_scene(record(m), {.box = {}, .frame = 1});
   ASSERT_TRUE(scene.ok()) << scene.error().message();
   EXPECT_NEAR(scene->views[2].image.rgb[0], 11 - 4, 0.1);
+  EXPECT_TRUE(scene->linearised);
   ASSERT_FALSE(scene->preprocessing.empty());
   EXPECT_EQ(scene->preprocessing[0].name, "linearise");
   EXPECT_TRUE(scene->preprocessing[0].on);

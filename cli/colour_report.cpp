@@ -124,7 +124,7 @@ void patch_table(HtmlPage& page, const ColourReadings& readings, const ColourCal
   std::map<std::string, std::vector<Cell>> patches;
   for (const ColourResidual& r : calibration.residuals) {
     const PatchReading& p = readings.patches[r.reading];
-    if (p.patch.rfind("flat:", 0) == 0) continue;
+    if (is_flat(p)) continue;
     auto& row = patches[p.light.empty() ? p.patch : p.patch + " @ " + p.light];
     row.resize(readings.cameras.size());
     Cell& cell = row[p.camera];

@@ -4,123 +4,24 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <set>
 
 #include <fmt/format.h>
 
+#include "base/square.h"
 #include "recon/preprocess/colour_advice.h"
+#include "recon/preprocess/colour_equations.h"
 #include "recon/preprocess/colour_fit.h"
 #include "recon/preprocess/flat_field.h"
 
 namespace emberlock {
 namespace {
 
-constexpr double kLeastRatio = 1.3;  // of exposures that tell a response
 constexpr int kResponsePoints = 256;
+constexpr double kMostOutliers = 1.0 / 3;  // of the target's readings
+constexpr double kMostOff = 0.05;          // RMS of a camera
 
 Error bad_target(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
-}
-
-using RadianceKey = std::pair<std::string, std::size_t>;
-
-/// Equations from readings, and what they came from.
-struct Equations {
-  std::vector<ColourEquation> all;
-  std::vector<std::size_t> reading;  ///< of each
-  std::vector<ColourResidual> left_out;
-  std::map<RadianceKey, std::size_t> lights;
-};
-
-Equations equations_of(const ColourReadings& readings) {
-  Equations out;
-  for (std::size_t i = 0; i < readings.patches.size(); ++i) {
-    const PatchReading& p = readings.patches[i];
-    const ColourCamera& camera = readings.cameras[p.camera];
-    const auto known = readings.radiance.find(p.patch);
-    for (std::size_t c = 0; c < 3; ++c) {
-      if (p.count[c] == 0) continue;
-      const double dark = dark_sample(camera.dark, c);
-      if (const ReadingUse use = use_of(p, c, dark); use != ReadingUse::used) {
-        out.left_out.push_back({i, c, 0, 0, use});
-        continue;
-      }
-      ColourEquation e;
-      e.camera = p.camera;
-      e.channel = c;
-      e.known = std::log(p.exposure);
-      const std::string name =
-          known == readings.radiance.end() ? "patch:" + p.patch + "@" + p.light : "light:" + p.light;
-      if (known != readings.radiance.end()) e.known += std::log(known->second[c]);
-      e.light = out.lights.emplace(RadianceKey{name, c}, out.lights.size()).first->second;
-      e.sample = p.mean[c];
-      e.variance = p.variance[c];
-      e.dark_sample = dark;
-      e.sample_sigma = mean_sigma(p, c, camera.step);
-      e.radius_squared = radius_squared(camera.size, p.x, p.y);
-      out.all.push_back(e);
-      out.reading.push_back(i);
-    }
-  }
-  return out;
-}
-
-/// Dark pictures brighter than every patch are swapped, or taken with the light on.
-Status check_dark(const ColourReadings& readings) {
-  for (std::size_t camera = 0; camera < readings.cameras.size(); ++camera) {
-    const ColourCamera& from = readings.cameras[camera];
-    if (from.dark.histogram[1].empty()) continue;
-    double brightest = 0;
-    for (const PatchReading& p : readings.patches)
-      if (p.camera == camera) brightest = std::max(brightest, p.mean[1]);
-    if (brightest > 0 && dark_sample(from.dark, 1) >= brightest) {
-      return bad_target("camera " + from.id, "its dark pictures are brighter than the target",
-                        "Take them with the lens covered; check that dark* and target* aren't exchanged");
-    }
-  }
-  return {};
-}
-
-/// The same radiance with more exposure must give a larger sample.
-Status check_rising(const ColourReadings& readings, const Equations& equations) {
-  using Key =
-      std::tuple<std::size_t, std::size_t, std::size_t, double, double>;  // camera, light, channel, place
-  std::map<Key, std::vector<std::pair<double, std::size_t>>> series;
-  for (std::size_t i = 0; i < equations.all.size(); ++i) {
-    const ColourEquation& e = equations.all[i];
-    const PatchReading& p = readings.patches[equations.reading[i]];
-    series[{e.camera, e.light, e.channel, p.x, p.y}].emplace_back(e.known, i);
-  }
-  for (auto& [key, steps] : series) {
-    std::sort(steps.begin(), steps.end());
-    for (std::size_t i = 1; i < steps.size(); ++i) {
-      const ColourEquation& low = equations.all[steps[i - 1].second];
-      const ColourEquation& high = equations.all[steps[i].second];
-      const double margin = 6 * std::hypot(low.sample_sigma, high.sample_sigma) + 0.01;
-      if (high.known - low.known < std::log(kLeastRatio) || high.sample > low.sample - margin) continue;
-      const PatchReading& p = readings.patches[equations.reading[steps[i].second]];
-      return bad_target(
-          "camera " + readings.cameras[low.camera].id + ": patch " + p.patch,
-          fmt::format("more exposure makes it darker: {:.3g} of white in {}, {:.3g} in {}", low.sample,
-                      readings.patches[equations.reading[steps[i - 1].second]].picture, high.sample,
-                      p.picture),
-          "Check the exposures told; switch the camera's automatic exposure and tone off");
-    }
-  }
-  return {};
-}
-
-/// Whether anything says how samples grow with light: one radiance, up to known factors, seen at two of them.
-bool response_told(const std::vector<ColourEquation>& equations) {
-  std::map<std::tuple<std::size_t, std::size_t>, std::pair<double, double>> range;  // camera, light
-  for (const ColourEquation& e : equations) {
-    const auto at = range.emplace(std::tuple(e.camera, e.light), std::pair(e.known, e.known)).first;
-    at->second.first = std::min(at->second.first, e.known);
-    at->second.second = std::max(at->second.second, e.known);
-  }
-  return std::any_of(range.begin(), range.end(), [](const auto& entry) {
-    return entry.second.second - entry.second.first > std::log(kLeastRatio);
-  });
 }
 
 /// Which cameras see a common radiance, directly or by others, in one channel: each one's group by its first
@@ -158,17 +59,6 @@ std::size_t main_group(const std::vector<std::size_t>& groups) {
     }
   }
   return best;
-}
-
-/// The lens's falloff needs a radiance at three or more distances that differ by much.
-bool vignetting_told(const std::vector<ColourEquation>& equations, std::size_t camera) {
-  std::map<std::size_t, std::set<int>> places;  // by light: tenths of r^2
-  for (const ColourEquation& e : equations)
-    if (e.camera == camera) places[e.light].insert(static_cast<int>(10 * e.radius_squared));
-  std::set<int> all;
-  for (const auto& [light, tenths] : places)
-    if (tenths.size() > 1) all.insert(tenths.begin(), tenths.end());
-  return all.size() >= 3 && *all.rbegin() - *all.begin() >= 3;
 }
 
 ColourFit start_of(const Equations& equations, std::size_t cameras, const ColourOptions& options) {
@@ -283,22 +173,58 @@ struct JointFit {
   std::vector<FoundFlat> flats;
 };
 
+/// The fit by the target alone, from where flat pictures lead it astray no more; `start` where that isn't
+/// enough.
+ColourFit fit_target(const ColourReadings& readings, const Equations& equations, const ColourFit& start,
+                     ColourHeld held) {
+  std::vector<ColourEquation> target;
+  for (std::size_t i = 0; i < equations.all.size(); ++i)
+    if (!is_flat(readings.patches[equations.reading[i]])) target.push_back(equations.all[i]);
+  held.vignetting = vignetting_not_told(target, readings.cameras.size());
+  return target.size() == equations.all.size() ? start : fit_colour(target, start, held).value_or(start);
+}
+
 /// Patches behind dust would darken their cameras, so where there are flat fields, the fit is made again with
 /// them.
-std::optional<JointFit> fit_jointly(const ColourReadings& readings, Equations& equations, ColourFit start,
-                                    const ColourHeld& held, double floor) {
-  auto fit = fit_colour(equations.all, std::move(start), held, floor);
+std::optional<JointFit> fit_jointly(const ColourReadings& readings, Equations& equations,
+                                    const ColourFit& start, const ColourHeld& held, double floor) {
+  auto fit = fit_colour(equations.all, fit_target(readings, equations, start, held), held);
   if (!fit) return std::nullopt;
   std::vector<FoundFlat> flats = find_flats(readings, *fit, floor);
   const bool any =
       std::any_of(flats.begin(), flats.end(), [](const FoundFlat& f) { return !f.flat.light.empty(); });
   if (any) {
     put_flats(readings, flats, equations);
-    fit = fit_colour(equations.all, std::move(*fit), held, floor);
+    fit = fit_colour(equations.all, std::move(*fit), held);
     if (!fit) return std::nullopt;
     flats = find_flats(readings, *fit, floor);
   }
   return JointFit{std::move(*fit), std::move(flats)};
+}
+
+/// A fit that a camera's readings contradict is no calibration.
+Status check_fit(const ColourReadings& readings, const Equations& equations) {
+  for (std::size_t camera = 0; camera < readings.cameras.size(); ++camera) {
+    double squares = 0;
+    double used = 0;
+    double outliers = 0;
+    for (std::size_t i = 0; i < equations.all.size(); ++i) {
+      const ColourEquation& e = equations.all[i];
+      if (e.camera != camera || is_flat(readings.patches[equations.reading[i]])) continue;
+      (e.outlier ? outliers : used) += 1;
+      if (!e.outlier) squares += square(e.residual);
+    }
+    const double off = std::sqrt(squares / std::max(1.0, used));
+    if (outliers <= kMostOutliers * (used + outliers) && off <= kMostOff) continue;
+    return bad_target(
+        "camera " + readings.cameras[camera].id,
+        fmt::format("its readings of the target contradict each other: off by {:.1f} % (RMS), and {:.0f} of "
+                    "{:.0f} further than that",
+                    100 * off, outliers, used + outliers),
+        "Check the exposures told and colour.json's rectangles; keep the light steady; switch automatic "
+        "exposure and white balance off");
+  }
+  return {};
 }
 
 Status check_colour_options(const ColourOptions& options) {
@@ -312,7 +238,7 @@ Status check_colour_options(const ColourOptions& options) {
 Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const ColourOptions& options) {
   EMBERLOCK_RETURN_IF_ERROR(check_colour_options(options));
   EMBERLOCK_RETURN_IF_ERROR(check_dark(readings));
-  Equations equations = equations_of(readings);
+  Equations equations = equations_of(readings, options);
   if (equations.all.empty()) {
     const auto saturated =
         std::count_if(equations.left_out.begin(), equations.left_out.end(),
@@ -338,7 +264,7 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
     groups[c] = groups_of(equations.all, cameras, c);
     for (std::size_t i = 0; i < cameras; ++i) held.gain[i][c] = groups[c][i] == i;
   }
-  for (std::size_t i = 0; i < cameras; ++i) held.vignetting[i] = !vignetting_told(equations.all, i);
+  held.vignetting = vignetting_not_told(equations.all, cameras);
 
   const auto joint =
       fit_jointly(readings, equations, start_of(equations, cameras, options), held, options.floor);
@@ -346,6 +272,7 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
     return bad_target("target pictures", "don't determine the cameras' colours",
                       "Take more pictures of more patches by all cameras");
   }
+  EMBERLOCK_RETURN_IF_ERROR(check_fit(readings, equations));
   const ColourFit& fit = joint->fit;
 
   ColourCalibration out;

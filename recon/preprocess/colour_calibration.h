@@ -61,8 +61,9 @@ struct ColourCalibration {
 };
 
 /// Errors: no usable patch at all (all saturated, or dark); nothing that tells the response (an exposure
-/// series, known radiances or a given gamma); a camera whose readings fall where light rises; dark pictures
-/// that are brighter than the target. Cameras that share no patch with the others are a warning and marked.
+/// series, known radiances or a given gamma); a camera whose readings fall where light rises, or contradict
+/// each other; dark pictures that are brighter than the target. Cameras that share no patch with the others
+/// are a warning and marked.
 Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const ColourOptions& options = {});
 
 }  // namespace emberlock

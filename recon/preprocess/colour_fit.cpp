@@ -149,14 +149,14 @@ class ColourProblem {
 };
 
 /// Relative standard deviation of the exposure that a reading tells.
-void weigh(std::vector<ColourEquation>& equations, const ColourFit& fit, double floor) {
+void weigh(std::vector<ColourEquation>& equations, const ColourFit& fit) {
   for (ColourEquation& e : equations) {
     const ColourUnknowns& c = fit.cameras[e.camera];
     const double whole = std::exp(ResponseCurve::log_exposure(c.response.data(), e.sample, e.variance));
     const double slope = whole * ResponseCurve::log_slope(c.response.data(), e.sample) / e.sample;
     const double noise = slope * e.sample_sigma /
                          std::max(kLeastExposure, whole - ResponseCurve::exposure(c.response, e.dark_sample));
-    e.sigma = std::hypot(floor, noise);
+    e.sigma = std::hypot(e.floor, noise);
   }
 }
 
@@ -182,16 +182,16 @@ void judge_equations(std::vector<ColourEquation>& equations, ColourFit& fit) {
 }  // namespace
 
 std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, ColourFit start,
-                                    const ColourHeld& held, double floor) {
+                                    const ColourHeld& held) {
   constexpr int kRounds = 3;
   ColourFit fit = std::move(start);
   for (int round = 0; round < kRounds; ++round) {
-    weigh(equations, fit, floor);
+    weigh(equations, fit);
     ColourProblem problem(equations, fit, held);
     if (!problem.solve()) return std::nullopt;
     judge_equations(equations, fit);
   }
-  weigh(equations, fit, floor);
+  weigh(equations, fit);
   const auto covariance = ColourProblem(equations, fit, held).covariance();
   if (!covariance) return std::nullopt;
   // Where the model misses by more than the noise, the noise isn't what limits the result.

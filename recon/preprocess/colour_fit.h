@@ -19,6 +19,7 @@ struct ColourEquation {
   double sample_sigma = 0;  ///< of the mean
   double radius_squared = 0;
   double flat = 0;         ///< ln of the flat field's share of the light
+  double floor = 0;        ///< relative: what it may be off by whatever the noise
   double dark_sample = 0;  ///< without light
   bool outlier = false;    ///< out
   double residual = 0;     ///< out: ln of the camera's radiance over the common one
@@ -48,6 +49,6 @@ struct ColourHeld {
 /// The joint robust fit from `start`; nothing where the equations leave something open. Weights are renewed
 /// as the response is found.
 std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, ColourFit start,
-                                    const ColourHeld& held, double floor);
+                                    const ColourHeld& held);
 
 }  // namespace emberlock

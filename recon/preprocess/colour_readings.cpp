@@ -21,7 +21,6 @@ namespace {
 using PlanJson = nlohmann::json;
 
 constexpr std::size_t kLargestPlan = std::size_t{16} << 20;
-constexpr int kFlatBlocks = 12;  // along each side, as patches of the fit
 
 Error bad_plan(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
@@ -170,12 +169,8 @@ class CameraPictures {
     return {};
   }
   Status add_flat(const Image& image, const PicturePath& picture) {
-    const ImageSize size = image.layout().size;
-    const int width = std::max(2, size.width / kFlatBlocks);
-    const int height = std::max(2, size.height / kFlatBlocks);
-    for (int y = 0; y + height <= size.height; y += height)
-      for (int x = 0; x + width <= size.width; x += width)
-        keep(image, picture, {x, y, width, height}, "flat:" + picture_name(picture));
+    for (PatchReading& patch : flat_patches(image.view(), picture_name(picture)))
+      keep(std::move(patch), picture);
     readings_.flats.push_back(read_flat(image.view()));
     readings_.flats.back().camera = index_;
     return {};
@@ -193,14 +188,14 @@ class CameraPictures {
         return bad_plan(picture.path.string(), "patch " + patch + " lies outside the picture",
                         "Correct its rectangle in colour.json");
       }
-      keep(image, picture, place, patch);
+      PatchReading reading = read_patch(image.view(), place);
+      reading.patch = patch;
+      keep(std::move(reading), picture);
     }
     return {};
   }
-  void keep(const Image& image, const PicturePath& picture, const PatchPlace& place, std::string patch) {
-    PatchReading reading = read_patch(image.view(), place);
+  void keep(PatchReading reading, const PicturePath& picture) {
     reading.camera = index_;
-    reading.patch = std::move(patch);
     reading.light = picture.light;
     reading.picture = picture_name(picture);
     reading.exposure = picture.exposure.value_or(1);

@@ -8,7 +8,9 @@
 namespace emberlock {
 namespace {
 
-constexpr int kFlatCells = 48;  // along a row, as a field
+constexpr const char* kFlatPrefix = "flat:";
+constexpr int kFlatBlocks = 12;  // along each side, as patches
+constexpr int kFlatCells = 48;   // along a row, as a field
 constexpr int kLeastFlatCell = 16;
 constexpr double kDarkest = 0.03;  // samples: below, noise and quantisation bend what the mean tells
 constexpr double kBrightest = 0.985;
@@ -84,6 +86,21 @@ FlatReading read_flat(const ImageView& picture) {
   }
   return flat;
 }
+
+std::vector<PatchReading> flat_patches(const ImageView& picture, const std::string& name) {
+  const ImageSize size = picture.layout.size;
+  const int width = std::max(2, size.width / kFlatBlocks);
+  const int height = std::max(2, size.height / kFlatBlocks);
+  std::vector<PatchReading> patches;
+  for (int y = 0; y + height <= size.height; y += height)
+    for (int x = 0; x + width <= size.width; x += width) {
+      patches.push_back(read_patch(picture, {x, y, width, height}));
+      patches.back().patch = kFlatPrefix + name;
+    }
+  return patches;
+}
+
+bool is_flat(const PatchReading& reading) { return reading.patch.rfind(kFlatPrefix, 0) == 0; }
 
 double dark_sample(const DarkReading& dark, std::size_t channel) {
   const std::vector<double>& shares = dark.histogram[channel];

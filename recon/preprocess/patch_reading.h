@@ -50,6 +50,10 @@ PatchReading read_patch(const ImageView& picture, const PatchPlace& place);
 /// A flat picture's cells, some 48 along a row, of at least 16 pixels a side.
 FlatReading read_flat(const ImageView& picture);
 
+/// The same in twelve by twelve coarse patches, which all saw one radiance: is_flat().
+std::vector<PatchReading> flat_patches(const ImageView& picture, const std::string& name);
+[[nodiscard]] bool is_flat(const PatchReading& reading);
+
 /// The median of the samples without light, 0 where they aren't known. Not their mean: black clips noise from
 /// below, which light doesn't see.
 double dark_sample(const DarkReading& dark, std::size_t channel);

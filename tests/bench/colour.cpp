@@ -87,7 +87,7 @@ void dust(int seeds) {
   }
   std::printf("dust on all sensors: %d rigs of eleven cameras\n", seeds);
   print_spread("without flat pictures", without);
-  print_spread("a flat picture each", with);
+  print_spread("two flat pictures each", with);
 }
 
 void smear() {

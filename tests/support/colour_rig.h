@@ -121,6 +121,7 @@ struct TargetOptions {
   std::vector<double> exposures = {0.25, 0.5, 1};
   int patches = 8;
   bool dark = true;
+  std::size_t places = 5;  ///< 1: in the middle alone
 };
 
 /// Greys and colours from 8 to 96 % of white.
@@ -134,7 +135,7 @@ inline std::vector<std::array<double, 3>> colour_chart(int patches, std::uint64_
   return chart;
 }
 
-/// A chart, seen by every camera in the middle and in four places further out.
+/// A chart, seen by every camera in the middle and in up to four places further out.
 inline ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint64_t seed,
                                   const TargetOptions& options = {}) {
   ColourReadings readings;
@@ -145,7 +146,7 @@ inline ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint
   for (std::size_t i = 0; i < rig.size(); ++i) {
     readings.cameras.push_back({"cam" + std::to_string(i), rig[i].size, 1.0 / 255, {}});
     if (options.dark) readings.cameras.back().dark = film_dark(rig[i], random);
-    for (std::size_t place = 0; place < kPlaces.size(); ++place) {
+    for (std::size_t place = 0; place < std::min(options.places, kPlaces.size()); ++place) {
       for (const double exposure : options.exposures) {
         for (std::size_t p = 0; p < chart.size(); ++p) {
           const double dx = 0.04 * (static_cast<double>(p % 4) - 1.5);
@@ -163,13 +164,19 @@ inline ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint
   return readings;
 }
 
-/// A flat picture of each camera.
+/// Two flat pictures of each camera.
 inline void add_flats(const std::vector<ColourTruth>& rig, ColourReadings& readings) {
   RandomStream random(5, 6);
-  for (std::size_t i = 0; i < rig.size(); ++i) {
-    readings.flats.push_back(read_flat(film_flat(rig[i], random).view()));
-    readings.flats.back().camera = i;
-  }
+  for (std::size_t i = 0; i < rig.size(); ++i)
+    for (const char* name : {"flat1", "flat2"}) {
+      const Image picture = film_flat(rig[i], random);
+      readings.flats.push_back(read_flat(picture.view()));
+      readings.flats.back().camera = i;
+      for (PatchReading& patch : flat_patches(picture.view(), std::to_string(i) + name)) {
+        patch.camera = i;
+        readings.patches.push_back(std::move(patch));
+      }
+    }
 }
 
 /// How far cameras are apart that see the same patch.

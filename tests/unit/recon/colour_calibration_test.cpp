@@ -42,6 +42,34 @@ TEST(CalibrateColour, AFlatPictureTakesDustOut) {
   EXPECT_TRUE(calibration->cameras[1].colour.flat.light.empty()) << "there is nothing on its sensor";
 }
 
+/// Thousands of a flat picture's cells must not talk the response into one that is blind to their dust.
+TEST(CalibrateColour, ATargetInOnePlaceAndDustyFlatPicturesAreEnough) {
+  auto rig = test::colour_rig(2, 2);
+  for (std::size_t i = 0; i < rig.size(); ++i) test::put_dust(rig[i], 2 + i);
+  ColourReadings readings =
+      test::film_target(rig, 2, {.exposures = {0.25, 0.5, 1}, .patches = 8, .dark = true, .places = 1});
+  test::add_flats(rig, readings);
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_TRUE(calibration.ok()) << calibration.error().message();
+  EXPECT_LE(test::held_out_spread(rig, &*calibration, 9).worst, 0.015);
+  for (const CalibratedColour& camera : calibration->cameras) EXPECT_TRUE(camera.vignetting_known);
+}
+
+TEST(CalibrateColour, AResponseThatMostReadingsContradictIsNoResult) {
+  const auto rig = test::colour_rig(2, 8);
+  ColourReadings readings = test::film_target(rig, 8);
+  RandomStream random(1, 2);
+  for (PatchReading& p : readings.patches)
+    if (p.camera == 1)
+      for (double& m : p.mean) m = std::clamp(m * random.uniform(0.99, 1.01), 0.0, 0.98);
+  EXPECT_TRUE(calibrate_colour(readings).ok()) << "noise";
+  for (PatchReading& p : readings.patches)
+    if (p.camera == 1) p.exposure = std::sqrt(p.exposure) * random.uniform(0.8, 1.25);
+  const auto calibration = calibrate_colour(readings);
+  ASSERT_FALSE(calibration.ok());
+  EXPECT_THAT(calibration.error().message(), HasSubstr("camera cam1"));
+}
+
 TEST(CalibrateColour, CamerasOfDifferentResolutionsAreMatched) {
   auto rig = test::colour_rig(3, 7);
   rig[1].size = {320, 240};
@@ -124,7 +152,8 @@ TEST(CalibrateColour, WrongPatchesAreLeftOut) {
 
 TEST(CalibrateColour, KnownRadiancesTellTheResponseWithoutAnExposureSeries) {
   const auto rig = test::colour_rig(2, 8);
-  ColourReadings readings = test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true});
+  ColourReadings readings =
+      test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true, .places = 5});
   EXPECT_THAT(calibrate_colour(readings).error().message(), HasSubstr("nothing tells the cameras' response"));
   const auto chart = test::colour_chart(8, 8);
   for (std::size_t p = 0; p < chart.size(); ++p) readings.radiance["p" + std::to_string(p)] = chart[p];
@@ -137,7 +166,7 @@ TEST(CalibrateColour, AToldGammaIsTaken) {
   auto rig = test::colour_rig(2, 8);
   for (test::ColourTruth& camera : rig) camera.gamma = 2.2;
   const auto calibration = calibrate_colour(
-      test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true}), {.gamma = 2.2});
+      test::film_target(rig, 8, {.exposures = {1}, .patches = 8, .dark = true, .places = 5}), {.gamma = 2.2});
   ASSERT_TRUE(calibration.ok()) << calibration.error().message();
   EXPECT_EQ(calibration->cameras[0].gamma, 2.2);
   EXPECT_LE(test::held_out_spread(rig, &*calibration, 9).worst, 0.01);

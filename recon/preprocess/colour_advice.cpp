@@ -23,7 +23,7 @@ void advise_on_colours(ColourCalibration& out) {
       wishes.emplace_back(0.3,
                           "camera " + c.camera +
                               ": the target in the middle, half way out and in a corner, or a flat picture");
-    else if (c.corner_sigma > 0.005 * c.corner)
+    else if (c.flat_worst == 0 && c.corner_sigma > 0.005 * c.corner)
       wishes.emplace_back(c.corner_sigma / c.corner,
                           fmt::format("camera {}: the target nearer to the corners, or a flat picture (light "
                                       "there is {:.2f} +- {:.2f})",

@@ -19,7 +19,11 @@ constexpr float kSoft = 0.02F;  // differences below this share of the expected 
 // Where the extinction falls, more light comes through and A^T A 1 grows: it is taken for a thinner medium,
 // so that it still majorises then.
 constexpr float kThinned = 0.5F;
-constexpr float kLeastCurvature = 0.05F;      // over the mean: bounds the steps where few rays come
+constexpr float kLeastCurvature = 0.05F;  // over the mean: bounds the steps where few rays come
+// Emission and extinction move at once and pull at the same rays: a matrix of two blocks is majorised by
+// twice the blocks on its diagonal. The emission's has slack enough; with 1 here, flames of few pixels
+// diverge.
+constexpr float kJoint = 2;
 constexpr float kMostExtinction = 0.3F;       // a voxel edge, unless more is expected
 constexpr float kFaintestExtinction = 1e-4F;  // a voxel edge: the scale of a medium thought to take nothing
 constexpr int kHoldOutOneIn = 32;             // pixels kept from the fit
@@ -201,8 +205,9 @@ void Descent::find_weights(const std::vector<Rgba>& x) {
   engine_->set_weights(weights);
 }
 
-/// J^T J 1, J being the derivative of the rays' radiance by the extinction: all of its entries have one sign,
-/// because extinction only takes light away, so this majorises J^T J. J 1 is a difference along (0, 0, 0, 1).
+/// kJoint J^T J 1, J being the derivative of the rays' radiance by the extinction: all of its entries have
+/// one sign, because extinction only takes light away, so this majorises J^T J. J 1 is a difference along (0,
+/// 0, 0, 1).
 void Descent::release_extinction() {
   const std::vector<std::uint8_t>& active = level_.problem.active;
   const std::vector<Rgba> x = engine_->get();
@@ -237,7 +242,7 @@ void Descent::release_extinction() {
   for (std::size_t p = 0; p < weights.size(); ++p)
     if (active[p] != 0 && gradient[p].c[3] > 0) mean.add(weights[p] = taken.times * gradient[p].c[3]);
   for (float& w : weights)
-    if (w > 0) w += kLeastCurvature * mean();
+    if (w > 0) w = kJoint * (w + kLeastCurvature * mean());
   engine_->set_field(weights, expected);
   engine_->set(x);
   field_ = {{}, kVariation * scale * mean(), kSoft * scale, std::max(kMostExtinction, 4 * scale)};

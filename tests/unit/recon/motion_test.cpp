@@ -13,28 +13,38 @@ namespace {
 
 constexpr double kReach = 5.4e-3;  // seconds
 
-/// Filmed by cameras up to 5.4 ms apart, whose averages are known.
-Scene late_scene(double rise_speed, std::uint64_t seed = 3) {
+PaperSceneOptions small_film() {
   PaperSceneOptions options;
+  options.flame.seed = 3;
+  options.image = {128, 96};
+  options.truth_voxels = 40;
+  return options;
+}
+
+/// Filmed by cameras up to 5.4 ms apart, whose averages are known.
+Scene late_scene(double rise_speed) {
+  PaperSceneOptions options = small_film();
   options.flame.rise_speed = rise_speed;
-  options.flame.seed = seed;
-  options.image = {160, 120};
-  options.truth_voxels = 48;
-  options.averaged_frames = 12;
+  options.averaged_frames = 8;
   for (std::uint64_t i = 0; i < 10; ++i)
     options.lateness.push_back(Seconds(kReach * (2 * random_uniform(7, 0, i) - 1)));
   return paper_scene(options);
 }
 
+const Scene& rising_scene() {
+  static const Scene scene = late_scene(1);
+  return scene;
+}
+
 EffectChoice chosen(const Scene& scene, const EffectRequest& request = {}) {
-  const auto choice = choose_effects(scene, grid_over(scene.box, 48), request, {});
+  const auto choice = choose_effects(scene, grid_over(scene.box, 40), request, {});
   EXPECT_TRUE(choice.ok());
   EXPECT_EQ(choice->reports.back().name, "motion");
   return *choice;
 }
 
 double heldout(const Scene& scene, const Effects& effects) {
-  const auto solved = solve(scene, grid_over(scene.box, 48), effects, {});
+  const auto solved = solve(scene, grid_over(scene.box, 40), effects, {});
   EXPECT_TRUE(solved.ok());
   return all_channels(solved->trace.back().heldout_rmse);
 }
@@ -78,7 +88,7 @@ TEST(MotionTest, APictureOfThePlaneThroughTheFlameChangesPlaceAsTheCameraDoes) {
 }
 
 TEST(MotionTest, AViewFromAnotherInstantIsRenderedAtItsOwn) {
-  const Scene scene = late_scene(1);
+  const Scene& scene = rising_scene();
   const EffectChoice choice = chosen(scene);
   ASSERT_TRUE(choice.reports.back().on) << choice.reports.back().reason;
   EXPECT_NEAR(choice.effects.motion.velocity[2], 1, 0.3);
@@ -94,10 +104,7 @@ TEST(MotionTest, AFlameThatStandsStillAndOneFilmedAtOnceAreLeftAlone) {
   EXPECT_FALSE(standing.reports.back().on) << standing.reports.back().reason;
   EXPECT_EQ(standing.effects.motion.carry, Motion::Carry::none);
 
-  PaperSceneOptions options;
-  options.image = {160, 120};
-  options.truth_voxels = 48;
-  const Scene at_once = paper_scene(options);
+  const Scene at_once = paper_scene(small_film());
   const EffectChoice choice = chosen(at_once);
   EXPECT_FALSE(choice.reports.back().on);
   EXPECT_EQ(choice.reports.back().predicted_change, 0);
@@ -108,7 +115,7 @@ TEST(MotionTest, AFlameThatStandsStillAndOneFilmedAtOnceAreLeftAlone) {
 }
 
 TEST(MotionTest, TimesThatAreAsUncertainAsTheyDifferAreNotUsed) {
-  Scene scene = late_scene(1);
+  Scene scene = rising_scene();
   for (View& view : scene.views) view.lateness_sigma = Seconds(kReach);
   const EffectChoice choice = chosen(scene);
   EXPECT_FALSE(choice.reports.back().on) << choice.reports.back().reason;
@@ -123,7 +130,7 @@ TEST(MotionTest, WhatIsSetByHandIsTaken) {
   EXPECT_EQ(parse_effects("motion=none")->fixed->motion.carry, Motion::Carry::none);
   for (const char* wrong : {"motion=fast", "motion=1/2", "motion=21", "motion=0/0/nan"})
     EXPECT_FALSE(parse_effects(wrong).ok()) << wrong;
-  const EffectChoice choice = chosen(late_scene(1), *request);
+  const EffectChoice choice = chosen(rising_scene(), *request);
   EXPECT_TRUE(choice.reports.back().on);
   EXPECT_GT(choice.reports.back().predicted_change, 1);
   EXPECT_EQ(choice.effects.motion.velocity[2], 0.8);
@@ -132,7 +139,7 @@ TEST(MotionTest, WhatIsSetByHandIsTaken) {
 /// A held-out view that is late too is rendered at its own instant: what is taken out of its picture is put
 /// into the render.
 TEST(MotionTest, TheSteadyPartGoesBackIntoARenderOfALateView) {
-  Scene scene = late_scene(1);
+  const Scene& scene = rising_scene();
   Effects effects;
   effects.motion = rising(1);
   const PreparedScene prepared(scene, effects);

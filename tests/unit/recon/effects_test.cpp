@@ -1,5 +1,8 @@
 #include "recon/effects/effects.h"
 
+#include <map>
+#include <tuple>
+
 #include <gtest/gtest.h>
 
 #include "recon/adjust/choose_effects.h"
@@ -11,17 +14,24 @@ namespace {
 
 ON_EACH_DEVICE(EffectsTest);
 
-EffectChoice found(const Scene& scene) {
-  SolveOptions options;
-  options.compute.device = device_here();
-  auto choice = choose_effects(scene, grid_over(scene.box, 64), {}, options);
-  EXPECT_TRUE(choice.ok());
-  return *choice;
+/// Searched once for all tests of a device.
+const EffectChoice& found(PerMeter extinction, FlameShape shape) {
+  static std::map<std::tuple<Device, double, FlameShape>, EffectChoice> choices;
+  const auto [at, first] = choices.try_emplace({device_here(), extinction.value(), shape});
+  if (first) {
+    const Scene scene = small_flame_scene(extinction, shape);
+    SolveOptions options;
+    options.compute.device = device_here();
+    auto choice = choose_effects(scene, grid_over(scene.box, 64), {}, options);
+    EXPECT_TRUE(choice.ok());
+    at->second = *choice;
+  }
+  return at->second;
 }
 
 TEST_P(EffectsTest, EmissionOnlyFlameIsFoundAsSuch) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
-    const EffectChoice choice = found(small_flame_scene(PerMeter(0), shape));
+    const EffectChoice& choice = found(PerMeter(0), shape);
     ASSERT_EQ(choice.reports.size(), 9u);
     EXPECT_FALSE(choice.reports[0].on) << choice.reports[0].reason;
     EXPECT_EQ(choice.effects.extinction.value, PerMeter(0));
@@ -38,7 +48,7 @@ TEST_P(EffectsTest, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs)
       EXPECT_TRUE(r.ok());
       return all_channels(r->trace.back().heldout_rmse);
     };
-    const double by_itself = heldout(found(scene).effects);
+    const double by_itself = heldout(found(PerMeter(32.8), shape).effects);
     EXPECT_LT(by_itself, heldout(absorbing(PerMeter(32.8))));
     EXPECT_LT(by_itself, 0.8 * heldout({}));
   }
@@ -46,7 +56,7 @@ TEST_P(EffectsTest, WhatThePicturesTellBeatsKnowingTheExtinctionButNotWhereItIs)
 
 TEST_P(EffectsTest, ConstantExtinctionIsFoundWithinAFactorOfTwo) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
-    const EffectChoice choice = found(small_flame_scene(PerMeter(32.8), shape));
+    const EffectChoice& choice = found(PerMeter(32.8), shape);
     EXPECT_TRUE(choice.reports[0].on);
     EXPECT_GT(choice.reports[0].predicted_change, 2);
     // The hull is larger than the medium, so the extinction that fits best is less than the truth.

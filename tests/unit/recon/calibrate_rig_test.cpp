@@ -25,7 +25,7 @@ void keep(BoardSightings& sightings, auto wanted) {
 }
 
 TEST(CalibrateRig, ARingWithWrongCornersIsFoundAndItsUncertaintiesAreRight) {
-  test::BoardRigOptions options = small_rig(6, 36);
+  test::BoardRigOptions options = small_rig(6, 26);
   const test::BoardRig rig = test::board_rig(options);
   const auto found = calibrate_rig(rig.sightings, {.world = "0"});
   ASSERT_TRUE(found.ok()) << found.error().message();
@@ -60,7 +60,7 @@ TEST(CalibrateRig, ExactCornersGiveTheExactRig) {
 }
 
 TEST(CalibrateRig, ViewsThatDontFitAreNamed) {
-  test::BoardRig rig = test::board_rig(small_rig(3, 16));
+  test::BoardRig rig = test::board_rig(small_rig(3, 12));
   auto& bad = rig.sightings.sightings[4];
   for (BoardCorner& corner : bad.corners)
     corner.pixel += Eigen::Vector2d(5.0 * (corner.id % 2), 3.0 * (corner.id % 3));
@@ -72,10 +72,10 @@ TEST(CalibrateRig, ViewsThatDontFitAreNamed) {
 }
 
 TEST(CalibrateRig, ACameraThatSharesNoInstantHasALensAndIsNamed) {
-  test::BoardRig rig = test::board_rig(small_rig(4, 30));
-  // Camera 3 is alone at its instants: give its views instants of their own.
+  test::BoardRig rig = test::board_rig(small_rig(3, 14));
+  // Camera 2 is alone at its instants: give its views instants of their own.
   for (auto& sighting : rig.sightings.sightings) {
-    if (sighting.camera != 3) continue;
+    if (sighting.camera != 2) continue;
     sighting.instant = rig.sightings.instants.size();
     rig.sightings.instants.push_back("alone " + std::to_string(sighting.instant));
   }
@@ -83,12 +83,12 @@ TEST(CalibrateRig, ACameraThatSharesNoInstantHasALensAndIsNamed) {
   ASSERT_TRUE(found.ok()) << found.error().message();
   EXPECT_FALSE(found->whole());
   EXPECT_TRUE(found->cameras[0].placed);
-  EXPECT_TRUE(found->cameras[3].calibrated);
-  EXPECT_FALSE(found->cameras[3].placed);
-  EXPECT_THAT(found->cameras[3].why, HasSubstr("shares no usable instant"));
-  EXPECT_THAT(next_pictures(*found), testing::Contains(HasSubstr("cam03: shares no usable instant")));
+  EXPECT_TRUE(found->cameras[2].calibrated);
+  EXPECT_FALSE(found->cameras[2].placed);
+  EXPECT_THAT(found->cameras[2].why, HasSubstr("shares no usable instant"));
+  EXPECT_THAT(next_pictures(*found), testing::Contains(HasSubstr("cam02: shares no usable instant")));
   const v1::Rig written = rig_of(*found, "");
-  EXPECT_EQ(written.cameras(3).calibration().camera_from_world_size(), 0);
+  EXPECT_EQ(written.cameras(2).calibration().camera_from_world_size(), 0);
   EXPECT_EQ(written.cameras(0).calibration().sigma_size(), 15);
 }
 
@@ -111,7 +111,7 @@ TEST(CalibrateRig, ParallelBoardsAreRefused) {
   BoardSightings sightings;
   sightings.cameras.push_back({"cam", lens.size});
   RandomStream random(3, 3);
-  for (std::size_t i = 0; i < 10; ++i) {
+  for (std::size_t i = 0; i < 6; ++i) {
     const CameraModel camera{
         lens,
         {Eigen::DiagonalMatrix<double, 3>(1, -1, -1).toDenseMatrix(),
@@ -130,7 +130,7 @@ TEST(CalibrateRig, ParallelBoardsAreRefused) {
 }
 
 TEST(CalibrateRig, TheWorldMustBeAnInstantThatWasUsed) {
-  const test::BoardRig rig = test::board_rig(small_rig(2, 12));
+  const test::BoardRig rig = test::board_rig(small_rig(2, 8));
   const auto found = calibrate_rig(rig.sightings, {.world = "nowhere"});
   ASSERT_FALSE(found.ok());
   EXPECT_THAT(found.error().message(), HasSubstr("--world nowhere"));

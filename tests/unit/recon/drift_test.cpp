@@ -13,8 +13,8 @@ using testing::HasSubstr;
 
 test::BoardRigOptions later_views(std::uint64_t seed) {
   test::BoardRigOptions options;
-  options.cameras = 5;
-  options.instants = 12;
+  options.cameras = 4;
+  options.instants = 10;
   options.seed = seed;
   options.board = {BoardKind::chessboard, 9, 6, Meters(0.018)};
   return options;

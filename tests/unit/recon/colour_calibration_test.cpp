@@ -126,7 +126,7 @@ TEST(CalibrateColour, GainsLieWithinTheirStatedUncertaintyAndHaveTheMeanOne) {
 }
 
 TEST(CalibrateColour, AResponseThatIsNoPowerLawIsFound) {
-  auto rig = test::colour_rig(3, 4);
+  auto rig = test::colour_rig(2, 4);
   for (test::ColourTruth& camera : rig) camera.toe = 0.5;
   const auto calibration = calibrate_colour(test::film_target(rig, 4));
   ASSERT_TRUE(calibration.ok()) << calibration.error().message();
@@ -140,7 +140,7 @@ TEST(CalibrateColour, AResponseThatIsNoPowerLawIsFound) {
 }
 
 TEST(CalibrateColour, WrongPatchesAreLeftOut) {
-  const auto rig = test::colour_rig(3, 6);
+  const auto rig = test::colour_rig(2, 6);
   ColourReadings readings = test::film_target(rig, 6);
   for (std::size_t i = 0; i < readings.patches.size(); i += 20)
     for (double& m : readings.patches[i].mean) m *= 0.8;  // a hand's shadow

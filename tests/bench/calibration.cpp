@@ -1,4 +1,4 @@
-// calibration [SEEDS] [INSTANTS] [FIRST]: rigs of eleven cameras on a ring, a board seen by two to four at a
+// calibration [SEEDS] [INSTANTS] [WIDTHxHEIGHT] [FIRST]: rigs of eleven cameras on a ring, a board seen by two to four at a
 // time, corners with 0.2 pixels of noise, 5 % of them wrong: how near calibration comes to the truth, and
 // whether its stated uncertainties are right. A line a rig, and the worst of all.
 #include <chrono>
@@ -13,7 +13,11 @@ int main(int argc, char** argv) {
   const int seeds = argc > 1 ? std::atoi(argv[1]) : 100;
   test::BoardRigOptions options;
   if (argc > 2) options.instants = std::atoi(argv[2]);
-  const int first = argc > 3 ? std::atoi(argv[3]) : 1;
+  if (argc > 3 && std::sscanf(argv[3], "%dx%d", &options.image.width, &options.image.height) != 2) {
+    std::fprintf(stderr, "%s is no picture size such as 1280x720\n", argv[3]);
+    return 2;
+  }
+  const int first = argc > 4 ? std::atoi(argv[4]) : 1;
   double place = 0;
   double turn = 0;
   double rays = 0;
@@ -55,6 +59,7 @@ int main(int argc, char** argv) {
         seed, views, found->rejected.size(), noise, among.place * 1e3, among.turn * 180 / M_PI,
         among.rays * 180 / M_PI, world.place * 1e3, world.turn * 180 / M_PI, world.chi2, world.freedom,
         seconds);
+    std::fflush(stdout);
     place = std::max(place, among.place);
     turn = std::max(turn, among.turn);
     rays = std::max(rays, among.rays);
@@ -64,7 +69,8 @@ int main(int argc, char** argv) {
     freedom += world.freedom;
     outside += std::abs(z) > 2.576 ? 1 : 0;
   }
-  std::printf("%d rigs of 11 cameras, %d instants: %d failed\n", seeds, options.instants, failures);
+  std::printf("%d rigs of 11 cameras, %d x %d pixels, %d instants: %d failed\n", seeds, options.image.width,
+              options.image.height, options.instants, failures);
   std::printf(
       "worst camera of all: %.3f mm, rays %.4f degrees, axes %.4f degrees among the cameras; %.3f mm, %.4f "
       "degrees in the world's "

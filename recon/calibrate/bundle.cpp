@@ -65,15 +65,30 @@ enum class Weigh { by_noise, by_inflated_noise };
 bool holds_lens(Held held) { return held == Held::lens || held == Held::both; }
 bool holds_pose(Held held) { return held == Held::pose || held == Held::both; }
 
-/// One corner's residuals, `weight` a pixel.
-std::unique_ptr<ceres::CostFunction> corner_cost(const Bundle& bundle, const BundleView& view, std::size_t i,
-                                                 double weight) {
-  using Cost = ceres::AutoDiffCostFunction<CornerCost, 2, kLensUnknowns, kPoseUnknowns, kPoseUnknowns>;
-  return std::make_unique<Cost>(new CornerCost{&bundle.cameras[view.camera].model.camera_from_world.rotation,
-                                               &bundle.boards[view.board].world_from_board.rotation,
-                                               bundle.board.point(view.corners[i].id), view.corners[i].pixel,
-                                               weight});
+CornerEquations corner_equations(const Bundle& bundle, const BundleView& view, std::size_t i, double weight) {
+  return {&bundle.cameras[view.camera].model.camera_from_world.rotation,
+          &bundle.boards[view.board].world_from_board.rotation, bundle.board.point(view.corners[i].id),
+          view.corners[i].pixel, weight};
 }
+
+/// As Ceres asks for them.
+class CornerCost final : public ceres::SizedCostFunction<2, kLensUnknowns, kPoseUnknowns, kPoseUnknowns> {
+ public:
+  explicit CornerCost(const CornerEquations& equations) : equations_(equations) {}
+
+  bool Evaluate(double const* const* at, double* residuals, double** by) const override {
+    CornerEquations::Slopes slopes;
+    if (!equations_(at[0], at[1], at[2], residuals, by == nullptr ? nullptr : &slopes)) return false;
+    if (by == nullptr) return true;
+    if (by[0] != nullptr) std::copy_n(slopes.lens.data(), slopes.lens.size(), by[0]);
+    if (by[1] != nullptr) std::copy_n(slopes.camera.data(), slopes.camera.size(), by[1]);
+    if (by[2] != nullptr) std::copy_n(slopes.board.data(), slopes.board.size(), by[2]);
+    return true;
+  }
+
+ private:
+  CornerEquations equations_;
+};
 
 /// The problem over `blocks`, which must outlive it. Cameras and boards that no used corner shows are left
 /// out.
@@ -85,7 +100,7 @@ std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks,
     for (std::size_t i = 0; i < view.corners.size(); ++i) {
       if (view.use[i] != CornerUse::used) continue;
       const double noise = camera.noise * (weigh == Weigh::by_noise ? 1 : camera.inflation);
-      problem->AddResidualBlock(corner_cost(bundle, view, i, 1 / noise).release(),
+      problem->AddResidualBlock(new CornerCost(corner_equations(bundle, view, i, 1 / noise)),
                                 loss == BundleLoss::cauchy ? new ceres::CauchyLoss(2) : nullptr,
                                 blocks.lenses[view.camera].data(), blocks.cameras[view.camera].data(),
                                 blocks.boards[view.board].data());
@@ -128,18 +143,15 @@ ViewEquations equations_of(const Bundle& bundle, const BundleView& view, const B
   Eigen::Index row = 0;
   for (std::size_t i = 0; i < view.corners.size(); ++i) {
     if (view.use[i] != CornerUse::used) continue;
-    const auto cost = corner_cost(bundle, view, i, 1 / bundle.cameras[view.camera].noise);
-    Eigen::Matrix<double, 2, kLensUnknowns, Eigen::RowMajor> by_lens;
-    Eigen::Matrix<double, 2, kPoseUnknowns, Eigen::RowMajor> by_board;
+    CornerEquations::Slopes slopes;
     Eigen::Vector2d residuals = Eigen::Vector2d::Zero();
-    const std::array<const double*, 3> at = {blocks.lenses[view.camera].data(),
-                                             blocks.cameras[view.camera].data(),
-                                             blocks.boards[view.board].data()};
-    std::array<double*, 3> by = {by_lens.data(), nullptr, by_board.data()};
-    cost->Evaluate(at.data(), residuals.data(), by.data());
+    const auto equations = corner_equations(bundle, view, i, 1 / bundle.cameras[view.camera].noise);
+    // A used corner lies in front of its camera.
+    (void)equations(blocks.lenses[view.camera].data(), blocks.cameras[view.camera].data(),
+                    blocks.boards[view.board].data(), residuals.data(), &slopes);
     result.residuals.segment<2>(row) = residuals;
-    result.lens.middleRows<2>(row) = by_lens;
-    result.board.middleRows<2>(row) = by_board;
+    result.lens.middleRows<2>(row) = slopes.lens;
+    result.board.middleRows<2>(row) = slopes.board;
     row += 2;
   }
   return result;

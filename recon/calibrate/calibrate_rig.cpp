@@ -11,6 +11,7 @@
 
 #include "recon/calibrate/chain_poses.h"
 #include "recon/calibrate/lens_start.h"
+#include "recon/calibrate/pose.h"
 
 namespace emberlock {
 namespace {
@@ -171,12 +172,6 @@ void move_world(Bundle& bundle, std::size_t board) {
   }
   for (BundleBoard& b : bundle.boards) b.world_from_board = chained(new_from_old, b.world_from_board);
   bundle.boards[board] = {{}, Held::pose};
-}
-
-Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
 }
 
 /// Uncertainty of b's pose as a sees it: along and about the worst axes.

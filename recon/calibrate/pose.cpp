@@ -52,6 +52,12 @@ Eigen::Matrix4d opengl_world_from_camera(const Rigid3& camera_from_world) {
   return m;
 }
 
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
 bool distortion_inverts(const Intrinsics& intrinsics) {
   if (intrinsics.distortion.none()) return true;
   const CameraModel camera{intrinsics, {}};

@@ -17,6 +17,9 @@ Result<Eigen::Matrix3d> nearest_rotation(const Eigen::Matrix3d& matrix);
 Rigid3 camera_from_world_of_opengl(const Eigen::Matrix4d& world_from_camera);
 Eigen::Matrix4d opengl_world_from_camera(const Rigid3& camera_from_world);
 
+/// The matrix m with m * w = v x w.
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v);
+
 /// Whether each pixel has a ray that projects back onto it, to 0.01 pixels: extreme distortions fold the
 /// picture.
 bool distortion_inverts(const Intrinsics& intrinsics);

@@ -1,6 +1,6 @@
-// calibration [SEEDS] [INSTANTS] [WIDTHxHEIGHT] [FIRST]: rigs of eleven cameras on a ring, a board seen by two to four at a
-// time, corners with 0.2 pixels of noise, 5 % of them wrong: how near calibration comes to the truth, and
-// whether its stated uncertainties are right. A line a rig, and the worst of all.
+// calibration [SEEDS] [INSTANTS] [WIDTHxHEIGHT] [FIRST]: rigs of eleven cameras on a ring, a board seen by
+// two to four at a time, corners with 0.2 pixels of noise, 5 % of them wrong: how near calibration comes to
+// the truth, and whether its stated uncertainties are right. A line a rig, and the worst of all.
 #include <chrono>
 #include <cmath>
 #include <cstdio>

@@ -72,6 +72,31 @@ v1::Calibration calibration_of(const CameraModel& camera) {
   return c;
 }
 
+v1::Rig empty_rig() {
+  v1::Rig rig;
+  rig.set_format_version(kRigFormatVersion);
+  return rig;
+}
+
+v1::RigCamera rig_camera_of(const std::string& id, const CameraModel& camera) {
+  v1::RigCamera message;
+  message.set_camera_id(id);
+  message.set_width(static_cast<std::uint32_t>(camera.intrinsics.size.width));
+  message.set_height(static_cast<std::uint32_t>(camera.intrinsics.size.height));
+  *message.mutable_calibration() = calibration_of(camera);
+  return message;
+}
+
+std::vector<std::pair<std::string, CameraModel>> placed_cameras(const v1::Rig& rig) {
+  std::vector<std::pair<std::string, CameraModel>> cameras;
+  for (const v1::RigCamera& camera : rig.cameras()) {
+    const ImageSize size{static_cast<int>(camera.width()), static_cast<int>(camera.height())};
+    auto model = camera_model_of(camera.calibration(), size, camera.camera_id(), "");
+    if (model) cameras.emplace_back(camera.camera_id(), *std::move(model));
+  }
+  return cameras;
+}
+
 Result<Box> box_of(const v1::Box& message, const std::string& where) {
   EMBERLOCK_RETURN_IF_ERROR(check_box(message, where));
   Box box;

@@ -2,6 +2,8 @@
 
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
@@ -17,6 +19,13 @@ Result<CameraModel> camera_model_of(const v1::Calibration& calibration, ImageSiz
                                     const std::string& camera_id, const std::string& where);
 /// The other way, without uncertainties.
 v1::Calibration calibration_of(const CameraModel& camera);
+
+/// A rig without cameras.
+v1::Rig empty_rig();
+/// A placed camera as a rig's file has it.
+v1::RigCamera rig_camera_of(const std::string& id, const CameraModel& camera);
+/// A rig's placed cameras by id. Those of a rig that wasn't checked may be left out.
+std::vector<std::pair<std::string, CameraModel>> placed_cameras(const v1::Rig& rig);
 
 /// Error where a number isn't finite, three are not there, or an edge is 0 or less.
 Result<Box> box_of(const v1::Box& box, const std::string& where);

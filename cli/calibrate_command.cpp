@@ -11,12 +11,11 @@
 
 #include "base/clock.h"
 #include "base/file.h"
+#include "cli/board_search.h"
 #include "cli/calibrate_report.h"
 #include "cli/commands.h"
 #include "cli/scene_options.h"
-#include "recon/calibrate/board_pictures.h"
 #include "recon/calibrate/calibrate_rig.h"
-#include "recon/calibrate/drift.h"
 #include "recon/calibrate/next_pictures.h"
 #include "recon/calibrate/rig_formats.h"
 
@@ -29,8 +28,7 @@ constexpr double kDegreesOfRadian = 180 / M_PI;
 
 /// The command line as typed.
 struct CamerasArguments {
-  std::vector<std::string> pictures;
-  std::string board;
+  BoardArguments boards;
   std::string out;
   std::string world;
   std::string box;
@@ -70,14 +68,24 @@ nlohmann::json calibration_json(const BoardReading& reading, const RigCalibratio
     rejected.push_back({{"picture", reading.sightings.sightings[view.sighting].picture}, {"why", view.why}});
   for (const auto& picture : reading.unused)
     rejected.push_back({{"picture", picture.path.string()}, {"why", picture.why}});
-  return {{"rms_pixels", rms_of(calibration.bundle)},
-          {"world", calibration.world},
-          {"cameras", cameras},
-          {"left_out", rejected},
-          {"take_next", next_pictures(calibration)}};
+  nlohmann::json result = {{"rms_pixels", rms_of(calibration.bundle)},
+                           {"world", calibration.world},
+                           {"cameras", cameras},
+                           {"left_out", rejected},
+                           {"take_next", next_pictures(calibration)}};
+  if (reading.film) {
+    const FilmCounts& film = *reading.film;
+    result["film"] = {{"instants", film.instants},
+                      {"searched", film.looked},
+                      {"seen", film.seen},
+                      {"moving", film.moving},
+                      {"taken", film.taken}};
+  }
+  return result;
 }
 
 void print_cameras(const BoardReading& reading, const RigCalibration& calibration, const std::string& out) {
+  if (reading.film) std::printf("%s\n", film_words(reading).c_str());
   std::printf("%s\n", calibration_words(reading, calibration).c_str());
   for (const CalibratedCamera& camera : calibration.cameras) {
     if (!camera.placed) {
@@ -110,21 +118,15 @@ Result<CalibrateOptions> calibrate_options(const CamerasArguments& arguments) {
   return options;
 }
 
-/// The board's corners in all pictures; `share` of the bar is theirs.
-BoardReading read_boards(const std::vector<std::string>& inputs, const std::string& board_text,
-                         const Progress& bar, double share) {
-  const Board board = or_fail(parse_board(board_text));
-  const auto pictures = or_fail(list_board_pictures({inputs.begin(), inputs.end()}));
-  return or_fail(find_boards(
-      pictures, board, [&](double fraction, std::string_view what) { report(bar, share * fraction, what); }));
-}
-
 void calibrate_cameras(const CamerasArguments& arguments) {
   const CalibrateOptions options = or_fail(calibrate_options(arguments));
-  or_fail(parse_board(arguments.board));
+  const Board board = or_fail(parse_board(arguments.boards.board));
   AtomicDirectory staging = or_fail(AtomicDirectory::create(arguments.out, kRigMarker));
   const Progress bar = progress_bar("calibrate");
-  const BoardReading reading = read_boards(arguments.pictures, arguments.board, bar, 0.6);
+  const BoardReading reading =
+      or_fail(read_boards(arguments.boards, search_for(board), [&](double fraction, std::string_view what) {
+        report(bar, 0.6 * fraction, what);
+      }));
   const RigCalibration calibration =
       or_fail(calibrate_rig(reading.sightings, options, [&](double fraction, std::string_view what) {
         report(bar, 0.6 + 0.4 * fraction, what);
@@ -145,20 +147,12 @@ void calibrate_cameras(const CamerasArguments& arguments) {
 
 void add_cameras(CLI::App& parent) {
   auto arguments = std::make_shared<CamerasArguments>();
-  CLI::App* verb = parent.add_subcommand(
-      "cameras",
-      "Lenses and poses of all cameras from pictures of a board; 1 if one of them couldn't be placed");
+  CLI::App* verb = parent.add_subcommand("cameras",
+                                         "Lenses and poses of all cameras from pictures or films of a board; "
+                                         "1 if one of them couldn't be placed");
   CamerasArguments& a = *arguments;
-  verb->add_option(
-          "pictures", a.pictures,
-          "A folder with a subfolder a camera, in which pictures of one instant have one number; or pictures "
-          "named by camera and instant (left01.jpg)")
-      ->required();
-  verb->add_option(
-          "--board", a.board,
-          "chessboard:9x6:25mm (inner corners, square), or charuco:11x8:30mm:22mm:5X5_100 (squares, square, "
-          "marker, dictionary)")
-      ->required();
+  add_board_options(*verb, a.boards, FilmSearchOptions{}.instants);
+  verb->get_option("--board")->required();
   verb->add_option("--out", a.out, "Folder for rig.json, index.html, transforms.json, opencv/ and colmap/")
       ->required();
   verb->add_option(
@@ -170,98 +164,6 @@ void add_cameras(CLI::App& parent) {
       "cx,cy,cz,sx,sy,sz: the flame's volume in that world, metres [the largest cube that all cameras see]");
   verb->add_flag("--json", a.json, "One JSON object on stdout");
   verb->callback([arguments] { calibrate_cameras(*arguments); });
-}
-
-const char* words_of(DriftVerdict verdict) {
-  switch (verdict) {
-    case DriftVerdict::still:
-      return "still";
-    case DriftVerdict::moved:
-      return "moved";
-    case DriftVerdict::lens:
-      return "lens";
-    case DriftVerdict::unknown:
-      return "unknown";
-  }
-  return "";
-}
-
-nlohmann::json drift_json(const DriftReport& report) {
-  nlohmann::json cameras = nlohmann::json::array();
-  for (const CameraDrift& camera : report.cameras) {
-    cameras.push_back({{"camera", camera.id},
-                       {"verdict", words_of(camera.verdict)},
-                       {"why", camera.why},
-                       {"instants", camera.instants},
-                       {"place_mm", {camera.place.x() * 1e3, camera.place.y() * 1e3, camera.place.z() * 1e3}},
-                       {"place_sigma_mm", camera.place_sigma * 1e3},
-                       {"turn_degrees", camera.turn.norm() * kDegreesOfRadian},
-                       {"turn_sigma_degrees", camera.turn_sigma * kDegreesOfRadian},
-                       {"chi2", camera.chi2},
-                       {"rms_before_pixels", camera.rms_before},
-                       {"rms_after_pixels", camera.rms_after}});
-  }
-  return {{"drifted", report.drifted()},
-          {"chi2_limit", report.limit},
-          {"rms_before_pixels", report.rms_before},
-          {"rms_after_pixels", report.rms_after},
-          {"one_of_two", report.one_of_two},
-          {"cameras", cameras}};
-}
-
-void print_drift(const DriftReport& report) {
-  std::printf(
-      "%.3f pixels RMS as calibrated, %.3f with the cameras moved that moved; a camera moved if its "
-      "chi-square (6 "
-      "degrees of freedom) is above %.1f\n",
-      report.rms_before, report.rms_after, report.limit);
-  for (const CameraDrift& camera : report.cameras) {
-    if (camera.verdict == DriftVerdict::unknown || camera.verdict == DriftVerdict::lens) {
-      std::printf("%-12s %-8s %s\n", camera.id.c_str(), words_of(camera.verdict), camera.why.c_str());
-      continue;
-    }
-    std::printf("%-12s %-8s %.2f mm (+- %.2f), %.3f degrees (+- %.3f), chi-square %.1f, from %zu instants\n",
-                camera.id.c_str(), words_of(camera.verdict), camera.place.norm() * 1e3,
-                camera.place_sigma * 1e3, camera.turn.norm() * kDegreesOfRadian,
-                camera.turn_sigma * kDegreesOfRadian, camera.chi2, camera.instants);
-  }
-  if (report.drifted() && report.one_of_two)
-    std::printf("Two cameras tell only that they moved against each other, not which of them did.\n");
-  std::printf("%s\n", report.drifted()
-                          ? "The calibration doesn't hold any more: run `emberlock calibrate cameras` anew."
-                          : "The calibration holds.");
-}
-
-void add_check(CLI::App& parent) {
-  struct Arguments {
-    std::string rig;
-    std::vector<std::string> pictures;
-    std::string board;
-    bool json = false;
-  };
-  auto arguments = std::make_shared<Arguments>();
-  CLI::App* verb = parent.add_subcommand(
-      "check",
-      "Whether a camera moved since the calibration, from later pictures of the board; 1 if one did");
-  verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")
-      ->required();
-  verb->add_option("pictures", arguments->pictures, "As for `calibrate cameras`; a few instants will do")
-      ->required();
-  verb->add_option("--board", arguments->board, "As for `calibrate cameras`")->required();
-  verb->add_flag("--json", arguments->json, "One JSON object on stdout");
-  verb->callback([arguments] {
-    const v1::Rig rig = or_fail(import_rig(arguments->rig));
-    const Progress bar = progress_bar("check");
-    const BoardReading reading = read_boards(arguments->pictures, arguments->board, bar, 0.9);
-    const DriftReport report_of_drift = or_fail(check_drift(rig, reading.sightings, arguments->rig));
-    report(bar, 1, "done");
-    if (arguments->json) {
-      std::printf("%s\n", drift_json(report_of_drift).dump().c_str());
-    } else {
-      print_drift(report_of_drift);
-    }
-    if (report_of_drift.drifted()) throw CLI::RuntimeError(1);
-  });
 }
 
 void add_convert(CLI::App& parent) {
@@ -294,7 +196,7 @@ void add_calibrate(CLI::App& app) {
       "calibrate", "Where the cameras stand, how their lenses draw, and whether that changed");
   verb->require_subcommand(1);
   add_cameras(*verb);
-  add_check(*verb);
+  add_calibrate_check(*verb);
   add_convert(*verb);
   add_calibrate_colour(*verb);
 }

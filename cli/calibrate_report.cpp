@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/board_search.h"
 #include "cli/html.h"
 #include "recon/calibrate/next_pictures.h"
 
@@ -202,6 +203,7 @@ std::string calibration_words(const BoardReading& reading, const RigCalibration&
 std::string calibration_html(const BoardReading& reading, const RigCalibration& calibration) {
   HtmlPage page("Calibration of the cameras");
   page.paragraph(calibration_words(reading, calibration));
+  if (reading.film) page.paragraph(film_words(reading) + ".");
   if (calibration.box) {
     const Box& box = *calibration.box;
     page.paragraph(fmt::format("Flame volume: {:.3f} x {:.3f} x {:.3f} m around ({:.3f}, {:.3f}, {:.3f}).",

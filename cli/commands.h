@@ -16,8 +16,10 @@ void add_verify(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 /// `tradeoff sync`; `parent` is the verb tradeoff.
 void add_tradeoff_sync(CLI::App& parent);
-/// `calibrate cameras`, `check` and `convert`.
+/// `calibrate cameras`, `check`, `convert` and `colour`.
 void add_calibrate(CLI::App& app);
+/// `calibrate check`; `parent` is the verb calibrate.
+void add_calibrate_check(CLI::App& parent);
 /// `calibrate colour`; `parent` is the verb calibrate.
 void add_calibrate_colour(CLI::App& parent);
 void add_import(CLI::App& app);

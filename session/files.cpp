@@ -107,11 +107,14 @@ Status check_calibration(const v1::Calibration& c, const std::string& where) {
   const bool whole = c.camera_from_world_size() == 0 || c.camera_from_world_size() == 12;
   const std::initializer_list<double> intrinsics = {c.fx(), c.fy(), c.cx(), c.cy(), c.k1(),
                                                     c.k2(), c.p1(), c.p2(), c.k3()};
-  const bool certain = (c.sigma_size() == 0 || c.sigma_size() == kCalibrationSigmas) &&
-                       std::all_of(c.sigma().begin(), c.sigma().end(), is_spread) &&
-                       is_spread(c.corner_sigma());
+  const bool rooted = c.sigma_size() == kCalibrationSigmas + kPoseRootNumbers;
+  const bool certain =
+      (c.sigma_size() == 0 || c.sigma_size() == kCalibrationSigmas || rooted) &&
+      std::all_of(c.sigma().begin(), c.sigma().end() - (rooted ? kPoseRootNumbers : 0), is_spread) &&
+      all_finite(c.sigma()) && is_spread(c.corner_sigma());
   if (!certain) {
-    return Error{ErrorKind::bad_input, "sigma is neither absent nor 15 finite numbers of 0 or more",
+    return Error{ErrorKind::bad_input,
+                 "sigma is neither absent nor 15 finite numbers of 0 or more (or those and 21 finite ones)",
                  where + ".calibration.sigma", "Remove it, or calibrate again"};
   }
   if (whole && all_finite(c.camera_from_world()) && all_finite(intrinsics)) return {};

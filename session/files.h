@@ -12,7 +12,8 @@
 namespace emberlock {
 
 inline constexpr std::uint32_t kSessionFormatVersion = 1;
-inline constexpr int kCalibrationSigmas = 15;  ///< numbers of Calibration.sigma, or none
+inline constexpr int kCalibrationSigmas = 15;  ///< numbers of Calibration.sigma, or none, and
+inline constexpr int kPoseRootNumbers = 21;    ///< maybe these behind them
 
 std::filesystem::path manifest_path(const std::filesystem::path& folder);
 std::filesystem::path events_path(const std::filesystem::path& folder);

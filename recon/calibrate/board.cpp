@@ -249,7 +249,16 @@ Result<Board> parse_board(std::string_view text) {
   return board;
 }
 
+Board lamp_as_board() { return {.kind = BoardKind::lamp, .columns = 1, .rows = 1}; }
+
+std::string noun_of(const Board& board) { return board.kind == BoardKind::lamp ? "lamp" : "board"; }
+
+BoardSearch search_for(const Board& board) {
+  return {board, [board](const ImageView& picture) { return find_board(picture, board); }};
+}
+
 std::string board_words(const Board& board) {
+  if (board.kind == BoardKind::lamp) return "lamp";
   const auto mm = [](Meters length) {
     std::array<char, 32> digits{};
     const auto [end, error] =

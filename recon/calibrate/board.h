@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +17,7 @@ namespace emberlock {
 enum class BoardKind : std::uint8_t {
   chessboard,  ///< seen whole or not at all
   charuco,     ///< markers number its corners: any part of it will do
+  lamp,        ///< no board but a small lamp, taken for one corner: it has a place and no pose
 };
 
 /// A flat board of squares. Its own frame, as whoever looks at it sees it: x along a row, y up, z out of the
@@ -42,8 +44,12 @@ struct Board {
 /// "charuco:11x8:30mm:22mm:5X5_100": 11 x 8 SQUARES (as cv::aruco::CharucoBoard counts), squares, markers,
 /// dictionary. Lengths in mm, cm or m. Error with the format as remedy.
 Result<Board> parse_board(std::string_view text);
-/// What parse_board() reads.
+/// What parse_board() reads; "lamp" of a lamp.
 std::string board_words(const Board& board);
+/// "board" or "lamp".
+std::string noun_of(const Board& board);
+/// A lamp as the board of one corner.
+Board lamp_as_board();
 
 /// A corner of the board as a picture shows it.
 struct BoardCorner {
@@ -51,10 +57,19 @@ struct BoardCorner {
   Eigen::Vector2d pixel;  ///< recon's convention: pixel centres at +0.5
 };
 
-/// The board's corners in a picture of any format, to a fraction of a pixel; none where it isn't seen, or too
-/// little of it (fewer than 6 corners, or all on one line). A chessboard that isn't ambiguous() gets the same
-/// corners from any side: its first is the one whose square inside the corners is black.
+/// The corners of a board (no lamp: smear_sync detects those) in a picture of any format, to a fraction of a
+/// pixel; none where it isn't seen, or too little of it (fewer than 6 corners, or all on one line). A
+/// chessboard that isn't ambiguous() gets the same corners from any side: its first is the one whose square
+/// inside the corners is black.
 std::vector<BoardCorner> find_board(const ImageView& picture, const Board& board);
+
+/// What is looked for in pictures, and how.
+struct BoardSearch {
+  Board board;
+  std::function<std::vector<BoardCorner>(const ImageView& picture)> find;  ///< called by several threads
+};
+/// By find_board().
+BoardSearch search_for(const Board& board);
 
 /// The board as a picture to print or to render, `square` pixels a square, a white margin of one square
 /// around. A corner (column, row) lies at ((column + 2) * square, (row + 2) * square) from the picture's

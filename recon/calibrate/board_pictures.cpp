@@ -69,7 +69,7 @@ struct Found {
   std::string unreadable;  ///< why
 };
 
-std::vector<Found> find_in_all(const std::vector<BoardPicture>& pictures, const Board& board,
+std::vector<Found> find_in_all(const std::vector<BoardPicture>& pictures, const BoardSearch& search,
                                const Progress& progress) {
   std::vector<Found> found(pictures.size());
   const Observer observer = [&](double fraction, std::string_view what) {
@@ -81,7 +81,7 @@ std::vector<Found> find_in_all(const std::vector<BoardPicture>& pictures, const 
     const auto picture = read_image(pictures[i].path);
     if (picture) {
       found[i].size = picture->layout().size;
-      found[i].corners = find_board(picture->view(), board);
+      found[i].corners = search.find(picture->view());
     } else {
       found[i].unreadable = picture.error().what;
     }
@@ -123,11 +123,11 @@ Result<std::vector<BoardPicture>> list_board_pictures(const std::vector<fs::path
   return pictures;
 }
 
-Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, const Board& board,
+Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, const BoardSearch& search,
                                  const Progress& progress) {
-  std::vector<Found> found = find_in_all(pictures, board, progress);
+  std::vector<Found> found = find_in_all(pictures, search, progress);
   BoardReading reading;
-  reading.sightings.board = board;
+  reading.sightings.board = search.board;
   std::map<std::string, std::size_t> cameras;
   std::map<std::string, std::size_t> instants;
   for (const BoardPicture& picture : pictures) instants.try_emplace(picture.instant);
@@ -160,7 +160,7 @@ Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, cons
                           "Calibrate a camera with pictures of one size: that which it records");
     }
     if (found[i].corners.empty()) {
-      reading.unused.push_back({picture.path, "the board wasn't found"});
+      reading.unused.push_back({picture.path, "the " + noun_of(search.board) + " wasn't found"});
       continue;
     }
     reading.sightings.sightings.push_back(

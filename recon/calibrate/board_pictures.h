@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,15 @@ struct BoardPicture {
 /// Sorted by camera and instant. Errors: nothing there, no picture, two pictures of one camera and instant.
 Result<std::vector<BoardPicture>> list_board_pictures(const std::vector<std::filesystem::path>& inputs);
 
+/// How a film's instants were chosen.
+struct FilmCounts {
+  std::size_t instants = 0;  ///< of the film
+  std::size_t looked = 0;    ///< of these were searched
+  std::size_t seen = 0;      ///< of these show the board to a camera
+  std::size_t moving = 0;    ///< of these were left out, as the board moved
+  std::size_t taken = 0;
+};
+
 struct BoardReading {
   BoardSightings sightings;
   struct Unused {
@@ -34,11 +44,12 @@ struct BoardReading {
     std::string why;
   };
   std::vector<Unused> unused;  ///< pictures that can't be read, or don't show the board
+  std::optional<FilmCounts> film = {};
 };
 
 /// Reads the pictures and finds the board, on all processors. Errors: pictures of several sizes from one
 /// camera; no picture that can be read.
-Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, const Board& board,
+Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, const BoardSearch& search,
                                  const Progress& progress = {});
 
 }  // namespace emberlock

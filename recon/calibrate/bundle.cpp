@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <ceres/ceres.h>
+#include <ceres/rotation.h>
 #include <glog/logging.h>
 
 #include "recon/calibrate/corner_cost.h"
@@ -90,6 +91,37 @@ class CornerCost final : public ceres::SizedCostFunction<2, kLensUnknowns, kPose
   CornerEquations equations_;
 };
 
+/// How far a pose is from what was known of it beforehand, in standard deviations.
+struct PriorCost {
+  Eigen::Matrix3d start_from_known;  ///< camera axes: where the block is linearised, of the known ones
+  Eigen::Vector3d center;
+  Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns> root;  ///< of the covariance's inverse
+
+  template <class T>
+  bool operator()(const T* camera, T* out) const {
+    Eigen::Matrix<T, 3, 3> turn;
+    ceres::AngleAxisToRotationMatrix(camera, turn.data());
+    const Eigen::Matrix<T, 3, 3> whole = turn * start_from_known.cast<T>();
+    Eigen::Matrix<T, kPoseUnknowns, 1> off;
+    ceres::RotationMatrixToAngleAxis(whole.data(), off.data() + 3);
+    for (int i = 0; i < 3; ++i) off[i] = camera[3 + i] - center[i];
+    Eigen::Map<Eigen::Matrix<T, kPoseUnknowns, 1>> residuals(out);
+    residuals = root.cast<T>() * off;
+    return true;
+  }
+};
+
+void add_prior(const BundleCamera& camera, PoseBlock& block, ceres::Problem& problem) {
+  const Rigid3& known = camera.prior->camera_from_world;
+  using Cost = ceres::AutoDiffCostFunction<PriorCost, kPoseUnknowns, kPoseUnknowns>;
+  using Square = Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns>;
+  const Square root = camera.prior->covariance.llt().matrixL().solve(Square::Identity());
+  problem.AddResidualBlock(
+      new Cost(new PriorCost{camera.model.camera_from_world.rotation * known.rotation.transpose(),
+                             known.inverse().translation, root}),
+      nullptr, block.data());
+}
+
 /// The problem over `blocks`, which must outlive it. Cameras and boards that no used corner shows are left
 /// out.
 std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks, BundleLoss loss,
@@ -109,16 +141,25 @@ std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks,
   for (std::size_t i = 0; i < bundle.cameras.size(); ++i) {
     if (!problem->HasParameterBlock(blocks.lenses[i].data())) continue;
     const Held held = bundle.cameras[i].held;
-    if (holds_pose(held)) problem->SetParameterBlockConstant(blocks.cameras[i].data());
+    if (holds_pose(held)) {
+      problem->SetParameterBlockConstant(blocks.cameras[i].data());
+    } else if (bundle.cameras[i].prior) {
+      add_prior(bundle.cameras[i], blocks.cameras[i], *problem);
+    }
     if (holds_lens(held)) {
       problem->SetParameterBlockConstant(blocks.lenses[i].data());
     } else if (bundle.cameras[i].k3 == ThirdRadial::held) {
       problem->SetManifold(blocks.lenses[i].data(), new ceres::SubsetManifold(kLensUnknowns, {8}));
     }
   }
-  for (std::size_t i = 0; i < bundle.boards.size(); ++i)
-    if (holds_pose(bundle.boards[i].held) && problem->HasParameterBlock(blocks.boards[i].data()))
+  for (std::size_t i = 0; i < bundle.boards.size(); ++i) {
+    if (!problem->HasParameterBlock(blocks.boards[i].data())) continue;
+    if (holds_pose(bundle.boards[i].held)) {
       problem->SetParameterBlockConstant(blocks.boards[i].data());
+    } else if (bundle.board.kind == BoardKind::lamp) {
+      problem->SetManifold(blocks.boards[i].data(), new ceres::SubsetManifold(kPoseUnknowns, {0, 1, 2}));
+    }
+  }
   return problem;
 }
 

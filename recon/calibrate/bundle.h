@@ -13,7 +13,8 @@
 namespace emberlock {
 
 /// Bundle adjustment of boards that cameras see (Triggs et al. 2000): all lenses, all cameras' poses and one
-/// pose of the board an instant, so that each corner falls where its picture shows it.
+/// pose of the board an instant, so that each corner falls where its picture shows it. A lamp is a board of
+/// one corner whose turn is held.
 
 /// A camera's unknowns in the order of every covariance and of v1::Calibration.sigma: fx, fy, cx, cy, k1, k2,
 /// p1, p2, k3, centre x, y, z (world, metres), turn about its own x, y, z (radians).
@@ -28,6 +29,13 @@ enum class Held {
   both,
 };
 
+/// What is known of a camera's pose beforehand: the covariance of its centre (world, metres) and its turn
+/// about its own axes (radians).
+struct PosePrior {
+  Rigid3 camera_from_world;
+  Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns> covariance;
+};
+
 enum class ThirdRadial {
   held,  ///< k3 stays as it is
   free,
@@ -40,6 +48,7 @@ struct BundleCamera {
   /// Pixels: standard deviation of a corner's coordinate, by which its residuals are weighed.
   double noise = 1;
   double inflation = 1;  ///< of the standard deviations: a view's corners err together (jackknife_inflation)
+  std::optional<PosePrior> prior = {};
 };
 
 struct BundleBoard {

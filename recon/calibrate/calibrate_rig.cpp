@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <fmt/format.h>
@@ -269,11 +270,13 @@ std::optional<Box> common_box(const Bundle& bundle) {
 }
 
 void tell_cameras(const BoardSightings& sightings, RigCalibration& result) {
+  const std::vector<PoseCovariance> relative = relative_pose_covariances(result.bundle, result.covariance);
   for (std::size_t b = 0; b < result.bundle_camera.size(); ++b) {
     CalibratedCamera& camera = result.cameras[result.bundle_camera[b]];
     camera.placed = true;
     camera.fit = result.bundle.cameras[b];
     camera.rms = rms_of(result.bundle, b);
+    camera.relative = relative[b];
     camera.sigma = result.covariance.diagonal()
                        .segment<kCameraUnknowns>(static_cast<Eigen::Index>(b) * kCameraUnknowns)
                        .cwiseSqrt();
@@ -356,6 +359,12 @@ v1::Rig rig_of(const RigCalibration& calibration, const std::string& created_utc
     v1::Calibration& c = *message.mutable_calibration();
     c = calibration_of(camera.fit.model);
     for (const double sigma : camera.sigma) c.add_sigma(sigma);
+    const Eigen::LLT<PoseCovariance> root(camera.relative);
+    if (camera.placed && root.info() == Eigen::Success) {
+      const PoseCovariance lower = root.matrixL();
+      for (int row = 0; row < kPoseUnknowns; ++row)
+        for (int column = 0; column <= row; ++column) c.add_sigma(lower(row, column));
+    }
     c.set_corner_sigma(camera.fit.noise);
     if (!camera.placed) c.clear_camera_from_world();
   }

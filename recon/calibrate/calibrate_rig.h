@@ -7,6 +7,7 @@
 #include "base/progress.h"
 #include "recon/calibrate/bundle.h"
 #include "recon/calibrate/clean.h"
+#include "recon/calibrate/relative_poses.h"
 #include "recon/calibrate/rig.h"
 
 namespace emberlock {
@@ -45,7 +46,8 @@ struct CalibratedCamera {
   std::string why = {};     ///< where one of them isn't: the reason, and what to do
   BundleCamera fit = {};    ///< valid if calibrated; pose if placed
   Eigen::Matrix<double, kCameraUnknowns, 1> sigma = Eigen::Matrix<double, kCameraUnknowns, 1>::Zero();
-  double rms = 0;  ///< pixels, of the used corners
+  PoseCovariance relative = PoseCovariance::Zero();  ///< of its pose given the lens, against other cameras
+  double rms = 0;                                    ///< pixels, of the used corners
   std::size_t views = 0, views_used = 0, corners = 0, corners_used = 0;
   double tilt = 0;  ///< radians: the widest angle between two of its boards
 };

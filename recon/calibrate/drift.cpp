@@ -18,26 +18,54 @@ namespace emberlock {
 namespace {
 
 using Vector6 = Eigen::Matrix<double, kPoseUnknowns, 1>;
-using Matrix6 = Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns>;
 
 constexpr double kNormalOfFalseAlarm = 3.09;  // 0.1 % on one side
 constexpr double kLensNoise = 2;              // times the calibration's noise, and
 constexpr double kLeastLensNoise = 0.3;       // pixels: blurred pictures are noisier too
 
-/// What chi-square of 6 degrees of freedom exceeds by chance in 0.1 % of checks of so many cameras (Wilson
-/// and Hilferty 1931; the tail's normal quantile grows by about ln(cameras) / 3.09).
-double chi2_limit(std::size_t cameras) {
+/// Pixels: a lamp isn't a point, and its middle not the same from all sides.
+constexpr double kLampNoise = 0.3;
+/// Of a camera that may have moved: so loose that it costs nothing, and what isn't determined stays.
+constexpr double kLoosePlace = 0.1;  // metres
+constexpr double kLooseTurn = 0.2;   // radians
+/// At least, also of a pose that was told without its uncertainty.
+constexpr double kLeastPlace = 1e-6;  // metres
+constexpr double kLeastTurn = 1e-6;   // radians
+
+/// What chi-square exceeds by chance in 0.1 % of checks of so many cameras (Wilson and Hilferty 1931; the
+/// tail's normal quantile grows by about ln(cameras) / 3.09).
+double chi2_limit(int freedom, std::size_t cameras) {
   const double z =
       kNormalOfFalseAlarm + std::log(static_cast<double>(std::max<std::size_t>(1, cameras))) / 3.4;
-  const double n = kPoseUnknowns;
+  const double n = freedom;
   return n * std::pow(1 - 2 / (9 * n) + z * std::sqrt(2 / (9 * n)), 3);
 }
 
 struct Known {
   CameraModel model;
-  Vector6 sigma = Vector6::Zero();  ///< centre, turn
-  double noise = 0;                 ///< 0: unknown
+  PoseCovariance spread;  ///< of centre and turn
+  double noise = 0;       ///< 0: unknown
 };
+
+PoseCovariance diagonal(double place, double turn) {
+  Vector6 variances;
+  variances << Eigen::Vector3d::Constant(place * place), Eigen::Vector3d::Constant(turn * turn);
+  return variances.asDiagonal();
+}
+
+/// What the calibration states of its pose: given its lens and against the others where that is stated, else
+/// the standard deviations, which are wider.
+PoseCovariance spread_of(const v1::Calibration& calibration) {
+  PoseCovariance root = PoseCovariance::Zero();
+  if (calibration.sigma_size() == kCalibrationSigmas + kPoseRootNumbers) {
+    int next = kCalibrationSigmas;
+    for (int row = 0; row < kPoseUnknowns; ++row)
+      for (int column = 0; column <= row; ++column) root(row, column) = calibration.sigma(next++);
+  } else if (calibration.sigma_size() == kCalibrationSigmas) {
+    for (int i = 0; i < kPoseUnknowns; ++i) root(i, i) = calibration.sigma(kLensUnknowns + i);
+  }
+  return root * root.transpose() + diagonal(kLeastPlace, kLeastTurn);
+}
 
 Result<Known> known_camera(const v1::Rig& rig, const BoardSightings::Camera& camera,
                            const std::string& where) {
@@ -56,8 +84,7 @@ Result<Known> known_camera(const v1::Rig& rig, const BoardSightings::Camera& cam
   }
   Known known;
   EMBERLOCK_ASSIGN_OR_RETURN(known.model, camera_model_of(found->calibration(), size, camera.id, where));
-  if (found->calibration().sigma_size() == kCalibrationSigmas)
-    for (int i = 0; i < kPoseUnknowns; ++i) known.sigma[i] = found->calibration().sigma(kLensUnknowns + i);
+  known.spread = spread_of(found->calibration());
   known.noise = found->calibration().corner_sigma();
   return known;
 }
@@ -78,6 +105,21 @@ double noise_of_all(const Bundle& bundle) {
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
   std::nth_element(distances.begin(), middle, distances.end());
   return *middle / std::sqrt(2 * std::log(2));  // Rayleigh's distribution
+}
+
+OwnViews lamp_views(const BoardSightings& sightings, std::size_t camera, const Known& known) {
+  OwnViews own;
+  own.bundle.board = sightings.board;
+  own.bundle.cameras.push_back({known.model, Held::both});
+  own.noise = own.bundle.cameras[0].noise = kLampNoise;
+  for (std::size_t s = 0; s < sightings.sightings.size(); ++s) {
+    const auto& sighting = sightings.sightings[s];
+    if (sighting.camera != camera) continue;
+    own.bundle.views.push_back({0, own.bundle.boards.size(), sighting.corners, {CornerUse::used}});
+    own.bundle.boards.emplace_back();
+    own.sightings.push_back(s);
+  }
+  return own;
 }
 
 Result<OwnViews> own_views(const BoardSightings& sightings, std::size_t camera, const Known& known) {
@@ -101,10 +143,42 @@ Result<OwnViews> own_views(const BoardSightings& sightings, std::size_t camera, 
   return own;
 }
 
-/// All cameras as calibrated, held; a board each instant that two of them see.
+using Seen = std::vector<std::pair<std::size_t, const BundleView*>>;  ///< by which camera
+
+/// The point nearest to all rays; none where it isn't in front of every camera.
+std::optional<Eigen::Vector3d> meeting_point(const std::vector<Known>& known, const Seen& seen) {
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const auto& [camera, view] : seen) {
+    const Ray ray = known[camera].model.ray(view->corners[0].pixel);
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ray.direction * ray.direction.transpose();
+    sum += across;
+    right += across * ray.origin;
+  }
+  const Eigen::Vector3d point = sum.ldlt().solve(right);
+  for (const auto& [camera, view] : seen)
+    if (!((known[camera].model.camera_from_world * point).z() > 1e-3)) return std::nullopt;
+  return point;
+}
+
+/// Where a board, or a lamp, is that cameras see at one instant.
+std::optional<Rigid3> first_pose(const BoardSightings& sightings, const std::vector<Known>& known,
+                                 const std::vector<OwnViews>& own, const Seen& seen) {
+  if (sightings.board.kind == BoardKind::lamp) {
+    const auto point = meeting_point(known, seen);
+    if (!point) return std::nullopt;
+    return Rigid3{Eigen::Matrix3d::Identity(), *point};
+  }
+  const auto& [first, view] = seen.front();
+  const Rigid3& pose = own[first].bundle.boards[view->board].world_from_board;  // camera_from_board
+  return chained(known[first].model.camera_from_world.inverse(), pose);
+}
+
+/// All cameras with their lenses, and their poses as far as the calibration knows them; a board each instant
+/// that two of them see.
 Bundle bundle_of(const BoardSightings& sightings, const std::vector<Known>& known,
                  const std::vector<OwnViews>& own, const std::vector<bool>& usable) {
-  std::map<std::size_t, std::vector<std::pair<std::size_t, const BundleView*>>> by_instant;
+  std::map<std::size_t, Seen> by_instant;
   for (std::size_t c = 0; c < known.size(); ++c) {
     if (!usable[c]) continue;
     for (std::size_t v = 0; v < own[c].sightings.size(); ++v)
@@ -114,32 +188,23 @@ Bundle bundle_of(const BoardSightings& sightings, const std::vector<Known>& know
   Bundle bundle;
   bundle.board = sightings.board;
   for (std::size_t c = 0; c < known.size(); ++c) {
-    BundleCamera camera{known[c].model, Held::both};
+    BundleCamera camera{known[c].model, Held::lens};
+    camera.prior = {known[c].model.camera_from_world, known[c].spread};
     if (!own[c].bundle.cameras.empty()) camera.noise = own[c].bundle.cameras[0].noise;
     bundle.cameras.push_back(camera);
   }
   for (const auto& [instant, seen] : by_instant) {
     if (seen.size() < 2) continue;
-    const auto& [first, view] = seen.front();
-    const Rigid3& pose = own[first].bundle.boards[view->board].world_from_board;  // camera_from_board
+    const auto pose = first_pose(sightings, known, own, seen);
+    if (!pose) continue;
     for (const auto& [camera, own_view] : seen) {
       bundle.views.push_back(*own_view);
       bundle.views.back().camera = camera;
       bundle.views.back().board = bundle.boards.size();
     }
-    bundle.boards.push_back({chained(known[first].model.camera_from_world.inverse(), pose), Held::none});
+    bundle.boards.push_back({*pose, Held::none});
   }
   return bundle;
-}
-
-/// Sum of squared residuals in standard deviations.
-double cost_of(const Bundle& bundle) {
-  double cost = 0;
-  for (const BundleView& view : bundle.views)
-    for (std::size_t i = 0; i < view.corners.size(); ++i)
-      if (view.use[i] == CornerUse::used)
-        cost += residual(bundle, view, i).squaredNorm() / std::pow(bundle.cameras[view.camera].noise, 2);
-  return cost;
 }
 
 Vector6 motion(const CameraModel& now, const CameraModel& calibrated) {
@@ -150,79 +215,115 @@ Vector6 motion(const CameraModel& now, const CameraModel& calibrated) {
   return result;
 }
 
+/// Sum of squares in standard deviations, of corners and of poses against what was known of them.
+double cost_of(const Bundle& bundle) {
+  double cost = 0;
+  for (const BundleView& view : bundle.views)
+    for (std::size_t i = 0; i < view.corners.size(); ++i)
+      if (view.use[i] == CornerUse::used)
+        cost += residual(bundle, view, i).squaredNorm() / std::pow(bundle.cameras[view.camera].noise, 2);
+  for (const BundleCamera& camera : bundle.cameras) {
+    const Vector6 off = motion(camera.model, {camera.model.intrinsics, camera.prior->camera_from_world});
+    cost += off.dot(camera.prior->covariance.ldlt().solve(off));
+  }
+  return cost;
+}
+
 double worst_deviation(const Eigen::Matrix3d& spread) {
   return std::sqrt(
       std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread).eigenvalues().maxCoeff()));
+}
+
+/// Equations for a camera's pose that lamps leave: the lamps' own places cost the others' two apiece.
+int lamp_equations(const Bundle& bundle, std::size_t camera) {
+  std::map<std::size_t, int> cameras_of;
+  for (const BundleView& view : bundle.views) ++cameras_of[view.board];
+  int equations = 0;
+  for (const BundleView& view : bundle.views)
+    if (view.camera == camera) equations += std::min(2, cameras_of[view.board] - 1);
+  return equations;
 }
 
 /// Frees one more camera: the bundle then, and what it says of that camera.
 struct Freed {
   Bundle bundle;
   double cost = INFINITY;
+  int freedom = kPoseUnknowns;
+  [[nodiscard]] bool turn_alone() const { return freedom < kPoseUnknowns; }
 };
 
 std::optional<Freed> freed(const Bundle& bundle, std::size_t camera) {
   Freed result{bundle};
-  result.bundle.cameras[camera].held = Held::lens;
-  // At first a camera that moved must not be believed.
-  if (!adjust(result.bundle, BundleLoss::cauchy).ok() || !adjust(result.bundle, BundleLoss::squares).ok())
-    return std::nullopt;
+  if (bundle.board.kind == BoardKind::lamp)
+    result.freedom = std::min(kPoseUnknowns, lamp_equations(bundle, camera));
+  PoseCovariance& prior = result.bundle.cameras[camera].prior->covariance;
+  const Eigen::Matrix3d place = prior.topLeftCorner<3, 3>();
+  prior = diagonal(kLoosePlace, kLooseTurn);
+  if (result.turn_alone()) {
+    result.freedom = std::min(3, result.freedom);
+    prior.topLeftCorner<3, 3>() = place;
+  }
+  if (!adjust(result.bundle, BundleLoss::squares).ok()) return std::nullopt;
   result.cost = cost_of(result.bundle);
   return result;
 }
 
-void judge(const Freed& fit, const Known& known, std::size_t camera, CameraDrift& drift) {
+void judge(const Freed& fit, double cost_as_calibrated, const Known& known, std::size_t camera,
+           CameraDrift& drift) {
   const auto spread = covariance(fit.bundle);
   if (!spread) {
     drift.verdict = DriftVerdict::unknown;
     drift.why = "its views don't tell its pose";
     return;
   }
+  drift.verdict = DriftVerdict::still;
   const Vector6 moved = motion(fit.bundle.cameras[camera].model, known.model);
   const auto at = static_cast<Eigen::Index>(camera) * kCameraUnknowns + kLensUnknowns;
-  Matrix6 total = spread->block<kPoseUnknowns, kPoseUnknowns>(at, at);
-  total.diagonal() += known.sigma.cwiseAbs2();
-  drift.place = moved.head<3>();
+  const PoseCovariance total = spread->block<kPoseUnknowns, kPoseUnknowns>(at, at) + known.spread;
+  drift.turn_alone = fit.turn_alone();
+  drift.freedom = fit.freedom;
+  drift.chi2 = std::max(0.0, cost_as_calibrated - fit.cost);
+  drift.place = drift.turn_alone ? Eigen::Vector3d::Zero() : Eigen::Vector3d(moved.head<3>());
   drift.turn = moved.tail<3>();
   drift.place_sigma = worst_deviation(total.topLeftCorner<3, 3>());
   drift.turn_sigma = worst_deviation(total.bottomRightCorner<3, 3>());
-  drift.chi2 = moved.dot(total.ldlt().solve(moved));
 }
 
 void count_instants(const Bundle& bundle, DriftReport& report) {
   for (const BundleView& view : bundle.views) ++report.cameras[view.camera].instants;
   for (CameraDrift& camera : report.cameras) {
     if (camera.verdict == DriftVerdict::lens || camera.instants > 0) continue;
-    camera.why = "shares no instant of the board with another camera";
+    camera.why = "shares no instant of the " + noun_of(bundle.board) + " with another camera";
   }
 }
 
 /// Frees cameras one after the other, while that is significant.
 Status find_moved(Bundle& bundle, const std::vector<Known>& known, DriftReport& report) {
-  EMBERLOCK_RETURN_IF_ERROR(adjust(bundle, BundleLoss::cauchy));
-  std::size_t free = 0;
+  std::set<std::size_t> free;
   std::size_t seen = 0;
   for (const CameraDrift& camera : report.cameras) seen += camera.instants > 0 ? 1 : 0;
-  while (free + 1 < seen) {
+  EMBERLOCK_RETURN_IF_ERROR(adjust(bundle, BundleLoss::squares));
+  while (free.size() + 1 < seen) {
+    const double cost = cost_of(bundle);
     std::optional<std::size_t> best;
     std::optional<Freed> best_fit;
     for (std::size_t c = 0; c < known.size(); ++c) {
       CameraDrift& camera = report.cameras[c];
-      if (camera.instants == 0 || bundle.cameras[c].held != Held::both) continue;
+      if (camera.instants == 0 || free.contains(c)) continue;
       auto fit = freed(bundle, c);
       if (!fit) continue;
-      camera.verdict = DriftVerdict::still;
-      judge(*fit, known[c], c, camera);
-      if (camera.chi2 <= report.limit || (best_fit && best_fit->cost <= fit->cost)) continue;
+      judge(*fit, cost, known[c], c, camera);
+      camera.limit = chi2_limit(fit->freedom, report.cameras.size());
+      if (camera.chi2 <= camera.limit || (best_fit && best_fit->cost <= fit->cost)) continue;
       best = c;
       best_fit = std::move(fit);
     }
     if (!best) break;
     bundle = std::move(best_fit->bundle);
     report.cameras[*best].verdict = DriftVerdict::moved;
-    ++free;
+    free.insert(*best);
   }
-  return adjust(bundle, BundleLoss::squares);
+  return {};
 }
 
 }  // namespace
@@ -236,16 +337,21 @@ bool DriftReport::drifted() const {
 Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sightings,
                                 const std::string& where) {
   DriftReport report;
-  report.limit = chi2_limit(sightings.cameras.size());
+  const bool lamp = sightings.board.kind == BoardKind::lamp;
   std::vector<Known> known;
   std::vector<OwnViews> own;
   std::vector<bool> usable;
   for (std::size_t c = 0; c < sightings.cameras.size(); ++c) {
     EMBERLOCK_ASSIGN_OR_RETURN(Known camera, known_camera(rig, sightings.cameras[c], where));
-    EMBERLOCK_ASSIGN_OR_RETURN(OwnViews views, own_views(sightings, c, camera));
+    OwnViews views;
+    if (lamp) {
+      views = lamp_views(sightings, c, camera);
+    } else {
+      EMBERLOCK_ASSIGN_OR_RETURN(views, own_views(sightings, c, camera));
+    }
     CameraDrift drift{.id = sightings.cameras[c].id};
     const double noise = views.noise;
-    const bool lens_fits = camera.noise == 0 || views.sightings.empty() ||
+    const bool lens_fits = lamp || camera.noise == 0 || views.sightings.empty() ||
                            noise < std::max(kLensNoise * camera.noise, kLeastLensNoise);
     if (!lens_fits) {
       drift.verdict = DriftVerdict::lens;
@@ -261,12 +367,14 @@ Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sighti
   }
   Bundle bundle = bundle_of(sightings, known, own, usable);
   if (bundle.views.empty() && !report.drifted()) {
-    return Error{ErrorKind::bad_input, "no two calibrated cameras see the board at one instant", "pictures",
-                 "Take pictures in which neighbouring cameras see the board at once"};
+    const std::string noun = noun_of(sightings.board);
+    return Error{ErrorKind::bad_input, "no two calibrated cameras see the " + noun + " at one instant",
+                 "pictures", "Take pictures in which neighbouring cameras see the " + noun + " at once"};
   }
   count_instants(bundle, report);
   if (bundle.views.empty()) return report;
   Bundle before = bundle;
+  for (BundleCamera& camera : before.cameras) camera.held = Held::both;
   EMBERLOCK_RETURN_IF_ERROR(adjust(before, BundleLoss::squares));
   EMBERLOCK_RETURN_IF_ERROR(find_moved(bundle, known, report));
   report.rms_before = rms_of(before);

@@ -136,4 +136,77 @@ inline BoardRig board_rig(const BoardRigOptions& options) {
   return rig;
 }
 
+/// The truth as a rig's file, with what a good calibration would state.
+inline v1::Rig rig_file_of(const BoardRig& rig) {
+  v1::Rig file;
+  file.set_format_version(1);
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    v1::RigCamera& camera = *file.add_cameras();
+    const ImageSize size = rig.cameras[c].intrinsics.size;
+    camera.set_camera_id(rig.sightings.cameras[c].id);
+    camera.set_width(static_cast<std::uint32_t>(size.width));
+    camera.set_height(static_cast<std::uint32_t>(size.height));
+    *camera.mutable_calibration() = calibration_of(rig.cameras[c]);
+    for (int i = 0; i < 15; ++i) camera.mutable_calibration()->add_sigma(i < 12 ? 1e-4 : 2e-4);
+    camera.mutable_calibration()->set_corner_sigma(0.2);
+  }
+  return file;
+}
+
+struct Knock {
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  ///< metres, in the world
+  Eigen::Vector3d turn = Eigen::Vector3d::Zero();   ///< radians, about the camera's own axes
+};
+
+/// Makes the file that of a rig one of whose cameras was knocked since.
+inline void knock(v1::Rig& file, const BoardRig& rig, int camera, const Knock& by) {
+  CameraModel before = rig.cameras[static_cast<std::size_t>(camera)];
+  const Eigen::Vector3d center = before.center() - by.place;
+  const double angle = by.turn.norm();
+  if (angle > 0) {
+    before.camera_from_world.rotation =
+        Eigen::AngleAxisd(-angle, by.turn / angle) * before.camera_from_world.rotation;
+  }
+  before.camera_from_world.translation = -(before.camera_from_world.rotation * center);
+  v1::Calibration& c = *file.mutable_cameras(camera)->mutable_calibration();
+  for (int i = 0; i < 12; ++i) c.set_camera_from_world(i, calibration_of(before).camera_from_world(i));
+}
+
+/// A lamp at places near the middle of what the cameras look at, which is `rig`'s world less its first board.
+inline std::vector<Eigen::Vector3d> lamp_places(const BoardRig& rig, int places, std::uint64_t seed) {
+  RandomStream random(seed, 78);
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  for (const CameraModel& camera : rig.cameras) {
+    const Eigen::Vector3d axis = camera.camera_from_world.rotation.row(2);
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
+    sum += across;
+    right += across * camera.center();
+  }
+  const Eigen::Vector3d middle = sum.inverse() * right;
+  std::vector<Eigen::Vector3d> result;
+  for (int i = 0; i < places; ++i) {
+    result.push_back(middle + Eigen::Vector3d(random.uniform(-0.06, 0.06), random.uniform(-0.06, 0.06),
+                                              random.uniform(-0.06, 0.06)));
+  }
+  return result;
+}
+
+/// What all cameras see of it, with noise.
+inline BoardSightings lamp_sightings(const BoardRig& rig, const std::vector<Eigen::Vector3d>& places,
+                                     double noise, std::uint64_t seed) {
+  RandomStream random(seed, 79);
+  BoardSightings sightings;
+  sightings.board = lamp_as_board();
+  sightings.cameras = rig.sightings.cameras;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    sightings.instants.push_back(std::to_string(i));
+    for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+      const Eigen::Vector2d off(noise * random.normal(), noise * random.normal());
+      sightings.sightings.push_back({c, i, "", {{0, rig.cameras[c].project(places[i]) + off}}});
+    }
+  }
+  return sightings;
+}
+
 }  // namespace emberlock::test

@@ -14,7 +14,7 @@ namespace emberlock::test {
 /// taken nine times a pixel; grey behind it. The camera stands in front of the board's whole plane, as far as
 /// it sees it.
 inline Image rendered_board(const CameraModel& camera, const Board& board, const Rigid3& world_from_board) {
-  constexpr int kSquare = 24;  // pixels of the print
+  constexpr int kSquare = 77;  // pixels of the print: whole ones a bit of markers that are 8/11 of a square
   constexpr int kRays = 3;     // along a pixel's edge
   const Image print = draw_board(board, kSquare);
   const ImageView paper = print.view();

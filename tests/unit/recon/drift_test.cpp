@@ -11,6 +11,8 @@ namespace emberlock {
 namespace {
 using testing::HasSubstr;
 
+constexpr double kDegree = M_PI / 180;
+
 test::BoardRigOptions later_views(std::uint64_t seed) {
   test::BoardRigOptions options;
   options.cameras = 4;
@@ -20,26 +22,10 @@ test::BoardRigOptions later_views(std::uint64_t seed) {
   return options;
 }
 
-/// The truth as a rig's file, with what a good calibration would state.
-v1::Rig calibrated(const test::BoardRig& rig) {
-  v1::Rig file;
-  file.set_format_version(1);
-  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    v1::RigCamera& camera = *file.add_cameras();
-    camera.set_camera_id(rig.sightings.cameras[c].id);
-    camera.set_width(640);
-    camera.set_height(480);
-    *camera.mutable_calibration() = calibration_of(rig.cameras[c]);
-    for (int i = 0; i < 15; ++i) camera.mutable_calibration()->add_sigma(i < 12 ? 1e-4 : 2e-4);
-    camera.mutable_calibration()->set_corner_sigma(0.2);
-  }
-  return file;
-}
-
 TEST(Drift, ARigThatStoodStillHolds) {
   for (const std::uint64_t seed : {1, 2}) {
     const test::BoardRig rig = test::board_rig(later_views(seed));
-    const auto report = check_drift(calibrated(rig), rig.sightings, "rig.json");
+    const auto report = check_drift(test::rig_file_of(rig), rig.sightings, "rig.json");
     ASSERT_TRUE(report.ok()) << report.error().message();
     EXPECT_FALSE(report->drifted()) << seed;
     EXPECT_LT(report->rms_before, 0.35);
@@ -50,16 +36,9 @@ TEST(Drift, ARigThatStoodStillHolds) {
 
 TEST(Drift, TheCameraThatWasKnockedIsNamedWithItsMotion) {
   const test::BoardRig rig = test::board_rig(later_views(3));
-  v1::Rig file = calibrated(rig);
-  CameraModel before = rig.cameras[2];  // where it stood: 1 mm aside, 0.5 degrees turned
+  v1::Rig file = test::rig_file_of(rig);
   const Eigen::Vector3d aside(1e-3, 0, 0);
-  const Eigen::Matrix3d turn =
-      Eigen::AngleAxisd(0.5 * M_PI / 180, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  const Eigen::Vector3d center = before.center() - aside;
-  before.camera_from_world.rotation = turn.transpose() * before.camera_from_world.rotation;
-  before.camera_from_world.translation = -(before.camera_from_world.rotation * center);
-  v1::Calibration& c = *file.mutable_cameras(2)->mutable_calibration();
-  for (int i = 0; i < 12; ++i) c.set_camera_from_world(i, calibration_of(before).camera_from_world(i));
+  test::knock(file, rig, 2, {aside, {0, 0.5 * kDegree, 0}});
   const auto report = check_drift(file, rig.sightings, "rig.json");
   ASSERT_TRUE(report.ok()) << report.error().message();
   for (std::size_t i = 0; i < report->cameras.size(); ++i) {
@@ -72,9 +51,36 @@ TEST(Drift, TheCameraThatWasKnockedIsNamedWithItsMotion) {
   EXPECT_GT(report->rms_before, 2 * report->rms_after);
 }
 
+/// By its own calibration, whose turns are five times as uncertain as its rays.
+TEST(Drift, AFoundRigsSmallTurnIsNamedAndNoNeighbour) {
+  test::BoardRigOptions options;
+  options.cameras = 5;
+  options.instants = 52;
+  options.board = {BoardKind::chessboard, 9, 6, Meters(0.022)};
+  test::BoardRig rig = test::board_rig(options);
+  BoardSightings before = rig.sightings;
+  std::erase_if(before.sightings, [](const auto& s) { return s.instant >= 40; });
+  std::erase_if(rig.sightings.sightings, [](const auto& s) { return s.instant < 40; });
+  const auto found = calibrate_rig(before, {.world = "0"});
+  ASSERT_TRUE(found.ok() && found->whole());
+  EXPECT_GT(found->cameras[2].sigma.tail<3>().maxCoeff(), 0.05 * kDegree);
+  v1::Rig file = rig_of(*found, "");
+  const auto still = check_drift(file, rig.sightings, "rig.json");
+  ASSERT_TRUE(still.ok()) << still.error().message();
+  EXPECT_FALSE(still->drifted());
+  test::BoardRig believed = rig;
+  for (std::size_t c = 0; c < 5; ++c) believed.cameras[c] = found->bundle.cameras[c].model;
+  test::knock(file, believed, 2, {.turn = {0, 0.1 * kDegree, 0}});
+  const auto turned = check_drift(file, rig.sightings, "rig.json");
+  ASSERT_TRUE(turned.ok()) << turned.error().message();
+  for (std::size_t c = 0; c < 5; ++c)
+    EXPECT_EQ(turned->cameras[c].verdict, c == 2 ? DriftVerdict::moved : DriftVerdict::still) << c;
+  EXPECT_LT(turned->cameras[2].turn_sigma, 0.05 * kDegree);
+}
+
 TEST(Drift, AChangedZoomIsTheLenss) {
   const test::BoardRig rig = test::board_rig(later_views(4));
-  v1::Rig file = calibrated(rig);
+  v1::Rig file = test::rig_file_of(rig);
   v1::Calibration& c = *file.mutable_cameras(1)->mutable_calibration();
   c.set_k1(c.k1() + 0.3);
   const auto report = check_drift(file, rig.sightings, "rig.json");
@@ -85,7 +91,7 @@ TEST(Drift, AChangedZoomIsTheLenss) {
 
 TEST(Drift, ARigThatDoesntFitIsAnError) {
   const test::BoardRig rig = test::board_rig(later_views(5));
-  v1::Rig file = calibrated(rig);
+  v1::Rig file = test::rig_file_of(rig);
   file.mutable_cameras(1)->set_width(1280);
   const auto other_size = check_drift(file, rig.sightings, "rig.json");
   ASSERT_FALSE(other_size.ok());
@@ -94,6 +100,87 @@ TEST(Drift, ARigThatDoesntFitIsAnError) {
   file.mutable_cameras(1)->set_camera_id("other");
   EXPECT_THAT(check_drift(file, rig.sightings, "rig.json").error().message(),
               HasSubstr("knows no camera cam01"));
+}
+
+test::BoardRig lamp_rig(int cameras, std::uint64_t seed) {
+  test::BoardRigOptions options;
+  options.cameras = cameras;
+  options.instants = 1;  // its board alone is the world
+  options.seed = seed;
+  options.board = {BoardKind::chessboard, 9, 6, Meters(0.018)};
+  return test::board_rig(options);
+}
+
+TEST(LampDrift, StillRigsHoldAndTheCameraThatTurnedIsNamed) {
+  int false_alarms = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const test::BoardRig rig = lamp_rig(6, seed);
+    const auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, 5, seed), 0.3, seed);
+    v1::Rig file = test::rig_file_of(rig);
+    const auto still = check_drift(file, lamps, "rig.json");
+    ASSERT_TRUE(still.ok()) << still.error().message();
+    false_alarms += still->drifted() ? 1 : 0;
+    test::knock(file, rig, 4, {.turn = {0, 0.2 * kDegree, 0}});
+    const auto turned = check_drift(file, lamps, "rig.json");
+    ASSERT_TRUE(turned.ok()) << turned.error().message();
+    for (std::size_t c = 0; c < 6; ++c)
+      EXPECT_EQ(turned->cameras[c].verdict, c == 4 ? DriftVerdict::moved : DriftVerdict::still)
+          << "camera " << c << " of rig " << seed;
+    EXPECT_FALSE(turned->cameras[4].turn_alone);
+    EXPECT_EQ(turned->cameras[4].freedom, 6);
+    EXPECT_GT(turned->rms_before, turned->rms_after);
+  }
+  EXPECT_EQ(false_alarms, 0) << "one in a thousand is meant";
+}
+
+TEST(LampDrift, OnePlaceTellsOnlyATurn) {
+  const test::BoardRig rig = lamp_rig(6, 7);
+  const auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, 1, 7), 0.3, 7);
+  v1::Rig file = test::rig_file_of(rig);
+  const auto still = check_drift(file, lamps, "rig.json");
+  ASSERT_TRUE(still.ok()) << still.error().message();
+  EXPECT_FALSE(still->drifted());
+  test::knock(file, rig, 1, {.turn = {0, 0.5 * kDegree, 0}});
+  const auto turned = check_drift(file, lamps, "rig.json");
+  ASSERT_TRUE(turned.ok()) << turned.error().message();
+  const CameraDrift& camera = turned->cameras[1];
+  EXPECT_EQ(camera.verdict, DriftVerdict::moved);
+  EXPECT_TRUE(camera.turn_alone);
+  EXPECT_EQ(camera.freedom, 2) << "the turn about the lamp's ray shows nothing";
+  EXPECT_EQ(camera.place.norm(), 0);
+  EXPECT_NEAR(camera.turn.norm() * 180 / M_PI, 0.5, 0.15);
+  for (const std::size_t c : {0U, 2U, 3U, 4U, 5U}) EXPECT_EQ(turned->cameras[c].verdict, DriftVerdict::still);
+}
+
+TEST(LampDrift, TwoCamerasTellThatOneOfThemMoved) {
+  for (const int places : {1, 4, 8}) {
+    const test::BoardRig rig = lamp_rig(2, 3);
+    const auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, places, 3), 0.2, 3);
+    v1::Rig file = test::rig_file_of(rig);
+    const auto still = check_drift(file, lamps, "rig.json");
+    ASSERT_TRUE(still.ok()) << still.error().message();
+    EXPECT_FALSE(still->drifted()) << places;
+    EXPECT_TRUE(still->one_of_two);
+    EXPECT_EQ(still->cameras[0].turn_alone, places < 6) << "an equation a place";
+    test::knock(file, rig, 1, {.turn = {0.5 * kDegree, 0, 0}});
+    const auto turned = check_drift(file, lamps, "rig.json");
+    ASSERT_TRUE(turned.ok()) << turned.error().message();
+    EXPECT_TRUE(turned->drifted()) << places;
+    if (places > 1) continue;
+    // The cameras stand beside each other: a turn sideways moves the lamp along its epipolar line.
+    v1::Rig sideways = test::rig_file_of(rig);
+    test::knock(sideways, rig, 1, {.turn = {0, 0.5 * kDegree, 0}});
+    EXPECT_FALSE(check_drift(sideways, lamps, "rig.json")->drifted());
+  }
+}
+
+TEST(LampDrift, ALampThatNoTwoCamerasSeeIsAnError) {
+  const test::BoardRig rig = lamp_rig(3, 2);
+  auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, 3, 2), 0.2, 2);
+  std::erase_if(lamps.sightings, [](const auto& s) { return s.camera != s.instant; });
+  const auto report = check_drift(test::rig_file_of(rig), lamps, "rig.json");
+  ASSERT_FALSE(report.ok());
+  EXPECT_THAT(report.error().message(), HasSubstr("no two calibrated cameras see the lamp"));
 }
 
 }  // namespace

@@ -1,0 +1,139 @@
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/board_search.h"
+#include "cli/commands.h"
+#include "recon/calibrate/drift.h"
+#include "recon/calibrate/rig_formats.h"
+
+namespace emberlock::cli {
+namespace {
+
+constexpr double kDegreesOfTurn = 180 / M_PI;
+constexpr std::size_t kCheckInstants = 20;  // a check asks for less than a calibration
+
+const char* words_of(DriftVerdict verdict) {
+  switch (verdict) {
+    case DriftVerdict::still:
+      return "still";
+    case DriftVerdict::moved:
+      return "moved";
+    case DriftVerdict::lens:
+      return "lens";
+    case DriftVerdict::unknown:
+      return "unknown";
+  }
+  return "";
+}
+
+nlohmann::json drift_json(const DriftReport& report) {
+  nlohmann::json cameras = nlohmann::json::array();
+  for (const CameraDrift& camera : report.cameras) {
+    cameras.push_back({{"camera", camera.id},
+                       {"verdict", words_of(camera.verdict)},
+                       {"why", camera.why},
+                       {"instants", camera.instants},
+                       {"place_mm", {camera.place.x() * 1e3, camera.place.y() * 1e3, camera.place.z() * 1e3}},
+                       {"place_sigma_mm", camera.place_sigma * 1e3},
+                       {"turn_degrees", camera.turn.norm() * kDegreesOfTurn},
+                       {"turn_sigma_degrees", camera.turn_sigma * kDegreesOfTurn},
+                       {"turn_alone", camera.turn_alone},
+                       {"chi2", camera.chi2},
+                       {"freedom", camera.freedom},
+                       {"chi2_limit", camera.limit},
+                       {"rms_before_pixels", camera.rms_before},
+                       {"rms_after_pixels", camera.rms_after}});
+  }
+  return {{"drifted", report.drifted()},
+          {"rms_before_pixels", report.rms_before},
+          {"rms_after_pixels", report.rms_after},
+          {"one_of_two", report.one_of_two},
+          {"cameras", cameras}};
+}
+
+void print_camera(const CameraDrift& camera) {
+  if (camera.verdict == DriftVerdict::unknown || camera.verdict == DriftVerdict::lens) {
+    std::printf("%-12s %-8s %s\n", camera.id.c_str(), words_of(camera.verdict), camera.why.c_str());
+    return;
+  }
+  const std::string place =
+      camera.turn_alone
+          ? std::string("place not told")
+          : fmt::format("{:.2f} mm (+- {:.2f})", camera.place.norm() * 1e3, camera.place_sigma * 1e3);
+  std::printf(
+      "%-12s %-8s %s, %.3f degrees (+- %.3f), chi-square %.1f of %d (moved above %.1f), from %zu instants\n",
+      camera.id.c_str(), words_of(camera.verdict), place.c_str(), camera.turn.norm() * kDegreesOfTurn,
+      camera.turn_sigma * kDegreesOfTurn, camera.chi2, camera.freedom, camera.limit, camera.instants);
+}
+
+void print_drift(const DriftReport& report) {
+  std::printf("%.3f pixels RMS as calibrated, %.3f with the cameras moved that moved\n", report.rms_before,
+              report.rms_after);
+  for (const CameraDrift& camera : report.cameras) print_camera(camera);
+  if (std::any_of(report.cameras.begin(), report.cameras.end(),
+                  [](const CameraDrift& camera) { return camera.turn_alone; }))
+    std::printf(
+        "The lamp was at too few places to tell where a camera stands: only turns are told, and what one "
+        "place can't show counts as none. Show it at three places or more, not in one line.\n");
+  if (report.drifted() && report.one_of_two)
+    std::printf("Two cameras tell only that they moved against each other, not which of them did.\n");
+  std::printf("%s\n", report.drifted()
+                          ? "The calibration doesn't hold any more: run `emberlock calibrate cameras` anew."
+                          : "The calibration holds.");
+}
+
+struct CheckArguments {
+  std::string rig;
+  BoardArguments boards;
+  bool lamp = false;
+  bool json = false;
+};
+
+void check(const CheckArguments& arguments) {
+  const v1::Rig rig = or_fail(import_rig(arguments.rig));
+  const BoardSearch search =
+      arguments.lamp ? search_for_lamp() : search_for(or_fail(parse_board(arguments.boards.board)));
+  const Progress bar = progress_bar("check");
+  const BoardReading reading =
+      or_fail(read_boards(arguments.boards, search, [&](double fraction, std::string_view what) {
+        report(bar, 0.9 * fraction, what);
+      }));
+  const DriftReport drift = or_fail(check_drift(rig, reading.sightings, arguments.rig));
+  report(bar, 1, "done");
+  if (arguments.json) {
+    std::printf("%s\n", drift_json(drift).dump().c_str());
+  } else {
+    if (reading.film) std::printf("%s\n", film_words(reading).c_str());
+    print_drift(drift);
+  }
+  if (drift.drifted()) throw CLI::RuntimeError(1);
+}
+
+}  // namespace
+
+void add_calibrate_check(CLI::App& parent) {
+  auto arguments = std::make_shared<CheckArguments>();
+  CLI::App* verb = parent.add_subcommand("check",
+                                         "Whether a camera moved since the calibration, from later pictures "
+                                         "of the board or a lamp; 1 if one did");
+  verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")
+      ->required();
+  add_board_options(*verb, arguments->boards, kCheckInstants);
+  CLI::Option* lamp = verb->add_flag("--lamp", arguments->lamp,
+                                     "The pictures show one small bright lamp, such as the strobe's, at one "
+                                     "place each instant; three places "
+                                     "tell all, one or two only a camera's turn");
+  verb->get_option("--board")->excludes(lamp);
+  verb->add_flag("--json", arguments->json, "One JSON object on stdout");
+  verb->callback([arguments] {
+    if (!arguments->lamp && arguments->boards.board.empty()) throw CLI::RequiredError("--board or --lamp");
+    check(*arguments);
+  });
+}
+
+}  // namespace emberlock::cli

@@ -90,10 +90,8 @@ class SeenFit {
     const double change = gathering(direction);
     Walk walk;
     walk.frame_period_change = change;
-    for (const int side : {0, 1}) {
-      const std::complex<double> sum = gathered(direction, side, change);
-      walk.place[static_cast<std::size_t>(side)] = std::arg(sum) / (2 * std::numbers::pi) * flash_period_;
-    }
+    for (const int side : {0, 1})
+      walk.place[static_cast<std::size_t>(side)] = densest_place(direction, side, change);
     for (int round = 0; round < 4; ++round)
       straighten(direction, round == 0 ? 4 * kStrayRows : kStrayRows, walk);
     state_errors(direction, walk);
@@ -130,6 +128,26 @@ class SeenFit {
       }
     }
     return best;
+  }
+  /// Where the dots of a side stand, whatever strays: the median of the densest stretch of an eighth of P,
+  /// over which the step of gathering() may leave them.
+  [[nodiscard]] double densest_place(int direction, int which, double change) const {
+    std::vector<double> at;  // modulo P, and once more around
+    for (const SeenDot& dot : dots_) {
+      if (side(dot, direction) == which)
+        at.push_back(wrap_positive(seconds(dot, direction) + dot.frame * change, flash_period_));
+    }
+    const std::size_t count = at.size();
+    std::sort(at.begin(), at.end());
+    for (std::size_t i = 0; i < count; ++i) at.push_back(at[i] + flash_period_);
+    const double stretch = std::max(flash_period_ / 8, 2 * kStrayRows * row_time_);
+    std::size_t first = 0;
+    std::size_t last = 0;
+    for (std::size_t from = 0, to = 0; from < count; ++from) {
+      while (to < from + count && at[to] - at[from] <= stretch) ++to;
+      if (to - from > last - first) first = from, last = to;
+    }
+    return last > first ? at[(first + last) / 2] : 0;
   }
   /// Least squares for T and the two sides' places, T held by what was known before; dots further than
   /// `stray` rows cost no more than a stray.

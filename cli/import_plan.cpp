@@ -105,7 +105,8 @@ Result<FramePlan> plan_frames(std::span<const TimedFilm> films, std::size_t refe
       plan.repeated += !camera.places.empty() && camera.places.back() == places[c] ? 1 : 0;
       camera.places.push_back(places[c]);
       camera.late_s.push_back((films[c].times.read_start(places[c]) - instant).value());
-      camera.sigma_s.push_back(films[c].times.sigma(places[c]).value());
+      camera.sigma_s.push_back(
+          c == reference ? 0 : sigma_between(films[c].times, places[c], clock.times, place).value());
     }
   }
   if (plan.instants.empty()) return nothing_in_common(films, reference);

@@ -29,7 +29,7 @@ struct FramePlan {
   struct Camera {
     std::vector<std::int64_t> places;  ///< by instant
     std::vector<double> late_s;        ///< read phase less instant
-    std::vector<double> sigma_s;       ///< standard error of late_s
+    std::vector<double> sigma_s;  ///< standard error of late_s; 0 of the reference, which makes the instants
   };
   std::vector<Camera> cameras;
   std::int64_t left_out = 0;  ///< instants within that lack a frame of some camera

@@ -14,7 +14,10 @@ struct DriftOptions {
   Seconds period{1 / 23.976};  ///< T
   /// t_row of a sensor that shifts charge (or exposes) by whole rows; zero: phases without steps.
   SecondsPerRow row_time{};
-  SecondsPerRow row_time_sigma{};  ///< its standard error, which tau inherits k times over
+  SecondsPerRow row_time_sigma{};  ///< its standard error, which every tau inherits k times over
+  /// Stated error of the lamp's row, one lamp for all samples, whose own sigmas then leave it out. The stairs
+  /// tell the row but for whole rows.
+  Rows lamp_sigma{};
   Seconds flash_width = microseconds(20);
   PartsPerMillion expected{0};  ///< the rate about which rates are looked for: of a detuned strobe, P / T - 1
   PartsPerMillion fastest{
@@ -32,6 +35,10 @@ struct Drift {
   PartsPerMillion rate;
   PartsPerMillion rate_sigma;  ///< standard error; the staircase of whole-row shifts is allowed for
   int samples = 0;             ///< that the fit rests on
+  /// What both errors owe to the row time being one standard error too long: cameras whose lines were made
+  /// with one row time share it.
+  Seconds tau_by_row_time{};
+  PartsPerMillion rate_by_row_time{};
 };
 
 /// Fits the line to samples whose `at` is the flash's (sample_of() makes such): the rate under which the

@@ -71,6 +71,7 @@ class Stairs {
     return sum;
   }
   /// Of the lamp's error, which moves the first number with it.
+  [[nodiscard]] double lamp() const { return wrap_symmetric(lamp_, 1); }
   [[nodiscard]] double lamp_sigma() const {
     double weights = 0;
     for (const StairPoint& p : points_) weights += 1 / square(scale(p));
@@ -215,7 +216,7 @@ std::optional<StairFit> fit_stairs(std::span<const StairPoint> points, const Sta
     m.covariance += least;
     last = (stairs.refine(m.mean, m.heat) && m.heat == 1) || round == kRounds - 2;
   }
-  StairFit fit{m.mean, m.covariance.diagonal().cwiseSqrt()};
+  StairFit fit{m.mean, m.covariance.diagonal().cwiseSqrt(), stairs.lamp()};
   fit.sigma(0) = std::hypot(fit.sigma(0), stairs.lamp_sigma());
   return fit;
 }

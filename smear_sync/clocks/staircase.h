@@ -42,6 +42,7 @@ struct StairStart {
 struct StairFit {
   StairLine line;
   StairLine sigma;
+  double lamp = 0;  ///< by which all dots miss their steps: the lamp's error, but for whole rows
 };
 
 /// The line whose stairs the points stand on: mean and deviation of the likelihood over all lines near the

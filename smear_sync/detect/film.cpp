@@ -13,6 +13,9 @@ constexpr double kSamePlace = 0.8;  // rows: what doesn't move stays within
 // Spots of a frame: hot pixels and reflections are fewer. The dots of a comb at a multiple of the frame rate
 // stand.
 constexpr std::size_t kStandingComb = 3;
+// Unsaturated readings of a lamp that else is saturated, below which they count for nothing: a flash that the
+// transfer cut in two is as dim, and its dot, a row from the lamp, bends it by most of a row.
+constexpr std::ptrdiff_t kFewestClear = 3;
 
 double middle(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -95,9 +98,10 @@ std::optional<LampReading> combine_lamps(std::span<const SmearReading> film) {
   for (const SmearReading& reading : film) {
     if (reading.lamp) lamps.push_back(*reading.lamp);
   }
-  const bool clear =
-      std::any_of(lamps.begin(), lamps.end(), [](const LampReading& l) { return !l.saturated; });
-  std::erase_if(lamps, [clear](const LampReading& l) { return clear && l.saturated; });
+  const auto clear_lamps =
+      std::count_if(lamps.begin(), lamps.end(), [](const LampReading& l) { return !l.saturated; });
+  const bool clear = clear_lamps >= std::min(kFewestClear, std::ssize(lamps));
+  std::erase_if(lamps, [clear](const LampReading& l) { return l.saturated == clear; });
   if (lamps.empty()) return std::nullopt;
   std::vector<double> xs;
   std::vector<double> ys;

@@ -9,9 +9,10 @@
 namespace emberlock {
 
 /// The lamp of a camera that stands still, from the readings of many frames: the mean over the unsaturated
-/// ones where there are any (a saturated lamp's outline is 0.07..0.7 rows off, the same way in every frame),
-/// else over all. `sigma` covers the readings' own errors and their scatter; that of saturated lamps doesn't
-/// fall with their number. Readings more than a pixel off the median don't count. Nothing without a lamp.
+/// ones where there are three or more (a saturated lamp's outline is 0.07..0.7 rows off, the same way in
+/// every frame), else over all. `sigma` covers the readings' own errors and their scatter; that of saturated
+/// lamps doesn't fall with their number. Readings more than a pixel off the median don't count. Nothing
+/// without a lamp.
 std::optional<LampReading> combine_lamps(std::span<const SmearReading> film);
 
 /// Reads again what single frames of one camera left ambiguous, by what moves: the dots of a strobe that is

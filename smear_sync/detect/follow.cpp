@@ -4,6 +4,13 @@
 #include "smear_sync/detect/look.h"
 
 namespace emberlock {
+namespace {
+
+bool shows_dots(const SmearReading& reading) {
+  return reading.state == SmearState::dot || reading.state == SmearState::comb;
+}
+
+}  // namespace
 
 struct FollowingDetector::Known {
   ImageLayout layout;
@@ -27,11 +34,13 @@ SmearReading FollowingDetector::read(const ImageView& frame) {
     if (std::optional<detail::Look> look = detail::look_again(plane, known_->look, turn, options_)) {
       SmearReading reading = detail::read_lamps(plane, look->background, look->search, options_);
       known_->look = std::move(*look);
+      known_->look.clear_of_dots |= shows_dots(reading);
       return reading;
     }
   }
   detail::Look look = detail::whole_look(plane, options_);
   SmearReading reading = detail::read_lamps(plane, look.background, look.search, options_);
+  look.clear_of_dots = shows_dots(reading);
   known_ = std::make_unique<Known>(Known{frame.layout, std::move(look)});
   return reading;
 }

@@ -11,8 +11,8 @@ namespace emberlock {
 /// and a sparse sample of the rest are read. All of the frame is looked at again whenever anything but the
 /// dots has changed (the lamp, its surroundings, the noise, the format), when a spot is as bright as a lamp,
 /// and every 128th frame. So a new lamp elsewhere is noticed at once when it is 16 rows tall, within 16
-/// frames when it is smaller. A saturated lamp that looks as it did is not measured again: its readings then
-/// share one error.
+/// frames when it is smaller. A saturated lamp that was measured while its dots stood elsewhere, and looks
+/// as it did, is not measured again: its readings then share one error.
 ///
 /// The result depends on the frames since construction and on nothing else. One for each camera; not for two
 /// threads at once.

@@ -82,6 +82,7 @@ Look whole_look(const Plane& plane, const DetectOptions& options) {
   look.search = find_lamps(plane, look.background, find_bright(plane, threshold, every_lamp(plane)), options);
   if (look.search.lamps.size() == 1)
     look.glance = glance_at(plane, look.background, look.search.lamps.front());
+  look.clear_of_dots = false;
   return look;
 }
 
@@ -97,7 +98,9 @@ std::optional<Look> look_again(const Plane& plane, const Look& before, unsigned 
     look.background = *background;
   }
   if (!alone(plane, look.background, lamp, turn, options)) return std::nullopt;
-  if (lamp.saturated && glance_at(plane, look.background, lamp).same_as(before.glance)) return look;
+  if (lamp.saturated && before.clear_of_dots &&
+      glance_at(plane, look.background, lamp).same_as(before.glance))
+    return look;
   std::optional<LampSearch> search = find_again(plane, look.background, lamp, options);
   if (!search) return std::nullopt;
   look.search = std::move(*search);

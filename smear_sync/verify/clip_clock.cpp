@@ -24,28 +24,33 @@ Number median(std::vector<Number> v) {
 }
 
 /// The lamp stands still: its place is the median of all frames', each frame's dot is told from there, and
-/// what shines elsewhere (a dot whose lamp wasn't lit, a reflection) isn't the lamp.
-std::vector<FrameReading> with_one_lamp(const ClipReading& clip, Rows& lamp) {
+/// what shines elsewhere (a dot whose lamp wasn't lit, a reflection) isn't the lamp. Its error is one for all
+/// frames, and no frame's own.
+std::vector<FrameReading> with_one_lamp(const ClipReading& clip, Rows& lamp, Rows& lamp_sigma) {
   std::vector<FrameReading> frames;
   std::vector<double> rows;
+  std::vector<double> sigmas;
   std::vector<double> columns;
   std::vector<double> radii;
   for (std::size_t i = 0; i < clip.frames.size(); ++i) {
     frames.push_back({static_cast<std::int64_t>(i), clip.frames[i]});
     if (const auto& seen = clip.frames[i].lamp) {
       rows.push_back(seen->y.value());
+      sigmas.push_back(seen->sigma.value());
       columns.push_back(seen->x);
       radii.push_back(seen->radius);
     }
   }
   if (rows.empty()) return frames;
   lamp = Rows(median(rows));
+  lamp_sigma = Rows(median(sigmas));
   const double column = median(columns);
   const double reach = median(radii) + 2;
   for (FrameReading& f : frames) {
     if (!f.reading.lamp) continue;
     if (std::hypot(f.reading.lamp->x - column, (f.reading.lamp->y - lamp).value()) <= reach) {
       f.reading.lamp->y = lamp;
+      f.reading.lamp->sigma = Rows(0);
     } else {
       f.reading = {SmearState::no_lamp, {}, {}, "what shines isn't where the lamp is in the other frames"};
     }
@@ -135,6 +140,7 @@ bool fit_line(const std::vector<FrameReading>& frames, const ClipOptions& option
   const DriftOptions with{.period = clock.flash_period,
                           .row_time = options.row_time,
                           .row_time_sigma = options.row_time_sigma,
+                          .lamp_sigma = clock.lamp_sigma,
                           .flash_width = options.flash_width,
                           .expected = PartsPerMillion(1e6 * (walk_a_frame / clock.believed_period)),
                           .fastest = told ? kNextToTheWalk : kNextToTheClaim};
@@ -268,7 +274,7 @@ Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& op
   EMBERLOCK_RETURN_IF_ERROR(check(options));
   ClipClock clock;
   clock.flash_period = period(options.flash_rate);
-  const std::vector<FrameReading> frames = with_one_lamp(clip, clock.lamp);
+  const std::vector<FrameReading> frames = with_one_lamp(clip, clock.lamp, clock.lamp_sigma);
   for (const FrameReading& f : frames) clock.lit += f.reading.lamp ? 1 : 0;
   if (clip.claimed_rate && !options.frame_rate &&
       std::abs(clip.claimed_rate->value() / options.flash_rate.value() - 1) > 0.05) {

@@ -53,6 +53,7 @@ struct ClipPoint {
 struct ClipClock {
   CcdTiming timing;      ///< n, K, d and T as measured; t_row as given
   Rows lamp;             ///< y_s, over all frames
+  Rows lamp_sigma{};     ///< its error, as the detector states it
   ReadMode mode;         ///< what the walk of the dots told, and why it didn't
   FrameNumbers numbers;  ///< what the code told, and why it didn't
   std::optional<Drift>

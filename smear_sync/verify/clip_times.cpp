@@ -4,6 +4,8 @@
 #include <cmath>
 #include <string>
 
+#include "base/square.h"
+
 namespace emberlock {
 
 std::int64_t ClipTimes::count_of(std::int64_t place) const {
@@ -29,12 +31,26 @@ Seconds ClipTimes::read_start(std::int64_t place) const {
 }
 
 Seconds ClipTimes::sigma(std::int64_t place) const {
-  const Seconds grown = period_sigma * (static_cast<double>(count_of(place)) - at);
-  return Seconds(std::hypot(start_sigma.value(), grown.value()));
+  const double away = static_cast<double>(count_of(place)) - at;
+  const double own = square(start_sigma.value()) - square(start_by_row_time.value()) +
+                     square(away) * (square(period_sigma.value()) - square(period_by_row_time.value()));
+  return Seconds(std::sqrt(std::max(0.0, own) + square(by_row_time(place).value())));
+}
+
+Seconds ClipTimes::by_row_time(std::int64_t place) const {
+  return start_by_row_time + period_by_row_time * (static_cast<double>(count_of(place)) - at);
 }
 
 std::int64_t ClipTimes::nearest_count(Seconds instant) const {
   return std::llround(at + (instant - start) / period);
+}
+
+Seconds sigma_between(const ClipTimes& a, std::int64_t place_a, const ClipTimes& b, std::int64_t place_b) {
+  const auto own = [](const ClipTimes& t, std::int64_t place) {
+    return std::max(0.0, square(t.sigma(place).value()) - square(t.by_row_time(place).value()));
+  };
+  const Seconds shared = a.by_row_time(place_a) - b.by_row_time(place_b);
+  return Seconds(std::sqrt(own(a, place_a) + own(b, place_b) + square(shared.value())));
 }
 
 Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options, const std::string& clip) {
@@ -69,6 +85,8 @@ Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options,
   times.start_sigma = clock.line->tau_sigma;
   times.start = clock.flash_period * flash - phase.tau +
                 times.period * (middle_count - static_cast<double>(clock.count_of(place)));
+  times.start_by_row_time = -1.0 * clock.line->tau_by_row_time;
+  times.period_by_row_time = clock.believed_period * (-1e-6 * clock.line->rate_by_row_time.value());
   times.drops = clock.numbers.drops;
   return times;
 }

@@ -13,13 +13,18 @@
 namespace emberlock {
 
 /// When each frame of a clip began to be read: a straight line on a clock that all clips of one strobe share,
-/// good beyond the frames that showed it. The line's two errors are independent of one another.
+/// good beyond the frames that showed it. The line's two errors are independent of one another, but for what
+/// the row time is to blame for.
 struct ClipTimes {
   double at = 0;         ///< the camera's count (ClipClock::count_of) at which the line is known best
   Seconds start;         ///< of count `at`
   Seconds start_sigma;   ///< standard error
   Seconds period;        ///< from one count to the next
   Seconds period_sigma;  ///< standard error
+  /// What start and period owe to a row time one standard error too long; part of the sigmas above. Clips
+  /// that were read with one row time err alike by it.
+  Seconds start_by_row_time{};
+  Seconds period_by_row_time{};
   std::vector<DroppedFrames> drops{};  ///< between places of the file, at which the count jumps
 
   [[nodiscard]] std::int64_t count_of(std::int64_t place) const;
@@ -28,9 +33,14 @@ struct ClipTimes {
   [[nodiscard]] Seconds read_start(std::int64_t place) const;
   /// Standard error of read_start, which grows with the distance from the frames that showed the strobe.
   [[nodiscard]] Seconds sigma(std::int64_t place) const;
+  /// What of it the row time is to blame for, with its sign.
+  [[nodiscard]] Seconds by_row_time(std::int64_t place) const;
   /// The count whose read phase starts nearest to an instant.
   [[nodiscard]] std::int64_t nearest_count(Seconds instant) const;
 };
+
+/// Standard error of how much later one clip's frame is read than another's: of both, less what they share.
+Seconds sigma_between(const ClipTimes& a, std::int64_t place_a, const ClipTimes& b, std::int64_t place_b);
 
 /// The times of a clip by its own clock, in the strobe's seconds since the code's first flash, modulo the
 /// code's cycle. The read direction must be known, or given by who read the clock. Errors (bad_input), with

@@ -152,10 +152,8 @@ void times_of(std::uint64_t seed, const fs::path& folder, Residuals& all) {
       return late - truth;
     };
     const auto& late = times.cameras(static_cast<int>(c)).late_s();
-    const double first = off(0, Seconds(late[0])).value() /
-                         std::hypot(camera.sigma_first->value(), reference.sigma_first->value());
-    const double last = off(result->instants - 1, Seconds(late[late.size() - 1])).value() /
-                        std::hypot(camera.sigma_last->value(), reference.sigma_last->value());
+    const double first = off(0, Seconds(late[0])) / *camera.sigma_first;
+    const double last = off(result->instants - 1, Seconds(late[late.size() - 1])) / *camera.sigma_last;
     all.squares_first += square(first);
     all.squares_last += square(last);
     all.worst = std::max({all.worst, std::abs(first), std::abs(last)});

@@ -31,18 +31,34 @@ TEST(ImportPlan, TakesOfEachFilmTheFrameNearestToTheReferencesInstant) {
   for (std::size_t i = 0; i < plan->instants.size(); ++i) {
     const Seconds instant = films[0].times.read_start(plan->cameras[0].places[i]);
     for (std::size_t c = 0; c < films.size(); ++c) {
-      const std::int64_t place = plan->cameras[c].places[i];
       double least = 1e9;
       for (std::int64_t p = 0; p < films[c].frames; ++p)
         least = std::min(least, std::abs((films[c].times.read_start(p) - instant).value()));
       EXPECT_EQ(std::abs(plan->cameras[c].late_s[i]), least);
-      EXPECT_NEAR(plan->cameras[c].sigma_s[i], std::hypot(3e-6, 4e-9 * static_cast<double>(place)), 1e-12);
+      const auto own = [&](std::size_t film) {
+        return std::hypot(3e-6, 4e-9 * static_cast<double>(plan->cameras[film].places[i]));
+      };
+      EXPECT_NEAR(plan->cameras[c].sigma_s[i], c == 0 ? 0 : std::hypot(own(c), own(0)), 1e-12);
     }
   }
   EXPECT_EQ(plan->cameras[0].places.front(), 25);
   EXPECT_EQ(plan->cameras[1].places.front(), 30);
   EXPECT_EQ(plan->cameras[2].places.front(), 0);
   EXPECT_EQ(plan->instants.size(), 60U);
+}
+
+TEST(ImportPlan, TakesNoErrorForTheCamerasThatTheyShare) {
+  std::vector films{film_of("a", 0, 0.04, 100), film_of("b", 0.01, 0.04, 100)};
+  for (TimedFilm& film : films) {
+    film.times.start_by_row_time = Seconds(3e-6);
+    film.times.period_by_row_time = Seconds(4e-9);
+  }
+  const auto alike = plan_frames(films, 0, {});
+  EXPECT_NEAR(alike->cameras[1].sigma_s[50], 0, 1e-12);
+  films[1].times.start_by_row_time = Seconds(-3e-6);
+  films[1].times.period_by_row_time = Seconds(-4e-9);
+  const auto against = plan_frames(films, 0, {});
+  EXPECT_NEAR(against->cameras[1].sigma_s[50], 2 * (3e-6 + 50 * 4e-9), 1e-12);
 }
 
 TEST(ImportPlan, TakesTheLongestPartInWhichNoFilmShowsTheStrobe) {

@@ -67,6 +67,54 @@ TEST(Drift, OneFrameInFiveIsWildAndBlindFramesArePassedOver) {
   EXPECT_NEAR(drift->rate.value(), 5, 0.2);
 }
 
+/// Dots on whole rows of `row`, the lamp's row `lamp_off` rows wrong.
+std::vector<PhaseSample> on_stairs(SecondsPerRow row, double lamp_off) {
+  auto samples = samples_of({.tau0 = 0.03, .ppm = 410, .seconds = 60, .frames = 400, .noise_rows = 0});
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    PhaseSample& s = samples[i];
+    const double x = (s.phase.tau / kDriftRow).value();
+    const Rows k(std::floor(x) + lamp_off + random_normal(5, 4, i) * 0.02);
+    s.shifted = ShiftedRows{k, Rows(0.02)};
+    s.phase.tau = (k + Rows(0.5)) * row;
+    s.phase.sigma = Rows(0.29) * row;
+  }
+  return samples;
+}
+
+TEST(Drift, ALampNearHalfARowOffMayBeAWholeRowOffAndSaysSo) {
+  DriftOptions with = options();
+  with.row_time = kDriftRow;
+  with.flash_width = microseconds(1);
+  with.lamp_sigma = Rows(0.3);
+  const auto rows_of_sigma = [&](double lamp_off) {
+    return (fit_drift(on_stairs(kDriftRow, lamp_off), with)->tau_sigma / kDriftRow).value();
+  };
+  EXPECT_LT(rows_of_sigma(0.05), 0.02);
+  EXPECT_NEAR(rows_of_sigma(0.5), std::sqrt(0.5), 0.1);
+  EXPECT_GT(rows_of_sigma(0.3), 0.1);
+  EXPECT_NEAR(rows_of_sigma(0.3), rows_of_sigma(-0.3), 0.02);
+}
+
+TEST(Drift, ARowTimeThatIsOffMovesTheLineAsStated) {
+  const SecondsPerRow longer = kDriftRow * (1 + 2e-4);
+  DriftOptions with = options();
+  with.flash_width = microseconds(1);
+  with.row_time = kDriftRow;
+  with.row_time_sigma = longer - kDriftRow;
+  const auto drift = fit_drift(on_stairs(kDriftRow, 0), with);
+  with.row_time = longer;
+  const auto moved = fit_drift(on_stairs(longer, 0), with);
+  ASSERT_TRUE(drift.ok() && moved.ok());
+  const Seconds by = drift->tau_by_row_time;
+  const Seconds middle =
+      wrap_symmetric(phase_at(*moved, drift->at, kDriftPeriod).tau - drift->tau, kDriftPeriod);
+  EXPECT_GT(by, microseconds(1));
+  EXPECT_NEAR(in_microseconds(middle), in_microseconds(by), 0.3);
+  EXPECT_NEAR((moved->rate - drift->rate).value(), drift->rate_by_row_time.value(), 0.05);
+  EXPECT_GT(std::abs(drift->rate_by_row_time.value()), 0.05);
+  EXPECT_GE(drift->tau_sigma, by);
+}
+
 // Charge moves in whole rows: a slow drift shows no step for a long time. The error must say so.
 TEST(Drift, StaircaseOfASlowDrift) {
   int outside = 0;

@@ -45,6 +45,17 @@ TEST(Film, UnsaturatedFramesTellTheLampsRow) {
   }
 }
 
+// A flash that the transfer cut in two is dim, and its dot stands a row beside the lamp.
+TEST(Film, AFewUnsaturatedFramesAmongSaturatedOnesTellNothing) {
+  std::vector<SmearReading> film;
+  for (std::uint64_t i = 0; i < 40; ++i) film.push_back(detect(film_scene().image({.seed = i}).view()));
+  for (const std::size_t dim : {7U, 19U}) {
+    film[dim] = detect(film_scene(90).disk(kFilmLampX, kFilmLampY + 1.6, 4, 90).image({.seed = dim}).view());
+    ASSERT_FALSE(film[dim].lamp->saturated);
+  }
+  EXPECT_NEAR(combine_lamps(film)->y.value(), kFilmLampY, 0.1);
+}
+
 TEST(Film, AWalkJustLongEnoughToTellLosesNoDot) {
   for (const double travel : {2.0, 3.0, 3.9, 4.2, 6.0}) {
     std::vector<SmearReading> film;

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/import_report.h"
 #include "cli/import_run.h"
 #include "cli/interrupt.h"
 
@@ -107,11 +108,10 @@ void print_table(const ImportArguments& arguments, const ImportResult& result) {
               static_cast<long long>(result.instants), result.cameras.size());
   for (const ImportedCamera& c : result.cameras) {
     std::printf("  %-20s", c.id.c_str());
-    if (c.late_first) {
+    if (c.clock) {
       std::printf(" frame %+6lld  %+9.4f ms +- %.4f at first, %+9.4f +- %.4f at last  %+7.2f ppm",
-                  static_cast<long long>(c.frame_offset), in_milliseconds(*c.late_first),
-                  in_milliseconds(*c.sigma_first), in_milliseconds(*c.late_last),
-                  in_milliseconds(*c.sigma_last), c.drift->value());
+                  static_cast<long long>(c.frame_offset), 1e3 * c.late_s.front(), 1e3 * c.sigma_s.front(),
+                  1e3 * c.late_s.back(), 1e3 * c.sigma_s.back(), c.drift->value());
     } else if (result.instants > 1) {
       std::printf(" frame %+6lld", static_cast<long long>(c.frame_offset));
     }
@@ -129,7 +129,7 @@ void import(const ImportArguments& arguments) {
   }));
   for (const std::string& note : result.notes) std::fprintf(stderr, "emberlock: %s\n", note.c_str());
   if (arguments.json) {
-    std::printf("%s", import_report(options, result).c_str());
+    std::printf("%s", import_json(options, result).c_str());
   } else {
     print_table(arguments, result);
   }

@@ -136,7 +136,7 @@ Status ImportFolder::write(const CameraPart& part, const Observer& observer,
 }
 
 Result<v1::Manifest> ImportFolder::finish(v1::Manifest manifest, const std::vector<CameraPart>& parts,
-                                          const v1::ShutterTimes* times, std::string_view report) const {
+                                          const v1::ShutterTimes* times, const ImportReports& reports) const {
   const fs::path folder = work_ / "session";
   std::error_code ec;
   fs::create_directories(folder, ec);
@@ -160,7 +160,8 @@ Result<v1::Manifest> ImportFolder::finish(v1::Manifest manifest, const std::vect
   EMBERLOCK_RETURN_IF_ERROR(check_manifest(manifest, manifest_path(folder).string()));
   fs::remove(shutter_times_path(folder), ec);
   if (times != nullptr) EMBERLOCK_RETURN_IF_ERROR(write_shutter_times(folder, *times));
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "import.json", report));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "import.json", reports.json));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "import.html", reports.page));
   EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder, manifest));
   fs::remove(session_, ec);  // an empty folder of this name
   EMBERLOCK_RETURN_IF_ERROR(move(folder, session_));

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -29,6 +28,12 @@ struct CameraPart {
   std::vector<FrameStamp> stamps{};    ///< as many
 };
 
+/// What stands beside a session's manifest for people and programs.
+struct ImportReports {
+  std::string json;  ///< import.json
+  std::string page;  ///< import.html
+};
+
 /// A session that grows in a folder beside its own, "NAME.importing": a camera at a time, each of which is
 /// kept when all its frames are there. Whoever is killed goes on with the cameras that lack, as long as the
 /// originals and what was asked for are the same.
@@ -46,7 +51,7 @@ class ImportFolder {
                std::optional<std::int64_t>& damaged_at) const;
   /// Puts the session together and gives it its name. `manifest` has everything but what the writer fills in.
   Result<v1::Manifest> finish(v1::Manifest manifest, const std::vector<CameraPart>& parts,
-                              const v1::ShutterTimes* times, std::string_view report) const;
+                              const v1::ShutterTimes* times, const ImportReports& reports) const;
 
  private:
   ImportFolder(std::filesystem::path session, std::filesystem::path work, UniqueFd lock)

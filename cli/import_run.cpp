@@ -7,16 +7,16 @@
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 #include <sys/stat.h>
 
 #include "base/in_parallel.h"
-#include "cli/clip_reader.h"
+#include "cli/import_clock.h"
 #include "cli/import_parts.h"
+#include "cli/import_report.h"
 #include "cli/import_transforms.h"
 #include "recon/calibrate/rig.h"
 #include "session/layout.h"
-#include "smear_sync/clocks/row_clock.h"
+#include "session/rig_file.h"
 
 namespace emberlock::cli {
 namespace fs = std::filesystem;
@@ -25,14 +25,6 @@ namespace {
 constexpr double kProbed = 0.03;  // of the whole import, as progress goes
 constexpr double kAnalysed = 0.15;
 constexpr int kMostPlans = 65;                   // each but the first is cut short by another damaged film
-constexpr SecondsPerRow kRowTimeAsGiven(20e-9);  // standard error of a row time given by hand
-
-/// A film on its way to the session.
-struct Candidate {
-  Film film;
-  std::optional<StrobeParts> strobe{};
-  std::optional<ClipTimes> times{};
-};
 
 /// Several errors as one, the first in front.
 Error together(const std::vector<Error>& errors) {
@@ -48,6 +40,7 @@ class Import {
   Result<ImportResult> run() {
     EMBERLOCK_ASSIGN_OR_RETURN(const ImportFolder target, ImportFolder::open(options_.out));
     EMBERLOCK_RETURN_IF_ERROR(probe());
+    EMBERLOCK_RETURN_IF_ERROR(read_calibration());
     EMBERLOCK_RETURN_IF_ERROR(choose_alignment());
     EMBERLOCK_RETURN_IF_ERROR(put_on_one_clock());
     for (int round = 0; round < kMostPlans; ++round) {
@@ -90,7 +83,8 @@ class Import {
   /// With `partial` a fault becomes a note, else it is kept for the error.
   bool forgive(const Error& error, std::vector<Error>& errors, const std::string& consequence) {
     if (options_.faults == Faults::partial && error.kind == ErrorKind::bad_input) {
-      notes_.push_back(consequence + ": " + error.where + ": " + error.what);
+      notes_.push_back(consequence + ": " + error.where + ": " + error.what +
+                       (error.remedy.empty() ? "" : ". " + error.remedy));
       return true;
     }
     errors.push_back(error);
@@ -131,65 +125,38 @@ class Import {
 
   Status put_on_one_clock() {
     if (alignment_ == Alignment::offsets) return by_offsets();
-    ClipOptions clip = options_.clip;
-    EMBERLOCK_RETURN_IF_ERROR(learn_row_time(clip));
-    const Status searched = in_parallel(
+    EMBERLOCK_ASSIGN_OR_RETURN(clip_, clip_options(options_));
+    EMBERLOCK_RETURN_IF_ERROR(in_parallel(
         films_.size(), stage(kProbed, kAnalysed), [&](std::size_t i, const Observer& observer) -> Status {
           EMBERLOCK_RETURN_IF_ERROR(observe(observer, 0, "strobe of " + films_[i].film.files.id));
-          EMBERLOCK_ASSIGN_OR_RETURN(films_[i].strobe, look_for_strobe(films_[i].film));
+          EMBERLOCK_ASSIGN_OR_RETURN(films_[i].strobe, look_for_strobe(films_[i].film, options_));
           return observe(observer, 1, "strobe of " + films_[i].film.files.id);
-        });
-    if (!searched.ok()) return searched.error();
+        }));
     std::vector<Error> errors;
     std::vector<Candidate> good;
     for (Candidate& c : films_) {
-      Result<ClipTimes> times = times_of(c, clip);
-      if (times.ok()) {
-        c.times = std::move(times).value();
-        for (const DroppedFrames& drop : c.times->drops)
-          notes_.push_back(fmt::format("{} {} {} frames between {} and {}", c.film.files.id,
-                                       drop.frames > 0 ? "lost" : "doubled", std::abs(drop.frames),
-                                       drop.after, drop.before));
-        good.push_back(std::move(c));
-      } else {
-        forgive(times.error(), errors, c.film.files.id + " is left out");
+      const Status read = read_clock(c, clip_);
+      if (!read.ok()) {
+        forgive(read.error(), errors, c.film.files.id + " is left out");
+        continue;
       }
+      for (const DroppedFrames& drop : c.times->drops)
+        notes_.push_back(fmt::format("{} {} {} frames between {} and {}", c.film.files.id,
+                                     drop.frames > 0 ? "lost" : "doubled", std::abs(drop.frames), drop.after,
+                                     drop.before));
+      good.push_back(std::move(c));
     }
     if (!errors.empty()) return together(errors);
     films_ = std::move(good);
     if (films_.empty())
       return Error{ErrorKind::bad_input, "no film shows a strobe that tells its times",
                    options_.folder.string(), "Film the strobe with all cameras; or add --unsynchronised"};
-    for (std::size_t i = 1; i < films_.size(); ++i) into_cycle_of(*films_[0].times, clip, *films_[i].times);
+    for (std::size_t i = 1; i < films_.size(); ++i) into_cycle_of(*films_[0].times, clip_, *films_[i].times);
     return {};
   }
 
   Status by_offsets() {
-    for (Candidate& c : films_) {
-      const auto told = options_.offsets.find(c.film.files.id);
-      std::int64_t offset = told == options_.offsets.end() ? 0 : told->second;
-      ClipTimes times;
-      times.period = period(c.film.frame_rate);
-      if (c.film.files.kind == CameraFiles::Kind::pictures) {
-        const std::vector<std::int64_t>& numbers = c.film.files.numbers;
-        offset -= numbers.front();
-        for (std::size_t i = 1; i < numbers.size(); ++i) {
-          const std::int64_t lacks = numbers[i] - numbers[i - 1] - 1;
-          const auto place = static_cast<std::int64_t>(i);
-          if (lacks > 0) times.drops.push_back({place - 1, place, static_cast<int>(lacks)});
-        }
-      }
-      times.start = times.period * static_cast<double>(-offset);
-      c.times = std::move(times);
-    }
-    for (const auto& [id, offset] : options_.offsets) {
-      const bool there = std::any_of(films_.begin(), films_.end(), [&, &wanted = id](const Candidate& c) {
-        return c.film.files.id == wanted;
-      });
-      if (!there)
-        return Error{ErrorKind::bad_input, "no camera has this id", "--offset " + id,
-                     "Name a camera of the folder"};
-    }
+    EMBERLOCK_RETURN_IF_ERROR(pair_by_offsets(films_, options_));
     const bool videos = std::any_of(films_.begin(), films_.end(), [](const Candidate& c) {
       return c.film.files.kind == CameraFiles::Kind::video;
     });
@@ -200,56 +167,6 @@ class Import {
     return {};
   }
 
-  Status learn_row_time(ClipOptions& clip) {
-    if (options_.row_time) {
-      clip.row_time = *options_.row_time;
-      clip.row_time_sigma = kRowTimeAsGiven;
-      return {};
-    }
-    EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<FilmedClip> comb, read_clips({options_.comb.string()}, {}));
-    const auto clock = fit_row_clock(comb.front().reading.frames, options_.comb_rate);
-    if (!clock.ok()) {
-      Error error = clock.error();
-      error.where = options_.comb.string();
-      return error;
-    }
-    clip.row_time = clock->row_time;
-    clip.row_time_sigma = clock->sigma;
-    return {};
-  }
-
-  Result<StrobeParts> look_for_strobe(const Film& film) const {
-    ClipReader reader(film.parts, Colours::brightness);
-    const FilmToSearch search{film.frames, film.frame_rate, keys_of(film),
-                              options_.strobe ? std::optional(places(*options_.strobe, film)) : std::nullopt};
-    bool begun = false;
-    return find_strobe(search, [&](std::int64_t place) -> Result<Image> {
-      if (!begun || reader.place() != place) EMBERLOCK_RETURN_IF_ERROR(reader.seek(place));
-      begun = true;
-      return reader.next();
-    });
-  }
-
-  static PlaceRange places(const Part& part, const Film& film) {
-    const double rate = film.frame_rate.value();
-    return {std::clamp<std::int64_t>(std::llround(part.from.value() * rate), 0, film.frames),
-            std::clamp<std::int64_t>(std::llround(part.to.value() * rate), 0, film.frames)};
-  }
-
-  static Result<ClipTimes> times_of(const Candidate& c, const ClipOptions& options) {
-    const std::string where = c.film.parts.front().path.string();
-    if (c.strobe->lit.empty()) {
-      return Error{
-          ErrorKind::bad_input, "shows no strobe", where,
-          "Give the film in which this camera shows the strobe's lamp for five seconds or more, or name "
-          "the part with --strobe. --partial leaves this camera out, --unsynchronised pairs frames "
-          "without a strobe"};
-    }
-    ClipReading reading{where, c.film.files.id, c.film.size.height, c.film.frame_rate, c.strobe->readings};
-    EMBERLOCK_ASSIGN_OR_RETURN(const ClipClock clock, read_clip_clock(reading, options));
-    return clip_times(clock, options, where);
-  }
-
   Result<FramePlan> make_plan() const {
     std::vector<TimedFilm> timed;
     for (const Candidate& c : films_) {
@@ -257,7 +174,7 @@ class Import {
                        c.strobe ? c.strobe->lit : std::vector<PlaceRange>()});
     }
     PlanOptions with;
-    if (options_.flame) with.flame = places(*options_.flame, films_.front().film);
+    if (options_.flame) with.flame = places_of(*options_.flame, films_.front().film);
     return plan_frames(timed, 0, with);
   }
 
@@ -295,12 +212,25 @@ class Import {
     return parts;
   }
 
+  /// What can be wrong with the rig is said before the films are searched.
+  Status read_calibration() {
+    if (options_.rig.empty()) return {};
+    EMBERLOCK_ASSIGN_OR_RETURN(rig_, read_rig(options_.rig));
+    v1::Manifest manifest;
+    for (const Candidate& c : films_) {
+      v1::CameraStream& stream = *manifest.add_cameras();
+      stream.set_camera_id(c.film.files.id);
+      stream.set_width(static_cast<std::uint32_t>(c.film.size.width));
+      stream.set_height(static_cast<std::uint32_t>(c.film.size.height));
+    }
+    return apply_rig(manifest, *rig_, options_.rig.string());
+  }
+
   /// Gives the cameras, and the manifest its box, what the rig knows.
   Status calibrate(v1::Manifest& manifest, std::vector<CameraPart>& parts) const {
-    if (options_.rig.empty()) return {};
-    EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, read_rig(options_.rig));
+    if (!rig_) return {};
     for (const CameraPart& part : parts) *manifest.add_cameras() = part.stream;
-    EMBERLOCK_RETURN_IF_ERROR(apply_rig(manifest, rig, options_.rig.string()));
+    EMBERLOCK_RETURN_IF_ERROR(apply_rig(manifest, *rig_, options_.rig.string()));
     for (std::size_t c = 0; c < parts.size(); ++c) parts[c].stream = manifest.cameras(static_cast<int>(c));
     return {};
   }
@@ -340,7 +270,7 @@ class Import {
           fmt::format("{} frames stand for two instants: the cameras' rates differ", plan.repeated));
     v1::ShutterTimes times;
     for (std::size_t c = 0; c < films_.size(); ++c) {
-      result.cameras.push_back(describe(plan, c));
+      result.cameras.push_back(describe(plan, parts, c));
       const FramePlan::Camera& camera = plan.cameras[c];
       v1::ShutterTimes::Camera& entry = *times.add_cameras();
       entry.set_camera_id(films_[c].film.files.id);
@@ -348,13 +278,14 @@ class Import {
       entry.set_sigma_s(*std::max_element(camera.sigma_s.begin(), camera.sigma_s.end()));
     }
     result.notes = notes_;
+    if (alignment_ == Alignment::strobe) result.clip = clip_;
     manifest.set_session_id(fs::absolute(options_.out).lexically_normal().filename().string());
     manifest.set_purpose("flame");
     manifest.set_created_utc(created(films_.front().film));
     const bool timed = alignment_ == Alignment::strobe;
     EMBERLOCK_ASSIGN_OR_RETURN(
         result.manifest,
-        target.finish(std::move(manifest), parts, timed ? &times : nullptr, import_report(options_, result)));
+        target.finish(std::move(manifest), parts, timed ? &times : nullptr, reports_of(options_, result)));
     EMBERLOCK_RETURN_IF_ERROR(observe(observer_, 1, "imported"));
     return result;
   }
@@ -367,22 +298,34 @@ class Import {
     return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(static_cast<std::time_t>(seconds)));
   }
 
-  ImportedCamera describe(const FramePlan& plan, std::size_t c) const {
+  /// A frame to know the camera by; none where it doesn't decode.
+  static std::optional<Image> preview_of(const CameraPart& part, std::int64_t place) {
+    ClipReader reader(part.files, part.colours);
+    if (!reader.seek(place).ok()) return std::nullopt;
+    const Result<Image> image = reader.next();
+    return image.ok() ? std::optional(small_picture(*image)) : std::nullopt;
+  }
+
+  ImportedCamera describe(const FramePlan& plan, const std::vector<CameraPart>& parts, std::size_t c) const {
     const Candidate& from = films_[c];
     const FramePlan::Camera& frames = plan.cameras[c];
     ImportedCamera camera;
     camera.id = from.film.files.id;
+    camera.name = from.film.files.name;
     for (const ClipPart& part : from.film.parts) camera.files.push_back(part.path.string());
     camera.frame_rate = from.film.frame_rate;
     camera.frames = from.film.frames;
     camera.first = frames.places.front();
     camera.frame_offset = frames.places.front() - plan.cameras[plan.reference].places.front();
+    camera.calibrated = parts[c].stream.has_calibration();
+    camera.places = frames.places;
+    camera.times = *from.times;
+    camera.preview = preview_of(parts[c], camera.places[camera.places.size() / 2]);
     if (!from.strobe) return camera;
     camera.strobe = from.strobe->lit;
-    camera.late_first = Seconds(frames.late_s.front());
-    camera.late_last = Seconds(frames.late_s.back());
-    camera.sigma_first = Seconds(frames.sigma_s.front());
-    camera.sigma_last = Seconds(frames.sigma_s.back());
+    camera.clock = from.clock;
+    camera.late_s = frames.late_s;
+    camera.sigma_s = frames.sigma_s;
     camera.drift = PartsPerMillion(1e6 * (films_[plan.reference].times->period / from.times->period - 1));
     return camera;
   }
@@ -390,6 +333,8 @@ class Import {
   const ImportOptions& options_;
   const Observer& observer_;
   Alignment alignment_ = Alignment::strobe;
+  std::optional<v1::Rig> rig_;
+  ClipOptions clip_;  // with the row time learnt
   std::vector<Candidate> films_;
   std::vector<std::optional<std::int64_t>> damaged_;  // by film: where writing found it so
   std::vector<std::string> notes_;
@@ -401,39 +346,6 @@ Result<ImportResult> run_import(const ImportOptions& options, const Observer& ob
   if (const auto transforms = transforms_in(options.folder))
     return import_transforms(*transforms, options, observer);
   return Import(options, observer).run();
-}
-
-std::string import_report(const ImportOptions& options, const ImportResult& result) {
-  using nlohmann::ordered_json;
-  const auto milliseconds_or_null = [](const std::optional<Seconds>& t) {
-    return t ? ordered_json(in_milliseconds(*t)) : ordered_json(nullptr);
-  };
-  ordered_json cameras = ordered_json::array();
-  for (const ImportedCamera& c : result.cameras) {
-    ordered_json strobe = ordered_json::array();
-    for (const PlaceRange& part : c.strobe) strobe.push_back({part.first, part.last});
-    ordered_json camera;
-    camera["id"] = c.id;
-    camera["files"] = c.files;
-    camera["frames"] = c.frames;
-    camera["frame_rate"] = c.frame_rate.value();
-    camera["strobe_frames"] = std::move(strobe);
-    camera["first_frame"] = c.first;
-    camera["frame_offset"] = c.frame_offset;
-    camera["late_ms"] = {milliseconds_or_null(c.late_first), milliseconds_or_null(c.late_last)};
-    camera["sigma_ms"] = {milliseconds_or_null(c.sigma_first), milliseconds_or_null(c.sigma_last)};
-    camera["drift_ppm"] = c.drift ? ordered_json(c.drift->value()) : ordered_json(nullptr);
-    cameras.push_back(std::move(camera));
-  }
-  ordered_json json;
-  json["source"] = options.folder.string();
-  json["aligned_by"] = options.alignment == Alignment::strobe ? "strobe" : "numbers";
-  json["reference"] = result.cameras.empty() ? "" : result.cameras[result.reference].id;
-  json["instants"] = result.instants;
-  json["instants_left_out"] = result.left_out;
-  json["cameras"] = std::move(cameras);
-  json["notes"] = result.notes;
-  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace emberlock::cli

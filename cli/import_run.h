@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "base/image.h"
 #include "base/progress.h"
 #include "base/quantity.h"
 #include "base/result.h"
@@ -16,6 +17,7 @@
 #include "session/frame_file.h"
 #include "session/writer.h"
 #include "smear_sync/verify/clip_clock.h"
+#include "smear_sync/verify/clip_times.h"
 
 namespace emberlock::cli {
 
@@ -58,15 +60,21 @@ struct ImportOptions {
 /// A camera as it was imported.
 struct ImportedCamera {
   std::string id;
+  std::string name;  ///< its file or subfolder, within the folder
   std::vector<std::string> files;
   Hertz frame_rate{};
   std::int64_t frames = 0;                           ///< of the film
   std::vector<PlaceRange> strobe{};                  ///< parts that show it
   std::int64_t first = 0;                            ///< place of the first imported frame
   std::int64_t frame_offset = 0;                     ///< its place less the reference's, of the first instant
-  std::optional<Seconds> late_first{}, late_last{};  ///< of the first and the last imported frame
-  std::optional<Seconds> sigma_first{}, sigma_last{};  ///< standard errors
-  std::optional<PartsPerMillion> drift{};              ///< its frame rate over the reference's, less one
+  std::vector<std::int64_t> places{};                ///< of the film, by instant
+  bool calibrated = false;
+  ClipTimes times{};                      ///< of the film: seconds of the strobe, or frames as told
+  std::optional<Image> preview{};         ///< the middle instant's frame, small
+  std::optional<ClipClock> clock{};       ///< what the strobe told; then, by instant:
+  std::vector<double> late_s{};           ///< later than the reference
+  std::vector<double> sigma_s{};          ///< its standard error
+  std::optional<PartsPerMillion> drift{};  ///< its frame rate over the reference's, less one
 };
 
 struct ImportResult {
@@ -75,15 +83,13 @@ struct ImportResult {
   std::size_t reference = 0;
   std::int64_t instants = 0;
   std::int64_t left_out = 0;       ///< instants within that lack a frame of some camera
-  std::vector<std::string> notes;  ///< what an operator should know, a sentence each
+  std::optional<ClipOptions> clip{};  ///< with which the strobe was read
+  std::vector<std::string> notes;     ///< what an operator should know, a sentence each
 };
 
 /// Makes a session of films. The originals are only read. Whoever is ended goes on when called again with the
 /// same options. Errors: bad_input (what is wrong with which film, and the remedy), io, refused (ended by the
 /// observer).
 Result<ImportResult> run_import(const ImportOptions& options, const Observer& observer);
-
-/// What import.json in the session says.
-std::string import_report(const ImportOptions& options, const ImportResult& result);
 
 }  // namespace emberlock::cli

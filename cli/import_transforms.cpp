@@ -8,6 +8,7 @@
 
 #include "base/in_parallel.h"
 #include "cli/import_parts.h"
+#include "cli/import_report.h"
 #include "recon/calibrate/transforms.h"
 #include "session/import_scan.h"
 #include "session/layout.h"
@@ -77,7 +78,14 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
     part.writer.min_free_bytes = options.min_free_bytes;
     part.places = {0};
     part.stamps = {FrameStamp{}};
-    result.cameras.push_back({part.stream.camera_id(), {frame.image.string()}, {}, 1});
+    ImportedCamera& camera = result.cameras.emplace_back();
+    camera.id = part.stream.camera_id();
+    camera.name = frame.image.filename().string();
+    camera.files = {frame.image.string()};
+    camera.frames = 1;
+    camera.places = {0};
+    camera.calibrated = true;
+    camera.preview = small_picture(picture);
     parts.push_back(std::move(part));
   }
   std::vector<std::optional<std::int64_t>> damaged(parts.size());
@@ -96,7 +104,7 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
   }
   result.instants = 1;
   EMBERLOCK_ASSIGN_OR_RETURN(
-      result.manifest, target.finish(std::move(manifest), parts, nullptr, import_report(options, result)));
+      result.manifest, target.finish(std::move(manifest), parts, nullptr, reports_of(options, result)));
   EMBERLOCK_RETURN_IF_ERROR(observe(observer, 1, "imported"));
   return result;
 }

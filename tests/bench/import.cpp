@@ -152,14 +152,14 @@ void times_of(std::uint64_t seed, const fs::path& folder, Residuals& all) {
       return late - truth;
     };
     const auto& late = times.cameras(static_cast<int>(c)).late_s();
-    const double first = off(0, Seconds(late[0])) / *camera.sigma_first;
-    const double last = off(result->instants - 1, Seconds(late[late.size() - 1])) / *camera.sigma_last;
+    const double first = off(0, Seconds(late[0])).value() / camera.sigma_s.front();
+    const double last = off(result->instants - 1, Seconds(late[late.size() - 1])).value() / camera.sigma_s.back();
     all.squares_first += square(first);
     all.squares_last += square(last);
     all.worst = std::max({all.worst, std::abs(first), std::abs(last)});
     std::printf("%4llu  crf %d  camera %zu  first %+6.2f sigma (%.2f us)  last %+6.2f sigma (%.2f us)\n",
                 static_cast<unsigned long long>(seed), film.strobe.format.crf, c, first,
-                in_microseconds(*camera.sigma_first), last, in_microseconds(*camera.sigma_last));
+                1e6 * camera.sigma_s.front(), last, 1e6 * camera.sigma_s.back());
     std::fflush(stdout);
   }
 }

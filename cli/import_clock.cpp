@@ -56,10 +56,11 @@ Status read_clock(Candidate& candidate, const ClipOptions& options) {
   const Film& film = candidate.film;
   const std::string where = film.parts.front().path.string();
   if (candidate.strobe->lit.empty()) {
-    return Error{ErrorKind::bad_input, "shows no strobe", where,
-                 "Give the film in which this camera shows the strobe's lamp for five seconds or more, or name "
-                 "the part with --strobe. --partial leaves this camera out, --unsynchronised pairs frames "
-                 "without a strobe"};
+    return Error{
+        ErrorKind::bad_input, "shows no strobe", where,
+        "Give the film in which this camera shows the strobe's lamp for five seconds or more, or name "
+        "the part with --strobe. --partial leaves this camera out, --unsynchronised pairs frames "
+        "without a strobe"};
   }
   const ClipReading reading{where, film.files.id, film.size.height, film.frame_rate,
                             candidate.strobe->readings};

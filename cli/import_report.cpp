@@ -11,7 +11,7 @@
 namespace emberlock::cli {
 namespace {
 
-constexpr int kPreviewWidth = 280;  // pixels
+constexpr int kPreviewWidth = 280;       // pixels
 constexpr std::size_t kMostShown = 600;  // points of a plot: more only fill the file
 constexpr const char* kGood = "#009e73";
 constexpr const char* kStrobeColour = "#e69f00";
@@ -111,9 +111,9 @@ void cameras(HtmlPage& page, const ImportOptions& options, const ImportResult& r
   std::vector<HtmlPage::Picture> pictures;
   for (const ImportedCamera& c : r.cameras) {
     if (c.preview)
-      pictures.push_back({fmt::format(R"(<img alt="{}" src="{}">)", html_escape(c.id),
-                                      png_data_uri(*c.preview)),
-                          fmt::format("{}, frame {}", c.id, c.places[c.places.size() / 2])});
+      pictures.push_back(
+          {fmt::format(R"(<img alt="{}" src="{}">)", html_escape(c.id), png_data_uri(*c.preview)),
+           fmt::format("{}, frame {}", c.id, c.places[c.places.size() / 2])});
   }
   page.gallery(pictures);
   std::vector<std::vector<std::string>> rows;
@@ -125,18 +125,19 @@ void cameras(HtmlPage& page, const ImportOptions& options, const ImportResult& r
       return fmt::format("{:+.4f} ± {:.4f}", 1e3 * c.late_s[i], 1e3 * c.sigma_s[i]);
     };
     const std::string files = c.files.size() > 1 ? fmt::format(" ({} files)", c.files.size()) : "";
-    rows.push_back({c.id + (is_reference && r.instants > 1 ? " (reference)" : ""), c.name + files,
-                    why_it_is(options, c), fmt::format("{}", c.frames),
-                    fmt::format("{} to {}", c.places.front(), c.places.back()),
-                    fmt::format("{:+d}", c.frame_offset), late(0), late(c.late_s.empty() ? 0 : c.late_s.size() - 1),
-                    c.drift && !is_reference ? fmt::format("{:+.2f}", c.drift->value()) : none,
-                    c.calibrated ? "yes" : "no"});
+    rows.push_back(
+        {c.id + (is_reference && r.instants > 1 ? " (reference)" : ""), c.name + files, why_it_is(options, c),
+         fmt::format("{}", c.frames), fmt::format("{} to {}", c.places.front(), c.places.back()),
+         fmt::format("{:+d}", c.frame_offset), late(0), late(c.late_s.empty() ? 0 : c.late_s.size() - 1),
+         c.drift && !is_reference ? fmt::format("{:+.2f}", c.drift->value()) : none,
+         c.calibrated ? "yes" : "no"});
   }
   page.table({"camera", "film", "known by", "frames", "imported", "frame offset", "late at first (ms)",
               "late at last (ms)", "drift (ppm)", "calibrated"},
              rows);
   page.paragraph(
-      "Frame offset: frame i + offset of the film belongs to frame i of the reference. Late: begins to be read "
+      "Frame offset: frame i + offset of the film belongs to frame i of the reference. Late: begins to be "
+      "read "
       "after the reference, with one standard error. Drift: its frame rate over the reference's.");
 }
 
@@ -178,10 +179,10 @@ void timeline(HtmlPage& page, const ImportResult& r) {
     svg += fmt::format(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="middle">{:+.1f} s</text>)", x(s),
                        height + 20, s);
   page.raw("<div class=\"scroll\">" + svg + "</svg></div>");
-  page.paragraph(
-      fmt::format("Orange: the strobe, which stays in the originals. Blue: the {} instants that are common to "
-                  "all, and imported; {} within lack a frame of some camera. Grey: neither.",
-                  r.instants, r.left_out));
+  page.paragraph(fmt::format(
+      "Orange: the strobe, which stays in the originals. Blue: the {} instants that are common to "
+      "all, and imported; {} within lack a frame of some camera. Grey: neither.",
+      r.instants, r.left_out));
 }
 
 void times(HtmlPage& page, const ImportResult& r) {
@@ -215,7 +216,8 @@ void times(HtmlPage& page, const ImportResult& r) {
                             .height = 300}) +
            "</div>");
   page.paragraph(
-      "The error grows with the distance from the strobe, as a camera's rate is known the better the longer it "
+      "The error grows with the distance from the strobe, as a camera's rate is known the better the longer "
+      "it "
       "filmed it. times.json holds each frame's time and the largest of its camera's errors.");
 }
 
@@ -229,8 +231,8 @@ std::string what_the_strobe_told(const ImportResult& r, const ImportedCamera& c)
       "frames a second. It reads the {} row first, as {}; K is {}{}{}. t_row is {:.4f} ± {:.4f} µs.",
       parts, clock.points.size(), clock.lit, 1 / clock.timing.frame_period.value(),
       clock.timing.direction == ReadDirection::top_first ? "top" : "bottom",
-      clock.mode.direction ? clock.mode.direction_reason : "told",
-      clock.timing.shifts, clock.mode.shifts ? ", as " : ", taken since ", clock.mode.shifts_reason,
+      clock.mode.direction ? clock.mode.direction_reason : "told", clock.timing.shifts,
+      clock.mode.shifts ? ", as " : ", taken since ", clock.mode.shifts_reason,
       1e6 * r.clip->row_time.value(), 1e6 * r.clip->row_time_sigma.value());
 }
 
@@ -316,8 +318,8 @@ ImportReports reports_of(const ImportOptions& options, const ImportResult& resul
 
 Image small_picture(const Image& image) {
   const ImageView view = image.view();
-  const int step = std::max(is_bayer(view.layout.format) ? 2 : 1,
-                            (view.width() + kPreviewWidth - 1) / kPreviewWidth);
+  const int step =
+      std::max(is_bayer(view.layout.format) ? 2 : 1, (view.width() + kPreviewWidth - 1) / kPreviewWidth);
   const bool colour = channels(view.layout.format) == 3;
   Image small({{std::max(1, view.width() / step), std::max(1, view.height() / step)},
                colour ? PixelFormat::rgb8 : PixelFormat::gray8,
@@ -332,7 +334,8 @@ Image small_picture(const Image& image) {
         for (int v = y * step; v < std::min(view.height(), (y + 1) * step); ++v)
           for (int u = x * step; u < std::min(view.width(), (x + 1) * step); ++u, ++pixels)
             sum += view.sample(u, v, c);
-        *row = static_cast<std::uint8_t>(255 * sum / (static_cast<std::int64_t>(pixels) * view.layout.white()));
+        *row =
+            static_cast<std::uint8_t>(255 * sum / (static_cast<std::int64_t>(pixels) * view.layout.white()));
       }
     }
   }

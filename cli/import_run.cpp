@@ -24,7 +24,7 @@ namespace {
 
 constexpr double kProbed = 0.03;  // of the whole import, as progress goes
 constexpr double kAnalysed = 0.15;
-constexpr int kMostPlans = 65;                   // each but the first is cut short by another damaged film
+constexpr int kMostPlans = 65;  // each but the first is cut short by another damaged film
 
 /// Several errors as one, the first in front.
 Error together(const std::vector<Error>& errors) {

@@ -63,17 +63,17 @@ struct ImportedCamera {
   std::string name;  ///< its file or subfolder, within the folder
   std::vector<std::string> files;
   Hertz frame_rate{};
-  std::int64_t frames = 0;                           ///< of the film
-  std::vector<PlaceRange> strobe{};                  ///< parts that show it
-  std::int64_t first = 0;                            ///< place of the first imported frame
-  std::int64_t frame_offset = 0;                     ///< its place less the reference's, of the first instant
-  std::vector<std::int64_t> places{};                ///< of the film, by instant
+  std::int64_t frames = 0;             ///< of the film
+  std::vector<PlaceRange> strobe{};    ///< parts that show it
+  std::int64_t first = 0;              ///< place of the first imported frame
+  std::int64_t frame_offset = 0;       ///< its place less the reference's, of the first instant
+  std::vector<std::int64_t> places{};  ///< of the film, by instant
   bool calibrated = false;
-  ClipTimes times{};                      ///< of the film: seconds of the strobe, or frames as told
-  std::optional<Image> preview{};         ///< the middle instant's frame, small
-  std::optional<ClipClock> clock{};       ///< what the strobe told; then, by instant:
-  std::vector<double> late_s{};           ///< later than the reference
-  std::vector<double> sigma_s{};          ///< its standard error
+  ClipTimes times{};                       ///< of the film: seconds of the strobe, or frames as told
+  std::optional<Image> preview{};          ///< the middle instant's frame, small
+  std::optional<ClipClock> clock{};        ///< what the strobe told; then, by instant:
+  std::vector<double> late_s{};            ///< later than the reference
+  std::vector<double> sigma_s{};           ///< its standard error
   std::optional<PartsPerMillion> drift{};  ///< its frame rate over the reference's, less one
 };
 
@@ -82,7 +82,7 @@ struct ImportResult {
   std::vector<ImportedCamera> cameras;
   std::size_t reference = 0;
   std::int64_t instants = 0;
-  std::int64_t left_out = 0;       ///< instants within that lack a frame of some camera
+  std::int64_t left_out = 0;          ///< instants within that lack a frame of some camera
   std::optional<ClipOptions> clip{};  ///< with which the strobe was read
   std::vector<std::string> notes;     ///< what an operator should know, a sentence each
 };

@@ -103,8 +103,8 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
     }
   }
   result.instants = 1;
-  EMBERLOCK_ASSIGN_OR_RETURN(
-      result.manifest, target.finish(std::move(manifest), parts, nullptr, reports_of(options, result)));
+  EMBERLOCK_ASSIGN_OR_RETURN(result.manifest,
+                             target.finish(std::move(manifest), parts, nullptr, reports_of(options, result)));
   EMBERLOCK_RETURN_IF_ERROR(observe(observer, 1, "imported"));
   return result;
 }

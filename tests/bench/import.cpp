@@ -153,7 +153,8 @@ void times_of(std::uint64_t seed, const fs::path& folder, Residuals& all) {
     };
     const auto& late = times.cameras(static_cast<int>(c)).late_s();
     const double first = off(0, Seconds(late[0])).value() / camera.sigma_s.front();
-    const double last = off(result->instants - 1, Seconds(late[late.size() - 1])).value() / camera.sigma_s.back();
+    const double last =
+        off(result->instants - 1, Seconds(late[late.size() - 1])).value() / camera.sigma_s.back();
     all.squares_first += square(first);
     all.squares_last += square(last);
     all.worst = std::max({all.worst, std::abs(first), std::abs(last)});

@@ -9,10 +9,12 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/import_run.h"
 #include "session/frame_file.h"
 #include "session/reader.h"
+#include "session/rig_file.h"
 #include "session/shutter_times.h"
 #include "session/verify.h"
 #include "tests/support/import_clips.h"
@@ -139,6 +141,20 @@ TEST_F(ImportFilms, SayByTheVerbWhatBecameOfThem) {
   EXPECT_EQ(json.at("cameras")[2].at("id"), "left");
   EXPECT_EQ(json.at("aligned_by"), "strobe");
   EXPECT_EQ(SessionReader::open(folder_ / "session")->layout(0).format, PixelFormat::gray8);
+  const std::string page = read_file(folder_ / "session/import.html").value();
+  const auto& left = json.at("cameras")[2];
+  for (const std::string& said :
+       {fmt::format("3 cameras, {} instants", json.at("instants").get<int>()),
+        std::string("--camera says so"), fmt::format("{:+d}", left.at("frame_offset").get<int>()),
+        fmt::format("{:+.4f} ± {:.4f}", left.at("late_ms")[0].get<double>(),
+                    left.at("sigma_ms")[0].get<double>()),
+        fmt::format("{} to {}", left.at("strobe_frames")[0][0].get<int>(),
+                    left.at("strobe_frames")[0][1].get<int>() - 1),
+        std::string("Calibrate camera-0, camera-2, left"), std::string("data:image/png"),
+        std::string("what the clock's fit leaves"), std::string("Standard error of that")})
+    EXPECT_THAT(page, HasSubstr(said));
+  for (const char* wrong : {"http://", "https://", "<script", "\"nan", "Lnan", "Mnan", "{}"})
+    EXPECT_EQ(page.find(wrong), std::string::npos) << wrong;
   EXPECT_EQ(test::run_verb(add_import, words).exit_code, 2) << "an existing session was overwritten";
 }
 
@@ -236,6 +252,53 @@ TEST_F(ImportFilms, AreNotPairedByGuess) {
   EXPECT_EQ(result->cameras[2].frame_offset, 14);
   EXPECT_THAT(result->notes, testing::Contains(HasSubstr("NOT SYNCHRONISED")));
   EXPECT_FALSE(fs::exists(shutter_times_path(with.out)));
+}
+
+TEST_F(ImportFilms, GetTheCalibrationOfTheirRigOrAreRefusedForItBeforeTheyAreSearched) {
+  v1::Rig rig;
+  rig.set_format_version(kRigFormatVersion);
+  for (int c = 0; c < 3; ++c) {
+    v1::RigCamera& camera = *rig.add_cameras();
+    camera.set_camera_id(fmt::format("camera-{}", c));
+    camera.set_width(320);
+    camera.set_height(240);
+    camera.mutable_calibration()->set_fx(500 + c);
+    camera.mutable_colour()->add_gain(1.5 + c);
+  }
+  for (int i = 0; i < 3; ++i) {
+    rig.mutable_box()->add_center(0.1 * i);
+    rig.mutable_box()->add_size(0.5);
+  }
+  ImportOptions with = options();
+  with.rig = folder_ / "rig.json";
+  ASSERT_TRUE(write_rig(with.rig, rig).ok());
+  with.flame = Part{Seconds(12), Seconds(12.4)};
+  const auto result = run_import(with, {});
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  const v1::Manifest manifest = SessionReader::open(with.out)->manifest();
+  for (int c = 0; c < 3; ++c) {
+    EXPECT_EQ(manifest.cameras(c).calibration().fx(), 500 + c);
+    EXPECT_EQ(manifest.cameras(c).colour().gain(0), 1.5 + c);
+    EXPECT_TRUE(result->cameras[static_cast<std::size_t>(c)].calibrated);
+  }
+  EXPECT_EQ(manifest.box().center(2), 0.2);
+
+  const auto refused = [&](const v1::Rig& wrong) {
+    EXPECT_TRUE(write_rig(with.rig, wrong).ok());
+    with.out = folder_ / "refused";
+    const auto answer = run_import(with, [](double fraction, std::string_view) { return fraction < 0.05; });
+    EXPECT_FALSE(fs::exists(with.out));
+    return answer.ok() ? std::string() : answer.error().message();
+  };
+  v1::Rig other_size = rig;
+  other_size.mutable_cameras(1)->set_width(640);
+  EXPECT_THAT(refused(other_size),
+              AllOf(HasSubstr("camera-1"), HasSubstr("640 x 240"), HasSubstr("320 x 240")));
+  v1::Rig without = rig;
+  without.mutable_cameras()->RemoveLast();
+  EXPECT_THAT(refused(without), AllOf(HasSubstr("rig.json"), HasSubstr("knows no camera camera-2")));
+  fs::remove(with.rig);
+  EXPECT_THAT(refusal(with), HasSubstr("rig.json"));
 }
 
 TEST_F(ImportFilms, OfOneCameraInPiecesOfDifferentSizeAreRefused) {

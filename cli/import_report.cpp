@@ -18,8 +18,8 @@ constexpr const char* kStrobeColour = "#e69f00";
 constexpr const char* kFlameColour = "#0072b2";
 constexpr const char* kDoubtful = "#d55e00";
 
-/// Cameras this near to one another need no correction, and are no hint of a doubtful lamp.
-constexpr Seconds kNegligible = milliseconds(0.5);
+constexpr Seconds kNegligible = milliseconds(0.5);  // cameras this near to one another need no correction
+constexpr Seconds kDoubt = milliseconds(0.2);       // a time known no better is worth another film
 
 bool by_strobe(const ImportResult& r) { return r.clip.has_value(); }
 
@@ -90,12 +90,12 @@ std::vector<std::string> advice(const ImportResult& r) {
                     in_milliseconds(latest(r))));
   for (const ImportedCamera& c : r.cameras) {
     if (!c.clock) continue;
-    const Rows sigma = Seconds(*std::max_element(c.sigma_s.begin(), c.sigma_s.end())) / r.clip->row_time;
-    if (sigma > Rows(0.3))
+    const Seconds sigma(*std::max_element(c.sigma_s.begin(), c.sigma_s.end()));
+    if (sigma > kDoubt)
       lines.push_back(fmt::format(
-          "{} is known to {:.1f} rows only: film the strobe for longer, after the flame too, and with an "
-          "exposure that doesn't saturate its lamp.",
-          c.id, sigma.value()));
+          "{} is known to {:.2f} ms only: film the strobe for longer, after the flame too, and with "
+          "an exposure that doesn't saturate its lamp.",
+          c.id, in_milliseconds(sigma)));
   }
   return lines;
 }
@@ -221,24 +221,26 @@ void times(HtmlPage& page, const ImportResult& r) {
       "filmed it. times.json holds each frame's time and the largest of its camera's errors.");
 }
 
-std::string what_the_strobe_told(const ImportResult& r, const ImportedCamera& c) {
+std::string what_the_strobe_told(const ImportedCamera& c) {
   const ClipClock& clock = *c.clock;
   std::string parts;
   for (const PlaceRange& lit : c.strobe)
     parts += fmt::format("{}{} to {}", parts.empty() ? "" : ", ", lit.first, lit.last - 1);
   return fmt::format(
       "The strobe is in frames {}: {} of {} lit ones show a single dot. By its clock the camera films {:.5f} "
-      "frames a second. It reads the {} row first, as {}; K is {}{}{}. t_row is {:.4f} ± {:.4f} µs.",
+      "frames a second. It reads the {} row first, as {}; K is {}{}{}.",
       parts, clock.points.size(), clock.lit, 1 / clock.timing.frame_period.value(),
       clock.timing.direction == ReadDirection::top_first ? "top" : "bottom",
       clock.mode.direction ? clock.mode.direction_reason : "told", clock.timing.shifts,
-      clock.mode.shifts ? ", as " : ", taken since ", clock.mode.shifts_reason,
-      1e6 * r.clip->row_time.value(), 1e6 * r.clip->row_time_sigma.value());
+      clock.mode.shifts ? ", as " : ", taken since ", clock.mode.shifts_reason);
 }
 
 void clocks(HtmlPage& page, const ImportResult& r) {
   if (!by_strobe(r)) return;
   page.heading("What the strobe told of each camera");
+  page.paragraph(fmt::format("All are read with t_row = {:.4f} ± {:.4f} µs.", 1e6 * r.clip->row_time.value(),
+                             1e6 * r.clip->row_time_sigma.value()));
+  std::vector<HtmlPage::Picture> pictures;
   for (const ImportedCamera& c : r.cameras) {
     if (!c.clock) continue;
     Series residuals{.name = "dots", .x = {}, .y = {}, .mark = Mark::points};
@@ -247,14 +249,15 @@ void clocks(HtmlPage& page, const ImportResult& r) {
       residuals.x.push_back(p.frame);
       residuals.y.push_back((p.residual / r.clip->row_time).value());
     }
-    page.raw(svg_plot({residuals}, {.title = c.id + ": what the clock's fit leaves",
-                                    .x_label = "frame of the film",
-                                    .y_label = "rows; shaded: one row",
-                                    .band = 0.5,
-                                    .width = 720,
-                                    .height = 220}));
-    page.paragraph(what_the_strobe_told(r, c));
+    pictures.push_back({svg_plot({residuals}, {.title = c.id + ": what the clock's fit leaves",
+                                               .x_label = "frame of the film",
+                                               .y_label = "rows; shaded: one row",
+                                               .band = 0.5,
+                                               .width = 600,
+                                               .height = 220}),
+                        what_the_strobe_told(c)});
   }
+  page.gallery(pictures);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -19,18 +20,6 @@
 #include "tests/support/video_writer.h"
 
 namespace emberlock::test {
-
-/// What cameras filmed that were started by hand: the strobe until it was switched off, then a flame.
-struct FlameFilm {
-  StrobeFilm strobe;       ///< its frames are the whole film's
-  Seconds strobe_off{12};  ///< on the rig's clock
-};
-
-/// When each frame of a file was read, by the rig's clock.
-struct FlameClip {
-  std::string file;
-  std::vector<TimePoint> read_starts;
-};
 
 /// A plume that sways and flickers, added to a dark picture.
 inline void add_flame(Image& image, Seconds at) {
@@ -55,6 +44,21 @@ inline void add_flame(Image& image, Seconds at) {
     }
   }
 }
+
+/// What cameras filmed that were started by hand: the strobe until it was switched off, then a flame.
+struct FlameFilm {
+  StrobeFilm strobe;       ///< its frames are the whole film's
+  Seconds strobe_off{12};  ///< on the rig's clock
+  /// What is added to a camera's dark picture, read at an instant of the rig's clock; called by many threads.
+  std::function<void(Image& image, std::size_t camera, Seconds at)> flame =
+      [](Image& image, std::size_t, Seconds at) { add_flame(image, at); };
+};
+
+/// When each frame of a file was read, by the rig's clock.
+struct FlameClip {
+  std::string file;
+  std::vector<TimePoint> read_starts;
+};
 
 /// Films all cameras, `folder`/camera-N.mp4.
 inline std::vector<FlameClip> film_flame(const FlameFilm& film, const std::filesystem::path& folder) {
@@ -85,7 +89,7 @@ inline std::vector<FlameClip> film_flame(const FlameFilm& film, const std::files
       const TimePoint read = rig->read_start(camera, frame.stamp.frame_id);
       Image image = *frame.image;
       // The flame is lit a second later.
-      if (read > TimePoint{} + film.strobe_off + Seconds(1)) add_flame(image, read - TimePoint{});
+      if (read > TimePoint{} + film.strobe_off + Seconds(1)) film.flame(image, c, read - TimePoint{});
       clips[c].read_starts.push_back(read);
       writer.write(image);
     }

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/clip_arguments.h"
 #include "cli/commands.h"
 #include "cli/import_report.h"
 #include "cli/import_run.h"
@@ -18,15 +19,7 @@ struct ImportArguments {
   std::string folder;
   std::string out;
   std::vector<std::string> cameras;
-  double flash_rate = 0;
-  std::string comb;
-  double comb_rate = 0;
-  double row_time_us = 0;
-  double frame_rate = 0;
-  std::string direction;
-  int shifts = 0;
-  FrameCode code{};
-  double flash_width_us = 20;
+  ClipArguments clip;
   bool unsynchronised = false;
   std::vector<std::string> offsets;
   std::string strobe;
@@ -78,21 +71,12 @@ Result<ImportOptions> options_from(const ImportArguments& a) {
     if (*end != '\0') return not_understood("--offset", text, "Write ID=FRAMES");
   }
   if (a.unsynchronised || !a.offsets.empty()) options.alignment = Alignment::offsets;
-  if (a.flash_rate > 0) options.alignment = Alignment::strobe;
-  ClipOptions& clip = options.clip;
-  if (a.flash_rate > 0) clip.flash_rate = Hertz(a.flash_rate);
-  clip.flash_width = microseconds(a.flash_width_us);
-  clip.code = a.code;
-  if (a.frame_rate > 0) {
-    clip.frame_rate = Hertz(a.frame_rate);
-    options.films.picture_rate = Hertz(a.frame_rate);
-  }
-  if (!a.direction.empty())
-    clip.direction = a.direction == "top-first" ? ReadDirection::top_first : ReadDirection::bottom_first;
-  if (a.shifts > 0) clip.shifts = a.shifts;
-  options.comb = a.comb;
-  options.comb_rate = Hertz(a.comb_rate);
-  if (a.row_time_us > 0) options.row_time = microseconds_per_row(a.row_time_us);
+  if (a.clip.flash_rate > 0) options.alignment = Alignment::strobe;
+  options.clip = clip_options_of(a.clip);
+  if (a.clip.frame_rate > 0) options.films.picture_rate = Hertz(a.clip.frame_rate);
+  options.comb = a.clip.comb;
+  options.comb_rate = Hertz(a.clip.comb_rate);
+  options.row_time = row_time_of(a.clip);
   EMBERLOCK_ASSIGN_OR_RETURN(options.strobe, part_from("--strobe", a.strobe));
   EMBERLOCK_ASSIGN_OR_RETURN(options.flame, part_from("--flame", a.flame));
   options.rig = a.rig;
@@ -135,39 +119,6 @@ void import(const ImportArguments& arguments) {
   }
 }
 
-void add_strobe_options(CLI::App& verb, ImportArguments& a) {
-  const auto positive = CLI::Range(1e-6, 1e6).description("");
-  verb.add_option("--flash-rate", a.flash_rate,
-                  "flashes a second of the strobe that all cameras filmed: about one a frame")
-      ->check(positive);
-  auto* row_time =
-      verb.add_option("--row-time-us", a.row_time_us, "time to shift a row, where there is no comb")
-          ->check(positive);
-  auto* comb =
-      verb.add_option("--comb", a.comb, "a clip of one of the cameras under a fast strobe: tells t_row")
-          ->excludes(row_time);
-  verb.add_option("--comb-rate", a.comb_rate, "of the strobe in that clip, flashes a second: about 300")
-      ->check(positive)
-      ->needs(comb);
-  verb.add_option("--frame-rate", a.frame_rate,
-                  "of the cameras, where the files claim a wrong one; of pictures")
-      ->check(positive);
-  verb.add_option("--direction", a.direction, "the row that is read first, where the dots' walk doesn't tell")
-      ->check(CLI::IsMember({"top-first", "bottom-first"}));
-  verb.add_option("--shifts", a.shifts,
-                  "K, row shifts a read phase, where the walk doesn't tell; else the rows")
-      ->check(CLI::Range(1, 100000));
-  verb.add_option("--code-words", a.code.words, "of the code in which the strobe skips flashes")
-      ->check(CLI::Range(1, 31))
-      ->capture_default_str();
-  verb.add_option("--code-spacing", a.code.spacing, "flashes from one word of it to the next")
-      ->check(CLI::Range(32, 100000))
-      ->capture_default_str();
-  verb.add_option("--flash-width-us", a.flash_width_us, "duration of a flash")
-      ->check(positive)
-      ->capture_default_str();
-}
-
 }  // namespace
 
 void add_import(CLI::App& app) {
@@ -183,14 +134,14 @@ void add_import(CLI::App& app) {
   verb->add_option("--out", a->out, "the session's folder, which must not exist or be empty")->required();
   verb->add_option("--camera", a->cameras,
                    "ID=NAME: another id for the file or subfolder NAME; may be repeated");
-  add_strobe_options(*verb, *a);
+  CLI::Option* flash_rate = add_clip_options(*verb, a->clip);
   auto* unsynchronised = verb->add_flag("--unsynchronised", a->unsynchronised,
                                         "without a strobe: the films' first frames belong together");
   verb->add_option(
       "--offset", a->offsets,
       "ID=N, without a strobe: frame i + N of this camera belongs to frame i of the others; may be "
       "repeated");
-  verb->get_option("--flash-rate")->excludes(unsynchronised)->excludes(verb->get_option("--offset"));
+  flash_rate->excludes(unsynchronised)->excludes(verb->get_option("--offset"));
   verb->add_option("--strobe", a->strobe,
                    "FROM-TO, seconds of each film: where the strobe is; else it is found");
   verb->add_option(

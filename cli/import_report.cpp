@@ -62,7 +62,7 @@ void summary(HtmlPage& page, const ImportResult& r) {
                                        seconds_at(r, static_cast<std::size_t>(r.instants) - 1));
   if (by_strobe(r)) {
     text += fmt::format(
-        " Frames are paired by the strobe; no camera reads more than {:.3f} ms off the reference, which is "
+        " Frames are paired by the strobe. The cameras read {:.3f} ms off the reference at most; how much is "
         "known to {:.1f} µs or better.",
         in_milliseconds(latest(r)), in_microseconds(most_uncertain(r)));
   } else if (!one) {

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "cli/clip_arguments.h"
 #include "cli/commands.h"
 #include "cli/verify_run.h"
 
@@ -15,16 +16,8 @@ namespace {
 
 struct VerifyArguments {
   std::vector<std::string> clips;
-  double flash_rate = 0;
-  double row_time_us = 0;
-  std::string comb;
-  double comb_rate = 0;
+  ClipArguments clip;
   std::string tolerance = "100rows";
-  double frame_rate = 0;
-  std::string direction;
-  int shifts = 0;
-  FrameCode code{};
-  double flash_width_us = 20;
   bool json = false;
   std::string out;
 };
@@ -32,18 +25,11 @@ struct VerifyArguments {
 VerifyRunOptions options_from(const VerifyArguments& a) {
   VerifyRunOptions options;
   options.clips = a.clips;
-  options.comb = a.comb;
-  options.comb_rate = Hertz(a.comb_rate);
-  if (a.row_time_us > 0) options.row_time = microseconds_per_row(a.row_time_us);
+  options.comb = a.clip.comb;
+  options.comb_rate = Hertz(a.clip.comb_rate);
+  options.row_time = row_time_of(a.clip);
   options.verify.tolerance = or_fail(parse_tolerance(a.tolerance));
-  ClipOptions& clip = options.verify.clip;
-  clip.flash_rate = Hertz(a.flash_rate);
-  clip.flash_width = microseconds(a.flash_width_us);
-  if (a.frame_rate > 0) clip.frame_rate = Hertz(a.frame_rate);
-  if (!a.direction.empty())
-    clip.direction = a.direction == "top-first" ? ReadDirection::top_first : ReadDirection::bottom_first;
-  if (a.shifts > 0) clip.shifts = a.shifts;
-  clip.code = a.code;
+  options.verify.clip = clip_options_of(a.clip);
   return options;
 }
 
@@ -109,37 +95,9 @@ void add_verify(CLI::App& app) {
       "verify",
       "Judges video files of cameras that filmed one strobe: in sync, by how much, which frames belong "
       "together.");
-  const auto positive = CLI::PositiveNumber;
   verb->add_option("clips", a->clips, "one video a camera, the reference first")->required();
-  verb->add_option("--flash-rate", a->flash_rate, "of the strobe, flashes a second: about one a frame")
-      ->required()
-      ->check(positive);
-  auto* row_time =
-      verb->add_option("--row-time-us", a->row_time_us, "t_row, the time to shift one row")->check(positive);
-  auto* comb =
-      verb->add_option("--comb", a->comb, "a clip of one of the cameras under a fast strobe: tells t_row")
-          ->excludes(row_time);
-  verb->add_option("--comb-rate", a->comb_rate, "of the strobe in that clip, flashes a second: about 300")
-      ->check(positive)
-      ->needs(comb);
+  add_clip_options(*verb, a->clip)->required();
   verb->add_option("--tolerance", a->tolerance, "to the reference, to either side: 100rows, 5.4ms or 500us")
-      ->capture_default_str();
-  verb->add_option("--frame-rate", a->frame_rate, "of the cameras, where the files claim a wrong one")
-      ->check(positive);
-  verb->add_option("--direction", a->direction,
-                   "the row that is read first, where the dots' walk doesn't tell")
-      ->check(CLI::IsMember({"top-first", "bottom-first"}));
-  verb->add_option("--shifts", a->shifts,
-                   "K, row shifts a read phase, where the walk doesn't tell; else the rows")
-      ->check(CLI::Range(1, 100000));
-  verb->add_option("--code-words", a->code.words, "of the code in which the strobe skips flashes")
-      ->check(CLI::Range(1, 31))
-      ->capture_default_str();
-  verb->add_option("--code-spacing", a->code.spacing, "flashes from one word of it to the next")
-      ->check(CLI::Range(32, 100000))
-      ->capture_default_str();
-  verb->add_option("--flash-width-us", a->flash_width_us, "duration of a flash")
-      ->check(positive)
       ->capture_default_str();
   verb->add_flag("--json", a->json, "the verdict as JSON on stdout");
   verb->add_option("--out", a->out, "write report.html, with frames, fits and residuals, to this folder");

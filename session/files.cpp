@@ -8,11 +8,11 @@
 #include <system_error>
 
 #include <fcntl.h>
-#include <google/protobuf/util/json_util.h>
 #include <unistd.h>
 
 #include "base/file.h"
 #include "base/unique_fd.h"
+#include "session/json_message.h"
 #include "session/layout.h"
 #include "session/name.h"
 
@@ -57,12 +57,8 @@ fs::path find_segment(const fs::path& folder, const std::string& camera_id, std:
 
 Result<v1::Manifest> parse_manifest(std::string_view json, const std::string& where) {
   v1::Manifest manifest;
-  const auto status = google::protobuf::util::JsonStringToMessage(
-      google::protobuf::StringPiece(json.data(), json.size()), &manifest);
-  if (!status.ok()) {
-    return Error{ErrorKind::bad_input, "not a session's manifest: " + std::string(status.message()), where,
-                 "Mend the JSON, or use a newer Emberlock"};
-  }
+  EMBERLOCK_RETURN_IF_ERROR(
+      read_json(json, manifest, "a session's manifest", where, "Mend the JSON, or use a newer Emberlock"));
   EMBERLOCK_RETURN_IF_ERROR(check_manifest(manifest, where));
   return manifest;
 }
@@ -144,15 +140,8 @@ Result<v1::Manifest> read_manifest(const fs::path& folder) {
 }
 
 Status write_manifest(const fs::path& folder, const v1::Manifest& manifest) {
-  std::string json;
-  google::protobuf::util::JsonPrintOptions options;
-  options.add_whitespace = true;
-  options.preserve_proto_field_names = true;
-  const auto status = google::protobuf::util::MessageToJsonString(manifest, &json, options);
-  if (!status.ok()) {
-    return Error{ErrorKind::bad_input, "the manifest has no JSON form: " + std::string(status.message()),
-                 manifest_path(folder).string(), "Use UTF-8 in its texts"};
-  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string json, json_of(manifest, Defaults::left_out, "the manifest",
+                                                             manifest_path(folder).string()));
   return write_file_atomically(manifest_path(folder), json);
 }
 

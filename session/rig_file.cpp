@@ -4,10 +4,9 @@
 #include <cmath>
 #include <set>
 
-#include <google/protobuf/util/json_util.h>
-
 #include "base/file.h"
 #include "session/files.h"
+#include "session/json_message.h"
 #include "session/name.h"
 
 namespace emberlock {
@@ -65,12 +64,9 @@ Status check_rig(const v1::Rig& rig, const std::string& where) {
 
 Result<v1::Rig> parse_rig(std::string_view json, const std::string& where) {
   v1::Rig rig;
-  const auto status = google::protobuf::util::JsonStringToMessage(
-      google::protobuf::StringPiece(json.data(), json.size()), &rig);
-  if (!status.ok()) {
-    return Error{ErrorKind::bad_input, "not a rig's calibration: " + std::string(status.message()), where,
-                 "Name the rig.json that `emberlock calibrate` wrote, or use a newer Emberlock"};
-  }
+  EMBERLOCK_RETURN_IF_ERROR(
+      read_json(json, rig, "a rig's calibration", where,
+                "Name the rig.json that `emberlock calibrate` wrote, or use a newer Emberlock"));
   EMBERLOCK_RETURN_IF_ERROR(check_rig(rig, where));
   return rig;
 }
@@ -81,16 +77,7 @@ Result<v1::Rig> read_rig(const std::filesystem::path& path) {
 }
 
 Result<std::string> rig_json(const v1::Rig& rig) {
-  std::string json;
-  google::protobuf::util::JsonPrintOptions options;
-  options.add_whitespace = true;
-  options.preserve_proto_field_names = true;
-  const auto status = google::protobuf::util::MessageToJsonString(rig, &json, options);
-  if (!status.ok()) {
-    return Error{ErrorKind::bad_input, "the rig has no JSON form: " + std::string(status.message()), "rig",
-                 "Use UTF-8 in its camera ids"};
-  }
-  return json;
+  return json_of(rig, Defaults::left_out, "the rig", "rig");
 }
 
 Status write_rig(const std::filesystem::path& path, const v1::Rig& rig) {

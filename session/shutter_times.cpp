@@ -7,9 +7,9 @@
 #include <system_error>
 
 #include <fmt/format.h>
-#include <google/protobuf/util/json_util.h>
 
 #include "base/file.h"
+#include "session/json_message.h"
 
 namespace emberlock {
 namespace fs = std::filesystem;
@@ -17,10 +17,11 @@ namespace {
 
 constexpr std::size_t kMaxTimesBytes = std::size_t{1} << 30;
 
+constexpr const char* kMakeAgain =
+    "Make it again with emberlock import, or remove it: the frames then count as taken at their instants";
+
 Error wrong_times(const std::string& where, std::string what) {
-  return {
-      ErrorKind::bad_input, std::move(what), where,
-      "Make it again with emberlock import, or remove it: the frames then count as taken at their instants"};
+  return {ErrorKind::bad_input, std::move(what), where, kMakeAgain};
 }
 
 Status check_numbers(const v1::ShutterTimes& times, const std::string& where) {
@@ -41,9 +42,7 @@ fs::path shutter_times_path(const fs::path& folder) { return folder / "times.jso
 
 Result<v1::ShutterTimes> parse_shutter_times(std::string_view json, const std::string& where) {
   v1::ShutterTimes times;
-  const auto status = google::protobuf::util::JsonStringToMessage(
-      google::protobuf::StringPiece(json.data(), json.size()), &times);
-  if (!status.ok()) return wrong_times(where, "not a session's times: " + std::string(status.message()));
+  EMBERLOCK_RETURN_IF_ERROR(read_json(json, times, "a session's times", where, kMakeAgain));
   EMBERLOCK_RETURN_IF_ERROR(check_numbers(times, where));
   return times;
 }
@@ -51,16 +50,8 @@ Result<v1::ShutterTimes> parse_shutter_times(std::string_view json, const std::s
 Status write_shutter_times(const fs::path& folder, const v1::ShutterTimes& times) {
   const fs::path path = shutter_times_path(folder);
   EMBERLOCK_RETURN_IF_ERROR(check_numbers(times, path.string()));
-  std::string json;
-  google::protobuf::util::JsonPrintOptions options;
-  options.add_whitespace = true;
-  options.always_print_primitive_fields = true;  // a reference's error of zero is a statement, not an absence
-  options.preserve_proto_field_names = true;
-  const auto status = google::protobuf::util::MessageToJsonString(times, &json, options);
-  if (!status.ok()) {
-    return Error{ErrorKind::bad_input, "the times have no JSON form: " + std::string(status.message()),
-                 path.string(), "Use UTF-8 in camera ids"};
-  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string json,
+                             json_of(times, Defaults::written, "the session's times", path.string()));
   return write_file_atomically(path, json);
 }
 

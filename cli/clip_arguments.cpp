@@ -1,0 +1,56 @@
+#include "cli/clip_arguments.h"
+
+namespace emberlock::cli {
+
+CLI::Option* add_clip_options(CLI::App& verb, ClipArguments& a) {
+  const auto positive = CLI::Range(1e-6, 1e6).description("");
+  CLI::Option* flash_rate =
+      verb.add_option("--flash-rate", a.flash_rate,
+                      "flashes a second of the strobe that all cameras filmed: about one a frame")
+          ->check(positive);
+  CLI::Option* row_time = verb.add_option("--row-time-us", a.row_time_us,
+                                          "t_row, the time to shift one row, where there is no comb")
+                              ->check(positive);
+  CLI::Option* comb =
+      verb.add_option("--comb", a.comb, "a clip of one of the cameras under a fast strobe: tells t_row")
+          ->excludes(row_time);
+  verb.add_option("--comb-rate", a.comb_rate, "of the strobe in that clip, flashes a second: about 300")
+      ->check(positive)
+      ->needs(comb);
+  verb.add_option("--frame-rate", a.frame_rate,
+                  "of the cameras, where the files claim a wrong one, or are pictures")
+      ->check(positive);
+  verb.add_option("--direction", a.direction, "the row that is read first, where the dots' walk doesn't tell")
+      ->check(CLI::IsMember({"top-first", "bottom-first"}));
+  verb.add_option("--shifts", a.shifts,
+                  "K, row shifts a read phase, where the walk doesn't tell; else the rows")
+      ->check(CLI::Range(1, 100000));
+  verb.add_option("--code-words", a.code.words, "of the code in which the strobe skips flashes")
+      ->check(CLI::Range(1, 31))
+      ->capture_default_str();
+  verb.add_option("--code-spacing", a.code.spacing, "flashes from one word of it to the next")
+      ->check(CLI::Range(32, 100000))
+      ->capture_default_str();
+  verb.add_option("--flash-width-us", a.flash_width_us, "duration of a flash")
+      ->check(positive)
+      ->capture_default_str();
+  return flash_rate;
+}
+
+ClipOptions clip_options_of(const ClipArguments& a) {
+  ClipOptions clip;
+  if (a.flash_rate > 0) clip.flash_rate = Hertz(a.flash_rate);
+  clip.flash_width = microseconds(a.flash_width_us);
+  if (a.frame_rate > 0) clip.frame_rate = Hertz(a.frame_rate);
+  if (!a.direction.empty())
+    clip.direction = a.direction == "top-first" ? ReadDirection::top_first : ReadDirection::bottom_first;
+  if (a.shifts > 0) clip.shifts = a.shifts;
+  clip.code = a.code;
+  return clip;
+}
+
+std::optional<SecondsPerRow> row_time_of(const ClipArguments& a) {
+  return a.row_time_us > 0 ? std::optional(microseconds_per_row(a.row_time_us)) : std::nullopt;
+}
+
+}  // namespace emberlock::cli

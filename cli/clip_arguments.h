@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "base/quantity.h"
+#include "smear_sync/verify/clip_clock.h"
+
+namespace emberlock::cli {
+
+/// How clips of a strobe are to be read, as typed.
+struct ClipArguments {
+  double flash_rate = 0;
+  double row_time_us = 0;
+  std::string comb;
+  double comb_rate = 0;
+  double frame_rate = 0;
+  std::string direction;
+  int shifts = 0;
+  FrameCode code{};
+  double flash_width_us = 20;
+};
+
+/// Adds their options to a verb and returns --flash-rate, which a verb may require.
+CLI::Option* add_clip_options(CLI::App& verb, ClipArguments& arguments);
+
+/// All but the row time.
+ClipOptions clip_options_of(const ClipArguments& arguments);
+
+/// As given by hand.
+std::optional<SecondsPerRow> row_time_of(const ClipArguments& arguments);
+
+}  // namespace emberlock::cli

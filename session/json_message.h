@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <google/protobuf/message.h>
+
+#include "base/result.h"
+
+namespace emberlock {
+
+/// Fills a message from protobuf's JSON mapping. Where it isn't: "not `what`", with the reason.
+Status read_json(std::string_view json, google::protobuf::Message& message, const std::string& what,
+                 const std::string& where, const std::string& remedy);
+
+enum class Defaults {
+  left_out,
+  written,  ///< a zero is a statement, not an absence
+};
+
+/// The JSON that read_json() reads, indented. Error: texts that aren't UTF-8, of `what` at `where`.
+Result<std::string> json_of(const google::protobuf::Message& message, Defaults defaults,
+                            const std::string& what, const std::string& where);
+
+}  // namespace emberlock

@@ -104,7 +104,7 @@ TEST_F(VerifyClips, OfEveryCodecAreToldToTwentyMicrosecondsAndToTheFrame) {
     with.format.codec = c.codec;
     with.format.crf = c.crf;
     with.suffix = c.suffix;
-    with.frames = 240;
+    with.frames = 180;
     const Outcome outcome = run([&] {
       std::vector<std::string> arguments = film(with);
       arguments.emplace_back("--json");
@@ -120,7 +120,7 @@ TEST_F(VerifyClips, GiveTheJsonOfTheManualAndAReportThatStandsAlone) {
   test::StrobeFilm with = test::random_film(44, 2, small_model(), kShortCode);
   with.format = {};
   with.suffix = ".mp4";
-  with.frames = 120;
+  with.frames = 90;
   with.rig.cameras[0].first_phase = with.rig.cameras[1].first_phase = Seconds(0);
   with.starts = {0.5, 0.5 + 0.001};
   std::vector<std::string> arguments = film(with);

@@ -69,9 +69,14 @@ Status search_film(SessionReader& reader, std::size_t camera, const BoardSearch&
                    const FilmSearchOptions& options, const Observer& observer, CameraFilm& film) {
   const std::string id = reader.manifest().cameras(static_cast<int>(camera)).camera_id();
   const std::size_t count = reader.stamps(camera).size();
+  // Of a short film the neighbour is searched next.
+  std::optional<std::pair<std::size_t, std::vector<BoardCorner>>> last;
   const auto corners_in = [&](std::size_t frame) -> Result<std::vector<BoardCorner>> {
-    EMBERLOCK_ASSIGN_OR_RETURN(const Frame read, reader.read(camera, frame));
-    return search.find(read.image->view());
+    if (!last || last->first != frame) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const Frame read, reader.read(camera, frame));
+      last.emplace(frame, search.find(read.image->view()));
+    }
+    return last->second;
   };
   for (std::size_t look = 0; look < film.frames.size(); ++look) {
     EMBERLOCK_RETURN_IF_ERROR(

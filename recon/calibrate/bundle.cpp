@@ -36,26 +36,19 @@ struct Blocks {
     }
   }
 
-  static Eigen::Matrix3d turn(const PoseBlock& block) {
-    const Eigen::Vector3d w(block[0], block[1], block[2]);
-    const double angle = w.norm();
-    if (angle == 0) return Eigen::Matrix3d::Identity();
-    return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
-  }
-
   void write_to(Bundle& bundle) const {
     for (std::size_t i = 0; i < cameras.size(); ++i) {
       CameraModel& model = bundle.cameras[i].model;
       const LensBlock& l = lenses[i];
       model.intrinsics = {model.intrinsics.size, l[0], l[1], l[2], l[3], {l[4], l[5], l[6], l[7], l[8]}};
-      const Eigen::Quaterniond rotation(turn(cameras[i]) * model.camera_from_world.rotation);
+      const Eigen::Quaterniond rotation(rotation_by(cameras[i].data()) * model.camera_from_world.rotation);
       model.camera_from_world.rotation = rotation.normalized().toRotationMatrix();
       const Eigen::Vector3d center(cameras[i][3], cameras[i][4], cameras[i][5]);
       model.camera_from_world.translation = -(model.camera_from_world.rotation * center);
     }
     for (std::size_t i = 0; i < boards.size(); ++i) {
       Rigid3& pose = bundle.boards[i].world_from_board;
-      const Eigen::Quaterniond rotation(turn(boards[i]) * pose.rotation);
+      const Eigen::Quaterniond rotation(rotation_by(boards[i].data()) * pose.rotation);
       pose = {rotation.normalized().toRotationMatrix(), {boards[i][3], boards[i][4], boards[i][5]}};
     }
   }

@@ -12,13 +12,6 @@ namespace {
 
 constexpr double kSmallTurn = 1e-4;  // radians: below, three terms of the series are exact to a double
 
-/// Rodrigues' rotation by a block's turn.
-Eigen::Matrix3d rotation_by(const Eigen::Vector3d& turn) {
-  const double angle = turn.norm();
-  if (angle == 0) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
-}
-
 /// How rotation * v changes with the turn (Gallego and Yezzi 2015, with the rotation group's right Jacobian).
 Eigen::Matrix3d slope_of_rotated(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& turn,
                                  const Eigen::Vector3d& v) {
@@ -33,12 +26,19 @@ Eigen::Matrix3d slope_of_rotated(const Eigen::Matrix3d& rotation, const Eigen::V
 
 }  // namespace
 
+Eigen::Matrix3d rotation_by(const double* block) {
+  const Eigen::Vector3d turn(block[0], block[1], block[2]);
+  const double angle = turn.norm();
+  if (angle == 0) return Eigen::Matrix3d::Identity();
+  return Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+}
+
 bool CornerEquations::operator()(const double* lens, const double* camera, const double* board,
                                  double* residuals, Slopes* slopes) const {
   const Eigen::Vector3d camera_turn(camera[0], camera[1], camera[2]);
   const Eigen::Vector3d board_turn(board[0], board[1], board[2]);
-  const Eigen::Matrix3d turned_board = rotation_by(board_turn);
-  const Eigen::Matrix3d turned_camera = rotation_by(camera_turn);
+  const Eigen::Matrix3d turned_board = rotation_by(board);
+  const Eigen::Matrix3d turned_camera = rotation_by(camera);
   const Eigen::Vector3d on_board = *board_rotation * corner;
   const Eigen::Vector3d from_camera = turned_board * on_board +
                                       Eigen::Vector3d(board[3], board[4], board[5]) -

@@ -12,6 +12,9 @@ namespace emberlock {
 using PoseBlock = std::array<double, kPoseUnknowns>;
 using LensBlock = std::array<double, kLensUnknowns>;
 
+/// Rodrigues' rotation by a block's turn.
+Eigen::Matrix3d rotation_by(const double* block);
+
 inline constexpr double kNearest = 1e-6;  // metres in front of a camera
 
 /// One corner's residuals, in standard deviations of its noise, and how they change with the unknowns. Poses

@@ -103,7 +103,7 @@ TEST(Board, PartOfACharucoBoardHasItsNumbers) {
        {&camera.intrinsics.fx, &camera.intrinsics.fy, &camera.intrinsics.cx, &camera.intrinsics.cy})
     *number *= 2;
   Rigid3 pose = turned_board(board, 0.2);
-  pose.translation.x() += 0.06;  // a good part out of the picture
+  pose.translation.x() += 0.12;  // a good part out of the picture
   const std::vector<int> visible = corners_with_markers(board, camera, pose);
   EXPECT_GE(visible.size(), 12U);
   EXPECT_LE(visible.size(), 36U) << "of 48";

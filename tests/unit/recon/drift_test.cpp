@@ -166,11 +166,6 @@ TEST(LampDrift, TwoCamerasTellThatOneOfThemMoved) {
     const auto turned = check_drift(file, lamps, "rig.json");
     ASSERT_TRUE(turned.ok()) << turned.error().message();
     EXPECT_TRUE(turned->drifted()) << places;
-    if (places > 1) continue;
-    // The cameras stand beside each other: a turn sideways moves the lamp along its epipolar line.
-    v1::Rig sideways = test::rig_file_of(rig);
-    test::knock(sideways, rig, 1, {.turn = {0, 0.5 * kDegree, 0}});
-    EXPECT_FALSE(check_drift(sideways, lamps, "rig.json")->drifted());
   }
 }
 

@@ -100,7 +100,7 @@ void add_calibrate_colour(CLI::App& parent) {
   verb->add_option(
           "folder", a.folder,
           "Holds colour.json (where the patches are) and a folder for each camera with its target[_LIGHT]"
-          "[_SECONDSs], flat and dark pictures")
+          "[_SECONDSs], flat and dark pictures, or a session whose frames colour.json names so")
       ->required();
   verb->add_option("--out", a.out, "Folder for rig.json and colour.html, the report")->required();
   verb->add_option("--rig", a.rig, "A rig.json whose cameras get the colours [a new one with colours alone]");

@@ -10,9 +10,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
-#include "recon/preprocess/dark_part.h"
-#include "recon/preprocess/hot_pixels.h"
 #include "session/frame_file.h"
+#include "session/reader.h"
 
 namespace emberlock {
 namespace fs = std::filesystem;
@@ -70,6 +69,22 @@ Result<std::array<double, 3>> parse_radiance(const PlanJson& json, const std::st
   return out;
 }
 
+Result<std::map<std::string, std::map<std::string, std::size_t>>> parse_frames(const PlanJson& json,
+                                                                               const std::string& where) {
+  std::map<std::string, std::map<std::string, std::size_t>> out;
+  if (!json.is_object()) return bad_plan(where, "is no object", "Give frames by name, by camera");
+  for (const auto& [camera, frames] : json.items()) {
+    const std::string of_camera = fmt::format("{}.{}", where, camera);
+    if (!frames.is_object()) return bad_plan(of_camera, "is no object", "Give frames by name");
+    for (const auto& [name, frame] : frames.items()) {
+      if (!frame.is_number_unsigned())
+        return bad_plan(fmt::format("{}.{}", of_camera, name), "is no frame", "Count frames from 0");
+      out[camera][name] = frame.get<std::size_t>();
+    }
+  }
+  return out;
+}
+
 enum class Purpose { dark, flat, target };
 struct PicturePath {
   fs::path path;
@@ -113,8 +128,7 @@ class CameraPictures {
     readings_.cameras.push_back({folder.filename().string(), {}, 1.0 / 255, {}});
   }
 
-  Status add(const PicturePath& picture) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const Image image, read_image(picture.path));
+  Status add(const PicturePath& picture, const Image& image) {
     ColourCamera& camera = readings_.cameras[index_];
     if (camera.size == ImageSize{}) {
       camera.size = image.layout().size;
@@ -134,32 +148,7 @@ class CameraPictures {
   }
 
   void finish() {
-    if (dark_.empty()) return;
-    DarkReading& dark = readings_.cameras[index_].dark;
-    std::vector<Samples> frames;
-    frames.reserve(dark_.size());
-    for (const Image& image : dark_) frames.push_back(samples_of(image.view()));
-    dark.hot_pixels = hot_pixels_of_dark(midmean_of(frames));
-    for (auto& histogram : dark.histogram) histogram.assign(256, 0);
-    std::array<double, 3> count = {};
-    for (const Samples& s : frames) {
-      const auto channels = static_cast<std::size_t>(s.channels());
-      for (std::size_t i = 0; i < s.value.size(); ++i) {
-        const auto pixel = i / channels;
-        const auto x = static_cast<int>(pixel % static_cast<std::size_t>(s.size.width));
-        const auto y = static_cast<int>(pixel / static_cast<std::size_t>(s.size.width));
-        const auto bin = static_cast<std::size_t>(std::clamp(std::lround(s.value[i]), 0L, 255L));
-        for (std::size_t c = 0; c < 3; ++c) {
-          const bool sees = s.layout == SampleLayout::grey || (s.layout == SampleLayout::rgb && i % 3 == c) ||
-                            (s.layout == SampleLayout::mosaic && mosaic_channel(x, y) == static_cast<int>(c));
-          if (!sees) continue;
-          dark.histogram[c][bin] += 1;
-          count[c] += 1;
-        }
-      }
-    }
-    for (std::size_t c = 0; c < 3; ++c)
-      for (double& share : dark.histogram[c]) share /= std::max(1.0, count[c]);
+    if (!dark_.empty()) readings_.cameras[index_].dark = read_dark(dark_);
   }
 
  private:
@@ -237,6 +226,44 @@ Status check_exposures(const std::vector<PicturePath>& pictures) {
                   "Name every target picture's exposure, as target_LIGHT_0.01s.png, or none's");
 }
 
+Status read_session(const ColourPlan& plan, const fs::path& folder, ColourReadings& readings) {
+  const fs::path path = folder / plan.session;
+  EMBERLOCK_ASSIGN_OR_RETURN(SessionReader session, SessionReader::open(path));
+  for (const auto& [camera, frames] : plan.frames) {
+    const std::string where = "colour.json: frames." + camera;
+    const bool twice = std::any_of(readings.cameras.begin(), readings.cameras.end(),
+                                   [&, &id = camera](const ColourCamera& c) { return c.id == id; });
+    if (twice) return bad_plan(where, "has a folder of pictures too", "Give a camera's pictures in one way");
+    const auto& streams = session.manifest().cameras();
+    const auto stream = std::find_if(streams.begin(), streams.end(),
+                                     [&, &id = camera](const auto& s) { return s.camera_id() == id; });
+    if (stream == streams.end())
+      return bad_plan(where, path.string() + " has no such camera", "Name the session's cameras");
+    const auto index = static_cast<std::size_t>(stream - streams.begin());
+    std::vector<PicturePath> pictures;
+    for (const auto& [name, frame] : frames) {
+      auto picture = by_name(folder / camera / (name + ".frame"));
+      if (!picture)
+        return bad_plan(where + "." + name, "is neither dark, flat nor target",
+                        "Name it as pictures are named");
+      pictures.push_back(*std::move(picture));
+    }
+    EMBERLOCK_RETURN_IF_ERROR(check_exposures(pictures));
+    CameraPictures into(plan, folder / camera, readings);
+    auto picture = pictures.begin();
+    for (const auto& [name, number] : frames) {
+      if (number >= session.stamps(index).size()) {
+        return bad_plan(where + "." + name, fmt::format("there are {} frames", session.stamps(index).size()),
+                        "Count frames from 0");
+      }
+      EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame, session.read(index, number));
+      EMBERLOCK_RETURN_IF_ERROR(into.add(*picture++, *frame.image));
+    }
+    into.finish();
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& where) {
@@ -256,10 +283,17 @@ Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& w
         EMBERLOCK_ASSIGN_OR_RETURN(plan.radiance[patch],
                                    parse_radiance(radiance, fmt::format("{}.{}", field, patch)));
       }
+    } else if (key == "frames") {
+      EMBERLOCK_ASSIGN_OR_RETURN(plan.frames, parse_frames(value, field));
+    } else if (key == "session" && value.is_string()) {
+      plan.session = value.get<std::string>();
     } else {
-      return bad_plan(field, "is no key of colour.json", "Keys are patches, pictures and radiance");
+      return bad_plan(field, "is no key of colour.json, or no text",
+                      "Keys are patches, pictures, radiance, frames and session");
     }
   }
+  if (plan.frames.empty() != plan.session.empty())
+    return bad_plan(where, "has frames without session, or session without frames", "Give both, or neither");
   return plan;
 }
 
@@ -283,9 +317,13 @@ Result<ColourReadings> read_colour_folder(const fs::path& folder, const Progress
     if (pictures.empty()) continue;
     EMBERLOCK_RETURN_IF_ERROR(check_exposures(pictures));
     CameraPictures into(plan, camera, readings);
-    for (const PicturePath& picture : pictures) EMBERLOCK_RETURN_IF_ERROR(into.add(picture));
+    for (const PicturePath& picture : pictures) {
+      EMBERLOCK_ASSIGN_OR_RETURN(const Image image, read_image(picture.path));
+      EMBERLOCK_RETURN_IF_ERROR(into.add(picture, image));
+    }
     into.finish();
   }
+  if (!plan.frames.empty()) EMBERLOCK_RETURN_IF_ERROR(read_session(plan, folder, readings));
   if (readings.cameras.empty()) {
     return bad_plan(folder.string(), "no camera's folder holds a target*, flat* or dark* picture",
                     "Give each camera a folder with its pictures in it");

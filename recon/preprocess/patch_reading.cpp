@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/preprocess/dark_part.h"
+#include "recon/preprocess/hot_pixels.h"
 #include "recon/preprocess/samples.h"
 
 namespace emberlock {
@@ -101,6 +103,35 @@ std::vector<PatchReading> flat_patches(const ImageView& picture, const std::stri
 }
 
 bool is_flat(const PatchReading& reading) { return reading.patch.rfind(kFlatPrefix, 0) == 0; }
+
+DarkReading read_dark(const std::vector<Image>& pictures) {
+  DarkReading dark;
+  std::vector<Samples> frames;
+  frames.reserve(pictures.size());
+  for (const Image& picture : pictures) frames.push_back(samples_of(picture.view()));
+  dark.hot_pixels = hot_pixels_of_dark(midmean_of(frames));
+  for (auto& histogram : dark.histogram) histogram.assign(256, 0);
+  std::array<double, 3> count = {};
+  for (const Samples& s : frames) {
+    const auto channels = static_cast<std::size_t>(s.channels());
+    for (std::size_t i = 0; i < s.value.size(); ++i) {
+      const auto pixel = i / channels;
+      const auto x = static_cast<int>(pixel % static_cast<std::size_t>(s.size.width));
+      const auto y = static_cast<int>(pixel / static_cast<std::size_t>(s.size.width));
+      const auto bin = static_cast<std::size_t>(std::clamp(std::lround(s.value[i]), 0L, 255L));
+      for (std::size_t c = 0; c < 3; ++c) {
+        const bool sees = s.layout == SampleLayout::grey || (s.layout == SampleLayout::rgb && i % 3 == c) ||
+                          (s.layout == SampleLayout::mosaic && mosaic_channel(x, y) == static_cast<int>(c));
+        if (!sees) continue;
+        dark.histogram[c][bin] += 1;
+        count[c] += 1;
+      }
+    }
+  }
+  for (std::size_t c = 0; c < 3; ++c)
+    for (double& share : dark.histogram[c]) share /= std::max(1.0, count[c]);
+  return dark;
+}
 
 double dark_sample(const DarkReading& dark, std::size_t channel) {
   const std::vector<double>& shares = dark.histogram[channel];

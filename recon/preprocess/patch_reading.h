@@ -54,6 +54,9 @@ FlatReading read_flat(const ImageView& picture);
 std::vector<PatchReading> flat_patches(const ImageView& picture, const std::string& name);
 [[nodiscard]] bool is_flat(const PatchReading& reading);
 
+/// Of at least one picture of one layout.
+DarkReading read_dark(const std::vector<Image>& pictures);
+
 /// The median of the samples without light, 0 where they aren't known. Not their mean: black clips noise from
 /// below, which light doesn't see.
 double dark_sample(const DarkReading& dark, std::size_t channel);

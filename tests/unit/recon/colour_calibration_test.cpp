@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include "recon/preprocess/colour_readings.h"
 #include "recon/preprocess/samples.h"
 #include "tests/support/colour_rig.h"
+#include "tests/support/recording.h"
 
 namespace emberlock {
 namespace {
@@ -267,6 +269,51 @@ TEST(ColourPlan, SaysWhichFieldIsWrong) {
   EXPECT_THAT(message(R"({"patches": {"a": {"white": [1, -2, 3, 4]}}})"), HasSubstr("patches.a.white"));
   EXPECT_THAT(message(R"({"pictures": {"a/b.png": 3}})"), HasSubstr("pictures.a/b.png"));
   EXPECT_THAT(message(R"({"radiance": {"white": -1}})"), HasSubstr("radiance.white"));
+}
+
+TEST(ColourReadings, FramesOfASessionAreRead) {
+  const test::TempFolder folder;
+  const ImageLayout layout{{64, 48}, PixelFormat::gray8, 8};
+  auto writer =
+      SessionWriter::create(folder / "film", test::manifest_of({layout, layout}), test::small_disk_options());
+  ASSERT_TRUE(writer.ok()) << writer.error().message();
+  for (std::size_t c = 0; c < 2; ++c) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      Frame frame = test::noise_frame(layout, i);
+      Image image(layout);
+      for (int y = 0; y < 48; ++y)
+        std::fill_n(image.row_as<std::uint8_t>(y), 64, static_cast<std::uint8_t>(51 * (i + c)));
+      frame.image = std::make_shared<const Image>(std::move(image));
+      ASSERT_TRUE(writer->write(c, frame).ok());
+    }
+  }
+  ASSERT_TRUE(writer->finish().ok());
+  const auto read = [&](const std::string& frames) {
+    test::put_bytes(
+        folder / "colour.json",
+        R"({"patches": {"cam0": {"white": [8, 8, 16, 16]}, "cam1": {"white": [20, 8, 16, 16]}}, )" + frames +
+            "}");
+    return read_colour_folder(folder.path());
+  };
+  const auto readings = read(
+      R"("session": "film", "frames": {"cam0": {"dark": 0, "target_A_0.5s": 2}, "cam1": {"target_A_1s": 1}})");
+  ASSERT_TRUE(readings.ok()) << readings.error().message();
+  ASSERT_EQ(readings->cameras.size(), 2U);
+  EXPECT_EQ(readings->cameras[1].id, "cam1");
+  ASSERT_EQ(readings->patches.size(), 2U);
+  EXPECT_NEAR(readings->patches[0].mean[0], 102 / 255.0, 1e-9);
+  EXPECT_EQ(readings->patches[0].exposure, 0.5);
+  EXPECT_EQ(readings->patches[0].light, "A");
+  EXPECT_NEAR(readings->patches[1].mean[0], 102 / 255.0, 1e-9) << "frame 1 of the other camera";
+  EXPECT_THAT(read(R"("frames": {"cam0": {"dark": 0}})").error().message(), HasSubstr("session"));
+  EXPECT_THAT(read(R"("session": "film", "frames": {"cam7": {"dark": 0}})").error().message(),
+              HasSubstr("cam7"));
+  EXPECT_THAT(read(R"("session": "film", "frames": {"cam0": {"dark": 9}})").error().message(),
+              HasSubstr("there are 3 frames"));
+  EXPECT_THAT(read(R"("session": "film", "frames": {"cam0": {"light": 0}})").error().message(),
+              HasSubstr("neither dark, flat nor target"));
+  EXPECT_THAT(read(R"("session": "film", "frames": {"cam0": {"dark": -1}})").error().message(),
+              HasSubstr("frames.cam0.dark"));
 }
 
 }  // namespace

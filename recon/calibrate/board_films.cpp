@@ -105,6 +105,7 @@ Status search_film(SessionReader& reader, std::size_t camera, const BoardSearch&
 std::vector<std::size_t> spread_evenly(std::size_t count, std::size_t most) {
   const std::size_t taken = std::min(count, most);
   std::vector<std::size_t> result;
+  result.reserve(taken);
   for (std::size_t n = 0; n < taken; ++n) result.push_back((2 * n + 1) * count / (2 * taken));
   return result;
 }

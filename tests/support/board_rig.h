@@ -185,6 +185,7 @@ inline std::vector<Eigen::Vector3d> lamp_places(const BoardRig& rig, int places,
   }
   const Eigen::Vector3d middle = sum.inverse() * right;
   std::vector<Eigen::Vector3d> result;
+  result.reserve(static_cast<std::size_t>(places));
   for (int i = 0; i < places; ++i) {
     result.push_back(middle + Eigen::Vector3d(random.uniform(-0.06, 0.06), random.uniform(-0.06, 0.06),
                                               random.uniform(-0.06, 0.06)));

@@ -239,6 +239,7 @@ struct PublishedWay {
 PublishedWay calibrate_as_published(const std::vector<int>& views) {
   const cv::Size board(9, 6);
   std::vector<cv::Point3f> points;
+  points.reserve(static_cast<std::size_t>(board.area()));
   for (int i = 0; i < board.area(); ++i)
     points.emplace_back(0.025F * static_cast<float>(i % 9), 0.025F * static_cast<float>(i / 9), 0.F);
   std::vector<std::vector<cv::Point2f>> corners;

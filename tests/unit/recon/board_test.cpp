@@ -109,6 +109,7 @@ TEST(Board, PartOfACharucoBoardHasItsNumbers) {
   EXPECT_LE(visible.size(), 36U) << "of 48";
   const auto corners = find_board(test::rendered_board(camera, board, pose).view(), board);
   std::vector<int> found;
+  found.reserve(corners.size());
   for (const BoardCorner& corner : corners) found.push_back(corner.id);
   EXPECT_THAT(found, testing::UnorderedElementsAreArray(visible));
   EXPECT_LT(worst_corner(corners, board, camera, pose), 0.4);

@@ -14,8 +14,8 @@ namespace {
 struct CornerCase {
   Eigen::Matrix3d camera_rotation;
   Eigen::Matrix3d board_rotation;
-  CornerEquations equations;
-  std::array<double, kLensUnknowns + 2 * kPoseUnknowns> at;
+  CornerEquations equations = {};
+  std::array<double, kLensUnknowns + 2 * kPoseUnknowns> at = {};
 
   CornerCase(std::uint64_t seed, double turn) {
     RandomStream random(seed, 5);

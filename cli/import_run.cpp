@@ -278,11 +278,11 @@ class Import {
       entry.set_sigma_s(*std::max_element(camera.sigma_s.begin(), camera.sigma_s.end()));
     }
     result.notes = notes_;
-    if (alignment_ == Alignment::strobe) result.clip = clip_;
+    const bool timed = alignment_ == Alignment::strobe;
+    if (timed) result.clip = clip_;
     manifest.set_session_id(fs::absolute(options_.out).lexically_normal().filename().string());
     manifest.set_purpose("flame");
     manifest.set_created_utc(created(films_.front().film));
-    const bool timed = alignment_ == Alignment::strobe;
     EMBERLOCK_ASSIGN_OR_RETURN(
         result.manifest,
         target.finish(std::move(manifest), parts, timed ? &times : nullptr, reports_of(options_, result)));

@@ -143,7 +143,7 @@ TEST(ImportWalk, FromFilmsToAVolumeThatShowsTheCameraHeldOut) {
   EXPECT_LT(filmed, 1.15 * rendered) << "the films cost more than the coder's noise";
   EXPECT_LT(rendered, 8);
 
-  // Three cameras a frame off.
+  // Two cameras a frame off.
   options.out = folder / "off";
   options.alignment = Alignment::offsets;
   for (std::size_t c = 0; c < kFilmed.size(); ++c)

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kPreviewWidth = 280;       // pixels
 constexpr std::size_t kMostShown = 600;  // points of a plot: more only fill the file
+constexpr const char* kNone = "–";
 constexpr const char* kGood = "#009e73";
 constexpr const char* kStrobeColour = "#e69f00";
 constexpr const char* kFlameColour = "#0072b2";
@@ -118,10 +119,9 @@ void cameras(HtmlPage& page, const ImportOptions& options, const ImportResult& r
   page.gallery(pictures);
   std::vector<std::vector<std::string>> rows;
   for (const ImportedCamera& c : r.cameras) {
-    const std::string none = "–";
     const bool is_reference = &c == &reference_of(r);
     const auto late = [&](std::size_t i) {
-      if (!c.clock || is_reference) return none;
+      if (!c.clock || is_reference) return std::string(kNone);
       return fmt::format("{:+.4f} ± {:.4f}", 1e3 * c.late_s[i], 1e3 * c.sigma_s[i]);
     };
     const std::string files = c.files.size() > 1 ? fmt::format(" ({} files)", c.files.size()) : "";
@@ -129,7 +129,7 @@ void cameras(HtmlPage& page, const ImportOptions& options, const ImportResult& r
         {c.id + (is_reference && r.instants > 1 ? " (reference)" : ""), c.name + files, why_it_is(options, c),
          fmt::format("{}", c.frames), fmt::format("{} to {}", c.places.front(), c.places.back()),
          fmt::format("{:+d}", c.frame_offset), late(0), late(c.late_s.empty() ? 0 : c.late_s.size() - 1),
-         c.drift && !is_reference ? fmt::format("{:+.2f}", c.drift->value()) : none,
+         c.drift && !is_reference ? fmt::format("{:+.2f}", c.drift->value()) : kNone,
          c.calibrated ? "yes" : "no"});
   }
   page.table({"camera", "film", "known by", "frames", "imported", "frame offset", "late at first (ms)",

@@ -112,6 +112,7 @@ void import(const ImportArguments& arguments) {
     return !Interrupt::asked();
   }));
   for (const std::string& note : result.notes) std::fprintf(stderr, "emberlock: %s\n", note.c_str());
+  std::fprintf(stderr, "emberlock: the report is %s\n", (options.out / "import.html").c_str());
   if (arguments.json) {
     std::printf("%s", import_json(options, result).c_str());
   } else {

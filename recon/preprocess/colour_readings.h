@@ -35,8 +35,8 @@ struct ColourReadings {
 ///    "radiance": {PATCH: L or [R, G, B]},
 ///    "session": FOLDER, "frames": {CAMERA: {NAME: frame}}}
 /// `pictures` stands instead of `patches` for those in which the target stood elsewhere; `radiance`, of a
-/// chart, may be absent and has any common unit; `frames` of a session (beside colour.json) are pictures, with
-/// names as those have: "target_A_0.01s", "dark_1".
+/// chart, may be absent and has any common unit; `frames` of a session (beside colour.json) are pictures,
+/// with names as those have: "target_A_0.01s", "dark_1".
 struct ColourPlan {
   using Places = std::map<std::string, PatchPlace>;
   std::map<std::string, Places> patches;

@@ -77,8 +77,12 @@ void summary(HtmlPage& page, const ImportResult& r) {
 std::vector<std::string> advice(const ImportResult& r) {
   std::vector<std::string> lines;
   std::string uncalibrated;
-  for (const ImportedCamera& c : r.cameras)
+  bool none = true;
+  for (const ImportedCamera& c : r.cameras) {
+    none = none && !c.calibrated;
     if (!c.calibrated) uncalibrated += (uncalibrated.empty() ? "" : ", ") + c.id;
+  }
+  if (none) uncalibrated = "the cameras";
   if (!uncalibrated.empty())
     lines.push_back("Calibrate " + uncalibrated +
                     " (emberlock calibrate cameras) and name its rig.json with --rig, here or when "

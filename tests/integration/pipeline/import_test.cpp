@@ -150,7 +150,7 @@ TEST_F(ImportFilms, SayByTheVerbWhatBecameOfThem) {
                     left.at("sigma_ms")[0].get<double>()),
         fmt::format("{} to {}", left.at("strobe_frames")[0][0].get<int>(),
                     left.at("strobe_frames")[0][1].get<int>() - 1),
-        std::string("Calibrate camera-0, camera-2, left"), std::string("data:image/png"),
+        std::string("Calibrate the cameras ("), std::string("data:image/png"),
         std::string("what the clock's fit leaves"), std::string("Standard error of that")})
     EXPECT_THAT(page, HasSubstr(said));
   for (const char* wrong : {"http://", "https://", "<script", "\"nan", "Lnan", "Mnan", "{}"})

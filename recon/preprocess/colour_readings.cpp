@@ -244,7 +244,7 @@ Status read_session(const ColourPlan& plan, const fs::path& folder, ColourReadin
     for (const auto& [name, frame] : frames) {
       auto picture = by_name(folder / camera / (name + ".frame"));
       if (!picture)
-        return bad_plan(where + "." + name, "is neither dark, flat nor target",
+        return bad_plan(fmt::format("{}.{}", where, name), "is neither dark, flat nor target",
                         "Name it as pictures are named");
       pictures.push_back(*std::move(picture));
     }
@@ -253,7 +253,8 @@ Status read_session(const ColourPlan& plan, const fs::path& folder, ColourReadin
     auto picture = pictures.begin();
     for (const auto& [name, number] : frames) {
       if (number >= session.stamps(index).size()) {
-        return bad_plan(where + "." + name, fmt::format("there are {} frames", session.stamps(index).size()),
+        return bad_plan(fmt::format("{}.{}", where, name),
+                        fmt::format("there are {} frames", session.stamps(index).size()),
                         "Count frames from 0");
       }
       EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame, session.read(index, number));

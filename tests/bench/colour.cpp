@@ -29,9 +29,27 @@ PatchSpread worse(const PatchSpread& a, const PatchSpread& b) {
           a.unmarked + b.unmarked};
 }
 
+/// What a perfect calibration would say: the noise of the patches themselves is left.
+ColourCalibration true_calibration(const std::vector<ColourTruth>& rig) {
+  constexpr std::size_t kPoints = 4096;
+  ColourCalibration out;
+  for (const ColourTruth& camera : rig) {
+    CalibratedColour& c = out.cameras.emplace_back();
+    for (std::size_t i = 0; i < kPoints; ++i) {
+      const double v = static_cast<double>(i) / (kPoints - 1);
+      c.colour.response.push_back(std::pow(v, camera.gamma + camera.toe * (1 - v)));
+    }
+    c.colour.gain = camera.gain;
+    c.colour.vignetting = camera.vignetting;
+    c.colour.dark.fill(camera.dark);
+  }
+  return out;
+}
+
 void patches(int seeds, double toe, const char* what) {
   PatchSpread before;
   PatchSpread after;
+  PatchSpread truth;
   double chi_square = 0;
   int gains = 0;
   double seconds = 0;
@@ -47,6 +65,8 @@ void patches(int seeds, double toe, const char* what) {
     }
     before = worse(before, held_out_spread(rig, nullptr, 100 + static_cast<std::uint64_t>(seed)));
     after = worse(after, held_out_spread(rig, &*calibration, 100 + static_cast<std::uint64_t>(seed)));
+    const ColourCalibration perfect = true_calibration(rig);
+    truth = worse(truth, held_out_spread(rig, &perfect, 100 + static_cast<std::uint64_t>(seed)));
     for (std::size_t c = 0; c < 3; ++c) {
       double mean = 0;
       for (const ColourTruth& camera : rig) mean += std::log(camera.gain[c]) / 11;
@@ -61,6 +81,7 @@ void patches(int seeds, double toe, const char* what) {
   std::printf("%s: %d rigs of eleven cameras, patches that no calibration saw\n", what, seeds);
   print_spread("as filmed", before);
   print_spread("calibrated (worst of all rigs)", after);
+  print_spread("told the cameras' truth instead", truth);
   std::printf(
       "  saturated but not marked: %d; gains' chi-square over their number: %.2f; %.2f s a rig with "
       "filming\n",

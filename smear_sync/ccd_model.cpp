@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/ccd_model.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// Rounding allowance for K t_row <= T, relative.
@@ -119,4 +120,4 @@ Rows shifts_between(const CcdTiming& timing, Rows lamp, Rows dot) {
   return wrap_positive((dot - lamp) * static_cast<double>(timing.direction), Rows(timing.shifts));
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

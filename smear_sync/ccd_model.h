@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -7,7 +8,7 @@
 #include "base/result.h"
 #include "smear_sync/ccd_timing.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // The forward model of smear in an interline CCD: light that leaks into the vertical shift register while it
 // moves.
@@ -19,8 +20,8 @@ namespace emberlock {
 // light: a packet of this image, of the dummy lines behind it, or (wrapped, or at rest) one that the next
 // picture will enter.
 //
-// Source: the paper, "Smear-Based CCD Camera Synchronization", with K and the circular k of a simulated
-// register.
+// Source: the paper, "Smear-Based CCD Camera Synchronization", equations (1) to (4), with K and the circular
+// k of a simulated register.
 
 /// Whether the register is emptied just before the next picture enters it. `before_transfer` removes what
 /// leaked in behind the image (the wrapped dots and those of the rest), so that dots are seen on one side of
@@ -84,4 +85,4 @@ std::optional<SmearCentre> smear_centre(const CcdTiming& timing, Rows lamp, cons
 /// The circular inverse: k = d (dot - lamp) mod K, in [0, K).
 Rows shifts_between(const CcdTiming& timing, Rows lamp, Rows dot);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "base/quantity.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Which displayed row leaves the chip first: d of SMEAR's forward model, +1 for the top row, -1 for the
 /// bottom row.
@@ -17,4 +18,4 @@ struct CcdTiming {
   ReadDirection direction = ReadDirection::top_first;  ///< d
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

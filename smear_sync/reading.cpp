@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/reading.h"
 
 #include "base/one_to_one.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr OneToOne<SmearState, std::string_view, 8> kStateNames{{{{SmearState::dot, "dot"},
@@ -20,4 +21,4 @@ std::string_view name(SmearState state) { return kStateNames.second_of(state).va
 
 std::string_view name(Side side) { return side == Side::above ? "above" : "below"; }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

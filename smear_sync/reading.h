@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -7,7 +8,7 @@
 
 #include "base/quantity.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// What one frame of a strobe shows. Rows and columns count from 0 at the centre of the top left pixel.
 enum class SmearState {
@@ -59,4 +60,4 @@ struct SmearReading {
   std::vector<DotReading> spots{};
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

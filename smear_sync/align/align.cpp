@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align.h"
 
 #include <algorithm>
@@ -9,6 +10,7 @@
 
 #include "smear_sync/align/align_choice.h"
 #include "smear_sync/align/align_context.h"
+#include "smear_sync/align/align_dial.h"
 #include "smear_sync/align/align_forecast.h"
 #include "smear_sync/align/align_hold.h"
 #include "smear_sync/align/align_look.h"
@@ -16,7 +18,7 @@
 #include "smear_sync/align/align_words.h"
 #include "smear_sync/align/reset_delay.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// A tolerance of fewer standard errors of a phase can't be told.
@@ -261,10 +263,9 @@ std::optional<std::string> untrimmable(const AlignContext& c) {
   return std::nullopt;
 }
 
-}  // namespace
-
-AlignStep align_step(const AlignState& before, const AlignRound& round,
-                     const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
+/// One round of flashes whose delay is known.
+AlignStep step_at(const AlignState& before, const AlignRound& round, const std::vector<AlignCamera>& cameras,
+                  const AlignOptions& options) {
   AlignState state = before;
   state.cameras.resize(cameras.size());
   ++state.rounds;
@@ -321,4 +322,20 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   return {std::move(state), std::move(decision)};
 }
 
-}  // namespace emberlock
+}  // namespace
+
+AlignStep align_step(const AlignState& before, const AlignRound& round,
+                     const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
+  if (!options.dial) return step_at(before, round, cameras, options);
+  AlignState state = before;
+  state.cameras.resize(cameras.size());
+  const AlignRound weighed = weigh_flashes(state, round, options);
+  DialAdvice advice = look_at_dial(state, weighed, options);
+  if (!advice.ready) return wait_for_dial(std::move(state), weighed, std::move(advice));
+  const AlignRound seen = without_walk(state, weighed, options);
+  AlignStep step = step_at(state, seen, cameras, options);
+  let_walk(step, seen, std::move(advice), cameras, options);
+  return step;
+}
+
+}  // namespace emberlock::smear

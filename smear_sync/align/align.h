@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -9,16 +10,18 @@
 
 #include "base/quantity.h"
 #include "base/result.h"
+#include "base/strobe_dial.h"
 #include "base/time_point.h"
 #include "smear_sync/align/phase_track.h"
 #include "smear_sync/align/rate_servo.h"
 #include "smear_sync/clocks/drift.h"
+#include "smear_sync/clocks/flash_rate.h"
 #include "smear_sync/clocks/phase.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // The alignment as a pure step: what was known, and what a round of filming showed, give what is known now
-// and what to do next. It has no clock and no device: daemon/align/run.h carries its orders out, and a
+// and what to do next. It has no clock and no device: rig/align/run.h carries its orders out, and a
 // recording replays through it.
 
 /// Which cameras are reset, and towards what.
@@ -119,6 +122,9 @@ struct AlignOptions {
   /// are called aligned; > 0 and < T / 4. Zero: what looks like a dot is believed.
   Seconds strobe_step = milliseconds(2);
   ResetBy reset_by = ResetBy::orders;
+  /// Of a strobe that somebody sets by hand: it is told nothing, and its flashes walk through the frames at a
+  /// rate that the frames tell (align_dial.h). `strobe_step` is then how far dots shall be seen to follow.
+  std::optional<StrobeDial> dial = {};
 };
 
 /// One camera in one round.
@@ -149,6 +155,10 @@ struct AlignRound {
   std::vector<CameraView> cameras;
   std::vector<ResetDone> resets;     ///< carried out since the round before
   std::vector<TrimDone> trims = {};  ///< likewise
+  FlashRate flashes = {};            ///< of a strobe with a dial: what the frames tell of it
+  /// `strobe_phase` doesn't rest on one camera's word, which can't be a witness to itself: dots may be judged
+  /// by how they follow it.
+  bool moves_told = true;
 };
 
 /// A dot, or what passes for one, where it stood when it was seen.
@@ -169,9 +179,10 @@ struct CameraTrack {
   std::optional<Sighting> sighted;  ///< the newest
   bool moved = false;               ///< its dot was seen to move with the strobe
   std::optional<Seconds> rough;  ///< seen at two places of the strobe, but only to this: too roughly to tell
-  std::string doubt;     ///< why what is seen isn't taken for its dot: it moved otherwise; empty if it is
-  bool away = false;     ///< in the last round
-  bool renewed = false;  ///< reset in the renewal under way
+  std::string doubt;      ///< why what is seen isn't taken for its dot: it moved otherwise; empty if it is
+  bool disputed = false;  ///< the doubt is that it and another camera contradict each other: either may err
+  bool away = false;      ///< in the last round
+  bool renewed = false;   ///< reset in the renewal under way
 };
 
 /// The phase to which cameras are brought, strobe_phase taken out: it moves as a camera of this rate would.
@@ -180,6 +191,16 @@ struct AlignTarget {
   Seconds tau;
   PartsPerMillion rate;
   bool settled = false;  ///< trims are near it: it stays as it is
+};
+
+/// What is remembered of a strobe that somebody sets by hand.
+struct DialState {
+  std::optional<Hertz> wanted;  ///< what was asked for last, where that isn't one flash a frame
+  PhaseTrack walk;  ///< how far the flashes have walked through the frames since they were first seen
+  std::optional<TimePoint> at;    ///< of the round before
+  Seconds walked;                 ///< since a look was counted, there or back
+  std::vector<ResetDone> resets;  ///< carried out while the dial was waited for: no camera has told of them
+  std::vector<TrimDone> trims;    ///< likewise
 };
 
 struct AlignState {
@@ -196,6 +217,7 @@ struct AlignState {
   int renewal = 0;  ///< rounds since cameras were last reset before they left tolerance; 0: none is under way
   std::optional<TimePoint> trimming;  ///< since when, until aligned
   std::optional<std::size_t> asked;   ///< the camera that somebody was asked to reset
+  DialState dial;
   std::vector<CameraTrack> cameras;
 };
 
@@ -210,6 +232,17 @@ struct CameraDecision {
   std::optional<ServoState> servo;      ///< of a camera that is trimmed
   std::optional<TimeLeft> time_left;    ///< in tolerance, as it drifts now
   std::string reason;                   ///< a sentence that an operator can act on
+};
+
+/// What is asked of whoever sets the strobe by its dial, and what it was seen to do.
+struct DialAdvice {
+  Hertz set;                      ///< flashes a second that it shall be set to
+  std::optional<Hertz> measured;  ///< what it does, by the frames of this round
+  PartsPerMillion sigma;          ///< standard error of that
+  std::vector<Hertz> others{};    ///< rates that would have shown the same (flash_rate.h)
+  bool ready = false;             ///< the flashes can be followed; if not, nothing goes on
+  bool act = false;               ///< somebody must turn it
+  std::string words;              ///< a sentence to them, or what was seen
 };
 
 enum class AlignVerdict {
@@ -243,6 +276,7 @@ struct AlignDecision {
                                       ///< camera out (three standard errors)
   std::optional<AlignEffort> effort;  ///< foretold in the first round that has all phases, given limits
   std::vector<AlignOffer> offers;     ///< of a refusal
+  std::optional<DialAdvice> dial;     ///< of a strobe that somebody sets by hand
   std::string reason;                 ///< of the verdict, or what the rig waits for
 };
 
@@ -255,4 +289,4 @@ struct AlignStep {
 AlignStep align_step(const AlignState& state, const AlignRound& round,
                      const std::vector<AlignCamera>& cameras, const AlignOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align_choice.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "smear_sync/align/reset_delay.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// Resets that a camera which can't be moved is as good as.
@@ -80,4 +81,4 @@ std::vector<bool> choose_resets(const AlignScene& scene, Seconds target) {
   return chosen;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -9,7 +10,7 @@
 
 #include "smear_sync/align/align.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // The core of the policy, without words: where the cameras stand gives the phase to which they are brought,
 // and which of them are reset.
@@ -59,4 +60,4 @@ Seconds choose_target(const AlignScene& scene);
 /// Which of the cameras out of tolerance are reset now.
 std::vector<bool> choose_resets(const AlignScene& scene, Seconds target);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

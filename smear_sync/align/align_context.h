@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "smear_sync/align/align.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// A phase seen earlier counts until it may have walked by this part of the tolerance (one standard error);
 /// of the trims' reach, which is far more, while trims bring the cameras together.
@@ -26,4 +27,4 @@ struct AlignContext {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align_forecast.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr int kPlays = 200;
@@ -175,4 +176,4 @@ std::vector<AlignOffer> find_offers(const Prospect& prospect, const AlignOptions
   return offers;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -6,7 +7,7 @@
 #include "smear_sync/align/align.h"
 #include "smear_sync/align/align_choice.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Where a rig stands and what is known of how its cameras move.
 struct Prospect {
@@ -28,4 +29,4 @@ std::vector<AlignOffer> find_offers(const Prospect& prospect, const AlignOptions
 /// camera can't be trimmed.
 Seconds trim_reach(const std::vector<std::optional<RateTrim>>& trims, const AlignOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align_hold.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include "smear_sync/align/align_look.h"
 #include "smear_sync/align/align_words.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// The next check comes before any of the cameras leaves by so many standard errors, and by so much more than
@@ -169,4 +170,4 @@ void foresee(const AlignState& state, AlignDecision& decision, const std::vector
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -7,7 +8,7 @@
 #include "smear_sync/align/align_context.h"
 
 // Holding what was reached: how long every camera stays in tolerance, and who is reset before it leaves.
-namespace emberlock {
+namespace emberlock::smear {
 
 /// How the cameras' errors move against a target that goes as the middle of them does, or as the reference or
 /// the held target does; every camera's error is known. Trims ordered count as in force.
@@ -32,4 +33,4 @@ void follow_renewal(AlignState& state, AlignDecision& decision, const AlignConte
 void foresee(const AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
              const AlignContext& c);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align_look.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include "smear_sync/align/reset_delay.h"
 #include "smear_sync/align/unordered_reset.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// The strobe's delay goes round this part of the period: it must stay below the strobe's own, which may be
@@ -97,6 +98,7 @@ void watch_moves(AlignState& state, const AlignContext& c) {
     CameraTrack& track = state.cameras[i];
     const Phase& phase = round.cameras[i].phase;
     if (phase.state != PhaseState::known) continue;
+    if (track.sighted && !round.moves_told) continue;
     if (track.sighted && track.phase.phase_known()) {
       const Drift drift = track.phase.at(round.at, c.track);
       const Seconds before = track.sighted->tau;
@@ -120,6 +122,7 @@ void watch_moves(AlignState& state, const AlignContext& c) {
     }
     track.moved = motions[i] == DotMotion::with_all;
     track.rough.reset();
+    track.disputed = false;
     track.doubt = all_stand ? "no camera's dot moved " + when_moved(*moves[i]) +
                                   ": see whether the strobe does as it is told"
                             : doubt_of(motions[i], *moves[i]);
@@ -134,6 +137,7 @@ void forget(CameraTrack& track, std::optional<Drift> before) {
   track.moved = false;
   track.rough.reset();
   track.doubt.clear();
+  track.disputed = false;
 }
 
 /// What people did: cameras that were switched off, and phases that jumped. Returns the latter.
@@ -233,7 +237,9 @@ void look_again(AlignState& state, AlignDecision& decision, const AlignContext& 
       if (why.empty()) why = doubt;
     } else if (phase.state == PhaseState::blind) {
       hidden = true;
-      camera.reason = "shows no phase: the strobe's is moved to bring it out (" + phase.reason + ")";
+      camera.reason = (c.options.dial ? "shows no phase: waits until the flashes have walked on ("
+                                      : "shows no phase: the strobe's is moved to bring it out (") +
+                      phase.reason + ")";
     } else {
       camera.reason = "can't be read: see to its view of the lamp and to the strobe (" + phase.reason + ")";
       if (why.empty()) why = phase.reason;
@@ -270,8 +276,10 @@ void ask_for_moves(AlignState& state, AlignDecision& decision, const AlignContex
     return;
   }
   decision.verdict = AlignVerdict::go_on;
-  decision.reason += fmt::format("; the strobe is moved by {:.2f} ms, which the dot of {} must follow",
-                                 in_milliseconds(c.options.strobe_step), all);
+  decision.reason += c.options.dial
+                         ? "; the dot of " + all + " must be seen to follow the flashes as they walk"
+                         : fmt::format("; the strobe is moved by {:.2f} ms, which the dot of {} must follow",
+                                       in_milliseconds(c.options.strobe_step), all);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -7,7 +8,7 @@
 #include "smear_sync/align/align_context.h"
 
 // What was seen of the cameras, and where to look next.
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Takes over what the round showed: delays and shifts of resets, trims ordered, phases of the cameras seen.
 /// Returns the cameras that somebody has reset without an order.
@@ -27,4 +28,4 @@ void look_again(AlignState& state, AlignDecision& decision, const AlignContext& 
 /// nobody moves the strobe for them. `looks`: rounds in a row that did so or looked for a phase.
 void ask_for_moves(AlignState& state, AlignDecision& decision, const AlignContext& c, int looks);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align_simulation.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 #include "base/random.h"
 #include "smear_sync/align/reset_delay.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kLatency = 0.31;    // s, from the order to the start of the first read phase
@@ -266,4 +267,4 @@ AlignStatistics simulate_many(const AlignSimulation& simulation, int rigs, std::
   return summarise(outcomes);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

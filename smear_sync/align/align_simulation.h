@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -5,7 +6,7 @@
 
 #include "smear_sync/align/align.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Cameras and strobe as bare numbers on one time axis: what align_step is judged against, without pictures,
 /// and what tolerances cost is measured with.
@@ -64,4 +65,4 @@ AlignStatistics summarise(const std::vector<AlignOutcome>& outcomes);
 /// Seeds first_seed, first_seed + 1, ...
 AlignStatistics simulate_many(const AlignSimulation& simulation, int rigs, std::uint64_t first_seed = 0);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

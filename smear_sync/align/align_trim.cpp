@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align_trim.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 
 #include "smear_sync/align/align_words.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kLongestWay = 3600;  // s, no plan goes further
@@ -210,4 +211,4 @@ bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& ro
   return true;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

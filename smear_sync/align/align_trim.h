@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
 
 #include "smear_sync/align/align.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Where a target stands at an instant, strobe_phase taken out.
 Seconds target_at(const AlignTarget& target, TimePoint at, Seconds period);
@@ -17,4 +18,4 @@ Seconds target_at(const AlignTarget& target, TimePoint at, Seconds period);
 bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& round,
                 const std::vector<AlignCamera>& cameras, const AlignOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

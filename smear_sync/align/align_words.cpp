@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align_words.h"
 
 #include <cmath>
@@ -6,7 +7,7 @@
 
 #include "base/one_to_one.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr OneToOne<AlignVerdict, std::string_view, 4> kVerdictNames{{{{AlignVerdict::go_on, "go-on"},
@@ -63,4 +64,4 @@ TrackOptions track_options(const AlignOptions& options) {
 
 std::string_view name(AlignVerdict verdict) { return kVerdictNames.second_of(verdict).value_or("unknown"); }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -6,7 +7,7 @@
 #include "smear_sync/align/align.h"
 
 // The sentences of the alignment's decisions, and what its steps share.
-namespace emberlock {
+namespace emberlock::smear {
 
 /// "reads 34.2 rows (1.847 ms) before the target"
 std::string standing(Seconds error, SecondsPerRow row_time);
@@ -25,4 +26,4 @@ std::string refusal(const AlignEffort& effort, const std::vector<AlignOffer>& of
 
 TrackOptions track_options(const AlignOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/move_together.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kAlike = 5;  // standard errors
@@ -30,15 +31,17 @@ std::vector<DotMotion> move_together(std::span<const std::optional<DotMove>> cam
     if (!cameras[i]) continue;
     const DotMove& move = *cameras[i];
     const Seconds allowed = kAlike * move.sigma;
-    const auto moved_by = [&](Seconds way) {
-      return abs(wrap_symmetric(move.seen - way, period)) <= allowed;
-    };
+    const auto moved_by = [&](Seconds by) { return abs(wrap_symmetric(move.seen - by, period)) <= allowed; };
     if (abs(wrap_symmetric(move.strobe, period)) <= 2 * allowed) continue;
+    const Seconds way = move.expected + common;
+    const bool same_back = abs(wrap_symmetric(2 * way, period)) <= 2 * allowed;
     if (moved_by(Seconds(0))) {
       motions[i] = DotMotion::none;
-    } else if (moved_by(move.expected + common)) {
+    } else if (same_back && (moved_by(way) || moved_by(-way))) {
+      continue;  // by half a period, there and back are the same
+    } else if (moved_by(way)) {
       motions[i] = DotMotion::with_all;
-    } else if (moved_by(-(move.expected + common))) {
+    } else if (moved_by(-way)) {
       motions[i] = DotMotion::against;
     } else {
       motions[i] = DotMotion::otherwise;
@@ -47,4 +50,4 @@ std::vector<DotMotion> move_together(std::span<const std::optional<DotMove>> cam
   return motions;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -6,7 +7,7 @@
 
 #include "base/quantity.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// How a camera's tau moved from where it was seen last to where it is seen now, in which time the strobe was
 /// moved.
@@ -32,7 +33,8 @@ constexpr double kToldPartOfStep = 1.0 / 20;
 /// The motions of all the cameras that filmed the same flashes, by camera; nothing of one that wasn't seen
 /// twice. What most of them differ by from what is expected, counting the strobe's word for one camera more,
 /// is their common motion: a beat that is known too roughly, a strobe that isn't where it says. Differences
-/// of up to five standard errors are none; a move is told from standing still from twice as much on.
+/// of up to five standard errors are none; a move is told from standing still from twice as much on, and one
+/// way from the other where twice the way isn't whole periods to that.
 std::vector<DotMotion> move_together(std::span<const std::optional<DotMove>> cameras, Seconds period);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/phase_track.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "base/square.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kImpossible = 6;  // standard errors
@@ -108,4 +109,4 @@ void PhaseTrack::order_trim(TimePoint from, PartsPerMillion trim, const TrackOpt
   orders_.push_back({from, trim.value() * 1e-6});
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -8,7 +9,7 @@
 #include "smear_sync/clocks/drift.h"
 #include "smear_sync/clocks/phase.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// How a camera's frame rate can be trimmed.
 struct RateTrim {
@@ -67,4 +68,4 @@ class PhaseTrack {
   int samples_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/rate_servo.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "base/one_to_one.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr OneToOne<ServoState, std::string_view, 3> kServoNames{
@@ -32,4 +33,4 @@ ServoStep rate_servo(const ServoSample& sample, const RateTrim& camera, Seconds 
   return {rounded(sample.holding.value() + kLockedGain * arriving, camera), ServoState::locked};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

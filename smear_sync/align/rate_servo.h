@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string_view>
@@ -5,7 +6,7 @@
 #include "base/quantity.h"
 #include "smear_sync/align/phase_track.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // The servo of one camera's frame rate: a sample in, an adjustment and a state out, as linuxptp's servos
 // have it. What needs memory (the phase, the rate, trims under way) is PhaseTrack's, so a step is a function
@@ -36,4 +37,4 @@ struct ServoStep {
 /// the error is within its noise, a quarter of that, so that the noise isn't followed.
 ServoStep rate_servo(const ServoSample& sample, const RateTrim& camera, Seconds interval);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/reset_delay.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "base/square.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kExcludedSigmas = 5;
@@ -126,4 +127,4 @@ std::optional<TimePoint> common_stamp(std::span<const TimePoint> stamps, TimePoi
   return near + wrap_symmetric(mean, period);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

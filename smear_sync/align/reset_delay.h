@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -7,7 +8,7 @@
 
 #include "smear_sync/align/align.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// The standard deviation of one reset's delay about its camera's mean: what is told, weighed as four
 /// resets, joined with what resets have shown.
@@ -38,4 +39,4 @@ double chance_within(Seconds tolerance, Seconds sigma);
 /// their stamps. Absent without stamps.
 std::optional<TimePoint> common_stamp(std::span<const TimePoint> stamps, TimePoint near, Seconds period);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <charconv>
 #include <cmath>
 #include <string>
@@ -5,7 +6,7 @@
 #include "base/one_to_one.h"
 #include "smear_sync/align/align.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr OneToOne<AlignPolicy, std::string_view, 4> kPolicyNames{
@@ -50,4 +51,4 @@ Result<AlignPolicy> parse_align_policy(std::string_view text) {
                "use fixed-reference, densest, timed or trimmed"};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

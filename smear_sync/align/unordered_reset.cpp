@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/unordered_reset.h"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kBeyond = 6;  // standard errors
@@ -86,4 +87,4 @@ bool same_phase(Seconds shift, Seconds sigma, const AlignContext& c) {
   return abs(wrap_symmetric(shift, c.options.period)) <= allowed(sigma, c);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

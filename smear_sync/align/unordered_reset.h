@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -5,7 +6,7 @@
 
 #include "smear_sync/align/align_context.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Cameras whose shutters somebody reset since the round before, as far as this one shows: their phase is
 /// six standard errors and a tenth of the tolerance from where it was to be, in another way than most
@@ -17,4 +18,4 @@ std::vector<std::size_t> unordered_resets(const AlignState& state, const AlignCo
 /// Whether a phase that was lost turned up where it would be without a reset.
 bool same_phase(Seconds shift, Seconds sigma, const AlignContext& c);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

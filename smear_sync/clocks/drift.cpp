@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/drift.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 #include "smear_sync/clocks/staircase.h"
 #include "smear_sync/clocks/weighted_line.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kHuber = 1.345;  // 95 % efficient on normal errors
@@ -122,6 +123,23 @@ double first_reached(double error, double rate, double curve, double tolerance) 
   return down > 0 ? 2 * gap / down : std::numeric_limits<double>::infinity();
 }
 
+/// The staircase that whole rows of charge make of the line; none of fewer than three frames.
+std::optional<StairFit> stairs_of(std::span<const PhaseSample> samples, TimePoint first, double span,
+                                  const WeightedLine& line, const DriftOptions& options) {
+  std::vector<StairPoint> seen;
+  for (const PhaseSample& s : samples) {
+    if (!s.shifted || s.phase.state != PhaseState::known) continue;
+    seen.push_back({Eigen::Vector2d(1, (s.at - first).value() - line.middle), s.shifted->rows.value(),
+                    s.shifted->sigma.value()});
+  }
+  if (seen.size() < 3) return std::nullopt;
+  const double row_time = options.row_time.value();
+  return fit_stairs(seen, {.line = Eigen::Vector2d(line.level / row_time, line.rate / row_time),
+                           .covariance = Eigen::Vector2d(square(0.5), square(1 / span)).asDiagonal(),
+                           .turn = options.period.value() / row_time,
+                           .width = (options.flash_width / options.row_time).value()});
+}
+
 }  // namespace
 
 Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions& options) {
@@ -161,21 +179,8 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
       row_time > 0 ? row_resolution(options.row_time, options.flash_width) : Seconds(0);
   line.level_variance += square(resolution.value());
   line.rate_variance += square(staircase_rate_error(resolution, Seconds(span)));
-  std::optional<StairFit> stairs;
-  if (resolution > Seconds(0)) {
-    std::vector<StairPoint> seen;
-    for (const PhaseSample& s : samples) {
-      if (!s.shifted || s.phase.state != PhaseState::known) continue;
-      seen.push_back({Eigen::Vector2d(1, (s.at - first).value() - line.middle), s.shifted->rows.value(),
-                      s.shifted->sigma.value()});
-    }
-    if (seen.size() >= 3) {
-      stairs = fit_stairs(seen, {.line = Eigen::Vector2d(line.level / row_time, line.rate / row_time),
-                                 .covariance = Eigen::Vector2d(square(0.5), square(1 / span)).asDiagonal(),
-                                 .turn = period / row_time,
-                                 .width = (options.flash_width / options.row_time).value()});
-    }
-  }
+  const std::optional<StairFit> stairs =
+      resolution > Seconds(0) ? stairs_of(samples, first, span, line, options) : std::nullopt;
   Drift drift;
   drift.at = first + Seconds(line.middle);
   drift.samples = static_cast<int>(points.size());
@@ -264,4 +269,4 @@ TimeLeft time_left(const Drift& error, TimePoint now, const TimeLeftOptions& opt
   return left;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <limits>
@@ -8,7 +9,7 @@
 #include "base/time_point.h"
 #include "smear_sync/clocks/phase.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 struct DriftOptions {
   Seconds period{1 / 23.976};  ///< T
@@ -82,4 +83,4 @@ struct TimeLeftOptions {
 /// where the error is outside already; an earliest of zero where it may be.
 TimeLeft time_left(const Drift& error, TimePoint now, const TimeLeftOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/frame_code.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr int kWordLength = 31;
@@ -370,4 +371,4 @@ FrameOffset frame_offset(const NumberedRun& a, const NumberedRun& b, const Frame
   return offset;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

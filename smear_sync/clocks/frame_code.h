@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "base/result.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // A dot fixes a camera's phase modulo the frame period; which frames belong together is told by flashes that
 // the strobe skips. The code is a cycle of words, `spacing` flashes from the start of one to that of the
@@ -110,4 +111,4 @@ struct FrameOffset {
 /// nearest to zero is given.
 FrameOffset frame_offset(const NumberedRun& a, const NumberedRun& b, const FrameCode& code, std::int64_t i);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/phase.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 #include "smear_sync/clocks/staircase.h"
 #include "smear_sync/clocks/weighted_line.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr OneToOne<PhaseState, std::string_view, 3> kPhaseNames{
@@ -241,4 +242,4 @@ CommonPhases refer(std::span<const std::vector<PhaseSample>> samples, const Circ
   return common;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

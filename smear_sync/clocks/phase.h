@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -11,7 +12,7 @@
 #include "smear_sync/ccd_timing.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // Conventions. tau = (t_flash - t_start) mod T, in [0, T): how long after the start of a camera's read phase
 // the strobe flashed. Every camera sees the same flash, so t_start of a is later than that of b by tau_b -
@@ -109,4 +110,4 @@ struct CommonPhases {
 /// what was known before, and taken out.
 CommonPhases refer(std::span<const std::vector<PhaseSample>> samples, const CircleOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/read_mode.h"
 
 #include <algorithm>
@@ -14,7 +15,7 @@
 
 #include "base/square.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kRowScatter = 0.35;  // of one dot: whole rows, and the fit of a faint dot
@@ -352,4 +353,4 @@ Result<ReadMode> find_read_mode(std::span<const FrameReading> frames, const Read
   return mode;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

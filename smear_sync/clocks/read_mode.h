@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "smear_sync/ccd_timing.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// What one frame showed, by the camera's own count of frames.
 struct FrameReading {
@@ -61,4 +62,4 @@ struct ReadMode {
 /// rates, row time or rows that aren't positive and finite.
 Result<ReadMode> find_read_mode(std::span<const FrameReading> frames, const ReadModeOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

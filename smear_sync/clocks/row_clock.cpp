@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/row_clock.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 #include "smear_sync/clocks/staircase.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// Whole rows of charge and the fit of a faint dot leave a row or so; what is further off isn't of this comb.
@@ -381,4 +382,4 @@ Result<RowClock> fit_row_clock(std::span<const SmearReading> frames, Hertz flash
   return clock;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

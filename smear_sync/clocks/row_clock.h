@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -6,7 +7,7 @@
 #include "base/result.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// What a comb of dots says about the sensor's clock.
 struct RowClock {
@@ -25,7 +26,7 @@ struct RowClock {
 };
 
 /// t_row = 1 / (p f): least squares for the pitch over all dots of all frames whose state is `comb` (the
-/// paper's equation for t_per_row, over more than two dots). Each frame has its own phase and the two sides
+/// paper's equation (2), over more than two dots). Each frame has its own phase and the two sides
 /// of the lamp their own offset, common to all frames: nothing is assumed about K. Gaps of several pitches
 /// (missed dots) and outliers are allowed; flash_rate is the strobe's, in flashes a second. Where the frames
 /// prove to be one walk of the comb (none was lost, the strobe is even), they are fitted as one, through the
@@ -37,4 +38,4 @@ Result<RowClock> fit_row_clock(std::span<const SmearReading> frames, Hertz flash
                                std::optional<Seconds> frame_period = std::nullopt,
                                Seconds flash_width = microseconds(20));
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

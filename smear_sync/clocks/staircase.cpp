@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/staircase.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include "base/random.h"
 #include "base/square.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kLeastOrder =
@@ -221,4 +222,4 @@ std::optional<StairFit> fit_stairs(std::span<const StairPoint> points, const Sta
   return fit;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

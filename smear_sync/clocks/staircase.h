@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -5,7 +6,7 @@
 
 #include <Eigen/Dense>
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // All in rows: a flash of `width` rows about x row periods after the start of the read phase leaves its dot u
 // rows from the lamp, where u stands still while the flash stays within one row period and moves over by the
@@ -51,4 +52,4 @@ struct StairFit {
 /// far that rows can't be told apart, or the flash is about as long as a row.
 std::optional<StairFit> fit_stairs(std::span<const StairPoint> points, const StairStart& start);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <span>
 
-namespace emberlock {
+namespace emberlock::smear {
 
 struct LinePoint {
   double t = 0;
@@ -42,4 +43,4 @@ inline WeightedLine weighted_line(std::span<const LinePoint> points) {
   return line;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/background.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include "smear_sync/detect/kernels.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 namespace {
 
@@ -128,4 +129,4 @@ double robust_scale(std::span<float> values) {
   return kMadSigma * static_cast<double>(median(values));
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

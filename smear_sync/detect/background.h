@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <span>
@@ -5,7 +6,7 @@
 
 #include "smear_sync/detect/plane.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// What the frame looks like away from lamp and dots, in samples of the plane.
 struct Background {
@@ -35,4 +36,4 @@ constexpr double kMadSigma = 1.4826;
 /// kMadSigma times the median absolute value; reorders.
 double robust_scale(std::span<float> values);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

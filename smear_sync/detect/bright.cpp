@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/bright.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include "smear_sync/detect/clones.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 constexpr int kChunk = 256;          // bytes looked at at once
@@ -154,4 +155,4 @@ std::vector<Extent> find_bright_in(const Plane& plane, int left, int right, doub
   return runs;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

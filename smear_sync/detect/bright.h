@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
 
 #include "smear_sync/detect/plane.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// Every `step`-th row from `first` on.
 struct RowStep {
@@ -26,4 +27,4 @@ BrightAreas find_bright(const Plane& plane, double threshold, RowStep rows);
 /// The same in some columns, ends included, in rows enough that no lamp is missed: not merged.
 std::vector<Extent> find_bright_in(const Plane& plane, int left, int right, double threshold);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/circle.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include <Eigen/Dense>
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 constexpr double kOnCircle = 0.5;  // pixels; an outline's points scatter by a few tenths
@@ -98,4 +99,4 @@ std::optional<Circle> fit_circle(const std::vector<Point>& outline, ImageSize im
   return best;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -5,7 +6,7 @@
 
 #include "base/image.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 struct Point {
   double x = 0, y = 0;
@@ -23,4 +24,4 @@ struct Circle {
 /// is what the outline was drawn in.
 std::optional<Circle> fit_circle(const std::vector<Point>& outline, ImageSize image);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 // A function so marked is compiled for plain x86-64 and for processors with wide vectors, and the loader

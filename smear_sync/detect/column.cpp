@@ -1,12 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/column.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include "smear_sync/detect/across.h"
 #include "smear_sync/detect/column_patch.h"
 #include "smear_sync/detect/dot_search.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 constexpr double kQuantiserGate = 2;  // its errors aren't Gaussian: rare blocks keep one whole coefficient
@@ -21,6 +23,8 @@ constexpr double kQuantiserWeakest = 1.5;
 constexpr double kQuantiserSure = 4;
 constexpr double kEightBitSure =
     2.5;  // and in frames of 8 bits that don't look compressed: a gentle compressor's
+
+constexpr double kBrightLine = 0.2;  // of saturation
 
 enum class Verdict { dot, suspect, half_field, nothing };
 
@@ -70,6 +74,21 @@ Verdict judge(const Column& c, const DotFit& f, const FitWindow& w, double min_s
   return c.compressed && f.snr < kQuantiserGate * min_snr ? Verdict::suspect : Verdict::dot;
 }
 
+/// A lamp's own line is brightest in the lamp's middle. One that is brighter elsewhere leaves of its lamp a
+/// rim.
+bool beside_brighter_line(const Column& c, double line_level, float outside) {
+  const float brightest = *std::max_element(c.level.begin(), c.level.begin() + c.patch.width) - outside;
+  if (static_cast<double>(brightest) < std::max(kBrightLine * c.saturation, 1.2 * line_level)) return false;
+  double sum = 0;
+  int count = 0;
+  for (int x = 0; x < c.patch.width; ++x) {
+    if (c.level[static_cast<std::size_t>(x)] - outside < 0.9F * brightest) continue;
+    sum += x;
+    ++count;
+  }
+  return std::abs(sum / count - c.x) > c.radius + 0.5;
+}
+
 /// The lamp's lane against its neighbours, in blocks of rows: a line is there in nearly all of them.
 void find_line(const Column& c, ColumnReading& reading) {
   const int core = c.core();
@@ -97,6 +116,7 @@ void find_line(const Column& c, ColumnReading& reading) {
   for (float& v : deviations) v -= outside;
   const double spread = robust_scale(deviations);  // of one column's level, fixed pattern included
   reading.line_level = inside / columns_inside - static_cast<double>(outside);
+  reading.rim = beside_brighter_line(c, reading.line_level, outside);
   const double rows = std::max(1.0, c.patch.height * (1 - reading.hidden));
   const double error =
       std::hypot(c.noise / std::sqrt(rows * columns_inside), spread / std::sqrt(columns_inside));
@@ -117,6 +137,29 @@ void find_line(const Column& c, ColumnReading& reading) {
     if (sum / rows_seen + reading.line_level > 0.4 * reading.line_level) ++bright;
   }
   reading.line = blocks >= 3 && bright >= 0.85 * blocks;
+}
+
+/// What the lamp's columns were levelled by, in the middle of its lane.
+double core_level(const Column& c) {
+  const int centre = std::clamp(static_cast<int>(std::lround(c.x)), 0, c.patch.width - 1);
+  return static_cast<double>(
+             c.level[static_cast<std::size_t>(centre)] +
+             c.level[static_cast<std::size_t>(c.patch.stride) + static_cast<std::size_t>(centre)]) /
+         2;
+}
+
+/// A spot whose samples reach saturation, or nearly.
+bool clips(const Column& c, const DotFit& f) {
+  return core_level(c) + f.amplitude + 3 * std::sqrt(c.noise * c.noise + f.gain * f.amplitude) >=
+         c.saturation;
+}
+
+/// A spot on a bright line that could be the line's own: brighter where the light that draws it is, or
+/// clipped.
+bool on_bright_line(const Column& c, const ColumnReading& reading, const DotFit& f) {
+  constexpr double kUneven = 0.2;
+  if (reading.line_level < kBrightLine * c.saturation) return false;
+  return f.amplitude < kUneven * reading.line_level || clips(c, f);
 }
 
 /// The slope along y that levelling may have left near a row: a part of what it took out, anything beside the
@@ -159,7 +202,8 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
   Column c = level_column(plane, background, lamp);
   reading.hidden = static_cast<double>(std::count(c.hidden.begin(), c.hidden.end(), 1)) / c.patch.height;
   find_line(c, reading);
-  if (reading.clipped) return reading;
+  reading.line = reading.line || reading.rim;
+  if (reading.clipped || reading.rim) return reading;
   const Responses found = search_lanes(c, options.min_dot_snr);
   // Grain that only the lanes show: a quantiser's too.
   constexpr double kCoarse = 1.5;
@@ -178,6 +222,14 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
     start.amplitude = std::max(1.0, c.core_mean(list[i].row));
     DotFit fit = fit_dot(c.patch, window, start, {c.noise, left_slope(c, list[i].row)});
     Verdict verdict = judge(c, fit, window, min_snr, options);
+    if (verdict == Verdict::dot && on_bright_line(c, reading, fit)) {
+      reading.clipped = reading.clipped || clips(c, fit);
+      verdict = Verdict::nothing;
+    }
+    if (verdict == Verdict::dot && wider_than_lamp(plane, c, lamp, window, fit)) {
+      reading.reflection = true;
+      verdict = Verdict::suspect;
+    }
     const double shift = c.compressed ? (c.flat ? kFlatShift : kGrainyShift) / c.sample_level : 0;
     fit.sigma_y = std::hypot(fit.sigma_y * found.scale, shift / std::max(fit.amplitude, 1e-9));
     fit.sigma_x = std::hypot(fit.sigma_x * found.scale, shift / std::max(fit.amplitude, 1e-9));
@@ -192,4 +244,4 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
   return reading;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

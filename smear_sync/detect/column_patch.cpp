@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/column_patch.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include "smear_sync/detect/kernels.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 /// Of the darkest rows, of which most of a comb's column leave a fifth at least.
@@ -349,4 +350,4 @@ Column level_column(const Plane& plane, const Background& background, const Lamp
   return c;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

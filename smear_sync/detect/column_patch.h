@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -5,7 +6,7 @@
 #include "smear_sync/detect/background.h"
 #include "smear_sync/detect/lamp.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// The columns around a lamp with everything taken out that is known not to be a dot: each column's own
 /// level, hot pixels, the lamp's halo. Coordinates are those of `patch`, which has all rows of the plane.
@@ -42,4 +43,4 @@ struct Column {
 
 Column level_column(const Plane& plane, const Background& background, const Lamp& lamp);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

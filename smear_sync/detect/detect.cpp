@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/detect.h"
 
 #include <fmt/format.h>
@@ -5,7 +6,7 @@
 #include "smear_sync/detect/judge.h"
 #include "smear_sync/detect/look.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 SmearReading detect(const ImageView& frame, const DetectOptions& options) {
   if (const std::string why = detail::unreadable(frame); !why.empty()) return detail::nothing(why);
@@ -14,4 +15,4 @@ SmearReading detect(const ImageView& frame, const DetectOptions& options) {
   return detail::read_lamps(plane, look.background, look.search, options);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

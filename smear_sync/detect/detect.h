@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "base/image.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Gates of the detector. Those in multiples of the noise follow the frame's own noise, measured away from
 /// the lamp. No dot weaker than 2.5 grey levels is taken from a frame of 8 bits: a gentle compressor makes
@@ -29,4 +30,4 @@ struct DetectOptions {
 /// as the sum of its channels. Pure; never fails: an empty or malformed view reads `no_lamp` with the reason.
 SmearReading detect(const ImageView& frame, const DetectOptions& options = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

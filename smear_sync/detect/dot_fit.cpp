@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/dot_fit.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 #include "smear_sync/detect/kernels.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 constexpr int kParameters = NormalSums::kParameters;  // amplitude, level, slope, x, y, radius
@@ -237,4 +238,4 @@ Evenness evenness(const Patch& patch, const FitWindow& window, const DotFit& f, 
   return e;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "smear_sync/detect/plane.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// A disk with a soft edge on a level and a slope along y:
 ///   v(x, y) = level + slope (y - y0) + amplitude / (1 + exp((r - radius) / kEdge)),  r = |(x, y) - (x0,
@@ -44,4 +45,4 @@ struct Evenness {
 };
 Evenness evenness(const Patch& patch, const FitWindow& window, const DotFit& fit, double noise);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

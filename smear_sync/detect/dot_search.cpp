@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/dot_search.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 #include "smear_sync/detect/dot_fit.h"
 #include "smear_sync/detect/kernels.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 constexpr int kOwn = Column::kLanes / 2;
@@ -166,4 +167,4 @@ Responses search_lanes(const Column& c, double min_snr) {
   return r;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

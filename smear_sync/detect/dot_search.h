@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
 
 #include "smear_sync/detect/column_patch.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// A row of the lamp's lane that looks like the middle of a dot.
 struct Candidate {
@@ -23,4 +24,4 @@ struct Responses {
 /// Matched filter along the lamp's lane, and along the empty ones beside it for comparison.
 Responses search_lanes(const Column& column, double min_snr);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

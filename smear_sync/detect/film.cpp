@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/film.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kSamePlace = 0.8;  // rows: what doesn't move stays within
@@ -189,4 +190,4 @@ std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_
   return settled;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

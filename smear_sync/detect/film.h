@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -6,7 +7,7 @@
 
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// The lamp of a camera that stands still, from the readings of many frames: the mean over the unsaturated
 /// ones where there are three or more (a saturated lamp's outline is 0.07..0.7 rows off, the same way in
@@ -26,4 +27,4 @@ std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_
 /// was: frames that show the lamp unsaturated measure it for those that don't.
 std::vector<SmearReading> share_lamp(std::span<const SmearReading> film);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/follow.h"
 
 #include "smear_sync/detect/judge.h"
 #include "smear_sync/detect/look.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 bool shows_dots(const SmearReading& reading) {
@@ -45,4 +46,4 @@ SmearReading FollowingDetector::read(const ImageView& frame) {
   return reading;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -5,7 +6,7 @@
 #include "base/image.h"
 #include "smear_sync/detect/detect.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Reads the frames of one camera in turn, in half of detect()'s time: once a lamp is found, only its columns
 /// and a sparse sample of the rest are read. All of the frame is looked at again whenever anything but the
@@ -34,4 +35,4 @@ class FollowingDetector {
   unsigned turn_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/glare.h"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 constexpr int kGap = 2;      // columns beside the outline that its blur still reaches
@@ -97,4 +98,4 @@ std::optional<GlareCentre> glare_centre(const Plane& plane, const Background& ba
   return GlareCentre{(low + high) / 2, noise / std::abs(slope)};
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -5,7 +6,7 @@
 #include "smear_sync/detect/background.h"
 #include "smear_sync/detect/plane.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 struct GlareCentre {
   double y = 0;
@@ -17,4 +18,4 @@ struct GlareCentre {
 /// Nothing when there is too little glare to tell. `lamp` is the saturated area's extent.
 std::optional<GlareCentre> glare_centre(const Plane& plane, const Background& background, const Extent& lamp);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/judge.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include "smear_sync/detect/column.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 LampReading lamp_reading(const Plane& plane, const Lamp& lamp) {
@@ -102,8 +103,9 @@ SmearReading judge(const Plane& plane, const Lamp& lamp, const ColumnReading& co
     return ambiguous(
         std::move(reading),
         fmt::format("a spot near row {:.0f} stands in the lamp's column, but doesn't {}", strongest->y,
-                    column.compressed ? "rise far enough above what compression makes; raise the bit rate"
-                                      : "look enough like the lamp to be its dot"));
+                    column.reflection   ? "have the lamp's width and less of its light: a reflection"
+                    : column.compressed ? "rise far enough above what compression makes; raise the bit rate"
+                                        : "look enough like the lamp to be its dot"));
   } else if (column.hidden > options.blind_fraction || lamp.centre_outside) {
     reading.state = SmearState::blind;
     reading.reason =
@@ -226,4 +228,4 @@ SmearReading read_lamps(const Plane& plane, const Background& background, const 
   return reading;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

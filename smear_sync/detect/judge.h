@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -6,7 +7,7 @@
 #include "smear_sync/detect/lamp.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// What the lamps that were found and their columns mean: the state and its reason.
 SmearReading read_lamps(const Plane& plane, const Background& background, const LampSearch& search,
@@ -17,4 +18,4 @@ std::string unreadable(const ImageView& frame);
 
 SmearReading nothing(std::string reason);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

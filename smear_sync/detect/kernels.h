@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -5,7 +6,7 @@
 
 // The loops over pixels in which a reading's time goes, without aliases and branches, which the compiler
 // makes vector code of. Pointers are to floats, `count` is a multiple of 8 unless said otherwise.
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// Takes `even` out of the even rows and `odd` out of the odd ones; bright[y] says whether anything that is
 /// left in a row exceeds the limit.
@@ -57,4 +58,4 @@ NormalSums normal_sums(const DiskModel& model, const PixelSpan& pixels);
 /// The disk of amplitude 1 at each pixel.
 void disk_at(const DiskModel& model, const PixelSpan& pixels, float* out);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/lamp.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include "smear_sync/detect/circle.h"
 #include "smear_sync/detect/glare.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 constexpr double kLow = 0.15;  // of the peak: where a lamp's outline ends and its halo begins
@@ -315,11 +316,15 @@ LampSearch find_lamps(const Plane& plane, const Background& background, const Br
                    [](const Lamp& a, const Lamp& b) { return a.flux * a.peak > b.flux * b.peak; });
   if (!search.lamps.empty()) {
     const Lamp first = search.lamps.front();
-    std::erase_if(search.lamps,
-                  [&](const Lamp& l) { return l.peak < 0.6 * first.peak || l.flux < 0.35 * first.flux; });
+    std::erase_if(search.lamps, [&](const Lamp& l) {
+      // What is as bright in the first one's own column is no copy of it, however small: of a large
+      // reflection and its lamp the lamp.
+      const bool source = std::abs(l.x - first.x) < 0.5 * first.radius && l.peak > 0.98 * first.peak;
+      return l.peak < 0.6 * first.peak || (l.flux < 0.35 * first.flux && !source);
+    });
     search.why_none.clear();
   }
   return search;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

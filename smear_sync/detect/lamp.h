@@ -1,5 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,7 +10,14 @@
 #include "smear_sync/detect/detect.h"
 #include "smear_sync/detect/plane.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
+
+/// A lamp's half width across columns, as far as its light tells (across.h); pixels.
+struct LampAcross {
+  double half_width = 0, sigma = 0;
+  double taller = 0;  ///< half height minus half width
+  double blur = 0;    ///< sigma of its edge
+};
 
 /// A bright, compact spot in the coordinates of its plane.
 struct Lamp {
@@ -18,7 +27,8 @@ struct Lamp {
   double flux = 0;    ///< pixels above half height
   double peak = 0;    ///< above the column's own level
   bool saturated = false;
-  bool centre_outside = false;  ///< cut by the edge so that the centre lies outside
+  bool centre_outside = false;               ///< cut by the edge so that the centre lies outside
+  mutable std::optional<LampAcross> across;  ///< measured when a spot first asks for it
 };
 
 struct LampSearch {
@@ -44,4 +54,4 @@ LampGlance glance_at(const Plane& plane, const Background& background, const Lam
 LampSearch find_lamps(const Plane& plane, const Background& background, const BrightAreas& bright,
                       const DetectOptions& options);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

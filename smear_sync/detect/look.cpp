@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/look.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 /// Just below white, or below the plateau of a signal that is clipped in a deeper container.
@@ -108,4 +109,4 @@ std::optional<Look> look_again(const Plane& plane, const Look& before, unsigned 
   return look;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -5,7 +6,7 @@
 #include "smear_sync/detect/background.h"
 #include "smear_sync/detect/lamp.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// What a frame shows before its columns are read.
 struct Look {
@@ -26,4 +27,4 @@ Look whole_look(const Plane& plane, const DetectOptions& options);
 std::optional<Look> look_again(const Plane& plane, const Look& before, unsigned turn,
                                const DetectOptions& options);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

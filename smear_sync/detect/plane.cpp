@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/plane.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include "smear_sync/detect/clones.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 namespace {
 
 template <class Sample>
@@ -113,4 +114,4 @@ Patch cut(const Plane& plane, Extent extent) {
   return patch;
 }
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

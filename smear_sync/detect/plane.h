@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -6,7 +7,7 @@
 
 #include "base/image.h"
 
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// A frame as one channel: grey frames as they are, Bayer frames as sums of all 2 x 2 cells (each holds R + 2
 /// G + B whatever its parity, so the mosaic leaves no pattern), colour as the sum of its channels. A sum with
@@ -57,4 +58,4 @@ struct Extent {
 /// What of `extent` lies in the plane.
 Patch cut(const Plane& plane, Extent extent);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/sensors/exposure_sweep.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr std::size_t kFewestDelays = 4;
@@ -177,4 +178,4 @@ Phase phase_of(const ExposureWindow& window, Seconds delay, Seconds period) {
   return {PhaseState::known, wrap_positive(delay - window.end, period), window.end_sigma, {}};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <span>
@@ -7,7 +8,7 @@
 #include "base/result.h"
 #include "smear_sync/clocks/phase.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // A global shutter as a phase sensor. All rows gather light during [t_start - E, t_start), so one frame tells
 // only whether the flash fell into it. The strobe's phase is swept: brightness against the flash's delay is a
@@ -64,4 +65,4 @@ std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const Swe
 /// tau of a flash that comes `delay` after the common time base: delay - end, modulo T.
 Phase phase_of(const ExposureWindow& window, Seconds delay, Seconds period);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 
@@ -9,7 +10,7 @@
 #include "smear_sync/sensors/rolling_band.h"
 #include "smear_sync/sensors/taken_look.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// A look tells nothing of an edge that may have moved past it since: so many standard errors of the way.
@@ -255,4 +256,4 @@ std::unique_ptr<PhaseSensor> make_global_sensor(const SensorOptions& options) {
   return std::make_unique<GlobalSensor>(options);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/sensors/phase_sensor.h"
 
 #include <fmt/format.h>
@@ -5,7 +6,7 @@
 #include "smear_sync/detect/follow.h"
 #include "smear_sync/sensors/taken_look.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace detail {
 namespace {
 
@@ -76,4 +77,4 @@ std::unique_ptr<PhaseSensor> make_phase_sensor(SensorKind kind, const SensorOpti
   return make_smear_sensor(options);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -13,7 +14,7 @@
 #include "smear_sync/clocks/row_clock.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// What the strobe does while a frame is filmed: one flash a frame, by `delay` late (in [0, T)), or none.
 struct Look {
@@ -68,4 +69,4 @@ std::unique_ptr<PhaseSensor> make_global_sensor(const SensorOptions& options);
 
 std::unique_ptr<PhaseSensor> make_phase_sensor(SensorKind kind, const SensorOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/sensors/rolling_band.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include "smear_sync/detect/judge.h"
 #include "smear_sync/detect/plane.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kLeastContrast = 8;  // of a row's two levels, in their noise
@@ -166,4 +167,4 @@ BandReading read_bands(const RowProfile& frame, const BandReference& reference, 
   return say(reading.dots.size() == 1 ? SmearState::dot : SmearState::comb, "");
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

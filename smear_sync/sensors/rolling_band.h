@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -13,7 +14,7 @@
 #include "smear_sync/clocks/row_clock.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // A rolling shutter as a phase sensor. Row r (in the order of reading) ends its exposure of E seconds at
 // t_start + r t_row, so a flash at tau lights the rows from tau / t_row to (tau + E) / t_row: a band, whose
@@ -75,4 +76,4 @@ struct SweptEdge {
 /// or not in step with it.
 Result<RowClock> fit_swept_row_clock(std::span<const SweptEdge> edges, Seconds period);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <string>
 #include <utility>
@@ -10,7 +11,7 @@
 #include "smear_sync/sensors/rolling_band.h"
 #include "smear_sync/sensors/taken_look.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// Edges that tell a row time.
@@ -172,4 +173,4 @@ std::unique_ptr<PhaseSensor> make_rolling_sensor(const SensorOptions& options) {
   return std::make_unique<RollingSensor>(options);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

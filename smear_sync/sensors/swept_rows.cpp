@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -6,7 +7,7 @@
 
 #include "smear_sync/sensors/rolling_band.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr std::size_t kFewestSweptEdges = 6;
@@ -107,4 +108,4 @@ Result<RowClock> fit_swept_row_clock(std::span<const SweptEdge> edges, Seconds p
   return clock;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <span>
@@ -7,7 +8,7 @@
 #include "smear_sync/sensors/phase_sensor.h"
 
 // What the sensors share.
-namespace emberlock::detail {
+namespace emberlock::smear::detail {
 
 /// A frame: when it came, how it was lit, and what it shows.
 struct TakenLook {
@@ -23,4 +24,4 @@ std::vector<PhaseSample> phases_at(Seconds delay, std::span<const TakenLook> tak
 /// Why no flash tells an edge of this exposure: it is hardly longer than the flash. Empty when it is longer.
 std::string too_short(Seconds exposure, Seconds flash_width);
 
-}  // namespace emberlock::detail
+}  // namespace emberlock::smear::detail

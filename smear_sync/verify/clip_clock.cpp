@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/verify/clip_clock.h"
 
 #include <algorithm>
@@ -6,22 +7,15 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+#include "smear_sync/verify/clip_line.h"
+#include "smear_sync/verify/dark_direction.h"
+#include "smear_sync/verify/median.h"
+
+namespace emberlock::smear {
 namespace {
 
-constexpr PartsPerMillion kRateSigma{40};      // of a camera's clock against a strobe's, as bought
-constexpr PartsPerMillion kNextToTheWalk{60};  // a line may differ that much from what the walk told
-constexpr PartsPerMillion kNextToTheClaim{500};
-constexpr std::size_t kFewestDots = 5;
+constexpr PartsPerMillion kRateSigma{40};  // of a camera's clock against a strobe's, as bought
 constexpr int kMostTurns = 4;
-constexpr double kOneLine = 1.5;  // rows: half of the dots lie that near to a line that is theirs
-
-template <class Number>
-Number median(std::vector<Number> v) {
-  const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);
-  std::nth_element(v.begin(), middle, v.end());
-  return *middle;
-}
 
 /// The lamp stands still: its place is the median of all frames', each frame's dot is told from there, and
 /// what shines elsewhere (a dot whose lamp wasn't lit, a reflection) isn't the lamp. Its error is one for all
@@ -93,118 +87,6 @@ std::vector<CodeFrame> flashes_seen(const std::vector<FrameReading>& frames) {
   seen.reserve(frames.size());
   for (const FrameReading& f : frames) seen.push_back({f.frame, flash_seen(f.reading)});
   return seen;
-}
-
-/// Whether the frame's dot is of the read phase before its own: behind the lamp in the order of reading.
-bool wrapped(const SmearReading& reading, const CcdTiming& timing) {
-  if (reading.dots.size() != 1 || !reading.lamp) return false;
-  return static_cast<double>(timing.direction) * (reading.dots.front().y - reading.lamp->y) < Rows(0);
-}
-
-/// Phases by the camera's own count; frames between which some were lost are left out.
-std::vector<PhaseSample> samples_of(const std::vector<FrameReading>& frames, const ClipClock& clock,
-                                    Seconds flash_width) {
-  std::vector<PhaseSample> samples;
-  for (const FrameReading& f : frames) {
-    const bool between_runs =
-        std::any_of(clock.numbers.drops.begin(), clock.numbers.drops.end(),
-                    [&](const DroppedFrames& d) { return f.frame > d.after && f.frame < d.before; });
-    const auto read_phase =
-        static_cast<double>(clock.count_of(f.frame) - (wrapped(f.reading, clock.timing) ? 1 : 0));
-    const TimePoint start = TimePoint{} + clock.believed_period * read_phase;
-    samples.push_back(between_runs
-                          ? PhaseSample{start, {PhaseState::unusable, {}, {}, "a frame was lost near it"}}
-                          : sample_of(f.reading, clock.timing, flash_width, start));
-    samples.back().at = start;  // modulo P phases are straight against the read phases' starts
-  }
-  return samples;
-}
-
-/// Fits the line through the samples and puts down how far each dot lies from it; false, with the reason,
-/// when there is none.
-bool fit_line(const std::vector<FrameReading>& frames, const ClipOptions& options, ClipClock& clock) {
-  const std::vector<PhaseSample> samples = samples_of(frames, clock, options.flash_width);
-  const auto known = std::count_if(samples.begin(), samples.end(),
-                                   [](const PhaseSample& s) { return s.phase.state == PhaseState::known; });
-  if (known < static_cast<std::ptrdiff_t>(kFewestDots)) {
-    const Phase none = combine(samples, {}, {.period = clock.flash_period});
-    clock.state = none.state == PhaseState::blind ? PhaseState::blind : PhaseState::unusable;
-    clock.reason =
-        frames.size() < 2 * kFewestDots
-            ? fmt::format("it has {} frames only; film the strobe for ten seconds", frames.size())
-            : fmt::format("{} of its {} frames show a dot; most say: {}", known, frames.size(), none.reason);
-    return false;
-  }
-  const bool told = clock.mode.frame_rate_error.has_value();
-  const Seconds walk_a_frame = clock.flash_period - clock.timing.frame_period;
-  const DriftOptions with{.period = clock.flash_period,
-                          .row_time = options.row_time,
-                          .row_time_sigma = options.row_time_sigma,
-                          .lamp_sigma = clock.lamp_sigma,
-                          .flash_width = options.flash_width,
-                          .expected = PartsPerMillion(1e6 * (walk_a_frame / clock.believed_period)),
-                          .fastest = told ? kNextToTheWalk : kNextToTheClaim};
-  const Result<Drift> line = fit_drift(samples, with);
-  if (!line.ok()) {
-    clock.reason = line.error().what;
-    return false;
-  }
-  clock.line = *line;
-  clock.points.clear();
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (samples[i].phase.state != PhaseState::known) continue;
-    const Phase fitted = phase_at(*line, samples[i].at, clock.flash_period);
-    const Seconds residual = wrap_symmetric(samples[i].phase.tau - fitted.tau, clock.flash_period);
-    clock.points.push_back(
-        {static_cast<int>(i), frames[i].reading.dots.front().y, samples[i].phase.tau, residual});
-  }
-  return true;
-}
-
-/// K as the walk told it, else as it may best be guessed.
-int first_shifts(const ClipReading& clip, const ClipOptions& options, const ClipClock& clock) {
-  if (clock.mode.shifts) return *clock.mode.shifts;
-  const int most = static_cast<int>((clock.timing.frame_period / options.row_time).value());
-  if (clock.mode.shifts_measured > Rows(0))
-    return std::clamp(static_cast<int>(std::lround(clock.mode.shifts_measured.value())), clip.rows,
-                      std::max(clip.rows, most));
-  return options.shifts.value_or(clip.rows);
-}
-
-/// By how many rows the dots that wrapped stand off the line's others: what K is too large.
-int excess_shifts(const std::vector<FrameReading>& frames, const ClipClock& clock) {
-  std::vector<double> residuals[2];
-  for (const ClipPoint& p : clock.points) {
-    const auto side = wrapped(frames[static_cast<std::size_t>(p.frame)].reading, clock.timing) ? 1U : 0U;
-    residuals[side].push_back((p.residual / clock.timing.row_time).value());
-  }
-  if (residuals[0].size() < kFewestDots || residuals[1].size() < kFewestDots) return 0;
-  return static_cast<int>(std::lround(median(residuals[1]) - median(residuals[0])));
-}
-
-void find_line(const std::vector<FrameReading>& frames, const ClipOptions& options, ClipClock& clock) {
-  clock.line.reset();
-  clock.points.clear();
-  clock.state = PhaseState::unusable;
-  clock.reason.clear();
-  if (!fit_line(frames, options, clock)) return;
-  if (const int excess = excess_shifts(frames, clock); excess != 0) {
-    clock.timing.shifts = std::max(clock.timing.rows, clock.timing.shifts - excess);
-    if (!fit_line(frames, options, clock)) return;
-  }
-  clock.timing.frame_period = clock.flash_period - clock.believed_period * (clock.line->rate.value() * 1e-6);
-  clock.period_sigma = clock.believed_period * (clock.line->rate_sigma.value() * 1e-6);
-  std::vector<double> distances;
-  for (const ClipPoint& p : clock.points)
-    distances.push_back(std::abs((p.residual / options.row_time).value()));
-  if (median(distances) > kOneLine) {
-    clock.reason = fmt::format(
-        "its dots stand {:.1f} rows off any steady walk: another strobe, a rate that isn't {:.4f} flashes a "
-        "second, or frames lost without a code",
-        median(distances), options.flash_rate.value());
-    return;
-  }
-  clock.state = PhaseState::known;
 }
 
 bool same_losses(const FrameNumbers& a, const FrameNumbers& b) {
@@ -285,6 +167,12 @@ Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& op
   }
   EMBERLOCK_ASSIGN_OR_RETURN(ClipWalk walk, read_walk(clip, options));
   clock.mode = std::move(walk.mode);
+  if (!clock.direction_known(options)) {
+    const DarkDirection dark = direction_by_dark_frames(frames);
+    clock.mode.direction = dark.direction;
+    if (dark.direction) clock.mode.direction_reason = dark.reason;
+    if (!dark.direction && !dark.reason.empty()) clock.mode.direction_reason += "; " + dark.reason;
+  }
   clock.believed_period = period(walk.frame_rate);
   const double off = clock.mode.frame_rate_error.value_or(PartsPerMillion(0)).value() * 1e-6;
   clock.timing = {
@@ -294,12 +182,11 @@ Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& op
       .row_time = options.row_time,
       .direction = clock.mode.direction.value_or(options.direction.value_or(ReadDirection::top_first))};
 
-  clock.timing.shifts = first_shifts(clip, options, clock);
-
   // The code counts the frames that were lost on the way, which the line needs; the line says where in the
   // frame the flash falls, which the code needs where that is near the frame's border. Both agree after a
   // turn or two.
   const std::vector<CodeFrame> seen = flashes_seen(frames);
+  for (const CodeFrame& f : seen) clock.seen.push_back(f.seen);
   DecodeOptions decode{.code = options.code,
                        .flashes_per_frame = clock.timing.frame_period / clock.flash_period};
   EMBERLOCK_ASSIGN_OR_RETURN(clock.numbers, number_frames(seen, decode));
@@ -316,4 +203,4 @@ Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& op
   return clock;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@
 #include "smear_sync/clocks/read_mode.h"
 #include "smear_sync/reading.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 // A clip is a film of the strobe whose file says nothing of when its frames were taken: timestamps of files
 // are nominal or jitter, and the clocks of several cameras have nothing in common. The strobe is the clock
@@ -62,7 +63,10 @@ struct ClipClock {
   Seconds flash_period;     ///< P
   Seconds period_sigma;     ///< standard error of timing.frame_period, in the strobe's seconds
   std::vector<ClipPoint> points;
+  /// How much more all taus may be: K isn't known, and the dots that tell them had wrapped. Zero where it is.
+  Seconds tau_slack{};
   int lit = 0;                              ///< frames that show the lamp
+  std::vector<FlashSeen> seen;              ///< by place: whether the strobe lit it
   PhaseState state = PhaseState::unusable;  ///< known when there is a line and d is known
   std::string reason;                       ///< one sentence when it isn't
 
@@ -70,6 +74,10 @@ struct ClipClock {
   [[nodiscard]] std::int64_t count_of(std::int64_t i) const;
   /// tau of the read phase of place `i`, modulo P. There must be a line.
   [[nodiscard]] Phase phase_of_frame(std::int64_t i) const;
+  /// Whether d was told, by the dots' walk or by `options`.
+  [[nodiscard]] bool direction_known(const ClipOptions& options) const {
+    return mode.direction.has_value() || options.direction.has_value();
+  }
   /// The run of numbered frames that holds place `i`, or the nearest; nullptr when there is none.
   [[nodiscard]] const NumberedRun* run_at(std::int64_t i) const;
 };
@@ -90,4 +98,4 @@ Result<ClipWalk> read_walk(const ClipReading& clip, const ClipOptions& options);
 /// that aren't positive and finite.
 Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/verify/clip_times.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include "base/square.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 std::int64_t ClipTimes::count_of(std::int64_t place) const {
   std::int64_t count = place;
@@ -53,7 +54,24 @@ Seconds sigma_between(const ClipTimes& a, std::int64_t place_a, const ClipTimes&
   return Seconds(std::sqrt(own(a, place_a) + own(b, place_b) + square(shared.value())));
 }
 
-Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options, const std::string& clip) {
+ClipTimes strobe_times(const ClipClock& clock) {
+  ClipTimes times;
+  times.period = clock.timing.frame_period;
+  times.period_sigma = clock.period_sigma;
+  times.at = static_cast<double>(clock.line->at.ns) * 1e-9 / clock.believed_period.value();
+  times.start_sigma = clock.line->tau_sigma;
+  // Flashes lie whole periods from a frame's own tau, not from that of the instant between two frames.
+  const double frame = std::round(times.at);
+  const Seconds tau = clock.line->tau + (clock.flash_period - times.period) * (frame - times.at);
+  times.start = times.period * (times.at - frame) - tau;
+  times.start_by_row_time = -1.0 * clock.line->tau_by_row_time;
+  times.period_by_row_time = clock.believed_period * (-1e-6 * clock.line->rate_by_row_time.value());
+  times.drops = clock.numbers.drops;
+  return times;
+}
+
+Result<ClipTimes> known_strobe_times(const ClipClock& clock, const ClipOptions& options,
+                                     const std::string& clip) {
   const auto unknown = [&](const std::string& what, const std::string& remedy) {
     return Error{ErrorKind::bad_input, what, clip, remedy};
   };
@@ -61,33 +79,26 @@ Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options,
     return unknown("its strobe tells no phase: " + clock.reason,
                    "Film the strobe for ten seconds, the lamp in the picture, detuned by about 1 %");
   }
-  if (!clock.mode.direction && !options.direction) {
+  if (!clock.direction_known(options)) {
     return unknown("which row is read first isn't known: " + clock.mode.direction_reason,
                    "Detune the strobe by about 1 %, or give --direction");
   }
-  const auto middle_count = static_cast<double>(clock.line->at.ns) * 1e-9 / clock.believed_period.value();
-  const NumberedRun* run = clock.run_at(std::llround(middle_count));
+  return strobe_times(clock);
+}
+
+Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options, const std::string& clip) {
+  EMBERLOCK_ASSIGN_OR_RETURN(ClipTimes times, known_strobe_times(clock, options, clip));
+  const std::int64_t middle = std::llround(times.at);
+  const NumberedRun* run = clock.run_at(middle);
   if (run == nullptr) {
-    return unknown("its frames can't be numbered: " + clock.numbers.reason,
-                   "Let the strobe skip flashes in its code while all cameras film it");
+    return Error{ErrorKind::bad_input, "its frames can't be numbered: " + clock.numbers.reason, clip,
+                 "Let the strobe skip flashes in its code while all cameras film it"};
   }
   // The place in the run that is nearest to the line's middle.
-  std::int64_t place = std::llround(middle_count) - (clock.count_of(run->first) - run->first);
+  std::int64_t place = middle - (clock.count_of(run->first) - run->first);
   place = std::clamp(place, run->first, run->last);
-  const Phase phase = clock.phase_of_frame(place);
-  const double in_flashes = phase.tau / clock.flash_period;
   const double coarse = run->start + static_cast<double>(place - run->first) * run->flashes_per_frame;
-  const double flash = std::round(coarse + in_flashes);
-  ClipTimes times;
-  times.period = clock.timing.frame_period;
-  times.period_sigma = clock.period_sigma;
-  times.at = middle_count;
-  times.start_sigma = clock.line->tau_sigma;
-  times.start = clock.flash_period * flash - phase.tau +
-                times.period * (middle_count - static_cast<double>(clock.count_of(place)));
-  times.start_by_row_time = -1.0 * clock.line->tau_by_row_time;
-  times.period_by_row_time = clock.believed_period * (-1e-6 * clock.line->rate_by_row_time.value());
-  times.drops = clock.numbers.drops;
+  times.start += clock.flash_period * std::round(coarse - times.read_start(place) / clock.flash_period);
   return times;
 }
 
@@ -97,4 +108,4 @@ void into_cycle_of(const ClipTimes& reference, const ClipOptions& options, ClipT
   times.start -= cycle * std::round(apart / cycle);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

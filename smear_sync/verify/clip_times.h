@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "smear_sync/clocks/frame_code.h"
 #include "smear_sync/verify/clip_clock.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// When each frame of a clip began to be read: a straight line on a clock that all clips of one strobe share,
 /// good beyond the frames that showed it. The line's two errors are independent of one another, but for what
@@ -42,6 +43,15 @@ struct ClipTimes {
 /// Standard error of how much later one clip's frame is read than another's: of both, less what they share.
 Seconds sigma_between(const ClipTimes& a, std::int64_t place_a, const ClipTimes& b, std::int64_t place_b);
 
+/// The times of a clip by its own clock, in the strobe's seconds less a whole number of its flashes: which
+/// one, nothing has told yet. There must be a line; its read direction is taken to be the clock's.
+ClipTimes strobe_times(const ClipClock& clock);
+
+/// The same where the read direction is known. Errors (bad_input), with `clip` as where: a clock without a
+/// phase.
+Result<ClipTimes> known_strobe_times(const ClipClock& clock, const ClipOptions& options,
+                                     const std::string& clip);
+
 /// The times of a clip by its own clock, in the strobe's seconds since the code's first flash, modulo the
 /// code's cycle. The read direction must be known, or given by who read the clock. Errors (bad_input), with
 /// `clip` as where: a clock without a phase, or without numbers.
@@ -50,4 +60,4 @@ Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options,
 /// Moves `times` by whole cycles of the code until its film begins as near to the reference's as may be.
 void into_cycle_of(const ClipTimes& reference, const ClipOptions& options, ClipTimes& times);
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/verify/verify.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 
 #include "base/one_to_one.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr OneToOne<ClipsVerdict, std::string_view, 3> kVerdictNames{
@@ -27,49 +28,23 @@ constexpr OneToOne<ClipState, std::string_view, 6> kClipNames{
 
 constexpr double kSigmas = 2;
 
-/// How the counts of two clips belong together, where the code tells it.
-std::optional<FrameOffset> offset_between(const ClipClock& reference, const ClipClock& camera,
-                                          const FrameCode& code, std::int64_t frame) {
-  const NumberedRun* from = reference.run_at(frame);
-  if (from == nullptr) return std::nullopt;
-  std::optional<FrameOffset> best;
-  std::int64_t least = 0;
-  for (const NumberedRun& run : camera.numbers.runs) {
-    FrameOffset offset = frame_offset(*from, run, code, frame);
-    const std::int64_t place = frame + offset.frames;
-    const std::int64_t away = std::max({std::int64_t{0}, run.first - place, place - run.last});
-    if (!best || away < least) {
-      best = std::move(offset);
-      least = away;
-    }
-  }
-  return best;
-}
-
 double per_frame_walk(const ClipClock& clock) {
   return std::abs((clock.flash_period / clock.timing.frame_period) - 1);
 }
 
-std::string no_code(const CameraVerdict& camera, const CameraVerdict& reference) {
-  const CameraVerdict& missing = reference.clock.numbers.runs.empty() ? reference : camera;
-  return missing.name + ": " + missing.clock.numbers.reason;
-}
-
 /// The error of two phases of the same strobe, and its standard error.
-void compare(const CameraVerdict& reference, CameraVerdict& camera, std::int64_t middle,
-             const VerifyOptions& options) {
+void compare(const CameraVerdict& reference, CameraVerdict& camera, const WholeFrames& whole,
+             std::int64_t middle, const VerifyOptions& options) {
   const Seconds flashes = reference.clock.flash_period;
   const Seconds frame = reference.clock.timing.frame_period;
-  const auto offset = offset_between(reference.clock, camera.clock, options.clip.code, middle);
-  if (offset) {
-    camera.frame_offset = offset->frames;
-    camera.offset_reason = offset->reason;
-  } else {
-    camera.offset_reason = no_code(camera, reference);
-  }
+  const auto& offset = whole.offset;
+  if (offset) camera.frame_offset = offset->frames;
+  camera.offset_reason = whole.reason;
+  camera.offset_by = whole.witness;
+  camera.offset_probability = whole.probability;
   if (!reference.clock.line || !camera.clock.line) return;
 
-  const std::int64_t place = middle + (offset ? offset->frames : 0);
+  const std::int64_t place = middle + (offset ? offset->frames : std::llround(whole.about.value_or(0)));
   const Phase there = camera.clock.phase_of_frame(place);
   const Phase here = reference.clock.phase_of_frame(middle);
   Seconds error = there.tau - here.tau;  // modulo P
@@ -78,12 +53,15 @@ void compare(const CameraVerdict& reference, CameraVerdict& camera, std::int64_t
     error = error + flashes * std::round((flashes * offset->lag - error) / flashes);
   } else {
     // Which flash belongs to which isn't known: frames of equal place may lie apart by the spread of the
-    // starts.
+    // starts, or by what the sound leaves open.
     const double walk = std::max(per_frame_walk(reference.clock), per_frame_walk(camera.clock));
-    camera.sigma = Seconds(std::hypot(camera.sigma.value(), walk * options.start_spread.value()));
+    const Seconds spread = whole.about ? frame * std::hypot(whole.about_sigma, 0.5) : options.start_spread;
+    camera.sigma = Seconds(std::hypot(camera.sigma.value(), walk * spread.value()));
     error = wrap_symmetric(error, flashes);
   }
   camera.error = wrap_symmetric(error, frame);
+  const auto slack = std::max(camera.clock.tau_slack, reference.clock.tau_slack);
+  camera.sigma = Seconds(std::hypot(camera.sigma.value(), slack.value()));
 
   const ClipClock& a = camera.clock;
   const ClipClock& b = reference.clock;
@@ -139,9 +117,11 @@ void judge(const CameraVerdict& reference, CameraVerdict& camera, const VerifyOp
     camera.state = ClipState::out_of_tolerance;
   } else {
     camera.state = ClipState::ambiguous;
-    camera.reason += camera.frame_offset ? ": too near the tolerance to tell"
-                                         : ": the beat moves the flash while it isn't known which frames "
-                                           "belong together";
+    const bool no_shifts = std::max(camera.clock.tau_slack, reference.clock.tau_slack) > Seconds(0);
+    camera.reason += no_shifts ? ": its dots wrapped, and K isn't known; give --shifts"
+                     : camera.frame_offset
+                         ? ": too near the tolerance to tell"
+                         : ": the beat moves the flash while it isn't known which frames belong together";
   }
 }
 
@@ -204,9 +184,10 @@ void advise(VerifyResult& result) {
        "tell the read direction; or give --direction.");
   tell(in_state(ClipState::unusable), "See to {}: lamp in the picture, strobe on, ten seconds of film.");
   const auto unnumbered = files_where([](const CameraVerdict& c) { return !c.frame_offset; });
-  tell(unnumbered,
-       "Let the strobe skip flashes in its code while all cameras film it, so that the frames of {} "
-       "can be numbered.");
+  tell(
+      unnumbered,
+      "Let the strobe skip flashes in its code while all cameras film it, or pass a hand before its lamp six "
+      "times at odd intervals, so that it is seen which frames of {} belong to which.");
   for (const CameraVerdict& c : result.cameras) {
     if (c.frame_offset.value_or(0) == 0) continue;
     result.to_do.push_back(fmt::format("Pair frame i of {} with frame i {} {} of {}.",
@@ -250,17 +231,30 @@ void conclude(VerifyResult& result) {
   }
 }
 
+Result<std::vector<WholeFrames>> match_all(const VerifyResult& result, const VerifyOptions& options,
+                                           std::span<const SoundTrack> sounds) {
+  std::vector<ClipClock> clocks;
+  for (const CameraVerdict& camera : result.cameras) clocks.push_back(camera.clock);
+  std::vector<std::optional<SoundOffset>> heard;
+  if (!sounds.empty()) heard = match_sounds(sounds, result.reference);
+  return match_frames(clocks, result.reference, result.middle, options.clip, heard);
+}
+
 }  // namespace
 
 std::string_view name(ClipState state) { return kClipNames.second_of(state).value_or("unknown"); }
 
 std::string_view name(ClipsVerdict verdict) { return kVerdictNames.second_of(verdict).value_or("unknown"); }
 
-Result<VerifyResult> verify_clips(std::span<const ClipReading> clips, const VerifyOptions& options) {
+Result<VerifyResult> verify_clips(std::span<const ClipReading> clips, const VerifyOptions& options,
+                                  std::span<const SoundTrack> sounds) {
   if (clips.size() < 2) {
     return Error{ErrorKind::bad_input, "one clip alone is in sync with nothing", "verify",
                  "give the clips of two cameras or more that filmed the same strobe"};
   }
+  if (!sounds.empty() && sounds.size() != clips.size())
+    return Error{ErrorKind::bad_input, "there isn't a sound track for each clip", "verify",
+                 "give one for each, empty where there is none"};
   VerifyResult result;
   result.options = options;
   for (const ClipReading& clip : clips) {
@@ -273,9 +267,10 @@ Result<VerifyResult> verify_clips(std::span<const ClipReading> clips, const Veri
   result.reference = choose_reference(result.cameras);
   result.middle = static_cast<std::int64_t>(clips[result.reference].frames.size() / 2);
   const CameraVerdict reference = result.cameras[result.reference];
-  for (CameraVerdict& camera : result.cameras) {
-    compare(reference, camera, result.middle, options);
-    judge(reference, camera, options);
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<WholeFrames> whole, match_all(result, options, sounds));
+  for (std::size_t i = 0; i < result.cameras.size(); ++i) {
+    compare(reference, result.cameras[i], whole[i], result.middle, options);
+    judge(reference, result.cameras[i], options);
   }
   CameraVerdict& itself = result.cameras[result.reference];
   if (itself.clock.state == PhaseState::known) {
@@ -287,12 +282,10 @@ Result<VerifyResult> verify_clips(std::span<const ClipReading> clips, const Veri
     itself.drift_sigma = PartsPerMillion(0);
     itself.time_left.reset();
   }
-  itself.frame_offset = 0;
-  itself.offset_reason = "the reference's own frames";
   find_worst_pair(result);
   conclude(result);
   advise(result);
   return result;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

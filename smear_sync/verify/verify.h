@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -13,8 +14,9 @@
 #include "smear_sync/align/align.h"
 #include "smear_sync/clocks/drift.h"
 #include "smear_sync/verify/clip_clock.h"
+#include "smear_sync/verify/whole_frames.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 
 /// Whether a camera reads in step with the reference, as its clip proves or doesn't.
 enum class ClipState {
@@ -37,8 +39,8 @@ std::string_view name(ClipsVerdict verdict);
 struct VerifyOptions {
   ClipOptions clip{};
   Tolerance tolerance{};  ///< to the reference, to either side
-  /// Clips without a code begin this near to one another, as clips that were started by hand: by so much may
-  /// a beat have moved the flash between them.
+  /// Clips whose frames nothing matches begin this near to one another, as clips that were started by hand:
+  /// by so much may a beat have moved the flash between them.
   Seconds start_spread{5};
 };
 
@@ -53,10 +55,12 @@ struct CameraVerdict {
   Seconds sigma;                 ///< its standard error
   /// Frame i + frame_offset of this file starts nearest to frame i of the reference's.
   std::optional<std::int64_t> frame_offset;
-  std::string offset_reason;             ///< how it is known, or why it isn't
-  std::optional<PartsPerMillion> drift;  ///< its frame rate over the reference's, less one
-  PartsPerMillion drift_sigma;           ///< standard error
-  std::optional<TimeLeft> time_left;     ///< within the tolerance, from the middle of the reference's clip on
+  std::string offset_reason;                    ///< how it is known, or why it isn't
+  FrameWitness offset_by = FrameWitness::none;  ///< who told it
+  double offset_probability = 0;                ///< that it is right; 0 without
+  std::optional<PartsPerMillion> drift;         ///< its frame rate over the reference's, less one
+  PartsPerMillion drift_sigma;                  ///< standard error
+  std::optional<TimeLeft> time_left;  ///< within the tolerance, from the middle of the reference's clip on
 };
 
 struct VerifyResult {
@@ -72,7 +76,8 @@ struct VerifyResult {
 
 /// Are cameras in step that filmed one strobe, by how much not, and which frames belong together. The
 /// reference is the first clip with a phase. Pure. Errors (bad_input): fewer than two clips; options out of
-/// range.
-Result<VerifyResult> verify_clips(std::span<const ClipReading> clips, const VerifyOptions& options);
+/// range; sounds, where given, that aren't one for each clip.
+Result<VerifyResult> verify_clips(std::span<const ClipReading> clips, const VerifyOptions& options,
+                                  std::span<const SoundTrack> sounds = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,6 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/async_writer.h"
 
 #include <algorithm>
+#include <chrono>
 #include <condition_variable>
 #include <deque>
 #include <map>
@@ -8,42 +10,99 @@
 #include <thread>
 #include <utility>
 
-namespace emberlock {
+namespace emberlock::session {
+namespace {
 
-/// What all lanes use. The writer itself lets distinct cameras write at the same time.
+using Clock = std::chrono::steady_clock;
+
+Clock::duration as_duration(Seconds s) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(s.value()));
+}
+
+Seconds since(Clock::time_point t) {
+  return Seconds(std::chrono::duration<double>(Clock::now() - t).count());
+}
+
+}  // namespace
+
+/// What all threads use. The writer itself lets distinct cameras write at the same time.
 struct AsyncWriter::Shared {
-  explicit Shared(SessionWriter w) : writer(std::move(w)) {}
+  Shared(SessionWriter w, const AsyncWriterOptions& o) : writer(std::move(w)), options(o) {}
 
-  void note_failure(const Error& error) {
+  void note(const Status& status) {
+    if (status) return;
     const std::scoped_lock lock(mutex);
-    if (!failure) failure = error;
+    if (!failure) failure = status.error();
   }
 
   SessionWriter writer;
+  const AsyncWriterOptions options;
   std::mutex append_mutex;
   std::mutex mutex;
   std::optional<Error> failure;  ///< guarded by mutex
 };
 
+/// Has the disk hold what was handed on, again and again.
+class AsyncWriter::Syncer {
+ public:
+  explicit Syncer(Shared& shared) : shared_(shared), thread_([this] { work(); }) {}
+  Syncer(const Syncer&) = delete;
+  Syncer& operator=(const Syncer&) = delete;
+  ~Syncer() {
+    {
+      const std::scoped_lock lock(mutex_);
+      ended_ = true;
+    }
+    wake_.notify_one();
+    thread_.join();
+  }
+
+ private:
+  /// A disk that is slow gets time between two syncs, too.
+  void work() {
+    constexpr auto kPause = std::chrono::milliseconds(50);
+    std::unique_lock lock(mutex_);
+    while (!ended_) {
+      const Clock::time_point begun = Clock::now();
+      lock.unlock();
+      shared_.note(shared_.writer.sync());
+      lock.lock();
+      wake_.wait_until(lock, std::max(begun + as_duration(kSyncInterval), Clock::now() + kPause),
+                       [this] { return ended_; });
+    }
+  }
+
+  Shared& shared_;
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool ended_ = false;
+  std::thread thread_;  ///< last: it uses all of the above
+};
+
 /// One camera's queue and encoder thread.
 class AsyncWriter::Lane {
  public:
-  Lane(Shared& shared, std::size_t camera, std::size_t bound)
-      : shared_(shared), camera_(camera), bound_(bound), thread_([this] { encode(); }) {}
+  Lane(Shared& shared, std::size_t camera)
+      : shared_(shared), camera_(camera), thread_([this] { encode(); }) {}
   Lane(const Lane&) = delete;
   Lane& operator=(const Lane&) = delete;
   ~Lane() { end(Ending::drop); }
 
   bool push(Frame frame) {
     {
-      const std::scoped_lock lock(mutex_);
+      std::unique_lock lock(mutex_);
+      if (shared_.options.when_full == WhenFull::wait)
+        room_.wait(lock, [&] { return ended_ || !is_full(bytes_of(frame)); });
       if (ended_) return false;
       arrivals_.add(frame.stamp.frame_id);
-      if (queue_.size() >= bound_) {
+      if (is_full(bytes_of(frame))) {
         ++lost_[LossCause::queue];
         return false;
       }
-      queue_.push_back(std::move(frame));
+      queued_bytes_ += bytes_of(frame);
+      const Clock::time_point now = Clock::now();
+      queue_.push_back({std::move(frame), now});
+      at_risk_.push_back(now);
     }
     wake_.notify_one();
     return true;
@@ -54,14 +113,18 @@ class AsyncWriter::Lane {
     lost_[cause] += frames;
   }
 
-  CameraProgress progress() const {
+  CameraProgress progress() {
     const std::scoped_lock lock(mutex_);
-    CameraProgress now{static_cast<double>(queue_.size()) / static_cast<double>(bound_), written_.bytes, {}};
-    const auto lost = [&](LossCause cause) {
-      const auto found = lost_.find(cause);
-      return found == lost_.end() ? 0 : found->second;
-    };
-    now.counts.set_recorded(written_.frames);
+    CameraProgress now;
+    now.arrived = arrivals_.delivered();
+    now.written = written_.frames;
+    now.safe = std::min(shared_.writer.safe(camera_), written_.frames);
+    now.queued = now.arrived - std::min(now.arrived, lost(LossCause::queue) + written_.refused + now.written);
+    now.queue_fill = std::min(fill(0), 1.0);
+    now.bytes = written_.bytes;
+    forget_what_is_settled(now.safe);
+    if (!at_risk_.empty()) now.at_risk = since(at_risk_.front());
+    now.counts.set_recorded(now.safe);
     now.counts.set_transport(lost(LossCause::transport));
     now.counts.set_underrun(lost(LossCause::underrun));
     now.counts.set_queue(lost(LossCause::queue));
@@ -79,8 +142,40 @@ class AsyncWriter::Lane {
     for (const auto& [cause, frames] : lost_) shared_.writer.count_lost(camera_, cause, frames);
   }
 
+  /// What has become of the frames so far; asked by the thread that encodes, or once that has ended.
+  void look() {
+    const std::scoped_lock lock(mutex_);
+    written_ = shared_.writer.written(camera_);
+    forget_what_is_settled(std::min(shared_.writer.safe(camera_), written_.frames));
+  }
+
  private:
   enum class Ending { drain, drop };
+  struct Waiting {
+    Frame frame;
+    Clock::time_point since;
+  };
+
+  static std::uint64_t bytes_of(const Frame& frame) { return frame.image ? frame.image->bytes().size() : 0; }
+
+  /// How full the queue would be with so much more.
+  [[nodiscard]] double fill(std::uint64_t more) const {
+    if (queue_.empty()) return 0;
+    const double by_bytes = static_cast<double>(queued_bytes_ + more) /
+                            static_cast<double>(std::max<std::uint64_t>(shared_.options.queue_bytes, 1));
+    return std::max(by_bytes, since(queue_.front().since) / shared_.options.queue_time);
+  }
+  [[nodiscard]] bool is_full(std::uint64_t more) const { return fill(more) > 1; }
+
+  [[nodiscard]] std::uint64_t lost(LossCause cause) const {
+    const auto found = lost_.find(cause);
+    return found == lost_.end() ? 0 : found->second;
+  }
+
+  /// Of the frames that were taken so many are safe, or given up, in their order.
+  void forget_what_is_settled(std::uint64_t safe) {
+    for (; settled_ < safe + written_.refused && !at_risk_.empty(); ++settled_) at_risk_.pop_front();
+  }
 
   void end(Ending ending) {
     {
@@ -89,45 +184,70 @@ class AsyncWriter::Lane {
       if (ending == Ending::drop) queue_.clear();
     }
     wake_.notify_one();
+    room_.notify_all();
     if (thread_.joinable()) thread_.join();
   }
 
+  /// The next frame; none when it is time to flush, or at the end.
   std::optional<Frame> pop() {
     std::unique_lock lock(mutex_);
-    wake_.wait(lock, [this] { return ended_ || !queue_.empty(); });
+    const auto has_work = [this] { return ended_ || !queue_.empty(); };
+    if (flush_due_) {
+      wake_.wait_until(lock, *flush_due_, has_work);
+    } else {
+      wake_.wait(lock, has_work);
+    }
     if (queue_.empty()) return std::nullopt;
-    Frame frame = std::move(queue_.front());
+    Frame frame = std::move(queue_.front().frame);
     queue_.pop_front();
+    queued_bytes_ -= bytes_of(frame);
+    room_.notify_all();
     return frame;
   }
 
+  [[nodiscard]] bool is_over() {
+    const std::scoped_lock lock(mutex_);
+    return ended_ && queue_.empty();
+  }
+
   void encode() {
-    while (const auto frame = pop()) {
-      const Status written = shared_.writer.write(camera_, *frame);
-      if (!written) shared_.note_failure(written.error());
-      const std::scoped_lock lock(mutex_);
-      written_ = shared_.writer.written(camera_);
+    while (!is_over()) {
+      if (const auto frame = pop()) {
+        shared_.note(shared_.writer.write(camera_, *frame));
+        if (!flush_due_) flush_due_ = Clock::now() + as_duration(kFlushInterval);
+      }
+      if (flush_due_ && Clock::now() >= *flush_due_) {
+        flush_due_.reset();
+        shared_.note(shared_.writer.flush(camera_));
+      }
+      look();
     }
+    shared_.note(shared_.writer.flush(camera_));
+    look();
   }
 
   Shared& shared_;
   const std::size_t camera_;
-  const std::size_t bound_;
-  mutable std::mutex mutex_;
+  std::optional<Clock::time_point> flush_due_;  ///< the thread's own: there is something to flush
+  std::mutex mutex_;                            ///< guards what follows
   std::condition_variable wake_;
-  std::deque<Frame> queue_;
+  std::condition_variable room_;
+  std::deque<Waiting> queue_;
+  std::uint64_t queued_bytes_ = 0;
   bool ended_ = false;
   Arrivals arrivals_;
   std::map<LossCause, std::uint64_t> lost_;
   WrittenSoFar written_;
+  std::deque<Clock::time_point> at_risk_;  ///< when frames arrived that aren't safe yet
+  std::uint64_t settled_ = 0;
   std::thread thread_;  ///< last: it uses all of the above
 };
 
 AsyncWriter::AsyncWriter(SessionWriter writer, AsyncWriterOptions options)
-    : shared_(std::make_unique<Shared>(std::move(writer))) {
-  const std::size_t bound = std::max<std::size_t>(options.queue_frames, 1);
+    : shared_(std::make_unique<Shared>(std::move(writer), options)) {
   const std::size_t cameras = shared_->writer.camera_count();
-  for (std::size_t i = 0; i < cameras; ++i) lanes_.push_back(std::make_unique<Lane>(*shared_, i, bound));
+  for (std::size_t i = 0; i < cameras; ++i) lanes_.push_back(std::make_unique<Lane>(*shared_, i));
+  syncer_ = std::make_unique<Syncer>(*shared_);
 }
 
 AsyncWriter::~AsyncWriter() = default;
@@ -152,7 +272,10 @@ CameraProgress AsyncWriter::progress(std::size_t camera) const { return lanes_.a
 
 Result<v1::Manifest> AsyncWriter::finish() {
   for (const auto& lane : lanes_) lane->finish();
-  return shared_->writer.finish();
+  syncer_.reset();
+  auto manifest = shared_->writer.finish();
+  for (const auto& lane : lanes_) lane->look();
+  return manifest;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/av.h"
 
 #include <array>
@@ -13,8 +14,9 @@
 #include <unistd.h>
 
 #include "base/log.h"
+#include "session/files.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 constexpr int kIoBuffer = 1 << 18;
@@ -37,6 +39,45 @@ Error not_a_video(const std::filesystem::path& path, const std::string& reason) 
       "Known are PGM, PPM, PNG, JPEG, TIFF, FITS and what FFmpeg reads; a truncated file may lack its index"};
 }
 
+/// The file with its streams, none of them chosen.
+Result<AvInput> open_file(const std::filesystem::path& path, Checking checking) {
+  quiet_libav();
+  AvInput input;
+  EMBERLOCK_ASSIGN_OR_RETURN(input.file, AvFile::open(path, AvFile::Mode::read));
+  AVFormatContext* format = avformat_alloc_context();
+  format->pb = input.file->io();
+  format->io_open = deny_open;
+  format->flags |= AVFMT_FLAG_CUSTOM_IO;
+  if (checking == Checking::strict) format->error_recognition |= AV_EF_CRCCHECK;
+  // On failure avformat_open_input frees the context itself.
+  int code = avformat_open_input(&format, "", nullptr, nullptr);
+  if (code < 0) return not_a_video(path, av_message(code));
+  input.format.reset(format);
+  code = avformat_find_stream_info(format, nullptr);
+  if (code < 0) return not_a_video(path, av_message(code));
+  return input;
+}
+
+/// Opens the decoder of the chosen stream, and drops all others' packets; libav's code.
+int open_decoder(AvInput& input, const AVCodec* codec, Checking checking) {
+  AVFormatContext* format = input.format.get();
+  for (unsigned i = 0; i < format->nb_streams; ++i) {
+    if (static_cast<int>(i) != input.stream) format->streams[i]->discard = AVDISCARD_ALL;
+  }
+  input.decoder.reset(avcodec_alloc_context3(codec));
+  const int code =
+      avcodec_parameters_to_context(input.decoder.get(), format->streams[input.stream]->codecpar);
+  if (code < 0) return code;
+  input.decoder->thread_count = 1;
+  if (checking == Checking::strict) input.decoder->err_recognition |= AV_EF_CRCCHECK | AV_EF_EXPLODE;
+  return avcodec_open2(input.decoder.get(), codec, nullptr);
+}
+
+Seconds begin_of(const AVStream& stream) {
+  if (stream.start_time == AV_NOPTS_VALUE) return Seconds(0);
+  return Seconds(static_cast<double>(stream.start_time) * av_q2d(stream.time_base));
+}
+
 }  // namespace
 
 std::string av_message(int code) {
@@ -54,11 +95,9 @@ Result<std::unique_ptr<AvFile>> AvFile::open(const std::filesystem::path& path, 
   const int flags = mode == Mode::read ? O_RDONLY : O_RDWR | O_CREAT | O_TRUNC;
   UniqueFd fd(::open(path.c_str(), flags | O_CLOEXEC, 0644));
   if (!fd) {
-    const bool reading = mode == Mode::read;
-    return Error{
-        reading ? ErrorKind::bad_input : ErrorKind::io,
-        std::string(reading ? "cannot open: " : "cannot create: ") + std::generic_category().message(errno),
-        path.string(), "Check the path and its permissions"};
+    if (mode == Mode::create) return errno_error(path, "cannot create");
+    return Error{ErrorKind::bad_input, "cannot open: " + std::generic_category().message(errno),
+                 path.string(), "Check the path and its permissions"};
   }
   auto* buffer = static_cast<std::uint8_t*>(av_malloc(kIoBuffer));
   std::unique_ptr<AvFile> file(new AvFile(std::move(fd), path));
@@ -99,35 +138,29 @@ std::int64_t AvFile::seek(void* self, std::int64_t offset, int whence) {
 }
 
 Result<AvInput> open_av_input(const std::filesystem::path& path, Checking checking) {
-  quiet_libav();
-  AvInput input;
-  EMBERLOCK_ASSIGN_OR_RETURN(input.file, AvFile::open(path, AvFile::Mode::read));
-  AVFormatContext* format = avformat_alloc_context();
-  format->pb = input.file->io();
-  format->io_open = deny_open;
-  format->flags |= AVFMT_FLAG_CUSTOM_IO;
-  if (checking == Checking::strict) format->error_recognition |= AV_EF_CRCCHECK;
-  // On failure avformat_open_input frees the context itself.
-  int code = avformat_open_input(&format, "", nullptr, nullptr);
-  if (code < 0) return not_a_video(path, av_message(code));
-  input.format.reset(format);
-  code = avformat_find_stream_info(format, nullptr);
-  if (code < 0) return not_a_video(path, av_message(code));
+  EMBERLOCK_ASSIGN_OR_RETURN(AvInput input, open_file(path, checking));
   const AVCodec* codec = nullptr;
-  input.stream = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
+  input.stream = av_find_best_stream(input.format.get(), AVMEDIA_TYPE_VIDEO, -1, -1, &codec, 0);
   if (input.stream < 0 || codec == nullptr)
     return not_a_video(path, "it holds no video stream that can be decoded");
-  for (unsigned i = 0; i < format->nb_streams; ++i) {
-    if (static_cast<int>(i) != input.stream) format->streams[i]->discard = AVDISCARD_ALL;
-  }
-  input.decoder.reset(avcodec_alloc_context3(codec));
-  code = avcodec_parameters_to_context(input.decoder.get(), format->streams[input.stream]->codecpar);
-  if (code < 0) return not_a_video(path, av_message(code));
-  input.decoder->thread_count = 1;
-  if (checking == Checking::strict) input.decoder->err_recognition |= AV_EF_CRCCHECK | AV_EF_EXPLODE;
-  code = avcodec_open2(input.decoder.get(), codec, nullptr);
+  const int code = open_decoder(input, codec, checking);
   if (code < 0) return not_a_video(path, av_message(code));
   return input;
 }
 
-}  // namespace emberlock
+Result<AvSound> open_av_sound(const std::filesystem::path& path) {
+  AvSound sound;
+  EMBERLOCK_ASSIGN_OR_RETURN(sound.input, open_file(path, Checking::lenient));
+  AVFormatContext* format = sound.input.format.get();
+  const int video = av_find_best_stream(format, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+  if (video < 0) return not_a_video(path, "it holds no video stream");
+  sound.video_begins = begin_of(*format->streams[video]);
+  const AVCodec* codec = nullptr;
+  sound.input.stream = av_find_best_stream(format, AVMEDIA_TYPE_AUDIO, -1, video, &codec, 0);
+  if (sound.input.stream < 0 || codec == nullptr) return sound;
+  sound.begins = begin_of(*format->streams[sound.input.stream]);
+  if (open_decoder(sound.input, codec, Checking::lenient) < 0) sound.input.decoder.reset();
+  return sound;
+}
+
+}  // namespace emberlock::session

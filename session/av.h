@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 extern "C" {
@@ -11,12 +12,13 @@ extern "C" {
 #include <memory>
 #include <string>
 
+#include "base/quantity.h"
 #include "base/result.h"
 #include "base/unique_fd.h"
 
 // Owners of libav's objects, and files for it that are plain descriptors: no protocols, no names with a
 // meaning.
-namespace emberlock {
+namespace emberlock::session {
 
 struct AvFree {
   void operator()(AVFrame* f) const { av_frame_free(&f); }
@@ -81,4 +83,14 @@ enum class Checking {
 /// Opens the first video stream of `path`. Only the file itself is read, whatever it refers to.
 Result<AvInput> open_av_input(const std::filesystem::path& path, Checking checking);
 
-}  // namespace emberlock
+/// The sound of a local video file, opened for reading.
+struct AvSound {
+  AvInput input;         ///< without a decoder where there is no sound that can be decoded
+  Seconds begins;        ///< the first sample, by the file's clock
+  Seconds video_begins;  ///< the first frame
+};
+
+/// Opens the sound that belongs to the first video stream of `path`. Errors: no video.
+Result<AvSound> open_av_sound(const std::filesystem::path& path);
+
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/camera_reader.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include "base/file.h"
 #include "session/files.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 
 Result<ParsedIndex> read_index(const fs::path& folder, const std::string& camera_id) {
@@ -63,6 +64,12 @@ Status CameraReader::open_segment(std::uint32_t number) {
   return {};
 }
 
+Status CameraReader::check(std::size_t i) {
+  const IndexRecord& record = records_.at(i);
+  EMBERLOCK_RETURN_IF_ERROR(open_segment(record.segment));
+  return segment_->check(record.segment_ms, record.pixel_hash);
+}
+
 Result<Frame> CameraReader::read(std::size_t i) {
   if (i >= records_.size()) {
     return Error{ErrorKind::out_of_data, "the recording has ended", "camera " + camera_id_};
@@ -83,4 +90,4 @@ Result<Frame> CameraReader::read(std::size_t i) {
   return Frame{record.stamp, std::make_shared<const Image>(std::move(image).value())};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

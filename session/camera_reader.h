@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@
 #include "session/index.h"
 #include "session/segment.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// One camera's part of a SessionReader: its index, and whichever segment was read last. One thread at a
 /// time.
@@ -25,6 +26,8 @@ class CameraReader {
   [[nodiscard]] const std::vector<FrameStamp>& stamps() const { return stamps_; }
   [[nodiscard]] const std::vector<IndexRecord>& records() const { return records_; }
   Result<Frame> read(std::size_t i);
+  /// Whether read(i) would succeed, as far as that shows without decoding: SegmentReader::check.
+  Status check(std::size_t i);
 
  private:
   Status open_segment(std::uint32_t number);
@@ -48,4 +51,4 @@ void list_segments(const std::filesystem::path& folder, const std::vector<IndexR
 /// The records of a camera's index file, with what is wrong with it.
 Result<ParsedIndex> read_index(const std::filesystem::path& folder, const std::string& camera_id);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

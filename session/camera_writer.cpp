@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/camera_writer.h"
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 #include "session/files.h"
 #include "session/layout.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
@@ -21,6 +22,8 @@ constexpr Seconds kSpaceCheckInterval{1};
 constexpr Seconds kRetryInterval{1};
 constexpr std::uint64_t kSpaceCheckBytes = std::uint64_t{64} << 20;
 constexpr std::uint32_t kLongestGapMs = 60'000;
+/// Without anybody who syncs meanwhile no more of them stay open.
+constexpr std::size_t kEndedSegmentsAtMost = 8;
 
 }  // namespace
 
@@ -44,7 +47,13 @@ Result<std::unique_ptr<CameraWriter>> CameraWriter::create(const fs::path& folde
   EMBERLOCK_RETURN_IF_ERROR(write_fully(index.get(), encode_index_header(), path));
   std::unique_ptr<CameraWriter> writer(
       new CameraWriter(folder, stream.camera_id(), layout, Hertz(stream.frame_rate_hz()), options));
+  UniqueFd for_ledger(::fcntl(index.get(), F_DUPFD_CLOEXEC, 0));
+  if (!for_ledger) return errno_error(path, "cannot keep the index open");
   writer->index_ = std::move(index);
+  // A folder lasts when the one that it stands in is synced as well.
+  writer->ledger_ = std::make_unique<SyncLedger>(
+      std::move(for_ledger), path,
+      std::vector<fs::path>{folder / stream.camera_id(), folder, folder.parent_path()});
   return writer;
 }
 
@@ -62,6 +71,10 @@ Status CameraWriter::write_pixels(const Frame& frame) {
                  "camera " + camera_id_ + ", frame " + std::to_string(frame.stamp.frame_id),
                  "Give each layout a session of its own"};
   }
+  if (Status synced = heed_sync(); !synced) {
+    refuse(synced.error(), frame.stamp);
+    return synced;
+  }
   if (refusal_ && frame.stamp.monotonic_time < retry_at_) return *refusal_;
   refusal_.reset();
   if (Status room = make_room(frame.stamp); !room) {
@@ -74,11 +87,11 @@ Status CameraWriter::write_pixels(const Frame& frame) {
   record.stamp = frame.stamp;
   record.pixel_hash = pixel_hash(frame.image->bytes());
   record.file_offset = segment_->bytes();
-  record.segment = static_cast<std::uint32_t>(segments_.size() - 1);
+  record.segment = next_segment_ - 1;
   record.frame_in_segment = static_cast<std::uint32_t>(segment.frames());
   record.segment_ms = next_milliseconds(frame.stamp);
 
-  Status written = segment_->write(*frame.image, record.segment_ms);
+  Status written = segment_->write(*frame.image, record);
   if (written) {
     const auto bytes = encode(record);
     written = write_fully(index_.get(), {bytes.data(), bytes.size()}, index_path(folder_, camera_id_));
@@ -123,10 +136,14 @@ Status CameraWriter::check_free_space(const FrameStamp& stamp) {
 }
 
 Status CameraWriter::open_segment(const FrameStamp& stamp) {
-  const auto number = static_cast<std::uint32_t>(segments_.size());
-  const std::string name = segment_name(camera_id_, number, options_.encoding);
+  const std::string name = segment_name(camera_id_, next_segment_, options_.encoding);
   EMBERLOCK_ASSIGN_OR_RETURN(segment_,
                              SegmentWriter::create(folder_ / name, layout_, options_.encoding, rate_));
+  if (Status kept = ledger_->begun(segment_->fd(), folder_ / name); !kept) {
+    segment_.reset();
+    return kept;
+  }
+  ++next_segment_;
   v1::Segment& segment = *segments_.Add();
   segment.set_file(name);
   segment.set_first_frame(counts_.recorded());
@@ -142,7 +159,52 @@ Status CameraWriter::close_segment() {
   }
   bytes_closed_ += segment_->bytes();
   segment_.reset();
+  ledger_->handed(counts_.recorded());
+  ledger_->ended();
+  // Who syncs meanwhile leaves one at most.
+  return ledger_->waiting() > kEndedSegmentsAtMost ? sync() : Status{};
+}
+
+/// Of what was written nothing stays in this process after it.
+Status CameraWriter::flush() {
+  if (failed_) return *failed_;
+  EMBERLOCK_RETURN_IF_ERROR(heed_sync());
+  if (!segment_) return {};
+  if (Status flushed = segment_->flush(); !flushed) {
+    abandon_segment(flushed.error());
+    return flushed;
+  }
+  ledger_->handed(counts_.recorded());
   return {};
+}
+
+/// What another thread's sync met: which of the frames after the last that went well the disk has, nobody
+/// knows, so they don't count as recorded.
+Status CameraWriter::heed_sync() {
+  Status synced = ledger_->failure();
+  if (!synced) drop_what_is_not_safe(synced.error());
+  return synced;
+}
+
+void CameraWriter::drop_what_is_not_safe(const Error& why) {
+  warn(why);
+  if (segment_) bytes_closed_ += segment_->bytes();
+  segment_.reset();
+  const std::uint64_t safe = ledger_->safe();
+  if (const Status cut = cut_index(safe); !cut) {
+    failed_ = cut.error();
+    return;
+  }
+  counts_.set_disk(counts_.disk() + counts_.recorded() - safe);
+  counts_.set_recorded(safe);
+  while (!segments_.empty() && segments_.rbegin()->first_frame() >= safe) segments_.RemoveLast();
+  if (!segments_.empty()) segments_.rbegin()->set_frames(safe - segments_.rbegin()->first_frame());
+}
+
+void CameraWriter::warn(const Error& why) {
+  // A disk that stays full is said once.
+  const auto level = std::exchange(warned_, true) ? spdlog::level::debug : spdlog::level::warn;
+  log(LogCategory::session).log(level, "camera {}: {}", camera_id_, why.message());
 }
 
 void CameraWriter::refuse(const Error& why, const FrameStamp& stamp) {
@@ -153,17 +215,16 @@ void CameraWriter::refuse(const Error& why, const FrameStamp& stamp) {
 /// After a failed write: the segment stays as it is, and its frames that aren't whole on the disk are counted
 /// as the disk's instead.
 void CameraWriter::abandon_segment(const Error& why) {
-  // A disk that stays full is said once.
-  const auto level = std::exchange(warned_, true) ? spdlog::level::debug : spdlog::level::warn;
-  log(LogCategory::session).log(level, "camera {}: {}", camera_id_, why.message());
+  warn(why);
   bytes_closed_ += segment_->bytes();
   segment_.reset();
-  const auto kept = cut_index();
-  if (!kept) {
-    failed_ = kept.error();
+  const auto kept = readable_frames();
+  v1::Segment& segment = *segments_.rbegin();
+  const Status cut = kept ? cut_index(segment.first_frame() + *kept) : Status(kept.error());
+  if (!cut) {
+    failed_ = cut.error();
     return;
   }
-  v1::Segment& segment = *segments_.rbegin();
   const std::uint64_t cost = segment.frames() - *kept;
   counts_.set_recorded(counts_.recorded() - cost);
   counts_.set_disk(counts_.disk() + cost);
@@ -174,10 +235,9 @@ void CameraWriter::abandon_segment(const Error& why) {
   segments_.RemoveLast();
 }
 
-/// Takes the last segment's frames that can't be read back off the index, which a failed write may have torn
-/// too. Returns how many stay. What was written before them reached the disk, so the search goes from the
-/// end.
-Result<std::uint64_t> CameraWriter::cut_index() {
+/// How many of the last segment's frames can be read back, the index's records among them, which a failed
+/// write may have torn too. What was written before them reached the disk, so the search goes from the end.
+Result<std::uint64_t> CameraWriter::readable_frames() {
   const v1::Segment& segment = *segments_.rbegin();
   const fs::path path = index_path(folder_, camera_id_);
   const auto start = static_cast<off_t>(kIndexHeaderBytes + segment.first_frame() * kIndexRecordBytes);
@@ -189,10 +249,17 @@ Result<std::uint64_t> CameraWriter::cut_index() {
   std::size_t kept = index.records.size();
   CameraReader reader(folder_, camera_id_, layout_, std::move(index.records));
   while (kept > 0 && !reader.read(kept - 1).ok()) --kept;
-  if (::ftruncate(index_.get(), start + static_cast<off_t>(kept * kIndexRecordBytes)) != 0) {
-    return errno_error(path, "cannot cut off what the disk refused");
-  }
   return kept;
+}
+
+/// Takes off the index, and off what is to be synced, the frames behind the first `frames`.
+Status CameraWriter::cut_index(std::uint64_t frames) {
+  const auto size = static_cast<off_t>(kIndexHeaderBytes + frames * kIndexRecordBytes);
+  if (::ftruncate(index_.get(), size) != 0) {
+    return errno_error(index_path(folder_, camera_id_), "cannot cut off what the disk refused");
+  }
+  ledger_->cut(frames);
+  return {};
 }
 
 /// The frame's arrival within its segment, for players; made to rise, whatever the clock does.
@@ -204,7 +271,7 @@ std::uint32_t CameraWriter::next_milliseconds(const FrameStamp& stamp) const {
 }
 
 WrittenSoFar CameraWriter::written() const {
-  return {counts_.recorded(), counts_.disk(),
+  return {ledger_->handed(), counts_.disk(),
           bytes_closed_ + (segment_ ? segment_->bytes() : 0) + kIndexHeaderBytes +
               counts_.recorded() * kIndexRecordBytes};
 }
@@ -253,11 +320,17 @@ Result<v1::Counts> CameraWriter::reconcile() const {
 
 Status CameraWriter::finish(v1::CameraStream& stream) {
   if (segment_) static_cast<void>(close_segment());
+  if (const Status synced = sync(); !synced && !failed_) static_cast<void>(heed_sync());
+  if (!failed_ && ledger_->safe() < counts_.recorded()) {
+    drop_what_is_not_safe({ErrorKind::io, "is no regular file, and keeps nothing",
+                           (folder_ / segments_.rbegin()->file()).string(), "Remove it"});
+  }
+  // What was cut off is to be gone after a power cut too.
+  if (!failed_) EMBERLOCK_RETURN_IF_ERROR(sync());
   if (failed_) return *failed_;
-  if (::fdatasync(index_.get()) != 0) return errno_error(index_path(folder_, camera_id_), "cannot flush");
   EMBERLOCK_ASSIGN_OR_RETURN(*stream.mutable_counts(), reconcile());
   *stream.mutable_segments() = segments_;
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -12,17 +13,23 @@
 #include "emberlock/v1/session.pb.h"
 #include "session/index.h"
 #include "session/segment.h"
+#include "session/sync_ledger.h"
 #include "session/writer.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
-/// One camera's part of a SessionWriter: its folder, index, segments and counts. One thread at a time.
+/// One camera's part of a SessionWriter: its folder, index, segments and counts. One thread at a time, but
+/// for sync() and safe().
 class CameraWriter {
  public:
+  /// `folder` is the session's, from the root.
   static Result<std::unique_ptr<CameraWriter>> create(const std::filesystem::path& folder,
                                                       const v1::CameraStream& stream,
                                                       const WriterOptions& options);
   Status write(const Frame& frame);
+  Status flush();
+  Status sync() { return ledger_->sync(); }
+  [[nodiscard]] std::uint64_t safe() const { return ledger_->safe(); }
   void count_lost(LossCause cause, std::uint64_t frames);
   [[nodiscard]] WrittenSoFar written() const;
   void set_arrivals(const Arrivals& arrivals) { arrivals_ = arrivals; }
@@ -40,7 +47,11 @@ class CameraWriter {
   Status close_segment();
   void refuse(const Error& why, const FrameStamp& stamp);
   void abandon_segment(const Error& why);
-  Result<std::uint64_t> cut_index();
+  Result<std::uint64_t> readable_frames();
+  Status cut_index(std::uint64_t frames);
+  Status heed_sync();
+  void drop_what_is_not_safe(const Error& why);
+  void warn(const Error& why);
   [[nodiscard]] std::uint32_t next_milliseconds(const FrameStamp& stamp) const;
   Result<v1::Counts> reconcile() const;
 
@@ -51,7 +62,9 @@ class CameraWriter {
   WriterOptions options_;
 
   UniqueFd index_;
+  std::unique_ptr<SyncLedger> ledger_;
   std::unique_ptr<SegmentWriter> segment_;
+  std::uint32_t next_segment_ = 0;                            ///< number of the one that is begun next
   google::protobuf::RepeatedPtrField<v1::Segment> segments_;  ///< the last is open while segment_ is
   TimePoint segment_start_;
   std::uint32_t last_milliseconds_ = 0;
@@ -69,4 +82,4 @@ class CameraWriter {
   std::optional<Error> failed_;  ///< the index on disk isn't known any more: nothing can be written
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/events.h"
 
 #include <cerrno>
@@ -13,7 +14,7 @@
 
 #include "session/files.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 ParsedEvents parse_events(std::string_view bytes) {
   ParsedEvents parsed;
@@ -53,14 +54,17 @@ Result<EventLog> EventLog::open(const std::filesystem::path& path, Mode mode) {
 Status EventLog::append(const v1::Event& event) {
   const off_t end = ::lseek(fd_.get(), 0, SEEK_END);
   Status written = write_fully(fd_.get(), encode(event), path_);
+  *unsynced_ = true;
   // A part of an event would hide those that follow.
   if (!written && ::ftruncate(fd_.get(), end) != 0) return errno_error(path_, "cannot cut off a torn event");
   return written;
 }
 
 Status EventLog::sync() {
-  if (::fdatasync(fd_.get()) != 0) return errno_error(path_, "cannot flush");
-  return {};
+  if (!unsynced_->exchange(false)) return {};
+  if (::fdatasync(fd_.get()) == 0) return {};
+  *unsynced_ = true;
+  return errno_error(path_, "cannot flush");
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,7 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,7 +13,7 @@
 #include "base/unique_fd.h"
 #include "emberlock/v1/session.pb.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 // events.binpb: each Event in protobuf's wire format behind its length as a varint; append-only.
 
@@ -32,12 +35,14 @@ class EventLog {
   /// Error `refused` where another process holds the lock: the session is being recorded.
   static Result<EventLog> open(const std::filesystem::path& path, Mode mode);
   Status append(const v1::Event& event);
+  /// Has the disk hold what was appended. Any thread.
   Status sync();
 
  private:
   EventLog(UniqueFd fd, std::filesystem::path path) : fd_(std::move(fd)), path_(std::move(path)) {}
   UniqueFd fd_;
   std::filesystem::path path_;
+  std::unique_ptr<std::atomic<bool>> unsynced_ = std::make_unique<std::atomic<bool>>(true);
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::session

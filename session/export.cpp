@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/export.h"
 
 #include <algorithm>
@@ -12,14 +13,14 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "base/file.h"
+#include "base/output_folder.h"
 #include "session/player_video.h"
 #include "session/reader.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kMarker = "export.txt";
 constexpr double kLongestGap =
     60;  // seconds that a video shows one frame for; what lasts longer is cut to this
 
@@ -194,7 +195,7 @@ class Exporter {
 Result<ExportReport> export_session(const fs::path& folder, const fs::path& target, ExportFormat format,
                                     const Observer& observer) {
   EMBERLOCK_ASSIGN_OR_RETURN(SessionReader reader, SessionReader::open(folder));
-  EMBERLOCK_ASSIGN_OR_RETURN(AtomicDirectory out, AtomicDirectory::create(target, kMarker));
+  EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder out, OutputFolder::create({target, kExport, {folder}}));
   ExportReport report;
   const auto cameras = static_cast<double>(reader.camera_count());
   for (std::size_t i = 0; i < reader.camera_count(); ++i) {
@@ -206,10 +207,10 @@ Result<ExportReport> export_session(const fs::path& folder, const fs::path& targ
     report.cameras.push_back(std::move(camera));
   }
   EMBERLOCK_RETURN_IF_ERROR(
-      write_file_atomically(out.path() / kMarker, "Exported from " + folder.string() + "\n"));
+      write_file_atomically(out.path() / "export.txt", "Exported from " + folder.string() + "\n"));
   EMBERLOCK_RETURN_IF_ERROR(out.commit());
   static_cast<void>(observe(observer, 1, "exported"));
   return report;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

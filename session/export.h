@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -5,11 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "base/output_folder.h"
 #include "base/progress.h"
 #include "base/quantity.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 enum class ExportFormat {
   png,    ///< CAMERA/000000.png, ...: samples as recorded, 9 to 16 bits in 16; Bayer as its mosaic; stamps in
@@ -33,10 +35,12 @@ struct ExportReport {
   std::string codec;  ///< of videos: libav's name
 };
 
-/// Writes a session for other programs to the folder `target`, which appears when it is complete; it must not
-/// exist, be empty, or be an earlier export. Errors: bad_input (no session, target in the way), io, refused
-/// (ended by the observer).
+/// Who makes the folder.
+inline constexpr OutputVerb kExport{"sessions export"};
+
+/// Writes a session for other programs to the folder `target`, an OutputFolder. Errors: bad_input (no
+/// session, target in the way), io, refused (ended by the observer).
 Result<ExportReport> export_session(const std::filesystem::path& folder, const std::filesystem::path& target,
                                     ExportFormat format, const Observer& observer = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,11 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/files.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <set>
 #include <system_error>
+#include <utility>
 
 #include <fcntl.h>
 #include <unistd.h>
@@ -16,7 +19,7 @@
 #include "session/layout.h"
 #include "session/name.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
@@ -28,6 +31,29 @@ fs::path reserve_path(const fs::path& folder) { return folder / "reserve"; }
 template <class Values>
 bool all_finite(const Values& values) {
   return std::all_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+const char* remedy_of(int code) {
+  switch (code) {
+    case EROFS:
+      return "The file system is read-only, as Linux makes it after an error: what was recorded until then "
+             "is "
+             "kept. See the kernel's log (dmesg), check and mount it anew, or record to another disk";
+    case EIO:
+      return "The disk fails: what was recorded until then is kept. See the kernel's log (dmesg), or record "
+             "to "
+             "another disk";
+    default:
+      return "Check the disk's space and the folder's permissions";
+  }
+}
+
+Status check_text_in(const std::string& where, const char* field, const std::string& text) {
+  Status good = check_text(field, text);
+  if (good) return good;
+  Error error = good.error();
+  error.where = where + ", " + error.where;
+  return error;
 }
 
 bool is_spread(double sigma) { return std::isfinite(sigma) && sigma >= 0; }
@@ -73,8 +99,16 @@ Status check_manifest(const v1::Manifest& manifest, const std::string& where) {
   if (manifest.cameras().empty()) {
     return Error{ErrorKind::bad_input, "no cameras", where + ", field cameras", "Record at least one camera"};
   }
+  const std::array<std::pair<const char*, const std::string*>, 4> texts{
+      {{"session_id", &manifest.session_id()},
+       {"created_utc", &manifest.created_utc()},
+       {"software", &manifest.software()},
+       {"purpose", &manifest.purpose()}}};
+  for (const auto& [field, text] : texts) EMBERLOCK_RETURN_IF_ERROR(check_text_in(where, field, *text));
   std::set<std::string> ids;
   for (const v1::CameraStream& camera : manifest.cameras()) {
+    EMBERLOCK_RETURN_IF_ERROR(check_text_in(where, "camera_id", camera.camera_id()));
+    EMBERLOCK_RETURN_IF_ERROR(check_text_in(where, "model", camera.model()));
     const std::string field = where + ", camera " + camera.camera_id();
     if (!is_folder_name(camera.camera_id())) {
       return Error{ErrorKind::bad_input, "the camera id can't name a folder", field,
@@ -170,8 +204,9 @@ Status write_fully(int fd, std::string_view bytes, const fs::path& path) {
 }
 
 Error errno_error(const fs::path& path, const std::string& action) {
-  return {ErrorKind::io, action + ": " + std::generic_category().message(errno), path.string(),
-          "Check the disk's space and the folder's permissions"};
+  const int code = errno;
+  return {ErrorKind::io, action + ": " + std::generic_category().message(code), path.string(),
+          remedy_of(code)};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

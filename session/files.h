@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -9,7 +10,7 @@
 #include "session/writer.h"
 
 // Names and small files of a session's folder.
-namespace emberlock {
+namespace emberlock::session {
 
 inline constexpr std::uint32_t kSessionFormatVersion = 1;
 inline constexpr int kCalibrationSigmas = 15;  ///< numbers of Calibration.sigma, or none, and
@@ -46,4 +47,4 @@ Status write_fully(int fd, std::string_view bytes, const std::filesystem::path& 
 /// "PATH: ACTION: <errno's words>" as an io error.
 Error errno_error(const std::filesystem::path& path, const std::string& action);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

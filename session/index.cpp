@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/index.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 static_assert(std::endian::native == std::endian::little,
@@ -71,13 +72,18 @@ bool decode(std::span<const char> bytes, IndexRecord& r) {
   return status_known && in.get<std::uint32_t>() == crc32(bytes.first(kIndexRecordBytes - 4));
 }
 
-/// Records follow each other: segments rise, and within one, frames and times do.
+}  // namespace
+
+std::optional<IndexRecord> decode_record(std::span<const char> bytes) {
+  IndexRecord record;
+  if (bytes.size() != kIndexRecordBytes || !decode(bytes, record)) return std::nullopt;
+  return record;
+}
+
 bool follows(const IndexRecord& a, const IndexRecord& b) {
   if (a.segment != b.segment) return b.segment > a.segment;
   return b.frame_in_segment > a.frame_in_segment && b.segment_ms > a.segment_ms;
 }
-
-}  // namespace
 
 std::uint32_t crc32(std::span<const char> bytes) {
   static constexpr std::array<std::uint32_t, 256> kTable = make_crc_table();
@@ -158,4 +164,4 @@ std::uint64_t pixel_hash(std::span<const std::byte> bytes) {
   return hash;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,8 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -11,7 +13,7 @@
 #include "base/frame.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 // <camera id>/index.bin: a header of 16 bytes, then one record of 68 bytes a frame; all numbers
 // little-endian.
@@ -40,6 +42,12 @@ inline constexpr std::size_t kMaxIndexBytes = std::size_t{4} << 30;  ///< 63 mil
 std::string encode_index_header();
 std::array<char, kIndexRecordBytes> encode(const IndexRecord& record);
 
+/// The record that these kIndexRecordBytes bytes hold; none where their checksum is wrong.
+std::optional<IndexRecord> decode_record(std::span<const char> bytes);
+
+/// Whether `b` may stand behind `a` in an index: segments rise, and within one, frames and times do.
+bool follows(const IndexRecord& a, const IndexRecord& b);
+
 /// A whole file of them.
 std::string encode_index(const std::vector<IndexRecord>& records);
 
@@ -61,4 +69,4 @@ std::uint32_t crc32(std::span<const char> bytes);
 /// lane = mix64(lane ^ word), the last word zero-padded, then the lanes and the length mixed together.
 std::uint64_t pixel_hash(std::span<const std::byte> bytes);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/json_message.h"
 
 #include <google/protobuf/util/json_util.h>
 
-namespace emberlock {
+namespace emberlock::session {
 
 Status read_json(std::string_view json, google::protobuf::Message& message, const std::string& what,
                  const std::string& where, const std::string& remedy) {
@@ -25,4 +26,4 @@ Result<std::string> json_of(const google::protobuf::Message& message, Defaults d
                "Use UTF-8 in its texts and camera ids"};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -7,7 +8,7 @@
 
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// Fills a message from protobuf's JSON mapping. Where it isn't: "not `what`", with the reason.
 Status read_json(std::string_view json, google::protobuf::Message& message, const std::string& what,
@@ -22,4 +23,4 @@ enum class Defaults {
 Result<std::string> json_of(const google::protobuf::Message& message, Defaults defaults,
                             const std::string& what, const std::string& where);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

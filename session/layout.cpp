@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/layout.h"
 
 #include <string>
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 v1::CameraStream::PixelFormat to_proto(PixelFormat format) {
@@ -78,4 +79,4 @@ Result<ImageLayout> layout_of(const v1::CameraStream& stream) {
                      static_cast<int>(stream.bit_depth())};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

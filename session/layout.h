@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "base/image.h"
 #include "base/result.h"
 #include "emberlock/v1/session.pb.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// The largest image side that files may have; larger ones are refused before memory is asked for.
 inline constexpr int kMaxImageSide = 16384;
@@ -17,4 +18,4 @@ void set_layout(v1::CameraStream& stream, const ImageLayout& layout);
 /// The stream's layout. Error bad_input names the field that is absent or out of range.
 Result<ImageLayout> layout_of(const v1::CameraStream& stream);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

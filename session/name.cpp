@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/name.h"
 
 #include <algorithm>
 #include <array>
 #include <string>
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 constexpr std::size_t kMaxNameBytes =
@@ -42,6 +43,21 @@ bool is_folder_name(std::string_view name) {
          std::all_of(name.begin(), name.end(), allowed);
 }
 
+Status check_text(std::string_view field, std::string_view text) {
+  const auto bad = [&](std::string what, std::string remedy) {
+    return Error{ErrorKind::bad_input, std::move(what), "field " + std::string(field), std::move(remedy)};
+  };
+  if (text.size() > kMaxTextBytes) {
+    return bad("is " + std::to_string(text.size()) + " bytes long, " + std::to_string(kMaxTextBytes) +
+                   " are allowed",
+               "Say it in fewer words");
+  }
+  const bool controls = std::any_of(
+      text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) < ' ') || c == '\x7f'; });
+  if (controls) return bad("holds control characters", "Leave line breaks and the like away");
+  return {};
+}
+
 Status check_session_name(std::string_view name) {
   const auto bad = [&](std::string what, std::string remedy) {
     return Error{ErrorKind::bad_input, std::move(what), shown(name), std::move(remedy)};
@@ -51,6 +67,11 @@ Status check_session_name(std::string_view name) {
                "Use letters, digits, space and . _ : - alone, no point in front, at most " +
                    std::to_string(kMaxNameBytes));
   }
+  if (name.starts_with('-')) {
+    return bad("begins with a hyphen, so that programs take it for an option",
+               "Begin with a letter or a digit");
+  }
+  if (name.starts_with(' ')) return bad("begins with a space, which nobody sees", "Leave it off");
   if (name.ends_with(' ') || name.ends_with('.')) {
     return bad("ends with a space or a point, which Windows drops", "Leave it off");
   }
@@ -58,4 +79,4 @@ Status check_session_name(std::string_view name) {
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

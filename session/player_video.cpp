@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/player_video.h"
 
 extern "C" {
@@ -10,7 +11,7 @@ extern "C" {
 
 #include "session/av.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 constexpr int kMpeg4Quality = 3;
@@ -183,4 +184,4 @@ Status PlayerVideo::close() {
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// A video file that any player shows: MP4 with H.264 where libav has its encoder, else MPEG-4; 8 bits, a
 /// constant frame rate. Sides are cut to even numbers of pixels.
@@ -38,4 +39,4 @@ class PlayerVideo {
   std::int64_t shown_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/reader.h"
 
 #include <system_error>
@@ -9,7 +10,7 @@
 #include "session/files.h"
 #include "session/layout.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 
 SessionReader::SessionReader(fs::path folder, v1::Manifest manifest)
@@ -63,4 +64,4 @@ const std::vector<FrameStamp>& SessionReader::stamps(std::size_t camera) const {
 
 Result<Frame> SessionReader::read(std::size_t camera, std::size_t i) { return cameras_.at(camera)->read(i); }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -9,7 +10,7 @@
 #include "base/result.h"
 #include "emberlock/v1/session.pb.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 class CameraReader;
 
@@ -49,4 +50,4 @@ class SessionReader {
   std::vector<std::unique_ptr<CameraReader>> cameras_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::session

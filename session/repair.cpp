@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <system_error>
 #include <utility>
@@ -9,9 +10,10 @@
 #include "session/layout.h"
 #include "session/rewrite.h"
 #include "session/salvage.h"
+#include "session/unindexed.h"
 #include "session/verify.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
@@ -33,10 +35,12 @@ Result<std::vector<std::size_t>> good_frames(CameraReader& reader, const std::st
 Result<RepairedCamera> repair_camera(const fs::path& folder, v1::CameraStream& stream,
                                      const Observer& observer) {
   EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(stream));
-  EMBERLOCK_ASSIGN_OR_RETURN(ParsedIndex index, read_index(folder, stream.camera_id()));
-  CameraReader reader(folder, stream.camera_id(), layout, std::move(index.records));
+  EMBERLOCK_ASSIGN_OR_RETURN(const ParsedIndex index, read_index(folder, stream.camera_id()));
+  const std::vector<IndexRecord> unindexed =
+      unindexed_frames(folder, stream.camera_id(), index.records, Search::behind_the_index);
+  CameraReader reader(folder, stream.camera_id(), layout, merged(index.records, unindexed));
   const auto& records = reader.records();
-  RepairedCamera report{stream.camera_id(), 0, 0, {}};
+  RepairedCamera report{stream.camera_id(), 0, 0, 0, {}};
   std::vector<IndexRecord> kept;
   for (std::size_t first = 0, end = 0; first < records.size(); first = end) {
     end = end_of_segment(records, first);
@@ -55,12 +59,17 @@ Result<RepairedCamera> repair_camera(const fs::path& folder, v1::CameraStream& s
     report.rewritten.push_back(path.lexically_relative(folder).generic_string());
   }
   report.kept = kept.size();
-  report.lost = records.size() - kept.size();
-  if (report.lost > 0) {
+  report.found =
+      static_cast<std::uint64_t>(std::count_if(kept.begin(), kept.end(), [&](const IndexRecord& record) {
+        return std::binary_search(unindexed.begin(), unindexed.end(), record, follows);
+      }));
+  report.lost = index.records.size() - (kept.size() - report.found);
+  if (report.lost > 0 || report.found > 0) {
     EMBERLOCK_RETURN_IF_ERROR(
         write_file_atomically(index_path(folder, stream.camera_id()), encode_index(kept)));
+    const std::uint64_t disk = stream.counts().disk() + report.lost;
     stream.mutable_counts()->set_recorded(kept.size());
-    stream.mutable_counts()->set_disk(stream.counts().disk() + report.lost);
+    stream.mutable_counts()->set_disk(disk - std::min(disk, report.found));
   }
   list_segments(folder, kept, stream);
   return report;
@@ -69,8 +78,9 @@ Result<RepairedCamera> repair_camera(const fs::path& folder, v1::CameraStream& s
 }  // namespace
 
 Result<RepairReport> repair_session(const fs::path& folder, const Observer& observer) {
-  EMBERLOCK_RETURN_IF_ERROR(observe(observer, 0, "salvaging"));
-  EMBERLOCK_ASSIGN_OR_RETURN(const SalvageReport salvaged, salvage(folder));
+  constexpr double kSalvaged = .2;  // of the work, where the recorder was killed
+  EMBERLOCK_ASSIGN_OR_RETURN(const SalvageReport salvaged, salvage(folder, part_of(observer, 0, kSalvaged)));
+  const Observer rest = part_of(observer, kSalvaged, 1);
   EMBERLOCK_ASSIGN_OR_RETURN(v1::Manifest manifest, read_manifest(folder));
   EMBERLOCK_ASSIGN_OR_RETURN(const EventLog lock,
                              EventLog::open(events_path(folder), EventLog::Mode::reopen));
@@ -80,10 +90,10 @@ Result<RepairReport> repair_session(const fs::path& folder, const Observer& obse
   const std::string before = manifest.SerializeAsString();
   for (int i = 0; i < manifest.cameras_size(); ++i) {
     v1::CameraStream& stream = *manifest.mutable_cameras(i);
-    EMBERLOCK_ASSIGN_OR_RETURN(
-        RepairedCamera camera,
-        repair_camera(folder, stream, part_of(observer, i / cameras, (i + 1) / cameras)));
+    EMBERLOCK_ASSIGN_OR_RETURN(RepairedCamera camera,
+                               repair_camera(folder, stream, part_of(rest, i / cameras, (i + 1) / cameras)));
     camera.lost += salvaged.cameras.at(static_cast<std::size_t>(i)).lost;
+    camera.found += salvaged.cameras.at(static_cast<std::size_t>(i)).found;
     report.cameras.push_back(std::move(camera));
   }
   const bool mended = manifest.SerializeAsString() != before;
@@ -96,4 +106,4 @@ Result<RepairReport> repair_session(const fs::path& folder, const Observer& obse
   return report;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

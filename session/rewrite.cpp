@@ -1,10 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/rewrite.h"
 
 #include <string>
 #include <system_error>
 #include <utility>
 
-namespace emberlock {
+#include "base/file.h"
+
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
@@ -17,9 +20,10 @@ Status write_frames(CameraReader& reader, const SegmentRewrite& what, const fs::
     EMBERLOCK_RETURN_IF_ERROR(
         observe(observer, static_cast<double>(i) / count, "writing " + target.string()));
     EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame, reader.read(what.frames[i]));
-    EMBERLOCK_RETURN_IF_ERROR(writer->write(*frame.image, reader.records()[what.frames[i]].segment_ms));
+    EMBERLOCK_RETURN_IF_ERROR(writer->write(*frame.image, reader.records()[what.frames[i]]));
   }
-  return writer->close();
+  EMBERLOCK_RETURN_IF_ERROR(writer->close());
+  return writer->sync();
 }
 
 }  // namespace
@@ -57,7 +61,7 @@ Status rewrite_segment(CameraReader& reader, const SegmentRewrite& what, const f
   }
   fs::rename(partial, target, ec);
   if (ec) return Error{ErrorKind::io, "cannot rename into place: " + ec.message(), target.string()};
-  return {};
+  return sync_folder(target.parent_path());  // before what it was made from may go
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

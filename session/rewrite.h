@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -8,7 +9,7 @@
 #include "session/camera_reader.h"
 #include "session/writer.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// Frames of one segment that are to lie in a file of their own.
 struct SegmentRewrite {
@@ -27,4 +28,4 @@ Status rewrite_segment(CameraReader& reader, const SegmentRewrite& what, const s
 Status read_back(const std::filesystem::path& path, const ImageLayout& layout,
                  std::span<const IndexRecord> records, const Observer& observer);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

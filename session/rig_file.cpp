@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/rig_file.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include "session/json_message.h"
 #include "session/name.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 constexpr std::size_t kMaxRigBytes = std::size_t{64} << 20;
@@ -86,4 +87,4 @@ Status write_rig(const std::filesystem::path& path, const v1::Rig& rig) {
   return write_file_atomically(path, json);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -8,7 +9,7 @@
 #include "emberlock/v1/rig.pb.h"
 
 // rig.json: what calibration knows of a rig's cameras, apart from any recording.
-namespace emberlock {
+namespace emberlock::session {
 
 inline constexpr std::uint32_t kRigFormatVersion = 1;
 
@@ -23,4 +24,4 @@ Result<std::string> rig_json(const v1::Rig& rig);
 /// Checks, then writes atomically.
 Status write_rig(const std::filesystem::path& path, const v1::Rig& rig);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,28 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/salvage.h"
 
 #include <algorithm>
 #include <cerrno>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <mutex>
+#include <optional>
+#include <set>
 #include <system_error>
 #include <utility>
 
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/in_parallel.h"
 #include "session/camera_reader.h"
 #include "session/events.h"
 #include "session/files.h"
 #include "session/layout.h"
+#include "session/unindexed.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
-
-/// How many of the last segment's frames, counted from its first, decode to what was recorded.
-std::size_t count_decodable(CameraReader& reader, std::size_t first, std::size_t end) {
-  std::size_t i = first;
-  while (i < end && reader.read(i).ok()) ++i;
-  return i - first;
-}
 
 /// The index's records as far as each stands for itself, even behind a damaged header.
 Result<ParsedIndex> read_what_is_left(const fs::path& path) {
@@ -35,17 +37,59 @@ Result<ParsedIndex> read_what_is_left(const fs::path& path) {
   return index;
 }
 
-/// A recorder that was killed leaves a last segment of which the end is missing: how many of its frames are
-/// lost.
-std::uint64_t cut_last_segment(CameraReader& reader, std::vector<IndexRecord>& records) {
-  if (records.empty()) return 0;
-  const auto last = std::find_if(records.rbegin(), records.rend(),
-                                 [&](const IndexRecord& r) { return r.segment != records.back().segment; });
-  const auto first = static_cast<std::size_t>(records.rend() - last);
-  const std::size_t kept = first + count_decodable(reader, first, records.size());
-  const std::uint64_t lost = records.size() - kept;
-  records.resize(kept);
-  return lost;
+std::pair<std::uint32_t, std::uint32_t> place(const IndexRecord& record) {
+  return {record.segment, record.frame_in_segment};
+}
+
+/// The segments of a killed recording that may have holes or lack their ends. While one sync went from the
+/// data to the index, more frames came into both, and perhaps a segment was ended and the next begun: so the
+/// last two, and every other that is shorter than the index says.
+std::set<std::uint32_t> segments_in_doubt(const fs::path& folder, const std::string& camera_id,
+                                          const std::vector<IndexRecord>& all) {
+  std::set<std::uint32_t> doubted;
+  std::size_t segments = 0;
+  for (auto last = all.rbegin(); last != all.rend(); ++last) {
+    if (last != all.rbegin() && std::prev(last)->segment == last->segment) continue;
+    std::error_code ec;
+    const auto bytes = fs::file_size(find_segment(folder, camera_id, last->segment), ec);
+    if (++segments <= 2 || ec || bytes <= last->file_offset) doubted.insert(last->segment);
+  }
+  return doubted;
+}
+
+/// Which of a recording's frames lie whole on the disk. What stands in the index does, but for the segments
+/// in doubt, and of frames that only the segments tell of nobody knows.
+Result<std::vector<IndexRecord>> keep_whole(const fs::path& folder, const v1::CameraStream& stream,
+                                            v1::Manifest::State state, const std::vector<IndexRecord>& index,
+                                            const std::vector<IndexRecord>& found, const Observer& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(stream));
+  const std::vector<IndexRecord> all = merged(index, found);
+  CameraReader reader(folder, stream.camera_id(), layout, all);
+  std::set<std::uint32_t> doubted;
+  if (state == v1::Manifest::RECORDING) doubted = segments_in_doubt(folder, stream.camera_id(), all);
+  std::vector<IndexRecord> kept;
+  std::optional<std::size_t> last_checked;  // of those kept: not decoded
+  auto next_found = found.begin();
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    EMBERLOCK_RETURN_IF_ERROR(
+        observe(observer, static_cast<double>(i) / static_cast<double>(all.size()), "salvaging"));
+    // One that contradicts its neighbours isn't among them all.
+    while (next_found != found.end() && place(*next_found) < place(all[i])) ++next_found;
+    const bool is_new = next_found != found.end() && all[i] == *next_found;
+    if (!is_new && !doubted.contains(all[i].segment)) {
+      kept.push_back(all[i]);
+    } else if (reader.check(i).ok() || reader.read(i).ok()) {
+      kept.push_back(all[i]);
+      last_checked = i;
+    }
+  }
+  // The one that was written last stands for all that the checksums say.
+  while (last_checked && !kept.empty() && kept.back() == all[*last_checked] &&
+         !reader.read(*last_checked).ok()) {
+    kept.pop_back();
+    last_checked = *last_checked > 0 ? std::optional(*last_checked - 1) : std::nullopt;
+  }
+  return kept;
 }
 
 /// What the manifest says of the frames' whereabouts, when `kept` of them stay and `lost` go.
@@ -67,31 +111,65 @@ v1::Counts counts_of(const v1::Counts& before, v1::Manifest::State state,
   return counts;
 }
 
-Result<SalvagedCamera> salvage_camera(const fs::path& folder, v1::Manifest::State state,
-                                      v1::CameraStream& stream) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(stream));
+/// One camera as salvage leaves it.
+struct SalvagedStream {
+  SalvagedCamera report;
+  v1::CameraStream stream;
+  std::vector<IndexRecord> records;
+};
+
+/// Finds out what is left; changes nothing.
+Result<SalvagedStream> examine_camera(const fs::path& folder, v1::Manifest::State state,
+                                      const v1::CameraStream& stream, const Observer& observer) {
   ParsedIndex index;
   std::error_code ec;
   const fs::path path = index_path(folder, stream.camera_id());
   if (fs::exists(path, ec)) {  // else killed before this camera's turn came
     EMBERLOCK_ASSIGN_OR_RETURN(index, read_what_is_left(path));
   }
-  std::vector<IndexRecord> records = index.records;
-  SalvagedCamera report{stream.camera_id()};
-  report.lost = index.bad_records;
-  if (state == v1::Manifest::RECORDING) {
-    CameraReader reader(folder, stream.camera_id(), layout, records);
-    report.lost += cut_last_segment(reader, records);
-  } else {
-    const std::uint64_t before = stream.counts().recorded();
-    report.lost = before - std::min<std::uint64_t>(before, records.size());
-  }
+  const bool recording = state == v1::Manifest::RECORDING;
+  const Search search = recording && index.bad_records == 0 ? Search::behind_the_index : Search::everywhere;
+  const std::vector<IndexRecord> found = unindexed_frames(folder, stream.camera_id(), index.records, search);
+  SalvagedStream left{{stream.camera_id()}, stream, {}};
+  EMBERLOCK_ASSIGN_OR_RETURN(left.records, keep_whole(folder, stream, state, index.records, found, observer));
+  const std::vector<IndexRecord>& records = left.records;
+  left.report.found =
+      static_cast<std::uint64_t>(std::count_if(found.begin(), found.end(), [&](const IndexRecord& record) {
+        return std::binary_search(records.begin(), records.end(), record, follows);
+      }));
+  // Bad records are of frames that the segments told of again, or of none that is known.
+  const std::uint64_t known =
+      recording ? index.records.size() + std::max<std::uint64_t>(index.bad_records, found.size())
+                : std::max<std::uint64_t>(stream.counts().recorded(), records.size());
+  left.report.lost = known - std::min<std::uint64_t>(known, records.size());
+  left.report.kept = records.size();
+  *left.stream.mutable_counts() = counts_of(stream.counts(), state, records, left.report.lost);
+  list_segments(folder, records, left.stream);
+  return left;
+}
+
+/// Where a killed recording's new index waits until the manifest tells of it.
+fs::path new_index_path(const fs::path& folder, const std::string& camera_id) {
+  fs::path path = index_path(folder, camera_id);
+  path += ".salvaged";
+  return path;
+}
+
+Status write_new_index(const fs::path& folder, const SalvagedStream& left) {
+  const fs::path path = new_index_path(folder, left.report.camera_id);
+  std::error_code ec;
   fs::create_directory(path.parent_path(), ec);
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(path, encode_index(records)));
-  report.kept = records.size();
-  *stream.mutable_counts() = counts_of(stream.counts(), state, records, report.lost);
-  list_segments(folder, records, stream);
-  return report;
+  return write_file_atomically(path, encode_index(left.records));
+}
+
+/// Nothing where there is none: it has been done before.
+Status install_new_index(const fs::path& folder, const std::string& camera_id) {
+  const fs::path path = new_index_path(folder, camera_id);
+  std::error_code ec;
+  if (!fs::exists(path, ec)) return {};
+  fs::rename(path, index_path(folder, camera_id), ec);
+  if (ec) return Error{ErrorKind::io, "cannot rename into place: " + ec.message(), path.string()};
+  return sync_folder(path.parent_path());
 }
 
 Status salvage_events(const fs::path& folder, SalvageReport& report) {
@@ -114,36 +192,57 @@ bool index_is_whole(const fs::path& folder, const v1::CameraStream& stream) {
 
 }  // namespace
 
-Result<SalvageReport> salvage(const fs::path& folder, const Progress& progress) {
+Result<SalvageReport> salvage(const fs::path& folder, const Observer& observer) {
+  EMBERLOCK_RETURN_IF_ERROR(observe(observer, 0, "salvaging"));
   EMBERLOCK_ASSIGN_OR_RETURN(v1::Manifest manifest, read_manifest(folder));
   std::error_code ec;
   const bool had_events = fs::exists(events_path(folder), ec);
   EMBERLOCK_ASSIGN_OR_RETURN(const EventLog lock,
                              EventLog::open(events_path(folder), EventLog::Mode::reopen));
   drop_reserve(folder);
+  const v1::Manifest::State state = manifest.state();
+  const bool killed = state == v1::Manifest::RECORDING;
   SalvageReport report;
-  report.changed = manifest.state() == v1::Manifest::RECORDING || !had_events;
+  report.changed = killed || !had_events;
   EMBERLOCK_RETURN_IF_ERROR(salvage_events(folder, report));
-  bool repaired = manifest.state() == v1::Manifest::RECORDING;
-  for (int i = 0; i < manifest.cameras_size(); ++i) {
-    v1::CameraStream& camera = *manifest.mutable_cameras(i);
-    emberlock::report(progress, static_cast<double>(i) / manifest.cameras_size(),
-                      "salvaging " + camera.camera_id());
-    if (manifest.state() != v1::Manifest::RECORDING && index_is_whole(folder, camera)) {
-      report.cameras.push_back({camera.camera_id(), camera.counts().recorded(), 0});
-      continue;
+  const auto cameras = static_cast<std::size_t>(manifest.cameras_size());
+  report.cameras.resize(cameras);
+  std::mutex mutex;  // of the manifest and what was repaired
+  bool repaired = killed;
+  const auto salvage_camera = [&](std::size_t i, const Observer& seen) -> Status {
+    v1::CameraStream& of_manifest = *manifest.mutable_cameras(static_cast<int>(i));
+    const v1::CameraStream before = [&] {
+      const std::lock_guard guard(mutex);
+      return of_manifest;
+    }();
+    // Of a recording that was killed only an earlier salvage has written counts.
+    const bool was_here = killed && before.has_counts();
+    if (was_here) EMBERLOCK_RETURN_IF_ERROR(install_new_index(folder, before.camera_id()));
+    if ((was_here || !killed) && index_is_whole(folder, before)) {
+      report.cameras[i] = {before.camera_id(), before.counts().recorded(),
+                           killed ? before.counts().disk() : 0};
+      return {};
     }
-    EMBERLOCK_ASSIGN_OR_RETURN(SalvagedCamera salvaged, salvage_camera(folder, manifest.state(), camera));
-    report.cameras.push_back(std::move(salvaged));
-    repaired = true;
-  }
+    EMBERLOCK_ASSIGN_OR_RETURN(const SalvagedStream left, examine_camera(folder, state, before, seen));
+    report.cameras[i] = left.report;
+    EMBERLOCK_RETURN_IF_ERROR(write_new_index(folder, left));
+    {
+      const std::lock_guard guard(mutex);
+      of_manifest = left.stream;
+      repaired = true;
+      // A salvage that is cut short knows by it what was lost, which the new index doesn't tell.
+      if (killed) EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder, manifest));
+    }
+    return install_new_index(folder, left.report.camera_id);
+  };
+  EMBERLOCK_RETURN_IF_ERROR(in_parallel(cameras, observer, salvage_camera));
   if (repaired) {
     report.changed = true;
     manifest.set_state(v1::Manifest::SALVAGED);
     EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder, manifest));
   }
-  emberlock::report(progress, 1, "salvaged");
+  static_cast<void>(observe(observer, 1, "salvaged"));
   return report;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,10 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/segment.h"
 
 extern "C" {
+#include <libavutil/crc.h>
 #include <libavutil/opt.h>
 }
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -13,15 +17,18 @@ extern "C" {
 #include <unistd.h>
 
 #include "session/files.h"
+#include "session/index.h"
 #include "session/segment_pixels.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 constexpr AVRational kMilliseconds{1, 1000};
 constexpr int kClusterMilliseconds = 250;
 constexpr int kClusterBytes = 4 << 20;
 constexpr int kSmallestSliced = 16;
+/// Before a frame's record in its packet's side data: the id of Matroska's BlockAdditional, big-endian.
+constexpr std::array<std::uint8_t, 8> kAdditionalId{0, 0, 0, 0, 0, 0, 0, 1};
 
 AVCodecID codec_of(const ImageLayout& layout, Encoding encoding) {
   if (encoding == Encoding::ffv1) return AV_CODEC_ID_FFV1;
@@ -48,8 +55,12 @@ Result<std::unique_ptr<SegmentWriter>> SegmentWriter::create(const std::filesyst
 SegmentWriter::~SegmentWriter() = default;
 
 Error SegmentWriter::failure(int code, const char* action) const {
-  return {ErrorKind::io, std::string(action) + ": " + av_message(code), file_->path().string(),
-          "Check the disk's space and health"};
+  // libav's codes of the operating system's errors are theirs, negated.
+  errno = AVUNERROR(code);
+  return code == AVERROR(EROFS) || code == AVERROR(EIO)
+             ? errno_error(file_->path(), action)
+             : Error{ErrorKind::io, std::string(action) + ": " + av_message(code), file_->path().string(),
+                     "Check the disk's space and health"};
 }
 
 Status SegmentWriter::open(const std::filesystem::path& path, Hertz frame_rate) {
@@ -104,6 +115,10 @@ Status SegmentWriter::write_header(Hertz frame_rate) {
   if (encoding_ == Encoding::ffv1) {
     av_dict_set_int(&options, "cluster_time_limit", kClusterMilliseconds, 0);
     av_dict_set_int(&options, "cluster_size_limit", kClusterBytes, 0);
+  } else {
+    // Side data is of NUT's version 4, which libav takes for granted only with this.
+    format->strict_std_compliance = FF_COMPLIANCE_EXPERIMENTAL;
+    av_dict_set(&options, "syncpoints", "timestamped", 0);
   }
   code = avformat_write_header(format, &options);
   av_dict_free(&options);
@@ -116,41 +131,64 @@ Status SegmentWriter::write_header(Hertz frame_rate) {
 }
 
 /// What the encoder for raw video would hand on, less its copy: rows without gaps between them.
-Status SegmentWriter::put_uncompressed(const Image& image, std::uint32_t milliseconds) {
+Status SegmentWriter::put_uncompressed(const Image& image, const IndexRecord& record) {
   // The packet is only read.
   packet_->data = const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(image.bytes().data()));
   packet_->size = static_cast<int>(image.bytes().size());
-  packet_->pts = milliseconds;
-  packet_->dts = milliseconds;
-  return put_packet();
+  packet_->pts = record.segment_ms;
+  packet_->dts = record.segment_ms;
+  return put_packet(&record);
 }
 
-Status SegmentWriter::write(const Image& image, std::uint32_t milliseconds) {
-  if (uncompressed()) return put_uncompressed(image, milliseconds);
+Status SegmentWriter::encode_and_put(const Image& image, const IndexRecord& record) {
   if (const int code = av_frame_make_writable(frame_.get()); code < 0) return failure(code, "cannot encode");
   to_av(image, *frame_);
-  frame_->pts = milliseconds;
+  frame_->pts = record.segment_ms;
   if (const int code = avcodec_send_frame(encoder_.get(), frame_.get()); code < 0) {
     return failure(code, "cannot encode");
   }
-  return drain();
+  return drain(&record);
 }
 
-Status SegmentWriter::drain() {
+Status SegmentWriter::write(const Image& image, const IndexRecord& record) {
+  EMBERLOCK_RETURN_IF_ERROR(uncompressed() ? put_uncompressed(image, record) : encode_and_put(image, record));
+  waiting_ = true;
+  start_writeback();
+  return {};
+}
+
+/// The encoders keep no frame back, so what comes out is what `record` is of.
+Status SegmentWriter::drain(const IndexRecord* record) {
   for (;;) {
     const int code = avcodec_receive_packet(encoder_.get(), packet_.get());
     if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return {};
     if (code < 0) return failure(code, "cannot encode");
-    EMBERLOCK_RETURN_IF_ERROR(put_packet());
+    EMBERLOCK_RETURN_IF_ERROR(put_packet(record));
   }
 }
 
-Status SegmentWriter::put_packet() {
+Status SegmentWriter::put_packet(const IndexRecord* record) {
   packet_->stream_index = 0;
   packet_->flags |= AV_PKT_FLAG_KEY;
+  if (record != nullptr) {
+    std::uint8_t* const side = av_packet_new_side_data(packet_.get(), AV_PKT_DATA_MATROSKA_BLOCKADDITIONAL,
+                                                       kAdditionalId.size() + kIndexRecordBytes);
+    if (side == nullptr) return failure(AVERROR(ENOMEM), "cannot write");
+    const auto bytes = encode(*record);
+    std::copy(bytes.begin(), bytes.end(), std::copy(kAdditionalId.begin(), kAdditionalId.end(), side));
+  }
   av_packet_rescale_ts(packet_.get(), kMilliseconds, format_->streams[0]->time_base);
   int code = av_write_frame(format_.get(), packet_.get());
   av_packet_unref(packet_.get());
+  if (code >= 0) code = file_->io()->error;
+  if (code < 0) return failure(code, "cannot write");
+  return {};
+}
+
+Status SegmentWriter::flush() {
+  if (!std::exchange(waiting_, false)) return {};
+  int code = av_write_frame(format_.get(), nullptr);  // ends Matroska's cluster
+  avio_flush(file_->io());
   if (code >= 0) code = file_->io()->error;
   if (code < 0) return failure(code, "cannot write");
   start_writeback();
@@ -160,10 +198,10 @@ Status SegmentWriter::put_packet() {
 /// Left to itself the kernel keeps seconds of frames in memory, and flushing them when the segment is closed,
 /// of all cameras at once, would fill the queues.
 void SegmentWriter::start_writeback() {
-  constexpr std::uint64_t kStep = std::uint64_t{8} << 20;
+  constexpr std::uint64_t kStep = std::uint64_t{1} << 20;
   const std::uint64_t written = bytes();
   if (written - on_its_way_ < kStep) return;
-  // Where it isn't known how to, the flush at the end does it all.
+  // Where it isn't known how to, the next sync does it all.
   ::sync_file_range(file_->fd(), static_cast<off64_t>(on_its_way_),
                     static_cast<off64_t>(written - on_its_way_), SYNC_FILE_RANGE_WRITE);
   on_its_way_ = written;
@@ -171,12 +209,16 @@ void SegmentWriter::start_writeback() {
 
 Status SegmentWriter::close() {
   avcodec_send_frame(encoder_.get(), nullptr);
-  EMBERLOCK_RETURN_IF_ERROR(drain());
+  EMBERLOCK_RETURN_IF_ERROR(drain(nullptr));
   int code = av_write_trailer(format_.get());
   avio_flush(file_->io());
   if (code >= 0) code = file_->io()->error;
   format_.reset();
   if (code < 0) return failure(code, "cannot finish the segment");
+  return {};
+}
+
+Status SegmentWriter::sync() {
   if (::fdatasync(file_->fd()) != 0) return errno_error(file_->path(), "cannot flush");
   return {};
 }
@@ -184,6 +226,24 @@ Status SegmentWriter::close() {
 bool SegmentWriter::uncompressed() const { return codec_of(layout_, encoding_) == AV_CODEC_ID_RAWVIDEO; }
 
 std::uint64_t SegmentWriter::bytes() const { return static_cast<std::uint64_t>(avio_tell(file_->io())); }
+
+std::vector<IndexRecord> records_in(const std::filesystem::path& segment) {
+  std::vector<IndexRecord> records;
+  const auto input = open_av_input(segment, Checking::lenient);
+  if (!input) return records;
+  const AvPtr<AVPacket> packet(av_packet_alloc());
+  for (; av_read_frame(input->format.get(), packet.get()) >= 0; av_packet_unref(packet.get())) {
+    if (packet->stream_index != input->stream) continue;
+    std::size_t size = 0;
+    const std::uint8_t* const side =
+        av_packet_get_side_data(packet.get(), AV_PKT_DATA_MATROSKA_BLOCKADDITIONAL, &size);
+    // libav's NUT puts another id before it: the record is what stands last.
+    if (side == nullptr || size < kIndexRecordBytes) continue;
+    const char* const at = reinterpret_cast<const char*>(side) + (size - kIndexRecordBytes);
+    if (const auto record = decode_record({at, kIndexRecordBytes})) records.push_back(*record);
+  }
+  return records;
+}
 
 SegmentReader::SegmentReader(std::filesystem::path path, ImageLayout layout, AvInput input)
     : path_(std::move(path)),
@@ -217,25 +277,36 @@ bool SegmentReader::seek(std::uint32_t milliseconds) {
 }
 
 Result<Image> SegmentReader::read(std::uint32_t milliseconds) {
+  return at<Image>(milliseconds, [this] { return decode(); });
+}
+
+Status SegmentReader::check(std::uint32_t milliseconds, std::uint64_t hash) {
+  if (input_.format->streams[input_.stream]->codecpar->codec_id == AV_CODEC_ID_FFV1)
+    return at<void>(milliseconds, [this] { return check_slices(); });
+  EMBERLOCK_ASSIGN_OR_RETURN(const Image image, read(milliseconds));
+  if (pixel_hash(image.bytes()) != hash) return damaged("the pixels aren't those that were recorded");
+  return {};
+}
+
+template <class T>
+Result<T> SegmentReader::at(std::uint32_t milliseconds, const std::function<Result<T>()>& take) {
   constexpr std::uint32_t kNear = 200;  // reading on beats seeking
   const std::int64_t target = ticks(milliseconds);
   const bool ahead = position_ >= 0 && target >= position_ && target - position_ <= ticks(kNear);
   if (ahead || seek(milliseconds)) {
-    auto image = scan_to(milliseconds, From::here);
-    if (image || target >= beyond_) return image;
+    Result<T> found = scan_to(milliseconds, From::here, take);
+    if (found || target >= beyond_) return found;
   }
-  return scan_from_start(milliseconds);
-}
-
-/// A damaged seek table must not cost a good frame.
-Result<Image> SegmentReader::scan_from_start(std::uint32_t milliseconds) {
+  // A damaged seek table must not cost a good frame.
   EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(path_, Checking::strict));
   input_.format.reset();  // before its file
   input_ = std::move(fresh);
-  return scan_to(milliseconds, From::start);
+  return scan_to(milliseconds, From::start, take);
 }
 
-Result<Image> SegmentReader::scan_to(std::uint32_t milliseconds, From from) {
+template <class T>
+Result<T> SegmentReader::scan_to(std::uint32_t milliseconds, From from,
+                                 const std::function<Result<T>()>& take) {
   const std::int64_t target = ticks(milliseconds);
   position_ = -1;
   for (;;) {
@@ -247,10 +318,30 @@ Result<Image> SegmentReader::scan_to(std::uint32_t milliseconds, From from) {
     }
     if (packet_->stream_index != input_.stream || packet_->pts < target) continue;
     if (packet_->pts > target) return damaged("the frame isn't in the segment, which is damaged");
-    auto image = decode();
-    if (image) position_ = target + 1;
-    return image;
+    Result<T> taken = take();
+    if (taken) position_ = target + 1;
+    return taken;
   }
+}
+
+/// A frame of FFV1 version 3 is a chain of slices, each ending in its length (24 bits), a byte of errors and
+/// a checksum (32 bits), over all of which together with the slice the CRC is 0: RFC 9043, 4.9. The chain is
+/// followed from its end.
+Status SegmentReader::check_slices() const {
+  constexpr int kFooter = 8;
+  const AVCRC* const table = av_crc_get_table(AV_CRC_32_IEEE);
+  int end = packet_->size;
+  while (end > 0) {
+    if (end < kFooter) return damaged("the frame's slices don't join");
+    const std::uint8_t* const footer = packet_->data + end - kFooter;
+    const int length = (footer[0] << 16 | footer[1] << 8 | footer[2]) + kFooter;
+    if (length > end) return damaged("the frame's slices don't join");
+    if (length == kFooter) return damaged("a slice is empty");  // of zeros the checksum would be right
+    end -= length;
+    if (av_crc(table, 0, packet_->data + end, static_cast<std::size_t>(length)) != 0)
+      return damaged("a slice's checksum is wrong");
+  }
+  return packet_->size > 0 ? Status() : damaged("the frame is empty");
 }
 
 Result<Image> SegmentReader::decode() {
@@ -269,4 +360,4 @@ Result<Image> SegmentReader::decode() {
   return image;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

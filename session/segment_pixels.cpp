@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/segment_pixels.h"
 
 #include <array>
@@ -5,7 +6,7 @@
 #include <cstdint>
 #include <cstring>
 
-namespace emberlock {
+namespace emberlock::session {
 
 AVPixelFormat coded_format(const ImageLayout& layout, Encoding encoding) {
   switch (layout.format) {
@@ -103,4 +104,4 @@ void from_av(const AVFrame& frame, Image& image) {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

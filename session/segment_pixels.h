@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 extern "C" {
@@ -8,7 +9,7 @@ extern "C" {
 #include "base/image.h"
 #include "session/writer.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// The libav format in which a layout is encoded. Grey and Bayer go as they are, 10 and 12 bits within 16
 /// (libav 59's FFV1 corrupts its own gray10). FFV1 takes 8-bit RGB as BGR0, which it codes as three planes,
@@ -20,4 +21,4 @@ AVPixelFormat coded_format(const ImageLayout& layout, Encoding encoding);
 void to_av(const Image& image, AVFrame& frame);
 void from_av(const AVFrame& frame, Image& image);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/shutter_times.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include "base/file.h"
 #include "session/json_message.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
@@ -87,4 +88,4 @@ Result<std::optional<v1::ShutterTimes>> read_shutter_times(const SessionReader& 
   return ordered;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

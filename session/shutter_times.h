@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -9,7 +10,7 @@
 #include "session/reader.h"
 
 // times.json, the sidecar of a session whose frames' true instants are known finer than their stamps tell.
-namespace emberlock {
+namespace emberlock::session {
 
 std::filesystem::path shutter_times_path(const std::filesystem::path& folder);
 
@@ -26,4 +27,4 @@ Status write_shutter_times(const std::filesystem::path& folder, const v1::Shutte
 /// index.
 Result<std::optional<v1::ShutterTimes>> read_shutter_times(const SessionReader& session);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

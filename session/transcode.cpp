@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <string>
 #include <system_error>
 #include <utility>
@@ -10,7 +11,7 @@
 #include "session/rewrite.h"
 #include "session/salvage.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
@@ -71,4 +72,4 @@ Status transcode(const fs::path& folder, const Observer& observer) {
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/verify.h"
 
 #include <algorithm>
@@ -12,8 +13,9 @@
 #include "session/events.h"
 #include "session/files.h"
 #include "session/layout.h"
+#include "session/unindexed.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
@@ -88,6 +90,21 @@ Status check_frames(const fs::path& folder, CameraReader& reader, const std::str
   return {};
 }
 
+/// Frames that lie there, and of which the index doesn't tell.
+void check_unindexed(const fs::path& folder, const std::string& camera_id, const CameraReader& indexed,
+                     std::uint64_t lost_to_the_disk, CameraCheck& check) {
+  const Search search = check.missing > 0 ? Search::everywhere : Search::behind_the_index;
+  CameraReader reader(folder, camera_id, indexed.layout(),
+                      unindexed_frames(folder, camera_id, indexed.records(), search));
+  for (std::size_t i = 0; i < reader.records().size(); ++i)
+    if (reader.read(i).ok()) ++check.unindexed;
+  // What a failing disk had taken all the same is counted as lost to it.
+  if (check.unindexed <= lost_to_the_disk) return;
+  check.problems.push_back(fmt::format("{}: lacks {} frames that lie in the segments",
+                                       index_path(folder, camera_id).lexically_relative(folder).string(),
+                                       check.unindexed));
+}
+
 Result<CameraCheck> check_camera(const fs::path& folder, const v1::Manifest& manifest,
                                  const v1::CameraStream& stream, const Observer& observer) {
   EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(stream));
@@ -97,6 +114,9 @@ Result<CameraCheck> check_camera(const fs::path& folder, const v1::Manifest& man
   if (manifest.state() != v1::Manifest::RECORDING) check_segments(folder, records, stream, check);
   CameraReader reader(folder, stream.camera_id(), layout, std::move(records));
   EMBERLOCK_RETURN_IF_ERROR(check_frames(folder, reader, stream.camera_id(), check, observer));
+  if (manifest.state() != v1::Manifest::RECORDING)
+    check_unindexed(folder, stream.camera_id(), reader, stream.counts().disk(), check);
+  if (check.good == 0) check.problems.push_back(stream.camera_id() + ": not one frame of it can be read");
   return check;
 }
 
@@ -111,6 +131,13 @@ void check_events(const fs::path& folder, SessionCheck& check) {
   if (events.valid_bytes != bytes->size()) {
     check.problems.push_back("events.binpb: damaged from byte " + std::to_string(events.valid_bytes));
   }
+}
+
+/// Not even what could be repaired.
+bool holds_nothing(const SessionCheck& check) {
+  return std::all_of(check.cameras.begin(), check.cameras.end(), [](const CameraCheck& c) {
+    return c.good == 0 && c.unindexed == 0 && c.bad == 0 && c.missing == 0;
+  });
 }
 
 }  // namespace
@@ -137,6 +164,8 @@ Result<SessionCheck> verify_session(const fs::path& folder, const Observer& obse
         "manifest.json: the recording isn't finished: its recorder still runs or was killed");
     check.to_do =
         "Wait for its recorder; if that was killed, `emberlock sessions repair` keeps what reached the disk";
+  } else if (holds_nothing(check)) {
+    check.to_do = "Nothing was recorded, or nothing of it is left: record again";
   } else if (!check.whole()) {
     check.to_do = "Restore the named files from a copy, or let `emberlock sessions repair` keep what is good";
   }
@@ -144,4 +173,4 @@ Result<SessionCheck> verify_session(const fs::path& folder, const Observer& obse
   return check;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,30 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/writer.h"
 
 #include <filesystem>
 #include <system_error>
 #include <utility>
 
+#include "base/file.h"
+#include "base/output_folder.h"
 #include "session/camera_writer.h"
 #include "session/events.h"
 #include "session/files.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-Status create_folder(const fs::path& folder) {
-  std::error_code ec;
-  if (fs::exists(folder, ec) && !(fs::is_directory(folder, ec) && fs::is_empty(folder, ec))) {
-    return Error{ErrorKind::bad_input, "exists already and is not an empty folder", folder.string(),
-                 "Name a new folder for the session"};
-  }
-  fs::create_directories(folder, ec);
-  if (ec) {
-    return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), folder.string(),
-                 "Check that its parent is writable"};
-  }
-  return {};
+/// From the root, without a slash at its end: the folder that it stands in is its parent_path().
+fs::path full_path(const fs::path& folder) {
+  fs::path path = fs::absolute(folder);
+  return path.has_filename() ? path : path.parent_path();
 }
+
+/// The folder of a session that is being begun; taken away again unless it is kept. Of what it holds only
+/// from ours() on, which another recorder of the same folder doesn't reach.
+class NewFolder {
+ public:
+  explicit NewFolder(fs::path path) : path_(std::move(path)) {}
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+  ~NewFolder() {
+    if (kept_) return;
+    std::error_code ec;
+    if (ours_) {
+      for (const auto& entry : fs::directory_iterator(path_, ec)) fs::remove_all(entry.path(), ec);
+    }
+    // Of the folders around it those that hold something by now stay.
+    for (const fs::path& folder : made_) fs::remove(folder, ec);
+  }
+  Status create() {
+    EMBERLOCK_RETURN_IF_ERROR(check_new_folder(path_));
+    std::error_code ec;
+    kept_ = false;
+    for (fs::path folder = path_; !fs::exists(folder, ec) && folder.has_relative_path();
+         folder = folder.parent_path())
+      made_.push_back(folder);
+    fs::create_directories(path_, ec);
+    if (ec)
+      return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), path_.string(),
+                   "Check that its parent is writable"};
+    for (const fs::path& folder : made_) EMBERLOCK_RETURN_IF_ERROR(sync_folder(folder.parent_path()));
+    return {};
+  }
+  void ours() { ours_ = true; }
+  void keep() { kept_ = true; }
+
+ private:
+  fs::path path_;
+  bool ours_ = false;
+  std::vector<fs::path> made_;  ///< the innermost first
+  bool kept_ = true;            ///< nothing of it is ours before create()
+};
 
 Status check_options(const WriterOptions& options) {
   if (options.frames_per_segment >= 1 && options.bytes_per_segment >= 1) return {};
@@ -40,8 +75,9 @@ SessionWriter::SessionWriter(SessionWriter&&) noexcept = default;
 SessionWriter& SessionWriter::operator=(SessionWriter&&) noexcept = default;
 SessionWriter::~SessionWriter() = default;
 
-Result<SessionWriter> SessionWriter::create(const fs::path& folder, v1::Manifest manifest,
+Result<SessionWriter> SessionWriter::create(const fs::path& where, v1::Manifest manifest,
                                             WriterOptions options) {
+  const fs::path folder = full_path(where);
   EMBERLOCK_RETURN_IF_ERROR(check_options(options));
   manifest.set_format_version(kSessionFormatVersion);
   manifest.set_state(v1::Manifest::RECORDING);
@@ -50,16 +86,20 @@ Result<SessionWriter> SessionWriter::create(const fs::path& folder, v1::Manifest
     camera.clear_counts();
   }
   EMBERLOCK_RETURN_IF_ERROR(check_manifest(manifest, manifest_path(folder).string()));
-  EMBERLOCK_RETURN_IF_ERROR(create_folder(folder));
+  NewFolder created(folder);
+  EMBERLOCK_RETURN_IF_ERROR(created.create());
   SessionWriter writer(folder, std::move(manifest));
+  // First of all: of several recorders that begin in one folder, one makes this file.
+  EMBERLOCK_ASSIGN_OR_RETURN(EventLog events, EventLog::open(events_path(folder), EventLog::Mode::create));
+  created.ours();
   EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder, writer.manifest_));
   EMBERLOCK_RETURN_IF_ERROR(keep_reserve(folder));
-  EMBERLOCK_ASSIGN_OR_RETURN(EventLog events, EventLog::open(events_path(folder), EventLog::Mode::create));
   writer.events_ = std::make_unique<EventLog>(std::move(events));
   for (const v1::CameraStream& camera : writer.manifest_.cameras()) {
     EMBERLOCK_ASSIGN_OR_RETURN(auto lane, CameraWriter::create(folder, camera, options));
     writer.cameras_.push_back(std::move(lane));
   }
+  created.keep();
   return writer;
 }
 
@@ -70,6 +110,19 @@ Status SessionWriter::write(std::size_t camera, const Frame& frame) {
 void SessionWriter::count_lost(std::size_t camera, LossCause cause, std::uint64_t frames) {
   cameras_.at(camera)->count_lost(cause, frames);
 }
+
+Status SessionWriter::flush(std::size_t camera) { return cameras_.at(camera)->flush(); }
+
+Status SessionWriter::sync() {
+  Status first = events_->sync();
+  for (const auto& camera : cameras_) {
+    const Status synced = camera->sync();
+    if (first && !synced) first = synced;
+  }
+  return first;
+}
+
+std::uint64_t SessionWriter::safe(std::size_t camera) const { return cameras_.at(camera)->safe(); }
 
 WrittenSoFar SessionWriter::written(std::size_t camera) const { return cameras_.at(camera)->written(); }
 
@@ -93,4 +146,4 @@ Result<v1::Manifest> SessionWriter::finish() {
   return manifest_;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

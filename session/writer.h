@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "base/result.h"
 #include "emberlock/v1/session.pb.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 class CameraWriter;
 class EventLog;
@@ -57,14 +58,15 @@ class Arrivals {
 };
 
 struct WrittenSoFar {
-  std::uint64_t frames = 0;
+  std::uint64_t frames = 0;   ///< with the operating system: a killed recorder doesn't take them along
   std::uint64_t refused = 0;  ///< frames, by the disk
   std::uint64_t bytes = 0;    ///< handed to the disk, of segments and index
 };
 
-/// Writes a session's folder. Distinct cameras may be written from distinct threads at the same time; one
-/// camera, and append(), by one thread at a time. Destroyed without finish() it leaves what a killed recorder
-/// would leave: a session in state RECORDING, for `salvage`.
+/// Writes a session's folder. What is recorded is on the disk after finish(); before that what flush() and
+/// sync() put there, which AsyncWriter calls all the time. Distinct cameras may be written from distinct
+/// threads at the same time; one camera, and append(), by one thread at a time. Destroyed without finish() it
+/// leaves what a killed recorder would leave: a session in state RECORDING, for `salvage`.
 class SessionWriter {
  public:
   /// Creates the folder (it must not exist, or be empty) with its manifest. Of `manifest` the caller fills
@@ -88,6 +90,15 @@ class SessionWriter {
   /// ids that never arrived were lost or left by the driver rather than lost by the camera; for `queue` and
   /// `disk` they arrived and were dropped.
   void count_lost(std::size_t camera, LossCause cause, std::uint64_t frames);
+  /// Hands what was written to the operating system; at the latest a quarter of a second of frames does that
+  /// by itself. Asked by the camera's thread. Errors as write(): what it cost is counted.
+  Status flush(std::size_t camera);
+  /// Has the disk hold what was flushed of all cameras, and the events. Any thread, beside all others: they
+  /// don't wait for it. An error is met by the cameras' next write too: frames that aren't safe then count as
+  /// lost to the disk.
+  Status sync();
+  /// Frames that a power cut can't take any more. Any thread.
+  [[nodiscard]] std::uint64_t safe(std::size_t camera) const;
   /// Asked by the camera's thread.
   [[nodiscard]] WrittenSoFar written(std::size_t camera) const;
   /// For whoever puts a queue before write(): what arrived before that queue, instead of what write() saw.
@@ -108,4 +119,4 @@ class SessionWriter {
   std::unique_ptr<EventLog> events_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::session

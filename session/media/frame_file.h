@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// What a video says of itself: claims, not measurements.
 struct VideoClaims {
@@ -47,4 +48,4 @@ class FrameFile {
 /// The only frame of an image file.
 Result<Image> read_image(const std::filesystem::path& path);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

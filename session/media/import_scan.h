@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// The files of one camera in a folder of foreign recordings.
 struct CameraFiles {
@@ -40,4 +41,4 @@ Result<FolderScan> scan_folder(const std::filesystem::path& folder, const Folder
 /// As people order names: runs of digits by their value.
 bool natural_less(std::string_view a, std::string_view b);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

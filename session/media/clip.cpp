@@ -1,8 +1,9 @@
-#include "session/clip.h"
+// SPDX-License-Identifier: Apache-2.0
+#include "session/media/clip.h"
 
 #include <utility>
 
-namespace emberlock {
+namespace emberlock::session {
 
 ClipReader::ClipReader(std::vector<ClipPart> parts, Colours colours)
     : parts_(std::move(parts)), colours_(colours) {}
@@ -49,4 +50,4 @@ Result<Image> ClipReader::next() {
   return image;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,4 +1,5 @@
-#include "session/video_scan.h"
+// SPDX-License-Identifier: Apache-2.0
+#include "session/media/video_scan.h"
 
 extern "C" {
 #include <libavutil/parseutils.h>
@@ -11,10 +12,10 @@ extern "C" {
 #include <fmt/format.h>
 
 #include "session/av.h"
-#include "session/frame_decoders.h"
-#include "session/frame_file.h"
+#include "session/media/frame_decoders.h"
+#include "session/media/frame_file.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 constexpr double kUneven = 0.1;          // of an interval
@@ -133,4 +134,4 @@ Result<VideoScan> scan_video(const std::filesystem::path& path) {
   return scan;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

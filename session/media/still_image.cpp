@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
@@ -8,9 +9,9 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
-#include "session/frame_decoders.h"
+#include "session/media/frame_decoders.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using Byte = unsigned char;
@@ -220,4 +221,4 @@ Result<Image> decode_still_image(std::string_view content, const std::string& wh
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

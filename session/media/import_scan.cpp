@@ -1,4 +1,5 @@
-#include "session/import_scan.h"
+// SPDX-License-Identifier: Apache-2.0
+#include "session/media/import_scan.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +10,7 @@
 
 #include "session/name.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
@@ -211,4 +212,4 @@ Result<FolderScan> scan_folder(const fs::path& folder, const FolderScanOptions& 
   return scan.finish();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

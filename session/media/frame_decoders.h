@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -6,10 +7,10 @@
 #include <string_view>
 
 #include "base/result.h"
-#include "session/frame_file.h"
+#include "session/media/frame_file.h"
 
 // What FrameFile chooses from by the first bytes of a file.
-namespace emberlock {
+namespace emberlock::session {
 
 /// PNM, PNG, JPEG or TIFF, by their magic numbers.
 bool is_still_image(std::string_view head);
@@ -29,4 +30,4 @@ Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path,
 /// A size that may be decoded: both sides within 1..kMaxImageSide.
 Status check_image_size(std::int64_t width, std::int64_t height, const std::string& where);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -8,10 +9,10 @@
 
 #include "base/image.h"
 #include "base/result.h"
-#include "session/frame_file.h"
-#include "session/video_scan.h"
+#include "session/media/frame_file.h"
+#include "session/media/video_scan.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// One file of a camera's film.
 struct ClipPart {
@@ -44,4 +45,4 @@ class ClipReader {
   std::unique_ptr<FrameFile> file_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,4 +1,5 @@
-#include "session/frame_file.h"
+// SPDX-License-Identifier: Apache-2.0
+#include "session/media/frame_file.h"
 
 #include <array>
 #include <cerrno>
@@ -11,10 +12,10 @@
 
 #include "base/file.h"
 #include "base/unique_fd.h"
-#include "session/frame_decoders.h"
 #include "session/layout.h"
+#include "session/media/frame_decoders.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 class ImageFile final : public FrameFile {
@@ -84,4 +85,4 @@ Result<Image> read_image(const std::filesystem::path& path) {
                path.string(), "Convert it, or name it where videos are taken"};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 extern "C" {
 #include <libavutil/pixdesc.h>
 #include <libswscale/swscale.h>
@@ -12,9 +13,9 @@ extern "C" {
 #include <vector>
 
 #include "session/av.h"
-#include "session/frame_decoders.h"
+#include "session/media/frame_decoders.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 static_assert(std::endian::native == std::endian::little,
@@ -292,4 +293,4 @@ Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path,
   return std::unique_ptr<FrameFile>(std::make_unique<VideoFile>(std::move(input), path.string(), colours));
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,9 +9,9 @@
 
 #include <fitsio.h>
 
-#include "session/frame_decoders.h"
+#include "session/media/frame_decoders.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 struct FitsClose {
@@ -126,4 +127,4 @@ Result<Image> decode_fits(std::string_view content, const std::string& where) {
   return image;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::session

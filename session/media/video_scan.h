@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::session {
 
 /// What a video file holds, told from its packets: nothing is decoded.
 struct VideoScan {
@@ -38,4 +39,4 @@ Result<VideoScan> scan_video(const std::filesystem::path& path);
 /// those before. Pure.
 std::optional<std::int64_t> first_irregular(const std::vector<std::int64_t>& ticks);
 
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "base/result.h"
 #include "base/sensor_kind.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// How a camera's shutter phase can be drawn anew.
 enum class ShutterReset {
@@ -93,4 +94,4 @@ class Camera {
   virtual Status trim_rate(PartsPerMillion trim) = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/camera_thread.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using Time = std::chrono::steady_clock::time_point;
@@ -57,7 +58,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   State state() const {
     const std::lock_guard lock(mutex_);
     if (hangs()) return State::quarantined;
-    if (!filming_) return State::idle;
+    if (!filming_) return over_ ? State::ended : State::idle;
     return lost_ ? State::lost : State::filming;
   }
 
@@ -115,6 +116,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       if (film != film_) return status;  // too late: nobody waits for it
       filming_ = status.ok();
       lost_ = false;
+      over_.reset();
       if (status) learn(camera.info());
       return status;
     });
@@ -134,6 +136,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     std::unique_lock lock(mutex_);
     filming_ = false;
     lost_ = false;
+    over_.reset();
     ++film_;
     orders_.clear();
     resets_to_do_ = 0;
@@ -168,7 +171,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     }
     if (hangs()) return hanging();
     if (!filming_) {
-      return Error{ErrorKind::device, "it does not film", where(), "start() it first"};
+      return over_.value_or(Error{ErrorKind::device, "it does not film", where(), "start() it first"});
     }
     if (lost_) {
       return away();
@@ -337,7 +340,10 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     if (next) return add(std::move(next), film);
     if (film != film_ || next.error().kind == ErrorKind::timed_out) return;
     if (next.error().kind == ErrorKind::device) return lose(next.error());
-    if (next.error().kind == ErrorKind::out_of_data) filming_ = false;
+    if (next.error().kind == ErrorKind::out_of_data) {
+      filming_ = false;
+      over_ = next.error();
+    }
     // The same trouble again and again is said once.
     if (waiting_.empty() || waiting_.back()) waiting_.push_back(std::move(next));
   }
@@ -394,6 +400,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   std::uint64_t film_ = 0;  ///< counts starts and stops: what was begun before one is nobody's any more
   bool filming_ = false;    ///< as the owner wants it
   bool lost_ = false;
+  std::optional<Error> over_;  ///< of a recording that has ended: what said so
   std::optional<Error> lost_by_;
   std::optional<CameraInfo> learnt_info_;
   Time lost_since_;
@@ -431,4 +438,4 @@ Status CameraThread::trim_rate(PartsPerMillion trim) {
   return worker_->call("trim_rate", [trim](Camera& camera) { return camera.trim_rate(trim); });
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

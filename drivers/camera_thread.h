@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -8,7 +9,7 @@
 
 #include "drivers/camera.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 struct CameraThreadOptions {
   std::size_t queue_frames = 64;      ///< frames that wait to be taken; beyond it the oldest is lost. >= 1
@@ -40,6 +41,7 @@ class CameraThread final : public Camera {
     filming,
     lost,         ///< it went away, and is being looked for
     quarantined,  ///< it hangs
+    ended,        ///< the recording that it replays is over: next_frame says out_of_data from now on
   };
 
   explicit CameraThread(std::unique_ptr<Camera> camera, CameraThreadOptions options = {});
@@ -65,4 +67,4 @@ class CameraThread final : public Camera {
   std::shared_ptr<Worker> worker_;  ///< shared with the thread, which may outlive this
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

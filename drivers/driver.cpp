@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/driver.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 std::string words(const CameraMode& mode) {
@@ -69,4 +70,4 @@ Result<CameraMode> choose_mode(std::span<const CameraMode> modes, const CameraRe
   });
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

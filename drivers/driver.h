@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <map>
@@ -15,7 +16,7 @@
 #include "drivers/holder.h"
 
 // What each camera driver offers beside `Camera`: to find what is there, and to open one of them.
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A way in which a camera can film.
 struct CameraMode {
@@ -66,4 +67,4 @@ struct CameraDriver {
   Result<std::unique_ptr<Camera>> (*open)(const std::string& id, const CameraRequest& request);
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

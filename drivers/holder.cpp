@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/holder.h"
 
 #include <fstream>
@@ -6,7 +7,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace fs = std::filesystem;
 namespace {
 
@@ -65,4 +66,4 @@ Error held_error(const fs::path& device, const std::string& where) {
           "close that program, then try again"};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

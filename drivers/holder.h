@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -6,7 +7,7 @@
 
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A process that has a device open.
 struct Holder {
@@ -23,4 +24,4 @@ std::optional<Holder> holder_of_socket(const std::string& inode);
 /// The error of a device that another process has, naming it where it can be.
 Error held_error(const std::filesystem::path& device, const std::string& where);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

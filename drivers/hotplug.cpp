@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/hotplug.h"
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 
 #include "base/clock.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 Error no_events(const std::string& action) {
@@ -66,4 +67,4 @@ std::optional<HotplugEvent> HotplugMonitor::next(Seconds deadline) {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -11,7 +12,7 @@
 struct udev;
 struct udev_monitor;
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 enum class Hotplug { came, went };
 
@@ -41,4 +42,4 @@ class HotplugMonitor {
   std::unique_ptr<udev_monitor, Release> monitor_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

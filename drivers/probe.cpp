@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/probe.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 /// The camera's own rate may be off by this, which alignment copes with: crystals are within 100 ppm.
@@ -194,15 +195,15 @@ Result<ProbeFilm> film_probe(Camera& camera, const ProbeOptions& options, Clock&
   ProbeFilm film{camera.info(), {}, {}, {}};
   const double filming = options.resets > 0 ? 0.7 : 1.0;
   Status ended = film_for(camera, options, clock, film, [&](double part) {
-    report(progress, std::clamp(filming * part, 0.0, filming), "filming");
+    tell(progress, std::clamp(filming * part, 0.0, filming), "filming");
   });
   if (ended.ok() && options.resets > 0) {
     ended = time_resets(camera, options.resets, clock, film, [&](int resets) {
-      report(progress, filming + (1 - filming) * resets / options.resets, "resetting its shutter");
+      tell(progress, filming + (1 - filming) * resets / options.resets, "resetting its shutter");
     });
   }
   camera.stop();
-  report(progress, 1, "done");
+  tell(progress, 1, "done");
   if (!ended && film.stamps.empty()) return ended.error();
   if (!ended) film.failed = ended.error();
   return film;
@@ -246,4 +247,4 @@ ProbeVerdict judge(const ProbeFilm& film, std::optional<double> link_megabits) {
   return verdict;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -9,7 +10,7 @@
 #include "drivers/camera.h"
 
 // Whether a camera is fit for its work: filmed for some seconds, and judged by what came.
-namespace emberlock {
+namespace emberlock::drivers {
 
 struct ProbeOptions {
   Seconds film{5};  ///< how long, >= 0.5
@@ -62,4 +63,4 @@ struct ProbeVerdict {
 /// Pure. `link_megabits` is what the camera's bus or network carries a second, where that is known.
 ProbeVerdict judge(const ProbeFilm& film, std::optional<double> link_megabits);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,12 +1,15 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "base/quantity.h"
 #include "base/result.h"
+#include "base/strobe_dial.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 enum class StrobeOutput { off, flashing, steady };
 
@@ -30,6 +33,9 @@ class Strobe {
   virtual Status apply(const StrobeSettings& settings) = 0;
   /// What the strobe itself says that it does, rounded to its own steps.
   virtual Result<StrobeSettings> read_back() = 0;
+  /// Of one that somebody sets by hand: what can be set. apply() then asks for it, and what was set is read
+  /// from frames.
+  [[nodiscard]] virtual std::optional<StrobeDial> dial() const { return std::nullopt; }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

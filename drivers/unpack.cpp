@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/unpack.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include "session/layout.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 /// What a packing is: significant bits, bits a pixel takes on the wire, and the smallest number of columns
@@ -186,8 +187,8 @@ Result<ImageLayout> layout_of(const PackedPixels& pixels) {
   const ImageSize size{pixels.size.width - 2 * x0, pixels.size.height - 2 * y0};
   const bool whole =
       pixels.size.width % kind.columns == 0 && (!is_bayer(kind.format) || pixels.size.height % 2 == 0);
-  if (size.width < 1 || size.height < 1 || pixels.size.width > kMaxImageSide ||
-      pixels.size.height > kMaxImageSide || !whole) {
+  if (size.width < 1 || size.height < 1 || pixels.size.width > session::kMaxImageSide ||
+      pixels.size.height > session::kMaxImageSide || !whole) {
     return Error{ErrorKind::bad_input,
                  "no picture of " + words(pixels.size) + " can be packed like that",
                  {},
@@ -222,4 +223,4 @@ Result<Image> unpack(const PackedPixels& pixels, std::span<const std::byte> byte
   return image;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

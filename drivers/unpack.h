@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -7,7 +8,7 @@
 #include "base/image.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// How devices lay out pixels that aren't compressed, by V4L2's and GenICam's PFNC's descriptions. Samples of
 /// more than 8 bits are little-endian in 16, right-aligned, but for the packed ones.
@@ -52,4 +53,4 @@ std::size_t row_bytes(const PackedPixels& pixels);
 /// `bytes` is too short for that.
 Result<Image> unpack(const PackedPixels& pixels, std::span<const std::byte> bytes, std::size_t stride);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

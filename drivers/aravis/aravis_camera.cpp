@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/aravis/aravis_camera.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include "base/log.h"
 #include "drivers/aravis/gvcp.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 namespace {
 
 /// Of kCallDeadline, what a call of the library may take; the rest is ours.
@@ -283,4 +284,4 @@ Status AravisCamera::trim_rate(PartsPerMillion /*trim*/) {
   return failure("its frame rate can't be trimmed", "choose a camera whose rate can be");
 }
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

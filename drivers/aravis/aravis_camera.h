@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -15,7 +16,7 @@
 #include "drivers/camera.h"
 #include "drivers/driver.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 
 /// A GigE Vision or USB3 Vision camera. What of the library may hang runs on a thread that is left behind
 /// when it does: the camera then says `device` until that call has returned, and the others film on.
@@ -83,4 +84,4 @@ class AravisCamera final : public Camera {
   std::deque<TimePoint> droughts_ended_;  ///< when a stream without a buffer got one, by the wall clock
 };
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/aravis/aravis_driver.h"
 
 #include <mutex>
@@ -9,7 +10,7 @@
 #include "drivers/aravis/link.h"
 #include "drivers/aravis/settings.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using namespace aravis;
@@ -105,4 +106,4 @@ Result<std::unique_ptr<Camera>> open(const std::string& id, const CameraRequest&
 
 CameraDriver aravis_driver() { return {"aravis", find, open}; }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

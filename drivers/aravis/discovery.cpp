@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/aravis/discovery.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 #include "drivers/aravis/gvcp.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 namespace {
 
 using Now = std::chrono::steady_clock;
@@ -155,4 +156,4 @@ Status inspect(const Seen& seen, const std::function<void(ArvCamera*)>& question
   return {};
 }
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

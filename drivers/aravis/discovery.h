@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -8,7 +9,7 @@
 #include "base/result.h"
 #include "drivers/aravis/library.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 
 enum class Transport { gige, usb3 };
 
@@ -40,4 +41,4 @@ Result<ObjectPtr<ArvCamera>> open_seen(const Seen& seen);
 /// Opens it for one question and closes it, while nobody else opens any. Thread-safe.
 Status inspect(const Seen& seen, const std::function<void(ArvCamera*)>& question);
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

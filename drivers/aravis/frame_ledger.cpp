@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/aravis/frame_ledger.h"
 
 #include <algorithm>
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 namespace {
 
 constexpr std::uint64_t kLast16 = 65535;
@@ -70,4 +71,4 @@ void FrameLedger::count(Fate fate, std::uint64_t frames) {
   }
 }
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

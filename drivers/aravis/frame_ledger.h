@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -6,7 +7,7 @@
 
 #include "drivers/camera.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 
 /// What became of a frame.
 enum class Fate { delivered, damaged, camera_gap, transport, resend, underrun, passed_over };
@@ -37,4 +38,4 @@ class FrameLedger {
   std::vector<Fate> unnumbered_;  ///< since last_id_
 };
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

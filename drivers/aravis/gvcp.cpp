@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/aravis/gvcp.h"
 
 #include <array>
@@ -18,7 +19,7 @@
 
 #include "base/unique_fd.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 namespace {
 
 constexpr std::uint16_t kPort = 3956;
@@ -170,4 +171,4 @@ std::optional<double> network_megabits(const std::string& interface_address) {
   return megabits;
 }
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,7 @@
 #include "drivers/holder.h"
 
 // What Aravis doesn't ask of a GigE Vision camera before it takes control of it, or of the network.
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 
 /// A bootstrap register (GigE Vision 2.0, chapter 28), read without control; none where the camera doesn't
 /// answer in time.
@@ -37,4 +38,4 @@ std::optional<int> network_mtu(const std::string& interface_address);
 /// Megabits a second that the interface with this address carries; none where it doesn't say.
 std::optional<double> network_megabits(const std::string& interface_address);
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

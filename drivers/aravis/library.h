@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <chrono>
@@ -14,7 +15,7 @@
 #include "base/result.h"
 
 // What of GLib and Aravis needs an owner, and calls that may hang.
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 
 struct Unref {
   void operator()(gpointer object) const { g_object_unref(object); }
@@ -71,4 +72,4 @@ bool done_within(const std::future<T>& answer, Seconds deadline) {
   return answer.wait_for(std::chrono::duration<double>(deadline.value())) == std::future_status::ready;
 }
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

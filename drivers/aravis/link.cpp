@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/aravis/link.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 #include "base/log.h"
 #include "drivers/aravis/pixel_format.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 namespace {
 
 constexpr std::uint64_t kNoId = ~std::uint64_t{0};  // never a frame's: GigE has 16 bits, or starts low
@@ -245,4 +246,4 @@ bool Link::starving() const {
   return waiting <= 0 && ARV_IS_GV_STREAM(stream_.get());  // USB3 takes all at once
 }
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -13,7 +14,7 @@
 #include "drivers/aravis/settings.h"
 #include "drivers/driver.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 
 /// What became of a buffer that Aravis gave back.
 enum class Arrival {
@@ -90,4 +91,4 @@ class Link {
   ObjectPtr<ArvStream> stream_;  ///< while it films; let go before the camera
 };
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

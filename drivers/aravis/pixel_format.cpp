@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/aravis/pixel_format.h"
 
 #include <array>
 #include <bit>
 #include <utility>
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 namespace {
 
 constexpr std::array<std::pair<std::string_view, PixelPacking>, 17> kPackings{{
@@ -71,4 +72,4 @@ bool lies_as_image(const PackedPixels& pixels) {
   }
 }
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/aravis/settings.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include "drivers/aravis/gvcp.h"
 #include "drivers/aravis/pixel_format.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 namespace {
 
 bool has(ArvCamera* camera, const char* feature) {
@@ -310,4 +311,4 @@ Result<Applied> apply(ArvCamera* camera, const CameraRequest& request, const std
   return applied;
 }
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

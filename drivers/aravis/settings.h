@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -9,7 +10,7 @@
 #include "drivers/unpack.h"
 
 // What a camera can, and how it is told what to do, by GenICam's standard names (SFNC).
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 
 /// A way in which the camera can film, and what it sends then.
 struct Offer {
@@ -45,4 +46,4 @@ inline constexpr const char* kPacketResend = "PacketResend";  ///< "always", "ne
 inline constexpr const char* kPacketDelayNs =
     "PacketDelayNs";  ///< between two packets, >= 0; GevSCPD is in ticks
 
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

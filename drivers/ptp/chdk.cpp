@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/chdk.h"
 
 #include <utility>
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 enum Command : std::uint32_t {
@@ -183,4 +184,4 @@ Status Chdk::press_movie_button() {
   return done.ok() ? Status() : done.error();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@
 // CHDK, the firmware add-on of Canon's compact cameras, as spoken over PTP: one operation, 0x9999, whose
 // first parameter says which command (CHDK, core/ptp.h). Other makers list 0x9999 too, for something else:
 // nothing here may be asked of a device whose USB vendor isn't Canon.
-namespace emberlock {
+namespace emberlock::drivers {
 
 inline constexpr std::uint16_t kCanonUsbVendor = 0x04a9;
 inline constexpr std::uint16_t kChdkOperation = 0x9999;
@@ -82,4 +83,4 @@ class Chdk {
   PtpSession* session_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

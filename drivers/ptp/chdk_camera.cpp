@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/chdk_camera.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr Seconds kPollPause = milliseconds(15);
@@ -331,4 +332,4 @@ Frame ChdkCamera::frame_of(const LiveView& view) {
   return {stamp, std::make_shared<const Image>(image_of(view, info_.layout.format))};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

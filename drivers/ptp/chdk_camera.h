@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -14,7 +15,7 @@
 #include "drivers/ptp/live_view.h"
 #include "drivers/ptp/power_command.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// Which action draws the phase of a camera's shutter anew: it differs by camera.
 enum class ChdkReset {
@@ -126,4 +127,4 @@ class ChdkCamera final : public Camera {
   int lost_in_a_row_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

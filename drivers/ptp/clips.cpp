@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/clips.h"
 
 #include <algorithm>
@@ -22,7 +23,7 @@ extern "C" {
 #include "base/log.h"
 #include "base/unique_fd.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace fs = std::filesystem;
 namespace {
 
@@ -189,7 +190,7 @@ Status Download::run(const Progress& progress) {
   }
   if (!by_parts && clip_.bytes > 0) EMBERLOCK_RETURN_IF_ERROR(whole());
   while (by_parts && done_ < clip_.bytes) {
-    report(progress, static_cast<double>(done_) / clip_.bytes, clip_.name);
+    tell(progress, static_cast<double>(done_) / clip_.bytes, clip_.name);
     EMBERLOCK_ASSIGN_OR_RETURN(const std::uint64_t came, next_part());
     if (came == 0) break;
   }
@@ -199,7 +200,7 @@ Status Download::run(const Progress& progress) {
                  session_.where(), "see whether it still films, then try again"};
   }
   if (::fsync(file_.get()) != 0) return io_error(part_, "it can't be written to the disk");
-  report(progress, 1, clip_.name);
+  tell(progress, 1, clip_.name);
   return {};
 }
 
@@ -282,4 +283,4 @@ Status verify_clip(const fs::path& target) {
   return Error{ErrorKind::bad_input, "it isn't what was downloaded", target.string(), "download it again"};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,7 @@
 #include "drivers/ptp/session.h"
 
 // Movies on a camera's card. Nothing here writes to the card or deletes from it.
-namespace emberlock {
+namespace emberlock::drivers {
 
 struct Clip {
   std::uint32_t handle = 0;  ///< until the camera is unplugged
@@ -40,4 +41,4 @@ Status download_clip(PtpSession& session, const Clip& clip, const std::filesyste
 /// Whether a downloaded clip still is what `target`.sha256 says. Errors: io; bad_input when it isn't.
 Status verify_clip(const std::filesystem::path& target);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

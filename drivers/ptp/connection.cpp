@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/connection.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include "base/clock.h"
 #include "drivers/ptp/chdk.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr Seconds kSearchDeadline{2};
@@ -110,4 +111,4 @@ Result<PtpConnection> connect_ptp(const std::string& id) {
   return Error{ErrorKind::device, "it isn't on the USB", "camera " + id, "plug it in and switch it on"};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

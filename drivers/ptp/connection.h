@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -9,7 +10,7 @@
 #include "drivers/ptp/session.h"
 #include "drivers/ptp/usb_transport.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A PTP device with its session open.
 struct PtpConnection {
@@ -39,4 +40,4 @@ Result<PtpConnection> connect_ptp(const std::string& id);
 /// Whether CHDK may be asked for: no other maker's 0x9999 means it.
 bool may_run_chdk(const PtpConnection& connection);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

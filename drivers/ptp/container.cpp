@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/container.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 Error malformed(std::string what) {
@@ -266,4 +267,4 @@ std::string ptp_operation_name(std::uint16_t code) {
   return name ? std::string(*name) : fmt::format("operation {:#06x}", code);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

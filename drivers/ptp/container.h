@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -11,7 +12,7 @@
 // What travels over PTP, as bytes: ISO 15740 and, for how it is wrapped on USB, PIMA 15740:2000 annex D.
 // Everything is little-endian. Whatever the bytes, parsing gives a value or the error that says where they
 // break the rules; errors are of kind `device`, as it is a device that sent them.
-namespace emberlock {
+namespace emberlock::drivers {
 
 enum class PtpType : std::uint16_t { command = 1, data = 2, response = 3, event = 4 };
 
@@ -107,4 +108,4 @@ std::string ptp_response_words(std::uint16_t code);
 /// An operation by name: "GetDeviceInfo".
 std::string ptp_operation_name(std::uint16_t code);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

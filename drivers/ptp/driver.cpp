@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/driver.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 #include "drivers/ptp/chdk_camera.h"
 #include "drivers/ptp/live_view.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr Seconds kLook = milliseconds(300);
@@ -94,4 +95,4 @@ Result<std::unique_ptr<Camera>> open(const std::string& id, const CameraRequest&
 
 CameraDriver ptp_driver() { return {"ptp", find, open}; }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

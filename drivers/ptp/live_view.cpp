@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/live_view.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include "drivers/ptp/container.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr std::int32_t kViewVersion = 2;
@@ -111,4 +112,4 @@ Image image_of(const LiveView& view, PixelFormat format) {
   return image;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -7,7 +8,7 @@
 #include "base/image.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// How CHDK's live view lays out pixels, full range BT.601.
 enum class LiveViewPacking {
@@ -31,4 +32,4 @@ Result<std::optional<LiveView>> parse_live_view(std::span<const std::byte> bytes
 /// gray8 takes the brightness as it was sent; rgb8 adds the colour.
 Image image_of(const LiveView& view, PixelFormat format);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/power_command.h"
 
 #include <chrono>
@@ -12,7 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 /// How long a command may go on that nobody waits for any more.
@@ -72,4 +73,4 @@ PowerCommand::State PowerCommand::state() {
   return state_;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

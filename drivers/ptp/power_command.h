@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -6,7 +7,7 @@
 
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A command line of the user's that switches a camera's power off and on, run by the shell. It is told which
 /// camera by the environment variable EMBERLOCK_CAMERA. Destroyed while it runs it is left to end by itself,
@@ -30,4 +31,4 @@ class PowerCommand {
   State state_ = State::running;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

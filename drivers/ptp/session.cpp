@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/session.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 enum Operation : std::uint16_t {
@@ -285,4 +286,4 @@ Result<std::uint64_t> PtpSession::partial_object(std::uint32_t handle, std::uint
   return came;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

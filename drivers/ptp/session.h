@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@
 #include "drivers/ptp/container.h"
 #include "drivers/ptp/transport.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// How long a device may take for an answer without much data.
 inline constexpr Seconds kPtpDeadline{1};
@@ -125,4 +126,4 @@ class PtpSession {
   std::optional<Exchange> exchange_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

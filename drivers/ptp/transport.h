@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -7,7 +8,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// How a piece that was received ends.
 enum class PtpPieceEnd {
@@ -40,4 +41,4 @@ class PtpTransport {
   virtual Status recover(std::uint32_t transaction) = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

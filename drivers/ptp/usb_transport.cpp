@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/ptp/usb_transport.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 #include "base/log.h"
 #include "drivers/holder.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr std::uint16_t kCanon = 0x04a9;
@@ -386,4 +387,4 @@ Result<std::unique_ptr<PtpTransport>> open_usb_ptp(const UsbPtpDevice& device) {
   return Error{ErrorKind::device, "it isn't there any more", device.path, "plug it in and switch it on"};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

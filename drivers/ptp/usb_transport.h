@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "base/result.h"
 #include "drivers/ptp/transport.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A device on the USB that has a PTP interface: of the still image class (06/01/01), or Canon's own.
 struct UsbPtpDevice {
@@ -31,4 +32,4 @@ Result<std::vector<UsbPtpDevice>> list_usb_ptp();
 /// or we may not open it.
 Result<std::unique_ptr<PtpTransport>> open_usb_ptp(const UsbPtpDevice& device);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/record.h"
 
 #include <cmath>
@@ -9,7 +10,7 @@
 #include "base/one_to_one.h"
 #include "session/layout.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr std::string_view kLate = "late frame: ";
@@ -37,7 +38,7 @@ v1::CameraStream to_proto(const CameraInfo& info) {
   v1::CameraStream stream;
   stream.set_camera_id(info.id);
   stream.set_model(info.model);
-  set_layout(stream, info.layout);
+  session::set_layout(stream, info.layout);
   stream.set_frame_rate_hz(info.frame_rate.value());
   stream.set_shutter_reset(kResets.second_of(info.reset).value_or(v1::CameraStream::NONE));
   stream.set_sensor(kSensors.second_of(info.sensor).value_or(v1::CameraStream::CCD));
@@ -52,7 +53,7 @@ v1::CameraStream to_proto(const CameraInfo& info) {
 
 Result<CameraInfo> camera_info(const v1::CameraStream& stream) {
   CameraInfo info;
-  EMBERLOCK_ASSIGN_OR_RETURN(info.layout, layout_of(stream));
+  EMBERLOCK_ASSIGN_OR_RETURN(info.layout, session::layout_of(stream));
   info.id = stream.camera_id();
   info.model = stream.model();
   info.frame_rate = Hertz(stream.frame_rate_hz());
@@ -131,4 +132,4 @@ Result<StrobeSettings> strobe_settings(const v1::StrobeState& state) {
   return s;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "session/reader.h"
 
 // How devices are written into a session, and read back from it.
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// The manifest's entry of a camera, ready for SessionWriter::create.
 v1::CameraStream to_proto(const CameraInfo& info);
@@ -39,4 +40,4 @@ std::optional<LateFrame> late_frame(const v1::Event& event);
 /// Errors: bad_input where a number isn't finite or the output unknown.
 Result<StrobeSettings> strobe_settings(const v1::StrobeState& state);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

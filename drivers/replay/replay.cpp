@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/replay.h"
 
 #include <algorithm>
@@ -6,10 +7,10 @@
 
 #include "drivers/replay/record.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
-TimePoint first_instant(const SessionReader& session) {
+TimePoint first_instant(const session::SessionReader& session) {
   TimePoint first{std::numeric_limits<std::int64_t>::max()};
   for (std::size_t c = 0; c < session.camera_count(); ++c) {
     if (!session.stamps(c).empty()) first = std::min(first, session.stamps(c).front().monotonic_time);
@@ -25,7 +26,7 @@ Error off_course(std::string what, std::string where) {
 
 }  // namespace
 
-ReplayClock::ReplayClock(const SessionReader& session) : latest_(first_instant(session)) {
+ReplayClock::ReplayClock(const session::SessionReader& session) : latest_(first_instant(session)) {
   for (const v1::Event& event : session.events()) {
     instants_.push_back({event.monotonic_ns()});
     done_.push_back(!event.has_strobe() && !event.has_reset() && !event.has_trim());
@@ -59,7 +60,7 @@ void ReplayClock::event_replayed(std::size_t event, After after) {
   while (next_ < done_.size() && done_[next_]) ++next_;
 }
 
-ReplayCamera::ReplayCamera(std::shared_ptr<SessionReader> session, std::size_t camera,
+ReplayCamera::ReplayCamera(std::shared_ptr<session::SessionReader> session, std::size_t camera,
                            std::shared_ptr<ReplayClock> clock)
     : session_(std::move(session)),
       camera_(camera),
@@ -141,7 +142,8 @@ Status ReplayCamera::trim_rate(PartsPerMillion trim) {
   return {};
 }
 
-ReplayStrobe::ReplayStrobe(std::shared_ptr<const SessionReader> session, std::shared_ptr<ReplayClock> clock)
+ReplayStrobe::ReplayStrobe(std::shared_ptr<const session::SessionReader> session,
+                           std::shared_ptr<ReplayClock> clock)
     : session_(std::move(session)), clock_(std::move(clock)) {}
 
 Result<std::size_t> ReplayStrobe::next_state() const {
@@ -170,9 +172,9 @@ Result<StrobeSettings> ReplayStrobe::read_back() {
 }
 
 Result<ReplayRig> ReplayRig::open(const std::filesystem::path& folder) {
-  EMBERLOCK_ASSIGN_OR_RETURN(SessionReader reader, SessionReader::open(folder));
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader reader, session::SessionReader::open(folder));
   ReplayRig rig;
-  rig.session = std::make_shared<SessionReader>(std::move(reader));
+  rig.session = std::make_shared<session::SessionReader>(std::move(reader));
   rig.clock = std::make_shared<ReplayClock>(*rig.session);
   for (std::size_t i = 0; i < rig.session->camera_count(); ++i) {
     rig.cameras.push_back(std::make_unique<ReplayCamera>(rig.session, i, rig.clock));
@@ -181,4 +183,4 @@ Result<ReplayRig> ReplayRig::open(const std::filesystem::path& folder) {
   return rig;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

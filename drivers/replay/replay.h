@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -29,14 +30,14 @@
 //   event before was done (a reset's before the call, a strobe state's after read_back). See ReplayClock.
 // Between the devices the order is free. A call that the recording doesn't show is an Error of kind device:
 // the replay has left the recorded course.
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// Answers with the instants that the live run got for its events, bit for bit: directly after a read_back
 /// that strobe state's own; otherwise that of the next strobe state, reset or trim to come; behind the last
 /// one the latest instant replayed. Sleeping is passing the time at once. Thread-safe.
 class ReplayClock final : public Clock {
  public:
-  explicit ReplayClock(const SessionReader& session);
+  explicit ReplayClock(const session::SessionReader& session);
   [[nodiscard]] TimePoint now() const override;
   void sleep_until(TimePoint t) override;
 
@@ -60,7 +61,7 @@ class ReplayClock final : public Clock {
 /// Error of kind bad_input that names file and frame; the call after goes on behind it.
 class ReplayCamera final : public Camera {
  public:
-  ReplayCamera(std::shared_ptr<SessionReader> session, std::size_t camera,
+  ReplayCamera(std::shared_ptr<session::SessionReader> session, std::size_t camera,
                std::shared_ptr<ReplayClock> clock);
   [[nodiscard]] const CameraInfo& info() const override { return info_; }
   /// Of what was replayed; what the live run lost stands in the session's manifest.
@@ -81,7 +82,7 @@ class ReplayCamera final : public Camera {
   /// Whether the next frame was waited for in vain, and still is.
   [[nodiscard]] bool late(Seconds deadline);
 
-  std::shared_ptr<SessionReader> session_;
+  std::shared_ptr<session::SessionReader> session_;
   std::size_t camera_;
   std::shared_ptr<ReplayClock> clock_;
   CameraInfo info_;
@@ -96,7 +97,7 @@ class ReplayCamera final : public Camera {
 /// The session's strobe.
 class ReplayStrobe final : public Strobe {
  public:
-  ReplayStrobe(std::shared_ptr<const SessionReader> session, std::shared_ptr<ReplayClock> clock);
+  ReplayStrobe(std::shared_ptr<const session::SessionReader> session, std::shared_ptr<ReplayClock> clock);
   [[nodiscard]] const std::string& id() const override { return id_; }
   /// Accepts what the next StrobeState can be the answer to: error device where its output is another one.
   Status apply(const StrobeSettings& settings) override;
@@ -106,7 +107,7 @@ class ReplayStrobe final : public Strobe {
   /// Where the next StrobeState stands among the events.
   [[nodiscard]] Result<std::size_t> next_state() const;
 
-  std::shared_ptr<const SessionReader> session_;
+  std::shared_ptr<const session::SessionReader> session_;
   std::shared_ptr<ReplayClock> clock_;
   std::string id_ = "replay";
   std::size_t next_event_ = 0;
@@ -116,10 +117,10 @@ class ReplayStrobe final : public Strobe {
 struct ReplayRig {
   static Result<ReplayRig> open(const std::filesystem::path& folder);
 
-  std::shared_ptr<SessionReader> session;
+  std::shared_ptr<session::SessionReader> session;
   std::shared_ptr<ReplayClock> clock;
   std::vector<std::unique_ptr<Camera>> cameras;  ///< in the manifest's order
   std::unique_ptr<Strobe> strobe;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

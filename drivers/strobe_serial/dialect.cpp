@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/strobe_serial/dialect.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 #include "drivers/strobe_serial/dialects.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 struct Entry {
@@ -165,4 +166,4 @@ void add_width_and_rate(std::vector<Command>& commands, Command width, Command r
 }
 
 }  // namespace strobe_serial
-}  // namespace emberlock
+}  // namespace emberlock::drivers

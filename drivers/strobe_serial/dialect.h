@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@
 
 // What is said to a strobe on a serial line and what its answers mean, without a port: settings to commands,
 // replies to settings or errors. Errors leave `where` to whoever knows the device.
-namespace emberlock {
+namespace emberlock::drivers {
 
 enum class StrobeDialect {
   emberlock,     ///< our own controller, PROTOCOL.md
@@ -107,4 +108,4 @@ class Dialect {
 Result<std::unique_ptr<const Dialect>> make_dialect(StrobeDialect dialect,
                                                     const DialectOptions& options = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -9,7 +10,7 @@
 #include "drivers/strobe_serial/dialect.h"
 
 // What the dialects share; private to drivers/strobe_serial.
-namespace emberlock::strobe_serial {
+namespace emberlock::drivers::strobe_serial {
 
 std::unique_ptr<const Dialect> make_controller(const DialectOptions& options);
 std::unique_ptr<const Dialect> make_scpi(const DialectOptions& options);
@@ -46,4 +47,4 @@ Result<std::string> identity(std::string_view reply);
 void add_width_and_rate(std::vector<Command>& commands, Command width, Command rate, const StrobeSettings& to,
                         const StrobeSettings& now);
 
-}  // namespace emberlock::strobe_serial
+}  // namespace emberlock::drivers::strobe_serial

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -8,7 +9,7 @@
 #include "drivers/strobe_serial/dialects.h"
 
 // Our own controller: PROTOCOL.md says every line.
-namespace emberlock::strobe_serial {
+namespace emberlock::drivers::strobe_serial {
 namespace {
 
 namespace wire = emberlock_controller;
@@ -201,4 +202,4 @@ std::unique_ptr<const Dialect> make_controller(const DialectOptions& options) {
   return std::make_unique<Controller>(options);
 }
 
-}  // namespace emberlock::strobe_serial
+}  // namespace emberlock::drivers::strobe_serial

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <map>
 
@@ -8,7 +9,7 @@
 // Gardasoft's RT and VTR lighting controllers (RT 20 user manual, section 12). Every command ends with the
 // prompt ">", an error comes before it. The flash follows the internal trigger by 10 us to 999 ms; the
 // shortest delay counts as phase 0.
-namespace emberlock::strobe_serial {
+namespace emberlock::drivers::strobe_serial {
 namespace {
 
 constexpr Seconds kShortestDelay = milliseconds(0.01), kLongestDelay = milliseconds(999);
@@ -173,4 +174,4 @@ std::unique_ptr<const Dialect> make_gardasoft(const DialectOptions& options) {
   return std::make_unique<Gardasoft>(options);
 }
 
-}  // namespace emberlock::strobe_serial
+}  // namespace emberlock::drivers::strobe_serial

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/strobe_serial/line.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include "drivers/strobe_serial/dialects.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr Seconds kReplyDeadline = milliseconds(400);  // instruments answer within 50 ms, at 9600 baud too
@@ -141,4 +142,4 @@ Result<std::string> Line::greet(TimePoint until) {
   return last;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "base/result.h"
 #include "drivers/strobe_serial/dialect.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// Bytes to and from a device: a serial port, or a simulation of a device. Errors: timed_out, device (it is
 /// gone: close the wire and find the device again).
@@ -59,4 +60,4 @@ class Line {
   bool in_step_ = false;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/strobe_serial/port.h"
 
 #include <algorithm>
@@ -15,7 +16,7 @@
 
 #include "drivers/holder.h"
 
-namespace emberlock::strobe_serial {
+namespace emberlock::drivers::strobe_serial {
 namespace {
 
 struct FreePort {
@@ -196,4 +197,4 @@ Result<std::unique_ptr<Wire>> open_port(const Port& port, int baud) {
   return std::unique_ptr<Wire>(std::move(wire));
 }
 
-}  // namespace emberlock::strobe_serial
+}  // namespace emberlock::drivers::strobe_serial

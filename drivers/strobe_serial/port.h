@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -8,7 +9,7 @@
 #include "drivers/strobe_serial/line.h"
 
 // Serial ports as the kernel lists them, through libserialport; private to drivers/strobe_serial.
-namespace emberlock::strobe_serial {
+namespace emberlock::drivers::strobe_serial {
 
 struct Port {
   std::string address;  ///< "/dev/ttyACM0"
@@ -30,4 +31,4 @@ Result<Port> find_port(const std::string& id);
 /// refused.
 Result<std::unique_ptr<Wire>> open_port(const Port& port, int baud);
 
-}  // namespace emberlock::strobe_serial
+}  // namespace emberlock::drivers::strobe_serial

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +11,7 @@
 // "&RF?" asks, both answer
 // "&rf24". Continuous strobe has whole Hertz, widths in thousandths of the period and no delay; &PD delays
 // flashes that something else triggers.
-namespace emberlock::strobe_serial {
+namespace emberlock::drivers::strobe_serial {
 namespace {
 
 constexpr double kDutySteps = 1000;
@@ -127,4 +128,4 @@ std::unique_ptr<const Dialect> make_schott(const DialectOptions& options) {
   return std::make_unique<Schott>(options);
 }
 
-}  // namespace emberlock::strobe_serial
+}  // namespace emberlock::drivers::strobe_serial

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -10,7 +11,7 @@
 
 // Pulse generators that trigger a strobe, by SCPI 1999 over IEEE 488.2. Commands are those that Keysight's
 // 33500 and 81100 and Rigol's DG share; levels and polarity stay as the front panel has them.
-namespace emberlock::strobe_serial {
+namespace emberlock::drivers::strobe_serial {
 namespace {
 
 constexpr Limits kScpiLimits{
@@ -131,4 +132,4 @@ std::unique_ptr<const Dialect> make_scpi(const DialectOptions& options) {
   return std::make_unique<Scpi>(options);
 }
 
-}  // namespace emberlock::strobe_serial
+}  // namespace emberlock::drivers::strobe_serial

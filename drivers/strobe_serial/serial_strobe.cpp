@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/strobe_serial/serial_strobe.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include "base/log.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr Seconds kCall(4);        // a code of 4096 flashes and its read back at 115200 baud take 1 s
@@ -131,4 +132,4 @@ Status SerialStrobe::apply(const StrobeSettings& to) {
   });
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -10,7 +11,7 @@
 #include "drivers/strobe_serial/dialect.h"
 #include "drivers/strobe_serial/line.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A strobe that listens to a dialect on a wire. A wire that dies is closed, and the next call opens it anew;
 /// what the device lost with its power it says itself (read_back), nothing is set again unasked. A call that
@@ -46,4 +47,4 @@ class SerialStrobe final : public Strobe {
   std::optional<Line> line_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

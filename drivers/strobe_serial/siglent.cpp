@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cctype>
 #include <map>
@@ -8,7 +9,7 @@
 
 // Siglent's SDG generators that know no SCPI tree (SDG programming guide, BSWV and OUTP). A pulse has no PHSE
 // there, but a delay in seconds. They report no errors and clip: what was taken is what reads back.
-namespace emberlock::strobe_serial {
+namespace emberlock::drivers::strobe_serial {
 namespace {
 
 constexpr Limits kSiglentLimits{
@@ -122,4 +123,4 @@ std::unique_ptr<const Dialect> make_siglent(const DialectOptions& options) {
   return std::make_unique<Siglent>(options);
 }
 
-}  // namespace emberlock::strobe_serial
+}  // namespace emberlock::drivers::strobe_serial

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/strobe_serial/strobe_serial.h"
 
 #include <fmt/format.h>
@@ -6,7 +7,7 @@
 #include "drivers/strobe_serial/port.h"
 #include "drivers/strobe_serial/serial_strobe.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr int kSlowestBaud = 300, kFastestBaud = 4000000;
@@ -67,4 +68,4 @@ Result<StrobeIdentity> identify_strobe(const std::string& id, std::optional<int>
   return last;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

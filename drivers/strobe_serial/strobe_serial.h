@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -11,7 +12,7 @@
 #include "drivers/strobe.h"
 #include "drivers/strobe_serial/dialect.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A serial port, which may lead to a strobe.
 struct StrobeFound {
@@ -46,4 +47,4 @@ struct StrobeIdentity {
 /// there, held), timed_out (nobody answers).
 Result<StrobeIdentity> identify_strobe(const std::string& id, std::optional<int> baud = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

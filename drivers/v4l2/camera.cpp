@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/camera.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include "drivers/v4l2/controls.h"
 #include "drivers/v4l2/nodes.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 /// Pictures that wait in the kernel while nobody takes them: half a second at 15 frames/s.
@@ -256,4 +257,4 @@ Error V4l2Camera::not_filming() const {
   return {ErrorKind::device, "it does not film", where(), "start() it first"};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

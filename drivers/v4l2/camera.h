@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <deque>
@@ -11,7 +12,7 @@
 #include "drivers/v4l2/jpeg.h"
 #include "drivers/v4l2/modes.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A camera behind V4L2, its buffers mapped from opening on, so that no other process takes it.
 class V4l2Camera final : public Camera {
@@ -64,4 +65,4 @@ class V4l2Camera final : public Camera {
   bool starved_ = false;                    ///< the kernel had no buffer when the frame before came
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

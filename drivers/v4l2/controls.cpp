@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/controls.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr std::size_t kMostControls = 1024;
@@ -137,4 +138,4 @@ Status set_exposure(const Ioctl& device, Seconds exposure, const std::string& wh
   return set_value(device, V4L2_CID_EXPOSURE_ABSOLUTE, ticks, false, "Exposure Time, Absolute", where);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

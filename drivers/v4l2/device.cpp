@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/device.h"
 
 #include <algorithm>
@@ -14,7 +15,7 @@
 
 #include "drivers/holder.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 v4l2_buffer mapped_buffer(std::uint32_t index) {
@@ -153,4 +154,4 @@ void V4l2Device::wait(Seconds deadline) {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

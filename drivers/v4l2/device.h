@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -13,7 +14,7 @@
 #include "base/unique_fd.h"
 #include "drivers/v4l2/modes.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// An opened device node, and the buffers that the kernel fills, once there are any.
 class V4l2Device {
@@ -79,4 +80,4 @@ class V4l2Device {
   std::vector<bool> ours_;  ///< which buffers the kernel doesn't have
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/frame_numbers.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 FrameNumbers::Number FrameNumbers::next(std::uint32_t sequence, TimePoint at) {
   std::uint64_t missing = 0;
@@ -28,4 +29,4 @@ FrameNumbers::Number FrameNumbers::next(std::uint32_t sequence, TimePoint at) {
   return {next_id_ - 1, missing};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -5,7 +6,7 @@
 #include "base/quantity.h"
 #include "base/time_point.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// Turns the sequence numbers of a stream, which begin anew at each start, into frame ids that never do, and
 /// tells how many frames are missing between two. A skip of the sequence is believed as far as time has
@@ -33,4 +34,4 @@ class FrameNumbers {
   std::uint64_t next_id_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

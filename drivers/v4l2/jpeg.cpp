@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/jpeg.h"
 
 #include <memory>
 
 #include <turbojpeg.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 DecodedJpeg decode_jpeg(std::span<const std::byte> bytes, ImageSize size) {
   DecodedJpeg decoded{Image(ImageLayout{size, PixelFormat::rgb8, 8}), FrameStatus::damaged};
@@ -27,4 +28,4 @@ DecodedJpeg decode_jpeg(std::span<const std::byte> bytes, ImageSize size) {
   return decoded;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

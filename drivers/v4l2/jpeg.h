@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -6,7 +7,7 @@
 #include "base/frame.h"
 #include "base/image.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 struct DecodedJpeg {
   Image image;  ///< rgb8
@@ -17,4 +18,4 @@ struct DecodedJpeg {
 /// one is grey or black.
 DecodedJpeg decode_jpeg(std::span<const std::byte> bytes, ImageSize size);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/modes.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 // Far more than devices have, so that one which counts without end is left in time.
@@ -233,4 +234,4 @@ v4l2_fract interval_for(const V4l2Mode& mode, std::optional<Hertz> wanted) {
   });
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@
 
 // The tables by which a V4L2 device says how it can film. Nothing in them is believed: a device may
 // contradict itself, repeat itself without end or name sizes of zero.
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// The kernel's ioctl on one device: 0, or errno.
 using Ioctl = std::function<int(unsigned long request, void* argument)>;
@@ -60,4 +61,4 @@ v4l2_fract interval_for(const V4l2Mode& mode, std::optional<Hertz> wanted);
 /// 1 / interval; 0 for what is none.
 Hertz rate_of(v4l2_fract interval);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/nodes.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 #include <system_error>
 #include <utility>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace fs = std::filesystem;
 namespace {
 
@@ -113,4 +114,4 @@ std::optional<VideoNode> find_video_node(std::span<const VideoNode> nodes, std::
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

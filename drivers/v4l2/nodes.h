@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -9,7 +10,7 @@
 
 // Which video devices there are, and who they are: read from sysfs alone, so that no device has to be opened
 // and none can hang.
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A device node of V4L2: a camera, or something else that has one.
 struct VideoNode {
@@ -32,4 +33,4 @@ std::optional<VideoNode> find_video_node(std::span<const VideoNode> nodes, std::
 /// one device may have several cameras ("vivid.0-vivid-003-vid-cap").
 std::string plugged_in_at(const std::filesystem::path& folder, const std::string& name, int index);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

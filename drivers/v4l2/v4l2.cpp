@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/v4l2/v4l2.h"
 
 #include <chrono>
@@ -19,7 +20,7 @@
 #include "drivers/v4l2/modes.h"
 #include "drivers/v4l2/nodes.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 /// What is known of a node without opening it.
@@ -99,4 +100,4 @@ Result<std::vector<CameraFound>> find() {
 
 CameraDriver v4l2_driver() { return {"v4l2", find, V4l2Camera::open}; }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/crystal.h"
 
 #include <cmath>
@@ -5,7 +6,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr int kWaves = 9;
@@ -42,4 +43,4 @@ Seconds Crystal::ahead(TimePoint at) const {
   return Seconds(ahead);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -6,7 +7,7 @@
 #include "base/quantity.h"
 #include "base/time_point.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A camera's crystal, whose rate wanders as its temperature goes: a sum of sinusoids an octave apart, from
 /// ten minutes to about two days, whose powers rise with the period as those of a random walk do. A closed
@@ -31,4 +32,4 @@ class Crystal {
   std::vector<Wave> waves_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <span>
@@ -5,7 +6,7 @@
 #include "base/quantity.h"
 #include "base/time_point.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// Something luminous that virtual cameras film: the seam by which a flame comes into the picture.
 /// Implementations are called from the threads of several cameras at once and give the same light for the
@@ -21,4 +22,4 @@ class LightField {
                             std::span<float> rgb) const = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

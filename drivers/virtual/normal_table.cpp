@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/normal_table.h"
 
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 /// The standard normal's quantile by bisection of its distribution function; 0 < p < 1.
@@ -33,4 +34,4 @@ const NormalTable& NormalTable::instance() {
   return table;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
 #include <cstdint>
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// Standard normal numbers for whole pictures, about four times as fast as Box and Muller: the sum of two
 /// quantiles from one table, divided by sqrt(2). Mean 0 and variance 1 exactly; tails reach 4.7 sigma.
@@ -25,4 +26,4 @@ class NormalTable {
   std::array<float, kSize> quantiles_{};  // of variance 1/2
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/options.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr int kMostCameras = 64;
@@ -61,9 +62,9 @@ std::optional<SensorKind> sensor_kind(std::string_view text) {
   return kSensorNames.first_of(text);
 }
 
-CcdTiming draw_timing(const VirtualRigDraw& draw, RandomStream& random) {
+smear::CcdTiming draw_timing(const VirtualRigDraw& draw, RandomStream& random) {
   const double crystal = 1 + random.uniform(-1, 1) * draw.crystal_spread.value() * 1e-6;
-  CcdTiming t;
+  smear::CcdTiming t;
   t.rows = draw.layout.size.height;
   t.frame_period = period(draw.rate) * crystal;
   t.row_time = draw.row_time * crystal;
@@ -74,7 +75,8 @@ CcdTiming draw_timing(const VirtualRigDraw& draw, RandomStream& random) {
   if (draw.models == VirtualRigDraw::Models::mixed) {
     const int choices[] = {t.rows, with_dummies, std::max(t.rows, most)};
     t.shifts = choices[model % 3];
-    t.direction = (model >> 32) % 2 == 0 ? ReadDirection::top_first : ReadDirection::bottom_first;
+    t.direction =
+        (model >> 32) % 2 == 0 ? smear::ReadDirection::top_first : smear::ReadDirection::bottom_first;
   }
   return t;
 }
@@ -105,6 +107,11 @@ Status check(const VirtualRigOptions& options) {
       in_range(where, "strobe.time_step", options.strobe.time_step.value(), 1e-9, 1e-3));
   EMBERLOCK_RETURN_IF_ERROR(
       in_range(where, "strobe.rate_error", options.strobe.rate_error.value(), -1000, 1000));
+  if (const auto& dial = options.strobe.dial) {
+    EMBERLOCK_RETURN_IF_ERROR(check(dial->dial));
+    EMBERLOCK_RETURN_IF_ERROR(in_range(where, "strobe.dial.error", dial->error.value(), -200e3, 200e3));
+    EMBERLOCK_RETURN_IF_ERROR(in_range(where, "strobe.dial.width", dial->width.value(), 1e-6, 1e-3));
+  }
   EMBERLOCK_RETURN_IF_ERROR(check(options.scene));
   std::set<std::string_view> ids;
   for (const VirtualCameraOptions& camera : options.cameras) {
@@ -175,4 +182,4 @@ Result<VirtualRigOptions> parse_virtual_rig(std::string_view name, std::uint64_t
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,13 +10,14 @@
 #include "base/image.h"
 #include "base/result.h"
 #include "base/sensor_kind.h"
+#include "base/strobe_dial.h"
 #include "base/time_point.h"
 #include "drivers/camera.h"
 #include "drivers/virtual/scene.h"
 #include "smear_sync/ccd_model.h"
 #include "smear_sync/ccd_timing.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// Where one camera images the strobe's lamp: a disk. Columns and rows count from 0 at the centre of the top
 /// left pixel; the disk may be cut by the image's edge or lie outside it.
@@ -30,9 +32,9 @@ struct VirtualCameraOptions {
   SensorKind sensor = SensorKind::ccd;
   ImageLayout layout{.size = {1280, 720}};
   Hertz nominal_rate{23.976};         ///< what the maker claims; the truth is timing.frame_period
-  CcdTiming timing{};                 ///< rows equal to the layout's height
+  smear::CcdTiming timing{};          ///< rows equal to the layout's height
   std::optional<Seconds> exposure{};  ///< > 0, at most the frame period; absent: the scene's
-  SweepOut sweep_out = SweepOut::none;
+  smear::SweepOut sweep_out = smear::SweepOut::none;
   VirtualLamp lamp{};
   ShutterReset reset = ShutterReset::on_command;
   Seconds reset_latency = milliseconds(180);  ///< from the action to the new read cycle, 0..10 s
@@ -43,11 +45,19 @@ struct VirtualCameraOptions {
   std::optional<Seconds> first_phase{};  ///< from the first start() to the first read phase; drawn if absent
 };
 
+/// A virtual strobe's dial, which nobody but a test's or a demonstration's operator turns.
+struct VirtualDialOptions {
+  StrobeDial dial{};
+  PartsPerMillion error{};           ///< of what it shows: it flashes so much faster; |.| <= 200 000
+  Seconds width = microseconds(20);  ///< of its flashes, 1 us..1 ms
+};
+
 struct VirtualStrobeOptions {
   std::string id = "virtual-strobe";
   Hertz rate_step{1.0 / 600};            ///< 0.1 flashes a minute, as the paper's Nova-Strobe dbx has
   Seconds time_step = nanoseconds(100);  ///< of phase and width
   PartsPerMillion rate_error{0};         ///< of its time base, which read_back knows nothing of; |.| <= 1000
+  std::optional<VirtualDialOptions> dial{};  ///< present: it is set by hand (virtual_dial.h)
 };
 
 struct VirtualRigOptions {
@@ -99,4 +109,4 @@ Status check_exposure(const VirtualScene& scene, const VirtualCameraOptions& cam
 /// Every range above; camera ids unique; timings possible. bad_input that names camera and field otherwise.
 Status check(const VirtualRigOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

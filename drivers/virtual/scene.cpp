@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/scene.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 bool VirtualScene::has(Pass pass) const {
   return std::find(passes.begin(), passes.end(), pass) != passes.end();
@@ -66,4 +67,4 @@ VirtualScene flame_scene(std::shared_ptr<const LightField> flame) {
   return scene;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -7,7 +8,7 @@
 #include "base/result.h"
 #include "drivers/virtual/light_field.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// One effect of the picture. A scene lists those it calls for; one that is not listed does not run and
 /// leaves no trace in the pixels. The order in the list means nothing: light adds up first, then noise, then
@@ -69,4 +70,4 @@ VirtualScene lit_room_scene();
 /// A flame in a dark room, with both noises; exposed for 1 ms.
 VirtualScene flame_scene(std::shared_ptr<const LightField> flame);
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/sensor.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 #include "drivers/virtual/normal_table.h"
 #include "smear_sync/ccd_model.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr double kEdgeSigma = 0.7;      // blur of the lamp's rim, pixels
@@ -279,7 +280,7 @@ void VirtualSensor::draw_bloom(const Shot& shot) {
 
 void VirtualSensor::light_rows(const Shot& shot) {
   const int rows = layout_.size.height;
-  const bool down = timing_.direction == ReadDirection::top_first;
+  const bool down = timing_.direction == smear::ReadDirection::top_first;
   for (int y = 0; y < rows; ++y) {
     const Rows order(kind_ != SensorKind::rolling_shutter ? 0 : down ? y : rows - 1 - y);
     lit_[static_cast<std::size_t>(y)] = static_cast<float>(lamp_level(shot, order * timing_.row_time));
@@ -302,10 +303,10 @@ void VirtualSensor::draw_smear(const Shot& shot) {
   const int margin = lamp_shape_.x0 - light_.x0;
   for (const LightPulse& p : shot.pulses) {
     const double leak = charge(*scene_, p) * scene_->smear_leak;
-    for (const FlashPart& part : split(timing_, {p.begin + p.width / 2, p.width})) {
+    for (const smear::FlashPart& part : split(timing_, {p.begin + p.width / 2, p.width})) {
       // Every lit row of the lamp leaks into the packet that stands under it.
       for (int y = lamp_shape_.y0; y < lamp_shape_.y1(); ++y) {
-        const auto at = landing(timing_, y, part, sweep_out_);
+        const auto at = smear::landing(timing_, y, part, sweep_out_);
         if (!at || at->image != 0) continue;
         add_scaled(lamp_shape_.row(y), lamp_shape_.width, static_cast<float>(leak * part.fraction),
                    light_.row(at->row) + margin);
@@ -358,4 +359,4 @@ std::vector<VirtualSensor::Point> VirtualSensor::draw_hot_pixels(int count) cons
   return points;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,7 @@
 #include "drivers/virtual/scene.h"
 #include "drivers/virtual/strobe_timeline.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A rectangle of the image and what falls on each of its pixels.
 struct Stamp {
@@ -88,8 +89,8 @@ class VirtualSensor {
 
   ImageLayout layout_;
   SensorKind kind_;
-  CcdTiming timing_;
-  SweepOut sweep_out_;
+  smear::CcdTiming timing_;
+  smear::SweepOut sweep_out_;
   VirtualLamp lamp_;
   int number_;
   std::uint64_t seed_;  // of this camera
@@ -112,4 +113,4 @@ class VirtualSensor {
   std::vector<float> normal_;  // and its noise, standard normal
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/strobe_timeline.h"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 void StrobeTimeline::apply(const StrobeSettings& settings, TimePoint at) {
   const std::lock_guard lock(mutex_);
@@ -52,4 +53,4 @@ std::vector<LightPulse> StrobeTimeline::light(TimePoint origin, Seconds from, Se
   return pulses;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

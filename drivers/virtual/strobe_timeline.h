@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,7 @@
 #include "base/time_point.h"
 #include "drivers/strobe.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// Light of the strobe: one flash, or a stretch of steady light.
 struct LightPulse {
@@ -51,4 +52,4 @@ class StrobeTimeline {
   std::vector<Segment> segments_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/virtual_camera.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include "base/log.h"
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 enum CameraStream : std::uint64_t {
@@ -211,7 +212,7 @@ std::shared_ptr<const VirtualScene> VirtualCamera::scene_of(std::uint64_t frame_
 }
 
 std::vector<LightPulse> VirtualCamera::light_on(std::uint64_t frame_id) const {
-  const CcdTiming& t = options_.timing;
+  const smear::CcdTiming& t = options_.timing;
   return room_->strobe()->light(read_start(frame_id), -t.frame_period, Rows(t.shifts) * t.row_time);
 }
 
@@ -237,4 +238,4 @@ Frame VirtualCamera::draw(std::uint64_t frame_id) {
   return {stamp, std::make_shared<const Image>(std::move(image))};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -13,7 +14,7 @@
 #include "drivers/virtual/sensor.h"
 #include "drivers/virtual/strobe_timeline.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// What all cameras of a rig share. Thread-safe.
 class VirtualRoom {
@@ -105,4 +106,4 @@ class VirtualCamera final : public Camera {
   FrameCounts counts_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

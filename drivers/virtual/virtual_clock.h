@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
 
 #include "base/clock.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A clock that moves only when somebody sleeps on it: sleeping takes no real time, and a run is the same
 /// each time. With one thread its instants are deterministic; with several the clock stands at the latest
@@ -24,4 +25,4 @@ class VirtualClock final : public Clock {
   std::atomic<std::int64_t> now_ns_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

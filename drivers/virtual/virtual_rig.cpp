@@ -1,17 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/virtual_rig.h"
 
 #include <algorithm>
 #include <utility>
 
 #include "drivers/virtual/virtual_camera.h"
+#include "drivers/virtual/virtual_dial.h"
 #include "drivers/virtual/virtual_strobe.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 struct VirtualRig::Parts {
   Parts(const VirtualRigOptions& options, const std::shared_ptr<Clock>& clock)
       : room(std::make_shared<VirtualRoom>(clock, options.strobe.rate_error, options.scene)),
         strobe(options.strobe, clock, room->strobe()) {
+    if (options.strobe.dial) dial = std::make_unique<VirtualDial>(options.strobe, clock, room->strobe());
     cameras.reserve(options.cameras.size());
     for (const VirtualCameraOptions& camera : options.cameras) {
       cameras.emplace_back(camera, static_cast<int>(cameras.size()), options, room);
@@ -20,6 +23,7 @@ struct VirtualRig::Parts {
 
   std::shared_ptr<VirtualRoom> room;
   VirtualStrobe strobe;
+  std::unique_ptr<VirtualDial> dial;  ///< instead of it, where there is one
   std::vector<VirtualCamera> cameras;
 };
 
@@ -34,7 +38,11 @@ Result<std::unique_ptr<VirtualRig>> VirtualRig::create(const VirtualRigOptions& 
 
 int VirtualRig::size() const { return static_cast<int>(parts_->cameras.size()); }
 Camera& VirtualRig::camera(int index) { return parts_->cameras.at(index); }
-Strobe& VirtualRig::strobe() { return parts_->strobe; }
+Strobe& VirtualRig::strobe() {
+  if (parts_->dial) return *parts_->dial;
+  return parts_->strobe;
+}
+VirtualDial* VirtualRig::dial() { return parts_->dial.get(); }
 Clock& VirtualRig::clock() { return parts_->room->clock(); }
 
 Status VirtualRig::set_scene(VirtualScene scene) {
@@ -73,9 +81,9 @@ std::vector<TrueDot> VirtualRig::dots(int index, std::uint64_t frame_id) const {
     double seen = 0;
     double brightest = 0;
     Rows sum;
-    for (const FlashPart& part : split(truth.timing, {centre, pulse.width})) {
+    for (const smear::FlashPart& part : split(truth.timing, {centre, pulse.width})) {
       const bool rest = part.shifts >= truth.timing.shifts;
-      const auto at = smear_centre(truth.timing, truth.lamp.y, part, truth.sweep_out);
+      const auto at = smear::smear_centre(truth.timing, truth.lamp.y, part, truth.sweep_out);
       if (rest || !at || at->image != 0) continue;
       seen += part.fraction;
       brightest = std::max(brightest, part.fraction);
@@ -87,4 +95,4 @@ std::vector<TrueDot> VirtualRig::dots(int index, std::uint64_t frame_id) const {
   return dots;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -11,7 +12,9 @@
 #include "drivers/virtual/options.h"
 #include "drivers/virtual/scene.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
+
+class VirtualDial;
 
 /// One dot as the model knows it.
 struct TrueDot {
@@ -46,6 +49,8 @@ class VirtualRig {
   [[nodiscard]] int size() const;
   [[nodiscard]] Camera& camera(int index);
   [[nodiscard]] Strobe& strobe();
+  /// The strobe, where it is one that is set by hand; else null.
+  [[nodiscard]] VirtualDial* dial();
   [[nodiscard]] Clock& clock();
 
   /// Frames whose read phase begins from now on show this scene.
@@ -70,4 +75,4 @@ class VirtualRig {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

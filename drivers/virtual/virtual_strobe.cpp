@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/virtual_strobe.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include "base/log.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr Hertz kSlowest{30.0 / 60};
@@ -62,4 +63,4 @@ Status VirtualStrobe::apply(const StrobeSettings& settings) {
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -7,7 +8,7 @@
 #include "drivers/virtual/options.h"
 #include "drivers/virtual/strobe_timeline.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 
 /// A stroboscope with the paper's range (30..20000 flashes a minute) and steps; writes what it is told to a
 /// timeline.
@@ -27,4 +28,4 @@ class VirtualStrobe final : public Strobe {
   StrobeSettings settings_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/box_error.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "recon/effects/background.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 float value(const RadianceImage& behind, std::size_t at) { return behind.rgb.empty() ? 0.F : behind.rgb[at]; }
@@ -16,8 +17,9 @@ int first_of(int x, int stride) { return (x + stride - 1) / stride * stride; }
 }  // namespace
 
 ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
-                               const Problem& problem, const Background& background, int stride)
-    : weight_(problem.list.rays.size()) {
+                               const Problem& problem, const Background& background, int stride,
+                               std::optional<std::size_t> rays)
+    : weight_(rays.value_or(problem.list.rays.size())) {
   std::vector<RadianceImage> behind;
   std::vector<double> pixels(views.size());
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -39,6 +41,7 @@ ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std:
     for (std::size_t c = 0; c < 3; ++c)
       unreached_[c] += sum[c] / (std::max(1.0, pixels[v]) * static_cast<double>(views.size()));
   }
+  black_ = unreached_;
   for (std::size_t r = 0; r < weight_.size(); ++r) {
     const std::size_t v = problem.list.rays[r].view;
     const PixelBox& box = boxes[v];
@@ -65,4 +68,10 @@ std::array<double, 3> ErrorOverBoxes::operator()(const std::vector<Rgba>& residu
   return sum;
 }
 
-}  // namespace emberlock
+std::array<double, 3> ErrorOverBoxes::black() const {
+  std::array<double, 3> root = {};
+  for (std::size_t c = 0; c < 3; ++c) root[c] = std::sqrt(black_[c]);
+  return root;
+}
+
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/choose_effects.h"
 
 #include <algorithm>
@@ -7,12 +8,13 @@
 
 #include "recon/adjust/find_extinction.h"
 #include "recon/adjust/find_motion.h"
+#include "recon/adjust/left_out_views.h"
 #include "recon/adjust/predict_effects.h"
 #include "recon/adjust/prepared_scene.h"
 #include "recon/effects/motion.h"
 #include "recon/preprocess/picture_clues.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 std::string explain(const FoundExtinction& found) {
@@ -27,27 +29,25 @@ std::string explain(const FoundExtinction& found) {
   return fmt::format("{:.3g} / m even and {:.3g} / m like soot fit the pictures best", even, soot);
 }
 
-/// The background and the clipped pixels: before the flame can be looked at, these must be known.
-Effects told_by_the_pictures(const Scene& scene, const EffectRequest& request) {
-  Effects known;
-  const std::vector<FlameMask> masks = flame_masks(scene);
-  const bool pictured = std::any_of(scene.views.begin(), scene.views.end(), [](const View& view) {
-    return view.role == ViewRole::input && view.background;
-  });
-  const std::optional<BorderLevel> border = border_level(scene, masks);
-  if (pictured)
-    known.background.kind = Background::Kind::image;
-  else if (border && *std::max_element(border->level.begin(), border->level.end()) >= request.tolerance)
-    known.background = {Background::Kind::constant, border->level};
-  known.sensor = request.assumed.sensor;
-  if (known.sensor.gamma != 1) known.sensor.response = Sensor::Response::gamma;
-  const std::vector<PixelBox> boxes = flame_boxes(scene, masks);
-  const double white = clip_level(scene, boxes, known.sensor.white);
-  if (white > 0 && clipped_pixels(scene, boxes, white).excess >= request.tolerance) {
-    known.sensor.clipping = Sensor::Clipping::at_white;
-    known.sensor.white = white;
-  }
-  return known;
+/// What views that are left out of the fit say of an extinction that was found between the pixels of all
+/// views.
+struct ShownFromElsewhere {
+  double with = 0;  ///< grey levels
+  double without = 0;
+  bool better = true;
+};
+/// Where the budget doesn't allow to look at both, the extinction is believed.
+ShownFromElsewhere show_from_elsewhere(const SolverSetup& setup, const Extinction& found,
+                                       const Elapsed& elapsed) {
+  constexpr double kLeastGain = 0.01;
+  const auto late = [&] { return is_spent(0.4, setup.options, elapsed); };
+  if (found.model == Extinction::Model::none) return {};
+  const LeftOutViews views(setup, setup.hull);
+  if (!views.any()) return {};
+  const double with = find_smoothness(views, found, late).error;
+  if (late()) return {};
+  const double without = find_smoothness(views, {}, late).error;
+  return {with, without, with < (1 - kLeastGain) * without};
 }
 
 /// Decides on the motion, in two halves: where it rises before anything else is known, and the rest once the
@@ -136,6 +136,28 @@ Status check_gamma(const Scene& scene, const EffectRequest& request) {
 
 }  // namespace
 
+Effects told_by_the_pictures(const Scene& scene, const EffectRequest& request) {
+  Effects known;
+  const std::vector<FlameMask> masks = flame_masks(scene);
+  const bool pictured = std::any_of(scene.views.begin(), scene.views.end(), [](const View& view) {
+    return view.role == ViewRole::input && view.background;
+  });
+  const std::optional<BorderLevel> border = border_level(scene, masks);
+  if (pictured)
+    known.background.kind = Background::Kind::image;
+  else if (border && *std::max_element(border->level.begin(), border->level.end()) >= request.tolerance)
+    known.background = {Background::Kind::constant, border->level};
+  known.sensor = request.assumed.sensor;
+  if (known.sensor.gamma != 1) known.sensor.response = Sensor::Response::gamma;
+  const std::vector<PixelBox> boxes = flame_boxes(scene, masks);
+  const double white = clip_level(scene, boxes, known.sensor.white);
+  if (white > 0 && clipped_pixels(scene, boxes, white).excess >= request.tolerance) {
+    known.sensor.clipping = Sensor::Clipping::at_white;
+    known.sensor.white = white;
+  }
+  return known;
+}
+
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
                                     const SolveOptions& options, const Elapsed& elapsed) try {
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
@@ -178,9 +200,15 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
     report.on = known.extinction.model != Extinction::Model::none;
     report.reason = "set by hand";
   } else {
-    report.on = report.predicted_change >= request.tolerance;
+    const ShownFromElsewhere shown = show_from_elsewhere(setup, found.extinction, elapsed);
+    report.on = report.predicted_change >= request.tolerance && shown.better;
     report.reason =
-        report.on
+        !shown.better
+            ? fmt::format(
+                  "{}, but views that are left out of the fit are shown to {:.3g} grey levels with it "
+                  "and to {:.3g} without",
+                  explain(found), shown.with, shown.without)
+        : report.on
             ? explain(found)
             : fmt::format("the best fit, {:.3g} / m, changes the pictures by less than {:.2g} grey levels",
                           found.extinction.value.value() + found.extinction.soot.value(), request.tolerance);
@@ -197,6 +225,8 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   return choice;
 } catch (const DeviceError& e) {
   return e.error();
+} catch (const Diverged& e) {
+  return e.error();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

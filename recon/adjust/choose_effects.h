@@ -1,9 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/adjust/solver.h"
 #include "recon/effects/effects.h"
 
-namespace emberlock {
+namespace emberlock::recon {
+
+/// The background and the clipped pixels: before the flame can be looked at, these must be known.
+Effects told_by_the_pictures(const Scene& scene, const EffectRequest& request);
 
 /// Decides which effects the pictures call for. With `request.fixed` it takes those and only predicts their
 /// change. Otherwise the extinction is found by a global search: cold solves on a coarse grid from a fraction
@@ -13,4 +17,4 @@ namespace emberlock {
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
                                     const SolveOptions& options, const Elapsed& elapsed = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/coarse_pictures.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "recon/hull/ray_list.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 Volume crop(const Volume& volume, const CroppedHull& to) {
@@ -116,4 +117,4 @@ double change(const std::vector<RadianceImage>& with, const std::vector<Radiance
   return std::sqrt(std::max(0.0, ww - wo * wo / oo));
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -5,7 +6,7 @@
 #include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A scene whose flame is known roughly.
 struct CoarseFlame {
@@ -47,4 +48,4 @@ class CoarsePictures {
 /// taken over each picture, then over them. 0 where the second set is black.
 double change(const std::vector<RadianceImage>& with, const std::vector<RadianceImage>& without);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

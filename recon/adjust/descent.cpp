@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/descent.h"
 
 #include <algorithm>
@@ -6,11 +7,10 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
-constexpr float kStiffness = 0.04F;  // of the tie of two neighbours, over the mean of A^T A 1
-constexpr float kSoftLight = 0.1F;   // differences below this share of the mean emission count quadratically
+constexpr float kSoftLight = 0.1F;  // differences below this share of the mean emission count quadratically
 constexpr float kMostMomentum = 0.93F;      // subsets are noisy: the full momentum would amplify that
 constexpr float kMostJointMomentum = 0.8F;  // of emission and extinction together, whose problem isn't convex
 constexpr float kVariation =
@@ -19,7 +19,9 @@ constexpr float kSoft = 0.02F;  // differences below this share of the expected 
 // Where the extinction falls, more light comes through and A^T A 1 grows: it is taken for a thinner medium,
 // so that it still majorises then.
 constexpr float kThinned = 0.5F;
-constexpr float kLeastCurvature = 0.05F;  // over the mean: bounds the steps where few rays come
+// Floors of the weights, over their mean: bound the steps where few rays come.
+constexpr float kLeastWeight = 0.02F;
+constexpr float kLeastCurvature = 0.05F;  // by the extinction
 // Emission and extinction move at once and pull at the same rays: a matrix of two blocks is majorised by
 // twice the blocks on its diagonal. The emission's has slack enough; with 1 here, flames of few pixels
 // diverge.
@@ -29,20 +31,16 @@ constexpr float kFaintestExtinction = 1e-4F;  // a voxel edge: the scale of a me
 constexpr int kHoldOutOneIn = 32;             // pixels kept from the fit
 constexpr std::size_t kFewestRays = 256;      // of a subset
 
-class Mean {
- public:
-  void add(float value) {
-    sum_ += static_cast<double>(value);
-    ++count_;
+/// Of those that any ray comes to.
+float mean(const std::vector<float>& weights) {
+  double sum = 0;
+  std::size_t count = 0;
+  for (const float w : weights) {
+    sum += static_cast<double>(w);
+    count += w > 0 ? 1 : 0;
   }
-  [[nodiscard]] float operator()() const {
-    return count_ > 0 ? static_cast<float>(sum_ / static_cast<double>(count_)) : 0;
-  }
-
- private:
-  double sum_ = 0;
-  std::size_t count_ = 0;
-};
+  return count > 0 ? static_cast<float>(sum / static_cast<double>(count)) : 0;
+}
 
 /// Pixel subsets whose successive ones lie as far apart as can be: Bayer's order (1973).
 int bayer(int x, int y) {
@@ -94,15 +92,28 @@ int stride_for(const SolverSetup& setup, const Grid& grid) {
   return std::max(1, static_cast<int>(std::min(1024.0, pixels_per_voxel(setup, grid) / kPixelsPerVoxel)));
 }
 
-Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets) {
+int stride_for_rays(const SolverSetup& setup, std::size_t rays) {
+  const auto pixels = static_cast<double>(flame_pixels(setup, 1));
+  return std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / static_cast<double>(rays)))));
+}
+
+Hull coarsen_to(const Hull& hull, int most_voxels) {
+  Hull coarse = hull;
+  while (std::max({coarse.grid.nx, coarse.grid.ny, coarse.grid.nz}) - 1 > most_voxels)
+    coarse = coarsen(coarse);
+  return coarse;
+}
+
+Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets,
+                 std::optional<std::size_t> left_out) {
   Level level;
   level.subsets = subsets_for(setup.sigma(hull.grid), pixels_per_voxel(setup, hull.grid) / stride,
                               flame_pixels(setup, stride), most_subsets);
   ProblemOptions options = setup.problem_options();
   options.subsets = level.subsets + 1;
-  options.subset_of = [subsets = level.subsets, stride](std::size_t, int x, int y) {
+  options.subset_of = [subsets = level.subsets, stride, left_out](std::size_t view, int x, int y) {
     if (x % stride != 0 || y % stride != 0) return -1;
-    if (held_out(x, y)) return subsets;
+    if (left_out ? view == *left_out : held_out(x, y)) return subsets;
     return bayer(x / stride, y / stride) * subsets / 16;
   };
   level.problem = pose(setup.views, hull, options, setup.pool);
@@ -113,9 +124,16 @@ Descent::Descent(const Level& level, const Optics& optics, const SolverSetup& se
                  const std::vector<Rgba>& x)
     : level_(level),
       engine_(make_engine(level.problem, optics, setup.options.precision, setup.pool)),
-      fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]) {
+      fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]),
+      guard_(black_error()) {
   find_weights(x);
+  stiffness_ *=
+      static_cast<float>(setup.smoothness.value_or(setup.options.smoothness.value_or(kLeastSmoothness)));
   engine_->set(x);
+  guard_ = Guard(start_error());
+  engine_->mark();
+  engine_->keep();
+  begin_anew();
 }
 
 std::size_t Descent::rays_of(int subset) const {
@@ -123,26 +141,101 @@ std::size_t Descent::rays_of(int subset) const {
   return level_.problem.list.subset_begin[s + 1] - level_.problem.list.subset_begin[s];
 }
 
-void Descent::pass() {
+float Descent::share(int subset) const {
+  return static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays_of(subset)));
+}
+
+template <class Act>
+void Descent::each_subset(const Act& act) {
+  for (int s = 0; s < level_.subsets; ++s)
+    if (rays_of(s) > 0) act(s);
+}
+
+double Descent::start_error() {
+  const double black = black_error();
+  if (level_.problem.background.empty()) return black;
+  each_subset([&](int s) { engine_->residual(s); });  // a medium darkens it, light or not
+  return std::max(black, fit_error());
+}
+
+void Descent::begin_anew() {
+  guard_.begin_anew();
+  last_error_ = std::numeric_limits<double>::infinity();
+}
+
+Guard::Finding Descent::pass() {
+  engine_->mark();  // what this pass judges: its own steps are judged by the next
   engine_->stiffen(stiffness_, soft_);
-  for (int s = 0; s < level_.subsets; ++s) {
-    const std::size_t rays = rays_of(s);
-    if (rays == 0) continue;
+  each_subset([&](int s) {
     engine_->residual(s);
     engine_->backproject(s);
     const double next_time = 0.5 * (1 + std::sqrt(1 + 4 * momentum_time_ * momentum_time_));
     const auto momentum = std::min(field_ ? kMostJointMomentum : kMostMomentum,
                                    static_cast<float>((momentum_time_ - 1) / next_time));
     momentum_time_ = next_time;
-    const Engine::Step step{static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)),
-                            momentum};
+    const Engine::Step step{share(s), momentum, length_};
     if (field_) {
       field_->emission = step;
       engine_->descend_field(*field_);
     } else {
       engine_->descend(step);
     }
+  });
+  double error = fit_error();
+  const Guard::Finding finding = guard_.look(error);
+  if (finding == Guard::Finding::best) engine_->keep();
+  if (finding == Guard::Finding::diverged) {
+    engine_->restore();
+    length_ /= 2;
+    each_subset([&](int s) { engine_->residual(s); });
+    guard_.went_back_to(error = fit_error());
   }
+  if (finding == Guard::Finding::diverged || !(error < last_error_)) {
+    engine_->rest();
+    momentum_time_ = 1;
+  }
+  last_error_ = std::isfinite(error) ? error : std::numeric_limits<double>::infinity();
+  return finding;
+}
+
+void Descent::settle() {
+  const auto judge = [&] {
+    engine_->rest();
+    for (int s = 0; s <= level_.subsets; ++s)
+      if (rays_of(s) > 0) engine_->residual(s);
+  };
+  judge();
+  const double last = fit_error();
+  if (guard_.halvings() == 0 && guard_.allows(last)) return;
+  engine_->mark();
+  engine_->restore();
+  judge();
+  if (!(last < fit_error())) return;
+  engine_->keep();
+  engine_->restore();
+  judge();
+}
+
+double Descent::fit_error() const {
+  const std::vector<Rgba> r = engine_->residuals();
+  double sum = 0;
+  for (std::size_t i = 0; i < fitted_; ++i)
+    for (std::size_t c = 0; c < 3; ++c)
+      sum += static_cast<double>(r[i].c[c]) * static_cast<double>(r[i].c[c]);
+  return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(fitted_))));
+}
+
+/// Of no light at all, behind which the whole background shines.
+double Descent::black_error() const {
+  const Problem& problem = level_.problem;
+  double sum = 0;
+  for (std::size_t r = 0; r < fitted_; ++r)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto behind = problem.background.empty() ? 0. : static_cast<double>(problem.background[r].c[c]);
+      const double left = static_cast<double>(problem.seen[r].c[c]) - behind;
+      sum += left * left;
+    }
+  return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(fitted_))));
 }
 
 double Descent::validation_error() {
@@ -157,21 +250,12 @@ double Descent::validation_error() {
   return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(rays_of(subset)))));
 }
 
-/// Every fourth subset lies about as densely as the voxels: enough for curvatures, which are smooth.
-Descent::Sample Descent::sample() const {
-  const int subsets = (level_.subsets + 3) / 4;
-  std::size_t rays = 0;
-  for (int s = 0; s < subsets; ++s) rays += rays_of(s);
-  return {subsets,
-          rays > 0 ? static_cast<float>(static_cast<double>(fitted_) / static_cast<double>(rays)) : 1.F};
-}
-
-/// Light that is seen over what an even medium of 1 would show, in the first subsets.
-float Descent::mean_emission(const std::vector<Rgba>& of_one, int subsets) const {
+/// Light that is seen over what an even medium of 1 would show.
+float Descent::mean_emission(const std::vector<Rgba>& of_one) const {
   const Problem& problem = level_.problem;
   double seen = 0;
   double even = 0;
-  for (std::size_t r = 0; r < problem.list.subset_begin[static_cast<std::size_t>(subsets)]; ++r) {
+  for (std::size_t r = 0; r < fitted_; ++r) {
     even += static_cast<double>(of_one[r].c[0]);
     for (std::size_t c = 0; c < 3; ++c) {
       const float behind = problem.background.empty() ? 0.F : problem.background[r].c[c];
@@ -181,72 +265,78 @@ float Descent::mean_emission(const std::vector<Rgba>& of_one, int subsets) const
   return even > 0 ? static_cast<float>(std::max(0.0, seen) / even) : 0;
 }
 
-/// A^T A 1 over the fitted rays; 1 only at the hull's key points. A field's extinction is lane 3 of x,
-/// thinned.
+/// The largest of all subsets' N / N_s A_s^T A_s 1; 1 only at the hull's key points. A field's extinction is
+/// lane 3 of x, thinned.
 void Descent::find_weights(const std::vector<Rgba>& x) {
   const std::vector<std::uint8_t>& active = level_.problem.active;
   std::vector<Rgba> ones(active.size());
   for (std::size_t p = 0; p < ones.size(); ++p)
     if (active[p] != 0) ones[p] = Rgba{{1, 1, 1, kThinned * x[p].c[3]}};
   engine_->set(ones);
+  engine_->set_weights(std::vector<float>(active.size()));
   const std::vector<Rgba> dark(level_.problem.list.rays.size());
-  const Sample taken = sample();
-  for (int s = 0; s < taken.subsets; ++s) {
-    engine_->residual_against(dark, s);
+  each_subset([&](int s) {
+    engine_->residual_against(dark, s, Engine::Behind::nothing);
     engine_->backproject(s);
-  }
-  soft_ = kSoftLight * mean_emission(engine_->residuals(), taken.subsets);
-  const std::vector<Rgba> gradient = engine_->gradient();
-  std::vector<float> weights(gradient.size());
-  Mean mean;
+    engine_->raise_weights(share(s));
+  });
+  soft_ = kSoftLight * mean_emission(engine_->residuals());
+  std::vector<float> weights = engine_->weights();
+  const float middle = mean(weights);
   for (std::size_t p = 0; p < weights.size(); ++p)
-    if (active[p] != 0 && gradient[p].c[0] > 0) mean.add(weights[p] = taken.times * gradient[p].c[0]);
-  stiffness_ = kStiffness * mean();
+    weights[p] = active[p] != 0 && weights[p] > 0 ? weights[p] + kLeastWeight * middle : 0;
+  stiffness_ = middle;
   engine_->set_weights(weights);
 }
 
-/// kJoint J^T J 1, J being the derivative of the rays' radiance by the extinction: all of its entries have
-/// one sign, because extinction only takes light away, so this majorises J^T J. J 1 is a difference along (0,
-/// 0, 0, 1).
+/// kJoint J^T J 1 of the subset that has most, J being the derivative by the extinction of what the rays
+/// show, the background that comes through included: all of its entries have one sign, because extinction
+/// only takes light away, so this majorises J^T J. J 1 is a difference along (0, 0, 0, 1).
 void Descent::release_extinction() {
   const std::vector<std::uint8_t>& active = level_.problem.active;
   const std::vector<Rgba> x = engine_->get();
-  std::vector<float> expected(x.size());
-  Mean extinction;
+  reference_.assign(x.size(), 0);
+  std::vector<Rgba> denser = x;
+  double sum = 0;
   for (std::size_t p = 0; p < x.size(); ++p)
-    if (active[p] != 0) extinction.add(expected[p] = x[p].c[3]);
-  const float scale = std::max(extinction(), kFaintestExtinction);
+    if (active[p] != 0) sum += static_cast<double>(reference_[p] = x[p].c[3]);
+  const auto points = static_cast<double>(std::count(active.begin(), active.end(), 1));
+  const float scale = std::max(static_cast<float>(sum / std::max(1.0, points)), kFaintestExtinction);
   const float difference = 0.02F * scale;
-  const Sample taken = sample();
   const auto radiance = [&](const std::vector<Rgba>& volume) {
     engine_->set(volume);
-    for (int s = 0; s < taken.subsets; ++s) engine_->project(s);
+    each_subset([&](int s) { engine_->project(s); });
     return engine_->residuals();
   };
-  std::vector<Rgba> denser = x;
   for (std::size_t p = 0; p < x.size(); ++p)
     if (active[p] != 0) denser[p].c[3] += difference;
   const std::vector<Rgba> after = radiance(denser);
   const std::vector<Rgba> before = radiance(x);
   std::vector<Rgba> target(before.size());  // so that the residual is J 1
-  for (std::size_t r = 0; r < target.size(); ++r)
-    target[r] = before[r] - (1 / difference) * (after[r] - before[r]);
-  engine_->clear_gradient();
-  for (int s = 0; s < taken.subsets; ++s) {
-    engine_->residual_against(target, s);
-    engine_->backproject(s);
+  const std::vector<Rgba>& behind = level_.problem.background;
+  for (std::size_t r = 0; r < target.size(); ++r) {
+    Rgba shown = before[r];
+    Rgba change = after[r] - before[r];
+    for (std::size_t c = 0; c < 3 && !behind.empty(); ++c) {
+      shown.c[c] += before[r].c[3] * behind[r].c[c];
+      change.c[c] += change.c[3] * behind[r].c[c];
+    }
+    target[r] = shown - (1 / difference) * change;
   }
-  const std::vector<Rgba> gradient = engine_->gradient();
-  std::vector<float> weights(gradient.size());
-  Mean mean;
+  engine_->set_field(std::vector<float>(x.size()), reference_);
+  each_subset([&](int s) {
+    engine_->residual_against(target, s, Engine::Behind::background);
+    engine_->backproject(s);
+    engine_->raise_field_weights(share(s));
+  });
+  std::vector<float> weights = engine_->field_weights();
+  const float middle = mean(weights);
   for (std::size_t p = 0; p < weights.size(); ++p)
-    if (active[p] != 0 && gradient[p].c[3] > 0) mean.add(weights[p] = taken.times * gradient[p].c[3]);
-  for (float& w : weights)
-    if (w > 0) w = kJoint * (w + kLeastCurvature * mean());
-  engine_->set_field(weights, expected);
+    weights[p] = active[p] != 0 && weights[p] > 0 ? kJoint * (weights[p] + kLeastCurvature * middle) : 0;
+  engine_->set_field(weights, reference_);
   engine_->set(x);
-  field_ = {{}, kVariation * scale * mean(), kSoft * scale, std::max(kMostExtinction, 4 * scale)};
+  field_ = {{}, kVariation * scale * middle, kSoft * scale, std::max(kMostExtinction, 4 * scale)};
   momentum_time_ = 1;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

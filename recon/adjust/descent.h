@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -5,10 +6,11 @@
 #include <vector>
 
 #include "recon/adjust/engine.h"
+#include "recon/adjust/guard.h"
 #include "recon/adjust/problem.h"
 #include "recon/adjust/tracker.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The pixels of one level of resolution, in interleaved subsets, with one more subset that is held out of
 /// the fit.
@@ -20,13 +22,34 @@ struct Level {
 /// Every how manieth pixel along both axes a grid calls for: about one and a half of them across a voxel.
 /// More say no more of the volume: what a step costs falls with the square, what it reaches doesn't.
 int stride_for(const SolverSetup& setup, const Grid& grid);
+/// The same for about so many pixels of all flames' boxes together.
+int stride_for_rays(const SolverSetup& setup, std::size_t rays);
+
+/// The hull on a grid that was halved until it has at most so many voxels along its longest side.
+Hull coarsen_to(const Hull& hull, int most_voxels);
 
 /// Every `stride`-th pixel along both axes. `most_subsets` is 1, 4 or 16; a thick medium or few pixels take
-/// fewer.
-Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets = 16);
+/// fewer. What is held out is some of all views' pixels, or one view as a whole.
+Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets = 16,
+                 std::optional<std::size_t> left_out = {});
+
+/// How firmly two neighbours are tied at least, over the mean of A^T A 1.
+constexpr double kLeastSmoothness = 0.04;
 
 /// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Huber total variation
 /// over x >= 0, by preconditioned ordered-subset steps with Nesterov's momentum.
+///
+/// Why it doesn't diverge. With F_s = N / N_s |A_s x - seen_s|^2 / 2 of the subset s (N_s of the N rays), the
+/// weight of a key point is W = max over s of N / N_s A_s^T A_s 1, plus a floor. All entries of A are >= 0,
+/// so diag(W) majorises the Hessian of every F_s (De Pierro 1995). The total variation is majorised at the
+/// beginning of a pass by a parabola whose Hessian 2 diag(T) majorises, T being the sum of a key point's ties
+/// t (update.h), and both together by D = W + 2 T. So within a pass a step x - D^-1 (grad F_s + slope),
+/// projected on x >= 0, is nonexpansive in the norm of D: it brings no two points farther apart, whichever
+/// subset comes next, and without momentum the iterates stay as near to any point that the pass leaves in
+/// place as they were. From pass to pass T is renewed, and the norm with it. That the objective falls all
+/// the same is what majorisation-minimisation says of steps by the full gradient (one subset) alone. Momentum
+/// isn't covered either: it starts anew whenever a pass raises the error (O'Donoghue and Candes 2015). Nor is
+/// an extinction that moves along, whose problem isn't convex. A Guard looks after all of it.
 class Descent {
  public:
   /// The level and the pool must outlive it. Starts from x: emission, and in lane 3 extinction where the
@@ -36,30 +59,44 @@ class Descent {
   /// From here on the extinction moves too, held to what it is now by the total variation of their
   /// difference. Absorb::field alone.
   void release_extinction();
-  /// One pass over all subsets.
-  void pass();
+  /// One pass over all subsets. One that finds that the steps before it went too far is taken back, with
+  /// them, and the next ones are half as long. Throws Diverged where that doesn't help.
+  Guard::Finding pass();
+  /// What the rays show besides the volume's light has changed (Engine::set_offset): earlier errors say
+  /// nothing.
+  void begin_anew();
+  /// Judges x itself, which no pass has yet, by all of the level's rays (engine().residuals()). Where steps
+  /// went too far, now or before, x becomes the best that was kept if that shows less. For who ends here.
+  void settle();
+  /// RMS over the fitted rays, each as its subset's step found it; grey levels.
+  [[nodiscard]] double fit_error() const;
   /// RMS over the held-out pixels, or over the first subset where there are none; grey levels.
   [[nodiscard]] double validation_error();
   [[nodiscard]] Engine& engine() { return *engine_; }
+  [[nodiscard]] int halvings() const { return guard_.halvings(); }
 
  private:
   [[nodiscard]] std::size_t rays_of(int subset) const;
-  /// The subsets that curvatures are taken from, and how many times more rays there are in all.
-  struct Sample {
-    int subsets;
-    float times;
-  };
-  [[nodiscard]] Sample sample() const;
-  [[nodiscard]] float mean_emission(const std::vector<Rgba>& of_one, int subsets) const;
+  /// All fitted rays over those of the subset.
+  [[nodiscard]] float share(int subset) const;
+  template <class Act>
+  void each_subset(const Act& act);
+  [[nodiscard]] float mean_emission(const std::vector<Rgba>& of_one) const;
+  [[nodiscard]] double black_error() const;
+  [[nodiscard]] double start_error();
   void find_weights(const std::vector<Rgba>& x);
 
   const Level& level_;
   std::unique_ptr<Engine> engine_;
   std::size_t fitted_ = 0;
+  Guard guard_;
   float stiffness_ = 0;  // at most
   float soft_ = 0;       // grey levels a voxel edge
+  float length_ = 1;     // of the steps; half as long each time that they were taken back
   double momentum_time_ = 1;
+  double last_error_ = 0;                   // of the pass before; infinite before the first
   std::optional<Engine::FieldStep> field_;  // once the extinction is released
+  std::vector<float> reference_;            // what it is held to, a voxel edge
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -8,7 +9,7 @@
 #include "recon/compute/device.h"
 #include "recon/render/march_table.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Holds a problem's volume and does the heavy steps of the solvers, on one device. x is the solution, y the
 /// point that residuals are taken at (x itself, or a look-ahead of it).
@@ -17,7 +18,10 @@ class Engine {
   struct Step {
     float scale;  ///< of the gradient: all rays over the rays that it was taken from
     float momentum;
+    float length = 1;  ///< of the step over that which the weights and the ties allow
   };
+  /// What lies behind the medium, in residual_against().
+  enum class Behind { nothing, background };
   struct PaperStep {
     float gain, decay, deviation;
     std::uint64_t stream;
@@ -28,25 +32,43 @@ class Engine {
   Engine(Engine&&) = delete;
   Engine& operator=(Engine&&) = delete;
 
-  virtual void set(const std::vector<Rgba>& x) = 0;  ///< x and y
+  virtual void set(const std::vector<Rgba>& x) = 0;   ///< x and y
+  virtual void hold(const std::vector<Rgba>& x) = 0;  ///< x alone: enough for who judges
   [[nodiscard]] virtual std::vector<Rgba> get() const = 0;
   /// x for whoever watches: never makes the device wait. Each call starts a copy and gives the last that has
   /// arrived, so x as it was some calls ago; empty before the first has.
   [[nodiscard]] virtual std::vector<Rgba> recent() = 0;
   /// residual = A y - seen for the subset's rays.
   virtual void residual(int subset) = 0;
+  /// residual = A x - seen, x being another engine's, which is read where it lies: nothing is copied. Both
+  /// have the same grid, precision and device.
+  virtual void residual_of(const Engine& other, int subset) = 0;
   /// What another pass adds to the radiance of each ray; part of residual() from here on.
   virtual void set_offset(const std::vector<Rgba>& offset) = 0;
   /// residual = A y.
   virtual void project(int subset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> residuals() const = 0;
+  /// Those of one subset's rays alone.
+  [[nodiscard]] virtual std::vector<Rgba> residuals(int subset) const = 0;
   /// gradient += A^T residual; under Absorb::field lane 3 is the slope by extinction, and residual() must
   /// have come last.
   virtual void backproject(int subset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> gradient() const = 0;
   virtual void clear_gradient() = 0;
+  /// x as it is now, for keep(): one copy, on the device.
+  virtual void mark() = 0;
+  /// What was marked last, and not kept yet, is what restore() goes back to: nothing is copied.
+  virtual void keep() = 0;
+  /// x and y become what was kept last.
+  virtual void restore() = 0;
+  /// y = x: the look-ahead is forgotten.
+  virtual void rest() = 0;
   /// The weights of descend(): one a key point, 0 for those that take no part. Clears the gradient.
   virtual void set_weights(const std::vector<float>& weights) = 0;
+  /// weights = max(weights, scale * lane 0 of the gradient), which is cleared. From a subset's gradient of
+  /// A x at x = 1 this is how weights come to majorise every subset.
+  virtual void raise_weights(float scale) = 0;
+  [[nodiscard]] virtual std::vector<float> weights() const = 0;
   /// Renews how firmly descend() ties key points to each other, see Stiffen: by `most` at most, in units of
   /// the weights, falling where the light changes by more than `soft` a voxel edge.
   virtual void stiffen(float most, float soft) = 0;
@@ -62,9 +84,13 @@ class Engine {
   /// a key point.
   /// Clears the gradient.
   virtual void set_field(const std::vector<float>& weights, const std::vector<float>& reference) = 0;
+  /// As raise_weights() and weights(), from lane 3: the curvature by the extinction.
+  virtual void raise_field_weights(float scale) = 0;
+  [[nodiscard]] virtual std::vector<float> field_weights() const = 0;
   virtual void descend_field(const FieldStep& step) = 0;
-  /// residual = A y - target, for targets other than what was seen.
-  virtual void residual_against(const std::vector<Rgba>& target, int subset) = 0;
+  /// residual = A y - target, for targets other than what was seen; before the problem's background A y is
+  /// with what of it comes through.
+  virtual void residual_against(const std::vector<Rgba>& target, int subset, Behind behind) = 0;
   /// x and y += the paper's adjustment from the subset's residuals.
   virtual void adjust(int subset, const PaperStep& step) = 0;
 };
@@ -79,10 +105,15 @@ struct Optics {
 /// Constant extinction of sigma a voxel edge, or none where it is 0.
 Optics absorbing_optics(float sigma);
 
+/// What an engine is for. One that only judges has memory for no more than what it is told to hold(), and
+/// can't step: residual_of(), set_offset() and residuals() are all else that it does.
+enum class EngineRole { solve, judge };
+
 /// On the pool's device. The problem and the pool must outlive the engine. Throws a DeviceError.
 std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
-                                    Pool& pool);
-std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics, Precision precision);
+                                    Pool& pool, EngineRole role = EngineRole::solve);
+std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics, Precision precision,
+                                         EngineRole role);
 
 /// In another precision.
 template <class To, class From>
@@ -97,4 +128,4 @@ std::vector<Quad<To>> converted(const std::vector<Quad<From>>& from) {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

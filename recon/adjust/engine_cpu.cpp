@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <optional>
 
@@ -5,18 +6,18 @@
 #include "recon/effects/exposure.h"
 #include "recon/kernels/paper.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 template <class Real>
 class CpuEngine final : public Engine {
  public:
-  CpuEngine(const Problem& problem, const Optics& optics, Pool& pool)
+  CpuEngine(const Problem& problem, const Optics& optics, Pool& pool, EngineRole role)
       : problem_(problem),
         optics_(optics),
         travel_(problem.list.bends.empty() ? Travel::straight : Travel::curved),
         pool_(pool),
-        x_(problem.grid().size()),
+        x_(role == EngineRole::solve ? problem.grid().size() : 0),
         y_(x_.size()),
         next_y_(x_.size()),
         gradient_(x_.size()),
@@ -29,15 +30,29 @@ class CpuEngine final : public Engine {
   }
 
   void set(const std::vector<Rgba>& x) override { x_ = y_ = next_y_ = converted<Real>(x); }
+  void hold(const std::vector<Rgba>& x) override { x_ = converted<Real>(x); }
   [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_); }
   [[nodiscard]] std::vector<Rgba> recent() override { return get(); }
   [[nodiscard]] std::vector<Rgba> residuals() const override { return converted<float>(residual_); }
+  [[nodiscard]] std::vector<Rgba> residuals(int subset) const override {
+    const auto begin = [&](int s) {
+      return residual_.begin() +
+             static_cast<std::ptrdiff_t>(problem_.list.subset_begin[static_cast<std::size_t>(s)]);
+    };
+    return converted<float>(std::vector<Quad<Real>>(begin(subset), begin(subset + 1)));
+  }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
   void residual(int subset) override { residual(subset, problem_.judge<Real>(offset_, optics_.white)); }
+  void residual_of(const Engine& other, int subset) override {
+    shown_ = &dynamic_cast<const CpuEngine&>(other).x_;
+    residual(subset);
+    shown_ = &y_;
+  }
   void set_offset(const std::vector<Rgba>& offset) override { offset_ = offset; }
-  void residual_against(const std::vector<Rgba>& target, int subset) override {
-    residual(subset, Judge<Real>{target.data(), nullptr, nullptr, 0});
+  void residual_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
+    const bool lit = behind == Behind::background && !problem_.background.empty();
+    residual(subset, Judge<Real>{target.data(), lit ? problem_.background.data() : nullptr, nullptr, 0});
   }
   void residual(int subset, const Judge<Real>& judge) {
     expose();
@@ -74,10 +89,16 @@ class CpuEngine final : public Engine {
   }
 
   void clear_gradient() override { std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{}); }
+  void mark() override { marked_ = x_; }
+  void keep() override { kept_.swap(marked_); }
+  void restore() override { x_ = y_ = next_y_ = kept_; }
+  void rest() override { y_ = x_; }
   void set_weights(const std::vector<float>& weights) override {
     weight_.assign(weights.begin(), weights.end());
     clear_gradient();
   }
+  void raise_weights(float scale) override { raise(weight_, 0, scale); }
+  [[nodiscard]] std::vector<float> weights() const override { return {weight_.begin(), weight_.end()}; }
 
   void stiffen(float most, float soft) override {
     each_row(table_.stiffen, Stiffen<Real>{problem_.grid(), weight_.data(), y_.data(), stiffness_.data(),
@@ -89,6 +110,10 @@ class CpuEngine final : public Engine {
     field_weight_.assign(weights.begin(), weights.end());
     reference_.assign(reference.begin(), reference.end());
     clear_gradient();
+  }
+  void raise_field_weights(float scale) override { raise(field_weight_, 3, scale); }
+  [[nodiscard]] std::vector<float> field_weights() const override {
+    return {field_weight_.begin(), field_weight_.end()};
   }
   void descend_field(const FieldStep& step) override {
     update(table_.field_update,
@@ -108,11 +133,19 @@ class CpuEngine final : public Engine {
  private:
   /// B y, where the exposure is long enough to matter.
   void expose() {
-    if (blur_) blurred_ = converted<Real>(blur_->forward(converted<float>(y_), pool_));
+    if (blur_) blurred_ = converted<Real>(blur_->forward(converted<float>(*shown_), pool_));
   }
   [[nodiscard]] Descend<Real> emission_step(const Step& step) {
-    return {problem_.grid(),  weight_.data(),    x_.data(),        y_.data(),          next_y_.data(),
-            gradient_.data(), stiffness_.data(), Real(step.scale), Real(step.momentum)};
+    return {problem_.grid(),  weight_.data(),    x_.data(),        y_.data(),           next_y_.data(),
+            gradient_.data(), stiffness_.data(), Real(step.scale), Real(step.momentum), Real(step.length)};
+  }
+  void raise(std::vector<Real>& weights, int lane, float scale) {
+    const RaiseWeight<Real> act{weights.data(), gradient_.data(), lane, Real(scale)};
+    constexpr int kTasks = 64;
+    pool_.run(kTasks, [&](int task) {
+      const Slice points = slice(weights.size(), kTasks, task);
+      for (std::size_t p = points.begin; p < points.end; ++p) act(p);
+    });
   }
   template <class Entry, class Update>
   void update(Entry entry, const Update& step) {
@@ -134,7 +167,7 @@ class CpuEngine final : public Engine {
     const std::size_t first =
         problem_.list.first_sample(problem_.list.subset_begin[static_cast<std::size_t>(subset)]);
     return {problem_.list.table(),
-            blur_ ? blurred_.data() : y_.data(),
+            blur_ ? blurred_.data() : shown_->data(),
             Real(optics_.sigma),
             residual_.data(),
             gradient_.data(),
@@ -189,7 +222,8 @@ class CpuEngine final : public Engine {
   Travel travel_;
   Pool& pool_;
   const MarchTable<Real>& table_ = march_table<Real>();
-  std::vector<Quad<Real>> x_, y_, next_y_, gradient_;
+  std::vector<Quad<Real>> x_, y_, next_y_, gradient_, marked_, kept_;
+  const std::vector<Quad<Real>>* shown_ = &y_;  // what is marched
   std::vector<Real> weight_, stiffness_, field_weight_, reference_;
   std::vector<Quad<Real>> residual_;
   std::vector<Quad<Real>> samples_;  // of one subset
@@ -210,12 +244,13 @@ Optics absorbing_optics(float sigma) {
 }
 
 std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
-                                    Pool& pool) {
+                                    Pool& pool, EngineRole role) {
   if constexpr (kCudaBuilt) {
-    if (pool.device() == Device::cuda) return make_cuda_engine(problem, optics, precision);
+    if (pool.device() == Device::cuda) return make_cuda_engine(problem, optics, precision, role);
   }
-  if (precision == Precision::float64) return std::make_unique<CpuEngine<double>>(problem, optics, pool);
-  return std::make_unique<CpuEngine<float>>(problem, optics, pool);
+  if (precision == Precision::float64)
+    return std::make_unique<CpuEngine<double>>(problem, optics, pool, role);
+  return std::make_unique<CpuEngine<float>>(problem, optics, pool, role);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

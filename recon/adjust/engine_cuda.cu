@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The engine's launches on a GPU, of the functors that the CPU runs. Sums into key points are gathered, so
 // results have the same bits on every run.
 #include <optional>
@@ -14,7 +15,7 @@
 #include "recon/kernels/paper.h"
 #include "recon/kernels/update.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// B and its transpose.
@@ -41,31 +42,44 @@ class DeviceBlur {
   CudaBuffer<Quad<Real>> blurred_;
 };
 
+/// The volume of an engine, whatever marches through it.
+template <class Real>
+class CudaVolume {
+ public:
+  explicit CudaVolume(std::size_t size) : x_(size) {}
+  [[nodiscard]] const CudaBuffer<Quad<Real>>& volume() const { return x_; }
+
+ protected:
+  CudaBuffer<Quad<Real>> x_;
+};
+
 /// One combination of the shipped ones.
 template <class Real, class Extinction, class Path>
-class CudaEngine final : public Engine {
+class CudaEngine final : public Engine, public CudaVolume<Real> {
  public:
-  CudaEngine(const Problem& problem, const Optics& optics, Extinction extinction)
-      : problem_(problem),
+  CudaEngine(const Problem& problem, const Optics& optics, Extinction extinction, EngineRole role)
+      : CudaVolume<Real>(role == EngineRole::solve ? problem.grid().size() : 0),
+        problem_(problem),
         optics_(optics),
         extinction_(extinction),
         lists_(problem.list),
         seen_(problem.seen),
         background_(problem.background),
-        x_(size()),
-        y_(size()),
-        next_y_(size()),
-        gradient_(size()),
-        weight_(size()),
-        stiffness_(size()),
+        y_(x_.size()),
+        next_y_(x_.size()),
+        gradient_(x_.size()),
+        weight_(x_.size()),
+        stiffness_(x_.size()),
         residual_(problem.list.rays.size()),
         samples_(CudaBuffer<Quad<Real>>::unfilled(Extinction::kField ? problem.most_samples() : 0)),
-        deposits_(CudaBuffer<Deposit<Real>>::unfilled(problem.most_samples())) {
+        deposits_(
+            CudaBuffer<Deposit<Real>>::unfilled(role == EngineRole::solve ? problem.most_samples() : 0)) {
     const ExposureBlur blur(optics.exposure, problem.grid());
     if (!blur.identity()) {
       blur_.emplace(blur, problem.grid());
-      exposed_gradient_ = CudaBuffer<Quad<Real>>(size());
+      exposed_gradient_ = CudaBuffer<Quad<Real>>(x_.size());
     }
+    if (role == EngineRole::judge) return;
     for (int s = 0; s < problem.list.subsets(); ++s) {
       const auto voxels = CudaBuffer<std::uint32_t>::unfilled(first_sample(s + 1) - first_sample(s));
       each_run(s, NameVoxels<Real, Path>{lists_.table(), voxels.data(), first_sample(s)}, "naming voxels");
@@ -78,6 +92,7 @@ class CudaEngine final : public Engine {
     y_.copy_from(x_);
     next_y_.copy_from(x_);
   }
+  void hold(const std::vector<Rgba>& x) override { x_.upload(converted<Real>(x)); }
   [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_.download()); }
   [[nodiscard]] std::vector<Rgba> recent() override {
     if (!snapshot_) snapshot_.emplace(size());
@@ -90,15 +105,24 @@ class CudaEngine final : public Engine {
   [[nodiscard]] std::vector<Rgba> residuals() const override {
     return converted<float>(residual_.download());
   }
+  [[nodiscard]] std::vector<Rgba> residuals(int subset) const override {
+    return converted<float>(residual_.download(first_ray(subset), first_ray(subset + 1) - first_ray(subset)));
+  }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_.download()); }
 
   void residual(int subset) override {
     residual(subset, Judge<Real>{seen_.data(), background_.data(), offset_.data(), Real(optics_.white)});
   }
+  void residual_of(const Engine& other, int subset) override {
+    shown_ = &dynamic_cast<const CudaVolume<Real>&>(other).volume();
+    residual(subset);
+    shown_ = &y_;
+  }
   void set_offset(const std::vector<Rgba>& offset) override { offset_.upload(offset); }
-  void residual_against(const std::vector<Rgba>& target, int subset) override {
+  void residual_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
     target_.upload(target);
-    residual(subset, Judge<Real>{target_.data(), nullptr, nullptr, 0});
+    const Rgba* background = behind == Behind::background ? background_.data() : nullptr;
+    residual(subset, Judge<Real>{target_.data(), background, nullptr, 0});
   }
   void residual(int subset, const Judge<Real>& judge) {
     const JudgeAndKeep<Real> keep{judge, residual_.data()};
@@ -133,10 +157,24 @@ class CudaEngine final : public Engine {
   }
 
   void clear_gradient() override { gradient_.clear(); }
+  void mark() override {
+    if (marked_.size() != size()) marked_ = CudaBuffer<Quad<Real>>::unfilled(size());
+    marked_.copy_from(x_);
+  }
+  void keep() override { kept_.swap(marked_); }
+  void restore() override {
+    x_.copy_from(kept_);
+    rest();
+    next_y_.copy_from(x_);
+  }
+  void rest() override { y_.copy_from(x_); }
   void set_weights(const std::vector<float>& weights) override {
     weight_.upload({weights.begin(), weights.end()});
     gradient_.clear();
   }
+
+  void raise_weights(float scale) override { raise(weight_, 0, scale); }
+  [[nodiscard]] std::vector<float> weights() const override { return as_floats(weight_); }
 
   void stiffen(float most, float soft) override {
     each_key_point(
@@ -150,6 +188,8 @@ class CudaEngine final : public Engine {
     reference_.upload({reference.begin(), reference.end()});
     gradient_.clear();
   }
+  void raise_field_weights(float scale) override { raise(field_weight_, 3, scale); }
+  [[nodiscard]] std::vector<float> field_weights() const override { return as_floats(field_weight_); }
   void descend_field(const FieldStep& step) override {
     update(DescendField<Real>{emission_step(step.emission), field_weight_.data(), reference_.data(),
                               Real(step.variation), Real(step.soft), Real(step.most)});
@@ -176,11 +216,18 @@ class CudaEngine final : public Engine {
 
   [[nodiscard]] std::size_t size() const { return problem_.grid().size(); }
   /// y, or B y where the exposure is long enough to matter.
-  [[nodiscard]] const Quad<Real>* exposed() { return blur_ ? blur_->forward(y_) : y_.data(); }
+  [[nodiscard]] const Quad<Real>* exposed() { return blur_ ? blur_->forward(*shown_) : shown_->data(); }
   [[nodiscard]] Radiance radiance() { return {lists_.table(), exposed(), extinction_}; }
   [[nodiscard]] Descend<Real> emission_step(const Step& step) {
-    return {problem_.grid(),  weight_.data(),    x_.data(),        y_.data(),          next_y_.data(),
-            gradient_.data(), stiffness_.data(), Real(step.scale), Real(step.momentum)};
+    return {problem_.grid(),  weight_.data(),    x_.data(),        y_.data(),           next_y_.data(),
+            gradient_.data(), stiffness_.data(), Real(step.scale), Real(step.momentum), Real(step.length)};
+  }
+  void raise(CudaBuffer<Real>& weights, int lane, float scale) {
+    launch(size(), RaiseWeight<Real>{weights.data(), gradient_.data(), lane, Real(scale)}, "raising weights");
+  }
+  [[nodiscard]] static std::vector<float> as_floats(const CudaBuffer<Real>& values) {
+    const std::vector<Real> host = values.download();
+    return {host.begin(), host.end()};
   }
   template <class Update>
   void update(const Update& step) {
@@ -225,7 +272,9 @@ class CudaEngine final : public Engine {
   Extinction extinction_;
   DeviceRayList lists_;
   CudaBuffer<Rgba> seen_, background_, offset_, target_;  // null where there is none
-  CudaBuffer<Quad<Real>> x_, y_, next_y_, gradient_;
+  using CudaVolume<Real>::x_;
+  CudaBuffer<Quad<Real>> y_, next_y_, gradient_, marked_, kept_;
+  const CudaBuffer<Quad<Real>>* shown_ = &y_;  // what is marched
   CudaBuffer<Real> weight_, stiffness_, field_weight_, reference_;
   CudaBuffer<Quad<Real>> residual_, samples_;  // samples of one subset
   CudaBuffer<Deposit<Real>> deposits_;         // of one subset
@@ -236,29 +285,32 @@ class CudaEngine final : public Engine {
 };
 
 template <class Real, class Extinction>
-std::unique_ptr<Engine> make_with(const Problem& problem, const Optics& optics, Extinction extinction) {
+std::unique_ptr<Engine> make_with(const Problem& problem, const Optics& optics, Extinction extinction,
+                                  EngineRole role) {
   if (problem.list.bends.empty())
-    return std::make_unique<CudaEngine<Real, Extinction, StraightPath>>(problem, optics, extinction);
-  return std::make_unique<CudaEngine<Real, Extinction, CurvedPath>>(problem, optics, extinction);
+    return std::make_unique<CudaEngine<Real, Extinction, StraightPath>>(problem, optics, extinction, role);
+  return std::make_unique<CudaEngine<Real, Extinction, CurvedPath>>(problem, optics, extinction, role);
 }
 
 template <class Real>
-std::unique_ptr<Engine> make_in(const Problem& problem, const Optics& optics) {
+std::unique_ptr<Engine> make_in(const Problem& problem, const Optics& optics, EngineRole role) {
   switch (optics.absorb) {
     case Absorb::field:
-      return make_with<Real>(problem, optics, FieldExtinction<Real>{});
+      return make_with<Real>(problem, optics, FieldExtinction<Real>{}, role);
     case Absorb::constant:
-      return make_with<Real>(problem, optics, ConstantExtinction<Real>{Real(optics.sigma)});
+      return make_with<Real>(problem, optics, ConstantExtinction<Real>{Real(optics.sigma)}, role);
     case Absorb::nothing:
       break;
   }
-  return make_with<Real>(problem, optics, NoExtinction<Real>{});
+  return make_with<Real>(problem, optics, NoExtinction<Real>{}, role);
 }
 
 }  // namespace
 
-std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics, Precision precision) {
-  return precision == Precision::float64 ? make_in<double>(problem, optics) : make_in<float>(problem, optics);
+std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics, Precision precision,
+                                         EngineRole role) {
+  return precision == Precision::float64 ? make_in<double>(problem, optics, role)
+                                         : make_in<float>(problem, optics, role);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

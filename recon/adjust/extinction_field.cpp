@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/extinction_field.h"
 
 #include <algorithm>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Soot is thought to be at most so many times denser than its mean: beyond, brightness tells of heat.
@@ -50,4 +51,4 @@ std::vector<Rgba> with_extinction(std::vector<Rgba> x, const std::vector<float>&
   return x;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -5,7 +6,7 @@
 #include "recon/adjust/problem.h"
 #include "recon/effects/effects.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What a field of extinction is thought to be at the problem's key points, a voxel edge: `value` times the
 /// share of each key point's eight voxels that belong to the medium, and `soot` spread like the luminance of
@@ -16,4 +17,4 @@ std::vector<float> expected_extinction(const Problem& problem, const Extinction&
 /// x with lane 3 replaced.
 std::vector<Rgba> with_extinction(std::vector<Rgba> x, const std::vector<float>& extinction);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

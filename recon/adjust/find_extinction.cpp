@@ -1,19 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/find_extinction.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-#include "recon/adjust/descent.h"
-#include "recon/adjust/extinction_field.h"
+#include "recon/adjust/cold_solve.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kCoarse = 64;           // voxels along the longest side, at most
 constexpr std::size_t kRays = 30000;  // about as many pixels of the flames' boxes are looked at
-constexpr int kEmissionPasses = 2;
-constexpr int kJointPasses = 4;
 
 struct Candidate {
   Extinction extinction;
@@ -26,44 +24,17 @@ Extinction guess(PerMeter even, PerMeter soot) {
   return {Extinction::Model::field, even, soot};
 }
 
-Hull coarse_hull(const Hull& hull) {
-  Hull coarse = hull;
-  while (std::max({coarse.grid.nx, coarse.grid.ny, coarse.grid.nz}) - 1 > kCoarse) coarse = coarsen(coarse);
-  return coarse;
-}
-
-int stride(const SolverSetup& setup) {
-  double pixels = 0;
-  for (const PixelBox& b : setup.boxes) pixels += static_cast<double>(b.x1 - b.x0) * (b.y1 - b.y0);
-  return std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / static_cast<double>(kRays)))));
-}
-
 /// Cold solves of one coarse problem, all by as many steps: candidates must differ in the extinction alone.
 class Probe {
  public:
   explicit Probe(const SolverSetup& setup)
-      : setup_(setup), hull_(coarse_hull(setup.hull)), level_(pose_level(setup, hull_, stride(setup), 4)) {}
+      : setup_(setup),
+        hull_(coarsen_to(setup.hull, kCoarse)),
+        level_(pose_level(setup, hull_, stride_for_rays(setup, kRays), 4)) {}
 
   [[nodiscard]] Candidate solve(const Extinction& extinction) const {
-    const Problem& problem = level_.problem;
-    std::vector<Rgba> x(problem.active.size());
-    if (extinction.model == Extinction::Model::none) {
-      Optics clear = setup_.optics(hull_.grid);
-      clear.absorb = Absorb::nothing;
-      Descent descent(level_, clear, setup_, x);
-      return finish(descent, extinction, kEmissionPasses + kJointPasses);
-    }
-    Optics optics = setup_.optics(hull_.grid);
-    optics.absorb = Absorb::field;
-    if (extinction.soot.value() > 0) {  // is spread by the light that there is
-      Descent even(level_, optics, setup_, with_extinction(x, expected_extinction(problem, extinction, x)));
-      for (int p = 0; p < kEmissionPasses; ++p) even.pass();
-      x = even.engine().get();
-    }
-    Descent descent(level_, optics, setup_, with_extinction(x, expected_extinction(problem, extinction, x)));
-    for (int p = 0; p < kEmissionPasses; ++p) descent.pass();
-    descent.release_extinction();
-    return finish(descent, extinction, kJointPasses);
+    ColdSolve solved = cold_solve(setup_, level_, extinction);
+    return {extinction, solved.error, std::move(solved.x)};
   }
 
   /// Mean length of a ray inside the hull.
@@ -81,11 +52,6 @@ class Probe {
   }
 
  private:
-  static Candidate finish(Descent& descent, const Extinction& extinction, int passes) {
-    for (int p = 0; p < passes; ++p) descent.pass();
-    return {extinction, descent.validation_error(), descent.engine().get()};
-  }
-
   const SolverSetup& setup_;
   Hull hull_;
   Level level_;
@@ -96,7 +62,7 @@ double vertex(const std::array<double, 3>& x, const std::array<double, 3>& error
   const double ab = (error[1] * error[1] - error[0] * error[0]) / (x[1] - x[0]);
   const double bc = (error[2] * error[2] - error[1] * error[1]) / (x[2] - x[1]);
   const double curvature = (bc - ab) / (x[2] - x[0]);
-  if (!(curvature > 0)) return x[1];
+  if (!(curvature > 0) || !std::isfinite(curvature)) return x[1];  // solves that diverged are infinite
   return std::clamp(0.5 * (x[0] + x[1]) - 0.5 * ab / curvature, x[0], x[2]);
 }
 
@@ -121,10 +87,7 @@ Candidate search_line(const std::vector<double>& places, const Try& attempt, con
 }  // namespace
 
 FoundExtinction find_extinction(const SolverSetup& setup, const Elapsed& elapsed) {
-  const auto late = [&] {
-    constexpr double kShare = 1.0 / 3;
-    return setup.options.budget && elapsed && elapsed().value() >= kShare * setup.options.budget->value();
-  };
+  const auto late = [&] { return is_spent(1.0 / 3, setup.options, elapsed); };
   const Probe probe(setup);
   const double chord = probe.mean_chord().value();
   const Candidate even = search_line(
@@ -149,4 +112,4 @@ FoundExtinction try_extinction(const SolverSetup& setup, const Extinction& extin
   return probe.result(probe.solve(field));
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

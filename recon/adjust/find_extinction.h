@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/adjust/tracker.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What the pictures say of the extinction, from a coarse grid.
 struct FoundExtinction {
@@ -23,4 +24,4 @@ FoundExtinction find_extinction(const SolverSetup& setup, const Elapsed& elapsed
 /// The same solve for an extinction that is given.
 FoundExtinction try_extinction(const SolverSetup& setup, const Extinction& extinction);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/find_motion.h"
 
 #include <algorithm>
@@ -9,13 +10,14 @@
 #include "recon/adjust/coarse_pictures.h"
 #include "recon/adjust/descent.h"
 #include "recon/adjust/prepared_scene.h"
+#include "recon/adjust/small_scene.h"
 #include "recon/effects/motion.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
-constexpr int kCoarseGrid = 64;            // voxels along the longest side, at most
-constexpr double kPixelsLookedAt = 30000;  // of the flames' boxes
+constexpr int kCoarseGrid = 64;          // voxels along the longest side, at most
+constexpr double kMotionPixels = 30000;  // of the flames' boxes
 constexpr int kMotionPasses = 6;
 constexpr double kFastestFlame = 5;  // m/s
 constexpr double kFirstStep = 0.5;   // m/s, of the search
@@ -28,53 +30,6 @@ Motion carried(const Eigen::Vector3d& velocity) {
   return {Motion::Carry::uniform, {velocity.x(), velocity.y(), velocity.z()}};
 }
 
-/// Every picture at a `factor`-th of its size, pixels averaged.
-RadianceImage shrunk(const RadianceImage& image, int factor) {
-  RadianceImage small({image.size.width / factor, image.size.height / factor});
-  const auto share = 1 / static_cast<float>(factor * factor);
-  for (int y = 0; y < small.size.height * factor; ++y) {
-    const std::size_t row = static_cast<std::size_t>(y / factor) * static_cast<std::size_t>(small.size.width);
-    const float* from =
-        &image.rgb[3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width)];
-    for (int x = 0; x < small.size.width * factor; ++x)
-      for (std::size_t c = 0; c < 3; ++c)
-        small.rgb[3 * (row + static_cast<std::size_t>(x / factor)) + c] +=
-            share * from[3 * static_cast<std::size_t>(x) + c];
-  }
-  return small;
-}
-
-View shrunk(const View& view, int factor) {
-  View small{view.name, view.camera, shrunk(view.image, factor), view.role};
-  Intrinsics& lens = small.camera.intrinsics;
-  lens.size = small.image.size;
-  for (double* length : {&lens.fx, &lens.fy, &lens.cx, &lens.cy}) *length /= factor;
-  if (view.background) small.background = shrunk(*view.background, factor);
-  if (view.average) small.average = shrunk(*view.average, factor);
-  small.lateness = view.lateness;
-  small.lateness_sigma = view.lateness_sigma;
-  return small;
-}
-
-/// The input views, small enough for about kPixelsLookedAt pixels of flame.
-Scene small_scene(const Scene& scene, const std::vector<FlameMask>& masks) {
-  double pixels = 0;
-  int narrowest = std::numeric_limits<int>::max();
-  for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    if (scene.views[v].role != ViewRole::input) continue;
-    const PixelBox& box = masks[v].box;
-    pixels += static_cast<double>(box.x1 - box.x0) * (box.y1 - box.y0);
-    narrowest = std::min({narrowest, scene.views[v].image.size.width, scene.views[v].image.size.height});
-  }
-  const int factor =
-      std::clamp(static_cast<int>(std::lround(std::sqrt(pixels / kPixelsLookedAt))), 1, narrowest);
-  Scene small;
-  small.box = scene.box;
-  for (const View& view : scene.views)
-    if (view.role == ViewRole::input) small.views.push_back(shrunk(view, factor));
-  return small;
-}
-
 /// Root of the mean over the views of the squared lateness (or of its standard error).
 double rms(const Scene& scene, Seconds View::*of) {
   double sum = 0;
@@ -85,8 +40,10 @@ double rms(const Scene& scene, Seconds View::*of) {
 class MotionProbe {
  public:
   explicit MotionProbe(const MotionSearch& search)
-      : small_(small_scene(search.scene, masks_before(search.scene, search.effects.background,
-                                                      search.options.flame_threshold))),
+      : small_(
+            small_scene(search.scene,
+                        masks_before(search.scene, search.effects.background, search.options.flame_threshold),
+                        kMotionPixels)),
         grid_(
             grid_over(search.scene.box,
                       std::min(kCoarseGrid, std::max({search.grid.nx, search.grid.ny, search.grid.nz}) - 1))),
@@ -103,8 +60,8 @@ class MotionProbe {
   [[nodiscard]] const Scene& scene() const { return small_; }
   [[nodiscard]] double edge() const { return static_cast<double>(grid_.edge); }
 
-  /// RMS over the flames' boxes that a cold solve leaves; infinite where no hull is left.
-  [[nodiscard]] double error(const Eigen::Vector3d& velocity) const {
+  /// RMS over the flames' boxes that a cold solve leaves; infinite where no hull is left, or it diverges.
+  [[nodiscard]] double error(const Eigen::Vector3d& velocity) const try {
     Effects effects = effects_;
     effects.motion = carried(velocity);
     const PreparedScene prepared(small_, effects);
@@ -120,6 +77,8 @@ class MotionProbe {
     for (int s = 0; s <= level.subsets; ++s) descent.engine().residual(s);
     const ErrorOverBoxes error(setup.views, boxes_, level.problem, effects_.background);
     return all_channels(error(descent.engine().residuals()));
+  } catch (const Diverged&) {
+    return std::numeric_limits<double>::infinity();
   }
 
   /// RMS change of the input pictures by the motion, over the flames' boxes.
@@ -236,4 +195,4 @@ FoundMotion judge_motion(const MotionSearch& search, const Motion& motion) {
   return found;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/adjust/tracker.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What a search for motion looks at.
 struct MotionSearch {
@@ -37,4 +38,4 @@ FoundMotion refine_motion(const MotionSearch& search, const Motion& from);
 /// Change and gain of a motion that is given; nothing is solved.
 FoundMotion judge_motion(const MotionSearch& search, const Motion& motion);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,10 +1,19 @@
-// The paper's solver: section "Volume Adjustment", equations (8) and (9), with its own constants.
+// SPDX-License-Identifier: Apache-2.0
+// The paper's solver: section "Volume Adjustment", equations (10) and (11) with the transmittance of (12),
+// and its own constants. paper.h says where it differs.
+#include "recon/adjust/paper.h"
+
+#include <algorithm>
 #include <cmath>
 
-#include "base/random.h"
-#include "recon/adjust/tracker.h"
+#include <fmt/format.h>
 
-namespace emberlock {
+#include "base/random.h"
+#include "recon/adjust/guard.h"
+#include "recon/adjust/tracker.h"
+#include "recon/effects/background.h"
+
+namespace emberlock::recon {
 namespace {
 
 constexpr double kAlphaL = 0.001;
@@ -16,21 +25,86 @@ constexpr double kLeastChange = 0.01;  // grey levels
 constexpr int kMostIterations = 1000;  // "until the change is small" has no bound of its own
 constexpr float kDeviation = 0.05F;    // of G(s); the paper gives the mean alone
 
+/// What stands out from the background, grey levels; the pictures themselves where it is black.
+std::vector<RadianceImage> flames_before_backgrounds(const SolverSetup& setup) {
+  std::vector<RadianceImage> flames;
+  for (const View* view : setup.views) {
+    flames.push_back(view->image);
+    const Background& background = setup.effects.background;
+    if (background.kind == Background::Kind::black) continue;
+    const RadianceImage behind =
+        backdrop(background, view->image.size, view->background ? &*view->background : nullptr);
+    std::vector<float>& rgb = flames.back().rgb;
+    for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = std::abs(rgb[i] - behind.rgb[i]);
+  }
+  return flames;
+}
+
+/// Rays without flame show the background and nothing else.
+void blacken(Problem& problem) {
+  for (std::size_t r = problem.list.subset_begin[1]; r < problem.seen.size(); ++r)
+    problem.seen[r] = problem.background.empty() ? Rgba{} : problem.background[r];
+}
+
 }  // namespace
+
+std::vector<std::string> paper_deviations() {
+  return {
+      "T starts at the hull, not at the volume's face",
+      fmt::format(
+          "T falls with the length of a sample's step, which is at most a voxel edge, not by {} a sample",
+          kOpacity),
+      "the three channels stop together, by the error over all of them",
+      fmt::format("D is in voxel edges, alpha_d = {} for a volume of {} m", kAlphaD, kPaperEdge),
+      fmt::format("sigma_G = {:.2f} is ours", kDeviation),
+      fmt::format("at most {} iterations is ours", kMostIterations),
+      "key points outside the hull hold 0, not a small negative number",
+  };
+}
+
+Status check_paper(const Scene& scene, const Effects& effects, const SolveOptions& options) {
+  const auto refuse = [](const char* what, const char* where, const char* remedy) {
+    return Error{ErrorKind::bad_input, what, where, remedy};
+  };
+  if (effects.extinction.model == Extinction::Model::field ||
+      effects.refraction.rays == Refraction::Rays::curved)
+    return refuse("the paper's solver knows constant extinction and straight rays alone", "effects",
+                  "Use --solver default, or extinction=VALUE");
+  if (effects.exposure.shutter == Exposure::Shutter::integrated)
+    return refuse("the paper's solver knows no exposure time", "effects",
+                  "Use --solver default, or leave exposure out");
+  const bool bounds = std::any_of(scene.views.begin(), scene.views.end(), [](const View& view) {
+    return view.role == ViewRole::input &&
+           std::any_of(view.bounds.begin(), view.bounds.end(), [](std::uint8_t bits) { return bits != 0; });
+  });
+  if (effects.sensor.clipping == Sensor::Clipping::at_white || bounds)
+    return refuse(bounds ? "the paper's solver takes saturated pixels for what they show, and some are"
+                         : "the paper's solver takes saturated pixels for what they show",
+                  "effects",
+                  bounds ? "Use --solver default, or pictures that aren't saturated"
+                         : "Use --solver default, or leave saturation out");
+  if (effects.scattering.order != Scattering::Order::none && effects.scattering.asymmetry != 0)
+    return refuse("the paper's solver scatters evenly alone", "effects", "Use --solver default, or g=0");
+  if (options.precision == Precision::float64)
+    return refuse("the paper's solver runs in single precision alone", "precision", "Leave --precision away");
+  return {};
+}
 
 Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker) {
   const double threshold = setup.options.flame_threshold.value_or(kPaperFlameThreshold);
   ProblemOptions options = setup.problem_options();
   options.subsets = 2;  // flame rays, which adjust, and the rest, which are only rendered
-  options.black_below = threshold;
+  const std::vector<RadianceImage> flames = flames_before_backgrounds(setup);
   options.subset_of = [&](std::size_t view, int x, int y) {
-    const RadianceImage& image = setup.views[view]->image;
+    const RadianceImage& flame = flames[view];
     const float* rgb =
-        &image.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width) +
+        &flame.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(flame.size.width) +
                         static_cast<std::size_t>(x))];
     return static_cast<double>(std::max({rgb[0], rgb[1], rgb[2]})) > threshold ? 0 : 1;
   };
-  Solution solution{{}, pose(setup.views, setup.hull, options, setup.pool), 0};
+  Solution solution;
+  solution.problem = pose(setup.views, setup.hull, options, setup.pool);
+  blacken(solution.problem);
   const Problem& problem = solution.problem;
   const float sigma = setup.sigma(problem.grid());
   const auto engine = make_engine(problem, absorbing_optics(sigma), Precision::float32, setup.pool);
@@ -44,10 +118,26 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
                          static_cast<float>(kAlphaD * box_edge / kPaperEdge), kDeviation, 0};
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostIterations;
   double last = -1;
-  while (solution.iterations < most) {
+  std::optional<Guard> guard;  // the first error is that of no light
+  const auto judge = [&] {
     engine->residual(0);
     engine->residual(1);
-    const std::array<double, 3> before = error(engine->residuals());
+    return error(engine->residuals());
+  };
+  while (solution.iterations < most) {
+    const std::array<double, 3> before = judge();
+    if (!guard) guard.emplace(all_channels(before));
+    // alpha_l isn't normalised by the number of views: with many of them it is too large.
+    const Guard::Finding finding = guard->look(all_channels(before));
+    if (finding == Guard::Finding::best) {
+      engine->mark();
+      engine->keep();
+    }
+    if (finding == Guard::Finding::diverged) {
+      engine->restore();
+      step.gain /= 2;
+      continue;
+    }
     step.stream = random_bits(setup.options.seed, 0, static_cast<std::uint64_t>(solution.iterations));
     engine->adjust(0, step);
     ++solution.iterations;
@@ -55,8 +145,15 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
     if (setup.options.iterations == 0 && std::abs(all_channels(before) - last) < kLeastChange) break;
     last = all_channels(before);
   }
+  solution.input_rmse = judge();
+  if (guard && !guard->allows(all_channels(solution.input_rmse))) {  // the last adjustment went too far
+    engine->restore();
+    solution.input_rmse = judge();
+  }
   solution.x = engine->get();
+  solution.black_error = all_channels(error.black());
+  solution.halvings = guard ? guard->halvings() : 0;
   return solution;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

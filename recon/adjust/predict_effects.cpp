@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/predict_effects.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include "recon/effects/background.h"
 #include "recon/preprocess/picture_clues.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr InScatterOptions kProbe{12, 2, 1e-2, 50};
@@ -80,7 +81,7 @@ class Predictor {
   }
   [[nodiscard]] Shot scatter(const Scattering& scattering);
   [[nodiscard]] static double change(const Shot& with, const Shot& without) {
-    return emberlock::change(with.pictures, without.pictures);
+    return recon::change(with.pictures, without.pictures);
   }
   /// Of what grows with the pixels, seen at every stride-th.
   [[nodiscard]] static Seconds pixel_cost(const Shot& with, const Shot& without, int stride) {
@@ -319,4 +320,4 @@ Result<EffectChoice> predict_effects(const CoarseFlame& flame, const Effects& fo
   return Predictor(flame, found, request, compute, elapsed)();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

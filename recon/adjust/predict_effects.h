@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "base/result.h"
@@ -5,7 +6,7 @@
 #include "recon/adjust/solver.h"
 #include "recon/effects/effects.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Decides on every effect but the extinction, which `found` brings (Volume::extinction where it is a field).
 /// An effect is on if it changes the coarse pictures by at least the request's tolerance: each is probed
@@ -21,4 +22,4 @@ Result<EffectChoice> predict_effects(const CoarseFlame& flame, const Effects& fo
                                      const EffectRequest& request, const ComputeOptions& compute,
                                      const Elapsed& elapsed = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

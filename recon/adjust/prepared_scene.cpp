@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/prepared_scene.h"
 
 #include <cmath>
@@ -6,7 +7,7 @@
 #include "recon/effects/motion.h"
 #include "recon/effects/sensor.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 PreparedScene::PreparedScene(const Scene& scene, const Effects& effects) : scene_(scene) {
   const Sensor& sensor = effects.sensor;
@@ -51,4 +52,4 @@ std::vector<FlameMask> masks_before(const Scene& scene, const Background& backgr
   return flame_masks(difference, threshold);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

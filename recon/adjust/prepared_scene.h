@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -7,7 +8,7 @@
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The views as a solver works on them: linear in light, and all of the scene's instant. Copies them only
 /// where the sensor isn't linear, or late views move.
@@ -31,4 +32,4 @@ void at_own_instant(RadianceImage& render, const Scene& scene, std::size_t i, co
 std::vector<FlameMask> masks_before(const Scene& scene, const Background& background,
                                     std::optional<double> threshold = std::nullopt);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

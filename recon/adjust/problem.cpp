@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/problem.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 #include "recon/effects/refraction.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 void find_active(const Hull& hull, std::vector<std::uint8_t>& active, std::vector<Slice>& row_span) {
@@ -85,10 +86,10 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
     const std::size_t pixel = problem.list.pixels[r];
     const float* rgb = &view.image.rgb[3 * pixel];
     const float bounds = view.bounds.empty() ? 0.F : static_cast<float>(view.bounds[pixel]);
-    if (static_cast<double>(std::max({rgb[0], rgb[1], rgb[2]})) > options.black_below)
-      problem.seen[r] = Rgba{{rgb[0], rgb[1], rgb[2], bounds}};
+    problem.seen[r] = Rgba{{rgb[0], rgb[1], rgb[2], bounds}};
   }
   problem.background = behind_rays(options.background, problem.list, views);
+  if (!options.adjoint) return problem;
   problem.slabs.resize(static_cast<std::size_t>(options.subsets));
   pool.run(options.subsets, [&](int subset) {
     problem.slabs[static_cast<std::size_t>(subset)] = sort_into_slabs(problem, subset);
@@ -125,4 +126,4 @@ std::vector<Rgba> refine(const std::vector<Rgba>& coarse, const Problem& from, c
   return fine;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

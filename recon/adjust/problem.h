@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -9,7 +10,7 @@
 #include "recon/kernels/judge.h"
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 struct View;
 class RefractiveIndex;
@@ -48,9 +49,9 @@ struct ProblemOptions {
   const RefractiveIndex* gas = nullptr;  ///< bends the rays where it is given
   double step = 1;                       ///< the march's longest, voxel edges
   int subsets = 1;
+  bool adjoint = true;  ///< whether residuals will be projected back; Problem::slabs is empty where not
   std::function<int(std::size_t view, int x, int y)>
-      subset_of;            ///< -1 leaves a pixel out; all in subset 0 where empty
-  double black_below = -1;  ///< grey levels: pixels at or below it count as black
+      subset_of;  ///< -1 leaves a pixel out; all in subset 0 where empty
 };
 
 Problem pose(const std::vector<const View*>& views, const Hull& hull, const ProblemOptions& options,
@@ -60,4 +61,4 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
 /// interpolation.
 std::vector<Rgba> refine(const std::vector<Rgba>& coarse, const Problem& from, const Problem& to);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,15 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/solver.h"
 
 #include <algorithm>
 #include <cmath>
 
+#include <fmt/format.h>
+
+#include "recon/adjust/guard.h"
+#include "recon/adjust/paper.h"
 #include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/tracker.h"
 #include "recon/effects/background.h"
 #include "recon/effects/refraction.h"
 #include "recon/render/scattered_source.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 Status check_request(const Scene& scene, const Grid& grid, const Effects& effects,
@@ -22,17 +27,14 @@ Status check_request(const Scene& scene, const Grid& grid, const Effects& effect
     return refuse("the grid has no voxel", "voxels", "Give at least one voxel along each side");
   EMBERLOCK_RETURN_IF_ERROR(check(effects));
   for (const View& view : scene.views) EMBERLOCK_RETURN_IF_ERROR(check(effects.background, view));
-  if (options.solver == Solver::paper && (effects.extinction.model == Extinction::Model::field ||
-                                          effects.refraction.rays == Refraction::Rays::curved))
-    return refuse("the paper's solver knows constant extinction and straight rays alone", "effects",
-                  "Use --solver default, or extinction=VALUE");
-  if (options.solver == Solver::paper && options.precision == Precision::float64)
-    return refuse("the paper's solver runs in single precision alone", "precision", "Leave --precision away");
+  if (options.solver == Solver::paper) EMBERLOCK_RETURN_IF_ERROR(check_paper(scene, effects, options));
   if (options.iterations < 0)
     return refuse("a negative number of iterations", "iterations",
                   "Give 1 or more, or 0 for the solver's rule");
   if (!(options.step >= 0.05 && options.step <= 4))
     return refuse("the step is out of range", "step", "Give 0.05..4 voxel edges");
+  if (options.smoothness && !(*options.smoothness >= 0 && *options.smoothness <= 100))
+    return refuse("the smoothness is out of range", "smoothness", "Give 0..100");
   if (options.compute.threads < 0 || options.compute.threads > 256)
     return refuse("the number of threads is out of range", "threads", "Give 1..256, or 0 for every core");
   if (options.budget && !elapsed)
@@ -43,6 +45,29 @@ Status check_request(const Scene& scene, const Grid& grid, const Effects& effect
                                           [](const View& v) { return v.role == ViewRole::held_out; }))
     return refuse("a target error without a held-out view", "target-rmse",
                   "Hold a view out, or leave the target away");
+  return {};
+}
+
+/// What is written, and what is said of it, are numbers; and the pictures are shown better than by no light.
+Status check_result(const Reconstruction& result, double black_error) {
+  const auto refuse = [](std::string what) {
+    return Error{
+        ErrorKind::not_converged, std::move(what), "solver",
+        "Check the cameras' poses and the box (--plan DIR shows them on the pictures); try fewer voxels"};
+  };
+  const auto finite = [](float v) { return std::isfinite(v); };
+  if (!std::all_of(result.volume.emission.begin(), result.volume.emission.end(), finite) ||
+      !std::all_of(result.volume.extinction.begin(), result.volume.extinction.end(), finite))
+    return refuse("the volume holds numbers that aren't finite");
+  const auto check = [&](const char* views, double error, double black) -> Status {
+    if (Guard::is_bearable(error, black)) return {};
+    return refuse(
+        fmt::format("the {} views are shown worse ({:.3g} grey levels) than by no light at all ({:.3g})",
+                    views, error, black));
+  };
+  EMBERLOCK_RETURN_IF_ERROR(check("input", all_channels(result.trace.back().input_rmse), black_error));
+  if (result.heldout_rmse)
+    return check("held-out", all_channels(*result.heldout_rmse), all_channels(result.heldout_black));
   return {};
 }
 
@@ -100,11 +125,16 @@ Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects
   if (effects.scattering.order != Scattering::Order::none)
     take_out_in_scatter(result.volume, result.hull, effects, pool);
   result.iterations = solution.iterations;
+  result.halvings = solution.halvings;
+  result.smoothness = solution.smoothness;
+  tracker.conclude(solution, result);
   result.solve_time = tracker.time() - start - result.hull_time;
-  result.trace = tracker.take_trace();
+  EMBERLOCK_RETURN_IF_ERROR(check_result(result, solution.black_error));
   return result;
 } catch (const DeviceError& e) {
   return e.error();
+} catch (const Diverged& e) {
+  return e.error();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -15,11 +16,11 @@
 #include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 enum class Solver {
   standard,  ///< exact adjoint, ordered subsets with momentum, non-negative, coarse to fine
-  paper,     ///< the paper's equations (8) and (9)
+  paper,     ///< the paper's equations (10) and (11), see paper.h
 };
 
 /// "default" or "paper"; an Error that lists them otherwise.
@@ -33,7 +34,16 @@ struct SolveOptions {
   std::optional<Seconds> budget;      ///< stop when `elapsed` reaches it
   std::optional<double> target_rmse;  ///< stop when the held-out views' error (all channels) is at most this
   std::optional<double> flame_threshold;  ///< grey levels; without it each view's noise_threshold
-  std::uint64_t seed = 1;                 ///< of the paper's G(s)
+  /// How firmly the default solver ties neighbouring key points, over their mean curvature, 0..100; otherwise
+  /// found from how well left-out views are shown (left_out_views.h).
+  std::optional<double> smoothness = {};
+  std::uint64_t seed = 1;  ///< of the paper's G(s)
+  /// Which of the held-out views' pixels a trace looks at, in every iteration.
+  enum class Trace {
+    sampled,  ///< few enough to cost next to nothing (held_out.h)
+    whole,    ///< all: for who measures what accuracy costs, off the clock
+  };
+  Trace trace = Trace::sampled;
   ComputeOptions compute;
 };
 
@@ -43,7 +53,16 @@ struct TracePoint {
   Seconds time{0};  ///< by `elapsed`, without the cost of the held-out evaluation itself
   int iteration = 0;
   std::array<double, 3> input_rmse = {};
+  /// An estimate from a fixed sample of the pixels (Reconstruction::trace_sample). In a finished trace it is
+  /// scaled by what all pixels showed at the end over what the sample showed there.
   std::array<double, 3> heldout_rmse = {};
+};
+
+/// How many of the held-out views' pixels, in their flames' boxes, a trace looks at; the same in every
+/// iteration.
+struct TraceSample {
+  std::size_t pixels = 0;
+  std::size_t of = 0;
 };
 
 struct Reconstruction {
@@ -51,7 +70,13 @@ struct Reconstruction {
   Hull hull;
   Effects effects;
   int iterations = 0;
+  double smoothness = 0;  ///< as in SolveOptions; 0 for the paper's solver
+  int halvings = 0;       ///< so often the error rose beyond its beginning, and the steps were halved
   std::vector<TracePoint> trace;
+  std::optional<std::array<double, 3>> heldout_rmse;  ///< of the volume, over all of the held-out pixels
+  std::array<double, 3> heldout_black = {};           ///< the same of a volume without light
+  TraceSample trace_sample;
+  Seconds trace_time{0};  ///< what the held-out views took: the sample while it ran, all pixels at the end
   Seconds hull_time{0};   ///< masks and carving
   Seconds solve_time{0};  ///< all the rest but the held-out views' evaluation for the trace
 };
@@ -70,13 +95,21 @@ struct Preview {
 /// Time since the solve began, as the caller measures it.
 using Elapsed = std::function<Seconds()>;
 
+/// Whether so much of the budget is spent; false where there is none, or no clock.
+inline bool is_spent(double share, const SolveOptions& options, const Elapsed& elapsed) {
+  return options.budget && elapsed && elapsed().value() >= share * options.budget->value();
+}
+
 /// Reconstructs the emission at the grid's key points from the input views, under the given effects. Held-out
-/// views are never fitted: they are rendered for the trace and for `target_rmse`. Deterministic: the same
+/// views are never fitted: a sample of their pixels is rendered for the trace, all of them at the end and
+/// before `target_rmse` counts as reached. Deterministic: the same
 /// bits for every number of threads, unless a budget ends it. Without `elapsed` all times are 0 and a budget
 /// is refused. Errors: check_scene's and carve's, a target without held-out views, options out of range, a
-/// device that can't run.
+/// device that can't run; of kind not_converged where the error diverges whatever the steps (guard.h), where
+/// input or held-out views are shown no better than by
+/// a volume without light, or a number isn't finite.
 Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects& effects,
                              const SolveOptions& options, const Elapsed& elapsed = {},
                              const std::function<void(const Preview&)>& preview = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <bit>
 
 #include <cub/device/device_radix_sort.cuh>
@@ -6,7 +7,7 @@
 #include "recon/compute/cuda_launch.h"
 #include "recon/kernels/gather.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 SortedSamples sort_by_voxel(const CudaBuffer<std::uint32_t>& voxels, std::size_t key_points) {
   const std::size_t count = voxels.size();
@@ -32,4 +33,4 @@ SortedSamples sort_by_voxel(const CudaBuffer<std::uint32_t>& voxels, std::size_t
   return sorted;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

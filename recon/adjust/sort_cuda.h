@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
 
 #include "recon/compute/cuda_buffer.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// See SamplesByVoxel.
 struct SortedSamples {
@@ -15,4 +16,4 @@ struct SortedSamples {
 /// Sorts samples by their voxels, one each, < key_points; those of one voxel stay in order.
 SortedSamples sort_by_voxel(const CudaBuffer<std::uint32_t>& voxels, std::size_t key_points);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

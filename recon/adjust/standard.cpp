@@ -1,20 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
 // The default solver: non-negative least squares with the exact adjoint, coarse to fine.
 #include <algorithm>
 #include <limits>
 
 #include "recon/adjust/descent.h"
 #include "recon/adjust/extinction_field.h"
+#include "recon/adjust/left_out_views.h"
 #include "recon/adjust/tracker.h"
 #include "recon/adjust/uneven_light.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kCoarsest = 24;  // no level has fewer voxels along its longest side, unless the grid itself has
-constexpr int kCoarseSteps = 64;     // of a coarse level
-constexpr int kMostSteps = 192;      // at full resolution, unless the user asks for more
-constexpr int kRound = 16;           // steps between two looks at the held-out pixels' error
-constexpr double kLeastGain = 0.02;  // a round that lowers it by a smaller share is the last
+constexpr int kCoarseSteps = 64;           // of a coarse level
+constexpr int kMostSteps = 192;            // at full resolution, unless the user asks for more
+constexpr int kRound = 16;                 // steps between two looks at the held-out pixels' error
+constexpr double kMostOfSmoothness = 0.5;  // of the budget may be spent when its search goes on
+constexpr double kLeastGain = 0.02;        // a round that lowers it by a smaller share is the last
 
 int longest(const Grid& g) { return std::max({g.nx, g.ny, g.nz}) - 1; }
 
@@ -28,16 +31,24 @@ std::unique_ptr<Descent> begin(const Level& level, const SolverSetup& setup, std
 
 }  // namespace
 
-Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
+Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
+  SolverSetup setup = asked;
+  setup.smoothness = asked.options.smoothness;
+  if (!setup.smoothness)
+    setup.smoothness = find_smoothness(LeftOutViews(setup, setup.hull), setup.effects.extinction, [&] {
+                         return tracker.is_spent(kMostOfSmoothness);
+                       }).value;
   std::vector<Hull> hulls = {setup.hull};
   while (longest(hulls.back().grid) >= 2 * kCoarsest) hulls.push_back(coarsen(hulls.back()));
 
   std::unique_ptr<const Level> level;
   std::unique_ptr<Descent> descent;
+  int halvings = 0;
   for (std::size_t l = hulls.size(); l-- > 0;) {
     auto finer = std::make_unique<const Level>(pose_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
     std::vector<Rgba> x = descent ? refine(descent->engine().get(), level->problem, finer->problem)
                                   : std::vector<Rgba>(finer->problem.active.size());
+    if (descent) halvings += descent->halvings();
     descent = begin(*finer, setup, std::move(x));
     level = std::move(finer);
     for (int s = 0; l > 0 && s < kCoarseSteps && !tracker.out_of_time(); s += level->subsets) descent->pass();
@@ -56,9 +67,13 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
       const UnevenLight light(setup,
                               to_volume(descent->engine().get(), level->problem, setup.hull, setup.effects));
       descent->engine().set_offset(light(setup.views, level->problem));
+      descent->begin_anew();
       tracker.add_offset(light);
     }
-    descent->pass();
+    if (descent->pass() == Guard::Finding::diverged) {  // what was taken back is no iteration
+      if (tracker.out_of_time()) break;
+      continue;
+    }
     ++iteration;
     const double validation = descent->validation_error();
     if (tracker.record(iteration, error(descent->engine().residuals()), descent->engine(), level->problem))
@@ -67,7 +82,15 @@ Solution solve_standard(const SolverSetup& setup, Tracker& tracker) {
     if (setup.options.iterations == 0 && validation > (1 - kLeastGain) * last) break;
     last = validation;
   }
-  return {descent->engine().get(), level->problem, iteration};
+  descent->settle();
+  const std::array<double, 3> reached = error(descent->engine().residuals());
+  return {descent->engine().get(),
+          level->problem,
+          iteration,
+          halvings + descent->halvings(),
+          *setup.smoothness,
+          all_channels(error.black()),
+          reached};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,32 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/tracker.h"
 
-namespace emberlock {
+#include <cmath>
+
+namespace emberlock::recon {
 
 Tracker::Tracker(const SolverSetup& setup, const std::vector<const View*>& held_out,
                  const std::vector<PixelBox>& boxes, const Elapsed& elapsed,
                  const std::function<void(const Preview&)>& preview)
-    : setup_(setup), elapsed_(elapsed), preview_(preview), views_(held_out) {
+    : setup_(setup), elapsed_(elapsed), preview_(preview) {
   if (held_out.empty()) return;
   const Seconds start = now();
-  held_out_ =
-      std::make_unique<const Problem>(pose(held_out, setup.hull, setup.problem_options(), setup.pool));
-  engine_ = make_engine(*held_out_, setup.optics(held_out_->grid()), setup.options.precision, setup.pool);
-  error_ = std::make_unique<const ErrorOverBoxes>(held_out, boxes, *held_out_, setup.effects.background);
+  held_out_ = std::make_unique<HeldOut>(setup, held_out, boxes);
   excluded_ += now() - start;
 }
 
 Seconds Tracker::time() const { return now() - excluded_; }
 
-bool Tracker::out_of_time() const { return setup_.options.budget && now() >= *setup_.options.budget; }
+/// A sample that was too hopeful once is believed less from then on, so that all pixels are seldom looked at.
+bool Tracker::reached(const std::array<double, 3>& sampled, const Engine& engine) {
+  if (!setup_.options.target_rmse) return false;
+  const double target = *setup_.options.target_rmse;
+  const double estimate = all_channels(sampled);
+  if (all_over_sampled_ * estimate > target) return false;
+  const double error = all_channels(held_out_->all(engine));
+  if (estimate > 0) all_over_sampled_ = std::max(1.0, error / estimate);
+  return error <= target;
+}
 
 bool Tracker::record(int iteration, const std::array<double, 3>& input_rmse, Engine& engine,
                      const Problem& problem) {
   TracePoint point{time(), iteration, input_rmse, {}};
+  bool done = false;
   if (held_out_) {
     const Seconds start = now();
-    engine_->set(engine.get());
-    engine_->residual(0);
-    point.heldout_rmse = (*error_)(engine_->residuals());
+    point.heldout_rmse = held_out_->sampled(engine);
+    done = reached(point.heldout_rmse, engine);
     excluded_ += now() - start;
   }
   trace_.push_back(point);
@@ -41,10 +50,29 @@ bool Tracker::record(int iteration, const std::array<double, 3>& input_rmse, Eng
               },
               setup_.hull, setup_.effects});
   }
-  if (held_out_ && setup_.options.target_rmse &&
-      all_channels(point.heldout_rmse) <= *setup_.options.target_rmse)
-    return true;
-  return out_of_time();
+  return done || out_of_time();
+}
+
+void Tracker::conclude(const Solution& solution, Reconstruction& result) {
+  std::erase_if(trace_, [](const TracePoint& p) {
+    return !std::isfinite(all_channels(p.input_rmse)) || !std::isfinite(all_channels(p.heldout_rmse));
+  });
+  if (trace_.empty()) trace_.push_back({time(), solution.iterations, {}, {}});
+  trace_.back().input_rmse = solution.input_rmse;
+  if (held_out_) {
+    const Seconds start = now();
+    const HeldOut::Both errors = held_out_->both(solution.x);
+    for (TracePoint& point : trace_)
+      for (std::size_t c = 0; c < 3; ++c)
+        if (errors.sampled[c] > 0) point.heldout_rmse[c] *= errors.all[c] / errors.sampled[c];
+    trace_.back().heldout_rmse = errors.all;
+    result.heldout_rmse = errors.all;
+    result.heldout_black = held_out_->black();
+    result.trace_sample = held_out_->sample();
+    excluded_ += now() - start;
+  }
+  result.trace_time = excluded_;
+  result.trace = std::move(trace_);
 }
 
 Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull& hull,
@@ -78,4 +106,4 @@ Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull&
   return volume;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

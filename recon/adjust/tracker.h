@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -8,10 +9,11 @@
 
 #include "recon/adjust/box_error.h"
 #include "recon/adjust/engine.h"
+#include "recon/adjust/held_out.h"
 #include "recon/adjust/problem.h"
 #include "recon/adjust/solver.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What the solvers share: the scene's input views, the hull, the pool, and the scale of extinction.
 struct SolverSetup {
@@ -21,7 +23,8 @@ struct SolverSetup {
   Effects effects;
   const SolveOptions& options;
   Pool& pool;
-  const RefractiveIndex* gas = nullptr;  ///< of curved rays
+  const RefractiveIndex* gas = nullptr;   ///< of curved rays
+  std::optional<double> smoothness = {};  ///< stands before the options'
 
   /// Extinction a voxel edge: all of it, or its mean where it is a field.
   [[nodiscard]] float sigma(const Grid& grid) const {
@@ -49,7 +52,10 @@ struct SolverSetup {
   }
 };
 
-/// Keeps the trace, evaluates the held-out views off the clock, and says when to stop.
+struct Solution;
+
+/// Keeps the trace, evaluates the held-out views off the clock, and says when to stop. Where there is a
+/// target, what the sample takes for reached is looked at with all pixels.
 class Tracker {
  public:
   Tracker(const SolverSetup& setup, const std::vector<const View*>& held_out,
@@ -60,25 +66,28 @@ class Tracker {
   /// on.
   template <class Offset>
   void add_offset(const Offset& offset) {
-    if (held_out_) engine_->set_offset(offset(views_, *held_out_));
+    if (held_out_) held_out_->set_offset(offset);
   }
   /// Adds a point to the trace; true when the budget is spent or the target reached.
   bool record(int iteration, const std::array<double, 3>& input_rmse, Engine& engine, const Problem& problem);
-  [[nodiscard]] bool out_of_time() const;
+  [[nodiscard]] bool out_of_time() const { return is_spent(1); }
+  /// Whether so much of the budget is spent.
+  [[nodiscard]] bool is_spent(double share) const { return recon::is_spent(share, setup_.options, elapsed_); }
   /// Time since the beginning without the held-out evaluations.
   [[nodiscard]] Seconds time() const;
-  [[nodiscard]] std::vector<TracePoint> take_trace() { return std::move(trace_); }
+  /// Ends the trace, whose last point becomes the solution's: judges it by all held-out pixels, and scales
+  /// the trace's estimates by them. Points of what wasn't finite, and was taken back, go.
+  void conclude(const Solution& solution, Reconstruction& result);
 
  private:
   [[nodiscard]] Seconds now() const { return elapsed_ ? elapsed_() : Seconds(0); }
+  [[nodiscard]] bool reached(const std::array<double, 3>& sampled, const Engine& engine);
 
   const SolverSetup& setup_;
   const Elapsed& elapsed_;
   const std::function<void(const Preview&)>& preview_;
-  std::vector<const View*> views_;
-  std::unique_ptr<const Problem> held_out_;
-  std::unique_ptr<Engine> engine_;
-  std::unique_ptr<const ErrorOverBoxes> error_;
+  std::unique_ptr<HeldOut> held_out_;
+  double all_over_sampled_ = 1;  // when both were last looked at
   Seconds excluded_{0};
   std::vector<TracePoint> trace_;
 };
@@ -88,13 +97,18 @@ class Tracker {
 Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull& hull,
                  const Effects& effects);
 
-/// Returns the last x through `x` and its problem; iterations done at full resolution.
+/// x, as it was judged at the end, and its problem; iterations done at full resolution.
 struct Solution {
   std::vector<Rgba> x;
   Problem problem;
   int iterations = 0;
+  int halvings = 0;  ///< see Reconstruction
+  double smoothness = 0;
+  double black_error = 0;  ///< of the input views, all channels: what a volume without light leaves
+  std::array<double, 3> input_rmse = {};  ///< of x, as in TracePoint
 };
+/// Both throw Diverged where their guard gives up.
 Solution solve_standard(const SolverSetup& setup, Tracker& tracker);
 Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/uneven_light.h"
 
 #include "recon/render/render.h"
 #include "recon/render/scattered_source.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 UnevenLight::UnevenLight(const SolverSetup& setup, Volume source)
     : setup_(setup), source_(std::move(source)), emission_(source_) {
@@ -37,4 +38,4 @@ std::vector<Rgba> UnevenLight::operator()(const std::vector<const View*>& views,
   return offset;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

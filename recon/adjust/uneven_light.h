@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/adjust/tracker.h"
 #include "recon/render/in_scatter.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What scattering that favours a direction adds to each ray, beyond the even light that a solver's emission
 /// holds already: the source's own light is scattered towards each camera. How it depends on the emission is
@@ -22,4 +23,4 @@ class UnevenLight {
   ScatterField field_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/board.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kFewestCorners = 6;
@@ -303,4 +304,4 @@ Image draw_board(const Board& board, int square) {
   return image;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -12,7 +13,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 enum class BoardKind : std::uint8_t {
   chessboard,  ///< seen whole or not at all
@@ -76,4 +77,4 @@ BoardSearch search_for(const Board& board);
 /// corner.
 Image draw_board(const Board& board, int square);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

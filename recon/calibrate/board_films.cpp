@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/board_films.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include "base/in_parallel.h"
 #include "session/reader.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kLeastDifference = 0.01;  // of the picture's diagonal
@@ -28,7 +29,7 @@ struct CameraFilm {
   std::size_t readable = 0;
 };
 
-std::vector<std::size_t> complete_frames(const SessionReader& reader, std::size_t camera) {
+std::vector<std::size_t> complete_frames(const session::SessionReader& reader, std::size_t camera) {
   std::vector<std::size_t> frames;
   const std::vector<FrameStamp>& stamps = reader.stamps(camera);
   for (std::size_t i = 0; i < stamps.size(); ++i)
@@ -37,7 +38,7 @@ std::vector<std::size_t> complete_frames(const SessionReader& reader, std::size_
 }
 
 /// The frame nearest to `t`, half a period away at most. `frames` in order of time.
-std::optional<std::size_t> nearest_frame(const SessionReader& reader, std::size_t camera,
+std::optional<std::size_t> nearest_frame(const session::SessionReader& reader, std::size_t camera,
                                          const std::vector<std::size_t>& frames, TimePoint t) {
   const std::vector<FrameStamp>& stamps = reader.stamps(camera);
   const auto away = [&](std::size_t frame) { return abs(stamps[frame].monotonic_time - t); };
@@ -65,7 +66,7 @@ double motion_between(const std::vector<BoardCorner>& a, const std::vector<Board
 }
 
 /// Reads one camera's frames in order, and the neighbours of those that show the board.
-Status search_film(SessionReader& reader, std::size_t camera, const BoardSearch& search,
+Status search_film(session::SessionReader& reader, std::size_t camera, const BoardSearch& search,
                    const FilmSearchOptions& options, const Observer& observer, CameraFilm& film) {
   const std::string id = reader.manifest().cameras(static_cast<int>(camera)).camera_id();
   const std::size_t count = reader.stamps(camera).size();
@@ -111,7 +112,7 @@ std::vector<std::size_t> spread_evenly(std::size_t count, std::size_t most) {
 }
 
 /// Which of the cameras' frames belong to the searched instants, and the instants' names.
-std::vector<CameraFilm> plan_films(const SessionReader& reader, const FilmSearchOptions& options,
+std::vector<CameraFilm> plan_films(const session::SessionReader& reader, const FilmSearchOptions& options,
                                    FilmCounts& counts, std::vector<std::string>& names) {
   const std::vector<std::size_t> first = complete_frames(reader, 0);
   counts.instants = first.size();
@@ -233,7 +234,7 @@ std::vector<std::size_t> spread_instants(const BoardSightings& sightings, std::s
 
 Result<BoardReading> find_boards_in_session(const std::filesystem::path& folder, const BoardSearch& search,
                                             const FilmSearchOptions& options, const Progress& progress) {
-  EMBERLOCK_ASSIGN_OR_RETURN(SessionReader reader, SessionReader::open(folder));
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader reader, session::SessionReader::open(folder));
   if (reader.camera_count() == 0)
     return Error{ErrorKind::bad_input, "has no camera", folder.string(), "Record or import one with cameras"};
   BoardReading reading;
@@ -241,7 +242,7 @@ Result<BoardReading> find_boards_in_session(const std::filesystem::path& folder,
   FilmCounts& counts = reading.film.emplace();
   std::vector<CameraFilm> films = plan_films(reader, options, counts, reading.sightings.instants);
   const Observer observer = [&](double fraction, std::string_view what) {
-    report(progress, fraction, what);
+    tell(progress, fraction, what);
     return true;
   };
   EMBERLOCK_RETURN_IF_ERROR(in_parallel(films.size(), observer, [&](std::size_t c, const Observer& part) {
@@ -283,4 +284,4 @@ Result<BoardReading> find_boards_in_session(const std::filesystem::path& folder,
   return reading;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -5,7 +6,7 @@
 #include "base/progress.h"
 #include "recon/calibrate/board_pictures.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 struct FilmSearchOptions {
   std::size_t instants = 160;  ///< are taken at most; 1..10000
@@ -31,4 +32,4 @@ Result<BoardReading> find_boards_in_session(const std::filesystem::path& folder,
 /// average, in the camera where that is least. Rising.
 std::vector<std::size_t> spread_instants(const BoardSightings& sightings, std::size_t most);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/board_pictures.h"
 
 #include <algorithm>
@@ -8,9 +9,9 @@
 #include <tuple>
 
 #include "base/in_parallel.h"
-#include "session/frame_file.h"
+#include "session/media/frame_file.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace fs = std::filesystem;
 namespace {
 
@@ -73,12 +74,12 @@ std::vector<Found> find_in_all(const std::vector<BoardPicture>& pictures, const 
                                const Progress& progress) {
   std::vector<Found> found(pictures.size());
   const Observer observer = [&](double fraction, std::string_view what) {
-    report(progress, fraction, what);
+    tell(progress, fraction, what);
     return true;
   };
   // No part fails: a picture that can't be read is told of with the others.
   (void)in_parallel(pictures.size(), observer, [&](std::size_t i, const Observer& part) -> Status {
-    const auto picture = read_image(pictures[i].path);
+    const auto picture = session::read_image(pictures[i].path);
     if (picture) {
       found[i].size = picture->layout().size;
       found[i].corners = search.find(picture->view());
@@ -174,4 +175,4 @@ Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, cons
   return reading;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

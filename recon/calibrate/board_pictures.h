@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -8,7 +9,7 @@
 #include "base/progress.h"
 #include "recon/calibrate/calibrate_rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A picture of the board: whose, and of which instant.
 struct BoardPicture {
@@ -52,4 +53,4 @@ struct BoardReading {
 Result<BoardReading> find_boards(const std::vector<BoardPicture>& pictures, const BoardSearch& search,
                                  const Progress& progress = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// An axis-aligned box in the world: the volume to reconstruct.
 struct Box {
@@ -10,4 +11,4 @@ struct Box {
   Eigen::Vector3d size = Eigen::Vector3d::Zero();    ///< metres, every component > 0
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

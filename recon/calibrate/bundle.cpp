@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/bundle.h"
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 
 #include "recon/calibrate/corner_cost.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// The bundle's numbers as Ceres moves them.
@@ -319,4 +320,4 @@ double rms_of(const Bundle& bundle, std::optional<std::size_t> camera) {
   return count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

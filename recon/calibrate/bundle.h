@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@
 #include "recon/calibrate/board.h"
 #include "recon/calibrate/camera_model.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Bundle adjustment of boards that cameras see (Triggs et al. 2000): all lenses, all cameras' poses and one
 /// pose of the board an instant, so that each corner falls where its picture shows it. A lamp is a board of
@@ -101,4 +102,4 @@ std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle);
 /// RMS distance of the used corners of a camera (of all of them, if none is given), pixels.
 double rms_of(const Bundle& bundle, std::optional<std::size_t> camera = std::nullopt);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

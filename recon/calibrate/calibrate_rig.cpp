@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/calibrate_rig.h"
 
 #include <algorithm>
@@ -14,7 +15,7 @@
 #include "recon/calibrate/lens_start.h"
 #include "recon/calibrate/pose.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kLensSteps = 8;  // share of the progress in tenths
@@ -28,9 +29,8 @@ Starts start_lenses(const BoardSightings& sightings, const CalibrateOptions& opt
                     const Progress& progress, RigCalibration& result) {
   Starts starts;
   for (std::size_t c = 0; c < sightings.cameras.size(); ++c) {
-    report(progress,
-           0.1 * kLensSteps * static_cast<double>(c) / static_cast<double>(sightings.cameras.size()),
-           "lens of " + sightings.cameras[c].id);
+    tell(progress, 0.1 * kLensSteps * static_cast<double>(c) / static_cast<double>(sightings.cameras.size()),
+         "lens of " + sightings.cameras[c].id);
     auto start = start_lens(sightings, c, options.clean);
     CalibratedCamera& camera = result.cameras[c];
     starts.lenses.push_back(start ? start->bundle.cameras[0].model.intrinsics : Intrinsics{});
@@ -327,13 +327,13 @@ Result<RigCalibration> calibrate_rig(const BoardSightings& sightings, const Cali
     return Error{ErrorKind::bad_input, result.cameras.front().why, "camera " + result.cameras.front().id,
                  sightings.cameras.size() > 1 ? "No other camera could be calibrated either" : ""};
   }
-  report(progress, 0.1 * kLensSteps, "all cameras together");
+  tell(progress, 0.1 * kLensSteps, "all cameras together");
   EMBERLOCK_RETURN_IF_ERROR(adjust_group(sightings, options, starts, placed, result));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::size_t world, world_board(sightings, options, result));
   result.world = sightings.instants[used_boards(sightings, result)[world].instant];
   move_world(result.bundle, world);
   EMBERLOCK_RETURN_IF_ERROR(adjust(result.bundle, BundleLoss::squares));
-  report(progress, 0.95, "uncertainties");
+  tell(progress, 0.95, "uncertainties");
   auto spread = covariance(result.bundle);
   if (!spread) {
     return Error{ErrorKind::bad_input, "the views don't determine all cameras", "cameras",
@@ -348,7 +348,7 @@ Result<RigCalibration> calibrate_rig(const BoardSightings& sightings, const Cali
 
 v1::Rig rig_of(const RigCalibration& calibration, const std::string& created_utc) {
   v1::Rig rig;
-  rig.set_format_version(kRigFormatVersion);
+  rig.set_format_version(session::kRigFormatVersion);
   rig.set_created_utc(created_utc);
   for (const CalibratedCamera& camera : calibration.cameras) {
     if (!camera.calibrated) continue;
@@ -372,4 +372,4 @@ v1::Rig rig_of(const RigCalibration& calibration, const std::string& created_utc
   return rig;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

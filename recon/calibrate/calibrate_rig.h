@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -10,7 +11,7 @@
 #include "recon/calibrate/relative_poses.h"
 #include "recon/calibrate/rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What was seen of a board: cameras, instants, and which corners each camera saw at which instant.
 struct BoardSightings {
@@ -89,4 +90,4 @@ Result<RigCalibration> calibrate_rig(const BoardSightings& sightings, const Cali
 /// `created_utc` as the file's; may be empty.
 v1::Rig rig_of(const RigCalibration& calibration, const std::string& created_utc);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/camera_model.h"
 
 #include <Eigen/Geometry>
 
-namespace emberlock {
+namespace emberlock::recon {
 Eigen::Vector2d CameraModel::project(const Eigen::Vector3d& world) const {
   const Eigen::Vector3d p = camera_from_world * world;
   Eigen::Vector2d normalised = p.head<2>() / p.z();
@@ -31,4 +32,4 @@ CameraModel look_at(const Intrinsics& intrinsics, const Eigen::Vector3d& center,
   return {intrinsics, camera_from_world};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

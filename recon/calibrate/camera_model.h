@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
@@ -6,7 +7,7 @@
 #include "base/result.h"
 #include "recon/kernels/lens.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Conventions of recon: world in metres, right-handed; camera axes as OpenCV's (x right, y down, z forward);
 // pixel coordinates count from 0 at the corner of the top left pixel, so that its centre is (0.5, 0.5).
@@ -51,4 +52,4 @@ struct CameraModel {
 CameraModel look_at(const Intrinsics& intrinsics, const Eigen::Vector3d& center,
                     const Eigen::Vector3d& target, const Eigen::Vector3d& up = Eigen::Vector3d::UnitZ());
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

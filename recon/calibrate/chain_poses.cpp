@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/chain_poses.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 #include <numeric>
 #include <set>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kFarOff = 50;  // pixels: a corner further off says no more
@@ -129,4 +130,4 @@ ChainPoses chain_poses(const BoardSightings& sightings, const std::vector<Intrin
   return result;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <map>
@@ -6,7 +7,7 @@
 
 #include "recon/calibrate/calibrate_rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A sighting with a first idea of its pose.
 struct PlacedSighting {
@@ -32,4 +33,4 @@ ChainPoses chain_poses(const BoardSightings& sightings, const std::vector<Intrin
 /// b_from_a * a_from_world.
 Rigid3 chained(const Rigid3& outer, const Rigid3& inner);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/clean.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr std::size_t kFewestInView = 6;
@@ -174,4 +175,4 @@ Result<std::vector<RejectedView>> clean(Bundle& bundle, const CleanOptions& opti
   return result;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

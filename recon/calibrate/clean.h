@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -6,7 +7,7 @@
 #include "base/result.h"
 #include "recon/calibrate/bundle.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 struct CleanOptions {
   double corner_limit = 4;   ///< a corner further off than so many standard deviations is wrong
@@ -28,4 +29,4 @@ struct RejectedView {
 /// rejected at a time: it spoils the others'.
 Result<std::vector<RejectedView>> clean(Bundle& bundle, const CleanOptions& options = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -11,7 +12,7 @@
 
 #include "recon/calibrate/rig_formats.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace fs = std::filesystem;
 namespace {
 
@@ -175,7 +176,7 @@ Result<v1::Rig> parse_colmap(std::string_view cameras, std::string_view images, 
     *rig.add_cameras() = rig_camera_of(camera_of_name(image.name), {lens->second, image.camera_from_world});
     ++i;  // the line of its points, which may be empty
   }
-  EMBERLOCK_RETURN_IF_ERROR(check_rig(rig, where + "/images.txt"));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, where + "/images.txt"));
   return rig;
 }
 
@@ -206,4 +207,4 @@ std::string colmap_images(const v1::Rig& rig) {
   return text;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/corner_cost.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 #include "recon/calibrate/pose.h"
 #include "recon/kernels/lens.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kSmallTurn = 1e-4;  // radians: below, three terms of the series are exact to a double
@@ -84,4 +85,4 @@ bool CornerEquations::operator()(const double* lens, const double* camera, const
   return true;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

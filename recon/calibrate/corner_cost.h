@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -6,7 +7,7 @@
 
 #include "recon/calibrate/bundle.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A pose's block: a turn (angle times axis) on top of where it was linearised, and a place.
 using PoseBlock = std::array<double, kPoseUnknowns>;
@@ -39,4 +40,4 @@ struct CornerEquations {
                   Slopes* slopes) const;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/drift.h"
 
 #include <algorithm>
@@ -14,7 +15,7 @@
 #include "recon/calibrate/lens_start.h"
 #include "session/files.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using Vector6 = Eigen::Matrix<double, kPoseUnknowns, 1>;
@@ -57,11 +58,11 @@ PoseCovariance diagonal(double place, double turn) {
 /// the standard deviations, which are wider.
 PoseCovariance spread_of(const v1::Calibration& calibration) {
   PoseCovariance root = PoseCovariance::Zero();
-  if (calibration.sigma_size() == kCalibrationSigmas + kPoseRootNumbers) {
-    int next = kCalibrationSigmas;
+  if (calibration.sigma_size() == session::kCalibrationSigmas + session::kPoseRootNumbers) {
+    int next = session::kCalibrationSigmas;
     for (int row = 0; row < kPoseUnknowns; ++row)
       for (int column = 0; column <= row; ++column) root(row, column) = calibration.sigma(next++);
-  } else if (calibration.sigma_size() == kCalibrationSigmas) {
+  } else if (calibration.sigma_size() == session::kCalibrationSigmas) {
     for (int i = 0; i < kPoseUnknowns; ++i) root(i, i) = calibration.sigma(kLensUnknowns + i);
   }
   return root * root.transpose() + diagonal(kLeastPlace, kLeastTurn);
@@ -389,4 +390,4 @@ Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sighti
   return report;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

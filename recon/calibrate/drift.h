@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -5,7 +6,7 @@
 
 #include "recon/calibrate/calibrate_rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 enum class DriftVerdict {
   still,    ///< what shows is explained by the corners' noise and the calibration's own uncertainty
@@ -53,4 +54,4 @@ struct DriftReport {
 Result<DriftReport> check_drift(const v1::Rig& rig, const BoardSightings& sightings,
                                 const std::string& where);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/lens_start.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include "recon/calibrate/pose.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr std::size_t kFewestViews = 3;
@@ -249,4 +250,4 @@ Result<LensStart> start_lens(const BoardSightings& sightings, std::size_t camera
   return start;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -5,7 +6,7 @@
 
 #include "recon/calibrate/calibrate_rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// One camera's lens from its own views of the board, cleaned: Zhang's method, then the bundle of this one
 /// camera (held at the origin). k3 is free only where corners reach 85 % of the half diagonal (it weighs r^6:
@@ -28,4 +29,4 @@ Result<LensStart> start_lens(const BoardSightings& sightings, std::size_t camera
 std::optional<Rigid3> board_pose(const Intrinsics& lens, const Board& board,
                                  const std::vector<BoardCorner>& corners);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/next_pictures.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kEnoughTilt = 0.5;         // radians between two of a camera's boards
@@ -123,4 +124,4 @@ std::vector<std::string> next_pictures(const RigCalibration& calibration) {
   return advice;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

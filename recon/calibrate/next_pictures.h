@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -6,7 +7,7 @@
 
 #include "recon/calibrate/calibrate_rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Used corners in each cell of a camera's picture, row by row from the top left.
 struct CornerCoverage {
@@ -30,4 +31,4 @@ std::vector<std::string> next_pictures(const RigCalibration& calibration);
 /// square root law. An estimate: where the board is and how it tilts counts as well.
 double expected_factor(std::size_t views, std::size_t more);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,12 +1,22 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
+#include <iterator>
+#include <map>
 #include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
 
+#include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
+#include <pugixml.hpp>
+#include <yaml-cpp/yaml.h>
 
 #include "recon/calibrate/rig_formats.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kOpencvPixelShift = 0.5;  // OpenCV counts pixels from the centre of the first one
@@ -15,45 +25,99 @@ Error bad_opencv(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
 }
 
-/// Reads a matrix of doubles, whatever its shape; none if it isn't there.
-std::optional<std::vector<double>> numbers_of(const cv::FileStorage& file, const char* key) {
-  const cv::FileNode node = file[key];
-  if (node.empty()) return std::nullopt;
-  cv::Mat matrix;
-  node >> matrix;
-  if (matrix.empty() || matrix.channels() != 1) return std::nullopt;
-  cv::Mat wide;
-  matrix.convertTo(wide, CV_64F);
-  return std::vector<double>(wide.begin<double>(), wide.end<double>());
+/// The numbers under each key that is wanted: one, or a matrix row by row.
+using NumbersByKey = std::map<std::string, std::vector<double>>;
+constexpr std::array kWanted = {
+    "image_width", "image_height", "camera_matrix", "distortion_coefficients", "R", "T"};
+
+/// Of a matrix's own account of itself; a plain list has none.
+Status check_shape(const std::string& key, int rows, int columns, std::size_t count) {
+  if (rows > 0 && columns > 0 &&
+      static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns) == count) {
+    return {};
+  }
+  return bad_opencv(key, fmt::format("holds {} numbers, not {} x {}", count, rows, columns),
+                    "Name a file that cv::FileStorage wrote");
 }
 
-Result<v1::RigCamera> opencv_camera(const cv::FileStorage& file, const std::string& id,
+/// YAML, and JSON, which is YAML too. Throws YAML::Exception, with the line.
+Result<NumbersByKey> numbers_of_yaml(const std::string& text) {
+  NumbersByKey numbers;
+  const YAML::Node file = YAML::Load(text);
+  if (!file.IsMap()) return numbers;
+  for (const char* key : kWanted) {
+    const YAML::Node node = file[key];
+    if (!node) continue;
+    const YAML::Node data = node.IsMap() ? node["data"] : node;
+    std::vector<double>& into = numbers[key];
+    if (data.IsSequence()) {
+      into = data.as<std::vector<double>>();
+    } else {
+      into.assign(1, data.as<double>());
+    }
+    if (node.IsMap())
+      EMBERLOCK_RETURN_IF_ERROR(
+          check_shape(key, node["rows"].as<int>(), node["cols"].as<int>(), into.size()));
+  }
+  return numbers;
+}
+
+Result<NumbersByKey> numbers_of_xml(const std::string& text) {
+  pugi::xml_document file;
+  const pugi::xml_parse_result parsed = file.load_buffer(text.data(), text.size());
+  if (!parsed) {
+    return bad_opencv(fmt::format("byte {}", parsed.offset), parsed.description(),
+                      "Name a file that cv::FileStorage wrote");
+  }
+  NumbersByKey numbers;
+  for (const char* key : kWanted) {
+    const pugi::xml_node node = file.child("opencv_storage").child(key);
+    if (!node) continue;
+    const pugi::xml_node data = node.child("data");
+    std::istringstream words((data ? data : node).text().get());
+    std::vector<double>& into = numbers[key];
+    into.assign(std::istream_iterator<double>(words), {});
+    if (!words.eof())
+      return bad_opencv(key, "holds what is no number", "Name a file that cv::FileStorage wrote");
+    if (data)
+      EMBERLOCK_RETURN_IF_ERROR(check_shape(key, node.child("rows").text().as_int(),
+                                            node.child("cols").text().as_int(), into.size()));
+  }
+  return numbers;
+}
+
+Result<v1::RigCamera> opencv_camera(const NumbersByKey& numbers, const std::string& id,
                                     const std::string& where) {
-  const auto matrix = numbers_of(file, "camera_matrix");
+  const auto of = [&](const char* key) -> std::optional<std::vector<double>> {
+    const auto found = numbers.find(key);
+    if (found == numbers.end() || found->second.empty()) return std::nullopt;
+    return found->second;
+  };
+  const auto matrix = of("camera_matrix");
   if (!matrix || matrix->size() != 9)
     return bad_opencv(where + ": camera_matrix", "no 3 x 3 matrix",
                       "Give OpenCV's calibration, with camera_matrix");
-  const auto k = numbers_of(file, "distortion_coefficients").value_or(std::vector<double>(5));
+  const auto k = of("distortion_coefficients").value_or(std::vector<double>(5));
   if (k.size() < 4 ||
       std::any_of(k.begin() + std::min<std::ptrdiff_t>(5, static_cast<std::ptrdiff_t>(k.size())), k.end(),
                   [](double v) { return v != 0; })) {
     return bad_opencv(where + ": distortion_coefficients", "are not k1, k2, p1, p2 and at most k3",
                       "Calibrate with OpenCV's model of five coefficients");
   }
-  const int width = file["image_width"].empty() ? 0 : static_cast<int>(file["image_width"]);
-  const int height = file["image_height"].empty() ? 0 : static_cast<int>(file["image_height"]);
-  if (width < 1 || height < 1 || width > 65536 || height > 65536)
+  const double width = of("image_width").value_or(std::vector<double>(1))[0];
+  const double height = of("image_height").value_or(std::vector<double>(1))[0];
+  if (!(width >= 1 && height >= 1 && width <= 65536 && height <= 65536))
     return bad_opencv(where + ": image_width, image_height", "are missing or out of range",
                       "Add them, in pixels");
   CameraModel camera;
-  camera.intrinsics = {{width, height},
+  camera.intrinsics = {{static_cast<int>(width), static_cast<int>(height)},
                        (*matrix)[0],
                        (*matrix)[4],
                        (*matrix)[2] + kOpencvPixelShift,
                        (*matrix)[5] + kOpencvPixelShift,
                        {k[0], k[1], k[2], k[3], k.size() > 4 ? k[4] : 0}};
-  auto turn = numbers_of(file, "R");
-  const auto place = numbers_of(file, "T");
+  auto turn = of("R");
+  const auto place = of("T");
   if (turn && turn->size() == 3) {
     cv::Mat full;
     cv::Rodrigues(*turn, full);
@@ -78,15 +142,20 @@ Result<v1::RigCamera> opencv_camera(const cv::FileStorage& file, const std::stri
 
 Result<v1::RigCamera> parse_opencv(std::string_view text, const std::string& camera_id,
                                    const std::string& where) {
+  const std::string whole(text);
+  const bool xml = whole.substr(0, whole.find_first_not_of(" \t\r\n") + 1).ends_with('<');
+  Result<NumbersByKey> numbers = NumbersByKey{};
   try {
-    const cv::FileStorage file(std::string(text), cv::FileStorage::READ | cv::FileStorage::MEMORY);
-    if (!file.isOpened())
-      return bad_opencv(where, "is no YAML or XML of OpenCV's", "Name a file that cv::FileStorage wrote");
-    return opencv_camera(file, camera_id, where);
-  } catch (const cv::Exception& e) {
-    return bad_opencv(where, "is no YAML or XML of OpenCV's: " + e.err,
-                      "Name a file that cv::FileStorage wrote");
+    numbers = xml ? numbers_of_xml(whole) : numbers_of_yaml(whole);
+  } catch (const YAML::Exception& e) {
+    numbers =
+        bad_opencv(fmt::format("line {}", e.mark.line + 1), e.msg, "Name a file that cv::FileStorage wrote");
   }
+  if (!numbers) {
+    const Error& e = numbers.error();
+    return bad_opencv(where, "is no YAML or XML of OpenCV's: " + e.where + ": " + e.what, e.remedy);
+  }
+  return opencv_camera(*numbers, camera_id, where);
 }
 
 std::string opencv_yaml(const v1::RigCamera& camera) {
@@ -111,4 +180,4 @@ std::string opencv_yaml(const v1::RigCamera& camera) {
   return file.releaseAndGetString();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

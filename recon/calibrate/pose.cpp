@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/pose.h"
 
 #include <Eigen/LU>
 #include <Eigen/SVD>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kRotationTolerance = 0.01;
@@ -73,4 +74,4 @@ bool distortion_inverts(const Intrinsics& intrinsics) {
   return true;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

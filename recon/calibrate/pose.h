@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <Eigen/Core>
@@ -5,7 +6,7 @@
 #include "base/result.h"
 #include "recon/calibrate/camera_model.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The rotation nearest to a calibrated 3 x 3 matrix, which must be a rotation to within 1 %, times any
 /// uniform positive scale (exporters leave one, and it moves no ray). Errors, without a place: not finite,
@@ -24,4 +25,4 @@ Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v);
 /// picture.
 bool distortion_inverts(const Intrinsics& intrinsics);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

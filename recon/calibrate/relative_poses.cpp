@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/relative_poses.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include "recon/calibrate/pose.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Of all poses, given all lenses. Numbers that are held have no variance.
@@ -71,4 +72,4 @@ std::vector<PoseCovariance> relative_pose_covariances(const Bundle& bundle,
   return result;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -6,7 +7,7 @@
 
 #include "recon/calibrate/bundle.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 using PoseCovariance = Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns>;
 
@@ -18,4 +19,4 @@ using PoseCovariance = Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns>;
 std::vector<PoseCovariance> relative_pose_covariances(const Bundle& bundle,
                                                       const Eigen::MatrixXd& covariance);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

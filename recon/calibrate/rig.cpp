@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/rig.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 #include "recon/calibrate/pose.h"
 #include "session/files.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 Error bad_rig(std::string where, std::string what, std::string remedy) {
@@ -74,7 +75,7 @@ v1::Calibration calibration_of(const CameraModel& camera) {
 
 v1::Rig empty_rig() {
   v1::Rig rig;
-  rig.set_format_version(kRigFormatVersion);
+  rig.set_format_version(session::kRigFormatVersion);
   return rig;
 }
 
@@ -98,7 +99,7 @@ std::vector<std::pair<std::string, CameraModel>> placed_cameras(const v1::Rig& r
 }
 
 Result<Box> box_of(const v1::Box& message, const std::string& where) {
-  EMBERLOCK_RETURN_IF_ERROR(check_box(message, where));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_box(message, where));
   Box box;
   for (int i = 0; i < 3; ++i) {
     box.center[i] = message.center(i);
@@ -142,4 +143,4 @@ Status apply_rig(v1::Manifest& manifest, const v1::Rig& rig, const std::string& 
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

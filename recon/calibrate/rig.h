@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -10,7 +11,7 @@
 #include "session/reader.h"
 #include "session/rig_file.h"  // read_rig, write_rig
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A camera from its file's numbers. `where` names what holds the calibration ("manifest.json: cameras[2]"),
 /// `camera_id` the camera. Errors: not calibrated (no pose), not finite, no focal length, a distortion that
@@ -36,4 +37,4 @@ v1::Box message_of(const Box& box);
 /// session that the rig lacks; pictures of another size than calibrated (names both).
 Status apply_rig(v1::Manifest& manifest, const v1::Rig& rig, const std::string& where);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/rig_formats.h"
 
 #include <algorithm>
@@ -9,11 +10,12 @@
 #include "recon/calibrate/pose.h"
 #include "recon/calibrate/transforms.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kLargestRigText = std::size_t{64} << 20;
+constexpr std::size_t kLargestOpencvText = std::size_t{4} << 20;  // of one camera
 
 Error bad_format(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
@@ -33,7 +35,7 @@ bool is_opencv_name(const fs::path& path) {
 Result<v1::Rig> import_opencv(const std::vector<fs::path>& files) {
   v1::Rig rig = empty_rig();
   for (const fs::path& file : files) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kLargestRigText));
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kLargestOpencvText));
     EMBERLOCK_ASSIGN_OR_RETURN(*rig.add_cameras(), parse_opencv(text, file.stem().string(), file.string()));
   }
   return rig;
@@ -41,7 +43,7 @@ Result<v1::Rig> import_opencv(const std::vector<fs::path>& files) {
 
 Result<v1::Rig> import_folder(const fs::path& folder) {
   std::error_code ec;
-  if (fs::exists(folder / "rig.json", ec)) return read_rig(folder / "rig.json");
+  if (fs::exists(folder / "rig.json", ec)) return session::read_rig(folder / "rig.json");
   if (fs::exists(folder / "cameras.txt", ec)) return import_colmap(folder);
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder, ec))
@@ -67,7 +69,7 @@ Result<v1::Rig> rig_of_transforms(std::string_view json, const fs::path& source)
     *rig.add_cameras() = rig_camera_of(frame.image.stem().string(), {lens, frame.camera_from_world});
   }
   if (transforms.box) *rig.mutable_box() = message_of(*transforms.box);
-  EMBERLOCK_RETURN_IF_ERROR(check_rig(rig, source.string()));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, source.string()));
   return rig;
 }
 
@@ -114,21 +116,21 @@ Result<v1::Rig> import_rig(const fs::path& path) {
     EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path, kLargestRigText));
     // Which of the two it is shows by the key that only one of them has.
     const bool transforms = text.find("\"frames\"") != std::string::npos;
-    return transforms ? rig_of_transforms(text, path) : parse_rig(text, path.string());
+    return transforms ? rig_of_transforms(text, path) : session::parse_rig(text, path.string());
   }
-  EMBERLOCK_RETURN_IF_ERROR(check_rig(rig, path.string()));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, path.string()));
   return rig;
 }
 
 Status export_rig(const v1::Rig& rig, const fs::path& folder) {
-  EMBERLOCK_RETURN_IF_ERROR(check_rig(rig, folder.string()));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, folder.string()));
   std::error_code ec;
   fs::create_directories(folder / "opencv", ec);
   fs::create_directories(folder / "colmap", ec);
   if (ec) {
     return Error{ErrorKind::io, "can't be made: " + ec.message(), folder.string(), "Choose another folder"};
   }
-  EMBERLOCK_RETURN_IF_ERROR(write_rig(folder / "rig.json", rig));
+  EMBERLOCK_RETURN_IF_ERROR(session::write_rig(folder / "rig.json", rig));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "transforms.json", transforms_json(rig)));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "colmap" / "cameras.txt", colmap_cameras(rig)));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "colmap" / "images.txt", colmap_images(rig)));
@@ -141,4 +143,4 @@ Status export_rig(const v1::Rig& rig, const fs::path& folder) {
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -6,7 +7,7 @@
 
 #include "recon/calibrate/rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Others' files for what rig.json holds. Colour, uncertainties and, but for transforms.json, the box have no
 // place in them.
@@ -35,4 +36,4 @@ std::string opencv_yaml(const v1::RigCamera& camera);
 Result<v1::Rig> rig_of_transforms(std::string_view json, const std::filesystem::path& source);
 std::string transforms_json(const v1::Rig& rig);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

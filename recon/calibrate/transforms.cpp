@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/transforms.h"
 
 #include <algorithm>
@@ -8,9 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
+#include "base/nesting.h"
 #include "recon/calibrate/pose.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace fs = std::filesystem;
 namespace {
 
@@ -257,7 +259,8 @@ Result<TransformsFrame> read_frame(const json& object, const Place& place, const
   return frame;
 }
 
-Result<json> parse(std::string_view text, const Place& place) {
+Result<json> parse(std::string_view text, const Place& place, const std::string& source) {
+  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(text, source));
   try {
     return json::parse(text);
   } catch (const json::parse_error& e) {
@@ -275,7 +278,7 @@ Result<json> parse(std::string_view text, const Place& place) {
 
 Result<Transforms> parse_transforms(std::string_view text, const fs::path& source) {
   const Place top{source.string(), ""};
-  EMBERLOCK_ASSIGN_OR_RETURN(const json document, parse(text, top));
+  EMBERLOCK_ASSIGN_OR_RETURN(const json document, parse(text, top, source.string()));
   if (!document.is_object()) return top.error("is no transforms.json", R"(Give an object with "frames")");
   EMBERLOCK_RETURN_IF_ERROR(check_keys(document, top, {"frames", "box"}));
   LensFields shared;
@@ -342,4 +345,4 @@ Result<Intrinsics> intrinsics_of(const TransformsFrame& frame, ImageSize size) {
   return intrinsics;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -10,7 +11,7 @@
 #include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Each view is one bit of the hull's mask.
 inline constexpr int kMaxViews = 64;
@@ -51,4 +52,4 @@ Result<Transforms> read_transforms(const std::filesystem::path& path);
 /// distortion that does not invert within the picture.
 Result<Intrinsics> intrinsics_of(const TransformsFrame& frame, ImageSize size);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -8,7 +9,7 @@
 
 #include "recon/compute/device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Throws a DeviceError: after cuda_status() has answered, it tells of a failing device or a defect of ours.
 void check_cuda(cudaError_t code, const char* what);
@@ -64,6 +65,14 @@ class CudaBuffer {
     check_cuda(cudaMemcpy(&to, data_ + at, sizeof(T), cudaMemcpyDeviceToHost), "copying from the GPU");
     return to;
   }
+  /// `count` of them from number `first` on.
+  [[nodiscard]] std::vector<T> download(std::size_t first, std::size_t count) const {
+    std::vector<T> to(count);
+    if (count > 0)
+      check_cuda(cudaMemcpy(to.data(), data_ + first, count * sizeof(T), cudaMemcpyDeviceToHost),
+                 "copying from the GPU");
+    return to;
+  }
   [[nodiscard]] std::vector<T> download() const {
     std::vector<T> to(size_);
     download(to.data());
@@ -85,4 +94,4 @@ class CudaBuffer {
   std::size_t size_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

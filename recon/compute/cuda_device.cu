@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstdint>
 #include <cstdio>
 #include <string>
@@ -7,7 +8,7 @@
 #include "recon/compute/cuda_buffer.h"
 #include "recon/compute/cuda_device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Why the first GPU can't be used; empty where it can.
@@ -92,4 +93,4 @@ void cuda_free(void* data) noexcept {
     (void)cudaFreeAsync(data, nullptr);  // a failure shows at the next call that can tell of it
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
 
 #include "recon/compute/cuda_buffer.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // For .cu files: how functors of recon/kernels run on the GPU, one thread for each call.
 
@@ -30,4 +31,4 @@ void launch(std::size_t count, const Act& act, const char* what) {
   launch(0, count, act, what);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cuda_runtime.h>
 
 #include "recon/compute/cuda_buffer.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Brings an array of the GPU to the CPU beside the work of the default stream, which only makes a copy on
 /// the GPU for it: a stream of its own carries that copy into one of two page-locked buffers, while the other
@@ -75,4 +76,4 @@ class CudaSnapshot {
   bool any_ = false;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/compute/device.h"
 
 #include <cstdlib>
@@ -5,7 +6,7 @@
 
 #include "recon/compute/cuda_device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 Result<Device> parse_device(std::string_view name) {
   if (name == "auto") return Device::automatic;
@@ -34,4 +35,4 @@ Status cuda_status() {
 }
 #endif
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <exception>
@@ -6,7 +7,7 @@
 
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 enum class Device {
   automatic,  ///< CUDA where it was built and a GPU answers, the CPU otherwise
@@ -50,4 +51,4 @@ Result<Device> parse_device(std::string_view name);
 /// what automatic means, for tests and comparisons.
 Result<Device> resolve(Device choice);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/compute/pool.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include <sanitizer/tsan_interface.h>
 #endif
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 // Debian's oneTBB is not instrumented: ThreadSanitizer doesn't see that starting a task and waiting for it
@@ -70,4 +71,4 @@ void Pool::run(int tasks, const std::function<void(int)>& task) {
   observe(&a.ended);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

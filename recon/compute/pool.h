@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -5,7 +6,7 @@
 
 #include "recon/compute/device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A pool of CPU threads, and the device that heavy passes run on beside them. The work is cut into tasks by
 /// the caller, never by the number of threads, so results whose tasks write to separate places, or are
@@ -42,4 +43,4 @@ constexpr Slice slice(std::size_t size, int tasks, int task) {
   return {size * i / n, size * (i + 1) / n};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/background.h"
 
 #include <algorithm>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 std::string text(ImageSize size) { return std::to_string(size.width) + " x " + std::to_string(size.height); }
@@ -44,4 +45,4 @@ std::vector<Rgba> behind_rays(const Background& background, const RayList& list,
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -6,7 +7,7 @@
 #include "recon/hull/ray_list.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // A background is what a pixel shows where nothing is in front of it. Its distance isn't known, so rays that
 // the gas bends see it at their own pixel.
@@ -23,4 +24,4 @@ RadianceImage backdrop(const Background& background, ImageSize size, const Radia
 std::vector<Rgba> behind_rays(const Background& background, const RayList& list,
                               const std::vector<const View*>& views);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/effects.h"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 Error bad(std::string what) {
@@ -271,4 +272,4 @@ Result<EffectRequest> parse_effects(std::string_view text) {
   return request;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

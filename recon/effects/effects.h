@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -9,7 +10,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // The table of effects: what light does on its way, beside being emitted. Each one's first choice is to be
 // left out, and then nothing of it runs.
@@ -152,4 +153,4 @@ struct EffectChoice {
   std::vector<EffectReport> reports;  ///< one for each effect of the table
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

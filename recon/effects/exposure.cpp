@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/exposure.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 #include "recon/effects/exposure_cuda.h"
 #include "recon/kernels/exposure.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// How far the instants of a motion by `way` edges are spread. Linear interpolation between key points blurs
@@ -63,4 +64,4 @@ std::vector<Rgba> ExposureBlur::average(const std::vector<Rgba>& in, int directi
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

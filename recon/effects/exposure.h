@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -7,7 +8,7 @@
 #include "recon/kernels/grid.h"
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// B: what a shutter makes of a flame that rises while it is open. The volume is the flame at the middle of
 /// the exposure; B x is the mean of x shifted along z by many equally spaced parts of the way, linear between
@@ -37,4 +38,4 @@ class ExposureBlur {
   std::vector<float> weights_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

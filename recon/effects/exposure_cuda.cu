@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/compute/cuda_launch.h"
 #include "recon/effects/exposure_cuda.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 std::vector<Rgba> average_on_cuda(const std::vector<Rgba>& in, const Grid& grid,
                                   const std::vector<float>& weights, int direction) {
@@ -15,4 +16,4 @@ std::vector<Rgba> average_on_cuda(const std::vector<Rgba>& in, const Grid& grid,
   return to.download();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -5,11 +6,11 @@
 #include "recon/kernels/exposure.h"
 #include "recon/kernels/grid.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// AverageAlongZ at all key points of a grid, on the GPU; weights as ExposureBlur has them. Throws a
 /// DeviceError.
 std::vector<Rgba> average_on_cuda(const std::vector<Rgba>& in, const Grid& grid,
                                   const std::vector<float>& weights, int direction);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/motion.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "recon/preprocess/flame_mask.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kFaintest = 0.1;  // grey levels: darker parts of a picture aren't moved
@@ -133,4 +134,4 @@ void bring_to_instant(View& view, const Motion& motion, const Eigen::Vector3d& f
   view.camera = camera_at_instant(view, motion);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

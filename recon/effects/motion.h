@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/effects/effects.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // A view that is late sees the flame carried on by velocity * lateness. A camera that is moved back by as
 // much sees what is carried as it was at the scene's instant, so no march and no solver knows of the motion.
@@ -25,4 +26,4 @@ RadianceImage change_of_place(const RadianceImage& picture, const View& view, co
 /// in light. Pixels from `white` on (> 0) are bounds and stay.
 void bring_to_instant(View& view, const Motion& motion, const Eigen::Vector3d& flame, double white = 0);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

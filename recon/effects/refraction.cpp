@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/refraction.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kCells = 32;     // along the medium's longest side, at most
@@ -156,4 +157,4 @@ IndexField RefractiveIndex::field(const Grid& grid) const {
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -6,7 +7,7 @@
 #include "recon/hull/medium.h"
 #include "recon/kernels/refract.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// n - 1 of air, or of burnt gas, which differs little from it, at atmospheric pressure: (n_air - 1) T_air /
 /// T (Gladstone and Dale 1863), n_air - 1 = 2.7e-4 at 293 K for visible light (Ciddor 1996: 2.71e-4 at 589
@@ -45,4 +46,4 @@ class RefractiveIndex {
   std::vector<Rgba> values_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

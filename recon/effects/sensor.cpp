@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/sensor.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 void bend(RadianceImage& image, double white, double exponent) {
@@ -31,4 +32,4 @@ void respond(RadianceImage& image, const Sensor& sensor) {
   clip(image, sensor);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/effects/effects.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // The camera's response, channel by channel: value = white * (radiance / white)^(1 / gamma), clipped at
 // white. Both ways are odd functions, so that noise around black stays unbiased. A solver works on linearised
@@ -17,4 +18,4 @@ void linearise(RadianceImage& image, const Sensor& sensor);
 /// `check`.
 void respond(RadianceImage& image, const Sensor& sensor);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/export/picture.h"
 
 #include <string_view>
@@ -8,7 +9,7 @@
 
 #include "base/file.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Gray8 as it is, rgb8 as blue, green, red.
@@ -52,4 +53,4 @@ Result<std::string> to_jpeg(const ImageView& image) {
   return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -6,7 +7,7 @@
 #include "base/image.h"
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Writes an 8-bit PNG; `image` is gray8 or rgb8. Atomically.
 Status write_png(const ImageView& image, const std::filesystem::path& path);
@@ -14,4 +15,4 @@ Status write_png(const ImageView& image, const std::filesystem::path& path);
 /// `image` (rgb8) as a JPEG of quality 85, for screens.
 Result<std::string> to_jpeg(const ImageView& image);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

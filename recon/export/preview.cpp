@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/export/preview.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-namespace emberlock {
+namespace emberlock::recon {
 
 ImageSize preview_size(ImageSize full, int widest) {
   if (full.width <= widest) return full;
@@ -81,4 +82,4 @@ CoarseBrightness coarse_brightness(const Volume& volume, int longest) {
   return coarse;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -8,7 +9,7 @@
 #include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // What is shown of a running solve: small, since it is made again and again and sent away.
 
@@ -32,4 +33,4 @@ struct CoarseBrightness {
 /// The mean over cubic blocks, as small as `longest` (>= 1) of them along the longest edge allow.
 CoarseBrightness coarse_brightness(const Volume& volume, int longest);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/export/report.h"
 
 #include <nlohmann/json.hpp>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using nlohmann::ordered_json;
@@ -52,6 +53,19 @@ ordered_json views_json(const Report& report) {
   return views;
 }
 
+ordered_json choice_json(const VoxelChoice& choice) {
+  auto options = ordered_json::array();
+  for (const VoxelChoice::Option& option : choice.options)
+    options.push_back({{"voxels", option.voxels}, {"seconds", option.time.value()}, {"error", option.error}});
+  return {{"rule", choice.rule},
+          {"voxels", choice.voxels},
+          {"by_the_paper", choice.by_the_paper},
+          {"calibration_seconds", choice.calibration_time.value()},
+          {"expected_seconds", choice.expected_time.value()},
+          {"options", std::move(options)},
+          {"words", choice.words}};
+}
+
 template <class T>
 ordered_json or_null(const std::optional<T>& value) {
   return value ? ordered_json(*value) : ordered_json();
@@ -82,6 +96,7 @@ std::string to_json(const Report& report) {
   json["warnings"] = report.warnings;
   json["input"] = report.input;
   json["solver"] = report.solver;
+  json["deviations"] = report.deviations;
   json["device"] = report.device;
   json["threads"] = report.threads;
   json["seed"] = report.seed;
@@ -93,17 +108,17 @@ std::string to_json(const Report& report) {
   json["finest_voxels"] = report.finest_voxels;
   json["hull_voxels"] = report.hull_voxels;
   json["iterations"] = report.iterations;
-  json["seconds"] = {{"effects", report.effects_time.value()},
-                     {"hull", report.hull_time.value()},
-                     {"solve", report.solve_time.value()},
-                     {"render", report.render_time.value()},
-                     {"total", report.total_time.value()}};
+  json["seconds"] = {{"effects", report.effects_time.value()}, {"hull", report.hull_time.value()},
+                     {"solve", report.solve_time.value()},     {"trace", report.trace_time.value()},
+                     {"render", report.render_time.value()},   {"total", report.total_time.value()}};
+  json["voxel_choice"] = choice_json(report.voxel_choice);
   json["plan"] = plan_json(report.plan);
   json["preprocessing"] = preprocessing_json(report);
   json["effects"] = effects_json(report);
   json["views"] = views_json(report);
+  json["trace_sample"] = {{"pixels", report.trace_sample.pixels}, {"of", report.trace_sample.of}};
   json["trace"] = trace_json(report);
   return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

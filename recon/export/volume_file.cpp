@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The only file that meets OpenVDB's headers: they take half a minute to compile.
 #include "recon/export/volume_file.h"
 
@@ -11,11 +12,19 @@
 #include <openvdb/openvdb.h>
 #pragma GCC diagnostic pop
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr const char* kDimensions = "emberlock_dimensions";
 constexpr int kLargestDimension = 4096;
+/// OpenVDB refuses voxels whose volume is below 3e-15 of its units: smaller ones are written in millimetres,
+/// and this says so.
+constexpr const char* kMetresPerUnit = "emberlock_metres_per_unit";
+constexpr double kSmallestVoxel = 2e-5;  // metres
+
+double metres_per_unit(const Grid& grid) {
+  return static_cast<double>(grid.edge) < kSmallestVoxel ? 1e-3 : 1;
+}
 
 template <class GridType, class ValueAt>
 typename GridType::Ptr sparse_grid(const Grid& grid, const char* name, const char* unit, ValueAt value_at) {
@@ -23,10 +32,12 @@ typename GridType::Ptr sparse_grid(const Grid& grid, const char* name, const cha
   out->setName(name);
   out->insertMeta("unit", openvdb::StringMetadata(unit));
   out->insertMeta(kDimensions, openvdb::Vec3IMetadata({grid.nx, grid.ny, grid.nz}));
-  out->setTransform(openvdb::math::Transform::createLinearTransform(static_cast<double>(grid.edge)));
-  out->transform().postTranslate(openvdb::Vec3d(static_cast<double>(grid.origin[0]),
-                                                static_cast<double>(grid.origin[1]),
-                                                static_cast<double>(grid.origin[2])));
+  const double metres = metres_per_unit(grid);
+  if (metres != 1) out->insertMeta(kMetresPerUnit, openvdb::DoubleMetadata(metres));
+  out->setTransform(openvdb::math::Transform::createLinearTransform(static_cast<double>(grid.edge) / metres));
+  out->transform().postTranslate(openvdb::Vec3d(static_cast<double>(grid.origin[0]) / metres,
+                                                static_cast<double>(grid.origin[1]) / metres,
+                                                static_cast<double>(grid.origin[2]) / metres));
   auto accessor = out->getAccessor();
   const auto background = out->background();
   for (int k = 0; k < grid.nz; ++k) {
@@ -53,9 +64,13 @@ Result<Grid> geometry(const openvdb::GridBase& from, const std::filesystem::path
   for (int axis = 0; axis < 3; ++axis) {
     if (n[axis] < 2 || n[axis] > kLargestDimension) return damaged(path, "dimensions out of range");
   }
+  const auto said = from.getMetadata<openvdb::DoubleMetadata>(kMetresPerUnit);
+  const double unit = said ? said->value() : 1;
+  if (!(unit > 0) || !std::isfinite(unit))
+    return damaged(path, std::string(kMetresPerUnit) + " is no length");
   const openvdb::Vec3d origin = from.transform().indexToWorld(openvdb::Vec3d(0, 0, 0));
-  for (int axis = 0; axis < 3; ++axis) grid.origin[axis] = static_cast<float>(origin[axis]);
-  grid.edge = static_cast<float>(from.voxelSize()[0]);
+  for (int axis = 0; axis < 3; ++axis) grid.origin[axis] = static_cast<float>(unit * origin[axis]);
+  grid.edge = static_cast<float>(unit * from.voxelSize()[0]);
   grid.nx = n[0];
   grid.ny = n[1];
   grid.nz = n[2];
@@ -83,6 +98,10 @@ bool inside(const Grid& grid, const openvdb::Coord& c) {
 Status write_volume(const Volume& volume, const std::filesystem::path& path) {
   openvdb::initialize();
   const auto& emission = volume.emission;
+  if (!(static_cast<double>(volume.grid.edge) >= kSmallestVoxel * 1e-3)) {
+    return Error{ErrorKind::bad_input, "voxels of less than 20 nm can't be written", path.string(),
+                 "Give fewer voxels, or lengths in metres"};
+  }
   auto emission_grid = sparse_grid<openvdb::Vec3SGrid>(
       volume.grid, "emission", "grey levels (0..255) per metre", [&](std::size_t i) {
         return openvdb::Vec3s(emission[3 * i], emission[3 * i + 1], emission[3 * i + 2]);
@@ -137,4 +156,4 @@ Result<Volume> read_volume(const std::filesystem::path& path) try {
   return damaged(path, e.what());
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

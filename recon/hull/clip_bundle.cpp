@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/clip_bundle.h"
 
 #include <bit>
@@ -11,7 +12,7 @@
 #include <hwy/highway.h>
 
 HWY_BEFORE_NAMESPACE();
-namespace emberlock::HWY_NAMESPACE {
+namespace emberlock::recon::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 using Floats = hn::CappedTag<float, RayBundle::kMost>;
@@ -154,11 +155,11 @@ void clip_all(const VoxelMask& mask, const VoxelMask& blocks, const RayBundle& b
   for (int first = 0; first < bundle.rays; first += lanes) clip_rays(mask, blocks, bundle, first, crossings);
 }
 
-}  // namespace emberlock::HWY_NAMESPACE
+}  // namespace emberlock::recon::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace emberlock {
+namespace emberlock::recon {
 
 HWY_EXPORT(clip_all);
 
@@ -167,5 +168,5 @@ void clip_bundle(const VoxelMask& mask, const VoxelMask& blocks, const RayBundle
   HWY_DYNAMIC_DISPATCH(clip_all)(mask, blocks, bundle, crossings);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon
 #endif

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -5,7 +6,7 @@
 
 #include "recon/kernels/clip.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Rays from one point, in voxel edges as clip_to_medium() takes them.
 struct RayBundle {
@@ -25,4 +26,4 @@ using Crossings = std::array<std::vector<float>, RayBundle::kMost>;
 void clip_bundle(const VoxelMask& mask, const VoxelMask& blocks, const RayBundle& bundle,
                  Crossings& crossings);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

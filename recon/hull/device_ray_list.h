@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/compute/cuda_buffer.h"
 #include "recon/hull/ray_list.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A list's rays on the GPU.
 class DeviceRayList {
@@ -23,4 +24,4 @@ class DeviceRayList {
   CudaBuffer<Bend> bends_;  // none where rays are straight
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

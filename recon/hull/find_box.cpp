@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/find_box.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 
 #include "recon/hull/hull.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kFar = 20;        // times the cameras' spread: what reaches so far has no end
@@ -151,4 +152,4 @@ Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks, co
   return box;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -7,7 +8,7 @@
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The box around what every view's mask allows: the paper's section "Sampling Step and Volume Dimension"
 /// measures position and size of the flame by the calibration; so does this, from the masks alone. The views'
@@ -19,4 +20,4 @@ namespace emberlock {
 Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks,
                      const ComputeOptions& compute = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/hull.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 #include "recon/hull/kernel_views.h"
 #include "recon/kernels/carve.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr std::size_t kMaxViews = 64;  // one bit each in a cube's set of open views
@@ -166,4 +167,4 @@ Result<Hull> carve(const Scene& scene, const std::vector<FlameMask>& masks, cons
   return e.error();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

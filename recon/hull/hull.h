@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -8,7 +9,7 @@
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A grid of cubic voxels over a box, `voxels` (>= 1) along its longest side; the shorter sides are rounded
 /// up to whole voxels, centred on the box.
@@ -25,4 +26,4 @@ Hull whole_grid(const Grid& grid);
 Result<Hull> carve(const Scene& scene, const std::vector<FlameMask>& masks, const Grid& grid,
                    const ComputeOptions& compute);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
 #include "recon/compute/cuda_launch.h"
 #include "recon/hull/hull_cuda.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 void carve_on_cuda(const Grid& grid, std::vector<Silhouette> views,
                    const std::vector<const std::uint8_t*>& masks, std::vector<std::uint8_t>& inside) {
@@ -40,4 +41,4 @@ void carve_on_cuda(const Grid& grid, std::vector<Silhouette> views,
   carved.download(inside.data());
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

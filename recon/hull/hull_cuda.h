@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -5,11 +6,11 @@
 
 #include "recon/kernels/carve.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The voxels that the views (at most 64, their tables not yet made) leave of a grid, on the GPU; `masks` are
 /// their flame pixels. Throws a DeviceError.
 void carve_on_cuda(const Grid& grid, std::vector<Silhouette> views,
                    const std::vector<const std::uint8_t*>& masks, std::vector<std::uint8_t>& inside);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

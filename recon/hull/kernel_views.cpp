@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/kernel_views.h"
 
 #include "recon/calibrate/camera_model.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 Silhouette silhouette(const CameraModel& camera) {
   Silhouette s;
@@ -65,4 +66,4 @@ Cutter::Cutter(const Hull& medium, const RayListOptions& options) {
   if (options.gas != nullptr) cut_.gas = *options.gas;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -7,7 +8,7 @@
 #include "recon/kernels/carve.h"
 #include "recon/kernels/cut.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Cameras and media as kernels need them.
 
@@ -32,4 +33,4 @@ class Cutter {
   CutRay cut_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

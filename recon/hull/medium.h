@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -6,7 +7,7 @@
 
 #include "recon/kernels/grid.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The voxels that can hold the medium. Voxel (i, j, k) lies between key points (i, j, k) and (i + 1, j + 1,
 /// k + 1) and is stored at i + (nx - 1) * (j + (ny - 1) * k).
@@ -16,4 +17,4 @@ struct Hull {
   std::size_t count = 0;             ///< voxels inside
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/ray_list.h"
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 #include "recon/hull/ray_list_cuda.h"
 #include "recon/kernels/cut.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 std::size_t voxel_index(const Grid& g, int i, int j, int k) {
@@ -344,4 +345,4 @@ RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& me
   return list;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "recon/kernels/march.h"
 #include "recon/kernels/refract.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 struct CameraModel;
 
@@ -58,4 +59,4 @@ struct RayListOptions {
 RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& medium,
                   const RayListOptions& options, Pool& pool);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

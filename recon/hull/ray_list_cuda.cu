@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cub/device/device_scan.cuh>
 
 #include "recon/compute/cuda_launch.h"
 #include "recon/hull/ray_list_cuda.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 struct SumOfCounts {
@@ -63,4 +64,4 @@ void cut_on_cuda(const CutRay& cut, const std::vector<PixelRays>& cameras, const
   list.pixels = numbers.download();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

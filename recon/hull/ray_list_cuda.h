@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -5,7 +6,7 @@
 #include "recon/hull/ray_list.h"
 #include "recon/kernels/cut.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Pixels of some views, sorted by subset; subsets + 1 values in subset_begin.
 struct PixelsInOrder {
@@ -22,4 +23,4 @@ PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, co
 void cut_on_cuda(const CutRay& cut, const std::vector<PixelRays>& cameras, const PixelsInOrder& pixels,
                  RayList& list);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -7,7 +8,7 @@
 #include "base/host_device.h"
 #include "recon/kernels/grid.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The flame pixels of a view, 1 or 0, row-major, and where to count them: how many lie above and left of
 /// every pixel corner (a summed-area table of (width + 1) * (height + 1) values, the first row and column
@@ -172,4 +173,4 @@ struct CarveVoxel {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -5,7 +6,7 @@
 
 #include "base/host_device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The voxels of a medium, mx by my by mz of them, within a border of empty ones: bytes, 1 or 0, voxel (i, j,
 /// k) at index(i, j, k). Coordinates are in voxel edges, voxel (i, j, k) being [i, i + 1) x [j, j + 1) x [k,
@@ -120,4 +121,4 @@ HOST_DEVICE inline void clip_to_medium(const VoxelMask& mask, const VoxelMask& b
   walk_voxels(mask, origin, direction, from > enter ? from : enter, to < leave ? to : leave, emit);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

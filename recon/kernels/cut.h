@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -9,7 +10,7 @@
 #include "recon/kernels/march.h"
 #include "recon/kernels/refract.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Cuts samples [0, count) of a stretch at the slabs' borders: piece(first, size), front to back. `z` is
 /// where the line starts and `dz` its direction along z.
@@ -159,4 +160,4 @@ struct WritePixelRuns {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

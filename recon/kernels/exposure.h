@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -5,7 +6,7 @@
 #include "base/host_device.h"
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// One key point of a column average along z: out(k) = sum of weight(m) * in(k - m) over m = -reach..reach,
 /// nothing outside the grid. With `direction` -1 it reads in(k + m): the transpose.
@@ -40,4 +41,4 @@ struct AddAt {
   HOST_DEVICE void operator()(std::size_t p) const { to[p] = to[p] + from[p]; }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

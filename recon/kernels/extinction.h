@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <math.h>
 
 #include "base/host_device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Named functions of the C library: unlike <cmath>'s overloads they are no inline functions of ours.
 HOST_DEVICE inline float exp_of(float x) { return expf(x); }
@@ -74,4 +75,4 @@ struct FieldExtinction {
   static constexpr bool kField = true;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/kernels/march.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Emission and extinction both unknown at key points (lanes 0..2 and 3 of the volume). With x_k = sigma_k ds
 // the step k of a ray gives
@@ -145,4 +146,4 @@ struct FieldAdjoint {
   };
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

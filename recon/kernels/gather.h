@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -7,7 +8,7 @@
 #include "recon/kernels/march.h"
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Transposes where thousands of threads run at once: nobody adds to a key point that another adds to. Every
 // sample's share is laid aside at its own place; then each key point takes what lies in the eight voxels
@@ -132,4 +133,4 @@ struct GatherDeposits {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

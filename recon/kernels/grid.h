@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
 
 #include "base/host_device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A regular grid of key points (voxel corners): key point (i, j, k) lies at origin + edge * (i, j, k), in
 /// metres, and is stored at index i + nx * (j + ny * k). The medium lives inside the nx - 1 by ny - 1 by nz -
@@ -24,4 +25,4 @@ struct Grid {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

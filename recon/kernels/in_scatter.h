@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -10,7 +11,7 @@
 #include "recon/kernels/phase_function.h"
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Light that arrives at coarse key points, by long characteristics: from a key point against the direction of
 // travel to the face of the grid's box. Coordinates and lengths count coarse edges.
@@ -277,4 +278,4 @@ struct MixPeak {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
 
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What a ray's radiance is held against. A background, an offset and a sensor's white are each there or not,
 /// for all rays.
@@ -76,4 +77,4 @@ struct MarchJudged {
   HOST_DEVICE void operator()(std::size_t ray) const { march(ray, keep); }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -5,7 +6,7 @@
 
 #include "base/host_device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Where Brown-Conrady distortion moves normalised image coordinates; numbers may be double, or carry
 /// derivatives. Arguments by value: the target may be the source.
@@ -66,4 +67,4 @@ struct PixelRays {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

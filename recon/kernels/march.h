@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -7,7 +8,7 @@
 #include "recon/kernels/extinction.h"
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // One source for the march, on the CPU and on the GPU, in single and in double precision. Coordinates count
 // voxel edges from key point (0, 0, 0). Policies: what extinguishes (extinction.h) and how rays run
@@ -285,4 +286,4 @@ struct Adjoint {
   };
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

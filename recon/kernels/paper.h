@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -9,7 +10,7 @@
 #include "base/random.h"
 #include "recon/kernels/march.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// exp(x) for -20 <= x <= 0 to 1e-4 (smaller x counts as -20): a Taylor polynomial of x / 32, squared five
 /// times; loops over it become vector code.
@@ -55,8 +56,8 @@ struct Fade {
   }
 };
 
-/// The paper's equations (8) and (9) for one run: every sample gives G(s) alpha_l dL T(s, s_e) to its eight
-/// key points, which `put` multiplies by exp(-alpha_d D(j, s)), D in voxel edges (Fade).
+/// The paper's equations (10) and (11) for one run: every sample gives G(s) alpha_l dL T(s, s_e), T of (12),
+/// to its eight key points, which `put` multiplies by exp(-alpha_d D(j, s)), D in voxel edges (Fade).
 template <class Extinction, class Put = IntoKeyPoints<float, Fade>>
 struct PaperAdjust {
   RayTable table;
@@ -90,4 +91,4 @@ struct PaperAdjust {
   };
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

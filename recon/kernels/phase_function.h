@@ -1,12 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <math.h>
 
 #include "base/host_device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
-/// The phase function of Henyey and Greenstein (1941), 1/sr:
+/// The phase function of Henyey and Greenstein (1941), 1/sr, the paper's equation (9):
 ///   p(mu) = (1 - g^2) / (4 pi (1 + g^2 - 2 g mu)^(3/2))
 /// mu is the cosine of the angle between the directions in which light travels before and after. g > 0
 /// scatters forwards, and the mean of mu is g; the paper's g has the opposite sign. |g| < 1; 0 is isotropic.
@@ -35,4 +36,4 @@ struct HenyeyGreenstein {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

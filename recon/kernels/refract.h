@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -6,7 +7,7 @@
 #include "base/host_device.h"
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Rays through gas of uneven temperature, by geometrical optics: d/ds (n dr/ds) = grad n. With p = n dr/ds
 // and dtau = ds / n these are Hamilton's equations of a particle, dr/dtau = p, dp/dtau = grad(n^2) / 2, which
@@ -173,4 +174,4 @@ HOST_DEVICE inline void trace(const IndexField& field, const float* origin, cons
   emit(stretch.origin, stretch.direction, kEndless);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstring>
@@ -5,7 +6,7 @@
 
 #include "base/host_device.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Four numbers that move together: R, G, B and a fourth lane, extinction or transmittance where one is called
 // for. nvcc sees arrays, other compilers vector registers; both look the same in memory, and c[i] is lane i.
@@ -136,4 +137,4 @@ HOST_DEVICE inline Quad<Real> mix(std::type_identity_t<Real> t, const Quad<Real>
 using Rgba = Quad<float>;
 using Rgba64 = Quad<double>;
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

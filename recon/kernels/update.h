@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -8,7 +9,7 @@
 #include "recon/kernels/march.h"
 #include "recon/kernels/rgba.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// How firmly light at a key point is tied to its six neighbours: the parabola that majorises the Huber total
 /// variation of lanes 0..2 at y (lagged diffusivity: Vogel and Oman 1996). Differences below `soft` count
@@ -47,7 +48,8 @@ struct Stiffen {
 
 /// The default solver's step at one key point, for lanes 0..2 (lane 3 stays as it is): a gradient step with
 /// its own length, projection on x >= 0, Nesterov's look-ahead.
-///   x' = max(0, y - (scale * gradient + slope) / (weight + curvature)),  y' = x' + momentum * (x' - x)
+///   x' = max(0, y - length * (scale * gradient + slope) / (weight + curvature))
+///   y' = x' + momentum * (x' - x)
 /// weight = A^T A 1 majorises A^T A (A >= 0); slope = sum of t (y - y_n) over the six neighbours, tied by the
 /// sum t of both ends' stiffness, and curvature = 2 sum of t. The gradient is cleared for the next subset.
 template <class Real>
@@ -61,6 +63,7 @@ struct Descend {
   const Real* stiffness = nullptr;
   Real scale = 1;
   Real momentum = 0;
+  Real length = 1;
 
   HOST_DEVICE void operator()(int i, int j, int k) const {
     const std::size_t p = grid.index(i, j, k);
@@ -79,7 +82,7 @@ struct Descend {
     tie(k > 0, p, p - plane, slope, curvature);
     tie(k < grid.nz - 1, p, p + plane, slope, curvature);
     slope.c[3] = 0;
-    const Quad<Real> after = non_negative(here - (1 / curvature) * slope);
+    const Quad<Real> after = non_negative(here - (length / curvature) * slope);
     next_y[p] = after + momentum * (after - x[p]);
     x[p] = after;
   }
@@ -124,7 +127,7 @@ struct DescendField {
     if (j < e.grid.ny - 1) vary(u, p + row, slope, curvature);
     if (k > 0) vary(u, p - plane, slope, curvature);
     if (k < e.grid.nz - 1) vary(u, p + plane, slope, curvature);
-    const Real after = clamp_to(e.y[p].c[3] - slope / curvature, Real(0), most);
+    const Real after = clamp_to(e.y[p].c[3] - e.length * slope / curvature, Real(0), most);
     e.x[p].c[3] = after;
     e.next_y[p].c[3] = clamp_to(after + e.momentum * (after - before), Real(0), most);
   }
@@ -137,6 +140,22 @@ struct DescendField {
     const Real stiffness = variation / (size > soft ? size : soft);
     slope += stiffness * d;
     curvature += 2 * stiffness;
+  }
+};
+
+/// weight = max(weight, scale * one lane of the gradient), which is cleared: over all subsets of the rays,
+/// what majorises each of them.
+template <class Real>
+struct RaiseWeight {
+  Real* weight = nullptr;
+  Quad<Real>* gradient = nullptr;
+  int lane = 0;
+  Real scale = 1;
+
+  HOST_DEVICE void operator()(std::size_t p) const {
+    const Real raised = scale * gradient[p].c[lane];
+    if (raised > weight[p]) weight[p] = raised;
+    gradient[p] = Quad<Real>{};
   }
 };
 
@@ -153,4 +172,4 @@ struct ActAt {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/advice.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include "recon/pipeline/shipped_front.h"
 #include "recon/preprocess/flame_mask.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kNoGain = 0.98;  // a smaller gain than 2 % is none
@@ -77,11 +78,14 @@ std::string more_voxels(const Report& report) {
   const int finest = report.finest_voxels;
   if (!report.heldout_rmse || report.solver != "default" || finest < 1 || voxels < 1) return {};
   if (voxels >= finest) {
-    return fmt::format("more voxels bring little: {} are what the pictures can show (two for three pixels)",
-                       finest);
+    return fmt::format(
+        "more voxels bring little: {} are what the pictures can show (two for three pixels), or the most "
+        "that is "
+        "taken unasked",
+        finest);
   }
   const int more = std::min(finest, voxels + (voxels + 1) / 2);
-  const std::vector<WorkPoint> front = scaled(shipped_front(), finest, 1, 1);
+  const std::vector<WorkPoint> front = scaled(shipped_ends(), finest, 1, 1);
   const auto end_of = [&](int v) {
     const std::vector<WorkPoint> points = at_voxels(front, v);
     return *best_within(points, std::numeric_limits<double>::infinity());
@@ -108,4 +112,4 @@ std::vector<std::string> next_steps(const Report& report) {
   return steps;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

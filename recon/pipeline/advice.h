@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -5,7 +6,7 @@
 
 #include "recon/export/report.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What going on would cost and bring, in one sentence, from the trace alone: the held-out error (the input
 /// error where nothing is held out) fell by g1 over the run's second quarter and by g2 over its second half;
@@ -20,4 +21,4 @@ std::string more_voxels(const Report& report);
 /// Both, as far as there is something to say.
 std::vector<std::string> next_steps(const Report& report);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

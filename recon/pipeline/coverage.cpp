@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/coverage.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr std::size_t kFewViews = 4;  // RECON.md's figures: test error 18 with 4 views, 3.1 with 10
@@ -51,4 +52,4 @@ std::vector<std::string> coverage_warnings(const Scene& scene) {
   return warnings;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

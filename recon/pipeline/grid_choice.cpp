@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/grid_choice.h"
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kAlpha = 1.5;
@@ -44,7 +45,9 @@ int voxels_by_the_paper(const Scene& scene) {
   }
   if (edge == 0) return kLargestChosenVoxels;
   const double voxels = std::ceil(scene.box.size.maxCoeff() / edge);
-  return static_cast<int>(std::clamp(voxels, 1.0, static_cast<double>(kLargestChosenVoxels)));
+  return static_cast<int>(std::clamp(voxels, 1.0, static_cast<double>(kLargestVoxels)));
 }
 
-}  // namespace emberlock
+int finest_voxels(const Scene& scene) { return std::min(voxels_by_the_paper(scene), kLargestChosenVoxels); }
+
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/planned_run.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include "recon/pipeline/shipped_front.h"
 #include "recon/preprocess/flame_mask.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kShareOfBudget = 0.9;  // a prediction errs; the guard inside the solver does the rest
@@ -28,9 +29,11 @@ double heldout_error(const Outcome& outcome) {
 class Choices {
  public:
   Choices(const Scene& scene, const ReconstructOptions& asked, const Reference& reference)
-      : all_(scaled(shipped_front(), voxels_by_the_paper(scene), std::max(1e-9, reference.seconds.value()),
+      : all_(scaled(shipped_front(), finest_voxels(scene), std::max(1e-9, reference.seconds.value()),
                     std::max(1e-9, reference.error))) {
-    std::erase_if(all_, [&](const WorkPoint& p) { return !choose_grid(scene, p.settings.voxels).ok(); });
+    std::erase_if(all_, [&](const WorkPoint& p) {
+      return !choose_grid(scene, p.settings.voxels, asked.solve.precision).ok();
+    });
     if (asked.effects) {
       const char* kept = asked.effects->fixed ? "none" : "auto";
       std::erase_if(all_, [&](const WorkPoint& p) { return p.settings.effects != kept; });
@@ -133,9 +136,10 @@ class PlannedRun {
   Status measure() {
     plan_.budget = asked_.solve.budget;
     plan_.target_rmse = asked_.solve.target_rmse;
-    report(progress_, 0, "measuring this machine on a coarse grid");
-    if (asked_.voxels) EMBERLOCK_RETURN_IF_ERROR(as_status(choose_grid(task_.scene, asked_.voxels)));
-    const int voxels = reference_voxels(voxels_by_the_paper(task_.scene));
+    tell(progress_, 0, "measuring this machine on a coarse grid");
+    if (asked_.voxels)
+      EMBERLOCK_RETURN_IF_ERROR(as_status(choose_grid(task_.scene, asked_.voxels, asked_.solve.precision)));
+    const int voxels = reference_voxels(finest_voxels(task_.scene));
     EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
                                choose_grid(task_.scene, std::min(voxels, asked_.voxels.value_or(voxels))));
     const Effects effects = asked_.effects && asked_.effects->fixed ? *asked_.effects->fixed : Effects{};
@@ -191,7 +195,7 @@ class PlannedRun {
     const double from = progress_from(plan_.attempts++);
     const double to = progress_from(plan_.attempts);
     return run_settled(task_, options, [&](double fraction, std::string_view words) {
-      report(progress_, from + (to - from) * std::min(fraction, 0.999), words);
+      tell(progress_, from + (to - from) * std::min(fraction, 0.999), words);
     });
   }
 
@@ -266,7 +270,8 @@ class PlannedRun {
       }
     }
     result.plan = plan_;
-    report(progress_, 1, "done");
+    result.voxel_choice.rule = asked_.voxels ? "asked" : "plan";
+    tell(progress_, 1, "done");
   }
 
   const Task& task_;
@@ -287,4 +292,4 @@ Result<Outcome> run_planned(const Task& task, const ReconstructOptions& options,
   return PlannedRun(task, options, progress).run();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

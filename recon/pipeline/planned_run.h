@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/pipeline/settled_run.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Whether a budget or a target is to choose settings.
 bool has_goal(const ReconstructOptions& options);
@@ -20,4 +21,4 @@ bool has_goal(const ReconstructOptions& options);
 ///   the run itself took and reached; the best run is the result.
 Result<Outcome> run_planned(const Task& task, const ReconstructOptions& options, const Progress& progress);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

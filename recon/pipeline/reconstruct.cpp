@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/reconstruct.h"
 
 #include <new>
@@ -6,16 +7,53 @@
 #include <fmt/format.h>
 
 #include "base/file.h"
+#include "recon/adjust/choose_effects.h"
+#include "recon/adjust/find_motion.h"
+#include "recon/adjust/find_pointing.h"
+#include "recon/adjust/guard.h"
+#include "recon/adjust/prepared_scene.h"
 #include "recon/export/picture.h"
 #include "recon/export/volume_file.h"
 #include "recon/pipeline/planned_run.h"
+#include "recon/pipeline/voxel_choice.h"
 #include "recon/preprocess/radiance.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr const char* kMarker = "report.json";
+/// The scene as it is told, or with cameras put right that point beside their calibration; and what is said
+/// of them.
+class PointedScene {
+ public:
+  PointedScene(const Scene& told, const ReconstructOptions& options, Device device, const Elapsed& elapsed,
+               const Progress& progress)
+      : told_(told) {
+    if (!options.correct_pointing || any_late(told)) return;  // what is late looks as if it pointed elsewhere
+    const EffectRequest request = options.effects.value_or(EffectRequest{});
+    const Effects known = request.fixed ? *request.fixed : told_by_the_pictures(told, request);
+    Pool pool(options.solve.compute.threads, device);
+    found_ = find_pointing(PreparedScene(told, known).scene(), known, options.solve, pool, elapsed, progress);
+    if (found_.any()) corrected_ = pointed(told, found_);
+  }
+  [[nodiscard]] const Scene& scene() const { return corrected_ ? *corrected_ : told_; }
+  void tell(Report& report) const {
+    for (std::size_t v = 0; v < found_.off.size(); ++v)
+      if (const PointingError& off = found_.off[v]; off.x != 0 || off.y != 0)
+        report.warnings.push_back(
+            fmt::format("{} points {:+.1f} pixels across and {:+.1f} down beside what its calibration says, "
+                        "and was put right: the "
+                        "flame's outlines didn't meet (left-out views are shown to {:.3g} grey levels "
+                        "instead of {:.3g} on a coarse "
+                        "grid). Calibrate it anew, or keep its pose with --keep-poses",
+                        told_.views[v].name, off.x, off.y, found_.error_after, found_.error_before));
+  }
+
+ private:
+  const Scene& told_;
+  FoundPointing found_;
+  std::optional<Scene> corrected_;
+};
 
 }  // namespace
 
@@ -25,22 +63,56 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
   const TimePoint start = clock.now();
   EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
-  const Task task{scene, device, [&] { return clock.now() - start; }, preview};
-  return has_goal(options) ? run_planned(task, options, progress) : run_settled(task, options, progress);
+  const Elapsed elapsed = [&] { return clock.now() - start; };
+  const PointedScene pointed(scene, options, device, elapsed, progress);
+  const Task task{pointed.scene(), device, elapsed, preview};
+  if (has_goal(options)) {
+    EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_planned(task, options, progress));
+    pointed.tell(outcome.report);
+    return outcome;
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
+  ReconstructOptions settled = options;
+  settled.voxels = choice.voxels;
+  EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_settled(task, settled, progress));
+  outcome.report.voxel_choice = std::move(choice);
+  pointed.tell(outcome.report);
+  return outcome;
 } catch (const DeviceError& e) {
+  return e.error();
+} catch (const Diverged& e) {
   return e.error();
 } catch (const std::bad_alloc&) {
   return Error{ErrorKind::bad_input, "not enough memory", "--voxels", "Give fewer voxels, or a smaller box"};
 }
 
-Status check_output(const fs::path& folder) {
-  // Creating the staging folder and letting it go asks the same questions as the real thing.
-  const auto probe = AtomicDirectory::create(folder, kMarker);
-  return probe ? Status() : Status(probe.error());
+Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
+                                const Progress& progress) try {
+  const TimePoint start = clock.now();
+  EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
+  const std::function<void(const Preview&)> nobody;
+  const Task task{scene, device, [&] { return clock.now() - start; }, nobody};
+  EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
+  EMBERLOCK_RETURN_IF_ERROR(choose_grid(scene, choice.voxels, options.solve.precision));
+  if (choice.rule == "knee") return choice;
+  ReconstructOptions settled = options;
+  settled.voxels = choice.voxels;
+  EMBERLOCK_ASSIGN_OR_RETURN(const Calibration measured, calibrate(task, settled));
+  choice.calibration_time = measured.took;
+  const std::vector<WorkPoint> expected = expected_runs(scene, settled, measured);
+  if (!expected.empty()) choice.expected_time = Seconds(expected.front().seconds);
+  return choice;
+} catch (const DeviceError& e) {
+  return e.error();
 }
 
-Status write_outcome(const Outcome& outcome, const fs::path& folder) {
-  EMBERLOCK_ASSIGN_OR_RETURN(AtomicDirectory staging, AtomicDirectory::create(folder, kMarker));
+Status check_output(const fs::path& folder, const std::vector<fs::path>& inputs) {
+  return OutputFolder::check({folder, kReconstruct, inputs});
+}
+
+Status write_outcome(const Outcome& outcome, const fs::path& folder, const std::vector<fs::path>& inputs) {
+  EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create({folder, kReconstruct, inputs}));
   EMBERLOCK_RETURN_IF_ERROR(write_volume(outcome.reconstruction.volume, staging.path() / "volume.vdb"));
   std::error_code ec;
   fs::create_directory(staging.path() / "views", ec);
@@ -48,8 +120,8 @@ Status write_outcome(const Outcome& outcome, const fs::path& folder) {
     const std::string name = fmt::format("{:04}.png", i);
     EMBERLOCK_RETURN_IF_ERROR(write_png(to_rgb8(outcome.renders[i]).view(), staging.path() / "views" / name));
   }
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / kMarker, to_json(outcome.report)));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "report.json", to_json(outcome.report)));
   return staging.commit();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -7,6 +8,7 @@
 #include <vector>
 
 #include "base/clock.h"
+#include "base/output_folder.h"
 #include "base/progress.h"
 #include "base/result.h"
 #include "recon/adjust/solver.h"
@@ -14,11 +16,17 @@
 #include "recon/export/report.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
+
+/// Where nobody tells the number of voxels.
+enum class VoxelRule {
+  knee,   ///< of time against error on this machine (voxel_choice.h); the paper's solver: finest_voxels()
+  paper,  ///< voxels_by_the_paper(), however many that are
+};
 
 struct ReconstructOptions {
-  std::optional<int>
-      voxels;  ///< along the box's longest edge, 1..kLargestVoxels; otherwise voxels_by_the_paper()
+  std::optional<int> voxels;  ///< along the box's longest edge, 1..kLargestVoxels
+  VoxelRule rule = VoxelRule::knee;
   /// Otherwise found out from the pictures; for the paper's solver its constant opacity of 0.05 a step.
   std::optional<EffectRequest> effects;
   /// A budget counts from the start of reconstruct() to its end, so it covers the choice of effects, the hull
@@ -29,6 +37,8 @@ struct ReconstructOptions {
   /// which the front doesn't know, takes the budget and the target as limits alone, as every solver does if
   /// false.
   bool choose_by_front = true;
+  /// Whether a camera that points beside what its calibration says is put right (find_pointing.h), and said.
+  bool correct_pointing = true;
 };
 
 /// A reconstruction with everything that is written about it.
@@ -38,19 +48,29 @@ struct Outcome {
   Report report;                       ///< its `input` is the caller's to fill
 };
 
-/// Effects, hull, solve, and the rendering of every view, held-out ones too. Everything but the times is a
-/// pure function of scene and options, unless a budget ends it. Errors: options out of range, a grid that
-/// doesn't fit into this machine's memory, and those of check_scene(), choose_effects() and solve().
+/// The number of voxels, effects, hull, solve, and the rendering of every view, held-out ones too. Everything
+/// but the times is a pure function of scene and options, unless a budget ends it, or the knee chooses the
+/// voxels: Report::voxel_choice says which, and with them told the result is the same. Errors: options out of
+/// range, a grid that doesn't fit into this machine's memory, and those of check_scene(), choose_effects()
+/// and solve().
 Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
                             const Progress& progress = {},
                             const std::function<void(const Preview&)>& preview = {});
 
-/// Whether write_outcome() may write to `folder`: it is absent, empty, or an earlier result (has a
-/// report.json).
-Status check_output(const std::filesystem::path& folder);
+/// What reconstruct() would take, without doing it: the number of voxels and how long that is thought to
+/// last.
+Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
+                                const Progress& progress = {});
 
-/// Writes volume.vdb, views/NNNN.png (8 bits, numbered as in the input) and report.json. The folder appears
-/// whole, or not at all; an earlier result is replaced.
-Status write_outcome(const Outcome& outcome, const std::filesystem::path& folder);
+/// Who makes the folder.
+inline constexpr OutputVerb kReconstruct{"reconstruct"};
 
-}  // namespace emberlock
+/// Whether write_outcome() may write to `folder`; `inputs` are what the scene was read from (files_of()).
+Status check_output(const std::filesystem::path& folder,
+                    const std::vector<std::filesystem::path>& inputs = {});
+
+/// Writes volume.vdb, views/NNNN.png (8 bits, numbered as in the input) and report.json as an OutputFolder.
+Status write_outcome(const Outcome& outcome, const std::filesystem::path& folder,
+                     const std::vector<std::filesystem::path>& inputs = {});
+
+}  // namespace emberlock::recon

@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/reference_run.h"
 
 #include <algorithm>
 
+#include "recon/adjust/descent.h"
 #include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kShare =
@@ -23,6 +25,7 @@ Result<Reference> measure_reference(const Scene& scene, const Grid& grid, const 
   coarse.solver = Solver::standard;
   coarse.iterations = options.iterations > 0 ? std::min(options.iterations, kIterations) : kIterations;
   coarse.target_rmse.reset();
+  if (!coarse.smoothness) coarse.smoothness = kLeastSmoothness;  // a yardstick searches for nothing
   Reference reference;
   EMBERLOCK_ASSIGN_OR_RETURN(reference.reconstruction, solve(scene, grid, effects, coarse, elapsed));
   const Reconstruction& done = reference.reconstruction;
@@ -41,4 +44,4 @@ Result<Reference> measure_reference(const Scene& scene, const Grid& grid, const 
   return reference;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

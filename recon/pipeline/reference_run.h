@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "base/result.h"
 #include "recon/adjust/solver.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The yardstick of shipped fronts: a coarse solve of the scene at hand, which takes in the machine's speed,
 /// the pictures' size and how hard the flame is.
@@ -14,7 +15,7 @@ struct Reference {
   double error = 0;  ///< of the held-out views, of the input views where none is held out; all channels
 };
 
-/// Voxels of a reference on a scene whose pictures call for `finest` (voxels_by_the_paper()).
+/// Voxels of a reference on a scene whose pictures call for `finest` (finest_voxels()).
 int reference_voxels(int finest);
 
 /// Takes step, precision, device, threads, threshold, budget and a limit of iterations from `options`.
@@ -22,4 +23,4 @@ int reference_voxels(int finest);
 Result<Reference> measure_reference(const Scene& scene, const Grid& grid, const Effects& effects,
                                     const SolveOptions& options, const Elapsed& elapsed);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

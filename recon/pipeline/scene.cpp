@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/scene.h"
 
 #include <algorithm>
@@ -11,11 +12,11 @@
 #include "recon/pipeline/session_picture.h"
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/radiance.h"
-#include "session/frame_file.h"
+#include "session/media/frame_file.h"
 #include "session/reader.h"
 #include "session/shutter_times.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace fs = std::filesystem;
 namespace {
 
@@ -30,7 +31,7 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
   Scene scene;
   scene.preprocessing = {{"all", false, "pictures of a transforms.json are taken as they are"}};
   for (const TransformsFrame& frame : transforms.frames) {
-    const auto image = read_image(frame.image);
+    const auto image = session::read_image(frame.image);
     if (!image) {
       return Error{image.error().kind, image.error().message(), frame.where + ".file_path",
                    "Correct file_path, or bring the picture there"};
@@ -62,13 +63,13 @@ std::optional<std::size_t> nearest_complete(const std::vector<FrameStamp>& stamp
 
 /// How far from an instant a camera's frame may be to stand for it: a frame period, anything where that isn't
 /// known.
-Seconds reach_of(const SessionReader& reader, std::size_t camera) {
+Seconds reach_of(const session::SessionReader& reader, std::size_t camera) {
   const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
   return Seconds(rate > 0 ? 1 / rate : INFINITY);
 }
 
 /// The complete frame of a camera within its reach of `t`.
-std::optional<std::size_t> frame_at(const SessionReader& reader, std::size_t camera, TimePoint t) {
+std::optional<std::size_t> frame_at(const session::SessionReader& reader, std::size_t camera, TimePoint t) {
   const auto nearest = nearest_complete(reader.stamps(camera), t);
   if (!nearest || abs(reader.stamps(camera)[*nearest].monotonic_time - t) > reach_of(reader, camera))
     return std::nullopt;
@@ -92,7 +93,7 @@ bool any_within(const std::vector<TimePoint>& rising, TimePoint t, Seconds reach
 
 /// The first camera's frame nearest to the middle of which all cameras have the instant; the middle one where
 /// there is none.
-std::size_t middle_frame(const SessionReader& reader) {
+std::size_t middle_frame(const session::SessionReader& reader) {
   std::vector<std::vector<TimePoint>> complete;
   for (std::size_t i = 0; i < reader.camera_count(); ++i)
     complete.push_back(complete_times(reader.stamps(i)));
@@ -111,8 +112,8 @@ std::size_t middle_frame(const SessionReader& reader) {
 }
 
 /// How late a frame is. One that stands in for a lost one is late, or early, by whole periods more.
-void tell_lateness(const SessionReader& reader, std::size_t camera, std::size_t frame, TimePoint instant,
-                   const v1::ShutterTimes::Camera& times, View& view) {
+void tell_lateness(const session::SessionReader& reader, std::size_t camera, std::size_t frame,
+                   TimePoint instant, const v1::ShutterTimes::Camera& times, View& view) {
   const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
   const Seconds after = reader.stamps(camera)[frame].monotonic_time - instant;
   const double periods = rate > 0 ? std::round(after.value() * rate) : 0;
@@ -122,7 +123,7 @@ void tell_lateness(const SessionReader& reader, std::size_t camera, std::size_t 
 
 /// A session and what it takes to develop each camera's frames.
 struct SessionPictures {
-  SessionReader reader;
+  session::SessionReader reader;
   std::vector<FrameDeveloper> developers = {};
 };
 
@@ -131,17 +132,17 @@ struct SessionPictures {
 template <class Act>
 Status each_of_some_frames(SessionPictures& session, std::size_t count, const Progress& progress,
                            const char* doing, const Act& act) {
-  SessionReader& reader = session.reader;
+  session::SessionReader& reader = session.reader;
   for (std::size_t i = 0; i < reader.camera_count(); ++i) {
     std::vector<std::size_t> complete;
     for (std::size_t f = 0; f < reader.stamps(i).size(); ++f)
       if (reader.stamps(i)[f].status == FrameStatus::complete) complete.push_back(f);
     const std::size_t taken = std::min(count, complete.size());
     for (std::size_t n = 0; n < taken; ++n) {
-      report(progress,
-             (static_cast<double>(i) + static_cast<double>(n) / static_cast<double>(taken)) /
-                 static_cast<double>(reader.camera_count()),
-             doing);
+      tell(progress,
+           (static_cast<double>(i) + static_cast<double>(n) / static_cast<double>(taken)) /
+               static_cast<double>(reader.camera_count()),
+           doing);
       // The middle of each of `taken` equal parts: the recording's own middle where it is one.
       const std::size_t frame = complete[(2 * n + 1) * complete.size() / (2 * taken)];
       EMBERLOCK_ASSIGN_OR_RETURN(const DevelopedPicture picture,
@@ -185,20 +186,20 @@ Status average(SessionPictures& session, const Progress& progress, Scene& scene)
 }
 
 Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
-  EMBERLOCK_ASSIGN_OR_RETURN(SessionReader opened, SessionReader::open(folder));
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader opened, session::SessionReader::open(folder));
   SessionPictures session{std::move(opened)};
-  SessionReader& reader = session.reader;
+  session::SessionReader& reader = session.reader;
   v1::Manifest manifest = reader.manifest();
   const std::string manifest_name = (folder / "manifest.json").string();
   if (options.rig) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, read_rig(*options.rig));
+    EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, session::read_rig(*options.rig));
     EMBERLOCK_RETURN_IF_ERROR(apply_rig(manifest, rig, options.rig->string()));
   }
   std::optional<Box> own_box;
   if (manifest.has_box()) {
     EMBERLOCK_ASSIGN_OR_RETURN(own_box, box_of(manifest.box(), manifest_name));
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(const auto times, read_shutter_times(reader));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto times, session::read_shutter_times(reader));
   Scene scene;
   if (reader.camera_count() == 0 || reader.camera_count() > kMaxViews) {
     return bad(manifest_name + ": cameras",
@@ -256,9 +257,19 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
 Result<Scene> load_scene(const fs::path& input, const SceneOptions& options) {
   std::error_code ec;
   if (!fs::is_directory(input, ec)) return load_transforms(input, options);
-  if (SessionReader::is_session(input)) return load_session(input, options);
+  if (session::SessionReader::is_session(input)) return load_session(input, options);
   return bad(input.string(), "is a folder without manifest.json, so no session",
              "Name a session's folder, or the transforms.json itself");
+}
+
+std::vector<fs::path> files_of(const fs::path& input, const SceneOptions& options) {
+  std::vector<fs::path> files{input};
+  if (options.rig) files.push_back(*options.rig);
+  std::error_code ec;
+  if (!fs::is_regular_file(input, ec)) return files;
+  if (const auto transforms = read_transforms(input))
+    for (const TransformsFrame& frame : transforms->frames) files.push_back(frame.image);
+  return files;
 }
 
 Status hold_out(Scene& scene, const std::vector<int>& views) {
@@ -277,4 +288,4 @@ Status hold_out(Scene& scene, const std::vector<int>& views) {
   return {};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

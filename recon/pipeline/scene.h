@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -10,7 +11,7 @@
 #include "recon/pipeline/session_picture.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 struct SceneOptions {
   std::optional<Box> box;  ///< stands before the input's own; without either it is found from the pictures
@@ -33,7 +34,11 @@ struct SceneOptions {
 /// on average over frames of the whole recording.
 Result<Scene> load_scene(const std::filesystem::path& input, const SceneOptions& options = {});
 
+/// What load_scene() reads, as far as it is there: the input, a transforms.json's pictures, the rig.
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& input,
+                                            const SceneOptions& options = {});
+
 /// Gives the views of these indices the role held_out. Errors: no such view, none left to reconstruct from.
 Status hold_out(Scene& scene, const std::vector<int>& views);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/session_picture.h"
 
 #include <cmath>
@@ -6,7 +7,7 @@
 
 #include "recon/preprocess/dark_part.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr std::size_t kMostDark = 33;
@@ -24,7 +25,8 @@ SensorKind sensor_of(const v1::CameraStream& stream) {
 
 using Frames = std::vector<Frame>;
 
-Result<Frames> read_frames(SessionReader& reader, std::size_t camera, std::size_t first, std::size_t count) {
+Result<Frames> read_frames(session::SessionReader& reader, std::size_t camera, std::size_t first,
+                           std::size_t count) {
   Frames frames;
   for (std::size_t i = first; i < first + count; ++i) {
     if (reader.stamps(camera)[i].status != FrameStatus::complete) continue;
@@ -36,7 +38,8 @@ Result<Frames> read_frames(SessionReader& reader, std::size_t camera, std::size_
 
 /// The frames at one end of the recording, if they all show the same and the flame's frame shows more light.
 /// The first look costs one frame.
-Result<Frames> dark_end(SessionReader& reader, std::size_t camera, std::size_t first, const Samples& flame) {
+Result<Frames> dark_end(session::SessionReader& reader, std::size_t camera, std::size_t first,
+                        const Samples& flame) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Frames look, read_frames(reader, camera, first, 1));
   if (look.empty()) return Frames{};
   const Samples start = samples_of(look.front().image->view());
@@ -47,7 +50,7 @@ Result<Frames> dark_end(SessionReader& reader, std::size_t camera, std::size_t f
   return frames.size() > kDarkFrames / 2 ? std::move(frames) : Frames{};
 }
 
-Result<Frames> find_dark(SessionReader& reader, std::size_t camera, std::size_t frame,
+Result<Frames> find_dark(session::SessionReader& reader, std::size_t camera, std::size_t frame,
                          const ImageView& picture) {
   const std::size_t count = reader.stamps(camera).size();
   const bool before = frame >= 2 * kDarkFrames;
@@ -64,7 +67,7 @@ Result<Frames> find_dark(SessionReader& reader, std::size_t camera, std::size_t 
   return dark;
 }
 
-Result<Frames> told_dark(SessionReader& reader, std::size_t camera, const FrameOptions& options) {
+Result<Frames> told_dark(session::SessionReader& reader, std::size_t camera, const FrameOptions& options) {
   const auto [first, last] = options.dark;
   const std::string where = reader.folder().string() + ": camera " +
                             reader.manifest().cameras(static_cast<int>(camera)).camera_id();
@@ -131,7 +134,7 @@ Status parse_smear(const std::string& text, FrameOptions& options) {
   return {};
 }
 
-Result<FrameDeveloper> FrameDeveloper::create(SessionReader& reader, std::size_t camera,
+Result<FrameDeveloper> FrameDeveloper::create(session::SessionReader& reader, std::size_t camera,
                                               const v1::CameraStream& stream, std::size_t flame,
                                               const FrameOptions& options) {
   FrameDeveloper developer;
@@ -151,14 +154,14 @@ Result<FrameDeveloper> FrameDeveloper::create(SessionReader& reader, std::size_t
   return developer;
 }
 
-Result<DevelopedPicture> FrameDeveloper::develop(SessionReader& reader, std::size_t frame) const {
+Result<DevelopedPicture> FrameDeveloper::develop(session::SessionReader& reader, std::size_t frame) const {
   EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(camera_, frame));
   CameraFrame from;
   from.frame = picture.image->view();
   from.sensor = sensor_;
   from.colour = colour_;
   for (const Frame& f : dark_) from.dark.push_back(f.image->view());
-  return emberlock::develop(from, options_);
+  return recon::develop(from, options_);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -11,7 +12,7 @@
 #include "recon/preprocess/develop.h"
 #include "session/reader.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// How a session's frames become pictures.
 struct FrameOptions {
@@ -39,12 +40,12 @@ class FrameDeveloper {
   /// `stream`: the camera as it is known by now, by the manifest or a rig. `flame`: a frame that shows the
   /// flame. Reads it, up to two frames to see whether there is a part without flame, and eight of that.
   /// Errors: those of SessionReader::read() and read_colour(); dark frames that the camera doesn't have.
-  static Result<FrameDeveloper> create(SessionReader& reader, std::size_t camera,
+  static Result<FrameDeveloper> create(session::SessionReader& reader, std::size_t camera,
                                        const v1::CameraStream& stream, std::size_t flame,
                                        const FrameOptions& options);
 
   /// A frame as radiance. `reader` is that of create(). Errors: those of SessionReader::read().
-  Result<DevelopedPicture> develop(SessionReader& reader, std::size_t frame) const;
+  Result<DevelopedPicture> develop(session::SessionReader& reader, std::size_t frame) const;
 
   /// Whether the camera's calibrated response makes its pictures linear in light.
   [[nodiscard]] bool linearises() const { return colour_ && !colour_->response.empty(); }
@@ -58,4 +59,4 @@ class FrameDeveloper {
   DevelopOptions options_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

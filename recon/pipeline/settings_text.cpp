@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Settings and work-precision points as text: the options of the command line, and points.csv.
 #include <charconv>
 #include <cmath>
@@ -5,7 +6,7 @@
 
 #include "recon/pipeline/work_precision.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr std::string_view kHeader =
@@ -114,4 +115,4 @@ std::string command_options(const Settings& s) {
          " --effects " + s.effects + " --solver " + std::string(name(s.solver));
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/settled_run.h"
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <unistd.h>
 
 #include "recon/adjust/choose_effects.h"
+#include "recon/adjust/paper.h"
 #include "recon/adjust/prepared_scene.h"
 #include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
@@ -14,12 +16,20 @@
 #include "recon/preprocess/radiance.h"
 #include "recon/render/render.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kPaperOpacity = 0.05;
-// Emission, gradient, momentum, preconditioner and previous state: RGB and padding in single precision.
-constexpr std::size_t kBytesPerKeyPoint = 80;
+/// What a solve holds at once. Of numbers in its precision the engine has six of four lanes (x, its
+/// look-ahead, the next, the gradient, what is marked and what is kept) and four of one (weights, ties,
+/// weights and reference of the extinction), and the judge of the held-out views one of four; of floats there
+/// are what a level starts from, a copy while weights are found, and the next coarser level, an eighth of all
+/// that.
+constexpr std::size_t bytes_per_key_point(Precision precision) {
+  const std::size_t number = precision == Precision::float64 ? sizeof(double) : sizeof(float);
+  const std::size_t level = (7 * 4 + 4) * number + 2 * sizeof(Rgba);
+  return level + level / 8;
+}
 
 Result<EffectChoice> decide_effects(const Scene& scene, const Grid& grid, const ReconstructOptions& options,
                                     const SolveOptions& solve_options, const Elapsed& elapsed) {
@@ -65,6 +75,7 @@ std::vector<ViewReport> judge(const Scene& scene, const std::vector<FlameMask>& 
 Report describe(const Scene& scene, const Grid& grid, const SolveOptions& options, Device device) {
   Report report;
   report.solver = options.solver == Solver::paper ? "paper" : "default";
+  if (options.solver == Solver::paper) report.deviations = paper_deviations();
   report.device = device == Device::cuda ? "cuda" : "cpu";
   report.threads = options.compute.threads;
   report.seed = options.seed;
@@ -73,7 +84,9 @@ Report describe(const Scene& scene, const Grid& grid, const SolveOptions& option
   report.box = scene.box;
   report.voxels = {grid.nx - 1, grid.ny - 1, grid.nz - 1};
   report.voxel_edge = Meters(static_cast<double>(grid.edge));
-  report.finest_voxels = voxels_by_the_paper(scene);
+  report.finest_voxels = finest_voxels(scene);
+  report.voxel_choice.voxels = std::max({grid.nx, grid.ny, grid.nz}) - 1;
+  report.voxel_choice.by_the_paper = voxels_by_the_paper(scene);
   report.warnings = coverage_warnings(scene);
   report.preprocessing = scene.preprocessing;
   return report;
@@ -84,18 +97,22 @@ constexpr double kSolveTo = 0.9;
 
 }  // namespace
 
-Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels) {
+double physical_memory() {
+  return static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
+}
+
+Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels, Precision precision,
+                         double memory) {
   if (voxels && (*voxels < 1 || *voxels > kLargestVoxels)) {
     return Error{ErrorKind::bad_input, std::to_string(*voxels) + " voxels are out of range", "--voxels",
                  "Give 1 to " + std::to_string(kLargestVoxels)};
   }
-  const Grid grid = grid_over(scene.box, voxels.value_or(voxels_by_the_paper(scene)));
-  const auto memory =
-      static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
-  if (static_cast<double>(grid.size()) * kBytesPerKeyPoint > memory) {
+  const Grid grid = grid_over(scene.box, voxels.value_or(finest_voxels(scene)));
+  if (static_cast<double>(grid.size() * bytes_per_key_point(precision)) > memory) {
     return Error{ErrorKind::bad_input,
                  "a grid of " + std::to_string(grid.size()) + " points exceeds the memory", "--voxels",
-                 "Give fewer voxels, or a smaller box"};
+                 precision == Precision::float64 ? "Give fewer voxels, a smaller box or --precision float32"
+                                                 : "Give fewer voxels, or a smaller box"};
   }
   return grid;
 }
@@ -106,9 +123,9 @@ Outcome finish(const Task& task, const SolveOptions& options, Reconstruction don
   const Seconds start = task.elapsed();
   const PreparedScene prepared(scene, done.effects);
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    report(progress,
-           kSolveTo + (1 - kSolveTo) * static_cast<double>(i) / static_cast<double>(scene.views.size()),
-           "rendering the views");
+    tell(progress,
+         kSolveTo + (1 - kSolveTo) * static_cast<double>(i) / static_cast<double>(scene.views.size()),
+         "rendering the views");
     outcome.renders.push_back(render_view(done.volume, done.hull, done.effects,
                                           prepared.scene().views[i].camera,
                                           RenderOptions{.compute = options.compute}));
@@ -122,20 +139,23 @@ Outcome finish(const Task& task, const SolveOptions& options, Reconstruction don
   result.heldout_rmse = over_views(result.views, ViewRole::held_out);
   result.hull_time = done.hull_time;
   result.solve_time = done.solve_time;
+  result.trace_time = done.trace_time;
   result.total_time = task.elapsed();
   result.render_time = result.total_time - start;
   result.iterations = done.iterations;
   result.trace = done.trace;
+  result.trace_sample = done.trace_sample;
   outcome.reconstruction = std::move(done);
-  report(progress, 1, "done");
+  tell(progress, 1, "done");
   return outcome;
 }
 
 Result<Outcome> run_settled(const Task& task, const ReconstructOptions& options, const Progress& progress) {
   const SolveOptions& solve_options = options.solve;
   const Seconds start = task.elapsed();
-  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, choose_grid(task.scene, options.voxels));
-  report(progress, 0, "finding out which effects matter");
+  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
+                             choose_grid(task.scene, options.voxels, solve_options.precision));
+  tell(progress, 0, "finding out which effects matter");
   EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
                              decide_effects(task.scene, grid, options, solve_options, task.elapsed));
   const Seconds effects_time = task.elapsed() - start;
@@ -145,11 +165,11 @@ Result<Outcome> run_settled(const Task& task, const ReconstructOptions& options,
     const double share = solve_options.iterations > 0
                              ? static_cast<double>(state.point.iteration) / solve_options.iterations
                              : state.point.iteration / (state.point.iteration + 10.0);
-    report(progress, kSolveFrom + (kSolveTo - kSolveFrom) * std::min(share, 1.0),
-           fmt::format("iteration {}", state.point.iteration));
+    tell(progress, kSolveFrom + (kSolveTo - kSolveFrom) * std::min(share, 1.0),
+         fmt::format("iteration {}", state.point.iteration));
     if (task.preview) task.preview(state);
   };
-  report(progress, kSolveFrom, "carving the hull");
+  tell(progress, kSolveFrom, "carving the hull");
   EMBERLOCK_ASSIGN_OR_RETURN(Reconstruction done,
                              solve(task.scene, grid, choice.effects, solve_options, task.elapsed, watch));
   Outcome outcome = finish(task, solve_options, std::move(done), progress);
@@ -158,4 +178,4 @@ Result<Outcome> run_settled(const Task& task, const ReconstructOptions& options,
   return outcome;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -8,7 +9,7 @@
 #include "recon/pipeline/work_precision.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What accuracy costs, measured once for scenes not seen yet: the default solver on the paper's set-up with
 /// two simulated flames (geometric means). Seconds are multiples of a reference run's seconds, errors
@@ -18,17 +19,33 @@ namespace emberlock {
 const std::vector<WorkPoint>& shipped_front();
 int shipped_finest();
 
+/// Runs that end by the solver's own rule (iterations 0), which shipped_front() has none of: what a
+/// reconstruction takes and reaches where nobody limits it. The same units.
+const std::vector<WorkPoint>& shipped_ends();
+
+/// What a reference run takes on finer grids than the reference's own, in its seconds: the first is 1.
+struct CalibrationRun {
+  int voxels = 0;
+  double seconds = 0;
+};
+const std::vector<CalibrationRun>& shipped_calibration();
+
 /// The front's points in a scene's own units: voxels by what its pictures call for, seconds and grey levels
 /// by its reference run.
 std::vector<WorkPoint> scaled(std::vector<WorkPoint> front, int finest, double reference_seconds,
                               double reference_error);
 
-/// The sweep that is shipped, one flame's measurement: its points in multiples of the reference.
-Result<std::vector<WorkPoint>> measure_front(const Scene& scene, const ComputeOptions& compute,
-                                             const Clock& clock, const Progress& progress = {});
+/// One flame's measurement, in multiples of its reference.
+struct MeasuredFront {
+  std::vector<WorkPoint> points;  ///< as shipped_front()
+  std::vector<WorkPoint> ends;
+  std::vector<CalibrationRun> calibration;
+};
+Result<MeasuredFront> measure_front(const Scene& scene, const ComputeOptions& compute, const Clock& clock,
+                                    const Progress& progress = {});
 
 /// Both flames' points as shipped_front.inc holds them.
 Result<std::string> measure_shipped_source(const ComputeOptions& compute, const Clock& clock,
                                            const Progress& progress = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/sweep.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 #include "recon/pipeline/reconstruct.h"
 #include "recon/preprocess/flame_mask.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 int input_views(const Scene& scene) {
@@ -67,6 +68,7 @@ Result<ReconstructOptions> options_of(const Settings& settings, const SweepOptio
   options.solve.step = settings.step;
   options.solve.iterations = settings.iterations;
   options.solve.compute = sweep.compute;
+  options.solve.trace = SolveOptions::Trace::whole;
   return options;
 }
 
@@ -91,7 +93,7 @@ void collect(const Report& report, const Settings& settings, std::vector<int> it
 }  // namespace
 
 SweepOptions sweep_defaults(SweepOptions o, const Scene& scene) {
-  const int finest = voxels_by_the_paper(scene);
+  const int finest = finest_voxels(scene);
   const int inputs = input_views(scene);
   if (o.voxels.empty()) {
     // The base is half of what the pictures can show: there a run is quick, and its error near the end.
@@ -208,7 +210,7 @@ Result<Sweep> sweep(const Scene& scene, const SweepOptions& asked, const Clock& 
     }
     const auto outcome = reconstruct(
         with_views(scene, runs[r].views), one, clock,
-        [&](double fraction, std::string_view) { report(progress, from + share * fraction * 0.999, words); });
+        [&](double fraction, std::string_view) { tell(progress, from + share * fraction * 0.999, words); });
     if (!outcome) {
       if (!first_error) first_error = outcome.error();
       result.skipped.push_back(words + ": " + outcome.error().message());
@@ -218,8 +220,8 @@ Result<Sweep> sweep(const Scene& scene, const SweepOptions& asked, const Clock& 
   }
   if (result.points.empty() && first_error) return *first_error;
   result.total = clock.now() - start;
-  report(progress, 1, "done");
+  tell(progress, 1, "done");
   return result;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

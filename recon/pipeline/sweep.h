@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -10,7 +11,7 @@
 #include "recon/pipeline/work_precision.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What a sweep tries. The first value of each list is its base: runs vary one setting at a time around the
 /// base, and cross voxels with effects, the two that matter most. Empty lists are filled in by
@@ -54,4 +55,4 @@ struct Sweep {
 Result<Sweep> sweep(const Scene& scene, const SweepOptions& options, const Clock& clock,
                     const Progress& progress = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/work_precision.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 #include <cstdlib>
 #include <set>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Through (x0, y0) and (x1, y1), straight on logarithmic axes.
@@ -87,6 +88,16 @@ const WorkPoint* choose(const std::vector<WorkPoint>& points, const Goal& goal) 
   return best != nullptr ? best : quickest_reaching(points, INFINITY);
 }
 
+const WorkPoint* knee(const std::vector<WorkPoint>& points, const Patience& patience) {
+  const auto cost = [&](const WorkPoint& p) {
+    return p.seconds + 100 * patience.seconds_a_percent * std::log(p.error);
+  };
+  const WorkPoint* best = nullptr;
+  for (const WorkPoint& p : points)
+    if (p.seconds <= patience.most_seconds && (best == nullptr || cost(p) < cost(*best))) best = &p;
+  return best != nullptr ? best : quickest_reaching(points, INFINITY);
+}
+
 std::vector<WorkPoint> at_voxels(const std::vector<WorkPoint>& points, int voxels) {
   if (points.empty()) return {};
   const auto [low, high] = neighbours(points, voxels);
@@ -105,4 +116,4 @@ std::vector<WorkPoint> at_voxels(const std::vector<WorkPoint>& points, int voxel
   return result;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

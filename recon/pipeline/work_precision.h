@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -8,7 +9,7 @@
 #include "base/result.h"
 #include "recon/adjust/solver.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // Work-precision diagrams: what accuracy costs. Work is seconds, from the scene in memory to the views
 // rendered; precision is the held-out views' RMS error over all channels, in grey levels.
@@ -61,6 +62,17 @@ struct Goal {
 /// error never fewer seconds. nullptr without points.
 const WorkPoint* choose(const std::vector<WorkPoint>& points, const Goal& goal);
 
+/// What waiting is worth to someone who has asked for nothing.
+struct Patience {
+  double seconds_a_percent = 1;  ///< a run may take so much longer for an error that is 1 % lower
+  double most_seconds = 8;       ///< and this at most
+};
+
+/// The knee of time against error: the point where a further step costs more seconds than it is worth, which
+/// is the least of seconds + 100 seconds_a_percent ln(error). Of the points within most_seconds, or the
+/// quickest where there are none. nullptr without points.
+const WorkPoint* knee(const std::vector<WorkPoint>& points, const Patience& patience = {});
+
 /// Points at a number of voxels that need not be among those measured: between the two nearest numbers (or
 /// from the two last ones on) seconds and error follow a power of the voxels, for each combination of other
 /// settings that both have. From one number alone: as measured.
@@ -79,4 +91,4 @@ std::string_view name(Solver solver);
 /// The options of `emberlock reconstruct` that mean these settings.
 std::string command_options(const Settings& settings);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/colour.h"
 
 #include <algorithm>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kLeastLight = 0.02;  // of the middle's: less is no lens
@@ -137,4 +138,4 @@ v1::Colour to_message(const Colour& colour) {
   return message;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

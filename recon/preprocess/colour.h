@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -9,7 +10,7 @@
 #include "base/result.h"
 #include "session/rig_file.h"  // v1::Colour
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// The share of the light that vignetting leaves out of account (dust on the sensor, shading by colour): at
 /// the middles of cells that divide the picture evenly, linear between them.
@@ -51,4 +52,4 @@ double radius_squared(ImageSize size, double x, double y);
 Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std::string& where);
 v1::Colour to_message(const Colour& colour);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

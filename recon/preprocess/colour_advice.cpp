@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/colour_advice.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What would help most comes first: each is weighed by the error that it would take away.
 void advise_on_colours(ColourCalibration& out) {
@@ -67,4 +68,4 @@ void warn_of_colours(const ColourReadings& readings, ColourCalibration& out) {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/preprocess/colour_calibration.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Puts into `out` what isn't as it should be.
 void warn_of_colours(const ColourReadings& readings, ColourCalibration& out);
@@ -10,4 +11,4 @@ void warn_of_colours(const ColourReadings& readings, ColourCalibration& out);
 /// Puts into `out` which picture would help most, first.
 void advise_on_colours(ColourCalibration& out);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

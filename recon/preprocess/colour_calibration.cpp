@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/colour_calibration.h"
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 #include "recon/preprocess/colour_fit.h"
 #include "recon/preprocess/flat_field.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kResponsePoints = 256;
@@ -233,6 +234,22 @@ Status check_colour_options(const ColourOptions& options) {
   return {};
 }
 
+/// A camera's colour as the fit found it.
+CalibratedColour calibrated(const ColourCamera& camera, const ColourUnknowns& found, const FoundFlat& flat) {
+  CalibratedColour out;
+  out.camera = camera.id;
+  out.gamma = found.response[0];
+  out.colour.response = response_table(found.response);
+  out.colour.vignetting = found.vignetting;
+  out.colour.flat = flat.flat;
+  out.flat_rms = flat.rms;
+  out.flat_worst = flat.worst;
+  out.colour.hot_pixels = camera.dark.hot_pixels;
+  for (std::size_t c = 0; c < 3; ++c)
+    out.colour.dark[c] = ResponseCurve::exposure(found.response, dark_sample(camera.dark, c));
+  return out;
+}
+
 }  // namespace
 
 Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const ColourOptions& options) {
@@ -277,19 +294,7 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
 
   ColourCalibration out;
   for (std::size_t i = 0; i < cameras; ++i) {
-    CalibratedColour camera;
-    camera.camera = readings.cameras[i].id;
-    const ColourUnknowns& found = fit.cameras[i];
-    camera.gamma = found.response[0];
-    camera.colour.response = response_table(found.response);
-    camera.colour.vignetting = found.vignetting;
-    camera.colour.flat = joint->flats[i].flat;
-    camera.flat_rms = joint->flats[i].rms;
-    camera.flat_worst = joint->flats[i].worst;
-    camera.colour.hot_pixels = readings.cameras[i].dark.hot_pixels;
-    for (std::size_t c = 0; c < 3; ++c)
-      camera.colour.dark[c] =
-          ResponseCurve::exposure(found.response, dark_sample(readings.cameras[i].dark, c));
+    CalibratedColour camera = calibrated(readings.cameras[i], fit.cameras[i], joint->flats[i]);
     camera.vignetting_known = !held.vignetting[i];
     tell_corner(fit, i, camera);
     out.cameras.push_back(std::move(camera));
@@ -310,4 +315,4 @@ Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

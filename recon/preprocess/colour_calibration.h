@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -9,7 +10,7 @@
 #include "recon/preprocess/colour.h"
 #include "recon/preprocess/colour_readings.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // All cameras' responses, gains and vignettings at once, from patches of a shared target: one robust least
 // squares over the logarithms of
@@ -66,4 +67,4 @@ struct ColourCalibration {
 /// are a warning and marked.
 Result<ColourCalibration> calibrate_colour(const ColourReadings& readings, const ColourOptions& options = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/colour_equations.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kLeastRatio = 1.3;  // of exposures that tell a response
@@ -127,4 +128,4 @@ std::vector<bool> vignetting_not_told(const std::vector<ColourEquation>& equatio
   return held;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <map>
@@ -8,7 +9,7 @@
 #include "recon/preprocess/colour_calibration.h"
 #include "recon/preprocess/colour_fit.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Equations from readings, and what they came from.
 struct Equations {
@@ -34,4 +35,4 @@ bool response_told(const std::vector<ColourEquation>& equations);
 /// their lens's falloff.
 std::vector<bool> vignetting_not_told(const std::vector<ColourEquation>& equations, std::size_t cameras);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/colour_fit.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 #include <Eigen/Dense>
 #include <ceres/ceres.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kCameraUnknowns = 10;
@@ -208,4 +209,4 @@ std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, Colo
   return fit;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -8,7 +9,7 @@
 
 #include "recon/preprocess/colour_model.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// One reading of one channel in the joint fit.
 struct ColourEquation {
@@ -51,4 +52,4 @@ struct ColourHeld {
 std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, ColourFit start,
                                     const ColourHeld& held);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include "recon/preprocess/colour.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// ln g(v) = p0 ln v + p1 (1 - v) + p2 (1 - v)^2 + p3 (1 - v)^3: g(1) = 1 whatever the numbers, and a power
 /// law where the last three are 0.
@@ -37,4 +38,4 @@ struct ResponseCurve {
   }
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

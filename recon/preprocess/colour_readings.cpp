@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/colour_readings.h"
 
 #include <algorithm>
@@ -10,10 +11,11 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
-#include "session/frame_file.h"
+#include "base/nesting.h"
+#include "session/media/frame_file.h"
 #include "session/reader.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace fs = std::filesystem;
 namespace {
 
@@ -160,7 +162,7 @@ class CameraPictures {
   Status add_flat(const Image& image, const PicturePath& picture) {
     for (PatchReading& patch : flat_patches(image.view(), picture_name(picture)))
       keep(std::move(patch), picture);
-    readings_.flats.push_back(read_flat(image.view()));
+    readings_.flats.push_back(recon::read_flat(image.view()));
     readings_.flats.back().camera = index_;
     return {};
   }
@@ -228,7 +230,7 @@ Status check_exposures(const std::vector<PicturePath>& pictures) {
 
 Status read_session(const ColourPlan& plan, const fs::path& folder, ColourReadings& readings) {
   const fs::path path = folder / plan.session;
-  EMBERLOCK_ASSIGN_OR_RETURN(SessionReader session, SessionReader::open(path));
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader session, session::SessionReader::open(path));
   for (const auto& [camera, frames] : plan.frames) {
     const std::string where = "colour.json: frames." + camera;
     const bool twice = std::any_of(readings.cameras.begin(), readings.cameras.end(),
@@ -268,6 +270,7 @@ Status read_session(const ColourPlan& plan, const fs::path& folder, ColourReadin
 }  // namespace
 
 Result<ColourPlan> parse_colour_plan(std::string_view text, const std::string& where) {
+  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(text, where));
   const PlanJson json = PlanJson::parse(text, nullptr, false);
   if (!json.is_object())
     return bad_plan(where, "is no JSON object", "See `emberlock calibrate colour --help`");
@@ -312,14 +315,14 @@ Result<ColourReadings> read_colour_folder(const fs::path& folder, const Progress
   ColourReadings readings;
   std::size_t done = 0;
   for (const fs::path& camera : cameras) {
-    report(progress, static_cast<double>(done++) / static_cast<double>(cameras.size()),
-           "reading " + camera.filename().string());
+    tell(progress, static_cast<double>(done++) / static_cast<double>(cameras.size()),
+         "reading " + camera.filename().string());
     EMBERLOCK_ASSIGN_OR_RETURN(const auto pictures, pictures_in(camera));
     if (pictures.empty()) continue;
     EMBERLOCK_RETURN_IF_ERROR(check_exposures(pictures));
     CameraPictures into(plan, camera, readings);
     for (const PicturePath& picture : pictures) {
-      EMBERLOCK_ASSIGN_OR_RETURN(const Image image, read_image(picture.path));
+      EMBERLOCK_ASSIGN_OR_RETURN(const Image image, session::read_image(picture.path));
       EMBERLOCK_RETURN_IF_ERROR(into.add(picture, image));
     }
     into.finish();
@@ -330,8 +333,8 @@ Result<ColourReadings> read_colour_folder(const fs::path& folder, const Progress
                     "Give each camera a folder with its pictures in it");
   }
   readings.radiance = plan.radiance;
-  report(progress, 1, "done");
+  tell(progress, 1, "done");
   return readings;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

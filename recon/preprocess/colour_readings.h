@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -11,7 +12,7 @@
 #include "base/result.h"
 #include "recon/preprocess/patch_reading.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 struct ColourCamera {
   std::string id;
@@ -56,4 +57,4 @@ Result<ColourPlan> parse_colour_plan(std::string_view json, const std::string& w
 /// outside its picture, a picture's exposure told where another's isn't; no such session, camera or frame.
 Result<ColourReadings> read_colour_folder(const std::filesystem::path& folder, const Progress& progress = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

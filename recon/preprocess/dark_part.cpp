@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/dark_part.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include "recon/preprocess/radiance.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kEdge = 8;  // pixels
@@ -87,4 +88,4 @@ void subtract(Samples& samples, const Samples& background) {
   for (std::size_t i = 0; i < samples.value.size(); ++i) samples.value[i] -= background.value[i];
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
 
 #include "recon/preprocess/samples.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// How many frames without flame make a background: the mean of the middle four has 1 / 2.6 of a frame's
 /// noise.
@@ -27,4 +28,4 @@ Samples midmean_of(const std::vector<Samples>& frames);
 /// Takes a background out. Saturated samples stay marked: what they have above it is still a lower bound.
 void subtract(Samples& samples, const Samples& background);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

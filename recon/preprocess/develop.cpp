@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/develop.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include "recon/preprocess/radiance.h"
 #include "recon/preprocess/samples.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 PreprocessStep linearised(const std::optional<Colour>& colour) {
@@ -138,4 +139,4 @@ std::vector<PreprocessStep> together(
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

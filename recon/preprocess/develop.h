@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -9,7 +10,7 @@
 #include "recon/preprocess/smear.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 struct DevelopOptions {
   enum class SmearRemoval { automatic, off, told };
@@ -44,4 +45,4 @@ DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& option
 std::vector<PreprocessStep> together(
     const std::vector<std::pair<std::string, std::vector<PreprocessStep>>>& cameras);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

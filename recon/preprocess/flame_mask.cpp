@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/flame_mask.h"
 
 #include <algorithm>
@@ -5,7 +6,9 @@
 #include <limits>
 #include <string>
 
-namespace emberlock {
+#include <fmt/format.h>
+
+namespace emberlock::recon {
 namespace {
 
 float brightness(const float* rgb) { return std::max({rgb[0], rgb[1], rgb[2]}); }
@@ -168,6 +171,38 @@ std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> thr
   return masks;
 }
 
+namespace {
+
+/// Rays march through the world in single precision: the box must be large against the steps of its numbers
+/// there. Smaller ones than these are lengths in another unit.
+Status check_place(const Scene& scene) {
+  constexpr double kSmallestSide = 1e-4;    // metres
+  constexpr double kStepsAlongSide = 4096;  // 16 a voxel of 256
+  const double side = scene.box.size.maxCoeff();
+  if (side < kSmallestSide) {
+    return Error{ErrorKind::bad_input, fmt::format("its longest side is {:.3g} m", side), "box",
+                 "Give lengths in metres: boxes from 0.1 mm on are reconstructed"};
+  }
+  const auto refuse = [&](const Eigen::Vector3d& point, const Eigen::Vector3d& extent,
+                          const std::string& where) -> Status {
+    const double away = (point.cwiseAbs() + extent).maxCoeff();
+    const double step = away * double{std::numeric_limits<float>::epsilon()};
+    if (side >= kStepsAlongSide * step) return {};
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("lies {:.3g} m from the world's origin, where single precision tells no less than "
+                    "{:.2g} m apart; the box's longest side is {:.3g} m",
+                    away, step, side),
+        where, "Move the world's origin into the box, in the cameras' poses too"};
+  };
+  EMBERLOCK_RETURN_IF_ERROR(refuse(scene.box.center, 0.5 * scene.box.size, "box"));
+  for (const View& view : scene.views)
+    EMBERLOCK_RETURN_IF_ERROR(refuse(view.camera.center(), Eigen::Vector3d::Zero(), view.name));
+  return {};
+}
+
+}  // namespace
+
 Status check_scene(const Scene& scene) {
   if (std::none_of(scene.views.begin(), scene.views.end(),
                    [](const View& v) { return v.role == ViewRole::input; }))
@@ -177,7 +212,7 @@ Status check_scene(const Scene& scene) {
     return Error{ErrorKind::bad_input, "a side is not a positive finite length", "box",
                  "Give cx,cy,cz,sx,sy,sz in metres, every side > 0"};
   for (const View& view : scene.views) EMBERLOCK_RETURN_IF_ERROR(check_view(view));
-  return {};
+  return check_place(scene);
 }
 
 std::array<double, 3> rmse(const RadianceImage& a, const RadianceImage& b, const PixelBox& box) {
@@ -195,4 +230,4 @@ double all_channels(const std::array<double, 3>& rmse) {
   return std::sqrt((rmse[0] * rmse[0] + rmse[1] * rmse[1] + rmse[2] * rmse[2]) / 3);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -8,7 +9,7 @@
 #include "base/result.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Pixels [x0, x1) x [y0, y1).
 struct PixelBox {
@@ -60,4 +61,4 @@ std::array<double, 3> rmse(const View& view, const RadianceImage& rendered, cons
 /// The three channels as one number: the root of the mean of their squares.
 double all_channels(const std::array<double, 3>& rmse);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

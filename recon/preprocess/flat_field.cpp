@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/flat_field.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include "base/square.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// A cell's light over the falloff, in its picture's own unit, and the standard deviation of that.
@@ -77,4 +78,4 @@ FoundFlat find_flat(const std::vector<FlatReading>& flats, const ColourUnknowns&
   return found;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

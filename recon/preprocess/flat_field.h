@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -5,7 +6,7 @@
 #include "recon/preprocess/colour_fit.h"
 #include "recon/preprocess/colour_readings.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What a camera's flat pictures show beyond its vignetting.
 struct FoundFlat {
@@ -21,4 +22,4 @@ struct FoundFlat {
 FoundFlat find_flat(const std::vector<FlatReading>& flats, const ColourUnknowns& camera,
                     const DarkReading& dark, double step, double floor);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

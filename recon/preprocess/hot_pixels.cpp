@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/hot_pixels.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kHotSigmas = 6;
@@ -124,4 +125,4 @@ void replace_hot_pixels(Samples& samples, const std::vector<std::uint32_t>& pixe
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -5,7 +6,7 @@
 
 #include "recon/preprocess/samples.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Pixels whose sample (any of three) lies more than six sigma above all but one of its eight neighbours of
 /// the same colour, in a picture without light, the midmean of dark frames: a hot pixel may have a hot
@@ -21,4 +22,4 @@ std::vector<std::uint32_t> hot_pixels_of_picture(const Samples& picture);
 /// Each becomes the median of its neighbours of the same colour that aren't in the list. `pixels`: rising.
 void replace_hot_pixels(Samples& samples, const std::vector<std::uint32_t>& pixels);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/patch_reading.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 #include "recon/preprocess/hot_pixels.h"
 #include "recon/preprocess/samples.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr const char* kFlatPrefix = "flat:";
@@ -160,4 +161,4 @@ ReadingUse use_of(const PatchReading& reading, std::size_t channel, double dark)
   return ReadingUse::used;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

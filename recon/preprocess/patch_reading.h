@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -7,7 +8,7 @@
 
 #include "base/image.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Pixels [x, x + width) x [y, y + height).
 struct PatchPlace {
@@ -70,4 +71,4 @@ enum class ReadingUse { used, saturated, dark, outlier };
 /// `dark`.
 ReadingUse use_of(const PatchReading& reading, std::size_t channel, double dark);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

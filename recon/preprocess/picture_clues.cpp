@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/picture_clues.h"
 
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using Levels = std::array<double, 3>;
@@ -181,4 +182,4 @@ ClippedPixels clipped_pixels(const Scene& scene, const std::vector<PixelBox>& bo
   return {clipped / pixels, std::sqrt(missing / (3 * pixels))};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

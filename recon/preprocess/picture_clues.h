@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -6,7 +7,7 @@
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // What a picture tells of its background and its sensor without any model of the flame.
 
@@ -35,4 +36,4 @@ struct ClippedPixels {
 /// the slopes at its ends.
 ClippedPixels clipped_pixels(const Scene& scene, const std::vector<PixelBox>& boxes, double white);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/radiance.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include "recon/preprocess/samples.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 RadianceImage to_radiance(const ImageView& image) { return to_picture(samples_of(image)); }
 
@@ -76,4 +77,4 @@ Image to_rgb8(const RadianceImage& image) {
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

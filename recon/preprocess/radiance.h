@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -5,7 +6,7 @@
 #include "base/image.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A picture as linear radiance: the sensor's white becomes 255 whatever its bit depth, grey fills all three
 /// channels, Bayer mosaics are interpolated (to_picture(); a measured sample stays what it is, so the data
@@ -24,4 +25,4 @@ void subtract_background(RadianceImage& image);
 /// Back to 8 bits a channel: rounded, clamped to 0..255; not-a-number becomes 0.
 Image to_rgb8(const RadianceImage& image);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

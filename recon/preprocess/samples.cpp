@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/samples.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Bilinear interpolation written as a normalised convolution with (1 2 1) x (1 2 1) over the samples of one
@@ -162,4 +163,4 @@ void equalise(RadianceImage& image, const Colour& colour) {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

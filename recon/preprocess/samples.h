@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -7,7 +8,7 @@
 #include "recon/preprocess/colour.h"
 #include "recon/preprocess/view.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// How a frame's samples lie: one a pixel (grey, or an RGGB mosaic) or three.
 enum class SampleLayout { grey, mosaic, rgb };
@@ -55,4 +56,4 @@ RadianceImage to_picture(const Samples& samples, std::vector<std::uint8_t>* boun
 /// Gain, vignetting and flat field: the same radiance has the same value in all cameras, anywhere.
 void equalise(RadianceImage& image, const Colour& colour);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

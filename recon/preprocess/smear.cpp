@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/smear.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 #include <Eigen/Dense>
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kBlock = 16;      // columns whose mean tells whether a row shows flame
@@ -274,4 +275,4 @@ void remove_smear(Samples& samples, const Smear& smear) {
     remove_from_rows(samples, smear);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -8,7 +9,7 @@
 
 #include "recon/preprocess/samples.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // A CCD's rows move past the light on their way out, and each pixel picks up a share of what falls on the
 // others of its column: in a light that lasts, (t_row / exposure) times the column shutter's leak of every
@@ -41,4 +42,4 @@ std::optional<Smear> find_smear(const Samples& samples, std::string* why = nullp
 /// what its rows without flame show stands in if that is more.
 void remove_smear(Samples& samples, const Smear& smear);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

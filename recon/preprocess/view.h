@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -10,7 +11,7 @@
 #include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Linear RGB in grey levels 0..255, interleaved, row-major: rgb[3 * (y * width + x) + c].
 struct RadianceImage {
@@ -58,4 +59,4 @@ struct Scene {
   bool linearised = false;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/render/coarse_medium.h"
 
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include "recon/hull/hull.h"
 #include "recon/hull/ray_list.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// The part of a fine voxel in the means around three coarse key points along one axis: the integral of a key
@@ -162,4 +163,4 @@ CoarseMedium coarse_medium(const Volume& volume, const Hull& medium, const Extin
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -8,7 +9,7 @@
 #include "recon/kernels/rgba.h"
 #include "recon/render/volume.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A medium on few key points, for light that is smooth.
 struct CoarseMedium {
@@ -24,4 +25,4 @@ struct CoarseMedium {
 CoarseMedium coarse_medium(const Volume& volume, const Hull& medium, const Extinction& extinction, int voxels,
                            Pool& pool);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/render/in_scatter.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include "recon/render/in_scatter_cuda.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using Lights = std::vector<Rgba>;  ///< [row of the phase matrix][active point]
@@ -295,4 +296,4 @@ std::vector<Rgba> in_scattered(const ScatterField& field, const Eigen::Vector3d&
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -12,7 +13,7 @@
 #include "recon/render/ordinates.h"
 #include "recon/render/volume.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // In-scatter: the integral G(x, w) = Int p(w . w') L(x, w') dw' over the sphere, which sigma_s = albedo *
 // sigma_t turns into a source, dL/ds = -sigma_t L + j + sigma_s G. G is smooth where the medium is not, so it
@@ -63,4 +64,4 @@ ScatterField find_in_scatter(const Volume& volume, const Hull& medium, const Eff
 /// from there to the camera's centre (metres). Isotropic scattering doesn't look at the camera.
 std::vector<Rgba> in_scattered(const ScatterField& field, const Eigen::Vector3d& camera_center, Pool& pool);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/compute/cuda_launch.h"
 #include "recon/render/in_scatter_cuda.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 void sweep_on_cuda(const SweepWork& work, std::vector<Rgba>& out, std::vector<Rgba>* keep) {
   const CudaBuffer<Rgba> shine(work.arrive.grid.shine, work.shine);
@@ -52,4 +53,4 @@ void at_active_on_cuda(const MixPeak& peak, std::size_t /*radiance*/, std::vecto
   to.download(out.data());
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

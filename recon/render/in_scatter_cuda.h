@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
 
 #include "recon/kernels/in_scatter.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // In-scatter's passes on the GPU. Functors come with pointers to the CPU's memory, results go back there. All
 // throw a DeviceError.
@@ -24,4 +25,4 @@ void sweep_on_cuda(const SweepWork& work, std::vector<Rgba>& out, std::vector<Rg
 void at_active_on_cuda(const BluntTowards& blunt, std::size_t radiance, std::vector<Rgba>& out);
 void at_active_on_cuda(const MixPeak& peak, std::size_t radiance, std::vector<Rgba>& out);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/render/march_table.h"
 
 #include <cstdlib>
 #include <string_view>
 #include <type_traits>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace isa {
 
 #define EMBERLOCK_TABLES(name)                 \
@@ -78,4 +79,4 @@ template const MarchTable<double>& march_table<double>();
 
 const char* march_table_name() { return kNames[static_cast<int>(chosen_isa())]; }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -7,7 +8,7 @@
 #include "recon/kernels/march.h"
 #include "recon/kernels/update.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// What a march works on; which members it takes is said at each entry of MarchTable.
 template <class Real>
@@ -70,4 +71,4 @@ const MarchTable<Real>& march_table(Isa level);
 /// "baseline", "v2", "v3" or "v4": what march_table() gives.
 const char* march_table_name();
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

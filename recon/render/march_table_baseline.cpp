@@ -1,2 +1,3 @@
+// SPDX-License-Identifier: Apache-2.0
 #define EMBERLOCK_ISA baseline
 #include "recon/render/march_table.inc"

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/render/ordinates.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Node `i` of Gauss and Legendre's n on (-1, 1), by Newton's method, and its weight.
@@ -97,4 +98,4 @@ std::vector<float> phase_matrix(const SplitPhase& phase, const std::vector<Ordin
   return out;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

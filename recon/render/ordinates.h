@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
 
 #include "recon/kernels/in_scatter.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Discrete ordinates: 2 n Gauss-Legendre nodes in the cosine to the z axis times 4 n equal steps in azimuth,
 /// 8 n^2 directions that integrate spherical harmonics up to degree 4 n - 1 exactly. Octants mirror each
@@ -27,4 +28,4 @@ SplitPhase split_phase(double asymmetry, int octant_levels);
 /// [to][from]; one row suffices for isotropic scattering.
 std::vector<float> phase_matrix(const SplitPhase& phase, const std::vector<Ordinate>& ordinates);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/render/render.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include "recon/render/render_cuda.h"
 #include "recon/render/scattered_source.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Emission, and in lane 3 extinction where it is a field, a voxel edge, at the cropped grid's key points.
@@ -118,4 +119,4 @@ RadianceImage render_view(const Volume& volume, const Hull& medium, const Effect
   return image;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/compute/device.h"
@@ -8,10 +9,10 @@
 #include "recon/render/in_scatter.h"
 #include "recon/render/volume.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 // The model, front to back along the ray through a pixel's centre (Radiative Transport, the paper's section
-// "Rendering Model"):
+// "Rendering Model", equations (5) and (6), blended as by (7) and (8)):
 //   L += T S ds phi(sigma ds),  T *= exp(-sigma ds),  phi(x) = (1 - exp(-x)) / x,  phi(0) = 1
 // S is the volume's emission in grey levels per metre, trilinear between key points; sigma is
 // Effects::extinction, constant or a field inside the medium (the hull's voxels) and 0 outside, so T counts
@@ -41,4 +42,4 @@ struct RenderOptions {
 RadianceImage render_view(const Volume& volume, const Hull& medium, const Effects& effects,
                           const CameraModel& camera, const RenderOptions& options = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/compute/cuda_launch.h"
 #include "recon/hull/device_ray_list.h"
 #include "recon/render/render_cuda.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 template <class Path, class Extinction>
@@ -38,4 +39,4 @@ std::vector<Rgba> march_on_cuda(const RayList& list, const std::vector<Rgba>& so
   return march(list, source, NoExtinction<float>{});
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

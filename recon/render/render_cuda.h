@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
@@ -5,11 +6,11 @@
 #include "recon/hull/ray_list.h"
 #include "recon/render/march_table.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// Radiance and transmittance of a list's rays through `source`, at its grid's key points, on the GPU; sigma
 /// of constant extinction, a voxel edge. Throws a DeviceError.
 std::vector<Rgba> march_on_cuda(const RayList& list, const std::vector<Rgba>& source, Absorb absorb,
                                 float sigma);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

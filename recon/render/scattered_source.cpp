@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/render/scattered_source.h"
 
 #include <algorithm>
 
-namespace emberlock {
+namespace emberlock::recon {
 
 void add_in_scatter(const ScatterField& field, const Eigen::Vector3d& camera_center, const Grid& grid,
                     const Extinction& extinction, Pool& pool, std::vector<Rgba>& source) {
@@ -57,4 +58,4 @@ void take_out_in_scatter(Volume& volume, const Hull& medium, const Effects& effe
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

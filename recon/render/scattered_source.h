@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include "recon/render/in_scatter.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// source += sigma_s G at the grid's key points, a voxel edge, G trilinear between the coarse ones. Where the
 /// extinction is a field it is lane 3 of the source.
@@ -15,4 +16,4 @@ void add_in_scatter(const ScatterField& field, const Eigen::Vector3d& camera_cen
 /// for.
 void take_out_in_scatter(Volume& volume, const Hull& medium, const Effects& effects, Pool& pool);
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <vector>
 
 #include "recon/kernels/grid.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 /// A reconstructed flame, at the grid's key points, trilinear between them.
 struct Volume {
@@ -14,4 +15,4 @@ struct Volume {
   std::vector<float> extinction;  ///< sigma_t, 1/m; size() values, or empty where nothing absorbs
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/synthetic/flame.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include "recon/compute/pool.h"
 #include "recon/render/render.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr int kTable = 64;          // noise samples a period, along each axis
@@ -299,4 +300,4 @@ Scene paper_scene(const PaperSceneOptions& options) {
   return scene;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 
 enum class FlameShape {
   plume,       ///< one turbulent plume around the z axis, dark core at its root, holes and tongues
@@ -78,4 +79,4 @@ struct PaperSceneOptions {
 /// between two of them, is held out. The views' lateness is theirs to know.
 Scene paper_scene(const PaperSceneOptions& options = {});
 
-}  // namespace emberlock
+}  // namespace emberlock::recon

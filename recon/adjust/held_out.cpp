@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/adjust/held_out.h"
+
+#include <algorithm>
+
+#include "recon/adjust/descent.h"
+#include "recon/adjust/tracker.h"
+
+namespace emberlock::recon {
+namespace {
+
+double area(const PixelBox& b) { return static_cast<double>(b.x1 - b.x0) * static_cast<double>(b.y1 - b.y0); }
+
+double area(const std::vector<PixelBox>& boxes) {
+  double sum = 0;
+  for (const PixelBox& b : boxes) sum += area(b);
+  return sum;
+}
+
+/// Every how manieth pixel of the held-out views the sample takes.
+int stride_of(const SolverSetup& setup, const std::vector<PixelBox>& boxes) {
+  if (setup.options.trace == SolveOptions::Trace::whole) return 1;
+  const int fitted = setup.options.solver == Solver::paper ? 1 : stride_for(setup, setup.hull.grid);
+  const double most =
+      std::max(HeldOut::kFewest, area(setup.boxes) / (fitted * fitted) / HeldOut::kFittedForOne);
+  int stride = 1;
+  while (area(boxes) / (stride * stride) > most) ++stride;
+  return stride;
+}
+
+/// Pixels outside of the boxes count nowhere, and nothing is projected back.
+Problem pose_sampled(const SolverSetup& setup, const std::vector<const View*>& views,
+                     const std::vector<PixelBox>& boxes, int stride) {
+  ProblemOptions options = setup.problem_options();
+  options.subsets = 2;
+  options.adjoint = false;
+  options.subset_of = [&boxes, stride](std::size_t view, int x, int y) {
+    const PixelBox& b = boxes[view];
+    if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return -1;
+    return x % stride == 0 && y % stride == 0 ? 0 : 1;
+  };
+  return pose(views, setup.hull, options, setup.pool);
+}
+
+/// Of a box, the pixels whose both coordinates are multiples of the stride.
+std::size_t pixels_on(const PixelBox& b, int stride) {
+  const auto multiples = [stride](int from, int to) {
+    return (to + stride - 1) / stride - (from + stride - 1) / stride;
+  };
+  return static_cast<std::size_t>(multiples(b.x0, b.x1)) * static_cast<std::size_t>(multiples(b.y0, b.y1));
+}
+
+}  // namespace
+
+HeldOut::HeldOut(const SolverSetup& setup, std::vector<const View*> views, const std::vector<PixelBox>& boxes)
+    : views_(std::move(views)),
+      stride_(stride_of(setup, boxes)),
+      problem_(pose_sampled(setup, views_, boxes, stride_)),
+      engine_(make_engine(problem_, setup.optics(problem_.grid()), setup.options.precision, setup.pool,
+                          EngineRole::judge)),
+      sample_error_(views_, boxes, problem_, setup.effects.background, stride_,
+                    problem_.list.subset_begin[1]),
+      error_(views_, boxes, problem_, setup.effects.background) {
+  for (const PixelBox& box : boxes) {
+    sample_.pixels += pixels_on(box, stride_);
+    sample_.of += pixels_on(box, 1);
+  }
+}
+
+std::array<double, 3> HeldOut::sampled(const Engine& solution) {
+  engine_->residual_of(solution, 0);
+  return sample_error_(engine_->residuals(0));
+}
+
+std::array<double, 3> HeldOut::all(const Engine& solution) {
+  for (int subset = 0; subset < 2; ++subset) engine_->residual_of(solution, subset);
+  return error_(engine_->residuals());
+}
+
+HeldOut::Both HeldOut::both(const std::vector<Rgba>& x) {
+  engine_->hold(x);
+  return {sampled(*engine_), all(*engine_)};
+}
+
+}  // namespace emberlock::recon

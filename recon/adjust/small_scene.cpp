@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/adjust/small_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+namespace emberlock::recon {
+namespace {
+
+/// Every picture at a `factor`-th of its size, pixels averaged.
+RadianceImage shrunk(const RadianceImage& image, int factor) {
+  RadianceImage small({image.size.width / factor, image.size.height / factor});
+  const auto share = 1 / static_cast<float>(factor * factor);
+  for (int y = 0; y < small.size.height * factor; ++y) {
+    const std::size_t row = static_cast<std::size_t>(y / factor) * static_cast<std::size_t>(small.size.width);
+    const float* from =
+        &image.rgb[3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width)];
+    for (int x = 0; x < small.size.width * factor; ++x)
+      for (std::size_t c = 0; c < 3; ++c)
+        small.rgb[3 * (row + static_cast<std::size_t>(x / factor)) + c] +=
+            share * from[3 * static_cast<std::size_t>(x) + c];
+  }
+  return small;
+}
+
+/// A mean over pixels is a lower bound as soon as one of them is.
+std::vector<std::uint8_t> shrunk_bounds(const View& view, int factor) {
+  if (view.bounds.empty()) return {};
+  const int width = view.image.size.width / factor;
+  const int height = view.image.size.height / factor;
+  std::vector<std::uint8_t> small(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height * factor; ++y)
+    for (int x = 0; x < width * factor; ++x)
+      small[static_cast<std::size_t>(y / factor) * static_cast<std::size_t>(width) +
+            static_cast<std::size_t>(x / factor)] |=
+          view.bounds[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.image.size.width) +
+                      static_cast<std::size_t>(x)];
+  return small;
+}
+
+View shrunk(const View& view, int factor) {
+  View small{view.name, view.camera, shrunk(view.image, factor), view.role};
+  Intrinsics& lens = small.camera.intrinsics;
+  lens.size = small.image.size;
+  for (double* length : {&lens.fx, &lens.fy, &lens.cx, &lens.cy}) *length /= factor;
+  small.bounds = shrunk_bounds(view, factor);
+  if (view.background) small.background = shrunk(*view.background, factor);
+  if (view.average) small.average = shrunk(*view.average, factor);
+  small.lateness = view.lateness;
+  small.lateness_sigma = view.lateness_sigma;
+  return small;
+}
+
+}  // namespace
+
+Scene small_scene(const Scene& scene, const std::vector<FlameMask>& masks, double pixels_looked_at) {
+  double pixels = 0;
+  int narrowest = std::numeric_limits<int>::max();
+  for (std::size_t v = 0; v < scene.views.size(); ++v) {
+    if (scene.views[v].role != ViewRole::input) continue;
+    const PixelBox& box = masks[v].box;
+    pixels += static_cast<double>(box.x1 - box.x0) * (box.y1 - box.y0);
+    narrowest = std::min({narrowest, scene.views[v].image.size.width, scene.views[v].image.size.height});
+  }
+  const int factor =
+      std::clamp(static_cast<int>(std::lround(std::sqrt(pixels / pixels_looked_at))), 1, narrowest);
+  Scene small;
+  small.box = scene.box;
+  for (const View& view : scene.views)
+    if (view.role == ViewRole::input) small.views.push_back(shrunk(view, factor));
+  return small;
+}
+
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -11,11 +12,12 @@
 #include "cli/align_daemon.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
-#include "daemon/align/json.h"
-#include "daemon/align/record.h"
-#include "daemon/align/run.h"
+#include "cli/strobe_choice.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
+#include "rig/align/json.h"
+#include "rig/align/record.h"
+#include "rig/align/run.h"
 
 namespace emberlock::cli {
 namespace {
@@ -25,6 +27,7 @@ constexpr Seconds kTrimLatency = milliseconds(80);
 
 struct AlignArguments {
   std::string rig;
+  std::string strobe = "virtual";
   std::string tolerance = "100rows";
   std::string policy = "densest";
   std::uint64_t seed = 1;
@@ -45,7 +48,7 @@ struct AlignArguments {
   bool anyway = false;
 };
 
-void print_table(const AlignRoundReport& report) {
+void print_table(const rig::AlignRoundReport& report) {
   const SecondsPerRow row = report.options.row_time;
   std::printf("round %d: %s; %d resets so far", report.decision.round, report.decision.reason.c_str(),
               report.decision.resets_so_far);
@@ -54,10 +57,12 @@ void print_table(const AlignRoundReport& report) {
                 in_milliseconds(*report.decision.worst_pair));
   }
   std::printf("\n");
+  if (const auto& dial = report.decision.dial; dial && dial->ready && !dial->act)
+    std::printf("    %s\n", dial->words.c_str());
   const bool mixed = std::any_of(report.sensors.begin(), report.sensors.end(),
                                  [](SensorKind kind) { return kind != SensorKind::ccd; });
   for (std::size_t i = 0; i < report.cameras.size(); ++i) {
-    const CameraDecision& camera = report.decision.cameras[i];
+    const smear::CameraDecision& camera = report.decision.cameras[i];
     const char mark = camera.reset ? '*' : camera.trim ? '~' : report.decision.reference == i ? '=' : ' ';
     std::printf("  %c %-12s ", mark, report.cameras[i].id.c_str());
     if (mixed) std::printf("%-8s", std::string(name(report.sensors[i])).c_str());
@@ -72,7 +77,7 @@ void print_table(const AlignRoundReport& report) {
 }
 
 /// What flashes told of a sensor other than a CCD.
-void print_sensor(const CameraInfo& camera, const std::optional<RowClock>& clock,
+void print_sensor(const drivers::CameraInfo& camera, const std::optional<smear::RowClock>& clock,
                   const std::optional<Seconds>& exposure) {
   if (camera.sensor == SensorKind::ccd) return;
   std::string text = fmt::format("  {}, {} shutter:", camera.id, name(camera.sensor));
@@ -83,13 +88,13 @@ void print_sensor(const CameraInfo& camera, const std::optional<RowClock>& clock
   std::printf("%s\n", (exposure || clock ? text : text + " nothing could be told of it").c_str());
 }
 
-void print_summary(const AlignRunResult& result) {
-  const AlignDecision& last = result.last;
+void print_summary(const rig::AlignRunResult& result) {
+  const smear::AlignDecision& last = result.last;
   const SecondsPerRow row = result.options.row_time;
   std::printf("%s after %d rounds and %d resets (policy %s, tolerance %.1f rows, t_row %.4f us): %s\n",
-              last.verdict == AlignVerdict::aligned   ? "aligned"
-              : last.verdict == AlignVerdict::refused ? "REFUSED"
-                                                      : "NOT aligned",
+              last.verdict == smear::AlignVerdict::aligned   ? "aligned"
+              : last.verdict == smear::AlignVerdict::refused ? "REFUSED"
+                                                             : "NOT aligned",
               last.round, result.resets, std::string(name(result.options.policy)).c_str(),
               result.options.tolerance.in_rows(row).value(), row.value() * 1e6, last.reason.c_str());
   if (result.checks > 0) std::printf("  held by %d checks\n", result.checks);
@@ -98,56 +103,63 @@ void print_summary(const AlignRunResult& result) {
 }
 
 /// Where the rounds go: JSON lines or tables on stdout.
-AlignObserver printer(bool json) {
-  return [json](const AlignRoundReport& report) {
+rig::AlignObserver printer(bool json) {
+  return [json](const rig::AlignRoundReport& report) {
     if (!json) return print_table(report);
-    std::printf("%s\n", round_json(report).dump().c_str());
+    std::printf("%s\n", rig::round_json(report).dump().c_str());
     std::fflush(stdout);
   };
 }
 
-Result<AlignRunOptions> options_from(const AlignArguments& arguments) {
-  AlignRunOptions options;
-  EMBERLOCK_ASSIGN_OR_RETURN(options.align.policy, parse_align_policy(arguments.policy));
-  EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, parse_tolerance(arguments.tolerance));
+Result<rig::AlignRunOptions> options_from(const AlignArguments& arguments) {
+  rig::AlignRunOptions options;
+  EMBERLOCK_ASSIGN_OR_RETURN(options.align.policy, smear::parse_align_policy(arguments.policy));
+  EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, smear::parse_tolerance(arguments.tolerance));
   options.align.max_rounds = arguments.max_rounds;
   options.align.delay_jitter = std::max(milliseconds(arguments.latency_jitter_ms), microseconds(1));
   options.align.reset_time = Seconds(arguments.reset_seconds);
   options.align.limits =
-      AlignLimits{arguments.max_resets, Seconds(60 * arguments.max_minutes), arguments.probability};
+      smear::AlignLimits{arguments.max_resets, Seconds(60 * arguments.max_minutes), arguments.probability};
   options.seed = arguments.seed;
-  if (arguments.hold_minutes) options.hold = std::min(Seconds(60 * *arguments.hold_minutes), kUntilStopped);
+  if (arguments.hold_minutes)
+    options.hold = std::min(Seconds(60 * *arguments.hold_minutes), rig::kUntilStopped);
   return options;
 }
 
-Result<AlignRunResult> align_live(const AlignArguments& arguments, const AlignObserver& observer) {
-  EMBERLOCK_ASSIGN_OR_RETURN(AlignRunOptions options, options_from(arguments));
-  EMBERLOCK_ASSIGN_OR_RETURN(VirtualRigOptions setup, parse_virtual_rig(arguments.rig, arguments.seed));
-  for (VirtualCameraOptions& camera : setup.cameras) {
+Result<rig::AlignRunResult> align_live(const AlignArguments& arguments, const rig::AlignObserver& observer) {
+  EMBERLOCK_ASSIGN_OR_RETURN(rig::AlignRunOptions options, options_from(arguments));
+  EMBERLOCK_ASSIGN_OR_RETURN(drivers::VirtualRigOptions setup,
+                             drivers::parse_virtual_rig(arguments.rig, arguments.seed));
+  EMBERLOCK_ASSIGN_OR_RETURN(const StrobeChoice strobe, parse_strobe(arguments.strobe));
+  setup.strobe.dial = strobe.dial;
+  if (strobe.dial) options.align.dial = strobe.dial->dial;
+  for (drivers::VirtualCameraOptions& camera : setup.cameras) {
     camera.reset_jitter = milliseconds(arguments.latency_jitter_ms);
     if (arguments.trim_range_ppm > 0) {
-      camera.trim = FrameRateTrim{PartsPerMillion(arguments.trim_range_ppm),
-                                  PartsPerMillion(arguments.trim_step_ppm), kTrimLatency};
+      camera.trim = drivers::FrameRateTrim{PartsPerMillion(arguments.trim_range_ppm),
+                                           PartsPerMillion(arguments.trim_step_ppm), kTrimLatency};
     }
     // What a data sheet says of the model: the direction, the rows and the shifts. t_row is measured.
     options.timing.push_back(
         {.rows = camera.timing.rows, .shifts = camera.timing.shifts, .direction = camera.timing.direction});
   }
   EMBERLOCK_ASSIGN_OR_RETURN(const auto virtual_rig,
-                             VirtualRig::create(setup, std::make_shared<VirtualClock>()));
-  AlignRig rig{{}, &virtual_rig->strobe(), &virtual_rig->clock(), nullptr};
+                             drivers::VirtualRig::create(setup, std::make_shared<drivers::VirtualClock>()));
+  rig::AlignRig rig{{}, &virtual_rig->strobe(), &virtual_rig->clock(), nullptr};
   for (int i = 0; i < virtual_rig->size(); ++i) rig.cameras.push_back(&virtual_rig->camera(i));
 
+  const rig::AlignObserver operating = operated(virtual_rig->dial(), strobe.at, observer);
   if (!arguments.delays.empty() && std::filesystem::exists(arguments.delays)) {
-    EMBERLOCK_ASSIGN_OR_RETURN(options.delays, read_delays(arguments.delays, rig));
+    EMBERLOCK_ASSIGN_OR_RETURN(options.delays, rig::read_delays(arguments.delays, rig));
   }
   EMBERLOCK_ASSIGN_OR_RETURN(
-      AlignRunResult result,
+      rig::AlignRunResult result,
       arguments.record.empty()
-          ? run_align(rig, options, observer, progress_bar("align"), Interrupt::asked)
-          : record_align(arguments.record, rig, options, observer, progress_bar("align"), Interrupt::asked));
+          ? rig::run_align(rig, options, operating, progress_bar("align"), Interrupt::asked)
+          : rig::record_align(arguments.record, rig, options, operating, progress_bar("align"),
+                              Interrupt::asked));
   if (!arguments.delays.empty())
-    EMBERLOCK_RETURN_IF_ERROR(write_delays(arguments.delays, rig, result.delays));
+    EMBERLOCK_RETURN_IF_ERROR(rig::write_delays(arguments.delays, rig, result.delays));
   return result;
 }
 
@@ -157,23 +169,23 @@ bool asks_daemon(const AlignArguments& arguments) {
 }
 
 void align(const AlignArguments& arguments) {
-  const AlignObserver observer = printer(arguments.json);
+  const rig::AlignObserver observer = printer(arguments.json);
   std::uint64_t seed = arguments.seed;
-  const auto result = [&]() -> Result<AlignRunResult> {
+  const auto result = [&]() -> Result<rig::AlignRunResult> {
     if (arguments.replay.empty()) {
       std::optional<Interrupt> interrupt;  // a run that isn't to be held ends by itself
       if (arguments.hold_minutes) interrupt.emplace();
       return align_live(arguments, observer);
     }
-    return replay_align(arguments.replay, observer, progress_bar("replay"), &seed);
+    return rig::replay_align(arguments.replay, observer, progress_bar("replay"), &seed);
   }();
   if (!result.ok()) fail(result.error());
   if (arguments.json) {
-    std::printf("%s\n", summary_json(*result, seed).dump().c_str());
+    std::printf("%s\n", rig::summary_json(*result, seed).dump().c_str());
   } else {
     print_summary(*result);
   }
-  if (result->last.verdict != AlignVerdict::aligned) throw CLI::RuntimeError(1);
+  if (result->last.verdict != smear::AlignVerdict::aligned) throw CLI::RuntimeError(1);
 }
 
 /// What the daemon can be asked for; the rest is its configuration's.
@@ -193,6 +205,27 @@ DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App&
   return wanted;
 }
 
+/// What an alignment may cost.
+void add_limits(CLI::App* verb, AlignArguments& a) {
+  verb->add_option("--max-rounds", a.max_rounds, "give up after so many")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  verb->add_option("--max-resets", a.max_resets,
+                   "refuse a tolerance that would take more, and say what could be met")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  verb->add_option("--max-minutes", a.max_minutes, "refuse what would take longer")
+      ->check(CLI::Range(0.01, 1e6))
+      ->capture_default_str();
+  verb->add_option("--probability", a.probability, "with which the limits must suffice")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str();
+  verb->add_option("--reset-seconds", a.reset_seconds,
+                   "of one reset, where an operator does it: what is foretold counts them")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
+}
+
 }  // namespace
 
 void add_align(CLI::App& app) {
@@ -204,6 +237,14 @@ void add_align(CLI::App& app) {
   CLI::Option* rig =
       verb->add_option("--rig", arguments->rig,
                        "cameras and strobe: virtual:N, or virtual:4ccd+3rolling+2global [the daemon's]");
+  verb->add_option(
+          "--strobe", arguments->strobe,
+          "of the rig: virtual (it is told what to do), manual or manual:step=1 (somebody sets it by a "
+          "dial, with steps of so many flashes a minute: says what to set, reads from the frames what "
+          "was set, and says which way to turn it), or virtual-dial:error=300,at=1510.5 (a simulated "
+          "dial, so many ppm off, that stands there at first, and somebody who turns it as told)")
+      ->needs(rig)
+      ->capture_default_str();
   verb->add_option("--tolerance", arguments->tolerance,
                    "to the common target, to either side: 100rows, 5.4ms or 500us")
       ->capture_default_str();
@@ -215,23 +256,7 @@ void add_align(CLI::App& app) {
   verb->add_option("--latency-jitter", arguments->latency_jitter_ms, "RMS of a reset's latency, ms")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  verb->add_option("--max-rounds", arguments->max_rounds, "give up after so many")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  verb->add_option("--max-resets", arguments->max_resets,
-                   "refuse a tolerance that would take more, and say what could be met")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str();
-  verb->add_option("--max-minutes", arguments->max_minutes, "refuse what would take longer")
-      ->check(CLI::Range(0.01, 1e6))
-      ->capture_default_str();
-  verb->add_option("--probability", arguments->probability, "with which the limits must suffice")
-      ->check(CLI::Range(0.01, 1.0))
-      ->capture_default_str();
-  verb->add_option("--reset-seconds", arguments->reset_seconds,
-                   "of one reset, where an operator does it: what is foretold counts them")
-      ->check(CLI::Range(0.0, 3600.0))
-      ->capture_default_str();
+  add_limits(verb, *arguments);
   verb->add_option("--trim-range", arguments->trim_range_ppm,
                    "by how much virtual cameras can trim their frame rates, ppm; 0: not at all")
       ->check(CLI::Range(0.0, 1000.0))

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -11,24 +12,24 @@
 
 #include "base/clock.h"
 #include "base/file.h"
-#include "cli/board_search.h"
-#include "cli/calibrate_report.h"
 #include "cli/commands.h"
+#include "cli/outputs.h"
 #include "cli/scene_options.h"
+#include "films/board_search.h"
 #include "recon/calibrate/calibrate_rig.h"
 #include "recon/calibrate/next_pictures.h"
 #include "recon/calibrate/rig_formats.h"
+#include "report/calibrate_report.h"
 
 namespace emberlock::cli {
 namespace {
 namespace fs = std::filesystem;
 
-constexpr const char* kRigMarker = "rig.json";
 constexpr double kDegreesOfRadian = 180 / M_PI;
 
 /// The command line as typed.
 struct CamerasArguments {
-  BoardArguments boards;
+  films::BoardArguments boards;
   std::string out;
   std::string world;
   std::string box;
@@ -39,7 +40,7 @@ struct CamerasArguments {
 void keep_colour(v1::Rig& rig, const fs::path& earlier) {
   std::error_code ec;
   if (!fs::exists(earlier, ec)) return;
-  const auto old = read_rig(earlier);
+  const auto old = session::read_rig(earlier);
   if (!old) return;
   for (v1::RigCamera& camera : *rig.mutable_cameras())
     for (const v1::RigCamera& known : old->cameras())
@@ -47,15 +48,16 @@ void keep_colour(v1::Rig& rig, const fs::path& earlier) {
         *camera.mutable_colour() = known.colour();
 }
 
-nlohmann::json calibration_json(const BoardReading& reading, const RigCalibration& calibration) {
+nlohmann::json calibration_json(const recon::BoardReading& reading,
+                                const recon::RigCalibration& calibration) {
   nlohmann::json cameras = nlohmann::json::array();
-  for (const CalibratedCamera& camera : calibration.cameras) {
+  for (const recon::CalibratedCamera& camera : calibration.cameras) {
     nlohmann::json entry = {{"camera", camera.id},      {"calibrated", camera.calibrated},
                             {"placed", camera.placed},  {"why", camera.why},
                             {"views", camera.views},    {"views_used", camera.views_used},
                             {"rms_pixels", camera.rms}, {"noise_pixels", camera.fit.noise}};
     if (camera.calibrated) {
-      const Intrinsics& in = camera.fit.model.intrinsics;
+      const recon::Intrinsics& in = camera.fit.model.intrinsics;
       entry["fx"] = in.fx;
       entry["fx_sigma"] = camera.sigma[0];
       entry["fy"] = in.fy;
@@ -68,13 +70,13 @@ nlohmann::json calibration_json(const BoardReading& reading, const RigCalibratio
     rejected.push_back({{"picture", reading.sightings.sightings[view.sighting].picture}, {"why", view.why}});
   for (const auto& picture : reading.unused)
     rejected.push_back({{"picture", picture.path.string()}, {"why", picture.why}});
-  nlohmann::json result = {{"rms_pixels", rms_of(calibration.bundle)},
+  nlohmann::json result = {{"rms_pixels", recon::rms_of(calibration.bundle)},
                            {"world", calibration.world},
                            {"cameras", cameras},
                            {"left_out", rejected},
-                           {"take_next", next_pictures(calibration)}};
+                           {"take_next", recon::next_pictures(calibration)}};
   if (reading.film) {
-    const FilmCounts& film = *reading.film;
+    const recon::FilmCounts& film = *reading.film;
     result["film"] = {{"instants", film.instants},
                       {"searched", film.looked},
                       {"seen", film.seen},
@@ -84,10 +86,11 @@ nlohmann::json calibration_json(const BoardReading& reading, const RigCalibratio
   return result;
 }
 
-void print_cameras(const BoardReading& reading, const RigCalibration& calibration, const std::string& out) {
-  if (reading.film) std::printf("%s\n", film_words(reading).c_str());
-  std::printf("%s\n", calibration_words(reading, calibration).c_str());
-  for (const CalibratedCamera& camera : calibration.cameras) {
+void print_cameras(const recon::BoardReading& reading, const recon::RigCalibration& calibration,
+                   const std::string& out) {
+  if (reading.film) std::printf("%s\n", films::film_words(reading).c_str());
+  std::printf("%s\n", report::calibration_words(reading, calibration).c_str());
+  for (const recon::CalibratedCamera& camera : calibration.cameras) {
     if (!camera.placed) {
       std::printf("%-12s %s. %s.\n", camera.id.c_str(), camera.calibrated ? "lens only" : "not calibrated",
                   camera.why.c_str());
@@ -104,13 +107,13 @@ void print_cameras(const BoardReading& reading, const RigCalibration& calibratio
                 view.why.c_str());
   for (const auto& picture : reading.unused)
     std::printf("left out     %s: %s\n", picture.path.c_str(), picture.why.c_str());
-  for (const std::string& sentence : next_pictures(calibration))
+  for (const std::string& sentence : recon::next_pictures(calibration))
     std::printf("take next    %s\n", sentence.c_str());
   std::printf("written to   %s\n", (fs::path(out) / "index.html").c_str());
 }
 
-Result<CalibrateOptions> calibrate_options(const CamerasArguments& arguments) {
-  CalibrateOptions options;
+Result<recon::CalibrateOptions> calibrate_options(const CamerasArguments& arguments) {
+  recon::CalibrateOptions options;
   if (!arguments.world.empty()) options.world = arguments.world;
   if (!arguments.box.empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(options.box, parse_box(arguments.box));
@@ -119,23 +122,26 @@ Result<CalibrateOptions> calibrate_options(const CamerasArguments& arguments) {
 }
 
 void calibrate_cameras(const CamerasArguments& arguments) {
-  const CalibrateOptions options = or_fail(calibrate_options(arguments));
-  const Board board = or_fail(parse_board(arguments.boards.board));
-  AtomicDirectory staging = or_fail(AtomicDirectory::create(arguments.out, kRigMarker));
+  const recon::CalibrateOptions options = or_fail(calibrate_options(arguments));
+  const recon::Board board = or_fail(recon::parse_board(arguments.boards.board));
+  OutputFolder staging =
+      or_fail(OutputFolder::create({arguments.out,
+                                    kCalibrateCameras,
+                                    {arguments.boards.pictures.begin(), arguments.boards.pictures.end()}}));
   const Progress bar = progress_bar("calibrate");
-  const BoardReading reading =
-      or_fail(read_boards(arguments.boards, search_for(board), [&](double fraction, std::string_view what) {
-        report(bar, 0.6 * fraction, what);
+  const recon::BoardReading reading = or_fail(
+      films::read_boards(arguments.boards, recon::search_for(board),
+                         [&](double fraction, std::string_view what) { tell(bar, 0.6 * fraction, what); }));
+  const recon::RigCalibration calibration =
+      or_fail(recon::calibrate_rig(reading.sightings, options, [&](double fraction, std::string_view what) {
+        tell(bar, 0.6 + 0.4 * fraction, what);
       }));
-  const RigCalibration calibration =
-      or_fail(calibrate_rig(reading.sightings, options, [&](double fraction, std::string_view what) {
-        report(bar, 0.6 + 0.4 * fraction, what);
-      }));
-  report(bar, 1, "done");
-  v1::Rig rig = rig_of(calibration, utc_now());
-  keep_colour(rig, fs::path(arguments.out) / kRigMarker);
-  or_fail(export_rig(rig, staging.path()));
-  or_fail(write_file_atomically(staging.path() / "index.html", calibration_html(reading, calibration)));
+  tell(bar, 1, "done");
+  v1::Rig rig = recon::rig_of(calibration, utc_now());
+  keep_colour(rig, fs::path(arguments.out) / "rig.json");
+  or_fail(recon::export_rig(rig, staging.path()));
+  or_fail(
+      write_file_atomically(staging.path() / "index.html", report::calibration_html(reading, calibration)));
   or_fail(staging.commit());
   if (arguments.json) {
     std::printf("%s\n", calibration_json(reading, calibration).dump().c_str());
@@ -151,7 +157,7 @@ void add_cameras(CLI::App& parent) {
                                          "Lenses and poses of all cameras from pictures or films of a board; "
                                          "1 if one of them couldn't be placed");
   CamerasArguments& a = *arguments;
-  add_board_options(*verb, a.boards, FilmSearchOptions{}.instants);
+  films::add_board_options(*verb, a.boards, recon::FilmSearchOptions{}.instants);
   verb->get_option("--board")->required();
   verb->add_option("--out", a.out, "Folder for rig.json, index.html, transforms.json, opencv/ and colmap/")
       ->required();
@@ -181,9 +187,10 @@ void add_convert(CLI::App& parent) {
   verb->add_option("--out", arguments->out, "Folder for rig.json, transforms.json, opencv/ and colmap/")
       ->required();
   verb->callback([arguments] {
-    const v1::Rig rig = or_fail(import_rig(arguments->rig));
-    AtomicDirectory staging = or_fail(AtomicDirectory::create(arguments->out, kRigMarker));
-    or_fail(export_rig(rig, staging.path()));
+    const v1::Rig rig = or_fail(recon::import_rig(arguments->rig));
+    OutputFolder staging =
+        or_fail(OutputFolder::create({arguments->out, kCalibrateConvert, {arguments->rig}}));
+    or_fail(recon::export_rig(rig, staging.path()));
     or_fail(staging.commit());
     std::printf("%d cameras written to %s\n", rig.cameras_size(), arguments->out.c_str());
   });

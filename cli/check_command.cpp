@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <memory>
@@ -6,8 +7,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "cli/board_search.h"
 #include "cli/commands.h"
+#include "films/board_search.h"
 #include "recon/calibrate/drift.h"
 #include "recon/calibrate/rig_formats.h"
 
@@ -17,23 +18,23 @@ namespace {
 constexpr double kDegreesOfTurn = 180 / M_PI;
 constexpr std::size_t kCheckInstants = 20;  // a check asks for less than a calibration
 
-const char* words_of(DriftVerdict verdict) {
+const char* words_of(recon::DriftVerdict verdict) {
   switch (verdict) {
-    case DriftVerdict::still:
+    case recon::DriftVerdict::still:
       return "still";
-    case DriftVerdict::moved:
+    case recon::DriftVerdict::moved:
       return "moved";
-    case DriftVerdict::lens:
+    case recon::DriftVerdict::lens:
       return "lens";
-    case DriftVerdict::unknown:
+    case recon::DriftVerdict::unknown:
       return "unknown";
   }
   return "";
 }
 
-nlohmann::json drift_json(const DriftReport& report) {
+nlohmann::json drift_json(const recon::DriftReport& report) {
   nlohmann::json cameras = nlohmann::json::array();
-  for (const CameraDrift& camera : report.cameras) {
+  for (const recon::CameraDrift& camera : report.cameras) {
     cameras.push_back({{"camera", camera.id},
                        {"verdict", words_of(camera.verdict)},
                        {"why", camera.why},
@@ -56,8 +57,8 @@ nlohmann::json drift_json(const DriftReport& report) {
           {"cameras", cameras}};
 }
 
-void print_camera(const CameraDrift& camera) {
-  if (camera.verdict == DriftVerdict::unknown || camera.verdict == DriftVerdict::lens) {
+void print_camera(const recon::CameraDrift& camera) {
+  if (camera.verdict == recon::DriftVerdict::unknown || camera.verdict == recon::DriftVerdict::lens) {
     std::printf("%-12s %-8s %s\n", camera.id.c_str(), words_of(camera.verdict), camera.why.c_str());
     return;
   }
@@ -71,12 +72,12 @@ void print_camera(const CameraDrift& camera) {
       camera.turn_sigma * kDegreesOfTurn, camera.chi2, camera.freedom, camera.limit, camera.instants);
 }
 
-void print_drift(const DriftReport& report) {
+void print_drift(const recon::DriftReport& report) {
   std::printf("%.3f pixels RMS as calibrated, %.3f with the cameras moved that moved\n", report.rms_before,
               report.rms_after);
-  for (const CameraDrift& camera : report.cameras) print_camera(camera);
+  for (const recon::CameraDrift& camera : report.cameras) print_camera(camera);
   if (std::any_of(report.cameras.begin(), report.cameras.end(),
-                  [](const CameraDrift& camera) { return camera.turn_alone; }))
+                  [](const recon::CameraDrift& camera) { return camera.turn_alone; }))
     std::printf(
         "The lamp was at too few places to tell where a camera stands: only turns are told, and what one "
         "place can't show counts as none. Show it at three places or more, not in one line.\n");
@@ -89,26 +90,27 @@ void print_drift(const DriftReport& report) {
 
 struct CheckArguments {
   std::string rig;
-  BoardArguments boards;
+  films::BoardArguments boards;
   bool lamp = false;
   bool json = false;
 };
 
 void check(const CheckArguments& arguments) {
-  const v1::Rig rig = or_fail(import_rig(arguments.rig));
-  const BoardSearch search =
-      arguments.lamp ? search_for_lamp() : search_for(or_fail(parse_board(arguments.boards.board)));
+  const v1::Rig rig = or_fail(recon::import_rig(arguments.rig));
+  const recon::BoardSearch search =
+      arguments.lamp ? films::search_for_lamp()
+                     : recon::search_for(or_fail(recon::parse_board(arguments.boards.board)));
   const Progress bar = progress_bar("check");
-  const BoardReading reading =
-      or_fail(read_boards(arguments.boards, search, [&](double fraction, std::string_view what) {
-        report(bar, 0.9 * fraction, what);
+  const recon::BoardReading reading =
+      or_fail(films::read_boards(arguments.boards, search, [&](double fraction, std::string_view what) {
+        tell(bar, 0.9 * fraction, what);
       }));
-  const DriftReport drift = or_fail(check_drift(rig, reading.sightings, arguments.rig));
-  report(bar, 1, "done");
+  const recon::DriftReport drift = or_fail(recon::check_drift(rig, reading.sightings, arguments.rig));
+  tell(bar, 1, "done");
   if (arguments.json) {
     std::printf("%s\n", drift_json(drift).dump().c_str());
   } else {
-    if (reading.film) std::printf("%s\n", film_words(reading).c_str());
+    if (reading.film) std::printf("%s\n", films::film_words(reading).c_str());
     print_drift(drift);
   }
   if (drift.drifted()) throw CLI::RuntimeError(1);
@@ -123,7 +125,7 @@ void add_calibrate_check(CLI::App& parent) {
                                          "of the board or a lamp; 1 if one did");
   verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")
       ->required();
-  add_board_options(*verb, arguments->boards, kCheckInstants);
+  films::add_board_options(*verb, arguments->boards, kCheckInstants);
   CLI::Option* lamp = verb->add_flag("--lamp", arguments->lamp,
                                      "The pictures show one small bright lamp, such as the strobe's, at one "
                                      "place each instant; three places "

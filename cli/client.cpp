@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/client.h"
 
 #include <atomic>
@@ -36,7 +37,6 @@ constexpr std::chrono::milliseconds kAskStop{50};
 constexpr int kLargestAnswer = 64 << 20;  // bytes
 constexpr int kKeepaliveMs = 20'000;
 
-const char* const kDaemonGroup = "The daemon";
 const char* const kRemedy =
     "Is it running? `systemctl status emberlockd` says, `sudo systemctl start emberlockd` starts it; "
     "--daemon names "
@@ -79,7 +79,7 @@ Result<ClientTls> read_tls(const DaemonAddress& address) {
     return Error{ErrorKind::bad_input, "a certificate goes with its key", address.address,
                  "Give both --tls-certificate and --tls-key"};
   if (address.tls_certificate.empty()) return tls;
-  EMBERLOCK_ASSIGN_OR_RETURN(tls.identity, TlsIdentity::read(address.tls_certificate, address.tls_key));
+  EMBERLOCK_ASSIGN_OR_RETURN(tls.identity, rig::TlsIdentity::read(address.tls_certificate, address.tls_key));
   return tls;
 }
 
@@ -102,6 +102,7 @@ ErrorKind kind_of(grpc::StatusCode code) {
     case grpc::StatusCode::NOT_FOUND:
       return ErrorKind::bad_input;
     case grpc::StatusCode::FAILED_PRECONDITION:
+    case grpc::StatusCode::PERMISSION_DENIED:
     case grpc::StatusCode::RESOURCE_EXHAUSTED:
       return ErrorKind::refused;
     case grpc::StatusCode::UNAVAILABLE:
@@ -110,6 +111,8 @@ ErrorKind kind_of(grpc::StatusCode code) {
       return ErrorKind::timed_out;
     case grpc::StatusCode::OUT_OF_RANGE:
       return ErrorKind::out_of_data;
+    case grpc::StatusCode::ABORTED:
+      return ErrorKind::not_converged;
     default:
       return ErrorKind::io;
   }
@@ -255,6 +258,9 @@ Result<v1::DaemonStatus> Client::status() {
 Status Client::acknowledge(const v1::AcknowledgeRequest& request) {
   return as_status(parts_->call(&v1::Daemon::Stub::Acknowledge, parts_->daemon, request));
 }
+Result<v1::ConsoleLink> Client::open_console() {
+  return parts_->call(&v1::Daemon::Stub::OpenConsole, parts_->daemon, v1::Empty());
+}
 Status Client::watch_status(const Take<v1::DaemonStatus>& take, const Stop& stop) {
   return parts_->stream(&v1::Daemon::Stub::WatchStatus, parts_->daemon, v1::Empty(), take, stop);
 }
@@ -307,32 +313,6 @@ Result<v1::ReconstructionStatus> Client::cancel_reconstruction() {
 Status Client::watch_iterations(const Take<v1::IterationPreview>& take, const Stop& stop) {
   return parts_->stream(&v1::Reconstruct::Stub::Watch, parts_->reconstruct, v1::Empty(), take, stop);
 }
-
-std::string usual_daemon() {
-  const char* const named = std::getenv("EMBERLOCK_DAEMON");
-  return named == nullptr || *named == '\0' ? "unix:/run/emberlock/emberlockd.sock" : named;
-}
-
-CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address) {
-  const auto file = [&verb](const char* name, std::filesystem::path& path, const char* words,
-                            const char* environment) {
-    verb.add_option(name, path, words)->envname(environment)->type_name("FILE")->group(kDaemonGroup);
-  };
-  CLI::Option* where =
-      verb.add_option("--daemon", address.address,
-                      "Where emberlockd is: unix:PATH or HOST:PORT; EMBERLOCK_DAEMON names another")
-          ->capture_default_str()
-          ->group(kDaemonGroup);
-  file("--tls-ca", address.tls_ca, "Of HOST:PORT: PEM of who vouches for the daemon", "EMBERLOCK_TLS_CA");
-  file("--token-file", address.token_file, "Of HOST:PORT: holds the daemon's token", "EMBERLOCK_TOKEN_FILE");
-  file("--tls-certificate", address.tls_certificate,
-       "Of HOST:PORT: PEM of this client, where the daemon wants one (tls_clients)",
-       "EMBERLOCK_TLS_CERTIFICATE");
-  file("--tls-key", address.tls_key, "Of HOST:PORT: PEM of its key", "EMBERLOCK_TLS_KEY");
-  return where;
-}
-
-bool is_daemon_option(const CLI::Option& option) { return option.get_group() == kDaemonGroup; }
 
 Client connect_or_leave(const DaemonAddress& address) {
   auto client = Client::connect(address);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -51,6 +52,7 @@ class Client {
 
   Result<v1::DaemonStatus> status();
   Status acknowledge(const v1::AcknowledgeRequest& request);
+  Result<v1::ConsoleLink> open_console();
   Status watch_status(const Take<v1::DaemonStatus>& take, const Stop& stop);
   Status watch_notices(const v1::WatchNoticesRequest& request, const Take<v1::Notice>& take,
                        const Stop& stop);

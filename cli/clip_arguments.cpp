@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/clip_arguments.h"
 
 namespace emberlock::cli {
@@ -37,13 +38,14 @@ CLI::Option* add_clip_options(CLI::App& verb, ClipArguments& a) {
   return flash_rate;
 }
 
-ClipOptions clip_options_of(const ClipArguments& a) {
-  ClipOptions clip;
+smear::ClipOptions clip_options_of(const ClipArguments& a) {
+  smear::ClipOptions clip;
   if (a.flash_rate > 0) clip.flash_rate = Hertz(a.flash_rate);
   clip.flash_width = microseconds(a.flash_width_us);
   if (a.frame_rate > 0) clip.frame_rate = Hertz(a.frame_rate);
   if (!a.direction.empty())
-    clip.direction = a.direction == "top-first" ? ReadDirection::top_first : ReadDirection::bottom_first;
+    clip.direction =
+        a.direction == "top-first" ? smear::ReadDirection::top_first : smear::ReadDirection::bottom_first;
   if (a.shifts > 0) clip.shifts = a.shifts;
   clip.code = a.code;
   return clip;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -19,7 +20,7 @@ struct ClipArguments {
   double frame_rate = 0;
   std::string direction;
   int shifts = 0;
-  FrameCode code{};
+  smear::FrameCode code{};
   double flash_width_us = 20;
 };
 
@@ -27,7 +28,7 @@ struct ClipArguments {
 CLI::Option* add_clip_options(CLI::App& verb, ClipArguments& arguments);
 
 /// All but the row time.
-ClipOptions clip_options_of(const ClipArguments& arguments);
+smear::ClipOptions clip_options_of(const ClipArguments& arguments);
 
 /// As given by hand.
 std::optional<SecondsPerRow> row_time_of(const ClipArguments& arguments);

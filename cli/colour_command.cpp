@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
@@ -8,9 +9,10 @@
 #include <fmt/format.h>
 
 #include "base/file.h"
-#include "cli/colour_report.h"
 #include "cli/commands.h"
+#include "cli/outputs.h"
 #include "recon/preprocess/colour_calibration.h"
+#include "report/colour_report.h"
 #include "session/rig_file.h"
 
 namespace emberlock::cli {
@@ -26,9 +28,10 @@ struct ColourArguments {
 };
 
 /// Puts the colours into the rig's cameras; cameras that it lacks are added with their colour alone.
-Status put_colours(v1::Rig& rig, const ColourReadings& readings, const ColourCalibration& calibration) {
+Status put_colours(v1::Rig& rig, const recon::ColourReadings& readings,
+                   const recon::ColourCalibration& calibration) {
   for (std::size_t i = 0; i < calibration.cameras.size(); ++i) {
-    const ColourCamera& from = readings.cameras[i];
+    const recon::ColourCamera& from = readings.cameras[i];
     auto* cameras = rig.mutable_cameras();
     auto camera = std::find_if(cameras->begin(), cameras->end(),
                                [&](const v1::RigCamera& c) { return c.camera_id() == from.id; });
@@ -44,13 +47,13 @@ Status put_colours(v1::Rig& rig, const ColourReadings& readings, const ColourCal
     into->set_camera_id(from.id);
     into->set_width(static_cast<std::uint32_t>(from.size.width));
     into->set_height(static_cast<std::uint32_t>(from.size.height));
-    *into->mutable_colour() = to_message(calibration.cameras[i].colour);
+    *into->mutable_colour() = recon::to_message(calibration.cameras[i].colour);
   }
   return {};
 }
 
-void print_summary(const ColourCalibration& calibration) {
-  for (const CalibratedColour& c : calibration.cameras) {
+void print_summary(const recon::ColourCalibration& calibration) {
+  for (const recon::CalibratedColour& c : calibration.cameras) {
     const auto& g = c.colour.gain;
     std::printf(
         "%-16s gain %.4f %.4f %.4f%s, gamma %.3f, corner %.3f%s, %zu hot pixels, off by %.2f %% RMS\n",
@@ -68,23 +71,25 @@ void print_summary(const ColourCalibration& calibration) {
 }
 
 Status calibrate_folder(const ColourArguments& arguments) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const ColourReadings readings,
-                             read_colour_folder(arguments.folder, progress_bar("calibrate colour")));
-  EMBERLOCK_ASSIGN_OR_RETURN(const ColourCalibration calibration,
-                             calibrate_colour(readings, {.gamma = arguments.gamma}));
+  OutputRequest where{arguments.out, kCalibrateColour, {arguments.folder}};
+  if (!arguments.rig.empty()) where.updated.emplace_back(arguments.rig);
+  EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(where));
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::ColourReadings readings,
+                             recon::read_colour_folder(arguments.folder, progress_bar("calibrate colour")));
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::ColourCalibration calibration,
+                             recon::calibrate_colour(readings, {.gamma = arguments.gamma}));
   v1::Rig rig;
   if (!arguments.rig.empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(rig, read_rig(arguments.rig));
+    EMBERLOCK_ASSIGN_OR_RETURN(rig, session::read_rig(arguments.rig));
   } else {
-    rig.set_format_version(kRigFormatVersion);
+    rig.set_format_version(session::kRigFormatVersion);
   }
   EMBERLOCK_RETURN_IF_ERROR(put_colours(rig, readings, calibration));
-  std::error_code ec;
-  fs::create_directories(arguments.out, ec);
-  if (ec) return Error{ErrorKind::io, ec.message(), arguments.out, "Give a folder that can be written"};
-  EMBERLOCK_RETURN_IF_ERROR(write_rig(fs::path(arguments.out) / "rig.json", rig));
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(fs::path(arguments.out) / "colour.html",
-                                                  colour_report_page(readings, calibration)));
+  EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create(where));
+  EMBERLOCK_RETURN_IF_ERROR(session::write_rig(staging.path() / "rig.json", rig));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "colour.html",
+                                                  report::colour_report_page(readings, calibration)));
+  EMBERLOCK_RETURN_IF_ERROR(staging.commit());
   print_summary(calibration);
   std::printf("%-16s %s\n", "written to", (fs::path(arguments.out) / "rig.json").c_str());
   return {};

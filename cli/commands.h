@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -27,6 +28,7 @@ void add_demo(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_sessions(CLI::App& app);
 void add_status(CLI::App& app);
+void add_console(CLI::App& app);
 void add_watch(CLI::App& app);
 void add_record(CLI::App& app);
 void add_strobe(CLI::App& app);

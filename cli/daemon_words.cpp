@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/daemon_words.h"
 
 #include <algorithm>
@@ -43,6 +44,14 @@ std::string camera_line(const v1::CameraStatus& camera) {
 std::string strobe_line(const v1::StrobeStatus& strobe) {
   if (strobe.id().empty()) return "none";
   const v1::StrobeState& settings = strobe.settings();
+  if (strobe.by_hand()) {
+    std::string text = fmt::format("set by hand, {}", in_words(strobe.light()));
+    if (settings.output() == v1::StrobeState::FLASHING)
+      text += fmt::format(": to {:.6g} a minute ({:.6g} Hz)", 60 * settings.rate_hz(), settings.rate_hz());
+    if (strobe.measured_hz() > 0)
+      text += fmt::format(", measured {:.6g} ({:.6g} Hz)", 60 * strobe.measured_hz(), strobe.measured_hz());
+    return strobe.reason().empty() ? text : text + ". " + strobe.reason();
+  }
   std::string text = fmt::format("{}, {}: {}", strobe.id(), in_words(strobe.light()),
                                  in_words(v1::StrobeState::Output_Name(settings.output())));
   if (settings.output() == v1::StrobeState::FLASHING)
@@ -64,6 +73,20 @@ std::string reconstruction_line(const v1::ReconstructionStatus& reconstruction) 
       return text + ". " + reconstruction.error();
     default:
       return text;
+  }
+}
+
+/// "salvage of take 1: 34 % done"; "compression of take 2: waits".
+std::string job_line(const v1::BackgroundJob& job) {
+  const bool salvages = job.kind() == v1::BackgroundJob::SALVAGE;
+  const std::string text = fmt::format("{} of {}: ", salvages ? "salvage" : "compression", job.session());
+  switch (job.state()) {
+    case v1::BackgroundJob::RUNNING:
+      return text + fmt::format("{:.0f} % done", 100 * job.fraction());
+    case v1::BackgroundJob::PAUSED:
+      return text + "stands still while something is recorded";
+    default:
+      return text + "waits";
   }
 }
 
@@ -122,17 +145,25 @@ std::string losses(const v1::Counts& counts) {
 
 std::string recording_line(const v1::RecordingStatus& recording) {
   const std::string lost = losses(recording.lost());
-  return fmt::format("{}: {}, {}, {} frames, {} lost, {}, {}/s, queue {:.0f} %", recording.session(),
-                     in_words(v1::RecordingStatus::State_Name(recording.state())),
-                     seconds_in_words(recording.seconds()), recording.frames(), lost,
-                     bytes_in_words(static_cast<double>(recording.bytes())),
-                     bytes_in_words(recording.bytes_per_s()), 100 * recording.queue_fill());
+  std::string line = fmt::format("{}: {}, {}, {} frames recorded", recording.session(),
+                                 in_words(v1::RecordingStatus::State_Name(recording.state())),
+                                 seconds_in_words(recording.seconds()), recording.frames());
+  // Of those that are neither recorded nor lost: where they are, while there are any.
+  const v1::FrameProgress& progress = recording.progress();
+  if (progress.arrived() > recording.frames() && progress.queued() + progress.written() > progress.safe())
+    line += fmt::format(" of {} that came ({} in memory, {} not yet synced, the oldest {} old)",
+                        progress.arrived(), progress.queued(), progress.written() - progress.safe(),
+                        seconds_in_words(progress.at_risk_s()));
+  return line + fmt::format(", {} lost, {}, {}/s, queue {:.0f} %", lost,
+                            bytes_in_words(static_cast<double>(recording.bytes())),
+                            bytes_in_words(recording.bytes_per_s()), 100 * recording.queue_fill());
 }
 
 std::string iteration_line(const v1::Iteration& iteration) {
   std::string text = fmt::format("iteration {}: {:.1f} s, input error {:.2f}", iteration.iteration(),
                                  iteration.seconds(), iteration.input_rmse());
-  if (iteration.has_heldout_rmse()) text += fmt::format(", held-out error {:.2f}", iteration.heldout_rmse());
+  if (iteration.has_heldout_rmse())
+    text += fmt::format(", held-out error about {:.2f}", iteration.heldout_rmse());
   return text + " grey levels";
 }
 
@@ -167,6 +198,7 @@ std::string status_screen(const v1::DaemonStatus& status) {
     add_line(text, "", status.recording().verdict());
   }
   if (status.has_reconstruction()) add_line(text, "volume", reconstruction_line(status.reconstruction()));
+  for (const v1::BackgroundJob& job : status.jobs()) add_line(text, "job", job_line(job));
   if (!status.faults().empty()) text += "faults\n";
   for (const v1::Fault& fault : status.faults()) text += fault_lines(fault);
   if (!status.cameras().empty()) text += "cameras\n";

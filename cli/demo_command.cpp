@@ -1,16 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 #include <memory>
 
-#include "base/file.h"
 #include "cli/commands.h"
-#include "cli/demo.h"
+#include "cli/outputs.h"
 #include "recon/preprocess/flame_mask.h"
+#include "report/demo_report.h"
+#include "rig/demo.h"
 
 namespace emberlock::cli {
 namespace {
 
 struct DemoArguments {
-  DemoOptions demo;
+  rig::DemoOptions demo;
   std::string out;
   std::string image = "1280x720";
 };
@@ -25,14 +27,14 @@ ImageSize parse_size(const std::string& text) {
   return size;
 }
 
-void print_summary(const DemoResult& r, const std::string& out) {
-  const Report& report = r.outcome.report;
+void print_summary(const rig::DemoResult& r, const std::string& out) {
+  const recon::Report& report = r.outcome.report;
   std::printf("aligned          %d cameras within 100 rows by %d resets, within 10 rows by %d timed ones\n",
               r.options.cameras, r.stages.front().result.resets, r.stages.back().result.resets);
   std::printf("worst pair       %.3f ms in truth\n", in_milliseconds(r.true_worst_pair));
   std::printf("held-out error   %.2f grey levels of 255 (the paper's solver: %.2f)\n",
-              all_channels(report.heldout_rmse.value_or(ChannelRmse{})),
-              all_channels(r.paper.report.heldout_rmse.value_or(ChannelRmse{})));
+              recon::all_channels(report.heldout_rmse.value_or(recon::ChannelRmse{})),
+              recon::all_channels(r.paper.report.heldout_rmse.value_or(recon::ChannelRmse{})));
   std::printf("reconstruction   %.2f s; whole demonstration %.0f s\n", report.total_time.value(),
               r.total_seconds.value());
   std::printf("look at          %s/report.html\n", out.c_str());
@@ -40,9 +42,9 @@ void print_summary(const DemoResult& r, const std::string& out) {
 
 void demo_command(DemoArguments arguments) {
   arguments.demo.image = parse_size(arguments.image);
-  AtomicDirectory folder = or_fail(AtomicDirectory::create(arguments.out, "report.html"));
-  const DemoResult result = or_fail(run_demo(arguments.demo, folder.path(), progress_bar));
-  or_fail(write_demo_report(result, folder.path()));
+  OutputFolder folder = or_fail(OutputFolder::create({arguments.out, kDemo}));
+  const rig::DemoResult result = or_fail(rig::run_demo(arguments.demo, folder.path(), progress_bar));
+  or_fail(report::write_demo_report(result, folder.path()));
   or_fail(folder.commit());
   print_summary(result, arguments.out);
 }

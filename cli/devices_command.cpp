@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <map>
@@ -13,11 +14,11 @@
 #include "base/clock.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
-#include "daemon/devices/device_list.h"
 #include "drivers/camera_thread.h"
 #include "drivers/hotplug.h"
 #include "drivers/probe.h"
 #include "drivers/virtual/virtual_rig.h"
+#include "rig/devices/device_list.h"
 
 namespace emberlock::cli {
 namespace {
@@ -40,19 +41,21 @@ struct ProbeArguments {
   bool json = false;
 };
 
-void print_failures(const DeviceList& list) {
-  for (const DeviceList::Failure& failure : list.failures)
+void print_failures(const rig::DeviceList& list) {
+  for (const rig::DeviceList::Failure& failure : list.failures)
     std::fprintf(stderr, "emberlock: %s\n", failure.error.message().c_str());
 }
 
 void list(const ListArguments& arguments) {
-  const DeviceList found = list_devices();
+  const rig::DeviceList found = rig::list_devices();
   if (arguments.json) {
-    std::printf("%s\n", device_json(found).c_str());
+    std::printf("%s\n", rig::device_json(found).c_str());
     return;
   }
   print_failures(found);
-  std::printf("%s", device_table(found, arguments.all_modes ? Detail::all_modes : Detail::best_mode).c_str());
+  std::printf("%s",
+              rig::device_table(found, arguments.all_modes ? rig::Detail::all_modes : rig::Detail::best_mode)
+                  .c_str());
   if (found.cameras.empty()) {
     std::printf(
         "No camera was found. Is it switched on and plugged in? Are the rules of udev/ installed, and are "
@@ -65,10 +68,10 @@ void list(const ListArguments& arguments) {
 void watch() {
   constexpr Seconds kLook{2};  // network cameras say nothing when they come
   const Interrupt interrupt;
-  auto hotplug = HotplugMonitor::open({"video4linux", "usb", "tty"});
+  auto hotplug = drivers::HotplugMonitor::open({"video4linux", "usb", "tty"});
   if (!hotplug) std::fprintf(stderr, "emberlock: %s\n", hotplug.error().message().c_str());
-  DeviceList before = list_devices();
-  std::printf("%s", device_table(before, Detail::best_mode).c_str());
+  rig::DeviceList before = rig::list_devices();
+  std::printf("%s", rig::device_table(before, rig::Detail::best_mode).c_str());
   std::fflush(stdout);
   SteadyClock clock;
   while (!Interrupt::asked()) {
@@ -77,12 +80,12 @@ void watch() {
     } else {
       clock.sleep_until(clock.now() + kLook);
     }
-    DeviceList after = keep_unseen(before, list_devices());
-    const DeviceChanges changed = changes(before, after);
-    for (const ListedCamera& camera : changed.went.cameras)
+    rig::DeviceList after = rig::keep_unseen(before, rig::list_devices());
+    const rig::DeviceChanges changed = rig::changes(before, after);
+    for (const rig::ListedCamera& camera : changed.went.cameras)
       std::printf("gone: %s\n", camera.found.id.c_str());
-    for (const StrobeFound& port : changed.went.ports) std::printf("gone: %s\n", port.id.c_str());
-    if (const std::string came = device_table(changed.came, Detail::best_mode); !came.empty())
+    for (const drivers::StrobeFound& port : changed.went.ports) std::printf("gone: %s\n", port.id.c_str());
+    if (const std::string came = rig::device_table(changed.came, rig::Detail::best_mode); !came.empty())
       std::printf("came:\n%s", came.c_str());
     std::fflush(stdout);
     before = std::move(after);
@@ -98,8 +101,8 @@ const std::map<std::string, PixelFormat> kFormats = [] {
   return formats;
 }();
 
-Result<CameraRequest> request_from(const ProbeArguments& arguments) {
-  CameraRequest request;
+Result<drivers::CameraRequest> request_from(const ProbeArguments& arguments) {
+  drivers::CameraRequest request;
   if (arguments.rate > 0) request.frame_rate = Hertz(arguments.rate);
   if (arguments.exposure_ms > 0) request.exposure = milliseconds(arguments.exposure_ms);
   if (!arguments.format.empty()) request.format = kFormats.at(arguments.format);
@@ -123,47 +126,49 @@ Result<CameraRequest> request_from(const ProbeArguments& arguments) {
 
 struct Probed {
   std::string where;
-  ProbeFilm film;
-  ProbeVerdict verdict;
+  drivers::ProbeFilm film;
+  drivers::ProbeVerdict verdict;
 };
 
-Result<Probed> probe_virtual(const ProbeArguments& arguments, const ProbeOptions& options) {
+Result<Probed> probe_virtual(const ProbeArguments& arguments, const drivers::ProbeOptions& options) {
   const auto clock = std::make_shared<SteadyClock>();
-  EMBERLOCK_ASSIGN_OR_RETURN(const VirtualRigOptions drawn, parse_virtual_rig(arguments.rig));
-  EMBERLOCK_ASSIGN_OR_RETURN(const auto rig, VirtualRig::create(drawn, clock));
+  EMBERLOCK_ASSIGN_OR_RETURN(const drivers::VirtualRigOptions drawn,
+                             drivers::parse_virtual_rig(arguments.rig));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto rig, drivers::VirtualRig::create(drawn, clock));
   for (int i = 0; i < rig->size(); ++i) {
     if (rig->camera(i).info().id != arguments.id) continue;
-    EMBERLOCK_ASSIGN_OR_RETURN(ProbeFilm film,
-                               film_probe(rig->camera(i), options, *clock, progress_bar("probe")));
-    ProbeVerdict verdict = judge(film, {});
+    EMBERLOCK_ASSIGN_OR_RETURN(drivers::ProbeFilm film,
+                               drivers::film_probe(rig->camera(i), options, *clock, progress_bar("probe")));
+    drivers::ProbeVerdict verdict = drivers::judge(film, {});
     return Probed{arguments.rig, std::move(film), std::move(verdict)};
   }
   return Error{ErrorKind::bad_input, "there is no such camera in " + arguments.rig, arguments.id,
                "there is virtual-00 and so on"};
 }
 
-Result<Probed> probe_real(const ProbeArguments& arguments, const ProbeOptions& options,
-                          const DeviceList& there) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const CameraRequest request, request_from(arguments));
-  EMBERLOCK_ASSIGN_OR_RETURN(const ListedCamera listed, find_camera(there, arguments.id));
-  const auto drivers = camera_drivers();
+Result<Probed> probe_real(const ProbeArguments& arguments, const drivers::ProbeOptions& options,
+                          const rig::DeviceList& there) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const drivers::CameraRequest request, request_from(arguments));
+  EMBERLOCK_ASSIGN_OR_RETURN(const rig::ListedCamera listed, rig::find_camera(there, arguments.id));
+  const auto drivers = rig::camera_drivers();
   const auto driver = std::find_if(drivers.begin(), drivers.end(),
-                                   [&](const CameraDriver& d) { return d.name == listed.driver; });
+                                   [&](const drivers::CameraDriver& d) { return d.name == listed.driver; });
   EMBERLOCK_ASSIGN_OR_RETURN(auto opened, driver->open(arguments.id, request));
-  CameraThread camera(std::move(opened));
+  drivers::CameraThread camera(std::move(opened));
   SteadyClock clock;
-  EMBERLOCK_ASSIGN_OR_RETURN(ProbeFilm film, film_probe(camera, options, clock, progress_bar("probe")));
-  ProbeVerdict verdict = judge(film, listed.found.link_megabits);
+  EMBERLOCK_ASSIGN_OR_RETURN(drivers::ProbeFilm film,
+                             drivers::film_probe(camera, options, clock, progress_bar("probe")));
+  drivers::ProbeVerdict verdict = drivers::judge(film, listed.found.link_megabits);
   return Probed{listed.found.address, std::move(film), std::move(verdict)};
 }
 
 nlohmann::ordered_json probe_json(const Probed& probed) {
   nlohmann::ordered_json findings = nlohmann::ordered_json::array();
-  for (const ProbeFinding& f : probed.verdict.findings) {
+  for (const drivers::ProbeFinding& f : probed.verdict.findings) {
     findings.push_back(
         {{"what", f.what}, {"fitness", name(f.fitness)}, {"measured", f.measured}, {"remedy", f.remedy}});
   }
-  const FrameCounts& c = probed.film.counts;
+  const drivers::FrameCounts& c = probed.film.counts;
   nlohmann::ordered_json json{{"id", probed.film.info.id},
                               {"fitness", name(probed.verdict.fitness)},
                               {"frame_rate_hz", probed.verdict.rate.value()},
@@ -189,17 +194,17 @@ nlohmann::ordered_json probe_json(const Probed& probed) {
 }
 
 void print_probe(const Probed& probed) {
-  const CameraInfo& info = probed.film.info;
+  const drivers::CameraInfo& info = probed.film.info;
   std::printf("%s (%s, %s), %d x %d %s\n", info.id.c_str(), info.model.c_str(), probed.where.c_str(),
               info.layout.size.width, info.layout.size.height, std::string(name(info.layout.format)).c_str());
-  for (const ProbeFinding& f : probed.verdict.findings) {
+  for (const drivers::ProbeFinding& f : probed.verdict.findings) {
     std::printf("  %-10s %-6s %s\n", f.what.c_str(), std::string(name(f.fitness)).c_str(),
                 f.measured.c_str());
     if (!f.remedy.empty()) std::printf("  %-10s %-6s -> %s\n", "", "", f.remedy.c_str());
   }
-  std::printf("%s\n", probed.verdict.fitness == Fitness::good   ? "fit"
-                      : probed.verdict.fitness == Fitness::poor ? "usable; see what is poor"
-                                                                : "not fit as it is");
+  std::printf("%s\n", probed.verdict.fitness == drivers::Fitness::good   ? "fit"
+                      : probed.verdict.fitness == drivers::Fitness::poor ? "usable; see what is poor"
+                                                                         : "not fit as it is");
 }
 
 void print_json(const nlohmann::ordered_json& json) {
@@ -207,22 +212,22 @@ void print_json(const nlohmann::ordered_json& json) {
 }
 
 /// Whether a serial port leads to a strobe, and to which.
-void probe_port(const ProbeArguments& arguments, const StrobeFound& port) {
-  const StrobeIdentity strobe = or_fail(identify_strobe(port.id));
-  const std::string dialect(name_of(strobe.dialect));
+void probe_port(const ProbeArguments& arguments, const drivers::StrobeFound& port) {
+  const drivers::StrobeIdentity strobe = or_fail(drivers::identify_strobe(port.id));
+  const std::string dialect(drivers::name_of(strobe.dialect));
   if (arguments.json) return print_json({{"id", port.id}, {"dialect", dialect}, {"model", strobe.model}});
   std::printf("%s (%s): a strobe, %s, that speaks %s\n", port.id.c_str(), port.address.c_str(),
               strobe.model.c_str(), dialect.c_str());
 }
 
 void probe(const ProbeArguments& arguments) {
-  DeviceList there;
-  if (arguments.rig.empty()) there = list_devices();
+  rig::DeviceList there;
+  if (arguments.rig.empty()) there = rig::list_devices();
   print_failures(there);
-  for (const StrobeFound& port : there.ports) {
+  for (const drivers::StrobeFound& port : there.ports) {
     if (port.id == arguments.id) return probe_port(arguments, port);
   }
-  const ProbeOptions options{Seconds(arguments.seconds), arguments.resets};
+  const drivers::ProbeOptions options{Seconds(arguments.seconds), arguments.resets};
   const Probed probed = or_fail(arguments.rig.empty() ? probe_real(arguments, options, there)
                                                       : probe_virtual(arguments, options));
   if (arguments.json) {
@@ -230,7 +235,7 @@ void probe(const ProbeArguments& arguments) {
   } else {
     print_probe(probed);
   }
-  if (probed.verdict.fitness == Fitness::unfit) throw CLI::RuntimeError(1);
+  if (probed.verdict.fitness == drivers::Fitness::unfit) throw CLI::RuntimeError(1);
 }
 
 void add_probe(CLI::App& devices) {

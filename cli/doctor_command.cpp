@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <memory>
@@ -5,21 +6,21 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "daemon/doctor/doctor.h"
+#include "rig/doctor/doctor.h"
 
 namespace emberlock::cli {
 namespace {
 
 struct DoctorArguments {
-  doctor::CollectOptions options;
+  rig::doctor::CollectOptions options;
   bool json = false;
 };
 
-void print_json(const std::vector<doctor::Check>& checks) {
+void print_json(const std::vector<rig::doctor::Check>& checks) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const doctor::Check& check : checks) {
+  for (const rig::doctor::Check& check : checks) {
     list.push_back({{"what", check.what},
-                    {"health", doctor::name(check.health)},
+                    {"health", rig::doctor::name(check.health)},
                     {"found", check.found},
                     {"remedy", check.remedy}});
   }
@@ -28,23 +29,24 @@ void print_json(const std::vector<doctor::Check>& checks) {
                           .c_str());
 }
 
-void print_lines(const std::vector<doctor::Check>& checks) {
-  for (const doctor::Check& check : checks) {
-    std::printf("%-4s  %-13s  %s\n", std::string(doctor::name(check.health)).c_str(), check.what.c_str(),
+void print_lines(const std::vector<rig::doctor::Check>& checks) {
+  for (const rig::doctor::Check& check : checks) {
+    std::printf("%-4s  %-13s  %s\n", std::string(rig::doctor::name(check.health)).c_str(), check.what.c_str(),
                 check.found.c_str());
     if (!check.remedy.empty()) std::printf("%19s  -> %s\n", "", check.remedy.c_str());
   }
 }
 
 void examine(const DoctorArguments& arguments) {
-  const std::vector<doctor::Check> checks = doctor::judge(doctor::collect(arguments.options));
+  const std::vector<rig::doctor::Check> checks = rig::doctor::judge(rig::doctor::collect(arguments.options));
   if (arguments.json) {
     print_json(checks);
   } else {
     print_lines(checks);
   }
-  if (std::any_of(checks.begin(), checks.end(),
-                  [](const doctor::Check& check) { return check.health == doctor::Health::fail; })) {
+  if (std::any_of(checks.begin(), checks.end(), [](const rig::doctor::Check& check) {
+        return check.health == rig::doctor::Health::fail;
+      })) {
     throw CLI::RuntimeError(1);
   }
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -8,9 +9,9 @@
 
 #include "cli/clip_arguments.h"
 #include "cli/commands.h"
-#include "cli/import_report.h"
-#include "cli/import_run.h"
 #include "cli/interrupt.h"
+#include "films/import_run.h"
+#include "report/import_report.h"
 
 namespace emberlock::cli {
 namespace {
@@ -45,19 +46,19 @@ Result<std::pair<std::string, std::string>> halves(const std::string& option, co
 }
 
 /// "FROM-TO" in seconds.
-Result<std::optional<Part>> part_from(const std::string& option, const std::string& text) {
-  if (text.empty()) return std::optional<Part>();
+Result<std::optional<films::Part>> part_from(const std::string& option, const std::string& text) {
+  if (text.empty()) return std::optional<films::Part>();
   double from = 0;
   double to = 0;
   char rest = 0;
   const bool read = std::sscanf(text.c_str(), "%lf-%lf%c", &from, &to, &rest) == 2;
   if (!read || !std::isfinite(from) || !std::isfinite(to) || from < 0 || to <= from)
     return not_understood(option, text, "Write FROM-TO in seconds, e.g. 2.5-14");
-  return std::optional(Part{Seconds(from), Seconds(to)});
+  return std::optional(films::Part{Seconds(from), Seconds(to)});
 }
 
-Result<ImportOptions> options_from(const ImportArguments& a) {
-  ImportOptions options;
+Result<films::ImportOptions> options_from(const ImportArguments& a) {
+  films::ImportOptions options;
   options.folder = a.folder;
   options.out = a.out;
   for (const std::string& text : a.cameras) {
@@ -70,8 +71,8 @@ Result<ImportOptions> options_from(const ImportArguments& a) {
     options.offsets[pair.first] = std::strtoll(pair.second.c_str(), &end, 10);
     if (*end != '\0') return not_understood("--offset", text, "Write ID=FRAMES");
   }
-  if (a.unsynchronised || !a.offsets.empty()) options.alignment = Alignment::offsets;
-  if (a.clip.flash_rate > 0) options.alignment = Alignment::strobe;
+  if (a.unsynchronised || !a.offsets.empty()) options.alignment = films::Alignment::offsets;
+  if (a.clip.flash_rate > 0) options.alignment = films::Alignment::strobe;
   options.clip = clip_options_of(a.clip);
   if (a.clip.frame_rate > 0) options.films.picture_rate = Hertz(a.clip.frame_rate);
   options.comb = a.clip.comb;
@@ -80,17 +81,17 @@ Result<ImportOptions> options_from(const ImportArguments& a) {
   EMBERLOCK_ASSIGN_OR_RETURN(options.strobe, part_from("--strobe", a.strobe));
   EMBERLOCK_ASSIGN_OR_RETURN(options.flame, part_from("--flame", a.flame));
   options.rig = a.rig;
-  options.films.joins = a.joined ? Joins::as_told : Joins::proven;
-  options.faults = a.partial ? Faults::partial : Faults::refuse;
-  options.colours = a.grey ? Colours::brightness : Colours::keep;
-  options.encoding = a.encoding == "ffv1" ? Encoding::ffv1 : Encoding::huffman_nut;
+  options.films.joins = a.joined ? films::Joins::as_told : films::Joins::proven;
+  options.faults = a.partial ? films::Faults::partial : films::Faults::refuse;
+  options.colours = a.grey ? session::Colours::brightness : session::Colours::keep;
+  options.encoding = a.encoding == "ffv1" ? session::Encoding::ffv1 : session::Encoding::huffman_nut;
   return options;
 }
 
-void print_table(const ImportArguments& arguments, const ImportResult& result) {
+void print_table(const ImportArguments& arguments, const films::ImportResult& result) {
   std::printf("%s: %lld instants of %zu cameras\n", arguments.out.c_str(),
               static_cast<long long>(result.instants), result.cameras.size());
-  for (const ImportedCamera& c : result.cameras) {
+  for (const films::ImportedCamera& c : result.cameras) {
     std::printf("  %-20s", c.id.c_str());
     if (c.clock) {
       std::printf(" frame %+6lld  %+9.4f ms +- %.4f at first, %+9.4f +- %.4f at last  %+7.2f ppm",
@@ -104,17 +105,18 @@ void print_table(const ImportArguments& arguments, const ImportResult& result) {
 }
 
 void import(const ImportArguments& arguments) {
-  const ImportOptions options = or_fail(options_from(arguments));
+  const films::ImportOptions options = or_fail(options_from(arguments));
   const Progress bar = progress_bar("import");
   const Interrupt interrupt;
-  const ImportResult result = or_fail(run_import(options, [&](double fraction, std::string_view what) {
-    report(bar, fraction, what);
+  const auto observer = [&](double fraction, std::string_view what) {
+    tell(bar, fraction, what);
     return !Interrupt::asked();
-  }));
+  };
+  const films::ImportResult result = or_fail(films::run_import(options, observer, report::reports_of));
   for (const std::string& note : result.notes) std::fprintf(stderr, "emberlock: %s\n", note.c_str());
   std::fprintf(stderr, "emberlock: the report is %s\n", (options.out / "import.html").c_str());
   if (arguments.json) {
-    std::printf("%s", import_json(options, result).c_str());
+    std::printf("%s", report::import_json(options, result).c_str());
   } else {
     print_table(arguments, result);
   }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/manual.h"
 
 #include <cstdio>
@@ -6,9 +7,12 @@
 
 #include <fmt/format.h>
 
+#include "base/roff.h"
 #include "cli/app_tree.h"
 #include "cli/completion.h"
-#include "daemon/config/manual.h"
+#if EMBERLOCK_WITH_DRIVERS
+#include "rig/config/manual.h"
+#endif
 
 namespace emberlock::cli {
 namespace {
@@ -72,9 +76,19 @@ void add_manual(CLI::App& app, const std::string& version) {
   CLI::App* man = hidden("man", "Prints a manual page, in roff.");
   man->add_option("PAGE", *page, "emberlock or emberlockd.toml")
       ->required()
+#if EMBERLOCK_WITH_DRIVERS
       ->check(CLI::IsMember({"emberlock", "emberlockd.toml"}));
+#else
+      ->check(CLI::IsMember({"emberlock"}));
+#endif
   man->callback([page, &app, version] {
-    std::printf("%s", (*page == "emberlock" ? manual_page(app, version) : config_manual(version)).c_str());
+#if EMBERLOCK_WITH_DRIVERS
+    if (*page == "emberlockd.toml") {
+      std::printf("%s", rig::config_manual(version).c_str());
+      return;
+    }
+#endif
+    std::printf("%s", manual_page(app, version).c_str());
   });
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/progress_stream.h"
 
 #include <algorithm>
@@ -8,13 +9,13 @@
 #include <fmt/format.h>
 #include <sys/prctl.h>
 
-#include "daemon/reconstruction/messages.h"
 #include "recon/export/picture.h"
 #include "recon/export/preview.h"
 #include "recon/pipeline/advice.h"
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/radiance.h"
 #include "recon/render/render.h"
+#include "session/child_messages.h"
 #include "session/files.h"
 
 namespace emberlock::cli {
@@ -25,37 +26,41 @@ constexpr int kBlocks = 64;   // of a volume, along its longest edge
 constexpr auto kRarely = std::chrono::milliseconds(200);
 constexpr int kShare = 20;  // pictures take one part in so many of the time
 
-v1::Iteration numbers(const TracePoint& point, bool judged) {
+v1::Iteration numbers(const recon::TracePoint& point, bool judged) {
   v1::Iteration iteration;
   iteration.set_iteration(static_cast<std::uint32_t>(point.iteration));
   iteration.set_seconds(point.time.value());
-  iteration.set_input_rmse(all_channels(point.input_rmse));
-  if (judged) iteration.set_heldout_rmse(all_channels(point.heldout_rmse));
+  iteration.set_input_rmse(recon::all_channels(point.input_rmse));
+  if (judged) iteration.set_heldout_rmse(recon::all_channels(point.heldout_rmse));
   return iteration;
 }
 
 /// The view to show: one that the solver doesn't know, if there is one.
-std::size_t shown_view(const Scene& scene) {
-  const auto held_out = std::find_if(scene.views.begin(), scene.views.end(),
-                                     [](const View& view) { return view.role == ViewRole::held_out; });
+std::size_t shown_view(const recon::Scene& scene) {
+  const auto held_out = std::find_if(scene.views.begin(), scene.views.end(), [](const recon::View& view) {
+    return view.role == recon::ViewRole::held_out;
+  });
   return held_out == scene.views.end() ? 0 : static_cast<std::size_t>(held_out - scene.views.begin());
 }
 
-bool is_judged(const Scene& scene) { return scene.views[shown_view(scene)].role == ViewRole::held_out; }
+bool is_judged(const recon::Scene& scene) {
+  return scene.views[shown_view(scene)].role == recon::ViewRole::held_out;
+}
 
-std::string jpeg(const RadianceImage& image) {
-  auto bytes = to_jpeg(to_rgb8(image).view());
+std::string jpeg(const recon::RadianceImage& image) {
+  auto bytes = recon::to_jpeg(recon::to_rgb8(image).view());
   return bytes ? std::move(*bytes) : std::string();
 }
 
-void add_pictures(v1::IterationPreview& message, const View& view, const RadianceImage& rendered) {
+void add_pictures(v1::IterationPreview& message, const recon::View& view,
+                  const recon::RadianceImage& rendered) {
   message.set_camera_id(view.name);
-  message.set_captured_jpeg(jpeg(shrunk(view.image, rendered.size)));
+  message.set_captured_jpeg(jpeg(recon::shrunk(view.image, rendered.size)));
   message.set_rendered_jpeg(jpeg(rendered));
 }
 
-void add_volume(v1::IterationPreview& message, const Volume& volume) {
-  const CoarseBrightness coarse = coarse_brightness(volume, kBlocks);
+void add_volume(v1::IterationPreview& message, const recon::Volume& volume) {
+  const recon::CoarseBrightness coarse = recon::coarse_brightness(volume, kBlocks);
   v1::VolumePreview& preview = *message.mutable_volume();
   preview.set_nx(static_cast<std::uint32_t>(coarse.nx));
   preview.set_ny(static_cast<std::uint32_t>(coarse.ny));
@@ -67,19 +72,19 @@ void add_volume(v1::IterationPreview& message, const Volume& volume) {
 }
 
 /// A view of a solve's volume, as it is so far.
-RadianceImage rendered_small(const Volume& volume, const Preview& preview, const View& view,
-                             const ComputeOptions& compute) {
-  const ImageSize size = preview_size(view.image.size, kWidest);
-  Effects effects = preview.effects;
+recon::RadianceImage rendered_small(const recon::Volume& volume, const recon::Preview& preview,
+                                    const recon::View& view, const recon::ComputeOptions& compute) {
+  const ImageSize size = recon::preview_size(view.image.size, kWidest);
+  recon::Effects effects = preview.effects;
   effects.scattering = {};
   effects.refraction = {};  // moves things by less than one of these pixels
-  RenderOptions options{.compute = compute};
-  RadianceImage behind;
+  recon::RenderOptions options{.compute = compute};
+  recon::RadianceImage behind;
   if (view.background) {
-    behind = shrunk(*view.background, size);
+    behind = recon::shrunk(*view.background, size);
     options.background = &behind;
   }
-  return render_view(volume, preview.hull, effects, resized(view.camera, size), options);
+  return recon::render_view(volume, preview.hull, effects, recon::resized(view.camera, size), options);
 }
 
 }  // namespace
@@ -95,13 +100,13 @@ Result<ProgressStream> ProgressStream::open(int fd) {
 }
 
 void ProgressStream::send(const v1::ChildMessage& message) {
-  if (!broken_) broken_ = !write_fully(fd_, framed(message), "--progress-fd").ok();
+  if (!broken_) broken_ = !session::write_fully(fd_, session::framed(message), "--progress-fd").ok();
 }
 
-void ProgressStream::loading(Device device) {
+void ProgressStream::loading(recon::Device device) {
   v1::ChildMessage message;
   message.mutable_progress()->set_doing("loading the pictures");
-  message.mutable_progress()->set_device(device == Device::cuda ? "cuda" : "cpu");
+  message.mutable_progress()->set_device(device == recon::Device::cuda ? "cuda" : "cpu");
   send(message);
 }
 
@@ -112,15 +117,16 @@ void ProgressStream::progress(double fraction, std::string_view doing) {
   send(message);
 }
 
-void ProgressStream::iteration(const Preview& preview, const Scene& scene, const ComputeOptions& compute) {
+void ProgressStream::iteration(const recon::Preview& preview, const recon::Scene& scene,
+                               const recon::ComputeOptions& compute) {
   if (broken_) return;
   v1::ChildMessage message;
   v1::IterationPreview& shown = *message.mutable_iteration();
   *shown.mutable_iteration() = numbers(preview.point, is_judged(scene));
   const Clock::time_point begin = Clock::now();
   if (begin >= pictures_due_) {
-    if (const std::optional<Volume> volume = preview.recent()) {
-      const View& view = scene.views[shown_view(scene)];
+    if (const std::optional<recon::Volume> volume = preview.recent()) {
+      const recon::View& view = scene.views[shown_view(scene)];
       add_pictures(shown, view, rendered_small(*volume, preview, view, compute));
       add_volume(shown, *volume);
       pictures_due_ = begin + std::max<Clock::duration>(kRarely, kShare * (Clock::now() - begin));
@@ -129,22 +135,24 @@ void ProgressStream::iteration(const Preview& preview, const Scene& scene, const
   send(message);
 }
 
-void ProgressStream::done(const Outcome& outcome, const Scene& scene, const std::string& folder) {
+void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& scene,
+                          const std::string& folder) {
   v1::ChildMessage last;
   v1::IterationPreview& shown = *last.mutable_iteration();
-  const Report& report = outcome.report;
+  const recon::Report& report = outcome.report;
   if (!report.trace.empty()) *shown.mutable_iteration() = numbers(report.trace.back(), is_judged(scene));
   const std::size_t v = shown_view(scene);
-  const ImageSize size = preview_size(scene.views[v].image.size, kWidest);
-  add_pictures(shown, scene.views[v], shrunk(outcome.renders[v], size));
+  const ImageSize size = recon::preview_size(scene.views[v].image.size, kWidest);
+  add_pictures(shown, scene.views[v], recon::shrunk(outcome.renders[v], size));
   add_volume(shown, outcome.reconstruction.volume);
   send(last);
 
   v1::ChildMessage message;
   v1::ChildMessage::Done& done = *message.mutable_done();
-  for (const EffectReport& effect : report.effects)
+  for (const recon::EffectReport& effect : report.effects)
     done.add_effects(fmt::format("{} {}: {}", effect.name, effect.on ? "on" : "off", effect.reason));
-  for (const std::string& advice : next_steps(report)) done.add_advice(advice);
+  for (const std::string& words : report.voxel_choice.words) done.add_advice(words);
+  for (const std::string& advice : recon::next_steps(report)) done.add_advice(advice);
   for (const std::string& warning : report.warnings) done.add_warnings(warning);
   done.set_result(folder);
   send(message);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <chrono>
@@ -17,12 +18,13 @@ class ProgressStream {
   /// SIGPIPE.
   static Result<ProgressStream> open(int fd);
 
-  void loading(Device device);
+  void loading(recon::Device device);
   void progress(double fraction, std::string_view doing);
   /// The numbers at once; pictures only where they are due, so that they take at most a twentieth of the
   /// solve's time.
-  void iteration(const Preview& preview, const Scene& scene, const ComputeOptions& compute);
-  void done(const Outcome& outcome, const Scene& scene, const std::string& folder);
+  void iteration(const recon::Preview& preview, const recon::Scene& scene,
+                 const recon::ComputeOptions& compute);
+  void done(const recon::Outcome& outcome, const recon::Scene& scene, const std::string& folder);
   void failed(const Error& error);
 
  private:

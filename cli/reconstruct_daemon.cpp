@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/reconstruct_daemon.h"
 
 #include <algorithm>
@@ -55,7 +56,7 @@ void reconstruct_by_daemon(const DaemonReconstruction& wanted) {
                            if (iteration.seconds() > shown) print_iteration(iteration, wanted.json);
                            shown = std::max(shown, iteration.seconds());
                          }
-                         report(progress, last.fraction(), last.doing());
+                         tell(progress, last.fraction(), last.doing());
                          return last.state() == State::RUNNING;
                        },
                        Interrupt::asked));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -8,6 +9,6 @@
 namespace emberlock::cli {
 
 /// "cx,cy,cz,sx,sy,sz" in metres.
-Result<Box> parse_box(const std::string& text);
+Result<recon::Box> parse_box(const std::string& text);
 
 }  // namespace emberlock::cli

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -8,9 +10,9 @@
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/sessions_daemon.h"
-#include "daemon/recordings/json.h"
-#include "daemon/recordings/store.h"
 #include "session/export.h"
+#include "session/job_json.h"
+#include "session/store.h"
 #include "session/verify.h"
 
 namespace emberlock::cli {
@@ -58,7 +60,7 @@ v1::ListSessionsResponse sessions_in(const SessionsArguments& a) {
   if (!fs::is_directory(a.folder)) {
     fail({ErrorKind::bad_input, "no such folder", a.folder, "Name the folder in which sessions lie"});
   }
-  return or_fail(SessionStore::open(a.folder)).list();
+  return or_fail(session::SessionStore::open(a.folder)).list();
 }
 
 void list(const SessionsArguments& a) {
@@ -70,15 +72,16 @@ void list(const SessionsArguments& a) {
 void verify(const SessionsArguments& a) {
   if (is_daemons(a.folder)) return job_by_daemon(a.daemon, SessionJob::verify, a.folder, a.json);
   const Interrupt interrupt;
-  const SessionCheck check = or_fail(verify_session(a.folder, until_interrupted("verify")));
+  const session::SessionCheck check = or_fail(session::verify_session(a.folder, until_interrupted("verify")));
   if (a.json) {
-    std::printf("%s\n", to_line(to_json(check)).c_str());
+    std::printf("%s\n", session::to_line(session::to_json(check)).c_str());
   } else {
-    for (const CameraCheck& c : check.cameras) {
+    for (const session::CameraCheck& c : check.cameras) {
       std::printf("%-24s %s of %s frames good", c.camera_id.c_str(), std::to_string(c.good).c_str(),
                   std::to_string(c.recorded).c_str());
       if (c.bad > 0) std::printf(", %s can't be read back", std::to_string(c.bad).c_str());
       if (c.missing > 0) std::printf(", %s missing from the index", std::to_string(c.missing).c_str());
+      if (c.unindexed > 0) std::printf(", %s that the index lacks", std::to_string(c.unindexed).c_str());
       std::printf("\n");
       for (const std::string& problem : c.problems) std::printf("  %s\n", problem.c_str());
     }
@@ -91,17 +94,24 @@ void verify(const SessionsArguments& a) {
 void repair(const SessionsArguments& a) {
   if (is_daemons(a.folder)) return job_by_daemon(a.daemon, SessionJob::repair, a.folder, a.json);
   const Interrupt interrupt;
-  const RepairReport report = or_fail(repair_session(a.folder, until_interrupted("repair")));
+  const session::RepairReport report =
+      or_fail(session::repair_session(a.folder, until_interrupted("repair")));
   if (a.json) {
-    std::printf("%s\n", to_line(to_json(report)).c_str());
+    std::printf("%s\n", session::to_line(session::to_json(report)).c_str());
     return;
   }
-  for (const RepairedCamera& c : report.cameras) {
-    std::printf("%-24s %s frames kept, %s lost\n", c.camera_id.c_str(), std::to_string(c.kept).c_str(),
+  for (const session::RepairedCamera& c : report.cameras) {
+    std::printf("%-24s %s frames kept, %s lost", c.camera_id.c_str(), std::to_string(c.kept).c_str(),
                 std::to_string(c.lost).c_str());
+    if (c.found > 0) std::printf(", %s taken up from the segments", std::to_string(c.found).c_str());
+    std::printf("\n");
     for (const std::string& file : c.rewritten) std::printf("  %s was written anew\n", file.c_str());
   }
-  std::printf("%s\n", report.changed ? "Mended." : "Nothing to mend: all there.");
+  const bool nothing = std::all_of(report.cameras.begin(), report.cameras.end(),
+                                   [](const session::RepairedCamera& c) { return c.kept == 0; });
+  std::printf("%s\n", nothing          ? "There is not one frame in it."
+                      : report.changed ? "Mended."
+                                       : "Nothing to mend.");
 }
 
 void export_frames(const SessionsArguments& a) {
@@ -114,15 +124,16 @@ void export_frames(const SessionsArguments& a) {
   }
   if (a.out.empty()) throw CLI::RequiredError("--out");
   const Interrupt interrupt;
-  const ExportFormat format = png ? ExportFormat::png : ExportFormat::video;
-  const ExportReport report = or_fail(export_session(a.folder, a.out, format, until_interrupted("export")));
+  const session::ExportFormat format = png ? session::ExportFormat::png : session::ExportFormat::video;
+  const session::ExportReport report =
+      or_fail(session::export_session(a.folder, a.out, format, until_interrupted("export")));
   if (a.json) {
-    std::printf("%s\n", to_line(to_json(report)).c_str());
+    std::printf("%s\n", session::to_line(session::to_json(report)).c_str());
     return;
   }
-  for (const ExportedCamera& c : report.cameras) {
+  for (const session::ExportedCamera& c : report.cameras) {
     std::printf("%s: %s frames", (fs::path(a.out) / c.file).c_str(), std::to_string(c.frames).c_str());
-    if (format == ExportFormat::video)
+    if (format == session::ExportFormat::video)
       std::printf(" at %.3f a second, %s", c.frame_rate.value(), report.codec.c_str());
     if (c.gaps > 0) std::printf(", %s gaps", std::to_string(c.gaps).c_str());
     if (c.repeated > 0) std::printf(" filled with %s repeated frames", std::to_string(c.repeated).c_str());

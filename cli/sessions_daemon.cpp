@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/sessions_daemon.h"
 
 #include <cstdio>
@@ -34,10 +35,6 @@ Status run(Client& client, SessionJob job, const std::string& session,
 
 }  // namespace
 
-bool is_daemons(const std::string& name) {
-  return name.find('/') == std::string::npos && !name.starts_with('.');
-}
-
 v1::ListSessionsResponse sessions_of_daemon(const DaemonAddress& address) {
   Client client = connect_or_leave(address);
   return or_leave(client, client.list_sessions());
@@ -50,7 +47,7 @@ void job_by_daemon(const DaemonAddress& address, SessionJob job, const std::stri
   v1::JobProgress last;
   or_leave(client, run(client, job, session, [&](const v1::JobProgress& told) {
              last = told;
-             report(progress, told.fraction(), told.doing());
+             tell(progress, told.fraction(), told.doing());
              return true;
            }));
   if (!last.done()) leave(client, {ErrorKind::io, "it was ended before it was done", session});

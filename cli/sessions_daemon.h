@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -7,7 +8,9 @@
 namespace emberlock::cli {
 
 /// Whether a session, or a folder of them, is one of the daemon's: a plain name, or none. "./NAME" is a path.
-bool is_daemons(const std::string& name);
+inline bool is_daemons(const std::string& name) {
+  return name.find('/') == std::string::npos && !name.starts_with('.');
+}
 
 v1::ListSessionsResponse sessions_of_daemon(const DaemonAddress& address);
 

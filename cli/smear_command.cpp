@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -8,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
-#include "session/frame_file.h"
+#include "session/media/frame_file.h"
 #include "smear_sync/detect/detect.h"
 
 namespace emberlock::cli {
@@ -22,7 +23,7 @@ struct SmearArguments {
 /// NaN and infinity have no JSON; rounding to a millionth keeps lines readable.
 double rounded(double v) { return std::isfinite(v) ? std::round(v * 1e6) / 1e6 : 0; }
 
-std::string reading_line(const std::string& file, int frame, const SmearReading& reading) {
+std::string reading_line(const std::string& file, int frame, const smear::SmearReading& reading) {
   nlohmann::ordered_json line;
   line["file"] = file;
   line["frame"] = frame;
@@ -30,7 +31,7 @@ std::string reading_line(const std::string& file, int frame, const SmearReading&
   line["lamp"] = nullptr;
   if (reading.lamp) line["lamp"] = {{"x", rounded(reading.lamp->x)}, {"y", rounded(reading.lamp->y.value())}};
   line["dots"] = nlohmann::ordered_json::array();
-  for (const DotReading& dot : reading.dots) {
+  for (const smear::DotReading& dot : reading.dots) {
     line["dots"].push_back({{"y", rounded(dot.y.value())},
                             {"sigma", rounded(dot.sigma.value())},
                             {"snr", rounded(dot.snr)},
@@ -41,11 +42,11 @@ std::string reading_line(const std::string& file, int frame, const SmearReading&
   return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
-std::string text_line(const std::string& file, int frame, const SmearReading& reading) {
+std::string text_line(const std::string& file, int frame, const smear::SmearReading& reading) {
   std::string line = fmt::format("{} frame {}: {}", file, frame, name(reading.state));
   if (reading.lamp)
     line += fmt::format(", lamp at row {:.2f}, column {:.2f}", reading.lamp->y.value(), reading.lamp->x);
-  for (const DotReading& dot : reading.dots) {
+  for (const smear::DotReading& dot : reading.dots) {
     line += fmt::format(", dot at row {:.2f} +- {:.2f} (SNR {:.0f}, {})", dot.y.value(), dot.sigma.value(),
                         dot.snr, name(dot.side));
   }
@@ -54,14 +55,14 @@ std::string text_line(const std::string& file, int frame, const SmearReading& re
 
 /// Reads all frames of a file; the error that ended it unless that was its end.
 Status read_frames(const std::string& path, bool json) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<FrameFile> file, FrameFile::open(path));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<session::FrameFile> file, session::FrameFile::open(path));
   for (int frame = 0;; ++frame) {
     const Result<Image> image = file->next();
     if (!image.ok()) {
       if (image.error().kind == ErrorKind::out_of_data) return {};
       return image.error();
     }
-    const SmearReading reading = detect(image->view());
+    const smear::SmearReading reading = smear::detect(image->view());
     const std::string line = json ? reading_line(path, frame, reading) : text_line(path, frame, reading);
     std::fprintf(stdout, "%s\n", line.c_str());
     std::fflush(stdout);

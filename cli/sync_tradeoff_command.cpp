@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -5,15 +6,17 @@
 #include <vector>
 
 #include "cli/commands.h"
-#include "cli/sync_tradeoff.h"
-#include "cli/tradeoff_report.h"
+#include "cli/outputs.h"
+#include "evaluate/sync_tradeoff.h"
+#include "report/sync_tradeoff_report.h"
+#include "report/tradeoff_report.h"
 
 namespace emberlock::cli {
 namespace {
 
 /// The command line as typed.
 struct SyncArguments {
-  SyncTradeoffOptions options;
+  evaluate::SyncTradeoffOptions options;
   std::vector<double> tolerances;
   std::vector<std::string> policies;
   double frame_rate = 23.976;
@@ -29,11 +32,11 @@ struct SyncArguments {
   bool json = false;
 };
 
-Result<SyncTradeoffOptions> options_of(const SyncArguments& a) {
-  SyncTradeoffOptions options = a.options;
+Result<evaluate::SyncTradeoffOptions> options_of(const SyncArguments& a) {
+  evaluate::SyncTradeoffOptions options = a.options;
   for (const double rows : a.tolerances) options.tolerances.emplace_back(rows);
   for (const std::string& word : a.policies) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const AlignPolicy policy, parse_align_policy(word));
+    EMBERLOCK_ASSIGN_OR_RETURN(const smear::AlignPolicy policy, smear::parse_align_policy(word));
     options.policies.push_back(policy);
   }
   options.frame_rate = Hertz(a.frame_rate);
@@ -49,12 +52,14 @@ Result<SyncTradeoffOptions> options_of(const SyncArguments& a) {
 }
 
 void tradeoff_sync(const SyncArguments& arguments) {
-  const SyncTradeoffOptions options = or_fail(options_of(arguments));
-  or_fail(check_tradeoff_output(arguments.out));
-  const SyncTradeoff tradeoff = or_fail(measure_sync_tradeoff(options, progress_bar("tradeoff")));
-  or_fail(write_sync_tradeoff(tradeoff, arguments.out));
+  const evaluate::SyncTradeoffOptions options = or_fail(options_of(arguments));
+  const OutputRequest where{arguments.out, kTradeoffSync};
+  or_fail(OutputFolder::check(where));
+  const evaluate::SyncTradeoff tradeoff =
+      or_fail(evaluate::measure_sync_tradeoff(options, progress_bar("tradeoff")));
+  or_fail(report::write_sync_tradeoff(tradeoff, where));
   if (arguments.json) {
-    std::printf("%s\n", sync_tradeoff_json(tradeoff).dump().c_str());
+    std::printf("%s\n", report::sync_tradeoff_json(tradeoff).dump().c_str());
     return;
   }
   std::printf("%s\n%s\nwritten to %s\n", tradeoff.why.c_str(), tradeoff.next_step.c_str(),
@@ -68,7 +73,7 @@ void add_tradeoff_sync(CLI::App& parent) {
   CLI::App* verb = parent.add_subcommand(
       "sync", "Resets and minutes against the cameras' tolerance, and what it does to a rising flame");
   SyncArguments& a = *arguments;
-  SyncTradeoffOptions& o = a.options;
+  evaluate::SyncTradeoffOptions& o = a.options;
   verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html")->required();
   verb->add_option("--cameras", o.cameras, "Cameras of the rig")->capture_default_str();
   verb->add_option("--tolerances", a.tolerances, "Rows to either side: i,j,... [1,2,5,10,20,50,100,200]")

@@ -1,8 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <string>
+#include <string_view>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -11,11 +14,12 @@
 #include "base/clock.h"
 #include "base/file.h"
 #include "cli/commands.h"
+#include "cli/outputs.h"
 #include "cli/scene_options.h"
-#include "cli/tradeoff_report.h"
 #include "recon/pipeline/scene.h"
 #include "recon/pipeline/shipped_front.h"
 #include "recon/pipeline/sweep.h"
+#include "report/tradeoff_report.h"
 
 namespace emberlock::cli {
 namespace {
@@ -60,22 +64,22 @@ std::vector<std::string> split_effects(const std::vector<std::string>& words) {
   return result;
 }
 
-Result<SweepOptions> options_of(const SweepArguments& arguments) {
-  SweepOptions options;
+Result<recon::SweepOptions> options_of(const SweepArguments& arguments) {
+  recon::SweepOptions options;
   options.voxels = arguments.voxels;
   options.views = arguments.views;
   options.iterations = arguments.iterations;
   options.steps = arguments.steps;
   for (const std::string& word : arguments.precisions) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const Precision precision, parse_precision(word));
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Precision precision, recon::parse_precision(word));
     options.precisions.push_back(precision);
   }
   options.effects = split_effects(arguments.effects);
   for (const std::string& word : arguments.solvers) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const Solver solver, parse_solver(word));
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Solver solver, recon::parse_solver(word));
     options.solvers.push_back(solver);
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(options.compute.device, parse_device(arguments.device));
+  EMBERLOCK_ASSIGN_OR_RETURN(options.compute.device, recon::parse_device(arguments.device));
   options.compute.threads = arguments.threads;
   if (arguments.budget) options.budget = Seconds(*arguments.budget);
   return options;
@@ -108,24 +112,37 @@ std::string machine(const SweepArguments& arguments) {
   return fmt::format("{}, {} threads, device {}", model, threads, arguments.device);
 }
 
-void print_summary(const Tradeoff& tradeoff, const std::string& out) {
-  std::printf("%s\n", what_a_second_buys(tradeoff.sweep.points).c_str());
-  for (const WorkPoint& p : pareto_front(tradeoff.sweep.points)) {
-    std::printf("%8.3f s  %6.2f grey levels  %s\n", p.seconds, p.error, command_options(p.settings).c_str());
+void print_summary(const report::Tradeoff& tradeoff, const std::string& out) {
+  std::printf("%s\n", report::what_a_second_buys(tradeoff.sweep.points).c_str());
+  for (const recon::WorkPoint& p : recon::pareto_front(tradeoff.sweep.points)) {
+    std::printf("%8.3f s  %6.2f grey levels  %s\n", p.seconds, p.error,
+                recon::command_options(p.settings).c_str());
   }
   for (const std::string& skipped : tradeoff.sweep.skipped) std::printf("left out  %s\n", skipped.c_str());
   std::printf("written to %s\n", (std::filesystem::path(out) / "index.html").c_str());
 }
 
-void ship(const SweepArguments& arguments, const ComputeOptions& compute) {
+/// Before minutes are measured: what would be replaced is nothing, or a front that was shipped before.
+void check_shipped_file(const std::string& path) {
+  constexpr std::string_view kFirstWords = "// Remade by `emberlock tradeoff recon --ship";
+  std::error_code unknown;
+  if (!std::filesystem::exists(path, unknown) && !unknown) return;
+  const Result<std::string> old = read_file(path);
+  if (old.ok() && old->starts_with(kFirstWords)) return;
+  fail({ErrorKind::bad_input, "is there already and is no shipped front", path,
+        "Name another file, or move it away"});
+}
+
+void ship(const SweepArguments& arguments, const recon::ComputeOptions& compute) {
+  check_shipped_file(arguments.ship);
   SteadyClock clock;
-  const std::string source = or_fail(measure_shipped_source(compute, clock, progress_bar("tradeoff")));
+  const std::string source = or_fail(recon::measure_shipped_source(compute, clock, progress_bar("tradeoff")));
   or_fail(write_file_atomically(arguments.ship, source));
   std::printf("written to %s; build again to ship it\n", arguments.ship.c_str());
 }
 
 void tradeoff_recon(const SweepArguments& arguments) {
-  const SweepOptions options = or_fail(options_of(arguments));
+  const recon::SweepOptions options = or_fail(options_of(arguments));
   if (!arguments.ship.empty()) {
     ship(arguments, options.compute);
     return;
@@ -134,16 +151,17 @@ void tradeoff_recon(const SweepArguments& arguments) {
     fail({ErrorKind::bad_input, "needs an input and a folder for the result", "tradeoff recon",
           "Give a transforms.json or a session, and --out DIR"});
   }
-  SceneOptions scene_options;
+  recon::SceneOptions scene_options;
   scene_options.frame = arguments.frame;
   if (!arguments.box.empty()) scene_options.box = or_fail(parse_box(arguments.box));
-  or_fail(check_tradeoff_output(arguments.out));
-  Scene scene = or_fail(load_scene(arguments.input, scene_options));
-  or_fail(hold_out(scene, arguments.held_out));
+  const OutputRequest where{arguments.out, kTradeoffRecon, recon::files_of(arguments.input)};
+  or_fail(OutputFolder::check(where));
+  recon::Scene scene = or_fail(recon::load_scene(arguments.input, scene_options));
+  or_fail(recon::hold_out(scene, arguments.held_out));
   SteadyClock clock;
-  Tradeoff tradeoff{arguments.input, common_options(arguments), machine(arguments), {}};
-  tradeoff.sweep = or_fail(sweep(scene, options, clock, progress_bar("tradeoff")));
-  or_fail(write_tradeoff(tradeoff, arguments.out));
+  report::Tradeoff tradeoff{arguments.input, common_options(arguments), machine(arguments), {}};
+  tradeoff.sweep = or_fail(recon::sweep(scene, options, clock, progress_bar("tradeoff")));
+  or_fail(report::write_tradeoff(tradeoff, where));
   print_summary(tradeoff, arguments.out);
 }
 

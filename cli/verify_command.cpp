@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -9,7 +10,9 @@
 
 #include "cli/clip_arguments.h"
 #include "cli/commands.h"
-#include "cli/verify_run.h"
+#include "cli/outputs.h"
+#include "films/verify_run.h"
+#include "report/verify_report.h"
 
 namespace emberlock::cli {
 namespace {
@@ -22,19 +25,19 @@ struct VerifyArguments {
   std::string out;
 };
 
-VerifyRunOptions options_from(const VerifyArguments& a) {
-  VerifyRunOptions options;
+films::VerifyRunOptions options_from(const VerifyArguments& a) {
+  films::VerifyRunOptions options;
   options.clips = a.clips;
   options.comb = a.clip.comb;
   options.comb_rate = Hertz(a.clip.comb_rate);
   options.row_time = row_time_of(a.clip);
-  options.verify.tolerance = or_fail(parse_tolerance(a.tolerance));
+  options.verify.tolerance = or_fail(smear::parse_tolerance(a.tolerance));
   options.verify.clip = clip_options_of(a.clip);
   return options;
 }
 
-void print_table(const VerifyRunResult& run) {
-  const VerifyResult& result = run.result;
+void print_table(const films::VerifyRunResult& run) {
+  const smear::VerifyResult& result = run.result;
   const SecondsPerRow row = result.options.clip.row_time;
   std::printf("%s\n", result.summary.c_str());
   std::printf("reference %s, frame %lld; t_row %.4f us", result.cameras[result.reference].name.c_str(),
@@ -45,7 +48,7 @@ void print_table(const VerifyRunResult& run) {
                 (*result.worst_pair / row).value());
   }
   std::printf("\n");
-  for (const CameraVerdict& c : result.cameras) {
+  for (const smear::CameraVerdict& c : result.cameras) {
     std::printf("  %-24s %-17s", c.name.c_str(), std::string(name(c.state)).c_str());
     if (c.error) {
       std::printf(" %+8.3f ms +- %.3f", in_milliseconds(*c.error), in_milliseconds(c.sigma));
@@ -53,25 +56,38 @@ void print_table(const VerifyRunResult& run) {
     if (c.frame_offset) std::printf("  frame %+lld", static_cast<long long>(*c.frame_offset));
     if (c.drift) std::printf("  %+.2f ppm", c.drift->value());
     std::printf("\n    %s\n", c.reason.c_str());
+    if (&c != &result.cameras[result.reference])
+      std::printf("    frames %s: %s\n",
+                  c.frame_offset ? std::string(name(c.offset_by)).c_str() : "not matched",
+                  c.offset_reason.c_str());
   }
   for (const std::string& line : result.to_do) std::printf("- %s\n", line.c_str());
 }
 
 /// What the JSON has no room for.
-void print_notes(const VerifyRunResult& run) {
+void print_notes(const films::VerifyRunResult& run) {
   for (const std::string& note : run.notes) std::fprintf(stderr, "emberlock: %s\n", note.c_str());
-  for (const CameraVerdict& c : run.result.cameras) {
-    if (c.state != ClipState::in_sync)
+  for (const smear::CameraVerdict& c : run.result.cameras) {
+    if (c.state != smear::ClipState::in_sync)
       std::fprintf(stderr, "emberlock: %s: %s\n", c.file.c_str(), c.reason.c_str());
     if (!c.frame_offset)
       std::fprintf(stderr, "emberlock: %s: no frame offset: %s\n", c.file.c_str(), c.offset_reason.c_str());
   }
 }
 
+/// Where the report goes, and what was read for it.
+OutputRequest where_to(const VerifyArguments& a) {
+  OutputRequest where{a.out, kVerify, {a.clips.begin(), a.clips.end()}};
+  if (!a.clip.comb.empty()) where.inputs.emplace_back(a.clip.comb);
+  return where;
+}
+
 void verify(const VerifyArguments& arguments) {
-  const VerifyRunResult run = or_fail(run_verify(options_from(arguments), progress_bar("verify")));
+  if (!arguments.out.empty()) or_fail(OutputFolder::check(where_to(arguments)));
+  const films::VerifyRunResult run =
+      or_fail(films::run_verify(options_from(arguments), progress_bar("verify")));
   if (arguments.json) {
-    std::printf("%s\n", verify_json(run.result)
+    std::printf("%s\n", films::verify_json(run.result)
                             .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
                             .c_str());
     print_notes(run);
@@ -80,11 +96,11 @@ void verify(const VerifyArguments& arguments) {
     for (const std::string& note : run.notes) std::printf("- %s\n", note.c_str());
   }
   if (!arguments.out.empty()) {
-    or_fail(write_verify_report(run, arguments.out));
+    or_fail(report::write_verify_report(run, where_to(arguments)));
     std::fprintf(stderr, "emberlock: the report is %s\n",
                  (std::filesystem::path(arguments.out) / "report.html").c_str());
   }
-  if (run.result.verdict != ClipsVerdict::in_sync) throw CLI::RuntimeError(1);
+  if (run.result.verdict != smear::ClipsVerdict::in_sync) throw CLI::RuntimeError(1);
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -6,7 +7,7 @@
 #include "daemon/board.h"
 #include "emberlock/v1/services.pb.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// Takes how far a job is; false ends it early.
 using JobObserver = std::function<bool(const v1::JobProgress&)>;
@@ -30,7 +31,7 @@ class Api {
   virtual Result<v1::RecordingStatus> stop_recording() = 0;
   virtual Result<v1::ListSessionsResponse> list_sessions() = 0;
   virtual Result<v1::Manifest> session(const v1::SessionRequest& request) = 0;
-  // The last progress told has `done`; what they return is only why none could begin.
+  // The last progress told has `done`; what they return is why none could begin, or why it failed on the way.
   virtual Status verify_session(const v1::SessionRequest& request, const JobObserver& observer) = 0;
   virtual Status repair_session(const v1::SessionRequest& request, const JobObserver& observer) = 0;
   virtual Status export_session(const v1::ExportRequest& request, const JobObserver& observer) = 0;
@@ -38,4 +39,4 @@ class Api {
   virtual Result<v1::ReconstructionStatus> cancel_reconstruction() = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/board.h"
 
 #include <algorithm>
@@ -7,7 +8,7 @@
 
 #include "base/clock.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 bool has_pictures(const v1::IterationPreview& preview) {
@@ -150,4 +151,4 @@ void Board::tell(Topic topic) {
   for (const auto& [key, changed] : subscribers_) changed(topic);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

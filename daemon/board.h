@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -12,7 +13,7 @@
 #include "emberlock/v1/services.pb.h"
 #include "emberlock/v1/status.pb.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// Ends a subscription when it goes. Its function is not running, and won't, once the destructor has
 /// returned.
@@ -84,4 +85,4 @@ class Board {
   std::uint64_t next_subscriber_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

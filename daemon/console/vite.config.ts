@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import {defineConfig} from 'vite';
 
 // Served by emberlockd from share/emberlock/console, or by `npm run dev` in front of one that runs (EMBERLOCK_URL).
@@ -10,5 +11,5 @@ export default defineConfig({
     chunkSizeWarningLimit: 1500,  // kB: vtk.js, read only when there is a volume to show
     modulePreload: {polyfill: false},
   },
-  server: {proxy: {'/api': {target: process.env.EMBERLOCK_URL ?? 'http://127.0.0.1:8741', ws: true}}},
+  server: {proxy: Object.fromEntries(['/api', '/open'].map(path => [path, {target: process.env.EMBERLOCK_URL ?? 'http://127.0.0.1:8741', ws: true}]))},
 });

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/engine/conductor.h"
 
 #include <utility>
@@ -6,26 +7,28 @@
 #include "base/log.h"
 #include "drivers/replay/record.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 constexpr Seconds kStrobeInterval{1};
 
-v1::CameraStatus::State shown(CameraThread::State state) {
+v1::CameraStatus::State shown(drivers::CameraThread::State state) {
   switch (state) {
-    case CameraThread::State::idle:
+    case drivers::CameraThread::State::idle:
       return v1::CameraStatus::STOPPED;
-    case CameraThread::State::filming:
+    case drivers::CameraThread::State::filming:
       return v1::CameraStatus::FILMING;
-    case CameraThread::State::lost:
+    case drivers::CameraThread::State::lost:
       return v1::CameraStatus::LOST;
-    case CameraThread::State::quarantined:
+    case drivers::CameraThread::State::quarantined:
       return v1::CameraStatus::QUARANTINED;
+    case drivers::CameraThread::State::ended:
+      return v1::CameraStatus::ENDED;
   }
   return v1::CameraStatus::STATE_UNSPECIFIED;
 }
 
-std::vector<std::string> ids_of(Rig& rig) {
+std::vector<std::string> ids_of(rig::Rig& rig) {
   std::vector<std::string> ids;
   for (std::size_t i = 0; i < rig.size(); ++i) ids.push_back(rig.camera(i).info().id);
   return ids;
@@ -33,13 +36,16 @@ std::vector<std::string> ids_of(Rig& rig) {
 
 }  // namespace
 
-Conductor::Conductor(const ConductorParts& parts, StopAsked stop)
+Conductor::Conductor(const ConductorParts& parts, rig::StopAsked stop, const rig::StopAsked& ending)
     : parts_(parts),
       devices_(parts.rig.devices()),
       stop_(std::move(stop)),
       watch_(ids_of(parts.rig)),
+      ended_(parts.rig.size(), false),
+      trouble_told_(parts.rig.size(), false),
       began_(parts.rig.clock().now()) {
-  for (Camera* camera : devices_.cameras) {
+  for (drivers::Camera* camera : devices_.cameras) {
+    if (ending && ending()) return;
     if (const Status started = camera->start(); !started.ok())
       parts_.board.notice(v1::AMBER, started.error().message());
   }
@@ -47,12 +53,14 @@ Conductor::Conductor(const ConductorParts& parts, StopAsked stop)
 }
 
 Conductor::~Conductor() {
-  if (recorder_) finish_recording();
-  for (Camera* camera : devices_.cameras) camera->stop();
+  end();
+  while (!is_done()) work();
+  for (drivers::Camera* camera : devices_.cameras) camera->stop();
 }
 
 Status Conductor::reconstruct(const v1::ReconstructRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(parts_.store.path_of(request.session()));
+  EMBERLOCK_RETURN_IF_ERROR(check_not_salvaged(parts_.work, request.session()));
   reconstruct_request_ = request;
   return happen(AskReconstruct{request.session()});
 }
@@ -64,30 +72,31 @@ Status Conductor::acknowledge(const v1::AcknowledgeRequest& request) {
 }
 
 Result<v1::StrobeState> Conductor::strobe() {
-  Strobe* strobe = devices_.strobe;
+  drivers::Strobe* strobe = devices_.strobe;
   if (strobe == nullptr)
     return Error{ErrorKind::refused, "the rig has no strobe", "[rig.strobe]", "Configure one"};
-  const Result<StrobeSettings> said = strobe->read_back();
+  const Result<drivers::StrobeSettings> said = strobe->read_back();
   strobe_status_ = said.ok() ? Status{} : Status(said.error());
   for (const Happening& happening : watch_.strobe(strobe->id(), strobe_status_))
     static_cast<void>(happen(happening));
   if (!said.ok()) return said.error();
   strobe_settings_ = *said;
-  return strobe_event(parts_.rig.clock().now(), *said).strobe();
+  return drivers::strobe_event(parts_.rig.clock().now(), *said).strobe();
 }
 
 Result<v1::StrobeState> Conductor::apply_strobe(const v1::StrobeState& wanted) {
   if (state_.phase != v1::IDLE && state_.phase != v1::CAPTURING) {
     return Error{ErrorKind::refused, "the alignment has the strobe", "strobe", "Stop the alignment first"};
   }
-  Strobe* strobe = devices_.strobe;
+  drivers::Strobe* strobe = devices_.strobe;
   if (strobe == nullptr)
     return Error{ErrorKind::refused, "the rig has no strobe", "[rig.strobe]", "Configure one"};
-  EMBERLOCK_ASSIGN_OR_RETURN(const StrobeSettings settings, strobe_settings(wanted));
+  EMBERLOCK_ASSIGN_OR_RETURN(const drivers::StrobeSettings settings, drivers::strobe_settings(wanted));
   EMBERLOCK_RETURN_IF_ERROR(strobe->apply(settings));
   EMBERLOCK_ASSIGN_OR_RETURN(const v1::StrobeState state, this->strobe());
   if (recorder_)
-    EMBERLOCK_RETURN_IF_ERROR(recorder_->append(strobe_event(parts_.rig.clock().now(), strobe_settings_)));
+    EMBERLOCK_RETURN_IF_ERROR(
+        recorder_->append(drivers::strobe_event(parts_.rig.clock().now(), strobe_settings_)));
   return state;
 }
 
@@ -128,7 +137,12 @@ void Conductor::begin_reconstruction() {
     reconstruct_request_.Clear();
     reconstruct_request_.set_session(state_.reconstructing);
   }
-  const auto started = parts_.reconstruction.start(reconstruct_request_);
+  // A recording that is handed on may be in salvage, as it couldn't be finished.
+  Status started = check_not_salvaged(parts_.work, reconstruct_request_.session());
+  if (started.ok()) {
+    const auto begun = parts_.reconstruction.start(reconstruct_request_);
+    if (!begun.ok()) started = begun.error();
+  }
   if (!started.ok())
     static_cast<void>(happen(ReconstructionEnded{false, started.error().what, started.error().remedy}));
 }
@@ -148,8 +162,7 @@ void Conductor::work() {
       return capture();
     case v1::FINISHING:
       drain();
-      if (all_have_come()) finish_recording();
-      return;
+      return finish_recording();
     default:
       if (real_time()) drain();
   }
@@ -157,7 +170,7 @@ void Conductor::work() {
 
 bool Conductor::waits() const {
   if (state_.phase == v1::ALIGNING || (state_.phase == v1::CALIBRATING && alignment_)) return false;
-  return real_time() || state_.phase == v1::IDLE;
+  return real_time() || state_.phase == v1::IDLE || finished_.valid();
 }
 
 void Conductor::heed_devices() {
@@ -202,10 +215,10 @@ std::vector<v1::CameraStatus::State> Conductor::camera_states() const {
   return states;
 }
 
-std::vector<FrameCounts> Conductor::counts() const {
-  std::vector<FrameCounts> counts;
-  for (const Camera* camera : devices_.cameras) counts.push_back(camera->counts());
+std::vector<drivers::FrameCounts> Conductor::counts() const {
+  std::vector<drivers::FrameCounts> counts;
+  for (const drivers::Camera* camera : devices_.cameras) counts.push_back(camera->counts());
   return counts;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

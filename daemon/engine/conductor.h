@@ -1,45 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <future>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "base/result.h"
-#include "daemon/align/alignment.h"
 #include "daemon/board.h"
-#include "daemon/config/config.h"
-#include "daemon/devices/geometry.h"
-#include "daemon/devices/rig.h"
 #include "daemon/engine/device_watch.h"
 #include "daemon/engine/machine.h"
 #include "daemon/engine/recorder.h"
 #include "daemon/reconstruction/child.h"
-#include "daemon/recordings/store.h"
-#include "daemon/recordings/transcoder.h"
+#include "daemon/work/upkeep.h"
+#include "daemon/work/work_queue.h"
+#include "rig/align/alignment.h"
+#include "rig/config/config.h"
+#include "rig/devices/geometry.h"
+#include "rig/devices/rig.h"
+#include "session/salvage.h"
+#include "session/store.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// What a conductor works with; all of it outlives it.
 struct ConductorParts {
-  Rig& rig;
-  const Geometry& geometry;
-  const DaemonConfig& config;
-  SessionStore& store;
+  rig::Rig& rig;
+  const rig::Geometry& geometry;
+  const rig::DaemonConfig& config;
+  session::SessionStore& store;
   ReconstructionChild& reconstruction;
-  Transcoder& transcoder;
+  WorkQueue& work;  ///< stands still while something is recorded
   Board& board;
+  UpkeepTold told = {};  ///< what became of a session in the background
 };
 
 /// Carries out what the machine orders, with the rig's devices: it aligns, holds the lock, records. One
 /// thread; engine.h has one for it, a test on a virtual clock steps it by itself.
 class Conductor {
  public:
-  /// `stop` ends a round of alignment early: somebody asked for something else.
-  explicit Conductor(const ConductorParts& parts, StopAsked stop = {});
+  /// Starts the cameras, each of which may take seconds, unless `ending` says that nobody needs them any
+  /// more. `stop` ends a round of alignment early: somebody asked for something else.
+  explicit Conductor(const ConductorParts& parts, rig::StopAsked stop = {},
+                     const rig::StopAsked& ending = {});
   Conductor(const Conductor&) = delete;
   Conductor& operator=(const Conductor&) = delete;
   ~Conductor();
@@ -55,8 +62,15 @@ class Conductor {
   Result<v1::StrobeState> strobe();
   Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted);
 
-  /// What became of a recording that was compressed in the background.
+  // What became of a session in the background.
   void transcoded(const std::string& session, const Status& outcome);
+  void salvaged(const std::string& session, const Result<session::SalvageReport>& outcome);
+
+  /// It shall end: a recording that runs is finished, for which work() goes on to be called, until is_done().
+  void end();
+  [[nodiscard]] bool is_done() const { return !recorder_; }
+  /// Rises while the recording that is being finished gets on.
+  [[nodiscard]] std::uint64_t finishing_progress() const;
 
   /// One slice of what the phase has to do: a round of filming, or the frames that have come. Returns after
   /// that; idle it has nothing to wait for.
@@ -73,7 +87,9 @@ class Conductor {
   void begin_alignment();
   void end_alignment();
   void begin_recording();
+  void begin_finishing();
   void finish_recording();
+  void conclude_recording(v1::RecordingStatus status);
   void begin_reconstruction();
   void measure_row_time();
   void film_round();
@@ -82,39 +98,46 @@ class Conductor {
   void end_recording();
   [[nodiscard]] bool all_have_come() const;
   void drain();
+  void heed_trouble(std::size_t camera, const Error& error);
+  /// Why no camera films, by camera; empty where one does.
+  [[nodiscard]] std::string nobody_films() const;
+  [[nodiscard]] Seconds longest_silence() const;
   void heed_devices();
   void heed_disk();
   void heed_reconstruction();
   void break_alignment(const std::string& reason);
   /// Why alignment failed: a device that is gone, else itself.
   void explain_failure(const Error& error);
-  [[nodiscard]] std::vector<FrameCounts> counts() const;
+  [[nodiscard]] std::vector<drivers::FrameCounts> counts() const;
   [[nodiscard]] std::vector<v1::CameraStatus::State> camera_states() const;
-  void remember(const AlignRoundReport& round);
+  void remember(const rig::AlignRoundReport& round);
   /// Of the alignment's last round.
   [[nodiscard]] v1::AlignmentStatus::Verdict verdict() const;
   void describe_cameras(v1::DaemonStatus& status) const;
   void describe_alignment(v1::AlignmentStatus& status) const;
 
-  [[nodiscard]] bool real_time() const { return parts_.rig.pace() == Rig::Pace::real_time; }
+  [[nodiscard]] bool real_time() const { return parts_.rig.pace() == rig::Rig::Pace::real_time; }
 
   ConductorParts parts_;
-  AlignRig devices_;
-  StopAsked stop_;
+  rig::AlignRig devices_;
+  rig::StopAsked stop_;
   MachineState state_;
   DeviceWatch watch_;
 
-  AlignRunOptions align_options_;
-  std::unique_ptr<Alignment> alignment_;
+  rig::AlignRunOptions align_options_;
+  std::unique_ptr<rig::Alignment> alignment_;
   TimePoint align_began_;
   std::deque<v1::RoundPoint> history_;
-  std::optional<AlignEffort> foretold_;
+  std::optional<smear::AlignEffort> foretold_;
   bool check_now_ = false;
   bool expired_ = false;  ///< the lock's end has been told
   bool phase_lost_ =
       false;  ///< a camera went away while it was recorded: what is known of its shutter is void
 
   std::unique_ptr<Recorder> recorder_;
+  /// What finishing recorder_ brings, on a thread of its own: a slow disk takes minutes. Gone before
+  /// recorder_.
+  std::future<v1::RecordingStatus> finished_;
   v1::RecordRequest record_request_;
   std::filesystem::path record_folder_;
   std::optional<v1::RecordingStatus> recording_;  ///< the last that ended
@@ -122,9 +145,10 @@ class Conductor {
   TimePoint record_ended_;
   std::optional<Seconds> spread_;  ///< between two cameras when it began, as the lock knew it
   std::optional<TimePoint> last_frame_;
-  std::vector<bool> ended_;  ///< recordings that are replayed have ends
+  std::vector<bool> ended_;         ///< recordings that are replayed have ends
+  std::vector<bool> trouble_told_;  ///< of a camera, since its last frame
   v1::ReconstructRequest reconstruct_request_;
-  StrobeSettings strobe_settings_;
+  drivers::StrobeSettings strobe_settings_;
   Status strobe_status_;  ///< of its last answer
   std::optional<TimePoint> strobe_asked_;
   v1::StorageStatus storage_;
@@ -132,4 +156,4 @@ class Conductor {
   TimePoint began_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

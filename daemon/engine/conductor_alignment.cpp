@@ -1,36 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
 // Aligning the cameras, and holding what was reached.
 #include <cmath>
 #include <limits>
 #include <utility>
 
-#include "daemon/align/record.h"
 #include "daemon/engine/conductor.h"
 #include "drivers/replay/record.h"
+#include "rig/align/record.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 constexpr std::size_t kHistory = 500;
 
-v1::RoundPoint point_of(const AlignRoundReport& report, TimePoint began) {
+v1::RoundPoint point_of(const rig::AlignRoundReport& report, TimePoint began) {
   v1::RoundPoint point;
   point.set_round(static_cast<std::uint32_t>(report.decision.round));
   point.set_at_s((report.round.at - began).value());
   point.set_resets(static_cast<std::uint32_t>(report.decision.resets_so_far));
-  for (const CameraDecision& camera : report.decision.cameras) {
+  for (const smear::CameraDecision& camera : report.decision.cameras) {
     point.add_error_rows(camera.error ? (*camera.error / report.options.row_time).value()
                                       : std::numeric_limits<double>::quiet_NaN());
   }
   return point;
 }
 
-Result<AlignRunOptions> options_of(const v1::AlignRequest& request, const AlignmentConfig& config, Rig& rig) {
-  EMBERLOCK_ASSIGN_OR_RETURN(AlignRunOptions options, rig.align_options(config));
+Result<rig::AlignRunOptions> options_of(const v1::AlignRequest& request, const rig::AlignmentConfig& config,
+                                        rig::Rig& rig) {
+  EMBERLOCK_ASSIGN_OR_RETURN(rig::AlignRunOptions options, rig.align_options(config));
   if (!request.tolerance().empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, parse_tolerance(request.tolerance()));
+    EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, smear::parse_tolerance(request.tolerance()));
   }
   if (!request.policy().empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(options.align.policy, parse_align_policy(request.policy()));
+    EMBERLOCK_ASSIGN_OR_RETURN(options.align.policy, smear::parse_align_policy(request.policy()));
   }
   if (request.anyway()) options.align.limits.reset();
   return options;
@@ -43,7 +45,7 @@ Status Conductor::align(const v1::AlignRequest& request) {
     return Error{ErrorKind::refused, "the rig has no strobe, so nothing tells the shutters' phases",
                  "[rig.strobe]", "Configure one"};
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(AlignRunOptions options,
+  EMBERLOCK_ASSIGN_OR_RETURN(rig::AlignRunOptions options,
                              options_of(request, parts_.config.alignment, parts_.rig));
   std::swap(options, align_options_);
   Status asked = happen(AskAlign{});
@@ -58,8 +60,8 @@ void Conductor::begin_alignment() {
   history_.clear();
   foretold_.reset();
   align_began_ = parts_.rig.clock().now();
-  auto alignment = Alignment::create(
-      devices_, align_options_, [this](const AlignRoundReport& round) { remember(round); }, {}, stop_);
+  auto alignment = rig::Alignment::create(
+      devices_, align_options_, [this](const rig::AlignRoundReport& round) { remember(round); }, {}, stop_);
   if (!alignment.ok()) {
     static_cast<void>(happen(RoundDone{v1::AlignmentStatus::REFUSED, alignment.error().message()}));
     return;
@@ -70,12 +72,14 @@ void Conductor::begin_alignment() {
 void Conductor::end_alignment() {
   if (!alignment_) return;
   if (!parts_.config.alignment.delays.empty()) {
-    const AlignRunResult result = alignment_->result();
-    if (const Status kept = write_delays(parts_.config.alignment.delays, devices_, result.delays); !kept.ok())
+    const rig::AlignRunResult result = alignment_->result();
+    if (const Status kept = rig::write_delays(parts_.config.alignment.delays, devices_, result.delays);
+        !kept.ok())
       parts_.board.notice(v1::AMBER, kept.error().message());
   }
   alignment_.reset();
-  v1::StrobeState off = strobe_event({}, strobe_settings_).strobe();
+  if (devices_.strobe->dial()) return;  // somebody switches it off
+  v1::StrobeState off = drivers::strobe_event({}, strobe_settings_).strobe();
   off.set_output(v1::StrobeState::OFF);
   if (const auto applied = apply_strobe(off); !applied.ok())
     parts_.board.notice(v1::AMBER, applied.error().message());
@@ -102,7 +106,7 @@ void Conductor::film_round() {
     return;
   }
   expired_ = false;
-  const AlignDecision& last = alignment_->last();
+  const smear::AlignDecision& last = alignment_->last();
   static_cast<void>(happen(RoundDone{verdict(), last.reason, last.renews, last.in_time}));
 }
 
@@ -127,7 +131,7 @@ void Conductor::explain_failure(const Error& error) {
   static_cast<void>(happen(RoundDone{v1::AlignmentStatus::GIVEN_UP, error.message()}));
 }
 
-void Conductor::remember(const AlignRoundReport& round) {
+void Conductor::remember(const rig::AlignRoundReport& round) {
   if (round.decision.effort && !foretold_) foretold_ = round.decision.effort;
   history_.push_back(point_of(round, align_began_));
   if (history_.size() > kHistory) history_.pop_front();
@@ -135,16 +139,16 @@ void Conductor::remember(const AlignRoundReport& round) {
 
 v1::AlignmentStatus::Verdict Conductor::verdict() const {
   switch (alignment_->last().verdict) {
-    case AlignVerdict::go_on:
+    case smear::AlignVerdict::go_on:
       return v1::AlignmentStatus::GO_ON;
-    case AlignVerdict::aligned:
+    case smear::AlignVerdict::aligned:
       return v1::AlignmentStatus::ALIGNED;
-    case AlignVerdict::refused:
+    case smear::AlignVerdict::refused:
       return v1::AlignmentStatus::REFUSED;
-    case AlignVerdict::given_up:
+    case smear::AlignVerdict::given_up:
       return v1::AlignmentStatus::GIVEN_UP;
   }
   return v1::AlignmentStatus::VERDICT_UNSPECIFIED;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

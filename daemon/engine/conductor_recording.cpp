@@ -1,5 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // Recording: what the cameras film goes to disk, and the disk is watched.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -8,8 +10,10 @@
 #include "base/clock.h"
 #include "daemon/engine/conductor.h"
 #include "drivers/replay/record.h"
+#include "rig/recording_rate.h"
+#include "session/name.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 /// A recording without a frame from any camera for so long ends.
@@ -18,8 +22,12 @@ constexpr Seconds kLongestWay{3};  // of frames that were filmed before a record
 constexpr Seconds kDiskInterval{1};
 /// With fewer on the disk the operator is told.
 constexpr double kMinutesWanted = 5;
+/// How long one slice of work waits for what is being finished.
+constexpr std::chrono::milliseconds kFinishSlice{4};
 /// Of a camera on a clock of its own, which films only while it is waited for.
 constexpr Seconds kFrameDeadline{3};
+/// A camera so slow that this many of its frames take longer than kNobodyFilms is waited for.
+constexpr double kFramesWaited = 3;
 
 }  // namespace
 
@@ -27,8 +35,13 @@ Status Conductor::record(const v1::RecordRequest& request) {
   if (!std::isfinite(request.seconds()) || request.seconds() < 0) {
     return Error{ErrorKind::bad_input, "is no length of time", "seconds", "Give 0 or more"};
   }
+  EMBERLOCK_RETURN_IF_ERROR(session::check_text("purpose", request.purpose()));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::filesystem::path folder,
                              parts_.store.path_for_new(request.name(), wall_clock()));
+  if (const std::string why = nobody_films(); !why.empty() && state_.phase != v1::CAPTURING)
+    return Error{ErrorKind::refused, "no camera films: " + why, "emberlockd",
+                 "See to the cameras: those that were lost are taken up again by themselves, and restarting "
+                 "emberlockd begins a replay anew"};
   const std::string name = folder.filename().string();
   const MachineStep asked =
       step(state_, AskRecord{name, request.unlocked(), request.reconstruct()}, utc_now());
@@ -52,6 +65,10 @@ void Conductor::begin_recording() {
     // A flash that was under way may show in the two frames that follow.
     if (const Status dark = alignment_->darken(); !dark.ok())
       parts_.board.notice(v1::AMBER, dark.error().message());
+    if (devices_.strobe->dial())
+      parts_.board.notice(v1::AMBER,
+                          "The strobe is set by hand: switch it off while the flame is recorded, or its "
+                          "flashes are too.");
     record_began_ = now + 2 * alignment_->options().period;
   }
   v1::Manifest manifest;
@@ -59,19 +76,20 @@ void Conductor::begin_recording() {
   manifest.set_created_utc(utc_now());
   manifest.set_purpose(record_request_.purpose().empty() ? "flame" : record_request_.purpose());
   parts_.geometry.describe(parts_.rig, manifest);
-  auto recorder = Recorder::begin(record_folder_, manifest,
-                                  {parts_.config.recording.writer, parts_.config.recording.queue}, counts(),
-                                  record_began_);
+  RecorderOptions options{parts_.config.recording.writer, parts_.config.recording.queue};
+  if (!real_time()) options.queue.when_full = session::WhenFull::wait;
+  // Before the disk is asked for anything: it would stand behind what a salvage writes.
+  parts_.work.pause();
+  auto recorder = Recorder::begin(record_folder_, manifest, options, counts(), record_began_);
   if (!recorder.ok()) {
+    parts_.work.resume();
     static_cast<void>(happen(RecordingRefused{recorder.error()}));
     return;
   }
   recorder_ = std::move(*recorder);
-  static_cast<void>(parts_.rig.show(Rig::Scene::flame));
-  parts_.transcoder.pause();
+  static_cast<void>(parts_.rig.show(rig::Rig::Scene::flame));
   last_frame_.reset();
   expired_ = false;
-  ended_.assign(devices_.cameras.size(), false);
   static_cast<void>(happen(RecordingBegun{}));
 }
 
@@ -87,25 +105,47 @@ void Conductor::end_recording() {
 bool Conductor::all_have_come() const {
   if (parts_.rig.clock().now() - record_ended_ > kLongestWay) return true;
   for (std::size_t i = 0; i < devices_.cameras.size(); ++i) {
-    if (parts_.rig.state(i) == CameraThread::State::filming && !ended_[i] && !recorder_->has_all(i))
+    if (parts_.rig.state(i) == drivers::CameraThread::State::filming && !ended_[i] && !recorder_->has_all(i))
       return false;
   }
   return true;
 }
 
+/// On a thread of its own: queues drain to the disk, and segments are flushed.
+void Conductor::begin_finishing() {
+  static_cast<void>(parts_.rig.show(rig::Rig::Scene::strobe));
+  finished_ = std::async(std::launch::async,
+                         [recorder = recorder_.get(), after = counts(), now = parts_.rig.clock().now()] {
+                           return recorder->finish(after, now);
+                         });
+}
+
+/// A slice of it.
 void Conductor::finish_recording() {
-  static_cast<void>(parts_.rig.show(Rig::Scene::strobe));
-  v1::RecordingStatus status = recorder_->finish(counts(), parts_.rig.clock().now());
+  if (!finished_.valid()) {
+    if (all_have_come()) begin_finishing();
+    return;
+  }
+  if (finished_.wait_for(kFinishSlice) == std::future_status::ready) conclude_recording(finished_.get());
+}
+
+void Conductor::conclude_recording(v1::RecordingStatus status) {
   recorder_.reset();
-  if (status.state() == v1::RecordingStatus::FAILED) static_cast<void>(salvage(record_folder_));
+  const bool broken = status.state() == v1::RecordingStatus::FAILED;
+  const bool nothing = !broken && status.frames() == 0 && lost(status.lost()) == 0;
+  if (nothing) {
+    status.set_state(v1::RecordingStatus::FAILED);
+    const std::string why = nobody_films();
+    status.set_verdict("not one frame came from any camera" + (why.empty() ? "" : ": " + why));
+  }
   if (spread_) status.set_spread_s(spread_->value());
-  parts_.transcoder.resume();
-  if (parts_.config.recording.transcode == RecordingConfig::Transcode::when_idle &&
-      is_uncompressed(record_folder_))
-    parts_.transcoder.add(record_folder_);
-  const std::uint64_t lost = status.lost().camera_gap() + status.lost().transport() +
-                             status.lost().underrun() + status.lost().queue() + status.lost().disk();
-  if (lost > 0) {
+  parts_.work.resume();
+  // What an end that failed left behind; the other is compressed.
+  const rig::RecordingConfig::Transcode transcode = parts_.config.recording.transcode;
+  if (broken) salvage_later(record_folder_, parts_.work, transcode, parts_.told);
+  if (!broken && transcode == rig::RecordingConfig::Transcode::when_idle)
+    compress_later(record_folder_, parts_.work, parts_.told);
+  if (lost(status.lost()) > 0) {
     static_cast<void>(happen(
         FaultRaised{{v1::Fault::FRAMES_LOST, status.session()},
                     v1::AMBER,
@@ -114,7 +154,40 @@ void Conductor::finish_recording() {
   }
   recording_ = status;
   static_cast<void>(
-      happen(RecordingFinished{status.state() == v1::RecordingStatus::COMPLETE, status.verdict()}));
+      happen(RecordingFinished{status.state() == v1::RecordingStatus::COMPLETE, status.verdict(), nothing}));
+}
+
+void Conductor::end() {
+  state_.reconstruct_after = false;
+  static_cast<void>(happen(RecordingEnds{"emberlockd is shutting down"}));
+  // What is still on its way isn't waited for.
+  if (recorder_ && !finished_.valid()) begin_finishing();
+}
+
+std::uint64_t Conductor::finishing_progress() const { return recorder_ ? recorder_->progress() : 0; }
+
+void Conductor::salvaged(const std::string& session, const Result<session::SalvageReport>& outcome) {
+  if (!outcome.ok() && outcome.error().kind == ErrorKind::refused)  // by who still records it
+    return parts_.board.notice(v1::AMBER, session + ": " + outcome.error().message());
+  if (!outcome.ok()) {
+    static_cast<void>(happen(FaultRaised{
+        {v1::Fault::SALVAGE_FAILED, session},
+        v1::AMBER,
+        "it wasn't finished, and can't be salvaged: " + outcome.error().message(),
+        outcome.error().remedy.empty() ? "What was written is kept. `emberlock sessions repair` tries again"
+                                       : outcome.error().remedy}));
+    return;
+  }
+  std::uint64_t kept = 0;
+  std::uint64_t gone = 0;
+  for (const session::SalvagedCamera& camera : outcome->cameras) {
+    kept += camera.kept;
+    gone += camera.lost;
+  }
+  parts_.board.notice(
+      v1::AMBER, fmt::format("{} was not finished: salvaged, what reached the disk is kept: {} frames of {} "
+                             "cameras; {} that the index has didn't reach it",
+                             session, kept, outcome->cameras.size(), gone));
 }
 
 void Conductor::transcoded(const std::string& session, const Status& outcome) {
@@ -140,8 +213,11 @@ void Conductor::capture() {
     static_cast<void>(happen(RecordingEnds{fmt::format("{:g} s are over", seconds)}));
   } else if (std::all_of(ended_.begin(), ended_.end(), [](bool ended) { return ended; })) {
     static_cast<void>(happen(RecordingEnds{"the recording that is replayed has ended"}));
-  } else if (watch_.none_films() && now - last_frame_.value_or(record_began_) > kNobodyFilms) {
-    static_cast<void>(happen(RecordingEnds{"no camera has filmed for a while"}));
+  } else if (now - last_frame_.value_or(record_began_) > longest_silence()) {
+    const std::string why = nobody_films();
+    static_cast<void>(
+        happen(RecordingEnds{fmt::format("no frame has come from any camera for {:.0f} s{}{}",
+                                         longest_silence().value(), why.empty() ? "" : ": ", why)}));
   }
   if (alignment_ && !expired_ && state_.phase == v1::CAPTURING && alignment_->time_left(now) <= Seconds(0)) {
     expired_ = true;
@@ -150,33 +226,79 @@ void Conductor::capture() {
   }
 }
 
+/// Of all cameras together, after which a recording ends.
+Seconds Conductor::longest_silence() const {
+  Seconds silence = kNobodyFilms;
+  for (const drivers::Camera* camera : devices_.cameras)
+    if (const double rate = camera->info().frame_rate.value(); rate > 0)
+      silence = std::max(silence, Seconds(kFramesWaited / rate));
+  return silence;
+}
+
 /// Takes the frames that are there; of cameras that film only while they are waited for, the next of each.
 void Conductor::drain() {
   const bool by_itself = real_time();
+  const bool recorded = recorder_ && !finished_.valid();
   const auto& cameras = devices_.cameras;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    for (;;) {
-      if (i < ended_.size() && ended_[i]) break;
+    while (!ended_[i]) {
       Result<Frame> frame = cameras[i]->next_frame(by_itself ? Seconds(0) : kFrameDeadline);
       if (!frame.ok()) {
-        if (frame.error().kind == ErrorKind::out_of_data && i < ended_.size()) ended_[i] = true;
-        if (frame.error().kind == ErrorKind::device) parts_.board.notice(v1::AMBER, frame.error().message());
+        heed_trouble(i, frame.error());
         break;
       }
-      last_frame_ = frame->stamp.monotonic_time;
-      if (recorder_) recorder_->take(i, std::move(*frame));
+      trouble_told_[i] = false;
+      last_frame_ = std::max(last_frame_.value_or(frame->stamp.monotonic_time), frame->stamp.monotonic_time);
+      if (recorded) recorder_->take(i, std::move(*frame));
       if (!by_itself) break;
     }
   }
+}
+
+/// A camera that hangs says so each time that it is asked, many times a second: it is told once.
+void Conductor::heed_trouble(std::size_t camera, const Error& error) {
+  if (error.kind == ErrorKind::timed_out) return;
+  if (error.kind == ErrorKind::out_of_data) {
+    ended_[camera] = true;
+    return;
+  }
+  if (trouble_told_[camera]) return;
+  trouble_told_[camera] = true;
+  parts_.board.notice(v1::AMBER, error.message());
+}
+
+std::string Conductor::nobody_films() const {
+  std::string why;
+  for (std::size_t i = 0; i < parts_.rig.size(); ++i) {
+    const char* words = "was stopped";
+    switch (parts_.rig.state(i)) {
+      case drivers::CameraThread::State::filming:
+        return {};
+      case drivers::CameraThread::State::lost:
+        words = "went away";
+        break;
+      case drivers::CameraThread::State::quarantined:
+        words = "doesn't answer";
+        break;
+      case drivers::CameraThread::State::ended:
+        words = "has replayed its recording to the end";
+        break;
+      case drivers::CameraThread::State::idle:
+        break;
+    }
+    why += fmt::format("{}{} {}", why.empty() ? "" : ", ", devices_.cameras[i]->info().id, words);
+  }
+  return why;
 }
 
 void Conductor::heed_disk() {
   const TimePoint now = SteadyClock().now();
   if (disk_looked_ && now - *disk_looked_ < kDiskInterval) return;
   disk_looked_ = now;
-  std::vector<CameraInfo> infos;
-  for (const Camera* camera : devices_.cameras) infos.push_back(camera->info());
-  const auto storage = parts_.store.storage(bytes_per_second(infos, parts_.config.recording.writer.encoding));
+  std::vector<drivers::CameraInfo> infos;
+  for (const drivers::Camera* camera : devices_.cameras) infos.push_back(camera->info());
+  const auto storage =
+      parts_.store.storage(rig::bytes_per_second(infos, parts_.config.recording.writer.encoding));
   if (!storage.ok()) {
     static_cast<void>(happen(
         FaultRaised{{v1::Fault::DISK_LOW}, v1::RED, storage.error().message(), storage.error().remedy}));
@@ -194,4 +316,4 @@ void Conductor::heed_disk() {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/engine/device_watch.h"
 
 #include <algorithm>
@@ -6,7 +7,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using State = v1::CameraStatus;
@@ -44,9 +45,10 @@ std::vector<Happening> DeviceWatch::cameras(const std::vector<v1::CameraStatus::
     if (states[i] == states_[i]) continue;
     if (gone(states_[i])) happenings.push_back(mended(states_[i], ids_[i]));
     if (gone(states[i])) happenings.push_back(raised(states[i], ids_[i]));
+    if (states[i] == State::ENDED) happenings.emplace_back(CameraEnded{ids_[i]});
   }
   states_ = states;
-  const bool all_lost = none_films();
+  const bool all_lost = !states_.empty() && std::all_of(states_.begin(), states_.end(), gone);
   if (all_lost != all_lost_) {
     const FaultKey key{v1::Fault::ALL_CAMERAS_LOST};
     if (all_lost) {
@@ -87,7 +89,7 @@ std::vector<Happening> DeviceWatch::clocks(TimePoint monotonic, TimePoint wall) 
       "on"}};
 }
 
-void DeviceWatch::frames(const std::vector<FrameCounts>& counts, TimePoint now) {
+void DeviceWatch::frames(const std::vector<drivers::FrameCounts>& counts, TimePoint now) {
   const Seconds span = counted_ ? now - *counted_ : kRateSpan;
   if (span < kRateSpan) return;
   for (std::size_t i = 0; i < counts.size(); ++i) {
@@ -99,8 +101,5 @@ void DeviceWatch::frames(const std::vector<FrameCounts>& counts, TimePoint now) 
 }
 
 bool DeviceWatch::all_film() const { return std::none_of(states_.begin(), states_.end(), gone); }
-bool DeviceWatch::none_films() const {
-  return !states_.empty() && std::all_of(states_.begin(), states_.end(), gone);
-}
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

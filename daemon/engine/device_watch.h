@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -9,7 +10,7 @@
 #include "daemon/engine/machine.h"
 #include "drivers/camera.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// Turns what devices say of themselves into happenings, each told once. Pure but for what it remembers.
 class DeviceWatch {
@@ -24,10 +25,9 @@ class DeviceWatch {
   std::vector<Happening> cameras(const std::vector<v1::CameraStatus::State>& states);
   std::vector<Happening> strobe(const std::string& id, const Status& answer);
   std::vector<Happening> clocks(TimePoint monotonic, TimePoint wall);
-  void frames(const std::vector<FrameCounts>& counts, TimePoint now);
+  void frames(const std::vector<drivers::FrameCounts>& counts, TimePoint now);
 
   [[nodiscard]] bool all_film() const;
-  [[nodiscard]] bool none_films() const;
   /// Frames a second that the camera made lately; 0 while that isn't known.
   [[nodiscard]] double rate(std::size_t camera) const { return rates_[camera]; }
 
@@ -42,4 +42,4 @@ class DeviceWatch {
   std::optional<TimePoint> counted_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/engine/engine.h"
 
 #include <chrono>
@@ -7,13 +8,13 @@
 
 #include "base/clock.h"
 #include "base/priority.h"
-#include "daemon/devices/device_list.h"
-#include "daemon/recordings/json.h"
+#include "rig/devices/device_list.h"
 #include "session/export.h"
 #include "session/files.h"
+#include "session/job_json.h"
 #include "session/verify.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 constexpr auto kPause = std::chrono::milliseconds(4);     ///< between two looks for frames
@@ -21,9 +22,9 @@ constexpr Seconds kShown{0.1};                            ///< between two statu
 constexpr Seconds kLongestSilence{10};                    ///< of the thread or of a camera that says it films
 constexpr auto kLongestFinish = std::chrono::minutes(5);  ///< of queues that drain to a slow disk
 
-ReconstructionOptions reconstruction_options(const DaemonConfig& config) {
+ReconstructionOptions reconstruction_options(const rig::DaemonConfig& config) {
   ReconstructionOptions options;
-  const ReconstructionConfig& wanted = config.reconstruction;
+  const rig::ReconstructionConfig& wanted = config.reconstruction;
   options.unasked.set_device(wanted.device);
   if (wanted.budget) options.unasked.set_budget_s(wanted.budget->value());
   if (wanted.voxels) options.unasked.set_voxels(static_cast<std::uint32_t>(*wanted.voxels));
@@ -55,77 +56,87 @@ Status run_job(const JobObserver& observer, const Job& job, const Good& good) {
   last.set_fraction(1);
   last.set_done(true);
   last.set_ok(good(*outcome));
-  last.set_report(to_line(to_json(*outcome)));
+  last.set_report(session::to_line(to_json(*outcome)));
   observer(last);
   return {};
 }
 
 }  // namespace
 
-Result<std::unique_ptr<Engine>> Engine::start(const DaemonConfig& config, Board& board, OnFrame on_frame,
-                                              RigOptions rig_options) {
-  EMBERLOCK_ASSIGN_OR_RETURN(SessionStore store,
-                             SessionStore::open(config.recording.folder,
-                                                {.min_free_bytes = config.recording.writer.min_free_bytes}));
-  for (const Salvaged& salvaged : store.salvage_all()) {
-    const bool ok = salvaged.outcome.ok();
-    board.notice(v1::AMBER, fmt::format("{} was not finished: {}", salvaged.session,
-                                        ok ? "salvaged, what reached the disk is kept"
-                                           : salvaged.outcome.error().message()));
-  }
+Result<std::unique_ptr<Engine>> Engine::start(const rig::DaemonConfig& config, Board& board, OnFrame on_frame,
+                                              rig::RigOptions rig_options) {
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      session::SessionStore store,
+      session::SessionStore::open(config.recording.folder,
+                                  {.min_free_bytes = config.recording.writer.min_free_bytes}));
   const auto ids = std::make_shared<std::vector<std::string>>();  // complete before the first frame
   if (on_frame) {
     rig_options.on_frame = [ids, show = std::move(on_frame)](std::size_t camera, const Frame& frame) {
       show((*ids)[camera], frame);
     };
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(std::unique_ptr<Rig> rig, Rig::open(config.rig, std::move(rig_options)));
+  EMBERLOCK_ASSIGN_OR_RETURN(std::unique_ptr<rig::Rig> rig,
+                             rig::Rig::open(config.rig, std::move(rig_options)));
   for (std::size_t i = 0; i < rig->size(); ++i) ids->push_back(rig->camera(i).info().id);
-  EMBERLOCK_ASSIGN_OR_RETURN(Geometry geometry, Geometry::of(config.rig, *rig));
+  EMBERLOCK_ASSIGN_OR_RETURN(rig::Geometry geometry, rig::Geometry::of(config.rig, *rig));
   std::unique_ptr<Engine> engine(
       new Engine(config, board, std::move(store), std::move(rig), std::move(geometry)));
-  engine->take_up_compression();
+  engine->take_up_work();
   return engine;
 }
 
-Engine::Engine(const DaemonConfig& config, Board& board, SessionStore store, std::unique_ptr<Rig> rig,
-               Geometry geometry)
+Engine::Engine(const rig::DaemonConfig& config, Board& board, session::SessionStore store,
+               std::unique_ptr<rig::Rig> rig, rig::Geometry geometry)
     : config_(config),
       board_(board),
       store_(std::move(store)),
       rig_(std::move(rig)),
       geometry_(std::move(geometry)),
       reconstruction_(reconstruction_options(config), board),
-      transcoder_([this](const std::string& session, const Status& outcome) {
-        post([session, outcome](Conductor& c) { c.transcoded(session, outcome); });
-      }),
       thread_([this] { run(); }) {}
 
-/// What an earlier daemon left uncompressed, or salvage just made whole.
-void Engine::take_up_compression() {
-  if (config_.recording.transcode != RecordingConfig::Transcode::when_idle) return;
-  const v1::ListSessionsResponse all = store_.list();
-  for (const auto& entry : all.sessions()) {
-    const auto folder = store_.path_of(entry.session());
-    if (entry.state() != v1::Manifest::RECORDING && folder.ok() && is_uncompressed(*folder))
-      transcoder_.add(*folder);
-  }
+void Engine::take_up_work() { take_up(store_, work_, config_.recording.transcode, told()); }
+
+UpkeepTold Engine::told() {
+  UpkeepTold told;
+  told.salvaged = [this](const std::string& session, const Result<session::SalvageReport>& outcome) {
+    post([session, outcome](Conductor& c) { c.salvaged(session, outcome); });
+  };
+  told.compressed = [this](const std::string& session, const Status& outcome) {
+    post([session, outcome](Conductor& c) { c.transcoded(session, outcome); });
+  };
+  return told;
 }
 
 Engine::~Engine() {
+  end();
+  thread_.join();
+}
+
+void Engine::end() {
   ending_ = true;
   asked_.notify_all();
-  thread_.join();
+}
+
+bool Engine::ended(Seconds wait) {
+  std::unique_lock lock(mutex_);
+  return shown_.wait_for(lock, std::chrono::duration<double>(wait.value()), [this] { return over_; });
 }
 
 void Engine::run() {
   const auto went_round = [this] { went_round_ns_ = SteadyClock().now().ns; };
-  Conductor conductor({*rig_, geometry_, config_, store_, reconstruction_, transcoder_, board_},
-                      [this, went_round] {
-                        went_round();
-                        return urgent_ > 0 || ending_;
-                      });
-  if (config_.alignment.at_start == AlignmentConfig::AtStart::align) {
+  went_round();  // cameras that hang take seconds each to start
+  Conductor conductor(
+      {*rig_, geometry_, config_, store_, reconstruction_, work_, board_, told()},
+      [this, went_round] {
+        went_round();
+        return urgent_ > 0 || ending_;
+      },
+      [this, went_round] {
+        went_round();
+        return ending_.load();
+      });
+  if (config_.alignment.at_start == rig::AlignmentConfig::AtStart::align) {
     if (const Status asked = conductor.align({}); !asked.ok())
       board_.notice(v1::AMBER, asked.error().message());
   }
@@ -140,13 +151,32 @@ void Engine::run() {
     for (const auto& call : calls) call(conductor);
     conductor.work();
     went_round();
-    const TimePoint now = SteadyClock().now();
-    if (calls.empty() && now - shown < kShown) continue;
-    shown = now;
+    if (calls.empty() && SteadyClock().now() - shown < kShown) continue;
+    shown = SteadyClock().now();
     show(conductor);
   }
+  refuse_calls();
+  conductor.end();
+  while (!conductor.is_done()) {
+    conductor.work();
+    went_round();
+    finishing_ = conductor.finishing_progress();
+    if (SteadyClock().now() - shown < kShown) continue;
+    shown = SteadyClock().now();
+    show(conductor);
+  }
+  show(conductor);
   const std::lock_guard lock(mutex_);
-  calls_.clear();  // their promises break: whoever waits is told
+  over_ = true;
+  shown_.notify_all();
+}
+
+/// Their promises break: whoever waits is told.
+void Engine::refuse_calls() {
+  std::deque<std::function<void(Conductor&)>> calls;
+  const std::lock_guard lock(mutex_);
+  refuses_ = true;
+  calls.swap(calls_);
 }
 
 void Engine::show(const Conductor& conductor) {
@@ -157,6 +187,7 @@ void Engine::show(const Conductor& conductor) {
 void Engine::post(std::function<void(Conductor&)> call) {
   {
     const std::lock_guard lock(mutex_);
+    if (refuses_) return;
     calls_.push_back(std::move(call));
   }
   asked_.notify_all();
@@ -184,13 +215,13 @@ Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call
 bool Engine::alive() const {
   const TimePoint now = SteadyClock().now();
   if (now - TimePoint{went_round_ns_.load()} > kLongestSilence) return false;
-  if (rig_->pace() != Rig::Pace::real_time) return true;
+  if (rig_->pace() != rig::Rig::Pace::real_time) return true;
   const std::lock_guard lock(progress_mutex_);
   progress_.resize(rig_->size());
   bool all = true;
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const std::uint64_t frames = rig_->counts(i).made();
-    if (rig_->state(i) != CameraThread::State::filming || frames != progress_[i].frames ||
+    if (rig_->state(i) != drivers::CameraThread::State::filming || frames != progress_[i].frames ||
         progress_[i].at == TimePoint{})
       progress_[i] = {frames, now};
     all &= now - progress_[i].at <= kLongestSilence;
@@ -204,7 +235,7 @@ Status Engine::acknowledge(const v1::AcknowledgeRequest& request) {
 
 Result<v1::ListDevicesResponse> Engine::list_devices() {
   v1::ListDevicesResponse response;
-  response.set_json(device_json(emberlock::list_devices()));
+  response.set_json(rig::device_json(rig::list_devices()));
   return response;
 }
 
@@ -239,7 +270,7 @@ Result<v1::RecordingStatus> Engine::stop_recording() {
   std::unique_lock lock(mutex_);
   const auto finished = [this] {
     const v1::Phase phase = board_.status()->phase();
-    return ending_ || (phase != v1::CAPTURING && phase != v1::FINISHING);
+    return over_ || (phase != v1::CAPTURING && phase != v1::FINISHING);
   };
   if (!shown_.wait_for(lock, kLongestFinish, finished)) {
     return Error{ErrorKind::timed_out, "its queues still drain to the disk", "the recording",
@@ -252,35 +283,40 @@ Result<v1::ListSessionsResponse> Engine::list_sessions() { return store_.list();
 
 Result<v1::Manifest> Engine::session(const v1::SessionRequest& request) {
   EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, store_.path_of(request.session()));
-  return read_manifest(folder);
+  return session::read_manifest(folder);
+}
+
+Result<std::filesystem::path> Engine::path_of(const std::string& session) const {
+  EMBERLOCK_RETURN_IF_ERROR(check_not_salvaged(work_, session));
+  return store_.path_of(session);
 }
 
 Status Engine::verify_session(const v1::SessionRequest& request, const JobObserver& observer) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, store_.path_of(request.session()));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, path_of(request.session()));
   return run_job(
-      observer, [&](const Observer& seen) { return emberlock::verify_session(folder, seen); },
-      [](const SessionCheck& check) { return check.whole(); });
+      observer, [&](const Observer& seen) { return session::verify_session(folder, seen); },
+      [](const session::SessionCheck& check) { return check.whole(); });
 }
 
 Status Engine::repair_session(const v1::SessionRequest& request, const JobObserver& observer) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, store_.path_of(request.session()));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, path_of(request.session()));
   return run_job(
-      observer, [&](const Observer& seen) { return emberlock::repair_session(folder, seen); },
-      [](const RepairReport& /*report*/) { return true; });
+      observer, [&](const Observer& seen) { return session::repair_session(folder, seen); },
+      [](const session::RepairReport& /*report*/) { return true; });
 }
 
 Status Engine::export_session(const v1::ExportRequest& request, const JobObserver& observer) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, store_.path_of(request.session()));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, path_of(request.session()));
   const bool video = request.format() == v1::ExportRequest::VIDEO;
-  const auto target =
-      config_.recording.folder.parent_path() / "exports" / request.session() / (video ? "video" : "png");
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto target,
+                             store_.path_for_export(request.session(), video ? "video" : "png"));
   return run_job(
       observer,
       [&](const Observer& seen) {
-        return emberlock::export_session(folder, target, video ? ExportFormat::video : ExportFormat::png,
-                                         seen);
+        return session::export_session(
+            folder, target, video ? session::ExportFormat::video : session::ExportFormat::png, seen);
       },
-      [](const ExportReport& /*report*/) { return true; });
+      [](const session::ExportReport& /*report*/) { return true; });
 }
 
 Result<v1::ReconstructionStatus> Engine::reconstruct(const v1::ReconstructRequest& request) {
@@ -299,4 +335,4 @@ Result<v1::ReconstructionStatus> Engine::cancel_reconstruction() {
                                                      });
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -12,8 +13,9 @@
 #include "base/result.h"
 #include "daemon/api.h"
 #include "daemon/engine/conductor.h"
+#include "daemon/work/upkeep.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// The daemon behind its servers: a conductor on a thread of its own, which alone touches the devices, and
 /// what clients ask of it. Any thread may call the Api.
@@ -22,11 +24,11 @@ class Engine final : public Api {
   /// Sees every frame, by its camera's id, on that camera's thread: it must return at once.
   using OnFrame = std::function<void(const std::string& camera_id, const Frame& frame)>;
 
-  /// Opens the sessions' folder and the rig. What a killed recorder left is salvaged; what is uncompressed
-  /// waits for the transcoder, where one is configured. Devices that aren't there don't keep it from
-  /// starting. `board` outlives it. Errors: bad_input and io.
-  static Result<std::unique_ptr<Engine>> start(const DaemonConfig& config, Board& board,
-                                               OnFrame on_frame = {}, RigOptions rig_options = {});
+  /// Opens the sessions' folder and the rig, which takes no second. What a killed recorder left is salvaged
+  /// and, where that is configured, what is uncompressed is compressed, both in the background. Devices that
+  /// aren't there don't keep it from starting. `board` outlives it. Errors: bad_input and io.
+  static Result<std::unique_ptr<Engine>> start(const rig::DaemonConfig& config, Board& board,
+                                               OnFrame on_frame = {}, rig::RigOptions rig_options = {});
   ~Engine() override;
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
@@ -34,6 +36,14 @@ class Engine final : public Api {
   /// Whether the thread went round lately, and every camera either films, or is known not to: what the
   /// watchdog asks.
   [[nodiscard]] bool alive() const;
+
+  /// It shall end. Returns at once: a recording that runs is finished first, as its frames wait in memory.
+  /// From now on whatever is asked is refused.
+  void end();
+  /// Whether it has, waiting so long for it at most.
+  [[nodiscard]] bool ended(Seconds wait);
+  /// Rises while the recording that is being finished gets on.
+  [[nodiscard]] std::uint64_t finishing_progress() const { return finishing_; }
 
   [[nodiscard]] Board& board() override { return board_; }
   Status acknowledge(const v1::AcknowledgeRequest& request) override;
@@ -58,21 +68,25 @@ class Engine final : public Api {
     interrupts,  ///< it ends the round
   };
 
-  Engine(const DaemonConfig& config, Board& board, SessionStore store, std::unique_ptr<Rig> rig,
-         Geometry geometry);
-  void take_up_compression();
+  Engine(const rig::DaemonConfig& config, Board& board, session::SessionStore store,
+         std::unique_ptr<rig::Rig> rig, rig::Geometry geometry);
+  void take_up_work();
+  [[nodiscard]] UpkeepTold told();
+  /// Refused while it is salvaged.
+  Result<std::filesystem::path> path_of(const std::string& session) const;
   void run();
   void show(const Conductor& conductor);
+  void refuse_calls();
   /// Has it done on the thread, and waits for that.
   void post(std::function<void(Conductor&)> call);
   template <class Answer>
   Answer on_thread(Urgency urgency, std::function<Answer(Conductor&)> call);
 
-  const DaemonConfig config_;
+  const rig::DaemonConfig config_;
   Board& board_;
-  SessionStore store_;
-  std::unique_ptr<Rig> rig_;
-  Geometry geometry_;
+  session::SessionStore store_;
+  std::unique_ptr<rig::Rig> rig_;
+  rig::Geometry geometry_;
   ReconstructionChild reconstruction_;
 
   std::mutex mutex_;
@@ -81,6 +95,9 @@ class Engine final : public Api {
   std::deque<std::function<void(Conductor&)>> calls_;
   std::atomic<int> urgent_ = 0;
   std::atomic<bool> ending_ = false;
+  bool refuses_ = false;  ///< what is asked, as it is ending
+  bool over_ = false;     ///< the thread has nothing more to do
+  std::atomic<std::uint64_t> finishing_ = 0;
   std::atomic<std::int64_t> went_round_ns_ = 0;
 
   struct CameraProgress {
@@ -89,8 +106,8 @@ class Engine final : public Api {
   };
   mutable std::mutex progress_mutex_;
   mutable std::vector<CameraProgress> progress_;  ///< by camera, as alive() saw it
-  Transcoder transcoder_;
+  WorkQueue work_;
   std::thread thread_;  ///< last: it uses all of the above
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/engine/machine.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 bool aligns(v1::Phase phase) { return phase == v1::CALIBRATING || phase == v1::ALIGNING; }
@@ -70,16 +71,25 @@ class Stepper {
   void operator()(const RecordingFinished& happened) {
     if (now().phase != v1::FINISHING) return;
     remark(happened.whole ? v1::GREEN : v1::RED, fmt::format("{}: {}", now().session, happened.verdict));
-    if (!happened.whole) {
+    if (happened.nothing) {
+      raise({{v1::Fault::NOTHING_RECORDED, now().session},
+             v1::RED,
+             happened.verdict,
+             "See to the cameras, and record again once `emberlock status` says that they film"});
+    } else if (!happened.whole) {
       raise({{v1::Fault::COUNTS_MISMATCH, now().session},
              v1::RED,
              happened.verdict,
              "What was written is kept. Verify the session, then repair it"});
     }
-    const bool hand_on = std::exchange(now().reconstruct_after, false);
+    const bool hand_on = std::exchange(now().reconstruct_after, false) && !happened.nothing;
     const std::string session = now().session;
     resume(happened.verdict);
     if (hand_on && now().reconstructing.empty()) (*this)(AskReconstruct{session});
+  }
+
+  void operator()(const CameraEnded& happened) {
+    remark(v1::AMBER, happened.id + ": the recording that it replays is over");
   }
 
   void operator()(const RowTimeMeasured& /*happened*/) {
@@ -222,6 +232,8 @@ class Stepper {
       case v1::Fault::DISK_FAILED:
       case v1::Fault::CLOCK_STEPPED:
       case v1::Fault::TRANSCODE_FAILED:
+      case v1::Fault::SALVAGE_FAILED:
+      case v1::Fault::NOTHING_RECORDED:
       case v1::Fault::RECONSTRUCTION_FAILED:
       case v1::Fault::NOT_ALIGNED:
         return true;
@@ -291,4 +303,4 @@ v1::Light light(const MachineState& state) {
   return worst;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "base/result.h"
 #include "emberlock/v1/status.pb.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 // The daemon's states as a pure function: what was, and what happened or is asked for, give what is, and what
 // to do. It has no clock, thread or device; engine/conductor.h carries out what it orders and tells it what
@@ -92,6 +93,11 @@ struct RecordingEnds {
 struct RecordingFinished {
   bool whole = false;  ///< the counts of camera, queue and file agree, and the disk took all
   std::string verdict;
+  bool nothing = false;  ///< not one frame came from any camera
+};
+/// The recording that a camera replays is over.
+struct CameraEnded {
+  std::string id;
 };
 struct ReconstructionEnded {
   bool ok = false;
@@ -111,8 +117,8 @@ struct FaultMended {
 using Happening =
     std::variant<AskAlign, AskIdle, AskRecord, AskStopRecording, AskReconstruct, AskCancelReconstruction,
                  AskAcknowledge, RowTimeMeasured, RoundDone, AlignmentBroken, Recovered, LockExpired,
-                 RecordingBegun, RecordingRefused, RecordingEnds, RecordingFinished, ReconstructionEnded,
-                 FaultRaised, FaultMended>;
+                 RecordingBegun, RecordingRefused, RecordingEnds, RecordingFinished, CameraEnded,
+                 ReconstructionEnded, FaultRaised, FaultMended>;
 
 enum class Action {
   begin_alignment,  ///< anew, from the row time on
@@ -143,4 +149,4 @@ MachineStep step(const MachineState& state, const Happening& happening, const st
 /// Of the whole: the worst fault that isn't over, else by phase.
 v1::Light light(const MachineState& state);
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,14 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/engine/recorder.h"
 
 #include <algorithm>
+#include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
+
+std::uint64_t lost(const v1::Counts& counts) {
+  return counts.camera_gap() + counts.transport() + counts.underrun() + counts.queue() + counts.disk();
+}
+
 namespace {
 
-std::uint64_t handed_on(const FrameCounts& counts) { return counts.delivered + counts.damaged; }
+std::uint64_t handed_on(const drivers::FrameCounts& counts) { return counts.delivered + counts.damaged; }
 
 void add(v1::Counts& sum, const v1::Counts& counts) {
   sum.set_recorded(sum.recorded() + counts.recorded());
@@ -20,12 +27,8 @@ void add(v1::Counts& sum, const v1::Counts& counts) {
   sum.set_passed_over(sum.passed_over() + counts.passed_over());
 }
 
-std::uint64_t lost(const v1::Counts& counts) {
-  return counts.camera_gap() + counts.transport() + counts.underrun() + counts.queue() + counts.disk();
-}
-
 std::string words(const v1::Counts& sum, std::size_t cameras) {
-  std::string text = fmt::format("{} frames of {} cameras written", sum.recorded(), cameras);
+  std::string text = fmt::format("{} frames of {} cameras recorded", sum.recorded(), cameras);
   if (lost(sum) == 0) return text + ", none lost";
   text += fmt::format(", {} lost: ", lost(sum));
   const char* separator = "";
@@ -40,11 +43,22 @@ std::string words(const v1::Counts& sum, std::size_t cameras) {
   return text;
 }
 
+/// Below the floor not one frame would be kept, and an empty session would stay.
+Status check_space(const std::filesystem::path& folder, const session::WriterOptions& options) {
+  std::error_code unknown;  // then the writer tells, with its first frame
+  const auto space = std::filesystem::space(folder, unknown);
+  if (unknown || space.available >= options.min_free_bytes) return {};
+  return Error{ErrorKind::io,
+               fmt::format("{} MiB free, fewer than the floor of {} MiB", space.available >> 20,
+                           options.min_free_bytes >> 20),
+               folder.string(), "Free space, or record to another disk"};
+}
+
 }  // namespace
 
 Explained explain(const CameraBooks& books) {
-  const FrameCounts& a = books.before;
-  const FrameCounts& b = books.after;
+  const drivers::FrameCounts& a = books.before;
+  const drivers::FrameCounts& b = books.after;
   std::uint64_t missing = books.arrivals.missing();
   const auto of = [&](std::uint64_t claimed) {
     const std::uint64_t part = std::min(claimed, missing);
@@ -65,6 +79,9 @@ std::string disagreement(const CameraBooks& books, const v1::Counts& file) {
     return fmt::format("the driver handed on {} frames, {} were taken and {} left out", driver, taken,
                        books.left_out);
   }
+  if (books.dropped != file.queue()) {
+    return fmt::format("{} frames found no room in the queue, {} are counted", books.dropped, file.queue());
+  }
   const std::uint64_t accounted = file.recorded() + file.queue() + file.disk();
   if (taken != accounted) {
     return fmt::format("{} frames were taken, {} are written or counted as dropped", taken, accounted);
@@ -75,20 +92,24 @@ std::string disagreement(const CameraBooks& books, const v1::Counts& file) {
 Result<std::unique_ptr<Recorder>> Recorder::begin(const std::filesystem::path& folder,
                                                   const v1::Manifest& manifest,
                                                   const RecorderOptions& options,
-                                                  const std::vector<FrameCounts>& before, TimePoint now) {
-  EMBERLOCK_ASSIGN_OR_RETURN(SessionWriter writer, SessionWriter::create(folder, manifest, options.writer));
+                                                  const std::vector<drivers::FrameCounts>& before,
+                                                  TimePoint now) {
+  EMBERLOCK_RETURN_IF_ERROR(check_space(folder.parent_path(), options.writer));
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionWriter writer,
+                             session::SessionWriter::create(folder, manifest, options.writer));
   return std::unique_ptr<Recorder>(
       new Recorder(std::move(writer), options, folder.filename().string(), manifest.purpose(), before, now));
 }
 
-Recorder::Recorder(SessionWriter writer, const RecorderOptions& options, std::string session,
-                   std::string purpose, const std::vector<FrameCounts>& before, TimePoint now)
+Recorder::Recorder(session::SessionWriter writer, const RecorderOptions& options, std::string session,
+                   std::string purpose, const std::vector<drivers::FrameCounts>& before, TimePoint now)
     : writer_(std::move(writer), options.queue),
       session_(std::move(session)),
       purpose_(std::move(purpose)),
       began_(now),
       past_end_(before.size(), false) {
-  for (const FrameCounts& counts : before) books_.push_back({.before = counts, .after = {}, .arrivals = {}});
+  for (const drivers::FrameCounts& counts : before)
+    books_.push_back({.before = counts, .after = {}, .arrivals = {}});
 }
 
 void Recorder::take(std::size_t camera, Frame frame) {
@@ -100,8 +121,35 @@ void Recorder::take(std::size_t camera, Frame frame) {
     return;
   }
   books.arrivals.add(frame.stamp.frame_id);
-  bytes_ += frame.image->bytes().size();
-  writer_.push(camera, std::move(frame));
+  if (!writer_.push(camera, std::move(frame))) ++books.dropped;
+}
+
+void Recorder::show_progress(v1::RecordingStatus& status) const {
+  v1::FrameProgress& all = *status.mutable_progress();
+  status.clear_cameras();
+  status.clear_lost();
+  status.clear_camera_progress();
+  std::uint64_t bytes = 0;
+  for (std::size_t i = 0; i < books_.size(); ++i) {
+    const session::CameraProgress now = writer_.progress(i);
+    *status.add_cameras() = now.counts;
+    add(*status.mutable_lost(), now.counts);
+    v1::FrameProgress& one = *status.add_camera_progress();
+    one.set_arrived(now.arrived);
+    one.set_queued(now.queued);
+    one.set_written(now.written);
+    one.set_safe(now.safe);
+    one.set_at_risk_s(now.at_risk.value());
+    all.set_arrived(all.arrived() + now.arrived);
+    all.set_queued(all.queued() + now.queued);
+    all.set_written(all.written() + now.written);
+    all.set_safe(all.safe() + now.safe);
+    all.set_at_risk_s(std::max(all.at_risk_s(), now.at_risk.value()));
+    status.set_queue_fill(std::max(status.queue_fill(), now.queue_fill));
+    bytes += now.bytes;
+  }
+  status.set_bytes(bytes);
+  status.set_frames(status.lost().recorded());
 }
 
 v1::RecordingStatus Recorder::status(TimePoint now) const {
@@ -111,31 +159,38 @@ v1::RecordingStatus Recorder::status(TimePoint now) const {
   status.set_state(v1::RecordingStatus::RECORDING);
   const double seconds = std::max((std::min(now, ended_.value_or(now)) - began_).value(), 0.0);
   status.set_seconds(seconds);
-  status.set_bytes(bytes_);
-  if (seconds > 0) status.set_bytes_per_s(static_cast<double>(bytes_) / seconds);
-  for (const CameraBooks& books : books_) {
-    v1::Counts& counts = *status.add_cameras();
-    counts.set_recorded(books.arrivals.delivered());
-    counts.set_camera_gap(books.arrivals.missing());
-    add(*status.mutable_lost(), counts);
-  }
-  status.set_frames(status.lost().recorded());
+  show_progress(status);
+  if (seconds > 0) status.set_bytes_per_s(static_cast<double>(status.bytes()) / seconds);
   return status;
 }
 
-v1::RecordingStatus Recorder::finish(const std::vector<FrameCounts>& after, TimePoint now) {
+std::uint64_t Recorder::progress() const {
+  std::uint64_t done = 0;
+  for (std::size_t i = 0; i < books_.size(); ++i) {
+    const session::CameraProgress camera = writer_.progress(i);
+    done += camera.bytes + camera.counts.recorded() + camera.counts.disk();
+  }
+  return done;
+}
+
+v1::RecordingStatus Recorder::finish(const std::vector<drivers::FrameCounts>& after, TimePoint now) {
   v1::RecordingStatus status = this->status(now);
   for (std::size_t i = 0; i < books_.size(); ++i) {
     books_[i].after = after[i];
     const Explained explained = explain(books_[i]);
-    writer_.count_lost(i, LossCause::transport, explained.transport);
-    writer_.count_lost(i, LossCause::underrun, explained.underrun);
-    writer_.count_lost(i, LossCause::passed_over, explained.passed_over);
+    writer_.count_lost(i, session::LossCause::transport, explained.transport);
+    writer_.count_lost(i, session::LossCause::underrun, explained.underrun);
+    writer_.count_lost(i, session::LossCause::passed_over, explained.passed_over);
   }
   const Result<v1::Manifest> manifest = writer_.finish();
+  status.clear_progress();
+  status.clear_queue_fill();
+  show_progress(status);  // what is safe by now, whatever came of the rest
   if (!manifest.ok()) {
     status.set_state(v1::RecordingStatus::FAILED);
-    status.set_verdict(manifest.error().message());
+    status.set_verdict(fmt::format("{} of {} frames are safe, the recording isn't finished: {}",
+                                   status.progress().safe(), status.progress().arrived(),
+                                   manifest.error().message()));
     return status;
   }
   status.clear_cameras();
@@ -155,4 +210,4 @@ v1::RecordingStatus Recorder::finish(const std::vector<FrameCounts>& after, Time
   return status;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -14,14 +15,15 @@
 #include "emberlock/v1/status.pb.h"
 #include "session/async_writer.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// What driver and recorder say of one camera's frames in one recording.
 struct CameraBooks {
-  FrameCounts before;          ///< the driver's, when it began
-  FrameCounts after;           ///< and when it ended
-  std::uint64_t left_out = 0;  ///< delivered in that time, but filmed before it began or after it ended
-  Arrivals arrivals;           ///< what was handed to the recorder
+  drivers::FrameCounts before;  ///< the driver's, when it began
+  drivers::FrameCounts after;   ///< and when it ended
+  std::uint64_t left_out = 0;   ///< delivered in that time, but filmed before it began or after it ended
+  session::Arrivals arrivals;   ///< what was handed to the recorder
+  std::uint64_t dropped = 0;    ///< of it, for want of room in the queue
 };
 
 /// Of the frame numbers that are missing among the arrivals those that the driver has an explanation for.
@@ -36,9 +38,13 @@ Explained explain(const CameraBooks& books);
 /// Why driver, queue and file don't agree on a camera's frames, in a sentence; empty if they do.
 std::string disagreement(const CameraBooks& books, const v1::Counts& file);
 
+/// Of the frames that a camera made those that a recording hasn't, whatever the cause; what nobody wanted
+/// isn't lost.
+std::uint64_t lost(const v1::Counts& counts);
+
 struct RecorderOptions {
-  WriterOptions writer;
-  AsyncWriterOptions queue;
+  session::WriterOptions writer;
+  session::AsyncWriterOptions queue;
 };
 
 /// One recording in progress: frames in, a session's folder out, and the books on what became of each. One
@@ -46,12 +52,13 @@ struct RecorderOptions {
 class Recorder {
  public:
   /// Of `manifest` the caller fills what SessionWriter::create says. `before` is what the drivers count now,
-  /// by camera.
+  /// by camera. Error io, and no folder is left: below the floor of free space, or it can't be written.
   static Result<std::unique_ptr<Recorder>> begin(const std::filesystem::path& folder,
                                                  const v1::Manifest& manifest, const RecorderOptions& options,
-                                                 const std::vector<FrameCounts>& before, TimePoint now);
+                                                 const std::vector<drivers::FrameCounts>& before,
+                                                 TimePoint now);
 
-  /// Never waits. Frames that came before it began or after it ended are left out.
+  /// Waits only where the options say so. Frames that came before it began or after it ended are left out.
   void take(std::size_t camera, Frame frame);
   /// It holds what was filmed until then; frames of that time may still be on their way.
   void end(TimePoint at) { ended_ = at; }
@@ -62,21 +69,23 @@ class Recorder {
   [[nodiscard]] std::optional<Error> failure() const { return writer_.failure(); }
   [[nodiscard]] v1::RecordingStatus status(TimePoint now) const;
 
-  /// Drains the queues, closes the session and compares the books. The last call.
-  v1::RecordingStatus finish(const std::vector<FrameCounts>& after, TimePoint now);
+  /// Rises as frames are written. May be asked by another thread while this one finishes, as status().
+  [[nodiscard]] std::uint64_t progress() const;
+  /// Drains the queues, closes the session and compares the books. The last that changes anything.
+  v1::RecordingStatus finish(const std::vector<drivers::FrameCounts>& after, TimePoint now);
 
  private:
-  Recorder(SessionWriter writer, const RecorderOptions& options, std::string session, std::string purpose,
-           const std::vector<FrameCounts>& before, TimePoint now);
+  Recorder(session::SessionWriter writer, const RecorderOptions& options, std::string session,
+           std::string purpose, const std::vector<drivers::FrameCounts>& before, TimePoint now);
+  void show_progress(v1::RecordingStatus& status) const;
 
-  AsyncWriter writer_;
+  session::AsyncWriter writer_;
   std::string session_;
   std::string purpose_;
   TimePoint began_;
   std::optional<TimePoint> ended_;
   std::vector<bool> past_end_;  ///< by camera
   std::vector<CameraBooks> books_;
-  std::uint64_t bytes_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/reconstruction/child.h"
 
 #include <algorithm>
@@ -16,13 +17,13 @@
 #include <unistd.h>
 
 #include "base/clock.h"
-#include "daemon/reconstruction/messages.h"
 #include "daemon/reconstruction/process.h"
 #include "recon/compute/device.h"
+#include "session/child_messages.h"
 #include "session/files.h"
 #include "session/name.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace fs = std::filesystem;
 namespace {
 
@@ -46,10 +47,11 @@ Status check_request(const v1::ReconstructRequest& request) {
   if (!std::isfinite(request.budget_s()) || request.budget_s() < 0)
     return refuse_field("budget_s", "is no length of time", "Give seconds above 0, or 0 for none");
   if (request.voxels() > kLargestVoxels)
-    return refuse_field("voxels", fmt::format("{} are too many", request.voxels()),
-                        fmt::format("Give at most {}, or 0 for the paper's rule", kLargestVoxels));
+    return refuse_field(
+        "voxels", fmt::format("{} are too many", request.voxels()),
+        fmt::format("Give at most {}, or 0 for the knee of time against error", kLargestVoxels));
   if (!request.device().empty()) {
-    if (const auto device = parse_device(request.device()); !device) return device.error();
+    if (const auto device = recon::parse_device(request.device()); !device) return device.error();
   }
   return {};
 }
@@ -127,11 +129,11 @@ ReconstructionChild::~ReconstructionChild() {
 }
 
 Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::ReconstructRequest& request) {
-  EMBERLOCK_RETURN_IF_ERROR(check_session_name(request.session()));
+  EMBERLOCK_RETURN_IF_ERROR(session::check_session_name(request.session()));
   EMBERLOCK_RETURN_IF_ERROR(check_request(request));
   const fs::path session = fs::absolute(options_.sessions / request.session());
   std::error_code ec;
-  if (!fs::is_regular_file(manifest_path(session), ec)) {
+  if (!fs::is_regular_file(session::manifest_path(session), ec)) {
     return Error{ErrorKind::bad_input, "there is no such session", request.session(),
                  "Look at `emberlock sessions list`"};
   }
@@ -231,7 +233,7 @@ void ReconstructionChild::take(v1::ChildMessage&& message) {
 
 ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take_words) {
   ChildEnd end;
-  ChildMessageParser parser;
+  session::ChildMessageParser parser;
   Steady::time_point heard = Steady::now();
   std::optional<Steady::time_point> kill_at;
   const auto condemn = [&](ChildEnd::Why why, std::string words) {
@@ -298,4 +300,4 @@ ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take
   return end;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -17,7 +18,7 @@
 #include "daemon/reconstruction/state.h"
 #include "emberlock/v1/services.pb.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 class ChildProcess;
 
@@ -76,4 +77,4 @@ class ReconstructionChild {
   Asked asked_ = Asked::nothing;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/reconstruction/process.h"
 
 #include <cerrno>
@@ -11,7 +12,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 Error system_error(int code, const std::string& action, const std::string& program) {
@@ -105,4 +106,4 @@ ChildProcess::Exit ChildProcess::reap() {
   return exit;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

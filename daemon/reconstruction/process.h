@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string>
@@ -9,7 +10,7 @@
 #include "base/result.h"
 #include "base/unique_fd.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// A program in a process group of its own: stdin and stdout are /dev/null, descriptor 3 is its messages'
 /// pipe, it has no other of ours. Destroyed, it is killed with all that it started, and reaped.
@@ -51,4 +52,4 @@ class ChildProcess {
   UniqueFd exited_, messages_, errors_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

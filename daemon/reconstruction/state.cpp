@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/reconstruction/state.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 /// Whether what is shown of an iteration holds together: it comes from another process.
@@ -102,4 +103,4 @@ std::string ReconstructionState::failure(const ChildEnd& end, const std::string&
   return fmt::format("it ended with exit code {}{}.{}{}", end.code, while_, words, cpu);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -6,7 +7,7 @@
 #include "emberlock/v1/child.pb.h"
 #include "emberlock/v1/status.pb.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// How a child came to its end.
 struct ChildEnd {
@@ -46,4 +47,4 @@ class ReconstructionState {
   bool done_ = false;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/console_files.h"
 
 #include <array>
@@ -9,7 +10,7 @@
 
 #include "base/file.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 namespace fs = std::filesystem;
@@ -78,4 +79,4 @@ const ConsoleFiles::File* ConsoleFiles::find(std::string_view path) const {
   return found == files_.end() ? nullptr : &found->second;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

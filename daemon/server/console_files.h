@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -7,7 +8,7 @@
 
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// The console as it was built, read once: a request only looks up a name, so no path leads anywhere else.
 class ConsoleFiles {
@@ -31,4 +32,4 @@ class ConsoleFiles {
   std::map<std::string, File, std::less<>> files_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

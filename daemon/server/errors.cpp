@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/errors.h"
 
 #include <array>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 struct Code {
@@ -12,13 +13,14 @@ struct Code {
   int http;
 };
 
-constexpr std::array<Code, 6> kCodes{{
+constexpr std::array<Code, 7> kCodes{{
     {ErrorKind::bad_input, grpc::StatusCode::INVALID_ARGUMENT, "INVALID_ARGUMENT", 400},
     {ErrorKind::io, grpc::StatusCode::INTERNAL, "INTERNAL", 500},
     {ErrorKind::device, grpc::StatusCode::UNAVAILABLE, "UNAVAILABLE", 503},
     {ErrorKind::out_of_data, grpc::StatusCode::OUT_OF_RANGE, "OUT_OF_RANGE", 416},
     {ErrorKind::timed_out, grpc::StatusCode::DEADLINE_EXCEEDED, "DEADLINE_EXCEEDED", 504},
     {ErrorKind::refused, grpc::StatusCode::FAILED_PRECONDITION, "FAILED_PRECONDITION", 409},
+    {ErrorKind::not_converged, grpc::StatusCode::ABORTED, "ABORTED", 422},
 }};
 
 const Code& code_of(ErrorKind kind) {
@@ -34,4 +36,4 @@ grpc::Status grpc_status(const Error& error) { return {code_of(error.kind).code,
 int http_status(ErrorKind kind) { return code_of(kind).http; }
 std::string_view code_name(ErrorKind kind) { return code_of(kind).name; }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <string_view>
@@ -6,7 +7,7 @@
 
 #include "base/result.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// An error as gRPC says it: INVALID_ARGUMENT, FAILED_PRECONDITION, ... and the whole message
 /// (services.proto).
@@ -19,4 +20,4 @@ inline grpc::Status grpc_status(const Status& status) {
 int http_status(ErrorKind kind);
 std::string_view code_name(ErrorKind kind);
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/feeds.h"
 
 #include <algorithm>
 #include <utility>
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 v1::DaemonStatus without_history(const v1::DaemonStatus& status) {
   v1::DaemonStatus brief = status;
@@ -84,4 +85,4 @@ Next<v1::IterationPreview> IterationFeed::next(TimePoint /*now*/) {
   return {.message = all[seen_++]};
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

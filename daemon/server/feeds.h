@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <deque>
@@ -14,7 +15,7 @@
 // its watcher is: the board is the mailbox, with one slot for the status and one for each camera, so a slow
 // watcher costs no memory and misses what was overtaken. The watcher asks when it can take one more message.
 // Not thread-safe; times are on the host's monotonic clock.
-namespace emberlock {
+namespace emberlock::daemon {
 
 template <class Message>
 struct Next {
@@ -103,4 +104,4 @@ class IterationFeed {
   std::size_t seen_ = 0;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,7 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/grpc_server.h"
 
 #include <atomic>
 #include <chrono>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,10 +12,11 @@
 #include <grpcpp/health_check_service_interface.h>
 #include <sys/stat.h>
 
+#include "base/clock.h"
 #include "base/log.h"
 #include "daemon/server/grpc_services.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 /// What gRPC says of itself goes where everything goes.
@@ -32,26 +35,46 @@ void log_grpc(gpr_log_func_args* args) {
   }
 }
 
-/// Lets in who shows the token, in metadata "authorization: Bearer TOKEN".
+/// Lets in who shows the token, in metadata "authorization: Bearer TOKEN". gRPC asks on threads of its own,
+/// not on those that carry others' calls, so that who guesses can be kept waiting; it doesn't tell who asks,
+/// so all guesses by gRPC count as one source's.
 class TokenCheck final : public grpc::AuthMetadataProcessor {
  public:
-  explicit TokenCheck(Token token) : token_(std::move(token)) {}
-  [[nodiscard]] bool IsBlocking() const override { return false; }
+  TokenCheck(rig::Token token, std::shared_ptr<AuthFailures> failures)
+      : token_(std::move(token)), failures_(std::move(failures)) {}
+  [[nodiscard]] bool IsBlocking() const override { return true; }
   grpc::Status Process(const InputMetadata& shown, grpc::AuthContext* /*context*/, OutputMetadata* consumed,
                        OutputMetadata* /*response*/) override {
     constexpr std::string_view kScheme = "Bearer ";
+    bool any = false;
     for (auto [at, end] = shown.equal_range("authorization"); at != end; ++at) {
       const std::string_view value(at->second.data(), at->second.size());
+      any = true;
       if (!value.starts_with(kScheme) || !token_.matches(value.substr(kScheme.size()))) continue;
       consumed->insert({"authorization", std::string(value)});
       return grpc::Status::OK;
     }
+    refuse(any ? Refusal::wrong_token : Refusal::nothing_shown);
     return {grpc::StatusCode::UNAUTHENTICATED,
             "emberlockd: the token is missing or wrong. Give the one of the daemon's token file"};
   }
 
  private:
-  Token token_;
+  static constexpr int kMostWaiting = 16;  ///< threads; who guesses beyond them is answered at once
+
+  void refuse(Refusal refusal) {
+    const AuthFailures::Outcome outcome =
+        failures_->note("grpc", "the network", refusal, SteadyClock().now());
+    if (outcome.line) log(LogCategory::daemon).warn("{}", *outcome.line);
+    if (outcome.delay == Seconds(0)) return;
+    if (++waiting_ <= kMostWaiting)
+      std::this_thread::sleep_for(std::chrono::duration<double>(outcome.delay.value()));
+    --waiting_;
+  }
+
+  rig::Token token_;
+  std::shared_ptr<AuthFailures> failures_;
+  std::atomic<int> waiting_ = 0;
 };
 
 Status check(const GrpcServerOptions& options) {
@@ -70,6 +93,8 @@ Status check(const GrpcServerOptions& options) {
 void set_limits(grpc::ServerBuilder& builder, const GrpcServerOptions& options) {
   const int keepalive_ms = static_cast<int>(in_milliseconds(options.keepalive));
   builder.SetMaxReceiveMessageSize(options.largest_request);
+  // Who says nothing in TLS's handshake keeps a file descriptor no longer than that.
+  builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, keepalive_ms);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.streams_a_connection);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT,
                              0);  // else two daemons share a port, and neither knows
@@ -89,7 +114,7 @@ std::shared_ptr<grpc::ServerCredentials> network_credentials(const GrpcServerOpt
     ssl.client_certificate_request = GRPC_SSL_REQUEST_AND_REQUIRE_CLIENT_CERTIFICATE_AND_VERIFY;
   }
   auto credentials = grpc::SslServerCredentials(ssl);
-  credentials->SetAuthMetadataProcessor(std::make_shared<TokenCheck>(*options.token));
+  credentials->SetAuthMetadataProcessor(std::make_shared<TokenCheck>(*options.token, options.failures));
   return credentials;
 }
 
@@ -100,7 +125,8 @@ struct GrpcServer::Parts {
       : workers(options.workers, options.waiting),
         jobs(options.jobs, options.waiting_jobs),
         pump(options.watchers),
-        services({api, workers, jobs, pump}) {}
+        sessions(options.sessions),
+        services({api, workers, jobs, pump, *sessions}) {}
 
   Status listen(const GrpcServerOptions& options);
   void follow(Board& board);
@@ -109,8 +135,9 @@ struct GrpcServer::Parts {
   Workers workers;
   Workers jobs;
   StreamPump pump;
+  std::shared_ptr<ConsoleSessions> sessions;
   GrpcServices services;
-  std::shared_ptr<const SocketLock> lock;
+  std::shared_ptr<const rig::SocketLock> lock;
   int tcp_port = 0;
   std::atomic<bool> serving = false;
   std::unique_ptr<grpc::Server> server;
@@ -124,8 +151,8 @@ Status GrpcServer::Parts::listen(const GrpcServerOptions& options) {
   if (!options.socket.empty()) {
     lock = options.lock;
     if (!lock) {
-      EMBERLOCK_ASSIGN_OR_RETURN(SocketLock taken, SocketLock::take(options.socket));
-      lock = std::make_shared<const SocketLock>(std::move(taken));
+      EMBERLOCK_ASSIGN_OR_RETURN(rig::SocketLock taken, rig::SocketLock::take(options.socket));
+      lock = std::make_shared<const rig::SocketLock>(std::move(taken));
     }
     builder.AddListeningPort("unix:" + options.socket.string(), grpc::InsecureServerCredentials());
   }
@@ -156,6 +183,8 @@ void GrpcServer::Parts::follow(Board& board) {
 
 Result<std::unique_ptr<GrpcServer>> GrpcServer::start(Api& api, GrpcServerOptions options) {
   EMBERLOCK_RETURN_IF_ERROR(check(options));
+  if (!options.sessions) options.sessions = std::make_shared<ConsoleSessions>();
+  if (!options.failures) options.failures = std::make_shared<AuthFailures>();
   gpr_set_log_function(log_grpc);
   grpc::EnableDefaultHealthCheckService(true);
   auto parts = std::make_unique<Parts>(api, options);
@@ -174,4 +203,4 @@ GrpcServer::~GrpcServer() {
 int GrpcServer::tcp_port() const { return parts_->tcp_port; }
 std::size_t GrpcServer::watchers() const { return parts_->pump.streams(); }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

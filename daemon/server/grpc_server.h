@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -9,20 +10,24 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "daemon/api.h"
-#include "daemon/server/access.h"
+#include "daemon/server/auth_failures.h"
+#include "daemon/server/console_sessions.h"
+#include "rig/access.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 struct GrpcServerOptions {
   /// Unix socket; its folder says who may use it. Empty: none.
   std::filesystem::path socket = {};
   /// Of the socket, for who took it before it opened devices; else it is taken at the start.
-  std::shared_ptr<const SocketLock> lock = {};
+  std::shared_ptr<const rig::SocketLock> lock = {};
   /// "192.168.0.5:7410", "0.0.0.0:7410", "[::]:7410": clients from elsewhere, who need TLS and the token.
   /// Empty: none.
   std::string tcp_address = {};
-  std::optional<ServerTls> tls = {};
-  std::optional<Token> token = {};
+  std::optional<rig::ServerTls> tls = {};
+  std::optional<rig::Token> token = {};
+  std::shared_ptr<ConsoleSessions> sessions = {};  ///< of the console, for OpenConsole; its own if null
+  std::shared_ptr<AuthFailures> failures = {};     ///< counts who isn't let in; its own if null
 
   std::size_t workers = 4;   ///< calls at a time
   std::size_t waiting = 32;  ///< more that queue; beyond it RESOURCE_EXHAUSTED
@@ -58,4 +63,4 @@ class GrpcServer {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,11 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/grpc_services.h"
 
 #include <type_traits>
 #include <utility>
 
+#include "base/clock.h"
 #include "emberlock/v1/services.grpc.pb.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using Context = grpc::CallbackServerContext;
@@ -92,6 +94,24 @@ class DaemonService final : public v1::Daemon::CallbackService {
                                         v1::Empty* response) override {
     return answer(backend_, context, response,
                   [this, request] { return backend_.api.acknowledge(*request); });
+  }
+  /// A link lets in whoever follows it, so it is for those alone whom the socket's folder lets in.
+  grpc::ServerUnaryReactor* OpenConsole(Context* context, const v1::Empty* /*request*/,
+                                        v1::ConsoleLink* response) override {
+    grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
+    if (context->peer().rfind("unix:", 0) != 0) {
+      reactor->Finish({grpc::StatusCode::PERMISSION_DENIED,
+                       "emberlockd: links are given over the Unix socket alone. From elsewhere open "
+                       "http_listen's address in a browser, and give the token there"});
+      return reactor;
+    }
+    const auto url = backend_.sessions.make_link(SteadyClock().now());
+    if (url) {
+      response->set_url(*url);
+      response->set_valid_s(ConsoleSessions::kLinkLife.value());
+    }
+    reactor->Finish(url ? grpc::Status::OK : grpc_status(url.error()));
+    return reactor;
   }
 
  private:
@@ -235,4 +255,4 @@ void GrpcServices::add_to(grpc::ServerBuilder& builder) {
   for (grpc::Service* service : services) builder.RegisterService(service);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

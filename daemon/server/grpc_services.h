@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -6,10 +7,11 @@
 #include <grpcpp/server_builder.h>
 
 #include "daemon/api.h"
+#include "daemon/server/console_sessions.h"
 #include "daemon/server/grpc_streams.h"
 #include "daemon/server/workers.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// What the services of services.proto share.
 struct GrpcBackend {
@@ -17,6 +19,7 @@ struct GrpcBackend {
   Workers& workers;  ///< for calls
   Workers& jobs;     ///< for what may take minutes
   StreamPump& pump;
+  ConsoleSessions& sessions;
 };
 
 /// All of services.proto, over an Api. What it refers to outlives the server that has them.
@@ -34,4 +37,4 @@ class GrpcServices {
   std::unique_ptr<All> all_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

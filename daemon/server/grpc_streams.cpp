@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/grpc_streams.h"
 
 #include <algorithm>
 #include <chrono>
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 StreamPump::StreamPump(std::size_t most) : most_(most), thread_([this] { pump(); }) {}
 
@@ -78,4 +79,4 @@ void StreamPump::pump() {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -19,7 +20,7 @@
 // gRPC's streams to clients. All that gRPC tells a stream, and all that changes on the board, only wakes the
 // pump; its thread alone asks feeds, writes and finishes. So no stream needs a lock, and no writer of the
 // board ever runs gRPC's code.
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// What the pump drives. Deletes itself when gRPC is done with it.
 class PumpedStream {
@@ -137,4 +138,4 @@ class JobStream final : public FeedStream<v1::JobProgress> {
   std::shared_ptr<Job> job_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/http_connection.h"
 
 #include <utility>
@@ -13,11 +14,15 @@
 #include <openssl/err.h>
 #include <openssl/sslerr.h>
 
+#include "base/clock.h"
+#include "base/log.h"
 #include "daemon/server/errors.h"
 #include "daemon/server/metrics.h"
+#include "daemon/server/peer.h"
+#include "daemon/server/stranger_page.h"
 #include "daemon/server/viewer.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 namespace asio = boost::asio;
@@ -33,7 +38,9 @@ constexpr const char* kPolicy =
     "worker-src 'self' "
     "blob:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
-constexpr std::chrono::seconds kGoodbye{1};  // for the other side to say it too
+constexpr std::string_view kOpenPath = "/open";
+constexpr std::uint64_t kLargestForm = 1024;  // bytes
+constexpr std::chrono::seconds kGoodbye{1};   // for the other side to say it too
 constexpr std::string_view kSpeakTls =
     "HTTP/1.1 400 Bad Request\r\nContent-Type: text/plain\r\nContent-Length: 50\r\nConnection: close\r\n\r\n"
     "TLS is spoken here: the address begins https://.\r\n";
@@ -44,18 +51,26 @@ beast::string_view view(std::string_view text) { return {text.data(), text.size(
 }  // namespace
 
 HttpConnection::HttpConnection(HttpContext& context, asio::ip::tcp::socket socket)
-    : context_(context), stream_(std::move(socket), context.tls.get()) {
-  ++context_.connection_count;
+    : context_(context),
+      peer_(peer_of(socket)),
+      since_(context.next_turn()),
+      delay_(context.loop),
+      stream_(std::move(socket), context.tls.get()) {
+  context_.connections.insert(this);
   beast::error_code ignored;
   stream_.next_layer().socket().set_option(asio::ip::tcp::no_delay(true), ignored);
 }
 
 HttpConnection::~HttpConnection() {
-  --context_.connection_count;
+  context_.connections.erase(this);
   end_job();
 }
 
-void HttpConnection::close() { stream_.next_layer().close(); }
+void HttpConnection::close() {
+  context_.connections.erase(this);
+  delay_.cancel();
+  stream_.next_layer().close();
+}
 
 void HttpConnection::end() {
   stream_.next_layer().expires_after(kGoodbye);
@@ -110,35 +125,99 @@ void HttpConnection::judge() {
   auto target = parse_target(view(request.target()));
   if (!target) return respond_error(400, "INVALID_ARGUMENT", "no such address", Next::end);
   target_ = *std::move(target);
-  if (target_.path == "/healthz") return read_body();
+  if (target_.path == "/healthz") {  // anybody's, so nothing is read for it
+    const bool has_body = parser_->chunked() || parser_->content_length().value_or(0) > 0;
+    return has_body ? respond_error(413, "INVALID_ARGUMENT", "this takes no body", Next::end) : read_body();
+  }
+  // To ask for the head of a link isn't to follow it.
+  if (request.method() != http::verb::get) target_.link.clear();
   const HttpHead head{.host = view(request[http::field::host]),
                       .origin = view(request[http::field::origin]),
                       .authorization = view(request[http::field::authorization]),
                       .cookie = view(request[http::field::cookie])};
-  switch (context_.gate.judge(head, target_)) {
+  HttpJudgement judgement = context_.gate.judge(head, target_, SteadyClock().now());
+  switch (judgement.verdict) {
     case HttpVerdict::welcome:
+      standing_ = Standing::known;
+      since_ = context_.next_turn();
+      who_ = std::move(judgement.who);
+      cookie_ = std::move(judgement.cookie);
+      if (target_.path == kOpenPath && request.method() == http::verb::get) return let_in({});
       return read_body();
-    case HttpVerdict::give_cookie: {
-      Response moved = response(303, kText, "");
-      moved.set(http::field::location, view(std::string_view(target_.path)));
-      moved.set(http::field::set_cookie, context_.gate.cookie_of(target_.token));
-      return respond(std::move(moved), Next::end);
+    case HttpVerdict::give_cookie:
+      return let_in(judgement.cookie);
+    case HttpVerdict::refused: {
+      const bool by_form =
+          judgement.refusal == Refusal::nothing_shown || judgement.refusal == Refusal::unknown_session;
+      if (by_form && target_.path == kOpenPath && request.method() == http::verb::post) return read_form();
+      return refuse(judgement.refusal);
     }
-    case HttpVerdict::wrong_host:
-      return respond_error(421, "PERMISSION_DENIED",
-                           "this name doesn't lead here: use localhost, or the address in numbers",
-                           Next::end);
-    case HttpVerdict::foreign_origin:
-      return respond_error(403, "PERMISSION_DENIED", "another site's page may not ask", Next::end);
-    case HttpVerdict::no_token:
-      // The page itself is no secret: it asks for the token.
-      if (target_.token.empty() && context_.console.find(target_.path) != nullptr) return read_body();
-      return respond_error(
-          401, "UNAUTHENTICATED",
-          "the token is missing or wrong: open this page once with ?token=TOKEN, or send it as "
-          "\"Authorization: Bearer TOKEN\"",
-          Next::end);
   }
+}
+
+void HttpConnection::let_in(const std::string& cookie) {
+  Response moved = response(303, kText, "");
+  moved.set(http::field::location, "/");
+  if (!cookie.empty()) moved.set(http::field::set_cookie, cookie);
+  respond(std::move(moved), Next::end);
+}
+
+void HttpConnection::read_form() {
+  if (parser_->content_length().value_or(0) > kLargestForm)
+    return respond_error(413, "INVALID_ARGUMENT", "the body is too long", Next::end);
+  parser_->body_limit(kLargestForm);
+  stream_.next_layer().expires_after(context_.patience());
+  http::async_read(stream_, buffer_, *parser_,
+                   [self = shared_from_this()](beast::error_code error, std::size_t /*bytes*/) {
+                     if (error) return self->close();
+                     const auto& request = self->parser_->get();
+                     const auto cookie = self->context_.gate.cookie_for_token(
+                         token_of_form(request.body()), view(request[http::field::host]),
+                         SteadyClock().now());
+                     cookie ? self->let_in(*cookie) : self->refuse(Refusal::wrong_token);
+                   });
+}
+
+/// Who guesses waits for the answer, he alone.
+void HttpConnection::refuse(Refusal refusal) {
+  standing_ = Standing::stranger;
+  const AuthFailures::Outcome outcome =
+      context_.options.failures->note("http", peer_, refusal, SteadyClock().now());
+  if (outcome.line) log(LogCategory::daemon).warn("{}", *outcome.line);
+  if (outcome.delay == Seconds(0)) return answer_refusal(refusal, Answered::at_once);
+  stream_.next_layer().expires_never();
+  delay_.expires_after(std::chrono::nanoseconds(static_cast<std::int64_t>(outcome.delay.value() * 1e9)));
+  delay_.async_wait([self = shared_from_this(), refusal](beast::error_code error) {
+    if (!error) self->answer_refusal(refusal, Answered::late);
+  });
+}
+
+void HttpConnection::answer_refusal(Refusal refusal, Answered answered) {
+  if (refusal == Refusal::foreign_host)
+    return respond_error(421, "PERMISSION_DENIED",
+                         "this name doesn't lead here: use localhost, or the address in numbers", Next::end);
+  if (refusal == Refusal::foreign_origin)
+    return respond_error(403, "PERMISSION_DENIED", "another site's page may not ask", Next::end);
+  const std::string_view path = target_.path;
+  const bool by_browser = path == "/" || path == "/index.html" || path == kOpenPath;
+  const TokenField field = context_.gate.has_token() ? TokenField::shown : TokenField::none;
+  Response refused =
+      by_browser ? response(401, "text/html; charset=utf-8", stranger_page(refusal, field))
+                 : response(401, kJson,
+                            error_json("UNAUTHENTICATED",
+                                       "this daemon doesn't know who asks: `emberlock console` prints a link "
+                                       "for browsers; programs send \"Authorization: Bearer TOKEN\", with "
+                                       "what its token_file holds") +
+                                '\n');
+  refused.set(http::field::www_authenticate, "Bearer realm=\"emberlock\"");
+  if (by_browser) {
+    refused.set("Content-Security-Policy", kStrangerPolicy);
+    refused.set("Referrer-Policy", "same-origin");  // else a form's browser doesn't tell whence it asks
+  }
+  // Late, the browser may have a new one by now.
+  if (refusal == Refusal::unknown_session && by_browser && answered == Answered::at_once)
+    refused.set(http::field::set_cookie, HttpGate::no_cookie(view(parser_->get()[http::field::host])));
+  respond(std::move(refused), Next::end);
 }
 
 void HttpConnection::read_body() {
@@ -171,7 +250,9 @@ void HttpConnection::answer() {
     const std::size_t others = context_.options.other_watchers ? context_.options.other_watchers() : 0;
     return respond(response(200, "text/plain; version=0.0.4; charset=utf-8",
                             metrics_text(*context_.api.board().status(), process_usage(),
-                                         {.viewers = context_.viewer_count, .other_watchers = others})));
+                                         {.viewers = context_.viewer_count,
+                                          .other_watchers = others,
+                                          .refused = context_.options.failures->counts()})));
   }
   answer_file();
 }
@@ -187,6 +268,7 @@ void HttpConnection::answer_file() {
   found.set(http::field::etag, file->tag);
   found.set(http::field::cache_control, view(file->caching));
   found.set("Content-Security-Policy", kPolicy);
+  if (target_.path == "/" && !cookie_.empty()) found.set(http::field::set_cookie, cookie_);
   respond(std::move(found));
 }
 
@@ -199,6 +281,7 @@ void HttpConnection::answer_api(std::string_view name) {
 
 void HttpConnection::call(const JsonMethod& method) {
   // The connection is let go of on the server's thread, where alone it may end.
+  standing_ = Standing::working;
   const bool queued = context_.workers.run([self = shared_from_this(), &method]() mutable {
     auto result = method.call(self->context_.api, self->parser_->get().body());
     auto& loop = self->context_.loop;
@@ -213,12 +296,11 @@ void HttpConnection::call(const JsonMethod& method) {
 void HttpConnection::watch() {
   if (!beast::websocket::is_upgrade(parser_->get()))
     return respond_error(426, "INVALID_ARGUMENT", "this is a WebSocket");
-  if (context_.viewer_count >= context_.options.viewers)
-    return respond_error(503, "RESOURCE_EXHAUSTED", "too many consoles are open: close one", Next::end);
-  std::make_shared<Viewer>(context_, std::move(stream_))->run(parser_->release());
+  context_.make_room_for_a_viewer();
+  std::make_shared<Viewer>(context_, who_, std::move(stream_))->run(parser_->release());
 }
 
-// ---- jobs: one JSON object a line, the newest progress alone
+// ---- jobs: one JSON object a line, the newest progress alone; the last is done, or an error
 
 void HttpConnection::start_job(const JsonMethod& method) {
   if (parser_->get().version() < 11)
@@ -235,6 +317,7 @@ void HttpConnection::start_job(const JsonMethod& method) {
     return respond_error(429, "RESOURCE_EXHAUSTED",
                          "too many jobs are waiting: try again when one has ended");
   }
+  standing_ = Standing::working;
   context_.jobs.insert(job_);
   notice_end();
 }
@@ -262,7 +345,14 @@ void HttpConnection::write_progress() {
   const auto ended = job_->ended();
   if (!ended) return;
   end_job();
-  if (!head_sent_ && !ended->ok()) return respond_error(ended->error());
+  if (ended->ok()) return write_end();
+  if (!head_sent_) return respond_error(ended->error());
+  const Error& error = ended->error();
+  write_line(error_json(code_name(error.kind), error.message()) + '\n');
+}
+
+/// Of a job's stream: nothing comes any more.
+void HttpConnection::write_end() {
   stream_.next_layer().expires_after(context_.patience());
   asio::async_write(
       stream_, http::make_chunk_last(),
@@ -287,6 +377,7 @@ void HttpConnection::write_line(const std::string& json) {
                         self->end_job();
                         return self->close();
                       }
+                      if (!self->job_) return self->write_end();  // it was the error's
                       self->stream_.next_layer().expires_never();
                       self->write_progress();
                     });
@@ -312,6 +403,7 @@ void HttpConnection::respond(Response response, Next next) {
   response.content_length(response.body().size());
   if (only_head) response.body().clear();
   answer_ = std::make_shared<const Response>(std::move(response));
+  if (standing_ == Standing::working) standing_ = Standing::known;
   stream_.next_layer().expires_after(context_.patience());
   http::async_write(stream_, *answer_,
                     [self = shared_from_this(), ends](beast::error_code error, std::size_t /*bytes*/) {
@@ -331,4 +423,4 @@ void HttpConnection::respond_error(const Error& error) {
   respond_error(static_cast<unsigned>(http_status(error.kind)), code_name(error.kind), error.message());
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

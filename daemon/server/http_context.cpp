@@ -1,14 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/http_context.h"
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include <boost/asio/post.hpp>
 
 #include "base/clock.h"
+#include "daemon/server/crowd.h"
+#include "daemon/server/http_connection.h"
 #include "daemon/server/viewer.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 HttpContext::HttpContext(Api& daemon, HttpServerOptions wanted, HttpGate who, ConsoleFiles files)
     : api(daemon),
@@ -20,6 +24,29 @@ HttpContext::HttpContext(Api& daemon, HttpServerOptions wanted, HttpGate who, Co
 
 std::chrono::nanoseconds HttpContext::patience() const {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(options.patience.value() * 1e9));
+}
+
+bool HttpContext::make_room_for_a_connection() {
+  if (connections.size() < options.connections) return true;
+  std::vector<HttpConnection*> those;
+  std::vector<Guest> guests;
+  for (HttpConnection* one : connections) {
+    if (one->standing() == HttpConnection::Standing::working) continue;
+    those.push_back(one);
+    guests.push_back({one->peer(), static_cast<int>(one->standing()), one->since()});
+  }
+  const auto leaves = who_leaves(guests);
+  if (leaves) those[*leaves]->close();
+  return leaves.has_value();
+}
+
+void HttpContext::make_room_for_a_viewer() {
+  if (viewers.size() < options.viewers) return;
+  const std::vector<Viewer*> those(viewers.begin(), viewers.end());
+  std::vector<Guest> guests;
+  guests.reserve(those.size());
+  for (const Viewer* one : those) guests.push_back({one->who(), one->spoke() ? 1 : 0, one->since()});
+  if (const auto leaves = who_leaves(guests)) those[*leaves]->make_room();
 }
 
 void HttpContext::wake() {
@@ -50,4 +77,4 @@ void HttpContext::tick_at(TimePoint at) {
   });
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/http_request.h"
 
 #include <algorithm>
@@ -5,10 +6,10 @@
 #include <arpa/inet.h>
 #include <fmt/format.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
-constexpr std::string_view kCookie = "emberlock_token";
+constexpr std::string_view kBearer = "Bearer ";
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -61,20 +62,48 @@ bool needs_no_resolver(std::string_view host) {
   return ::inet_pton(AF_INET, name.c_str(), &address) == 1;
 }
 
-bool own_page(std::string_view origin, std::string_view host) {
-  for (const std::string_view scheme : {"http://", "https://"}) {
-    if (origin.starts_with(scheme) && origin.substr(scheme.size()) == host) return true;
-  }
-  return false;
+/// Of the one scheme that is spoken here: a page that came by http:// from an address where TLS is spoken is
+/// somebody else's.
+bool own_page(std::string_view origin, std::string_view host, std::string_view scheme) {
+  return origin.starts_with(scheme) && origin.substr(scheme.size()) == host;
 }
 
-std::string_view cookie_value(std::string_view cookies) {
+/// Browsers send a host's cookies to each of its ports: daemons behind several ports of one name, or of
+/// tunnels, need a name each.
+std::string cookie_name(std::string_view host) {
+  const std::string_view name = without_port(host);
+  return name.size() == host.size() ? "emberlock_session"
+                                    : fmt::format("emberlock_session_{}", host.substr(name.size() + 1));
+}
+
+std::string_view cookie_value(std::string_view cookies, std::string_view name) {
   while (!cookies.empty()) {
     std::string_view one = next_part(cookies, ';');
     while (one.starts_with(' ')) one.remove_prefix(1);
-    if (next_part(one, '=') == kCookie) return one;
+    if (next_part(one, '=') == name) return one;
   }
   return {};
+}
+
+HttpJudgement refused(Refusal refusal) {
+  HttpJudgement judgement;
+  judgement.refusal = refusal;
+  return judgement;
+}
+
+HttpJudgement welcome(std::string who, std::string cookie = {}) {
+  HttpJudgement judgement;
+  judgement.verdict = HttpVerdict::welcome;
+  judgement.who = std::move(who);
+  judgement.cookie = std::move(cookie);
+  return judgement;
+}
+
+HttpJudgement give_cookie(std::string cookie) {
+  HttpJudgement judgement;
+  judgement.verdict = HttpVerdict::give_cookie;
+  judgement.cookie = std::move(cookie);
+  return judgement;
 }
 
 }  // namespace
@@ -82,31 +111,61 @@ std::string_view cookie_value(std::string_view cookies) {
 std::optional<HttpTarget> parse_target(std::string_view target) {
   const bool plain = std::all_of(target.begin(), target.end(), [](char c) { return c > ' ' && c < '\x7f'; });
   if (!plain || !target.starts_with('/')) return std::nullopt;
-  HttpTarget parsed{.path = std::string(next_part(target, '?')), .token = {}};
+  HttpTarget parsed{.path = std::string(next_part(target, '?')), .token = {}, .link = {}};
   while (!target.empty()) {
     std::string_view value = next_part(target, '&');
-    if (next_part(value, '=') != "token") continue;
-    auto token = unescape(value);
-    if (!token) return std::nullopt;
-    parsed.token = *std::move(token);
+    const std::string_view name = next_part(value, '=');
+    if (name != "token" && name != "link") continue;
+    auto secret = unescape(value);
+    if (!secret) return std::nullopt;
+    (name == "token" ? parsed.token : parsed.link) = *std::move(secret);
   }
   return parsed;
 }
 
-HttpVerdict HttpGate::judge(const HttpHead& head, const HttpTarget& target) const {
-  if (!head.origin.empty() && !own_page(head.origin, head.host)) return HttpVerdict::foreign_origin;
-  // With a token a foreign name gains nothing: it is sent no cookie.
-  if (!token_) return needs_no_resolver(head.host) ? HttpVerdict::welcome : HttpVerdict::wrong_host;
-  constexpr std::string_view kScheme = "Bearer ";
-  if (head.authorization.starts_with(kScheme) && token_->matches(head.authorization.substr(kScheme.size())))
-    return HttpVerdict::welcome;
-  if (!target.token.empty() && token_->matches(target.token)) return HttpVerdict::give_cookie;
-  return token_->matches(cookie_value(head.cookie)) ? HttpVerdict::welcome : HttpVerdict::no_token;
+std::string token_of_form(std::string_view body) {
+  const auto parsed = parse_target("/?" + std::string(body));
+  return parsed ? parsed->token : std::string();
 }
 
-std::string HttpGate::cookie_of(std::string_view token) const {
-  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age=31536000{}", kCookie, token,
-                     transport_ == Transport::tls ? "; Secure" : "");
+HttpJudgement HttpGate::judge(const HttpHead& head, const HttpTarget& target, TimePoint now) const {
+  const std::string_view scheme = transport_ == Transport::tls ? "https://" : "http://";
+  if (!head.origin.empty() && !own_page(head.origin, head.host, scheme))
+    return refused(Refusal::foreign_origin);
+  // Beyond this machine a foreign name gains nothing: it is sent no cookie.
+  if (transport_ == Transport::plain && !needs_no_resolver(head.host)) return refused(Refusal::foreign_host);
+  if (head.authorization.starts_with(kBearer)) {
+    const bool right = token_ && token_->matches(head.authorization.substr(kBearer.size()));
+    return right ? welcome("token") : refused(Refusal::wrong_token);
+  }
+  // A link that a browser of ours follows again, by its "back", does no harm.
+  const std::string_view cookie = cookie_value(head.cookie, cookie_name(head.host));
+  if (const auto session = sessions_->find(cookie, now))
+    return welcome(fmt::format("session {}", *session), cookie_of(cookie, head.host));
+  if (!target.token.empty()) {
+    auto given = cookie_for_token(target.token, head.host, now);
+    return given ? give_cookie(std::move(*given)) : refused(Refusal::wrong_token);
+  }
+  if (!target.link.empty()) {
+    const auto session = sessions_->follow(target.link, now);
+    return session ? give_cookie(cookie_of(*session, head.host)) : refused(Refusal::wrong_link);
+  }
+  return refused(cookie.empty() ? Refusal::nothing_shown : Refusal::unknown_session);
 }
 
-}  // namespace emberlock
+std::optional<std::string> HttpGate::cookie_for_token(std::string_view shown, std::string_view host,
+                                                      TimePoint now) const {
+  if (!token_ || !token_->matches(shown)) return std::nullopt;
+  const auto session = sessions_->open(now);
+  if (!session) return std::nullopt;
+  return cookie_of(*session, host);
+}
+
+std::string HttpGate::no_cookie(std::string_view host) { return cookie_name(host) + "=; Path=/; Max-Age=0"; }
+
+std::string HttpGate::cookie_of(std::string_view session, std::string_view host) const {
+  return fmt::format("{}={}; Path=/; HttpOnly; SameSite=Strict; Max-Age={:.0f}{}", cookie_name(host), session,
+                     ConsoleSessions::kSessionLife.value(), transport_ == Transport::tls ? "; Secure" : "");
+}
+
+}  // namespace emberlock::daemon

@@ -1,21 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 
-#include "daemon/server/access.h"
+#include "base/time_point.h"
+#include "daemon/server/auth_failures.h"
+#include "daemon/server/console_sessions.h"
+#include "rig/access.h"
 
-// What is decided of an HTTP request by its head alone; pure.
-namespace emberlock {
+// What is decided of an HTTP request by its head alone.
+namespace emberlock::daemon {
 
-/// Of a request for "/path?token=T".
+/// Of a request for "/path?token=T" or "/open?link=L".
 struct HttpTarget {
   std::string path;   ///< begins with a slash; as sent, as no name of ours needs escapes
   std::string token;  ///< of the query; empty: none
+  std::string link;   ///< likewise
 };
 /// Absent: no such request is answered (absolute URLs, spaces and control characters, escapes that are none).
 std::optional<HttpTarget> parse_target(std::string_view target);
+/// What a form of ours sends as its body: "token=T". Empty: nothing that is a token.
+std::string token_of_form(std::string_view body);
 
 /// What a browser tells of whence it asks, and who asks. Empty: not told.
 struct HttpHead {
@@ -27,27 +35,48 @@ struct HttpHead {
 
 enum class HttpVerdict {
   welcome,
-  give_cookie,     ///< the query's token is right: from now on a cookie says so, and addresses hold no secret
-  wrong_host,      ///< a foreign name was made to lead here (DNS rebinding)
-  foreign_origin,  ///< another site's page asks
-  no_token,
+  give_cookie,  ///< the address holds what is right: from now on a cookie says so, and addresses hold no
+                ///< secret
+  refused,
+};
+struct HttpJudgement {
+  HttpVerdict verdict = HttpVerdict::refused;
+  Refusal refusal = Refusal::nothing_shown;  ///< of refused
+  std::string who = {};                      ///< of welcome: "token", or "session 3"
+  /// The value of Set-Cookie: of give_cookie; of a welcome by a session, to be set again on the console's
+  /// page.
+  std::string cookie = {};
 };
 
-/// Who may ask. On this machine everybody; with a token, who shows it: as "Authorization: Bearer T", once as
-/// ?token=T, then as the cookie that this sets.
+/// Who may ask: who shows the token, as "Authorization: Bearer T" or once as ?token=T, and whose browser
+/// followed a link (console_sessions.h); browsers then show the cookie of their session.
 class HttpGate {
  public:
-  enum class Transport { plain, tls };
-  /// `token`: demanded of everybody; absent: of nobody.
-  explicit HttpGate(std::optional<Token> token, Transport transport = Transport::plain)
-      : token_(std::move(token)), transport_(transport) {}
-  [[nodiscard]] HttpVerdict judge(const HttpHead& head, const HttpTarget& target) const;
-  /// The value of Set-Cookie for a token that is right.
-  [[nodiscard]] std::string cookie_of(std::string_view token) const;
+  enum class Transport {
+    plain,  ///< of this machine alone: by its numbers or "localhost", no other name
+    tls,
+  };
+  /// `token` absent: there is none that lets in. `sessions` is never null.
+  HttpGate(std::optional<rig::Token> token, std::shared_ptr<ConsoleSessions> sessions,
+           Transport transport = Transport::plain)
+      : token_(std::move(token)), sessions_(std::move(sessions)), transport_(transport) {}
+
+  /// A link that is right is followed by it: it opens nothing a second time.
+  [[nodiscard]] HttpJudgement judge(const HttpHead& head, const HttpTarget& target, TimePoint now) const;
+  /// The value of Set-Cookie for a token that is right; absent: it isn't.
+  [[nodiscard]] std::optional<std::string> cookie_for_token(std::string_view shown, std::string_view host,
+                                                            TimePoint now) const;
+  /// The value of Set-Cookie by which a browser forgets a session that ended.
+  [[nodiscard]] static std::string no_cookie(std::string_view host);
+  /// Whether there is a token that lets in.
+  [[nodiscard]] bool has_token() const { return token_.has_value(); }
 
  private:
-  std::optional<Token> token_;
+  [[nodiscard]] std::string cookie_of(std::string_view session, std::string_view host) const;
+
+  std::optional<rig::Token> token_;
+  std::shared_ptr<ConsoleSessions> sessions_;
   Transport transport_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,9 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/http_server.h"
 
 #include <charconv>
 #include <thread>
 #include <utility>
 
+#include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <fmt/format.h>
 
@@ -11,7 +13,7 @@
 #include "daemon/server/http_connection.h"
 #include "daemon/server/http_context.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 namespace asio = boost::asio;
@@ -44,6 +46,15 @@ Status listen_at(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
   return Error{ErrorKind::io, fmt::format("nothing can listen there: {}", error.message()),
                fmt::format("{}:{}", endpoint.address().to_string(), endpoint.port()),
                "choose another port, or stop who has it"};
+}
+
+/// Where a browser finds it: a server that listens everywhere, by this machine's name.
+std::string browser_url(const asio::ip::address& address, int port, std::string_view scheme) {
+  boost::system::error_code unknown;
+  std::string host = address.is_unspecified() ? asio::ip::host_name(unknown) : address.to_string();
+  if (unknown) host = "localhost";
+  if (!address.is_unspecified() && address.is_v6()) host = "[" + host + "]";
+  return fmt::format("{}://{}:{}", scheme, host, port);
 }
 
 ConsoleFiles read_console(const std::filesystem::path& folder) {
@@ -80,7 +91,7 @@ void HttpServer::Parts::accept() {
         if (!ended) accept();
       });
     }
-    if (context.connection_count < context.options.connections)
+    if (context.make_room_for_a_connection())
       std::make_shared<HttpConnection>(context, std::move(socket))->run();
     accept();
   });
@@ -100,13 +111,17 @@ Result<std::unique_ptr<HttpServer>> HttpServer::start(Api& api, HttpServerOption
   if (!this_machine_alone) {
     EMBERLOCK_ASSIGN_OR_RETURN(tls, make_tls_context(*options.tls));
   }
-  HttpGate gate =
-      this_machine_alone ? HttpGate(std::nullopt) : HttpGate(options.token, HttpGate::Transport::tls);
+  if (!options.sessions) options.sessions = std::make_shared<ConsoleSessions>();
+  if (!options.failures) options.failures = std::make_shared<AuthFailures>();
+  HttpGate gate(options.token, options.sessions,
+                this_machine_alone ? HttpGate::Transport::plain : HttpGate::Transport::tls);
   ConsoleFiles console = read_console(options.console);
   auto parts = std::make_unique<Parts>(api, std::move(options), std::move(gate), std::move(console));
   parts->context.tls = std::move(tls);
   EMBERLOCK_RETURN_IF_ERROR(listen_at(parts->acceptor, endpoint));
   parts->port = parts->acceptor.local_endpoint().port();
+  parts->context.options.sessions->serve_at(
+      browser_url(endpoint.address(), parts->port, this_machine_alone ? "http" : "https"));
   parts->accept();
   parts->subscription =
       api.board().subscribe([&context = parts->context](Board::Topic /*topic*/) { context.wake(); });
@@ -131,4 +146,4 @@ std::string HttpServer::url() const {
 }
 std::size_t HttpServer::viewers() const { return parts_->context.viewer_count; }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstddef>
@@ -10,20 +11,23 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "daemon/api.h"
-#include "daemon/server/access.h"
+#include "daemon/server/auth_failures.h"
+#include "daemon/server/console_sessions.h"
+#include "rig/access.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 struct HttpServerOptions {
   std::string listen = "127.0.0.1:7140";  ///< "address:port", "[::1]:7140"; port 0: any that is free
-  /// Demanded of everybody and spoken to everybody if `listen` isn't of this machine alone; then both must be
-  /// there.
-  std::optional<Token> token = {};
-  std::optional<ServerTls> tls = {};
+  std::optional<rig::Token> token = {};   ///< lets in who shows it; beyond this machine it must be there
+  /// Spoken to everybody if `listen` isn't of this machine alone, and then it must be there.
+  std::optional<rig::ServerTls> tls = {};
+  std::shared_ptr<ConsoleSessions> sessions = {};  ///< browsers that are let in; its own if null
+  std::shared_ptr<AuthFailures> failures = {};     ///< counts who isn't; its own if null
   std::filesystem::path console =
       {};  ///< its files; where there are none the API is served alone, and a page that says so
-  std::size_t viewers = 64;       ///< WebSockets; beyond it 503
-  std::size_t connections = 256;  ///< beyond it they are closed at once
+  std::size_t viewers = 64;       ///< WebSockets; beyond it one makes room: crowd.h
+  std::size_t connections = 256;  ///< others; beyond it likewise, strangers first
   std::size_t workers = 4;        ///< calls at a time
   std::size_t waiting = 32;       ///< more that queue; beyond it 429
   std::size_t jobs = 2;           ///< verify, repair and export at a time
@@ -37,11 +41,13 @@ struct HttpServerOptions {
       {};  ///< for /metrics: those that aren't viewers here (gRPC's)
 };
 
-/// The console and the API over HTTP/1.1, beyond this machine over TLS, from one thread:
+/// The console and the API over HTTP/1.1, beyond this machine over TLS, from one thread, for who is let in
+/// (http_request.h); who isn't is told at / what to do.
 ///   GET /, /assets/...           the console
+///   GET /open?link=L, POST /open  a session's cookie, for a link or for a form's token
 ///   POST /api/v1/<Service>/<Method>  json_api.h; jobs answer with one JSON object a line, as they go
 ///   GET /api/v1/watch            WebSocket: watch_messages.h
-///   GET /metrics                 for Prometheus;  GET /healthz: 200 once the engine runs, without a token
+///   GET /metrics                 for Prometheus;  GET /healthz: 200 once the engine runs, for everybody
 /// Serves while it lives; the Api must outlive it.
 class HttpServer {
  public:
@@ -63,4 +69,4 @@ class HttpServer {
   std::unique_ptr<Parts> parts_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,13 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/http_stream.h"
 
 #include <boost/asio/buffer.hpp>
 #include <openssl/ssl.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 namespace asio = boost::asio;
 
-Result<std::shared_ptr<asio::ssl::context>> make_tls_context(const ServerTls& tls) {
+Result<std::shared_ptr<asio::ssl::context>> make_tls_context(const rig::ServerTls& tls) {
   auto context = std::make_shared<asio::ssl::context>(asio::ssl::context::tls_server);
   SSL_CTX* const native = context->native_handle();
   SSL_CTX_set_min_proto_version(native, TLS1_2_VERSION);
@@ -26,4 +27,4 @@ Result<std::shared_ptr<asio::ssl::context>> make_tls_context(const ServerTls& tl
   return context;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -14,12 +15,12 @@
 #include <boost/beast/websocket/ssl.hpp>
 #include <boost/beast/websocket/teardown.hpp>
 
-#include "daemon/server/access.h"
+#include "rig/access.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// How `tls` is spoken, from TLS 1.2 on. Error bad_input: OpenSSL won't have it.
-Result<std::shared_ptr<boost::asio::ssl::context>> make_tls_context(const ServerTls& tls);
+Result<std::shared_ptr<boost::asio::ssl::context>> make_tls_context(const rig::ServerTls& tls);
 
 /// A connection of the console's, in plain or over TLS: a stream as Boost.Asio and Beast want one, so that
 /// what stands on it needn't know. Its next layer is the TCP stream, which has the deadlines.
@@ -96,4 +97,4 @@ class HttpStream {
   Either stream_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/job.h"
 
 #include <utility>
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 void Job::run(const std::function<Status(const JobObserver&)>& job) {
   const auto cancelled = [this] {
@@ -10,7 +11,9 @@ void Job::run(const std::function<Status(const JobObserver&)>& job) {
     return !changed_;
   };
   if (cancelled()) return;
+  bool done = false;
   Status status = job([&](const v1::JobProgress& progress) {
+    done = progress.done();
     {
       const std::lock_guard lock(mutex_);
       newest_ = progress;
@@ -18,6 +21,9 @@ void Job::run(const std::function<Status(const JobObserver&)>& job) {
     tell();
     return !cancelled();
   });
+  if (status.ok() && !done)
+    status = Error{ErrorKind::io, "it ended without saying what came of it", "emberlockd",
+                   "Ask again; the daemon's journal may say why"};
   {
     const std::lock_guard lock(mutex_);
     ended_ = std::move(status);
@@ -45,4 +51,4 @@ std::optional<Status> Job::ended() const {
   return newest_ ? std::nullopt : ended_;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

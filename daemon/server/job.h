@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -6,7 +7,7 @@
 
 #include "daemon/api.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// One of the Api's jobs on its way to one client: what it told last, until the client has gone. Shared by
 /// the thread that runs it and the one that writes. Thread-safe.
@@ -15,7 +16,7 @@ class Job {
   /// `changed` is called after each progress and at the end, on the thread that runs.
   explicit Job(std::function<void()> changed) : changed_(std::move(changed)) {}
 
-  /// Runs it to its end, on this thread.
+  /// Runs it to its end, on this thread. One that ends well without a last progress that is done is an error.
   void run(const std::function<Status(const JobObserver&)>& job);
   /// Nobody is interested any more: it ends at its next progress, and `changed` isn't called again.
   void cancel();
@@ -34,4 +35,4 @@ class Job {
   std::optional<Status> ended_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

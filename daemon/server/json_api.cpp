@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/json_api.h"
 
 #include <array>
@@ -6,7 +7,7 @@
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 template <class Request>
@@ -94,4 +95,4 @@ std::string error_json(std::string_view code, std::string_view message) {
   return error.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -9,7 +10,7 @@
 
 // services.proto in protobuf's JSON: what POST /api/v1/<Service>/<Method> is asked and answers. Names are
 // those of the .proto.
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// A method of services.proto; the plain streams aren't among them, as a browser watches by WebSocket.
 struct JsonMethod {
@@ -28,4 +29,4 @@ std::string to_json(const google::protobuf::Message& message);
 /// {"code": "FAILED_PRECONDITION", "message": "..."}
 std::string error_json(std::string_view code, std::string_view message);
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/metrics.h"
 
 #include <algorithm>
@@ -18,7 +19,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 /// Labels as they stand between braces: camera="CAM 1",fate="delivered".
@@ -164,7 +165,19 @@ void show_recording(Exposition& out, const v1::DaemonStatus& status) {
   const v1::RecordingStatus& recording = status.recording();
   out.family("emberlock_recording_state", "gauge", "1 for the state of the recording that runs or ran last.");
   out.states(recording.state());
-  out.single("emberlock_recording_frames", "gauge", "Written, of all cameras.", recording.frames());
+  out.single("emberlock_recording_frames", "gauge", "Recorded, of all cameras: on the disk and synced.",
+             recording.frames());
+  const v1::FrameProgress& progress = recording.progress();
+  out.family(
+      "emberlock_recording_progress_frames", "gauge",
+      "How far frames have come: arrived = queued + written + what queue and disk lost; safe are those of "
+      "the written that are synced.");
+  out.sample(static_cast<double>(progress.arrived()), {{"stage", "arrived"}});
+  out.sample(static_cast<double>(progress.queued()), {{"stage", "queued"}});
+  out.sample(static_cast<double>(progress.written()), {{"stage", "written"}});
+  out.sample(static_cast<double>(progress.safe()), {{"stage", "safe"}});
+  out.single("emberlock_recording_at_risk_seconds", "gauge",
+             "Since the oldest frame that isn't safe arrived: what a power cut takes.", progress.at_risk_s());
   out.single("emberlock_recording_bytes", "gauge", "Written.", recording.bytes());
   out.single("emberlock_recording_bytes_per_second", "gauge", "Written now.", recording.bytes_per_s());
   out.single("emberlock_recording_queue_fill_ratio", "gauge", "Of the fullest queue.",
@@ -187,10 +200,18 @@ void show_reconstruction(Exposition& out, const v1::DaemonStatus& status) {
   out.single("emberlock_reconstruction_done_ratio", "gauge", "How far it is.", reconstruction.fraction());
 }
 
-void show_process(Exposition& out, const ProcessUsage& process, const WatcherCounts& watchers) {
+void show_clients(Exposition& out, const ClientCounts& clients) {
   out.family("emberlock_watchers", "gauge", "Who watches: consoles, and streams over gRPC.");
-  out.sample(watchers.viewers, {{"by", "console"}});
-  out.sample(watchers.other_watchers, {{"by", "grpc"}});
+  out.sample(clients.viewers, {{"by", "console"}});
+  out.sample(clients.other_watchers, {{"by", "grpc"}});
+  out.family("emberlock_refused_total", "counter", "Requests that were turned away, by what was wrong.");
+  for (const auto& [way, counts] : clients.refused) {
+    for (std::size_t i = 0; i < counts.size(); ++i)
+      out.sample(counts[i], {{"by", way}, {"reason", std::string(name_of(static_cast<Refusal>(i)))}});
+  }
+}
+
+void show_process(Exposition& out, const ProcessUsage& process) {
   out.single("process_cpu_seconds_total", "counter", "Processor time, of user and system.", process.cpu_s);
   out.single("process_resident_memory_bytes", "gauge", "Memory that it holds.", process.resident_bytes);
   out.single("process_open_fds", "gauge", "Open file descriptors.", process.open_files);
@@ -236,14 +257,15 @@ ProcessUsage process_usage() {
 }
 
 std::string metrics_text(const v1::DaemonStatus& status, const ProcessUsage& process,
-                         const WatcherCounts& watchers) {
+                         const ClientCounts& clients) {
   Exposition out;
   show_daemon(out, status);
   show_cameras(out, status);
   show_recording(out, status);
   show_reconstruction(out, status);
-  show_process(out, process, watchers);
+  show_clients(out, clients);
+  show_process(out, process);
   return out.take();
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,12 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 
+#include "daemon/server/auth_failures.h"
 #include "emberlock/v1/status.pb.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// What the operating system counts of this process.
 struct ProcessUsage {
@@ -18,13 +22,15 @@ struct ProcessUsage {
 /// What can't be read is 0.
 ProcessUsage process_usage();
 
-struct WatcherCounts {
-  std::size_t viewers = 0;         ///< consoles
-  std::size_t other_watchers = 0;  ///< gRPC's streams
+/// Of those who ask.
+struct ClientCounts {
+  std::size_t viewers = 0;                                                   ///< consoles
+  std::size_t other_watchers = 0;                                            ///< gRPC's streams
+  std::map<std::string, std::array<std::uint64_t, kRefusals>> refused = {};  ///< as AuthFailures::counts
 };
 
 /// All of it in Prometheus' text format, version 0.0.4.
 std::string metrics_text(const v1::DaemonStatus& status, const ProcessUsage& process,
-                         const WatcherCounts& watchers);
+                         const ClientCounts& clients);
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

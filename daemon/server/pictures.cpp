@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/pictures.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include "base/clock.h"
 #include "base/log.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 constexpr double kEarly = 0.2;  // periods before it is due that a frame is taken: cameras jitter
@@ -136,4 +137,4 @@ void Pictures::make() {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

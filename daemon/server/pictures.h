@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <condition_variable>
@@ -12,7 +13,7 @@
 #include "base/time_point.h"
 #include "daemon/board.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 struct PicturesOptions {
   int width = 480;   ///< pixels at most; height follows
@@ -58,4 +59,4 @@ class Pictures {
 Result<v1::Picture> make_picture(const std::string& camera_id, const Frame& frame,
                                  const PicturesOptions& options);
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

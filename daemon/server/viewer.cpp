@@ -1,5 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/viewer.h"
 
+#include <chrono>
 #include <string_view>
 #include <utility>
 
@@ -10,7 +12,7 @@
 
 #include "base/clock.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 namespace beast = boost::beast;
@@ -21,6 +23,9 @@ namespace websocket = beast::websocket;
 constexpr int kKernelBytes = 256 << 10;
 constexpr int kUnsentBytes = 64 << 10;
 
+constexpr std::uint16_t kMadeRoom = 4001;  // a WebSocket's reason to close, of those that programs may choose
+constexpr std::chrono::seconds kFarewell{1};  // for the other side to say it too
+
 void keep_kernel_queue_short(int socket) {
   (void)::setsockopt(socket, SOL_SOCKET, SO_SNDBUF, &kKernelBytes, sizeof(kKernelBytes));
   (void)::setsockopt(socket, IPPROTO_TCP, TCP_NOTSENT_LOWAT, &kUnsentBytes, sizeof(kUnsentBytes));
@@ -28,8 +33,11 @@ void keep_kernel_queue_short(int socket) {
 
 }  // namespace
 
-Viewer::Viewer(HttpContext& context, HttpStream stream)
+Viewer::Viewer(HttpContext& context, std::string who, HttpStream stream)
     : context_(context),
+      who_(std::move(who)),
+      since_(context.next_turn()),
+      farewell_(context.loop),
       socket_(std::move(stream)),
       history_(context.api.board()),
       status_(context.api.board()),
@@ -40,7 +48,10 @@ Viewer::Viewer(HttpContext& context, HttpStream stream)
   keep_kernel_queue_short(beast::get_lowest_layer(socket_).socket().native_handle());
 }
 
-Viewer::~Viewer() {
+Viewer::~Viewer() { leave(); }
+
+void Viewer::leave() {
+  if (!std::exchange(counted_, false)) return;
   context_.viewers.erase(this);
   if (--context_.viewer_count == 0) context_.messages.forget();
 }
@@ -69,6 +80,18 @@ void Viewer::close() {
   beast::get_lowest_layer(socket_).close();
 }
 
+void Viewer::make_room() {
+  leave();
+  open_ = false;
+  pictures_.reset();
+  // One that takes nothing hears no farewell either.
+  if (in_flight_ || request_) return beast::get_lowest_layer(socket_).close();
+  farewell_.expires_after(kFarewell);
+  farewell_.async_wait([self = shared_from_this()](beast::error_code /*error*/) { self->close(); });
+  socket_.async_close({static_cast<websocket::close_code>(kMadeRoom), "another console was opened"},
+                      [self = shared_from_this()](beast::error_code /*error*/) { self->farewell_.cancel(); });
+}
+
 void Viewer::read() {
   socket_.async_read(heard_, [self = shared_from_this()](beast::error_code error, std::size_t bytes) {
     if (error) return self->close();
@@ -80,11 +103,14 @@ void Viewer::hear(std::size_t bytes) {
   const std::string_view text(static_cast<const char*>(heard_.data().data()), bytes);
   const auto wish = parse_wish(text);
   heard_.consume(heard_.size());
+  if (!counted_) return read();  // it makes room, and waits for the other side's farewell
   if (!wish || !socket_.got_text()) {
     open_ = false;
     return socket_.async_close({websocket::close_code::policy_error, "no such message"},
                                [self = shared_from_this()](beast::error_code /*error*/) { self->close(); });
   }
+  spoke_ = true;
+  since_ = context_.next_turn();
   // The new feed is there before the old one goes, so that pictures go on being made.
   pictures_ = *wish ? std::make_unique<PictureFeed>(context_.api.board(), **wish) : nullptr;
   context_.serve(*this);
@@ -137,4 +163,4 @@ void Viewer::send(ViewerMessages::Shared message) {
                       });
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

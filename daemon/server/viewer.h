@@ -1,9 +1,12 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 
+#include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/string_body.hpp>
@@ -13,7 +16,7 @@
 #include "daemon/server/http_context.h"
 #include "daemon/server/http_stream.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// One console's WebSocket: one write in flight, and for the next the newest of what it hasn't seen. A
 /// console that doesn't read stands still alone, and is gone when it gives no sign of life. On the server's
@@ -22,7 +25,8 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
  public:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
-  Viewer(HttpContext& context, HttpStream stream);
+  /// `who` was let in.
+  Viewer(HttpContext& context, std::string who, HttpStream stream);
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
   ~Viewer();
@@ -32,14 +36,26 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
   /// Something may be new. Returns when it wants to be asked again without that, if so.
   std::optional<TimePoint> write(TimePoint now);
   void close();
+  /// Ends it for another, and says so: a console then doesn't come back by itself.
+  void make_room();
+  [[nodiscard]] const std::string& who() const { return who_; }
+  /// Whether it ever said what it wants to see, as each console does, and which came when: larger is later.
+  [[nodiscard]] bool spoke() const { return spoke_; }
+  [[nodiscard]] std::uint64_t since() const { return since_; }
 
  private:
+  void leave();
   void read();
   void hear(std::size_t bytes);
   void send(ViewerMessages::Shared message);
   [[nodiscard]] ViewerMessages::Shared next(TimePoint now, std::optional<TimePoint>& again);
 
   HttpContext& context_;
+  const std::string who_;
+  std::uint64_t since_;
+  bool spoke_ = false;
+  bool counted_ = true;
+  boost::asio::steady_timer farewell_;
   boost::beast::websocket::stream<HttpStream> socket_;
   boost::beast::flat_buffer heard_;
   std::shared_ptr<const Request> request_;
@@ -54,4 +70,4 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
   std::deque<ViewerMessages::Shared> iteration_rest_;  ///< of the iteration that is being sent
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/viewer_messages.h"
 
 #include <utility>
 
 #include "daemon/server/feeds.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 ViewerMessages::Shared shared(WatchMessage message) {
@@ -39,4 +40,4 @@ std::vector<ViewerMessages::Shared> ViewerMessages::of(
   return iteration_.made;
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

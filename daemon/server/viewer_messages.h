@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <map>
@@ -7,7 +8,7 @@
 
 #include "daemon/server/watch_messages.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// The messages of what was shown last, made once for all viewers. Not thread-safe.
 class ViewerMessages {
@@ -32,4 +33,4 @@ class ViewerMessages {
   Last<v1::IterationPreview, std::vector<Shared>> iteration_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/watch_messages.h"
 
 #include <cmath>
@@ -6,9 +7,10 @@
 #include <google/protobuf/util/json_util.h>
 #include <nlohmann/json.hpp>
 
+#include "base/nesting.h"
 #include "daemon/server/json_api.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 WatchMessage text_of(const char* name, const google::protobuf::Message& message) {
@@ -79,6 +81,7 @@ std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview) {
 Result<std::optional<v1::WatchPicturesRequest>> parse_wish(std::string_view text) {
   const Error unknown{ErrorKind::bad_input, "no such message", "WebSocket",
                       R"(send {"watch": {"camera_ids": [...], "rate_hz": 12}} or {"watch": null})"};
+  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(text, "WebSocket"));  // it is written out again below
   const auto json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object() || json.size() != 1 || !json.contains("watch")) return unknown;
   const nlohmann::json& watch = json["watch"];
@@ -90,4 +93,4 @@ Result<std::optional<v1::WatchPicturesRequest>> parse_wish(std::string_view text
   return std::optional(std::move(request));
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -17,7 +18,7 @@
 // little-endian), the header, which is JSON with a "kind", then the bytes. From the console, as text:
 // {"watch": WatchPicturesRequest}, or
 // {"watch": null} for no pictures.
-namespace emberlock {
+namespace emberlock::daemon {
 
 struct WatchMessage {
   enum class Kind { text, binary };
@@ -38,4 +39,4 @@ std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview);
 /// What a console's message wants: which pictures, or none. Error bad_input: it is no such message.
 Result<std::optional<v1::WatchPicturesRequest>> parse_wish(std::string_view text);
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/workers.h"
 
 #include <utility>
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 Workers::Workers(std::size_t threads, std::size_t waiting) : waiting_(waiting), idle_(threads) {
   for (std::size_t i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
@@ -44,4 +45,4 @@ void Workers::work() {
   }
 }
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

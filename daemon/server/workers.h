@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <condition_variable>
@@ -8,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace emberlock {
+namespace emberlock::daemon {
 
 /// A few threads for calls that take long, and a queue with a bound. Thread-safe.
 class Workers {
@@ -35,4 +36,4 @@ class Workers {
   std::vector<std::thread> threads_;
 };
 
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Runs at installation, when the prefix is known.
 if(CMAKE_INSTALL_PREFIX STREQUAL "/usr")
   set(etc /etc)

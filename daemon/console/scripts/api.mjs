@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Writes src/api.gen.ts from the .proto files: the types of everything on the wire, and for each message a table by which
 // src/wire.ts reads protobuf's JSON (where defaults are left out and 64-bit numbers are strings). So the page can't drift
 // from the daemon: a field that is renamed there doesn't compile here. Knows the proto3 that those files use, no more.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What an operator orders: carried out, and told when it fails; and orders that need a second press.
 import {el, set, setText} from './dom';
 import {sentence} from './format';

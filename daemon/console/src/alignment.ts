@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Aligning: orders, how far it is, every camera's error against time, what it cost, and what could be met instead.
 import type {AlignmentCost, AlignmentOffer, AlignmentStatus, DaemonStatus} from './api.gen';
 import {act, TwoStep} from './act';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The grid of all cameras, and one of them enlarged.
 import type {DaemonStatus} from './api.gen';
 import {el, Keyed, set, setText, show} from './dom';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How late and how often pictures are seen. Measured when the browser goes on to the next frame after the one that drew them.
 import type {Picture} from './wire';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The little that the page needs to make and change elements. Everything is built once; then only what changed is touched.
 
 type Child = Node | string | undefined | false;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One camera over the whole page, with every number known of it.
 import type {CameraStatus, DaemonStatus} from './api.gen';
 import {el, setText} from './dom';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Numbers as an operator reads them: no more digits than matter, always the unit, a true minus sign.
 
 const kNone = '–';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is read from across the room: the phase, whether all is well, who does what next, and what is wrong.
 import type {CameraStatus, DaemonStatus, Fault} from './api.gen';
 import {act} from './act';
@@ -65,6 +66,7 @@ export class Header {
   private readonly live = el('div', {class: 'hidden', 'aria-live': 'assertive', id: 'announcements'});
   private said = '';
   private lostAt?: number;
+  private displaced = false;
   readonly root: HTMLElement;
 
   constructor() {
@@ -104,9 +106,10 @@ export class Header {
 
   connection(state: Connection): void {
     set(this.link, 'data-connection', state);
-    setText(this.link, {connecting: 'connecting', open: 'live', lost: 'lost', token: 'token needed'}[state]);
+    setText(this.link, {connecting: 'connecting', open: 'live', lost: 'lost', token: 'not let in', displaced: 'displaced'}[state]);
+    this.displaced = state === 'displaced';
     if (state === 'open') this.lostAt = undefined;
-    else if (state === 'lost') this.lostAt ??= performance.now();
+    else if (state === 'lost' || state === 'displaced') this.lostAt ??= performance.now();
     set(document.documentElement, 'data-stale', this.lostAt !== undefined);
     this.showLost();
   }
@@ -114,7 +117,9 @@ export class Header {
   private showLost(): void {
     show(this.lost, this.lostAt !== undefined);
     if (this.lostAt === undefined) return;
-    const text = `Connection to emberlockd lost ${Math.round((performance.now() - this.lostAt) / 1000)} s ago. What is shown is old. Trying again …`;
+    const since = `${Math.round((performance.now() - this.lostAt) / 1000)} s ago`;
+    const text = this.displaced ? `A newer console took this one's place ${since}: the daemon shows so many at a time. What is shown is old. Reload to take it back.`
+      : `Connection to emberlockd lost ${since}. What is shown is old. Trying again …`;
     setText(this.lost, text);
     this.say('Connection lost.');
   }

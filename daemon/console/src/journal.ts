@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The daemon's journal, the newest line first.
 import type {Notice} from './api.gen';
 import {el, setText} from './dom';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Keyboard shortcuts, and the list of them.
 import {el} from './dom';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A state as shape, colour and word together, so that none of them has to be seen.
 import type {CameraStatus, Light, Phase} from './api.gen';
 import {set, setText, svg} from './dom';
@@ -43,6 +44,7 @@ export function cameraWord(camera: CameraStatus, tolerance: number | undefined):
   switch (camera.state) {
     case 'LOST': return 'lost';
     case 'QUARANTINED': return 'hangs';
+    case 'ENDED': return 'over';
     case 'STOPPED': return 'stopped';
     case 'STATE_UNSPECIFIED': return 'unknown';
     case 'FILMING': break;

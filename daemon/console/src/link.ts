@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // The WebSocket: what the daemon tells, as it tells it; and again from the start when the connection was lost.
 import type {AlignmentStatus, DaemonStatus, IterationPreview, Notice, RoundPoint} from './api.gen';
 import {ApiError, type BinaryHeader, call, decode, unpack} from './wire';
 
-export type Connection = 'connecting' | 'open' | 'lost' | 'token';
+export type Connection = 'connecting' | 'open' | 'lost' | 'token' | 'displaced';
 
 export interface Listener {
   connection(state: Connection): void;
@@ -13,6 +14,7 @@ export interface Listener {
 }
 
 const kQuiet = 3000;           // ms without a word after which the daemon is asked whether it is there
+const kDisplaced = 4001;       // the daemon's reason to close: it has as many consoles as it may, and a newer one came
 const kLongestWait = 2000;     // ms between tries to connect again
 
 const ask = () => call('Daemon/GetStatus', {}, AbortSignal.timeout(2000));
@@ -43,8 +45,8 @@ export class Link {
 
   /** Gives the daemon the token, which it answers with a cookie. False: it isn't the right one. */
   async unlock(token: string): Promise<boolean> {
-    const answer = await fetch(`/?token=${encodeURIComponent(token)}`, {credentials: 'same-origin'}).catch(() => undefined);
-    if (!answer || answer.status === 401) return false;
+    const answer = await fetch('/open', {method: 'POST', body: new URLSearchParams({token}), credentials: 'same-origin'}).catch(() => undefined);
+    if (!answer?.ok) return false;
     this.connect();
     return true;
   }
@@ -63,7 +65,13 @@ export class Link {
       this.sendWatch();
     };
     socket.onmessage = event => this.receive(event.data as string | ArrayBuffer);
-    socket.onclose = () => { if (this.socket === socket) void this.lost(); };
+    socket.onclose = ({code}) => {
+      if (this.socket !== socket) return;
+      if (code !== kDisplaced) return void this.lost();
+      // Two that came back each time would displace each other for ever.
+      this.socket = undefined;
+      this.listener.connection('displaced');
+    };
   }
 
   private receive(data: string | ArrayBuffer): void {

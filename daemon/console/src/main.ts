@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page: one part for each thing the operator minds, all shown from the daemon's status as it comes.
 import './style.css';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What alignment saw, drawn over a picture in the camera's own pixels: lamp, dots, the row where the dot should be, the band.
 import type {CameraStatus} from './api.gen';
 import {set, show, svg} from './dom';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures on canvases: each shows its newest alone, and all that are ready are drawn in one animation frame.
 import {diagnostics} from './diagnostics';
 import {el} from './dom';

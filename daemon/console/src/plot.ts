@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Lines over time by uPlot, in colours that colour-blind people tell apart (Okabe and Ito), and dashed where those repeat.
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A reconstruction as it runs: captured beside rendered after every iteration, error against time, the volume.
 import type {DaemonStatus, Iteration, IterationPreview, Light, ReconstructionStatus} from './api.gen';
 import {act, TwoStep} from './act';
@@ -124,7 +125,7 @@ export class Reconstruction {
     this.iterations = list;
     const last = list.at(-1);
     show(this.plot.root, last !== undefined);
-    setText(this.latest, last ? `Iteration ${last.iteration}: error ${fixed(last.input_rmse, 2)} of 255${known(last.heldout_rmse) ? `, held out ${fixed(last.heldout_rmse, 2)}` : ''}` : '');
+    setText(this.latest, last ? `Iteration ${last.iteration}: error ${fixed(last.input_rmse, 2)} of 255${known(last.heldout_rmse) ? `, held out about ${fixed(last.heldout_rmse, 2)}` : ''}` : '');
     set(this.latest, 'data-iterations', list.length);
     if (!last) return;
     const heldOut = list.some(item => known(item.heldout_rmse));

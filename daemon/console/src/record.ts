@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Recording: one big button, and what the recording loses or doesn't.
 import type {Counts, DaemonStatus, RecordingStatus} from './api.gen';
 import {act, TwoStep} from './act';
@@ -14,6 +15,12 @@ export function drops(counts: Counts | undefined): [string, number][] {
   return causes.map(([cause, words]): [string, number] => [words, counts?.[cause] ?? 0]).filter(([, lost]) => lost > 0).sort((a, b) => b[1] - a[1]);
 }
 
+/** What a power cut now would take: frames that are on their way to the disk, and since when. */
+export function atRisk(r: RecordingStatus): string {
+  const frames = (r.progress?.queued ?? 0) + (r.progress?.written ?? 0) - (r.progress?.safe ?? 0);
+  return frames > 0 ? `${count(frames)}, ${fixed(r.progress?.at_risk_s ?? 0, 1)} s` : 'none';
+}
+
 export class Record {
   private readonly button = el('button', {class: 'record', type: 'button', 'aria-keyshortcuts': 'R'});
   private readonly hint = el('p', {class: 'note hint', role: 'status'});
@@ -26,7 +33,7 @@ export class Record {
   private readonly disk = el('p', {class: 'disk'});
   private readonly verdict = el('p', {class: 'verdict', role: 'status'});
   private readonly name = el('input', {name: 'name', maxlength: 80, placeholder: 'by time', autocomplete: 'off', spellcheck: false,
-                                       pattern: '[A-Za-z0-9 ._:\\-]*', title: 'Letters, digits, space and . _ : -'});
+                                       pattern: '([A-Za-z0-9_:][A-Za-z0-9 ._:\\-]*)?', title: 'Letters, digits, space and . _ : -, a letter or digit in front'});
   private readonly purpose = el('select', {name: 'purpose'}, el('option', {value: 'flame'}, 'flame'), el('option', {value: 'alignment'}, 'alignment'));
   private readonly seconds = el('input', {name: 'seconds', type: 'number', min: 0, step: 'any', placeholder: 'until stopped', inputmode: 'decimal'});
   private readonly reconstruct = el('input', {name: 'reconstruct', type: 'checkbox'});
@@ -97,7 +104,9 @@ export class Record {
 
   private showRecording(r: RecordingStatus): void {
     const list: [string, string][] = [
-      ['frames', count(r.frames)],
+      ['frames safe', count(r.frames)],
+      ['arrived', count(r.progress?.arrived ?? r.frames)],
+      ['not yet safe', atRisk(r)],
       ['written', bytes(r.bytes)],
       ['rate', `${fixed(r.bytes_per_s / 1e6, 1)} MB/s`],
       ['spread', short(r.spread_s)],

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // The recorded sessions, and what is done with them.
-import type {DaemonStatus, ExportRequest_Format, JobProgress, ListSessionsResponse_Entry as Entry, Light} from './api.gen';
+import type {BackgroundJob, DaemonStatus, ExportRequest_Format, JobProgress, ListSessionsResponse_Entry as Entry, Light} from './api.gen';
 import {act} from './act';
 import {el, Keyed, set, setText, show} from './dom';
 import {bytes, count, dateAndTime, percent, plural} from './format';
@@ -11,6 +12,14 @@ export function sessionState(entry: Entry): [Light, string] {
   if (entry.state === 'COMPLETE') return entry.lost > 0 ? ['AMBER', 'complete, frames lost'] : ['GREEN', 'complete'];
   if (entry.state === 'SALVAGED') return ['AMBER', 'salvaged'];
   return entry.state === 'RECORDING' ? ['AMBER', 'open'] : ['LIGHT_UNSPECIFIED', 'unknown'];
+}
+
+/** What is done to a session in the background: "being salvaged, 34 %". */
+export function jobWords(job: BackgroundJob): string {
+  const salvages = job.kind === 'SALVAGE';
+  if (job.state === 'PAUSED') return `${salvages ? 'salvage' : 'compression'} stands still while something is recorded`;
+  if (job.state === 'RUNNING') return `${salvages ? 'being salvaged' : 'being compressed'}, ${percent(job.fraction)}`;
+  return `waits to be ${salvages ? 'salvaged' : 'compressed'}`;
 }
 
 /** A job's report (JSON) in lines: "frames: 14400". What is nested is left to the file. */
@@ -35,8 +44,10 @@ class Row {
   private readonly job = el('div', {class: 'job', hidden: true}, this.progress, this.doing, this.report);
   private readonly buttons: HTMLButtonElement[];
   private readonly reconstruct: HTMLButtonElement;
+  private readonly background = el('span', {class: 'background', role: 'status', hidden: true});
   private entry?: Entry;
   private busy = false;
+  private salvaged = false;
   readonly root: HTMLTableRowElement;
 
   constructor(readonly session: string, private readonly changed: () => void) {
@@ -54,7 +65,7 @@ class Row {
     const names = ['When', 'Of', 'Cameras', 'Frames', 'Lost', 'Size'];
     this.cells.forEach((cell, place) => set(cell, 'data-name', names[place]));
     this.root = el('tr', {'data-session': session},
-      el('th', {scope: 'row'}, session, el('span', {class: 'state'}, this.sign.root, this.state)), ...this.cells,
+      el('th', {scope: 'row'}, session, el('span', {class: 'state'}, this.sign.root, this.state), this.background), ...this.cells,
       el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.reconstruct), this.job));
   }
 
@@ -69,13 +80,22 @@ class Row {
     this.enable();
   }
 
+  /** What is done to it in the background; nothing else is while it is salvaged. */
+  showJob(job: BackgroundJob | undefined): void {
+    show(this.background, job !== undefined);
+    setText(this.background, job ? jobWords(job) : '');
+    if (this.salvaged === (job?.kind === 'SALVAGE')) return;
+    this.salvaged = !this.salvaged;
+    this.enable();
+  }
+
   private enable(): void {
-    for (const button of this.buttons) button.disabled = this.busy;
-    this.reconstruct.disabled = this.busy || !this.entry?.calibrated;
+    for (const button of this.buttons) button.disabled = this.busy || this.salvaged;
+    this.reconstruct.disabled = this.busy || this.salvaged || !this.entry?.calibrated;
     set(this.reconstruct, 'title', this.entry?.calibrated ? undefined : 'Its cameras are not calibrated, or the volume is not known.');
   }
 
-  private run(job: (tell: (progress: JobProgress) => void) => Promise<JobProgress | undefined>): void {
+  private run(job: (tell: (progress: JobProgress) => void) => Promise<JobProgress>): void {
     this.busy = true;
     this.enable();
     show(this.job, true);
@@ -87,8 +107,8 @@ class Row {
     })).then(last => {
       this.busy = false;
       this.enable();
-      set(this.job, 'data-ok', last?.done ? String(last.ok) : 'false');
-      setText(this.doing, !last ? 'Could not begin.' : !last.done ? 'Broke off.' : last.ok ? `Done: ${last.doing || 'all is well'}` : `Failed: ${last.doing}`);
+      set(this.job, 'data-ok', String(last?.ok ?? false));
+      setText(this.doing, !last ? 'It failed.' : last.ok ? `Done: ${last.doing || 'all is well'}` : `Failed: ${last.doing}`);
       this.report.replaceChildren(...reportLines(last?.report ?? '').map(line => el('li', {}, line)));
       this.changed();
     });
@@ -100,6 +120,7 @@ export class Sessions {
   private readonly note = el('p', {class: 'note'}, 'None yet.');
   private readonly rows = new Keyed<Entry, Row>(this.body, session => new Row(session, () => void this.refresh()), (row, entry) => row.show(entry));
   private shown = '';
+  private jobs: BackgroundJob[] = [];
   readonly root: HTMLElement;
 
   constructor() {
@@ -110,9 +131,11 @@ export class Sessions {
       el('div', {class: 'scroll'}, el('table', {}, el('thead', {}, el('tr', {}, ...heads.map(head => el('th', {scope: 'col'}, head)))), this.body)));
   }
 
-  /** Read again when a recording came, went or changed its state. */
+  /** Read again when a recording came, went or changed its state, or something was done to a session. */
   show(status: DaemonStatus): void {
-    const key = `${status.recording?.session} ${status.recording?.state} ${status.recording?.transcoded === undefined || status.recording.transcoded >= 1}`;
+    this.jobs = status.jobs;
+    this.showJobs();
+    const key = `${status.recording?.session} ${status.recording?.state} ${status.jobs.map(job => `${job.kind} ${job.session}`).join()}`;
     if (key === this.shown) return;
     this.shown = key;
     void this.refresh();
@@ -124,5 +147,10 @@ export class Sessions {
     this.rows.show(list.sessions, entry => entry.session);
     setText(this.note, list.sessions.length === 0 ? 'None yet.' : plural(list.sessions.length, 'session'));
     show(this.body.closest('.scroll')!, list.sessions.length > 0);
+    this.showJobs();
+  }
+
+  private showJobs(): void {
+    for (const [session, row] of this.rows.views) row.showJob(this.jobs.find(job => job.session === session));
   }
 }

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // The strobe: what it is asked for, and what it read back.
-import type {DaemonStatus, StrobeState, StrobeState_Output} from './api.gen';
+import type {DaemonStatus, StrobeState, StrobeState_Output, StrobeStatus} from './api.gen';
 import {act} from './act';
 import {el, set, setText, show} from './dom';
 import {fixed, short} from './format';
@@ -15,6 +16,13 @@ export function strobeWords(s: StrobeState): string {
   const flashes = s.code.filter(Boolean).length;
   const code = flashes === s.code.length ? output : flashes === 0 ? 'held dark' : `${output} ${flashes} of ${s.code.length} times`;
   return `${fixed(s.rate_hz, 3)} Hz, phase ${short(s.phase_s)}, width ${short(s.width_s)}, ${code}`;
+}
+
+/** Of a strobe that somebody sets by hand: what to set, and what it was seen to do. */
+function dialWords(strobe: StrobeStatus): string {
+  const rate = (hz: number) => `${fixed(hz * 60, 1)} a minute (${fixed(hz, 3)} Hz)`;
+  const set = strobe.settings?.output === 'FLASHING' ? `To set: ${rate(strobe.settings.rate_hz)}` : '';
+  return [set, strobe.measured_hz > 0 ? `measured: ${rate(strobe.measured_hz)}` : ''].filter(Boolean).join(', ');
 }
 
 export class Strobe {
@@ -46,15 +54,16 @@ export class Strobe {
   show(status: DaemonStatus): void {
     const strobe = status.strobe;
     const there = strobe !== undefined && strobe.id !== '';
-    show(this.form, there);
+    const byHand = there && strobe.by_hand;
+    show(this.form, there && !byHand);
     showSign(this.sign, this.word, strobe?.light ?? 'LIGHT_UNSPECIFIED', there ? strobe.id : 'none');
-    setText(this.readBack, there && strobe.settings ? `Reads back: ${strobeWords(strobe.settings)}` : '');
+    setText(this.readBack, byHand ? dialWords(strobe) : there && strobe.settings ? `Reads back: ${strobeWords(strobe.settings)}` : '');
     setText(this.reason, there ? strobe.reason : 'The rig has no strobe: cameras can be recorded, not aligned.');
     if (there && strobe.settings && !this.dirty) this.fill(strobe.settings);
     const busy = status.phase !== 'IDLE' && status.phase !== 'PHASE_UNSPECIFIED';
     for (const control of [this.apply, this.rate, this.phase, this.width, ...this.outputs]) control.disabled = busy;
     set(this.form, 'data-busy', busy);
-    setText(this.why, there && busy ? 'In use. Stop the alignment to set it by hand.' : '');
+    setText(this.why, there && busy && !byHand ? 'In use. Stop the alignment to set it by hand.' : '');
   }
 
   private fill(s: StrobeState): void {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One camera: its live picture with what alignment saw, and the numbers that an operator acts on.
 import type {CameraStatus} from './api.gen';
 import {el, set, setText, show} from './dom';

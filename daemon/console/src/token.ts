@@ -1,4 +1,5 @@
-// Asks for the token where the daemon wants one.
+// SPDX-License-Identifier: Apache-2.0
+// Says what to do where the daemon doesn't know this browser any more, and takes the token where there is one.
 import {el, setText} from './dom';
 
 export class Token {
@@ -13,8 +14,9 @@ export class Token {
         if (await unlock(this.input.value)) this.close();
         else setText(this.note, 'That is not the token.');
       }},
-        el('h2', {id: 'token-title'}, 'Token'), el('p', {}, 'This daemon wants a token from other machines. Its file on the daemon\'s machine is named in the configuration.'),
-        el('label', {for: 'token'}, 'Token'), this.input, el('button', {class: 'primary', type: 'submit'}, 'Unlock'), this.note));
+        el('h2', {id: 'token-title'}, 'This browser isn\'t let in any more'),
+        el('p', {}, 'The daemon has started anew, perhaps. On its machine ', el('code', {}, 'emberlock console'), ' prints a link: open it in this browser, then come back here.'),
+        el('label', {for: 'token'}, 'Or give the daemon\'s token'), this.input, el('button', {class: 'primary', type: 'submit'}, 'Unlock'), this.note));
   }
 
   ask(): void {

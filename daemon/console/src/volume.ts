@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The flame's volume, to be turned with the mouse. This file alone needs vtk.js: it is loaded when the first volume comes.
 import '@kitware/vtk.js/Rendering/OpenGL/Profiles/Volume';
 

@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // What goes over the wire: protobuf's JSON with its defaults filled in, calls, streams of jobs, and the WebSocket's messages.
-import {type Calls, fields, responses, type Streams} from './api.gen';
+import {type Calls, fields, type JobProgress, responses, type Streams} from './api.gen';
 
 /** Why a call failed: the daemon's code ("FAILED_PRECONDITION", ...) and its sentence. */
 export class ApiError extends Error {
@@ -45,22 +46,27 @@ export async function call<M extends keyof Calls>(method: M, request: Calls[M][0
   return decode(responses[method], await response.json()) as Calls[M][1];
 }
 
-/** Of a job: tells each message, and returns the last. */
-export async function follow<M extends keyof Streams>(method: M, request: Streams[M][0],
-                                                      tell: (message: Streams[M][1]) => void): Promise<Streams[M][1] | undefined> {
+/** Methods that tell how far they are, and what came of them. */
+export type Jobs = {[M in keyof Streams as Streams[M][1] extends JobProgress ? M : never]: Streams[M]};
+
+/** Of a job: tells each message, and returns the last, which is done. An error's line and a stream that ends before it is done are
+ *  thrown. */
+export async function follow<M extends keyof Jobs>(method: M, request: Jobs[M][0], tell: (message: JobProgress) => void): Promise<JobProgress> {
   const reader = (await post(method, request)).body!.pipeThrough(new TextDecoderStream()).getReader();
   let rest = '';
-  let last: Streams[M][1] | undefined;
+  let last: JobProgress | undefined;
   for (;;) {
-    const {done, value} = await reader.read();
+    const {done, value} = await reader.read().catch(() => ({done: true, value: ''}));
     const lines = (rest + (value ?? '')).split('\n');
-    rest = done ? '' : lines.pop()!;
+    rest = lines.pop()!;  // a line that is cut short is none
     for (const line of lines.filter(text => text.trim() !== '')) {
       const json = JSON.parse(line) as {code?: string; message?: string};
       if (json.code !== undefined && json.message !== undefined) throw new ApiError(500, json.code, json.message);
-      tell((last = decode(responses[method], json) as Streams[M][1]));
+      tell((last = decode(responses[method], json) as JobProgress));
     }
-    if (done) return last;
+    if (!done) continue;
+    if (last?.done) return last;
+    throw new ApiError(502, '', 'The connection broke off before it was done. See what the journal says, and ask again.');
   }
 }
 

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <memory>
+
+#include "cli/client.h"
+#include "cli/commands.h"
+
+namespace emberlock::cli {
+namespace {
+
+struct ConsoleArguments {
+  DaemonAddress daemon;
+  bool json = false;
+};
+
+void print_link(const ConsoleArguments& arguments) {
+  Client client = connect_or_leave(arguments.daemon);
+  const v1::ConsoleLink link = or_leave(client, client.open_console());
+  if (arguments.json) {
+    std::printf("%s\n", json_line(link).c_str());
+    return;
+  }
+  std::printf("%s\n", link.url().c_str());
+  // Whoever passes the link on hands over the rig; stdout is the link alone, for programs that open it.
+  std::fprintf(stderr,
+               "Opens the console in one browser, once, within %.0f s; then that browser is let in.\n",
+               link.valid_s());
+}
+
+}  // namespace
+
+void add_console(CLI::App& app) {
+  auto arguments = std::make_shared<ConsoleArguments>();
+  CLI::App* verb = app.add_subcommand(
+      "console",
+      "Prints a link that opens the console in a browser: it asks the daemon over its Unix socket");
+  add_daemon_options(*verb, arguments->daemon);
+  verb->add_flag("--json", arguments->json,
+                 "ConsoleLink of emberlock/v1/services.proto, as JSON on one line");
+  verb->callback([arguments] { print_link(*arguments); });
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// What stands in for the daemon's client where EMBERLOCK_DAEMON is off.
+#include "cli/commands.h"
+#include "cli/reconstruct_daemon.h"
+#include "cli/sessions_daemon.h"
+
+namespace emberlock::cli {
+namespace {
+
+[[noreturn]] void no_client() {
+  fail({ErrorKind::refused,
+        "this emberlock was built without the daemon's client (EMBERLOCK_DAEMON=OFF)",
+        {},
+        "Name a folder (./NAME for one here), or use a build with it"});
+}
+
+}  // namespace
+
+void reconstruct_by_daemon(const DaemonReconstruction&) { no_client(); }
+v1::ListSessionsResponse sessions_of_daemon(const DaemonAddress&) { no_client(); }
+void job_by_daemon(const DaemonAddress&, SessionJob, const std::string&, bool) { no_client(); }
+
+}  // namespace emberlock::cli

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "base/output_folder.h"
+
+namespace emberlock::cli {
+
+// Who makes folders, beside `reconstruct` (recon/pipeline/reconstruct.h) and `sessions export`
+// (session/export.h). New sessions (import, align --record) are made where nothing is: check_new_folder().
+
+inline constexpr OutputVerb kPlan{"reconstruct --plan"};
+inline constexpr OutputVerb kTradeoffRecon{"tradeoff recon"};
+inline constexpr OutputVerb kTradeoffSync{"tradeoff sync"};
+inline constexpr OutputVerb kVerify{"verify"};
+inline constexpr OutputVerb kDemo{"demo"};
+
+inline constexpr std::array<std::string_view, 1> kBesideCameras{"calibrate colour"};
+inline constexpr OutputVerb kCalibrateCameras{"calibrate cameras", kBesideCameras};
+inline constexpr std::array<std::string_view, 2> kBesideColour{"calibrate cameras", "calibrate convert"};
+inline constexpr OutputVerb kCalibrateColour{"calibrate colour", kBesideColour};
+inline constexpr OutputVerb kCalibrateConvert{"calibrate convert"};
+
+}  // namespace emberlock::cli

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "films/board_search.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "session/reader.h"
+#include "smear_sync/detect/detect.h"
+
+namespace emberlock::films {
+namespace {
+
+/// Pixels: a lamp whose middle is less sure is none to measure a camera's pose by. Its radius bears on both
+/// coordinates alike, so the row's error is the column's.
+constexpr double kWorstLamp = 0.3;
+
+}  // namespace
+
+void add_board_options(CLI::App& verb, BoardArguments& arguments, std::size_t instants) {
+  arguments.film.instants = instants;
+  verb.add_option("pictures", arguments.pictures,
+                  "A folder with a subfolder a camera, in which pictures of one instant have one number; or "
+                  "pictures named by camera and instant (left01.jpg); or a recorded or imported session")
+      ->required();
+  verb.add_option("--board", arguments.board,
+                  "chessboard:9x6:25mm (inner corners, square), or charuco:11x8:30mm:22mm:5X5_100 (squares, "
+                  "square, marker, dictionary)");
+  verb.add_option(
+          "--instants", arguments.film.instants,
+          "Of a session: so many instants are taken at most, spread over poses, of four times as many "
+          "that are searched")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000));
+  verb.add_option("--still", arguments.film.stillness,
+                  "Of a session: pixels that the board may move from one frame to the next; 0: don't ask")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1000.0));
+}
+
+recon::BoardSearch search_for_lamp() {
+  return {recon::lamp_as_board(), [](const ImageView& picture) -> std::vector<recon::BoardCorner> {
+            const smear::SmearReading reading = smear::detect(picture);
+            if (!reading.lamp || reading.lamps.size() > 1 || reading.lamp->sigma.value() > kWorstLamp)
+              return {};
+            return {{0, {reading.lamp->x + 0.5, reading.lamp->y.value() + 0.5}}};
+          }};
+}
+
+Result<recon::BoardReading> read_boards(const BoardArguments& arguments, const recon::BoardSearch& search,
+                                        const Progress& progress) {
+  const auto session =
+      std::find_if(arguments.pictures.begin(), arguments.pictures.end(),
+                   [](const std::string& path) { return session::SessionReader::is_session(path); });
+  if (session != arguments.pictures.end()) {
+    if (arguments.pictures.size() > 1) {
+      return Error{ErrorKind::bad_input, "is a session beside other pictures", *session,
+                   "Name one session alone, or pictures"};
+    }
+    return recon::find_boards_in_session(*session, search, arguments.film, progress);
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto pictures, recon::list_board_pictures({arguments.pictures.begin(),
+                                                                              arguments.pictures.end()}));
+  return recon::find_boards(pictures, search, progress);
+}
+
+std::string film_words(const recon::BoardReading& reading) {
+  if (!reading.film) return "";
+  const recon::FilmCounts& film = *reading.film;
+  return fmt::format("{} of {} instants searched: {} show the {}, it moves at {}, {} taken", film.looked,
+                     film.instants, film.seen, recon::noun_of(reading.sightings.board), film.moving,
+                     film.taken);
+}
+
+}  // namespace emberlock::films

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "films/import_transforms.h"
+
+#include <set>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "base/in_parallel.h"
+#include "films/import_parts.h"
+#include "films/small_picture.h"
+#include "recon/calibrate/transforms.h"
+#include "session/layout.h"
+#include "session/media/import_scan.h"
+#include "session/media/video_scan.h"
+
+namespace emberlock::films {
+namespace fs = std::filesystem;
+namespace {
+
+void put_calibration(const recon::Intrinsics& lens, const recon::Rigid3& pose, v1::Calibration& out) {
+  out.set_fx(lens.fx);
+  out.set_fy(lens.fy);
+  out.set_cx(lens.cx);
+  out.set_cy(lens.cy);
+  out.set_k1(lens.distortion.k1);
+  out.set_k2(lens.distortion.k2);
+  out.set_p1(lens.distortion.p1);
+  out.set_p2(lens.distortion.p2);
+  out.set_k3(lens.distortion.k3);
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) out.add_camera_from_world(pose.rotation(row, column));
+    out.add_camera_from_world(pose.translation(row));
+  }
+}
+
+/// As short a name as tells the pictures apart: that of the file, or with its folder.
+std::vector<std::string> ids_of(const std::vector<recon::TransformsFrame>& frames) {
+  std::vector<std::string> ids;
+  std::set<std::string> distinct;
+  for (const recon::TransformsFrame& frame : frames) {
+    ids.push_back(frame.image.stem().string());
+    distinct.insert(ids.back());
+  }
+  if (distinct.size() == ids.size()) return ids;
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    ids[i] = frames[i].image.parent_path().filename().string() + "-" + ids[i];
+  return ids;
+}
+
+}  // namespace
+
+std::optional<fs::path> transforms_in(const fs::path& path) {
+  std::error_code ec;
+  if (fs::is_regular_file(path, ec)) return path.extension() == ".json" ? std::optional(path) : std::nullopt;
+  const fs::path inside = path / "transforms.json";
+  return fs::is_regular_file(inside, ec) ? std::optional(inside) : std::nullopt;
+}
+
+Result<ImportResult> import_transforms(const fs::path& transforms, const ImportOptions& options,
+                                       const Observer& observer, const ReportsOf& reports) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Transforms scene, recon::read_transforms(transforms));
+  std::vector<fs::path> inputs{transforms};
+  for (const recon::TransformsFrame& frame : scene.frames) inputs.push_back(frame.image);
+  EMBERLOCK_ASSIGN_OR_RETURN(const ImportFolder target, ImportFolder::open(options.out, inputs));
+  const std::vector<std::string> ids = ids_of(scene.frames);
+  ImportResult result;
+  std::vector<CameraPart> parts;
+  for (std::size_t i = 0; i < scene.frames.size(); ++i) {
+    const recon::TransformsFrame& frame = scene.frames[i];
+    EMBERLOCK_ASSIGN_OR_RETURN(const Image picture, session::read_image(frame.image));
+    const ImageLayout& layout = picture.layout();
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Intrinsics lens, recon::intrinsics_of(frame, layout.size));
+    CameraPart part;
+    const auto renamed = options.ids.find(ids[i]);
+    part.stream.set_camera_id(renamed == options.ids.end() ? ids[i] : renamed->second);
+    session::set_layout(part.stream, layout);
+    put_calibration(lens, frame.camera_from_world, *part.stream.mutable_calibration());
+    part.files = {{frame.image, session::VideoScan{layout.size, {0}, {0}, {}, {}, {}, {}, 1, {}}, 0}};
+    part.writer.min_free_bytes = options.min_free_bytes;
+    part.places = {0};
+    part.stamps = {FrameStamp{}};
+    ImportedCamera& camera = result.cameras.emplace_back();
+    camera.id = part.stream.camera_id();
+    camera.name = frame.image.filename().string();
+    camera.files = {frame.image.string()};
+    camera.frames = 1;
+    camera.places = {0};
+    camera.calibrated = true;
+    camera.preview = small_picture(picture);
+    parts.push_back(std::move(part));
+  }
+  std::vector<std::optional<std::int64_t>> damaged(parts.size());
+  EMBERLOCK_RETURN_IF_ERROR(in_parallel(parts.size(), part_of(observer, 0, kNearlyDone),
+                                        [&](std::size_t i, const Observer& told) -> Status {
+                                          return target.write(parts[i], told, damaged[i]);
+                                        }));
+  v1::Manifest manifest;
+  manifest.set_session_id(fs::absolute(options.out).lexically_normal().filename().string());
+  manifest.set_purpose("flame");
+  if (scene.box) {
+    for (int i = 0; i < 3; ++i) {
+      manifest.mutable_box()->add_center(scene.box->center(i));
+      manifest.mutable_box()->add_size(scene.box->size(i));
+    }
+  }
+  result.instants = 1;
+  EMBERLOCK_ASSIGN_OR_RETURN(result.manifest,
+                             target.finish(std::move(manifest), parts, nullptr, reports(options, result)));
+  EMBERLOCK_RETURN_IF_ERROR(observe(observer, 1, "imported"));
+  return result;
+}
+
+}  // namespace emberlock::films

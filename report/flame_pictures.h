@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "base/image.h"
+#include "recon/preprocess/flame_mask.h"
+#include "recon/preprocess/view.h"
+
+namespace emberlock::report {
+
+/// A rectangle of an 8-bit colour picture; all of it where the box is empty.
+Image crop(const Image& image, const recon::PixelBox& box);
+
+/// |a - b| times `gain`; the two have one size.
+recon::RadianceImage difference(const recon::RadianceImage& a, const recon::RadianceImage& b, double gain);
+
+/// The picture at another width, its shape kept; each pixel is the mean of those that it covers.
+Image scaled(const Image& image, int width);
+
+/// Pictures of equal height from left to right, `gap` black columns between them.
+Image side_by_side(const std::vector<Image>& pictures, int gap = 8);
+
+/// The box with a margin around it, inside the image.
+recon::PixelBox with_margin(const recon::PixelBox& box, int margin, ImageSize size);
+
+}  // namespace emberlock::report

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "base/image.h"
+#include "smear_sync/ccd_timing.h"
+#include "smear_sync/reading.h"
+
+namespace emberlock::report {
+
+/// Rows [from, to] of the displayed image.
+struct RowSpan {
+  Rows from;
+  Rows to;
+};
+
+/// Where the dot of a lamp imaged at row `lamp` is displayed while the phase lies within `tolerance` of
+/// `tau`: up to two spans, since rows go around modulo K; none where it would not be seen (rest, dummy
+/// lines).
+std::vector<RowSpan> tolerance_band(const smear::CcdTiming& timing, Rows lamp, Seconds tau, Rows tolerance);
+
+/// The lamp's column of a frame, full height and `half_width` columns to each side, as inline SVG: contrast
+/// stretched so that a faint dot shows, a circle about the lamp, ticks at the dots, and the tolerance band:
+/// the rows where the dot must lie. Without a lamp the middle column is shown.
+std::string smear_strip_svg(const ImageView& frame, const smear::SmearReading& reading,
+                            const std::vector<RowSpan>& band, int half_width = 80);
+
+}  // namespace emberlock::report

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/access.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <system_error>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <openssl/crypto.h>
+#include <openssl/pem.h>
+#include <openssl/x509.h>
+#include <sys/file.h>
+#include <sys/random.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "base/file.h"
+
+namespace emberlock::rig {
+namespace {
+
+namespace fs = std::filesystem;
+
+Error os_error(const fs::path& path, std::string_view doing, std::string remedy = {}) {
+  return {ErrorKind::io, fmt::format("{} failed: {}", doing, std::generic_category().message(errno)),
+          path.string(), std::move(remedy)};
+}
+
+constexpr std::size_t kLargestPem = 1 << 20;
+
+bool fit_for_a_token(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+         std::string_view("-._~+/=").find(c) != std::string_view::npos;
+}
+
+template <auto function>
+struct Free {
+  template <class T>
+  void operator()(T* pointer) const {
+    function(pointer);
+  }
+};
+using Bio = std::unique_ptr<BIO, Free<BIO_free>>;
+using Certificate = std::unique_ptr<X509, Free<X509_free>>;
+using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
+
+Bio bio_of(const std::string& pem) { return Bio(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size()))); }
+
+/// A daemon that runs without a terminal can't be asked for a key's password.
+int no_password(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*user*/) { return 0; }
+
+/// The first in the file.
+Result<Certificate> parse_certificate(const std::string& pem, const fs::path& file) {
+  Certificate first(PEM_read_bio_X509(bio_of(pem).get(), nullptr, no_password, nullptr));
+  if (!first)
+    return Error{ErrorKind::bad_input, "holds no certificate in PEM", file.string(),
+                 "its first line is -----BEGIN CERTIFICATE-----"};
+  if (X509_cmp_current_time(X509_get0_notAfter(first.get())) <= 0)
+    return Error{ErrorKind::bad_input, "has run out", file.string(), "renew the certificate"};
+  return first;
+}
+
+}  // namespace
+
+Result<std::string> read_secret_file(const fs::path& file, std::size_t max_bytes, std::string_view what) {
+  EMBERLOCK_ASSIGN_OR_RETURN(std::string text, read_file(file, max_bytes));
+  struct stat status {};
+  if (::stat(file.c_str(), &status) != 0) return os_error(file, "stat");
+  const auto open_to = [&](std::string_view who, std::string_view remedy) {
+    return Error{ErrorKind::bad_input, fmt::format("{} {} (mode {:04o})", who, what, status.st_mode & 07777U),
+                 file.string(), fmt::format("make it private: chmod {} {}", remedy, file.string())};
+  };
+  // root tries a service user's files, too.
+  if (status.st_uid != 0 && status.st_uid != ::geteuid() && ::geteuid() != 0)
+    return Error{ErrorKind::bad_input, fmt::format("another user owns {} (uid {})", what, status.st_uid),
+                 file.string(),
+                 fmt::format("make it root's, or the daemon's user's: chown USER {}", file.string())};
+  if ((status.st_mode & S_IRWXO) != 0) return open_to("everybody may read or write", "o=");
+  if ((status.st_mode & S_IWGRP) != 0) return open_to("its group may write to", "g-w");
+  return text;
+}
+
+Result<std::string> random_secret() {
+  std::array<unsigned char, 32> bytes{};
+  if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
+    return os_error("the kernel's random numbers", "getrandom");
+  std::string text;
+  for (const unsigned char byte : bytes) text += fmt::format("{:02x}", byte);
+  return text;
+}
+
+Result<Token> Token::parse(std::string_view text) {
+  while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.remove_suffix(1);
+  if (text.size() < kShortest || text.size() > kLongest ||
+      !std::all_of(text.begin(), text.end(), fit_for_a_token))
+    return Error{ErrorKind::bad_input,
+                 fmt::format("no token: {} to {} letters, digits and -._~+/= are one", kShortest, kLongest),
+                 "", "make one with `emberlockd --make-token FILE`"};
+  return Token(std::string(text));
+}
+
+Result<Token> Token::read(const fs::path& file) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_secret_file(file, 4096, "the token"));
+  auto token = parse(text);
+  if (token) return token;
+  Error error = token.error();
+  error.where = file.string();
+  return error;
+}
+
+bool Token::matches(std::string_view shown) const {
+  return shown.size() == secret_.size() && CRYPTO_memcmp(shown.data(), secret_.data(), secret_.size()) == 0;
+}
+
+Status make_token(const fs::path& file) {
+  EMBERLOCK_ASSIGN_OR_RETURN(std::string text, random_secret());
+  text += '\n';
+  const UniqueFd out(::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, S_IRUSR | S_IWUSR));
+  if (!out && errno == EEXIST)
+    return Error{ErrorKind::bad_input, "exists already", file.string(),
+                 "remove it first, if no client needs it any more"};
+  if (!out) return os_error(file, "open");
+  if (::write(out.get(), text.data(), text.size()) != static_cast<ssize_t>(text.size()))
+    return os_error(file, "write");
+  return {};
+}
+
+Result<TlsIdentity> TlsIdentity::read(const fs::path& certificate, const fs::path& key) {
+  TlsIdentity identity;
+  EMBERLOCK_ASSIGN_OR_RETURN(identity.certificate, read_file(certificate, kLargestPem));
+  EMBERLOCK_ASSIGN_OR_RETURN(identity.key, read_secret_file(key, kLargestPem, "the key"));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Certificate shown, parse_certificate(identity.certificate, certificate));
+  const Key secret(PEM_read_bio_PrivateKey(bio_of(identity.key).get(), nullptr, no_password, nullptr));
+  if (!secret)
+    return Error{ErrorKind::bad_input, "holds no private key in PEM, or one with a password", key.string(),
+                 "take the password off: openssl pkey -in KEY -out NEW"};
+  if (X509_check_private_key(shown.get(), secret.get()) != 1)
+    return Error{ErrorKind::bad_input, fmt::format("is not the key of {}", certificate.string()),
+                 key.string(), "name the key that the certificate was made with"};
+  return identity;
+}
+
+Result<ServerTls> ServerTls::read(const fs::path& certificate, const fs::path& key, const fs::path& clients) {
+  ServerTls tls;
+  EMBERLOCK_ASSIGN_OR_RETURN(tls.identity, TlsIdentity::read(certificate, key));
+  if (clients.empty()) return tls;
+  EMBERLOCK_ASSIGN_OR_RETURN(tls.clients, read_file(clients, kLargestPem));
+  EMBERLOCK_RETURN_IF_ERROR(parse_certificate(tls.clients, clients));
+  return tls;
+}
+
+namespace {
+
+/// Takes away what a daemon left behind that has the lock no more; never anything but a socket.
+Status remove_stale(const fs::path& socket) {
+  struct stat found {};
+  if (::lstat(socket.c_str(), &found) != 0) return {};
+  if (!S_ISSOCK(found.st_mode))
+    return Error{ErrorKind::bad_input, "is there already, and no socket", socket.string(),
+                 "choose another path"};
+  if (::unlink(socket.c_str()) != 0) return os_error(socket, "unlink");
+  return {};
+}
+
+Status make_folder(const fs::path& folder) {
+  if (folder.empty() || fs::is_directory(folder)) return {};
+  if (::mkdir(folder.c_str(), S_IRWXU | S_IRGRP | S_IXGRP) == 0) return {};
+  return os_error(folder, "mkdir", "make the folder, or choose another path for the socket");
+}
+
+}  // namespace
+
+Result<SocketLock> SocketLock::take(const fs::path& socket) {
+  if (socket.native().size() >= sizeof(sockaddr_un::sun_path))
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("too long for a socket: {} characters at most", sizeof(sockaddr_un::sun_path) - 1),
+        socket.string(), "choose a shorter path"};
+  EMBERLOCK_RETURN_IF_ERROR(make_folder(socket.parent_path()));
+  const fs::path lock_file = socket.string() + ".lock";
+  UniqueFd file(
+      ::open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR | S_IRGRP));
+  if (!file) return os_error(lock_file, "open", "the daemon must be able to write to the socket's folder");
+  if (::flock(file.get(), LOCK_EX | LOCK_NB) != 0) {
+    std::array<char, 32> holder{};
+    const bool known = ::pread(file.get(), holder.data(), holder.size() - 1, 0) > 0;
+    return Error{ErrorKind::refused,
+                 fmt::format("another emberlockd{} serves here",
+                             known ? fmt::format(" (pid {})", holder.data()) : std::string()),
+                 socket.string(), "stop it, or choose another socket"};
+  }
+  const std::string pid = std::to_string(::getpid());
+  if (::ftruncate(file.get(), 0) != 0 || ::pwrite(file.get(), pid.data(), pid.size(), 0) < 0)
+    return os_error(lock_file, "write");
+  EMBERLOCK_RETURN_IF_ERROR(remove_stale(socket));
+  return SocketLock(std::move(file));
+}
+
+}  // namespace emberlock::rig

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/config/preflight.h"
+
+#include <cerrno>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "base/file.h"
+#include "recon/calibrate/transforms.h"
+#include "rig/access.h"
+#include "session/reader.h"
+
+namespace emberlock::rig {
+namespace {
+namespace fs = std::filesystem;
+
+constexpr std::size_t kLargestSecret = 1 << 20;
+
+class Preflight {
+ public:
+  std::vector<Error> of(const DaemonConfig& config) {
+    const ServerConfig& server = config.server;
+    folder_for_writing("recording.folder", config.recording.folder);
+    if (!config.alignment.delays.empty())
+      folder_for_writing("alignment.delays", config.alignment.delays.parent_path());
+    if (!server.socket.empty()) folder_for_writing("server.socket", server.socket.parent_path());
+    readable("server.tls_certificate", server.tls_certificate);
+    readable("server.tls_clients", server.tls_clients);
+    secret("server.tls_key", server.tls_key);
+    if (const std::string token = secret("server.token_file", server.token_file);
+        !server.token_file.empty() && !token.empty() && token.substr(0, token.find('\n')).size() < 16) {
+      problem("server.token_file", server.token_file, "the token is shorter than 16 characters",
+              fmt::format("make one: openssl rand -hex 24 > {}", server.token_file.string()));
+    }
+    program(config.reconstruction.program);
+    calibration(config.rig.calibration);
+    replay(config.rig.replay_session);
+    return std::move(problems_);
+  }
+
+ private:
+  void problem(const char* key, const fs::path& path, std::string what, std::string remedy) {
+    problems_.push_back({ErrorKind::bad_input, std::move(what), fmt::format("{}, {}", key, path.string()),
+                         std::move(remedy)});
+  }
+
+  /// It exists and can be written to, or can be made.
+  void folder_for_writing(const char* key, const fs::path& folder) {
+    std::error_code ignored;
+    fs::path there = folder.empty() ? "." : folder;
+    while (!fs::exists(there, ignored) && there.has_relative_path()) there = there.parent_path();
+    if (!fs::is_directory(there, ignored)) {
+      problem(key, there, "this is no folder", "name another");
+    } else if (::access(there.c_str(), W_OK | X_OK) != 0) {
+      problem(key, there, fmt::format("can't be written to: {}", std::strerror(errno)),
+              "give it to the daemon's user: chown emberlock: " + there.string());
+    }
+  }
+
+  std::string readable(const char* key, const fs::path& file, std::size_t largest = kLargestSecret) {
+    if (file.empty()) return {};
+    auto content = read_file(file, largest);
+    if (!content) problem(key, file, content.error().what, "let the daemon's user read it");
+    return content ? std::move(*content) : std::string();
+  }
+
+  std::string secret(const char* key, const fs::path& file) {
+    if (file.empty()) return {};
+    auto content = read_secret_file(file, kLargestSecret, "it");
+    if (!content) problem(key, file, content.error().what, content.error().remedy);
+    return content ? std::move(*content) : std::string();
+  }
+
+  void program(const fs::path& path) {
+    if (path.has_parent_path() && ::access(path.c_str(), X_OK) != 0)
+      problem("reconstruction.program", path, fmt::format("can't be run: {}", std::strerror(errno)),
+              "name the emberlock program");
+  }
+
+  void calibration(const fs::path& file) {
+    if (file.empty()) return;
+    const auto transforms = recon::read_transforms(file);
+    if (!transforms) problems_.push_back(transforms.error());
+  }
+
+  void replay(const fs::path& folder) {
+    if (folder.empty()) return;
+    const auto session = session::SessionReader::open(folder);
+    if (!session) problems_.push_back(session.error());
+  }
+
+  std::vector<Error> problems_;
+};
+
+}  // namespace
+
+std::vector<Error> preflight(const DaemonConfig& config) { return Preflight().of(config); }
+
+std::vector<Error> check_config(const std::filesystem::path& file) {
+  const auto text = read_file(file, kLargestSecret);
+  if (!text) return {text.error()};
+  ConfigReading reading = read_config(*text, file);
+  return reading.problems.empty() ? preflight(reading.config) : std::move(reading.problems);
+}
+
+}  // namespace emberlock::rig

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "base/file.h"
 
 #include <cerrno>
@@ -64,6 +65,14 @@ Result<std::string> read_file(const fs::path& path, std::size_t max_bytes) {
   return content;
 }
 
+Status sync_folder(const fs::path& folder) {
+  const UniqueFd fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!fd) return system_error(folder, "cannot open the folder");
+  // Some file systems over a network can't, and needn't.
+  if (::fsync(fd.get()) == 0 || errno == EINVAL || errno == ENOTSUP) return {};
+  return system_error(folder, "cannot flush the folder", "Check the disk's health");
+}
+
 Status write_file_atomically(const fs::path& path, std::string_view content) {
   const fs::path partial = sibling(path);
   {
@@ -80,54 +89,7 @@ Status write_file_atomically(const fs::path& path, std::string_view content) {
     ::unlink(partial.c_str());
     return error;
   }
-  return {};
-}
-
-Result<AtomicDirectory> AtomicDirectory::create(const fs::path& target, std::string_view marker) {
-  std::error_code ec;
-  if (fs::exists(target, ec)) {
-    const bool ours =
-        fs::is_directory(target, ec) && (fs::is_empty(target, ec) || fs::exists(target / marker, ec));
-    if (!ours) {
-      return Error{ErrorKind::bad_input,
-                   "exists and is not an earlier result (no " + std::string(marker) + " in it)",
-                   target.string(), "Name a new folder, or remove this one"};
-    }
-  }
-  const fs::path staging = sibling(fs::absolute(target));
-  fs::create_directories(staging.parent_path(), ec);
-  fs::remove_all(staging, ec);
-  if (!fs::create_directory(staging, ec)) {
-    return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), target.string(),
-                 "Check that its parent is writable"};
-  }
-  return AtomicDirectory(fs::absolute(target), staging);
-}
-
-AtomicDirectory::AtomicDirectory(AtomicDirectory&& o) noexcept
-    : target_(std::move(o.target_)), staging_(std::exchange(o.staging_, {})) {}
-
-AtomicDirectory::~AtomicDirectory() {
-  std::error_code ec;
-  if (!staging_.empty()) fs::remove_all(staging_, ec);
-}
-
-Status AtomicDirectory::commit() {
-  std::error_code ec;
-  fs::path old = staging_;
-  old += ".old";
-  const bool replaces = fs::exists(target_, ec);
-  if (replaces) fs::rename(target_, old, ec);
-  if (!ec) fs::rename(staging_, target_, ec);
-  if (ec) {
-    const std::string reason = ec.message();
-    if (replaces && !fs::exists(target_, ec)) fs::rename(old, target_, ec);
-    return Error{ErrorKind::io, "cannot move the result into place: " + reason, target_.string(),
-                 "Check that the folder's parent is writable"};
-  }
-  staging_.clear();
-  if (replaces) fs::remove_all(old, ec);
-  return {};
+  return sync_folder(path.parent_path());
 }
 
 }  // namespace emberlock

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 /// Marks a function that runs on the CPU and, when nvcc compiles it, on the GPU. On the CPU it is always

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <functional>
@@ -15,7 +16,7 @@ using Progress = std::function<void(double fraction, std::string_view what)>;
 /// The most that is reported before the end.
 inline constexpr double kNearlyDone = 0.999;
 
-inline void report(const Progress& progress, double fraction, std::string_view what) {
+inline void tell(const Progress& progress, double fraction, std::string_view what) {
   if (progress) progress(fraction, what);
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <optional>
@@ -8,12 +9,13 @@
 namespace emberlock {
 
 enum class ErrorKind {
-  bad_input,    ///< a file, an option or a value that the user can mend (exit code 2)
-  io,           ///< the operating system refused: disk, permissions, sockets
-  device,       ///< a camera, strobe or accelerator failed or is absent
-  out_of_data,  ///< the stream, file or recording has ended
-  timed_out,    ///< a deadline passed
-  refused,      ///< it can't be done in the present state; another moment may do
+  bad_input,      ///< a file, an option or a value that the user can mend (exit code 2)
+  io,             ///< the operating system refused: disk, permissions, sockets
+  device,         ///< a camera, strobe or accelerator failed or is absent
+  out_of_data,    ///< the stream, file or recording has ended
+  timed_out,      ///< a deadline passed
+  refused,        ///< it can't be done in the present state; another moment may do
+  not_converged,  ///< an iteration's numbers don't settle: its result would be worse than none
 };
 
 /// What went wrong, where (file, field, device), and what to do about it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How long virtual cameras take from cold to locked, and whether a lock that is held is ever wrong:
 //   bench_align_lock cold SEEDS    11 cameras to +-100 rows, by each policy, in seconds of the rig's time
 //   bench_align_lock hold HOURS    11 cameras whose crystals wander, held; the truth asked every second; a
@@ -12,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/align/alignment.h"
+#include "rig/align/alignment.h"
 #include "tests/support/small_rig.h"
 
 namespace emberlock {
@@ -23,27 +24,28 @@ constexpr Seconds kTolerance = milliseconds(5.4);
 /// Within an hour, as the temperature of a room and of the cameras goes.
 constexpr PartsPerMillion kWander{2};
 
-test::SmallBench bench_of(std::uint64_t seed, AlignPolicy policy, PartsPerMillion wander = {}) {
-  VirtualRigOptions setup = test::small_rig(seed, 11);
-  for (VirtualCameraOptions& camera : setup.cameras) camera.wander = wander;
+test::SmallBench bench_of(std::uint64_t seed, smear::AlignPolicy policy, PartsPerMillion wander = {}) {
+  drivers::VirtualRigOptions setup = test::small_rig(seed, 11);
+  for (drivers::VirtualCameraOptions& camera : setup.cameras) camera.wander = wander;
   test::SmallBench bench(setup);
   bench.options.comb_frames = 24;
   bench.options.align.policy = policy;
   bench.options.align.tolerance.amount = kTolerance;
-  bench.options.align.reset_by = ResetBy::anybody;  // as the daemon has it
+  bench.options.align.reset_by = smear::ResetBy::anybody;  // as the daemon has it
   bench.options.seed = seed;
   return bench;
 }
 
 int cold(int seeds) {
-  for (const AlignPolicy policy : {AlignPolicy::fixed_reference, AlignPolicy::densest, AlignPolicy::timed}) {
+  for (const smear::AlignPolicy policy :
+       {smear::AlignPolicy::fixed_reference, smear::AlignPolicy::densest, smear::AlignPolicy::timed}) {
     std::vector<double> seconds;
     double resets = 0;
     for (int seed = 1; seed <= seeds; ++seed) {
       test::SmallBench bench = bench_of(static_cast<std::uint64_t>(seed), policy);
       const TimePoint began = bench.align.clock->now();
-      const auto result = run_align(bench.align, bench.options);
-      if (!result || result->last.verdict != AlignVerdict::aligned) {
+      const auto result = rig::run_align(bench.align, bench.options);
+      if (!result || result->last.verdict != smear::AlignVerdict::aligned) {
         std::printf("seed %d: %s\n", seed,
                     result ? result->last.reason.c_str() : result.error().message().c_str());
         continue;
@@ -91,7 +93,7 @@ struct Held {
 };
 
 /// Holds the rig for an hour or less. The truth is asked every second, and about every round.
-bool hold_hour(Alignment& alignment, const test::SmallBench& bench, double seconds, Held& held) {
+bool hold_hour(rig::Alignment& alignment, const test::SmallBench& bench, double seconds, Held& held) {
   Clock& clock = *bench.align.clock;
   const int resets = alignment.resets();
   const TimePoint began = clock.now();
@@ -133,8 +135,8 @@ bool hold_hour(Alignment& alignment, const test::SmallBench& bench, double secon
 }
 
 int hold(double hours) {
-  test::SmallBench bench = bench_of(1, AlignPolicy::timed, kWander);
-  const auto made = Alignment::create(bench.align, bench.options);
+  test::SmallBench bench = bench_of(1, smear::AlignPolicy::timed, kWander);
+  const auto made = rig::Alignment::create(bench.align, bench.options);
   if (!made || !(*made)->start()) return 1;
   std::printf("%-8s %7s %8s %6s %6s %14s %11s %13s %5s\n", "hour", "checks", "renewals", "losses", "resets",
               "locked", "not locked", "worst error", "out");

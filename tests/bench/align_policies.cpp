@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What each policy takes to bring 11 cameras within a tolerance: resets and seconds, mean and 95th percentile
 // over fresh rigs.
 //   bench_align_policies [RIGS [FIRST_SEED]]
@@ -11,8 +12,8 @@ namespace {
 
 using namespace emberlock;
 
-AlignSimulation by_resets(AlignPolicy policy, double rows) {
-  AlignSimulation sim;
+smear::AlignSimulation by_resets(smear::AlignPolicy policy, double rows) {
+  smear::AlignSimulation sim;
   sim.options.policy = policy;
   sim.options.tolerance = {Rows(rows)};
   sim.options.max_rounds = 2000;
@@ -20,9 +21,9 @@ AlignSimulation by_resets(AlignPolicy policy, double rows) {
 }
 
 /// From +-100 rows. Phases as four frames of a 20 us flash show them: whole-row shifts, and 0.16 rows a dot.
-AlignSimulation by_trims(PartsPerMillion crystals) {
-  AlignSimulation sim = by_resets(AlignPolicy::trimmed, 1);
-  sim.trim = RateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
+smear::AlignSimulation by_trims(PartsPerMillion crystals) {
+  smear::AlignSimulation sim = by_resets(smear::AlignPolicy::trimmed, 1);
+  sim.trim = smear::RateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
   sim.flash_rows = 20.0 / 54;
   sim.noise_rows = 0.08;
   sim.rate_spread = crystals;
@@ -32,19 +33,19 @@ AlignSimulation by_trims(PartsPerMillion crystals) {
   return sim;
 }
 
-AlignSimulation known(AlignSimulation sim) {
+smear::AlignSimulation known(smear::AlignSimulation sim) {
   sim.delay_known = true;
   return sim;
 }
-AlignSimulation latencies(AlignSimulation sim, Seconds spread) {
+smear::AlignSimulation latencies(smear::AlignSimulation sim, Seconds spread) {
   sim.latency_spread = spread;
   return sim;
 }
-AlignSimulation drifting(AlignSimulation sim) {
+smear::AlignSimulation drifting(smear::AlignSimulation sim) {
   sim.rate_spread = PartsPerMillion(10);
   return sim;
 }
-AlignSimulation anywhere(AlignSimulation sim) {
+smear::AlignSimulation anywhere(smear::AlignSimulation sim) {
   sim.spread_rows = 0;
   sim.delay_known = true;
   return sim;
@@ -64,17 +65,17 @@ int main(int argc, char** argv) {
       "frame; 20 us flash\n");
   std::printf("%-58s %9s %7s %5s %8s %6s %6s %8s %7s\n", "policy", "tolerance", "resets", "p95", "seconds",
               "p95", "worst", "aligned", "error");
-  const auto print = [&](const char* name, const AlignSimulation& sim) {
-    const AlignStatistics s = simulate_many(sim, rigs, seed);
+  const auto print = [&](const char* name, const smear::AlignSimulation& sim) {
+    const smear::AlignStatistics s = smear::simulate_many(sim, rigs, seed);
     std::printf("%-58s %4.0f rows %7.2f %5d %8.1f %6.1f %6.1f %7.1f%% %7.2f\n", name,
                 std::get<Rows>(sim.options.tolerance.amount).value(), s.resets, s.resets_p95, s.seconds,
                 s.seconds_p95, s.seconds_worst, 100.0 * s.aligned / s.rigs, s.true_worst_rows);
   };
   for (const double rows : {100.0, 10.0}) {
-    print("fixed-reference", by_resets(AlignPolicy::fixed_reference, rows));
-    print("densest", by_resets(AlignPolicy::densest, rows));
-    print("densest, cameras drift by 10 ppm", drifting(by_resets(AlignPolicy::densest, rows)));
-    const AlignSimulation timed = by_resets(AlignPolicy::timed, rows);
+    print("fixed-reference", by_resets(smear::AlignPolicy::fixed_reference, rows));
+    print("densest", by_resets(smear::AlignPolicy::densest, rows));
+    print("densest, cameras drift by 10 ppm", drifting(by_resets(smear::AlignPolicy::densest, rows)));
+    const smear::AlignSimulation timed = by_resets(smear::AlignPolicy::timed, rows);
     print("timed, each camera's delay known", known(timed));
     print("timed, delay known, cameras drift by 10 ppm", drifting(known(timed)));
     print("timed, from scratch, one delay +- 0.1 ms", latencies(timed, milliseconds(0.1)));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // calibration [SEEDS] [INSTANTS] [WIDTHxHEIGHT] [FIRST]: rigs of eleven cameras on a ring, a board seen by
 // two to four at a time, corners with 0.2 pixels of noise, 5 % of them wrong: how near calibration comes to
 // the truth, and whether its stated uncertainties are right. A line a rig, and the worst of all.
@@ -32,7 +33,7 @@ int main(int argc, char** argv) {
     options.seed = static_cast<std::uint64_t>(seed);
     const test::BoardRig rig = test::board_rig(options);
     const auto start = std::chrono::steady_clock::now();
-    const auto found = calibrate_rig(rig.sightings, {.world = "0"});
+    const auto found = recon::calibrate_rig(rig.sightings, {.world = "0"});
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     slowest = std::max(slowest, seconds);
     if (!found || !found->whole()) {
@@ -45,7 +46,7 @@ int main(int argc, char** argv) {
     const test::PoseErrors world = test::errors_in_world(*found, rig.cameras);
     std::size_t views = 0;
     double noise = 0;
-    for (const CalibratedCamera& camera : found->cameras) {
+    for (const recon::CalibratedCamera& camera : found->cameras) {
       views += camera.views_used;
       noise += camera.fit.noise / static_cast<double>(found->cameras.size());
     }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How well cameras' clocks are told from a strobe, and whether the stated errors hold, over films with fresh
 // seeds.
 //   bench_clock_statistics [TRIALS] [SEED]
@@ -49,7 +50,8 @@ test::ClockFilm draw(std::uint64_t seed) {
   f.lamp = random.uniform(200, 520);
   f.timing.row_time = microseconds_per_row(random.uniform(53.5, 54.5));
   f.timing.shifts = random.uniform() < 0.5 ? 720 : 740;
-  f.timing.direction = random.uniform() < 0.5 ? ReadDirection::top_first : ReadDirection::bottom_first;
+  f.timing.direction =
+      random.uniform() < 0.5 ? smear::ReadDirection::top_first : smear::ReadDirection::bottom_first;
   f.timing.frame_period = Seconds(1 / 24.0 * (1 + random.uniform(-20e-6, 20e-6)));
   return f;
 }
@@ -58,9 +60,9 @@ std::optional<Trial> row_time(test::ClockFilm f) {
   RandomStream random(f.seed, 32);
   f.flash_rate = random.uniform(299.5, 300.5);
   f.first_flash = random.uniform(0, 1 / f.flash_rate);
-  std::vector<SmearReading> readings;
-  for (FrameReading& r : film(f)) readings.push_back(std::move(r.reading));
-  const auto clock = fit_row_clock(readings, Hertz(f.flash_rate));
+  std::vector<smear::SmearReading> readings;
+  for (smear::FrameReading& r : film(f)) readings.push_back(std::move(r.reading));
+  const auto clock = smear::fit_row_clock(readings, Hertz(f.flash_rate));
   if (!clock.ok() || clock->near_integer_pitch) return std::nullopt;
   return Trial{(clock->row_time - f.timing.row_time).value() * 1e9, clock->sigma.value() * 1e9};
 }
@@ -75,10 +77,10 @@ std::optional<Line> walk(test::ClockFilm f, double ppm) {
   RandomStream random(f.seed, 33);
   f.flash_rate = 1 / (f.timing.frame_period.value() * (1 + ppm * 1e-6));
   f.first_flash = random.uniform(0, f.timing.frame_period.value());
-  const auto fit = fit_drift(phases(f), {.period = f.timing.frame_period,
-                                         .row_time = f.timing.row_time,
-                                         .flash_width = Seconds(f.flash_width),
-                                         .expected = PartsPerMillion(ppm)});
+  const auto fit = smear::fit_drift(phases(f), {.period = f.timing.frame_period,
+                                                .row_time = f.timing.row_time,
+                                                .flash_width = Seconds(f.flash_width),
+                                                .expected = PartsPerMillion(ppm)});
   if (!fit.ok()) return std::nullopt;
   if (fit->samples < f.frames / 2) return std::nullopt;  // the flash rested: seen in too few frames
   const double at = (fit->at - TimePoint{}).value();
@@ -117,8 +119,8 @@ int main(int argc, char** argv) {
       test::ClockFilm f = with(i, 2);
       f.flash_rate = 1 / f.timing.frame_period.value();
       f.first_flash = RandomStream(f.seed, 33).uniform(0, f.timing.frame_period.value());
-      const Phase phase = phases(f)[1].phase;
-      if (phase.state != PhaseState::known) return std::nullopt;
+      const smear::Phase phase = phases(f)[1].phase;
+      if (phase.state != smear::PhaseState::known) return std::nullopt;
       return Trial{wrap_symmetric(phase.tau.value() - true_tau(f, f.timing.frame_period.value()),
                                   f.timing.frame_period.value()) /
                        f.timing.row_time.value(),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What calibrating colours and preparing pictures reach, on simulated cameras whose truth is known.
 //   build/release/bin/bench_colour [seeds]
 #include <chrono>
@@ -30,11 +31,11 @@ PatchSpread worse(const PatchSpread& a, const PatchSpread& b) {
 }
 
 /// What a perfect calibration would say: the noise of the patches themselves is left.
-ColourCalibration true_calibration(const std::vector<ColourTruth>& rig) {
+recon::ColourCalibration true_calibration(const std::vector<ColourTruth>& rig) {
   constexpr std::size_t kPoints = 4096;
-  ColourCalibration out;
+  recon::ColourCalibration out;
   for (const ColourTruth& camera : rig) {
-    CalibratedColour& c = out.cameras.emplace_back();
+    recon::CalibratedColour& c = out.cameras.emplace_back();
     for (std::size_t i = 0; i < kPoints; ++i) {
       const double v = static_cast<double>(i) / (kPoints - 1);
       c.colour.response.push_back(std::pow(v, camera.gamma + camera.toe * (1 - v)));
@@ -57,7 +58,7 @@ void patches(int seeds, double toe, const char* what) {
     auto rig = colour_rig(11, static_cast<std::uint64_t>(seed));
     for (ColourTruth& camera : rig) camera.toe = toe;
     const auto start = std::chrono::steady_clock::now();
-    const auto calibration = calibrate_colour(film_target(rig, static_cast<std::uint64_t>(seed)));
+    const auto calibration = recon::calibrate_colour(film_target(rig, static_cast<std::uint64_t>(seed)));
     seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (!calibration) {
       std::printf("seed %d: %s\n", seed, calibration.error().message().c_str());
@@ -65,13 +66,13 @@ void patches(int seeds, double toe, const char* what) {
     }
     before = worse(before, held_out_spread(rig, nullptr, 100 + static_cast<std::uint64_t>(seed)));
     after = worse(after, held_out_spread(rig, &*calibration, 100 + static_cast<std::uint64_t>(seed)));
-    const ColourCalibration perfect = true_calibration(rig);
+    const recon::ColourCalibration perfect = true_calibration(rig);
     truth = worse(truth, held_out_spread(rig, &perfect, 100 + static_cast<std::uint64_t>(seed)));
     for (std::size_t c = 0; c < 3; ++c) {
       double mean = 0;
       for (const ColourTruth& camera : rig) mean += std::log(camera.gain[c]) / 11;
       for (std::size_t i = 0; i < rig.size(); ++i) {
-        const CalibratedColour& found = calibration->cameras[i];
+        const recon::CalibratedColour& found = calibration->cameras[i];
         const double off = std::log(found.colour.gain[c]) - (std::log(rig[i].gain[c]) - mean);
         chi_square += off * off / (found.gain_sigma[c] * found.gain_sigma[c]);
         ++gains;
@@ -95,10 +96,10 @@ void dust(int seeds) {
     const auto number = static_cast<std::uint64_t>(seed);
     auto rig = colour_rig(11, number);
     for (std::size_t i = 0; i < rig.size(); ++i) put_dust(rig[i], 100 * number + i);
-    ColourReadings readings = film_target(rig, number);
-    const auto lens_alone = calibrate_colour(readings);
+    recon::ColourReadings readings = film_target(rig, number);
+    const auto lens_alone = recon::calibrate_colour(readings);
     add_flats(rig, readings);
-    const auto flat = calibrate_colour(readings);
+    const auto flat = recon::calibrate_colour(readings);
     if (!lens_alone || !flat) {
       std::printf("seed %d: not calibrated\n", seed);
       continue;
@@ -120,9 +121,9 @@ void smear() {
       for (const double peak : {180.0, 400.0}) {
         const SmearedFlame flame = smeared_flame(format, fraction, peak, 1);
         std::string why;
-        const auto found = find_smear(flame.seen, &why);
-        Samples cleaned = flame.seen;
-        if (found) remove_smear(cleaned, *found);
+        const auto found = recon::find_smear(flame.seen, &why);
+        recon::Samples cleaned = flame.seen;
+        if (found) recon::remove_smear(cleaned, *found);
         std::printf("  %-12s fraction %.0e, brightest %3.0f: %7.3f -> %6.3f  x%.3f  %s\n",
                     std::string(name(format)).c_str(), fraction, peak, rms_of(flame.seen, flame.clean),
                     rms_of(cleaned, flame.clean), found ? found->fraction[0] / fraction : 0.0, why.c_str());

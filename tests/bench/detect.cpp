@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Time of one reading; prints machine and build by Google Benchmark's own header.
 #include "smear_sync/detect/detect.h"
 
@@ -24,13 +25,13 @@ Image frame(PixelFormat format, int depth, bool comb) {
 
 void read(benchmark::State& state, PixelFormat format, int depth, bool comb) {
   const Image image = frame(format, depth, comb);
-  for (auto _ : state) benchmark::DoNotOptimize(detect(image.view()));
+  for (auto _ : state) benchmark::DoNotOptimize(smear::detect(image.view()));
 }
 
 /// The frames after the first, of a camera that films on.
 void follow(benchmark::State& state, PixelFormat format, int depth) {
   const Image image = frame(format, depth, false);
-  FollowingDetector detector;
+  smear::FollowingDetector detector;
   benchmark::DoNotOptimize(detector.read(image.view()));
   for (auto _ : state) benchmark::DoNotOptimize(detector.read(image.view()));
 }

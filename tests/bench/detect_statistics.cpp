@@ -1,5 +1,6 @@
+// SPDX-License-Identifier: Apache-2.0
 // How often and how well the detector reads dots, on random frames that nothing was tuned on.
-//   bench_detect_statistics [FRAMES] [SEED] [dots|dotless|compressed]
+//   bench_detect_statistics [FRAMES] [SEED] [dots|dotless|reflections|compressed]
 #include <cstdio>
 #include <cstdlib>
 
@@ -70,6 +71,14 @@ void dotless(int frames, std::uint64_t seed) {
   for (const Format& f : kFormats) false_dots(f.name, read_dotless(f.format, frames, seed + 4));
 }
 
+void reflections(int frames, std::uint64_t seed) {
+  dotless_heading();
+  false_dots("disks 1.2..4 lamps wide", read_lookalikes(Lookalike::disk, frames / 3, seed + 6));
+  false_dots("ellipses so wide, lamp-tall", read_lookalikes(Lookalike::ellipse, frames / 3, seed + 7));
+  false_dots("Gaussians so wide", read_lookalikes(Lookalike::soft, frames / 3, seed + 8));
+  false_dots("lines of 100..400 levels", read_lookalikes(Lookalike::line, frames / 3, seed + 9));
+}
+
 void compressed(int frames, std::uint64_t seed) {
   const Compressor compressors[] = {
       {"JPEG 75", [](const std::vector<Image>& film) { return jpeg_film(film, 75); }},
@@ -96,6 +105,7 @@ int main(int argc, char** argv) {
               static_cast<unsigned long long>(seed));
   if (part.empty() || part == "dots") dots(frames, seed);
   if (part.empty() || part == "dotless") dotless(frames, seed);
+  if (part.empty() || part == "reflections") reflections(frames, seed);
   if (part.empty() || part == "compressed") compressed(frames, seed);
   return 0;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // drift [SEEDS] [CAMERAS] [INSTANTS] [LATER] [PLACES]: rigs of cameras on a ring are calibrated from INSTANTS
 // views of a board and then checked by LATER others, and by a lamp at PLACES places: how often a rig that
 // stood still is said to have moved, how chi-square is spread then, and from what turn on a camera is named.
@@ -25,8 +26,8 @@ struct Tally {
   int freedom = 0;
 };
 
-void count(const v1::Rig& file, const BoardSightings& later, bool knocked, Tally& tally) {
-  const auto report = check_drift(file, later, "rig.json");
+void count(const v1::Rig& file, const recon::BoardSightings& later, bool knocked, Tally& tally) {
+  const auto report = recon::check_drift(file, later, "rig.json");
   if (!report) {
     std::printf("FAILED: %s\n", report.error().message().c_str());
     return;
@@ -34,8 +35,9 @@ void count(const v1::Rig& file, const BoardSightings& later, bool knocked, Tally
   ++tally.checks;
   bool alarm = false;
   for (std::size_t c = 0; c < report->cameras.size(); ++c) {
-    const CameraDrift& camera = report->cameras[c];
-    const bool moved = camera.verdict == DriftVerdict::moved || camera.verdict == DriftVerdict::lens;
+    const recon::CameraDrift& camera = report->cameras[c];
+    const bool moved =
+        camera.verdict == recon::DriftVerdict::moved || camera.verdict == recon::DriftVerdict::lens;
     if (knocked && c == kKnocked) {
       tally.named += moved ? 1 : 0;
     } else {
@@ -68,29 +70,29 @@ int main(int argc, char** argv) {
   const int later = number(4, 12);
   const int places = number(5, 5);
   options.instants = instants + later;
-  options.board = {BoardKind::chessboard, 9, 6, Meters(0.022)};
+  options.board = {recon::BoardKind::chessboard, 9, 6, Meters(0.022)};
   const std::vector<double> turns = {0, 0.02, 0.05, 0.1, 0.2};
   std::vector<Tally> boards(turns.size());
   std::vector<Tally> lamps(turns.size());
   for (int seed = 1; seed <= seeds; ++seed) {
     options.seed = static_cast<std::uint64_t>(seed);
     const test::BoardRig rig = test::board_rig(options);
-    BoardSightings before = rig.sightings;
+    recon::BoardSightings before = rig.sightings;
     std::erase_if(before.sightings, [&](const auto& s) { return static_cast<int>(s.instant) >= instants; });
-    BoardSightings after = rig.sightings;
+    recon::BoardSightings after = rig.sightings;
     std::erase_if(after.sightings, [&](const auto& s) { return static_cast<int>(s.instant) < instants; });
-    const auto found = calibrate_rig(before, {.world = "0"});
+    const auto found = recon::calibrate_rig(before, {.world = "0"});
     if (!found || !found->whole()) {
       std::printf("%d isn't calibrated\n", seed);
       continue;
     }
-    const BoardSightings lamp =
+    const recon::BoardSightings lamp =
         test::lamp_sightings(rig, test::lamp_places(rig, places, options.seed), options.noise, options.seed);
     test::BoardRig believed = rig;
     for (std::size_t i = 0; i < found->bundle.cameras.size(); ++i)
       believed.cameras[found->bundle_camera[i]] = found->bundle.cameras[i].model;
     for (std::size_t t = 0; t < turns.size(); ++t) {
-      v1::Rig file = rig_of(*found, "");
+      v1::Rig file = recon::rig_of(*found, "");
       if (turns[t] > 0) test::knock(file, believed, kKnocked, {.turn = {0, turns[t] * M_PI / 180, 0}});
       count(file, after, turns[t] > 0, boards[t]);
       count(file, lamp, turns[t] > 0, lamps[t]);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What `emberlock import` costs, and how near its times come to the truth.
 //   import speed FOLDER EMBERLOCK [OPTION...]: 11 clips of 60 s, 1280 x 720 H.264 in colour (made in FOLDER
 //   unless
@@ -20,7 +21,8 @@
 #include <unistd.h>
 
 #include "base/square.h"
-#include "cli/import_run.h"
+#include "films/import_run.h"
+#include "report/import_report.h"
 #include "session/reader.h"
 #include "session/shutter_times.h"
 #include "tests/support/import_clips.h"
@@ -37,7 +39,7 @@ int usage() {
 
 /// Eleven cameras as consumers', one film each; those that are there already are kept.
 test::FlameFilm fleet() {
-  VirtualRigDraw model;
+  drivers::VirtualRigDraw model;
   test::FlameFilm film{test::random_film(7, 11, model), Seconds(13)};
   film.strobe.format = {};
   film.strobe.format.gop = 12;
@@ -113,10 +115,10 @@ struct Residuals {
 };
 
 void times_of(std::uint64_t seed, const fs::path& folder, Residuals& all) {
-  VirtualRigDraw model;
+  drivers::VirtualRigDraw model;
   model.layout.size = {320, 240};
   model.row_time = microseconds_per_row(160);
-  const FrameCode code{};
+  const smear::FrameCode code{};
   test::FlameFilm film{test::random_film(seed, 3, model, code), Seconds(14)};
   film.strobe.format.codec = AV_CODEC_ID_H264;
   film.strobe.format.crf = 18 + static_cast<int>(seed % 8);
@@ -125,24 +127,24 @@ void times_of(std::uint64_t seed, const fs::path& folder, Residuals& all) {
   film.strobe.frames = 60 * 24;
   const auto clips = test::film_flame(film, folder / "clips");
   fs::create_directories(folder / "comb");
-  cli::ImportOptions options;
+  films::ImportOptions options;
   options.folder = folder / "clips";
   options.out = folder / "session";
-  options.alignment = cli::Alignment::strobe;
+  options.alignment = films::Alignment::strobe;
   options.clip.flash_rate = film.strobe.strobe.rate;
   options.comb = test::film_strobe(test::comb_of(film.strobe, 0, 48), folder / "comb")[0].file;
   options.comb_rate = Hertz(300);
-  const auto result = cli::run_import(options, {});
+  const auto result = films::run_import(options, {}, report::reports_of);
   if (!result.ok()) {
     ++all.refused;
     std::printf("%4llu  %s\n", static_cast<unsigned long long>(seed), result.error().message().c_str());
     return;
   }
-  const auto session = SessionReader::open(options.out);
-  const auto times = read_shutter_times(*session).value().value();
+  const auto session = session::SessionReader::open(options.out);
+  const auto times = session::read_shutter_times(*session).value().value();
   const auto& reference = result->cameras[0];
   for (std::size_t c = 1; c < clips.size(); ++c) {
-    const cli::ImportedCamera& camera = result->cameras[c];
+    const films::ImportedCamera& camera = result->cameras[c];
     ++all.cameras;
     const auto off = [&](std::int64_t instant, Seconds late) {
       const Seconds truth = clips[c].read_starts[static_cast<std::size_t>(camera.first + instant)] -

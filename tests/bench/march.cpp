@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The march and what stands around it, stage by stage, in the paper's set-up (recon/synthetic, paper_scene):
 // ten views of 640 x 480, 128^3 voxels, and a table over voxels, views and threads.
 //   bench_march [--benchmark_filter=REGEX]      voxels:512 runs only where a filter asks for it
@@ -43,7 +44,7 @@ namespace {
 using namespace emberlock;
 
 constexpr double kSigma = 32.8;  // 1/m, the flame's own
-constexpr double kKeyPoint = sizeof(Rgba);
+constexpr double kKeyPoint = sizeof(recon::Rgba);
 
 /// The least wall and core seconds of the repeats.
 class Least {
@@ -75,12 +76,12 @@ Least repeat(benchmark::State& state, const Work& work) {
 Least triad(int threads, int repeats) {
   constexpr std::size_t kWords = std::size_t{1} << 24;
   std::vector<float> a(kWords), b(kWords, 1.F), c(kWords, 2.F);
-  Pool pool(threads);
+  recon::Pool pool(threads);
   Least least;
   for (int r = 0; r < repeats; ++r)
     least([&] {
       pool.run(64, [&](int task) {
-        const Slice part = slice(kWords, 64, task);
+        const recon::Slice part = recon::slice(kWords, 64, task);
         for (std::size_t i = part.begin; i < part.end; ++i) a[i] = b[i] + 3.F * c[i];
       });
       benchmark::DoNotOptimize(a.data());
@@ -120,42 +121,43 @@ void reset_peak() {
 // --- scenes and problems
 
 /// Input views on a circle, as paper_scene's ten, without a held-out one.
-Scene circle_scene(int views) {
-  Scene scene;
+recon::Scene circle_scene(int views) {
+  recon::Scene scene;
   scene.box = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)};
-  const FlameTruth truth = Flame().at(Seconds(0), grid_over(scene.box, 192));
+  const recon::FlameTruth truth = recon::Flame().at(Seconds(0), recon::grid_over(scene.box, 192));
   const double focal = 320 * std::numbers::sqrt3;  // 60 degrees across
   for (int i = 0; i < views; ++i) {
     const double a = 2 * std::numbers::pi * i / views;
     const double e = (i % 2 == 0 ? 1 : -1) * std::numbers::pi / 18;
     const Eigen::Vector3d at(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
-    View view{"camera " + std::to_string(i),
-              look_at({{640, 480}, focal, focal, 320, 240, {}}, 0.3 * at, Eigen::Vector3d::Zero()),
-              {}};
-    view.image = render_view(truth.volume, truth.medium, truth.effects, view.camera);
+    recon::View view{
+        "camera " + std::to_string(i),
+        recon::look_at({{640, 480}, focal, focal, 320, 240, {}}, 0.3 * at, Eigen::Vector3d::Zero()),
+        {}};
+    view.image = recon::render_view(truth.volume, truth.medium, truth.effects, view.camera);
     scene.views.push_back(std::move(view));
   }
   return scene;
 }
 
-const Scene& scene_of(int views) {
-  static std::map<int, Scene> scenes;
+const recon::Scene& scene_of(int views) {
+  static std::map<int, recon::Scene> scenes;
   const auto found = scenes.find(views);
   if (found != scenes.end()) return found->second;
-  return scenes.emplace(views, views == 10 ? paper_scene() : circle_scene(views)).first->second;
+  return scenes.emplace(views, views == 10 ? recon::paper_scene() : circle_scene(views)).first->second;
 }
 
-std::vector<const View*> inputs(const Scene& scene) {
-  std::vector<const View*> views;
-  for (const View& view : scene.views)
-    if (view.role == ViewRole::input) views.push_back(&view);
+std::vector<const recon::View*> inputs(const recon::Scene& scene) {
+  std::vector<const recon::View*> views;
+  for (const recon::View& view : scene.views)
+    if (view.role == recon::ViewRole::input) views.push_back(&view);
   return views;
 }
 
-ComputeOptions on_cpu(int threads) { return {Device::cpu, threads}; }
+recon::ComputeOptions on_cpu(int threads) { return {recon::Device::cpu, threads}; }
 
-Hull carved(const Scene& scene, const Grid& grid, int threads) {
-  return carve(scene, flame_masks(scene), grid, on_cpu(threads)).value();
+recon::Hull carved(const recon::Scene& scene, const recon::Grid& grid, int threads) {
+  return recon::carve(scene, recon::flame_masks(scene), grid, on_cpu(threads)).value();
 }
 
 struct Setup {
@@ -166,35 +168,37 @@ struct Setup {
 };
 
 /// The last one asked for is kept: a large problem takes gigabytes.
-std::optional<std::pair<Setup, Problem>>& kept_problem() {
-  static std::optional<std::pair<Setup, Problem>> kept;
+std::optional<std::pair<Setup, recon::Problem>>& kept_problem() {
+  static std::optional<std::pair<Setup, recon::Problem>> kept;
   return kept;
 }
-const Problem& problem_of(const Setup& setup) {
+const recon::Problem& problem_of(const Setup& setup) {
   auto& kept = kept_problem();
   if (kept && kept->first == setup) return kept->second;
   kept.reset();
-  const Scene& scene = scene_of(setup.views);
-  const Grid grid = grid_over(scene.box, setup.voxels);
-  Pool pool(0);
-  kept.emplace(setup, pose(inputs(scene), setup.cube ? whole_grid(grid) : carved(scene, grid, 0), {}, pool));
+  const recon::Scene& scene = scene_of(setup.views);
+  const recon::Grid grid = recon::grid_over(scene.box, setup.voxels);
+  recon::Pool pool(0);
+  kept.emplace(setup, recon::pose(inputs(scene),
+                                  setup.cube ? recon::whole_grid(grid) : carved(scene, grid, 0), {}, pool));
   return kept->second;
 }
 
 struct Counts {
   double samples = 0, crossings = 0, key_points = 0, ray_bytes = 0;
 };
-Counts count(const Problem& problem) {
+Counts count(const recon::Problem& problem) {
   Counts counts;
-  for (const Run& run : problem.list.runs) {
+  for (const recon::Run& run : problem.list.runs) {
     const float* d = problem.list.rays[run.ray].direction;
     const float main_axis = std::max({std::abs(d[0]), std::abs(d[1]), std::abs(d[2])});
     counts.samples += run.count;
     counts.crossings += static_cast<double>(static_cast<float>(run.count) * run.step * main_axis);
   }
   counts.key_points = static_cast<double>(std::count(problem.active.begin(), problem.active.end(), 1));
-  counts.ray_bytes = static_cast<double>(problem.list.rays.size() * (sizeof(MarchRay) + sizeof(Rgba)) +
-                                         problem.list.runs.size() * sizeof(Run));
+  counts.ray_bytes =
+      static_cast<double>(problem.list.rays.size() * (sizeof(recon::MarchRay) + sizeof(recon::Rgba)) +
+                          problem.list.runs.size() * sizeof(recon::Run));
   return counts;
 }
 
@@ -206,7 +210,7 @@ constexpr const char* kAbsorbNames[] = {"none", "constant", "field"};
 
 struct Case {
   Stage stage;
-  Absorb absorb;
+  recon::Absorb absorb;
   Setup setup = {};
   int threads = 1;
   [[nodiscard]] bool goes_there() const { return stage != Stage::adjoint && stage != Stage::update; }
@@ -219,7 +223,7 @@ struct Bytes {
 };
 Bytes moved(const Case& c, const Counts& n) {
   const double kept_samples =
-      c.absorb == Absorb::field && c.stage != Stage::forward ? n.samples * kKeyPoint : 0;
+      c.absorb == recon::Absorb::field && c.stage != Stage::forward ? n.samples * kKeyPoint : 0;
   Bytes bytes;
   if (c.goes_there()) {
     bytes.near += 8 * kKeyPoint * n.samples;
@@ -234,21 +238,22 @@ Bytes moved(const Case& c, const Counts& n) {
   return bytes;
 }
 
-std::unique_ptr<Engine> engine_for(const Case& c, const Problem& problem, Pool& pool) {
+std::unique_ptr<recon::Engine> engine_for(const Case& c, const recon::Problem& problem, recon::Pool& pool) {
   const auto sigma = static_cast<float>(kSigma) * problem.grid().edge;
-  Optics optics = absorbing_optics(c.absorb == Absorb::constant ? sigma : 0);
+  recon::Optics optics = recon::absorbing_optics(c.absorb == recon::Absorb::constant ? sigma : 0);
   optics.absorb = c.absorb;
-  auto engine = make_engine(problem, optics, Precision::float32, pool);
-  engine->set(std::vector<Rgba>(problem.grid().size(), Rgba{{3, 2, 1, sigma}}));
+  auto engine = recon::make_engine(problem, optics, recon::Precision::float32, pool);
+  engine->set(std::vector<recon::Rgba>(problem.grid().size(), recon::Rgba{{3, 2, 1, sigma}}));
   const std::vector<float> weights(problem.active.begin(), problem.active.end());
   engine->set_weights(weights);
-  if (c.absorb == Absorb::field) engine->set_field(weights, std::vector<float>(problem.grid().size(), sigma));
+  if (c.absorb == recon::Absorb::field)
+    engine->set_field(weights, std::vector<float>(problem.grid().size(), sigma));
   engine->residual(0);  // what the adjoint alone starts from
   return engine;
 }
 
-void work(Engine& engine, const Case& c) {
-  constexpr Engine::Step kSmall = {1e-7F, 0.5F};  // stays where it is, near enough
+void work(recon::Engine& engine, const Case& c) {
+  constexpr recon::Engine::Step kSmall = {1e-7F, 0.5F};  // stays where it is, near enough
   if (c.stage == Stage::forward) {
     engine.project(0);
     return;
@@ -256,14 +261,14 @@ void work(Engine& engine, const Case& c) {
   if (c.goes_there()) engine.residual(0);
   if (c.comes_back()) engine.backproject(0);
   if (c.updates()) engine.stiffen(1e-3F, 1);
-  if (c.updates() && c.absorb == Absorb::field) engine.descend_field({kSmall, 1e-3F, 1e-3F, 0.3F});
-  if (c.updates() && c.absorb != Absorb::field) engine.descend(kSmall);
+  if (c.updates() && c.absorb == recon::Absorb::field) engine.descend_field({kSmall, 1e-3F, 1e-3F, 0.3F});
+  if (c.updates() && c.absorb != recon::Absorb::field) engine.descend(kSmall);
 }
 
 void run_stage(benchmark::State& state, const Case& c) {
-  const Problem& problem = problem_of(c.setup);
+  const recon::Problem& problem = problem_of(c.setup);
   const Counts n = count(problem);
-  Pool pool(c.threads);
+  recon::Pool pool(c.threads);
   const auto engine = engine_for(c, problem, pool);
   const double memory = triad_rate(c.threads);
   const Least least = repeat(state, [&] { work(*engine, c); });
@@ -285,62 +290,63 @@ void run_stage(benchmark::State& state, const Case& c) {
 // --- hull, pictures, whole frames
 
 void masks(benchmark::State& state) {
-  const Scene& scene = scene_of(10);
-  repeat(state, [&] { benchmark::DoNotOptimize(flame_masks(scene)); });
+  const recon::Scene& scene = scene_of(10);
+  repeat(state, [&] { benchmark::DoNotOptimize(recon::flame_masks(scene)); });
 }
 
 void hull(benchmark::State& state) {
-  const Scene& scene = scene_of(10);
-  const auto flames = flame_masks(scene);
-  const Grid grid = grid_over(scene.box, 128);
-  const ComputeOptions compute = on_cpu(static_cast<int>(state.range(0)));
-  repeat(state, [&] { benchmark::DoNotOptimize(carve(scene, flames, grid, compute)); });
+  const recon::Scene& scene = scene_of(10);
+  const auto flames = recon::flame_masks(scene);
+  const recon::Grid grid = recon::grid_over(scene.box, 128);
+  const recon::ComputeOptions compute = on_cpu(static_cast<int>(state.range(0)));
+  repeat(state, [&] { benchmark::DoNotOptimize(recon::carve(scene, flames, grid, compute)); });
 }
 
 void hull_and_rays(benchmark::State& state) {
-  const Scene& scene = scene_of(10);
-  const auto flames = flame_masks(scene);
-  const Grid grid = grid_over(scene.box, 128);
+  const recon::Scene& scene = scene_of(10);
+  const auto flames = recon::flame_masks(scene);
+  const recon::Grid grid = recon::grid_over(scene.box, 128);
   const int threads = static_cast<int>(state.range(0));
-  Pool pool(threads);
+  recon::Pool pool(threads);
   std::size_t rays = 0;
   repeat(state, [&] {
-    const Hull medium = carve(scene, flames, grid, on_cpu(threads)).value();
-    rays = pose(inputs(scene), medium, {}, pool).list.rays.size();
+    const recon::Hull medium = recon::carve(scene, flames, grid, on_cpu(threads)).value();
+    rays = recon::pose(inputs(scene), medium, {}, pool).list.rays.size();
   });
   state.counters["rays"] = static_cast<double>(rays);
 }
 
-void render(benchmark::State& state, Absorb absorb, int threads) {
-  const Scene& scene = scene_of(10);
-  const Grid grid = grid_over(scene.box, 128);
-  const Hull medium = carved(scene, grid, 0);
-  Volume volume{grid, std::vector<float>(3 * grid.size(), 1000.F), {}};
-  Effects effects;
-  if (absorb != Absorb::nothing) effects = absorbing(PerMeter(kSigma));
-  if (absorb == Absorb::field) {
-    effects.extinction.model = Extinction::Model::field;
+void render(benchmark::State& state, recon::Absorb absorb, int threads) {
+  const recon::Scene& scene = scene_of(10);
+  const recon::Grid grid = recon::grid_over(scene.box, 128);
+  const recon::Hull medium = carved(scene, grid, 0);
+  recon::Volume volume{grid, std::vector<float>(3 * grid.size(), 1000.F), {}};
+  recon::Effects effects;
+  if (absorb != recon::Absorb::nothing) effects = recon::absorbing(PerMeter(kSigma));
+  if (absorb == recon::Absorb::field) {
+    effects.extinction.model = recon::Extinction::Model::field;
     volume.extinction.assign(grid.size(), static_cast<float>(kSigma));
   }
-  RenderOptions options;
+  recon::RenderOptions options;
   options.compute = on_cpu(threads);
-  const CameraModel& camera = scene.views.back().camera;
-  repeat(state, [&] { benchmark::DoNotOptimize(render_view(volume, medium, effects, camera, options)); });
+  const recon::CameraModel& camera = scene.views.back().camera;
+  repeat(state,
+         [&] { benchmark::DoNotOptimize(recon::render_view(volume, medium, effects, camera, options)); });
 }
 
 /// From pictures to a volume, its extinction told or found first.
 void frame(benchmark::State& state, bool told, int voxels, int threads) {
   kept_problem().reset();
-  const Scene& scene = scene_of(10);
-  const Grid grid = grid_over(scene.box, voxels);
-  SolveOptions options;
+  const recon::Scene& scene = scene_of(10);
+  const recon::Grid grid = recon::grid_over(scene.box, voxels);
+  recon::SolveOptions options;
   options.compute = on_cpu(threads);
   reset_peak();
   state.counters["start_MB"] = peak_megabytes();
   repeat(state, [&] {
-    Effects effects = absorbing(PerMeter(kSigma));
-    if (!told) effects = choose_effects(scene, grid, {}, options).value().effects;
-    benchmark::DoNotOptimize(solve(scene, grid, effects, options));
+    recon::Effects effects = recon::absorbing(PerMeter(kSigma));
+    if (!told) effects = recon::choose_effects(scene, grid, {}, options).value().effects;
+    benchmark::DoNotOptimize(recon::solve(scene, grid, effects, options));
   });
   state.counters["peak_MB"] = peak_megabytes();
 }
@@ -364,7 +370,7 @@ void add_paper_setup(int threads) {
   const std::string on = "/threads:" + std::to_string(threads);
   for (const bool told : {true, false})
     add((told ? "solve/told" : "solve/auto") + on, 2, frame, told, 128, threads);
-  for (const Absorb absorb : {Absorb::nothing, Absorb::constant, Absorb::field}) {
+  for (const recon::Absorb absorb : {recon::Absorb::nothing, recon::Absorb::constant, recon::Absorb::field}) {
     for (const Stage stage : {Stage::forward, Stage::adjoint, Stage::joint, Stage::update, Stage::iteration})
       add_stage("", {stage, absorb, {}, threads}, 8);
     add("render_view/" + std::string(kAbsorbNames[static_cast<int>(absorb)]) + on, 8, render, absorb,
@@ -379,7 +385,7 @@ void add_table() {
     for (const int views : {4, 10, 16, 28})
       for (const int threads : {1, 2})
         add_stage("voxels:" + std::to_string(voxels) + "/views:" + std::to_string(views) + "/",
-                  {Stage::iteration, Absorb::constant, {voxels, views, false}, threads}, 3);
+                  {Stage::iteration, recon::Absorb::constant, {voxels, views, false}, threads}, 3);
 }
 
 }  // namespace
@@ -387,12 +393,12 @@ void add_table() {
 int main(int argc, char** argv) {
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  benchmark::AddCustomContext("march", march_table_name());
+  benchmark::AddCustomContext("march", recon::march_table_name());
   add("triad", 1, bandwidth)->ArgName("threads")->Arg(1)->Arg(2);
   for (const int threads : {1, 2}) add_paper_setup(threads);
   add("solve/told/voxels:256/threads:2", 1, frame, true, 256, 2);
   add("masks", 4, masks);
-  for (const Absorb absorb : {Absorb::nothing, Absorb::constant})
+  for (const recon::Absorb absorb : {recon::Absorb::nothing, recon::Absorb::constant})
     for (const Stage stage : {Stage::forward, Stage::adjoint})
       add_stage("cube/", {stage, absorb, {128, 10, true}, 1}, 3);
   add_table();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How well flames are reconstructed that nobody tuned the solver on (recon/synthetic: seeds 11..13 in both
 // shapes), by what the truth is and what the program is told; and the paper's method beside it. On this
 // machine's CPU.
@@ -14,7 +15,7 @@ using namespace emberlock;
 
 namespace {
 
-Elapsed stopwatch() {
+recon::Elapsed stopwatch() {
   const auto start = std::chrono::steady_clock::now();
   return [start] {
     return Seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -24,24 +25,24 @@ Elapsed stopwatch() {
 /// What the pictures were made with, and whether the program is told.
 struct Situation {
   const char* name;
-  void (*prepare)(PaperSceneOptions&);
+  void (*prepare)(recon::PaperSceneOptions&);
   bool told = false;        // the extinction; otherwise found out from the pictures
   bool nine_views = false;  // the tenth held out
   double budget = 0;        // seconds for hull and solve; 0: none
 };
 
-void as_it_is(PaperSceneOptions&) {}
+void as_it_is(recon::PaperSceneOptions&) {}
 
 /// Noise belongs to what the solver sees, not to what judges it.
-Scene filmed(PaperSceneOptions options, bool nine_views) {
-  Scene scene = paper_scene(options);
+recon::Scene filmed(recon::PaperSceneOptions options, bool nine_views) {
+  recon::Scene scene = recon::paper_scene(options);
   if (options.noise > 0) {
     options.noise = 0;
-    scene.views.back().image = paper_scene(options).views.back().image;
+    scene.views.back().image = recon::paper_scene(options).views.back().image;
   }
   if (nine_views) {
     scene.views.pop_back();
-    scene.views.back().role = ViewRole::held_out;
+    scene.views.back().role = recon::ViewRole::held_out;
   }
   return scene;
 }
@@ -51,33 +52,33 @@ struct Sum {
   int on = 0, count = 0;
 };
 
-bool run(const Situation& situation, FlameShape shape, std::uint64_t seed, Sum& sum) {
-  PaperSceneOptions film;
+bool run(const Situation& situation, recon::FlameShape shape, std::uint64_t seed, Sum& sum) {
+  recon::PaperSceneOptions film;
   film.flame.shape = shape;
   film.flame.seed = seed;
   situation.prepare(film);
-  const Scene scene = filmed(film, situation.nine_views);
-  const Grid grid = grid_over(scene.box, 128);
-  SolveOptions options;
-  options.compute.device = Device::cpu;
-  const Elapsed clock = stopwatch();
-  Effects effects;
+  const recon::Scene scene = filmed(film, situation.nine_views);
+  const recon::Grid grid = recon::grid_over(scene.box, 128);
+  recon::SolveOptions options;
+  options.compute.device = recon::Device::cpu;
+  const recon::Elapsed clock = stopwatch();
+  recon::Effects effects;
   if (situation.budget > 0) options.budget = Seconds(situation.budget);
   if (situation.told) {
-    effects.extinction = {Extinction::Model::field, film.flame.extinction, PerMeter(0)};
+    effects.extinction = {recon::Extinction::Model::field, film.flame.extinction, PerMeter(0)};
   } else {
-    const auto choice = choose_effects(scene, grid, {}, options, clock);
+    const auto choice = recon::choose_effects(scene, grid, {}, options, clock);
     if (!choice.ok()) return false;
     effects = choice->effects;
   }
   const double search = clock().value();
-  const auto r = solve(scene, grid, effects, options, stopwatch());
+  const auto r = recon::solve(scene, grid, effects, options, stopwatch());
   if (!r.ok()) return false;
-  const double error = all_channels(r->trace.back().heldout_rmse);
+  const double error = recon::all_channels(r->trace.back().heldout_rmse);
   const double solve_time = (r->hull_time + r->solve_time).value();
-  const bool on = effects.extinction.model != Extinction::Model::none;
+  const bool on = effects.extinction.model != recon::Extinction::Model::none;
   std::printf("| %-28s | %s %2d | %5.2f | %5.2f | %5.2f | %-4s %4.1f + %4.1f |\n", situation.name,
-              shape == FlameShape::plume ? "plume" : "two  ", static_cast<int>(seed), error, search,
+              shape == recon::FlameShape::plume ? "plume" : "two  ", static_cast<int>(seed), error, search,
               solve_time, on ? "on" : "off", effects.extinction.value.value(),
               effects.extinction.soot.value());
   sum.error += error;
@@ -89,21 +90,22 @@ bool run(const Situation& situation, FlameShape shape, std::uint64_t seed, Sum& 
 }
 
 void paper(std::uint64_t seed) {
-  PaperSceneOptions film;
+  recon::PaperSceneOptions film;
   film.flame.seed = seed;
-  const Scene scene = filmed(film, false);
-  const Grid grid = grid_over(scene.box, 128);
-  SolveOptions options;
-  options.compute.device = Device::cpu;
-  options.solver = Solver::paper;
+  const recon::Scene scene = filmed(film, false);
+  const recon::Grid grid = recon::grid_over(scene.box, 128);
+  recon::SolveOptions options;
+  options.compute.device = recon::Device::cpu;
+  options.solver = recon::Solver::paper;
   options.iterations = 200;
-  const auto r =
-      solve(scene, grid, absorbing(extinction_of_opacity(0.05, Meters(static_cast<double>(grid.edge)))),
-            options, stopwatch());
+  const auto r = recon::solve(
+      scene, grid,
+      recon::absorbing(recon::extinction_of_opacity(0.05, Meters(static_cast<double>(grid.edge)))), options,
+      stopwatch());
   if (!r.ok()) return;
   std::printf("paper's solver, plume %d:", static_cast<int>(seed));
   for (const std::size_t n : {10, 30, 70, 200})
-    std::printf(" %.2f", all_channels(r->trace[n - 1].heldout_rmse));
+    std::printf(" %.2f", recon::all_channels(r->trace[n - 1].heldout_rmse));
   std::printf(" at 10 / 30 / 70 / 200 iterations, %.1f ms each\n",
               1e3 * r->solve_time.value() / r->iterations);
 }
@@ -118,23 +120,23 @@ int main(int argc, char** argv) {
       {"extinction told", as_it_is, true},
       {"extinction told, 0.25 s", as_it_is, true, false, 0.25},
       {"paper's model, same grid",
-       [](PaperSceneOptions& o) {
+       [](recon::PaperSceneOptions& o) {
          o.truth_voxels = 128;
          o.truth_step = 1;
        }},
       {"truth on a finer grid", as_it_is},
       {"1 % noise, same grid",
-       [](PaperSceneOptions& o) {
+       [](recon::PaperSceneOptions& o) {
          o.truth_voxels = 128;
          o.truth_step = 1;
          o.noise = 2.55;
        }},
       {"nine views, the tenth held out", as_it_is, false, true},
-      {"emission only", [](PaperSceneOptions& o) { o.flame.extinction = PerMeter(0); }},
-      {"proportional to soot", [](PaperSceneOptions& o) { o.flame.absorber = Absorber::soot; }},
+      {"emission only", [](recon::PaperSceneOptions& o) { o.flame.extinction = PerMeter(0); }},
+      {"proportional to soot", [](recon::PaperSceneOptions& o) { o.flame.absorber = recon::Absorber::soot; }},
       {"scattering, albedo 0.5",
-       [](PaperSceneOptions& o) {
-         o.flame.scattering = {Scattering::Order::multiple, 0.5, 0};
+       [](recon::PaperSceneOptions& o) {
+         o.flame.scattering = {recon::Scattering::Order::multiple, 0.5, 0};
        }},
   };
   std::printf(
@@ -144,7 +146,7 @@ int main(int argc, char** argv) {
   std::printf("|---|---|---|---|---|---|\n");
   Sum sums[std::size(situations)];
   for (std::size_t s = 0; s < std::size(situations); ++s)
-    for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes})
+    for (const recon::FlameShape shape : {recon::FlameShape::plume, recon::FlameShape::two_plumes})
       for (int seed = first; seed <= last; ++seed)
         if (!run(situations[s], shape, static_cast<std::uint64_t>(seed), sums[s])) return 1;
   std::printf("\n| truth | mean held-out | mean seconds in all | extinction on |\n|---|---|---|---|\n");

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Frames a second that one thread writes and reads back, by format and encoding, of a flame-like picture with
 // camera noise (pure noise would flatter no codec, a flat one every codec).
 #include <algorithm>
@@ -48,7 +49,7 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-void measure(const ImageLayout& layout, Encoding encoding) {
+void measure(const ImageLayout& layout, session::Encoding encoding) {
   constexpr int kFrames = 60;
   const std::filesystem::path folder =
       std::filesystem::temp_directory_path() / ("emberlock-bench-" + std::to_string(::getpid()));
@@ -59,16 +60,16 @@ void measure(const ImageLayout& layout, Encoding encoding) {
   v1::CameraStream& camera = *manifest.add_cameras();
   camera.set_camera_id("cam0");
   camera.set_frame_rate_hz(60);
-  set_layout(camera, layout);
+  session::set_layout(camera, layout);
   double best_write = 1e9;
   double best_read = 1e9;
   std::uintmax_t bytes = 0;
   for (int repeat = 0; repeat < 3; ++repeat) {
     std::filesystem::remove_all(folder);
-    WriterOptions options;
+    session::WriterOptions options;
     options.encoding = encoding;
     options.min_free_bytes = 0;
-    auto writer = SessionWriter::create(folder, manifest, options);
+    auto writer = session::SessionWriter::create(folder, manifest, options);
     auto start = std::chrono::steady_clock::now();
     for (int i = 0; i < kFrames && writer.ok(); ++i) {
       Frame frame;
@@ -80,8 +81,8 @@ void measure(const ImageLayout& layout, Encoding encoding) {
     best_write = std::min(best_write, seconds_since(start));
     if (!writer.ok() || !writer->finish().ok()) return;
     bytes = std::filesystem::file_size(folder / "cam0" /
-                                       (encoding == Encoding::ffv1 ? "000000.mkv" : "000000.nut"));
-    auto reader = SessionReader::open(folder);
+                                       (encoding == session::Encoding::ffv1 ? "000000.mkv" : "000000.nut"));
+    auto reader = session::SessionReader::open(folder);
     start = std::chrono::steady_clock::now();
     for (std::size_t i = 0; i < kFrames && reader.ok(); ++i) {
       if (!reader->read(0, i).ok()) return;
@@ -92,9 +93,9 @@ void measure(const ImageLayout& layout, Encoding encoding) {
   const double raw = static_cast<double>(layout.row_bytes()) * layout.size.height * kFrames;
   std::printf("%-8s %5s  %4d x %-4d  write %6.1f fps %6.1f MB/s  read %6.1f fps  ratio %.2f\n",
               std::string(name(layout.format)).c_str(),
-              encoding == Encoding::ffv1      ? "ffv1"
-              : encoding == Encoding::raw_nut ? "raw"
-                                              : "huff",
+              encoding == session::Encoding::ffv1      ? "ffv1"
+              : encoding == session::Encoding::raw_nut ? "raw"
+                                                       : "huff",
               layout.size.width, layout.size.height, kFrames / best_write, raw / best_write / 1e6,
               kFrames / best_read, raw / static_cast<double>(bytes));
 }
@@ -102,7 +103,8 @@ void measure(const ImageLayout& layout, Encoding encoding) {
 }  // namespace
 
 int main() {
-  for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut, Encoding::huffman_nut}) {
+  for (const session::Encoding encoding :
+       {session::Encoding::ffv1, session::Encoding::raw_nut, session::Encoding::huffman_nut}) {
     measure({{1280, 720}, PixelFormat::gray8, 8}, encoding);
     measure({{1280, 720}, PixelFormat::gray16, 12}, encoding);
     measure({{1280, 720}, PixelFormat::rgb8, 8}, encoding);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How many cameras one machine records in real time: N synthetic cameras deliver on time, whatever the
 // recorder does, through AsyncWriter to a folder.
 //   bench_recording_fleet [--cameras 11] [--size 1280x720] [--rate 24] [--seconds 60] [--encoding raw|ffv1]
@@ -38,7 +39,7 @@ struct Fleet {
   double seconds = 60;
   std::string encoding = "raw";
   std::string folder;
-  std::size_t queue_frames = AsyncWriterOptions{}.queue_frames;
+  double queue_seconds = session::AsyncWriterOptions{}.queue_time.value();
   bool find = false;
   bool transcode = false;
 };
@@ -52,6 +53,7 @@ struct Outcome {
   double user_cpus = 0;
   double system_cpus = 0;
   double fullest = 0;
+  double at_risk = 0;           // seconds: the longest that a frame took to become safe
   double waiting_for_disk = 0;  // of the time, all processors together
   std::string failure;
 };
@@ -96,13 +98,13 @@ v1::Manifest manifest_of(const Fleet& fleet, const ImageLayout& layout) {
     v1::CameraStream& camera = *manifest.add_cameras();
     camera.set_camera_id("cam" + std::to_string(i));
     camera.set_frame_rate_hz(fleet.rate);
-    set_layout(camera, layout);
+    session::set_layout(camera, layout);
   }
   return manifest;
 }
 
 /// Delivers a camera's frames, each a picture of its own in memory, as a driver would, at its time.
-void film(AsyncWriter& writer, std::size_t camera, const Fleet& fleet,
+void film(session::AsyncWriter& writer, std::size_t camera, const Fleet& fleet,
           const std::vector<std::shared_ptr<const Image>>& scenes, Clock::time_point start,
           std::uint64_t frames) {
   for (std::uint64_t i = 0; i < frames; ++i) {
@@ -113,22 +115,22 @@ void film(AsyncWriter& writer, std::size_t camera, const Fleet& fleet,
     frame.stamp.frame_id = i;
     frame.stamp.monotonic_time.ns = static_cast<std::int64_t>(at * 1e9);
     frame.image = std::make_shared<const Image>(*scenes[(i + camera) % scenes.size()]);
-    writer.push(camera, std::move(frame));
+    static_cast<void>(writer.push(camera, std::move(frame)));  // what is lost the manifest counts
   }
 }
 
 Outcome record(const Fleet& fleet, const ImageLayout& layout, const std::filesystem::path& folder) {
   std::vector<std::shared_ptr<const Image>> scenes;
   for (std::uint64_t i = 0; i < 8; ++i) scenes.push_back(flame_like(layout, i));
-  WriterOptions options;
-  options.encoding = fleet.encoding == "raw" ? Encoding::raw_nut : Encoding::ffv1;
-  auto session = SessionWriter::create(folder, manifest_of(fleet, layout), options);
+  session::WriterOptions options;
+  options.encoding = fleet.encoding == "raw" ? session::Encoding::raw_nut : session::Encoding::ffv1;
+  auto session = session::SessionWriter::create(folder, manifest_of(fleet, layout), options);
   Outcome outcome;
   if (!session) {
     outcome.failure = session.error().message();
     return outcome;
   }
-  AsyncWriter writer(std::move(session).value(), {.queue_frames = fleet.queue_frames});
+  session::AsyncWriter writer(std::move(session).value(), {.queue_time = Seconds(fleet.queue_seconds)});
   const auto frames = static_cast<std::uint64_t>(fleet.seconds * fleet.rate);
   const auto cameras = static_cast<std::size_t>(fleet.cameras);
   rusage before{};
@@ -143,8 +145,11 @@ Outcome record(const Fleet& fleet, const ImageLayout& layout, const std::filesys
     }
     const std::jthread watcher([&](const std::stop_token& stop) {
       while (!stop.stop_requested()) {
-        for (std::size_t c = 0; c < cameras; ++c)
-          outcome.fullest = std::max(outcome.fullest, writer.progress(c).queue_fill);
+        for (std::size_t c = 0; c < cameras; ++c) {
+          const session::CameraProgress now = writer.progress(c);
+          outcome.fullest = std::max(outcome.fullest, now.queue_fill);
+          outcome.at_risk = std::max(outcome.at_risk, now.at_risk.value());
+        }
         std::this_thread::sleep_for(std::chrono::milliseconds(20));
       }
     });
@@ -188,7 +193,7 @@ void print(const Fleet& fleet, const Outcome& o) {
       "%2d cameras %s at %g/s, %s, %.0f s: %llu frames made, %llu recorded, lost: queue %llu disk %llu gap "
       "%llu, "
       "unaccounted %lld; %.1f MB/s, CPU %.2f user + %.2f system, waiting for disk %.2f, fullest queue %.0f "
-      "%%, "
+      "%%, safe after %.2f s at most, "
       "finished in %.1f s\n",
       fleet.cameras, fleet.size.c_str(), fleet.rate, fleet.encoding.c_str(), o.seconds,
       static_cast<unsigned long long>(o.made), static_cast<unsigned long long>(o.counts.recorded()),
@@ -196,17 +201,17 @@ void print(const Fleet& fleet, const Outcome& o) {
       static_cast<unsigned long long>(o.counts.camera_gap()),
       static_cast<long long>(o.made) - static_cast<long long>(o.counts.recorded() + lost(o)),
       static_cast<double>(o.bytes) / 1e6 / o.seconds, o.user_cpus, o.system_cpus, o.waiting_for_disk,
-      100 * o.fullest, o.finish_seconds);
+      100 * o.fullest, o.at_risk, o.finish_seconds);
   if (!o.failure.empty()) std::printf("  %s\n", o.failure.c_str());
   std::fflush(stdout);
 }
 
 void compress(const std::filesystem::path& folder) {
   auto start = Clock::now();
-  const Status done = transcode(folder);
+  const Status done = session::transcode(folder);
   const double transcoded = std::chrono::duration<double>(Clock::now() - start).count();
   start = Clock::now();
-  const auto check = verify_session(folder);
+  const auto check = session::verify_session(folder);
   std::printf("transcoded in %.0f s%s; verified in %.0f s: %s\n", transcoded,
               done ? "" : (": " + done.error().message()).c_str(),
               std::chrono::duration<double>(Clock::now() - start).count(),
@@ -224,7 +229,7 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", fleet.seconds)->check(CLI::PositiveNumber);
   app.add_option("--encoding", fleet.encoding)->check(CLI::IsMember({"raw", "ffv1"}));
   app.add_option("--folder", fleet.folder);
-  app.add_option("--queue-frames", fleet.queue_frames);
+  app.add_option("--queue-seconds", fleet.queue_seconds)->check(CLI::PositiveNumber);
   app.add_flag("--find", fleet.find);
   app.add_flag("--transcode", fleet.transcode);
   CLI11_PARSE(app, argc, argv);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the smear (the bands of rolling shutters, the brightness of global ones) tells of shutter resets: the
 // delay from the order to the new phase's stamps, modulo T, and how it jitters, beside the virtual cameras'
 // truth.
@@ -22,19 +23,20 @@ struct Delays {
 Delays measure(SensorKind kind, int rigs) {
   Delays delays;
   for (int seed = 1; seed <= rigs; ++seed) {
-    VirtualRigOptions setup = test::small_rig(static_cast<std::uint64_t>(seed), 3, {kind, kind, kind});
-    for (VirtualCameraOptions& camera : setup.cameras) camera.reset_latency = milliseconds(180);
+    drivers::VirtualRigOptions setup =
+        test::small_rig(static_cast<std::uint64_t>(seed), 3, {kind, kind, kind});
+    for (drivers::VirtualCameraOptions& camera : setup.cameras) camera.reset_latency = milliseconds(180);
     test::SmallBench bench(setup);
-    bench.options.align.policy = AlignPolicy::timed;
+    bench.options.align.policy = smear::AlignPolicy::timed;
     bench.options.align.tolerance.amount = Rows(10);
-    const auto result = run_align(bench.align, bench.options);
+    const auto result = rig::run_align(bench.align, bench.options);
     if (!result.ok()) {
       std::fprintf(stderr, "rig %d: %s\n", seed, result.error().message().c_str());
       continue;
     }
     for (int i = 0; i < bench.rig->size(); ++i) {
       if (!result->delays[i]) continue;
-      const CcdTiming& timing = bench.rig->truth(i).timing;
+      const smear::CcdTiming& timing = bench.rig->truth(i).timing;
       // A frame is stamped when its last row has been shifted out.
       const Seconds truth = milliseconds(180) + Rows(timing.shifts) * timing.row_time;
       delays.learnt_ms.push_back(in_milliseconds(result->delays[i]->mean));

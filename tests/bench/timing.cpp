@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What cameras that are milliseconds apart cost, and what is left of it once each view is rendered at its own
 // instant: flames that nobody tuned the program on (recon/synthetic: seeds 11..13 in both shapes), rising
 // 1 m/s, each with its own offsets, ten views, the eleventh held out. On this machine's CPU.
@@ -15,7 +16,7 @@ using namespace emberlock;
 
 namespace {
 
-Elapsed stopwatch() {
+recon::Elapsed stopwatch() {
   const auto start = std::chrono::steady_clock::now();
   return [start] {
     return Seconds(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
@@ -24,33 +25,33 @@ Elapsed stopwatch() {
 
 struct Run {
   double error = 0;  // held-out RMS, grey levels
-  EffectReport motion;
-  Motion found;
+  recon::EffectReport motion;
+  recon::Motion found;
   double seconds = 0;
 };
 
 /// Everything is found out from the pictures.
-Run reconstructed(const Scene& scene) {
-  const Elapsed clock = stopwatch();
-  const Grid grid = grid_over(scene.box, 128);
-  SolveOptions options;
-  options.compute.device = Device::cpu;
-  const auto choice = choose_effects(scene, grid, {}, options, clock);
+Run reconstructed(const recon::Scene& scene) {
+  const recon::Elapsed clock = stopwatch();
+  const recon::Grid grid = recon::grid_over(scene.box, 128);
+  recon::SolveOptions options;
+  options.compute.device = recon::Device::cpu;
+  const auto choice = recon::choose_effects(scene, grid, {}, options, clock);
   if (!choice.ok()) std::exit(1);
-  const auto solved = solve(scene, grid, choice->effects, options, clock);
+  const auto solved = recon::solve(scene, grid, choice->effects, options, clock);
   if (!solved.ok()) std::exit(1);
-  return {all_channels(solved->trace.back().heldout_rmse), choice->reports.back(), choice->effects.motion,
-          clock().value()};
+  return {recon::all_channels(solved->trace.back().heldout_rmse), choice->reports.back(),
+          choice->effects.motion, clock().value()};
 }
 
 /// Without what it knows of its views' times.
-Scene unaware(Scene scene) {
-  for (View& view : scene.views) view.lateness = Seconds(0);
+recon::Scene unaware(recon::Scene scene) {
+  for (recon::View& view : scene.views) view.lateness = Seconds(0);
   return scene;
 }
 
-Scene without_averages(Scene scene) {
-  for (View& view : scene.views) view.average.reset();
+recon::Scene without_averages(recon::Scene scene) {
+  for (recon::View& view : scene.views) view.average.reset();
   return scene;
 }
 
@@ -68,21 +69,21 @@ int main(int argc, char** argv) {
   std::printf("|---|---|---|---|---|---|---|---|\n");
   double sum[5] = {};
   int runs = 0;
-  for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes})
+  for (const recon::FlameShape shape : {recon::FlameShape::plume, recon::FlameShape::two_plumes})
     for (std::uint64_t seed = 11; seed <= 13; ++seed) {
-      PaperSceneOptions film;
+      recon::PaperSceneOptions film;
       film.flame.shape = shape;
       film.flame.seed = seed;
-      const Run together = reconstructed(paper_scene(film));
+      const Run together = reconstructed(recon::paper_scene(film));
       for (int draw = 0; draw < draws; ++draw) {
         film.averaged_frames = 24;
         film.lateness.clear();
         for (std::uint64_t i = 0; i < 11; ++i)
           film.lateness.push_back(
               Seconds(reach * (2 * random_uniform(seed, 77 + static_cast<std::uint64_t>(draw), i) - 1)));
-        const Scene all_late = paper_scene(film);
+        const recon::Scene all_late = recon::paper_scene(film);
         film.lateness.pop_back();
-        const Scene late = paper_scene(film);
+        const recon::Scene late = recon::paper_scene(film);
         const Run as_filmed = reconstructed(unaware(late));
         const Run corrected = reconstructed(late);
         const Run plain = reconstructed(without_averages(late));
@@ -95,7 +96,7 @@ int main(int argc, char** argv) {
         std::printf(
             "| %s %d | %.2f | %.2f (%.2f) | %.2f (%.2f) | %.2f (%.2f) | %.2f (%.2f) | %.2f %.2f %.2f, change "
             "%.1f | %.2f of %.2f |\n",
-            shape == FlameShape::plume ? "plume" : "two", static_cast<int>(seed), errors[0], errors[1],
+            shape == recon::FlameShape::plume ? "plume" : "two", static_cast<int>(seed), errors[0], errors[1],
             errors[1] / errors[0], errors[2], errors[2] / errors[0], errors[3], errors[3] / errors[0],
             errors[4], errors[4] / errors[0], v[0], v[1], v[2], corrected.motion.predicted_change,
             corrected.motion.seconds.value(), corrected.seconds);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // verify_statistics [RIGS] [SEED] [FRAMES]: how near `emberlock verify` comes to the truth on random rigs
 // whose cameras write 1280 x 720 video: a line a rig, and the worst of all.
 #include <chrono>
@@ -7,34 +8,34 @@
 #include <filesystem>
 #include <string>
 
-#include "cli/verify_run.h"
+#include "films/verify_run.h"
 #include "tests/support/strobe_clips.h"
 
 namespace emberlock {
 namespace {
 
-using cli::VerifyRunOptions;
+using films::VerifyRunOptions;
 
 struct Worst {
   double error_ms = 0, sigmas = 0, drift_ppm = 0;
   int offsets_wrong = 0, unknown = 0, cameras = 0;
 };
 
-void judge(std::uint64_t seed, int frames, const VirtualRigDraw& model, const std::filesystem::path& folder,
-           Worst& all) {
+void judge(std::uint64_t seed, int frames, const drivers::VirtualRigDraw& model,
+           const std::filesystem::path& folder, Worst& all) {
   RandomStream random(seed, 7);
   const int cameras = 3 + static_cast<int>(random.uniform(0, 2));
   test::StrobeFilm film = test::random_film(seed, cameras, model);
   film.frames = frames;
   std::filesystem::create_directories(folder / "comb");
-  VerifyRunOptions options;
+  films::VerifyRunOptions options;
   const auto truths = test::film_strobe(film, folder);
   for (const auto& truth : truths) options.clips.push_back(truth.file);
   options.comb = test::film_strobe(test::comb_of(film, 0, 48), folder / "comb")[0].file;
   options.comb_rate = Hertz(300);
   options.verify.clip.flash_rate = film.strobe.rate;
   const auto start = std::chrono::steady_clock::now();
-  const auto run = cli::run_verify(options, {});
+  const auto run = films::run_verify(options, {});
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   if (!run.ok()) {
     std::printf("%4llu  %s\n", static_cast<unsigned long long>(seed), run.error().message().c_str());
@@ -43,7 +44,7 @@ void judge(std::uint64_t seed, int frames, const VirtualRigDraw& model, const st
   }
   Worst rig;
   for (std::size_t c = 0; c < truths.size(); ++c) {
-    const CameraVerdict& camera = run->result.cameras[c];
+    const smear::CameraVerdict& camera = run->result.cameras[c];
     ++rig.cameras;
     if (!camera.error || !camera.drift) {
       ++rig.unknown;
@@ -82,7 +83,7 @@ int main(int argc, char** argv) {
   const int rigs = argc > 1 ? std::atoi(argv[1]) : 20;
   const std::uint64_t seed = argc > 2 ? std::strtoull(argv[2], nullptr, 10) : 1;
   const int frames = argc > 3 ? std::atoi(argv[3]) : 240;
-  emberlock::VirtualRigDraw model;
+  emberlock::drivers::VirtualRigDraw model;
   if (argc > 4 && std::string(argv[4]) == "small") {
     model.layout.size = {320, 240};
     model.row_time = emberlock::microseconds_per_row(160);
@@ -94,7 +95,7 @@ int main(int argc, char** argv) {
       "                          (/s)    off by      off by              off by     wrong\n");
   emberlock::Worst all;
   for (int rig = 0; rig < rigs; ++rig) {
-    emberlock::judge(seed + static_cast<std::uint64_t>(rig), frames, model, folder, all);
+    judge(seed + static_cast<std::uint64_t>(rig), frames, model, folder, all);
     std::filesystem::remove_all(folder);
   }
   std::printf(

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What consoles cost the daemon: 11 cameras of 1280 x 720 Mono8 at 24 frames a second, shown to 1, 10 and 50
 // of them, of the 50 one that never reads. The consoles are a process of their own, so that the processor
 // time is the daemon's alone.
@@ -127,9 +128,10 @@ void measure(int consoles, int stalled) {
     ::_exit(::write(to_parent[1], &seen, sizeof(seen)) == sizeof(seen) ? 0 : 1);
   }
   test::FakeApi api;
-  const auto server = HttpServer::start(api, {.listen = "127.0.0.1:0"});
+  const auto server = daemon::HttpServer::start(
+      api, {.listen = "127.0.0.1:0", .token = *rig::Token::parse(test::kHttpToken)});
   if (!server) return;
-  Pictures pictures(api.board(), {});
+  daemon::Pictures pictures(api.board(), {});
   std::atomic<bool> over = false;
   v1::DaemonStatus status = long_aligned();
   std::thread cameras([&] {
@@ -150,12 +152,12 @@ void measure(int consoles, int stalled) {
     }
   });
   const int port = (*server)->port();
-  const double cpu = process_usage().cpu_s;
+  const double cpu = daemon::process_usage().cpu_s;
   Seen seen;
   if (::write(to_child[1], &port, sizeof(port)) != sizeof(port) ||
       ::read(to_parent[0], &seen, sizeof(seen)) != sizeof(seen))
     std::puts("the consoles failed");
-  const ProcessUsage usage = process_usage();
+  const daemon::ProcessUsage usage = daemon::process_usage();
   over = true;
   cameras.join();
   ::waitpid(child, nullptr, 0);
@@ -164,7 +166,8 @@ void measure(int consoles, int stalled) {
       "{:5.1f} % of a "
       "core, {} MB; {:.0f} kB/s of status and rounds a console (a status with its rounds: {:.0f} kB)\n",
       consoles, stalled, seen.slowest_hz, seen.late_ms, 100 * (usage.cpu_s - cpu) / (kDuration.value() + 1),
-      usage.resident_bytes >> 20, seen.text_bytes / 1000, static_cast<double>(to_json(status).size()) / 1000);
+      usage.resident_bytes >> 20, seen.text_bytes / 1000,
+      static_cast<double>(daemon::to_json(status).size()) / 1000);
   std::fflush(stdout);
 }
 

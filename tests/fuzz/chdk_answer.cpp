@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -14,17 +15,18 @@ namespace {
 
 /// Sends what the fuzzer made up, cut into pieces: each as long as its first two bytes say, or as was asked
 /// for.
-class MadeUp final : public PtpTransport {
+class MadeUp final : public drivers::PtpTransport {
  public:
   explicit MadeUp(std::span<const std::byte> bytes) : left_(bytes) {}
   [[nodiscard]] std::size_t packet_bytes() const override { return 64; }
   Status send(std::span<const std::byte> /*transfer*/, Seconds /*deadline*/) override { return {}; }
-  Result<PtpPiece> receive(std::size_t most, Seconds /*deadline*/) override {
+  Result<drivers::PtpPiece> receive(std::size_t most, Seconds /*deadline*/) override {
     if (left_.size() < 2) return Error{ErrorKind::device, "it is unplugged"};
     const std::size_t length = std::to_integer<std::size_t>(left_[0]) | std::to_integer<std::size_t>(left_[1])
                                                                             << 8;
     const std::size_t size = std::min({length, most, left_.size() - 2});
-    const PtpPiece piece{left_.subspan(2, size), size < most ? PtpPieceEnd::short_packet : PtpPieceEnd::more};
+    const drivers::PtpPiece piece{left_.subspan(2, size), size < most ? drivers::PtpPieceEnd::short_packet
+                                                                      : drivers::PtpPieceEnd::more};
     left_ = left_.subspan(2 + size);
     return piece;
   }
@@ -35,20 +37,21 @@ class MadeUp final : public PtpTransport {
 };
 
 void look_at(std::span<const std::byte> bytes) {
-  const auto view = parse_live_view(bytes);
+  const auto view = drivers::parse_live_view(bytes);
   if (!view.ok() || !*view) return;
   const ImageSize size = (*view)->size;
   if ((*view)->bytes.size() < static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height))
     std::abort();
-  const Image gray = image_of(**view, PixelFormat::gray8);
-  const Image rgb = image_of(**view, PixelFormat::rgb8);
+  const Image gray = drivers::image_of(**view, PixelFormat::gray8);
+  const Image rgb = drivers::image_of(**view, PixelFormat::rgb8);
   if (rgb.bytes().size() != 3 * gray.bytes().size()) std::abort();
 }
 
 void talk(std::span<const std::byte> bytes) {
-  PtpSession session(std::make_unique<MadeUp>(bytes), "camera", std::make_shared<VirtualClock>());
+  drivers::PtpSession session(std::make_unique<MadeUp>(bytes), "camera",
+                              std::make_shared<drivers::VirtualClock>());
   if (!session.open().ok()) return;
-  Chdk chdk(session);
+  drivers::Chdk chdk(session);
   (void)chdk.version();
   (void)chdk.run("return get_mode()");
   (void)chdk.read_message();

@@ -1,24 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>
 #include <utility>
 
-#include "daemon/reconstruction/messages.h"
 #include "daemon/reconstruction/state.h"
+#include "session/child_messages.h"
 
 // What a reconstruction's child sends the daemon, in two pieces.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emberlock;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
-  ReconstructionState state{v1::ReconstructionStatus()};
+  daemon::ReconstructionState state{v1::ReconstructionStatus()};
   const auto take = [&](v1::ChildMessage&& message) {
     const auto shown = state.take(std::move(message));
     if (!shown || !shown->has_volume()) return;
     const v1::VolumePreview& volume = shown->volume();
     if (volume.voxels().size() != std::size_t{volume.nx()} * volume.ny() * volume.nz()) std::abort();
   };
-  ChildMessageParser parser;
+  session::ChildMessageParser parser;
   if (parser.add(bytes.substr(0, size / 2), take))
     static_cast<void>(parser.add(bytes.substr(size / 2), take).ok());
   state.end({}, "");

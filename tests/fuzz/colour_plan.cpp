@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -7,7 +8,7 @@
 /// Whatever a colour.json holds: an error that says where and what to do, or rectangles with extent.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emberlock;
-  const auto plan = parse_colour_plan({reinterpret_cast<const char*>(data), size}, "fuzz/colour.json");
+  const auto plan = recon::parse_colour_plan({reinterpret_cast<const char*>(data), size}, "fuzz/colour.json");
   if (!plan) {
     if (plan.error().where.empty() || plan.error().remedy.empty()) std::abort();
     return 0;

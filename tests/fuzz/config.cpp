@@ -1,4 +1,5 @@
-#include "daemon/config/config.h"
+// SPDX-License-Identifier: Apache-2.0
+#include "rig/config/config.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -11,13 +12,13 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emberlock;
   const std::filesystem::path file = "/fuzz/emberlockd.toml";
-  const ConfigReading once = read_config({reinterpret_cast<const char*>(data), size}, file);
+  const rig::ConfigReading once = rig::read_config({reinterpret_cast<const char*>(data), size}, file);
   for (const Error& problem : once.problems) {
     if (problem.what.empty() || problem.where.empty() || problem.remedy.empty()) std::abort();
   }
   if (!once.problems.empty()) return 0;
-  const std::string printed = print_config(once.config);
-  const ConfigReading again = read_config(printed, file);
-  if (!again.problems.empty() || print_config(again.config) != printed) std::abort();
+  const std::string printed = rig::print_config(once.config);
+  const rig::ConfigReading again = rig::read_config(printed, file);
+  if (!again.problems.empty() || rig::print_config(again.config) != printed) std::abort();
   return 0;
 }

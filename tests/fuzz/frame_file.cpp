@@ -1,4 +1,5 @@
-#include "session/frame_file.h"
+// SPDX-License-Identifier: Apache-2.0
+#include "session/media/frame_file.h"
 
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +16,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const std::string path = "/proc/self/fd/" + std::to_string(file.get());
   if (::ftruncate(file.get(), 0) != 0) return 0;
   if (::pwrite(file.get(), data, size, 0) != static_cast<ssize_t>(size)) return 0;
-  auto frames = emberlock::FrameFile::open(path);
+  auto frames = emberlock::session::FrameFile::open(path);
   constexpr int kEnough = 4;
   for (int i = 0; frames.ok() && i < kEnough; ++i) {
     if (!(*frames)->next().ok()) break;

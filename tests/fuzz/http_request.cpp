@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/http_request.h"
 
 #include <algorithm>
@@ -25,27 +26,38 @@ std::string_view next_line(std::string_view& text) {
   return line;
 }
 
+daemon::HttpGate gate(std::optional<rig::Token> token, daemon::HttpGate::Transport transport) {
+  return {std::move(token), std::make_shared<daemon::ConsoleSessions>(), transport};
+}
+
 /// Whatever a head says: nobody is let in who didn't show the token, and no foreign name leads here.
 void judge(std::string_view text) {
-  const auto target = parse_target(next_line(text));
+  const auto target = daemon::parse_target(next_line(text));
   if (!target) return;
   if (!target->path.starts_with('/') || target->path.find_first_of(" ?\r\n") != std::string::npos)
     std::abort();
   std::array<std::string_view, 4> lines;
   for (std::string_view& line : lines) line = next_line(text);
-  const HttpHead head{.host = lines[0], .origin = lines[1], .authorization = lines[2], .cookie = lines[3]};
-  const bool shown = target->token == kSecret || lines[2].ends_with(kSecret) ||
-                     lines[3].find(kSecret) != std::string_view::npos;
-  const HttpVerdict guarded = HttpGate(*Token::parse(kSecret)).judge(head, *target);
-  if ((guarded == HttpVerdict::welcome || guarded == HttpVerdict::give_cookie) && !shown) std::abort();
+  const daemon::HttpHead head{
+      .host = lines[0], .origin = lines[1], .authorization = lines[2], .cookie = lines[3]};
+  const bool shown = target->token == kSecret || lines[2].ends_with(kSecret);
+  const daemon::HttpVerdict guarded =
+      gate(*rig::Token::parse(kSecret), daemon::HttpGate::Transport::tls).judge(head, *target, {}).verdict;
+  if (guarded != daemon::HttpVerdict::refused && !shown) std::abort();
+  // Without a token, and no session open, nobody is let in; by a foreign name nobody whatever he shows.
+  if (gate(std::nullopt, daemon::HttpGate::Transport::plain).judge(head, *target, {}).verdict !=
+      daemon::HttpVerdict::refused)
+    std::abort();
   const bool by_name = lines[0].find("evil.example") != std::string_view::npos;
-  if (by_name && HttpGate(std::nullopt).judge(head, *target) == HttpVerdict::welcome) std::abort();
+  const daemon::HttpVerdict local =
+      gate(*rig::Token::parse(kSecret), daemon::HttpGate::Transport::plain).judge(head, *target, {}).verdict;
+  if (by_name && local != daemon::HttpVerdict::refused) std::abort();
 }
 
 /// Whatever a body holds: an error that says what to do, or an answer in JSON.
 void ask(std::string_view text) {
   static test::FakeApi* const api = new test::FakeApi;
-  const JsonMethod* const method = find_json_method(next_line(text));
+  const daemon::JsonMethod* const method = daemon::find_json_method(next_line(text));
   if (method == nullptr) return;
   const std::string body(text);
   if (method->job != nullptr) {
@@ -58,7 +70,7 @@ void ask(std::string_view text) {
 
 /// Whatever a console says: a rate that can be kept, or an error.
 void wish(std::string_view text) {
-  const auto wish = parse_wish(text);
+  const auto wish = daemon::parse_wish(text);
   if (!wish.ok()) return;
   if (*wish && !((*wish)->rate_hz() >= 0)) std::abort();
 }

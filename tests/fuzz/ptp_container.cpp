@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -14,24 +15,24 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto bytes = std::as_bytes(std::span(data + 1, size - 1));
   switch (data[0] % 4) {
     case 0: {
-      const auto message = parse_ptp_message(bytes);
+      const auto message = drivers::parse_ptp_message(bytes);
       if (!message.ok()) break;
-      const auto again = encode(*message);
+      const auto again = drivers::encode(*message);
       if (!std::equal(again.begin(), again.end(), bytes.begin(), bytes.end())) std::abort();
       break;
     }
     case 1: {
-      const auto info = parse_ptp_device_info(bytes);
+      const auto info = drivers::parse_ptp_device_info(bytes);
       if (info.ok() && info->operations.size() * 2 > bytes.size()) std::abort();
       break;
     }
     case 2: {
-      const auto info = parse_ptp_object_info(bytes);
+      const auto info = drivers::parse_ptp_object_info(bytes);
       if (info.ok() && info->name.size() > 2 * bytes.size()) std::abort();
       break;
     }
     default: {
-      const auto list = parse_ptp_u32_array(bytes);
+      const auto list = drivers::parse_ptp_u32_array(bytes);
       if (list.ok() && list->size() * 4 > bytes.size()) std::abort();
       break;
     }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -19,15 +20,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     for (const v1::RigCamera& camera : rig->cameras()) {
       const ImageSize side{static_cast<int>(camera.width()), static_cast<int>(camera.height())};
-      const auto model = camera_model_of(camera.calibration(), side, camera.camera_id(), "fuzz");
+      const auto model = recon::camera_model_of(camera.calibration(), side, camera.camera_id(), "fuzz");
       if (model && !(std::abs(model->ray({0.5, 0.5}).direction.norm() - 1) < 1e-9)) std::abort();
     }
   };
   if (cut == std::string_view::npos) {
-    judge(parse_rig(bytes, "fuzz/rig.json"));
-    (void)parse_board(bytes);
+    judge(session::parse_rig(bytes, "fuzz/rig.json"));
+    (void)recon::parse_board(bytes);
   } else {
-    judge(parse_colmap(bytes.substr(0, cut), bytes.substr(cut + 1), "fuzz"));
+    judge(recon::parse_colmap(bytes.substr(0, cut), bytes.substr(cut + 1), "fuzz"));
   }
   return 0;
 }

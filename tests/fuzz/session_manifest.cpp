@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -12,12 +13,12 @@
 // The protobuf files of a session: manifest and shutter times as JSON, and the events on the wire.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
-  if (const auto manifest = emberlock::parse_manifest(bytes, "input"); manifest.ok()) {
+  if (const auto manifest = emberlock::session::parse_manifest(bytes, "input"); manifest.ok()) {
     for (const auto& camera : manifest->cameras()) {
-      if (!emberlock::layout_of(camera).ok()) std::abort();
+      if (!emberlock::session::layout_of(camera).ok()) std::abort();
     }
   }
-  if (const auto times = emberlock::parse_shutter_times(bytes, "input"); times.ok()) {
+  if (const auto times = emberlock::session::parse_shutter_times(bytes, "input"); times.ok()) {
     for (const auto& camera : times->cameras()) {
       for (const double late : camera.late_s()) {
         if (!std::isfinite(late)) std::abort();
@@ -25,6 +26,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       if (!(camera.sigma_s() >= 0)) std::abort();
     }
   }
-  if (emberlock::parse_events(bytes).valid_bytes > size) std::abort();
+  if (emberlock::session::parse_events(bytes).valid_bytes > size) std::abort();
   return 0;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +15,7 @@ namespace {
 using namespace emberlock;
 
 /// Whatever a device answers: an error that says what to do, or settings that a strobe could have.
-void read_answers(const Dialect& dialect, const std::vector<std::string>& lines) {
+void read_answers(const drivers::Dialect& dialect, const std::vector<std::string>& lines) {
   std::vector<std::string> answers;
   for (const std::string& line : lines) {
     const auto told = dialect.unframe(line, 7);
@@ -57,7 +58,7 @@ void tell_controller(std::string_view bytes) {
   // And the same text with frames that are right, which chance won't find.
   std::string text;
   std::uint8_t number = 0;
-  const auto dialect = make_dialect(StrobeDialect::emberlock);
+  const auto dialect = drivers::make_dialect(drivers::StrobeDialect::emberlock);
   for (const char c : bytes) {
     if (c != '\n') {
       text += c;
@@ -94,7 +95,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     else
       lines.back() += c;
   }
-  const auto dialect = make_dialect(static_cast<StrobeDialect>(reader));
+  const auto dialect = drivers::make_dialect(static_cast<drivers::StrobeDialect>(reader));
   read_answers(**dialect, lines);
   return 0;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
@@ -14,7 +15,7 @@
 // other: a byte that is 0 for "no more", else the whole answer.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace emberlock;
-  const Ioctl device = [&](unsigned long request, void* argument) {
+  const drivers::Ioctl device = [&](unsigned long request, void* argument) {
     if (size == 0) return EINVAL;
     const bool answers = *data != 0;
     ++data;
@@ -31,15 +32,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto require = [](bool holds) {
     if (!holds) std::abort();
   };
-  for (const V4l2Mode& mode : list_modes(device, ImageSize{640, 360}).modes) {
-    const auto layout = layout_of(mode.pixels);
+  for (const drivers::V4l2Mode& mode : drivers::list_modes(device, ImageSize{640, 360}).modes) {
+    const auto layout = drivers::layout_of(mode.pixels);
     require(layout.ok() && *layout == mode.mode.layout);
-    require(!mode.intervals.empty() && mode.mode.frame_rate == rate_of(mode.intervals.front()));
+    require(!mode.intervals.empty() && mode.mode.frame_rate == drivers::rate_of(mode.intervals.front()));
     for (const double wanted : {0.0, 0.02, 15.0, 9999.0, 1e12}) {
-      const Hertz rate = rate_of(interval_for(mode, Hertz(wanted)));
+      const Hertz rate = drivers::rate_of(drivers::interval_for(mode, Hertz(wanted)));
       require(rate > Hertz(0) && rate <= mode.mode.frame_rate * (1 + 1e-4));
     }
   }
-  (void)set_control(device, "Brightness", "5", "input");
+  (void)drivers::set_control(device, "Brightness", "5", "input");
   return 0;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A soak: emberlockd with eleven simulated cameras in real time, and all that use it at once, for as long as
 // asked. An operator goes round: strobe, alignment, a recording of 5 s, its verification, a reconstruction,
 // requests that must be refused. Beside him three `emberlock watch` and three consoles come and go, one of
@@ -70,18 +71,6 @@ class Findings {
   int number_ = 0;
 };
 
-/// A port that nobody listens on.
-int free_port() {
-  const UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof address;
-  auto* const any = reinterpret_cast<sockaddr*>(&address);
-  if (::bind(fd.get(), any, size) != 0 || ::getsockname(fd.get(), any, &size) != 0) std::abort();
-  return ntohs(address.sin_port);
-}
-
 /// The programs of this build lie beside this one.
 std::string program(const char* name) {
   return (fs::read_symlink("/proc/self/exe").parent_path() / name).string();
@@ -92,15 +81,18 @@ class Daemon {
  public:
   Daemon(const Plan& plan, int port) : port_(port), socket_(plan.folder / "run" / "d.sock") {
     const std::string config = plan.folder / "emberlockd.toml";
+    const fs::path token = plan.folder / "token";
+    std::ofstream(token) << test::kHttpToken;
+    fs::permissions(token, fs::perms::owner_read | fs::perms::owner_write);
     std::ofstream(config) << fmt::format(
         "[rig]\nname = \"soak\"\n[rig.virtual]\nscene = \"flame\"\nseed = 1\n"
         "[[rig.camera]]\ndriver = \"virtual\"\ncount = {}\nsize = \"320x240\"\nrate_hz = {}\n"
         "[rig.strobe]\ndriver = \"virtual\"\n[alignment]\ntolerance = \"60rows\"\nframe_deadline_s = 30\n"
         "[recording]\nfolder = \"{}\"\nencoding = \"raw\"\ntranscode = \"when-idle\"\n"
         "[reconstruction]\nprogram = \"{}\"\ndevice = \"cpu\"\nvoxels = 16\nbudget_s = 2\n"
-        "[server]\nsocket = \"{}\"\nhttp_listen = \"127.0.0.1:{}\"\n",
+        "[server]\nsocket = \"{}\"\nhttp_listen = \"127.0.0.1:{}\"\ntoken_file = \"{}\"\n",
         kCameras, plan.rate_hz, (plan.folder / "sessions").string(), program("emberlock"), socket_.string(),
-        port_);
+        port_, token.string());
     std::string name = program("emberlockd");
     std::string option = "--config";
     std::string value = config;
@@ -162,7 +154,7 @@ struct Soak {
   std::atomic<std::uint64_t> pictures = 0;
   std::vector<double> resident_mb = {};  ///< one a second
 
-  explicit Soak(Plan given) : plan(std::move(given)), daemon(plan, free_port()) {}
+  explicit Soak(Plan given) : plan(std::move(given)), daemon(plan, test::free_port()) {}
   void pause(std::chrono::milliseconds time) {
     for (const auto until = Clock::now() + time; !over && Clock::now() < until;)
       std::this_thread::sleep_for(20ms);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -6,8 +7,8 @@
 
 #include <gtest/gtest.h>
 
-#include "daemon/align/json.h"
-#include "daemon/align/record.h"
+#include "rig/align/json.h"
+#include "rig/align/record.h"
 #include "tests/support/small_rig.h"
 
 namespace emberlock::test {
@@ -16,26 +17,26 @@ namespace emberlock::test {
 constexpr Rows kReadingError{1};
 
 inline void expect_aligned_in_truth(SmallBench& bench) {
-  const auto result = run_align(bench.align, bench.options);
+  const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok()) << result.error().message();
-  ASSERT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
+  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->last.reason;
   const SecondsPerRow row = result->options.row_time;
   EXPECT_LT(bench.true_error(row), result->options.tolerance.in_rows(row) + kReadingError);
 }
 
 /// Records an alignment, runs it again from the recording, and compares every line. Returns the lines.
 inline std::vector<std::string> expect_replays(SmallBench& bench, const std::string& name,
-                                               const StopAsked& stop = {}) {
+                                               const rig::StopAsked& stop = {}) {
   const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / name;
   std::filesystem::remove_all(folder);
   std::vector<std::string> live;
   std::vector<std::string> again;
   const auto into = [](std::vector<std::string>& lines) {
-    return [&lines](const AlignRoundReport& r) { lines.push_back(round_json(r).dump()); };
+    return [&lines](const rig::AlignRoundReport& r) { lines.push_back(rig::round_json(r).dump()); };
   };
-  const auto recorded = record_align(folder, bench.align, bench.options, into(live), {}, stop);
+  const auto recorded = rig::record_align(folder, bench.align, bench.options, into(live), {}, stop);
   EXPECT_TRUE(recorded.ok());
-  const auto replayed = replay_align(folder, into(again));
+  const auto replayed = rig::replay_align(folder, into(again));
   EXPECT_TRUE(replayed.ok());
   EXPECT_EQ(live, again);
   std::filesystem::remove_all(folder);

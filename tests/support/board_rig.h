@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -22,16 +23,16 @@ struct BoardRigOptions {
   double wrong = 0.05;  ///< share of corners that are wrong, by up to 20 pixels in each coordinate
   std::uint64_t seed = 1;
   ImageSize image = {640, 480};
-  Board board = {BoardKind::chessboard, 16, 11, Meters(0.014)};
+  recon::Board board = {recon::BoardKind::chessboard, 16, 11, Meters(0.014)};
 };
 
 struct BoardRig {
-  std::vector<CameraModel> cameras;      ///< the truth, in the world of the first board
-  std::vector<Rigid3> world_from_board;  ///< by instant
-  BoardSightings sightings;
+  std::vector<recon::CameraModel> cameras;      ///< the truth, in the world of the first board
+  std::vector<recon::Rigid3> world_from_board;  ///< by instant
+  recon::BoardSightings sightings;
 };
 
-inline Rigid3 chain(const Rigid3& outer, const Rigid3& inner) {
+inline recon::Rigid3 chain(const recon::Rigid3& outer, const recon::Rigid3& inner) {
   return {outer.rotation * inner.rotation, outer * inner.translation};
 }
 
@@ -40,30 +41,30 @@ inline Eigen::Vector3d on_ring(double radius, double azimuth, double elevation) 
                                   std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
 }
 
-inline std::vector<CameraModel> ring_cameras(const BoardRigOptions& options, RandomStream& random) {
-  std::vector<CameraModel> cameras;
+inline std::vector<recon::CameraModel> ring_cameras(const BoardRigOptions& options, RandomStream& random) {
+  std::vector<recon::CameraModel> cameras;
   const double focal = 0.5 * options.image.width / std::tan(M_PI / 6);
   for (int i = 0; i < options.cameras; ++i) {
     const bool eleventh = i == 10;
     const double azimuth = eleventh ? 90 : 36.0 * i;
     const double elevation = eleventh ? 0 : i % 2 == 0 ? 10 : -10;
-    Intrinsics lens{options.image,
-                    focal * random.uniform(0.97, 1.03),
-                    0,
-                    0.5 * options.image.width + random.uniform(-8, 8),
-                    0.5 * options.image.height + random.uniform(-8, 8),
-                    {random.uniform(-0.15, -0.05), random.uniform(0, 0.05), random.uniform(-1e-3, 1e-3),
-                     random.uniform(-1e-3, 1e-3), 0}};
+    recon::Intrinsics lens{options.image,
+                           focal * random.uniform(0.97, 1.03),
+                           0,
+                           0.5 * options.image.width + random.uniform(-8, 8),
+                           0.5 * options.image.height + random.uniform(-8, 8),
+                           {random.uniform(-0.15, -0.05), random.uniform(0, 0.05),
+                            random.uniform(-1e-3, 1e-3), random.uniform(-1e-3, 1e-3), 0}};
     lens.fy = lens.fx * random.uniform(0.995, 1.005);
-    cameras.push_back(look_at(lens, on_ring(0.3, azimuth * M_PI / 180, elevation * M_PI / 180),
-                              Eigen::Vector3d(random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01),
-                                              random.uniform(-0.01, 0.01))));
+    cameras.push_back(recon::look_at(lens, on_ring(0.3, azimuth * M_PI / 180, elevation * M_PI / 180),
+                                     Eigen::Vector3d(random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01),
+                                                     random.uniform(-0.01, 0.01))));
   }
   return cameras;
 }
 
 /// The board somewhere near the origin, its face towards `azimuth` (radians), tilted by up to 45 degrees.
-inline Rigid3 carried_board(const Board& board, double azimuth, RandomStream& random) {
+inline recon::Rigid3 carried_board(const recon::Board& board, double azimuth, RandomStream& random) {
   const Eigen::Vector3d out = on_ring(1, azimuth + random.uniform(-0.3, 0.3), random.uniform(-0.8, 0.8));
   const Eigen::Vector3d right = Eigen::Vector3d::UnitZ().cross(out).normalized();
   Eigen::Matrix3d rotation;
@@ -76,13 +77,14 @@ inline Rigid3 carried_board(const Board& board, double azimuth, RandomStream& ra
 
 /// The corners that a camera sees of a board; none unless all are in the picture and the board turns its face
 /// to it.
-inline std::vector<BoardCorner> seen_corners(const CameraModel& camera, const Board& board,
-                                             const Rigid3& world_from_board) {
+inline std::vector<recon::BoardCorner> seen_corners(const recon::CameraModel& camera,
+                                                    const recon::Board& board,
+                                                    const recon::Rigid3& world_from_board) {
   const Eigen::Vector3d middle =
       world_from_board * (0.5 * (board.point(0) + board.point(board.corners() - 1)));
   const double facing = world_from_board.rotation.col(2).dot((camera.center() - middle).normalized());
   if (facing < 0.5) return {};
-  std::vector<BoardCorner> corners;
+  std::vector<recon::BoardCorner> corners;
   const ImageSize size = camera.intrinsics.size;
   for (int id = 0; id < board.corners(); ++id) {
     const Eigen::Vector3d world = world_from_board * board.point(id);
@@ -94,8 +96,9 @@ inline std::vector<BoardCorner> seen_corners(const CameraModel& camera, const Bo
   return corners;
 }
 
-inline void disturb(std::vector<BoardCorner>& corners, const BoardRigOptions& options, RandomStream& random) {
-  for (BoardCorner& corner : corners) {
+inline void disturb(std::vector<recon::BoardCorner>& corners, const BoardRigOptions& options,
+                    RandomStream& random) {
+  for (recon::BoardCorner& corner : corners) {
     corner.pixel += options.noise * Eigen::Vector2d(random.normal(), random.normal());
     if (random.uniform(0, 1) < options.wrong)
       corner.pixel += Eigen::Vector2d(random.uniform(-20, 20), random.uniform(-20, 20));
@@ -114,8 +117,8 @@ inline BoardRig board_rig(const BoardRigOptions& options) {
   for (int i = 0;
        static_cast<int>(rig.world_from_board.size()) < options.instants && i < 100 * options.instants; ++i) {
     const double azimuth = 2.399963 * i;  // the golden angle: all sides alike
-    const Rigid3 pose = carried_board(options.board, azimuth, random);
-    std::vector<BoardSightings::Sighting> seen;
+    const recon::Rigid3 pose = carried_board(options.board, azimuth, random);
+    std::vector<recon::BoardSightings::Sighting> seen;
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
       auto corners = seen_corners(rig.cameras[c], options.board, pose);
       if (!corners.empty()) seen.push_back({c, rig.world_from_board.size(), "", std::move(corners)});
@@ -129,10 +132,10 @@ inline BoardRig board_rig(const BoardRigOptions& options) {
     rig.sightings.instants.push_back(std::to_string(rig.world_from_board.size()));
     rig.world_from_board.push_back(pose);
   }
-  const Rigid3 old_from_new = rig.world_from_board.front();
-  for (CameraModel& camera : rig.cameras)
+  const recon::Rigid3 old_from_new = rig.world_from_board.front();
+  for (recon::CameraModel& camera : rig.cameras)
     camera.camera_from_world = chain(camera.camera_from_world, old_from_new);
-  for (Rigid3& pose : rig.world_from_board) pose = chain(old_from_new.inverse(), pose);
+  for (recon::Rigid3& pose : rig.world_from_board) pose = chain(old_from_new.inverse(), pose);
   return rig;
 }
 
@@ -146,7 +149,7 @@ inline v1::Rig rig_file_of(const BoardRig& rig) {
     camera.set_camera_id(rig.sightings.cameras[c].id);
     camera.set_width(static_cast<std::uint32_t>(size.width));
     camera.set_height(static_cast<std::uint32_t>(size.height));
-    *camera.mutable_calibration() = calibration_of(rig.cameras[c]);
+    *camera.mutable_calibration() = recon::calibration_of(rig.cameras[c]);
     for (int i = 0; i < 15; ++i) camera.mutable_calibration()->add_sigma(i < 12 ? 1e-4 : 2e-4);
     camera.mutable_calibration()->set_corner_sigma(0.2);
   }
@@ -160,7 +163,7 @@ struct Knock {
 
 /// Makes the file that of a rig one of whose cameras was knocked since.
 inline void knock(v1::Rig& file, const BoardRig& rig, int camera, const Knock& by) {
-  CameraModel before = rig.cameras[static_cast<std::size_t>(camera)];
+  recon::CameraModel before = rig.cameras[static_cast<std::size_t>(camera)];
   const Eigen::Vector3d center = before.center() - by.place;
   const double angle = by.turn.norm();
   if (angle > 0) {
@@ -169,7 +172,7 @@ inline void knock(v1::Rig& file, const BoardRig& rig, int camera, const Knock& b
   }
   before.camera_from_world.translation = -(before.camera_from_world.rotation * center);
   v1::Calibration& c = *file.mutable_cameras(camera)->mutable_calibration();
-  for (int i = 0; i < 12; ++i) c.set_camera_from_world(i, calibration_of(before).camera_from_world(i));
+  for (int i = 0; i < 12; ++i) c.set_camera_from_world(i, recon::calibration_of(before).camera_from_world(i));
 }
 
 /// A lamp at places near the middle of what the cameras look at, which is `rig`'s world less its first board.
@@ -177,7 +180,7 @@ inline std::vector<Eigen::Vector3d> lamp_places(const BoardRig& rig, int places,
   RandomStream random(seed, 78);
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
-  for (const CameraModel& camera : rig.cameras) {
+  for (const recon::CameraModel& camera : rig.cameras) {
     const Eigen::Vector3d axis = camera.camera_from_world.rotation.row(2);
     const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - axis * axis.transpose();
     sum += across;
@@ -194,11 +197,11 @@ inline std::vector<Eigen::Vector3d> lamp_places(const BoardRig& rig, int places,
 }
 
 /// What all cameras see of it, with noise.
-inline BoardSightings lamp_sightings(const BoardRig& rig, const std::vector<Eigen::Vector3d>& places,
-                                     double noise, std::uint64_t seed) {
+inline recon::BoardSightings lamp_sightings(const BoardRig& rig, const std::vector<Eigen::Vector3d>& places,
+                                            double noise, std::uint64_t seed) {
   RandomStream random(seed, 79);
-  BoardSightings sightings;
-  sightings.board = lamp_as_board();
+  recon::BoardSightings sightings;
+  sightings.board = recon::lamp_as_board();
   sightings.cameras = rig.sightings.cameras;
   for (std::size_t i = 0; i < places.size(); ++i) {
     sightings.instants.push_back(std::to_string(i));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -10,7 +11,7 @@
 #include <openssl/pem.h>
 #include <openssl/x509v3.h>
 
-#include "daemon/server/access.h"
+#include "rig/access.h"
 
 namespace emberlock::test {
 
@@ -24,7 +25,7 @@ class CertificateAuthority {
 
   [[nodiscard]] std::string pem() const { return pem_of(own_.get()); }
   /// For the DNS name `host`, and this machine's address in numbers if that is "localhost".
-  [[nodiscard]] TlsIdentity issue(const std::string& host) const {
+  [[nodiscard]] rig::TlsIdentity issue(const std::string& host) const {
     const Key key(EVP_EC_gen("P-256"), EVP_PKEY_free);
     const std::string names = "DNS:" + host + (host == "localhost" ? ",IP:127.0.0.1" : "");
     return {pem_of(make(host, key.get(), {{NID_subject_alt_name, names.c_str()}}).get()), pem_of(key.get())};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -15,7 +16,7 @@ namespace emberlock::test {
 
 /// One camera and one strobe, by their clocks alone: what is filmed are readings, without pixels.
 struct ClockFilm {
-  CcdTiming timing{.rows = 720, .shifts = 740};
+  smear::CcdTiming timing{.rows = 720, .shifts = 740};
   double flash_rate = 300;
   double first_flash = 0;  ///< s after the start of frame 0's read phase
   int frames = 24;
@@ -38,13 +39,13 @@ struct ClockFilm {
 /// shares. Written from the definition, apart from the product's forward model. Frame i shows what read phase
 /// i moved and what wrapped in the one before; its lamp is lit by the flashes of the frame period before its
 /// read phase.
-inline std::vector<FrameReading> film(const ClockFilm& f) {
+inline std::vector<smear::FrameReading> film(const ClockFilm& f) {
   RandomStream random(f.seed, 9);
   const double period = f.timing.frame_period.value();
   const double row_time = f.timing.row_time.value();
   const int n = f.timing.rows;
   const int shifts = f.timing.shifts;
-  const bool down = f.timing.direction == ReadDirection::top_first;
+  const bool down = f.timing.direction == smear::ReadDirection::top_first;
   const double lamp = down ? f.lamp : n - 1 - f.lamp;  // in the order of reading
   const auto given = [&](std::int64_t j) {
     const auto cycle = static_cast<std::int64_t>(f.code.size());
@@ -57,9 +58,9 @@ inline std::vector<FrameReading> film(const ClockFilm& f) {
   const auto first_after = [&](double t) {
     return static_cast<std::int64_t>(std::ceil((t - f.first_flash) * f.flash_rate));
   };
-  std::vector<FrameReading> readings;
+  std::vector<smear::FrameReading> readings;
   for (int i = 0; i < f.frames; ++i) {
-    SmearReading r;
+    smear::SmearReading r;
     const double start = i * period;
     bool lit = false;
     for (std::int64_t j = first_after(start - period) - 1; j <= first_after(start); ++j) {
@@ -70,9 +71,9 @@ inline std::vector<FrameReading> film(const ClockFilm& f) {
       readings.push_back({i, r});
       continue;
     }
-    r.lamp = LampReading{.x = 80,
-                         .y = Rows(f.lamp + f.lamp_error + random.normal(0, f.lamp_noise)),
-                         .sigma = Rows(std::max(f.lamp_noise, 0.001))};
+    r.lamp = smear::LampReading{.x = 80,
+                                .y = Rows(f.lamp + f.lamp_error + random.normal(0, f.lamp_noise)),
+                                .sigma = Rows(std::max(f.lamp_noise, 0.001))};
     for (const int read : {i - 1, i}) {
       const double begin = read * period;
       for (std::int64_t j = first_after(begin) - 1; j <= first_after(begin + shifts * row_time); ++j) {
@@ -92,12 +93,14 @@ inline std::vector<FrameReading> film(const ClockFilm& f) {
     }
     if (random.uniform() < f.false_dots) r.dots.push_back({.x = 80, .y = Rows(random.uniform(0, n))});
     std::sort(r.dots.begin(), r.dots.end(),
-              [](const DotReading& a, const DotReading& b) { return a.y < b.y; });
-    for (DotReading& dot : r.dots) {
+              [](const smear::DotReading& a, const smear::DotReading& b) { return a.y < b.y; });
+    for (smear::DotReading& dot : r.dots) {
       dot.sigma = Rows(std::max(f.dot_noise, 0.001));
-      dot.side = dot.y < r.lamp->y ? Side::above : Side::below;
+      dot.side = dot.y < r.lamp->y ? smear::Side::above : smear::Side::below;
     }
-    r.state = r.dots.empty() ? SmearState::no_dot : r.dots.size() == 1 ? SmearState::dot : SmearState::comb;
+    r.state = r.dots.empty()       ? smear::SmearState::no_dot
+              : r.dots.size() == 1 ? smear::SmearState::dot
+                                   : smear::SmearState::comb;
     readings.push_back({i, std::move(r)});
   }
   return readings;
@@ -110,11 +113,11 @@ inline double true_tau(const ClockFilm& f, double t) {
 }
 
 /// The phases of a film's frames.
-inline std::vector<PhaseSample> phases(const ClockFilm& f) {
-  std::vector<PhaseSample> samples;
-  for (const FrameReading& r : film(f)) {
-    samples.push_back(sample_of(r.reading, f.timing, Seconds(f.flash_width),
-                                TimePoint{} + f.timing.frame_period * static_cast<double>(r.frame)));
+inline std::vector<smear::PhaseSample> phases(const ClockFilm& f) {
+  std::vector<smear::PhaseSample> samples;
+  for (const smear::FrameReading& r : film(f)) {
+    samples.push_back(smear::sample_of(r.reading, f.timing, Seconds(f.flash_width),
+                                       TimePoint{} + f.timing.frame_period * static_cast<double>(r.frame)));
   }
   return samples;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -28,7 +29,7 @@ struct ColourTruth {
   std::vector<Dust> dust = {};
 
   [[nodiscard]] double exposure(double radiance, std::size_t channel, double x, double y) const {
-    double light = falloff(vignetting, radius_squared(size, x, y));
+    double light = recon::falloff(vignetting, recon::radius_squared(size, x, y));
     for (const Dust& d : dust)
       light *= 1 - d.depth * std::exp(-0.5 * (square(x - d.x) + square(y - d.y)) / square(d.radius));
     return radiance * light / gain[channel] + dark;
@@ -67,8 +68,8 @@ inline std::vector<ColourTruth> colour_rig(std::size_t cameras, std::uint64_t se
   return rig;
 }
 
-inline PatchReading film_patch(const ColourTruth& camera, const std::array<double, 3>& radiance,
-                               double exposure, double x, double y, RandomStream& random) {
+inline recon::PatchReading film_patch(const ColourTruth& camera, const std::array<double, 3>& radiance,
+                                      double exposure, double x, double y, RandomStream& random) {
   constexpr int kEdge = 24;
   Image tile(ImageLayout{{kEdge, kEdge}, PixelFormat::rgb8, 8});
   for (int v = 0; v < kEdge; ++v)
@@ -79,15 +80,15 @@ inline PatchReading film_patch(const ColourTruth& camera, const std::array<doubl
         tile.row_as<std::uint8_t>(v)[3 * u + static_cast<int>(c)] =
             static_cast<std::uint8_t>(noisy_sample(camera, light, random));
       }
-  PatchReading reading = read_patch(tile.view(), {0, 0, kEdge, kEdge});
+  recon::PatchReading reading = recon::read_patch(tile.view(), {0, 0, kEdge, kEdge});
   reading.exposure = exposure;
   reading.x = x;
   reading.y = y;
   return reading;
 }
 
-inline DarkReading film_dark(const ColourTruth& camera, RandomStream& random) {
-  DarkReading dark;
+inline recon::DarkReading film_dark(const ColourTruth& camera, RandomStream& random) {
+  recon::DarkReading dark;
   constexpr int kSamples = 20000;
   for (auto& histogram : dark.histogram) {
     histogram.assign(256, 0);
@@ -136,9 +137,9 @@ inline std::vector<std::array<double, 3>> colour_chart(int patches, std::uint64_
 }
 
 /// A chart, seen by every camera in the middle and in up to four places further out.
-inline ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint64_t seed,
-                                  const TargetOptions& options = {}) {
-  ColourReadings readings;
+inline recon::ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint64_t seed,
+                                         const TargetOptions& options = {}) {
+  recon::ColourReadings readings;
   RandomStream random(seed, 2);
   const auto chart = colour_chart(options.patches, seed);
   constexpr std::array<std::array<double, 2>, 5> kPlaces = {
@@ -151,7 +152,7 @@ inline ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint
         for (std::size_t p = 0; p < chart.size(); ++p) {
           const double dx = 0.04 * (static_cast<double>(p % 4) - 1.5);
           const double dy = 0.06 * (static_cast<double>(p / 4) - 0.5);
-          PatchReading reading =
+          recon::PatchReading reading =
               film_patch(rig[i], chart[p], exposure, (kPlaces[place][0] + dx) * rig[i].size.width,
                          (kPlaces[place][1] + dy) * rig[i].size.height, random);
           reading.camera = i;
@@ -165,14 +166,14 @@ inline ColourReadings film_target(const std::vector<ColourTruth>& rig, std::uint
 }
 
 /// Two flat pictures of each camera.
-inline void add_flats(const std::vector<ColourTruth>& rig, ColourReadings& readings) {
+inline void add_flats(const std::vector<ColourTruth>& rig, recon::ColourReadings& readings) {
   RandomStream random(5, 6);
   for (std::size_t i = 0; i < rig.size(); ++i)
     for (const char* name : {"flat1", "flat2"}) {
       const Image picture = film_flat(rig[i], random);
-      readings.flats.push_back(read_flat(picture.view()));
+      readings.flats.push_back(recon::read_flat(picture.view()));
       readings.flats.back().camera = i;
-      for (PatchReading& patch : flat_patches(picture.view(), std::to_string(i) + name)) {
+      for (recon::PatchReading& patch : recon::flat_patches(picture.view(), std::to_string(i) + name)) {
         patch.camera = i;
         readings.patches.push_back(std::move(patch));
       }
@@ -192,8 +193,8 @@ struct PatchSpread {
 
 /// Patches that no calibration saw, 1..110 % of white, each camera showing them in other places; frames are
 /// developed as a session's are.
-inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig, const ColourCalibration* calibration,
-                                   std::uint64_t seed) {
+inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig,
+                                   const recon::ColourCalibration* calibration, std::uint64_t seed) {
   constexpr int kAcross = 6, kDown = 4;
   RandomStream random(seed, 3);
   std::vector<std::array<double, 3>> patches;
@@ -226,11 +227,11 @@ inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig, const Co
           frame.row_as<std::uint8_t>(y)[3 * x + c] = static_cast<std::uint8_t>(
               noisy_sample(camera, camera.exposure(radiance, channel, x + 0.5, y + 0.5), random));
         }
-    CameraFrame from;
+    recon::CameraFrame from;
     from.frame = frame.view();
     from.sensor = SensorKind::global_shutter;
     if (calibration != nullptr) from.colour = calibration->cameras[i].colour;
-    const DevelopedPicture picture = develop(from);
+    const recon::DevelopedPicture picture = recon::develop(from);
     std::vector<std::array<double, 3>> sum(patches.size());
     std::vector<std::array<int, 3>> bound(patches.size());
     std::vector<std::array<int, 3>> clipped(patches.size());

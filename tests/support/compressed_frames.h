@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 extern "C" {
@@ -65,7 +66,7 @@ class Codec {
   }
 
   void feed(const Image& image) {
-    AvPtr<AVFrame> f(av_frame_alloc());
+    session::AvPtr<AVFrame> f(av_frame_alloc());
     f->format = encoder_->pix_fmt;
     f->width = size_.width;
     f->height = size_.height;
@@ -110,9 +111,9 @@ class Codec {
   }
 
   ImageSize size_;
-  AvPtr<AVCodecContext> encoder_, decoder_;
-  AvPtr<AVFrame> frame_;
-  AvPtr<AVPacket> packet_;
+  session::AvPtr<AVCodecContext> encoder_, decoder_;
+  session::AvPtr<AVFrame> frame_;
+  session::AvPtr<AVPacket> packet_;
   std::int64_t fed_ = 0;
   std::vector<Image> out_;
 };

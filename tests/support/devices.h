@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdlib>
@@ -12,23 +13,25 @@
 namespace emberlock {
 
 /// What this machine can run: tests that hold on every device are instantiated over these.
-inline std::vector<Device> devices() {
-  std::vector<Device> found = {Device::cpu};
-  if (cuda_status().ok()) found.push_back(Device::cuda);
+inline std::vector<recon::Device> devices() {
+  std::vector<recon::Device> found = {recon::Device::cpu};
+  if (recon::cuda_status().ok()) found.push_back(recon::Device::cuda);
   return found;
 }
 
-inline std::string device_name(Device device) { return device == Device::cuda ? "cuda" : "cpu"; }
+inline std::string device_name(recon::Device device) {
+  return device == recon::Device::cuda ? "cuda" : "cpu";
+}
 
 /// A test that runs on each device: Device::automatic, the default of all options, is that one.
-class OnEachDevice : public testing::TestWithParam<Device> {
+class OnEachDevice : public testing::TestWithParam<recon::Device> {
  protected:
   OnEachDevice() { ::setenv("EMBERLOCK_DEVICE", device_name(GetParam()).c_str(), 1); }
   ~OnEachDevice() override { ::unsetenv("EMBERLOCK_DEVICE"); }
 };
 
 /// The one that such a test runs on.
-inline Device device_here() { return OnEachDevice::GetParam(); }
+inline recon::Device device_here() { return OnEachDevice::GetParam(); }
 
 /// Suite `name` for TEST_P.
 #define ON_EACH_DEVICE(name)                                            \

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <atomic>
@@ -15,9 +16,9 @@ namespace emberlock::test {
 
 /// A daemon without devices: it shows what a test puts on its board, remembers what it was asked, and answers
 /// what the test says. Set the answers before the first call; calls come from any thread.
-class FakeApi : public Api {
+class FakeApi : public daemon::Api {
  public:
-  Board& board() override { return board_; }
+  daemon::Board& board() override { return board_; }
 
   Status acknowledge(const v1::AcknowledgeRequest& request) override {
     return ask("acknowledge", request, on_acknowledge);
@@ -37,13 +38,13 @@ class FakeApi : public Api {
   Result<v1::Manifest> session(const v1::SessionRequest& request) override {
     return ask("session", request, on_session);
   }
-  Status verify_session(const v1::SessionRequest& request, const JobObserver& observer) override {
+  Status verify_session(const v1::SessionRequest& request, const daemon::JobObserver& observer) override {
     return job("verify_session", request, observer);
   }
-  Status repair_session(const v1::SessionRequest& request, const JobObserver& observer) override {
+  Status repair_session(const v1::SessionRequest& request, const daemon::JobObserver& observer) override {
     return job("repair_session", request, observer);
   }
-  Status export_session(const v1::ExportRequest& request, const JobObserver& observer) override {
+  Status export_session(const v1::ExportRequest& request, const daemon::JobObserver& observer) override {
     return job("export_session", request, observer);
   }
   Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override {
@@ -73,7 +74,7 @@ class FakeApi : public Api {
   std::function<Result<v1::ReconstructionStatus>(const v1::ReconstructRequest&)> on_reconstruct;
   std::function<Result<v1::ReconstructionStatus>()> on_cancel_reconstruction;
   /// What verify, repair and export do; unset: one progress, done and ok.
-  std::function<Status(const JobObserver&)> on_job;
+  std::function<Status(const daemon::JobObserver&)> on_job;
 
  private:
   void remember(std::string call) {
@@ -93,7 +94,7 @@ class FakeApi : public Api {
     return answer ? answer(request) : empty<Answer>();
   }
   template <class Request>
-  Status job(const std::string& name, const Request& request, const JobObserver& observer) {
+  Status job(const std::string& name, const Request& request, const daemon::JobObserver& observer) {
     remember(name + " " + request.ShortDebugString());
     if (on_job) return on_job(observer);
     v1::JobProgress whole;
@@ -111,14 +112,14 @@ class FakeApi : public Api {
       return std::remove_reference_t<decltype(std::declval<Answer&>().value())>();
   }
 
-  Board board_;
+  daemon::Board board_;
   mutable std::mutex mutex_;
   std::vector<std::string> calls_;
 };
 
 /// Jobs, for on_job. This one tells its progress as often as that, and then that it is done.
-inline std::function<Status(const JobObserver&)> job_that_tells(int times) {
-  return [times](const JobObserver& observer) {
+inline std::function<Status(const daemon::JobObserver&)> job_that_tells(int times) {
+  return [times](const daemon::JobObserver& observer) {
     v1::JobProgress progress;
     for (int i = 0; i < times; ++i) observer(progress);
     progress.set_done(true);
@@ -133,7 +134,7 @@ class EndlessJob {
  public:
   [[nodiscard]] bool begun() const { return begun_; }
   [[nodiscard]] bool ended() const { return ended_; }
-  Status operator()(const JobObserver& observer) {
+  Status operator()(const daemon::JobObserver& observer) {
     begun_ = true;
     while (observer({})) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     ended_ = true;

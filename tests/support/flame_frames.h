@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -19,12 +20,12 @@
 namespace emberlock::test {
 
 /// The flame from the side, of 255 its brightest about 230.
-inline RadianceImage flame_picture(std::uint64_t seed, ImageSize size = {640, 480}) {
-  PaperSceneOptions options;
+inline recon::RadianceImage flame_picture(std::uint64_t seed, ImageSize size = {640, 480}) {
+  recon::PaperSceneOptions options;
   options.flame.seed = seed;
   options.image = size;
   options.truth_voxels = size.width < 400 ? 64 : 192;
-  return std::move(paper_scene(options).views.back().image);
+  return std::move(recon::paper_scene(options).views.back().image);
 }
 
 struct FilmOptions {
@@ -39,7 +40,7 @@ struct FilmOptions {
 };
 
 /// 8-bit samples of a picture; the same seed makes the same noise.
-inline Image film(const RadianceImage& picture, const FilmOptions& options, std::uint64_t seed) {
+inline Image film(const recon::RadianceImage& picture, const FilmOptions& options, std::uint64_t seed) {
   Image image(ImageLayout{picture.size, options.format, 8});
   const int channels = emberlock::channels(options.format);
   std::uint64_t at = 0;
@@ -52,7 +53,7 @@ inline Image film(const RadianceImage& picture, const FilmOptions& options, std:
               ? options.hot_level
               : 0;
       for (int c = 0; c < channels; ++c, ++at) {
-        const int seen = is_bayer(options.format) ? mosaic_channel(x, y) : channels == 3 ? c : 1;
+        const int seen = is_bayer(options.format) ? recon::mosaic_channel(x, y) : channels == 3 ? c : 1;
         double v =
             options.level +
             options.gain * static_cast<double>(picture.rgb[3 * pixel + static_cast<std::size_t>(seen)]) + hot;
@@ -68,44 +69,45 @@ inline Image film(const RadianceImage& picture, const FilmOptions& options, std:
 }
 
 /// What a sensor's columns hold of a picture's light, the mean of the channels it has at each pixel.
-inline std::vector<double> column_light(const RadianceImage& picture, PixelFormat format, double gain) {
+inline std::vector<double> column_light(const recon::RadianceImage& picture, PixelFormat format,
+                                        double gain) {
   std::vector<double> light(static_cast<std::size_t>(picture.size.width));
   for (int y = 0; y < picture.size.height; ++y)
     for (int x = 0; x < picture.size.width; ++x) {
       const float* rgb = &picture.rgb[3 * static_cast<std::size_t>(y * picture.size.width + x)];
       const double all = channels(format) == 3
                              ? static_cast<double>(rgb[0] + rgb[1] + rgb[2]) / 3
-                             : static_cast<double>(rgb[is_bayer(format) ? mosaic_channel(x, y) : 1]);
+                             : static_cast<double>(rgb[is_bayer(format) ? recon::mosaic_channel(x, y) : 1]);
       light[static_cast<std::size_t>(x)] += gain * all;
     }
   return light;
 }
 
 struct SmearedFlame {
-  Samples seen;   ///< with smear
-  Samples clean;  ///< without, the same noise
+  recon::Samples seen;   ///< with smear
+  recon::Samples clean;  ///< without, the same noise
 };
 
-inline SmearedFlame smeared_flame(const RadianceImage& picture, PixelFormat format, double fraction,
+inline SmearedFlame smeared_flame(const recon::RadianceImage& picture, PixelFormat format, double fraction,
                                   double peak, std::uint64_t seed) {
   FilmOptions options;
   options.format = format;
   options.gain = peak / 230;
   SmearedFlame out;
-  out.clean = samples_of(film(picture, options, seed).view());
+  out.clean = recon::samples_of(film(picture, options, seed).view());
   options.smear = column_light(picture, format, options.gain);
   for (double& s : options.smear) s *= fraction;
-  out.seen = samples_of(film(picture, options, seed).view());
+  out.seen = recon::samples_of(film(picture, options, seed).view());
   return out;
 }
 inline SmearedFlame smeared_flame(PixelFormat format, double fraction, double peak, std::uint64_t seed) {
-  static const RadianceImage picture = flame_picture(11);
+  static const recon::RadianceImage picture = flame_picture(11);
   return smeared_flame(picture, format, fraction, peak, seed);
 }
 
 /// Of the means over blocks of 16 x 16 pixels, which leave noise and quantisation behind; blocks with
 /// saturated samples aside.
-inline double rms_of(const Samples& a, const Samples& b) {
+inline double rms_of(const recon::Samples& a, const recon::Samples& b) {
   constexpr int kEdge = 16;
   double squares = 0;
   int blocks = 0;
@@ -130,17 +132,17 @@ inline double rms_of(const Samples& a, const Samples& b) {
 }
 
 /// RMS over the flame's box: bilinear, gradient.
-inline std::pair<double, double> demosaicing_errors(const RadianceImage& picture, double noise) {
-  const PixelBox box = flame_mask(picture, 2).box;
+inline std::pair<double, double> demosaicing_errors(const recon::RadianceImage& picture, double noise) {
+  const recon::PixelBox box = recon::flame_mask(picture, 2).box;
   FilmOptions options;
   options.format = PixelFormat::bayer_rggb8;
   options.level = 0;
   options.noise = noise;
-  const Samples mosaic = samples_of(film(picture, options, 3).view());
-  const auto error = [&](Demosaicing how) {
-    return all_channels(rmse(to_picture(mosaic, nullptr, how), picture, box));
+  const recon::Samples mosaic = recon::samples_of(film(picture, options, 3).view());
+  const auto error = [&](recon::Demosaicing how) {
+    return recon::all_channels(recon::rmse(recon::to_picture(mosaic, nullptr, how), picture, box));
   };
-  return {error(Demosaicing::bilinear), error(Demosaicing::gradient)};
+  return {error(recon::Demosaicing::bilinear), error(recon::Demosaicing::gradient)};
 }
 inline std::pair<double, double> demosaicing_errors(std::uint64_t seed, double noise) {
   return demosaicing_errors(flame_picture(seed), noise);
@@ -150,7 +152,7 @@ struct HotPixelRates {
   int dark_found = 0, dark_false = 0, picture_found = 0, picture_false = 0;
 };
 
-inline HotPixelRates hot_pixel_rates(const RadianceImage& picture, PixelFormat format, double level,
+inline HotPixelRates hot_pixel_rates(const recon::RadianceImage& picture, PixelFormat format, double level,
                                      std::uint64_t seed) {
   FilmOptions options;
   options.format = format;
@@ -164,21 +166,21 @@ inline HotPixelRates hot_pixel_rates(const RadianceImage& picture, PixelFormat f
     std::sort(options.hot.begin(), options.hot.end());
     options.hot.erase(std::unique(options.hot.begin(), options.hot.end()), options.hot.end());
   }
-  std::vector<Samples> dark;
-  for (std::uint64_t f = 0; f < kDarkFrames; ++f)
-    dark.push_back(samples_of(film(RadianceImage(picture.size), options, 20 + f).view()));
+  std::vector<recon::Samples> dark;
+  for (std::uint64_t f = 0; f < recon::kDarkFrames; ++f)
+    dark.push_back(recon::samples_of(film(recon::RadianceImage(picture.size), options, 20 + f).view()));
   const auto count = [&](const std::vector<std::uint32_t>& found, int& right, int& wrong) {
     for (const std::uint32_t p : found)
       ++(std::binary_search(options.hot.begin(), options.hot.end(), p) ? right : wrong);
   };
   HotPixelRates rates;
-  count(hot_pixels_of_dark(midmean_of(dark)), rates.dark_found, rates.dark_false);
-  count(hot_pixels_of_picture(samples_of(film(picture, options, 40).view())), rates.picture_found,
-        rates.picture_false);
+  count(recon::hot_pixels_of_dark(recon::midmean_of(dark)), rates.dark_found, rates.dark_false);
+  count(recon::hot_pixels_of_picture(recon::samples_of(film(picture, options, 40).view())),
+        rates.picture_found, rates.picture_false);
   return rates;
 }
 inline HotPixelRates hot_pixel_rates(PixelFormat format, double level, std::uint64_t seed) {
-  static const RadianceImage picture = flame_picture(11);
+  static const recon::RadianceImage picture = flame_picture(11);
   return hot_pixel_rates(picture, format, level, seed);
 }
 
@@ -199,23 +201,23 @@ struct BackgroundResidual {
   double filmed = 0, level = 0, dark_part = 0;
 };
 
-inline BackgroundResidual background_residual(const RadianceImage& picture, std::uint64_t seed) {
+inline BackgroundResidual background_residual(const recon::RadianceImage& picture, std::uint64_t seed) {
   FilmOptions options;
   options.format = PixelFormat::rgb8;
   options.gain = 0.6;
   options.background = lit_wall(picture.size);
   const Image frame = film(picture, options, seed);
   std::vector<Image> dark;
-  for (std::uint64_t f = 0; f < kDarkFrames; ++f)
-    dark.push_back(film(RadianceImage(picture.size), options, 100 + f));
-  RadianceImage truth = picture;
+  for (std::uint64_t f = 0; f < recon::kDarkFrames; ++f)
+    dark.push_back(film(recon::RadianceImage(picture.size), options, 100 + f));
+  recon::RadianceImage truth = picture;
   for (float& v : truth.rgb) v *= 0.6F;
-  CameraFrame camera;
+  recon::CameraFrame camera;
   camera.frame = frame.view();
   camera.sensor = SensorKind::global_shutter;
-  const auto off = [&] { return all_channels(rmse(develop(camera).image, truth, {})); };
+  const auto off = [&] { return recon::all_channels(recon::rmse(recon::develop(camera).image, truth, {})); };
   BackgroundResidual out;
-  out.filmed = all_channels(rmse(to_radiance(frame.view()), truth, {}));
+  out.filmed = recon::all_channels(recon::rmse(recon::to_radiance(frame.view()), truth, {}));
   out.level = off();
   for (const Image& d : dark) camera.dark.push_back(d.view());
   out.dark_part = off();

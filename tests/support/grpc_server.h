@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -17,9 +18,9 @@ namespace emberlock::test {
 /// A real server on a socket of its own, before a daemon without devices.
 class GrpcServerTest : public testing::Test {
  protected:
-  void serve(GrpcServerOptions options = {}) {
+  void serve(daemon::GrpcServerOptions options = {}) {
     if (options.socket.empty() && options.tcp_address.empty()) options.socket = socket;
-    auto started = GrpcServer::start(api, std::move(options));
+    auto started = daemon::GrpcServer::start(api, std::move(options));
     ASSERT_TRUE(started.ok()) << started.error().message();
     server = std::move(started).value();
   }
@@ -36,7 +37,7 @@ class GrpcServerTest : public testing::Test {
   TempFolder folder;
   std::filesystem::path socket = folder / "emberlockd.sock";
   FakeApi api;
-  std::unique_ptr<GrpcServer> server;
+  std::unique_ptr<daemon::GrpcServer> server;
 };
 
 }  // namespace emberlock::test

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <stdexcept>
@@ -13,6 +14,11 @@
 
 namespace emberlock::test {
 
+/// What lets tests in over HTTP: servers take it for their token, and these headers show it.
+inline constexpr const char* kHttpToken = "0123456789abcdef";
+inline const std::string kLetIn =
+    std::string("Host: localhost\r\nAuthorization: Bearer ") + kHttpToken + "\r\n";
+
 /// A socket to a port of this machine.
 inline UniqueFd connect_to(int port) {
   UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
@@ -23,6 +29,19 @@ inline UniqueFd connect_to(int port) {
   if (::connect(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0)
     throw std::runtime_error("nobody listens");
   return fd;
+}
+
+/// A port of this machine that nobody listens on.
+inline int free_port() {
+  const UniqueFd fd(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0));
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(address);
+  auto* const any = reinterpret_cast<sockaddr*>(&address);
+  if (::bind(fd.get(), any, size) != 0 || ::getsockname(fd.get(), any, &size) != 0)
+    throw std::runtime_error("no port is free");
+  return ntohs(address.sin_port);
 }
 
 inline void send_all(const UniqueFd& socket, std::string_view bytes) {
@@ -58,11 +77,19 @@ inline HttpAnswer ask_raw(int port, std::string_view request) {
   return {std::stoi(answer.substr(9)), answer.substr(0, end), answer.substr(end + 4)};
 }
 
-/// `headers`: lines, each with its "\r\n".
+/// `headers`: lines, each with its "\r\n"; those of who is let in unless others are given.
 inline HttpAnswer ask(int port, const std::string& method, const std::string& target,
-                      const std::string& body = {}, const std::string& headers = "Host: localhost\r\n") {
+                      const std::string& body = {}, const std::string& headers = kLetIn) {
   return ask_raw(port, method + " " + target + " HTTP/1.1\r\nConnection: close\r\n" + headers +
                            "Content-Length: " + std::to_string(body.size()) + "\r\n\r\n" + body);
+}
+
+/// What an answer sets as a cookie, "NAME=VALUE"; empty: nothing.
+inline std::string cookie_of(const HttpAnswer& answer) {
+  constexpr std::string_view kSet = "Set-Cookie: ";
+  const std::size_t at = answer.head.find(kSet);
+  if (at == std::string::npos) return {};
+  return answer.head.substr(at + kSet.size(), answer.head.find(';', at) - at - kSet.size());
 }
 
 }  // namespace emberlock::test

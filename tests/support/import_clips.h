@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -62,10 +63,10 @@ struct FlameClip {
 
 /// Films all cameras, `folder`/camera-N.mp4.
 inline std::vector<FlameClip> film_flame(const FlameFilm& film, const std::filesystem::path& folder) {
-  VirtualRigOptions options = film.strobe.rig;
+  drivers::VirtualRigOptions options = film.strobe.rig;
   options.queue_frames = 4096;
-  const auto clock = std::make_shared<VirtualClock>();
-  const auto rig = VirtualRig::create(options, clock).value();
+  const auto clock = std::make_shared<drivers::VirtualClock>();
+  const auto rig = drivers::VirtualRig::create(options, clock).value();
   if (!rig->strobe().apply(film.strobe.strobe).ok()) throw std::runtime_error("the strobe refuses");
   std::multimap<double, int> order;
   for (int c = 0; c < rig->size(); ++c)
@@ -75,7 +76,7 @@ inline std::vector<FlameClip> film_flame(const FlameFilm& film, const std::files
     if (!rig->camera(camera).start().ok()) throw std::runtime_error("a camera doesn't start");
   }
   clock->sleep_until(TimePoint{} + film.strobe_off);
-  if (!rig->strobe().apply({.output = StrobeOutput::off}).ok())
+  if (!rig->strobe().apply({.output = drivers::StrobeOutput::off}).ok())
     throw std::runtime_error("the strobe refuses");
 
   std::filesystem::create_directories(folder);

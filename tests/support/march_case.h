@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -14,9 +15,9 @@ namespace emberlock {
 
 /// Rays through a medium with holes: two cameras, one of them close above.
 struct MarchCase {
-  Hull medium;
-  std::vector<CameraModel> cameras;
-  RayList list;
+  recon::Hull medium;
+  std::vector<recon::CameraModel> cameras;
+  recon::RayList list;
 };
 
 struct MarchCaseOptions {
@@ -29,8 +30,8 @@ struct MarchCaseOptions {
 };
 
 /// Gas whose index rises by 0.03 in the middle of a cube of 40 cm: a hundred times what a flame does.
-inline RefractiveIndex lens_of_gas() {
-  const Grid grid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.4)}, 20);
+inline recon::RefractiveIndex lens_of_gas() {
+  const recon::Grid grid = recon::grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.4)}, 20);
   std::vector<float> excess;
   for (int k = -10; k <= 10; ++k)
     for (int j = -10; j <= 10; ++j)
@@ -41,31 +42,32 @@ inline RefractiveIndex lens_of_gas() {
 
 inline MarchCase march_case(const MarchCaseOptions& options = {}) {
   MarchCase out;
-  Hull& medium = out.medium;
-  medium = whole_grid(grid_over({Eigen::Vector3d::Zero(), options.size}, options.voxels));
+  recon::Hull& medium = out.medium;
+  medium = recon::whole_grid(recon::grid_over({Eigen::Vector3d::Zero(), options.size}, options.voxels));
   medium.count = 0;
   for (std::size_t v = 0; v < medium.inside.size(); ++v) {
     medium.inside[v] = v == 0 || random_uniform(options.seed, 9, v / 4) < options.filled ? 1 : 0;
     medium.count += medium.inside[v];
   }
-  const Intrinsics lens{{40, 30}, 35, 35, 20, 15, {}};
-  out.cameras = {look_at(lens, {0.3, 0.1, 0.05}, Eigen::Vector3d::Zero()),
-                 look_at(lens, {0.02, -0.03, 0.35}, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitY())};
-  const RefractiveIndex index = lens_of_gas();
-  const IndexField gas = index.field(medium.grid);
-  RayListOptions clip;
+  const recon::Intrinsics lens{{40, 30}, 35, 35, 20, 15, {}};
+  out.cameras = {
+      recon::look_at(lens, {0.3, 0.1, 0.05}, Eigen::Vector3d::Zero()),
+      recon::look_at(lens, {0.02, -0.03, 0.35}, Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitY())};
+  const recon::RefractiveIndex index = lens_of_gas();
+  const recon::IndexField gas = index.field(medium.grid);
+  recon::RayListOptions clip;
   clip.step = options.step;
   if (options.curved) clip.gas = &gas;
-  Pool pool(1);
-  out.list = clip_rays({&out.cameras[0], &out.cameras[1]}, medium, clip, pool);
+  recon::Pool pool(1);
+  out.list = recon::clip_rays({&out.cameras[0], &out.cameras[1]}, medium, clip, pool);
   return out;
 }
 
 /// Uniform numbers in [0, most) in lanes 0..2 and in [0, most_fourth) in lane 3.
 template <class Real>
-std::vector<Quad<Real>> random_quads(std::size_t size, std::uint64_t seed, double most = 1,
-                                     double most_fourth = 0) {
-  std::vector<Quad<Real>> out(size);
+std::vector<recon::Quad<Real>> random_quads(std::size_t size, std::uint64_t seed, double most = 1,
+                                            double most_fourth = 0) {
+  std::vector<recon::Quad<Real>> out(size);
   for (std::size_t i = 0; i < size; ++i)
     for (std::size_t c = 0; c < 4; ++c)
       out[i].c[c] = static_cast<Real>((c < 3 ? most : most_fourth) * random_uniform(seed, c, i));
@@ -74,7 +76,7 @@ std::vector<Quad<Real>> random_quads(std::size_t size, std::uint64_t seed, doubl
 
 /// Sum over lanes 0..lanes - 1.
 template <class Real>
-double dot(const std::vector<Quad<Real>>& a, const std::vector<Quad<Real>>& b, int lanes = 3) {
+double dot(const std::vector<recon::Quad<Real>>& a, const std::vector<recon::Quad<Real>>& b, int lanes = 3) {
   double sum = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
     for (int c = 0; c < lanes; ++c) sum += static_cast<double>(a[i].c[c]) * static_cast<double>(b[i].c[c]);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -17,39 +18,41 @@
 
 namespace emberlock {
 
-using Order = Scattering::Order;
+using Order = recon::Scattering::Order;
 
-inline Effects scattering(PerMeter extinction, Order order, double albedo, double asymmetry = 0) {
-  Effects e = absorbing(extinction);
+inline recon::Effects scattering(PerMeter extinction, Order order, double albedo, double asymmetry = 0) {
+  recon::Effects e = recon::absorbing(extinction);
   e.scattering = {order, albedo, asymmetry};
   return e;
 }
 
-inline Volume uniform_volume(const Grid& grid, float emission) {
+inline recon::Volume uniform_volume(const recon::Grid& grid, float emission) {
   return {grid, std::vector<float>(3 * grid.size(), emission), {}};
 }
 
-inline Grid cube(int voxels, double size = 0.2) {
-  return grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(size)}, voxels);
+inline recon::Grid cube(int voxels, double size = 0.2) {
+  return recon::grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(size)}, voxels);
 }
 
-inline Eigen::Vector3d place(const Grid& g, int i, int j, int k) {
+inline Eigen::Vector3d place(const recon::Grid& g, int i, int j, int k) {
   return Eigen::Vector3d(g.origin[0], g.origin[1], g.origin[2]) +
          static_cast<double>(g.edge) * Eigen::Vector3d(i, j, k);
 }
 
-inline double green(const std::vector<Rgba>& v, std::size_t at) { return static_cast<double>(v[at].c[1]); }
+inline double green(const std::vector<recon::Rgba>& v, std::size_t at) {
+  return static_cast<double>(v[at].c[1]);
+}
 
-inline double greatest(const std::vector<Rgba>& v) {
+inline double greatest(const std::vector<recon::Rgba>& v) {
   double high = 0;
-  for (const Rgba& x : v) high = std::max(high, static_cast<double>(x.c[1]));
+  for (const recon::Rgba& x : v) high = std::max(high, static_cast<double>(x.c[1]));
   return high;
 }
 
 /// Two soft, coloured blobs of light in a soft cloud off their middle.
-inline Volume cloud(int voxels, double thickest) {
-  const Grid grid = cube(voxels);
-  Volume v = uniform_volume(grid, 0);
+inline recon::Volume cloud(int voxels, double thickest) {
+  const recon::Grid grid = cube(voxels);
+  recon::Volume v = uniform_volume(grid, 0);
   v.extinction.resize(grid.size());
   const auto blob = [](const Eigen::Vector3d& d, double width) {
     return std::exp(-d.squaredNorm() / (2 * width * width));
@@ -73,14 +76,14 @@ inline Volume cloud(int voxels, double thickest) {
 /// A volume's fields in double at any point, straight from the key points; with a medium, 0 outside it and of
 /// constant extinction inside.
 struct Fields {
-  const Volume& volume;
-  const Hull* medium = nullptr;
+  const recon::Volume& volume;
+  const recon::Hull* medium = nullptr;
   double constant = 0;  ///< 1/m
   double emission = 0;  ///< green
   double extinction = 0;
 
   bool at(const Eigen::Vector3d& p) {
-    const Grid& g = volume.grid;
+    const recon::Grid& g = volume.grid;
     const int voxels[3] = {g.nx - 1, g.ny - 1, g.nz - 1};
     int cell[3];
     double f[3];
@@ -121,10 +124,11 @@ struct Estimate {
 /// multiplies it by the albedo. Without bias; it shares nothing with the program but the phase function's
 /// sampling.
 struct RandomWalks {
-  const Volume& volume;
+  const recon::Volume& volume;
   double majorant = 0;
-  Scattering scattering;
-  const Hull* medium = nullptr;  ///< of constant extinction, the majorant's; the volume's field where null
+  recon::Scattering scattering;
+  const recon::Hull* medium =
+      nullptr;  ///< of constant extinction, the majorant's; the volume's field where null
 
   /// G at a point, towards a direction.
   [[nodiscard]] Estimate in_scatter(const Eigen::Vector3d& from, const Eigen::Vector3d& towards,
@@ -169,7 +173,7 @@ struct RandomWalks {
   }
 
   [[nodiscard]] Eigen::Vector3d turn(const Eigen::Vector3d& travel, RandomStream& random) const {
-    const double cosine = HenyeyGreenstein<double>{scattering.asymmetry}.sample(random.uniform());
+    const double cosine = recon::HenyeyGreenstein<double>{scattering.asymmetry}.sample(random.uniform());
     return turned(travel, cosine, random.uniform(0, 2 * std::numbers::pi));
   }
 };

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -22,10 +23,11 @@ namespace emberlock::test {
 
 class TempFolder {
  public:
-  TempFolder() {
-    // In memory where there is such a folder: recordings flush each segment to disk, and tests make many.
+  /// In memory where there is such a folder: recordings flush each segment to disk, and tests make many.
+  enum class On { memory, disk };
+  explicit TempFolder(On on = On::memory) {
     const std::filesystem::path memory = "/dev/shm";
-    const bool usable = ::access(memory.c_str(), W_OK) == 0;
+    const bool usable = on == On::memory && ::access(memory.c_str(), W_OK) == 0;
     std::string name =
         ((usable ? memory : std::filesystem::temp_directory_path()) / "emberlock-test-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
@@ -80,18 +82,18 @@ inline v1::Manifest manifest_of(const std::vector<ImageLayout>& layouts) {
     v1::CameraStream& camera = *manifest.add_cameras();
     camera.set_camera_id("cam" + std::to_string(i));
     camera.set_frame_rate_hz(100);
-    set_layout(camera, layouts[i]);
+    session::set_layout(camera, layouts[i]);
   }
   return manifest;
 }
 
 /// Records `frames` noise frames of one camera; throws with the message where something fails.
 inline void record(const std::filesystem::path& folder, const ImageLayout& layout, std::uint64_t frames,
-                   const WriterOptions& options) {
+                   const session::WriterOptions& options) {
   const auto check = [](const auto& result) {
     if (!result.ok()) throw std::runtime_error(result.error().message());
   };
-  auto writer = SessionWriter::create(folder, manifest_of({layout}), options);
+  auto writer = session::SessionWriter::create(folder, manifest_of({layout}), options);
   check(writer);
   for (std::uint64_t i = 0; i < frames; ++i) check(writer->write(0, noise_frame(layout, i)));
   check(writer->finish());
@@ -108,8 +110,8 @@ inline void put_bytes(const std::filesystem::path& path, std::string_view bytes)
 }
 
 /// Options for a machine whose disk may be fuller than a recorder would like.
-inline WriterOptions small_disk_options(Encoding encoding = Encoding::ffv1) {
-  WriterOptions options;
+inline session::WriterOptions small_disk_options(session::Encoding encoding = session::Encoding::ffv1) {
+  session::WriterOptions options;
   options.encoding = encoding;
   options.min_free_bytes = 0;
   return options;

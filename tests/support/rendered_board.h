@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -13,12 +14,13 @@ namespace emberlock::test {
 /// The board as a camera films it: rays through the pixels' corners meet its plane, and what lies between is
 /// taken nine times a pixel; grey behind it. The camera stands in front of the board's whole plane, as far as
 /// it sees it.
-inline Image rendered_board(const CameraModel& camera, const Board& board, const Rigid3& world_from_board) {
+inline Image rendered_board(const recon::CameraModel& camera, const recon::Board& board,
+                            const recon::Rigid3& world_from_board) {
   constexpr int kSquare = 77;  // pixels of the print: whole ones a bit of markers that are 8/11 of a square
   constexpr int kRays = 3;     // along a pixel's edge
-  const Image print = draw_board(board, kSquare);
+  const Image print = recon::draw_board(board, kSquare);
   const ImageView paper = print.view();
-  const Rigid3 board_from_world = world_from_board.inverse();
+  const recon::Rigid3 board_from_world = world_from_board.inverse();
   const Eigen::Vector3d eye = board_from_world * camera.center();
   const int width = camera.intrinsics.size.width;
   const int height = camera.intrinsics.size.height;

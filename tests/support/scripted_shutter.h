@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -34,7 +35,7 @@ struct ScriptedShutter {
     return wrap_positive(delay - end + (at - TimePoint{}) * (rate.value() * 1e-6), period);
   }
 
-  [[nodiscard]] Image picture(TimePoint at, const Look& look) {
+  [[nodiscard]] Image picture(TimePoint at, const smear::Look& look) {
     Image image(ImageLayout{kSize, PixelFormat::gray16, 12});
     RandomStream random(seed, static_cast<std::uint64_t>(++pictures_));
     const bool other = another_strobe && pictures_ % 3 == 0;
@@ -67,30 +68,30 @@ struct ScriptedShutter {
 
 /// What a sensor told in a round.
 struct ToldRound {
-  Phase phase;  ///< the last one
+  smear::Phase phase;  ///< the last one
   TimePoint at;
   int looks = 0;
 };
 
-/// Films a shutter for a sensor as daemon/align/bench.h films a camera: looks three periods apart until the
+/// Films a shutter for a sensor as rig/align/bench.h films a camera: looks three periods apart until the
 /// sensor is content, then four frames of flashes that come `delay` late.
 class SensorRounds {
  public:
-  SensorRounds(ScriptedShutter& shutter, PhaseSensor& sensor) : shutter_(shutter), sensor_(sensor) {}
+  SensorRounds(ScriptedShutter& shutter, smear::PhaseSensor& sensor) : shutter_(shutter), sensor_(sensor) {}
 
-  ToldRound film(const Beat& own, Seconds wanted = microseconds(10)) {
+  ToldRound film(const smear::Beat& own, Seconds wanted = microseconds(10)) {
     ToldRound told;
     sensor_.begin_round(own);
     for (int asked = 0; asked < 40; ++asked) {
-      const std::vector<Look> looks = sensor_.next_looks(wanted);
+      const std::vector<smear::Look> looks = sensor_.next_looks(wanted);
       if (looks.empty()) break;
-      for (const Look& look : looks) {
+      for (const smear::Look& look : looks) {
         take(look, 3);
         ++told.looks;
       }
     }
     for (int i = 0; i < 4; ++i) take({kDelay}, 1);
-    for (const PhaseSample& sample : sensor_.phases(kDelay)) {
+    for (const smear::PhaseSample& sample : sensor_.phases(kDelay)) {
       told.phase = sample.phase;
       told.at = sample.at;
     }
@@ -101,7 +102,7 @@ class SensorRounds {
     return abs(wrap_symmetric(told.phase.tau - shutter_.tau(told.at, kDelay), shutter_.period));
   }
   /// A picture whose rows overlap.
-  SmearReading take_malformed() {
+  smear::SmearReading take_malformed() {
     const Image picture = shutter_.picture(now_, {kDelay});
     ImageView view = picture.view();
     view.stride = 1;
@@ -112,18 +113,18 @@ class SensorRounds {
   static constexpr Seconds kDelay{0.0175};
 
  private:
-  void take(const Look& look, double periods) {
+  void take(const smear::Look& look, double periods) {
     now_ = now_ + periods * shutter_.period;
     const Image picture = shutter_.picture(now_, look);
     (void)sensor_.take(picture.view(), now_, look);
   }
 
   ScriptedShutter& shutter_;
-  PhaseSensor& sensor_;
+  smear::PhaseSensor& sensor_;
   TimePoint now_;
 };
 
-inline const Beat kStill{PartsPerMillion(0), PartsPerMillion(1)};
+inline const smear::Beat kStill{PartsPerMillion(0), PartsPerMillion(1)};
 
 /// What is said of an exposure that is too short, and of one that is too long; then it is as it was.
 inline void expect_exposures_advised(ScriptedShutter& shutter, SensorRounds& rounds,

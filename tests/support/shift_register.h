@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <deque>
@@ -10,9 +11,9 @@ namespace emberlock::test {
 
 /// The row at which a flash of no width shows, found by shifting a register packet by packet; none when it
 /// rests or the packet becomes a dummy line.
-inline std::optional<int> shift_register(const CcdTiming& timing, int lamp_row, Seconds tau) {
+inline std::optional<int> shift_register(const smear::CcdTiming& timing, int lamp_row, Seconds tau) {
   const auto mirrored = [&](int row) {
-    return timing.direction == ReadDirection::top_first ? row : timing.rows - 1 - row;
+    return timing.direction == smear::ReadDirection::top_first ? row : timing.rows - 1 - row;
   };
   std::deque<int> packets;  // the image row that each packet will become; front: next to be read out
   for (int row = 0; row < timing.shifts; ++row) packets.push_back(row);
@@ -27,14 +28,14 @@ inline std::optional<int> shift_register(const CcdTiming& timing, int lamp_row, 
   return std::nullopt;
 }
 
-inline SmearReading reading_of(double dot_row, double lamp_row) {
-  SmearReading reading;
-  reading.state = SmearState::dot;
-  reading.lamp = LampReading{.x = 100, .y = Rows(lamp_row), .sigma = Rows(0.05), .radius = 4};
-  DotReading dot;
+inline smear::SmearReading reading_of(double dot_row, double lamp_row) {
+  smear::SmearReading reading;
+  reading.state = smear::SmearState::dot;
+  reading.lamp = smear::LampReading{.x = 100, .y = Rows(lamp_row), .sigma = Rows(0.05), .radius = 4};
+  smear::DotReading dot;
   dot.y = Rows(dot_row);
   dot.sigma = Rows(0.05);
-  dot.side = dot_row < lamp_row ? Side::above : Side::below;
+  dot.side = dot_row < lamp_row ? smear::Side::above : smear::Side::below;
   reading.dots.push_back(dot);
   return reading;
 }

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -16,7 +17,7 @@ namespace emberlock::test {
 /// A rolling shutter by definition: row r gathers the flashes of the exposure before t_start + r t_row, of a
 /// scene whose rows differ, in ambient light.
 struct Roller {
-  CcdTiming timing{
+  smear::CcdTiming timing{
       .rows = 480, .shifts = 480, .frame_period = Seconds(1 / 30.0), .row_time = microseconds_per_row(60)};
   double exposure = 4e-3;
   double ambient = 20;
@@ -27,11 +28,11 @@ struct Roller {
   double first_flash = 0.012;
   std::uint64_t seed = 1;
 
-  [[nodiscard]] RowProfile frame(int i) const {
-    RowProfile p;
+  [[nodiscard]] smear::RowProfile frame(int i) const {
+    smear::RowProfile p;
     p.noise = std::max(noise, 0.01);
     for (int y = 0; y < timing.rows; ++y) {
-      const int order = timing.direction == ReadDirection::top_first ? y : timing.rows - 1 - y;
+      const int order = timing.direction == smear::ReadDirection::top_first ? y : timing.rows - 1 - y;
       const double end = i * timing.frame_period.value() + order * timing.row_time.value();
       double light = 0;
       const int last = static_cast<int>(std::ceil((end - first_flash) * flash_rate)) + 1;
@@ -48,18 +49,18 @@ struct Roller {
     return p;
   }
   /// A strobe detuned by 1 %, for as long as its band crosses the frame.
-  [[nodiscard]] BandReference reference() const {
+  [[nodiscard]] smear::BandReference reference() const {
     Roller detuned = *this;
     detuned.flash_rate = 1 / timing.frame_period.value() * 1.023;
     detuned.exposure = std::min(exposure, 0.4 * timing.frame_period.value());
-    std::vector<RowProfile> frames;
+    std::vector<smear::RowProfile> frames;
     for (int i = 0; i < 90; ++i) frames.push_back(detuned.frame(i));
-    auto r = learn_band_reference(frames);
+    auto r = smear::learn_band_reference(frames);
     EXPECT_TRUE(r.ok());
-    return r.ok() ? *r : BandReference{};
+    return r.ok() ? *r : smear::BandReference{};
   }
-  [[nodiscard]] BandReading read(int i) const {
-    return read_bands(frame(i), reference(), {.direction = timing.direction});
+  [[nodiscard]] smear::BandReading read(int i) const {
+    return smear::read_bands(frame(i), reference(), {.direction = timing.direction});
   }
 };
 
@@ -76,7 +77,7 @@ struct Shutter {
   double white = 1e9;
   std::uint64_t seed = 1;
 
-  [[nodiscard]] SweepSample film(Seconds delay) const {
+  [[nodiscard]] smear::SweepSample film(Seconds delay) const {
     double light = 0;
     for (int turn = -1; turn <= 2; ++turn) {
       const double begin = delay.value() - width / 2 + turn * kShutterPeriod;
@@ -89,17 +90,17 @@ struct Shutter {
     return {delay, std::min(level, white), noise, level >= white};
   }
   /// Films what next_delays() asks for, to the end.
-  [[nodiscard]] std::vector<SweepSample> sweep(Seconds resolution,
-                                               SweepEdges edges = SweepEdges::both) const {
-    std::vector<SweepSample> samples;
+  [[nodiscard]] std::vector<smear::SweepSample> sweep(
+      Seconds resolution, smear::SweepEdges edges = smear::SweepEdges::both) const {
+    std::vector<smear::SweepSample> samples;
     for (int round = 0; round < 40; ++round) {
-      const auto delays = next_delays(samples, options(), resolution, edges);
+      const auto delays = smear::next_delays(samples, options(), resolution, edges);
       if (delays.empty()) break;
       for (const Seconds d : delays) samples.push_back(film(d));
     }
     return samples;
   }
-  [[nodiscard]] SweepOptions options() const {
+  [[nodiscard]] smear::SweepOptions options() const {
     return {.period = Seconds(kShutterPeriod), .flash_width = Seconds(width)};
   }
 };

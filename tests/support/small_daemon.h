@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <filesystem>
@@ -14,17 +15,17 @@
 namespace emberlock::test {
 
 /// Four simulated cameras of 320 x 240 and their strobe, on a clock of their own.
-inline DaemonConfig small_config(const std::filesystem::path& folder) {
-  DaemonConfig config;
+inline rig::DaemonConfig small_config(const std::filesystem::path& folder) {
+  rig::DaemonConfig config;
   config.rig.name = "small";
-  CameraConfig cameras;
+  rig::CameraConfig cameras;
   cameras.count = 4;
   cameras.request.size = ImageSize{320, 240};
   config.rig.cameras.push_back(cameras);
-  config.rig.virtual_rig.time = VirtualConfig::Time::fast;
-  config.rig.strobe.source = StrobeSource::virtual_;
+  config.rig.virtual_rig.time = rig::VirtualConfig::Time::fast;
+  config.rig.strobe.source = rig::StrobeSource::virtual_;
   config.recording.folder = folder / "sessions";
-  config.recording.writer = small_disk_options(Encoding::raw_nut);
+  config.recording.writer = small_disk_options(session::Encoding::raw_nut);
   config.alignment.run.align.tolerance.amount = Rows(30);
   config.alignment.run.comb_frames = 12;
   return config;
@@ -32,14 +33,14 @@ inline DaemonConfig small_config(const std::filesystem::path& folder) {
 
 /// A conductor with all that it works with, stepped by hand.
 struct SmallDaemon {
-  explicit SmallDaemon(DaemonConfig setup, RigOptions options = {}, StopAsked stop = {})
+  explicit SmallDaemon(rig::DaemonConfig setup, rig::RigOptions options = {}, rig::StopAsked stop = {})
       : config(std::move(setup)),
-        store(SessionStore::open(config.recording.folder, {.min_free_bytes = 0}).value()),
-        rig(Rig::open(config.rig, std::move(options)).value()),
-        geometry(Geometry::of(config.rig, *rig).value()),
+        store(session::SessionStore::open(config.recording.folder, {.min_free_bytes = 0}).value()),
+        rig(rig::Rig::open(config.rig, std::move(options)).value()),
+        geometry(rig::Geometry::of(config.rig, *rig).value()),
         reconstruction({}, board),
         conductor(std::in_place,
-                  ConductorParts{*rig, geometry, config, store, reconstruction, transcoder, board},
+                  daemon::ConductorParts{*rig, geometry, config, store, reconstruction, work, board},
                   std::move(stop)) {}
 
   /// Works until `done`, or for so many slices.
@@ -57,14 +58,14 @@ struct SmallDaemon {
     return nullptr;
   }
 
-  DaemonConfig config;
-  Board board;
-  SessionStore store;
-  std::unique_ptr<Rig> rig;
-  Geometry geometry;
-  ReconstructionChild reconstruction;
-  Transcoder transcoder;
-  std::optional<Conductor> conductor;
+  rig::DaemonConfig config;
+  daemon::Board board;
+  session::SessionStore store;
+  std::unique_ptr<rig::Rig> rig;
+  rig::Geometry geometry;
+  daemon::ReconstructionChild reconstruction;
+  daemon::WorkQueue work;
+  std::optional<daemon::Conductor> conductor;
   v1::DaemonStatus status;
 };
 

@@ -1,38 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
 #include <memory>
 #include <vector>
 
-#include "daemon/align/run.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
+#include "rig/align/run.h"
 
 namespace emberlock::test {
 
 /// Four cameras of 320 x 240 whose 240 rows take most of the frame period, so that few phases are blind.
-inline VirtualRigOptions small_rig(std::uint64_t seed, int cameras = 4,
-                                   std::vector<SensorKind> sensors = {}) {
-  VirtualRigDraw draw;
+inline drivers::VirtualRigOptions small_rig(std::uint64_t seed, int cameras = 4,
+                                            std::vector<SensorKind> sensors = {}) {
+  drivers::VirtualRigDraw draw;
   draw.cameras = cameras;
   draw.sensors = std::move(sensors);
   draw.seed = seed;
   draw.layout.size = {320, 240};
   draw.row_time = microseconds_per_row(150);
-  return draw_virtual_rig(draw);
+  return drivers::draw_virtual_rig(draw);
 }
 
 /// The rig, opened on a virtual clock, and what a data sheet says of it.
 struct SmallBench {
-  explicit SmallBench(const VirtualRigOptions& setup)
-      : rig(VirtualRig::create(setup, std::make_shared<VirtualClock>()).value()) {
+  explicit SmallBench(const drivers::VirtualRigOptions& setup)
+      : rig(drivers::VirtualRig::create(setup, std::make_shared<drivers::VirtualClock>()).value()) {
     align.strobe = &rig->strobe();
     align.clock = &rig->clock();
     for (int i = 0; i < rig->size(); ++i) align.cameras.push_back(&rig->camera(i));
     options.align.tolerance.amount = Rows(30);
     options.comb_frames = 12;
-    for (const VirtualCameraOptions& camera : setup.cameras) {
-      const CcdTiming& t = camera.timing;
+    for (const drivers::VirtualCameraOptions& camera : setup.cameras) {
+      const smear::CcdTiming& t = camera.timing;
       options.timing.push_back({.rows = t.rows, .shifts = t.shifts, .direction = t.direction});
     }
   }
@@ -50,9 +51,9 @@ struct SmallBench {
     return worst / row_time / 2;
   }
 
-  std::unique_ptr<VirtualRig> rig;
-  AlignRig align;
-  AlignRunOptions options;
+  std::unique_ptr<drivers::VirtualRig> rig;
+  rig::AlignRig align;
+  rig::AlignRunOptions options;
 };
 
 }  // namespace emberlock::test

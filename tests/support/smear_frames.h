@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -49,6 +50,30 @@ class SmearScene {
     }
     return sum / 16;
   }
+  /// What covers `amplitude` times a part of each pixel within its half widths across columns and along rows,
+  /// with an edge of this blur, to first order in the distance from the edge.
+  SmearScene& ellipse(double x, double y, double across, double along, double amplitude, double blur) {
+    for (int py = 0; py < height_; ++py) {
+      for (int px = 0; px < width_; ++px) {
+        const double dx = px - x;
+        const double dy = py - y;
+        const double r = std::hypot(dx / across, dy / along);
+        const double slope = std::hypot(dx / (across * across), dy / (along * along)) / std::max(r, 1e-9);
+        const double outside = (r - 1) / std::max(slope, 1e-9);
+        at(px, py) += amplitude * 0.5 * std::erfc(outside / (1.4142135623730951 * blur));
+      }
+    }
+    return *this;
+  }
+  /// A Gaussian of this half width at half height.
+  SmearScene& soft_spot(double x, double y, double half_width, double amplitude) {
+    const double fall = std::log(2.0) / (half_width * half_width);
+    for (int py = 0; py < height_; ++py) {
+      for (int px = 0; px < width_; ++px)
+        at(px, py) += amplitude * std::exp(-fall * ((px - x) * (px - x) + (py - y) * (py - y)));
+    }
+    return *this;
+  }
   /// Glare: falls as 1 / (1 + (r / scale)^2) to all sides.
   SmearScene& halo(double x, double y, double amplitude, double scale) {
     for (int py = 0; py < height_; ++py) {
@@ -68,12 +93,14 @@ class SmearScene {
     }
     return *this;
   }
-  /// A full-height line with the lamp's profile across.
-  SmearScene& line(double x, double radius, double amplitude) {
+  /// A full-height line with the lamp's profile across, brighter and darker by `ripple` of itself along a
+  /// sine of this period in rows.
+  SmearScene& line(double x, double radius, double amplitude, double ripple = 0, double period = 1) {
     for (int py = 0; py < height_; ++py) {
+      const double bright = amplitude * (1 + ripple * std::sin(2 * 3.141592653589793 * py / period));
       for (int px = 0; px < width_; ++px) {
         const double d = std::abs(px - x);
-        at(px, py) += d < radius ? amplitude * std::sqrt(1 - d * d / (radius * radius)) : 0;
+        at(px, py) += d < radius ? bright * std::sqrt(1 - d * d / (radius * radius)) : 0;
       }
     }
     return *this;

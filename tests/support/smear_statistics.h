@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -116,10 +117,11 @@ struct SmearTally {
          normed = 0;  ///< sums over the found: of errors, (error / bound)^2
   int within = 0;     ///< found, the error at most two stated sigma
 
-  void add(const SmearTruth& t, const SmearReading& r, PixelFormat format = PixelFormat::gray8,
+  void add(const SmearTruth& t, const smear::SmearReading& r, PixelFormat format = PixelFormat::gray8,
            int bit_depth = 8) {
     ++frames;
-    if (r.state == SmearState::ambiguous || r.state == SmearState::blind || r.state == SmearState::saturated)
+    if (r.state == smear::SmearState::ambiguous || r.state == smear::SmearState::blind ||
+        r.state == smear::SmearState::saturated)
       ++abstained;
     if (r.dots.empty()) return;
     ++dots;
@@ -184,7 +186,7 @@ inline SmearTally read_dots(const SmearRange& range, const SmearScene::Sensor& s
       s.noise = t.noise;
       s.shot = t.shot;
       s.seed = seed * 1'000'003 + static_cast<std::uint64_t>(i);
-      sum.add(t, detect(t.scene().image(s).view()), s.format, s.bit_depth);
+      sum.add(t, smear::detect(t.scene().image(s).view()), s.format, s.bit_depth);
     }
     return sum;
   });
@@ -217,7 +219,58 @@ inline SmearTally read_dotless(PixelFormat format, int frames, std::uint64_t see
       const double noise = 0.3 + 2.7 * random_uniform(seed, 5, static_cast<std::uint64_t>(i));
       const Image image = dotless_scene(seed, i).image(
           {.noise = noise, .seed = seed * 1'000'003 + static_cast<std::uint64_t>(i), .format = format});
-      sum.add({}, detect(image.view()));
+      sum.add({}, smear::detect(image.view()));
+    }
+    return sum;
+  });
+}
+
+/// What only looks like a dot: frames without one.
+enum class Lookalike {
+  disk,     ///< a blinking reflection in the lamp's column, 1.2..4 lamps wide
+  ellipse,  ///< the same, as tall as the lamp
+  soft,     ///< the same, a Gaussian
+  line,     ///< a steady line that may saturate, uneven by up to a tenth along its rows
+};
+constexpr Lookalike kReflections[] = {Lookalike::disk, Lookalike::ellipse, Lookalike::soft};
+
+/// The lamp of draw_truth, every third with a halo, and the lookalike.
+inline SmearTruth lookalike_truth(std::uint64_t seed, int frame) {
+  SmearTruth t = draw_truth({}, seed, static_cast<std::uint64_t>(frame));
+  t.amplitude = 0;
+  return t;
+}
+inline SmearScene lookalike_scene(Lookalike kind, std::uint64_t seed, int frame) {
+  const SmearTruth t = lookalike_truth(seed, frame);
+  RandomStream random(seed + 1, static_cast<std::uint64_t>(frame));
+  const auto log_uniform = [&](double low, double high) {
+    return low * std::pow(high / low, random.uniform());
+  };
+  SmearScene scene = t.scene();
+  if (kind == Lookalike::line) {
+    const double ripple = random.uniform(0, 0.1);
+    return scene.line(t.x, t.radius, random.uniform(100, 400), ripple, log_uniform(60, 2000));
+  }
+  const double width = log_uniform(1.2, 4) * t.radius;
+  const double amplitude = log_uniform(8, 400);
+  const double x = t.x + random.uniform(-0.5, 0.5);
+  const double blur = random.uniform(0.8, 2.5);
+  if (frame % 3 == 0) scene.halo(t.x, t.lamp_y, random.uniform(10, 100), random.uniform(4, 12));
+  if (kind == Lookalike::disk) return scene.disk(x, t.dot_y, width, amplitude, blur);
+  if (kind == Lookalike::ellipse) return scene.ellipse(x, t.dot_y, width, t.radius, amplitude, blur);
+  return scene.soft_spot(x, t.dot_y, width, amplitude);
+}
+
+inline SmearTally read_lookalikes(Lookalike kind, int frames, std::uint64_t seed) {
+  return tally(frames, 16, [&](int first, int count) {
+    SmearTally sum;
+    for (int i = first; i < first + count; ++i) {
+      const SmearTruth t = lookalike_truth(seed, i);
+      const Image image = lookalike_scene(kind, seed, i)
+                              .image({.noise = t.noise,
+                                      .shot = t.shot,
+                                      .seed = seed * 1'000'003 + static_cast<std::uint64_t>(i)});
+      sum.add({}, smear::detect(image.view()));
     }
     return sum;
   });
@@ -245,7 +298,7 @@ inline SmearTally read_compressed(
     }
     const std::vector<Image> seen = compress(film);
     SmearTally sum;
-    for (std::size_t i = 0; i < seen.size(); ++i) sum.add(truths[i], detect(seen[i].view()));
+    for (std::size_t i = 0; i < seen.size(); ++i) sum.add(truths[i], smear::detect(seen[i].view()));
     return sum;
   });
 }

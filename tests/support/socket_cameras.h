@@ -1,6 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <chrono>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <set>
@@ -13,12 +15,21 @@
 #include "drivers/driver.h"
 
 // Cameras of a driver "v4l2" that a test plugs in and out, by their ids: 100 small frames a second while they
-// are in.
+// are in, and nothing is wrong with them.
 namespace emberlock::test {
+
+/// What a camera that is plugged in does instead of filming.
+enum class Ails {
+  nothing,
+  mute,   ///< no frame comes in time
+  hangs,  ///< a call doesn't return
+  ended,  ///< as a recording that is replayed
+};
 
 struct Sockets {
   std::mutex mutex;
   std::set<std::string> plugged;
+  std::map<std::string, Ails> ailing;
 };
 inline Sockets& sockets() {
   static Sockets all;
@@ -37,7 +48,17 @@ inline void unplug(const std::string& id) {
   sockets().plugged.erase(id);
 }
 
-class SocketCamera final : public Camera {
+inline void ail(const std::string& id, Ails how) {
+  const std::lock_guard lock(sockets().mutex);
+  sockets().ailing[id] = how;
+}
+inline Ails ailing(const std::string& id) {
+  const std::lock_guard lock(sockets().mutex);
+  const auto found = sockets().ailing.find(id);
+  return found == sockets().ailing.end() ? Ails::nothing : found->second;
+}
+
+class SocketCamera final : public drivers::Camera {
  public:
   explicit SocketCamera(std::string id) {
     info_.id = std::move(id);
@@ -45,8 +66,8 @@ class SocketCamera final : public Camera {
     info_.layout.size = {64, 48};
     info_.frame_rate = Hertz(100);
   }
-  [[nodiscard]] const CameraInfo& info() const override { return info_; }
-  [[nodiscard]] FrameCounts counts() const override { return counts_; }
+  [[nodiscard]] const drivers::CameraInfo& info() const override { return info_; }
+  [[nodiscard]] drivers::FrameCounts counts() const override { return counts_; }
   Status start() override {
     if (!is_plugged(info_.id)) return Error{ErrorKind::device, "it isn't there", info_.id, "plug it in"};
     return {};
@@ -54,6 +75,10 @@ class SocketCamera final : public Camera {
   void stop() override {}
   Result<Frame> next_frame(Seconds /*deadline*/) override {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    while (ailing(info_.id) == Ails::hangs) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    if (ailing(info_.id) == Ails::mute) return Error{ErrorKind::timed_out, "no frame", info_.id, "wait"};
+    if (ailing(info_.id) == Ails::ended)
+      return Error{ErrorKind::out_of_data, "the recording has ended", info_.id, {}};
     if (!is_plugged(info_.id)) return Error{ErrorKind::device, "it went away", info_.id, "plug it in"};
     Frame frame;
     frame.stamp.frame_id = counts_.delivered++;
@@ -70,16 +95,18 @@ class SocketCamera final : public Camera {
   }
 
  private:
-  CameraInfo info_;
-  FrameCounts counts_;
+  drivers::CameraInfo info_;
+  drivers::FrameCounts counts_;
 };
 
-inline std::vector<CameraDriver> socket_drivers() {
-  return {{"v4l2", [] { return Result<std::vector<CameraFound>>(std::vector<CameraFound>{}); },
-           [](const std::string& id, const CameraRequest& /*request*/) -> Result<std::unique_ptr<Camera>> {
+inline std::vector<drivers::CameraDriver> socket_drivers() {
+  return {{"v4l2",
+           [] { return Result<std::vector<drivers::CameraFound>>(std::vector<drivers::CameraFound>{}); },
+           [](const std::string& id,
+              const drivers::CameraRequest& /*request*/) -> Result<std::unique_ptr<drivers::Camera>> {
              if (!is_plugged(id))
                return Error{ErrorKind::device, "there is no such camera", id, "plug it in"};
-             return std::unique_ptr<Camera>(std::make_unique<SocketCamera>(id));
+             return std::unique_ptr<drivers::Camera>(std::make_unique<SocketCamera>(id));
            }}};
 }
 

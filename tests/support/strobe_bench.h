@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <deque>
@@ -15,14 +16,14 @@ namespace emberlock::test {
 enum class Fault { none, silent, garbled, truncated, flipped, late, twice, renumbered, chatter };
 
 struct StrobeBench {
-  explicit StrobeBench(StrobeDialect spoken, const DialectOptions& options = {})
-      : StrobeBench(make_dialect(spoken, options).value(), make_device(spoken)) {}
-  StrobeBench(std::unique_ptr<const Dialect> dialect, std::unique_ptr<StrobeDevice> simulated)
+  explicit StrobeBench(drivers::StrobeDialect spoken, const drivers::DialectOptions& options = {})
+      : StrobeBench(drivers::make_dialect(spoken, options).value(), make_device(spoken)) {}
+  StrobeBench(std::unique_ptr<const drivers::Dialect> dialect, std::unique_ptr<StrobeDevice> simulated)
       : device(std::move(simulated)),
         strobe(
             "bench", std::move(dialect), [this] { return open(); }, clock) {}
 
-  Result<std::unique_ptr<Wire>> open();
+  Result<std::unique_ptr<drivers::Wire>> open();
   template <class Device>
   Device& as() {
     return dynamic_cast<Device&>(*device);
@@ -32,17 +33,17 @@ struct StrobeBench {
   void spoil_all(Fault fault) { always = fault; }
   double seconds() const { return (clock->now() - TimePoint{}).value(); }
 
-  std::shared_ptr<VirtualClock> clock = std::make_shared<VirtualClock>();
+  std::shared_ptr<drivers::VirtualClock> clock = std::make_shared<drivers::VirtualClock>();
   std::unique_ptr<StrobeDevice> device;
   std::deque<Fault> faults;
   Fault always = Fault::none;
   bool plugged = true;
   int opened = 0;
   int heard = 0;  ///< writes
-  SerialStrobe strobe;
+  drivers::SerialStrobe strobe;
 };
 
-class BenchWire final : public Wire {
+class BenchWire final : public drivers::Wire {
  public:
   explicit BenchWire(StrobeBench& bench) : bench_(bench) {}
 
@@ -109,10 +110,10 @@ class BenchWire final : public Wire {
   std::deque<std::pair<TimePoint, std::string>> pending_;
 };
 
-inline Result<std::unique_ptr<Wire>> StrobeBench::open() {
+inline Result<std::unique_ptr<drivers::Wire>> StrobeBench::open() {
   if (!plugged) return Error{ErrorKind::device, "it isn't plugged in"};
   ++opened;
-  return std::unique_ptr<Wire>(std::make_unique<BenchWire>(*this));
+  return std::unique_ptr<drivers::Wire>(std::make_unique<BenchWire>(*this));
 }
 
 }  // namespace emberlock::test

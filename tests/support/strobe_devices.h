@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -262,24 +263,24 @@ class ControllerDevice final : public StrobeDevice {
   }
 };
 
-inline std::unique_ptr<StrobeDevice> make_device(StrobeDialect dialect) {
+inline std::unique_ptr<StrobeDevice> make_device(drivers::StrobeDialect dialect) {
   switch (dialect) {
-    case StrobeDialect::emberlock:
+    case drivers::StrobeDialect::emberlock:
       return std::make_unique<ControllerDevice>();
-    case StrobeDialect::scpi:
+    case drivers::StrobeDialect::scpi:
       return std::make_unique<ScpiDevice>();
-    case StrobeDialect::siglent_bswv:
+    case drivers::StrobeDialect::siglent_bswv:
       return std::make_unique<SiglentDevice>();
-    case StrobeDialect::gardasoft_rt:
+    case drivers::StrobeDialect::gardasoft_rt:
       return std::make_unique<GardasoftDevice>();
-    case StrobeDialect::schott_cv_ls:
+    case drivers::StrobeDialect::schott_cv_ls:
       return std::make_unique<SchottDevice>();
   }
   return nullptr;
 }
 
-inline const std::vector<StrobeDialect> kAllDialects{StrobeDialect::emberlock, StrobeDialect::scpi,
-                                                     StrobeDialect::siglent_bswv, StrobeDialect::gardasoft_rt,
-                                                     StrobeDialect::schott_cv_ls};
+inline const std::vector<drivers::StrobeDialect> kAllDialects{
+    drivers::StrobeDialect::emberlock, drivers::StrobeDialect::scpi, drivers::StrobeDialect::siglent_bswv,
+    drivers::StrobeDialect::gardasoft_rt, drivers::StrobeDialect::schott_cv_ls};
 
 }  // namespace emberlock::test

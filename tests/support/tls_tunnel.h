@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -12,7 +13,7 @@
 #include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/write.hpp>
 
-#include "daemon/server/access.h"
+#include "rig/access.h"
 
 namespace emberlock::test {
 
@@ -21,7 +22,7 @@ namespace emberlock::test {
 class TlsTunnel {
  public:
   /// To `port`, believing `ca`, and showing `identity` if there is one.
-  TlsTunnel(int port, const std::string& ca, const TlsIdentity& identity = {})
+  TlsTunnel(int port, const std::string& ca, const rig::TlsIdentity& identity = {})
       : to_(boost::asio::ip::address_v4::loopback(), static_cast<unsigned short>(port)) {
     context_.set_verify_mode(boost::asio::ssl::verify_peer);
     context_.add_certificate_authority(boost::asio::buffer(ca));

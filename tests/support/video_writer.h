@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 extern "C" {
@@ -33,7 +34,7 @@ struct VideoFormat {
 class VideoWriter {
  public:
   VideoWriter(const std::filesystem::path& path, ImageSize size, const VideoFormat& format) {
-    quiet_libav();
+    session::quiet_libav();
     AVFormatContext* context = nullptr;
     expect(avformat_alloc_output_context2(&context, nullptr, nullptr, path.c_str()), "no container");
     output_.reset(context);
@@ -122,7 +123,7 @@ class VideoWriter {
     }
   }
   static void expect(int code, const char* what) {
-    if (code < 0) throw std::runtime_error(std::string(what) + ": " + av_message(code));
+    if (code < 0) throw std::runtime_error(std::string(what) + ": " + session::av_message(code));
   }
   void encode(const AVFrame* frame) {
     expect(avcodec_send_frame(encoder_.get(), frame), "cannot encode");
@@ -136,10 +137,10 @@ class VideoWriter {
     }
   }
 
-  std::unique_ptr<AVFormatContext, AvFreeOutput> output_;
-  AvPtr<AVCodecContext> encoder_;
-  AvPtr<AVFrame> frame_;
-  AvPtr<AVPacket> packet_;
+  std::unique_ptr<AVFormatContext, session::AvFreeOutput> output_;
+  session::AvPtr<AVCodecContext> encoder_;
+  session::AvPtr<AVFrame> frame_;
+  session::AvPtr<AVPacket> packet_;
   SwsContext* scaler_ = nullptr;
   AVStream* stream_ = nullptr;
   std::int64_t count_ = 0;

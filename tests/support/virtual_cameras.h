@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cmath>
@@ -12,9 +13,9 @@ namespace emberlock::testing_support {
 
 /// A camera of 64 x 120 pixels, 12 bits, that reads 250 us a row and 24 frames a second; its lamp is at (30,
 /// 50).
-inline VirtualCameraOptions small_camera(ReadDirection direction = ReadDirection::top_first,
-                                         int shifts = 120) {
-  VirtualCameraOptions c;
+inline drivers::VirtualCameraOptions small_camera(
+    smear::ReadDirection direction = smear::ReadDirection::top_first, int shifts = 120) {
+  drivers::VirtualCameraOptions c;
   c.layout = {.size = {64, 120}, .format = PixelFormat::gray16, .bit_depth = 12};
   c.timing = {.rows = 120,
               .shifts = shifts,
@@ -28,20 +29,20 @@ inline VirtualCameraOptions small_camera(ReadDirection direction = ReadDirection
 }
 
 /// A rig of such cameras that draws the passes named and nothing else.
-inline std::unique_ptr<VirtualRig> small_rig(
-    std::vector<VirtualCameraOptions> cameras, std::vector<Pass> passes,
-    std::shared_ptr<Clock> clock = std::make_shared<VirtualClock>()) {
-  VirtualRigOptions options;
+inline std::unique_ptr<drivers::VirtualRig> small_rig(
+    std::vector<drivers::VirtualCameraOptions> cameras, std::vector<drivers::Pass> passes,
+    std::shared_ptr<Clock> clock = std::make_shared<drivers::VirtualClock>()) {
+  drivers::VirtualRigOptions options;
   options.cameras = std::move(cameras);
   options.scene.passes = std::move(passes);
-  return VirtualRig::create(std::move(options), std::move(clock)).value();
+  return drivers::VirtualRig::create(std::move(options), std::move(clock)).value();
 }
 
 /// Grey levels (0..255) above the background, summed over the lamp's columns, by row.
 inline std::vector<double> column_light(const Frame& frame, double x, int half_width = 7) {
   const ImageView v = frame.image->view();
   const double scale = 255.0 / v.layout.white();
-  const double background = std::round(VirtualScene{}.background / scale);
+  const double background = std::round(drivers::VirtualScene{}.background / scale);
   std::vector<double> rows(v.height());
   for (int y = 0; y < v.height(); ++y) {
     for (int i = static_cast<int>(x) - half_width; i <= static_cast<int>(x) + half_width; ++i) {

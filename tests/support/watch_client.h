@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -19,8 +20,7 @@ class WatchClient {
     std::string bytes;
   };
 
-  explicit WatchClient(int port, const std::string& headers = "Host: localhost\r\n")
-      : socket_(connect_to(port)) {
+  explicit WatchClient(int port, const std::string& headers = kLetIn) : socket_(connect_to(port)) {
     send_all(socket_, "GET /api/v1/watch HTTP/1.1\r\n" + headers +
                           "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
                           "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n");

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The page before a daemon that plays what real rigs seldom do: states, disconnects, refusals, faults, eleven cameras at every width.
 import {readdirSync, statSync} from 'node:fs';
 import {fileURLToPath} from 'node:url';
@@ -236,13 +237,20 @@ describe('the connection', () => {
     await page.waitForSelector('.link[data-connection=open]', {timeout: 9000});
   });
 
-  test('a token is asked for, a wrong one refused, the right one opens', async () => {
+  test('a link opens the console and leaves the address; after a new start a token or another link is asked for', async () => {
     mock.status = idle();
-    mock.token = 'sesame street';
-    const watched = await openPage(browser, mock.url, kLaptop);
+    mock.token = 'first start';
+    mock.link = '0123';
+    const watched = await openPage(browser, `${mock.url}open?link=0123`, kLaptop);
     opened.push(watched);
     const {page} = watched;
-    await page.waitForSelector('dialog.token[open]');
+    await page.waitForSelector('.link[data-connection=open]');
+    expect(page.url()).toBe(mock.url);
+    mock.token = 'sesame street';
+    await mock.stop();
+    await mock.start();
+    await page.waitForSelector('dialog.token[open]', {timeout: 8000});
+    expect(await text(page, 'dialog.token')).toContain('emberlock console');
     await page.fill('#token', 'open');
     await page.keyboard.press('Enter');
     await page.waitForFunction(() => document.querySelector('dialog.token .note')!.textContent === 'That is not the token.');
@@ -251,6 +259,16 @@ describe('the connection', () => {
     await page.keyboard.press('Enter');
     await page.waitForSelector('.link[data-connection=open]');
     expect(await page.locator('dialog.token').isVisible()).toBe(false);
+  });
+
+  test('a console that made room for a newer one says so and does not push that one out', async () => {
+    mock.status = locked();
+    const page = await open();
+    mock.close(4001);
+    await page.waitForSelector('.link[data-connection=displaced]');
+    expect(await text(page, '.connection-lost')).toContain('Reload to take it back');
+    await new Promise(resolve => setTimeout(resolve, 1500));  // longer than it waits before it connects again
+    expect(mock.wanted).toEqual([]);
   });
 
   test('a hidden page asks for no pictures', async () => {
@@ -431,6 +449,41 @@ describe('what was recorded', () => {
     await until(() => mock.calls.some(({method, request}) => method === 'Reconstruct/Start' && request.session === 'candle 1'), Boolean, 'started');
   });
 
+  test('a job that fails on its way, or breaks off, is told, and looks so', async () => {
+    mock.status = idle();
+    mock.answers['Sessions/List'] = () => ({sessions: [entry]});
+    mock.jobs['Sessions/Repair'] = async function* () {
+      yield {fraction: 0.4, doing: 'reads virtual-03'};
+      yield {code: 'INTERNAL', message: 'candle 1: the disk is full. Free space.'} as object;
+    };
+    mock.jobs['Sessions/Export'] = async function* () { yield {fraction: 0.4, doing: 'writes virtual-03'}; };
+    const page = await open();
+    const row = page.locator('tr[data-session="candle 1"]');
+    await page.getByRole('button', {name: 'Repair candle 1'}).click();
+    await until(() => row.locator('.job').getAttribute('data-ok'), ok => ok === 'false', 'failed');
+    expect(await text(page, '.toast p')).toBe('Candle 1: the disk is full. Free space.');
+    await page.getByRole('button', {name: 'Export images candle 1'}).click();
+    await until(() => page.locator('.toast').count(), count => count === 2, 'broke off');
+    expect(await page.locator('.toast p').last().innerText()).toContain('broke off before it was done');
+  });
+
+  test('a session that is being salvaged says how far it is, and nothing else is done to it', async () => {
+    mock.status = idle();
+    mock.answers['Sessions/List'] = () => ({sessions: [{...entry, state: 'RECORDING' as const}, {...entry, session: 'other'}]});
+    const page = await open();
+    await page.waitForSelector('tr[data-session]');
+    mock.show({jobs: [{kind: 'SALVAGE', session: 'candle 1', state: 'RUNNING', fraction: 0.34, doing: 'salvaging'}]});
+    const row = page.locator('tr[data-session="candle 1"]');
+    await until(() => row.locator('.background').innerText(), words => words === 'being salvaged, 34 %', 'how far');
+    for (const words of ['Verify', 'Export images', 'Reconstruct']) {
+      expect(await page.getByRole('button', {name: `${words} candle 1`}).isDisabled()).toBe(true);
+      expect(await page.getByRole('button', {name: `${words} other`}).isDisabled()).toBe(false);
+    }
+    mock.show({jobs: []});
+    await until(() => page.getByRole('button', {name: 'Export images candle 1'}).isDisabled(), disabled => !disabled, 'free again');
+    expect(await row.locator('.background').isVisible()).toBe(false);
+  });
+
   test('a reconstruction is seen after every iteration, and its volume turns', async () => {
     mock.status = locked();
     const page = await open();
@@ -443,7 +496,7 @@ describe('what was recorded', () => {
     const {header, bytes} = flameVolume();
     mock.tellBytes(header, bytes);
     await page.waitForSelector('.pair canvas[data-iteration="5"]');
-    expect(await text(page, '.latest')).toBe('Iteration 5: error 4.74 of 255, held out 5.98');
+    expect(await text(page, '.latest')).toBe('Iteration 5: error 4.74 of 255, held out about 5.98');
     expect(await text(page, '#reconstruction header')).toContain('adjusts the volume · 42 %');
     await page.locator('#reconstruction').scrollIntoViewIfNeeded();
     await page.waitForSelector('.volume[data-voxels="32768"] canvas', {timeout: 20_000});

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A daemon that only talks: the console's wire on a port of its own, what it shows and answers is the test's to say.
 import {readFile} from 'node:fs/promises';
 import {createServer, type IncomingMessage, type Server, type ServerResponse} from 'node:http';
@@ -32,6 +33,8 @@ export class Mock {
   answers: Answers = {};
   jobs: Jobs = {};
   token?: string;
+  /** The secret of a link that opens the console, once. */
+  link?: string;
   /** A camera's picture now. */
   jpeg?: (camera: string, frame: number) => Uint8Array | undefined;
   /** Every call, in order. */
@@ -139,9 +142,12 @@ export class Mock {
   private async handle(request: IncomingMessage, response: ServerResponse): Promise<void> {
     const url = new URL(request.url!, this.url);
     response.setHeader('Content-Security-Policy', kPolicy);
-    if (this.token && url.searchParams.get('token') === this.token) response.setHeader('Set-Cookie', `emberlock=${this.token}; HttpOnly; SameSite=Strict; Path=/`);
-    else if (this.token && url.searchParams.has('token')) return answer(response, 401, {code: 'UNAUTHENTICATED', message: 'not the token'});
+    if (url.pathname === '/open') return this.open(url, request, response);
     if (url.pathname.startsWith('/api/v1/')) return this.api(url.pathname.slice(8), request, response);
+    if (!this.allowed(request)) {
+      response.writeHead(401, {'Content-Type': 'text/html; charset=utf-8'}).end('<!doctype html><p>Type <code>emberlock console</code></p>');
+      return;
+    }
     const path = normalize(url.pathname === '/' ? 'index.html' : url.pathname.slice(1));
     try {
       const file = await readFile(join(this.console, path));
@@ -149,6 +155,21 @@ export class Mock {
     } catch {
       answer(response, 404, {code: 'NOT_FOUND', message: `${path}: there is no such file`});
     }
+  }
+
+  private async open(url: URL, request: IncomingMessage, response: ServerResponse): Promise<void> {
+    const chunks: Buffer[] = [];
+    for await (const chunk of request) chunks.push(chunk as Buffer);
+    const link = url.searchParams.get('link');
+    const right = link ? link === this.link : new URLSearchParams(Buffer.concat(chunks).toString()).get('token') === this.token;
+    if (!right) return answer(response, 401, {code: 'UNAUTHENTICATED', message: 'not known'});
+    if (link) this.link = undefined;
+    response.writeHead(303, {Location: '/', 'Set-Cookie': `emberlock=${this.token}; HttpOnly; SameSite=Strict; Path=/`}).end();
+  }
+
+  /** Closes every console's WebSocket for this reason. */
+  close(code: number): void {
+    for (const {socket} of this.watchers) socket.close(code);
   }
 
   private async api(method: string, request: IncomingMessage, response: ServerResponse): Promise<void> {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures for the mock, painted by the browser itself: a lamp, its smear, the dot; and a flame with its volume.
 import type {Browser} from 'playwright-core';
 

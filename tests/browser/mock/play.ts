@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `npm run mock`: serves the built console (EMBERLOCK_CONSOLE) before a mock that plays from idle to a volume, again and again.
 import {startChromium} from '../support/chromium';
 import {Mock} from './mock';

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // States of a rig of eleven cameras, as the daemon would tell them.
 import type {AlignmentStatus, CameraStatus, DaemonStatus, RecordingStatus, ReconstructionStatus, RoundPoint} from '../../../daemon/console/src/api.gen';
 
@@ -48,7 +49,7 @@ export function history(rounds: number): RoundPoint[] {
 const base: Wire<DaemonStatus> = {
   rig: 'virtual:11', version: '0.1.0', faults: [],
   storage: {folder: '/var/lib/emberlock', free_bytes: 412e9, floor_bytes: 5e9, bytes_per_s: 243e6, minutes_left: 27.9},
-  strobe: {id: 'virtual', light: 'GREEN', reason: '', settings: {output: 'OFF', rate_hz: 24, phase_s: 0, width_s: 20e-6, code: []}},
+  strobe: {id: 'virtual', light: 'GREEN', reason: '', settings: {output: 'OFF', rate_hz: 24, phase_s: 0, width_s: 20e-6, code: []}, by_hand: false, measured_hz: 0},
 };
 const flashing = {...base.strobe!, settings: {...base.strobe!.settings!, output: 'FLASHING' as const}};
 
@@ -80,7 +81,8 @@ export function capturing(seconds: number, change: Wire<RecordingStatus> = {}): 
   const frames = Math.floor(24 * seconds) * kCameras;
   return {...locked(), phase: 'CAPTURING', light: 'GREEN', reason: 'Records all 11 cameras.', next_step: '',
           recording: {session: '2026-11-22_031500', state: 'RECORDING', purpose: 'flame', seconds, frames, bytes: frames * 307200, bytes_per_s: 81.1e6, queue_fill: 0.07,
-                      lost: {recorded: frames, camera_gap: 0, transport: 0, underrun: 0, queue: 0, disk: 0, passed_over: 0}, cameras: [], verdict: '', spread_s: 2.2e-3, ...change}};
+                      progress: {arrived: frames + 66, queued: 11, written: frames + 55, safe: frames, at_risk_s: 0.3},
+                      lost: {recorded: frames, camera_gap: 0, transport: 0, underrun: 0, queue: 0, disk: 0, passed_over: 0}, cameras: [], camera_progress: [], verdict: '', spread_s: 2.2e-3, ...change}};
 }
 
 export function reconstruction(iterations: number, change: Wire<ReconstructionStatus> = {}): ReconstructionStatus {

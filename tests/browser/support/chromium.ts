@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Debian's Chromium, driven by Playwright.
 import {mkdirSync, writeFileSync} from 'node:fs';
 

@@ -1,5 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // emberlockd in a folder of its own, on a free port of this machine.
-import {type ChildProcess, spawn} from 'node:child_process';
+import {type ChildProcess, execFileSync, spawn} from 'node:child_process';
+import {randomBytes} from 'node:crypto';
 import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
 import {createServer} from 'node:net';
 import {tmpdir} from 'node:os';
@@ -23,11 +25,15 @@ export class Daemon {
   private child?: ChildProcess;
   private said = '';
   private ended = false;
+  readonly token = randomBytes(32).toString('hex');
+  private bin = '';
   url = '';
 
   /** `rig` is the configuration's part that tells of cameras and strobe. */
   async start(bin: string, console: string, rig: string): Promise<void> {
     const port = await freePort();
+    this.bin = bin;
+    writeFileSync(join(this.folder, 'token'), this.token, {mode: 0o600});
     this.url = `http://127.0.0.1:${port}/`;
     const configuration = join(this.folder, 'emberlock.toml');
     writeFileSync(configuration, `${rig}
@@ -39,6 +45,7 @@ voxels = 48
 [server]
 socket = "${this.folder}/emberlockd.sock"
 http_listen = "127.0.0.1:${port}"
+token_file = "${this.folder}/token"
 console = "${console}"
 `);
     // It goes with whoever runs the tests, even where that is killed.
@@ -50,8 +57,13 @@ console = "${console}"
     if (this.ended) throw new Error(`emberlockd ended: ${this.said}`);
   }
 
+  /** As an operator gets one: what `emberlock console` prints. */
+  link(): string {
+    return execFileSync(`${this.bin}/emberlock`, ['console', '--daemon', `unix:${this.folder}/emberlockd.sock`], {stdio: ['ignore', 'pipe', 'ignore']}).toString().trim();
+  }
+
   async call<T>(method: string, request: object = {}): Promise<T> {
-    const answer = await fetch(`${this.url}api/v1/${method}`, {method: 'POST', headers: {'Content-Type': 'application/json'}, body: JSON.stringify(request)});
+    const answer = await fetch(`${this.url}api/v1/${method}`, {method: 'POST', headers: {'Content-Type': 'application/json', Authorization: `Bearer ${this.token}`}, body: JSON.stringify(request)});
     if (!answer.ok) throw new Error(`${method}: ${await answer.text()}`);
     return (await answer.json()) as T;
   }

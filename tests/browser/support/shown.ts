@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is to be seen on the page: numbers in texts, and pixels.
 import type {Locator, Page} from 'playwright-core';
 

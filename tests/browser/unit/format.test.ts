@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 import {expect, test} from 'vitest';
 
 import {bytes, clock, count, micros, percent, ppm, rows, sentence, short, span} from '../../../daemon/console/src/format';

@@ -1,7 +1,8 @@
-import {expect, test} from 'vitest';
+// SPDX-License-Identifier: Apache-2.0
+import {afterEach, expect, test, vi} from 'vitest';
 
 import type {DaemonStatus} from '../../../daemon/console/src/api.gen';
-import {decode, unpack} from '../../../daemon/console/src/wire';
+import {decode, follow, unpack} from '../../../daemon/console/src/wire';
 import {pack} from '../mock/mock';
 
 test('what protobuf leaves out of its JSON gets its default, and what is optional stays absent', () => {
@@ -32,4 +33,38 @@ test('a binary message is its header and its bytes', () => {
 test('a binary message that is cut short is an error', () => {
   expect(() => unpack(new Uint8Array([1, 0]).buffer)).toThrow('without its header');
   expect(() => unpack(new Uint8Array([9, 0, 0, 0, 123]).buffer)).toThrow('shorter');
+});
+
+/** A daemon that answers a job with these pieces of its stream, and then ends it or breaks off. */
+function answerWith(pieces: string[], end: 'ends' | 'breaks' = 'ends'): void {
+  const body = new ReadableStream<Uint8Array>({
+    start(stream) {
+      for (const piece of pieces) stream.enqueue(new TextEncoder().encode(piece));
+      if (end === 'ends') stream.close();
+      else setTimeout(() => stream.error(new TypeError('network error')), 0);
+    },
+  });
+  vi.stubGlobal('fetch', () => Promise.resolve(new Response(body)));
+}
+const verified = (told: string[] = []) => follow('Sessions/Verify', {session: 's'}, progress => told.push(progress.doing));
+afterEach(() => vi.unstubAllGlobals());
+
+test('a job is told line by line, however its bytes come, and its last line is what came of it', async () => {
+  answerWith(['{"doing": "rea', 'ds"}\n{"doing": "checks"}\n', '{"done": true, "ok": true, "report": "{}"}\n']);
+  const told: string[] = [];
+  expect(await verified(told)).toMatchObject({done: true, ok: true});
+  expect(told).toEqual(['reads', 'checks', '']);
+});
+
+test('a job that fails on its way is an error, in the daemon\u2019s words', async () => {
+  answerWith(['{"doing": "reads"}\n{"code": "INTERNAL", "message": "exports: no space left on device."}\n']);
+  await expect(verified()).rejects.toMatchObject({code: 'INTERNAL', message: 'exports: no space left on device.'});
+});
+
+test('a stream that ends without its last line is an error, wherever it is cut', async () => {
+  const lines = '{"doing": "reads"}\n{"done": true, "ok": true}\n';
+  for (let length = 0; length < lines.length; ++length) {
+    answerWith([lines.slice(0, length)], length % 2 === 0 ? 'ends' : 'breaks');
+    await expect(verified(), `${length} bytes`).rejects.toThrow('broke off');
+  }
 });

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // How late and how often pictures are seen, told by the test's own clock.
 import type {Page} from 'playwright-core';
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The whole walk of an operator, from strobe to volume: the built page before emberlockd with eleven virtual cameras in real
 // time. What the page shows is held against what the API says. Times are printed, never asked for.
 import {existsSync} from 'node:fs';
@@ -77,6 +78,28 @@ afterAll(async () => {
   console.log(failed ? `emberlockd said last:\n${daemon.log.split('\n').slice(-60).join('\n')}` : Object.entries(figures).map(([name, value]) => `${name.padEnd(40)} ${value}`).join('\n'));
 });
 
+test('a browser that nobody let in is told what to do; the link opens the console, once, and leaves the address', async () => {
+  expect(await text('h1')).toContain('by a link');
+  expect(await text('pre')).toBe('emberlock console');
+  await screenshot(page, 'stranger');
+  const link = daemon.link();
+  await page.goto(link);
+  await until(() => text('h1'), words => words === 'Idle', 'the console is open', 20);
+  expect(page.url()).toBe(daemon.url);
+  expect(await page.evaluate(() => document.cookie)).toBe('');
+  const other = await openPage(browser, link, {width: 800, height: 600});
+  expect(await other.page.locator('[role=alert]').innerText()).toContain('opened already');
+  // The token opens it too, by the page's own form.
+  await other.page.fill('input[name=token]', 'this is another token');
+  await other.page.keyboard.press('Enter');
+  await until(() => other.page.locator('[role=alert]').innerText(), words => words === 'That is not the token.', 'it is refused');
+  await other.page.fill('input[name=token]', daemon.token);
+  await other.page.keyboard.press('Enter');
+  await until(() => other.page.locator('h1').first().innerText(), words => words === 'Idle', 'the token opens the console', 20);
+  expect(other.page.url()).toBe(daemon.url);
+  await other.page.context().close();
+});
+
 test('idle: eleven cameras are live, the disk has room', async () => {
   await until(() => text('h1'), words => words === 'Idle', 'the rig is idle', 20);
   await until(() => page.evaluate(() => window.emberlockDiagnostics.shown.size), cameras => cameras === kCameras, 'all are shown', 30);
@@ -150,7 +173,7 @@ test('locked: every camera green, its offset in rows and microseconds, its dot i
 }, 400_000);
 
 test('at phone width nothing is wider than the screen', async () => {
-  const phone = await openPage(browser, daemon.url, {width: 360, height: 800});
+  const phone = await openPage(browser, daemon.link(), {width: 360, height: 800});
   await phone.page.waitForSelector('.tile[data-light=GREEN]');
   await phone.page.waitForFunction(() => window.emberlockDiagnostics.shown.size > 0);
   expect(await phone.page.evaluate(() => document.documentElement.scrollWidth)).toBe(360);
@@ -177,18 +200,18 @@ test('recorded: what is shown is what the daemon, its files and its books say', 
   await page.locator('button.record').click();
   await until(() => text('h1'), words => words === 'Recording', 'it records', 20);
   const shown = async (name: string) => number((await facts(page.locator('#record .numbers')))[name]!);
-  await follows('frames', () => shown('frames'), status => status.recording!.frames, 0);
+  await follows('frames', () => shown('frames safe'), status => status.recording!.frames, 0);
   await follows('the clock', async () => number((await text('.record-line .clock')).replace('0:', '')), status => status.recording!.seconds, 0.1);
   await agrees('losses', async () => numbers(await text('.drops')).reduce((all, frames) => all + frames, 0), totalLost);
-  await until(() => shown('frames'), now => now > kCameras * 30, 'some seconds are recorded', 60);
+  await until(() => shown('frames safe'), now => now > kCameras * 30, 'some seconds are recorded', 60);
   await screenshot(page, 'recording');
   await page.locator('button.record').dblclick();  // the first press arms, the second within 5 s stops
   await until(() => page.locator('#record').getAttribute('data-recording'), state => state === 'COMPLETE' || state === 'FAILED', 'it ends', 60);
   expect(await page.locator('#record').getAttribute('data-recording'), await text('#record .verdict')).toBe('COMPLETE');
-  await agrees('frames and verdict at the end', async () => [await shown('frames'), await text('#record .verdict')], ({recording}) => [recording!.frames, recording!.verdict]);
+  await agrees('frames and verdict at the end', async () => [await shown('frames safe'), await text('#record .verdict')], ({recording}) => [recording!.frames, recording!.verdict]);
   await follows('megabytes written', () => shown('written'), status => status.recording!.bytes / 1e6, 0.6);
   await follows('minutes left on the disk', async () => number(await text('.disk')), status => status.storage!.minutes_left, 1);
-  frames = await shown('frames');
+  frames = await shown('frames safe');
   const manifest = decode('Manifest', await daemon.call('Sessions/Get', {session: 'walk'})) as Manifest;
   expect(manifest.cameras).toHaveLength(kCameras);
   expect(manifest.cameras.reduce((sum, camera) => sum + camera.counts!.recorded, 0)).toBe(frames);

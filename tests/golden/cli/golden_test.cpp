@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whole outputs against what they were when somebody last looked at them. After a wanted change:
 //   EMBERLOCK_UPDATE_GOLDEN=1 build/release/bin/golden_cli
 // remakes the files beside this one; their diff is the review.
@@ -11,10 +12,10 @@
 #include <gtest/gtest.h>
 
 #include "base/file.h"
-#include "daemon/align/json.h"
 #include "recon/export/report.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/synthetic/flame.h"
+#include "rig/align/json.h"
 #include "tests/support/small_rig.h"
 
 namespace emberlock::cli {
@@ -77,14 +78,14 @@ void expect_golden(const std::string& name, const std::string& text) {
 
 TEST(Golden, AlignmentOfASmallRig) {
   test::SmallBench bench(test::small_rig(7));
-  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.align.policy = smear::AlignPolicy::timed;
   bench.options.seed = 7;
   std::string lines;
-  const auto result = run_align(bench.align, bench.options, [&](const AlignRoundReport& report) {
-    lines += rounded(round_json(report)).dump() + "\n";
+  const auto result = rig::run_align(bench.align, bench.options, [&](const rig::AlignRoundReport& report) {
+    lines += rounded(rig::round_json(report)).dump() + "\n";
   });
   ASSERT_TRUE(result.ok()) << result.error().message();
-  lines += rounded(summary_json(*result, 7)).dump() + "\n";
+  lines += rounded(rig::summary_json(*result, 7)).dump() + "\n";
   expect_golden("align_small_rig.jsonl", lines);
 }
 
@@ -96,19 +97,19 @@ class StoppedClock final : public Clock {
 };
 
 TEST(Golden, ReportOfASmallReconstruction) {
-  PaperSceneOptions scene;
+  recon::PaperSceneOptions scene;
   scene.image = {96, 72};
   scene.truth_voxels = 32;
-  ReconstructOptions options;
+  recon::ReconstructOptions options;
   options.voxels = 24;
-  options.solve.compute = {Device::cpu, 2};
+  options.solve.compute = {recon::Device::cpu, 2};
   options.solve.iterations = 4;
   const StoppedClock clock;
-  auto outcome = reconstruct(paper_scene(scene), options, clock);
+  auto outcome = recon::reconstruct(recon::paper_scene(scene), options, clock);
   ASSERT_TRUE(outcome.ok()) << outcome.error().message();
   outcome->report.input = "paper_scene";
   expect_golden("report_small_reconstruction.json",
-                rounded(nlohmann::ordered_json::parse(to_json(outcome->report))).dump(1) + "\n");
+                rounded(nlohmann::ordered_json::parse(recon::to_json(outcome->report))).dump(1) + "\n");
 }
 
 }  // namespace

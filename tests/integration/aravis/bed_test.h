@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdlib>
@@ -16,8 +17,8 @@
 namespace emberlock::testing_support {
 
 /// The film that the figures speak of, at which the fake camera's pixels are known.
-inline CameraRequest small_film() {
-  CameraRequest request;
+inline drivers::CameraRequest small_film() {
+  drivers::CameraRequest request;
   request.size = ImageSize{640, 480};
   request.format = PixelFormat::gray8;
   request.frame_rate = Hertz(15);
@@ -48,13 +49,13 @@ class AravisBed : public ::testing::Test {
   }
 
   /// All opened, at the same time.
-  std::vector<std::unique_ptr<Camera>> open_all(const std::vector<std::unique_ptr<FakeCamera>>& cameras,
-                                                const CameraRequest& request) {
-    std::vector<std::future<Result<std::unique_ptr<Camera>>>> opening;
+  std::vector<std::unique_ptr<drivers::Camera>> open_all(
+      const std::vector<std::unique_ptr<FakeCamera>>& cameras, const drivers::CameraRequest& request) {
+    std::vector<std::future<Result<std::unique_ptr<drivers::Camera>>>> opening;
     for (const auto& fake : cameras) {
       opening.push_back(std::async(std::launch::async, driver.open, fake->serial(), request));
     }
-    std::vector<std::unique_ptr<Camera>> all;
+    std::vector<std::unique_ptr<drivers::Camera>> all;
     for (auto& one : opening) {
       auto opened = one.get();
       EXPECT_TRUE(opened.ok()) << opened.error().message();
@@ -63,7 +64,7 @@ class AravisBed : public ::testing::Test {
     return all;
   }
 
-  const CameraDriver driver = aravis_driver();
+  const drivers::CameraDriver driver = drivers::aravis_driver();
   SteadyClock clock;
 };
 

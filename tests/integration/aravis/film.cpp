@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/integration/aravis/film.h"
 
 namespace emberlock::testing_support {
@@ -35,7 +36,7 @@ void look_at(const Frame& frame, Film& film) {
   film.last = frame.stamp;
 }
 
-Film film_for(Camera& camera, Seconds time) {
+Film film_for(drivers::Camera& camera, Seconds time) {
   const SteadyClock clock;
   const TimePoint until = clock.now() + time;
   Film film;
@@ -52,7 +53,7 @@ Film film_for(Camera& camera, Seconds time) {
   return film;
 }
 
-Status start_within(Camera& camera, Seconds time) {
+Status start_within(drivers::Camera& camera, Seconds time) {
   SteadyClock clock;
   const TimePoint until = clock.now() + time;
   for (;;) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <cstdint>
@@ -25,9 +26,9 @@ struct Film {
 void look_at(const Frame& frame, Film& film);
 
 /// Takes frames for so long, or until the camera says `device`.
-Film film_for(Camera& camera, Seconds time);
+Film film_for(drivers::Camera& camera, Seconds time);
 
 /// Tries to start it until it does or so much time has passed; the last error then.
-Status start_within(Camera& camera, Seconds time);
+Status start_within(drivers::Camera& camera, Seconds time);
 
 }  // namespace emberlock::testing_support

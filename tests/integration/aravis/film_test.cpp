@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Filming: every frame is accounted for, against what the cameras themselves write down.
 #include <cmath>
 #include <cstdio>
@@ -25,7 +26,7 @@ class FilmTest : public AravisBed {
   }
 };
 
-std::uint64_t all_of(const FrameCounts& counts) {
+std::uint64_t all_of(const drivers::FrameCounts& counts) {
   return counts.delivered + counts.damaged + counts.lost() + counts.passed_over;
 }
 
@@ -51,7 +52,7 @@ TEST_F(FilmTest, ElevenCamerasFilmWithoutAFrameUnaccountedFor) {
   }
   std::uint64_t lost = 0, sent = 0, unaccounted = 0;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const FrameCounts counts = cameras[i]->counts();
+    const drivers::FrameCounts counts = cameras[i]->counts();
     const std::uint64_t its = processes[i]->sent().frames.size();
     EXPECT_EQ(all_of(counts), its) << processes[i]->serial();
     EXPECT_EQ(counts.delivered, films[i].frames);
@@ -73,9 +74,9 @@ TEST_F(FilmTest, ElevenCamerasFilmWithoutAFrameUnaccountedFor) {
 
 TEST_F(FilmTest, FramesThatTheNetworkTearsAreCountedByCauseAndNeverHandedOn) {
   const auto processes = fakes(2, "TORN", 2, 8);
-  std::vector<std::unique_ptr<Camera>> cameras;
+  std::vector<std::unique_ptr<drivers::Camera>> cameras;
   for (const char* resend : {"never", "always"}) {
-    CameraRequest request = small_film();
+    drivers::CameraRequest request = small_film();
     request.size = ImageSize{320, 240};  // 55 packets: a third of the frames lack one
     request.frame_rate = Hertz(30);
     request.controls["PacketResend"] = resend;
@@ -96,7 +97,7 @@ TEST_F(FilmTest, FramesThatTheNetworkTearsAreCountedByCauseAndNeverHandedOn) {
   }
   for (std::size_t i = 0; i < 2; ++i) {
     const auto sent = processes[i]->sent();
-    const FrameCounts counts = cameras[i]->counts();
+    const drivers::FrameCounts counts = cameras[i]->counts();
     const std::uint64_t torn = i == 0 ? counts.transport : counts.resend;
     ASSERT_GT(sent.incomplete.size(), 10U);
     EXPECT_EQ(films[i].wrong_pixels, 0U);
@@ -112,7 +113,7 @@ TEST_F(FilmTest, FramesThatTheNetworkTearsAreCountedByCauseAndNeverHandedOn) {
 
 TEST_F(FilmTest, WhoTakesNoFramesFindsTheOverflowCountedAsUnderrun) {
   const auto processes = fakes(1, "SLOW");
-  CameraRequest request = small_film();
+  drivers::CameraRequest request = small_film();
   request.size = ImageSize{64, 48};
   request.frame_rate = Hertz(100);
   auto camera = driver.open("SLOW1", request);
@@ -121,7 +122,7 @@ TEST_F(FilmTest, WhoTakesNoFramesFindsTheOverflowCountedAsUnderrun) {
   clock.sleep_until(clock.now() + Seconds(2));  // 200 frames, 101 buffers
   const Film film = film_for(**camera, milliseconds(500));
   (*camera)->stop();
-  const FrameCounts counts = (*camera)->counts();
+  const drivers::FrameCounts counts = (*camera)->counts();
   EXPECT_GT(counts.underrun, 50U);
   EXPECT_LE(counts.lost(), counts.underrun + 20);  // on a busy machine the kernel may lose some too
   EXPECT_EQ(film.skipped, counts.lost());
@@ -133,7 +134,7 @@ TEST_F(FilmTest, AResetShowsTheNewCycleAndLosesNothing) {
   const auto processes = fakes(1, "RESET");
   auto camera = driver.open("RESET1", small_film());
   ASSERT_TRUE(camera.ok()) << camera.error().message();
-  EXPECT_EQ((*camera)->info().reset, ShutterReset::on_command);
+  EXPECT_EQ((*camera)->info().reset, drivers::ShutterReset::on_command);
   ASSERT_TRUE((*camera)->start().ok());
   Film film = film_for(**camera, milliseconds(300));
   std::vector<double> latencies;

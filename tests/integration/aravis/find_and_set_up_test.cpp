@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What is there, who has it, and what it is asked for.
 #include <algorithm>
 #include <csignal>
@@ -29,13 +30,13 @@ TEST_F(FindAndSetUp, ElevenCamerasAreFoundBySerialWithWhatTheyCan) {
   ASSERT_EQ(found->size(), 11U);
   for (const auto& fake : cameras) {
     const auto it = std::find_if(found->begin(), found->end(),
-                                 [&](const CameraFound& one) { return one.id == fake->serial(); });
+                                 [&](const drivers::CameraFound& one) { return one.id == fake->serial(); });
     ASSERT_NE(it, found->end()) << fake->serial();
     EXPECT_EQ(it->address, fake->address());
     EXPECT_EQ(it->model, "Aravis Fake");
     EXPECT_EQ(it->modes.size(), 7U);  // Mono8, Mono16, RGB8, four Bayer mosaics
-    EXPECT_EQ(it->reset, ShutterReset::on_command);
-    EXPECT_EQ(it->trigger, ExternalTrigger::present);
+    EXPECT_EQ(it->reset, drivers::ShutterReset::on_command);
+    EXPECT_EQ(it->trigger, drivers::ExternalTrigger::present);
     EXPECT_FALSE(it->holder.has_value());
     EXPECT_THAT(it->notes, Contains(HasSubstr("packets of 1400 bytes, the network takes 65536")));
   }
@@ -51,14 +52,14 @@ TEST_F(FindAndSetUp, AWrongIdSaysWhatIsThere) {
 
 TEST_F(FindAndSetUp, WhatACameraCannotIsRefusedWithWhatItCan) {
   const auto cameras = fakes(1, "PICKY");
-  const auto refusal = [&](const CameraRequest& request) {
+  const auto refusal = [&](const drivers::CameraRequest& request) {
     const auto opened = driver.open("PICKY1", request);
     EXPECT_FALSE(opened.ok());
     if (opened) return std::string();
     EXPECT_EQ(opened.error().kind, ErrorKind::bad_input) << opened.error().message();
     return opened.error().message();
   };
-  CameraRequest request = small_film();
+  drivers::CameraRequest request = small_film();
   request.size = ImageSize{9000, 9000};
   EXPECT_THAT(refusal(request), HasSubstr("9000 x 9000"));
   request = small_film();
@@ -80,7 +81,7 @@ TEST_F(FindAndSetUp, FormatsThatLieOtherwiseInMemoryAreHandedOnWhole) {
   for (const auto& [format, size, depth] : {std::tuple(PixelFormat::gray16, ImageSize{64, 32}, 16),
                                             {PixelFormat::rgb8, ImageSize{64, 32}, 8},
                                             {PixelFormat::bayer_rggb8, ImageSize{64, 32}, 8}}) {
-    CameraRequest request = small_film();
+    drivers::CameraRequest request = small_film();
     request.format = format;
     request.size = size;
     request.frame_rate = Hertz(50);

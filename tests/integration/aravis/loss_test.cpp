@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cameras that go away, hang, and come back.
 #include <cstdio>
 #include <filesystem>
@@ -41,8 +42,8 @@ TEST_F(LossTest, ACameraThatDiesIsReportedPickedUpAgainAndHarmsNoOther) {
       }
     });
   }
-  Camera& killed = *cameras[2];
-  Camera& frozen = *cameras[3];
+  drivers::Camera& killed = *cameras[2];
+  drivers::Camera& frozen = *cameras[3];
   double frozen_report = 0, frozen_stop = 0;
   Film frozen_film;
   std::jthread hanging([&] {  // one that hangs
@@ -59,7 +60,7 @@ TEST_F(LossTest, ACameraThatDiesIsReportedPickedUpAgainAndHarmsNoOther) {
   });
 
   const Film before = film_for(killed, Seconds(1));
-  const FrameCounts counts_before = killed.counts();
+  const drivers::FrameCounts counts_before = killed.counts();
   processes[2]->kill();
   const TimePoint killed_at = clock.now();
   const Film film = film_for(killed, Seconds(10));
@@ -92,7 +93,7 @@ TEST_F(LossTest, ACameraThatDiesIsReportedPickedUpAgainAndHarmsNoOther) {
   hanging.join();
   ASSERT_TRUE(frozen_film.error.has_value());
   EXPECT_LE(frozen_report, kReportWithin.value());
-  EXPECT_LE(frozen_stop, kCallDeadline.value());
+  EXPECT_LE(frozen_stop, drivers::kCallDeadline.value());
   EXPECT_TRUE(start_within(frozen, Seconds(20)).ok());
   EXPECT_TRUE(frozen.next_frame(Seconds(2)).ok());
   done = true;
@@ -109,7 +110,7 @@ TEST_F(LossTest, ACameraThatDiesIsReportedPickedUpAgainAndHarmsNoOther) {
 
 TEST_F(LossTest, ACameraThatWaitsForItsTriggerIsLostOnlyWhenItAnswersNoMore) {
   const auto processes = fakes(1, "TRIGGER");
-  CameraRequest request = small_film();
+  drivers::CameraRequest request = small_film();
   request.controls = {
       {"TriggerSelector", "FrameStart"}, {"TriggerMode", "On"}, {"TriggerSource", "Software"}};
   auto camera = driver.open("TRIGGER1", request);
@@ -135,15 +136,15 @@ TEST_F(LossTest, StoppingACameraThatHangsIsBounded) {
   processes[0]->freeze();
   TimePoint before = clock.now();
   cameras[0]->stop();
-  EXPECT_LE((clock.now() - before).value(), kCallDeadline.value());
+  EXPECT_LE((clock.now() - before).value(), drivers::kCallDeadline.value());
   before = clock.now();
   const Status again = cameras[0]->start();
-  EXPECT_LE((clock.now() - before).value(), kCallDeadline.value());
+  EXPECT_LE((clock.now() - before).value(), drivers::kCallDeadline.value());
   ASSERT_FALSE(again.ok());
   EXPECT_THAT(again.error().message(), HasSubstr("camera HANG1: it hangs"));
   before = clock.now();
   cameras[0].reset();
-  EXPECT_LE((clock.now() - before).value(), kCallDeadline.value());
+  EXPECT_LE((clock.now() - before).value(), drivers::kCallDeadline.value());
   const Film other = film_for(*cameras[1], Seconds(1));
   EXPECT_GE(other.frames, 13U);
   EXPECT_EQ(other.skipped, 0U);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An effect that is off costs no instructions: the library's marches under no extinction against marches
 // written down for emission alone, compiled alike, counted by valgrind's callgrind.
 #include <string>
@@ -12,15 +13,15 @@ namespace emberlock {
 namespace {
 
 struct Level {
-  Isa isa;
+  recon::Isa isa;
   const char* name;
   const char* program;  ///< compiled for this level
 };
 /// Those that this CPU runs.
 std::vector<Level> levels() {
-  std::vector<Level> all{{Isa::baseline, "baseline", EMBERLOCK_COST_MARCH},
-                         {Isa::v3, "v3", EMBERLOCK_COST_MARCH_V3}};
-  std::erase_if(all, [](const Level& level) { return level.isa > best_isa(); });
+  std::vector<Level> all{{recon::Isa::baseline, "baseline", EMBERLOCK_COST_MARCH},
+                         {recon::Isa::v3, "v3", EMBERLOCK_COST_MARCH_V3}};
+  std::erase_if(all, [](const Level& level) { return level.isa > recon::best_isa(); });
   return all;
 }
 

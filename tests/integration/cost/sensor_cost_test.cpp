@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A pass of the virtual CCD that a scene doesn't list costs no instructions: its pictures against ones drawn
 // by a program that never heard of passes, counted by valgrind's callgrind.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // An effect that is off costs no instructions on the GPU either: counted in the PTX of the library's functors
 // under no extinction and of marches written down for emission alone.
 #include <cctype>

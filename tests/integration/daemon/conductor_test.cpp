@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The daemon without its servers: from the strobe to a recording, on simulated cameras and a clock of their
 // own.
 #include "daemon/engine/conductor.h"
@@ -8,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "drivers/virtual/virtual_dial.h"
 #include "session/reader.h"
 #include "tests/support/small_daemon.h"
 
@@ -23,7 +25,7 @@ using ::testing::SizeIs;
 class Daemon : public ::testing::Test {
  protected:
   /// The largest true difference between two read phases, modulo the frame period.
-  static Seconds true_spread(VirtualRig& rig) {
+  static Seconds true_spread(drivers::VirtualRig& rig) {
     const TimePoint now = rig.clock().now();
     const double period = rig.truth(0).timing.frame_period.value();
     double spread = 0;
@@ -60,9 +62,51 @@ TEST_F(Daemon, FromColdToLocked) {
   }
 }
 
+TEST_F(Daemon, AStrobeThatSomebodySetsByItsDialLocksThemToo) {
+  rig::DaemonConfig config = small_config(temp_.path());
+  config.rig.strobe.source = rig::StrobeSource::manual;
+  config.alignment.run.align.policy = smear::AlignPolicy::timed;
+  SmallDaemon daemon(std::move(config));
+  v1::DaemonStatus status = daemon.conductor->status();
+  EXPECT_TRUE(status.strobe().by_hand());
+  EXPECT_THAT(status.strobe().reason(), HasSubstr("is set by hand"));
+  v1::StrobeState off;
+  off.set_output(v1::StrobeState::OFF);
+  EXPECT_EQ(daemon.conductor->apply_strobe(off).error().kind, ErrorKind::refused);
+
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  const auto told = [&](const std::string& words) {
+    return daemon.work_until(
+        [&] {
+          status = daemon.conductor->status();
+          return status.strobe().reason().find(words) != std::string::npos;
+        },
+        100);
+  };
+  ASSERT_TRUE(
+      told("no flash is seen, all through the round: switch the strobe on, and set it to 1438.6 flashes"));
+  EXPECT_THAT(status.next_step(), HasSubstr("set it to 1438.6 flashes a minute (23.977 Hz)"));
+  EXPECT_EQ(status.strobe().light(), v1::AMBER);
+  EXPECT_NEAR(60 * status.strobe().settings().rate_hz(), 1438.6, 0.05);
+  EXPECT_EQ(status.strobe().measured_hz(), 0);
+
+  drivers::VirtualDial& dial = *daemon.rig->virtual_rig()->dial();
+  dial.turn(Hertz(1400.0 / 60));
+  ASSERT_TRUE(told("the strobe flashes at 1400.0 a minute: turn it up by 38.6 (2.76 %), to 1438.6"));
+  EXPECT_NEAR(60 * status.strobe().measured_hz(), 1400, 0.5);
+  dial.turn(Hertz(1441.5 / 60));
+  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  status = daemon.conductor->status();
+  EXPECT_EQ(status.strobe().light(), v1::GREEN);
+  EXPECT_THAT(status.strobe().reason(), HasSubstr("leave it"));
+  EXPECT_NEAR(60 * status.strobe().measured_hz(), 1441.5, 0.5);
+  EXPECT_LE(true_spread(*daemon.rig->virtual_rig()).value(), 2 * status.alignment().tolerance_s());
+  EXPECT_TRUE(daemon.conductor->stop_sync().ok());
+}
+
 TEST_F(Daemon, SlowCamerasAreLockedToo) {
   for (const std::uint64_t seed : {1, 2, 3, 4}) {
-    DaemonConfig config = small_config(temp_ / std::to_string(seed));
+    rig::DaemonConfig config = small_config(temp_ / std::to_string(seed));
     config.rig.cameras[0].request.frame_rate = Hertz(10);
     config.rig.virtual_rig.draw.seed = seed;
     config.alignment.run.comb_frames = 24;
@@ -134,7 +178,7 @@ TEST_F(Daemon, ALockedRecordingIsWholeAndTheLockIsCheckedAfterIt) {
       [&] { return static_cast<int>(daemon.conductor->status().alignment().round()) > rounds; }));
   EXPECT_EQ(daemon.conductor->phase(), v1::LOCKED);
 
-  auto session = SessionReader::open(temp_.path() / "sessions" / "take 1");
+  auto session = session::SessionReader::open(temp_.path() / "sessions" / "take 1");
   ASSERT_TRUE(session.ok()) << session.error().message();
   for (std::size_t camera = 0; camera < 4; ++camera) {
     const std::vector<FrameStamp>& stamps = session->stamps(camera);
@@ -156,7 +200,14 @@ TEST_F(Daemon, WhatCannotBeDoneNowIsRefusedWithARemedy) {
   request.set_unlocked(true);
   request.set_name("../outside");
   EXPECT_EQ(daemon.conductor->record(request).error().kind, ErrorKind::bad_input);
+  request.set_name("-rf");
+  EXPECT_EQ(daemon.conductor->record(request).error().kind, ErrorKind::bad_input);
   request.set_name("take");
+  request.set_purpose(std::string(3'900'000, 'x'));
+  const Status wordy = daemon.conductor->record(request);
+  EXPECT_EQ(wordy.error().kind, ErrorKind::bad_input);
+  EXPECT_EQ(wordy.error().where, "field purpose");
+  request.clear_purpose();
   ASSERT_TRUE(daemon.conductor->record(request).ok());
   EXPECT_EQ(daemon.conductor->align({}).error().kind, ErrorKind::refused);
   ASSERT_TRUE(daemon.conductor->stop_recording().ok());
@@ -174,13 +225,13 @@ TEST_F(Daemon, AWholeRecordingReplaysThroughItBitForBit) {
     ASSERT_TRUE(live.conductor->record(request).ok());
     ASSERT_TRUE(live.reach(v1::IDLE));
   }
-  DaemonConfig config = small_config(temp_.path());
+  rig::DaemonConfig config = small_config(temp_.path());
   config.rig.cameras.clear();
-  CameraConfig replayed;
-  replayed.source = CameraSource::replay;
+  rig::CameraConfig replayed;
+  replayed.source = rig::CameraSource::replay;
   config.rig.cameras.push_back(replayed);
   config.rig.replay_session = temp_.path() / "sessions" / "live";
-  config.rig.strobe.source = StrobeSource::replay;
+  config.rig.strobe.source = rig::StrobeSource::replay;
   SmallDaemon again(config);
   v1::RecordRequest request;
   request.set_name("again");
@@ -189,8 +240,8 @@ TEST_F(Daemon, AWholeRecordingReplaysThroughItBitForBit) {
   ASSERT_TRUE(again.reach(v1::IDLE));
   EXPECT_EQ(again.conductor->status().recording().state(), v1::RecordingStatus::COMPLETE)
       << again.conductor->status().recording().verdict();
-  auto first = SessionReader::open(temp_.path() / "sessions" / "live").value();
-  auto second = SessionReader::open(temp_.path() / "sessions" / "again").value();
+  auto first = session::SessionReader::open(temp_.path() / "sessions" / "live").value();
+  auto second = session::SessionReader::open(temp_.path() / "sessions" / "again").value();
   for (std::size_t camera = 0; camera < 4; ++camera) {
     ASSERT_EQ(first.stamps(camera), second.stamps(camera));
     for (std::size_t i = 0; i < first.stamps(camera).size(); ++i)

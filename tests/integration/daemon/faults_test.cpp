@@ -1,11 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
 // What goes wrong in a lab: each time the operator is told what happened and what to do, and what was
 // recorded stays.
+#include <array>
 #include <chrono>
+#include <filesystem>
 #include <thread>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
+#include "base/unique_fd.h"
 #include "session/reader.h"
 #include "session/verify.h"
 #include "tests/support/small_daemon.h"
@@ -15,31 +22,41 @@ namespace emberlock {
 namespace {
 
 using test::SmallDaemon;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::Ge;
 using ::testing::HasSubstr;
+using ::testing::Le;
+using ::testing::SizeIs;
 
 class Faults : public ::testing::Test {
  protected:
   Faults() {
-    test::plug_in("left");
-    test::plug_in("right");
+    for (const char* id : {"left", "right"}) {
+      test::plug_in(id);
+      test::ail(id, test::Ails::nothing);
+    }
+  }
+  ~Faults() override {
+    for (const char* id : {"left", "right"}) test::ail(id, test::Ails::nothing);
   }
 
   /// Two cameras that film in real time.
-  DaemonConfig config() {
-    DaemonConfig config = test::small_config(temp_.path());
+  rig::DaemonConfig config() {
+    rig::DaemonConfig config = test::small_config(temp_.path());
     config.rig.cameras.clear();
     for (const char* id : {"left", "right"}) {
-      CameraConfig camera;
-      camera.source = CameraSource::v4l2;
+      rig::CameraConfig camera;
+      camera.source = rig::CameraSource::v4l2;
       camera.id = id;
       config.rig.cameras.push_back(camera);
     }
-    config.rig.virtual_rig.time = VirtualConfig::Time::real;
-    config.rig.strobe.source = StrobeSource::none;
+    config.rig.virtual_rig.time = rig::VirtualConfig::Time::real;
+    config.rig.strobe.source = rig::StrobeSource::none;
     return config;
   }
-  RigOptions options() {
-    RigOptions options;
+  rig::RigOptions options() {
+    rig::RigOptions options;
     options.drivers = drivers_;
     return options;
   }
@@ -64,10 +81,23 @@ class Faults : public ::testing::Test {
     request.set_unlocked(true);
     return daemon.conductor->record(request);
   }
-  SessionReader take() { return SessionReader::open(temp_.path() / "sessions" / "take").value(); }
+  /// What the journal says of a camera.
+  static std::vector<std::string> journal_of(SmallDaemon& daemon, const std::string& id) {
+    std::vector<std::string> lines;
+    for (const v1::Notice& notice : daemon.board.notices(0))
+      if (notice.text().find(id) != std::string::npos) lines.push_back(notice.text());
+    return lines;
+  }
+  /// Many more slices than it takes to tell anything.
+  static void go_round(SmallDaemon& daemon) {
+    for (int i = 0; i < 2000; ++i) daemon.conductor->work();
+  }
+  session::SessionReader take() {
+    return session::SessionReader::open(temp_.path() / "sessions" / "take").value();
+  }
 
   test::TempFolder temp_;
-  std::vector<CameraDriver> drivers_ = test::socket_drivers();
+  std::vector<drivers::CameraDriver> drivers_ = test::socket_drivers();
 };
 
 TEST_F(Faults, ACameraThatGoesAndComesBackIsToldAndTheOthersLoseNothing) {
@@ -91,7 +121,7 @@ TEST_F(Faults, ACameraThatGoesAndComesBackIsToldAndTheOthersLoseNothing) {
   ASSERT_TRUE(soon(daemon, [&] { return daemon.conductor->phase() == v1::IDLE; }));
   EXPECT_EQ(daemon.conductor->status().recording().state(), v1::RecordingStatus::COMPLETE)
       << daemon.conductor->status().recording().verdict();
-  SessionReader session = take();
+  session::SessionReader session = take();
   const auto& stamps = session.stamps(1);
   ASSERT_GT(stamps.size(), 20U);
   for (std::size_t i = 1; i < stamps.size(); ++i) EXPECT_EQ(stamps[i].frame_id, stamps[i - 1].frame_id + 1);
@@ -110,29 +140,25 @@ TEST_F(Faults, AllCamerasLostIsOneFaultMoreAndWhatWasRecordedStays) {
   ASSERT_TRUE(daemon.conductor->stop_recording().ok());
   ASSERT_TRUE(soon(daemon, [&] { return daemon.conductor->phase() == v1::IDLE; }));
   EXPECT_GE(daemon.conductor->status().recording().frames(), 40U);
-  EXPECT_TRUE(verify_session(temp_.path() / "sessions" / "take")->whole());
+  EXPECT_TRUE(session::verify_session(temp_.path() / "sessions" / "take")->whole());
 }
 
-TEST_F(Faults, ADiskBelowItsFloorEndsTheRecordingWithEveryFrameAccountedFor) {
-  DaemonConfig full = config();
+TEST_F(Faults, BelowTheFloorOfFreeSpaceNoRecordingBeginsAndNoFolderStays) {
+  rig::DaemonConfig full = config();
   full.recording.writer.min_free_bytes = std::uint64_t{1} << 60;
   SmallDaemon daemon(full, options());
   ASSERT_TRUE(soon(daemon, [&] { return all_film(daemon); }));
-  ASSERT_TRUE(record(daemon).ok());
-  ASSERT_TRUE(soon(daemon, [&] { return daemon.conductor->phase() == v1::IDLE; }));
-  const v1::Fault* failed = daemon.fault(v1::Fault::DISK_FAILED);
-  ASSERT_NE(failed, nullptr);
-  EXPECT_THAT(failed->what(), HasSubstr("floor"));
-  EXPECT_THAT(failed->remedy(), HasSubstr("Free space"));
-  const v1::RecordingStatus recording = daemon.conductor->status().recording();
-  EXPECT_EQ(recording.frames(), 0U);
-  EXPECT_GT(recording.lost().disk(), 0U);
-  EXPECT_EQ(recording.state(), v1::RecordingStatus::COMPLETE) << recording.verdict();
+  const auto refused = record(daemon);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_THAT(refused.error().message(), HasSubstr("floor"));
+  EXPECT_THAT(refused.error().message(), HasSubstr("Free space"));
+  EXPECT_EQ(daemon.conductor->phase(), v1::IDLE);
+  EXPECT_FALSE(std::filesystem::exists(temp_.path() / "sessions" / "take"));
 }
 
 TEST_F(Faults, ASilentStrobeIsWaitedForAndSaidSo) {
-  DaemonConfig silent = config();
-  silent.rig.strobe.source = StrobeSource::serial;
+  rig::DaemonConfig silent = config();
+  silent.rig.strobe.source = rig::StrobeSource::serial;
   silent.rig.strobe.id = "nobody";
   SmallDaemon daemon(silent, options());
   ASSERT_NE(daemon.fault(v1::Fault::STROBE_SILENT), nullptr);
@@ -152,6 +178,111 @@ TEST_F(Faults, ACameraThatIsAbsentAtStartIsTakenUpWhenItComes) {
   test::plug_in("right");
   ASSERT_TRUE(soon(daemon, [&] { return all_film(daemon); }));
   EXPECT_TRUE(daemon.fault(v1::Fault::CAMERA_LOST)->over());
+}
+
+TEST_F(Faults, AReplayThatEndsIsToldOnceAndNoRecordingBeginsAfterIt) {
+  SmallDaemon daemon(config(), options());
+  ASSERT_TRUE(soon(daemon, [&] { return all_film(daemon); }));
+  test::ail("left", test::Ails::ended);
+  test::ail("right", test::Ails::ended);
+  ASSERT_TRUE(soon(daemon, [&] {
+    const v1::DaemonStatus status = daemon.conductor->status();
+    return std::all_of(status.cameras().begin(), status.cameras().end(),
+                       [](const auto& camera) { return camera.state() == v1::CameraStatus::ENDED; });
+  }));
+  go_round(daemon);
+  for (const char* id : {"left", "right"}) {
+    EXPECT_THAT(journal_of(daemon, id),
+                ElementsAre(std::string(id) + ": the recording that it replays is over."));
+  }
+  EXPECT_EQ(daemon.conductor->status().cameras(0).light(), v1::AMBER);
+  const Status refused = record(daemon);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().kind, ErrorKind::refused);
+  EXPECT_THAT(refused.error().message(), HasSubstr("left has replayed its recording to the end"));
+  EXPECT_EQ(daemon.conductor->phase(), v1::IDLE);
+  EXPECT_FALSE(std::filesystem::exists(temp_.path() / "sessions" / "take"));
+}
+
+TEST_F(Faults, AReplayThatEndsEndsItsRecording) {
+  SmallDaemon daemon(config(), options());
+  ASSERT_TRUE(soon(daemon, [&] { return all_film(daemon); }));
+  ASSERT_TRUE(record(daemon).ok());
+  ASSERT_TRUE(soon(daemon, [&] { return daemon.conductor->status().recording().frames() > 10; }));
+  test::ail("left", test::Ails::ended);
+  test::ail("right", test::Ails::ended);
+  ASSERT_TRUE(soon(daemon, [&] { return daemon.conductor->phase() == v1::IDLE; }));
+  EXPECT_EQ(daemon.conductor->status().recording().state(), v1::RecordingStatus::COMPLETE)
+      << daemon.conductor->status().recording().verdict();
+}
+
+TEST_F(Faults, ACameraThatHangsIsToldOnceAndARecordingThatGetsNoFrameEndsInAClearError) {
+  test::ail("right", test::Ails::mute);  // says that it films
+  SmallDaemon daemon(config(), options());
+  test::ail("left", test::Ails::hangs);
+  ASSERT_TRUE(soon(
+      daemon, [&] { return daemon.fault(v1::Fault::CAMERA_HANGS) != nullptr; }, Seconds(20)));
+  ASSERT_TRUE(record(daemon).ok());
+  ASSERT_TRUE(soon(
+      daemon, [&] { return daemon.conductor->phase() == v1::IDLE; }, Seconds(40)));
+  const v1::RecordingStatus recording = daemon.conductor->status().recording();
+  EXPECT_EQ(recording.state(), v1::RecordingStatus::FAILED);
+  EXPECT_THAT(recording.verdict(), HasSubstr("not one frame came from any camera"));
+  const v1::Fault* nothing = daemon.fault(v1::Fault::NOTHING_RECORDED);
+  ASSERT_NE(nothing, nullptr);
+  EXPECT_FALSE(nothing->remedy().empty());
+  EXPECT_EQ(daemon.status.light(), v1::RED);
+  go_round(daemon);
+  EXPECT_THAT(journal_of(daemon, "left"), SizeIs(AllOf(Ge(1U), Le(3U))));
+  EXPECT_THAT(daemon.board.notices(0), SizeIs(Le(12U)));
+}
+
+/// A disk that takes nothing any more: whatever is written to this file waits until somebody reads it.
+class StuckFile {
+ public:
+  explicit StuckFile(std::filesystem::path path) : path_(std::move(path)) {
+    EXPECT_EQ(::mkfifo(path_.c_str(), 0600), 0) << path_;
+  }
+  StuckFile(const StuckFile&) = delete;
+  StuckFile& operator=(const StuckFile&) = delete;
+  ~StuckFile() { let_go(); }
+  void let_go() {
+    if (reader_.joinable()) return;
+    reader_ = std::jthread([this](const std::stop_token& stop) {
+      const UniqueFd fd(::open(path_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+      std::array<char, 1 << 16> bytes{};
+      while (!stop.stop_requested())
+        if (::read(fd.get(), bytes.data(), bytes.size()) <= 0)
+          std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    });
+  }
+
+ private:
+  std::filesystem::path path_;
+  std::jthread reader_;
+};
+
+TEST_F(Faults, WhileADiskTakesNothingARecordingIsFinishedBesideAllElse) {
+  SmallDaemon daemon(config(), options());
+  ASSERT_TRUE(soon(daemon, [&] { return all_film(daemon); }));
+  ASSERT_TRUE(record(daemon).ok());
+  // Before its first frame: segments are made when that comes.
+  StuckFile stuck(temp_.path() / "sessions" / "take" / "left" / "000000.nut");
+  const TimePoint began = SteadyClock().now();
+  ASSERT_TRUE(soon(daemon, [&] { return SteadyClock().now() - began > milliseconds(500); }));
+  ASSERT_TRUE(daemon.conductor->stop_recording().ok());
+  const TimePoint stopped = SteadyClock().now();
+  ASSERT_TRUE(soon(daemon, [&] { return SteadyClock().now() - stopped > Seconds(1); }));
+  const v1::DaemonStatus status = daemon.conductor->status();
+  EXPECT_EQ(status.phase(), v1::FINISHING);
+  EXPECT_EQ(status.recording().state(), v1::RecordingStatus::FINISHING);
+  EXPECT_FALSE(daemon.conductor->is_done());
+  EXPECT_EQ(daemon.conductor->record({}).error().kind, ErrorKind::refused);
+  stuck.let_go();
+  ASSERT_TRUE(soon(
+      daemon, [&] { return daemon.conductor->phase() == v1::IDLE; }, Seconds(20)));
+  EXPECT_TRUE(daemon.conductor->is_done());
+  EXPECT_TRUE(record(daemon).error().kind == ErrorKind::bad_input);  // its name is taken
 }
 
 }  // namespace

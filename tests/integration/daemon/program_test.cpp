@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The programs as an operator runs them: emberlockd, killed and started again, and `emberlock` as its client.
 #include <chrono>
 #include <csignal>
@@ -10,12 +11,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "base/file.h"
 #include "session/reader.h"
 #include "session/verify.h"
+#include "tests/support/daemon_program.h"
+#include "tests/support/daemon_test.h"
 #include "tests/support/recording.h"
 #include "tests/support/shell.h"
 
@@ -24,34 +25,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// emberlockd, on a configuration of its own.
-class Program {
+/// The one that was built.
+class Program : public test::Program {
  public:
-  explicit Program(const std::string& config) {
-    pid_ = ::fork();
-    if (pid_ != 0) return;
-    ::execl(EMBERLOCKD_PROGRAM, "emberlockd", "--config", config.c_str(), nullptr);
-    ::_exit(127);
-  }
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
-  ~Program() {
-    if (pid_ > 0) end(SIGKILL);
-  }
-  /// Its exit status, or minus the signal that ended it.
-  int end(int signal) {
-    ::kill(pid_, signal);
-    int status = 0;
-    ::waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-  }
-
- private:
-  pid_t pid_ = -1;
+  explicit Program(const std::string& config) : test::Program(EMBERLOCKD_PROGRAM, config) {}
 };
 
-class DaemonProgram : public ::testing::Test {
+class DaemonProgram : public test::DaemonTest {
  protected:
   DaemonProgram() {
     std::ofstream(config())
@@ -60,21 +40,6 @@ class DaemonProgram : public ::testing::Test {
         << "\"\nfree_space_floor_mib = 0\nencoding = \"raw\"\ntranscode = \"never\"\n[server]\nsocket = \""
         << (temp_ / "run" / "d.sock").string() << "\"\nhttp_listen = \"\"\n";
   }
-  [[nodiscard]] std::filesystem::path sessions() const { return temp_ / "sessions"; }
-  [[nodiscard]] std::string config() const { return (temp_ / "d.toml").string(); }
-  [[nodiscard]] Shell client(const std::string& words) const {
-    return shell(std::string(EMBERLOCK_PROGRAM) + " " + words +
-                 " --daemon unix:" + (temp_ / "run" / "d.sock").string());
-  }
-  /// Asks until the answer has `words`.
-  [[nodiscard]] bool answers(const std::string& question, const std::string& words) const {
-    for (int i = 0; i < 100; ++i) {
-      if (client(question).output.find(words) != std::string::npos) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-    return false;
-  }
-  test::TempFolder temp_;
 };
 
 TEST_F(DaemonProgram, KilledInMidRecordingItLosesASecondAtMostAndTheNextOneSalvagesTheRest) {
@@ -90,12 +55,12 @@ TEST_F(DaemonProgram, KilledInMidRecordingItLosesASecondAtMostAndTheNextOneSalva
     recording.join();
   }
   Program again(config());
-  ASSERT_TRUE(answers("status", "filming"));
-  const auto check = verify_session(sessions() / "killed");
+  ASSERT_TRUE(answers("sessions list", "SALVAGED"));
+  const auto check = session::verify_session(sessions() / "killed");
   ASSERT_TRUE(check.ok()) << check.error().message();
   EXPECT_TRUE(check->whole()) << check->to_do;
   EXPECT_EQ(check->state, v1::Manifest::SALVAGED);
-  auto session = SessionReader::open(sessions() / "killed").value();
+  auto session = session::SessionReader::open(sessions() / "killed").value();
   for (std::size_t camera = 0; camera < 4; ++camera) {
     const auto& stamps = session.stamps(camera);
     ASSERT_FALSE(stamps.empty());
@@ -120,7 +85,7 @@ TEST_F(DaemonProgram, AskedToEndItFinishesItsRecording) {
   ASSERT_TRUE(answers("status", "recording  ended"));
   EXPECT_EQ(daemon.end(SIGTERM), 0);
   recording.join();
-  const auto check = verify_session(sessions() / "ended");
+  const auto check = session::verify_session(sessions() / "ended");
   ASSERT_TRUE(check.ok()) << check.error().message();
   EXPECT_EQ(check->state, v1::Manifest::COMPLETE);
   EXPECT_TRUE(check->whole());
@@ -146,7 +111,13 @@ TEST_F(DaemonProgram, ItsLogIsAsTheConfigurationSays) {
   text.replace(text.find(kNowhere), kNowhere.size(),
                "http_listen = \"127.0.0.1:0\"\n[log]\nformat = \"json\"\n");
   std::ofstream(config()) << text;
-  const Shell run = shell("timeout --preserve-status -s TERM 2 " EMBERLOCKD_PROGRAM " --config " + config());
+#ifdef EMBERLOCK_SANITIZED
+  const std::string seconds = "15";
+#else
+  const std::string seconds = "2";
+#endif
+  const Shell run =
+      shell("timeout --preserve-status -s TERM " + seconds + " " EMBERLOCKD_PROGRAM " --config " + config());
   EXPECT_EQ(run.status, 0);
   std::istringstream lines(run.output);
   bool says_where = false;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A recorded session, reconstructed by the program itself as the daemon's child.
 #include <condition_variable>
 #include <csignal>
@@ -20,11 +21,11 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using State = v1::ReconstructionStatus;
 
-v1::Manifest manifest_of(const Scene& scene) {
+v1::Manifest manifest_of(const recon::Scene& scene) {
   v1::Manifest manifest = test::manifest_of(
       std::vector<ImageLayout>(scene.views.size(), {scene.views.front().image.size, PixelFormat::rgb8, 8}));
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    const CameraModel& camera = scene.views[i].camera;
+    const recon::CameraModel& camera = scene.views[i].camera;
     v1::Calibration& calibration = *manifest.mutable_cameras(static_cast<int>(i))->mutable_calibration();
     calibration.set_fx(camera.intrinsics.fx);
     calibration.set_fy(camera.intrinsics.fy);
@@ -43,18 +44,18 @@ v1::Manifest manifest_of(const Scene& scene) {
 
 /// One frame of the paper's eleven cameras, at 64 x 48.
 void record_flame(const fs::path& folder) {
-  PaperSceneOptions options;
+  recon::PaperSceneOptions options;
   options.image = {64, 48};
   options.truth_voxels = 32;
-  const Scene scene = paper_scene(options);
+  const recon::Scene scene = recon::paper_scene(options);
   const auto check = [](const auto& result) {
     if (!result.ok()) throw std::runtime_error(result.error().message());
   };
-  auto writer = SessionWriter::create(folder, manifest_of(scene), test::small_disk_options());
+  auto writer = session::SessionWriter::create(folder, manifest_of(scene), test::small_disk_options());
   check(writer);
   for (std::size_t camera = 0; camera < scene.views.size(); ++camera) {
     Frame frame;
-    frame.image = std::make_shared<const Image>(to_rgb8(scene.views[camera].image));
+    frame.image = std::make_shared<const Image>(recon::to_rgb8(scene.views[camera].image));
     check(writer->write(camera, frame));
   }
   check(writer->finish());
@@ -64,14 +65,14 @@ class DaemonReconstruction : public testing::Test {
  protected:
   DaemonReconstruction() {
     record_flame(folder_ / "sessions/candle");
-    ReconstructionOptions options;
+    daemon::ReconstructionOptions options;
     options.program = EMBERLOCK_PROGRAM;
     options.sessions = folder_ / "sessions";
     options.results = folder_ / "results";
     options.unasked.set_device("cpu");
     options.unasked.set_voxels(24);
     options.unasked.add_hold_out(10);
-    child_ = std::make_unique<ReconstructionChild>(options, board_, [this] {
+    child_ = std::make_unique<daemon::ReconstructionChild>(options, board_, [this] {
       const std::lock_guard lock(mutex_);
       changed_.notify_all();
     });
@@ -89,10 +90,10 @@ class DaemonReconstruction : public testing::Test {
   }
 
   test::TempFolder folder_;
-  Board board_;
+  daemon::Board board_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::unique_ptr<ReconstructionChild> child_;
+  std::unique_ptr<daemon::ReconstructionChild> child_;
 };
 
 TEST_F(DaemonReconstruction, ARecordedFlameBecomesAVolumeThatIsSeenGrowing) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -13,21 +14,21 @@ namespace {
 ON_EACH_DEVICE(InScatterPicture);
 
 TEST_P(InScatterPicture, PicturesOfAScatteringCloudAgreeWithRandomWalks) {
-  const Volume volume = cloud(24, 30);
-  const Hull medium = whole_grid(volume.grid);
-  const CameraModel camera =
-      look_at({{9, 9}, 20, 20, 4.5, 4.5, {}}, {0.45, 0.1, 0.05}, Eigen::Vector3d::Zero());
-  RenderOptions options;
+  const recon::Volume volume = cloud(24, 30);
+  const recon::Hull medium = recon::whole_grid(volume.grid);
+  const recon::CameraModel camera =
+      recon::look_at({{9, 9}, 20, 20, 4.5, 4.5, {}}, {0.45, 0.1, 0.05}, Eigen::Vector3d::Zero());
+  recon::RenderOptions options;
   options.in_scatter.voxels = 16;
-  Effects effects;
-  effects.extinction.model = Extinction::Model::field;
-  const RadianceImage without = render_view(volume, medium, effects, camera, options);
+  recon::Effects effects;
+  effects.extinction.model = recon::Extinction::Model::field;
+  const recon::RadianceImage without = recon::render_view(volume, medium, effects, camera, options);
   for (const double g : {0.0, 0.6}) {
     for (const Order order : {Order::single, Order::multiple}) {
       effects.scattering = {order, 0.9, g};
-      const RadianceImage image = render_view(volume, medium, effects, camera, options);
+      const recon::RadianceImage image = recon::render_view(volume, medium, effects, camera, options);
       for (const auto& [x, y] : {std::pair(4, 4), std::pair(3, 5), std::pair(6, 3)}) {
-        const Ray ray = camera.ray({x + 0.5, y + 0.5});
+        const recon::Ray ray = camera.ray({x + 0.5, y + 0.5});
         double enter = 0;
         for (Fields fields{volume}; !fields.at(ray.origin + enter * ray.direction);) enter += 1e-4;
         const Estimate truth = RandomWalks{volume, 30, effects.scattering}.radiance(
@@ -42,15 +43,16 @@ TEST_P(InScatterPicture, PicturesOfAScatteringCloudAgreeWithRandomWalks) {
 }
 
 TEST_P(InScatterPicture, PictureOfAFlameOfWhiteSootAgreesWithRandomWalks) {
-  const Flame flame;
+  const recon::Flame flame;
   const double sigma = flame.options().extinction.value();
-  FlameTruth truth = flame.at(Seconds(0), cube(96));
+  recon::FlameTruth truth = flame.at(Seconds(0), cube(96));
   truth.effects.scattering = {Order::multiple, 0.9, 0.5};
-  const CameraModel camera = look_at({{40, 40}, 40, 40, 20, 20, {}}, {0.3, 0, 0.03}, Eigen::Vector3d::Zero());
-  const RadianceImage image = render_view(truth.volume, truth.medium, truth.effects, camera);
+  const recon::CameraModel camera =
+      recon::look_at({{40, 40}, 40, 40, 20, 20, {}}, {0.3, 0, 0.03}, Eigen::Vector3d::Zero());
+  const recon::RadianceImage image = recon::render_view(truth.volume, truth.medium, truth.effects, camera);
   const RandomWalks walks{truth.volume, sigma, truth.effects.scattering, &truth.medium};
   for (const auto& [x, y] : {std::pair(20, 20), std::pair(21, 27), std::pair(18, 15)}) {
-    const Ray ray = camera.ray({x + 0.5, y + 0.5});
+    const recon::Ray ray = camera.ray({x + 0.5, y + 0.5});
     double enter = 0;
     for (Fields fields{truth.volume, &truth.medium, sigma}; !fields.at(ray.origin + enter * ray.direction);)
       enter += 1e-4;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -71,19 +72,19 @@ struct SlabResult {
   double face, middle;
 };
 SlabResult wide_box(int cells, int width, double cell, double albedo, double asymmetry) {
-  Grid grid;
+  recon::Grid grid;
   grid.edge = 0.01F;
   grid.nx = grid.ny = width + 1;
   grid.nz = cells + 1;
   const PerMeter sigma(cell / 0.01);
-  const Volume volume = uniform_volume(grid, static_cast<float>((1 - albedo) * sigma.value()));
-  InScatterOptions options;
+  const recon::Volume volume = uniform_volume(grid, static_cast<float>((1 - albedo) * sigma.value()));
+  recon::InScatterOptions options;
   options.voxels = width;
   options.octant_levels = 3;
-  Pool pool(0, device_here());
-  const ScatterField field = find_in_scatter(
+  recon::Pool pool(0, device_here());
+  const recon::ScatterField field = recon::find_in_scatter(
       volume, whole_grid(grid), scattering(sigma, Order::multiple, albedo, asymmetry), options, pool);
-  const std::vector<Rgba> g = in_scattered(field, {0.3, 0.2, 5}, pool);
+  const std::vector<recon::Rgba> g = recon::in_scattered(field, {0.3, 0.2, 5}, pool);
   return {green(g, grid.index(width / 2, width / 2, 0)),
           green(g, grid.index(width / 2, width / 2, cells / 2))};
 }
@@ -114,12 +115,12 @@ TEST_P(InScatterSlab, DeepInsideAnIsothermalMediumEveryPhaseFunctionSeesTheSourc
 // ---- Energy
 
 /// Radiance that leaves at p (in coarse edges) along `travel`, in double and steps of a quarter of an edge.
-double leaving(const ScatterField& field, const std::vector<Rgba>& g, Eigen::Vector3d p,
+double leaving(const recon::ScatterField& field, const std::vector<recon::Rgba>& g, Eigen::Vector3d p,
                const Eigen::Vector3d& travel) {
   constexpr double kStep = 0.25;
-  const ShiningGrid medium{field.medium.grid.nx, field.medium.grid.ny, field.medium.grid.nz,
-                           field.medium.shine.data()};
-  const ShiningGrid light{field.medium.grid.nx, field.medium.grid.ny, field.medium.grid.nz, g.data()};
+  const recon::ShiningGrid medium{field.medium.grid.nx, field.medium.grid.ny, field.medium.grid.nz,
+                                  field.medium.shine.data()};
+  const recon::ShiningGrid light{field.medium.grid.nx, field.medium.grid.ny, field.medium.grid.nz, g.data()};
   double radiance = 0;
   double transmittance = 1;
   p -= kStep / 2 * travel;
@@ -127,7 +128,7 @@ double leaving(const ScatterField& field, const std::vector<Rgba>& g, Eigen::Vec
          p.z() < field.medium.grid.nz - 1;
        p -= kStep * travel) {
     const Eigen::Vector3f q = p.cast<float>();
-    const Rgba m = medium.at(q.x(), q.y(), q.z());
+    const recon::Rgba m = medium.at(q.x(), q.y(), q.z());
     const auto sigma = static_cast<double>(m.c[3]);
     const double source = static_cast<double>(m.c[1]) +
                           field.albedo * sigma * static_cast<double>(light.at(q.x(), q.y(), q.z()).c[1]);
@@ -138,13 +139,14 @@ double leaving(const ScatterField& field, const std::vector<Rgba>& g, Eigen::Vec
 }
 
 TEST_P(InScatterSlab, WhatABoxOfAlmostWhiteMediumEmitsLeavesIt) {
-  const Volume volume = cloud(12, 30);
-  Effects effects;
-  effects.extinction.model = Extinction::Model::field;
+  const recon::Volume volume = cloud(12, 30);
+  recon::Effects effects;
+  effects.extinction.model = recon::Extinction::Model::field;
   effects.scattering = {Order::multiple, 0.999, 0};
-  Pool pool(0, device_here());
-  const ScatterField field = find_in_scatter(volume, whole_grid(volume.grid), effects, {}, pool);
-  const std::vector<Rgba> g = in_scattered(field, {1, 0, 0}, pool);
+  recon::Pool pool(0, device_here());
+  const recon::ScatterField field =
+      recon::find_in_scatter(volume, whole_grid(volume.grid), effects, {}, pool);
+  const std::vector<recon::Rgba> g = recon::in_scattered(field, {1, 0, 0}, pool);
   const int n = field.medium.grid.nx - 1;
   double emitted = 0;
   double absorbed = 0;
@@ -163,7 +165,7 @@ TEST_P(InScatterSlab, WhatABoxOfAlmostWhiteMediumEmitsLeavesIt) {
     for (const int side : {0, n})
       for (int v = 0; v < n; ++v)
         for (int u = 0; u < n; ++u)
-          for (const Ordinate& o : field.ordinates) {
+          for (const recon::Ordinate& o : field.ordinates) {
             const Eigen::Vector3d travel(o.travel[0], o.travel[1], o.travel[2]);
             const double out = side == 0 ? -travel[axis] : travel[axis];
             if (out <= 0) continue;
@@ -178,15 +180,16 @@ TEST_P(InScatterSlab, WhatABoxOfAlmostWhiteMediumEmitsLeavesIt) {
 }
 
 TEST_P(InScatterSlab, CoarseningKeepsTheEmissionAndTheOpticalMass) {
-  const Volume volume = cloud(23, 30);
-  Effects effects;
-  effects.extinction.model = Extinction::Model::field;
+  const recon::Volume volume = cloud(23, 30);
+  recon::Effects effects;
+  effects.extinction.model = recon::Extinction::Model::field;
   effects.scattering = {Order::single, 0.5, 0};
-  InScatterOptions options;
+  recon::InScatterOptions options;
   options.voxels = 7;
-  Pool pool(0, device_here());
-  const ScatterField field = find_in_scatter(volume, whole_grid(volume.grid), effects, options, pool);
-  const auto total = [](const Grid& g, const auto& value) {
+  recon::Pool pool(0, device_here());
+  const recon::ScatterField field =
+      recon::find_in_scatter(volume, whole_grid(volume.grid), effects, options, pool);
+  const auto total = [](const recon::Grid& g, const auto& value) {
     double sum = 0;
     for (int k = 0; k < g.nz; ++k)
       for (int j = 0; j < g.ny; ++j)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/render/in_scatter.h"
 
 #include <array>
@@ -19,21 +20,21 @@ TEST_P(InScatter, AgreesWithRandomWalksThroughACloud) {
   constexpr double kDiscretisation = 0.045;
   constexpr double kThickest = 30;
   constexpr int kWalks = 15000;
-  const Volume volume = cloud(24, kThickest);
-  const Hull medium = whole_grid(volume.grid);
+  const recon::Volume volume = cloud(24, kThickest);
+  const recon::Hull medium = recon::whole_grid(volume.grid);
   const Eigen::Vector3d camera(0.28, 0.1, 0.05);
-  InScatterOptions options;
+  recon::InScatterOptions options;
   options.voxels = 12;
-  Pool pool(0, device_here());
-  const Scattering cases[] = {{Order::single, 0.9, 0},      {Order::multiple, 0.9, 0},
-                              {Order::single, 0.9, 0.6},    {Order::multiple, 0.9, 0.6},
-                              {Order::multiple, 0.9, -0.4}, {Order::multiple, 0.9, 0.9}};
-  for (const Scattering& s : cases) {
-    Effects effects;
-    effects.extinction.model = Extinction::Model::field;
+  recon::Pool pool(0, device_here());
+  const recon::Scattering cases[] = {{Order::single, 0.9, 0},      {Order::multiple, 0.9, 0},
+                                     {Order::single, 0.9, 0.6},    {Order::multiple, 0.9, 0.6},
+                                     {Order::multiple, 0.9, -0.4}, {Order::multiple, 0.9, 0.9}};
+  for (const recon::Scattering& s : cases) {
+    recon::Effects effects;
+    effects.extinction.model = recon::Extinction::Model::field;
     effects.scattering = s;
-    const ScatterField field = find_in_scatter(volume, medium, effects, options, pool);
-    const std::vector<Rgba> found = in_scattered(field, camera, pool);
+    const recon::ScatterField field = recon::find_in_scatter(volume, medium, effects, options, pool);
+    const std::vector<recon::Rgba> found = recon::in_scattered(field, camera, pool);
     for (const auto& [i, j, k] :
          {std::array{6, 6, 6}, std::array{3, 7, 8}, std::array{9, 4, 4}, std::array{0, 6, 6}}) {
       const Eigen::Vector3d p = place(field.medium.grid, i, j, k);
@@ -47,22 +48,23 @@ TEST_P(InScatter, AgreesWithRandomWalksThroughACloud) {
 }
 
 TEST_P(InScatter, FinerGridsComeCloserToRandomWalks) {
-  const Volume volume = cloud(24, 30);
-  Effects effects;
-  effects.extinction.model = Extinction::Model::field;
+  const recon::Volume volume = cloud(24, 30);
+  recon::Effects effects;
+  effects.extinction.model = recon::Extinction::Model::field;
   effects.scattering = {Order::single, 0.9, 0};
   const Eigen::Vector3d at(0.05, -0.0333333333333333333,
                            -0.0333333333333333333);  // key point (9, 4, 4) of 12
   const Estimate truth =
       RandomWalks{volume, 30, effects.scattering}.in_scatter(at, Eigen::Vector3d::UnitX(), 100000);
-  Pool pool(0, device_here());
+  recon::Pool pool(0, device_here());
   double error[2];
   for (const int voxels : {12, 24}) {
-    InScatterOptions options;
+    recon::InScatterOptions options;
     options.voxels = voxels;
-    const ScatterField field = find_in_scatter(volume, whole_grid(volume.grid), effects, options, pool);
+    const recon::ScatterField field =
+        recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, options, pool);
     const int scale = voxels / 12;
-    error[scale - 1] = green(in_scattered(field, {1, 0, 0}, pool),
+    error[scale - 1] = green(recon::in_scattered(field, {1, 0, 0}, pool),
                              field.medium.grid.index(9 * scale, 4 * scale, 4 * scale)) -
                        truth.mean;
   }
@@ -73,39 +75,39 @@ TEST_P(InScatter, FinerGridsComeCloserToRandomWalks) {
 // ---- What is left out, limits, hard cases
 
 TEST_P(InScatter, NothingRunsWhereNothingScatters) {
-  const Grid grid = cube(4);
-  const Volume volume = uniform_volume(grid, 100);
-  Hull nothing = whole_grid(grid);
+  const recon::Grid grid = cube(4);
+  const recon::Volume volume = uniform_volume(grid, 100);
+  recon::Hull nothing = recon::whole_grid(grid);
   nothing.inside.assign(nothing.inside.size(), 0);
   nothing.count = 0;
-  Pool pool(0, device_here());
-  const Effects on = scattering(PerMeter(30), Order::multiple, 0.5);
-  EXPECT_FALSE(find_in_scatter(volume, whole_grid(grid), on, {}, pool).empty());
-  EXPECT_TRUE(find_in_scatter(volume, nothing, on, {}, pool).empty());
-  for (const Effects& off :
+  recon::Pool pool(0, device_here());
+  const recon::Effects on = scattering(PerMeter(30), Order::multiple, 0.5);
+  EXPECT_FALSE(recon::find_in_scatter(volume, recon::whole_grid(grid), on, {}, pool).empty());
+  EXPECT_TRUE(recon::find_in_scatter(volume, nothing, on, {}, pool).empty());
+  for (const recon::Effects& off :
        {scattering(PerMeter(30), Order::none, 0.5), scattering(PerMeter(30), Order::multiple, 0),
         scattering(PerMeter(0), Order::multiple, 0.5)}) {
-    const ScatterField field = find_in_scatter(volume, whole_grid(grid), off, {}, pool);
+    const recon::ScatterField field = recon::find_in_scatter(volume, recon::whole_grid(grid), off, {}, pool);
     EXPECT_TRUE(field.empty());
     EXPECT_TRUE(field.ordinates.empty() && field.medium.shine.empty());
-    EXPECT_EQ(greatest(in_scattered(field, {1, 0, 0}, pool)), 0);
+    EXPECT_EQ(greatest(recon::in_scattered(field, {1, 0, 0}, pool)), 0);
   }
 }
 
 TEST_P(InScatter, MultipleScatteringTendsToSingleAsTheAlbedoVanishes) {
-  const Volume volume = cloud(8, 30);
-  Effects effects;
-  effects.extinction.model = Extinction::Model::field;
-  Pool pool(0, device_here());
+  const recon::Volume volume = cloud(8, 30);
+  recon::Effects effects;
+  effects.extinction.model = recon::Extinction::Model::field;
+  recon::Pool pool(0, device_here());
   for (const double g : {0.0, 0.5}) {
     const auto found = [&](Order order, double albedo) {
       effects.scattering = {order, albedo, g};
-      return in_scattered(find_in_scatter(volume, whole_grid(volume.grid), effects, {}, pool), {1, 0, 0},
-                          pool);
+      return recon::in_scattered(
+          recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, {}, pool), {1, 0, 0}, pool);
     };
-    const std::vector<Rgba> single = found(Order::single, 1e-6);
-    const std::vector<Rgba> multiple = found(Order::multiple, 1e-6);
-    const std::vector<Rgba> strong = found(Order::multiple, 0.9);
+    const std::vector<recon::Rgba> single = found(Order::single, 1e-6);
+    const std::vector<recon::Rgba> multiple = found(Order::multiple, 1e-6);
+    const std::vector<recon::Rgba> strong = found(Order::multiple, 0.9);
     for (std::size_t i = 0; i < single.size(); ++i)
       EXPECT_NEAR(green(multiple, i), green(single, i), 1e-5 * greatest(single));
     EXPECT_GT(greatest(strong), 1.3 * greatest(single));
@@ -113,23 +115,25 @@ TEST_P(InScatter, MultipleScatteringTendsToSingleAsTheAlbedoVanishes) {
 }
 
 TEST_P(InScatter, ErrorBoundHoldsAndAlmostWhiteThickMediaConverge) {
-  const Volume volume = cloud(10, 60);
-  Effects effects;
-  effects.extinction.model = Extinction::Model::field;
-  Pool pool(0, device_here());
+  const recon::Volume volume = cloud(10, 60);
+  recon::Effects effects;
+  effects.extinction.model = recon::Extinction::Model::field;
+  recon::Pool pool(0, device_here());
   for (const double asymmetry : {0.0, 0.8, -0.8}) {
     effects.scattering = {Order::multiple, 0.999, asymmetry};
-    InScatterOptions options;
+    recon::InScatterOptions options;
     options.octant_levels = 2;
     options.tolerance = 0.03;
-    const ScatterField rough = find_in_scatter(volume, whole_grid(volume.grid), effects, options, pool);
+    const recon::ScatterField rough =
+        recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, options, pool);
     options.tolerance = 1e-4;
-    const ScatterField exact = find_in_scatter(volume, whole_grid(volume.grid), effects, options, pool);
+    const recon::ScatterField exact =
+        recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, options, pool);
     EXPECT_LE(rough.error_bound, 0.03);
     EXPECT_LE(exact.error_bound, 2e-4);  // rounding adds to what the recurrence says
     EXPECT_LT(exact.iterations, 60) << asymmetry;
-    const std::vector<Rgba> a = in_scattered(rough, {0.5, 0, 0}, pool);
-    const std::vector<Rgba> b = in_scattered(exact, {0.5, 0, 0}, pool);
+    const std::vector<recon::Rgba> a = recon::in_scattered(rough, {0.5, 0, 0}, pool);
+    const std::vector<recon::Rgba> b = recon::in_scattered(exact, {0.5, 0, 0}, pool);
     double worst = 0;
     for (std::size_t i = 0; i < a.size(); ++i) worst = std::max(worst, std::abs(green(a, i) - green(b, i)));
     EXPECT_LE(worst / greatest(b), rough.error_bound + exact.error_bound) << asymmetry;
@@ -137,26 +141,26 @@ TEST_P(InScatter, ErrorBoundHoldsAndAlmostWhiteThickMediaConverge) {
 }
 
 TEST_P(InScatter, HardCasesStayFiniteAndNonNegative) {
-  Pool pool(0, device_here());
-  const Box needle{Eigen::Vector3d::Zero(), {0.02, 0.2, 0.02}};
-  for (const Grid& grid : {cube(1), cube(6), grid_over(needle, 10)}) {
-    const Volume volume = uniform_volume(grid, 1000);
-    Hull checked = whole_grid(grid);
+  recon::Pool pool(0, device_here());
+  const recon::Box needle{Eigen::Vector3d::Zero(), {0.02, 0.2, 0.02}};
+  for (const recon::Grid& grid : {cube(1), cube(6), recon::grid_over(needle, 10)}) {
+    const recon::Volume volume = uniform_volume(grid, 1000);
+    recon::Hull checked = recon::whole_grid(grid);
     checked.count = 0;
     for (std::size_t i = 0; i < checked.inside.size(); ++i)
       checked.count += checked.inside[i] = i % 3 == 0 ? 1 : 0;
     for (const double sigma : {1e-6, 32.8, 1e6, 1e12})
       for (const double g : {0.0, 0.99, -0.99, 1.0, -1.0})
         for (const double albedo : {0.999, 1.0}) {
-          InScatterOptions options;
+          recon::InScatterOptions options;
           options.octant_levels = 2;
           options.max_iterations = 20;
-          const ScatterField field = find_in_scatter(
+          const recon::ScatterField field = recon::find_in_scatter(
               volume, checked, scattering(PerMeter(sigma), Order::multiple, albedo, g), options, pool);
           ASSERT_TRUE(std::isfinite(field.error_bound));
           for (const Eigen::Vector3d& camera :
                {Eigen::Vector3d(0.3, 0, 0), place(field.medium.grid, 0, 0, 0)})
-            for (const Rgba& v : in_scattered(field, camera, pool))
+            for (const recon::Rgba& v : recon::in_scattered(field, camera, pool))
               for (int c = 0; c < 4; ++c)
                 ASSERT_TRUE(v.c[c] >= 0 && std::isfinite(v.c[c])) << sigma << ' ' << g << ' ' << albedo;
         }
@@ -164,16 +168,17 @@ TEST_P(InScatter, HardCasesStayFiniteAndNonNegative) {
 }
 
 TEST_P(InScatter, SameBitsForAnyNumberOfThreads) {
-  const Volume volume = cloud(7, 30);
-  Effects effects;
-  effects.extinction.model = Extinction::Model::field;
+  const recon::Volume volume = cloud(7, 30);
+  recon::Effects effects;
+  effects.extinction.model = recon::Extinction::Model::field;
   for (const double g : {0.0, 0.9}) {
     effects.scattering = {Order::multiple, 0.9, g};
-    std::vector<Rgba> first;
+    std::vector<recon::Rgba> first;
     for (const int threads : {1, 2, 16}) {
-      Pool pool(threads, device_here());
-      const std::vector<Rgba> found = in_scattered(
-          find_in_scatter(volume, whole_grid(volume.grid), effects, {}, pool), {0.3, 0.1, 0}, pool);
+      recon::Pool pool(threads, device_here());
+      const std::vector<recon::Rgba> found = recon::in_scattered(
+          recon::find_in_scatter(volume, recon::whole_grid(volume.grid), effects, {}, pool), {0.3, 0.1, 0},
+          pool);
       if (first.empty()) first = found;
       for (std::size_t i = 0; i < found.size(); ++i)
         for (std::size_t c = 0; c < 4; ++c) ASSERT_EQ(found[i].c[c], first[i].c[c]) << threads;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/predict_effects.h"
 
 #include <algorithm>
@@ -14,36 +15,36 @@ namespace {
 
 ON_EACH_DEVICE(PredictEffects);
 
-using Pictures = std::vector<RadianceImage>;
+using Pictures = std::vector<recon::RadianceImage>;
 
-ComputeOptions on_threads(int threads) { return {device_here(), threads}; }
+recon::ComputeOptions on_threads(int threads) { return {device_here(), threads}; }
 
 /// A flame filmed finely, and the same flame on a coarse grid.
 struct Filmed {
-  PaperSceneOptions options;
-  Scene scene;
-  std::vector<FlameMask> masks;
-  FlameTruth fine, coarse;
+  recon::PaperSceneOptions options;
+  recon::Scene scene;
+  std::vector<recon::FlameMask> masks;
+  recon::FlameTruth fine, coarse;
 
-  explicit Filmed(Absorber absorber, PerMeter extinction = PerMeter(32.8),
-                  FlameShape shape = FlameShape::plume) {
+  explicit Filmed(recon::Absorber absorber, PerMeter extinction = PerMeter(32.8),
+                  recon::FlameShape shape = recon::FlameShape::plume) {
     options.flame.shape = shape;
     options.flame.absorber = absorber;
     options.flame.extinction = extinction;
     options.image = {160, 120};
     options.truth_voxels = 80;
-    scene = paper_scene(options);
-    masks = flame_masks(scene);
-    const Flame flame(options.flame);
-    fine = flame.at(Seconds(0), grid_over(scene.box, options.truth_voxels));
-    coarse = flame.at(Seconds(0), grid_over(scene.box, 64));
+    scene = recon::paper_scene(options);
+    masks = recon::flame_masks(scene);
+    const recon::Flame flame(options.flame);
+    fine = flame.at(Seconds(0), recon::grid_over(scene.box, options.truth_voxels));
+    coarse = flame.at(Seconds(0), recon::grid_over(scene.box, 64));
   }
 
-  [[nodiscard]] EffectChoice predict(const char* words, int threads = 0) const {
-    const auto request = parse_effects(words);
+  [[nodiscard]] recon::EffectChoice predict(const char* words, int threads = 0) const {
+    const auto request = recon::parse_effects(words);
     EXPECT_TRUE(request.ok()) << words;
-    const auto choice = predict_effects({scene, masks, coarse.volume, coarse.medium}, coarse.effects,
-                                        *request, on_threads(threads));
+    const auto choice = recon::predict_effects({scene, masks, coarse.volume, coarse.medium}, coarse.effects,
+                                               *request, on_threads(threads));
     EXPECT_TRUE(choice.ok());
     return *choice;
   }
@@ -51,18 +52,18 @@ struct Filmed {
   /// Full pictures of the fine flame under its extinction and what `words` name, seen by cameras that have
   /// sunk by `rise`.
   [[nodiscard]] Pictures full(const char* words, double rise = 0) const {
-    Effects effects = *parse_effects(words)->fixed;
+    recon::Effects effects = *recon::parse_effects(words)->fixed;
     effects.extinction = fine.effects.extinction;
-    Pool pool(0, device_here());
-    RenderOptions render;
+    recon::Pool pool(0, device_here());
+    recon::RenderOptions render;
     render.step = 0.5;
-    const ScatterField scattered = find_in_scatter(fine.volume, fine.medium, effects, {}, pool);
+    const recon::ScatterField scattered = recon::find_in_scatter(fine.volume, fine.medium, effects, {}, pool);
     render.scattered = &scattered;
     Pictures out;
-    for (const View& view : scene.views) {
-      CameraModel camera = view.camera;
+    for (const recon::View& view : scene.views) {
+      recon::CameraModel camera = view.camera;
       camera.camera_from_world.translation += camera.camera_from_world.rotation * Eigen::Vector3d(0, 0, rise);
-      out.push_back(render_view(fine.volume, fine.medium, effects, camera, render));
+      out.push_back(recon::render_view(fine.volume, fine.medium, effects, camera, render));
     }
     return out;
   }
@@ -73,10 +74,10 @@ struct Filmed {
       double sum = 0;
       int views = 0;
       for (std::size_t v = 0; v < scene.views.size(); ++v) {
-        if (scene.views[v].role != ViewRole::input) continue;
-        RadianceImage scaled = without[v];
+        if (scene.views[v].role != recon::ViewRole::input) continue;
+        recon::RadianceImage scaled = without[v];
         for (float& value : scaled.rgb) value *= static_cast<float>(gain);
-        sum += std::pow(all_channels(rmse(with[v], scaled, masks[v].box)), 2);
+        sum += std::pow(recon::all_channels(recon::rmse(with[v], scaled, masks[v].box)), 2);
         ++views;
       }
       return sum / views;
@@ -91,24 +92,24 @@ struct Filmed {
 };
 
 const Filmed& sooty() {
-  static const Filmed filmed(Absorber::soot);
+  static const Filmed filmed(recon::Absorber::soot);
   return filmed;
 }
 const Filmed& two_even_plumes() {
-  static const Filmed filmed(Absorber::medium, PerMeter(32.8), FlameShape::two_plumes);
+  static const Filmed filmed(recon::Absorber::medium, PerMeter(32.8), recon::FlameShape::two_plumes);
   return filmed;
 }
 
-const EffectReport& report_of(const EffectChoice& choice, std::string_view name) {
+const recon::EffectReport& report_of(const recon::EffectChoice& choice, std::string_view name) {
   const auto at = std::find_if(choice.reports.begin(), choice.reports.end(),
-                               [&](const EffectReport& r) { return r.name == name; });
+                               [&](const recon::EffectReport& r) { return r.name == name; });
   EXPECT_NE(at, choice.reports.end()) << name;
   return *at;
 }
 
-std::string names_of_those_on(const EffectChoice& choice) {
+std::string names_of_those_on(const recon::EffectChoice& choice) {
   std::string names;
-  for (const EffectReport& report : choice.reports)
+  for (const recon::EffectReport& report : choice.reports)
     if (report.on) names += (names.empty() ? "" : ", ") + report.name;
   return names;
 }
@@ -119,9 +120,9 @@ void expect_within(double factor, double predicted, double full, const char* wha
 }
 
 /// The change that `asked` predicts of an effect is that of the full simulation's pictures, within a factor.
-EffectReport expect_predicted(double factor, const char* effect, const Filmed& filmed,
-                              const std::string& asked, const Pictures& full, const Pictures& plain) {
-  EffectReport report = report_of(filmed.predict(asked.c_str()), effect);
+recon::EffectReport expect_predicted(double factor, const char* effect, const Filmed& filmed,
+                                     const std::string& asked, const Pictures& full, const Pictures& plain) {
+  recon::EffectReport report = report_of(filmed.predict(asked.c_str()), effect);
   expect_within(factor, report.predicted_change, filmed.change_over_boxes(full, plain), asked.c_str());
   return report;
 }
@@ -163,7 +164,7 @@ TEST_P(PredictEffects, ExposureIsTheMeanOfInstantsWithinAFactorOfTwo) {
     for (int i = 0; i < kInstants; ++i) {
       const Pictures instant = sooty().full("none", time * ((i + 0.5) / kInstants - 0.5));
       if (mean.empty())
-        for (const RadianceImage& image : instant) mean.emplace_back(image.size);
+        for (const recon::RadianceImage& image : instant) mean.emplace_back(image.size);
       for (std::size_t v = 0; v < mean.size(); ++v)
         for (std::size_t p = 0; p < mean[v].rgb.size(); ++p) mean[v].rgb[p] += instant[v].rgb[p] / kInstants;
     }
@@ -182,10 +183,10 @@ TEST_P(PredictEffects, AnEvenBackgroundIsFoundAtTheBordersAndItsChangePredicted)
   const Pictures lit = filmed.full("background=8/5/3");
   const double full = filmed.change_over_boxes(lit, filmed.full("none"));
   for (std::size_t v = 0; v < lit.size(); ++v) filmed.scene.views[v].image = lit[v];
-  filmed.masks = flame_masks(filmed.scene);
-  const EffectChoice choice = filmed.predict("auto:albedo=0");
+  filmed.masks = recon::flame_masks(filmed.scene);
+  const recon::EffectChoice choice = filmed.predict("auto:albedo=0");
   EXPECT_EQ(names_of_those_on(choice), "background");
-  EXPECT_EQ(choice.effects.background.kind, Background::Kind::constant);
+  EXPECT_EQ(choice.effects.background.kind, recon::Background::Kind::constant);
   for (std::size_t c = 0; c < 3; ++c)
     EXPECT_NEAR(choice.effects.background.radiance[c], (std::array{8.0, 5.0, 3.0})[c], 0.01);
   expect_within(1.2, report_of(choice, "background").predicted_change, full, "background");
@@ -193,19 +194,19 @@ TEST_P(PredictEffects, AnEvenBackgroundIsFoundAtTheBordersAndItsChangePredicted)
 
 TEST_P(PredictEffects, ViewsWithBackgroundPicturesUseThem) {
   Filmed filmed = sooty();
-  for (View& view : filmed.scene.views) {
-    view.background = RadianceImage(view.image.size);
+  for (recon::View& view : filmed.scene.views) {
+    view.background = recon::RadianceImage(view.image.size);
     for (std::size_t p = 0; p < view.background->rgb.size(); ++p)
       view.background->rgb[p] = p / 3 % 160 < 80 ? 20 : 0;  // the left half is lit
   }
-  const EffectChoice choice = filmed.predict("auto:albedo=0");
+  const recon::EffectChoice choice = filmed.predict("auto:albedo=0");
   EXPECT_EQ(names_of_those_on(choice), "background");
-  EXPECT_EQ(choice.effects.background.kind, Background::Kind::image);
+  EXPECT_EQ(choice.effects.background.kind, recon::Background::Kind::image);
   EXPECT_GT(report_of(choice, "background").predicted_change, 3);
-  filmed.scene.views[2].background = RadianceImage(ImageSize{10, 10});
+  filmed.scene.views[2].background = recon::RadianceImage(ImageSize{10, 10});
   const auto refused =
-      predict_effects({filmed.scene, filmed.masks, filmed.coarse.volume, filmed.coarse.medium},
-                      filmed.coarse.effects, {}, on_threads(1));
+      recon::predict_effects({filmed.scene, filmed.masks, filmed.coarse.volume, filmed.coarse.medium},
+                             filmed.coarse.effects, {}, on_threads(1));
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().where, "camera 2");
 }
@@ -213,8 +214,8 @@ TEST_P(PredictEffects, ViewsWithBackgroundPicturesUseThem) {
 TEST_P(PredictEffects, NoisyDarkPicturesHaveNoBackground) {
   Filmed filmed = sooty();
   filmed.options.noise = 1;
-  filmed.scene = paper_scene(filmed.options);
-  filmed.masks = flame_masks(filmed.scene);
+  filmed.scene = recon::paper_scene(filmed.options);
+  filmed.masks = recon::flame_masks(filmed.scene);
   EXPECT_EQ(names_of_those_on(filmed.predict("auto:albedo=0")), "");
 }
 
@@ -222,7 +223,7 @@ TEST_P(PredictEffects, NoisyDarkPicturesHaveNoBackground) {
 double overexpose(Filmed& filmed, float gain, float white) {
   Pictures before;
   Pictures after;
-  for (View& view : filmed.scene.views) {
+  for (recon::View& view : filmed.scene.views) {
     for (float& value : view.image.rgb) value *= gain;
     before.push_back(view.image);
     for (float& value : view.image.rgb) value = std::min(value, white);
@@ -230,8 +231,8 @@ double overexpose(Filmed& filmed, float gain, float white) {
   }
   double sum = 0;
   for (std::size_t v = 0; v < before.size(); ++v)
-    if (filmed.scene.views[v].role == ViewRole::input)
-      sum += std::pow(all_channels(rmse(before[v], after[v], filmed.masks[v].box)), 2) / 10;
+    if (filmed.scene.views[v].role == recon::ViewRole::input)
+      sum += std::pow(recon::all_channels(recon::rmse(before[v], after[v], filmed.masks[v].box)), 2) / 10;
   return std::sqrt(sum);
 }
 
@@ -240,9 +241,9 @@ TEST_P(PredictEffects, WhatSaturatedPixelsLackIsPredictedWithinAHalf) {
     for (const float white : {255.0F, 247.5F}) {  // the latter after a black level was taken out
       Filmed filmed = sooty();
       const double missing = overexpose(filmed, gain, white);
-      const EffectChoice choice = filmed.predict("auto:albedo=0");
+      const recon::EffectChoice choice = filmed.predict("auto:albedo=0");
       EXPECT_EQ(names_of_those_on(choice), "saturation");
-      EXPECT_EQ(choice.effects.sensor.clipping, Sensor::Clipping::at_white);
+      EXPECT_EQ(choice.effects.sensor.clipping, recon::Sensor::Clipping::at_white);
       EXPECT_EQ(choice.effects.sensor.white, static_cast<double>(white));
       expect_within(1.5, report_of(choice, "saturation").predicted_change, missing, "saturation");
     }
@@ -256,35 +257,36 @@ TEST_P(PredictEffects, BrightPicturesThatDoNotEndAtWhiteAreNotSaturated) {
 }
 
 TEST_P(PredictEffects, EightMillisecondsOfExposureAreCalledForAndOneIsNot) {
-  const EffectChoice eight = sooty().predict("auto:albedo=0:exposure=0.008:rise=-1");
+  const recon::EffectChoice eight = sooty().predict("auto:albedo=0:exposure=0.008:rise=-1");
   EXPECT_EQ(names_of_those_on(eight), "exposure");
-  EXPECT_EQ(eight.effects.exposure.shutter, Exposure::Shutter::integrated);
+  EXPECT_EQ(eight.effects.exposure.shutter, recon::Exposure::Shutter::integrated);
   EXPECT_EQ(eight.effects.exposure.time, Seconds(0.008));
   EXPECT_EQ(eight.effects.exposure.rise_speed, -1);
-  const EffectChoice one = sooty().predict("auto:albedo=0:exposure=0.001");
+  const recon::EffectChoice one = sooty().predict("auto:albedo=0:exposure=0.001");
   EXPECT_EQ(names_of_those_on(one), "");
-  EXPECT_EQ(one.effects.exposure.shutter, Exposure::Shutter::instant);
+  EXPECT_EQ(one.effects.exposure.shutter, recon::Exposure::Shutter::instant);
 }
 
 TEST_P(PredictEffects, WhereNothingIsCalledForNothingIsOn) {
-  const Filmed glowing(Absorber::medium, PerMeter(0));
-  for (const EffectChoice& choice : {glowing.predict("auto"), sooty().predict("auto:albedo=0.01")}) {
+  const Filmed glowing(recon::Absorber::medium, PerMeter(0));
+  for (const recon::EffectChoice& choice : {glowing.predict("auto"), sooty().predict("auto:albedo=0.01")}) {
     EXPECT_EQ(names_of_those_on(choice), "");
     EXPECT_EQ(choice.reports.size(), 7u);
-    EXPECT_EQ(choice.effects.scattering.order, Scattering::Order::none);
-    EXPECT_EQ(choice.effects.refraction.rays, Refraction::Rays::straight);
-    EXPECT_EQ(choice.effects.background.kind, Background::Kind::black);
-    EXPECT_EQ(choice.effects.exposure.shutter, Exposure::Shutter::instant);
-    EXPECT_EQ(choice.effects.sensor.response, Sensor::Response::linear);
-    EXPECT_EQ(choice.effects.sensor.clipping, Sensor::Clipping::none);
+    EXPECT_EQ(choice.effects.scattering.order, recon::Scattering::Order::none);
+    EXPECT_EQ(choice.effects.refraction.rays, recon::Refraction::Rays::straight);
+    EXPECT_EQ(choice.effects.background.kind, recon::Background::Kind::black);
+    EXPECT_EQ(choice.effects.exposure.shutter, recon::Exposure::Shutter::instant);
+    EXPECT_EQ(choice.effects.sensor.response, recon::Sensor::Response::linear);
+    EXPECT_EQ(choice.effects.sensor.clipping, recon::Sensor::Clipping::none);
   }
 }
 
 TEST_P(PredictEffects, OnIsWhatChangesThePicturesByTheToleranceAtLeast) {
   const std::string words = "auto:albedo=0.2:g=0.6:exposure=0.004:gamma=1.1";
-  const EffectChoice all = sooty().predict((words + ":tolerance=0").c_str());
+  const recon::EffectChoice all = sooty().predict((words + ":tolerance=0").c_str());
   for (const double tolerance : {0.02, 0.4, 0.9, 100.0}) {
-    const EffectChoice some = sooty().predict((words + ":tolerance=" + std::to_string(tolerance)).c_str());
+    const recon::EffectChoice some =
+        sooty().predict((words + ":tolerance=" + std::to_string(tolerance)).c_str());
     for (const char* name : {"scattering", "phase function", "refraction", "exposure", "gamma"})
       EXPECT_EQ(report_of(some, name).on, report_of(all, name).predicted_change >= tolerance)
           << name << " at " << tolerance;
@@ -292,15 +294,15 @@ TEST_P(PredictEffects, OnIsWhatChangesThePicturesByTheToleranceAtLeast) {
 }
 
 TEST_P(PredictEffects, ScatteringIsSingleWhereMoreWouldNotShow) {
-  const EffectChoice weak = sooty().predict("auto:albedo=0.2:g=0");
-  EXPECT_EQ(weak.effects.scattering.order, Scattering::Order::single);
+  const recon::EffectChoice weak = sooty().predict("auto:albedo=0.2:g=0");
+  EXPECT_EQ(weak.effects.scattering.order, recon::Scattering::Order::single);
   EXPECT_NE(report_of(weak, "scattering").reason.find("the same from all sides"), std::string::npos);
-  EXPECT_EQ(sooty().predict("auto:albedo=0.8").effects.scattering.order, Scattering::Order::multiple);
+  EXPECT_EQ(sooty().predict("auto:albedo=0.8").effects.scattering.order, recon::Scattering::Order::multiple);
 }
 
 TEST_P(PredictEffects, ByHandIsTakenAsItIsAndPredicted) {
   const char* words = "extinction=1,scattering=single:albedo=0.01:g=0.5,exposure=0.001,saturation=250";
-  const EffectChoice choice = sooty().predict(words);
+  const recon::EffectChoice choice = sooty().predict(words);
   EXPECT_EQ(names_of_those_on(choice), "scattering, phase function, exposure, saturation");
   EXPECT_EQ(choice.effects.scattering.albedo, 0.01);
   EXPECT_EQ(choice.effects.scattering.asymmetry, 0.5);
@@ -320,9 +322,9 @@ TEST_P(PredictEffects, AnEmptyMediumCallsForNothing) {
 
 TEST_P(PredictEffects, SameChoiceForAnyNumberOfThreads) {
   const char* words = "auto:albedo=0.5:exposure=0.008:gamma=1.1";
-  const EffectChoice one = sooty().predict(words, 1);
+  const recon::EffectChoice one = sooty().predict(words, 1);
   for (const int threads : {2, 16}) {
-    const EffectChoice other = sooty().predict(words, threads);
+    const recon::EffectChoice other = sooty().predict(words, threads);
     ASSERT_EQ(other.reports.size(), one.reports.size());
     for (std::size_t i = 0; i < one.reports.size(); ++i) {
       EXPECT_EQ(other.reports[i].name, one.reports[i].name);
@@ -335,13 +337,13 @@ TEST_P(PredictEffects, SameChoiceForAnyNumberOfThreads) {
 
 TEST_P(PredictEffects, FindingOutIsTimedAndCostsAreReported) {
   double clock = 0;
-  const auto request = parse_effects("auto:albedo=0.2");
+  const auto request = recon::parse_effects("auto:albedo=0.2");
   const auto choice =
-      predict_effects({sooty().scene, sooty().masks, sooty().coarse.volume, sooty().coarse.medium, 2},
-                      sooty().coarse.effects, *request, on_threads(1), [&] {
-                        clock += 0.001;  // every look at the clock takes a millisecond
-                        return Seconds(clock);
-                      });
+      recon::predict_effects({sooty().scene, sooty().masks, sooty().coarse.volume, sooty().coarse.medium, 2},
+                             sooty().coarse.effects, *request, on_threads(1), [&] {
+                               clock += 0.001;  // every look at the clock takes a millisecond
+                               return Seconds(clock);
+                             });
   ASSERT_TRUE(choice.ok());
   EXPECT_GT(report_of(*choice, "scattering").seconds, Seconds(0));
   EXPECT_GT(report_of(*choice, "scattering").cost, Seconds(0));

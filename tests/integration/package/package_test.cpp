@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What `cmake --install` lays down, and the Debian package that cpack made of it (the test `package` before
 // this one).
 #include <algorithm>

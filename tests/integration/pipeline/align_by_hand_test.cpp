@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cameras that people reset, who say nothing of it: whom they are asked for, and how soon it is seen.
 #include <functional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/align/alignment.h"
+#include "rig/align/alignment.h"
 #include "tests/support/aligned.h"
 
 namespace emberlock {
@@ -20,13 +21,13 @@ using testing::HasSubstr;
 constexpr Seconds kSeenWithin{1.2};
 
 /// A camera whose plug somebody pulls.
-class PluggedCamera final : public Camera {
+class PluggedCamera final : public drivers::Camera {
  public:
-  PluggedCamera(Camera& camera, Clock& clock) : camera_(camera), clock_(clock) {}
+  PluggedCamera(drivers::Camera& camera, Clock& clock) : camera_(camera), clock_(clock) {}
   void unplug_until(TimePoint until) { gone_until_ = until; }
 
-  [[nodiscard]] const CameraInfo& info() const override { return camera_.info(); }
-  [[nodiscard]] FrameCounts counts() const override { return camera_.counts(); }
+  [[nodiscard]] const drivers::CameraInfo& info() const override { return camera_.info(); }
+  [[nodiscard]] drivers::FrameCounts counts() const override { return camera_.counts(); }
   Status start() override {
     if (clock_.now() < gone_until_) return Error{ErrorKind::device, "it isn't there", info().id, {}};
     if (gone_until_ != TimePoint{}) {
@@ -45,7 +46,7 @@ class PluggedCamera final : public Camera {
   Status trim_rate(PartsPerMillion trim) override { return camera_.trim_rate(trim); }
 
  private:
-  Camera& camera_;
+  drivers::Camera& camera_;
   Clock& clock_;
   TimePoint gone_until_;
 };
@@ -53,8 +54,8 @@ class PluggedCamera final : public Camera {
 class AlignByHand : public testing::Test {
  protected:
   AlignByHand() {
-    bench.rig->set_reset(ShutterReset::by_hand);
-    bench.options.align.reset_by = ResetBy::anybody;
+    bench.rig->set_reset(drivers::ShutterReset::by_hand);
+    bench.options.align.reset_by = smear::ResetBy::anybody;
     bench.options.align.tolerance.amount = Rows(30);
   }
 
@@ -66,15 +67,15 @@ class AlignByHand : public testing::Test {
   }
 
   /// Rounds, with what people do after each, until all are aligned or so many were made.
-  void run(const std::function<void(const AlignDecision&)>& people, int rounds = 400) {
+  void run(const std::function<void(const smear::AlignDecision&)>& people, int rounds = 400) {
     if (!alignment) {
-      alignment = Alignment::create(bench.align, bench.options).value();
+      alignment = rig::Alignment::create(bench.align, bench.options).value();
       ASSERT_TRUE(alignment->start().ok());
     }
     for (int i = 0; i < rounds; ++i) {
       const auto done = alignment->round();
       ASSERT_TRUE(done.ok()) << done.error().message();
-      const AlignDecision& last = alignment->last();
+      const smear::AlignDecision& last = alignment->last();
       if (pressed && std::find(last.jumped.begin(), last.jumped.end(), pressed->first) != last.jumped.end()) {
         longest = std::max(longest, alignment->at() - pressed->second);
         pressed.reset();
@@ -84,13 +85,13 @@ class AlignByHand : public testing::Test {
         ++unseen;  // it landed where it had been: the people press again if they are asked
         pressed.reset();
       }
-      if (last.verdict != AlignVerdict::go_on) return;
+      if (last.verdict != smear::AlignVerdict::go_on) return;
       people(last);
     }
   }
 
   SmallBench bench{small_rig(7, 3)};
-  std::unique_ptr<Alignment> alignment;
+  std::unique_ptr<rig::Alignment> alignment;
   std::optional<std::pair<std::size_t, TimePoint>> pressed;
   Seconds longest;  ///< from a press to the round that saw it
   int noticed = 0;
@@ -99,14 +100,15 @@ class AlignByHand : public testing::Test {
 
 TEST_F(AlignByHand, WhoPressesWhatIsAskedForGetsThere) {
   int presses = 0;
-  run([&](const AlignDecision& last) {
-    for (const CameraDecision& camera : last.cameras) EXPECT_FALSE(camera.reset) << "nobody is told to";
+  run([&](const smear::AlignDecision& last) {
+    for (const smear::CameraDecision& camera : last.cameras)
+      EXPECT_FALSE(camera.reset) << "nobody is told to";
     if (pressed || !last.reset_next) return;
     EXPECT_THAT(last.cameras[*last.reset_next].reason, HasSubstr("reset its shutter by hand"));
     press(*last.reset_next);
     ++presses;
   });
-  ASSERT_EQ(alignment->last().verdict, AlignVerdict::aligned) << alignment->last().reason;
+  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
   EXPECT_GT(presses, 0);
   EXPECT_EQ(noticed, presses);
   EXPECT_EQ(alignment->resets(), presses);
@@ -118,14 +120,14 @@ TEST_F(AlignByHand, WhoPressesWhatIsAskedForGetsThere) {
 TEST_F(AlignByHand, AWrongCameraIsNoticedAsWell) {
   int wrong = 0;
   run(
-      [&](const AlignDecision& last) {
+      [&](const smear::AlignDecision& last) {
         if (pressed || !last.reset_next) return;
         const std::size_t other = (*last.reset_next + 1) % last.cameras.size();
         press(wrong < 3 ? other : *last.reset_next);
         ++wrong;
       },
       600);
-  ASSERT_EQ(alignment->last().verdict, AlignVerdict::aligned) << alignment->last().reason;
+  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
   EXPECT_GE(noticed, 3);
   EXPECT_LE(unseen, 1);
   EXPECT_LT(longest, kSeenWithin);
@@ -136,43 +138,43 @@ TEST_F(AlignByHand, WhoNeverPressesIsWaitedFor) {
   bench.options.align.max_rounds = 10;
   std::optional<std::size_t> asked;
   run(
-      [&](const AlignDecision& last) {
+      [&](const smear::AlignDecision& last) {
         if (!last.reset_next) return;
         EXPECT_EQ(asked.value_or(*last.reset_next), *last.reset_next) << "the same one all the time";
         asked = last.reset_next;
       },
       40);
   EXPECT_TRUE(asked);
-  EXPECT_EQ(alignment->last().verdict, AlignVerdict::go_on) << alignment->last().reason;
+  EXPECT_EQ(alignment->last().verdict, smear::AlignVerdict::go_on) << alignment->last().reason;
   EXPECT_EQ(alignment->resets(), 0);
 }
 
 TEST_F(AlignByHand, PressesTwiceAndTooEarlyDoNoHarm) {
-  alignment = Alignment::create(bench.align, bench.options).value();
+  alignment = rig::Alignment::create(bench.align, bench.options).value();
   ASSERT_TRUE(alignment->start().ok());
   press(0);
   int presses = 0;
   run(
-      [&](const AlignDecision& last) {
+      [&](const smear::AlignDecision& last) {
         if (!last.reset_next) return;
         if (pressed && (presses % 2 == 0 || presses > 4)) return;
         press(*last.reset_next, pressed ? Seconds(0.05) : Seconds(0.3));
         ++presses;
       },
       600);
-  ASSERT_EQ(alignment->last().verdict, AlignVerdict::aligned) << alignment->last().reason;
+  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
   EXPECT_LT(bench.true_error(alignment->options().row_time), Rows(31));
 }
 
 TEST_F(AlignByHand, APressOnALockedRigIsSeenByTheNextRoundsAndEndsTheLock) {
-  run([&](const AlignDecision& last) {
+  run([&](const smear::AlignDecision& last) {
     if (!pressed && last.reset_next) press(*last.reset_next);
   });
   ASSERT_TRUE(alignment->locked(bench.align.clock->now()));
   pressed.reset();
   press(1, Seconds(0));
   noticed = 0;
-  run([&](const AlignDecision& /*last*/) {}, 4);
+  run([&](const smear::AlignDecision& /*last*/) {}, 4);
   EXPECT_EQ(noticed, 1);
   const bool in = bench.true_error(alignment->options().row_time) < Rows(31);
   EXPECT_EQ(alignment->locked(bench.align.clock->now()), in);
@@ -184,7 +186,7 @@ TEST_F(AlignByHand, ACameraThatIsSwitchedOffIsWaitedForAndDrawnAnew) {
   bench.options.align.max_rounds = 10;
   bool pulled = false;
   int away = 0;
-  run([&](const AlignDecision& last) {
+  run([&](const smear::AlignDecision& last) {
     if (!pulled && last.round == 3) {
       plug.unplug_until(bench.align.clock->now() + Seconds(8));
       pulled = true;
@@ -197,7 +199,7 @@ TEST_F(AlignByHand, ACameraThatIsSwitchedOffIsWaitedForAndDrawnAnew) {
     if (!pressed && last.reset_next) press(*last.reset_next);
   });
   EXPECT_GT(away, 5) << "the others are filmed meanwhile";
-  ASSERT_EQ(alignment->last().verdict, AlignVerdict::aligned) << alignment->last().reason;
+  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
   EXPECT_LT(bench.true_error(alignment->options().row_time), Rows(31));
 }
 

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cameras held in tolerance for minutes of their own time, on a virtual clock.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/align/run.h"
+#include "rig/align/run.h"
 #include "session/reader.h"
 #include "tests/support/aligned.h"
 
@@ -16,11 +17,11 @@ using testing::HasSubstr;
 
 /// Two crystals that are 50 ppm apart, which takes their cameras out of +-30 rows of 150 us in three minutes.
 SmallBench drifting_bench() {
-  VirtualRigOptions setup = small_rig(2);
+  drivers::VirtualRigOptions setup = small_rig(2);
   setup.cameras[1].timing.frame_period = setup.cameras[0].timing.frame_period * (1 - 25e-6);
   setup.cameras[2].timing.frame_period = setup.cameras[0].timing.frame_period * (1 + 25e-6);
   SmallBench bench(setup);
-  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.align.policy = smear::AlignPolicy::timed;
   bench.options.hold = Seconds(600);
   return bench;
 }
@@ -33,14 +34,14 @@ TEST(AlignHold, ChecksAsAnnouncedResetWhatLeavesAndEndsInTolerance) {
   int resets = 0;  // ordered after the cameras were first aligned
   Seconds late;
   std::optional<TimePoint> due;
-  const auto result = run_align(bench.align, bench.options, [&](const AlignRoundReport& r) {
+  const auto result = rig::run_align(bench.align, bench.options, [&](const rig::AlignRoundReport& r) {
     if (due) {
       ++checks;
       late = std::max(late, r.round.at - *due);
     }
     due.reset();
     last = r.round.at;
-    if (r.decision.verdict == AlignVerdict::aligned) {
+    if (r.decision.verdict == smear::AlignVerdict::aligned) {
       if (aligned == TimePoint{}) aligned = r.round.at;
       ASSERT_TRUE(r.decision.next_check);
       // A check takes a round: none can come sooner.
@@ -48,11 +49,11 @@ TEST(AlignHold, ChecksAsAnnouncedResetWhatLeavesAndEndsInTolerance) {
       const Rows within = r.options.tolerance.in_rows(r.options.row_time) + Rows(1);
       EXPECT_LT(bench.true_error(r.options.row_time), within) << r.decision.round;
     } else if (aligned != TimePoint{}) {
-      for (const CameraDecision& camera : r.decision.cameras) resets += camera.reset ? 1 : 0;
+      for (const smear::CameraDecision& camera : r.decision.cameras) resets += camera.reset ? 1 : 0;
     }
   });
   ASSERT_TRUE(result.ok()) << result.error().message();
-  EXPECT_EQ(result->last.verdict, AlignVerdict::aligned);
+  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::aligned);
   EXPECT_GE(last - aligned, Seconds(600));
   EXPECT_LT(last - aligned, Seconds(610));
   EXPECT_EQ(result->checks, checks);
@@ -63,18 +64,18 @@ TEST(AlignHold, ChecksAsAnnouncedResetWhatLeavesAndEndsInTolerance) {
 }
 
 TEST(AlignHold, FramesThatComeWhileNothingIsFilmedAreCountedAsPassedOver) {
-  VirtualRigOptions setup = small_rig(2);
-  for (VirtualCameraOptions& camera : setup.cameras)  // in step: nobody is reset
+  drivers::VirtualRigOptions setup = small_rig(2);
+  for (drivers::VirtualCameraOptions& camera : setup.cameras)  // in step: nobody is reset
     camera.first_phase = 0.6 * camera.timing.frame_period;
   SmallBench bench(setup);
   bench.options.hold = Seconds(120);
   const auto folder = std::filesystem::path(testing::TempDir()) / "align_hold_counts";
   std::filesystem::remove_all(folder);
-  const auto result = record_align(folder, bench.align, bench.options);
+  const auto result = rig::record_align(folder, bench.align, bench.options);
   ASSERT_TRUE(result.ok()) << result.error().message();
   ASSERT_GT(result->checks, 0);
   ASSERT_EQ(result->resets, 0);
-  const auto session = SessionReader::open(folder);
+  const auto session = session::SessionReader::open(folder);
   ASSERT_TRUE(session.ok());
   for (const v1::CameraStream& camera : session->manifest().cameras()) {
     EXPECT_GT(camera.counts().passed_over(), 1000U);
@@ -85,9 +86,9 @@ TEST(AlignHold, FramesThatComeWhileNothingIsFilmedAreCountedAsPassedOver) {
 
 TEST(AlignHold, EndsSoonWhenAskedTo) {
   SmallBench bench = drifting_bench();
-  bench.options.hold = kUntilStopped;
+  bench.options.hold = rig::kUntilStopped;
   int asked = 0;
-  const auto result = run_align(bench.align, bench.options, {}, {}, [&] { return ++asked > 2000; });
+  const auto result = rig::run_align(bench.align, bench.options, {}, {}, [&] { return ++asked > 2000; });
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_GT(result->checks, 0);
   EXPECT_LE(asked, 2005);
@@ -96,9 +97,9 @@ TEST(AlignHold, EndsSoonWhenAskedTo) {
 TEST(AlignHold, TheLimitOfRoundsCountsFromTheLastTimeAllWereIn) {
   SmallBench bench = drifting_bench();
   bench.options.align.max_rounds = 12;
-  const auto result = run_align(bench.align, bench.options);
+  const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
+  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->last.reason;
   EXPECT_GT(result->last.round, 12);
 }
 

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // CCDs, rolling and global shutters in one alignment, from pictures to phases in truth.
 #include <algorithm>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "daemon/align/run.h"
+#include "rig/align/run.h"
 #include "tests/support/aligned.h"
 
 namespace emberlock::cli {
@@ -20,8 +21,8 @@ constexpr auto kCcd = SensorKind::ccd;
 constexpr auto kRolling = SensorKind::rolling_shutter;
 constexpr auto kGlobal = SensorKind::global_shutter;
 
-VirtualRigOptions mixed_rig(std::uint64_t seed, const std::vector<SensorKind>& sensors = {
-                                                    kCcd, kRolling, kGlobal, kRolling, kGlobal}) {
+drivers::VirtualRigOptions mixed_rig(std::uint64_t seed, const std::vector<SensorKind>& sensors = {
+                                                             kCcd, kRolling, kGlobal, kRolling, kGlobal}) {
   return small_rig(seed, static_cast<int>(sensors.size()), sensors);
 }
 
@@ -29,7 +30,7 @@ class EverySensor : public testing::TestWithParam<std::vector<SensorKind>> {};
 
 TEST_P(EverySensor, ComesWithinToleranceInTruth) {
   SmallBench bench(mixed_rig(3, GetParam()));
-  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.align.policy = smear::AlignPolicy::timed;
   expect_aligned_in_truth(bench);
 }
 
@@ -49,33 +50,34 @@ TEST(AlignSensors, GlobalShuttersComeWithinACoarseTolerance) {
 
 TEST(AlignSensors, AMixedRigComesWithinThreeRows) {
   SmallBench bench(mixed_rig(5));
-  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.align.policy = smear::AlignPolicy::timed;
   bench.options.align.tolerance.amount = Rows(3);
   expect_aligned_in_truth(bench);
 }
 
 TEST(AlignSensors, TheTimeThatIsForetoldCountsTheSweepsOfShuttersThatAreReset) {
   SmallBench bench(mixed_rig(3, {kGlobal, kGlobal, kGlobal}));
-  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.align.policy = smear::AlignPolicy::timed;
   bench.options.align.tolerance.amount = Rows(20);
   std::optional<TimePoint> last;
   bool reset = false;
   double quiet = 0;  // seconds of rounds
   double after = 0;  // of those after resets
   int rounds[2] = {0, 0};
-  AlignOptions used;
-  const auto result = run_align(bench.align, bench.options, [&](const AlignRoundReport& r) {
+  smear::AlignOptions used;
+  const auto result = rig::run_align(bench.align, bench.options, [&](const rig::AlignRoundReport& r) {
     if (last) {
       (reset ? after : quiet) += (r.round.at - *last).value();
       ++rounds[reset ? 1 : 0];
     }
     last = r.round.at;
     const auto& cameras = r.decision.cameras;
-    reset = std::any_of(cameras.begin(), cameras.end(), [](const CameraDecision& c) { return c.reset; });
+    reset =
+        std::any_of(cameras.begin(), cameras.end(), [](const smear::CameraDecision& c) { return c.reset; });
     used = r.options;
   });
   ASSERT_TRUE(result.ok()) << result.error().message();
-  ASSERT_EQ(result->last.verdict, AlignVerdict::aligned) << result->last.reason;
+  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->last.reason;
   ASSERT_GT(rounds[0], 0);
   ASSERT_GT(rounds[1], 0);
   const double foretold_quiet = used.round_time.value() * rounds[0];
@@ -87,11 +89,11 @@ TEST(AlignSensors, TheTimeThatIsForetoldCountsTheSweepsOfShuttersThatAreReset) {
 TEST(AlignSensors, RowTimesAndExposuresAreMeasured) {
   SmallBench bench(mixed_rig(5));
   bench.options.align.max_rounds = 1;
-  const auto result = run_align(bench.align, bench.options);
+  const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok()) << result.error().message();
   for (int i = 0; i < bench.rig->size(); ++i) {
     const auto camera = static_cast<std::size_t>(i);
-    const VirtualCameraOptions& truth = bench.rig->truth(i);
+    const drivers::VirtualCameraOptions& truth = bench.rig->truth(i);
     if (truth.sensor == kRolling) {
       ASSERT_TRUE(result->row_clocks[camera]);
       const double error = (result->row_clocks[camera]->row_time - truth.timing.row_time).value();
@@ -107,18 +109,18 @@ TEST(AlignSensors, RowTimesAndExposuresAreMeasured) {
 
 /// Aligns two cameras, one of them with this exposure; what is said of the camera that it doesn't suit.
 std::string said_of(SensorKind kind, Seconds exposure, Seconds flash_width = microseconds(20)) {
-  VirtualRigOptions setup = mixed_rig(4, {kind, kind});
+  drivers::VirtualRigOptions setup = mixed_rig(4, {kind, kind});
   setup.cameras[1].exposure = exposure;
   SmallBench bench(setup);
   bench.options.align.max_looks = 1;
   bench.options.flash_width = flash_width;
   std::string said;  // in the first round: later ones sweep anew, and a drift may lead a flash into view
-  const auto result = run_align(bench.align, bench.options, [&](const AlignRoundReport& r) {
+  const auto result = rig::run_align(bench.align, bench.options, [&](const rig::AlignRoundReport& r) {
     if (said.empty()) said = r.decision.cameras[1].reason;
   });
   EXPECT_TRUE(result.ok()) << result.error().message();
   if (!result.ok()) return result.error().message();
-  EXPECT_EQ(result->last.verdict, AlignVerdict::given_up);
+  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::given_up);
   EXPECT_EQ(result->resets, 0);
   EXPECT_THAT(result->last.reason, HasSubstr("virtual-01"));
   return said;
@@ -143,30 +145,30 @@ TEST(AlignSensors, AFlashLongerThanTheExposureIsSaidAndWhatToDo) {
 
 TEST(AlignSensors, AWrongReadDirectionOfARollingShutterIsNoticed) {
   SmallBench bench(mixed_rig(4, {kCcd, kRolling}));
-  bench.options.timing[1].direction = ReadDirection::bottom_first;
+  bench.options.timing[1].direction = smear::ReadDirection::bottom_first;
   bench.options.align.max_looks = 1;
-  const auto result = run_align(bench.align, bench.options);
+  const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->last.verdict, AlignVerdict::given_up);
+  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::given_up);
   EXPECT_THAT(result->last.cameras[1].reason, HasSubstr("other read direction"));
 }
 
 TEST(AlignSensors, FlashesThatLightNothingInViewAreSaid) {
-  VirtualRigOptions setup = mixed_rig(4, {kCcd, kRolling, kGlobal});
+  drivers::VirtualRigOptions setup = mixed_rig(4, {kCcd, kRolling, kGlobal});
   setup.scene.room_share = 0;
   setup.cameras[2].lamp.x = -400;  // its light alone would tell a global shutter's phase
   SmallBench bench(setup);
   bench.options.align.max_looks = 1;
-  const auto result = run_align(bench.align, bench.options);
+  const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->last.verdict, AlignVerdict::given_up);
+  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::given_up);
   EXPECT_THAT(result->last.cameras[1].reason, HasSubstr("let the strobe light"));
   EXPECT_THAT(result->last.cameras[2].reason, HasSubstr("bring the strobe into view"));
 }
 
 TEST(AlignSensors, ARecordingOfThemReplaysToTheBit) {
   SmallBench bench(mixed_rig(6, {kCcd, kRolling, kGlobal}));
-  bench.options.align.policy = AlignPolicy::timed;
+  bench.options.align.policy = smear::AlignPolicy::timed;
   const auto rounds = expect_replays(bench, "align_sensors_replay");
   EXPECT_THAT(rounds, testing::Each(HasSubstr("\"sensor\":\"global\"")));
   EXPECT_THAT(rounds, testing::Contains(HasSubstr("\"reset\":true")));

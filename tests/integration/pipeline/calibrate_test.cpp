@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From pictures of a board to rig.json, through the verb; and OpenCV's own stereo pairs with their published
 // result.
 #include <cmath>
@@ -55,7 +56,7 @@ test::BoardRigOptions two_cameras() {
   options.instants = 8;
   options.seed = 5;
   options.image = {320, 240};
-  options.board = *parse_board("chessboard:9x6:18mm");
+  options.board = *recon::parse_board("chessboard:9x6:18mm");
   return options;
 }
 
@@ -78,10 +79,10 @@ TEST_F(CalibrateVerb, RenderedPicturesOfABoardBecomeARig) {
   EXPECT_LT(told["rms_pixels"], 0.25);
   for (const char* file : {"index.html", "transforms.json", "colmap/cameras.txt", "opencv/cam00.yml"})
     EXPECT_TRUE(fs::exists(out / file)) << file;
-  const auto written = read_rig(out / "rig.json");
+  const auto written = session::read_rig(out / "rig.json");
   ASSERT_TRUE(written.ok()) << written.error().message();
   for (int c = 0; c < 2; ++c) {
-    const auto camera = camera_model_of(written->cameras(c).calibration(), options.image, "", "");
+    const auto camera = recon::camera_model_of(written->cameras(c).calibration(), options.image, "", "");
     ASSERT_TRUE(camera.ok());
     const v1::Calibration& calibration = written->cameras(c).calibration();
     for (int axis = 0; axis < 3; ++axis) {
@@ -104,8 +105,8 @@ TEST_F(CalibrateVerb, AFilmOfABoardThatRestsInEachPoseBecomesARig) {
   const test::BoardRig rig = test::board_rig(options);
   constexpr std::size_t kRest = 2;  // frames
   const ImageLayout layout{options.image, PixelFormat::gray8, 8};
-  auto writer = SessionWriter::create(folder_ / "film", test::manifest_of({layout, layout}),
-                                      test::small_disk_options(Encoding::huffman_nut));
+  auto writer = session::SessionWriter::create(folder_ / "film", test::manifest_of({layout, layout}),
+                                               test::small_disk_options(session::Encoding::huffman_nut));
   ASSERT_TRUE(writer.ok()) << writer.error().message();
   for (std::size_t c = 0; c < 2; ++c) {
     for (std::size_t i = 0; i < rig.world_from_board.size(); ++i) {
@@ -129,11 +130,11 @@ TEST_F(CalibrateVerb, AFilmOfABoardThatRestsInEachPoseBecomesARig) {
   EXPECT_EQ(told["film"]["searched"], 16);
   EXPECT_EQ(told["film"]["moving"], 7) << "the last frame of each pose but the last";
   EXPECT_EQ(told["film"]["taken"], 8);
-  const auto written = read_rig(fs::path(out) / "rig.json");
+  const auto written = session::read_rig(fs::path(out) / "rig.json");
   ASSERT_TRUE(written.ok()) << written.error().message();
   ASSERT_EQ(written->cameras_size(), 2);
-  const auto first = camera_model_of(written->cameras(0).calibration(), options.image, "", "");
-  const auto second = camera_model_of(written->cameras(1).calibration(), options.image, "", "");
+  const auto first = recon::camera_model_of(written->cameras(0).calibration(), options.image, "", "");
+  const auto second = recon::camera_model_of(written->cameras(1).calibration(), options.image, "", "");
   EXPECT_EQ(written->cameras(1).camera_id(), "cam1");
   EXPECT_NEAR((first->center() - second->center()).norm(),
               (rig.cameras[0].center() - rig.cameras[1].center()).norm(), 2e-3);
@@ -149,7 +150,7 @@ TEST_F(CalibrateVerb, ALampTellsWhichCameraTurned) {
   test::BoardRigOptions options;
   options.cameras = 4;
   options.instants = 1;
-  options.board = *parse_board("chessboard:9x6:18mm");
+  options.board = *recon::parse_board("chessboard:9x6:18mm");
   const test::BoardRig rig = test::board_rig(options);
   const auto lamps = test::lamp_sightings(rig, test::lamp_places(rig, 4, 1), 0, 1);
   for (const auto& sighting : lamps.sightings) {
@@ -161,7 +162,7 @@ TEST_F(CalibrateVerb, ALampTellsWhichCameraTurned) {
              (lamps.instants[sighting.instant] + ".png"));
   }
   const auto check = [&](const v1::Rig& file) {
-    EXPECT_TRUE(write_rig(folder_ / "rig.json", file).ok());
+    EXPECT_TRUE(session::write_rig(folder_ / "rig.json", file).ok());
     return test::run_verb(cli::add_calibrate, {"calibrate", "check", (folder_ / "rig.json").string(),
                                                (folder_ / "pictures").string(), "--lamp", "--json"});
   };
@@ -210,24 +211,25 @@ class OpencvPairs : public testing::Test {
           files.push_back(kOpencvData /
                           (std::string(side) + (i < 10 ? "0" : "") + std::to_string(i) + ".jpg"));
     }
-    const auto pictures = list_board_pictures(files);
+    const auto pictures = recon::list_board_pictures(files);
     ASSERT_TRUE(pictures.ok()) << pictures.error().message();
-    auto reading = find_boards(*pictures, search_for(*parse_board("chessboard:9x6:25mm")));
+    auto reading =
+        recon::find_boards(*pictures, recon::search_for(*recon::parse_board("chessboard:9x6:25mm")));
     ASSERT_TRUE(reading.ok()) << reading.error().message();
-    reading_ = new BoardReading(*std::move(reading));
+    reading_ = new recon::BoardReading(*std::move(reading));
   }
   static void TearDownTestSuite() {
     delete reading_;
     reading_ = nullptr;
   }
-  static BoardSightings subset(auto wanted) {
-    BoardSightings result = reading_->sightings;
-    std::erase_if(result.sightings, [&](const BoardSightings::Sighting& s) { return !wanted(s); });
+  static recon::BoardSightings subset(auto wanted) {
+    recon::BoardSightings result = reading_->sightings;
+    std::erase_if(result.sightings, [&](const recon::BoardSightings::Sighting& s) { return !wanted(s); });
     return result;
   }
-  static BoardReading* reading_;
+  static recon::BoardReading* reading_;
 };
-BoardReading* OpencvPairs::reading_ = nullptr;
+recon::BoardReading* OpencvPairs::reading_ = nullptr;
 
 struct PublishedWay {
   double focal = 0;
@@ -265,9 +267,9 @@ PublishedWay calibrate_as_published(const std::vector<int>& views) {
 }
 
 TEST_F(OpencvPairs, TheLeftCameraIsAsPublishedButForTheViewWithWrongCorners) {
-  const auto found = calibrate_rig(subset([](const auto& s) { return s.camera == 0; }));
+  const auto found = recon::calibrate_rig(subset([](const auto& s) { return s.camera == 0; }));
   ASSERT_TRUE(found.ok()) << found.error().message();
-  const CalibratedCamera& left = found->cameras[0];
+  const recon::CalibratedCamera& left = found->cameras[0];
   EXPECT_LE(left.rms, 0.25);
   EXPECT_GE(left.views_used, 12U);
   EXPECT_LT(left.sigma[0], 1.5) << "an uncertainty that explains everything says nothing";
@@ -282,8 +284,8 @@ TEST_F(OpencvPairs, TheLeftCameraIsAsPublishedButForTheViewWithWrongCorners) {
 }
 
 TEST_F(OpencvPairs, DisjointHalvesAgreeOnTheBaseline) {
-  const auto baseline = [](const BoardSightings& sightings) {
-    const auto found = calibrate_rig(sightings);
+  const auto baseline = [](const recon::BoardSightings& sightings) {
+    const auto found = recon::calibrate_rig(sightings);
     if (!found || !found->whole()) return -1.0;
     return (found->bundle.cameras[0].model.center() - found->bundle.cameras[1].model.center()).norm();
   };

@@ -1,6 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
 // The demonstration with a small rig: strobe, alignment, recording, reconstruction and report, through the
 // code that ships.
-#include "cli/demo.h"
+#include "rig/demo.h"
 
 #include <filesystem>
 #include <fstream>
@@ -9,8 +10,9 @@
 #include <unistd.h>
 
 #include "base/file.h"
-#include "daemon/align/record.h"
 #include "recon/preprocess/flame_mask.h"
+#include "report/demo_report.h"
+#include "rig/align/record.h"
 #include "session/reader.h"
 
 namespace emberlock::cli {
@@ -24,30 +26,30 @@ class DemoTest : public testing::Test {
   static void SetUpTestSuite() {
     folder_ = fs::temp_directory_path() / ("emberlock_demo_test." + std::to_string(::getpid()));
     fs::create_directories(folder_);
-    DemoOptions options;
+    rig::DemoOptions options;
     options.cameras = 6;
     options.image = {320, 240};
     options.flame_frames = 3;
     options.voxels = 40;
     options.truth_voxels = 40;
-    result_ =
-        new Result<DemoResult>(run_demo(options, folder_, [](const std::string&) { return Progress{}; }));
+    result_ = new Result<rig::DemoResult>(
+        rig::run_demo(options, folder_, [](const std::string&) { return Progress{}; }));
   }
   static void TearDownTestSuite() {
     delete result_;
     fs::remove_all(folder_);
   }
   void SetUp() override { ASSERT_TRUE(result_->ok()) << result_->error().message(); }
-  static const DemoResult& result() { return **result_; }
+  static const rig::DemoResult& result() { return **result_; }
 
   static fs::path folder_;
-  static Result<DemoResult>* result_;
+  static Result<rig::DemoResult>* result_;
 };
 fs::path DemoTest::folder_;
-Result<DemoResult>* DemoTest::result_ = nullptr;
+Result<rig::DemoResult>* DemoTest::result_ = nullptr;
 
 TEST_F(DemoTest, EveryCameraEndsWithinTheToleranceInTruth) {
-  for (const AlignStage& stage : result().stages) {
+  for (const rig::AlignStage& stage : result().stages) {
     for (const auto& error : stage.errors.back()) {
       ASSERT_TRUE(error.has_value());
       EXPECT_LE(std::abs(error->value()), stage.tolerance.value()) << stage.title;
@@ -60,7 +62,7 @@ TEST_F(DemoTest, EveryCameraEndsWithinTheToleranceInTruth) {
 TEST_F(DemoTest, RowTimesAreMeasuredNotAssumed) {
   ASSERT_EQ(result().row_clocks.size(), 6U);
   for (std::size_t i = 0; i < 6; ++i) {
-    const RowClock& clock = result().row_clocks[i];
+    const smear::RowClock& clock = result().row_clocks[i];
     // So few rows hold few dots; what is stated must cover what is true.
     EXPECT_LE(abs(clock.row_time - result().true_row_times[i]), 3 * clock.sigma) << i;
     EXPECT_LE(clock.sigma / clock.row_time, 0.005) << i;
@@ -68,14 +70,14 @@ TEST_F(DemoTest, RowTimesAreMeasuredNotAssumed) {
 }
 
 TEST_F(DemoTest, TheRecordedAlignmentReplaysToTheSameEnd) {
-  const auto replayed = replay_align(folder_ / "alignment");
+  const auto replayed = rig::replay_align(folder_ / "alignment");
   ASSERT_TRUE(replayed.ok()) << replayed.error().message();
   EXPECT_EQ(replayed->resets, result().stages.back().result.resets);
   EXPECT_EQ(replayed->last.worst_pair, result().stages.back().result.last.worst_pair);
 }
 
 TEST_F(DemoTest, EveryFrameOfTheFlameIsRecordedAndReadable) {
-  auto session = SessionReader::open(folder_ / "flame");
+  auto session = session::SessionReader::open(folder_ / "flame");
   ASSERT_TRUE(session.ok()) << session.error().message();
   ASSERT_EQ(session->camera_count(), 6U);
   for (std::size_t camera = 0; camera < 6; ++camera) {
@@ -87,16 +89,16 @@ TEST_F(DemoTest, EveryFrameOfTheFlameIsRecordedAndReadable) {
 TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
   const auto held_out = result().outcome.report.heldout_rmse;
   ASSERT_TRUE(held_out.has_value());
-  EXPECT_LT(all_channels(*held_out), all_channels(*result().paper.report.heldout_rmse));
-  const View& view = result().scene.views[static_cast<std::size_t>(result().held_out)];
-  const PixelBox box = noise_mask(view.image).box;
-  EXPECT_LT(all_channels(*held_out),
-            0.5 * all_channels(rmse(view.image, RadianceImage(view.image.size), box)))
+  EXPECT_LT(recon::all_channels(*held_out), recon::all_channels(*result().paper.report.heldout_rmse));
+  const recon::View& view = result().scene.views[static_cast<std::size_t>(result().held_out)];
+  const recon::PixelBox box = recon::noise_mask(view.image).box;
+  EXPECT_LT(recon::all_channels(*held_out),
+            0.5 * recon::all_channels(recon::rmse(view.image, recon::RadianceImage(view.image.size), box)))
       << "less than half the error of a black picture";
 }
 
 TEST_F(DemoTest, TheReportStandsAlone) {
-  ASSERT_TRUE(write_demo_report(result(), folder_).ok());
+  ASSERT_TRUE(report::write_demo_report(result(), folder_).ok());
   std::string page = read_file(folder_ / "report.html").value();
   for (std::size_t at = 0; (at = page.find("base64,", at)) != std::string::npos; ++at) {
     page.erase(at, page.find('"', at) - at);  // a picture's letters may spell anything
@@ -109,9 +111,9 @@ TEST_F(DemoTest, TheReportStandsAlone) {
 }
 
 TEST(Demo, OptionsOutOfRangeAreNamed) {
-  DemoOptions options;
+  rig::DemoOptions options;
   options.cameras = 2;
-  const auto r = run_demo(options, fs::temp_directory_path() / "emberlock_never", {});
+  const auto r = rig::run_demo(options, fs::temp_directory_path() / "emberlock_never", {});
   ASSERT_FALSE(r.ok());
   EXPECT_EQ(r.error().kind, ErrorKind::bad_input);
   EXPECT_THAT(r.error().message(), HasSubstr("--cameras"));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Whole frames: the strobe plays the code, cameras of different counts and phases film it, and each is
 // numbered.
 #include <cmath>
@@ -14,17 +15,18 @@ namespace emberlock {
 namespace {
 
 struct Filmed {
-  std::vector<CodeFrame> frames;
-  std::vector<SmearReading> readings;
+  std::vector<smear::CodeFrame> frames;
+  std::vector<smear::SmearReading> readings;
 };
 
 TEST(FrameCodeRun, EveryVirtualCameraIsNumberedAndADroppedFrameIsCaught) {
-  VirtualRigOptions setup = draw_virtual_rig({.cameras = 3, .seed = 5, .layout = {.size = {160, 720}}});
-  for (VirtualCameraOptions& camera : setup.cameras) camera.lamp.x = 80;
-  auto rig = VirtualRig::create(setup, std::make_shared<VirtualClock>()).value();
-  const FrameCode code{.words = 4, .spacing = 50};
-  StrobeSettings flashes{.output = StrobeOutput::flashing, .rate = Hertz(23.976)};
-  flashes.code = flash_pattern(code).value();
+  drivers::VirtualRigOptions setup =
+      drivers::draw_virtual_rig({.cameras = 3, .seed = 5, .layout = {.size = {160, 720}}});
+  for (drivers::VirtualCameraOptions& camera : setup.cameras) camera.lamp.x = 80;
+  auto rig = drivers::VirtualRig::create(setup, std::make_shared<drivers::VirtualClock>()).value();
+  const smear::FrameCode code{.words = 4, .spacing = 50};
+  drivers::StrobeSettings flashes{.output = drivers::StrobeOutput::flashing, .rate = Hertz(23.976)};
+  flashes.code = smear::flash_pattern(code).value();
   ASSERT_TRUE(rig->strobe().apply(flashes).ok());
   const double flash_period = 1 / rig->strobe().read_back().value().rate.value();
 
@@ -46,20 +48,21 @@ TEST(FrameCodeRun, EveryVirtualCameraIsNumberedAndADroppedFrameIsCaught) {
       if (i == 0) first_id[camera] = frame.stamp.frame_id;
       if (camera == 2 && i == kLost) continue;
       Filmed& f = filmed[camera];
-      f.readings.push_back(detect(frame.image->view()));
-      f.frames.push_back({static_cast<std::int64_t>(f.frames.size()), flash_seen(f.readings.back())});
+      f.readings.push_back(smear::detect(frame.image->view()));
+      f.frames.push_back({static_cast<std::int64_t>(f.frames.size()), smear::flash_seen(f.readings.back())});
     }
   }
 
-  std::vector<FrameNumbers> numbers;
+  std::vector<smear::FrameNumbers> numbers;
   for (int camera = 0; camera < 3; ++camera) {
-    const CcdTiming& truth = rig->truth(camera).timing;
+    const smear::CcdTiming& truth = rig->truth(camera).timing;
     // tau of the first frame, as the truth has it: the strobe was told at the clock's zero.
     const double tau =
         wrap_positive(-(rig->read_start(camera, first_id[camera]) - TimePoint{}).value(), flash_period);
-    DecodeOptions options{.code = code, .flashes_per_frame = truth.frame_period.value() / flash_period};
+    smear::DecodeOptions options{.code = code,
+                                 .flashes_per_frame = truth.frame_period.value() / flash_period};
     options.first_phase = tau / flash_period;
-    numbers.push_back(number_frames(filmed[camera].frames, options).value());
+    numbers.push_back(smear::number_frames(filmed[camera].frames, options).value());
     ASSERT_FALSE(numbers.back().runs.empty()) << numbers.back().reason;
     const double start = (rig->read_start(camera, first_id[camera]) - TimePoint{}).value() / flash_period;
     EXPECT_NEAR(wrap_symmetric(numbers.back().runs[0].start - start, code.flashes()), 0, 0.01)
@@ -73,7 +76,7 @@ TEST(FrameCodeRun, EveryVirtualCameraIsNumberedAndADroppedFrameIsCaught) {
   EXPECT_GE(numbers[2].drops[0].before, kLost);
 
   // Which frames belong together, against the true starts of the read phases.
-  const auto offset = frame_offset(numbers[0].runs[0], numbers[1].runs[0], code, 40);
+  const auto offset = smear::frame_offset(numbers[0].runs[0], numbers[1].runs[0], code, 40);
   const TimePoint mine = rig->read_start(0, first_id[0] + 40);
   const auto other = static_cast<std::uint64_t>(static_cast<std::int64_t>(first_id[1]) + 40 + offset.frames);
   EXPECT_LE(std::abs((mine - rig->read_start(1, other)).value()), 0.5 * flash_period + 1e-6);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `emberlock import` on films that virtual cameras made of a strobe and then a flame, and on what people give
 // it by mistake.
 #include <filesystem>
@@ -11,8 +12,9 @@
 
 #include "base/file.h"
 #include "cli/commands.h"
-#include "cli/import_run.h"
-#include "session/frame_file.h"
+#include "films/import_run.h"
+#include "report/import_report.h"
+#include "session/media/frame_file.h"
 #include "session/reader.h"
 #include "session/rig_file.h"
 #include "session/shutter_times.h"
@@ -28,14 +30,14 @@ namespace fs = std::filesystem;
 using testing::AllOf;
 using testing::HasSubstr;
 
-const FrameCode kImportCode{.words = 8, .spacing = 60};
+const smear::FrameCode kImportCode{.words = 8, .spacing = 60};
 
 /// Three cameras, started within a second, that filmed the strobe for ten seconds and then a flame.
 class ImportFilms : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     shared_ = new test::TempFolder;
-    VirtualRigDraw model;
+    drivers::VirtualRigDraw model;
     model.layout.size = {320, 240};
     model.row_time = microseconds_per_row(160);
     test::FlameFilm film{test::random_film(43, 3, model, kImportCode), Seconds(11)};
@@ -55,11 +57,11 @@ class ImportFilms : public testing::Test {
     delete shared_;
   }
 
-  ImportOptions options() const {
-    ImportOptions options;
+  films::ImportOptions options() const {
+    films::ImportOptions options;
     options.folder = *shared_ / "films";
     options.out = folder_ / "session";
-    options.alignment = Alignment::strobe;
+    options.alignment = films::Alignment::strobe;
     options.clip.flash_rate = flash_rate_;
     options.clip.code = kImportCode;
     options.comb = comb_;
@@ -74,8 +76,8 @@ class ImportFilms : public testing::Test {
       fs::create_symlink(clip.file, folder_ / "films" / fs::path(clip.file).filename());
     return folder_ / "films";
   }
-  static std::string refusal(const ImportOptions& options) {
-    const auto result = run_import(options, {});
+  static std::string refusal(const films::ImportOptions& options) {
+    const auto result = films::run_import(options, {}, report::reports_of);
     EXPECT_FALSE(result.ok());
     return result.ok() ? std::string() : result.error().message();
   }
@@ -89,12 +91,12 @@ class ImportFilms : public testing::Test {
 };
 
 TEST_F(ImportFilms, BecomeASessionOfTheFramesThatBelongTogetherEachWithItsTime) {
-  const auto result = run_import(options(), {});
+  const auto result = films::run_import(options(), {}, report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
-  auto session = SessionReader::open(folder_ / "session");
+  auto session = session::SessionReader::open(folder_ / "session");
   ASSERT_TRUE(session.ok()) << session.error().message();
   ASSERT_EQ(session->camera_count(), 3U);
-  const auto times = read_shutter_times(*session);
+  const auto times = session::read_shutter_times(*session);
   ASSERT_TRUE(times.ok() && times->has_value());
   // The flame's 3.5 s, less the second or so by which the films' ends differ.
   EXPECT_GT(result->instants, 60);
@@ -106,7 +108,7 @@ TEST_F(ImportFilms, BecomeASessionOfTheFramesThatBelongTogetherEachWithItsTime) 
     const std::int64_t first = result->cameras[c].first;
     EXPECT_GT(truth.read_starts[first], TimePoint{} + Seconds(11)) << "still the strobe";
     EXPECT_LT(truth.read_starts[first], TimePoint{} + Seconds(11.2)) << "flame was thrown away";
-    const auto film = FrameFile::open(truth.file).value();
+    const auto film = session::FrameFile::open(truth.file).value();
     for (std::int64_t i = 0; i < first; ++i) ASSERT_TRUE(film->next().ok());
     for (std::int64_t i = 0; i < result->instants; ++i) {
       const Seconds late = truth.read_starts[first + i] - reference.read_starts[result->cameras[0].first + i];
@@ -120,7 +122,7 @@ TEST_F(ImportFilms, BecomeASessionOfTheFramesThatBelongTogetherEachWithItsTime) 
     }
     EXPECT_LT(entry.sigma_s(), 100e-6);
   }
-  EXPECT_TRUE(verify_session(folder_ / "session")->whole());
+  EXPECT_TRUE(session::verify_session(folder_ / "session")->whole());
   EXPECT_FALSE(fs::exists(folder_ / "session.importing"));
 }
 
@@ -140,7 +142,7 @@ TEST_F(ImportFilms, SayByTheVerbWhatBecameOfThem) {
   EXPECT_EQ(json.at("cameras").size(), 3U);
   EXPECT_EQ(json.at("cameras")[2].at("id"), "left");
   EXPECT_EQ(json.at("aligned_by"), "strobe");
-  EXPECT_EQ(SessionReader::open(folder_ / "session")->layout(0).format, PixelFormat::gray8);
+  EXPECT_EQ(session::SessionReader::open(folder_ / "session")->layout(0).format, PixelFormat::gray8);
   const std::string page = read_file(folder_ / "session/import.html").value();
   const auto& left = json.at("cameras")[2];
   for (const std::string& said :
@@ -159,10 +161,11 @@ TEST_F(ImportFilms, SayByTheVerbWhatBecameOfThem) {
 }
 
 TEST_F(ImportFilms, GoOnWhereTheyWereKilled) {
-  ImportOptions with = options();
+  films::ImportOptions with = options();
   int seen = 0;
-  const auto ended =
-      run_import(with, [&](double fraction, std::string_view) { return fraction < 0.7 || ++seen < 3; });
+  const auto ended = films::run_import(
+      with, [&](double fraction, std::string_view) { return fraction < 0.7 || ++seen < 3; },
+      report::reports_of);
   ASSERT_FALSE(ended.ok());
   EXPECT_EQ(ended.error().kind, ErrorKind::refused);
   EXPECT_FALSE(fs::exists(with.out));
@@ -171,17 +174,20 @@ TEST_F(ImportFilms, GoOnWhereTheyWereKilled) {
     if (entry.path().extension() == ".done") done.push_back(fs::last_write_time(entry.path()));
   EXPECT_FALSE(done.empty());
   std::vector<double> fractions;
-  const auto result = run_import(with, [&](double fraction, std::string_view what) {
-    if (what.starts_with("camera-")) fractions.push_back(fraction);
-    return true;
-  });
+  const auto result = films::run_import(
+      with,
+      [&](double fraction, std::string_view what) {
+        if (what.starts_with("camera-")) fractions.push_back(fraction);
+        return true;
+      },
+      report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_LT(fractions.size(), 2.2 * static_cast<double>(result->instants)) << "all was written anew";
-  EXPECT_TRUE(verify_session(with.out)->whole());
+  EXPECT_TRUE(session::verify_session(with.out)->whole());
 }
 
 TEST_F(ImportFilms, WithoutTheStrobeAreRefusedOrLeftOutAndNamed) {
-  ImportOptions with = options();
+  films::ImportOptions with = options();
   with.folder = own_films();
   test::VideoWriter writer(with.folder / "dark.mp4", {320, 240}, {});
   const Image black({.size = {320, 240}});
@@ -189,19 +195,19 @@ TEST_F(ImportFilms, WithoutTheStrobeAreRefusedOrLeftOutAndNamed) {
   writer.close();
   EXPECT_THAT(refusal(with),
               AllOf(HasSubstr("dark.mp4"), HasSubstr("shows no strobe"), HasSubstr("--partial")));
-  with.faults = Faults::partial;
-  const auto result = run_import(with, {});
+  with.faults = films::Faults::partial;
+  const auto result = films::run_import(with, {}, report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->cameras.size(), 3U);
   EXPECT_THAT(result->notes, testing::Contains(AllOf(HasSubstr("dark is left out"), HasSubstr("no strobe"))));
 }
 
 TEST_F(ImportFilms, OfVariableFrameRateAreRefusedOrUsedUpToThere) {
-  ImportOptions with = options();
+  films::ImportOptions with = options();
   with.folder = own_films();
   const fs::path varying = with.folder / "camera-2.mp4";
   fs::remove(varying);
-  const auto original = FrameFile::open((*clips_)[2].file, Colours::brightness).value();
+  const auto original = session::FrameFile::open((*clips_)[2].file, session::Colours::brightness).value();
   test::VideoWriter writer(varying, {320, 240}, {});
   for (int i = 0; i < 340; ++i) {
     if (i == 310) writer.skip(1);
@@ -210,19 +216,19 @@ TEST_F(ImportFilms, OfVariableFrameRateAreRefusedOrUsedUpToThere) {
   writer.close();
   EXPECT_THAT(refusal(with),
               AllOf(HasSubstr("camera-2.mp4"), HasSubstr("frame rate varies"), HasSubstr("frame 310")));
-  with.faults = Faults::partial;
-  const auto result = run_import(with, {});
+  with.faults = films::Faults::partial;
+  const auto result = films::run_import(with, {}, report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->cameras[2].frames, 310);
   EXPECT_THAT(result->notes, testing::Contains(HasSubstr("camera-2 is used in part")));
 }
 
 TEST_F(ImportFilms, ThatAreTruncatedEndWhereTheyDecodeAndSaySo) {
-  ImportOptions with = options();
+  films::ImportOptions with = options();
   with.folder = own_films();
   fs::remove(with.folder / "camera-1.mp4");
   // Matroska, which keeps its frames before its index.
-  const auto original = FrameFile::open((*clips_)[1].file, Colours::brightness).value();
+  const auto original = session::FrameFile::open((*clips_)[1].file, session::Colours::brightness).value();
   test::VideoFormat format;
   format.gop = 12;
   test::VideoWriter writer(with.folder / "camera-1.mkv", {320, 240}, format);
@@ -230,33 +236,33 @@ TEST_F(ImportFilms, ThatAreTruncatedEndWhereTheyDecodeAndSaySo) {
   writer.close();
   const fs::path cut = with.folder / "camera-1.mkv";
   fs::resize_file(cut, fs::file_size(cut) * 93 / 100);
-  const auto result = run_import(with, {});
+  const auto result = films::run_import(with, {}, report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_LT(result->cameras[1].frames, 330);
   EXPECT_THAT(result->notes, testing::Contains(AllOf(HasSubstr("camera-1"), HasSubstr("truncated"))));
-  EXPECT_TRUE(verify_session(with.out)->whole());
+  EXPECT_TRUE(session::verify_session(with.out)->whole());
   with.out = folder_ / "wanted";
-  with.flame = Part{Seconds(12), Seconds(13.9)};
+  with.flame = films::Part{Seconds(12), Seconds(13.9)};
   EXPECT_THAT(refusal(with), AllOf(HasSubstr("camera-1.mkv"), HasSubstr("doesn't reach")));
 }
 
 TEST_F(ImportFilms, AreNotPairedByGuess) {
-  ImportOptions with = options();
+  films::ImportOptions with = options();
   with.alignment.reset();
   EXPECT_THAT(refusal(with), AllOf(HasSubstr("--flash-rate"), HasSubstr("--unsynchronised")));
-  with.alignment = Alignment::offsets;
+  with.alignment = films::Alignment::offsets;
   with.offsets["camera-2"] = 14;
-  with.flame = Part{Seconds(12), Seconds(13)};
-  const auto result = run_import(with, {});
+  with.flame = films::Part{Seconds(12), Seconds(13)};
+  const auto result = films::run_import(with, {}, report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->cameras[2].frame_offset, 14);
   EXPECT_THAT(result->notes, testing::Contains(HasSubstr("NOT SYNCHRONISED")));
-  EXPECT_FALSE(fs::exists(shutter_times_path(with.out)));
+  EXPECT_FALSE(fs::exists(session::shutter_times_path(with.out)));
 }
 
 TEST_F(ImportFilms, GetTheCalibrationOfTheirRigOrAreRefusedForItBeforeTheyAreSearched) {
   v1::Rig rig;
-  rig.set_format_version(kRigFormatVersion);
+  rig.set_format_version(session::kRigFormatVersion);
   for (int c = 0; c < 3; ++c) {
     v1::RigCamera& camera = *rig.add_cameras();
     camera.set_camera_id(fmt::format("camera-{}", c));
@@ -269,13 +275,13 @@ TEST_F(ImportFilms, GetTheCalibrationOfTheirRigOrAreRefusedForItBeforeTheyAreSea
     rig.mutable_box()->add_center(0.1 * i);
     rig.mutable_box()->add_size(0.5);
   }
-  ImportOptions with = options();
+  films::ImportOptions with = options();
   with.rig = folder_ / "rig.json";
-  ASSERT_TRUE(write_rig(with.rig, rig).ok());
-  with.flame = Part{Seconds(12), Seconds(12.4)};
-  const auto result = run_import(with, {});
+  ASSERT_TRUE(session::write_rig(with.rig, rig).ok());
+  with.flame = films::Part{Seconds(12), Seconds(12.4)};
+  const auto result = films::run_import(with, {}, report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
-  const v1::Manifest manifest = SessionReader::open(with.out)->manifest();
+  const v1::Manifest manifest = session::SessionReader::open(with.out)->manifest();
   for (int c = 0; c < 3; ++c) {
     EXPECT_EQ(manifest.cameras(c).calibration().fx(), 500 + c);
     EXPECT_EQ(manifest.cameras(c).colour().gain(0), 1.5 + c);
@@ -284,9 +290,10 @@ TEST_F(ImportFilms, GetTheCalibrationOfTheirRigOrAreRefusedForItBeforeTheyAreSea
   EXPECT_EQ(manifest.box().center(2), 0.2);
 
   const auto refused = [&](const v1::Rig& wrong) {
-    EXPECT_TRUE(write_rig(with.rig, wrong).ok());
+    EXPECT_TRUE(session::write_rig(with.rig, wrong).ok());
     with.out = folder_ / "refused";
-    const auto answer = run_import(with, [](double fraction, std::string_view) { return fraction < 0.05; });
+    const auto answer = films::run_import(
+        with, [](double fraction, std::string_view) { return fraction < 0.05; }, report::reports_of);
     EXPECT_FALSE(fs::exists(with.out));
     return answer.ok() ? std::string() : answer.error().message();
   };
@@ -302,7 +309,7 @@ TEST_F(ImportFilms, GetTheCalibrationOfTheirRigOrAreRefusedForItBeforeTheyAreSea
 }
 
 TEST_F(ImportFilms, OfOneCameraInPiecesOfDifferentSizeAreRefused) {
-  ImportOptions with = options();
+  films::ImportOptions with = options();
   with.folder = own_films();
   fs::create_directories(with.folder / "cam");
   for (const auto& [name, size] :
@@ -328,15 +335,15 @@ TEST(ImportPictures, ByTheirNumbersCutToThoseThatAllCamerasHave) {
                  static_cast<std::streamsize>(image.bytes().size()));
     }
   }
-  ImportOptions options;
+  films::ImportOptions options;
   options.folder = folder / "in";
   options.out = folder / "session";
   options.min_free_bytes = 0;
-  const auto result = run_import(options, {});
+  const auto result = films::run_import(options, {}, report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->instants, 3);  // 9, 10, 12
   EXPECT_THAT(result->notes, testing::Contains(HasSubstr("1 instants are left out")));
-  auto session = SessionReader::open(options.out).value();
+  auto session = session::SessionReader::open(options.out).value();
   for (std::size_t c = 0; c < 2; ++c) {
     const std::vector<std::uint64_t> numbers{9, 10, 12};
     ASSERT_EQ(session.stamps(c).size(), 3U);
@@ -361,13 +368,13 @@ TEST(ImportTransforms, BecomeACalibratedSessionOfOneInstant) {
     "box": {"center": [0, 0, 1], "size": [1, 1, 2]}, "frames": [
     {"file_path": "a.pgm", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]},
     {"file_path": "b.pgm", "transform_matrix": [[0,0,1,3],[0,1,0,0],[-1,0,0,0],[0,0,0,1]]}]})";
-  ImportOptions options;
+  films::ImportOptions options;
   options.folder = folder.path();
   options.out = folder / "session";
   options.min_free_bytes = 0;
-  const auto result = run_import(options, {});
+  const auto result = films::run_import(options, {}, report::reports_of);
   ASSERT_TRUE(result.ok()) << result.error().message();
-  auto session = SessionReader::open(options.out).value();
+  auto session = session::SessionReader::open(options.out).value();
   ASSERT_EQ(session.camera_count(), 2U);
   EXPECT_EQ(session.manifest().box().size(2), 2);
   EXPECT_EQ(session.manifest().cameras(0).calibration().fy(), 31);

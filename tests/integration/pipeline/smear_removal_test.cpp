@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Smear removal knows no more of a CCD than which rows lighten which; the forward model of smear_sync knows
 // the shift register. Here they meet.
 #include <gtest/gtest.h>
@@ -12,14 +13,15 @@ constexpr int kRows = 48;
 constexpr double kLeak = 1e-2;  // of a row's light, were the register under it for a whole frame
 
 /// What a steady light of 1 at `lit` rows adds to each row of image 0.
-std::vector<double> smear_of(const CcdTiming& timing, const std::vector<double>& light, SweepOut sweep_out) {
+std::vector<double> smear_of(const smear::CcdTiming& timing, const std::vector<double>& light,
+                             smear::SweepOut sweep_out) {
   std::vector<double> out(light.size());
   const double t_row = timing.row_time.value();
   const int periods = static_cast<int>(std::lround(timing.frame_period.value() / t_row));
   for (int row = 0; row < timing.rows; ++row)
     for (int step = -periods; step < periods; ++step)
-      for (const SmearDeposit& d :
-           smear_deposits(timing, row, {Seconds((step + 0.5) * t_row), Seconds(0)}, sweep_out))
+      for (const smear::SmearDeposit& d :
+           smear::smear_deposits(timing, row, {Seconds((step + 0.5) * t_row), Seconds(0)}, sweep_out))
         if (d.image == 0 && d.row != row)
           out[static_cast<std::size_t>(d.row)] +=
               kLeak / periods * d.fraction * light[static_cast<std::size_t>(row)];
@@ -27,13 +29,13 @@ std::vector<double> smear_of(const CcdTiming& timing, const std::vector<double>&
 }
 
 struct SmearCase {
-  ReadDirection direction;
-  SweepOut sweep_out;
-  SmearPath path;
+  smear::ReadDirection direction;
+  smear::SweepOut sweep_out;
+  recon::SmearPath path;
 };
 
 TEST(SmearRemoval, UndoesWhatTheShiftRegisterDoes) {
-  CcdTiming timing;
+  smear::CcdTiming timing;
   timing.rows = kRows;
   timing.shifts = kRows;
   timing.row_time = microseconds_per_row(50);
@@ -41,13 +43,15 @@ TEST(SmearRemoval, UndoesWhatTheShiftRegisterDoes) {
   std::vector<double> light(kRows);
   for (int y = 14; y < 30; ++y) light[static_cast<std::size_t>(y)] = 100 + 5 * y;
   for (const SmearCase& c :
-       {SmearCase{ReadDirection::top_first, SweepOut::none, SmearPath::whole_column},
-        SmearCase{ReadDirection::bottom_first, SweepOut::none, SmearPath::whole_column},
-        SmearCase{ReadDirection::top_first, SweepOut::before_transfer, SmearPath::rows_above},
-        SmearCase{ReadDirection::bottom_first, SweepOut::before_transfer, SmearPath::rows_below}}) {
+       {SmearCase{smear::ReadDirection::top_first, smear::SweepOut::none, recon::SmearPath::whole_column},
+        SmearCase{smear::ReadDirection::bottom_first, smear::SweepOut::none, recon::SmearPath::whole_column},
+        SmearCase{smear::ReadDirection::top_first, smear::SweepOut::before_transfer,
+                  recon::SmearPath::rows_above},
+        SmearCase{smear::ReadDirection::bottom_first, smear::SweepOut::before_transfer,
+                  recon::SmearPath::rows_below}}) {
     timing.direction = c.direction;
     const std::vector<double> smear = smear_of(timing, light, c.sweep_out);
-    Samples samples;
+    recon::Samples samples;
     samples.size = {32, kRows};
     samples.value.resize(32 * kRows);
     for (int y = 0; y < kRows; ++y)
@@ -55,7 +59,7 @@ TEST(SmearRemoval, UndoesWhatTheShiftRegisterDoes) {
         samples.value[samples.index(x, y)] =
             static_cast<float>(light[static_cast<std::size_t>(y)] + smear[static_cast<std::size_t>(y)]);
     const double fraction = kLeak / 60;
-    remove_smear(samples, {{fraction, fraction, fraction}, 0, c.path});
+    recon::remove_smear(samples, {{fraction, fraction, fraction}, 0, c.path});
     double worst = 0;
     double added = 0;
     for (int y = 0; y < kRows; ++y) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `emberlock verify` on video files that virtual cameras made: H.264 and others, of several models, started
 // at odd times; and on what people give it by mistake.
 #include <fstream>
@@ -7,9 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "cli/commands.h"
-#include "cli/verify_run.h"
-#include "session/frame_file.h"
+#include "films/verify_run.h"
+#include "session/media/frame_file.h"
 #include "tests/support/recording.h"
+#include "tests/support/sound_writer.h"
 #include "tests/support/strobe_clips.h"
 #include "tests/support/verb.h"
 
@@ -20,14 +22,14 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 /// Cameras of 240 rows that read for as long as ones of 720: a ninth of the pixels to code.
-VirtualRigDraw small_model() {
-  VirtualRigDraw draw;
+drivers::VirtualRigDraw small_model() {
+  drivers::VirtualRigDraw draw;
   draw.layout.size = {320, 240};
   draw.row_time = microseconds_per_row(160);
   return draw;
 }
 
-const FrameCode kShortCode{.words = 8, .spacing = 60};
+const smear::FrameCode kShortCode{.words = 8, .spacing = 60};
 
 using Outcome = test::VerbRun;
 Outcome run(std::vector<std::string> arguments) {
@@ -76,8 +78,8 @@ TEST(VideoFile, BrightnessAloneIsWhatTheColoursMeanAndTheFileSaysItsRateAndLengt
     test::VideoWriter writer(folder / name, {64, 48}, format);
     for (int i = 0; i < 7; ++i) writer.write(picture);
     writer.close();
-    const auto coloured = FrameFile::open(folder / name).value();
-    const auto bright = FrameFile::open(folder / name, Colours::brightness).value();
+    const auto coloured = session::FrameFile::open(folder / name).value();
+    const auto bright = session::FrameFile::open(folder / name, session::Colours::brightness).value();
     EXPECT_NEAR(bright->claims().frame_rate->value(), 24000.0 / 1001, 1e-3) << name;
     EXPECT_EQ(bright->claims().frames, 7) << name;
     const Image rgb = coloured->next().value();
@@ -134,7 +136,11 @@ TEST_F(VerifyClips, GiveTheJsonOfTheManualAndAReportThatStandsAlone) {
   EXPECT_THAT(keys, ElementsAre("reference", "cameras", "worst_pair_ms", "verdict"));
   keys.clear();
   for (const auto& [key, value] : json.at("cameras")[1].items()) keys.push_back(key);
-  EXPECT_THAT(keys, ElementsAre("file", "error_ms", "sigma_ms", "frame_offset", "drift_ppm", "state"));
+  EXPECT_THAT(keys, ElementsAre("file", "error_ms", "sigma_ms", "frame_offset", "drift_ppm", "state",
+                                "offset_by", "offset_probability", "offset_reason"));
+  EXPECT_EQ(json.at("cameras")[0].at("offset_by"), nullptr);
+  EXPECT_THAT(json.at("cameras")[1].at("offset_by"), testing::AnyOf("code", "pattern"));
+  EXPECT_GT(json.at("cameras")[1].at("offset_probability"), 0.998);
   EXPECT_EQ(json.at("reference"), truths_[0].file);
   EXPECT_EQ(json.at("verdict"), "in sync");
   EXPECT_EQ(json.at("cameras")[1].at("state"), "in sync");
@@ -163,6 +169,105 @@ TEST_F(VerifyClips, ALostFrameIsToldAndTheOthersStayPaired) {
   }());
   const nlohmann::json json = nlohmann::json::parse(outcome.out);
   expect_truth(json.at("cameras")[1], truths_[1]);
+}
+
+/// 54 us long, or 160 us.
+enum class RowsAre { as_of_720, as_of_240 };
+
+/// Four cameras of one model, of 96 frames each, that show six skipped flashes with unlike gaps under a beat
+/// of 0.02 %; each flash comes some rows after the read phase began.
+test::StrobeFilm slow_beat(RowsAre rows = RowsAre::as_of_720) {
+  test::StrobeFilm with = test::random_film(47, 4, small_model(), kShortCode);
+  drivers::VirtualRigDraw draw;
+  draw.layout.size = {160, 720};
+  if (rows == RowsAre::as_of_240) draw = small_model();
+  draw.cameras = 4;
+  draw.seed = 47;
+  with.rig.cameras = drivers::draw_virtual_rig(draw).cameras;
+  with.rig.strobe.rate_error = PartsPerMillion(0);
+  with.rig.strobe.rate_step = Hertz(1e-6);
+  with.format = {};
+  with.suffix = ".mkv";
+  with.frames = 96;
+  with.strobe.rate = Hertz(23.976 * 1.0002);
+  with.strobe.code.assign(2000, true);
+  for (const int skipped : {40, 48, 63, 74, 93, 99})
+    with.strobe.code[static_cast<std::size_t>(skipped)] = false;
+  with.starts = {0.8, 1.3, 0.5, 1.1};
+  for (std::size_t c = 0; c < 4; ++c) {
+    const Seconds before_flash =
+        Rows(60 + (rows == RowsAre::as_of_240 ? 3.0 : 9.0) * static_cast<double>(c)) * draw.row_time;
+    with.rig.cameras[c].first_phase =
+        wrap_positive(with.strobe.phase - Seconds(with.starts[c]) - before_flash, period(with.strobe.rate));
+  }
+  return with;
+}
+
+TEST_F(VerifyClips, OfFourSecondsAreMatchedBySixSkippedFlashesUnderASlowBeat) {
+  for (const RowsAre rows : {RowsAre::as_of_720, RowsAre::as_of_240}) {
+    std::vector<std::string> arguments = film(slow_beat(rows));
+    arguments.emplace_back("--json");
+    const Outcome outcome = run(arguments);
+    const nlohmann::json json = nlohmann::json::parse(outcome.out);
+    for (std::size_t i = 0; i < truths_.size(); ++i) {
+      const auto& camera = json.at("cameras")[i];
+      ASSERT_FALSE(camera.at("frame_offset").is_null()) << outcome.out;
+      ASSERT_FALSE(camera.at("error_ms").is_null()) << outcome.out << outcome.err;
+      EXPECT_NEAR(camera.at("error_ms").get<double>(), in_milliseconds(truths_[i].error), 0.02)
+          << camera.dump();
+      EXPECT_EQ(camera.at("frame_offset").get<int>(), truths_[i].frame_offset);
+      if (i == 0) continue;
+      EXPECT_EQ(camera.at("offset_by"), "pattern");
+      EXPECT_GE(camera.at("offset_probability"), 0.999);
+    }
+  }
+}
+
+TEST_F(VerifyClips, OfPatternsThatNobodyChoseAreNeverMatchedWrongly) {
+  int right = 0;
+  for (std::uint64_t seed = 60; seed < 65; ++seed) {
+    const test::StrobeFilm with = test::pattern_film(
+        seed, 2, small_model(), test::kTellingPatterns.at(seed % test::kTellingPatterns.size()));
+    const nlohmann::json json = nlohmann::json::parse(run([&] {
+                                                        std::vector<std::string> arguments = film(with);
+                                                        arguments.emplace_back("--json");
+                                                        return arguments;
+                                                      }())
+                                                          .out);
+    const int reference = json.at("reference") == truths_[0].file ? 0 : 1;
+    const auto& camera = json.at("cameras")[static_cast<std::size_t>(1 - reference)];
+    if (camera.at("frame_offset").is_null()) {
+      EXPECT_FALSE(camera.at("offset_reason").get<std::string>().empty());
+      continue;
+    }
+    const auto of = static_cast<std::size_t>(reference);
+    EXPECT_EQ(camera.at("frame_offset").get<int>(), test::nearest_offset(truths_[of], truths_[1 - of]))
+        << seed << camera.dump();
+    ++right;
+  }
+  EXPECT_GE(right, 2);
+}
+
+TEST_F(VerifyClips, WhoseSoundContradictsTheirPatternGetNoOffsetAndOneThatAgreesIsNamed) {
+  const test::StrobeFilm with = slow_beat();
+  std::vector<std::string> arguments = film(with);
+  arguments.emplace_back("--json");
+  for (std::size_t c = 0; c < 4; ++c) {
+    const std::string loud = (folder_ / fmt::format("loud-{}.mkv", c)).string();
+    // A clap 3 s after the rig began; the last camera's track is put half a second off.
+    const double clap = 3 - with.starts[c] - with.rig.cameras[c].first_phase->value() + (c == 3 ? 0.5 : 0);
+    test::add_sound(truths_[c].file, loud, test::claps({clap}, 4, 16000), 16000, Seconds(0));
+    arguments[c] = loud;
+  }
+  const nlohmann::json json = nlohmann::json::parse(run(arguments).out);
+  for (const std::size_t c : {1U, 2U}) {
+    const auto& camera = json.at("cameras")[c];
+    EXPECT_EQ(camera.at("frame_offset"), truths_[c].frame_offset) << camera.dump();
+    EXPECT_THAT(camera.at("offset_reason").get<std::string>(), HasSubstr("the sound agrees"));
+  }
+  const auto& off = json.at("cameras")[3];
+  EXPECT_TRUE(off.at("frame_offset").is_null()) << off.dump();
+  EXPECT_THAT(off.at("offset_reason").get<std::string>(), HasSubstr("contradict"));
 }
 
 TEST_F(VerifyClips, WrongInputSaysWhatToDo) {

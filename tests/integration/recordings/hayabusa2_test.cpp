@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // A real CCD frame with vertical smear: Hayabusa2's ONC-W2, the Earth as a steady source (ISAS/JAXA, public
 // domain).
 #include <filesystem>
 
 #include <gtest/gtest.h>
 
-#include "session/frame_file.h"
+#include "session/media/frame_file.h"
 #include "smear_sync/detect/detect.h"
 #include "tests/support/recordings.h"
 
@@ -15,11 +16,11 @@ class Hayabusa2 : public testing::TestWithParam<const char*> {};
 
 TEST_P(Hayabusa2, TheEarthIsASteadyLampAndTheTrapIsNoDot) {
   const std::filesystem::path file = test::recordings() / "smear_hayabusa2" / GetParam();
-  const Result<Image> image = read_image(file);
+  const Result<Image> image = session::read_image(file);
   ASSERT_TRUE(image.ok()) << image.error().message();
   EXPECT_EQ(image->layout().size, (ImageSize{1024, 1024}));
-  const SmearReading r = detect(image->view());
-  EXPECT_EQ(r.state, SmearState::steady) << name(r.state) << ": " << r.reason;
+  const smear::SmearReading r = smear::detect(image->view());
+  EXPECT_EQ(r.state, smear::SmearState::steady) << name(r.state) << ": " << r.reason;
   ASSERT_TRUE(r.lamp);
   // Centroid of the pixels of 1000 DN or more.
   EXPECT_NEAR(r.lamp->y.value(), 775.3, 0.5);

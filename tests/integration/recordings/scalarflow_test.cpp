@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // One frame of real smoke in five calibrated views (ScalarFlow, Eckert, Um, Thuerey 2019).
 #include <cmath>
 #include <cstdio>
@@ -21,12 +22,12 @@ constexpr double kThreshold = 15;
 fs::path transforms() { return test::recordings() / "scalarflow" / "transforms.json"; }
 
 /// Averages squares of kShrink x kShrink pixels: nine times less work, and a voxel still covers 3.6 pixels.
-void shrink(View& view) {
+void shrink(recon::View& view) {
   constexpr int kShrink = 3;
-  Intrinsics& lens = view.camera.intrinsics;
+  recon::Intrinsics& lens = view.camera.intrinsics;
   lens.size = {lens.size.width / kShrink, lens.size.height / kShrink};
   for (double* length : {&lens.fx, &lens.fy, &lens.cx, &lens.cy}) *length /= kShrink;
-  RadianceImage small(lens.size);
+  recon::RadianceImage small(lens.size);
   for (int y = 0; y < kShrink * lens.size.height; ++y) {
     for (int x = 0; x < kShrink * lens.size.width; ++x) {
       for (int c = 0; c < 3; ++c) {
@@ -41,30 +42,32 @@ void shrink(View& view) {
 class ScalarFlowTest : public testing::Test {
  protected:
   void SetUp() override {
-    auto scene = load_scene(transforms());
+    auto scene = recon::load_scene(transforms());
     ASSERT_TRUE(scene.ok()) << scene.error().message();
     scene_ = std::move(scene).value();
   }
-  [[nodiscard]] Report without_view(std::size_t held_out, Solver solver, int iterations = 0) const {
-    Scene scene = scene_;
-    for (View& view : scene.views) shrink(view);
-    scene.views[held_out].role = ViewRole::held_out;
-    ReconstructOptions options;
+  [[nodiscard]] recon::Report without_view(std::size_t held_out, recon::Solver solver,
+                                           int iterations = 0) const {
+    recon::Scene scene = scene_;
+    for (recon::View& view : scene.views) shrink(view);
+    scene.views[held_out].role = recon::ViewRole::held_out;
+    recon::ReconstructOptions options;
     options.voxels = kVoxels;
     options.solve.solver = solver;
     options.solve.iterations = iterations;
     options.solve.flame_threshold = kThreshold;
-    options.solve.compute.device = Device::cpu;
+    options.solve.compute.device = recon::Device::cpu;
     SteadyClock clock;
-    const auto outcome = reconstruct(scene, options, clock);
+    const auto outcome = recon::reconstruct(scene, options, clock);
     EXPECT_TRUE(outcome.ok()) << outcome.error().message();
-    return outcome.ok() ? outcome->report : Report{};
+    return outcome.ok() ? outcome->report : recon::Report{};
   }
-  Scene scene_;
+  recon::Scene scene_;
 };
 
 /// Whether every view sees a flame pixel where the point lies.
-bool shines_in_all(const Scene& scene, const std::vector<FlameMask>& masks, const Eigen::Vector3d& point) {
+bool shines_in_all(const recon::Scene& scene, const std::vector<recon::FlameMask>& masks,
+                   const Eigen::Vector3d& point) {
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     const Eigen::Vector2d pixel = scene.views[i].camera.project(point);
     const int x = static_cast<int>(std::floor(pixel.x()));
@@ -78,7 +81,7 @@ bool shines_in_all(const Scene& scene, const std::vector<FlameMask>& masks, cons
 TEST_F(ScalarFlowTest, TheCellsThatShineInAllViewsAreAsManyAsTheDataStates) {
   // 44 x 78 x 44 cells judged at their centres fill 7854: cameras, box and pictures are read as they were
   // meant.
-  const auto masks = flame_masks(scene_, kThreshold);
+  const auto masks = recon::flame_masks(scene_, kThreshold);
   const Eigen::Array3d cells(44, 78, 44);
   const Eigen::Array3d edge = scene_.box.size.array() / cells;
   const Eigen::Array3d low = scene_.box.center.array() - 0.5 * scene_.box.size.array();
@@ -95,9 +98,9 @@ TEST_F(ScalarFlowTest, TheCellsThatShineInAllViewsAreAsManyAsTheDataStates) {
 }
 
 TEST_F(ScalarFlowTest, TheHullHoldsEveryVoxelThatShinesInAllViews) {
-  const auto masks = flame_masks(scene_, kThreshold);
-  const Grid grid = grid_over(scene_.box, kVoxels);
-  const auto hull = carve(scene_, masks, grid, {.device = Device::cpu});
+  const auto masks = recon::flame_masks(scene_, kThreshold);
+  const recon::Grid grid = recon::grid_over(scene_.box, kVoxels);
+  const auto hull = recon::carve(scene_, masks, grid, {.device = recon::Device::cpu});
   ASSERT_TRUE(hull.ok()) << hull.error().message();
   std::size_t lost = 0;
   for (int k = 0; k + 1 < grid.nz; ++k) {
@@ -119,27 +122,28 @@ TEST_F(ScalarFlowTest, TheHullHoldsEveryVoxelThatShinesInAllViews) {
 TEST_F(ScalarFlowTest, EachViewHeldOutInTurnIsPredicted) {
   constexpr double kMeasured[] = {10.7, 11.9, 10.8, 9.4, 12.6};
   for (std::size_t view = 0; view < 5; ++view) {
-    const Report report = without_view(view, Solver::standard);
+    const recon::Report report = without_view(view, recon::Solver::standard);
     ASSERT_TRUE(report.heldout_rmse);
-    const double error = all_channels(*report.heldout_rmse);
+    const double error = recon::all_channels(*report.heldout_rmse);
     std::printf("view %zu held out: error %.2f, input error %.2f, %d iterations\n", view, error,
-                all_channels(report.input_rmse), report.iterations);
+                recon::all_channels(report.input_rmse), report.iterations);
     EXPECT_LT(error, 1.1 * kMeasured[view]) << "view " << view;
-    EXPECT_LT(all_channels(report.input_rmse), error) << "view " << view;
+    EXPECT_LT(recon::all_channels(report.input_rmse), error) << "view " << view;
   }
 }
 
 TEST_F(ScalarFlowTest, TheDefaultSolverBeatsThePapersAfterManyMoreIterations) {
   // Left alone the paper's solver stops after 537 iterations, at 16.0; a hundred are what a test can wait
   // for.
-  const Report ours = without_view(1, Solver::standard);
-  const Report papers = without_view(1, Solver::paper, 100);
+  const recon::Report ours = without_view(1, recon::Solver::standard);
+  const recon::Report papers = without_view(1, recon::Solver::paper, 100);
   ASSERT_TRUE(ours.heldout_rmse && papers.heldout_rmse);
-  std::printf("default %.2f after %d iterations, paper %.2f after %d\n", all_channels(*ours.heldout_rmse),
-              ours.iterations, all_channels(*papers.heldout_rmse), papers.iterations);
+  std::printf("default %.2f after %d iterations, paper %.2f after %d\n",
+              recon::all_channels(*ours.heldout_rmse), ours.iterations,
+              recon::all_channels(*papers.heldout_rmse), papers.iterations);
   EXPECT_LT(ours.iterations, 20);
-  EXPECT_LT(all_channels(*ours.heldout_rmse), 15) << "below what the paper's solver ever reaches";
-  EXPECT_LT(all_channels(*ours.heldout_rmse), all_channels(*papers.heldout_rmse));
+  EXPECT_LT(recon::all_channels(*ours.heldout_rmse), 15) << "below what the paper's solver ever reaches";
+  EXPECT_LT(recon::all_channels(*ours.heldout_rmse), recon::all_channels(*papers.heldout_rmse));
 }
 
 }  // namespace

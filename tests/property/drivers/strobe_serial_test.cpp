@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Laws of strobes on a serial line: what is set reads back within the device's steps, and no damage to the
 // line ever makes a driver believe what isn't so.
 #include <cmath>
@@ -8,7 +9,7 @@
 #include "tests/support/properties.h"
 #include "tests/support/strobe_bench.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using test::any_int;
@@ -101,4 +102,4 @@ RC_GTEST_PROP(StrobeSerialLaws, WhateverTheLineLosesOrBreaksWhatIsToldIsSo, ()) 
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Laws of the virtual rig: what the pictures show, the truth accessors know; and nothing depends on the
 // order.
 #include <cmath>
@@ -8,7 +9,7 @@
 #include "tests/support/properties.h"
 #include "tests/support/virtual_cameras.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using namespace testing_support;  // NOLINT(google-build-using-namespace)
@@ -17,7 +18,7 @@ using test::any_real;
 
 VirtualCameraOptions any_camera() {
   VirtualCameraOptions c =
-      small_camera(*rc::gen::element(ReadDirection::top_first, ReadDirection::bottom_first),
+      small_camera(*rc::gen::element(smear::ReadDirection::top_first, smear::ReadDirection::bottom_first),
                    *rc::gen::element(120, 140, 166));
   c.timing.frame_period = c.timing.frame_period * (1 + any_real(-1e-4, 1e-4));
   c.lamp = {.x = any_real(10, 54), .y = Rows(any_real(10, 110)), .radius = any_real(2, 4)};
@@ -56,7 +57,7 @@ RC_GTEST_PROP(VirtualRigLaws, ADotGivesTheFlashsPhaseBackWithinARow, ()) {
     for (const TrueDot& dot : rig->dots(0, id)) {
       // The lamp's own row, less a rounding, is 0 shifts and not K.
       const Rows k =
-          wrap_positive(shifts_between(c.timing, c.lamp.y, dot.y) + Rows(1e-9), Rows(c.timing.shifts));
+          wrap_positive(smear::shifts_between(c.timing, c.lamp.y, dot.y) + Rows(1e-9), Rows(c.timing.shifts));
       const Seconds tau = (k + Rows(0.5)) * c.timing.row_time;
       const Seconds off = wrap_symmetric(dot.flash - rig->read_start(0, id) - tau, c.timing.frame_period);
       // Half a row for whole-row shifts, and as much for a flash that spans two rows.
@@ -121,4 +122,4 @@ RC_GTEST_PROP(VirtualRigLaws, ResetsKeepFrameNumbersAndArrivalTimesInOrder, ()) 
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/camera_model.h"
 
 #include <Eigen/Geometry>
@@ -7,7 +8,7 @@
 #include "recon/calibrate/pose.h"
 #include "tests/support/properties.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using test::law;
@@ -87,4 +88,4 @@ TEST(CameraModelLaws, TheNearestRotationOfARotationIsItself) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Rays clipped side by side cross the medium where each alone does, whatever vectors the CPU has.
 #include <cmath>
 
@@ -9,7 +10,7 @@
 #include "recon/hull/clip_bundle.h"
 #include "recon/hull/kernel_views.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 Hull some_medium() {
@@ -98,4 +99,4 @@ INSTANTIATE_TEST_SUITE_P(Vectors, ClipBundleLaw, testing::ValuesIn(hwy::Supporte
                          [](const auto& target) { return hwy::TargetName(target.param); });
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

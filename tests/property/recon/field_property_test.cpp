@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Laws of the march whose emission and extinction are both unknown, and of the step that it feeds.
 #include <cmath>
 
@@ -8,7 +9,7 @@
 #include "tests/support/march_case.h"
 #include "tests/support/properties.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using test::law;
@@ -177,4 +178,4 @@ TEST_P(FieldLaw, AStepOfTotalVariationAloneNeverRaisesIt) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

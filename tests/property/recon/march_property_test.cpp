@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -9,7 +10,7 @@
 #include "recon/render/render.h"
 #include "tests/support/devices.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(MarchLaw);
@@ -109,4 +110,4 @@ TEST(MarchLaw, PiecesOfAStretchShareNoSampleMissNoneAndKeepToTheirSlab) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <numbers>
 
@@ -6,7 +7,7 @@
 
 #include "recon/kernels/phase_function.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// Int f(mu) dmu over [-1, 1] by Simpson's rule in a variable that crowds the nodes at the peak: 1 -+ mu = 2
@@ -47,4 +48,4 @@ TEST(PhaseFunctionLaw, LooksTheSameFromBothEnds) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <vector>
 
@@ -10,7 +11,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/marches.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(UpdateLaw);
@@ -110,4 +111,4 @@ TEST_P(UpdateLaw, AStepThatNoPictureAsksForNeverRaisesTheVariation) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

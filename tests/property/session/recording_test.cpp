@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/recording.h"
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 #include "session/reader.h"
 #include "session/writer.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 ImageLayout any_layout() {
@@ -83,4 +84,4 @@ RC_GTEST_PROP(RecordingLaws, ArrivalsAndGapsFillTheRangeOfIds, ()) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/ccd_model.h"
 
 #include <cmath>
@@ -10,7 +11,7 @@
 
 #include "tests/support/properties.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::any_int;
@@ -154,4 +155,4 @@ RC_GTEST_PROP(CcdModelLaws, MirroringTheChipMirrorsTheDots, ()) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What the detector promises over many frames: errors near the Cramer-Rao bound, no dot where there is none.
 #include <cmath>
 #include <cstdio>
@@ -8,7 +9,7 @@
 #include "tests/support/smear_frames.h"
 #include "tests/support/smear_statistics.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::SmearRange;
@@ -44,6 +45,42 @@ TEST(DetectProperty, FramesWithoutADotShowNone) {
     const SmearTally t = test::read_dotless(format, 400, 14);
     EXPECT_EQ(t.dots, 0) << name(format);
     EXPECT_LE(t.abstained, 0.02 * t.frames) << name(format);
+  }
+}
+
+TEST(DetectProperty, ReflectionsWiderThanTheLampShowNoDot) {
+  // One in a few thousand does: faint, hardly wider than a small lamp that is clipped, in its glare.
+  for (const test::Lookalike kind : test::kReflections)
+    EXPECT_LE(test::read_lookalikes(kind, 1000, 18).dots, 1) << "kind " << static_cast<int>(kind);
+}
+
+TEST(DetectProperty, BrightLinesShowNoDot) {
+  EXPECT_EQ(test::read_lookalikes(test::Lookalike::line, 1000, 19).dots, 0);
+}
+
+/// A clipped lamp's width is known by its flanks alone, and these by the lens, which nobody told.
+TEST(DetectProperty, DotsOfClippedLampsAreReadWhateverTheLensAndTheMosaic) {
+  constexpr int kFrames = 200;
+  for (const PixelFormat format : {PixelFormat::gray8, PixelFormat::bayer_rggb8, PixelFormat::rgb8}) {
+    for (const double sharpest : {0.3, 0.6, 1.0}) {
+      int found = 0;
+      for (int i = 0; i < kFrames; ++i) {
+        RandomStream random(77, static_cast<std::uint64_t>(i));
+        test::SmearTruth t =
+            test::draw_truth({.min_radius = 2.5, .min_amplitude = 6}, 31, static_cast<std::uint64_t>(i));
+        t.blur = random.uniform(sharpest, 1.5 * sharpest);
+        t.bright = 255 * std::pow(10, random.uniform(0.3, 2));
+        SmearScene scene = t.scene();
+        if (i % 3 == 0) scene.halo(t.x, t.lamp_y, random.uniform(10, 60), random.uniform(4, 12));
+        const Image image = scene.image({.noise = t.noise,
+                                         .shot = t.shot,
+                                         .seed = 1000 + static_cast<std::uint64_t>(i),
+                                         .format = format});
+        const SmearReading reading = detect(image.view());
+        if (reading.dots.size() == 1 && std::abs(reading.dots[0].y.value() - t.dot_y) < 3) ++found;
+      }
+      EXPECT_GE(found, 0.98 * kFrames) << name(format) << ", blur from " << sharpest;
+    }
   }
 }
 
@@ -89,4 +126,4 @@ TEST(DetectProperty, AMirroredFrameGivesTheMirroredReading) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 
 #include <gtest/gtest.h>
@@ -8,7 +9,7 @@
 #include "tests/support/properties.h"
 #include "tests/support/shift_register.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::any_real;
@@ -160,4 +161,4 @@ TEST(AlignLaws, TheStepIsAPureFunction) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Laws of what reads walks, codes, bands and sweeps: what is told is true, whatever was filmed; else it says
 // why not.
 #include <cmath>
@@ -12,7 +13,7 @@
 #include "tests/support/properties.h"
 #include "tests/support/shutters.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::any_real;
@@ -152,4 +153,4 @@ TEST(ExposureSweepLaws, AWindowThatIsToldIsTheShutters) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

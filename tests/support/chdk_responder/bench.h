@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <memory>
@@ -15,7 +16,7 @@ namespace emberlock::chdk_responder {
 /// A camera, a cable and a session, in virtual time.
 struct Bench {
   explicit Bench(DeviceOptions options = {})
-      : clock(std::make_shared<VirtualClock>()),
+      : clock(std::make_shared<drivers::VirtualClock>()),
         cable(std::make_shared<Cable>(Cable{clock, Device(std::move(options))})),
         session(std::make_unique<FakeTransport>(cable), "camera E1", clock),
         chdk(session) {}
@@ -23,14 +24,14 @@ struct Bench {
   Seconds elapsed() { return clock->now() - TimePoint{}; }
   void pass(Seconds time) { clock->sleep_until(clock->now() + time); }
   void record() {
-    ASSERT_TRUE(chdk.change_mode(ChdkMode::record).ok());
+    ASSERT_TRUE(chdk.change_mode(drivers::ChdkMode::record).ok());
     pass(Seconds(1));
   }
 
-  std::shared_ptr<VirtualClock> clock;
+  std::shared_ptr<drivers::VirtualClock> clock;
   std::shared_ptr<Cable> cable;
-  PtpSession session;
-  Chdk chdk;
+  drivers::PtpSession session;
+  drivers::Chdk chdk;
 };
 
 /// With its session open.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/chdk_responder/chdk_device.h"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
@@ -20,7 +21,7 @@ struct Cable {
   int transports = 0;  ///< open now
 };
 
-class FakeTransport final : public PtpTransport {
+class FakeTransport final : public drivers::PtpTransport {
  public:
   explicit FakeTransport(std::shared_ptr<Cable> cable) : cable_(std::move(cable)) { ++cable_->transports; }
   ~FakeTransport() override { --cable_->transports; }
@@ -35,7 +36,7 @@ class FakeTransport final : public PtpTransport {
     return {};
   }
 
-  Result<PtpPiece> receive(std::size_t most, Seconds deadline) override {
+  Result<drivers::PtpPiece> receive(std::size_t most, Seconds deadline) override {
     if (!cable_->plugged || halted_) return gone();
     const TimePoint until = cable_->clock->now() + deadline;
     const auto ready = cable_->device.next_ready();
@@ -45,7 +46,8 @@ class FakeTransport final : public PtpTransport {
     halted_ = piece->stalls;
     if (halted_) return gone();
     bytes_ = std::move(piece->bytes);
-    return PtpPiece{bytes_, bytes_.size() < most ? PtpPieceEnd::short_packet : PtpPieceEnd::more};
+    return drivers::PtpPiece{
+        bytes_, bytes_.size() < most ? drivers::PtpPieceEnd::short_packet : drivers::PtpPieceEnd::more};
   }
 
   Status recover(std::uint32_t /*transaction*/) override {

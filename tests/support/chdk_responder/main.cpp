@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // chdk_responder USBREDIR_SOCKET CONTROL_SOCKET: a Canon camera with CHDK for QEMU's usb-redir. It listens on
 // both sockets until it is killed. Each connection to the first is the camera plugged in anew, switched on
 // and in playback mode; its card stays. The second takes lines and answers each with "ok", "ok VALUE" or

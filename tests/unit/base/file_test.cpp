@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "base/file.h"
 
 #include <fstream>
@@ -46,35 +47,6 @@ TEST_F(FileTest, WritingIntoAnAbsentFolderSaysSo) {
   const auto s = write_file_atomically(root_ / "no" / "such" / "file", "x");
   ASSERT_FALSE(s.ok());
   EXPECT_EQ(s.error().kind, ErrorKind::io);
-}
-
-TEST_F(FileTest, AbandonedDirectoryLeavesNothing) {
-  {
-    auto d = AtomicDirectory::create(root_ / "out", "report.json");
-    ASSERT_TRUE(d.ok());
-    put(d->path() / "half", "x");
-  }
-  EXPECT_TRUE(fs::is_empty(root_));
-}
-
-TEST_F(FileTest, CommittedDirectoryReplacesAnEarlierResult) {
-  for (const char* content : {"first", "second"}) {
-    auto d = AtomicDirectory::create(root_ / "out", "report.json");
-    ASSERT_TRUE(d.ok()) << d.error().message();
-    put(d->path() / "report.json", content);
-    ASSERT_TRUE(d->commit().ok());
-    EXPECT_EQ(read_file(root_ / "out" / "report.json").value(), content);
-  }
-  EXPECT_EQ(std::distance(fs::directory_iterator(root_), {}), 1);
-}
-
-TEST_F(FileTest, SomebodyElsesFolderIsNotReplaced) {
-  fs::create_directories(root_ / "photos");
-  put(root_ / "photos" / "holiday.jpg", "x");
-  const auto d = AtomicDirectory::create(root_ / "photos", "report.json");
-  ASSERT_FALSE(d.ok());
-  EXPECT_EQ(d.error().kind, ErrorKind::bad_input);
-  EXPECT_TRUE(fs::exists(root_ / "photos" / "holiday.jpg"));
 }
 
 }  // namespace

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a line of the log looks like to a person, a program and systemd's journal.
 #include "base/log.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `emberlock status --daemon HOST:PORT`, against a server that speaks TLS: who is right gets in, and who
 // isn't is told which of the two certificates or the token stands in the way, where, and what to do.
 #include <fstream>
@@ -35,13 +36,13 @@ class ClientTls : public testing::Test {
     write("token", kToken + "\n");
   }
   void write(const std::string& name, const std::string& text) { test::write_secret(folder_ / name, text); }
-  void write(const std::string& name, const TlsIdentity& identity) {
+  void write(const std::string& name, const rig::TlsIdentity& identity) {
     write(name + ".crt", identity.certificate);
     write(name + ".key", identity.key);
   }
-  void serve(ServerTls tls) {
-    auto started = GrpcServer::start(
-        api_, {.tcp_address = "127.0.0.1:0", .tls = std::move(tls), .token = *Token::parse(kToken)});
+  void serve(rig::ServerTls tls) {
+    auto started = daemon::GrpcServer::start(
+        api_, {.tcp_address = "127.0.0.1:0", .tls = std::move(tls), .token = *rig::Token::parse(kToken)});
     ASSERT_TRUE(started.ok()) << started.error().message();
     server_ = std::move(*started);
     where_ = "localhost:" + std::to_string(server_->tcp_port());
@@ -67,7 +68,7 @@ class ClientTls : public testing::Test {
   test::CertificateAuthority servers_{"the lab"};
   test::CertificateAuthority strangers_{"somebody else"};
   test::FakeApi api_;
-  std::unique_ptr<GrpcServer> server_;
+  std::unique_ptr<daemon::GrpcServer> server_;
   std::string where_;
 };
 
@@ -143,16 +144,16 @@ TEST_F(ClientTls, APortWhereNobodyListensAndANameThatLeadsNowhereAreUnreachable)
 }
 
 TEST_F(ClientTls, APortOfThePlainConsoleIsToldApart) {
-  auto console = HttpServer::start(api_, {.listen = "127.0.0.1:0"});
+  auto console = daemon::HttpServer::start(api_, {.listen = "127.0.0.1:0"});
   ASSERT_TRUE(console.ok());
   where_ = "localhost:" + std::to_string((*console)->port());
   expect_refused(status(), AllOf(HasSubstr("speaks no TLS"), HasSubstr("`listen`")));
 }
 
 TEST_F(ClientTls, APortOfTheConsoleOverTlsIsToldApart) {
-  auto console = HttpServer::start(
-      api_,
-      {.listen = "0.0.0.0:0", .token = *Token::parse(kToken), .tls = ServerTls{servers_.issue("localhost")}});
+  auto console = daemon::HttpServer::start(api_, {.listen = "0.0.0.0:0",
+                                                  .token = *rig::Token::parse(kToken),
+                                                  .tls = rig::ServerTls{servers_.issue("localhost")}});
   ASSERT_TRUE(console.ok()) << console.error().message();
   where_ = "localhost:" + std::to_string((*console)->port());
   expect_refused(status(), HasSubstr("not of `http_listen`"));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What shells offer, asked of the shells themselves.
 #include "cli/completion.h"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The verbs that ask emberlockd, against a real server on a socket and a daemon without devices.
 #include <atomic>
 #include <chrono>
@@ -39,9 +40,10 @@ class DaemonVerbs : public testing::Test {
  protected:
   DaemonVerbs() {
     api_.board().show(status_in(v1::IDLE));
-    GrpcServerOptions options;
+    daemon::GrpcServerOptions options;
     options.socket = folder_ / "socket";
-    auto server = GrpcServer::start(api_, options);
+    options.sessions = sessions_;
+    auto server = daemon::GrpcServer::start(api_, options);
     if (!server) throw std::runtime_error(server.error().message());
     server_ = std::move(*server);
   }
@@ -71,7 +73,8 @@ class DaemonVerbs : public testing::Test {
 
   test::TempFolder folder_;
   test::FakeApi api_;
-  std::unique_ptr<GrpcServer> server_;
+  std::shared_ptr<daemon::ConsoleSessions> sessions_ = std::make_shared<daemon::ConsoleSessions>();
+  std::unique_ptr<daemon::GrpcServer> server_;
   std::vector<std::thread> threads_;
 };
 
@@ -81,6 +84,7 @@ TEST(DaemonVerbsAlone, WithoutADaemonTheySayWhatToDoAndLeaveWithThree) {
   for (const auto& [add, words] : std::vector<std::pair<void (*)(CLI::App&), std::vector<std::string>>>{
            {add_status, {"status"}},
            {add_watch, {"watch"}},
+           {add_console, {"console"}},
            {add_align, {"align"}},
            {add_record, {"record"}},
            {add_strobe, {"strobe"}},
@@ -121,16 +125,55 @@ TEST_F(DaemonVerbs, StatusIsAScreenForPeopleAndJsonForPrograms) {
   camera.set_id("cam1");
   camera.set_state(v1::CameraStatus::FILMING);
   camera.set_error_rows(-3.25);
+  v1::BackgroundJob& salvage = *status.add_jobs();
+  salvage.set_kind(v1::BackgroundJob::SALVAGE);
+  salvage.set_session("candle");
+  salvage.set_state(v1::BackgroundJob::RUNNING);
+  salvage.set_fraction(.34);
+  v1::BackgroundJob& waits = *status.add_jobs();
+  waits.set_kind(v1::BackgroundJob::COMPRESS);
+  waits.set_session("torch");
+  waits.set_state(v1::BackgroundJob::WAITING);
   api_.board().show(status);
   const test::VerbRun screen = run(add_status, {"status"});
   EXPECT_EQ(screen.exit_code, 0) << screen.err;
-  for (const char* words : {"bench", "locked, amber: cam1 drifts", "Look at cam1.", "camera lost cam2",
-                            "Plug it in.", "cam1", "-3.2 rows"}) {
+  for (const char* words :
+       {"bench", "locked, amber: cam1 drifts", "Look at cam1.", "camera lost cam2", "Plug it in.", "cam1",
+        "-3.2 rows", "salvage of candle: 34 % done", "compression of torch: waits"}) {
     EXPECT_THAT(screen.out, HasSubstr(words));
   }
   const json printed = json::parse(run(add_status, {"status", "--json"}).out);
   EXPECT_EQ(printed["faults"][0]["remedy"], "Plug it in.");
   EXPECT_EQ(printed["next_step"], "Look at cam1.") << "named as in the .proto";
+}
+
+TEST_F(DaemonVerbs, StatusSaysWhatToSetAStrobeWithADialToAndWhatItDoes) {
+  v1::DaemonStatus status = status_in(v1::ALIGNING);
+  v1::StrobeStatus& strobe = *status.mutable_strobe();
+  strobe.set_id("manual");
+  strobe.set_light(v1::AMBER);
+  strobe.set_by_hand(true);
+  strobe.mutable_settings()->set_output(v1::StrobeState::FLASHING);
+  strobe.mutable_settings()->set_rate_hz(1438.6 / 60);
+  strobe.set_measured_hz(1510.5 / 60);
+  strobe.set_reason("turn it down");
+  api_.board().show(status);
+  EXPECT_THAT(
+      run(add_status, {"status"}).out,
+      HasSubstr("set by hand, amber: to 1438.6 a minute (23.9767 Hz), measured 1510.5 (25.175 Hz). Turn it"));
+}
+
+TEST_F(DaemonVerbs, ConsolePrintsALinkAloneAndBesideItWhatItIsGoodFor) {
+  const test::VerbRun nowhere = run(add_console, {"console"});
+  EXPECT_EQ(nowhere.exit_code, 1);
+  EXPECT_THAT(nowhere.err, HasSubstr("http_listen"));
+  sessions_->serve_at("http://127.0.0.1:7140");
+  const test::VerbRun link = run(add_console, {"console"});
+  EXPECT_EQ(link.exit_code, 0) << link.err;
+  EXPECT_THAT(link.out, testing::MatchesRegex("http://127\\.0\\.0\\.1:7140/open\\?link=[0-9a-f]{64}\n"));
+  EXPECT_THAT(link.err, HasSubstr("once, within 120 s"));
+  const json printed = json::parse(run(add_console, {"console", "--json"}).out);
+  EXPECT_NE(printed["url"].get<std::string>() + "\n", link.out) << "each is another";
 }
 
 TEST_F(DaemonVerbs, AStatusThatIsRedIsTheExitCodeToo) {
@@ -202,7 +245,7 @@ TEST_F(DaemonVerbs, RecordFollowsToTheVerdict) {
   const test::VerbRun result = run(add_record, {"record", "candle", "--seconds", "2", "--reconstruct"});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("24 frames"));
-  EXPECT_THAT(result.out, HasSubstr("48 frames, none lost"));
+  EXPECT_THAT(result.out, HasSubstr("48 frames recorded, none lost"));
   EXPECT_THAT(result.out, HasSubstr("The books agree."));
   EXPECT_THAT(api_.calls().front(), HasSubstr("name: \"candle\""));
   EXPECT_THAT(api_.calls().front(), HasSubstr("seconds: 2"));

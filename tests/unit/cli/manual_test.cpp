@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "cli/manual.h"
 
 #include <filesystem>
@@ -5,8 +6,9 @@
 
 #include <gmock/gmock.h>
 
+#include "base/roff.h"
 #include "cli/commands.h"
-#include "daemon/config/manual.h"
+#include "rig/config/manual.h"
 #include "tests/support/recording.h"
 #include "tests/support/shell.h"
 
@@ -38,7 +40,7 @@ TEST_F(Manual, ThePageHoldsEveryVerbAndOptionThatHelpShows) {
 TEST_F(Manual, PagesAreGoodRoff) {
   const test::TempFolder folder;
   const fs::path page = folder / "page.roff";
-  for (const std::string& text : {manual_page(app_, "1"), config_manual("1")}) {
+  for (const std::string& text : {manual_page(app_, "1"), rig::config_manual("1")}) {
     std::ofstream(page) << text;
     EXPECT_EQ(shell("LC_ALL=C.UTF-8 groff -man -Tutf8 -ww -z '" + page.string() + "' 2>&1").output, "");
     const std::string shown =
@@ -49,7 +51,7 @@ TEST_F(Manual, PagesAreGoodRoff) {
 }
 
 TEST(ConfigManual, EveryKeyIsThere) {
-  const std::string page = config_manual("1");
+  const std::string page = rig::config_manual("1");
   for (const char* part :
        {"[rig.strobe]", "[[rig.camera]]", "flash_width_us", "A number from 0.1 to 10000", "\"100rows\""})
     EXPECT_THAT(page, HasSubstr(roff(part)));

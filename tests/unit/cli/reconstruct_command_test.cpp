@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -12,11 +13,13 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "base/output_folder.h"
 #include "base/unique_fd.h"
 #include "cli/commands.h"
-#include "daemon/reconstruction/messages.h"
 #include "recon/calibrate/pose.h"
 #include "recon/export/picture.h"
+#include "recon/export/volume_file.h"
+#include "session/child_messages.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -40,11 +43,11 @@ class ReconstructCommandTest : public testing::Test {
 
   void add_view(int i) {
     const Eigen::Vector3d centre(0.5 * std::cos(1.3 * i), 0.5 * std::sin(1.3 * i), 0.1 * (i - 2));
-    const CameraModel camera = look_at({{64, 48}, 80, 80, 32, 24, {}}, centre, {0, 0, 0});
+    const recon::CameraModel camera = recon::look_at({{64, 48}, 80, 80, 32, 24, {}}, centre, {0, 0, 0});
     Image picture(ImageLayout{{64, 48}, PixelFormat::rgb8, 8});
     for (int y = 0; y < 48; ++y) {
       for (int x = 0; x < 64; ++x) {
-        const Ray ray = camera.ray({x + 0.5, y + 0.5});
+        const recon::Ray ray = camera.ray({x + 0.5, y + 0.5});
         const double distance = ray.origin.cross(ray.direction).norm();
         const double light = 220 * std::exp(-distance * distance / (2 * 0.02 * 0.02));
         for (int c = 0; c < 3; ++c)
@@ -52,8 +55,8 @@ class ReconstructCommandTest : public testing::Test {
       }
     }
     const std::string name = "view" + std::to_string(i) + ".png";
-    ASSERT_TRUE(write_png(picture.view(), root_ / name).ok());
-    const Eigen::Matrix4d m = opengl_world_from_camera(camera.camera_from_world);
+    ASSERT_TRUE(recon::write_png(picture.view(), root_ / name).ok());
+    const Eigen::Matrix4d m = recon::opengl_world_from_camera(camera.camera_from_world);
     json matrix = json::array();
     for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
     document_["frames"].push_back({{"file_path", name}, {"transform_matrix", matrix}});
@@ -103,6 +106,30 @@ TEST_F(ReconstructCommandTest, WritesVolumeViewsAndReport) {
   EXPECT_THAT(result.out, HasSubstr("only 3 input views"));
 }
 
+TEST_F(ReconstructCommandTest, WithoutVoxelsItTakesTheKneeAndSaysHowToAskForMore) {
+  const Run result = run({"--hold-out", "1", "--device", "cpu", "--effects", "none"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const json choice = report()["voxel_choice"];
+  EXPECT_EQ(choice["rule"], "knee");
+  EXPECT_THAT(result.out, HasSubstr("--voxels paper"));
+  EXPECT_THAT(result.out, HasSubstr(choice["words"][0].get<std::string>()));
+  const Run paper = run({"--voxels", "paper", "--device", "cpu", "--effects", "none", "--iterations", "1"});
+  ASSERT_EQ(paper.exit_code, 0) << paper.err;
+  EXPECT_EQ(report()["voxel_choice"]["rule"], "paper");
+  EXPECT_EQ(report()["voxels"][0], choice["by_the_paper"]);
+}
+
+TEST_F(ReconstructCommandTest, ThePapersSolverSaysWhereItIsNotThePapers) {
+  const Run result = run({"--solver", "paper", "--voxels", "12", "--iterations", "2", "--device", "cpu"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("T starts at the hull, not at the volume's face; "));
+  EXPECT_GE(report()["deviations"].size(), 6U);
+  fs::remove_all(root_ / "out");
+  expect_refused(
+      run({"--solver", "paper", "--voxels", "12", "--device", "cpu", "--effects", "exposure=0.01"}),
+      "exposure");
+}
+
 TEST_F(ReconstructCommandTest, APlanFindsTheBoxAndShowsItOnThePictures) {
   document_.erase("box");
   save();
@@ -118,7 +145,7 @@ TEST_F(ReconstructCommandTest, APlanFindsTheBoxAndShowsItOnThePictures) {
 /// Everything that `emberlock reconstruct --progress-fd` told.
 std::vector<v1::ChildMessage> read_messages(const fs::path& path) {
   std::vector<v1::ChildMessage> messages;
-  ChildMessageParser parser;
+  session::ChildMessageParser parser;
   const Status status = parser.add(
       read_file(path).value(), [&](v1::ChildMessage&& message) { messages.push_back(std::move(message)); });
   EXPECT_TRUE(status.ok());
@@ -232,6 +259,46 @@ TEST_F(ReconstructCommandTest, ABoxThatIsNoneIsRefused) {
   }
 }
 
+/// The same scene in other units of length: what is found doesn't depend on them.
+TEST_F(ReconstructCommandTest, BoxesOfEverySizeAreFoundAlike) {
+  const json metres = document_;
+  double expected = 0;
+  for (const double scale : {1.0, 1e-3, 5e-3, 0.1, 50.0}) {  // of a box of 20 cm
+    document_ = metres;
+    for (int i = 0; i < 3; ++i) document_["box"]["size"][i] = 0.2 * scale;
+    for (json& frame : document_["frames"])
+      for (int row = 0; row < 3; ++row)
+        frame["transform_matrix"][row][3] = scale * frame["transform_matrix"][row][3].get<double>();
+    save();
+    const Run result = run({"--voxels", "16", "--hold-out", "1", "--device", "cpu", "--effects", "none"});
+    ASSERT_EQ(result.exit_code, 0) << scale << result.err;
+    const double error = report()["heldout_rmse"][0];
+    if (scale == 1) expected = error;
+    EXPECT_NEAR(error, expected, 0.02 * expected) << scale;
+    const auto volume = recon::read_volume(root_ / "out" / "volume.vdb");
+    ASSERT_TRUE(volume.ok()) << volume.error().message();
+    EXPECT_NEAR(volume->grid.edge, 0.2 * scale / 16, 1e-6 * scale);
+    EXPECT_NEAR(volume->grid.origin[0], -0.1 * scale, 1e-6 * scale);
+  }
+}
+
+TEST_F(ReconstructCommandTest, ABoxThatSinglePrecisionCannotHoldIsRefused) {
+  expect_refused(run({"--box", "1e6,0,0,.2,.2,.2"}), "world's origin");
+  expect_refused(run({"--box", "0,0,0,1e-5,1e-5,1e-5"}), "lengths in metres");
+  for (json& frame : document_["frames"])
+    frame["transform_matrix"][2][3] = 5e5 + frame["transform_matrix"][2][3].get<double>();
+  document_["box"]["center"][2] = 5e5;
+  save();
+  expect_refused(run({}), "world's origin");
+  document_.erase("box");
+  save();
+  EXPECT_EQ(run({}).exit_code, 2);
+  EXPECT_EQ(test::run_verb(add_reconstruct, {"reconstruct", (root_ / "transforms.json").string(), "--plan",
+                                             (root_ / "plan").string()})
+                .exit_code,
+            2);
+}
+
 TEST_F(ReconstructCommandTest, HoldOutOutOfRangeOrEverythingIsRefused) {
   expect_refused(run({"--hold-out", "5"}), "0 to 4");
   expect_refused(run({"--hold-out", "0,1,2,3,4"}), "every view");
@@ -277,7 +344,7 @@ TEST_F(ReconstructCommandTest, AFolderOfSomebodyElsesIsNotTouched) {
   std::ofstream(root_ / "out" / "thesis.tex") << "x";
   const Run result = run({"--voxels", "8"});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.err, HasSubstr("report.json"));
+  EXPECT_THAT(result.err, HasSubstr(kResultList));
   EXPECT_TRUE(fs::exists(root_ / "out" / "thesis.tex"));
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -19,7 +20,7 @@ using ::testing::HasSubstr;
 const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
 
 void damage(const std::filesystem::path& session) {
-  const auto path = find_segment(session, "cam0", 0);
+  const auto path = session::find_segment(session, "cam0", 0);
   std::string bytes = test::bytes_of(path);
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
   test::put_bytes(path, bytes);

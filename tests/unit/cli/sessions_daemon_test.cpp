@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // `emberlock sessions` of the daemon's recordings, against a real server and a daemon without devices.
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -23,7 +24,7 @@ class SessionsOfDaemon : public test::GrpcServerTest {
   }
   /// Jobs end so.
   void end_with(bool ok, const std::string& report) {
-    api.on_job = [ok, report](const JobObserver& observer) {
+    api.on_job = [ok, report](const daemon::JobObserver& observer) {
       v1::JobProgress progress;
       progress.set_fraction(0.5);
       progress.set_doing("reads");
@@ -87,7 +88,7 @@ TEST_F(SessionsOfDaemon, OneThatIsNotWholeIsTheExitCodeAndItsReport) {
 }
 
 TEST_F(SessionsOfDaemon, AJobThatCanNotBeginIsToldInTheDaemonsWords) {
-  api.on_job = [](const JobObserver&) {
+  api.on_job = [](const daemon::JobObserver&) {
     return Error{ErrorKind::bad_input, "no such session", "candle", "`emberlock sessions list` shows them"};
   };
   const test::VerbRun result = run({"repair", "candle"});
@@ -96,14 +97,28 @@ TEST_F(SessionsOfDaemon, AJobThatCanNotBeginIsToldInTheDaemonsWords) {
   EXPECT_EQ(result.out, "");
 }
 
+TEST_F(SessionsOfDaemon, AJobThatFailsOnItsWayIsAFailureInTheDaemonsWords) {
+  api.on_job = [](const daemon::JobObserver& observer) -> Status {
+    v1::JobProgress progress;
+    progress.set_fraction(.5);
+    for (int i = 0; i < 20; ++i) observer(progress);
+    return Error{ErrorKind::io, "no space left on device", "exports/flame", "Free space"};
+  };
+  for (const std::string verb : {"verify", "repair", "export"}) {
+    const test::VerbRun result = run({verb, "flame"});
+    EXPECT_EQ(result.exit_code, 1) << verb;
+    EXPECT_THAT(result.err, HasSubstr("exports/flame: no space left on device. Free space"));
+  }
+}
+
 TEST_F(SessionsOfDaemon, AJobThatEndsBeforeItIsDoneIsAFailure) {
-  api.on_job = [](const JobObserver& observer) {
+  api.on_job = [](const daemon::JobObserver& observer) {
     observer({});
     return Status();
   };
   const test::VerbRun result = run({"verify", "flame"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.err, HasSubstr("flame: it was ended before it was done"));
+  EXPECT_THAT(result.err, HasSubstr("it ended without saying what came of it"));
 }
 
 TEST_F(SessionsOfDaemon, TheDaemonChoosesWhereItExports) {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -9,10 +10,10 @@
 
 #include "base/file.h"
 #include "cli/commands.h"
-#include "cli/tradeoff_report.h"
 #include "recon/calibrate/pose.h"
 #include "recon/export/picture.h"
 #include "recon/preprocess/radiance.h"
+#include "report/tradeoff_report.h"
 #include "tests/support/small_flame.h"
 #include "tests/support/verb.h"
 
@@ -25,19 +26,19 @@ using testing::Not;
 
 /// The small flame as files, the eleventh view standing between two of the others.
 void write_scene(const fs::path& folder) {
-  const Scene scene = small_flame_scene();
+  const recon::Scene scene = small_flame_scene();
   json frames = json::array();
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    const View& view = scene.views[i];
+    const recon::View& view = scene.views[i];
     const std::string name = "view" + std::to_string(i) + ".png";
-    ASSERT_TRUE(write_png(to_rgb8(view.image).view(), folder / name).ok());
-    const Eigen::Matrix4d m = opengl_world_from_camera(view.camera.camera_from_world);
+    ASSERT_TRUE(recon::write_png(recon::to_rgb8(view.image).view(), folder / name).ok());
+    const Eigen::Matrix4d m = recon::opengl_world_from_camera(view.camera.camera_from_world);
     json matrix = json::array();
     for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
     frames.push_back({{"file_path", name}, {"transform_matrix", matrix}});
   }
-  const Intrinsics& lens = scene.views[0].camera.intrinsics;
-  const Box& box = scene.box;
+  const recon::Intrinsics& lens = scene.views[0].camera.intrinsics;
+  const recon::Box& box = scene.box;
   const json document{{"fl_x", lens.fx},
                       {"fl_y", lens.fy},
                       {"cx", lens.cx},
@@ -86,7 +87,7 @@ const std::vector<std::string> kSmall{"--hold-out",  "10",      "--voxels",     
 TEST_F(TradeoffCommandTest, SweepsAndWritesThreeFiles) {
   const Run result = tradeoff(kSmall);
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  const auto points = parse_csv(file("points.csv"));
+  const auto points = recon::parse_csv(file("points.csv"));
   ASSERT_TRUE(points.ok());
   EXPECT_EQ(points->size(), 4);  // two runs of two iterations
   const std::string page = file("index.html");
@@ -110,12 +111,12 @@ TEST_F(TradeoffCommandTest, AnEarlierResultIsReplacedAndSomebodyElsesFolderIsNot
 
 TEST_F(TradeoffCommandTest, ThePrintedCommandRepeatsThePoint) {
   ASSERT_EQ(tradeoff(kSmall).exit_code, 0);
-  const WorkPoint p = parse_csv(file("points.csv"))->at(1);
+  const recon::WorkPoint p = recon::parse_csv(file("points.csv"))->at(1);
   std::vector<std::string> words{"reconstruct", (root_ / "transforms.json").string(),
                                  "--out",       (root_ / "again").string(),
                                  "--hold-out",  "10",
                                  "--device",    "cpu"};
-  std::istringstream options(command_options(p.settings));
+  std::istringstream options(recon::command_options(p.settings));
   for (std::string word; options >> word;) words.push_back(word);
   const Run result = run(words);
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -173,31 +174,42 @@ TEST_F(TradeoffCommandTest, ReconstructRefusesStepsPrecisionsAndViewsThatAreNone
   expect_refused(with("--views", "12"), "--views");
 }
 
+TEST_F(TradeoffCommandTest, AShippedFrontReplacesNoFileOfSomebodyElses) {
+  const fs::path notes = root_ / "notes.txt";
+  std::ofstream(notes) << "measured by hand";
+  expect_refused(run({"tradeoff", "recon", "--ship", notes.string()}), "no shipped front");
+  EXPECT_EQ(*read_file(notes), "measured by hand");
+}
+
 TEST(TradeoffDiagram, MarksEachPointOfTheFrontAndNoOther) {
-  const auto at = [](double seconds, double error) { return WorkPoint{{.voxels = 64}, seconds, error}; };
-  const std::string svg = tradeoff_svg({at(0.1, 9), at(1, 3), at(2, 4), at(10, 2)});
+  const auto at = [](double seconds, double error) {
+    return recon::WorkPoint{{.voxels = 64}, seconds, error};
+  };
+  const std::string svg = report::tradeoff_svg({at(0.1, 9), at(1, 3), at(2, 4), at(10, 2)});
   std::size_t rings = 0;
   for (std::size_t i = svg.find("<circle class=\"front\""); i != std::string::npos;
        i = svg.find("<circle class=\"front\"", i + 1))
     ++rings;
   EXPECT_EQ(rings, 3);
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
-  EXPECT_THAT(tradeoff_svg({at(1, 3)}), Not(HasSubstr("nan")));
+  EXPECT_THAT(report::tradeoff_svg({at(1, 3)}), Not(HasSubstr("nan")));
 }
 
 TEST(TradeoffDiagram, SaysWhatASecondBuysAndWhereItEnds) {
-  const auto at = [](double seconds, double error) { return WorkPoint{{.voxels = 64}, seconds, error}; };
-  const std::string words = what_a_second_buys({at(1, 8), at(2, 4), at(4, 3.99), at(20, 5)});
+  const auto at = [](double seconds, double error) {
+    return recon::WorkPoint{{.voxels = 64}, seconds, error};
+  };
+  const std::string words = report::what_a_second_buys({at(1, 8), at(2, 4), at(4, 3.99), at(20, 5)});
   EXPECT_EQ(words,
             "Within 1 s the held-out error falls to 8.0 grey levels, within 2 s to 4.0; going on to 20 s "
             "buys no more.");
 }
 
 TEST(TradeoffReport, InputNamesCannotBecomeMarkup) {
-  Tradeoff tradeoff{"<script>.json", "", "test", {}};
+  report::Tradeoff tradeoff{"<script>.json", "", "test", {}};
   tradeoff.sweep.points = {{{.voxels = 64}, 1, 2}};
   tradeoff.sweep.run = {0};
-  EXPECT_THAT(tradeoff_html(tradeoff), Not(HasSubstr("<script>")));
+  EXPECT_THAT(report::tradeoff_html(tradeoff), Not(HasSubstr("<script>")));
 }
 
 }  // namespace

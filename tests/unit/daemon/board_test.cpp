@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What watchers read: the newest alone, told of at once, and nothing to one that has gone.
 #include "daemon/board.h"
 
@@ -8,7 +9,7 @@
 
 #include "tests/support/fake_api.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using testing::ElementsAre;
@@ -135,4 +136,4 @@ TEST(FakeApi, RemembersWhatItWasAsked) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

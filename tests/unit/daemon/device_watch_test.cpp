@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/engine/device_watch.h"
 
 #include <variant>
@@ -5,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using Shown = v1::CameraStatus;
@@ -23,6 +24,8 @@ std::vector<std::string> in_short(const std::vector<Happening>& happenings) {
       EXPECT_THAT(raised->what, Not(IsEmpty()));
       EXPECT_THAT(raised->remedy, Not(IsEmpty()));
       all.push_back("raised " + v1::Fault::Kind_Name(raised->key.kind) + " " + raised->key.subject);
+    } else if (const auto* ended = std::get_if<CameraEnded>(&happening)) {
+      all.push_back("ended " + ended->id);
     } else {
       const FaultKey key = std::get<FaultMended>(happening).key;
       all.push_back("mended " + v1::Fault::Kind_Name(key.kind) + " " + key.subject);
@@ -46,7 +49,6 @@ TEST_F(Watching, ACameraThatGoesAndComesBackIsToldOnceEachTime) {
   EXPECT_THAT(cameras({Shown::LOST, Shown::FILMING}), ElementsAre("raised CAMERA_LOST left"));
   EXPECT_THAT(cameras({Shown::LOST, Shown::FILMING}), IsEmpty());
   EXPECT_FALSE(watch_.all_film());
-  EXPECT_FALSE(watch_.none_films());
   EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), ElementsAre("mended CAMERA_LOST left"));
   EXPECT_THAT(cameras({Shown::FILMING, Shown::FILMING}), IsEmpty());
   EXPECT_TRUE(watch_.all_film());
@@ -64,15 +66,21 @@ TEST_F(Watching, WithTheLastCameraAllAreLostUntilTheFirstIsBack) {
   cameras({Shown::LOST, Shown::FILMING});
   EXPECT_THAT(cameras({Shown::LOST, Shown::QUARANTINED}),
               ElementsAre("raised CAMERA_HANGS right", "raised ALL_CAMERAS_LOST "));
-  EXPECT_TRUE(watch_.none_films());
   EXPECT_THAT(cameras({Shown::LOST, Shown::QUARANTINED}), IsEmpty());
   EXPECT_THAT(cameras({Shown::FILMING, Shown::QUARANTINED}),
               ElementsAre("mended CAMERA_LOST left", "mended ALL_CAMERAS_LOST "));
 }
 
+TEST_F(Watching, AReplayThatEndsIsToldOnceAndIsNoLostCamera) {
+  EXPECT_THAT(cameras({Shown::ENDED, Shown::FILMING}), ElementsAre("ended left"));
+  EXPECT_THAT(cameras({Shown::ENDED, Shown::FILMING}), IsEmpty());
+  EXPECT_THAT(cameras({Shown::ENDED, Shown::ENDED}), ElementsAre("ended right"));
+  EXPECT_TRUE(watch_.all_film());
+  EXPECT_THAT(cameras({Shown::ENDED, Shown::LOST}), ElementsAre("raised CAMERA_LOST right"));
+}
+
 TEST_F(Watching, ACameraThatIsStoppedOnPurposeIsNotLost) {
   EXPECT_THAT(cameras({Shown::STOPPED, Shown::STOPPED}), IsEmpty());
-  EXPECT_FALSE(watch_.none_films());
 }
 
 TEST_F(Watching, ASilentStrobeIsToldOnceAndAgainWhenItsTroubleChanges) {
@@ -102,7 +110,7 @@ TEST_F(Watching, AWallClockThatIsMovedIsToldOnceByHowMuchAndWhatToDo) {
 
 TEST_F(Watching, RatesCountEveryFrameThatTheCameraMadeOverTwoSeconds) {
   watch_.frames({{}, {}}, at(0));
-  FrameCounts left;
+  drivers::FrameCounts left;
   left.delivered = 40;
   left.transport = 8;
   watch_.frames({left, {}}, at(1));
@@ -113,4 +121,4 @@ TEST_F(Watching, RatesCountEveryFrameThatTheCameraMadeOverTwoSeconds) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

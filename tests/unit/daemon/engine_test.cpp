@@ -1,18 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
 // The conductor on its thread, asked by others.
 #include "daemon/engine/engine.h"
 
 #include <thread>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include "base/unique_fd.h"
+#include "daemon/work/upkeep.h"
+#include "session/files.h"
 #include "session/verify.h"
 #include "tests/support/small_daemon.h"
 #include "tests/support/wait.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using test::small_config;
@@ -35,12 +41,12 @@ class EngineThread : public ::testing::Test {
   }
   [[nodiscard]] std::filesystem::path sessions() const { return config_.recording.folder; }
   /// A session of an earlier daemon's.
-  void left_by_another(const std::string& session, Encoding encoding) const {
+  void left_by_another(const std::string& session, session::Encoding encoding) const {
     test::record(sessions() / session, kLeftLayout, 20, test::small_disk_options(encoding));
   }
 
   test::TempFolder temp_;
-  DaemonConfig config_ = small_config(temp_.path());
+  rig::DaemonConfig config_ = small_config(temp_.path());
   Board board_;
   std::unique_ptr<Engine> engine_;
 };
@@ -77,11 +83,11 @@ TEST_F(EngineThread, WhatManyAskAtOnceIsDoneAndTheRecordingIsWhole) {
   }
   for (std::thread& client : clients) client.join();
   ASSERT_TRUE(engine_->stop_recording().ok());
-  EXPECT_TRUE(verify_session(sessions() / "take")->whole());
+  EXPECT_TRUE(session::verify_session(sessions() / "take")->whole());
 }
 
 TEST_F(EngineThread, AJobLeavesTheProcessorToOthersAndItsLastWordIsWhatCameOfIt) {
-  left_by_another("old", Encoding::ffv1);
+  left_by_another("old", session::Encoding::ffv1);
   start();
   const auto niceness = [] { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); };
   const int before = niceness();
@@ -103,27 +109,99 @@ TEST_F(EngineThread, EndedInMidRecordingItFinishesIt) {
   start();
   ASSERT_TRUE(engine_->record(take()).ok());
   engine_.reset();
-  const auto check = verify_session(sessions() / "take");
+  const auto check = session::verify_session(sessions() / "take");
   ASSERT_TRUE(check.ok()) << check.error().message();
   EXPECT_EQ(check->state, v1::Manifest::COMPLETE);
   EXPECT_TRUE(check->whole()) << check->to_do;
 }
 
 TEST_F(EngineThread, WhatAnEarlierDaemonLeftUncompressedIsCompressedFromTheStart) {
-  left_by_another("raw", Encoding::raw_nut);
-  left_by_another("compressed", Encoding::ffv1);
-  config_.recording.transcode = RecordingConfig::Transcode::when_idle;
+  left_by_another("raw", session::Encoding::raw_nut);
+  left_by_another("compressed", session::Encoding::ffv1);
+  config_.recording.transcode = rig::RecordingConfig::Transcode::when_idle;
   start();
   ASSERT_TRUE(wait_until([&] { return !board_.notices(0).empty(); }));
   EXPECT_THAT(board_.notices(0).front().text(), HasSubstr("raw: compressed and verified"));
   EXPECT_FALSE(is_uncompressed(sessions() / "raw"));
-  EXPECT_TRUE(verify_session(sessions() / "raw")->whole());
+  EXPECT_TRUE(session::verify_session(sessions() / "raw")->whole());
   EXPECT_EQ(board_.notices(0).size(), 1U);
 }
 
+TEST_F(EngineThread, WhatItRecordedUncompressedIsCompressedAndSaid) {
+  config_.recording.writer.encoding = session::Encoding::raw_nut;
+  config_.recording.transcode = rig::RecordingConfig::Transcode::when_idle;
+  start();
+  ASSERT_TRUE(engine_->record(take()).ok());
+  ASSERT_TRUE(engine_->stop_recording().ok());
+  ASSERT_TRUE(wait_until([&] {
+    const auto notices = board_.notices(0);
+    return std::any_of(notices.begin(), notices.end(), [](const v1::Notice& n) {
+      return n.text().find("take: compressed and verified") != std::string::npos;
+    });
+  }));
+  EXPECT_FALSE(is_uncompressed(sessions() / "take"));
+}
+
+TEST_F(EngineThread, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecordingMayBegin) {
+  {
+    auto writer = session::SessionWriter::create(sessions() / "killed", test::manifest_of({kLeftLayout}),
+                                                 test::small_disk_options());
+    ASSERT_TRUE(writer->write(0, test::noise_frame(kLeftLayout, 0)));
+  }
+  // Salvage waits for whoever would write this.
+  const auto index = session::index_path(sessions() / "killed", "cam0");
+  std::filesystem::remove(index);
+  ASSERT_EQ(::mkfifo(index.c_str(), 0600), 0);
+  start();
+  ASSERT_TRUE(wait_until([&] {
+    return board_.status()->jobs_size() == 1 &&
+           board_.status()->jobs(0).state() == v1::BackgroundJob::RUNNING;
+  }));
+  EXPECT_EQ(board_.status()->jobs(0).kind(), v1::BackgroundJob::SALVAGE);
+  EXPECT_EQ(board_.status()->jobs(0).session(), "killed");
+  v1::SessionRequest session;
+  session.set_session("killed");
+  v1::ExportRequest exporting;
+  exporting.set_session("killed");
+  v1::ReconstructRequest reconstruction;
+  reconstruction.set_session("killed");
+  const JobObserver nobody = [](const v1::JobProgress&) { return true; };
+  for (const Status& refused :
+       {engine_->verify_session(session, nobody), engine_->repair_session(session, nobody),
+        engine_->export_session(exporting, nobody), Status(engine_->reconstruct(reconstruction).error())}) {
+    ASSERT_FALSE(refused.ok());
+    EXPECT_EQ(refused.error().kind, ErrorKind::refused);
+    EXPECT_THAT(refused.error().message(), HasSubstr("salvaged"));
+    EXPECT_FALSE(refused.error().remedy.empty());
+  }
+  ASSERT_TRUE(engine_->record(take()).ok());
+  EXPECT_EQ(board_.status()->jobs(0).state(), v1::BackgroundJob::PAUSED);
+  EXPECT_EQ(engine_->stop_recording()->state(), v1::RecordingStatus::COMPLETE);
+  ASSERT_TRUE(wait_until(
+      [&] { return UniqueFd(::open(index.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC)).get() >= 0; }));
+  // It is no index: the operator is told.
+  ASSERT_TRUE(wait_until([&] { return board_.status()->faults_size() == 1; }));
+  EXPECT_EQ(board_.status()->faults(0).kind(), v1::Fault::SALVAGE_FAILED);
+  EXPECT_EQ(board_.status()->faults(0).subject(), "killed");
+  EXPECT_FALSE(board_.status()->faults(0).remedy().empty());
+  std::filesystem::remove(index);
+  EXPECT_TRUE(engine_->verify_session(session, nobody).ok());
+}
+
+TEST_F(EngineThread, EndedItRefusesWhatIsAskedAndStillFinishesItsRecording) {
+  start();
+  ASSERT_TRUE(engine_->record(take()).ok());
+  engine_->end();
+  ASSERT_TRUE(wait_until([&] { return engine_->ended(milliseconds(50)); }));
+  EXPECT_EQ(board_.status()->recording().state(), v1::RecordingStatus::COMPLETE);
+  EXPECT_EQ(engine_->align({}).error().kind, ErrorKind::refused);
+  EXPECT_EQ(engine_->record(take()).error().kind, ErrorKind::refused);
+  EXPECT_TRUE(session::verify_session(sessions() / "take")->whole());
+}
+
 TEST_F(EngineThread, WhereNothingIsToBeCompressedItStaysAsItWas) {
-  left_by_another("raw", Encoding::raw_nut);
-  config_.recording.transcode = RecordingConfig::Transcode::never;
+  left_by_another("raw", session::Encoding::raw_nut);
+  config_.recording.transcode = rig::RecordingConfig::Transcode::never;
   start();
   ASSERT_TRUE(engine_->strobe().ok());
   engine_.reset();
@@ -131,4 +209,4 @@ TEST_F(EngineThread, WhereNothingIsToBeCompressedItStaysAsItWas) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "daemon/engine/machine.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using ::testing::ElementsAre;
@@ -150,6 +151,19 @@ TEST(Machine, CountsThatDoNotAgreeAreRedUntilSomebodyKnows) {
   EXPECT_EQ(light(run.state()), v1::GREEN);
 }
 
+TEST(Machine, ARecordingWithoutAFrameIsRedAndHandedOnToNobody) {
+  Walk run({AskRecord{"take", true, true}, RecordingBegun{}, RecordingEnds{"no frame has come"}});
+  EXPECT_THAT(run.go(RecordingFinished{false, "not one frame came from any camera", true}).actions,
+              IsEmpty());
+  EXPECT_EQ(run.state().phase, v1::IDLE);
+  EXPECT_EQ(light(run.state()), v1::RED);
+  ASSERT_EQ(run.state().faults.size(), 1);
+  EXPECT_EQ(run.state().faults[0].kind(), v1::Fault::NOTHING_RECORDED);
+  EXPECT_FALSE(run.state().faults[0].remedy().empty());
+  run.go(AskAcknowledge{run.state().faults[0].id()});
+  EXPECT_EQ(light(run.state()), v1::GREEN);
+}
+
 TEST(Machine, ADiskThatRefusesARecordingLeavesTheRigAsItWas) {
   Walk run(kToLocked);
   run.go(AskRecord{"take"});
@@ -229,6 +243,8 @@ std::vector<Happening> everything() {
           RecordingEnds{"x"},
           RecordingFinished{true, "x"},
           RecordingFinished{false, "x"},
+          RecordingFinished{false, "x", true},
+          CameraEnded{"k"},
           ReconstructionEnded{true, "x"},
           ReconstructionEnded{false, "x"},
           FaultRaised{{v1::Fault::CAMERA_LOST, "k"}, v1::RED, "x", "y"},
@@ -292,4 +308,4 @@ TEST(Machine, NoOrderOfHappeningsLeadsAstray) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

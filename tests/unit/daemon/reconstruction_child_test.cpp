@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <chrono>
 #include <condition_variable>
 #include <csignal>
@@ -13,10 +14,10 @@
 
 #include "base/unique_fd.h"
 #include "daemon/reconstruction/child.h"
-#include "daemon/reconstruction/messages.h"
+#include "session/child_messages.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -46,7 +47,7 @@ class ReconstructionChildTest : public testing::Test {
     return *child_;
   }
   void message(const std::string& name, const v1::ChildMessage& message) const {
-    std::ofstream(root_ / name, std::ios::binary) << framed(message);
+    std::ofstream(root_ / name, std::ios::binary) << session::framed(message);
   }
   void done_message() const {
     v1::ChildMessage done;
@@ -269,4 +270,4 @@ TEST_F(ReconstructionChildTest, SessionsOutsideTheFolderAndValuesOutOfRangeAreRe
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

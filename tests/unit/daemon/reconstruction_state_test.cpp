@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <csignal>
 #include <limits>
@@ -8,7 +9,7 @@
 
 #include "daemon/reconstruction/state.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -143,4 +144,4 @@ TEST(ReconstructionState, AnEndWithoutAResultIsAFailure) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

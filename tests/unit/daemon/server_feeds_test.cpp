@@ -1,9 +1,10 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a watcher is told next, on a clock that the test moves.
 #include <gmock/gmock.h>
 
 #include "daemon/server/feeds.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 constexpr TimePoint kStart{1'000'000'000};
@@ -128,4 +129,4 @@ TEST(ServerFeeds, IterationsAreToldFromTheFirstOnAndThenThoseOfTheNextReconstruc
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

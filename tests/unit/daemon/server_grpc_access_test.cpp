@@ -1,6 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 // Who may ask over gRPC, and at which addresses: sockets that are taken or left behind, tokens, TLS from both
 // sides.
+#include <chrono>
 #include <fstream>
+#include <future>
 
 #include <gmock/gmock.h>
 #include <sys/socket.h>
@@ -10,7 +13,7 @@
 #include "tests/support/grpc_server.h"
 #include "tests/support/unix_socket.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using test::FakeApi;
@@ -58,7 +61,7 @@ TEST_F(ServerGrpcAccess, TheSocketIsForItsGroupAlone) {
 }
 
 TEST_F(ServerGrpcAccess, OverTcpWithoutTlsItRefusesToStart) {
-  const auto token = Token::parse("0123456789abcdef");
+  const auto token = rig::Token::parse("0123456789abcdef");
   ASSERT_TRUE(token.ok());
   const auto started = GrpcServer::start(api, {.tcp_address = "127.0.0.1:0", .token = *token});
   ASSERT_FALSE(started.ok());
@@ -70,7 +73,7 @@ class ServerGrpcTls : public ServerGrpcAccess {
  protected:
   void SetUp() override {
     options.tcp_address = "127.0.0.1:0";
-    options.tls = ServerTls{servers.issue("localhost")};
+    options.tls = rig::ServerTls{servers.issue("localhost")};
   }
   grpc::Status ask(const std::shared_ptr<grpc::ChannelCredentials>& credentials,
                    const std::string& authorization) {
@@ -81,7 +84,7 @@ class ServerGrpcTls : public ServerGrpcAccess {
                grpc::CreateChannel("localhost:" + std::to_string(server->tcp_port()), credentials))
         ->GetStatus(&context, {}, &status);
   }
-  std::shared_ptr<grpc::ChannelCredentials> trusting(const TlsIdentity& showing = {}) const {
+  std::shared_ptr<grpc::ChannelCredentials> trusting(const rig::TlsIdentity& showing = {}) const {
     return grpc::SslCredentials({servers.pem(), showing.key, showing.certificate});
   }
   test::CertificateAuthority servers{"who signs servers"};
@@ -95,7 +98,7 @@ TEST_F(ServerGrpcTls, WithoutATokenItRefusesToStart) {
 }
 
 TEST_F(ServerGrpcTls, TheRightTokenIsLetInAndNoOther) {
-  options.token = *Token::parse("0123456789abcdef");
+  options.token = *rig::Token::parse("0123456789abcdef");
   serve(options);
   EXPECT_TRUE(ask(trusting(), "Bearer 0123456789abcdef").ok());
   for (const char* wrong :
@@ -107,22 +110,61 @@ TEST_F(ServerGrpcTls, TheRightTokenIsLetInAndNoOther) {
 
 TEST_F(ServerGrpcTls, WithAnAuthorityForClientsWhoHasNoCertificateOfItsIsNotHeardAtAll) {
   const test::CertificateAuthority clients("who signs clients");
-  options.token = *Token::parse("0123456789abcdef");
+  options.token = *rig::Token::parse("0123456789abcdef");
   options.tls->clients = clients.pem();
   serve(options);
   EXPECT_TRUE(ask(trusting(clients.issue("operator")), "Bearer 0123456789abcdef").ok());
   EXPECT_EQ(ask(trusting(clients.issue("operator")), "Bearer 0123456789abcdeF").error_code(),
             grpc::UNAUTHENTICATED);
-  for (const TlsIdentity& wrong : {TlsIdentity{}, servers.issue("operator")})
+  for (const rig::TlsIdentity& wrong : {rig::TlsIdentity{}, servers.issue("operator")})
     EXPECT_EQ(ask(trusting(wrong), "Bearer 0123456789abcdef").error_code(), grpc::UNAVAILABLE);
 }
 
+TEST_F(ServerGrpcTls, GuessesAreCountedAndSlowedAndTheRightTokenIsNot) {
+  options.token = *rig::Token::parse("0123456789abcdef");
+  options.failures = std::make_shared<AuthFailures>();
+  serve(options);
+  constexpr int kGuesses = AuthFailures::kFree + 4;
+  const auto begun = std::chrono::steady_clock::now();
+  for (int i = 0; i < kGuesses; ++i)
+    EXPECT_EQ(ask(trusting(), "Bearer 0123456789abcdeF").error_code(), grpc::UNAUTHENTICATED);
+  EXPECT_GT(std::chrono::steady_clock::now() - begun, std::chrono::milliseconds(1500))
+      << "0.1 + .2 + .4 + .8 s";
+  auto guess = std::async(std::launch::async, [&] { return ask(trusting(), "Bearer 0123456789abcdeF"); });
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(ask(trusting(), "Bearer 0123456789abcdef").ok());
+  EXPECT_EQ(guess.get().error_code(), grpc::UNAUTHENTICATED);
+  EXPECT_EQ(options.failures->counts().at("grpc")[static_cast<std::size_t>(Refusal::wrong_token)],
+            kGuesses + 1U);
+}
+
+TEST_F(ServerGrpcTls, LinksToTheConsoleAreGivenOverTheUnixSocketAlone) {
+  options.token = *rig::Token::parse("0123456789abcdef");
+  options.socket = socket;
+  options.sessions = std::make_shared<ConsoleSessions>();
+  serve(options);
+  const auto open = [&](const std::shared_ptr<grpc::Channel>& by, v1::ConsoleLink& link) {
+    grpc::ClientContext context;
+    context.AddMetadata("authorization", "Bearer 0123456789abcdef");
+    return v1::Daemon::NewStub(by)->OpenConsole(&context, {}, &link);
+  };
+  v1::ConsoleLink link;
+  EXPECT_EQ(open(channel(), link).error_code(), grpc::FAILED_PRECONDITION) << "no console is served";
+  options.sessions->serve_at("http://127.0.0.1:7140");
+  ASSERT_TRUE(open(channel(), link).ok());
+  EXPECT_THAT(link.url(), testing::StartsWith("http://127.0.0.1:7140/open?link="));
+  EXPECT_EQ(link.valid_s(), 120);
+  const auto network = grpc::CreateChannel("localhost:" + std::to_string(server->tcp_port()), trusting());
+  const grpc::Status refused = open(network, link);
+  EXPECT_EQ(refused.error_code(), grpc::PERMISSION_DENIED);
+  EXPECT_THAT(refused.error_message(), HasSubstr("Unix socket"));
+}
+
 TEST_F(ServerGrpcTls, ATakenPortIsAnErrorAndNotShared) {
-  options.token = *Token::parse("0123456789abcdef");
+  options.token = *rig::Token::parse("0123456789abcdef");
   serve(options);
   options.tcp_address = "127.0.0.1:" + std::to_string(server->tcp_port());
   EXPECT_FALSE(GrpcServer::start(api, options).ok());
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Calls over gRPC, from a real client to a real server: what is asked arrives, what is wrong is said, and
 // nobody who stalls or goes holds the others up.
 #include <atomic>
@@ -11,7 +12,7 @@
 #include "tests/support/grpc_server.h"
 #include "tests/support/wait.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using test::wait_until;
@@ -165,4 +166,4 @@ TEST_F(ServerGrpcCalls, HealthFollowsTheEngine) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Streams over gRPC, from a real server to real clients: what changes is told, the newest alone, and nobody
 // who vanishes or stalls costs the others anything.
 #include <array>
@@ -12,7 +13,7 @@
 #include "tests/support/unix_socket.h"
 #include "tests/support/wait.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using test::wait_until;
@@ -220,4 +221,4 @@ TEST_F(ServerGrpcWatch, TooManyWatchersAreRefused) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The console's server, asked by a client that says whatever bytes a test likes.
 #include <atomic>
 #include <chrono>
@@ -15,7 +16,7 @@
 #include "tests/support/recording.h"
 #include "tests/support/wait.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using nlohmann::json;
@@ -41,6 +42,7 @@ class ServerHttpTest : public testing::Test {
   void serve(HttpServerOptions options = {}) {
     if (options.listen == HttpServerOptions().listen) options.listen = "127.0.0.1:0";
     options.console = folder / "console";
+    options.token = *rig::Token::parse(test::kHttpToken);
     auto started = HttpServer::start(api, std::move(options));
     ASSERT_TRUE(started.ok()) << started.error().message();
     server = std::move(started).value();
@@ -56,7 +58,7 @@ class ServerHttpTest : public testing::Test {
     api.on_job = std::ref(job);
     UniqueFd client = test::connect_to(port);
     test::send_all(client,
-                   "POST /api/v1/Sessions/Export HTTP/1.1\r\nHost: localhost\r\nContent-Length: 0\r\n\r\n");
+                   "POST /api/v1/Sessions/Export HTTP/1.1\r\n" + test::kLetIn + "Content-Length: 0\r\n\r\n");
     EXPECT_TRUE(wait_until([&] { return job.begun(); }));
     return client;
   }
@@ -88,7 +90,7 @@ TEST_F(ServerHttpTest, WhatABrowserHasAlreadyIsNotSentAgain) {
   const std::size_t at = page.head.find("ETag: ");
   ASSERT_NE(at, std::string::npos);
   const std::string tag = page.head.substr(at + 6, page.head.find("\r\n", at) - at - 6);
-  const HttpAnswer again = ask(port, "GET", "/", "", "Host: localhost\r\nIf-None-Match: " + tag + "\r\n");
+  const HttpAnswer again = ask(port, "GET", "/", "", test::kLetIn + "If-None-Match: " + tag + "\r\n");
   EXPECT_EQ(again.status, 304);
   EXPECT_THAT(again.body, IsEmpty());
   const HttpAnswer head = ask(port, "HEAD", "/");
@@ -161,8 +163,7 @@ TEST_F(ServerHttpTest, WhatIsNoRequestOfOursIsRefusedAndNeverReachesTheApi) {
 TEST_F(ServerHttpTest, OversizedAndMalformedRequestsAreRefused) {
   serve();
   EXPECT_EQ(ask(port, "GET", "/" + std::string(20'000, 'a')).status, 431);
-  EXPECT_EQ(ask(port, "GET", "/", "", "Host: localhost\r\nX: " + std::string(20'000, 'a') + "\r\n").status,
-            431);
+  EXPECT_EQ(ask(port, "GET", "/", "", test::kLetIn + "X: " + std::string(20'000, 'a') + "\r\n").status, 431);
   EXPECT_EQ(ask(port, "POST", "/api/v1/Sync/Align", std::string(2'000'000, ' ')).status, 413);
   EXPECT_EQ(ask_raw(port, "this is no HTTP\r\n\r\n").status, 400);
   EXPECT_EQ(ask_raw(port, std::string("\x16\x03\x01\x02\x00\x01", 6) + std::string(500, '\0')).status, 400);
@@ -176,20 +177,11 @@ TEST_F(ServerHttpTest, AClientThatDawdlesIsCutOff) {
   test::send_all(in_head, "GET / HTTP/1.1\r\nHost:");
   const UniqueFd in_body = test::connect_to(port);
   test::send_all(in_body,
-                 "POST /api/v1/Sync/Stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 10\r\n\r\n{");
+                 "POST /api/v1/Sync/Stop HTTP/1.1\r\n" + test::kLetIn + "Content-Length: 10\r\n\r\n{");
   // Each ends, without an answer.
   for (const UniqueFd* socket : {&idle, &in_head, &in_body})
     EXPECT_THAT(test::read_to_end(*socket), IsEmpty());
   EXPECT_EQ(ask(port, "GET", "/").status, 200);
-}
-
-TEST_F(ServerHttpTest, BeyondTheMostConnectionsNoneIsTaken) {
-  serve({.connections = 1});
-  {
-    const UniqueFd first = test::connect_to(port);
-    ASSERT_TRUE(wait_until([&] { return ask(port, "GET", "/").status == 0; }));
-  }
-  EXPECT_TRUE(wait_until([&] { return ask(port, "GET", "/").status == 200; }));
 }
 
 TEST_F(ServerHttpTest, BeyondTheQueueCallsAreRefused) {
@@ -212,8 +204,9 @@ TEST_F(ServerHttpTest, BeyondTheQueueCallsAreRefused) {
 
 TEST_F(ServerHttpTest, AnotherSitesPageAndAForeignNameAreTurnedAway) {
   serve();
+  const std::string kShown = std::string("Authorization: Bearer ") + test::kHttpToken + "\r\n";
   const auto status_for = [&](const std::string& headers) {
-    return ask(port, "POST", "/api/v1/Sync/Stop", "", headers).status;
+    return ask(port, "POST", "/api/v1/Sync/Stop", "", headers + kShown).status;
   };
   EXPECT_EQ(status_for("Host: localhost:7140\r\nOrigin: http://localhost:7140\r\n"), 200);
   EXPECT_EQ(status_for("Host: 127.0.0.1\r\n"), 200);
@@ -244,6 +237,43 @@ TEST_F(ServerHttpTest, AJobThatCannotBeginIsAnError) {
   EXPECT_EQ(ask(port, "POST", "/api/v1/Sessions/Repair", "x").status, 400);
 }
 
+TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
+  std::atomic<bool> seen = false;
+  api.on_job = [&](const JobObserver& observer) -> Status {
+    v1::JobProgress progress;
+    progress.set_doing("writes");
+    observer(progress);
+    wait_until([&] { return seen.load(); });
+    return Error{ErrorKind::io, "no space left on device", "exports/flame", "Free space"};
+  };
+  serve();
+  for (const char* job : {"Verify", "Repair", "Export"}) {
+    seen = false;
+    const UniqueFd client = test::connect_to(port);
+    test::send_all(client, std::string("POST /api/v1/Sessions/") + job + " HTTP/1.1\r\n" + test::kLetIn +
+                               "Content-Length: 0\r\n\r\n");
+    std::string answer;
+    for (char c = 0; answer.find("writes") == std::string::npos && ::read(client.get(), &c, 1) == 1;)
+      answer += c;
+    seen = true;
+    answer += test::read_to_end(client);
+    EXPECT_THAT(answer, HasSubstr("HTTP/1.1 200"));
+    EXPECT_THAT(answer, HasSubstr(R"({"code":"INTERNAL","message":"exports/flame: no space left on device. )"
+                                  "Free space\"}\n\r\n0\r\n\r\n"))
+        << job;
+  }
+}
+
+TEST_F(ServerHttpTest, AJobThatEndsWithoutSayingWhatCameOfItIsAnError) {
+  api.on_job = [](const JobObserver& observer) {
+    observer({});
+    return Status();
+  };
+  serve();
+  const HttpAnswer answer = ask(port, "POST", "/api/v1/Sessions/Verify", R"({"session": "s"})");
+  EXPECT_THAT(answer.body, HasSubstr(R"("code":"INTERNAL")"));
+}
+
 TEST_F(ServerHttpTest, AJobEndsWhenItsClientGoesInMidStream) {
   test::EndlessJob endless;
   serve();
@@ -264,6 +294,8 @@ TEST_F(ServerHttpTest, HealthAndMetricsFollowTheEngine) {
   EXPECT_EQ(ask(port, "GET", "/healthz").status, 503);
   show(v1::LOCKED);
   EXPECT_EQ(ask(port, "GET", "/healthz").status, 200);
+  EXPECT_EQ(ask(port, "POST", "/healthz", std::string(1 << 20, 'x')).status, 413)
+      << "strangers fill no memory";
   const HttpAnswer metrics = ask(port, "GET", "/metrics");
   EXPECT_THAT(metrics.head, HasSubstr("text/plain; version=0.0.4"));
   EXPECT_THAT(metrics.body, HasSubstr("emberlock_phase{state=\"locked\"} 1\n"));
@@ -277,4 +309,4 @@ TEST_F(ServerHttpTest, ATakenPortIsAnError) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

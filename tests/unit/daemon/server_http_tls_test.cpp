@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The console's server beyond this machine: over TLS, to who has the token.
 #include <chrono>
 
@@ -12,7 +13,7 @@
 #include "tests/support/wait.h"
 #include "tests/support/watch_client.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using nlohmann::json;
@@ -22,6 +23,7 @@ using test::wait_until;
 using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::MatchesRegex;
 using testing::StartsWith;
 
 const std::string kToken = "0123456789abcdef";
@@ -32,8 +34,8 @@ class ServerHttpTls : public testing::Test {
   HttpServerOptions options() const {
     HttpServerOptions options;
     options.listen = "0.0.0.0:0";
-    options.token = *Token::parse(kToken);
-    options.tls = ServerTls{servers.issue("localhost")};
+    options.token = *rig::Token::parse(kToken);
+    options.tls = rig::ServerTls{servers.issue("localhost")};
     return options;
   }
   void serve(HttpServerOptions wanted) {
@@ -79,15 +81,16 @@ TEST_F(ServerHttpTls, ATokenIsShownAsHeaderOrCookieAndAnAddressWithItGivesTheCoo
   EXPECT_EQ(get("/metrics", "").status, 401);
   EXPECT_EQ(ask(port, "POST", "/api/v1/Daemon/GetStatus", "", "Host: lab:7140\r\n").status, 401);
   EXPECT_EQ(get("/metrics", "Authorization: Bearer 0123456789abcdeX\r\n").status, 401);
-  EXPECT_EQ(get("/?token=wrong", "Cookie: emberlock_token=wrong\r\n").status, 401);
+  EXPECT_EQ(get("/?token=wrong", "Cookie: emberlock_session_7140=wrong\r\n").status, 401);
   EXPECT_EQ(get("/metrics", "Authorization: Bearer 0123456789abcdef\r\n").status, 200);
   EXPECT_EQ(get("/healthz", "").status, 200);  // tells nothing but that
   const HttpAnswer moved = get("/?token=0123456789abcde%66", "");
   EXPECT_EQ(moved.status, 303);
   EXPECT_THAT(moved.head, HasSubstr("Location: /\r\n"));
-  EXPECT_THAT(moved.head, HasSubstr("Set-Cookie: emberlock_token=0123456789abcdef; Path=/; HttpOnly; "
-                                    "SameSite=Strict; Max-Age=31536000; Secure"));
-  EXPECT_EQ(get("/metrics", "Cookie: theme=dark; emberlock_token=0123456789abcdef\r\n").status, 200);
+  const std::string cookie = test::cookie_of(moved);
+  EXPECT_THAT(cookie, MatchesRegex("emberlock_session_7140=[0-9a-f]{64}")) << "no token lies in the browser";
+  EXPECT_THAT(moved.head, HasSubstr("; Path=/; HttpOnly; SameSite=Strict; Max-Age=2592000; Secure"));
+  EXPECT_EQ(get("/metrics", "Cookie: theme=dark; " + cookie + "\r\n").status, 200);
 }
 
 TEST_F(ServerHttpTls, CallsJobsAndMetricsAnswerAsInPlain) {
@@ -156,7 +159,7 @@ TEST_F(ServerHttpTls, WithAnAuthorityForClientsWhoHasNoCertificateOfItsIsNotHear
   HttpServerOptions strict = options();
   strict.tls->clients = clients.pem();
   serve(strict);
-  const auto status_for = [&](const TlsIdentity& identity) {
+  const auto status_for = [&](const rig::TlsIdentity& identity) {
     const test::TlsTunnel own(server->port(), servers.pem(), identity);
     return ask(own.port(), "GET", "/metrics", "", kShown).status;
   };
@@ -175,4 +178,4 @@ TEST_F(ServerHttpTls, TheServerGoesWhileConsolesWatch) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Metrics, read back by the grammar of Prometheus' text format 0.0.4 and compared with what they speak of.
 #include <ctime>
 #include <limits>
@@ -11,7 +12,7 @@
 
 #include "daemon/server/metrics.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 using testing::Contains;
@@ -88,7 +89,7 @@ v1::DaemonStatus busy() {
 TEST(ServerMetrics, EverySampleIsTheStatusValue) {
   const auto samples =
       parse(metrics_text(busy(), {.cpu_s = 1.5, .resident_bytes = 1000, .open_files = 9, .start_s = 1.7e9},
-                         {.viewers = 3, .other_watchers = 2}));
+                         {.viewers = 3, .other_watchers = 2, .refused = {{"http", {0, 7, 0, 0, 0, 1}}}}));
   const std::map<std::string, double> expected{
       {R"(emberlock_build_info{version="1.2"})", 1},
       {R"(emberlock_phase{state="capturing"})", 1},
@@ -114,6 +115,9 @@ TEST(ServerMetrics, EverySampleIsTheStatusValue) {
       {"emberlock_reconstruction_iterations", 1},
       {R"(emberlock_watchers{by="console"})", 3},
       {R"(emberlock_watchers{by="grpc"})", 2},
+      {R"(emberlock_refused_total{by="http",reason="wrong_token"})", 7},
+      {R"(emberlock_refused_total{by="http",reason="foreign_origin"})", 1},
+      {R"(emberlock_refused_total{by="http",reason="wrong_link"})", 0},
       {"process_cpu_seconds_total", 1.5},
       {"process_resident_memory_bytes", 1000},
       {"process_open_fds", 9},
@@ -171,4 +175,4 @@ TEST(ServerMetrics, OfThisProcessTheSystemsCountsAreTold) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

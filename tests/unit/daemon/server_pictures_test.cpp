@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // From frames to the pictures that consoles show: every format, the newest of each camera, and none that
 // nobody wants.
 #include <atomic>
@@ -11,7 +12,7 @@
 #include "daemon/server/pictures.h"
 #include "tests/support/wait.h"
 
-namespace emberlock {
+namespace emberlock::daemon {
 namespace {
 
 /// Of one level everywhere; a mosaic and RGB of (r, g, b) levels.
@@ -113,4 +114,4 @@ TEST(Pictures, ACameraThatFilmsFastIsShownAtTheRateAskedFor) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::daemon

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // How frames of GigE Vision and USB3 Vision cameras are numbered, and what becomes of each is counted.
 #include <gtest/gtest.h>
 
 #include "drivers/aravis/frame_ledger.h"
 #include "drivers/aravis/pixel_format.h"
 
-namespace emberlock::aravis {
+namespace emberlock::drivers::aravis {
 namespace {
 
 std::uint64_t number(FrameLedger& ledger, std::uint64_t id, Fate fate = Fate::delivered) {
@@ -115,4 +116,4 @@ TEST(AravisPixelFormat, OnlyWhatAnImageHoldsBitForBitLiesAsOne) {
 }
 
 }  // namespace
-}  // namespace emberlock::aravis
+}  // namespace emberlock::drivers::aravis

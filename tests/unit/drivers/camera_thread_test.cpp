@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/camera_thread.h"
 
 #include <atomic>
@@ -15,7 +16,7 @@
 
 #include "base/clock.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using std::chrono::steady_clock;
@@ -37,6 +38,7 @@ class Desk {
   std::atomic<int> resets{0};
   std::atomic<std::int64_t> reset_at{0};
   std::atomic<bool> refuses_resets{false};
+  std::atomic<bool> ended{false};  ///< as a recording, behind the frames that were made
 
   void make_frames(int count) {
     const std::lock_guard lock(mutex_);
@@ -105,6 +107,7 @@ class DeskCamera final : public Camera {
       frame.stamp.monotonic_time = SteadyClock().now();
       return frame;
     }
+    if (desk_->ended) return Error{ErrorKind::out_of_data, "the recording has ended", "camera c7", {}};
     std::this_thread::sleep_for(std::chrono::duration<double>(std::min(deadline.value(), .001)));
     return Error{ErrorKind::timed_out, "no frame", "camera c7", {}};
   }
@@ -142,6 +145,20 @@ struct CameraThreadTest : ::testing::Test {
     ASSERT_TRUE(held);
   }
 };
+
+TEST_F(CameraThreadTest, ARecordingThatEndsGivesItsFramesAndThenSaysSoEachTime) {
+  desk->make_frames(3);
+  desk->ended = true;
+  ASSERT_TRUE(camera->start().ok());
+  until([&] { return camera->state() == State::ended; });
+  for (std::uint64_t id = 0; id < 3; ++id) EXPECT_EQ(camera->next_frame(kSoon)->stamp.frame_id, id);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(camera->next_frame(kSoon).error().kind, ErrorKind::out_of_data);
+  desk->ended = false;
+  ASSERT_TRUE(camera->start().ok());
+  EXPECT_EQ(camera->state(), State::filming);
+  camera->stop();
+  EXPECT_EQ(camera->state(), State::idle);
+}
 
 TEST_F(CameraThreadTest, FramesComeInOrderAndAreCountedAsTheyAreTaken) {
   ASSERT_TRUE(camera->start().ok());
@@ -325,4 +342,4 @@ TEST_F(CameraThreadTest, ACameraThatIsNotThereRefusesToStart) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The camera whose frames are a live view, in virtual time.
 #include "drivers/ptp/chdk_camera.h"
 
@@ -16,7 +17,7 @@
 #include "drivers/virtual/virtual_clock.h"
 #include "tests/support/chdk_responder/fake_transport.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using chdk_responder::Cable;
@@ -350,4 +351,4 @@ TEST(ChdkCamera, StoppedItDropsWhatIsUnderWayAndFilmsAgain) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // CHDK's commands and its live view, against a camera of tests/support/chdk_responder.
 #include "drivers/ptp/chdk.h"
 
@@ -14,7 +15,7 @@
 #include "drivers/ptp/live_view.h"
 #include "tests/support/chdk_responder/bench.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using chdk_responder::OpenBench;
@@ -207,4 +208,4 @@ TEST(ChdkLiveView, DescriptionsThatCannotBeAreRefused) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/crystal.h"
 
 #include <cmath>
@@ -8,7 +9,7 @@
 #include "drivers/virtual/virtual_clock.h"
 #include "drivers/virtual/virtual_rig.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 TimePoint after(double seconds) { return TimePoint{} + Seconds(seconds); }
@@ -61,4 +62,4 @@ TEST(Crystal, TimesTheFramesOfItsCamera) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/driver.h"
 
 #include <csignal>
@@ -13,7 +14,7 @@
 
 #include "base/unique_fd.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using ::testing::HasSubstr;
@@ -133,4 +134,4 @@ TEST_F(HolderOf, OneThatOnlyNamesItIsNone) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/probe.h"
 
 #include <string>
@@ -7,7 +8,7 @@
 
 #include "tests/support/virtual_cameras.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using ::testing::HasSubstr;
@@ -127,4 +128,4 @@ TEST(Probe, AResetThatIsRefusedEndsTheFilmAndIsSaid) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

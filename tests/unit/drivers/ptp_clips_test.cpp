@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Movies on the card: made, listed, downloaded, interrupted, resumed, verified.
 #include <cstdint>
 #include <cstdlib>
@@ -15,7 +16,7 @@
 #include "drivers/ptp/clips.h"
 #include "tests/support/chdk_responder/bench.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 namespace fs = std::filesystem;
 
@@ -178,4 +179,4 @@ TEST_F(PtpClips, ACameraThatCannotSendPartsSendsTheWhole) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

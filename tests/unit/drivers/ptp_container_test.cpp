@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdint>
 #include <initializer_list>
@@ -9,7 +10,7 @@
 
 #include "drivers/ptp/container.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using testing::ElementsAre;
@@ -108,4 +109,4 @@ TEST(PtpWords, CodesAreToldInWordsAndNumbers) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // A session against a camera of tests/support/chdk_responder, in process and in virtual time.
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +10,7 @@
 #include "drivers/ptp/session.h"
 #include "tests/support/chdk_responder/bench.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using chdk_responder::Bench;
@@ -197,4 +198,4 @@ TEST(PtpSession, DataBeyondWhatWasAskedForAreRefusedBeforeTheyAreRead) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

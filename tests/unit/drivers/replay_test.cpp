@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/replay/replay.h"
 
 #include <limits>
@@ -7,7 +8,7 @@
 #include "drivers/replay/record.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using test::noise_frame;
@@ -37,7 +38,7 @@ StrobeSettings flashing(double phase_ms) {
 void record_run(const std::filesystem::path& folder) {
   v1::Manifest manifest;
   for (const char* id : {"left", "right"}) *manifest.add_cameras() = to_proto(info_of(id));
-  auto writer = SessionWriter::create(folder, manifest, test::small_disk_options());
+  auto writer = session::SessionWriter::create(folder, manifest, test::small_disk_options());
   ASSERT_TRUE(writer) << writer.error().message();
   ASSERT_TRUE(writer->append(strobe_event({1'000'000'001}, flashing(1))));
   const auto film = [&](std::uint64_t from) {
@@ -182,4 +183,4 @@ TEST(ReplayRecord, AStrobeStateWithNumbersThatAreNotFiniteIsRefused) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

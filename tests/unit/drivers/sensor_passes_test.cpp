@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The passes that a scene lists are all that its pictures show.
 #include <algorithm>
 #include <memory>
@@ -7,7 +8,7 @@
 #include "drivers/virtual/sensor.h"
 #include "tests/support/virtual_cameras.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using namespace testing_support;  // NOLINT(google-build-using-namespace)
@@ -115,4 +116,4 @@ TEST(SensorPasses, TheirOrderInTheListMeansNothing) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

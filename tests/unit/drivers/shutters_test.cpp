@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What flashes leave in the pictures of rolling and global shutters, by their definitions.
 #include <algorithm>
 #include <cmath>
@@ -9,7 +10,7 @@
 #include "drivers/virtual/sensor.h"
 #include "tests/support/virtual_cameras.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using namespace testing_support;  // NOLINT(google-build-using-namespace)
@@ -17,7 +18,7 @@ using testing::HasSubstr;
 
 constexpr double kRow = 250e-6;  // of small_camera()
 
-VirtualCameraOptions camera(SensorKind kind, Seconds exposure, ReadDirection direction) {
+VirtualCameraOptions camera(SensorKind kind, Seconds exposure, smear::ReadDirection direction) {
   VirtualCameraOptions c = small_camera(direction);
   c.sensor = kind;
   c.exposure = exposure;
@@ -50,13 +51,13 @@ std::vector<double> parts(const VirtualCameraOptions& options, Seconds exposure,
 }
 
 TEST(RollingShutter, AFlashLightsTheRowsThatAreExposedThen) {
-  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+  for (const auto direction : {smear::ReadDirection::top_first, smear::ReadDirection::bottom_first}) {
     for (const double exposure : {2e-3, 7e-3}) {
       for (const double begin : {0.0031, 0.0249, -0.0011}) {
         const auto options = camera(SensorKind::rolling_shutter, Seconds(exposure), direction);
         const auto part = parts(options, Seconds(exposure), {Seconds(begin), microseconds(20)});
         for (int y = 0; y < 120; ++y) {
-          const int order = direction == ReadDirection::top_first ? y : 119 - y;
+          const int order = direction == smear::ReadDirection::top_first ? y : 119 - y;
           const double end = order * kRow;
           const double lit =
               std::clamp((std::min(begin + 20e-6, end) - std::max(begin, end - exposure)) / 20e-6, 0.0, 1.0);
@@ -68,7 +69,8 @@ TEST(RollingShutter, AFlashLightsTheRowsThatAreExposedThen) {
 }
 
 TEST(RollingShutter, TheLampShowsInItsLitRowsOnly) {
-  const auto options = camera(SensorKind::rolling_shutter, milliseconds(0.5), ReadDirection::top_first);
+  const auto options =
+      camera(SensorKind::rolling_shutter, milliseconds(0.5), smear::ReadDirection::top_first);
   VirtualScene scene;
   scene.passes = {Pass::lamp, Pass::bloom, Pass::smear};
   scene.background = 0;
@@ -85,7 +87,7 @@ TEST(RollingShutter, TheLampShowsInItsLitRowsOnly) {
 
 TEST(GlobalShutter, TheFlashsShareInsideTheWindowScalesTheBrightness) {
   const Seconds exposure = milliseconds(3);
-  const auto options = camera(SensorKind::global_shutter, exposure, ReadDirection::top_first);
+  const auto options = camera(SensorKind::global_shutter, exposure, smear::ReadDirection::top_first);
   for (const auto& [begin_us, share] : {std::pair{-1000.0, 1.0},
                                         {-3000.0, 1.0},
                                         {-3005.0, 0.75},
@@ -99,8 +101,8 @@ TEST(GlobalShutter, TheFlashsShareInsideTheWindowScalesTheBrightness) {
 }
 
 TEST(GlobalShutter, LeavesNoSmear) {
-  const auto rig = small_rig({camera(SensorKind::global_shutter, milliseconds(30), ReadDirection::top_first)},
-                             {Pass::smear});
+  const auto rig = small_rig(
+      {camera(SensorKind::global_shutter, milliseconds(30), smear::ReadDirection::top_first)}, {Pass::smear});
   ASSERT_TRUE(rig->strobe().apply({.output = StrobeOutput::flashing, .rate = Hertz(24)}).ok());
   ASSERT_TRUE(rig->camera(0).start().ok());
   const Frame frame = rig->camera(0).next_frame(Seconds(1)).value();
@@ -114,8 +116,8 @@ TEST(Shutters, EachCamerasOwnExposureGoesBeforeTheScenes) {
   scene.exposure = milliseconds(1);
   VirtualRigOptions setup;
   setup.scene = scene;
-  setup.cameras = {camera(SensorKind::global_shutter, milliseconds(30), ReadDirection::top_first),
-                   camera(SensorKind::global_shutter, milliseconds(30), ReadDirection::top_first)};
+  setup.cameras = {camera(SensorKind::global_shutter, milliseconds(30), smear::ReadDirection::top_first),
+                   camera(SensorKind::global_shutter, milliseconds(30), smear::ReadDirection::top_first)};
   setup.cameras[1].id = "of-the-scene";
   setup.cameras[1].exposure.reset();
   auto rig = VirtualRig::create(setup, std::make_shared<VirtualClock>()).value();
@@ -135,7 +137,7 @@ TEST(Shutters, EachCamerasOwnExposureGoesBeforeTheScenes) {
 
 TEST(Shutters, AnExposureThatDoesNotFitNamesTheCamera) {
   VirtualRigOptions setup;
-  setup.cameras = {camera(SensorKind::global_shutter, milliseconds(50), ReadDirection::top_first)};
+  setup.cameras = {camera(SensorKind::global_shutter, milliseconds(50), smear::ReadDirection::top_first)};
   const Status refused = check(setup);
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.error().message(), HasSubstr("virtual-00"));
@@ -163,4 +165,4 @@ TEST(Shutters, ARigsNameTellsHowManyOfEachKind) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

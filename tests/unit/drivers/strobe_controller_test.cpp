@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The code that runs on our microcontroller, without one.
 #include <fstream>
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The words of each dialect, by the makers' manuals, and answers that no device should give.
 #include <string>
 #include <vector>
@@ -9,7 +10,7 @@
 #include "drivers/strobe_serial/controller/protocol.h"
 #include "drivers/strobe_serial/dialect.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using testing::ElementsAre;
@@ -210,4 +211,4 @@ TEST(EmberlockDialect, TurnsTheControllersRangesIntoErrorsThatNameThem) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

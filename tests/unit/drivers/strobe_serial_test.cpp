@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What every strobe on a serial line does when the line or the device fails, over our simulations of the
 // devices.
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include "tests/support/strobe_bench.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using test::Fault;
@@ -342,4 +343,4 @@ TEST(SerialStrobeDevices, ASchottRoundsToWholeHertzAndThousandthsAndHasNoPhase) 
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

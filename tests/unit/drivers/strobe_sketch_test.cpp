@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The sketch of our controller on a simulated ATmega: what the driver asks for is what the pin does, to the
 // tick of 0.5 us.
 #include "tests/support/avr/Arduino.h"
@@ -12,7 +13,7 @@
 #include "drivers/strobe_serial/serial_strobe.h"
 #include "drivers/virtual/virtual_clock.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr double kTicks = 2e6;  // a second
@@ -149,4 +150,4 @@ TEST_F(StrobeSketch, CountsTheFlashesThatItGave) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/unpack.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 /// Bits of a row, least significant first, as PFNC's "p" packings define them.
@@ -148,4 +149,4 @@ TEST(Unpack, TooFewBytesOrImpossibleSidesAreRefused) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

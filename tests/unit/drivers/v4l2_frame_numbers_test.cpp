@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
 #include "drivers/v4l2/frame_numbers.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr Seconds kPeriod = milliseconds(40);
@@ -76,4 +77,4 @@ TEST(V4l2FrameNumbers, BelieveTheSequenceWhereThePeriodIsUnknown) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

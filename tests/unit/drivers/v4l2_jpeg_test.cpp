@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <vector>
 
@@ -6,7 +7,7 @@
 
 #include "drivers/v4l2/jpeg.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 constexpr ImageSize kSize{64, 48};
@@ -51,4 +52,4 @@ TEST(V4l2Jpeg, OfNonsenseIsDamagedAndBlack) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

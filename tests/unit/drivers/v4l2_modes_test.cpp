@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cerrno>
 #include <cmath>
 
@@ -7,7 +8,7 @@
 #include "drivers/v4l2/controls.h"
 #include "drivers/v4l2/modes.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using testing::ElementsAre;
@@ -181,4 +182,4 @@ TEST(V4l2Controls, SetTheExposureInTenthsOfAMillisecond) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <fstream>
 
 #include <gmock/gmock.h>
@@ -6,7 +7,7 @@
 
 #include "drivers/v4l2/nodes.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 namespace fs = std::filesystem;
 
@@ -111,4 +112,4 @@ TEST_F(V4l2Nodes, AreNoneWhereThereIsNoVideoAtAll) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

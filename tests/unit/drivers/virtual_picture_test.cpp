@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What virtual cameras show: dots, lines, bloom, noise, colours, each pass by itself.
 #include <algorithm>
 #include <cmath>
@@ -8,7 +9,7 @@
 
 #include "tests/support/virtual_cameras.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using namespace testing_support;  // NOLINT(google-build-using-namespace)
@@ -49,7 +50,7 @@ Frame frame_with(const VirtualCameraOptions& camera, std::vector<Pass> passes, d
 }
 
 TEST(VirtualPicture, DotsLieWhereTheShiftRegisterPutsThem) {
-  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+  for (const auto direction : {smear::ReadDirection::top_first, smear::ReadDirection::bottom_first}) {
     for (const int shifts : {120, 140, 166}) {
       for (const double k : {5.3, 30.3, 60.3, 80.3, 105.3, 135.3, 155.3, 165.9}) {
         const VirtualCameraOptions c = small_camera(direction, shifts);
@@ -133,13 +134,13 @@ TEST(VirtualPicture, CodedSkipsShowInTheirFramesAndTheLampAnImageLater) {
 
 TEST(VirtualPicture, SweepOutLeavesOneSide) {
   VirtualCameraOptions c = small_camera();
-  c.sweep_out = SweepOut::before_transfer;
+  c.sweep_out = smear::SweepOut::before_transfer;
   EXPECT_GT(blob(column_light(frame_with(c, {Pass::smear}, 30.3 * 250e-6), 30), 80).sum, 20 * kDotSum);
   EXPECT_LT(blob(column_light(frame_with(c, {Pass::smear}, 90.3 * 250e-6), 30), 60, 200).sum, 5);
 }
 
 TEST(VirtualPicture, SteadyLightDrawsALineOfFullHeight) {
-  for (const auto direction : {ReadDirection::top_first, ReadDirection::bottom_first}) {
+  for (const auto direction : {smear::ReadDirection::top_first, smear::ReadDirection::bottom_first}) {
     const auto rig = small_rig({small_camera(direction, 140)}, {Pass::smear});
     ASSERT_TRUE(rig->strobe().apply({.output = StrobeOutput::steady}).ok());
     ASSERT_TRUE(rig->camera(0).start().ok());
@@ -370,7 +371,7 @@ TEST(VirtualPicture, AFlameFillsEveryPixelFormat) {
 
 TEST(VirtualPicture, CamerasOfEqualPhaseFilmTheFlameAtTheSameInstant) {
   const auto ramp = std::make_shared<Ramp>(64);
-  VirtualCameraOptions second = small_camera(ReadDirection::bottom_first, 140);
+  VirtualCameraOptions second = small_camera(smear::ReadDirection::bottom_first, 140);
   second.id = "second";
   const auto rig = small_rig({small_camera(), second}, {});
   VirtualScene scene = flame_scene(ramp);
@@ -392,4 +393,4 @@ TEST(VirtualPicture, TheStrobeIsWhiteInColour) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

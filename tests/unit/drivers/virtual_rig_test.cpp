@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The rig's time, queues, resets, names and options.
 #include "drivers/virtual/virtual_rig.h"
 
@@ -15,7 +16,7 @@
 #include "base/log.h"
 #include "tests/support/virtual_cameras.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using namespace testing_support;  // NOLINT(google-build-using-namespace)
@@ -391,7 +392,7 @@ TEST(VirtualRigOptions, MixedModelsDrawEveryDirectionAndReadLength) {
   int up = 0, plain = 0, dummies = 0, full = 0;
   for (const VirtualCameraOptions& c : rig.cameras) {
     EXPECT_TRUE(check(c.timing).ok());
-    up += c.timing.direction == ReadDirection::bottom_first;
+    up += c.timing.direction == smear::ReadDirection::bottom_first;
     plain += c.timing.shifts == 720, dummies += c.timing.shifts == 740, full += c.timing.shifts == 772;
   }
   EXPECT_GT(up, 8);
@@ -440,4 +441,4 @@ TEST(VirtualRigOptions, ARefusedSceneChangesNothing) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

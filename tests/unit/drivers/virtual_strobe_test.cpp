@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/virtual/virtual_strobe.h"
 
 #include <cmath>
@@ -8,7 +9,7 @@
 
 #include "drivers/virtual/virtual_clock.h"
 
-namespace emberlock {
+namespace emberlock::drivers {
 namespace {
 
 using testing::HasSubstr;
@@ -135,4 +136,4 @@ TEST(StrobeTimeline, AFlashThatStraddlesTheWindowCounts) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::drivers

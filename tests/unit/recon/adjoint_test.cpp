@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The transposes of the marches: <A x, y> = <x, A^T y> where the extinction is known, the gradient of 1/2
 // |R|^2 where it is not.
 #include <gtest/gtest.h>
@@ -6,7 +7,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(Adjoint);
@@ -90,7 +91,7 @@ void expect_transpose(const Problem& problem, const Optics& optics, Precision pr
   const std::vector<Rgba> black(problem.list.rays.size());
   engine->set(x);
   for (int s = 0; s < problem.list.subsets(); ++s) {
-    engine->residual_against(black, s);  // A x
+    engine->residual_against(black, s, Engine::Behind::nothing);  // A x
     engine->backproject(s);
   }
   const std::vector<Rgba> seen = engine->residuals();
@@ -133,4 +134,4 @@ TEST_P(Adjoint, OfTheEngineHasTheSameBitsOnEveryRun) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

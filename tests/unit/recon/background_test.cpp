@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/background.h"
 
 #include <cmath>
@@ -10,7 +11,7 @@
 #include "recon/render/render.h"
 #include "tests/support/devices.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(BackgroundTest);
@@ -185,4 +186,4 @@ TEST(Background, PictureOfAnotherSizeIsRefusedByItsViewsName) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/board_films.h"
 
 #include <cmath>
@@ -6,7 +7,7 @@
 
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -24,9 +25,9 @@ constexpr ImageLayout kSmall{{64, 48}, PixelFormat::gray8, 8};
 
 /// A session of cameras whose frames' greys are told; -1 is a frame that the camera lost.
 void record_greys(const std::filesystem::path& folder, const std::vector<std::vector<int>>& cameras) {
-  auto writer =
-      SessionWriter::create(folder, test::manifest_of(std::vector<ImageLayout>(cameras.size(), kSmall)),
-                            test::small_disk_options());
+  auto writer = session::SessionWriter::create(
+      folder, test::manifest_of(std::vector<ImageLayout>(cameras.size(), kSmall)),
+      test::small_disk_options());
   ASSERT_TRUE(writer.ok()) << writer.error().message();
   for (std::size_t c = 0; c < cameras.size(); ++c) {
     for (std::size_t i = 0; i < cameras[c].size(); ++i) {
@@ -113,4 +114,4 @@ TEST(BoardFilms, InstantsAreSpreadOverThePicture) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

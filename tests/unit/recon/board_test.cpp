@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/board.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include "tests/support/rendered_board.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 using testing::HasSubstr;
 
@@ -125,4 +126,4 @@ TEST(Board, ThereIsNoneInAnEmptyOrTinyPicture) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

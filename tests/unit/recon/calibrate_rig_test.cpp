@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/calibrate_rig.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 #include "recon/calibrate/next_pictures.h"
 #include "tests/support/pose_errors.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 using testing::HasSubstr;
 
@@ -150,4 +151,4 @@ TEST(CalibrateRig, TheSquareRootLaw) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/camera_model.h"
 
 #include <cmath>
@@ -8,7 +9,7 @@
 
 #include "recon/calibrate/pose.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 const Intrinsics kLens{{640, 480}, 500, 510, 320, 240, {}};
@@ -97,4 +98,4 @@ TEST(Pose, OpenGlLooksAlongMinusZAndHasYUp) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

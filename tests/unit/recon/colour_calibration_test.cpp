@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/colour_calibration.h"
 
 #include <gmock/gmock.h>
@@ -7,7 +8,7 @@
 #include "tests/support/colour_rig.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using testing::HasSubstr;
@@ -274,8 +275,8 @@ TEST(ColourPlan, SaysWhichFieldIsWrong) {
 TEST(ColourReadings, FramesOfASessionAreRead) {
   const test::TempFolder folder;
   const ImageLayout layout{{64, 48}, PixelFormat::gray8, 8};
-  auto writer =
-      SessionWriter::create(folder / "film", test::manifest_of({layout, layout}), test::small_disk_options());
+  auto writer = session::SessionWriter::create(folder / "film", test::manifest_of({layout, layout}),
+                                               test::small_disk_options());
   ASSERT_TRUE(writer.ok()) << writer.error().message();
   for (std::size_t c = 0; c < 2; ++c) {
     for (std::size_t i = 0; i < 3; ++i) {
@@ -317,4 +318,4 @@ TEST(ColourReadings, FramesOfASessionAreRead) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/corner_cost.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 /// A corner somewhere in front of a camera somewhere, all its unknowns other than 0.
@@ -93,4 +94,4 @@ TEST(CornerEquations, ACornerBehindTheCameraIsNone) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/drift.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include "tests/support/board_rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 using testing::HasSubstr;
 
@@ -179,4 +180,4 @@ TEST(LampDrift, ALampThatNoTwoCamerasSeeIsAnError) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

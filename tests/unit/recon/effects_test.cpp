@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/effects.h"
 
 #include <map>
@@ -9,7 +10,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(EffectsTest);
@@ -253,4 +254,4 @@ TEST(Effects, ThePapersOpacityAsExtinction) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -10,9 +11,9 @@
 #include "recon/export/picture.h"
 #include "recon/export/report.h"
 #include "recon/export/volume_file.h"
-#include "session/frame_file.h"
+#include "session/media/frame_file.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -90,7 +91,7 @@ TEST_F(ExportTest, APictureIsReadBackWithItsColours) {
   for (std::size_t i = 0; i < picture.bytes().size(); ++i)
     picture.bytes()[i] = static_cast<std::byte>(17 * i);
   ASSERT_TRUE(write_png(picture.view(), root_ / "p.png").ok());
-  const auto read = read_image(root_ / "p.png");
+  const auto read = session::read_image(root_ / "p.png");
   ASSERT_TRUE(read.ok()) << read.error().message();
   EXPECT_EQ(*read, picture);
 }
@@ -146,4 +147,4 @@ TEST_F(ExportTest, ANameThatIsNoUtf8StillGivesAReport) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

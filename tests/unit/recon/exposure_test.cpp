@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/exposure.h"
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 #include "recon/render/render.h"
 #include "tests/support/devices.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(ExposureTest);
@@ -207,4 +208,4 @@ TEST_P(ExposureTest, DeviationWithExtinctionIsSmallBesideTheMotion) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/find_box.h"
 
 #include <gmock/gmock.h>
@@ -5,7 +6,7 @@
 #include "recon/pipeline/grid_choice.h"
 #include "tests/support/small_flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using testing::HasSubstr;
@@ -60,9 +61,9 @@ TEST(FindBoxTest, ASpeckThatOneViewAloneShowsChangesNothing) {
 
 TEST(FindBoxTest, ASmallerBoxTakesFewerVoxels) {
   Scene scene = small_flame_scene();
-  const int told = voxels_by_the_paper(scene);
+  const int told = finest_voxels(scene);
   scene.box = *find_box(scene, flame_masks(scene));
-  const int found = voxels_by_the_paper(scene);
+  const int found = finest_voxels(scene);
   EXPECT_LT(found, told);
   EXPECT_GT(found, told / 3);
 }
@@ -93,4 +94,4 @@ TEST(FindBoxTest, WrongPosesDontMeet) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

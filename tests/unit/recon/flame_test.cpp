@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/synthetic/flame.h"
 
 #include <algorithm>
 
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 const Grid kGrid = grid_over({Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)}, 40);
@@ -67,4 +68,4 @@ TEST(PaperScene, IsTheTenPlusOneViewsOfThePaper) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The march's hard cases, on every device of this machine. Those of scattering are in
 // tests/integration/optics/in_scatter_test.cpp, the solvers' in hard_scenes_test.cpp.
 #include <cmath>
@@ -13,7 +14,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/march_case.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using test::camera_at;
@@ -231,4 +232,4 @@ TEST(MarchHardCase, TheFarCornerOf512CubedVoxelsLooksAsInAGridOfItsOwn) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Scenes that are hard on solvers, for every device of this machine and both solvers.
 #include <cmath>
 #include <map>
@@ -8,7 +9,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/ring_scene.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kFullCircle = 2 * std::numbers::pi;
@@ -163,4 +164,4 @@ INSTANTIATE_TEST_SUITE_P(Devices, HardScene,
                          });
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/hull.h"
 
 #include <cmath>
@@ -9,7 +10,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(HullTest);
@@ -161,4 +162,4 @@ TEST(FlameMask, NanAndInfiniteInputIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

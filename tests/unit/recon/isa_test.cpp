@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Every level of vector instructions that this CPU runs gives what the baseline gives, but for rounding.
 #include <cmath>
 
@@ -5,7 +6,7 @@
 
 #include "tests/support/march_case.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 template <class Real>
@@ -103,4 +104,4 @@ INSTANTIATE_TEST_SUITE_P(Levels, IsaTest, testing::ValuesIn(levels()), [](const 
 });
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

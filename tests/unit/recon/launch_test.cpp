@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What a GPU runs one thread for each call, called here one after the other and backwards: every call has its
 // own place to write to, and together they do what the CPU's own way does.
 #include <algorithm>
@@ -15,7 +16,7 @@
 #include "tests/support/march_case.h"
 #include "tests/support/ring_scene.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 template <class Act>
@@ -71,7 +72,7 @@ void expect_gathered(const RayList& list) {
 
   const Marcher<float> march(list);
   const ConstantExtinction<float> extinction{0.1F};
-  launch(list.runs.size(), emberlock::Adjoint<float, ConstantExtinction<float>, Path, LayAside<float>>{
+  launch(list.runs.size(), emberlock::recon::Adjoint<float, ConstantExtinction<float>, Path, LayAside<float>>{
                                list.table(), residual.data(), extinction, aside});
   gather(Trilinear{});
   expect_near(gradient, march.adjoint(Absorb::constant, residual, 0.1F));
@@ -184,4 +185,4 @@ TEST(Launch, StraightRaysAreCutInTwoPassesAsInOne) { expect_cut(false); }
 TEST(Launch, CurvedRaysAreCutInTwoPassesAsInOne) { expect_cut(true); }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <numbers>
 
@@ -11,7 +12,7 @@
 #include "tests/support/camera_at.h"
 #include "tests/support/devices.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using test::camera_at;
@@ -137,4 +138,4 @@ TEST(Clip, ARayExactlyAlongAnOuterFaceBelongsToTheClosedBox) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/motion.h"
 
 #include <gtest/gtest.h>
@@ -8,7 +9,7 @@
 #include "recon/adjust/solver.h"
 #include "recon/synthetic/flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kReach = 5.4e-3;  // seconds
@@ -153,4 +154,4 @@ TEST(MotionTest, TheSteadyPartGoesBackIntoARenderOfALateView) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

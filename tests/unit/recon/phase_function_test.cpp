@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/kernels/phase_function.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr double kAsymmetries[] = {-0.99, -0.6, -1e-9, 0, 1e-9, 0.3, 0.9, 0.99};
@@ -74,4 +75,4 @@ TEST(PhaseFunction, RandomSamplesHaveTheMeanCosineThatTheAsymmetryNames) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

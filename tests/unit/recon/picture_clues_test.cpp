@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/picture_clues.h"
 
 #include <algorithm>
@@ -5,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 constexpr ImageSize kSize{64, 48};
@@ -94,4 +95,4 @@ TEST(PictureClues, PicturesClipWhereTheirBrightestPixelsPileUp) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -13,11 +14,12 @@
 #include "recon/pipeline/grid_choice.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/preprocess/flame_mask.h"
-#include "session/frame_file.h"
+#include "recon/synthetic/flame.h"
+#include "session/media/frame_file.h"
 #include "tests/support/counting_clock.h"
 #include "tests/support/devices.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(Reconstruct);
@@ -81,9 +83,52 @@ TEST(GridChoice, AThinBoxIsSampledAlongItsThinSide) {
 TEST(GridChoice, SharpPicturesAreCappedAndACameraInsideDecidesNothing) {
   Scene scene = ball(1);
   scene.views[0].camera.intrinsics.fx = 1e5;
-  EXPECT_EQ(voxels_by_the_paper(scene), kLargestChosenVoxels);
+  EXPECT_EQ(voxels_by_the_paper(scene), kLargestVoxels);
+  EXPECT_EQ(finest_voxels(scene), kLargestChosenVoxels);
   scene.views[0].camera = look_at({{80, 60}, 100, 100, 40, 30, {}}, {0.01, 0, 0}, {0, 0, 0});
   EXPECT_LE(voxels_by_the_paper(scene), kLargestChosenVoxels);
+}
+
+/// n_max / alpha of the paper's words for one camera, written down apart from grid_choice.cpp: the box's
+/// corners by the pinhole's own formula, the twelve edges between corners that differ in one coordinate.
+double most_voxels_of(const View& view, const Box& box) {
+  const Intrinsics& lens = view.camera.intrinsics;
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector2d>> corners;
+  for (const double x : {-0.5, 0.5})
+    for (const double y : {-0.5, 0.5})
+      for (const double z : {-0.5, 0.5}) {
+        const Eigen::Vector3d side(x, y, z);
+        const Eigen::Vector3d p = view.camera.camera_from_world * (box.center + side.cwiseProduct(box.size));
+        corners.emplace_back(side, Eigen::Vector2d(lens.fx * p.x() / p.z(), lens.fy * p.y() / p.z()));
+      }
+  double most = 0;
+  int edges = 0;
+  for (const auto& [a, at_a] : corners)
+    for (const auto& [b, at_b] : corners) {
+      if (((a - b).array() != 0).count() != 1) continue;
+      ++edges;
+      most = std::max(most, (at_a - at_b).cwiseAbs().maxCoeff());
+    }
+  EXPECT_EQ(edges, 2 * 12) << "each one from both ends";
+  return most / 1.5;
+}
+
+TEST(GridChoice, ThePapersRuleOnThePapersOwnScene) {
+  PaperSceneOptions film;
+  film.truth_voxels = 8;
+  const Scene scene = paper_scene(film);
+  double least = 1e9;
+  double most = 0;
+  for (const View& view : scene.views) {
+    if (view.role != ViewRole::input) continue;
+    const double voxels = most_voxels_of(view, scene.box);
+    least = std::min(least, voxels);
+    most = std::max(most, voxels);
+  }
+  EXPECT_NEAR(least, 401.3, 0.05);
+  EXPECT_NEAR(most, 441.3, 0.05);
+  EXPECT_EQ(voxels_by_the_paper(scene), 442);
+  EXPECT_EQ(finest_voxels(scene), 256);
 }
 
 TEST(Coverage, WarnsWhereTheInputErrorProvesNothing) {
@@ -274,7 +319,7 @@ INSTANTIATE_TEST_SUITE_P(Devices, OutcomeTest, testing::ValuesIn(devices()),
 TEST_P(OutcomeTest, EveryViewIsWrittenHeldOutOnesToo) {
   ASSERT_TRUE(write_outcome(outcome_, root_ / "out").ok());
   for (const char* name : {"0000.png", "0001.png", "0002.png", "0003.png", "0004.png"}) {
-    const auto view = read_image(root_ / "out" / "views" / name);
+    const auto view = session::read_image(root_ / "out" / "views" / name);
     ASSERT_TRUE(view.ok()) << view.error().message();
     EXPECT_EQ(view->layout().size, (ImageSize{80, 60}));
   }
@@ -304,4 +349,4 @@ TEST_P(OutcomeTest, AFailureLeavesNothingBehind) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

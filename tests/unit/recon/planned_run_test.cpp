@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/planned_run.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(Advice);
@@ -88,7 +89,7 @@ TEST_P(Budget, ALargerOneChoosesMoreVoxels) {
     before = voxels;
   }
   EXPECT_GT(before, first);
-  EXPECT_LE(before, voxels_by_the_paper(flame()));
+  EXPECT_LE(before, finest_voxels(flame()));
 }
 
 TEST_P(Budget, TooSmallForAnythingElseGivesTheReferenceRun) {
@@ -139,7 +140,7 @@ TEST_P(Target, IsReachedAndNoMoreIsDone) {
   EXPECT_EQ(far.report.plan->missed_by, 0);
   EXPECT_LE(all_channels(far.report.trace.back().heldout_rmse), 14);
   EXPECT_THAT(far.report.plan->words, Contains(HasSubstr("was reached after")));
-  EXPECT_LT(far.report.plan->voxels, voxels_by_the_paper(flame()));
+  EXPECT_LT(far.report.plan->voxels, finest_voxels(flame()));
 }
 
 TEST_P(Target, MissedItSaysByHowMuchAndWhatWouldBeNeeded) {
@@ -201,4 +202,4 @@ TEST_P(Advice, SaysWhatTheLastIterationsBoughtAndWhatVoxelsWouldBring) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Single against double precision: the functions of the extinction, the marches, whole reconstructions.
 #include <cmath>
 
@@ -8,7 +9,7 @@
 #include "tests/support/march_case.h"
 #include "tests/support/small_flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(PrecisionTest);
@@ -127,4 +128,4 @@ TEST_P(PrecisionTest, ReconstructionsDifferByLessThanAHundredthOfAGreyLevelOnThe
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,13 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <array>
 #include <set>
 
 #include <gmock/gmock.h>
 
 #include "recon/preprocess/develop.h"
-#include "session/frame_file.h"
+#include "session/media/frame_file.h"
 #include "tests/support/flame_frames.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 using testing::HasSubstr;
@@ -93,7 +94,7 @@ TEST(Demosaicing, BilinearIsTheBetterOneOnFlamesAndGradientOnPicturesWithEdges) 
     const auto [bilinear, gradient] = test::demosaicing_errors(small_flame_picture(), noise);
     EXPECT_LT(bilinear, 1.02 * gradient) << noise;
   }
-  const auto picture = read_image("/usr/share/doc/opencv-doc/examples/data/fruits.jpg");
+  const auto picture = session::read_image("/usr/share/doc/opencv-doc/examples/data/fruits.jpg");
   ASSERT_TRUE(picture.ok()) << picture.error().message();
   test::FilmOptions film;
   film.format = PixelFormat::bayer_rggb8;
@@ -236,4 +237,4 @@ TEST(Develop, SaysWhatRanAndWhy) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

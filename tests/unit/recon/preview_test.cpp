@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/export/preview.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include "recon/export/picture.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 TEST(Preview, KeepsProportionsAndNeverGrows) {
@@ -90,4 +91,4 @@ TEST(Preview, AJpegTakesColourAloneAndSomethingToShow) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

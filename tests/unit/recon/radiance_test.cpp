@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/preprocess/radiance.h"
 
 #include <cmath>
 
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 float at(const RadianceImage& image, int x, int y, int c) {
@@ -65,4 +66,4 @@ TEST(Radiance, EightBitsRoundAndClamp) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

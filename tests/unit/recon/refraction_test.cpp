@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/refraction.h"
 
 #include <algorithm>
@@ -13,7 +14,7 @@
 #include "recon/render/render.h"
 #include "tests/support/devices.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(RefractionTest);
@@ -332,4 +333,4 @@ TEST_P(RefractionTest, SameBitsForAnyNumberOfThreads) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,13 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/rig_formats.h"
 
 #include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
 
 #include <gmock/gmock.h>
+#include <opencv2/core.hpp>
 #include <unistd.h>
 
+#include "base/file.h"
 #include "tests/support/board_rig.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
@@ -122,13 +128,14 @@ TEST(RigFiles, BadFilesNameTheLineAndTheRemedy) {
   EXPECT_THAT(parse_opencv("%YAML:1.0\n---\na: 1\n", "c", "c.yml").error().message(),
               HasSubstr("camera_matrix"));
   EXPECT_FALSE(import_rig("/nowhere/rig.json").ok());
-  EXPECT_THAT(parse_rig("{}", "rig.json").error().message(), HasSubstr("format_version"));
-  EXPECT_THAT(parse_rig(R"({"format_version": 1, "cameras": [{"camera_id": "a", "width": 4, "height": 4,
+  EXPECT_THAT(session::parse_rig("{}", "rig.json").error().message(), HasSubstr("format_version"));
+  EXPECT_THAT(
+      session::parse_rig(R"({"format_version": 1, "cameras": [{"camera_id": "a", "width": 4, "height": 4,
       "calibration": {"sigma": [1]}}]})",
-                        "rig.json")
-                  .error()
-                  .message(),
-              HasSubstr("sigma"));
+                         "rig.json")
+          .error()
+          .message(),
+      HasSubstr("sigma"));
 }
 
 TEST(ApplyRig, ASessionsCamerasGetWhatTheRigKnows) {
@@ -166,5 +173,86 @@ TEST(ApplyRig, WhatDoesntFitNamesBothAndChangesNothing) {
               HasSubstr("knows no camera camX"));
 }
 
+/// Parsers that call themselves for each level would end the program, as OpenCV's own does.
+TEST_F(RigFormats, WhatNestsDeeplyIsRefused) {
+  constexpr int kLevels = 50'000;
+  std::map<std::string, std::string> files;
+  const auto repeat = [](const std::string& text, int times) {
+    std::string all;
+    for (int i = 0; i < times; ++i) all += text;
+    return all;
+  };
+  const std::string yaml = "%YAML:1.0\n---\n";
+  files["flow.yml"] = yaml + "a: " + std::string(kLevels, '[');
+  files["maps.yml"] = yaml + "a: " + repeat("{a: ", kLevels);
+  files["lines.yml"] = yaml + "a: " + repeat("[\n", kLevels);
+  files["hidden.yml"] = yaml + "a: " + repeat("[ \"]\",\n", kLevels);
+  files["comments.yml"] = yaml + "a: " + repeat("[ # ]\n", kLevels);
+  files["dashes.yml"] = yaml + "a:\n  " + repeat("- ", kLevels) + "1\n";
+  files["tight.yml"] = yaml + "a:\n  " + repeat("-", kLevels) + "\n";
+  files["colons.yml"] = yaml + repeat("a: ", kLevels) + "1\n";
+  std::string stairs = yaml;
+  for (int i = 0; i < 1000; ++i) stairs += std::string(static_cast<std::size_t>(i), ' ') + "a:\n";
+  files["stairs.yml"] = stairs;
+  const std::string xml = "<?xml version=\"1.0\"?>\n<opencv_storage>\n";
+  files["tags.xml"] = xml + repeat("<a>", kLevels);
+  files["lines.xml"] = xml + repeat("<a>\n", kLevels);
+  files["comments.xml"] = xml + repeat("<a><!-- </a> -->\n", kLevels);
+  files["attributes.xml"] = xml + repeat("<a type_id=\"x\">", kLevels);
+  files["json.yml"] = "{\"a\": " + std::string(kLevels, '[');
+  files["json2.yml"] = "{" + repeat("\"a\": {", kLevels);
+  for (const auto& [name, text] : files) {
+    std::ofstream(folder_ / name) << text;
+    const auto rig = import_rig(folder_ / name);
+    ASSERT_FALSE(rig.ok()) << name;
+    EXPECT_EQ(rig.error().kind, ErrorKind::bad_input) << name;
+    EXPECT_FALSE(rig.error().remedy.empty()) << name;
+  }
+  std::ofstream(folder_ / "large.yml") << yaml << std::string(5'000'000, '\n');
+  EXPECT_THAT(import_rig(folder_ / "large.yml").error().message(), HasSubstr("larger than"));
+  std::ofstream(folder_ / "deep.json") << "{\"frames\": " << std::string(kLevels, '[');
+  EXPECT_THAT(import_rig(folder_ / "deep.json").error().message(), HasSubstr("nests more than"));
+}
+
+/// What isn't deep is read, whatever it looks like.
+TEST_F(RigFormats, LongFlatFilesOfOpenCvAreRead) {
+  const std::string camera = *read_file(folder_ / "opencv" / "cam00.yml");
+  std::string more = "views:\n";
+  for (int i = 0; i < 300; ++i) more += "   - [ -1.5, -2.e-03, -.5, 4. ]\n";
+  std::ofstream(folder_ / "long.yml") << camera << more << "time: \"Mon Nov 23 01:02:03 2026 [UTC]\"\n";
+  const auto rig = import_rig(folder_ / "long.yml");
+  ASSERT_TRUE(rig.ok()) << rig.error().message();
+  EXPECT_GT(rig->cameras(0).calibration().fx(), 0);
+  cv::FileStorage xml((folder_ / "camera.xml").string(), cv::FileStorage::WRITE);
+  xml << "image_width" << 640 << "image_height" << 480 << "camera_matrix"
+      << cv::Mat(cv::Matx33d(600, 0, 320, 0, 600, 240, 0, 0, 1)) << "distortion_coefficients"
+      << cv::Mat(cv::Mat::zeros(5, 1, CV_64F));
+  for (int i = 0; i < 1000; ++i) xml << "time" + std::to_string(i) << "01:02:03, a string";
+  xml.release();
+  const auto read = import_rig(folder_ / "camera.xml");
+  ASSERT_TRUE(read.ok()) << read.error().message();
+  EXPECT_EQ(read->cameras(0).calibration().fx(), 600);
+}
+
+/// Each of these ends OpenCV's own parser.
+TEST_F(RigFormats, WhatIsCutOffOrHoldsNoTextIsRefused) {
+  const std::string nul(70, '\0');
+  for (const std::string& text :
+       {std::string("<?xml version="), "<?xml version=" + nul + "\"1.0\"?>\n<opencv_storage>\n", nul,
+        std::string("<opencv_storage><camera_matrix type_id=\"opencv-matrix\"><rows>"),
+        std::string("%YAML:1.0\n---\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   data: [ 1")}) {
+    const auto rig = parse_opencv(text, "cam00", "cut.xml");
+    ASSERT_FALSE(rig.ok()) << text;
+    EXPECT_EQ(rig.error().kind, ErrorKind::bad_input) << text;
+  }
+}
+TEST_F(RigFormats, AMatrixOfAnotherShapeThanItSaysIsRefused) {
+  const auto rig = parse_opencv(
+      "image_width: 640\nimage_height: 480\ncamera_matrix: {rows: 3, cols: 3, dt: d, data: [1, 0, 0]}\n", "a",
+      "a.yml");
+  ASSERT_FALSE(rig.ok());
+  EXPECT_THAT(rig.error().message(), HasSubstr("camera_matrix: holds 3 numbers, not 3 x 3"));
+}
+
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

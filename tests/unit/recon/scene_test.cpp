@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/scene.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 #include "session/shutter_times.h"
 #include "session/writer.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -154,7 +155,7 @@ class SessionSceneTest : public SceneTest {
   [[nodiscard]] fs::path record(const v1::Manifest& m, std::uint64_t lost = 3) const {
     fs::path folder = root_ / "session";
     fs::remove_all(folder);
-    auto writer = SessionWriter::create(folder, m, {.min_free_bytes = 0});
+    auto writer = session::SessionWriter::create(folder, m, {.min_free_bytes = 0});
     EXPECT_TRUE(writer.ok()) << writer.error().message();
     for (std::size_t camera = 0; camera < 3; ++camera) {
       for (std::uint64_t f = 0; f < 5; ++f) {
@@ -188,7 +189,7 @@ class SessionSceneTest : public SceneTest {
 /// flame in the upper three rows.
 fs::path SessionSceneTest::record_long(const v1::Manifest& m) const {
   fs::path folder = root_ / "long";
-  auto writer = SessionWriter::create(folder, m, {.min_free_bytes = 0});
+  auto writer = session::SessionWriter::create(folder, m, {.min_free_bytes = 0});
   EXPECT_TRUE(writer.ok()) << writer.error().message();
   for (std::size_t camera = 0; camera < 3; ++camera) {
     for (std::uint64_t f = 0; f < 24; ++f) {
@@ -340,7 +341,7 @@ TEST_F(SessionSceneTest, TimesBringLatenessAndAverages) {
     camera->set_sigma_s(1e-5);
     for (int f = 0; f < (i == 1 ? 4 : 5); ++f) camera->add_late_s(1e-3 * i + 1e-4 * f);
   }
-  ASSERT_TRUE(write_shutter_times(folder, times).ok());
+  ASSERT_TRUE(session::write_shutter_times(folder, times).ok());
   const auto scene = load_scene(folder, {.box = {}, .frame = 3});
   ASSERT_TRUE(scene.ok()) << scene.error().message();
   EXPECT_NEAR(scene->views[0].lateness.value(), 3e-4, 1e-12);
@@ -364,4 +365,4 @@ TEST_F(SessionSceneTest, ASessionWithoutABoxNeedsOne) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

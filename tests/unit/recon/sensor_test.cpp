@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/effects/sensor.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include "recon/kernels/judge.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 Sensor gamma_sensor(double gamma, double white, bool clips) {
@@ -136,4 +137,4 @@ TEST(Sensor, DescentOnTheBoundFindsWhatTheClippedPixelsHide) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

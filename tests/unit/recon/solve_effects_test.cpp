@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Pictures made with an effect, reconstructed with it and without: an effect that the solver follows must
 // cost nothing in quality, and one that it ignores must.
 #include <algorithm>
@@ -9,7 +10,7 @@
 #include "recon/synthetic/flame.h"
 #include "tests/support/devices.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(SolveEffects);
@@ -190,4 +191,4 @@ TEST_P(SolveEffects, ThePapersSolverRefusesWhatItDoesNotKnow) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/solver.h"
 
 #include <algorithm>
@@ -10,7 +11,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(SolverTest);
@@ -175,4 +176,4 @@ TEST(Device, CudaRunsOrSaysWhyNot) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The same bits for 1, 2 and 16 threads. The solvers in single precision are in solver_test.cpp, curved rays
 // in refraction_test.cpp.
 #include <cstring>
@@ -11,7 +12,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(Threads);
@@ -103,4 +104,4 @@ TEST_P(Threads, RenderTheSameBitsUnderEveryEffect) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

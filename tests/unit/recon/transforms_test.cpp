@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/transforms.h"
 
 #include <cmath>
@@ -9,7 +10,7 @@
 
 #include "recon/calibrate/pose.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
@@ -200,4 +201,4 @@ TEST(Transforms, DistortionThatFoldsThePictureIsRefused) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

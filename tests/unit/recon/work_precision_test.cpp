@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "recon/pipeline/work_precision.h"
 
 #include <algorithm>
@@ -16,7 +17,7 @@
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
-namespace emberlock {
+namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(Sweep);
@@ -308,4 +309,4 @@ TEST(ShippedFront, IsUsable) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::recon

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/async_writer.h"
 
 #include <array>
@@ -11,9 +12,10 @@
 
 #include "base/unique_fd.h"
 #include "session/reader.h"
+#include "session/salvage.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using test::manifest_of;
@@ -22,6 +24,8 @@ using test::small_disk_options;
 using test::TempFolder;
 
 const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
+constexpr std::uint64_t kFrameBytes = 64 * 48;
+constexpr Seconds kEver{1e6};
 
 SessionWriter writer_for(const std::filesystem::path& folder, std::size_t cameras) {
   return SessionWriter::create(folder, manifest_of(std::vector<ImageLayout>(cameras, kLayout)),
@@ -33,7 +37,7 @@ std::uint64_t accounted(const v1::Counts& c) { return c.recorded() + c.camera_ga
 
 TEST(AsyncWriter, CamerasPushAtOnceAndEveryFrameIsWritten) {
   const TempFolder temp;
-  AsyncWriter writer(writer_for(temp / "s", 3), {.queue_frames = 1000});
+  AsyncWriter writer(writer_for(temp / "s", 3), {.queue_time = kEver});
   std::vector<std::thread> cameras;
   for (std::size_t c = 0; c < 3; ++c) {
     cameras.emplace_back([&writer, c] {
@@ -60,7 +64,8 @@ TEST(AsyncWriter, AFullQueueLosesFramesCountedAsTheQueues) {
   const ImageLayout large{{1280, 720}, PixelFormat::gray8, 8};
   auto writer = SessionWriter::create(temp / "s", manifest_of({large}), small_disk_options());
   ASSERT_TRUE(writer);
-  AsyncWriter async(std::move(writer).value(), {.queue_frames = 2});
+  AsyncWriter async(std::move(writer).value(),
+                    {.queue_bytes = 2 * noise_frame(large, 0).image->bytes().size(), .queue_time = kEver});
   const Frame frame = noise_frame(large, 0);
   std::uint64_t refused = 0;
   std::uint64_t id = 0;
@@ -83,7 +88,7 @@ TEST(AsyncWriter, AFullQueueLosesFramesCountedAsTheQueues) {
 TEST(AsyncWriter, LossesOfTheDriverAreTakenFromTheCamerasGaps) {
   const TempFolder temp;
   AsyncWriter writer(writer_for(temp / "s", 1));
-  for (const std::uint64_t id : {0, 1, 6}) writer.push(0, noise_frame(kLayout, id));
+  for (const std::uint64_t id : {0, 1, 6}) EXPECT_TRUE(writer.push(0, noise_frame(kLayout, id)));
   writer.count_lost(0, LossCause::transport, 1);
   writer.count_lost(0, LossCause::underrun, 2);
   const auto manifest = writer.finish();
@@ -111,8 +116,8 @@ TEST(AsyncWriter, NoSpaceIsToldWhileRecordingAndCountedAsTheDisks) {
 TEST(AsyncWriter, AFrameOfAnotherLayoutIsToldAndCounted) {
   const TempFolder temp;
   AsyncWriter writer(writer_for(temp / "s", 1));
-  writer.push(0, noise_frame({{48, 64}, PixelFormat::gray8, 8}, 0));
-  writer.push(0, noise_frame(kLayout, 1));
+  EXPECT_TRUE(writer.push(0, noise_frame({{48, 64}, PixelFormat::gray8, 8}, 0)));
+  EXPECT_TRUE(writer.push(0, noise_frame(kLayout, 1)));
   const auto manifest = writer.finish();
   ASSERT_TRUE(manifest) << manifest.error().message();
   EXPECT_EQ(manifest->cameras(0).counts().disk(), 1U);
@@ -128,7 +133,7 @@ TEST(AsyncWriter, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
   AsyncWriter writer(SessionWriter::create(temp / "s", manifest_of({kLayout, kLayout}),
                                            small_disk_options(Encoding::raw_nut))
                          .value(),
-                     {.queue_frames = 8});
+                     {.queue_bytes = 8 * kFrameBytes, .queue_time = kEver});
   put_stalled_disk(temp / "s/cam0/000000.nut");
   std::uint64_t refused = 0;
   for (std::uint64_t i = 0; i < 200; ++i) {  // 600 KB; were push() to wait, it would wait for ever
@@ -139,7 +144,12 @@ TEST(AsyncWriter, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
   const CameraProgress stalled = writer.progress(0);
   EXPECT_EQ(stalled.queue_fill, 1);
   EXPECT_EQ(stalled.counts.queue(), refused);
-  EXPECT_LT(stalled.counts.recorded(), 60U);
+  EXPECT_EQ(stalled.arrived, 200U);
+  EXPECT_EQ(stalled.queued + stalled.written + refused, 200U);
+  EXPECT_GE(stalled.queued, 8U);
+  EXPECT_EQ(stalled.safe, 0U);
+  EXPECT_EQ(stalled.counts.recorded(), 0U) << "what no disk has is called recorded";
+  EXPECT_GT(stalled.at_risk.value(), 0);
 
   std::thread disk([&] {  // it comes back
     const UniqueFd fd(::open((temp / "s/cam0/000000.nut").c_str(), O_RDONLY | O_CLOEXEC));
@@ -157,14 +167,68 @@ TEST(AsyncWriter, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
   EXPECT_EQ(accounted(counts), 200U);
 }
 
+TEST(AsyncWriter, AFrameThatHasWaitedTooLongFillsItsQueueHoweverSmallItIs) {
+  const TempFolder temp;
+  AsyncWriter writer(
+      SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options(Encoding::raw_nut))
+          .value(),
+      {.queue_time = Seconds(0.05)});
+  put_stalled_disk(temp / "s/cam0/000000.nut");
+  std::uint64_t id = 0;
+  while (writer.push(0, noise_frame(kLayout, id))) ++id;  // were only bytes bounded, 20 000 frames would fit
+  EXPECT_LT(id, 15'000U);
+  EXPECT_EQ(writer.progress(0).queue_fill, 1);
+  EXPECT_EQ(writer.progress(0).counts.queue(), 1U);
+  std::thread disk([&] {
+    const UniqueFd fd(::open((temp / "s/cam0/000000.nut").c_str(), O_RDONLY | O_CLOEXEC));
+    std::array<char, 4096> bytes{};
+    while (::read(fd.get(), bytes.data(), bytes.size()) > 0) {
+    }
+  });
+  static_cast<void>(writer.finish());
+  disk.join();
+}
+
+TEST(AsyncWriter, ASimulationWaitsForRoomAndLosesNothing) {
+  const TempFolder temp;
+  AsyncWriter writer(writer_for(temp / "s", 1),
+                     {.queue_bytes = kFrameBytes, .queue_time = Seconds(1e-6), .when_full = WhenFull::wait});
+  for (std::uint64_t i = 0; i < 100; ++i) ASSERT_TRUE(writer.push(0, noise_frame(kLayout, i)));
+  const auto manifest = writer.finish();
+  ASSERT_TRUE(manifest) << manifest.error().message();
+  EXPECT_EQ(manifest->cameras(0).counts().recorded(), 100U);
+}
+
+TEST(AsyncWriter, WhatItCallsSafeASalvageOfACopyFinds) {
+  for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut}) {
+    const TempFolder temp;
+    AsyncWriter writer(
+        SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options(encoding)).value());
+    for (std::uint64_t i = 0; i < 7; ++i) ASSERT_TRUE(writer.push(0, noise_frame(kLayout, i)));
+    // No frame comes after these, and no segment ends: they become safe nevertheless.
+    while (writer.progress(0).safe < 7) std::this_thread::yield();
+    std::filesystem::copy(temp / "s", temp / "copy", std::filesystem::copy_options::recursive);
+    const auto salvaged = salvage(temp / "copy");
+    ASSERT_TRUE(salvaged) << salvaged.error().message();
+    EXPECT_EQ(salvaged->cameras.at(0).kept, 7U);
+    EXPECT_EQ(salvaged->cameras.at(0).lost, 0U);
+    ASSERT_TRUE(writer.finish());
+  }
+}
+
 TEST(AsyncWriter, ProgressAddsUpToWhatFinishTells) {
   const TempFolder temp;
-  AsyncWriter writer(writer_for(temp / "s", 2), {.queue_frames = 100});
-  for (const std::uint64_t id : {0, 1, 2, 7, 8}) writer.push(1, noise_frame(kLayout, id));
+  AsyncWriter writer(writer_for(temp / "s", 2), {.queue_time = kEver});
+  for (const std::uint64_t id : {0, 1, 2, 7, 8}) EXPECT_TRUE(writer.push(1, noise_frame(kLayout, id)));
   writer.count_lost(1, LossCause::transport, 3);
   while (writer.progress(1).counts.recorded() < 5) std::this_thread::yield();
   const CameraProgress now = writer.progress(1);
   EXPECT_EQ(now.queue_fill, 0);
+  EXPECT_EQ(now.arrived, 5U);
+  EXPECT_EQ(now.queued, 0U);
+  EXPECT_EQ(now.written, 5U);
+  EXPECT_EQ(now.safe, 5U);
+  EXPECT_EQ(now.at_risk.value(), 0);
   EXPECT_GT(now.bytes, 5U * 68);
   const auto manifest = writer.finish();
   ASSERT_TRUE(manifest) << manifest.error().message();
@@ -185,10 +249,10 @@ TEST(AsyncWriter, ThrownAwayUnfinishedLeavesASessionToSalvage) {
   const TempFolder temp;
   {
     AsyncWriter writer(writer_for(temp / "s", 2));
-    for (std::uint64_t i = 0; i < 10; ++i) writer.push(0, noise_frame(kLayout, i));
+    for (std::uint64_t i = 0; i < 10; ++i) EXPECT_TRUE(writer.push(0, noise_frame(kLayout, i)));
   }
   EXPECT_FALSE(SessionReader::open(temp / "s"));
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/export.h"
 
 #include <fstream>
@@ -7,10 +8,10 @@
 #include <gtest/gtest.h>
 
 #include "session/files.h"
-#include "session/frame_file.h"
+#include "session/media/frame_file.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using test::manifest_of;
@@ -126,4 +127,4 @@ TEST(Export, EndedOrInTheWayOfOtherFilesItLeavesNothingBehind) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

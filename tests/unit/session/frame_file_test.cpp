@@ -1,4 +1,5 @@
-#include "session/frame_file.h"
+// SPDX-License-Identifier: Apache-2.0
+#include "session/media/frame_file.h"
 
 #include <array>
 #include <string>
@@ -12,7 +13,7 @@
 #include "session/segment.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using test::noise_image;
@@ -204,6 +205,12 @@ TEST(FrameFile, FitsCutShortIsAnError) {
   }
 }
 
+IndexRecord record_at(std::uint32_t milliseconds) {
+  IndexRecord record;
+  record.segment_ms = milliseconds;
+  return record;
+}
+
 class Video : public testing::TestWithParam<ImageLayout> {};
 
 TEST_P(Video, OfFfv1ComesBackFrameForFrame) {
@@ -211,7 +218,8 @@ TEST_P(Video, OfFfv1ComesBackFrameForFrame) {
   const ImageLayout layout = GetParam();
   auto writer = SegmentWriter::create(temp / "v.mkv", layout, Encoding::ffv1, Hertz(25));
   ASSERT_TRUE(writer);
-  for (std::uint32_t i = 0; i < 5; ++i) ASSERT_TRUE((*writer)->write(noise_image(layout, i), i * 40));
+  for (std::uint32_t i = 0; i < 5; ++i)
+    ASSERT_TRUE((*writer)->write(noise_image(layout, i), record_at(i * 40)));
   ASSERT_TRUE((*writer)->close());
   auto file = FrameFile::open(temp / "v.mkv");
   ASSERT_TRUE(file) << file.error().message();
@@ -234,7 +242,8 @@ TEST(FrameFile, AVideoCutShortGivesItsFramesAndThenAnError) {
   const ImageLayout layout{{64, 48}, PixelFormat::gray8, 8};
   auto writer = SegmentWriter::create(temp / "v.mkv", layout, Encoding::ffv1, Hertz(25));
   ASSERT_TRUE(writer);
-  for (std::uint32_t i = 0; i < 60; ++i) ASSERT_TRUE((*writer)->write(noise_image(layout, i), i * 40));
+  for (std::uint32_t i = 0; i < 60; ++i)
+    ASSERT_TRUE((*writer)->write(noise_image(layout, i), record_at(i * 40)));
   ASSERT_TRUE((*writer)->close());
   std::filesystem::resize_file(temp / "v.mkv", std::filesystem::file_size(temp / "v.mkv") / 2);
   auto file = FrameFile::open(temp / "v.mkv");
@@ -264,4 +273,4 @@ TEST(FrameFile, AVideoWithoutFramesIsAnError) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -19,7 +20,7 @@
 
 // A disk that is full, in earnest: a process of its own records to a small file system in memory (in a mount
 // namespace), or may not let a file grow.
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using test::manifest_of;
@@ -59,9 +60,11 @@ std::string record_all(const std::filesystem::path& folder, Encoding encoding, s
   auto session = SessionWriter::create(folder, manifest_of({kFullDiskLayout, kFullDiskLayout}),
                                        small_disk_options(encoding));
   if (!session) return session.error().message();
-  AsyncWriter writer(std::move(session).value(), {.queue_frames = kManyFrames});
+  AsyncWriter writer(std::move(session).value(), {.when_full = WhenFull::wait});
   for (std::uint64_t i = 0; i < kManyFrames; ++i) {
-    for (const std::size_t camera : {0, 1}) writer.push(camera, noise_frame(kFullDiskLayout, i, camera));
+    for (const std::size_t camera : {0, 1}) {
+      if (!writer.push(camera, noise_frame(kFullDiskLayout, i, camera))) return "a frame was lost on its way";
+    }
   }
   const auto manifest = writer.finish();
   if (!manifest) return manifest.error().message();
@@ -137,4 +140,4 @@ TEST_P(FullDisk, FilesThatMayNotGrowAreAsAFullDisk) {
 INSTANTIATE_TEST_SUITE_P(Recording, FullDisk, testing::Values(Encoding::ffv1, Encoding::raw_nut));
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,4 +1,5 @@
-#include "session/import_scan.h"
+// SPDX-License-Identifier: Apache-2.0
+#include "session/media/import_scan.h"
 
 #include <string>
 #include <vector>
@@ -6,10 +7,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "session/video_scan.h"
+#include "session/media/video_scan.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using testing::ElementsAre;
@@ -89,4 +90,4 @@ TEST(VideoScan, FindsWhereFramesStopFollowingEvenly) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

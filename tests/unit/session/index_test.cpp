@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/index.h"
 
 #include <array>
@@ -7,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 IndexRecord record(std::uint32_t i) {
@@ -116,4 +117,4 @@ TEST(PixelHash, NeverChangesItsValue) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <string>
 
 #include <gtest/gtest.h>
@@ -6,7 +7,7 @@
 #include "session/files.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using test::TempFolder;
@@ -111,4 +112,4 @@ TEST(Events, ALengthBeyondTheFileIsATornEnd) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

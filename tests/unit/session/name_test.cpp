@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/name.h"
 
 #include <string>
 
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 TEST(SessionName, WhatPeopleCallARecordingIsTaken) {
@@ -28,6 +29,35 @@ TEST(SessionName, WhatLeadsElsewhereOrBreaksATerminalIsRefused) {
   }
 }
 
+TEST(SessionName, WhatLooksLikeAnOptionOrLikeNothingIsRefusedAndSaysWhy) {
+  for (const char* name : {"-", "-rf", "--help", "-1"}) {
+    const Status status = check_session_name(name);
+    ASSERT_FALSE(status) << name;
+    EXPECT_NE(status.error().message().find("hyphen"), std::string::npos);
+  }
+  for (const char* name : {" ", " lead", "  two"}) {
+    const Status status = check_session_name(name);
+    ASSERT_FALSE(status) << name;
+    EXPECT_NE(status.error().message().find("begins with a space"), std::string::npos);
+  }
+  EXPECT_TRUE(check_session_name("take-2 - second"));
+}
+
+TEST(Text, IsBoundedAndOnOneLine) {
+  EXPECT_TRUE(check_text("purpose", ""));
+  EXPECT_TRUE(check_text("purpose", "fl\xc3\xa4mme, third try: \"blue\""));
+  EXPECT_TRUE(check_text("purpose", std::string(kMaxTextBytes, 'x')));
+  for (const std::string& text :
+       {std::string(3'900'000, 'x'), std::string(kMaxTextBytes + 1, 'x'), std::string("two\nlines"),
+        std::string("a\0b", 3), std::string("\x1b[2J")}) {
+    const Status status = check_text("purpose", text);
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().kind, ErrorKind::bad_input);
+    EXPECT_EQ(status.error().where, "field purpose");
+    EXPECT_LT(status.error().message().size(), 250U);
+  }
+}
+
 TEST(SessionName, WhatWindowsCannotHoldIsRefused) {
   for (const char* name : {"con", "NUL", "Com7", "lpt1.log", "aux .txt", "ends.", "ends "}) {
     EXPECT_FALSE(check_session_name(name)) << name;
@@ -35,4 +65,4 @@ TEST(SessionName, WhatWindowsCannotHoldIsRefused) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

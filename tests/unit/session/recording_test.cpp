@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "tests/support/recording.h"
 
 #include <algorithm>
@@ -12,7 +13,7 @@
 #include "session/salvage.h"
 #include "session/writer.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using test::manifest_of;
@@ -248,6 +249,27 @@ TEST(Recording, IntoAFolderThatHoldsSomethingIsRefused) {
   EXPECT_EQ(test::bytes_of(temp / "s" / "thesis.tex"), "years of work");
 }
 
+/// Whatever refuses it, there is no folder afterwards that there wasn't before.
+TEST(Recording, ThatIsRefusedLeavesNothing) {
+  const TempFolder temp;
+  v1::Manifest wordy = manifest_of({kSmall});
+  wordy.set_purpose(std::string(3'900'000, 'x'));
+  const auto refused = SessionWriter::create(temp / "sessions/s", wordy, small_disk_options());
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message().find("purpose"), std::string::npos);
+  EXPECT_LT(refused.error().message().size(), 500U);
+  EXPECT_FALSE(std::filesystem::exists(temp / "sessions"));
+
+  // The second camera's folder can't be made, as the first camera's index stands in its way.
+  v1::Manifest clashing = manifest_of({kSmall, kSmall});
+  clashing.mutable_cameras(1)->set_camera_id("events.binpb");
+  EXPECT_FALSE(SessionWriter::create(temp / "sessions/s", clashing, small_disk_options()));
+  EXPECT_FALSE(std::filesystem::exists(temp / "sessions"));
+  std::filesystem::create_directories(temp / "sessions/s");
+  EXPECT_FALSE(SessionWriter::create(temp / "sessions/s", clashing, small_disk_options()));
+  EXPECT_TRUE(std::filesystem::is_empty(temp / "sessions/s")) << "what was there before stays, as it was";
+}
+
 TEST(Recording, ASingleRowOfPixelsIsRefusedBeforeAnythingIsCreated) {
   const TempFolder temp;
   const auto writer = SessionWriter::create(temp / "s", manifest_of({{{64, 1}, PixelFormat::gray8, 8}}),
@@ -305,4 +327,4 @@ TEST(Recording, TranscodingADamagedRawSegmentKeepsIt) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/shutter_times.h"
 
 #include <cmath>
@@ -9,7 +10,7 @@
 
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using test::TempFolder;
@@ -94,4 +95,4 @@ TEST(ShutterTimes, OfNoFiniteNumberAreNeitherWrittenNorRead) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

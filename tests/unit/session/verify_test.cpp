@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "session/verify.h"
 
 #include <string>
@@ -9,7 +10,7 @@
 #include "session/salvage.h"
 #include "tests/support/recording.h"
 
-namespace emberlock {
+namespace emberlock::session {
 namespace {
 
 using test::bytes_of;
@@ -127,7 +128,7 @@ TEST_P(VerifyBoth, AMissingSegmentCostsItsFramesAndIsNamed) {
 
 INSTANTIATE_TEST_SUITE_P(Session, VerifyBoth, testing::Values(Encoding::ffv1, Encoding::raw_nut));
 
-TEST(Verify, ADamagedIndexCostsItsRecordAndADamagedHeaderNone) {
+TEST(Verify, ADamagedIndexCostsNoFrame) {
   const TempFolder temp;
   record_two(temp / "s");
   flip(index_path(temp / "s", "cam0"), 3);
@@ -140,10 +141,46 @@ TEST(Verify, ADamagedIndexCostsItsRecordAndADamagedHeaderNone) {
   ASSERT_TRUE(report) << report.error().message();
   EXPECT_EQ(report->cameras[0].kept, kFrames);
   EXPECT_EQ(report->cameras[0].lost, 0U);
-  EXPECT_EQ(report->cameras[1].kept, kFrames - 1);
-  EXPECT_EQ(report->cameras[1].lost, 1U);
+  EXPECT_EQ(report->cameras[1].kept, kFrames);
+  EXPECT_EQ(report->cameras[1].found, 1U);
+  EXPECT_EQ(report->cameras[1].lost, 0U);
   EXPECT_TRUE(verified(temp / "s").whole());
   expect_all_good(temp / "s");
+}
+
+TEST(Verify, NeverCallsNothingAllThere) {
+  const TempFolder temp;
+  auto writer = SessionWriter::create(temp / "none", manifest_of({kVerifiedLayout, kVerifiedLayout}),
+                                      small_disk_options());
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->finish());
+  SessionCheck check = verified(temp / "none");
+  EXPECT_FALSE(check.whole());
+  EXPECT_NE(check.cameras.at(1).problems.at(0).find("not one frame"), std::string::npos);
+  EXPECT_NE(check.to_do.find("record again"), std::string::npos);
+
+  writer = SessionWriter::create(temp / "one of two", manifest_of({kVerifiedLayout, kVerifiedLayout}),
+                                 small_disk_options());
+  ASSERT_TRUE(writer);
+  ASSERT_TRUE(writer->write(0, noise_frame(kVerifiedLayout, 0, 0)));
+  ASSERT_TRUE(writer->finish());
+  check = verified(temp / "one of two");
+  EXPECT_FALSE(check.whole());
+  EXPECT_TRUE(check.cameras.at(0).problems.empty());
+  EXPECT_EQ(check.cameras.at(1).problems.size(), 1U);
+
+  // The files of a whole session are gone, and its index with them, as after a power cut.
+  record_two(temp / "gone");
+  for (const char* camera : {"cam0", "cam1"}) {
+    for (std::uint32_t number : {0U, 1U, 2U})
+      std::filesystem::remove(find_segment(temp / "gone", camera, number));
+    std::filesystem::resize_file(index_path(temp / "gone", camera), kIndexHeaderBytes);
+  }
+  check = verified(temp / "gone");
+  EXPECT_FALSE(check.whole());
+  EXPECT_EQ(check.cameras.at(0).missing, kFrames);
+  ASSERT_TRUE(repair_session(temp / "gone"));
+  EXPECT_FALSE(verified(temp / "gone").whole());
 }
 
 TEST(Verify, TornEventsAListOfOtherSegmentsAndWrongCountsAreFound) {
@@ -253,4 +290,4 @@ TEST(Transcode, CutShortAnywhereIsTakenUpAgain) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::session

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Cameras that are held in tolerance: when they are filmed again, and who is reset before it leaves.
 #include "smear_sync/align/align_hold.h"
 
@@ -5,7 +6,7 @@
 
 #include "smear_sync/align/align_simulation.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 /// Crystals 40 ppm apart lead cameras out of +-100 rows of 54 us in some minutes.
@@ -163,4 +164,4 @@ TEST_F(HeldCameras, OneThatIsResetByHandIsAskedForBeforeItLeaves) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

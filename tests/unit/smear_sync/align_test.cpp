@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/align.h"
 
 #include <gmock/gmock.h>
@@ -5,7 +6,7 @@
 
 #include "smear_sync/align/align_simulation.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using testing::HasSubstr;
@@ -278,4 +279,4 @@ TEST(Policy, NamesGoThereAndBack) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

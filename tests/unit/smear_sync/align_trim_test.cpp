@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // Frame rates trimmed until all cameras are in phase, what is refused, and when to look again.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "smear_sync/align/align_simulation.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using testing::HasSubstr;
@@ -187,4 +188,4 @@ TEST(AlignSchedule, CamerasOfKnownEqualRatesAreLeftAloneForLonger) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

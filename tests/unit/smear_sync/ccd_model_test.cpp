@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/ccd_model.h"
 
 #include <cmath>
@@ -6,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 // Row times that binary floating point holds exactly, so that borders between row periods are exact too.
@@ -125,4 +126,4 @@ TEST(CcdModel, ImpossibleTimingsAreRefusedWithTheField) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/detect.h"
 
 #include <cmath>
@@ -8,7 +9,7 @@
 #include "tests/support/compressed_frames.h"
 #include "tests/support/smear_frames.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::SmearScene;
@@ -592,4 +593,4 @@ TEST(Detect, EmptyMalformedAndTinyFrames) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

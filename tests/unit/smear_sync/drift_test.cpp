@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/drift.h"
 
 #include <cmath>
@@ -6,7 +7,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 const Seconds kDriftPeriod(1 / 23.976);
@@ -201,4 +202,4 @@ TEST(TimeLeft, OutsideIsNoTimeAtAll) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/sensors/exposure_sweep.h"
 
 #include <cmath>
@@ -8,7 +9,7 @@
 #include "base/random.h"
 #include "tests/support/shutters.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::Shutter;
@@ -116,4 +117,4 @@ TEST(ExposureSweep, PhasesOfTwoShuttersCompareLikeAnyOthers) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

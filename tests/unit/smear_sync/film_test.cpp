@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What many frames tell that one can't.
 #include "smear_sync/detect/film.h"
 
@@ -8,7 +9,7 @@
 #include "smear_sync/detect/detect.h"
 #include "tests/support/smear_frames.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::SmearScene;
@@ -147,4 +148,4 @@ TEST(Film, WhereNothingMovesNothingIsSettled) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Reading frame after frame: the same as reading each alone, and nothing new goes unseen.
 #include "smear_sync/detect/follow.h"
 
@@ -7,7 +8,7 @@
 
 #include "tests/support/smear_frames.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::SmearScene;
@@ -100,4 +101,4 @@ TEST(Follow, OtherFormatsAndMalformedFramesBetween) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/frame_code.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include "tests/support/clock_film.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::ClockFilm;
@@ -207,4 +208,4 @@ TEST(FrameCode, OptionsOutOfRangeAreRefused) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // A global shutter from round to round, while its crystal, the light and its exposure change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/scripted_shutter.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::kStill;
@@ -145,4 +146,4 @@ TEST_F(GlobalSensor, APictureThatCantBeReadSaysSoAndCountsForNothing) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/move_together.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include "smear_sync/align/align_simulation.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using testing::ElementsAre;
@@ -195,4 +196,4 @@ TEST(MoveTogether, NoTrueDotIsDoubted) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/sensors/phase_sensor.h"
 
 #include <gmock/gmock.h>
@@ -5,7 +6,7 @@
 
 #include "tests/support/smear_frames.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr CcdTiming kTiming{
@@ -54,4 +55,4 @@ TEST(SmearSensor, TheRowTimeOfACombScalesItsPhases) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/phase.h"
 
 #include <gtest/gtest.h>
@@ -6,7 +7,7 @@
 #include "tests/support/clock_film.h"
 #include "tests/support/shift_register.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::reading_of;
@@ -215,4 +216,4 @@ TEST(Refer, WithoutAnyDotKeepsTheBeatThatWasPromised) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

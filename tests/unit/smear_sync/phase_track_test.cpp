@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/phase_track.h"
 
 #include <gtest/gtest.h>
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 const Beat kBeat{PartsPerMillion(0), PartsPerMillion(5)};
@@ -77,4 +78,4 @@ TEST(PhaseTrack, NeighboursAboutTheWrapAreNeighbours) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/rate_servo.h"
 
 #include <gtest/gtest.h>
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 const RateTrim kCamera{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
@@ -39,4 +40,4 @@ TEST(RateServo, TrimsAreStepsWithinTheRange) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

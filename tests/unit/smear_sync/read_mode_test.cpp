@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/read_mode.h"
 
 #include <cmath>
@@ -7,7 +8,7 @@
 
 #include "tests/support/clock_film.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::ClockFilm;
@@ -172,4 +173,4 @@ TEST(ReadMode, RatesThatAreNone) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/align/reset_delay.h"
 
 #include <gtest/gtest.h>
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 const AlignOptions kAlignOptions;
@@ -83,4 +84,4 @@ TEST(ResetDelay, HandsDrawEvenlyUntilTheirShiftsShowOtherwise) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/sensors/rolling_band.h"
 
 #include <cmath>
@@ -10,7 +11,7 @@
 #include "smear_sync/clocks/row_clock.h"
 #include "tests/support/shutters.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::Roller;
@@ -184,4 +185,4 @@ TEST(RollingBand, TheProfileOfAPictureIsTheMeanOfItsRows) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

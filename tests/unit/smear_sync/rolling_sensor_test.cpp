@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: Apache-2.0
 // A rolling shutter from round to round, while the light and its exposure change.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/scripted_shutter.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using test::kStill;
@@ -73,4 +74,4 @@ TEST_F(RollingSensor, APictureThatCantBeReadSaysSoAndCountsForNothing) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

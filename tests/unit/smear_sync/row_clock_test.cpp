@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/clocks/row_clock.h"
 
 #include <algorithm>
@@ -8,7 +9,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 constexpr double kRowTime = 54e-6;
@@ -203,4 +204,4 @@ TEST(RowClock, DotsAtRandomAreNoComb) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

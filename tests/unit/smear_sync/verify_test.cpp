@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // What clips of one strobe prove, told from readings made of flashes and shift registers alone.
 #include "smear_sync/verify/verify.h"
 
@@ -9,7 +10,7 @@
 
 #include "base/random.h"
 
-namespace emberlock {
+namespace emberlock::smear {
 namespace {
 
 using testing::ContainsRegex;
@@ -136,7 +137,8 @@ TEST(Verify, RandomRigsComeOutWithinMicrosecondsAndToTheFrame) {
       const CameraVerdict& c = result.cameras[i];
       ASSERT_TRUE(c.error && c.drift) << "rig " << rig << ": " << c.reason;
       const Truth expected = truth(cameras[0], cameras[i]);
-      EXPECT_EQ(c.frame_offset, expected.offset) << "rig " << rig << " camera " << i;
+      EXPECT_EQ(c.frame_offset, expected.offset)
+          << "rig " << rig << " camera " << i << ": " << c.offset_reason;
       EXPECT_NEAR(wrap_symmetric(in_milliseconds(*c.error) - expected.error_ms, 1000 / 23.976), 0, 0.01)
           << "rig " << rig << " camera " << i;
       EXPECT_NEAR(c.drift->value(), cameras[0].ppm - cameras[i].ppm, 3) << "rig " << rig << " camera " << i;
@@ -202,7 +204,8 @@ TEST(Verify, WithoutACodeAStrobeInTuneStillTellsTheError) {
 }
 
 TEST(Verify, AStrobeInTuneLeavesTheDirectionOpenAndSaysHowToTellIt) {
-  const VerifyResult result = verify({{.start = 1 - 0.012}, {.start = 1.002 - 0.012}}, {.rate = 23.976});
+  const VerifyResult result =
+      verify({{.start = 1 - 0.012}, {.start = 1.002 - 0.012}}, {.rate = 23.976, .coded = false});
   EXPECT_EQ(result.cameras[1].state, ClipState::direction_unknown);
   EXPECT_FALSE(result.cameras[1].error);
   EXPECT_EQ(result.verdict, ClipsVerdict::not_proven);
@@ -214,9 +217,23 @@ TEST(Verify, AStrobeInTuneTellsNoDirectionByWayOfAFrameRateNearby) {
   for (const int direction : {-1, +1}) {
     for (const double rate : {23.9775, 23.974}) {
       std::vector<Camera> cameras(2, {.start = 1 - 0.012, .direction = direction});
-      for (const CameraVerdict& c : verify(cameras, {.rate = rate}).cameras)
+      for (const CameraVerdict& c : verify(cameras, {.rate = rate, .coded = false}).cameras)
         EXPECT_FALSE(c.clock.mode.direction) << c.clock.mode.direction_reason;
     }
+  }
+}
+
+TEST(Verify, AStrobeInTuneTellsTheDirectionByTheFlashesThatItSkips) {
+  for (const int direction : {-1, +1}) {
+    const Camera first{.start = 1 - 0.012, .direction = direction};
+    const Camera second{.start = 1.002 - 0.012, .direction = direction};
+    const VerifyResult result = verify({first, second}, {.rate = 23.976});
+    const CameraVerdict& c = result.cameras[1];
+    ASSERT_TRUE(c.clock.mode.direction) << c.clock.mode.direction_reason;
+    EXPECT_EQ(static_cast<int>(*c.clock.mode.direction), direction);
+    ASSERT_TRUE(c.error) << c.reason;
+    EXPECT_NEAR(in_milliseconds(*c.error), truth(first, second).error_ms, 0.2);
+    EXPECT_EQ(c.frame_offset, truth(first, second).offset) << c.offset_reason;
   }
 }
 
@@ -287,7 +304,8 @@ TEST(Verify, ADotWhoseLampWasNotLitIsNoLamp) {
   }
   ASSERT_GT(changed, 5);
   const VerifyResult result = verify_clips(clips, options_of({})).value();
-  EXPECT_EQ(result.cameras[1].frame_offset, truth({.start = 1}, {.start = 0.3}).offset);
+  EXPECT_EQ(result.cameras[1].frame_offset, truth({.start = 1}, {.start = 0.3}).offset)
+      << result.cameras[1].offset_reason;
   EXPECT_EQ(result.cameras[1].clock.numbers.misread, 0);
 }
 
@@ -313,4 +331,4 @@ TEST(Verify, OneClipOrASenselessRateIsRefused) {
 }
 
 }  // namespace
-}  // namespace emberlock
+}  // namespace emberlock::smear

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // The CHDK camera of tests/support/chdk_responder, behind QEMU's usbredir, the kernel's USB and libusb. Where
 // a test prints what it measured, that is of this camera under emulation, not of a Canon's.
 #include <algorithm>
@@ -29,7 +30,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr const char* kId = "EMBER0001";
-const CameraRequest kGray{.format = PixelFormat::gray8};
+const drivers::CameraRequest kGray{.format = PixelFormat::gray8};
 
 /// How often to do what is done again and again: EMBERLOCK_VM_ROUNDS, 100 for the full length.
 int rounds_or(int usual) {
@@ -44,15 +45,15 @@ class ChdkOnUsb : public UsbBed {
     const auto connection = connect(true);
     ASSERT_TRUE(connection.ok()) << connection.error().message();
   }
-  std::unique_ptr<Camera> filming(const CameraRequest& request = kGray) {
-    auto camera = ptp_driver().open(kId, request);
+  std::unique_ptr<drivers::Camera> filming(const drivers::CameraRequest& request = kGray) {
+    auto camera = drivers::ptp_driver().open(kId, request);
     EXPECT_TRUE(camera.ok()) << camera.error().message();
     if (!camera.ok()) return nullptr;
     const Status started = (*camera)->start();
     EXPECT_TRUE(started.ok()) << started.error().message();
     return std::move(*camera);
   }
-  Result<Frame> frame(Camera& camera, Seconds limit) {
+  Result<Frame> frame(drivers::Camera& camera, Seconds limit) {
     const TimePoint until = clock_.now() + limit;
     auto result = camera.next_frame(milliseconds(20));
     while (!result.ok() && result.error().kind == ErrorKind::timed_out && clock_.now() < until) {
@@ -61,7 +62,7 @@ class ChdkOnUsb : public UsbBed {
     return result;
   }
   /// How long until the camera films again, once it is plugged in.
-  Seconds return_of(Camera& camera) {
+  Seconds return_of(drivers::Camera& camera) {
     const TimePoint plugged = clock_.now();
     EXPECT_TRUE(within(Seconds(10), [&] { return camera.start().ok(); }));
     EXPECT_TRUE(frame(camera, Seconds(5)).ok());
@@ -70,23 +71,24 @@ class ChdkOnUsb : public UsbBed {
 };
 
 TEST_F(ChdkOnUsb, IsFoundWithWhatItCanDo) {
-  const auto found = ptp_driver().find();
+  const auto found = drivers::ptp_driver().find();
   ASSERT_TRUE(found.ok()) << found.error().message();
   ASSERT_EQ(found->size(), 1u);
   EXPECT_EQ(found->front().id, kId);
   EXPECT_EQ(found->front().model, "Canon PowerShot E1");
-  EXPECT_EQ(found->front().reset, ShutterReset::on_command);
+  EXPECT_EQ(found->front().reset, drivers::ShutterReset::on_command);
   EXPECT_THAT(found->front().notes, testing::Contains(HasSubstr("CHDK 2.9")));
   EXPECT_THAT(found->front().address, testing::StartsWith("usb-"));
   EXPECT_GE(found->front().link_megabits.value_or(0), 12);
 }
 
 TEST_F(ChdkOnUsb, ScriptsAndMessagesGoBothWays) {
-  auto connection = connect_ptp(kId);
+  auto connection = drivers::connect_ptp(kId);
   ASSERT_TRUE(connection.ok()) << connection.error().message();
-  Chdk chdk(*connection->session);
-  EXPECT_THAT(chdk.run("return get_mode()").value(),
-              testing::ElementsAre(ChdkValue(false), ChdkValue(false), ChdkValue(2)));
+  drivers::Chdk chdk(*connection->session);
+  EXPECT_THAT(
+      chdk.run("return get_mode()").value(),
+      testing::ElementsAre(drivers::ChdkValue(false), drivers::ChdkValue(false), drivers::ChdkValue(2)));
   ASSERT_TRUE(chdk.start_script("write_usb_msg(\"ready\"); return read_usb_msg(1000)").ok());
   EXPECT_EQ(std::get<std::string>(chdk.read_message()->value), "ready");
   ASSERT_TRUE(chdk.write_message("go").ok());
@@ -129,7 +131,7 @@ TEST_F(ChdkOnUsb, AResetShowsTheNewPhaseInTheNextFrame) {
       const auto after = frame(*camera, Seconds(6));
       ASSERT_TRUE(after.ok()) << after.error().message();
       EXPECT_EQ(after->image->view().sample(0, 0), (before->image->view().sample(0, 0) + 1) % 256);
-      const auto reset = dynamic_cast<ChdkCamera&>(*camera).last_reset();
+      const auto reset = dynamic_cast<drivers::ChdkCamera&>(*camera).last_reset();
       ASSERT_TRUE(reset && reset->first_frame);
       latencies.push_back(in_milliseconds(*reset->first_frame - reset->at));
     }
@@ -144,24 +146,24 @@ TEST_F(ChdkOnUsb, AResetShowsTheNewPhaseInTheNextFrame) {
 }
 
 TEST_F(ChdkOnUsb, AMovieIsMadeAndDownloaded) {
-  auto connection = connect_ptp(kId);
+  auto connection = drivers::connect_ptp(kId);
   ASSERT_TRUE(connection.ok()) << connection.error().message();
-  Chdk chdk(*connection->session);
-  ASSERT_TRUE(chdk.change_mode(ChdkMode::record).ok());
-  ASSERT_TRUE(within(Seconds(3), [&] { return chdk.mode().value() == ChdkMode::record; }));
-  const std::size_t before = list_clips(*connection->session)->size();
-  ASSERT_TRUE(start_movie(chdk, clock_).ok());
-  ASSERT_TRUE(stop_movie(chdk, clock_).ok());
-  const auto clips = list_clips(*connection->session).value();
+  drivers::Chdk chdk(*connection->session);
+  ASSERT_TRUE(chdk.change_mode(drivers::ChdkMode::record).ok());
+  ASSERT_TRUE(within(Seconds(3), [&] { return chdk.mode().value() == drivers::ChdkMode::record; }));
+  const std::size_t before = drivers::list_clips(*connection->session)->size();
+  ASSERT_TRUE(drivers::start_movie(chdk, clock_).ok());
+  ASSERT_TRUE(drivers::stop_movie(chdk, clock_).ok());
+  const auto clips = drivers::list_clips(*connection->session).value();
   ASSERT_EQ(clips.size(), before + 1);
   const std::filesystem::path target = "/tmp/" + clips.back().name;
   const TimePoint begin = clock_.now();
-  const Status done = download_clip(*connection->session, clips.back(), target);
+  const Status done = drivers::download_clip(*connection->session, clips.back(), target);
   ASSERT_TRUE(done.ok()) << done.error().message();
   fmt::print("movie: {} bytes at {:.1f} MB/s\n", clips.back().bytes,
              clips.back().bytes * 1e-6 / (clock_.now() - begin).value());
   EXPECT_EQ(std::filesystem::file_size(target), clips.back().bytes);
-  EXPECT_TRUE(verify_clip(target).ok());
+  EXPECT_TRUE(drivers::verify_clip(target).ok());
 }
 
 TEST_F(ChdkOnUsb, FaultsCostAFrameOrATimeAndNoMore) {
@@ -223,7 +225,7 @@ class OtherProcess {
     EXPECT_EQ(::pipe(ends), 0);
     pid_ = ::fork();
     if (pid_ == 0) {
-      const auto held = connect_ptp(kId);
+      const auto held = drivers::connect_ptp(kId);
       if (held.ok()) (void)!::write(ends[1], "y", 1);
       ::pause();
     }
@@ -249,18 +251,18 @@ class OtherProcess {
 TEST_F(ChdkOnUsb, OneThatAnotherProcessHasIsListedWithItsHolder) {
   {
     const OtherProcess other;
-    const auto found = ptp_driver().find();
+    const auto found = drivers::ptp_driver().find();
     ASSERT_TRUE(found.ok()) << found.error().message();
     ASSERT_EQ(found->size(), 1u);
     EXPECT_EQ(found->front().id, kId) << "its USB descriptor says it too";
     ASSERT_TRUE(found->front().holder);
     EXPECT_EQ(found->front().holder->pid, other.pid());
     EXPECT_EQ(found->front().holder->program, "vm_ptp");
-    const auto refused = ptp_driver().open(kId, {});
+    const auto refused = drivers::ptp_driver().open(kId, {});
     ASSERT_FALSE(refused.ok());
     EXPECT_THAT(refused.error().message(), HasSubstr(fmt::format("vm_ptp (process {})", other.pid())));
   }
-  EXPECT_TRUE(ptp_driver().open(kId, {}).ok()) << "what a killed process left behind is recovered";
+  EXPECT_TRUE(drivers::ptp_driver().open(kId, {}).ok()) << "what a killed process left behind is recovered";
 }
 
 struct Held {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // drivers/ptp over a real USB stack: the kernel's, libusb, and QEMU's MTP camera, which we did not write.
 #include <cstdint>
 #include <filesystem>
@@ -20,11 +21,11 @@ class Mtp : public UsbBed {
  protected:
   Mtp() : folder_("/tmp/clips") { fs::create_directories(folder_); }
   ~Mtp() override { fs::remove_all(folder_); }
-  static std::string original(const Clip& clip) {
+  static std::string original(const drivers::Clip& clip) {
     return read_file("/run/vm/mtp/DCIM/100CANON/" + clip.name).value();
   }
-  Clip large(PtpSession& session) {
-    const auto clips = list_clips(session);
+  drivers::Clip large(drivers::PtpSession& session) {
+    const auto clips = drivers::list_clips(session);
     EXPECT_TRUE(clips.ok()) << clips.error().message();
     return clips->at(1);
   }
@@ -36,15 +37,15 @@ class Mtp : public UsbBed {
 TEST_F(Mtp, IsListedAsACameraThatCanNotBeFilmedWith) {
   plug_mtp();
   ASSERT_TRUE(connect(false).ok());
-  const auto found = ptp_driver().find();
+  const auto found = drivers::ptp_driver().find();
   ASSERT_TRUE(found.ok()) << found.error().message();
   ASSERT_EQ(found->size(), 1u);
   EXPECT_EQ(found->front().model, "QEMU filesharing");
   EXPECT_FALSE(found->front().id.empty());
-  EXPECT_EQ(found->front().reset, ShutterReset::none);
+  EXPECT_EQ(found->front().reset, drivers::ShutterReset::none);
   EXPECT_THAT(found->front().notes.at(0), testing::HasSubstr("can't be filmed with"));
   EXPECT_FALSE(found->front().holder);
-  const auto opened = ptp_driver().open(found->front().id, {});
+  const auto opened = drivers::ptp_driver().open(found->front().id, {});
   ASSERT_FALSE(opened.ok());
   EXPECT_THAT(opened.error().message(), testing::HasSubstr("doesn't run CHDK"));
 }
@@ -53,16 +54,16 @@ TEST_F(Mtp, ClipsComeByteForByte) {
   plug_mtp();
   auto connection = connect(false);
   ASSERT_TRUE(connection.ok()) << connection.error().message();
-  const auto clips = list_clips(*connection->session);
+  const auto clips = drivers::list_clips(*connection->session);
   ASSERT_TRUE(clips.ok()) << clips.error().message();
   ASSERT_EQ(clips->size(), 2u);
-  for (const Clip& clip : *clips) {
+  for (const drivers::Clip& clip : *clips) {
     const TimePoint begin = clock_.now();
-    const Status done = download_clip(*connection->session, clip, folder_ / clip.name);
+    const Status done = drivers::download_clip(*connection->session, clip, folder_ / clip.name);
     ASSERT_TRUE(done.ok()) << done.error().message();
     const Seconds took = clock_.now() - begin;
     EXPECT_EQ(read_file(folder_ / clip.name).value(), original(clip));
-    EXPECT_TRUE(verify_clip(folder_ / clip.name).ok());
+    EXPECT_TRUE(drivers::verify_clip(folder_ / clip.name).ok());
     fmt::print("{}: {} bytes at {:.1f} MB/s\n", clip.name, clip.bytes, clip.bytes * 1e-6 / took.value());
   }
   constexpr int kTransactions = 500;
@@ -75,10 +76,10 @@ TEST_F(Mtp, UnpluggedInMidTransferIsSaidWithinASecondAndTheDownloadGoesOnAfterwa
   plug_mtp();
   auto connection = connect(false);
   ASSERT_TRUE(connection.ok()) << connection.error().message();
-  const Clip clip = large(*connection->session);
+  const drivers::Clip clip = large(*connection->session);
   TimePoint pulled;
   const Status interrupted =
-      download_clip(*connection->session, clip, target(), [&](double done, std::string_view) {
+      drivers::download_clip(*connection->session, clip, target(), [&](double done, std::string_view) {
         if (done < 0.4 || !mtp_plugged_) return;
         unplug_mtp();
         pulled = clock_.now();
@@ -96,9 +97,9 @@ TEST_F(Mtp, UnpluggedInMidTransferIsSaidWithinASecondAndTheDownloadGoesOnAfterwa
   ASSERT_TRUE(connection.ok()) << connection.error().message();
   fmt::print("plugged in: answers after {:.1f} ms\n", in_milliseconds(clock_.now() - plugged));
   double first = 0;
-  const Status done =
-      download_clip(*connection->session, large(*connection->session), target(),
-                    [&](double fraction, std::string_view) { first = first == 0 ? fraction : first; });
+  const Status done = drivers::download_clip(
+      *connection->session, large(*connection->session), target(),
+      [&](double fraction, std::string_view) { first = first == 0 ? fraction : first; });
   ASSERT_TRUE(done.ok()) << done.error().message();
   EXPECT_GT(first, 0.3);
   EXPECT_EQ(read_file(target()).value(), original(clip));

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <array>
@@ -85,14 +86,14 @@ class UsbBed : public testing::Test {
     return false;
   }
   /// The device of that maker, once it is on the bus.
-  Result<PtpConnection> connect(bool canon) {
-    Result<PtpConnection> connection = Error{ErrorKind::timed_out, "it doesn't appear on the bus"};
+  Result<drivers::PtpConnection> connect(bool canon) {
+    Result<drivers::PtpConnection> connection = Error{ErrorKind::timed_out, "it doesn't appear on the bus"};
     within(Seconds(5), [&] {
-      const auto devices = list_usb_ptp();
+      const auto devices = drivers::list_usb_ptp();
       if (!devices.ok()) return false;
-      for (const UsbPtpDevice& device : *devices) {
-        if ((device.vendor == kCanonUsbVendor) != canon) continue;
-        connection = connect_ptp(device);
+      for (const drivers::UsbPtpDevice& device : *devices) {
+        if ((device.vendor == drivers::kCanonUsbVendor) != canon) continue;
+        connection = drivers::connect_ptp(device);
         return connection.ok();
       }
       return false;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // Strobes behind the kernel's own serial drivers: a gadget's usb_f_acm at one end, cdc-acm and our driver at
 // the other. EMBERLOCK_UNPLUG_ROUNDS says how often the plug is pulled (5).
 #include <chrono>
@@ -24,8 +25,8 @@ using test::FarEnd;
 using test::Trouble;
 using testing::HasSubstr;
 
-constexpr StrobeSettings kSettings{
-    .output = StrobeOutput::flashing, .rate = Hertz(25), .width = milliseconds(4)};
+constexpr drivers::StrobeSettings kSettings{
+    .output = drivers::StrobeOutput::flashing, .rate = Hertz(25), .width = milliseconds(4)};
 constexpr const char* kSerial = "E7531";
 
 class Stopwatch {
@@ -46,10 +47,10 @@ bool within(double seconds, const std::function<bool()>& holds) {
   return false;
 }
 
-std::optional<StrobeFound> found() {
-  const auto all = find_serial_strobes();
+std::optional<drivers::StrobeFound> found() {
+  const auto all = drivers::find_serial_strobes();
   if (!all) return {};
-  for (const StrobeFound& strobe : *all) {
+  for (const drivers::StrobeFound& strobe : *all) {
     if (strobe.id == kSerial) return strobe;
   }
   return {};
@@ -63,7 +64,7 @@ class StrobeOnTheUsb : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     gadget_ = std::make_unique<SerialGadget>(kSerial);
-    far_end_ = std::make_unique<FarEnd>(test::make_device(StrobeDialect::emberlock));
+    far_end_ = std::make_unique<FarEnd>(test::make_device(drivers::StrobeDialect::emberlock));
   }
   static void TearDownTestSuite() {
     far_end_.reset();
@@ -74,13 +75,13 @@ class StrobeOnTheUsb : public testing::Test {
     ASSERT_TRUE(within(10, [] { return found().has_value(); }));
     far_end_->trouble(Trouble::none);
   }
-  std::unique_ptr<Strobe> open(StrobeDialect dialect, std::optional<int> baud = {}) {
+  std::unique_ptr<drivers::Strobe> open(drivers::StrobeDialect dialect, std::optional<int> baud = {}) {
     far_end_->replace(test::make_device(dialect));
-    auto strobe = open_serial_strobe(kSerial, {.dialect = dialect, .baud = baud});
-    EXPECT_TRUE(strobe.ok()) << name_of(dialect) << ": " << strobe.error().message();
+    auto strobe = drivers::open_serial_strobe(kSerial, {.dialect = dialect, .baud = baud});
+    EXPECT_TRUE(strobe.ok()) << drivers::name_of(dialect) << ": " << strobe.error().message();
     return strobe.ok() ? std::move(*strobe) : nullptr;
   }
-  static void expect_set(Strobe& strobe, const std::string& what) {
+  static void expect_set(drivers::Strobe& strobe, const std::string& what) {
     const Status applied = strobe.apply(kSettings);
     ASSERT_TRUE(applied.ok()) << what << ": " << applied.error().message();
     const auto told = strobe.read_back();
@@ -101,39 +102,41 @@ TEST_F(StrobeOnTheUsb, IsFoundByItsSerialNumberWithItsMakersWords) {
   // Who sees a new line's end first may open it for a moment.
   EXPECT_TRUE(within(5, [] { return !found()->holder; }));
   // The place will do as well.
-  EXPECT_TRUE(open_serial_strobe("usb-dummy_hcd.0-1:1.0", {}).ok());
-  EXPECT_THAT(open_serial_strobe("E0", {}).error().message(), HasSubstr("strobe E0: it isn't plugged in"));
+  EXPECT_TRUE(drivers::open_serial_strobe("usb-dummy_hcd.0-1:1.0", {}).ok());
+  EXPECT_THAT(drivers::open_serial_strobe("E0", {}).error().message(),
+              HasSubstr("strobe E0: it isn't plugged in"));
 }
 
 TEST_F(StrobeOnTheUsb, EachDialectIsSetAndReadBack) {
-  for (const StrobeDialect dialect : test::kAllDialects) {
+  for (const drivers::StrobeDialect dialect : test::kAllDialects) {
     const Stopwatch watch;
-    if (const auto strobe = open(dialect)) expect_set(*strobe, std::string(name_of(dialect)));
-    std::cout << fmt::format("[ measured ] {}: opened, set and read back in {:.2f} s\n", name_of(dialect),
-                             watch.seconds());
+    if (const auto strobe = open(dialect)) expect_set(*strobe, std::string(drivers::name_of(dialect)));
+    std::cout << fmt::format("[ measured ] {}: opened, set and read back in {:.2f} s\n",
+                             drivers::name_of(dialect), watch.seconds());
   }
 }
 
 TEST_F(StrobeOnTheUsb, EachDialectIsToldFromTheOthers) {
-  for (const StrobeDialect dialect : {StrobeDialect::emberlock, StrobeDialect::siglent_bswv}) {
+  for (const drivers::StrobeDialect dialect :
+       {drivers::StrobeDialect::emberlock, drivers::StrobeDialect::siglent_bswv}) {
     far_end_->replace(test::make_device(dialect));
-    const auto who = identify_strobe(kSerial);
-    ASSERT_TRUE(who.ok()) << name_of(dialect) << ": " << who.error().message();
+    const auto who = drivers::identify_strobe(kSerial);
+    ASSERT_TRUE(who.ok()) << drivers::name_of(dialect) << ": " << who.error().message();
     EXPECT_EQ(who->dialect, dialect) << who->model;
   }
 }
 
 TEST_F(StrobeOnTheUsb, SpeaksAtAnyBaud) {
   for (const int baud : {1200, 9600, 57600, 115200, 921600}) {
-    if (const auto strobe = open(StrobeDialect::emberlock, baud))
+    if (const auto strobe = open(drivers::StrobeDialect::emberlock, baud))
       expect_set(*strobe, fmt::format("{} baud", baud));
   }
-  const auto never = open_serial_strobe(kSerial, {.baud = 7});
+  const auto never = drivers::open_serial_strobe(kSerial, {.baud = 7});
   EXPECT_EQ(never.error().kind, ErrorKind::bad_input);
 }
 
 TEST_F(StrobeOnTheUsb, ItsLinesEndIsLeftUpSoThatNoReopeningResetsIt) {
-  ASSERT_TRUE(open(StrobeDialect::emberlock));
+  ASSERT_TRUE(open(drivers::StrobeDialect::emberlock));
   const UniqueFd tty(::open(found()->address.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
   termios settings{};
   ASSERT_EQ(::tcgetattr(tty.get(), &settings), 0);
@@ -141,9 +144,9 @@ TEST_F(StrobeOnTheUsb, ItsLinesEndIsLeftUpSoThatNoReopeningResetsIt) {
 }
 
 TEST_F(StrobeOnTheUsb, ACodeOf3720FlashesIsPlayed) {
-  const auto strobe = open(StrobeDialect::emberlock);
+  const auto strobe = open(drivers::StrobeDialect::emberlock);
   ASSERT_TRUE(strobe);
-  StrobeSettings s = kSettings;
+  drivers::StrobeSettings s = kSettings;
   for (int i = 0; i < 3720; ++i) s.code.push_back(i % 5 != 2);
   const Stopwatch watch;
   const Status applied = strobe->apply(s);
@@ -154,23 +157,24 @@ TEST_F(StrobeOnTheUsb, ACodeOf3720FlashesIsPlayed) {
 }
 
 TEST_F(StrobeOnTheUsb, SilenceLatenessAndNoiseAreErrorsUntilTheyEnd) {
-  for (const StrobeDialect dialect : test::kAllDialects) {
+  for (const drivers::StrobeDialect dialect : test::kAllDialects) {
     const auto strobe = open(dialect);
     ASSERT_TRUE(strobe);
-    expect_set(*strobe, std::string(name_of(dialect)));
+    expect_set(*strobe, std::string(drivers::name_of(dialect)));
     for (const Trouble trouble : {Trouble::silent, Trouble::garbled, Trouble::late}) {
       far_end_->trouble(trouble);
       const Stopwatch watch;
       const auto told = strobe->read_back();
       EXPECT_LT(watch.seconds(), 4);
       // What is late only may still be right in time by saying it again.
-      EXPECT_TRUE(!told.ok() || trouble == Trouble::late) << name_of(dialect) << static_cast<int>(trouble);
+      EXPECT_TRUE(!told.ok() || trouble == Trouble::late)
+          << drivers::name_of(dialect) << static_cast<int>(trouble);
       if (!told.ok()) {
         EXPECT_THAT(told.error().where, HasSubstr(kSerial));
       }
       far_end_->trouble(Trouble::none);
-      EXPECT_TRUE(within(10, [&] { return strobe->read_back().ok(); })) << name_of(dialect);
-      expect_set(*strobe, std::string(name_of(dialect)));
+      EXPECT_TRUE(within(10, [&] { return strobe->read_back().ok(); })) << drivers::name_of(dialect);
+      expect_set(*strobe, std::string(drivers::name_of(dialect)));
     }
   }
 }
@@ -179,7 +183,7 @@ TEST_F(StrobeOnTheUsb, APortThatAProgramHasIsNamedWithIt) {
   const std::string address = found()->address;
   ASSERT_EQ(std::system(("sleep 30 <" + address + " & sleep 0.2").c_str()), 0);
   EXPECT_TRUE(within(5, [] { return found()->holder.has_value(); }));
-  const auto refused = open_serial_strobe(kSerial, {});
+  const auto refused = drivers::open_serial_strobe(kSerial, {});
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.error().message(), HasSubstr("sleep"));
   ASSERT_EQ(std::system(fmt::format("kill {}", found()->holder->pid).c_str()), 0);

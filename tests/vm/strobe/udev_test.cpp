@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // udev/72-emberlock.rules under a real udevd, with devices of the kernel's and of QEMU's that come and go.
 #include <algorithm>
 #include <chrono>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -43,10 +44,11 @@ long heap_kilobytes() {
 }
 
 TEST_F(V4l2Again, AllComeBackEachTimeThatTheyAreUnpluggedWithoutALeak) {
-  std::vector<std::unique_ptr<CameraThread>> cameras;
+  std::vector<std::unique_ptr<drivers::CameraThread>> cameras;
   for (int i = 0; i < 2; ++i) {
-    cameras.push_back(std::make_unique<CameraThread>(v4l2_driver().open(id(i), small_gray()).value(),
-                                                     CameraThreadOptions{.queue_frames = 2}));
+    cameras.push_back(
+        std::make_unique<drivers::CameraThread>(drivers::v4l2_driver().open(id(i), small_gray()).value(),
+                                                drivers::CameraThreadOptions{.queue_frames = 2}));
     ASSERT_TRUE(cameras.back()->start().ok());
   }
   const int rounds = from_environment("EMBERLOCK_VM_ROUNDS", 10);

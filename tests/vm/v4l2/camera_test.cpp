@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <csignal>
 #include <vector>
@@ -21,7 +22,7 @@ class V4l2Vivid : public Vivid {
   V4l2Vivid() : Vivid(2) {}
 
   /// Films `n` frames, and holds the counts to their numbers.
-  static std::vector<Frame> film(Camera& camera, int n) {
+  static std::vector<Frame> film(drivers::Camera& camera, int n) {
     std::vector<Frame> frames;
     for (int i = 0; i < n; ++i) {
       auto frame = camera.next_frame(Seconds(2));
@@ -33,25 +34,26 @@ class V4l2Vivid : public Vivid {
   }
 };
 
-std::uint64_t accounted_for(const FrameCounts& counts) {
+std::uint64_t accounted_for(const drivers::FrameCounts& counts) {
   return counts.delivered + counts.damaged + counts.passed_over + counts.lost();
 }
 
 TEST_F(V4l2Vivid, IsFoundByWhereItIsWithItsModes) {
-  const auto found = v4l2_driver().find();
+  const auto found = drivers::v4l2_driver().find();
   ASSERT_TRUE(found.ok()) << found.error().message();
   ASSERT_EQ(found->size(), 2U);
   for (int i = 0; i < 2; ++i) EXPECT_EQ((*found)[i].id, id(i));
   EXPECT_EQ((*found)[0].model, "vivid");
   EXPECT_THAT((*found)[0].address, HasSubstr("/dev/video"));
-  EXPECT_EQ((*found)[0].reset, ShutterReset::on_command);
-  const CameraMode yuyv{{{640, 360}, PixelFormat::rgb8, 8}, "YUYV", Hertz(40)};
-  const CameraMode gray{{{1280, 720}, PixelFormat::gray8, 8}, "GREY", Hertz(12.5)};
-  const auto has = [&](const CameraMode& wanted) {
-    return std::any_of((*found)[0].modes.begin(), (*found)[0].modes.end(), [&](const CameraMode& mode) {
-      return mode.layout == wanted.layout && mode.encoding == wanted.encoding &&
-             std::abs(mode.frame_rate / wanted.frame_rate - 1) < 0.01;
-    });
+  EXPECT_EQ((*found)[0].reset, drivers::ShutterReset::on_command);
+  const drivers::CameraMode yuyv{{{640, 360}, PixelFormat::rgb8, 8}, "YUYV", Hertz(40)};
+  const drivers::CameraMode gray{{{1280, 720}, PixelFormat::gray8, 8}, "GREY", Hertz(12.5)};
+  const auto has = [&](const drivers::CameraMode& wanted) {
+    return std::any_of((*found)[0].modes.begin(), (*found)[0].modes.end(),
+                       [&](const drivers::CameraMode& mode) {
+                         return mode.layout == wanted.layout && mode.encoding == wanted.encoding &&
+                                std::abs(mode.frame_rate / wanted.frame_rate - 1) < 0.01;
+                       });
   };
   EXPECT_TRUE(has(yuyv));
   EXPECT_TRUE(has(gray));
@@ -61,7 +63,7 @@ TEST_F(V4l2Vivid, FilmsInEachFormatWithNoFrameUnaccountedFor) {
   for (const PixelFormat format : {PixelFormat::gray8, PixelFormat::gray16, PixelFormat::bayer_rggb8,
                                    PixelFormat::bayer_rggb16, PixelFormat::rgb8}) {
     SCOPED_TRACE(name(format));
-    CameraRequest request = small_gray();
+    drivers::CameraRequest request = small_gray();
     request.format = format;
     const auto camera = filming(id(1), request);
     ASSERT_NE(camera, nullptr);
@@ -80,7 +82,7 @@ TEST_F(V4l2Vivid, FilmsInEachFormatWithNoFrameUnaccountedFor) {
 TEST_F(V4l2Vivid, StampsFramesByTheMonotonicClock) {
   const auto camera = filming(id(0));
   ASSERT_NE(camera, nullptr);
-  EXPECT_NE(camera->info().device_time_of, DeviceTimeOf::unknown);
+  EXPECT_NE(camera->info().device_time_of, drivers::DeviceTimeOf::unknown);
   const auto frames = film(*camera, 10);
   ASSERT_EQ(frames.size(), 10U);
   for (const Frame& frame : frames) {
@@ -95,17 +97,17 @@ TEST_F(V4l2Vivid, StampsFramesByTheMonotonicClock) {
 }
 
 TEST_F(V4l2Vivid, RefusesWhatItCantFilmAndSaysWhatItCan) {
-  const auto camera = v4l2_driver().open(id(0), {.size = ImageSize{123, 45}});
+  const auto camera = drivers::v4l2_driver().open(id(0), {.size = ImageSize{123, 45}});
   ASSERT_FALSE(camera.ok());
   EXPECT_EQ(camera.error().kind, ErrorKind::bad_input);
   EXPECT_THAT(camera.error().message(), HasSubstr("640 x 360"));
-  const auto unknown = v4l2_driver().open("vivid.7", {});
+  const auto unknown = drivers::v4l2_driver().open("vivid.7", {});
   ASSERT_FALSE(unknown.ok());
   EXPECT_EQ(unknown.error().kind, ErrorKind::device);
 }
 
 TEST_F(V4l2Vivid, SetsControlsByNameAndRefusesWrongOnes) {
-  CameraRequest request = small_gray();
+  drivers::CameraRequest request = small_gray();
   request.controls = {{"Brightness", "100"}, {"Horizontal Flip", "on"}, {"Test Pattern", "100% Black"}};
   const auto camera = filming(id(0), request);
   ASSERT_NE(camera, nullptr);
@@ -116,7 +118,7 @@ TEST_F(V4l2Vivid, SetsControlsByNameAndRefusesWrongOnes) {
            {"Test Pattern", "Rainbow", "16x16 Checkers"},
            {"Shininess", "1", "Brightness"}}) {
     request.controls = {{name, value}};
-    const auto refused = v4l2_driver().open(id(1), request);
+    const auto refused = drivers::v4l2_driver().open(id(1), request);
     ASSERT_FALSE(refused.ok()) << name;
     EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
     EXPECT_THAT(refused.error().message(), HasSubstr(says));
@@ -168,9 +170,9 @@ TEST_F(V4l2Vivid, FilmsOnWhenABufferIsRefused) {
 }
 
 TEST_F(V4l2Vivid, SaysThatItDoesNotStartAndStartsTheNextTime) {
-  auto opened = v4l2_driver().open(id(0), small_gray());
+  auto opened = drivers::v4l2_driver().open(id(0), small_gray());
   ASSERT_TRUE(opened.ok()) << opened.error().message();
-  Camera& camera = **opened;
+  drivers::Camera& camera = **opened;
   Vivid::control(0, "Inject VIDIOC_STREAMON Error", "1");
   const Status refused = camera.start();
   ASSERT_FALSE(refused.ok());
@@ -234,7 +236,7 @@ TEST_F(V4l2Vivid, NamesTheProcessThatHoldsIt) {
   ASSERT_EQ(::pipe(ready), 0);
   const pid_t holder = ::fork();
   if (holder == 0) {
-    const auto camera = v4l2_driver().open(id(0), small_gray());
+    const auto camera = drivers::v4l2_driver().open(id(0), small_gray());
     const char answer = camera.ok() ? 'y' : 'n';
     (void)!::write(ready[1], &answer, 1);
     ::pause();
@@ -244,11 +246,11 @@ TEST_F(V4l2Vivid, NamesTheProcessThatHoldsIt) {
   ASSERT_EQ(::read(ready[0], &answer, 1), 1);
   ASSERT_EQ(answer, 'y');
 
-  const auto refused = v4l2_driver().open(id(0), small_gray());
+  const auto refused = drivers::v4l2_driver().open(id(0), small_gray());
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().kind, ErrorKind::device);
   EXPECT_THAT(refused.error().message(), HasSubstr(fmt::format("process {}", holder)));
-  const auto found = v4l2_driver().find();
+  const auto found = drivers::v4l2_driver().find();
   ASSERT_TRUE(found.ok());
   ASSERT_TRUE((*found)[0].holder);
   EXPECT_EQ((*found)[0].holder->pid, holder);

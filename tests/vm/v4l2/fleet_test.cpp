@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -33,9 +34,9 @@ class V4l2Fleet : public Vivid {
 
   void film_all() {
     for (int i = 0; i < kCameras; ++i) {
-      auto opened = v4l2_driver().open(id(i), small_gray());
+      auto opened = drivers::v4l2_driver().open(id(i), small_gray());
       ASSERT_TRUE(opened.ok()) << opened.error().message();
-      cameras_.push_back(std::make_unique<CameraThread>(std::move(opened).value()));
+      cameras_.push_back(std::make_unique<drivers::CameraThread>(std::move(opened).value()));
     }
     for (const auto& camera : cameras_) {
       const Status started = camera->start();
@@ -53,7 +54,7 @@ class V4l2Fleet : public Vivid {
     return last;
   }
 
-  std::vector<std::unique_ptr<CameraThread>> cameras_;
+  std::vector<std::unique_ptr<drivers::CameraThread>> cameras_;
 };
 
 TEST_F(V4l2Fleet, NoFrameIsUnaccountedForAndOneThatGoesLeavesTheOthersAlone) {
@@ -68,7 +69,7 @@ TEST_F(V4l2Fleet, NoFrameIsUnaccountedForAndOneThatGoesLeavesTheOthersAlone) {
   }
   const Seconds passed = SteadyClock().now() - begin;
   const double share = (processor_time() - used) / passed / kCameras;
-  FrameCounts all;
+  drivers::FrameCounts all;
   std::uint64_t unaccounted = 0;
   for (int i = 0; i < kCameras; ++i) {
     // What was on its way when the time was up.
@@ -76,7 +77,7 @@ TEST_F(V4l2Fleet, NoFrameIsUnaccountedForAndOneThatGoesLeavesTheOthersAlone) {
       last[i] = frame->stamp.frame_id;
       if (frame->stamp.monotonic_time > begin + length) break;
     }
-    const FrameCounts counts = cameras_[i]->counts();
+    const drivers::FrameCounts counts = cameras_[i]->counts();
     const auto known = counts.delivered + counts.damaged + counts.lost() + counts.passed_over;
     // A gap is counted when the frame after it comes, which may wait in the queue.
     unaccounted += last[i] + 1 > known ? last[i] + 1 - known : 0;
@@ -107,7 +108,7 @@ TEST_F(V4l2Fleet, NoFrameIsUnaccountedForAndOneThatGoesLeavesTheOthersAlone) {
   const Seconds report = SteadyClock().now() - gone;
   std::printf("one of 11 that went was reported after %.0f ms\n", in_milliseconds(report));
   EXPECT_LE(report, Seconds(1));
-  EXPECT_EQ(cameras_[4]->state(), CameraThread::State::lost);
+  EXPECT_EQ(cameras_[4]->state(), drivers::CameraThread::State::lost);
   for (int i = 0; i < kCameras; ++i) {
     if (i == 4) continue;
     const TimePoint now = SteadyClock().now();
@@ -116,7 +117,7 @@ TEST_F(V4l2Fleet, NoFrameIsUnaccountedForAndOneThatGoesLeavesTheOthersAlone) {
       frame = cameras_[i]->next_frame(Seconds(2));
       ASSERT_TRUE(frame.ok()) << frame.error().message();
     } while (frame->stamp.monotonic_time < now);
-    EXPECT_EQ(cameras_[i]->state(), CameraThread::State::filming);
+    EXPECT_EQ(cameras_[i]->state(), drivers::CameraThread::State::filming);
   }
 }
 

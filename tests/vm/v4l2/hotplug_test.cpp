@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #include "drivers/hotplug.h"
 
 #include <algorithm>
@@ -18,7 +19,7 @@ namespace {
 
 /// The nodes of the next `n` events, which must come within a second each and be of that kind; in order of
 /// their names.
-std::vector<std::string> hear(HotplugMonitor& monitor, Hotplug what, int n) {
+std::vector<std::string> hear(drivers::HotplugMonitor& monitor, drivers::Hotplug what, int n) {
   std::vector<std::string> nodes;
   for (int i = 0; i < n; ++i) {
     const auto event = monitor.next(Seconds(1));
@@ -37,32 +38,32 @@ class HotplugVideo : public Vivid {
 };
 
 TEST_F(HotplugVideo, CamerasThatGoAndComeAreHeardOfOnceTheyCanBeOpened) {
-  auto monitor = HotplugMonitor::open({"video4linux"});
+  auto monitor = drivers::HotplugMonitor::open({"video4linux"});
   ASSERT_TRUE(monitor.ok()) << monitor.error().message();
   unplug();
-  EXPECT_THAT(hear(*monitor, Hotplug::went, 2), testing::ElementsAre("/dev/video0", "/dev/video1"));
+  EXPECT_THAT(hear(*monitor, drivers::Hotplug::went, 2), testing::ElementsAre("/dev/video0", "/dev/video1"));
   plug_in();
-  const auto came = hear(*monitor, Hotplug::came, 2);
+  const auto came = hear(*monitor, drivers::Hotplug::came, 2);
   EXPECT_THAT(came, testing::ElementsAre("/dev/video0", "/dev/video1"));
-  for (const std::string& node : came) EXPECT_TRUE(V4l2Device::open(node, "test").ok()) << node;
+  for (const std::string& node : came) EXPECT_TRUE(drivers::V4l2Device::open(node, "test").ok()) << node;
   EXPECT_FALSE(monitor->next(milliseconds(100)));
 }
 
 TEST(HotplugUsb, ACameraThatGoesAndComesIsHeardOf) {
   auto qmp = Qmp::open();
   ASSERT_TRUE(qmp.ok()) << qmp.error().message();
-  auto monitor = HotplugMonitor::open({"usb"});
+  auto monitor = drivers::HotplugMonitor::open({"usb"});
   ASSERT_TRUE(monitor.ok()) << monitor.error().message();
   ASSERT_TRUE(qmp->plug_mtp("hotplug").ok());
   const auto came = monitor->next(Seconds(5));
   ASSERT_TRUE(came);
-  EXPECT_EQ(came->what, Hotplug::came);
+  EXPECT_EQ(came->what, drivers::Hotplug::came);
   EXPECT_EQ(came->subsystem, "usb");
   EXPECT_THAT(came->node, testing::StartsWith("/dev/bus/usb/"));
   ASSERT_TRUE(qmp->unplug("hotplug").ok());
   const auto went = monitor->next(Seconds(5));
   ASSERT_TRUE(went);
-  EXPECT_EQ(went->what, Hotplug::went);
+  EXPECT_EQ(went->what, drivers::Hotplug::went);
   EXPECT_EQ(went->node, came->node);
 }
 

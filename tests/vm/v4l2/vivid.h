@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <chrono>
@@ -52,11 +53,11 @@ class Vivid : public testing::Test {
   }
   /// Sets one of vivid's own controls, beside whoever films: "Inject Fatal Streaming Error".
   static void control(int camera, const std::string& name, const std::string& value) {
-    const auto node = find_video_node(list_video_nodes(), id(camera));
+    const auto node = drivers::find_video_node(drivers::list_video_nodes(), id(camera));
     ASSERT_TRUE(node);
-    const auto device = V4l2Device::open(node->device, "test");
+    const auto device = drivers::V4l2Device::open(node->device, "test");
     ASSERT_TRUE(device.ok()) << device.error().message();
-    const Status set = set_control(device->as_ioctl(), name, value, "test");
+    const Status set = drivers::set_control(device->as_ioctl(), name, value, "test");
     ASSERT_TRUE(set.ok()) << set.error().message();
   }
 
@@ -70,7 +71,8 @@ class Vivid : public testing::Test {
   static void settle() { ASSERT_EQ(std::system("udevadm settle"), 0); }
   static int there() {
     int n = 0;
-    for (const VideoNode& node : list_video_nodes()) n += std::filesystem::exists(node.device) ? 1 : 0;
+    for (const drivers::VideoNode& node : drivers::list_video_nodes())
+      n += std::filesystem::exists(node.device) ? 1 : 0;
     return n;
   }
   static void wait_for(const std::function<bool()>& holds) {
@@ -87,13 +89,14 @@ inline int from_environment(const char* name, int otherwise) {
   return text != nullptr ? std::atoi(text) : otherwise;
 }
 
-inline CameraRequest small_gray() {
+inline drivers::CameraRequest small_gray() {
   return {.size = ImageSize{640, 360}, .format = PixelFormat::gray8, .frame_rate = Hertz(15)};
 }
 
 /// Opened and filming.
-inline std::unique_ptr<Camera> filming(const std::string& id, const CameraRequest& request = small_gray()) {
-  auto opened = v4l2_driver().open(id, request);
+inline std::unique_ptr<drivers::Camera> filming(const std::string& id,
+                                                const drivers::CameraRequest& request = small_gray()) {
+  auto opened = drivers::v4l2_driver().open(id, request);
   EXPECT_TRUE(opened.ok()) << opened.error().message();
   if (!opened) return nullptr;
   const Status started = (*opened)->start();

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: Apache-2.0
 // sensor CASE: draws one frame in the function `measured`, whose instructions callgrind counts.
 #include "drivers/virtual/sensor.h"
 
@@ -20,14 +21,14 @@ struct SensorByHand {
       : row(static_cast<std::size_t>(width)), normal(static_cast<std::size_t>(width) + 2) {}
 
   __attribute__((noinline)) void add_noise(int y, std::uint64_t key, float variance) {
-    const NormalTable& table = NormalTable::instance();
+    const drivers::NormalTable& table = drivers::NormalTable::instance();
     const std::size_t samples = row.size();
     std::uint64_t counter = static_cast<std::uint64_t>(y) << 32;
     for (std::size_t i = 0; i < samples; i += 3) {
       const std::uint64_t bits = mix64(counter++ ^ key);
       normal[i] = table(bits);
-      normal[i + 1] = table(bits >> NormalTable::kBitsEach);
-      normal[i + 2] = table(bits >> (2 * NormalTable::kBitsEach));
+      normal[i + 1] = table(bits >> drivers::NormalTable::kBitsEach);
+      normal[i + 2] = table(bits >> (2 * drivers::NormalTable::kBitsEach));
     }
     const float sigma = std::sqrt(variance);
     for (std::size_t i = 0; i < samples; ++i) row[i] += normal[i] * sigma;
@@ -56,28 +57,29 @@ struct SensorByHand {
 };
 
 int run(const std::string& name) {
-  VirtualCameraOptions camera;
+  drivers::VirtualCameraOptions camera;
   camera.layout.size = {320, 240};
   camera.timing = {.rows = 240, .shifts = 240};
   camera.lamp = {.x = 160, .y = Rows(120), .radius = 4};
-  const LightPulse pulses[] = {{milliseconds(-20), microseconds(20)}, {milliseconds(5), microseconds(20)}};
-  VirtualSensor sensor(camera, 0, 1);
+  const drivers::LightPulse pulses[] = {{milliseconds(-20), microseconds(20)},
+                                        {milliseconds(5), microseconds(20)}};
+  drivers::VirtualSensor sensor(camera, 0, 1);
   SensorByHand by_hand(camera.layout.size.width);
   Image image;
 
-  const std::map<std::string, std::vector<Pass>> scenes = {
+  const std::map<std::string, std::vector<drivers::Pass>> scenes = {
       {"no_pass", {}},
       {"no_pass_of_wild_figures", {}},
-      {"read_noise", {Pass::read_noise}},
-      {"both_noises", {Pass::read_noise, Pass::shot_noise}},
-      {"smear", {Pass::smear}},
-      {"room", {Pass::room}},
-      {"lamp_and_smear", {Pass::lamp, Pass::smear}},
-      {"lamp_bloom_and_smear", {Pass::lamp, Pass::bloom, Pass::smear}},
-      {"hot_pixels", {Pass::hot_pixels}},
-      {"quantise", {Pass::quantise}},
+      {"read_noise", {drivers::Pass::read_noise}},
+      {"both_noises", {drivers::Pass::read_noise, drivers::Pass::shot_noise}},
+      {"smear", {drivers::Pass::smear}},
+      {"room", {drivers::Pass::room}},
+      {"lamp_and_smear", {drivers::Pass::lamp, drivers::Pass::smear}},
+      {"lamp_bloom_and_smear", {drivers::Pass::lamp, drivers::Pass::bloom, drivers::Pass::smear}},
+      {"hot_pixels", {drivers::Pass::hot_pixels}},
+      {"quantise", {drivers::Pass::quantise}},
   };
-  VirtualScene scene;
+  drivers::VirtualScene scene;
   if (name == "no_pass_of_wild_figures") {
     scene.hot_pixels = 100000;
     scene.halo_level = 255;
@@ -88,13 +90,13 @@ int run(const std::string& name) {
   if (name == "quantise") scene.adc_bits = 6;
   if (const auto at = scenes.find(name); at != scenes.end()) {
     scene.passes = at->second;
-    const auto shared = std::make_shared<VirtualScene>(scene);
+    const auto shared = std::make_shared<drivers::VirtualScene>(scene);
     (void)sensor.expose(shared, pulses, {});  // chooses the passes
     measured([&] { image = sensor.expose(shared, pulses, {}); });
   } else if (name == "no_pass_by_hand") {
     measured([&] { image = by_hand.expose(camera.layout, SensorByHand::Noise::none); });
   } else if (name == "read_noise_by_hand") {
-    (void)NormalTable::instance();  // drawn up at its first use
+    (void)drivers::NormalTable::instance();  // drawn up at its first use
     measured([&] { image = by_hand.expose(camera.layout, SensorByHand::Noise::read); });
   } else {
     return 2;

@@ -1,0 +1,420 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every verb that writes a folder, and what becomes of files there that aren't its own: planted before and
+// after, by people and by other verbs.
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "base/file.h"
+#include "base/output_folder.h"
+#include "cli/app_tree.h"
+#include "cli/commands.h"
+#include "recon/calibrate/board.h"
+#include "recon/calibrate/pose.h"
+#include "recon/calibrate/rig_formats.h"
+#include "recon/export/picture.h"
+#include "recon/preprocess/radiance.h"
+#include "recon/synthetic/flame.h"
+#include "tests/support/board_rig.h"
+#include "tests/support/recording.h"
+#include "tests/support/rendered_board.h"
+#include "tests/support/strobe_clips.h"
+#include "tests/support/verb.h"
+
+namespace emberlock::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::Not;
+using Words = std::vector<std::string>;
+
+/// A verb with all that it needs but the folder that it writes.
+struct Writer {
+  const char* verb;    ///< as its results name it
+  const char* option;  ///< before the folder
+  void (*add)(CLI::App&);
+  Words words;
+  fs::path input;  ///< one file that it reads; none where it reads none
+  std::set<std::string> makes;
+};
+
+void write(const fs::path& path, const std::string& text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path) << text;
+}
+
+/// Every file below a folder with its content; a symlink with where it leads.
+std::map<std::string, std::string> files_below(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    const std::string name = entry.path().lexically_relative(folder).string();
+    if (entry.is_symlink()) files[name] = fs::read_symlink(entry.path()).string();
+    if (entry.is_regular_file() && !entry.is_symlink()) files[name] = *read_file(entry.path());
+  }
+  return files;
+}
+
+/// Eleven views of a small flame.
+fs::path make_transforms(const fs::path& folder) {
+  fs::create_directories(folder);
+  recon::PaperSceneOptions options;
+  options.image = {48, 36};
+  options.truth_voxels = 16;
+  const recon::Scene scene = recon::paper_scene(options);
+  nlohmann::json frames = nlohmann::json::array();
+  for (const recon::View& view : scene.views) {
+    const std::string name = fmt::format("view{}.png", frames.size());
+    EXPECT_TRUE(recon::write_png(recon::to_rgb8(view.image).view(), folder / name).ok());
+    const Eigen::Matrix4d m = recon::opengl_world_from_camera(view.camera.camera_from_world);
+    nlohmann::json matrix = nlohmann::json::array();
+    for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
+    const recon::Intrinsics& lens = view.camera.intrinsics;
+    frames.push_back({{"file_path", name},
+                      {"transform_matrix", matrix},
+                      {"w", lens.size.width},
+                      {"h", lens.size.height},
+                      {"fl_x", lens.fx},
+                      {"fl_y", lens.fy},
+                      {"cx", lens.cx},
+                      {"cy", lens.cy}});
+  }
+  const recon::Box& box = scene.box;
+  write(folder / "transforms.json",
+        nlohmann::json{{"box",
+                        {{"center", {box.center.x(), box.center.y(), box.center.z()}},
+                         {"size", {box.size.x(), box.size.y(), box.size.z()}}}},
+                       {"frames", frames}}
+            .dump());
+  return folder / "transforms.json";
+}
+
+/// A folder a camera with pictures of a chessboard.
+fs::path make_boards(const fs::path& folder) {
+  test::BoardRigOptions options;
+  options.cameras = 2;
+  options.instants = 6;
+  options.seed = 5;
+  options.image = {320, 240};
+  options.board = *recon::parse_board("chessboard:9x6:18mm");
+  const test::BoardRig rig = test::board_rig(options);
+  for (const auto& sighting : rig.sightings.sightings) {
+    const fs::path file =
+        folder / rig.sightings.cameras[sighting.camera].id / fmt::format("board_{}.png", sighting.instant);
+    fs::create_directories(file.parent_path());
+    const Image picture = test::rendered_board(rig.cameras[sighting.camera], options.board,
+                                               rig.world_from_board[sighting.instant]);
+    EXPECT_TRUE(recon::write_png(picture.view(), file).ok());
+  }
+  return folder;
+}
+
+/// One camera that sees four greys at two exposures, as it is: a power of 2.2.
+fs::path make_target(const fs::path& folder) {
+  nlohmann::json patches;
+  for (int p = 0; p < 4; ++p) patches[fmt::format("p{}", p)] = {16 * p, 0, 16, 48};
+  write(folder / "colour.json", nlohmann::json{{"patches", {{"left", patches}}}}.dump());
+  for (const double exposure : {0.25, 0.5, 1.0}) {
+    Image picture(ImageLayout{{64, 48}, PixelFormat::rgb8, 8});
+    for (int y = 0; y < 48; ++y) {
+      for (int x = 0; x < 64; ++x) {
+        const double light = exposure * (0.1 + 0.2 * (x / 16));
+        for (int c = 0; c < 3; ++c)
+          picture.row_as<std::uint8_t>(y)[3 * x + c] =
+              static_cast<std::uint8_t>(255 * std::pow(light, 1 / 2.2) + 0.5 * ((x + y) % 2));
+      }
+    }
+    fs::create_directories(folder / "left");
+    EXPECT_TRUE(
+        recon::write_png(picture.view(), folder / "left" / fmt::format("target_{}s.png", exposure)).ok());
+  }
+  return folder;
+}
+
+/// Two clips of one strobe and one of a comb, and the words that tell of them.
+Words make_clips(const fs::path& folder) {
+  drivers::VirtualRigDraw model;
+  model.layout.size = {320, 240};
+  model.row_time = microseconds_per_row(160);
+  test::StrobeFilm film = test::random_film(44, 2, model, {.words = 8, .spacing = 60});
+  film.format = {};
+  film.suffix = ".mp4";
+  film.frames = 90;
+  fs::create_directories(folder / "comb");
+  Words words;
+  for (const auto& truth : test::film_strobe(film, folder)) words.push_back(truth.file);
+  const auto comb = test::film_strobe(test::comb_of(film, 0, 36), folder / "comb");
+  words.insert(words.end(),
+               {"--flash-rate", fmt::format("{}", film.strobe.rate.value()), "--comb", comb[0].file,
+                "--comb-rate", "300", "--code-words", "8", "--code-spacing", "60"});
+  return words;
+}
+
+class OutputFolders : public testing::Test {
+ protected:
+  /// Verbs whose earlier result gives way to the next.
+  std::vector<Writer> replacing() {
+    const std::string transforms = make_transforms(temp_ / "project").string();
+    const std::string boards = make_boards(temp_ / "boards").string();
+    const std::string target = make_target(temp_ / "target").string();
+    test::record(temp_ / "session", {{64, 48}, PixelFormat::gray8, 8}, 2, test::small_disk_options());
+    const std::string session = (temp_ / "session").string();
+    Words clips = make_clips(temp_ / "clips");
+    const fs::path clip = clips.front();
+    clips.insert(clips.begin(), "verify");
+    return {
+        {"reconstruct",
+         "--out",
+         add_reconstruct,
+         {"reconstruct", transforms, "--voxels", "8", "--iterations", "2", "--effects", "none", "--device",
+          "cpu"},
+         temp_ / "project" / "view2.png",
+         {"report.json", "volume.vdb", "views/0003.png"}},
+        {"reconstruct --plan",
+         "--plan",
+         add_reconstruct,
+         {"reconstruct", transforms, "--voxels", "8", "--device", "cpu"},
+         temp_ / "project" / "view2.png",
+         {"index.html", "box/0003.png"}},
+        {"tradeoff recon",
+         "--out",
+         add_tradeoff,
+         {"tradeoff", "recon",        transforms, "--hold-out", "1",    "--voxels", "8",       "--views",
+          "0",        "--step",       "1",        "--effects",  "none", "--solver", "default", "--precision",
+          "float32",  "--iterations", "1,2",      "--device",   "cpu"},
+         temp_ / "project" / "view2.png",
+         {"points.csv", "diagram.svg", "index.html"}},
+        {"tradeoff sync",
+         "--out",
+         add_tradeoff,
+         {"tradeoff", "sync", "--cameras", "3", "--tolerances", "100", "--policies", "densest", "--rigs",
+          "20", "--flame-speed", "0"},
+         {},
+         {"points.csv", "diagram.svg", "index.html"}},
+        {"calibrate cameras",
+         "--out",
+         add_calibrate,
+         {"calibrate", "cameras", boards, "--board", "chessboard:9x6:18mm", "--world", "0"},
+         temp_ / "boards" / "cam00" / "board_0.png",
+         {"rig.json", "index.html", "opencv/cam00.yml"}},
+        {"calibrate colour",
+         "--out",
+         add_calibrate,
+         {"calibrate", "colour", target, "--gamma", "2.2"},
+         temp_ / "target" / "colour.json",
+         {"rig.json", "colour.html"}},
+        {"calibrate convert",
+         "--out",
+         add_calibrate,
+         {"calibrate", "convert", transforms},
+         transforms,
+         {"rig.json", "transforms.json", "colmap/cameras.txt"}},
+        {"verify", "--out", add_verify, clips, clip, {"report.html"}},
+        {"demo",
+         "--out",
+         add_demo,
+         {"demo", "--cameras", "3", "--image", "160x160", "--frames", "1", "--voxels", "8"},
+         {},
+         {"report.html", "summary.png", "flame/manifest.json", "reconstruction/volume.vdb"}},
+        {"sessions export",
+         "--out",
+         add_sessions,
+         {"sessions", "export", session},
+         temp_ / "session" / "manifest.json",
+         {"export.txt", "cam0/000001.png"}},
+    };
+  }
+  /// Verbs that make a new session, and never replace one.
+  std::vector<Writer> founding() {
+    make_transforms(temp_ / "project");
+    return {
+        {"import",
+         "--out",
+         add_import,
+         {"import", (temp_ / "project" / "transforms.json").string()},
+         temp_ / "project" / "view2.png",
+         {"manifest.json", "import.html", "view3/index.bin"}},
+        {"align",
+         "--record",
+         add_align,
+         {"align", "--rig", "virtual:3"},
+         {},
+         {"manifest.json", "events.binpb"}},
+    };
+  }
+  static test::VerbRun run(const Writer& writer, const fs::path& out) {
+    Words words = writer.words;
+    words.insert(words.end(), {writer.option, out.string()});
+    return test::run_verb(writer.add, words);
+  }
+  static void expect_made(const Writer& writer, const fs::path& out) {
+    for (const std::string& file : writer.makes)
+      EXPECT_TRUE(fs::exists(out / file)) << writer.verb << ' ' << file;
+  }
+  /// Refused as bad input, with every file below the test's folder as it was.
+  void expect_refused(const Writer& writer, const fs::path& out, const std::string& words) const {
+    const auto before = files_below(temp_.path());
+    const auto refused = run(writer, out);
+    EXPECT_EQ(refused.exit_code, 2) << writer.verb << refused.out << refused.err;
+    EXPECT_THAT(refused.err, HasSubstr(words)) << writer.verb;
+    EXPECT_EQ(files_below(temp_.path()), before) << writer.verb;
+  }
+  test::TempFolder temp_;
+};
+
+/// Every option of every verb that names a folder to write to, as the tables above have it.
+TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
+  std::set<std::string> listed;
+  for (const std::vector<Writer>& writers : {replacing(), founding()}) {
+    for (const Writer& writer : writers) {
+      const bool plan = std::string_view(writer.option) == "--plan";
+      listed.insert(std::string("emberlock ") + (plan ? "reconstruct" : writer.verb) + " " + writer.option);
+    }
+  }
+  CLI::App app{"", "emberlock"};
+  for (const auto add :
+       {add_devices, add_smear, add_align, add_reconstruct, add_verify, add_tradeoff, add_calibrate,
+        add_import, add_demo, add_doctor, add_sessions, add_status, add_watch, add_record, add_strobe})
+    add(app);
+  std::set<std::string> found;
+  cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {
+    for (const CLI::Option* option : cli::options_of(verb)) {
+      const std::string words = option->get_description();
+      const bool folder = words.find("older") != std::string::npos || option->check_lname("out");
+      const bool reads =
+          option->get_positional() || option->check_lname("strobe") || option->check_lname("camera");
+      if (folder && !reads) found.insert(path + " " + option->get_name());
+    }
+  });
+  EXPECT_EQ(found, listed);
+}
+
+TEST_F(OutputFolders, OfAnEarlierResultEveryVerbReplacesItsOwnFilesAlone) {
+  for (const Writer& writer : replacing()) {
+    SCOPED_TRACE(writer.verb);
+    const fs::path out = temp_ / "results" / "out";
+    {
+      auto earlier = OutputFolder::create({out, {writer.verb}});
+      ASSERT_TRUE(earlier.ok()) << earlier.error().message();
+      write(earlier->path() / "old.txt", "of the run before");
+      write(earlier->path() / "views" / "9999.png", "too");
+      ASSERT_TRUE(earlier->commit().ok());
+    }
+    write(out / "notes.txt", "mine");
+    write(out / "photos" / "holiday.jpg", "mine");
+    write(out / "views" / "best.txt", "mine");
+    fs::create_directory_symlink(temp_ / "project", out / "link");
+    const auto done = run(writer, out);
+    EXPECT_LT(done.exit_code, 2) << done.out << done.err;
+    expect_made(writer, out);
+    EXPECT_FALSE(fs::exists(out / "old.txt"));
+    EXPECT_FALSE(fs::exists(out / "views" / "9999.png"));
+    for (const char* mine : {"notes.txt", "photos/holiday.jpg", "views/best.txt"})
+      EXPECT_EQ(*read_file(out / mine), "mine") << mine;
+    EXPECT_TRUE(fs::exists(out / "link" / "view2.png"));
+    EXPECT_EQ(std::distance(fs::directory_iterator(temp_ / "results"), {}), 1) << "nothing hidden is left";
+
+    // What the run made is its own too, until somebody changes it.
+    const std::string first = *writer.makes.begin();
+    std::ofstream(out / first, std::ios::app) << "and what I think of it";
+    expect_refused(writer, out, "was changed since");
+    fs::remove_all(temp_ / "results");
+  }
+}
+
+TEST_F(OutputFolders, AFolderThatNobodyListedIsLeftAlone) {
+  for (const Writer& writer : replacing()) {
+    SCOPED_TRACE(writer.verb);
+    for (const char* name :
+         {"report.json", "index.html", "rig.json", "points.csv", "report.html", "export.txt"})
+      write(temp_ / "site" / name, "by a former version, or mine");
+    write(temp_ / "site" / "photos" / "holiday.jpg", "mine");
+    expect_refused(writer, temp_ / "site", kResultList);
+    fs::remove_all(temp_ / "site");
+  }
+  for (const Writer& writer : founding()) {
+    SCOPED_TRACE(writer.verb);
+    write(temp_ / "take" / "manifest.json", "mine");
+    expect_refused(writer, temp_ / "take", "not an empty folder");
+    fs::remove_all(temp_ / "take");
+    const auto done = run(writer, temp_ / "take");
+    EXPECT_EQ(done.exit_code, 0) << done.err;
+    expect_made(writer, temp_ / "take");
+    expect_refused(writer, temp_ / "take", "not an empty folder");
+    fs::remove_all(temp_ / "take");
+  }
+}
+
+TEST_F(OutputFolders, WhatIsReadIsNeverInWhatIsWritten) {
+  std::vector<Writer> writers = replacing();
+  for (Writer& writer : founding()) writers.push_back(std::move(writer));
+  for (const Writer& writer : writers) {
+    if (writer.input.empty()) continue;
+    SCOPED_TRACE(writer.verb);
+    const fs::path folder = writer.input.parent_path();
+    // The input's own folder, with a list as if the verb had once written there.
+    if (std::string_view(writer.verb) != "import") {
+      write(folder / kResultList, R"({"format": "emberlock result", "version": 1, "files": []})");
+      expect_refused(writer, folder, "lies in ");
+      fs::create_directory_symlink(folder, temp_ / "link");
+      expect_refused(writer, temp_ / "link" / ".", "lies in ");
+      fs::remove(temp_ / "link");
+      fs::remove(folder / kResultList);
+    }
+    // Folders are read whole; beside a file is a place like any other.
+    const bool reads_folder =
+        std::any_of(writer.words.begin(), writer.words.end(), [&](const std::string& word) {
+          return fs::is_directory(word) && writer.input.string().starts_with(word);
+        });
+    if (reads_folder) expect_refused(writer, folder / "result", "lies in a folder that is read");
+  }
+}
+
+TEST_F(OutputFolders, AColourCalibrationKeepsTheRigThatItAddsTo) {
+  const fs::path out = temp_ / "rig";
+  const std::string boards = make_boards(temp_ / "boards").string();
+  const std::string target = make_target(temp_ / "target").string();
+  const Words cameras{"calibrate", "cameras", boards,  "--board",   "chessboard:9x6:18mm",
+                      "--world",   "0",       "--out", out.string()};
+  ASSERT_EQ(test::run_verb(add_calibrate, cameras).exit_code, 0);
+  const auto colour = test::run_verb(add_calibrate, {"calibrate", "colour", target, "--gamma", "2.2", "--rig",
+                                                     (out / "rig.json").string(), "--out", out.string()});
+  ASSERT_EQ(colour.exit_code, 0) << colour.err;
+  for (const char* file : {"colour.html", "index.html", "opencv/cam00.yml"})
+    EXPECT_TRUE(fs::exists(out / file)) << file;
+  EXPECT_EQ(session::read_rig(out / "rig.json")->cameras_size(), 3);
+  const auto again = test::run_verb(add_calibrate, cameras);
+  ASSERT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_TRUE(fs::exists(out / "colour.html"));
+}
+
+/// An import that was ended leaves its work beside the session: what somebody else put there stays.
+TEST_F(OutputFolders, AnUnfinishedImportsFolderIsKnownByItsContent) {
+  const Writer import = founding().front();
+  const fs::path work = temp_ / "take.importing";
+  write(work / "camera-view0" / "my.txt", "mine");
+  expect_refused(import, temp_ / "take", "take.importing");
+  write(work / "lock", "");
+  expect_refused(import, temp_ / "take", "take.importing");
+  write(work / "lock", "emberlock import, unfinished\n");
+  const auto refused = run(import, temp_ / "take");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("no import made"));
+  EXPECT_EQ(*read_file(work / "camera-view0" / "my.txt"), "mine");
+  fs::remove_all(work / "camera-view0");
+  write(work / "notes.txt", "mine");
+  const auto done = run(import, temp_ / "take");
+  EXPECT_EQ(done.exit_code, 0) << done.err;
+  expect_made(import, temp_ / "take");
+  EXPECT_EQ(files_below(work), (std::map<std::string, std::string>{{"notes.txt", "mine"}}));
+}
+
+}  // namespace
+}  // namespace emberlock::cli

@@ -1,0 +1,132 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/adjust/held_out.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "recon/adjust/descent.h"
+#include "recon/adjust/tracker.h"
+#include "tests/support/devices.h"
+#include "tests/support/small_flame.h"
+
+namespace emberlock::recon {
+namespace {
+
+ON_EACH_DEVICE(HeldOutTrace);
+
+const Effects kHeldOutMedium = absorbing(PerMeter(32.8));
+
+/// Pictures large enough that a sample is few of their pixels.
+Scene scene_with_two_held_out() {
+  PaperSceneOptions film;
+  film.image = {320, 240};
+  film.truth_voxels = 64;
+  Scene scene = paper_scene(film);
+  scene.views[3].role = ViewRole::held_out;
+  return scene;
+}
+
+Reconstruction solved_here(const Scene& scene, SolveOptions options, int voxels = 48) {
+  options.compute.device = device_here();
+  auto r = solve(scene, grid_over(scene.box, voxels), kHeldOutMedium, options);
+  EXPECT_TRUE(r.ok());
+  return r ? std::move(*r) : Reconstruction{};
+}
+
+SolveOptions at_most_iterations(int iterations, SolveOptions::Trace trace = SolveOptions::Trace::sampled) {
+  SolveOptions options;
+  options.iterations = iterations;
+  options.trace = trace;
+  return options;
+}
+
+TEST_P(HeldOutTrace, IsAnEstimateFromFewPixelsThatEndsAtTheErrorOfAll) {
+  const Scene scene = scene_with_two_held_out();
+  const Reconstruction sampled = solved_here(scene, at_most_iterations(5));
+  const Reconstruction whole = solved_here(scene, at_most_iterations(5, SolveOptions::Trace::whole));
+  EXPECT_EQ(sampled.volume.emission, whole.volume.emission) << "who watches changes nothing";
+  EXPECT_EQ(whole.trace_sample.pixels, whole.trace_sample.of);
+  EXPECT_EQ(sampled.trace_sample.of, whole.trace_sample.of);
+  EXPECT_LT(8 * sampled.trace_sample.pixels, sampled.trace_sample.of);
+  EXPECT_GT(sampled.trace_sample.pixels, 400U);
+  ASSERT_TRUE(sampled.heldout_rmse && whole.heldout_rmse);
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR((*sampled.heldout_rmse)[c], (*whole.heldout_rmse)[c], 1e-6);
+  ASSERT_EQ(sampled.trace.size(), whole.trace.size());
+  for (std::size_t i = 0; i < whole.trace.size(); ++i) {
+    const double exact = all_channels(whole.trace[i].heldout_rmse);
+    EXPECT_NEAR(all_channels(sampled.trace[i].heldout_rmse), exact, 0.1 * exact) << i;
+  }
+  for (std::size_t c = 0; c < 3; ++c)
+    EXPECT_NEAR(sampled.trace.back().heldout_rmse[c], (*sampled.heldout_rmse)[c], 1e-6);
+}
+
+/// A view is wrong everywhere but where the sample looks.
+TEST_P(HeldOutTrace, ATargetIsReachedByAllPixelsNotByTheSample) {
+  Scene scene = scene_with_two_held_out();
+  scene.views[3].role = ViewRole::input;
+  const Reconstruction before = solved_here(scene, at_most_iterations(4));
+  const int stride = static_cast<int>(std::lround(std::sqrt(
+      static_cast<double>(before.trace_sample.of) / static_cast<double>(before.trace_sample.pixels))));
+  ASSERT_GT(stride, 1);
+  const double reached = all_channels(*before.heldout_rmse);
+  RadianceImage& image = scene.views.back().image;
+  for (int y = 0; y < image.size.height; ++y)
+    for (int x = 0; x < image.size.width; ++x)
+      if (x % stride != 0 || y % stride != 0)
+        for (int c = 0; c < 3; ++c) {
+          float& value = image.rgb[static_cast<std::size_t>(3 * (y * image.size.width + x) + c)];
+          if (value > 20) value += 25;
+        }
+  SolveOptions options = at_most_iterations(4);
+  options.target_rmse = 1.5 * reached;
+  const Reconstruction r = solved_here(scene, options);
+  EXPECT_EQ(r.iterations, 4) << "the sample alone would have stopped it";
+  EXPECT_GT(all_channels(*r.heldout_rmse), *options.target_rmse);
+}
+
+TEST_P(HeldOutTrace, AnEngineJudgesAnothersVolumeWhereItLies) {
+  const Scene scene = scene_with_two_held_out();
+  const Hull hull = whole_grid(grid_over(scene.box, 24));
+  Pool pool(2, device_here());
+  SolveOptions options;
+  const SolverSetup setup{{&scene.views[0]}, {{0, 0, 320, 240}}, hull, kHeldOutMedium, options, pool};
+  const Problem problem = pose({&scene.views[3]}, hull, setup.problem_options(), pool);
+  const Optics optics = setup.optics(problem.grid());
+  const auto solver = make_engine(problem, optics, Precision::float32, pool);
+  const auto judge = make_engine(problem, optics, Precision::float32, pool, EngineRole::judge);
+  solver->set(std::vector<Rgba>(problem.grid().size(), Rgba{{3, 2, 1, 0}}));
+  solver->residual(0);
+  judge->residual_of(*solver, 0);
+  const auto same = [](const std::vector<Rgba>& a, const std::vector<Rgba>& b) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Rgba& p, const Rgba& q) {
+      return p.c[0] == q.c[0] && p.c[1] == q.c[1] && p.c[2] == q.c[2];
+    });
+  };
+  EXPECT_TRUE(same(solver->residuals(), judge->residuals()));
+  EXPECT_TRUE(same(solver->residuals(0), judge->residuals(0)));
+  EXPECT_GT(problem.list.rays.size(), 1000U);
+}
+
+/// The work that a trace adds, counted in pixels: a twentieth of the fitted ones, and only forwards.
+TEST_P(HeldOutTrace, TakesATwentiethOfTheFittedPixelsHoweverManyViewsAreHeldOut) {
+  Scene scene = scene_with_two_held_out();
+  for (const std::size_t v : {1U, 5U, 7U}) scene.views[v].role = ViewRole::held_out;
+  std::size_t fitted = 0;
+  for (const View& view : scene.views) {
+    if (view.role == ViewRole::held_out) continue;
+    const PixelBox box = flame_mask(view.image, noise_threshold(view.image)).box;
+    fitted += static_cast<std::size_t>((box.x1 - box.x0) * (box.y1 - box.y0));
+  }
+  for (const Solver solver : {Solver::standard, Solver::paper}) {
+    SolveOptions options = at_most_iterations(1);
+    options.solver = solver;
+    const Reconstruction r = solved_here(scene, options, 96);
+    const double most = std::max(HeldOut::kFewest, static_cast<double>(fitted) / HeldOut::kFittedForOne);
+    EXPECT_LE(static_cast<double>(r.trace_sample.pixels), 1.1 * most);
+    EXPECT_GE(static_cast<double>(r.trace_sample.of), 4 * most);
+  }
+}
+
+}  // namespace
+}  // namespace emberlock::recon

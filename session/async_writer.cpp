@@ -138,6 +138,7 @@ class AsyncWriter::Lane {
   /// Ends the thread once the queue is empty, and tells the writer what it couldn't see.
   void finish() {
     end(Ending::drain);
+    const std::scoped_lock lock(mutex_);
     shared_.writer.set_arrivals(camera_, arrivals_);
     for (const auto& [cause, frames] : lost_) shared_.writer.count_lost(camera_, cause, frames);
   }

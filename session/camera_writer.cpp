@@ -50,10 +50,9 @@ Result<std::unique_ptr<CameraWriter>> CameraWriter::create(const fs::path& folde
   UniqueFd for_ledger(::fcntl(index.get(), F_DUPFD_CLOEXEC, 0));
   if (!for_ledger) return errno_error(path, "cannot keep the index open");
   writer->index_ = std::move(index);
-  // A folder lasts when the one that it stands in is synced as well.
-  writer->ledger_ = std::make_unique<SyncLedger>(
-      std::move(for_ledger), path,
-      std::vector<fs::path>{folder / stream.camera_id(), folder, folder.parent_path()});
+  // The session's own folder lasts since it was made.
+  writer->ledger_ = std::make_unique<SyncLedger>(std::move(for_ledger), path,
+                                                 std::vector<fs::path>{folder / stream.camera_id(), folder});
   return writer;
 }
 

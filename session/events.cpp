@@ -54,17 +54,17 @@ Result<EventLog> EventLog::open(const std::filesystem::path& path, Mode mode) {
 Status EventLog::append(const v1::Event& event) {
   const off_t end = ::lseek(fd_.get(), 0, SEEK_END);
   Status written = write_fully(fd_.get(), encode(event), path_);
-  *unsynced_ = true;
+  disk_->behind = true;
   // A part of an event would hide those that follow.
   if (!written && ::ftruncate(fd_.get(), end) != 0) return errno_error(path_, "cannot cut off a torn event");
   return written;
 }
 
 Status EventLog::sync() {
-  if (!unsynced_->exchange(false)) return {};
-  if (::fdatasync(fd_.get()) == 0) return {};
-  *unsynced_ = true;
-  return errno_error(path_, "cannot flush");
+  const std::scoped_lock lock(disk_->syncing);
+  if (disk_->failure && disk_->behind.exchange(false) && ::fdatasync(fd_.get()) != 0)
+    disk_->failure = errno_error(path_, "cannot flush");
+  return disk_->failure;
 }
 
 }  // namespace emberlock::session

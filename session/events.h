@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,14 +36,20 @@ class EventLog {
   /// Error `refused` where another process holds the lock: the session is being recorded.
   static Result<EventLog> open(const std::filesystem::path& path, Mode mode);
   Status append(const v1::Event& event);
-  /// Has the disk hold what was appended. Any thread.
+  /// Has the disk hold what was appended. An error stays: the kernel tells of a write that failed once only.
+  /// Any thread.
   Status sync();
 
  private:
+  struct Disk {
+    std::mutex syncing;  ///< guards `failure`
+    Status failure;
+    std::atomic<bool> behind = true;  ///< events were appended since the last sync
+  };
   EventLog(UniqueFd fd, std::filesystem::path path) : fd_(std::move(fd)), path_(std::move(path)) {}
   UniqueFd fd_;
   std::filesystem::path path_;
-  std::unique_ptr<std::atomic<bool>> unsynced_ = std::make_unique<std::atomic<bool>>(true);
+  std::unique_ptr<Disk> disk_ = std::make_unique<Disk>();
 };
 
 }  // namespace emberlock::session

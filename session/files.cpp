@@ -89,6 +89,16 @@ Result<v1::Manifest> parse_manifest(std::string_view json, const std::string& wh
   return manifest;
 }
 
+Status check_texts(const v1::Manifest& manifest, const std::string& where) {
+  const std::array<std::pair<const char*, const std::string*>, 4> texts{
+      {{"session_id", &manifest.session_id()},
+       {"created_utc", &manifest.created_utc()},
+       {"software", &manifest.software()},
+       {"purpose", &manifest.purpose()}}};
+  for (const auto& [field, text] : texts) EMBERLOCK_RETURN_IF_ERROR(check_text_in(where, field, *text));
+  return {};
+}
+
 Status check_manifest(const v1::Manifest& manifest, const std::string& where) {
   if (manifest.format_version() != kSessionFormatVersion) {
     return Error{ErrorKind::bad_input,
@@ -99,16 +109,8 @@ Status check_manifest(const v1::Manifest& manifest, const std::string& where) {
   if (manifest.cameras().empty()) {
     return Error{ErrorKind::bad_input, "no cameras", where + ", field cameras", "Record at least one camera"};
   }
-  const std::array<std::pair<const char*, const std::string*>, 4> texts{
-      {{"session_id", &manifest.session_id()},
-       {"created_utc", &manifest.created_utc()},
-       {"software", &manifest.software()},
-       {"purpose", &manifest.purpose()}}};
-  for (const auto& [field, text] : texts) EMBERLOCK_RETURN_IF_ERROR(check_text_in(where, field, *text));
   std::set<std::string> ids;
   for (const v1::CameraStream& camera : manifest.cameras()) {
-    EMBERLOCK_RETURN_IF_ERROR(check_text_in(where, "camera_id", camera.camera_id()));
-    EMBERLOCK_RETURN_IF_ERROR(check_text_in(where, "model", camera.model()));
     const std::string field = where + ", camera " + camera.camera_id();
     if (!is_folder_name(camera.camera_id())) {
       return Error{ErrorKind::bad_input, "the camera id can't name a folder", field,

@@ -31,6 +31,8 @@ Result<v1::Manifest> read_manifest(const std::filesystem::path& folder);
 /// What a reader and a writer rely on: version, camera ids fit for folder names and unique, layouts, finite
 /// numbers.
 Status check_manifest(const v1::Manifest& manifest, const std::string& where);
+/// What a writer takes of people: no control characters, not too long. A session that has such is read.
+Status check_texts(const v1::Manifest& manifest, const std::string& where);
 /// Of a calibration: finite, whole. Of a box: three finite numbers each, sizes above 0. `where` names what
 /// holds it.
 Status check_calibration(const v1::Calibration& calibration, const std::string& where);

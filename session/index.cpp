@@ -5,6 +5,8 @@
 #include <bit>
 #include <cstring>
 
+#include <zlib.h>
+
 #include "base/random.h"
 
 namespace emberlock::session {
@@ -45,14 +47,10 @@ class Unpacker {
   const char* at_;
 };
 
-constexpr std::array<std::uint32_t, 256> make_crc_table() {
-  std::array<std::uint32_t, 256> table{};
-  for (std::uint32_t i = 0; i < 256; ++i) {
-    std::uint32_t c = i;
-    for (int bit = 0; bit < 8; ++bit) c = (c & 1) != 0 ? 0xedb88320U ^ (c >> 1) : c >> 1;
-    table[i] = c;
-  }
-  return table;
+/// CRC-32 of IEEE 802.3.
+std::uint32_t checksum(std::span<const char> bytes) {
+  return static_cast<std::uint32_t>(
+      ::crc32(0, reinterpret_cast<const Bytef*>(bytes.data()), static_cast<uInt>(bytes.size())));
 }
 
 bool decode(std::span<const char> bytes, IndexRecord& r) {
@@ -69,7 +67,7 @@ bool decode(std::span<const char> bytes, IndexRecord& r) {
   const auto status = in.get<std::uint32_t>();
   r.stamp.status = static_cast<FrameStatus>(status);
   const bool status_known = status <= static_cast<std::uint32_t>(FrameStatus::damaged);
-  return status_known && in.get<std::uint32_t>() == crc32(bytes.first(kIndexRecordBytes - 4));
+  return status_known && in.get<std::uint32_t>() == checksum(bytes.first(kIndexRecordBytes - 4));
 }
 
 }  // namespace
@@ -83,13 +81,6 @@ std::optional<IndexRecord> decode_record(std::span<const char> bytes) {
 bool follows(const IndexRecord& a, const IndexRecord& b) {
   if (a.segment != b.segment) return b.segment > a.segment;
   return b.frame_in_segment > a.frame_in_segment && b.segment_ms > a.segment_ms;
-}
-
-std::uint32_t crc32(std::span<const char> bytes) {
-  static constexpr std::array<std::uint32_t, 256> kTable = make_crc_table();
-  std::uint32_t c = 0xffffffffU;
-  for (const char b : bytes) c = kTable[(c ^ static_cast<unsigned char>(b)) & 0xff] ^ (c >> 8);
-  return ~c;
 }
 
 std::string encode_index_header() {
@@ -108,7 +99,7 @@ std::array<char, kIndexRecordBytes> encode(const IndexRecord& r) {
       .put(r.stamp.monotonic_time.ns);
   out.put(r.pixel_hash).put(r.file_offset).put(r.segment).put(r.frame_in_segment).put(r.segment_ms);
   out.put(static_cast<std::uint32_t>(r.stamp.status));
-  out.put(crc32(std::span<const char>(bytes).first(kIndexRecordBytes - 4)));
+  out.put(checksum(std::span<const char>(bytes).first(kIndexRecordBytes - 4)));
   return bytes;
 }
 

@@ -62,9 +62,6 @@ struct ParsedIndex {
 /// within its header is an empty one, torn.
 Result<ParsedIndex> parse_index(std::string_view bytes, const std::string& where);
 
-/// CRC-32 of IEEE 802.3 (zlib's).
-std::uint32_t crc32(std::span<const char> bytes);
-
 /// 64-bit hash of an image's packed bytes, as the index keeps it: four lanes of 8-byte little-endian words,
 /// lane = mix64(lane ^ word), the last word zero-padded, then the lanes and the length mixed together.
 std::uint64_t pixel_hash(std::span<const std::byte> bytes);

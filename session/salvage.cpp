@@ -92,22 +92,24 @@ Result<std::vector<IndexRecord>> keep_whole(const fs::path& folder, const v1::Ca
   return kept;
 }
 
-/// What the manifest says of the frames' whereabouts, when `kept` of them stay and `lost` go.
-v1::Counts counts_of(const v1::Counts& before, v1::Manifest::State state,
-                     const std::vector<IndexRecord>& records, std::uint64_t lost) {
+/// What the manifest says of a killed recording's frames: `kept` of `known` stay, of those that have a record
+/// `told`.
+v1::Counts counts_of_killed(std::uint64_t kept, std::uint64_t known, const std::vector<IndexRecord>& told) {
+  Arrivals arrivals;
+  for (const IndexRecord& record : told) arrivals.add(record.stamp.frame_id);
+  const std::uint64_t untold = known - std::min<std::uint64_t>(known, told.size());
+  v1::Counts counts;
+  counts.set_recorded(kept);
+  counts.set_disk(known - std::min(known, kept));
+  // Which cause took the other ids that are missing died with the recorder's counters.
+  counts.set_camera_gap(arrivals.missing() - std::min(arrivals.missing(), untold));
+  return counts;
+}
+
+v1::Counts counts_of_finished(const v1::Counts& before, std::uint64_t kept) {
   v1::Counts counts = before;
-  if (state == v1::Manifest::RECORDING) {
-    Arrivals arrivals;
-    for (const IndexRecord& record : records) arrivals.add(record.stamp.frame_id);
-    counts.Clear();
-    counts.set_disk(lost);
-    // Which cause took the ids that are missing died with the recorder's counters.
-    counts.set_camera_gap(arrivals.missing());
-  } else {
-    counts.set_disk(before.disk() + before.recorded() -
-                    std::min<std::uint64_t>(before.recorded(), records.size()));
-  }
-  counts.set_recorded(records.size());
+  counts.set_disk(before.disk() + before.recorded() - std::min(before.recorded(), kept));
+  counts.set_recorded(kept);
   return counts;
 }
 
@@ -137,13 +139,21 @@ Result<SalvagedStream> examine_camera(const fs::path& folder, v1::Manifest::Stat
       static_cast<std::uint64_t>(std::count_if(found.begin(), found.end(), [&](const IndexRecord& record) {
         return std::binary_search(records.begin(), records.end(), record, follows);
       }));
-  // Bad records are of frames that the segments told of again, or of none that is known.
+  // Bad records are of frames that the segments told of again, or of none that is known; behind the index
+  // there are no records.
+  const auto behind =
+      static_cast<std::uint64_t>(std::count_if(found.begin(), found.end(), [&](const IndexRecord& record) {
+        return index.records.empty() || follows(index.records.back(), record);
+      }));
   const std::uint64_t known =
-      recording ? index.records.size() + std::max<std::uint64_t>(index.bad_records, found.size())
-                : std::max<std::uint64_t>(stream.counts().recorded(), records.size());
+      recording
+          ? index.records.size() + std::max<std::uint64_t>(index.bad_records, found.size() - behind) + behind
+          : std::max<std::uint64_t>(stream.counts().recorded(), records.size());
   left.report.lost = known - std::min<std::uint64_t>(known, records.size());
   left.report.kept = records.size();
-  *left.stream.mutable_counts() = counts_of(stream.counts(), state, records, left.report.lost);
+  *left.stream.mutable_counts() = recording
+                                      ? counts_of_killed(records.size(), known, merged(index.records, found))
+                                      : counts_of_finished(stream.counts(), records.size());
   list_segments(folder, records, left.stream);
   return left;
 }

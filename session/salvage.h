@@ -26,12 +26,12 @@ struct SalvageReport {
 
 /// Repairs a session whose recorder was killed, or that a power cut ended: cuts torn ends off the index and
 /// the events, takes up the frames of which only the segments tell, keeps those that lie whole on the disk,
-/// and turns the manifest SALVAGED. Of segments that were synced when they were closed the frames aren't
-/// read; cameras are read on as many threads as there are processors, at this thread's priority. Of a
-/// finished session only an index or events that can't be read are mended; `repair` does the rest. Cut short
-/// at any point, by the observer or a crash, it leaves a session that salvage takes up again: what it found
-/// of a camera stands in the manifest before that camera's index is replaced. Errors: bad_input (no session),
-/// io, refused (a recorder still writes it, or ended by the observer).
+/// and turns the manifest SALVAGED. Frames are read of the last two segments alone, and of those that are
+/// shorter than the index says; cameras are read on as many threads as there are processors, at this thread's
+/// priority. Of a finished session only an index or events that can't be read are mended; `repair` does the
+/// rest. Cut short at any point, by the observer or a crash, it leaves a session that salvage takes up again:
+/// what it found of a camera stands in the manifest before that camera's index is replaced. Errors: bad_input
+/// (no session), io, refused (a recorder still writes it, or ended by the observer).
 Result<SalvageReport> salvage(const std::filesystem::path& folder, const Observer& observer = {});
 
 /// Turns the uncompressed segments of a finished session into FFV1. Each is replaced only after every frame

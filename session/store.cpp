@@ -94,6 +94,7 @@ std::string name_of_time(TimePoint wall_clock) {
 }  // namespace
 
 Result<SessionStore> SessionStore::open(fs::path folder, StoreOptions options) {
+  if (!folder.has_filename()) folder = folder.parent_path();  // a slash at its end
   std::error_code ec;
   fs::create_directories(folder, ec);
   if (ec || ::access(folder.c_str(), W_OK | X_OK) != 0) {

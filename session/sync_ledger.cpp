@@ -59,9 +59,11 @@ void SyncLedger::cut(std::uint64_t frames) {
 
 /// Data before the index. Frames that are written meanwhile may still reach the disk in the index alone:
 /// salvage doubts the last segments.
-Status SyncLedger::sync(const Due& due) const {
+Status SyncLedger::sync(const Due& due, std::shared_ptr<UniqueFd>& failed) const {
   for (const File& segment : due.segments) {
-    if (segment.regular && flush_(segment.fd->get()) != 0) return errno_error(segment.path, "cannot flush");
+    if (!segment.regular || flush_(segment.fd->get()) == 0) continue;
+    failed = segment.fd;
+    return errno_error(segment.path, "cannot flush");
   }
   if (due.folders) {
     for (const std::filesystem::path& folder : folders_) EMBERLOCK_RETURN_IF_ERROR(sync_folder(folder));
@@ -84,13 +86,18 @@ Status SyncLedger::sync() {
     due_.folders = false;
   }
   // A stream's data is on its way since it was written (SegmentWriter): this waits for the rest.
-  Status done = sync(due);
+  std::shared_ptr<UniqueFd> failed;
+  Status done = sync(due, failed);
   const std::scoped_lock lock(mutex_);
   if (!done) {
-    failure_ = done;
+    // The segment that it is of may have been cut off meanwhile.
+    const bool cut_off = failed != nullptr && cuts != cuts_ &&
+                         std::none_of(due_.segments.begin(), due_.segments.end(),
+                                      [&](const File& file) { return file.fd == failed; });
+    if (!cut_off) failure_ = done;
     due_.folders = true;
     dirty_ = true;
-    return done;
+    return cut_off ? Status{} : done;
   }
   const bool all_regular =
       std::all_of(due.segments.begin(), due.segments.end(), [](const File& f) { return f.regular; });

@@ -62,7 +62,8 @@ class SyncLedger {
     std::uint64_t frames = 0;
     bool folders = false;
   };
-  Status sync(const Due& due) const;
+  /// `failed` is the segment whose error this is, if it is a segment's.
+  Status sync(const Due& due, std::shared_ptr<UniqueFd>& failed) const;
 
   const Flush flush_;
   const UniqueFd index_;

@@ -2,14 +2,18 @@
 #include "session/writer.h"
 
 #include <filesystem>
+#include <string>
 #include <system_error>
 #include <utility>
+
+#include <unistd.h>
 
 #include "base/file.h"
 #include "base/output_folder.h"
 #include "session/camera_writer.h"
 #include "session/events.h"
 #include "session/files.h"
+#include "session/name.h"
 
 namespace emberlock::session {
 namespace fs = std::filesystem;
@@ -19,6 +23,14 @@ namespace {
 fs::path full_path(const fs::path& folder) {
   fs::path path = fs::absolute(folder);
   return path.has_filename() ? path : path.parent_path();
+}
+
+/// What a device says of itself, fit for a manifest.
+std::string in_one_line(std::string text) {
+  for (char& c : text) {
+    if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
+  }
+  return text.substr(0, kMaxTextBytes);
 }
 
 /// The folder of a session that is being begun; taken away again unless it is kept. Of what it holds only
@@ -48,7 +60,12 @@ class NewFolder {
     if (ec)
       return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), path_.string(),
                    "Check that its parent is writable"};
-    for (const fs::path& folder : made_) EMBERLOCK_RETURN_IF_ERROR(sync_folder(folder.parent_path()));
+    // A folder lasts when the one that it stands in is synced. One that may not be read can't be: then it
+    // lasts from when its first file does.
+    for (const fs::path& folder : made_) {
+      const fs::path parent = folder.parent_path();
+      if (::access(parent.c_str(), R_OK) == 0) EMBERLOCK_RETURN_IF_ERROR(sync_folder(parent));
+    }
     return {};
   }
   void ours() { ours_ = true; }
@@ -84,7 +101,9 @@ Result<SessionWriter> SessionWriter::create(const fs::path& where, v1::Manifest 
   for (v1::CameraStream& camera : *manifest.mutable_cameras()) {
     camera.clear_segments();
     camera.clear_counts();
+    camera.set_model(in_one_line(camera.model()));
   }
+  EMBERLOCK_RETURN_IF_ERROR(check_texts(manifest, manifest_path(folder).string()));
   EMBERLOCK_RETURN_IF_ERROR(check_manifest(manifest, manifest_path(folder).string()));
   NewFolder created(folder);
   EMBERLOCK_RETURN_IF_ERROR(created.create());

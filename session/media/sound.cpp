@@ -45,6 +45,9 @@ class Loudness {
   std::vector<int> counts_;
 };
 
+/// Floating-point samples beyond this many full scales are no sound.
+constexpr double kLoudest = 1e6;
+
 /// The mean square of all channels at sample i, of a full scale of one.
 template <class Sample>
 double mean_square(const AVFrame& frame, int channels, bool planar, int i) {
@@ -61,7 +64,7 @@ double mean_square(const AVFrame& frame, int channels, bool planar, int i) {
     if constexpr (std::is_same_v<Sample, std::uint8_t>) value = (value - 128) / 128;
     if constexpr (std::is_same_v<Sample, std::int16_t>) value /= 32768;
     if constexpr (std::is_same_v<Sample, std::int32_t>) value /= 2147483648.0;
-    if (std::isfinite(value)) sum += value * value;
+    if (std::abs(value) <= kLoudest) sum += value * value;
   }
   return sum / channels;
 }

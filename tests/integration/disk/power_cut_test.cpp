@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <string>
+#include <thread>
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -79,10 +81,13 @@ TEST_P(Disk, ThatTurnsReadOnlyIsToldAndKeepsWhatWasCalledRecorded) {
     ASSERT_TRUE(session) << session.error().message();
     session::AsyncWriter writer(std::move(session).value());
     std::uint64_t id = 0;
-    for (; writer.progress(0).safe < 50; ++id)
-      static_cast<void>(writer.push(0, test::noise_frame(layout, id)));
+    const auto film = [&] {  // no faster than the disk has room for
+      static_cast<void>(writer.push(0, test::noise_frame(layout, id++)));
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    };
+    while (writer.progress(0).safe < 50) film();
     turn_read_only(disk);
-    for (; !writer.failure(); ++id) static_cast<void>(writer.push(0, test::noise_frame(layout, id)));
+    while (!writer.failure()) film();
     EXPECT_NE(writer.failure()->message().find("read-only"), std::string::npos)
         << writer.failure()->message();
     EXPECT_NE(writer.failure()->message().find("dmesg"), std::string::npos) << writer.failure()->message();

@@ -304,7 +304,7 @@ AlignStep step_at(const AlignState& before, const AlignRound& round, const std::
   const bool waits =
       decision.reset_next || std::any_of(state.cameras.begin(), state.cameras.end(),
                                          [](const CameraTrack& camera) { return camera.away; });
-  if (waits) --state.rounds_out;
+  if (waits) state.rounds_out = std::max(0, state.rounds_out - 1);
   if (decision.verdict == AlignVerdict::aligned) state.rounds_out = 0;
   if (decision.verdict == AlignVerdict::go_on && state.rounds_out >= options.max_rounds) {
     decision.verdict = AlignVerdict::given_up;

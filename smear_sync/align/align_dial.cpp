@@ -401,7 +401,7 @@ void let_walk(AlignStep& step, const AlignRound& seen, DialAdvice advice,
           (hidden.empty() ? ", so that dots are seen to follow them"
                           : ", so that the dot of " + hidden + " walks into sight");
       decision.reason = advice.words;
-      --step.state.rounds_out;
+      step.state.rounds_out = std::max(0, step.state.rounds_out - 1);
     }
   }
   decision.dial = std::move(advice);

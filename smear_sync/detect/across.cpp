@@ -157,7 +157,7 @@ SpotAcross spot_across(const Column& c, FitWindow w, const DotFit& spot, const L
   return s;
 }
 
-/// Light beside the spot, farther out than a lamp's copy reaches, that ends above and below it.
+/// Light beside the spot, farther out than a lamp's copy reaches, that ends above it or below it.
 bool light_beside(const Column& c, const DotFit& spot) {
   const int first = whole(c.radius) + 2;
   const int last = first + std::max(2, whole(0.5 * c.radius));

@@ -14,8 +14,8 @@ namespace emberlock::smear::detail {
 /// first asked for, and kept in `lamp`.
 ///
 /// An unclipped lamp tells its half width and its blur. Of a clipped one only the flanks are left, in which
-/// half width and blur stand for each other: half a pixel more for a tenth of a pixel less. The blur is
-/// taken for that of a lens in focus, or for the sharpest that the spot's own allows: a dot's is the lens's.
+/// half width and blur stand for each other: a little more blur looks like a narrower lamp. The blur is taken
+/// for that of a lens in focus, or for the sharpest that the spot's own allows: a dot's is the lens's.
 /// A softer lens makes the lamp seem wider than it is, and fewer spots are refused.
 ///
 /// Light beside the spot, where a lamp's copy has none, needs no fit. A quantiser softens edges: in

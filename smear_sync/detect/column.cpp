@@ -227,7 +227,7 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
       verdict = Verdict::nothing;
     }
     if (verdict == Verdict::dot && wider_than_lamp(plane, c, lamp, window, fit)) {
-      reading.reflection = true;
+      reading.reflection = Rows(fit.y);
       verdict = Verdict::suspect;
     }
     const double shift = c.compressed ? (c.flat ? kFlatShift : kGrainyShift) / c.sample_level : 0;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Dense>
 
@@ -206,7 +207,9 @@ EdgeFit fit_edge(const EdgeSamples& samples, EdgeFit f, const std::vector<EdgeFr
   const EdgeMatrix covariance = stiff.inverse() * std::pow(std::max(1.0, f.misfit), 2);
   Eigen::Index column = 0;
   for (const EdgeFree what : free) {
-    const double sigma = std::sqrt(std::max(0.0, covariance(column, column)));
+    // What the samples don't tell is anybody's guess, not certain.
+    const double variance = covariance(column, column);
+    const double sigma = variance > 0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity();
     if (what == EdgeFree::across || what == EdgeFree::radius) f.across_sigma = sigma;
     if (what == EdgeFree::blur) f.blur_sigma = sigma;
     ++column;

@@ -102,7 +102,8 @@ SmearReading judge(const Plane& plane, const Lamp& lamp, const ColumnReading& co
     for (const DotFit& f : column.suspects) reading.spots.push_back(dot_reading(plane, lamp, f));
     return ambiguous(
         std::move(reading),
-        fmt::format("a spot near row {:.0f} stands in the lamp's column, but doesn't {}", strongest->y,
+        fmt::format("a spot near row {:.0f} stands in the lamp's column, but doesn't {}",
+                    column.reflection ? column.reflection->value() : strongest->y,
                     column.reflection   ? "have the lamp's width and less of its light: a reflection"
                     : column.compressed ? "rise far enough above what compression makes; raise the bit rate"
                                         : "look enough like the lamp to be its dot"));

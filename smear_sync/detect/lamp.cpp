@@ -317,8 +317,8 @@ LampSearch find_lamps(const Plane& plane, const Background& background, const Br
   if (!search.lamps.empty()) {
     const Lamp first = search.lamps.front();
     std::erase_if(search.lamps, [&](const Lamp& l) {
-      // What is as bright in the first one's own column is no copy of it, however small: of a large
-      // reflection and its lamp the lamp.
+      // A dot is never as bright as its lamp. So a small spot as bright as the largest one, in its column, is
+      // kept: that may be the lamp, and the large one its reflection.
       const bool source = std::abs(l.x - first.x) < 0.5 * first.radius && l.peak > 0.98 * first.peak;
       return l.peak < 0.6 * first.peak || (l.flux < 0.35 * first.flux && !source);
     });

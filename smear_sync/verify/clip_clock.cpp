@@ -110,10 +110,11 @@ Status check(const ClipOptions& options) {
 }  // namespace
 
 std::int64_t ClipClock::count_of(std::int64_t i) const {
+  std::int64_t count = i;
   for (const DroppedFrames& drop : numbers.drops) {
-    if (i >= drop.before) i += drop.frames;
+    if (i >= drop.before) count += drop.frames;
   }
-  return i;
+  return count;
 }
 
 Phase ClipClock::phase_of_frame(std::int64_t i) const {
@@ -163,6 +164,9 @@ Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& op
     clock.reason = fmt::format(
         "the file claims {:.3f} frames a second: flash the strobe about once a frame, or give --frame-rate",
         clip.claimed_rate->value());
+    clock.believed_period = period(*clip.claimed_rate);  // for who places the clip by its sound
+    clock.timing.rows = clock.timing.shifts = clip.rows;
+    clock.timing.frame_period = clock.believed_period;
     return clock;
   }
   EMBERLOCK_ASSIGN_OR_RETURN(ClipWalk walk, read_walk(clip, options));

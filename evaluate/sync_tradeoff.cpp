@@ -283,10 +283,10 @@ Result<SyncTradeoff> measure_sync_tradeoff(const SyncTradeoffOptions& asked, con
 std::string repeat_command(const SyncTradeoff& t, const SyncCost& cost) {
   const SyncTradeoffOptions& o = t.options;
   const SyncTradeoffOptions standard;
-  std::string words = fmt::format("emberlock tradeoff sync --out point --policies {} --tolerances {:g}",
+  std::string words = fmt::format("emberlock tradeoff sync --out point --policies {} --tolerances {}",
                                   name(cost.policy), cost.tolerance.value());
-  const auto add = [&](const char* option, double value, double usual) {
-    if (value != usual) words += fmt::format(" {} {:g}", option, value);
+  const auto add = [&](const char* option, auto value, auto usual) {
+    if (value != usual) words += fmt::format(" {} {}", option, value);
   };
   add("--cameras", o.cameras, standard.cameras);
   add("--frame-rate", o.frame_rate.value(), standard.frame_rate.value());
@@ -299,7 +299,7 @@ std::string repeat_command(const SyncTradeoff& t, const SyncCost& cost) {
   add("--trim-range", o.trim_range.value(), standard.trim_range.value());
   add("--trim-step", o.trim_step.value(), standard.trim_step.value());
   add("--rigs", o.rigs, standard.rigs);
-  add("--seed", static_cast<double>(o.seed), static_cast<double>(standard.seed));
+  add("--seed", o.seed, standard.seed);
   add("--flame-speed", o.flame_speed, standard.flame_speed);
   add("--voxels", o.voxels, standard.voxels);
   add("--draws", o.draws, standard.draws);

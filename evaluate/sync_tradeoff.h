@@ -46,7 +46,7 @@ struct SyncCost {
   smear::AlignStatistics
       statistics;       ///< no rigs: not simulated, since `expected` resets are more than anybody does
   double expected = 0;  ///< resets, where not simulated
-  /// Every rig of twenty was aligned: mean and percentile mean something.
+  /// At least 19 rigs of 20 were aligned: mean and percentile mean something.
   [[nodiscard]] bool reached() const {
     return statistics.rigs > 0 && statistics.aligned >= 0.95 * statistics.rigs;
   }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/cold_solve.h"
 
+#include <cmath>
 #include <limits>
 
 #include "recon/adjust/extinction_field.h"
@@ -8,44 +9,48 @@
 namespace emberlock::recon {
 namespace {
 
+// Over the pixels: emission alone, then emission and extinction together; without extinction to find, both.
+constexpr int kEmissionPasses = 2;
+constexpr int kJointPasses = 4;
+
 ColdSolve finish(Descent& descent, int passes) {
   for (int p = 0; p < passes; ++p) descent.pass();
-  return {descent.validation_error(), descent.engine().get()};
+  const double error = descent.validation_error();
+  if (!std::isfinite(error)) throw Diverged(error, error);
+  return {error, descent.engine().get()};
 }
 
-ColdSolve solve_level(const SolverSetup& setup, const Level& level, const Extinction& extinction,
-                      const ColdPasses& passes) {
+ColdSolve solve_level(const SolverSetup& setup, const Level& level, const Extinction& extinction) {
   const Problem& problem = level.problem;
   Optics optics = setup.optics(problem.grid());
   std::vector<Rgba> x(problem.active.size());
   if (extinction.model == Extinction::Model::none) {
     optics.absorb = Absorb::nothing;
     Descent descent(level, optics, setup, x);
-    return finish(descent, passes.emission + passes.joint);
+    return finish(descent, kEmissionPasses + kJointPasses);
   }
   if (extinction.model == Extinction::Model::constant) {
     SolverSetup even = setup;
     even.effects.extinction = extinction;
     Descent descent(level, even.optics(problem.grid()), even, x);
-    return finish(descent, passes.emission + passes.joint);
+    return finish(descent, kEmissionPasses + kJointPasses);
   }
   optics.absorb = Absorb::field;
   if (extinction.soot.value() > 0) {  // is spread by the light that there is
     Descent even(level, optics, setup, with_extinction(x, expected_extinction(problem, extinction, x)));
-    for (int p = 0; p < passes.emission; ++p) even.pass();
+    for (int p = 0; p < kEmissionPasses; ++p) even.pass();
     x = even.engine().get();
   }
   Descent descent(level, optics, setup, with_extinction(x, expected_extinction(problem, extinction, x)));
-  for (int p = 0; p < passes.emission; ++p) descent.pass();
+  for (int p = 0; p < kEmissionPasses; ++p) descent.pass();
   descent.release_extinction();
-  return finish(descent, passes.joint);
+  return finish(descent, kJointPasses);
 }
 
 }  // namespace
 
-ColdSolve cold_solve(const SolverSetup& setup, const Level& level, const Extinction& extinction,
-                     const ColdPasses& passes) try {
-  return solve_level(setup, level, extinction, passes);
+ColdSolve cold_solve(const SolverSetup& setup, const Level& level, const Extinction& extinction) try {
+  return solve_level(setup, level, extinction);
 } catch (const Diverged&) {
   return {std::numeric_limits<double>::infinity(), std::vector<Rgba>(level.problem.active.size())};
 }

@@ -7,12 +7,6 @@
 
 namespace emberlock::recon {
 
-/// How long a cold solve goes on: passes over the pixels.
-struct ColdPasses {
-  int emission = 2;  ///< alone; without an extinction to find both
-  int joint = 4;     ///< emission and extinction together
-};
-
 /// What a few passes from darkness make of a level, for comparing candidates.
 struct ColdSolve {
   double error = 0;     ///< RMS over the level's held-out pixels, grey levels; infinite where it diverged
@@ -20,7 +14,6 @@ struct ColdSolve {
 };
 
 /// `extinction`: none, constant, or a field's first guess.
-ColdSolve cold_solve(const SolverSetup& setup, const Level& level, const Extinction& extinction,
-                     const ColdPasses& passes = {});
+ColdSolve cold_solve(const SolverSetup& setup, const Level& level, const Extinction& extinction);
 
 }  // namespace emberlock::recon

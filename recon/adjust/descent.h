@@ -19,8 +19,8 @@ struct Level {
   int subsets = 1;  ///< that are fitted; subset number `subsets` is held out
 };
 
-/// Every how manieth pixel along both axes a grid calls for: about one and a half of them across a voxel.
-/// More say no more of the volume: what a step costs falls with the square, what it reaches doesn't.
+/// The stride, in pixels along both axes, that a grid calls for: about one and a half pixels a voxel are
+/// taken. More say no more of the volume: what a step costs falls with the square, what it reaches doesn't.
 int stride_for(const SolverSetup& setup, const Grid& grid);
 /// The same for about so many pixels of all flames' boxes together.
 int stride_for_rays(const SolverSetup& setup, std::size_t rays);

@@ -54,7 +54,6 @@ class Engine {
   /// have come last.
   virtual void backproject(int subset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> gradient() const = 0;
-  virtual void clear_gradient() = 0;
   /// x as it is now, for keep(): one copy, on the device.
   virtual void mark() = 0;
   /// What was marked last, and not kept yet, is what restore() goes back to: nothing is copied.
@@ -88,8 +87,8 @@ class Engine {
   virtual void raise_field_weights(float scale) = 0;
   [[nodiscard]] virtual std::vector<float> field_weights() const = 0;
   virtual void descend_field(const FieldStep& step) = 0;
-  /// residual = A y - target, for targets other than what was seen; before the problem's background A y is
-  /// with what of it comes through.
+  /// residual = A y - target, for targets other than what was seen. With Behind::background A y includes the
+  /// background's light that the medium lets through.
   virtual void residual_against(const std::vector<Rgba>& target, int subset, Behind behind) = 0;
   /// x and y += the paper's adjustment from the subset's residuals.
   virtual void adjust(int subset, const PaperStep& step) = 0;

@@ -88,7 +88,7 @@ class CpuEngine final : public Engine {
     for (std::size_t p = 0; p < before.size(); ++p) gradient_[p] = gradient_[p] + before[p];
   }
 
-  void clear_gradient() override { std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{}); }
+  void clear_gradient() { std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{}); }
   void mark() override { marked_ = x_; }
   void keep() override { kept_.swap(marked_); }
   void restore() override { x_ = y_ = next_y_ = kept_; }

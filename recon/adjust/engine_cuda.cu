@@ -156,7 +156,6 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     launch(size(), AddAt<Real>{blur_->adjoint(exposed_gradient_), gradient_.data()}, "adding up");
   }
 
-  void clear_gradient() override { gradient_.clear(); }
   void mark() override {
     if (marked_.size() != size()) marked_ = CudaBuffer<Quad<Real>>::unfilled(size());
     marked_.copy_from(x_);

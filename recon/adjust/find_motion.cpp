@@ -74,7 +74,7 @@ class MotionProbe {
     const Level level = pose_level(setup, *hull, 1, 4);
     Descent descent(level, setup.optics(hull->grid), setup, std::vector<Rgba>(level.problem.active.size()));
     for (int p = 0; p < kMotionPasses; ++p) descent.pass();
-    for (int s = 0; s <= level.subsets; ++s) descent.engine().residual(s);
+    descent.settle();
     const ErrorOverBoxes error(setup.views, boxes_, level.problem, effects_.background);
     return all_channels(error(descent.engine().residuals()));
   } catch (const Diverged&) {

@@ -135,10 +135,12 @@ class PointingProbe {
     const Level level = pose_level(setup, *hull, 1, 4);
     Descent descent(level, setup.optics(hull->grid), setup, std::vector<Rgba>(level.problem.active.size()));
     for (int p = 0; p < kPointingPasses; ++p) descent.pass();
+    descent.settle();
     const Volume volume = to_volume(descent.engine().get(), level.problem, *hull, effects_);
     const View& left = small_.views[view];
-    const RadianceImage shown =
-        render_view(volume, *hull, effects_, left.camera, RenderOptions{.compute = options_.compute});
+    const RadianceImage shown = render_view(
+        volume, *hull, effects_, left.camera,
+        {.compute = options_.compute, .background = left.background ? &*left.background : nullptr});
     const double error = all_channels(rmse(shown, left.image, boxes_[view]));
     return LeftOut{error * error, register_to(left.image, shown, boxes_[view])};
   } catch (const Diverged&) {

@@ -18,10 +18,11 @@ constexpr double kRounding = 1e-4;  // grey levels
 Diverged::Diverged(double error, double best)
     : error_{
           ErrorKind::not_converged,
-          std::isfinite(best) ? fmt::format("the error rises to {:.3g} grey levels however short the steps "
-                                            "are; the lowest was {:.3g}",
-                                            error, best)
-                              : "the error is not finite however short the steps are",
+          std::isfinite(best) && std::isfinite(error)
+              ? fmt::format("the error rises to {:.3g} grey levels however short the steps "
+                            "are; the lowest was {:.3g}",
+                            error, best)
+              : "the error is not finite however short the steps are",
           "solver",
           "Check the cameras' poses and the box; try fewer voxels, --effects none or --precision float64"} {}
 

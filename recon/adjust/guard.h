@@ -47,8 +47,6 @@ class Guard {
   void begin_anew();
   /// At most `start`, beyond rounding and what the order of subsets lets an error waver by.
   static bool is_bearable(double error, double start);
-  [[nodiscard]] double start() const { return start_; }
-  [[nodiscard]] double best() const { return best_; }
   [[nodiscard]] int halvings() const { return halvings_; }
 
  private:

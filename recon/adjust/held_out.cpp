@@ -17,7 +17,7 @@ double area(const std::vector<PixelBox>& boxes) {
   return sum;
 }
 
-/// Every how manieth pixel of the held-out views the sample takes.
+/// The stride, in pixels, at which the sample takes the held-out views.
 int stride_of(const SolverSetup& setup, const std::vector<PixelBox>& boxes) {
   if (setup.options.trace == SolveOptions::Trace::whole) return 1;
   const int fitted = setup.options.solver == Solver::paper ? 1 : stride_for(setup, setup.hull.grid);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -32,7 +33,7 @@ class LeftOutViews {
 
 struct FoundSmoothness {
   double value = kLeastSmoothness;
-  double error = 0;  ///< LeftOutViews::error() with it
+  double error = std::numeric_limits<double>::infinity();  ///< LeftOutViews::error() with it, if looked at
 };
 /// How firmly neighbours are tied that shows left-out views best: kLeastSmoothness, or one of a few
 /// multiples, where it lowers the error by a share that counts. Ends with the best so far once `late` says

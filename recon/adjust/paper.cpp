@@ -136,6 +136,7 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
     if (finding == Guard::Finding::diverged) {
       engine->restore();
       step.gain /= 2;
+      last = -1;  // the error that comes next was met before: it says nothing of the end
       continue;
     }
     step.stream = random_bits(setup.options.seed, 0, static_cast<std::uint64_t>(solution.iterations));

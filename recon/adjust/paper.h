@@ -15,14 +15,12 @@ namespace emberlock::recon {
 /// to
 ///   100 times too small.
 /// - T falls with the length of a sample's step inside the hull, exp(-sigma_t length), not by a constant
-/// opacity
-///   a sample: the pieces of a ray are cut into equal steps of at most one voxel edge.
+///   opacity a sample: the pieces of a ray are cut into equal steps of at most one voxel edge.
 /// - The channels stop together, by the error over all of them; the paper reconstructs and stops each by
-/// itself.
+///   itself.
 /// - D, of equation (10), is in voxel edges; the paper gives no unit. alpha_d = 1 belongs to its 20 cm.
 /// - The deviation of G(s), of equation (11), 0.05, and the limit of 1000 iterations are ours: the paper
-/// gives
-///   none.
+///   gives none.
 /// - Key points outside the hull hold 0.
 /// Its voxels are cubes; without a number of them there are finest_voxels() along the longest edge, not
 /// voxels_by_the_paper() (pipeline/grid_choice.h).

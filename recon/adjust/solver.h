@@ -47,14 +47,16 @@ struct SolveOptions {
   ComputeOptions compute;
 };
 
-/// Errors after an iteration. RMSE in grey levels (0..255) for R, G, B over the bounding box of each view's
+/// An iteration's errors. RMSE in grey levels (0..255) for R, G, B over the bounding box of each view's
 /// flame pixels, the mean square taken over the views; 0 where there is no such view.
 struct TracePoint {
   Seconds time{0};  ///< by `elapsed`, without the cost of the held-out evaluation itself
   int iteration = 0;
+  /// What the iteration's steps met, each before it was taken; in a finished trace's last point of the volume
+  /// itself.
   std::array<double, 3> input_rmse = {};
-  /// An estimate from a fixed sample of the pixels (Reconstruction::trace_sample). In a finished trace it is
-  /// scaled by what all pixels showed at the end over what the sample showed there.
+  /// After the iteration: an estimate from a fixed sample of the pixels (Reconstruction::trace_sample). In a
+  /// finished trace it is scaled by what all pixels showed at the end over what the sample showed there.
   std::array<double, 3> heldout_rmse = {};
 };
 
@@ -102,12 +104,11 @@ inline bool is_spent(double share, const SolveOptions& options, const Elapsed& e
 
 /// Reconstructs the emission at the grid's key points from the input views, under the given effects. Held-out
 /// views are never fitted: a sample of their pixels is rendered for the trace, all of them at the end and
-/// before `target_rmse` counts as reached. Deterministic: the same
-/// bits for every number of threads, unless a budget ends it. Without `elapsed` all times are 0 and a budget
-/// is refused. Errors: check_scene's and carve's, a target without held-out views, options out of range, a
-/// device that can't run; of kind not_converged where the error diverges whatever the steps (guard.h), where
-/// input or held-out views are shown no better than by
-/// a volume without light, or a number isn't finite.
+/// before `target_rmse` counts as reached. Deterministic: the same bits for every number of threads, unless a
+/// budget ends it. Without `elapsed` all times are 0 and a budget is refused. Errors: check_scene's and
+/// carve's, a target without held-out views, options out of range, a device that can't run; of kind
+/// not_converged where the error diverges whatever the steps (guard.h), where the input views are shown no
+/// better than by a volume without light or held-out ones worse, or where a number isn't finite.
 Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects& effects,
                              const SolveOptions& options, const Elapsed& elapsed = {},
                              const std::function<void(const Preview&)>& preview = {});

@@ -46,6 +46,7 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
   int halvings = 0;
   for (std::size_t l = hulls.size(); l-- > 0;) {
     auto finer = std::make_unique<const Level>(pose_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
+    if (descent) descent->settle();  // nobody has judged the last pass yet
     std::vector<Rgba> x = descent ? refine(descent->engine().get(), level->problem, finer->problem)
                                   : std::vector<Rgba>(finer->problem.active.size());
     if (descent) halvings += descent->halvings();

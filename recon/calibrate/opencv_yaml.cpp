@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <iterator>
+#include <charconv>
 #include <map>
 #include <optional>
 #include <sstream>
@@ -76,9 +76,14 @@ Result<NumbersByKey> numbers_of_xml(const std::string& text) {
     const pugi::xml_node data = node.child("data");
     std::istringstream words((data ? data : node).text().get());
     std::vector<double>& into = numbers[key];
-    into.assign(std::istream_iterator<double>(words), {});
-    if (!words.eof())
-      return bad_opencv(key, "holds what is no number", "Name a file that cv::FileStorage wrote");
+    for (std::string word; words >> word;) {
+      double number = 0;
+      const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), number);
+      if (problem != std::errc() || end != word.data() + word.size())
+        return bad_opencv(key, "holds '" + word + "', which is no number",
+                          "Name a file that cv::FileStorage wrote");
+      into.push_back(number);
+    }
     if (data)
       EMBERLOCK_RETURN_IF_ERROR(check_shape(key, node.child("rows").text().as_int(),
                                             node.child("cols").text().as_int(), into.size()));

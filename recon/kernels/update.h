@@ -55,7 +55,7 @@ struct Stiffen {
 template <class Real>
 struct Descend {
   Grid grid;
-  const Real* weight = nullptr;  ///< 0 where no ray comes: such key points stay at 0
+  const Real* weight = nullptr;  ///< 0 where no ray comes: such key points stay as they are
   Quad<Real>* x = nullptr;
   const Quad<Real>* y = nullptr;
   Quad<Real>* next_y = nullptr;

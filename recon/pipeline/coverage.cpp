@@ -10,7 +10,7 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr std::size_t kFewViews = 4;  // RECON.md's figures: test error 18 with 4 views, 3.1 with 10
+constexpr std::size_t kFewViews = 4;
 constexpr double kSimilarDegrees = 20;
 
 /// The largest angle between any two lines of sight, in degrees, 0..90: opposite views lie on one line.

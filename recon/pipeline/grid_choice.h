@@ -17,9 +17,9 @@ inline constexpr int kLargestVoxels = 1024;
 /// full even where it leaves the picture. n_max,d is the most that an edge in dimension d covers in any input
 /// view, and n_max,d / alpha voxels with alpha = 1.5 sample it: two for three pixels. Our voxels are cubic,
 /// so the dimension that asks for the smallest edge decides, and a part of a voxel counts as one. On the
-/// paper's own set-up (paper_scene) n_max / alpha is 401.3 to 441.3 by camera, so 442 voxels; cameras in one
-/// plane would ask for 370 to 462. Edges that reach behind a camera don't count; without any other the answer
-/// is kLargestChosenVoxels. At most kLargestVoxels.
+/// paper's own set-up (paper_scene) n_max / alpha is 401.3 to 441.3 by camera, so 442 voxels (the test
+/// GridChoice.ThePapersRuleOnThePapersOwnScene). Edges that reach behind a camera don't count; without any
+/// other the answer is kLargestChosenVoxels. At most kLargestVoxels.
 int voxels_by_the_paper(const Scene& scene);
 
 /// The finest grid that is chosen unasked: the paper's rule, but at most kLargestChosenVoxels. Memory and

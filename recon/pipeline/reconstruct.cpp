@@ -95,7 +95,13 @@ Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& op
   const Task task{scene, device, [&] { return clock.now() - start; }, nobody};
   EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
   EMBERLOCK_RETURN_IF_ERROR(choose_grid(scene, choice.voxels, options.solve.precision));
-  if (choice.rule == "knee") return choice;
+  if (choice.rule == "knee" && has_goal(options)) {
+    choice.words = {"with --budget or --target-rmse a run chooses its voxels itself; without: " +
+                    choice.words.front()};
+    choice.expected_time = Seconds(0);
+  }
+  // The shipped front tells of the default solver's own end alone.
+  if (choice.rule == "knee" || has_goal(options) || options.solve.solver != Solver::standard) return choice;
   ReconstructOptions settled = options;
   settled.voxels = choice.voxels;
   EMBERLOCK_ASSIGN_OR_RETURN(const Calibration measured, calibrate(task, settled));
@@ -105,6 +111,8 @@ Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& op
   return choice;
 } catch (const DeviceError& e) {
   return e.error();
+} catch (const std::bad_alloc&) {
+  return Error{ErrorKind::bad_input, "not enough memory", "--voxels", "Give fewer voxels, or a smaller box"};
 }
 
 Status check_output(const fs::path& folder, const std::vector<fs::path>& inputs) {

@@ -126,9 +126,10 @@ Outcome finish(const Task& task, const SolveOptions& options, Reconstruction don
     tell(progress,
          kSolveTo + (1 - kSolveTo) * static_cast<double>(i) / static_cast<double>(scene.views.size()),
          "rendering the views");
-    outcome.renders.push_back(render_view(done.volume, done.hull, done.effects,
-                                          prepared.scene().views[i].camera,
-                                          RenderOptions{.compute = options.compute}));
+    const View& view = prepared.scene().views[i];
+    outcome.renders.push_back(render_view(
+        done.volume, done.hull, done.effects, view.camera,
+        {.compute = options.compute, .background = view.background ? &*view.background : nullptr}));
     at_own_instant(outcome.renders.back(), scene, i, done.effects);
   }
   outcome.report = describe(scene, done.hull.grid, options, task.device);

@@ -109,10 +109,11 @@ std::vector<WorkPoint> expected_runs(const Scene& scene, const ReconstructOption
   std::vector<WorkPoint> runs = shipped_ends();
   if (limit > 0) {
     for (WorkPoint& run : runs) {
+      const double end = run.seconds;
       for (const WorkPoint& p : shipped_front())
         if (p.settings.voxels == run.settings.voxels && p.settings.effects == run.settings.effects &&
             p.settings.iterations <= limit)
-          run = {run.settings, std::min(run.seconds, p.seconds), p.error};
+          run = {run.settings, std::min(end, p.seconds), p.error};
     }
   }
   // The front's flames take light: what leaves that out has a model that doesn't fit, and its errors say
@@ -155,7 +156,14 @@ Result<VoxelChoice> choose_voxels(const Task& task, const ReconstructOptions& op
             voxels, kLargestChosenVoxels, voxels_by_the_paper(scene)));
   }
   tell(progress, 0, "measuring this machine on coarse grids");
-  EMBERLOCK_ASSIGN_OR_RETURN(const Calibration measured, calibrate(task, options));
+  const auto calibrated = calibrate(task, options);
+  if (!calibrated) {  // a coarse run without effects is a yardstick alone: the real one may do
+    const int voxels = finest_voxels(scene);
+    return told(scene, "finest", voxels,
+                fmt::format("{} voxels along the longest edge, as this machine couldn't be measured: {}",
+                            voxels, calibrated.error().message()));
+  }
+  const Calibration& measured = *calibrated;
   const std::vector<WorkPoint> points = expected_runs(scene, options, measured);
   const WorkPoint* chosen = knee(points);
   if (chosen == nullptr) return told(scene, "finest", finest_voxels(scene), "");  // choose_grid() says why

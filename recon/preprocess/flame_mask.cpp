@@ -62,8 +62,18 @@ Status check_view(const View& view) {
                  view.name, "Give a mark for each pixel, or none at all"};
   }
   EMBERLOCK_RETURN_IF_ERROR(check_pixels(view.image, "pixel", view.name));
-  if (view.background) return check_pixels(*view.background, "the background's pixel", view.name);
-  return {};
+  const auto check_beside = [&](const auto& picture, const char* name) -> Status {
+    if (!picture) return {};
+    if (picture->size != size || picture->rgb.size() != view.image.rgb.size()) {
+      return Error{ErrorKind::bad_input,
+                   fmt::format("the {} is {} x {}, the image {} x {}", name, picture->size.width,
+                               picture->size.height, size.width, size.height),
+                   view.name, "Give it the size of the image"};
+    }
+    return check_pixels(*picture, fmt::format("the {}'s pixel", name).c_str(), view.name);
+  };
+  EMBERLOCK_RETURN_IF_ERROR(check_beside(view.background, "background"));
+  return check_beside(view.average, "average");
 }
 
 /// `judged(pixel, channel, a - b)` is what counts of a difference.

@@ -30,6 +30,12 @@ class OnEachDevice : public testing::TestWithParam<recon::Device> {
   ~OnEachDevice() override { ::unsetenv("EMBERLOCK_DEVICE"); }
 };
 
+/// What this machine can run beside the CPU, to be compared with it; often none.
+inline std::vector<recon::Device> other_devices() {
+  const std::vector<recon::Device> all = devices();
+  return {all.begin() + 1, all.end()};
+}
+
 /// The one that such a test runs on.
 inline recon::Device device_here() { return OnEachDevice::GetParam(); }
 

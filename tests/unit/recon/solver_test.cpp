@@ -16,6 +16,11 @@ namespace {
 
 ON_EACH_DEVICE(SolverTest);
 
+class BesideTheCpu : public OnEachDevice {};
+INSTANTIATE_TEST_SUITE_P(Devices, BesideTheCpu, testing::ValuesIn(other_devices()),
+                         [](const auto& on) { return device_name(on.param); });
+GTEST_ALLOW_UNINSTANTIATED_PARAMETERIZED_TEST(BesideTheCpu);  // where there is no GPU
+
 const Effects kPaperMedium = absorbing(PerMeter(32.8));
 
 SolveOptions on_device(int iterations = 0) {
@@ -136,7 +141,7 @@ TEST_P(SolverTest, TargetWithoutHeldOutViewIsRefused) {
   EXPECT_EQ(solve(scene, grid_over(scene.box, 16), {}, options).error().where, "target-rmse");
 }
 
-TEST_P(SolverTest, EveryDeviceReconstructsWhatTheCpuDoes) {
+TEST_P(BesideTheCpu, ReconstructsWhatTheCpuDoes) {
   const Scene scene = small_flame_scene();
   SolveOptions options = on_device(3);
   const auto here = solve(scene, grid_over(scene.box, 40), kPaperMedium, options);

@@ -21,8 +21,8 @@
 namespace emberlock {
 namespace {
 
-constexpr std::array<const char*, 7> kNames{"base",  "smear_sync", "session", "drivers",
-                                            "recon", "daemon",     "cli"};
+constexpr std::array<const char*, 9> kNames{"base", "smear_sync", "session", "drivers", "recon",
+                                            "rig",  "films",      "daemon",  "cli"};
 
 std::array<std::shared_ptr<spdlog::logger>, kNames.size()> make_loggers() {
   const auto sink = std::make_shared<spdlog::sinks::stderr_color_sink_mt>();

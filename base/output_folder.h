@@ -34,8 +34,8 @@ struct OutputVerb {
 /// How an earlier result gives way to a new one.
 enum class Replace {
   at_once,       ///< the kernel exchanges both folders; in two steps where the file system can't
-  in_two_steps,  ///< the earlier one is called "TARGET.earlier" for a moment; for file systems without
-                 ///< exchange
+  in_two_steps,  ///< the earlier one is called "TARGET.emberlock-earlier" for a moment; for file systems
+                 ///< without exchange
 };
 
 struct OutputRequest {

@@ -193,7 +193,7 @@ DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App&
   static const std::set<std::string> kAskable = {"--tolerance", "--policy", "--anyway", "--stop", "--json"};
   for (const CLI::Option* option : verb.get_options()) {
     if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
-      fail({ErrorKind::bad_input, "is for a rig of its own", option->get_name(),
+      fail({ErrorKind::bad_input, "works only together with --rig", option->get_name(),
             "Give --rig too, or leave it to the daemon's configuration"});
     }
   }

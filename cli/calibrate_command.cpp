@@ -12,6 +12,7 @@
 
 #include "base/clock.h"
 #include "base/file.h"
+#include "cli/board_options.h"
 #include "cli/commands.h"
 #include "cli/outputs.h"
 #include "cli/scene_options.h"
@@ -157,7 +158,7 @@ void add_cameras(CLI::App& parent) {
                                          "Lenses and poses of all cameras from pictures or films of a board; "
                                          "1 if one of them couldn't be placed");
   CamerasArguments& a = *arguments;
-  films::add_board_options(*verb, a.boards, recon::FilmSearchOptions{}.instants);
+  add_board_options(*verb, a.boards, recon::FilmSearchOptions{}.instants);
   verb->get_option("--board")->required();
   verb->add_option("--out", a.out, "Folder for rig.json, index.html, transforms.json, opencv/ and colmap/")
       ->required();

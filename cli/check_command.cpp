@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "cli/board_options.h"
 #include "cli/commands.h"
 #include "films/board_search.h"
 #include "recon/calibrate/drift.h"
@@ -125,7 +126,7 @@ void add_calibrate_check(CLI::App& parent) {
                                          "of the board or a lamp; 1 if one did");
   verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")
       ->required();
-  films::add_board_options(*verb, arguments->boards, kCheckInstants);
+  add_board_options(*verb, arguments->boards, kCheckInstants);
   CLI::Option* lamp = verb->add_flag("--lamp", arguments->lamp,
                                      "The pictures show one small bright lamp, such as the strobe's, at one "
                                      "place each instant; three places "

@@ -15,7 +15,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <google/protobuf/util/json_util.h>
 #include <grpc/support/log.h>
 #include <grpcpp/grpcpp.h>
 #include <sys/socket.h>
@@ -32,7 +31,7 @@ namespace {
 
 constexpr std::chrono::seconds kConnect{5};
 constexpr std::chrono::seconds kCall{15};     // what answers at once, devices included
-constexpr std::chrono::seconds kQueues{180};  // what waits for queues to reach the disk
+constexpr std::chrono::seconds kQueues{310};  // what waits for queues to reach the disk
 constexpr std::chrono::milliseconds kAskStop{50};
 constexpr int kLargestAnswer = 64 << 20;  // bytes
 constexpr int kKeepaliveMs = 20'000;
@@ -166,7 +165,9 @@ struct Client::Parts {
            (status.error_code() == grpc::StatusCode::UNAVAILABLE &&
             channel->GetState(false) != GRPC_CHANNEL_READY);
     if (lost) return unreachable(where, "it went away", "`journalctl -u emberlockd` says why");
-    if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED)
+    // The same code with words of the daemon's own is a device's that didn't answer it.
+    if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED &&
+        status.error_message() == "Deadline Exceeded")
       return {ErrorKind::timed_out, "the daemon didn't answer in time", where,
               "`journalctl -u emberlockd` may say why"};
     if (status.error_code() == grpc::StatusCode::UNAUTHENTICATED)
@@ -289,9 +290,6 @@ Result<v1::RecordingStatus> Client::stop_recording() {
 Result<v1::ListSessionsResponse> Client::list_sessions() {
   return parts_->call(&v1::Sessions::Stub::List, parts_->sessions, v1::Empty());
 }
-Result<v1::Manifest> Client::session(const v1::SessionRequest& request) {
-  return parts_->call(&v1::Sessions::Stub::Get, parts_->sessions, request);
-}
 Status Client::verify(const v1::SessionRequest& request, const Take<v1::JobProgress>& take,
                       const Stop& stop) {
   return parts_->stream(&v1::Sessions::Stub::Verify, parts_->sessions, request, take, stop);
@@ -326,14 +324,6 @@ void leave(const Client& client, const Error& error) {
   if (!client.lost()) fail(error);
   std::fprintf(stderr, "emberlock: %s\n", error.message().c_str());
   throw CLI::RuntimeError(error.message(), kUnreachable);
-}
-
-std::string json_line(const google::protobuf::Message& message) {
-  google::protobuf::util::JsonPrintOptions options;
-  options.preserve_proto_field_names = true;
-  std::string text;
-  static_cast<void>(google::protobuf::util::MessageToJsonString(message, &text, options).ok());
-  return text;
 }
 
 }  // namespace emberlock::cli

@@ -63,7 +63,6 @@ class Client {
   Result<v1::RecordingStatus> record(const v1::RecordRequest& request);
   Result<v1::RecordingStatus> stop_recording();
   Result<v1::ListSessionsResponse> list_sessions();
-  Result<v1::Manifest> session(const v1::SessionRequest& request);
   Status verify(const v1::SessionRequest& request, const Take<v1::JobProgress>& take, const Stop& stop);
   Status repair(const v1::SessionRequest& request, const Take<v1::JobProgress>& take, const Stop& stop);
   Status export_to(const v1::ExportRequest& request, const Take<v1::JobProgress>& take, const Stop& stop);
@@ -89,8 +88,5 @@ T or_leave(const Client& client, Result<T> result) {
 inline void or_leave(const Client& client, const Status& status) {
   if (!status) leave(client, status.error());
 }
-
-/// On one line, fields named as in the .proto: what --json prints.
-std::string json_line(const google::protobuf::Message& message);
 
 }  // namespace emberlock::cli

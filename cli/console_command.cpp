@@ -4,6 +4,7 @@
 
 #include "cli/client.h"
 #include "cli/commands.h"
+#include "cli/daemon_words.h"
 
 namespace emberlock::cli {
 namespace {

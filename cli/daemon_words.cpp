@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <google/protobuf/util/json_util.h>
 
 namespace emberlock::cli {
 namespace {
@@ -203,6 +204,14 @@ std::string status_screen(const v1::DaemonStatus& status) {
   for (const v1::Fault& fault : status.faults()) text += fault_lines(fault);
   if (!status.cameras().empty()) text += "cameras\n";
   for (const v1::CameraStatus& camera : status.cameras()) text += camera_line(camera);
+  return text;
+}
+
+std::string json_line(const google::protobuf::Message& message) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.preserve_proto_field_names = true;
+  std::string text;
+  static_cast<void>(google::protobuf::util::MessageToJsonString(message, &text, options).ok());
   return text;
 }
 

@@ -9,6 +9,8 @@
 // What the daemon shows, as people read it in a terminal.
 namespace emberlock::cli {
 
+/// On one line, fields named as in the .proto: what --json prints.
+std::string json_line(const google::protobuf::Message& message);
 /// "LOCKED" as "locked", "BY_HAND" as "by hand".
 std::string in_words(std::string enum_name);
 std::string in_words(v1::Light light);

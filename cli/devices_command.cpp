@@ -143,7 +143,7 @@ Result<Probed> probe_virtual(const ProbeArguments& arguments, const drivers::Pro
     return Probed{arguments.rig, std::move(film), std::move(verdict)};
   }
   return Error{ErrorKind::bad_input, "there is no such camera in " + arguments.rig, arguments.id,
-               "there is virtual-00 and so on"};
+               "Its cameras are virtual-00, virtual-01 and so on"};
 }
 
 Result<Probed> probe_real(const ProbeArguments& arguments, const drivers::ProbeOptions& options,

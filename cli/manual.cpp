@@ -54,7 +54,8 @@ std::string manual_page(const CLI::App& app, std::string_view version) {
   page +=
       ".SH EXIT STATUS\n0: done. 1: it failed, or what was checked isn't as it should be. 2: the command "
       "line or an "
-      "input file is wrong.\n.SH ENVIRONMENT\n.TP\n\\fBEMBERLOCK_LOG\\fR\nWhat is logged on stderr: "
+      "input file is wrong. 3: the daemon can't be reached, or went away.\n.SH "
+      "ENVIRONMENT\n.TP\n\\fBEMBERLOCK_LOG\\fR\nWhat is logged on stderr: "
       "\"debug\", or "
       "by folder \"session=debug,recon=info\".\n.SH SEE ALSO\n\\fBemberlockd\\fR(8), "
       "\\fBemberlockd.toml\\fR(5)\n";

@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What stands in for the daemon's client where EMBERLOCK_DAEMON is off.
+#include <string>
+#include <utility>
+
+#include "cli/align_daemon.h"
 #include "cli/commands.h"
 #include "cli/reconstruct_daemon.h"
 #include "cli/sessions_daemon.h"
@@ -7,17 +11,20 @@
 namespace emberlock::cli {
 namespace {
 
-[[noreturn]] void no_client() {
+[[noreturn]] void no_client(std::string remedy) {
   fail({ErrorKind::refused,
         "this emberlock was built without the daemon's client (EMBERLOCK_DAEMON=OFF)",
         {},
-        "Name a folder (./NAME for one here), or use a build with it"});
+        std::move(remedy)});
 }
+
+constexpr const char* kFolder = "Name a folder (./NAME for one here), or use a build with it";
 
 }  // namespace
 
-void reconstruct_by_daemon(const DaemonReconstruction&) { no_client(); }
-v1::ListSessionsResponse sessions_of_daemon(const DaemonAddress&) { no_client(); }
-void job_by_daemon(const DaemonAddress&, SessionJob, const std::string&, bool) { no_client(); }
+void reconstruct_by_daemon(const DaemonReconstruction&) { no_client(kFolder); }
+v1::ListSessionsResponse sessions_of_daemon(const DaemonAddress&) { no_client(kFolder); }
+void job_by_daemon(const DaemonAddress&, SessionJob, const std::string&, bool) { no_client(kFolder); }
+void align_by_daemon(const DaemonAlignment&) { no_client("Give --rig, or use a build with it"); }
 
 }  // namespace emberlock::cli

@@ -257,7 +257,7 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
                                                  "--budget", "--voxels", "--hold-out", "--device"};
   for (const CLI::Option* option : verb.get_options()) {
     if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
-      fail({ErrorKind::bad_input, "isn't the daemon's to be asked", option->get_name(),
+      fail({ErrorKind::bad_input, "can't be used with --daemon", option->get_name(),
             "Leave it away, or reconstruct here, without --daemon"});
     }
   }
@@ -269,7 +269,7 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
   request.set_budget_s(arguments.budget.value_or(0));
   const std::optional<int> voxels = or_fail(options_of(arguments)).voxels;
   if (!voxels && !arguments.voxels.empty()) {
-    fail({ErrorKind::bad_input, "\"" + arguments.voxels + "\" isn't the daemon's to be asked", "--voxels",
+    fail({ErrorKind::bad_input, "\"" + arguments.voxels + "\" can't be used with --daemon", "--voxels",
           "Give a number, or reconstruct here, without --daemon"});
   }
   request.set_voxels(static_cast<std::uint32_t>(voxels.value_or(0)));

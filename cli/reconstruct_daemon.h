@@ -10,7 +10,7 @@ struct DaemonReconstruction {
   DaemonAddress daemon;
   v1::ReconstructRequest request;
   bool cancel = false;  ///< instead: the one that runs
-  bool json = false;    ///< IterationPreview, a line each, and ReconstructionStatus at the end
+  bool json = false;    ///< Iteration, a line each, and ReconstructionStatus at the end
 };
 
 /// Starts it and shows each iteration until it has ended. Leaves with exit code 1 where it failed or was

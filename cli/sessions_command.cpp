@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "cli/commands.h"
+#include "cli/daemon_words.h"
 #include "cli/interrupt.h"
 #include "cli/sessions_daemon.h"
 #include "session/export.h"

@@ -56,7 +56,7 @@ void job_by_daemon(const DaemonAddress& address, SessionJob job, const std::stri
     std::printf("%s\n", last.report().c_str());
   } else {
     if (!told.is_discarded()) std::printf("%s\n", told.dump(2).c_str());
-    std::printf("%s: %s\n", session.c_str(), last.ok() ? "well" : "NOT well");
+    std::printf("%s: %s\n", session.c_str(), last.ok() ? "all good" : "damaged, see above");
   }
   if (!last.ok()) throw CLI::RuntimeError(1);
 }

@@ -36,7 +36,7 @@ class Lines {
     if (json_) return print("status", status);
     std::string line = fmt::format("{}, {}: {}", in_words(v1::Phase_Name(status.phase())),
                                    in_words(status.light()), status.reason());
-    if (!status.next_step().empty()) line += ". " + status.next_step();
+    if (!status.next_step().empty()) line += " " + status.next_step();
     if (std::exchange(last_, line) != line) print(status.now_utc() + " " + line);
   }
   void show(const v1::Notice& notice) {

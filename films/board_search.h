@@ -4,8 +4,6 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "recon/calibrate/board_films.h"
 
 namespace emberlock::films {
@@ -17,9 +15,6 @@ struct BoardArguments {
   recon::FilmSearchOptions film;
 };
 
-/// Adds `pictures`, --board, --instants [`instants`] and --still.
-void add_board_options(CLI::App& verb, BoardArguments& arguments, std::size_t instants);
-
 /// The lamp where smear_sync's detector sees one alone, and well.
 recon::BoardSearch search_for_lamp();
 
@@ -28,7 +23,7 @@ recon::BoardSearch search_for_lamp();
 Result<recon::BoardReading> read_boards(const BoardArguments& arguments, const recon::BoardSearch& search,
                                         const Progress& progress);
 
-/// "1440 instants, 640 searched, ..."; empty of pictures.
+/// "640 of 1440 instants searched: ..."; empty of pictures.
 std::string film_words(const recon::BoardReading& reading);
 
 }  // namespace emberlock::films

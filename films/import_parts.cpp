@@ -86,13 +86,13 @@ void remove_work(const fs::path& work) {
   for (const std::string& id : parts) {
     const Status gone = remove_part(work / (std::string(kPart) + id),
                                     [&](const std::string& path) { return is_of_session(path, id); });
-    if (!gone.ok()) log(LogCategory::cli).warn("{}", gone.error().message());
+    if (!gone.ok()) log(LogCategory::films).warn("{}", gone.error().message());
   }
   const bool all = remove_ours(work, [&](const std::string& path, const struct stat& /*info*/) {
     return path == "lock" ||
            (path.starts_with(kPart) && path.ends_with(kMark) && path.find('/') == std::string::npos);
   });
-  if (!all) log(LogCategory::cli).warn("{} holds files that no import made: they are kept", work.string());
+  if (!all) log(LogCategory::films).warn("{} holds files that no import made: they are kept", work.string());
 }
 
 /// Everything that a camera's frames depend on; what is written under one text needn't be written again.
@@ -244,6 +244,7 @@ Result<v1::Manifest> ImportFolder::finish(v1::Manifest manifest, const std::vect
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "import.html", reports.page));
   EMBERLOCK_RETURN_IF_ERROR(session::write_manifest(folder, manifest));
   EMBERLOCK_RETURN_IF_ERROR(move(folder, session_));  // where an empty folder may be
+  EMBERLOCK_RETURN_IF_ERROR(sync_folder(session_.parent_path()));
   remove_work(work_);
   return manifest;
 }

@@ -119,7 +119,7 @@ void look_around(const FilmToSearch& film, Looker& looker) {
 }
 
 /// Every frame from `from` on, until long after the last that shows the lamp and after all glances up to
-/// `glances_to` that did.
+/// `last_glance` that did.
 std::map<std::int64_t, smear::SmearReading> read_on(Looker& looker, const LampPlace& lamp, std::int64_t from,
                                                     std::int64_t last_glance) {
   std::map<std::int64_t, smear::SmearReading> film;

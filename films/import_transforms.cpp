@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "films/import_transforms.h"
 
+#include <map>
 #include <set>
 #include <string>
 #include <system_error>
@@ -14,6 +15,7 @@
 #include "session/layout.h"
 #include "session/media/import_scan.h"
 #include "session/media/video_scan.h"
+#include "session/name.h"
 
 namespace emberlock::films {
 namespace fs = std::filesystem;
@@ -49,6 +51,27 @@ std::vector<std::string> ids_of(const std::vector<recon::TransformsFrame>& frame
   return ids;
 }
 
+/// The same with the names that `wanted` gives some of them. Errors: a name of none; one that can't name a
+/// folder.
+Result<std::vector<std::string>> rename(std::vector<std::string> ids,
+                                        std::map<std::string, std::string> wanted,
+                                        const fs::path& transforms) {
+  for (std::string& id : ids) {
+    const std::string name = id;
+    if (const auto other = wanted.find(id); other != wanted.end()) {
+      id = other->second;
+      wanted.erase(other);
+    }
+    if (!session::is_folder_name(id)) {
+      return Error{ErrorKind::bad_input, "'" + id + "' can't be a camera's id", transforms.string(),
+                   "Give it one of letters, digits, space and . _ : -, with --camera ID=" + name};
+    }
+  }
+  if (wanted.empty()) return ids;
+  return Error{ErrorKind::bad_input, "no picture is called '" + wanted.begin()->first + "'",
+               transforms.string(), "Name a picture without its ending"};
+}
+
 }  // namespace
 
 std::optional<fs::path> transforms_in(const fs::path& path) {
@@ -64,7 +87,8 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
   std::vector<fs::path> inputs{transforms};
   for (const recon::TransformsFrame& frame : scene.frames) inputs.push_back(frame.image);
   EMBERLOCK_ASSIGN_OR_RETURN(const ImportFolder target, ImportFolder::open(options.out, inputs));
-  const std::vector<std::string> ids = ids_of(scene.frames);
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::string> ids,
+                             rename(ids_of(scene.frames), options.ids, transforms));
   ImportResult result;
   std::vector<CameraPart> parts;
   for (std::size_t i = 0; i < scene.frames.size(); ++i) {
@@ -73,8 +97,7 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
     const ImageLayout& layout = picture.layout();
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::Intrinsics lens, recon::intrinsics_of(frame, layout.size));
     CameraPart part;
-    const auto renamed = options.ids.find(ids[i]);
-    part.stream.set_camera_id(renamed == options.ids.end() ? ids[i] : renamed->second);
+    part.stream.set_camera_id(ids[i]);
     session::set_layout(part.stream, layout);
     put_calibration(lens, frame.camera_from_world, *part.stream.mutable_calibration());
     part.files = {{frame.image, session::VideoScan{layout.size, {0}, {0}, {}, {}, {}, {}, 1, {}}, 0}};

@@ -86,7 +86,10 @@ Result<v1::StrobeState> Conductor::strobe() {
 
 Result<v1::StrobeState> Conductor::apply_strobe(const v1::StrobeState& wanted) {
   if (state_.phase != v1::IDLE && state_.phase != v1::CAPTURING) {
-    return Error{ErrorKind::refused, "the alignment has the strobe", "strobe", "Stop the alignment first"};
+    return state_.phase == v1::FINISHING
+               ? Error{ErrorKind::refused, "a recording is being finished", "strobe", "Ask again in a moment"}
+               : Error{ErrorKind::refused, "the alignment has the strobe", "strobe",
+                       "Stop the alignment first"};
   }
   drivers::Strobe* strobe = devices_.strobe;
   if (strobe == nullptr)
@@ -188,7 +191,8 @@ void Conductor::heed_devices() {
       break_alignment("waiting for a camera that went away");
     }
   }
-  if (!strobe_status_.ok() && devices_.strobe != nullptr &&
+  // Waiting for one that is silent would cost frames of a recording.
+  if (!recorder_ && !strobe_status_.ok() && devices_.strobe != nullptr &&
       (!strobe_asked_ || now - *strobe_asked_ >= kStrobeInterval)) {
     strobe_asked_ = now;
     static_cast<void>(strobe());
@@ -203,10 +207,10 @@ void Conductor::heed_reconstruction() {
   const bool cancelled = status->state() == v1::ReconstructionStatus::CANCELLED;
   static_cast<void>(
       happen(ReconstructionEnded{ok || cancelled,
-                                 ok          ? "done, in " + status->result()
+                                 ok          ? "done: the result is in " + status->result()
                                  : cancelled ? "cancelled"
                                              : status->error(),
-                                 "Recordings aren't touched by this: try again, or on the other device"}));
+                                 "The recording is unharmed. Try again, or with --device cpu or cuda"}));
 }
 
 std::vector<v1::CameraStatus::State> Conductor::camera_states() const {

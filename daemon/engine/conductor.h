@@ -139,6 +139,7 @@ class Conductor {
   /// recorder_.
   std::future<v1::RecordingStatus> finished_;
   v1::RecordRequest record_request_;
+  Status begun_;  ///< how the recording asked for last began
   std::filesystem::path record_folder_;
   std::optional<v1::RecordingStatus> recording_;  ///< the last that ended
   TimePoint record_began_;

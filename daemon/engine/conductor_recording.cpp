@@ -11,6 +11,7 @@
 #include "daemon/engine/conductor.h"
 #include "drivers/replay/record.h"
 #include "rig/recording_rate.h"
+#include "session/files.h"
 #include "session/name.h"
 
 namespace emberlock::daemon {
@@ -48,10 +49,9 @@ Status Conductor::record(const v1::RecordRequest& request) {
   if (asked.refusal) return *asked.refusal;
   record_folder_ = folder;
   record_request_ = request;
-  const std::string before = state_.reason;
+  begun_ = {};
   EMBERLOCK_RETURN_IF_ERROR(happen(AskRecord{name, request.unlocked(), request.reconstruct()}));
-  if (state_.phase == v1::CAPTURING) return {};
-  return Error{ErrorKind::io, state_.reason, record_folder_.string()};
+  return begun_;
 }
 
 Status Conductor::stop_recording() { return happen(AskStopRecording{}); }
@@ -83,6 +83,7 @@ void Conductor::begin_recording() {
   auto recorder = Recorder::begin(record_folder_, manifest, options, counts(), record_began_);
   if (!recorder.ok()) {
     parts_.work.resume();
+    begun_ = recorder.error();
     static_cast<void>(happen(RecordingRefused{recorder.error()}));
     return;
   }
@@ -131,8 +132,11 @@ void Conductor::finish_recording() {
 
 void Conductor::conclude_recording(v1::RecordingStatus status) {
   recorder_.reset();
-  const bool broken = status.state() == v1::RecordingStatus::FAILED;
-  const bool nothing = !broken && status.frames() == 0 && lost(status.lost()) == 0;
+  const bool failed = status.state() == v1::RecordingStatus::FAILED;
+  // One whose counts disagree is finished all the same.
+  const auto manifest = session::read_manifest(record_folder_);
+  const bool broken = failed && !(manifest && manifest->state() == v1::Manifest::COMPLETE);
+  const bool nothing = !failed && status.frames() == 0 && lost(status.lost()) == 0;
   if (nothing) {
     status.set_state(v1::RecordingStatus::FAILED);
     const std::string why = nobody_films();
@@ -158,7 +162,11 @@ void Conductor::conclude_recording(v1::RecordingStatus status) {
 }
 
 void Conductor::end() {
-  state_.reconstruct_after = false;
+  if (std::exchange(state_.reconstruct_after, false))
+    parts_.board.notice(v1::AMBER,
+                        fmt::format("{} is not handed on, as emberlockd is shutting down. Start it "
+                                    "later: emberlock reconstruct \"{}\" --daemon",
+                                    state_.session, state_.session));
   static_cast<void>(happen(RecordingEnds{"emberlockd is shutting down"}));
   // What is still on its way isn't waited for.
   if (recorder_ && !finished_.valid()) begin_finishing();
@@ -185,9 +193,10 @@ void Conductor::salvaged(const std::string& session, const Result<session::Salva
     gone += camera.lost;
   }
   parts_.board.notice(
-      v1::AMBER, fmt::format("{} was not finished: salvaged, what reached the disk is kept: {} frames of {} "
-                             "cameras; {} that the index has didn't reach it",
-                             session, kept, outcome->cameras.size(), gone));
+      v1::AMBER,
+      fmt::format("{} was not finished. It has been salvaged: {} frames of {} cameras are kept; the "
+                  "pixels of {} more never reached the disk",
+                  session, kept, outcome->cameras.size(), gone));
 }
 
 void Conductor::transcoded(const std::string& session, const Status& outcome) {

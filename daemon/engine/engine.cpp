@@ -32,7 +32,8 @@ ReconstructionOptions reconstruction_options(const rig::DaemonConfig& config) {
   options.threads = wanted.threads;
   options.program = config.reconstruction.program;
   options.sessions = config.recording.folder;
-  options.results = config.recording.folder.parent_path() / "results";
+  if (!options.sessions.has_filename()) options.sessions = options.sessions.parent_path();
+  options.results = options.sessions.parent_path() / "results";
   options.silence = config.reconstruction.silence;
   options.niceness = config.reconstruction.niceness;
   return options;

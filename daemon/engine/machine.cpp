@@ -85,7 +85,12 @@ class Stepper {
     const bool hand_on = std::exchange(now().reconstruct_after, false) && !happened.nothing;
     const std::string session = now().session;
     resume(happened.verdict);
-    if (hand_on && now().reconstructing.empty()) (*this)(AskReconstruct{session});
+    if (!hand_on) return;
+    if (now().reconstructing.empty()) return (*this)(AskReconstruct{session});
+    remark(v1::AMBER,
+           fmt::format("{} was not handed on, as {} is being reconstructed. Start it later: emberlock "
+                       "reconstruct \"{}\" --daemon",
+                       session, now().reconstructing, session));
   }
 
   void operator()(const CameraEnded& happened) {
@@ -114,7 +119,7 @@ class Stepper {
         raise({{v1::Fault::NOT_ALIGNED},
                v1::RED,
                happened.reason,
-               "Choose what can be met, or see to the cameras named"});
+               "Ask for a wider tolerance (those that can be met are listed), or check the cameras named"});
         enter(v1::IDLE, happened.reason);
         act(Action::end_alignment);
         return;

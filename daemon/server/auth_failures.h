@@ -36,10 +36,11 @@ class AuthFailures {
   static constexpr int kFree = 3;             ///< wrong guesses of a source that aren't slowed
   static constexpr Seconds kFirstDelay{0.1};  ///< then this, doubled by each
   static constexpr Seconds kLongestDelay{2};
-  static constexpr Seconds kForget{60};             ///< without a guess, a source begins anew
-  static constexpr std::size_t kMostSources = 256;  ///< known at a time; beyond it the one heard last is kept
-  static constexpr Seconds kLogApart{60};           ///< between two lines about one source
-  static constexpr int kMostLines = 10;             ///< in so much time, about all of them
+  static constexpr Seconds kForget{60};  ///< without a guess, a source begins anew
+  static constexpr std::size_t kMostSources =
+      256;                                 ///< known at a time; beyond it the one silent longest goes
+  static constexpr Seconds kLogApart{60};  ///< between two lines about one source
+  static constexpr int kMostLines = 10;    ///< in so much time, about all of them
 
   struct Outcome {
     Seconds delay{0};                   ///< before the answer

@@ -213,7 +213,7 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
       const bool lost = kind == ErrorKind::device && anybody_resets();
       if (kind != ErrorKind::timed_out && !lost) return frame.error();
       if (stopped()) break;
-      if (!away_[camera]) log(LogCategory::daemon).warn("{}", frame.error().message());
+      if (!away_[camera]) log(LogCategory::rig).warn("{}", frame.error().message());
       EMBERLOCK_RETURN_IF_ERROR(record(
           drivers::late_event(filmed_, {rig_.cameras[camera]->info().id, taken_[camera], deadline(camera)})));
       reset_ordered_[camera] = false;

@@ -56,7 +56,7 @@ Status measure_row_times(const AlignRig& rig, AlignBench& bench, const AlignRunO
           smear::fit_row_clock(film.readings[i], bench.strobe().rate, options.timing[i].frame_period);
       result.row_clocks[i].reset();
       if (!fit.ok()) {
-        log(LogCategory::daemon).warn("camera {}: {}", rig.cameras[i]->info().id, fit.error().message());
+        log(LogCategory::rig).warn("camera {}: {}", rig.cameras[i]->info().id, fit.error().message());
         continue;
       }
       near_integer |= fit->near_integer_pitch;

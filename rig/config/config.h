@@ -21,8 +21,8 @@
 #include "session/writer.h"
 #include "smear_sync/ccd_timing.h"
 
-// What emberlockd is told by its configuration file (TOML). Each key stands in one table, table.cpp, with its
-// unit, range and words; reading, errors, the commented file and the manual page come from there, the
+// What emberlockd is told by its configuration file (TOML). Each key stands in one table (table*.cpp), with
+// its unit, range and words; reading, errors, the commented file and the manual page come from there, the
 // defaults from the structs here. Where another header has the options already, the key sets them directly.
 namespace emberlock::rig {
 
@@ -123,7 +123,7 @@ struct ServerConfig {
   std::filesystem::path tls_certificate, tls_key;  ///< PEM
   std::filesystem::path
       tls_clients;  ///< PEM of the authority that signs clients' certificates; empty: none asked for
-  std::filesystem::path token_file;  ///< its first line is the token
+  std::filesystem::path token_file;  ///< holds the token and nothing else
   std::filesystem::path console;  ///< the console's files; empty: load_config finds them beside the program
   int viewers = 64;               ///< at most so many WebSockets; one more displaces one
   int picture_width = 480;        ///< pixels, at most

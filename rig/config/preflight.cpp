@@ -29,10 +29,9 @@ class Preflight {
     readable("server.tls_certificate", server.tls_certificate);
     readable("server.tls_clients", server.tls_clients);
     secret("server.tls_key", server.tls_key);
-    if (const std::string token = secret("server.token_file", server.token_file);
-        !server.token_file.empty() && !token.empty() && token.substr(0, token.find('\n')).size() < 16) {
-      problem("server.token_file", server.token_file, "the token is shorter than 16 characters",
-              fmt::format("make one: openssl rand -hex 24 > {}", server.token_file.string()));
+    if (!server.token_file.empty()) {
+      if (const auto token = Token::read(server.token_file); !token)
+        problem("server.token_file", server.token_file, token.error().what, token.error().remedy);
     }
     program(config.reconstruction.program);
     calibration(config.rig.calibration);
@@ -51,6 +50,7 @@ class Preflight {
     std::error_code ignored;
     fs::path there = folder.empty() ? "." : folder;
     while (!fs::exists(there, ignored) && there.has_relative_path()) there = there.parent_path();
+    if (there.empty()) there = ".";
     if (!fs::is_directory(there, ignored)) {
       problem(key, there, "this is no folder", "name another");
     } else if (::access(there.c_str(), W_OK | X_OK) != 0) {

@@ -43,7 +43,7 @@ Section<DaemonConfig> make_alignment_section() {
        number<C>("max_resets", EMBERLOCK_AT(alignment.run.align.limits->resets), {1, 1000000},
                  "One that would take more resets is refused, likewise."),
        number<C>("probability", EMBERLOCK_AT(alignment.run.align.limits->probability), {0.01, 1},
-                 "With which these limits must suffice."),
+                 "Probability with which the alignment must stay within these limits."),
        number<C>("max_rounds", EMBERLOCK_AT(alignment.run.align.max_rounds), {1, 1000000},
                  "Rounds of filming without all within tolerance, then it is given up."),
        number<C>("reset_s", EMBERLOCK_AT(alignment.run.align.reset_time), {0, 3600},
@@ -90,13 +90,13 @@ Section<DaemonConfig> make_recording_section() {
                  "Below so much free disk frames are refused, so that the disk never fills up."),
        number<C>("queue_s", EMBERLOCK_AT(recording.queue.queue_time), {0.05, 60},
                  "A camera's frame waits in memory no longer for its encoder; then new ones are lost, and "
-                 "counted. What waits a power cut takes, and half a second more at most."),
+                 "counted. A power cut loses the frames that still wait, and at most half a second more."),
        number<C>("queue_mib", EMBERLOCK_AT(recording.queue.queue_bytes), {1, 1e6, kMebi},
-                 "Nor more than this of a camera's frames."),
+                 "Memory that one camera's waiting frames may take."),
        number<C>("frames_per_segment", EMBERLOCK_AT(recording.writer.frames_per_segment), {1, 1e9},
-                 "A file is closed after so many,"),
+                 "Frames after which a file is closed and the next begun."),
        number<C>("segment_mib", EMBERLOCK_AT(recording.writer.bytes_per_segment), {1, 1e6, kMebi},
-                 "or once it has grown to this.")}};
+                 "Size at which a file is closed and the next begun.")}};
 }
 
 /// hold_out = [3, 7]
@@ -134,8 +134,10 @@ Section<DaemonConfig> make_reconstruction_section() {
                      {{"auto", "auto"}, {"cpu", "cpu"}, {"cuda", "cuda"}}, "What it computes on."),
            number<C>("budget_s", EMBERLOCK_AT(reconstruction.budget), {1, 86400},
                      "Be done within so long; by the reconstruction's own rules if absent.", "60"),
-           number<C>("voxels", EMBERLOCK_AT(reconstruction.voxels), {1, 1024},
-                     "Along the longest edge; two for three pixels if absent, at most 256.", "192"),
+           number<C>(
+               "voxels", EMBERLOCK_AT(reconstruction.voxels), {1, 1024},
+               "Along the longest edge. If absent, the knee of time against error, measured on this machine.",
+               "192"),
            hold_out(),
            number<C>("threads", EMBERLOCK_AT(reconstruction.threads), {0, 256}, "On the CPU; 0: one a core."),
            number<C>("silence_s", EMBERLOCK_AT(reconstruction.silence), {1, 86400},
@@ -168,11 +170,10 @@ Section<DaemonConfig> make_server_section() {
                "PEM of the authority that signs clients' certificates: with it each client that comes by TLS "
                "must have one, browsers too.",
                "\"clients.crt\""),
-       text<C>(
-           "token_file", EMBERLOCK_AT(server.token_file), kPath,
-           "Its first line is the token that clients show, by HTTP on this machine too; others may not read "
-           "it, nor its group write to it.",
-           "\"token\""),
+       text<C>("token_file", EMBERLOCK_AT(server.token_file), kPath,
+               "A file that holds the token and nothing else. Clients show it, by HTTP on this machine too; "
+               "others may not read it, nor its group write to it.",
+               "\"token\""),
        text<C>("console", EMBERLOCK_AT(server.console), kPath,
                "The folder of the console's files; share/emberlock/console beside the program's folder if "
                "absent.",

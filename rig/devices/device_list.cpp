@@ -158,8 +158,9 @@ Result<ListedCamera> find_camera(const DeviceList& list, const std::string& id) 
     if (camera.found.id == id) return camera;
     there += (there.empty() ? "" : ", ") + camera.found.id;
   }
-  return Error{ErrorKind::bad_input, "there is no such camera", id,
-               there.empty() ? "no camera was found: see `emberlock devices`" : "there is " + there};
+  return Error{
+      ErrorKind::bad_input, "there is no such camera", id,
+      there.empty() ? "no camera was found: see `emberlock devices`" : "the cameras found are " + there};
 }
 
 DeviceList keep_unseen(const DeviceList& before, DeviceList now) {

@@ -53,9 +53,9 @@ std::vector<std::string> ids_of(const std::vector<recon::TransformsFrame>& frame
 
 /// The same with the names that `wanted` gives some of them. Errors: a name of none; one that can't name a
 /// folder.
-Result<std::vector<std::string>> rename(std::vector<std::string> ids,
-                                        std::map<std::string, std::string> wanted,
-                                        const fs::path& transforms) {
+Result<std::vector<std::string>> named(std::vector<std::string> ids,
+                                       std::map<std::string, std::string> wanted,
+                                       const fs::path& transforms) {
   for (std::string& id : ids) {
     const std::string name = id;
     if (const auto other = wanted.find(id); other != wanted.end()) {
@@ -88,7 +88,7 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
   for (const recon::TransformsFrame& frame : scene.frames) inputs.push_back(frame.image);
   EMBERLOCK_ASSIGN_OR_RETURN(const ImportFolder target, ImportFolder::open(options.out, inputs));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::string> ids,
-                             rename(ids_of(scene.frames), options.ids, transforms));
+                             named(ids_of(scene.frames), options.ids, transforms));
   ImportResult result;
   std::vector<CameraPart> parts;
   for (std::size_t i = 0; i < scene.frames.size(); ++i) {

@@ -68,7 +68,7 @@ TEST_F(SessionsOfDaemon, AreListedWithWhatTheyLostAndWhyOneCanNotBeRead) {
 
 TEST_F(SessionsOfDaemon, AreVerifiedRepairedAndExportedByTheirNames) {
   end_with(true, R"({"whole":true})");
-  EXPECT_THAT(run({"verify", "flame"}).out, HasSubstr("flame: well"));
+  EXPECT_THAT(run({"verify", "flame"}).out, HasSubstr("flame: all good"));
   EXPECT_EQ(json::parse(run({"repair", "flame", "--json"}).out), json({{"whole", true}}));
   EXPECT_EQ(run({"export", "flame"}).exit_code, 0);
   EXPECT_EQ(run({"export", "flame", "--format", "video"}).exit_code, 0);
@@ -83,7 +83,7 @@ TEST_F(SessionsOfDaemon, OneThatIsNotWholeIsTheExitCodeAndItsReport) {
   const test::VerbRun shown = run({"verify", "flame"});
   EXPECT_EQ(shown.exit_code, 1);
   EXPECT_THAT(shown.out, HasSubstr("cam2: 3 frames can't be read back"));
-  EXPECT_THAT(shown.out, HasSubstr("flame: NOT well"));
+  EXPECT_THAT(shown.out, HasSubstr("flame: damaged, see above"));
   EXPECT_EQ(run({"verify", "flame", "--json"}).exit_code, 1);
 }
 

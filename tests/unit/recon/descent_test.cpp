@@ -218,7 +218,7 @@ TEST_P(DescentOn, TheSearchForSmoothnessEndsWithItsShareOfTheBudget) {
   EXPECT_EQ(looks, 2);
   EXPECT_EQ(first.value, kLeastSmoothness);
   EXPECT_EQ(first.error, views.error({}, kLeastSmoothness));
-  EXPECT_EQ(find_smoothness(views, {}, [] { return true; }).error, 0) << "nothing is tried";
+  EXPECT_TRUE(std::isinf(find_smoothness(views, {}, [] { return true; }).error)) << "nothing is tried";
 }
 
 /// The ball as a medium that takes light, before a wall that is brighter than itself.

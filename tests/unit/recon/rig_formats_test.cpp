@@ -234,6 +234,23 @@ TEST_F(RigFormats, LongFlatFilesOfOpenCvAreRead) {
   EXPECT_EQ(read->cameras(0).calibration().fx(), 600);
 }
 
+TEST_F(RigFormats, ANumberThatIsBrokenOffIsRefused) {
+  const std::string camera =
+      "<?xml version=\"1.0\"?>\n<opencv_storage><image_width>640</image_width>"
+      "<image_height>480</image_height><camera_matrix type_id=\"opencv-matrix\"><rows>3</rows>"
+      "<cols>3</cols><dt>d</dt><data>600. 0. 320. 0. 600. 240. 0. 0. 1.</data></camera_matrix>"
+      "<distortion_coefficients>";
+  for (const char* const numbers : {"0.1 0.2 0 0 0.05e", "0.1 0.2 0 0 0.05 -", "0.1 0.2 0 0 1e999"}) {
+    const auto rig = parse_opencv(camera + numbers + "</distortion_coefficients></opencv_storage>\n", "cam00",
+                                  "broken.xml");
+    ASSERT_FALSE(rig.ok()) << numbers;
+    EXPECT_NE(rig.error().message().find("no number"), std::string::npos) << rig.error().message();
+  }
+  EXPECT_TRUE(parse_opencv(camera + "0.1 0.2 0 0 -.5e-1</distortion_coefficients></opencv_storage>\n",
+                           "cam00", "good.xml")
+                  .ok());
+}
+
 /// Each of these ends OpenCV's own parser.
 TEST_F(RigFormats, WhatIsCutOffOrHoldsNoTextIsRefused) {
   const std::string nul(70, '\0');

@@ -115,6 +115,22 @@ TEST_P(VoxelChoiceTest, ASlowOrBusyMachineTakesFewerVoxelsAndSaysSo) {
   EXPECT_THAT(choice.words, Contains(HasSubstr("--voxels paper")));
 }
 
+/// Time and error of one and the same point of the shipped front.
+TEST_P(VoxelChoiceTest, FewerIterationsTakeTheTimeOfThoseIterations) {
+  Calibration as_shipped;
+  as_shipped.unit = Seconds(1);
+  ReconstructOptions limited;
+  limited.solve.iterations = 12;
+  limited.voxels = 256;
+  const auto points = expected_runs(pictures(), limited, as_shipped);
+  ASSERT_EQ(points.size(), 1U);
+  limited.solve.iterations = 1;
+  const auto first = expected_runs(pictures(), limited, as_shipped);
+  ASSERT_EQ(first.size(), 1U);
+  EXPECT_GT(points[0].seconds, 1.2 * first[0].seconds);
+  EXPECT_LT(points[0].error, first[0].error);
+}
+
 TEST_P(VoxelChoiceTest, AMachineTenTimesAsSlowIsMeasuredAsTenTimesAsSlow) {
   const std::function<void(const Preview&)> nobody;
   const auto unit = [&](double tick) {

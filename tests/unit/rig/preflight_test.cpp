@@ -55,7 +55,7 @@ TEST_F(Preflight, ATokenThatEverybodyReadsIsRefused) {
   const auto found = problems(kServer + std::string("token_file = \"token\""));
   ASSERT_THAT(found, SizeIs(1));
   EXPECT_THAT(found.front().message(),
-              HasSubstr("everybody may read or write it (mode 0644). Make it private: chmod o= "));
+              HasSubstr("everybody may read or write the token (mode 0644). Make it private: chmod o= "));
   write("token", "0123456789abcdef0123\n", 0640);
   EXPECT_THAT(problems(kServer + std::string("token_file = \"token\"")), IsEmpty());
   write("token", "0123456789abcdef0123\n", 0660);

@@ -73,6 +73,13 @@ TEST(Manifest, AnErrorNamesFileAndField) {
   EXPECT_TRUE(parse_manifest(manifest_with(""), "manifest.json"));
 }
 
+/// Earlier writers took such words.
+TEST(Manifest, WordsThatNoWriterTakesAnyMoreAreRead) {
+  const auto parsed = parse_manifest(manifest_with("", R"(, "purpose": "two\nlines")"), "manifest.json");
+  ASSERT_TRUE(parsed) << parsed.error().message();
+  EXPECT_FALSE(check_texts(*parsed, "manifest.json"));
+}
+
 TEST(Manifest, DeeplyNestedJsonIsRefusedWithoutACrash) {
   std::string json = R"({"cameras": )";
   for (int i = 0; i < 100'000; ++i) json += '[';

@@ -112,6 +112,12 @@ TEST_F(SalvageCutShort, KeepsWhatLiesBehindAHoleAndCountsTheRest) {
   // The torn record's frame lies in its segment still.
   EXPECT_GE(whole_.cameras[2].kept + whole_.cameras[2].lost + 1, kSalvagedFrames);
   EXPECT_LE(whole_.cameras[2].kept + whole_.cameras[2].lost, kSalvagedFrames);
+  const auto manifest = read_manifest(temp_ / "whole");
+  for (std::size_t c = 0; c < kSalvagedCameras; ++c) {
+    const v1::Counts& counts = manifest->cameras(static_cast<int>(c)).counts();
+    EXPECT_EQ(counts.disk(), whole_.cameras[c].lost);
+    EXPECT_EQ(counts.camera_gap(), 0U) << "every frame is counted once";
+  }
   const auto check = verify_session(temp_ / "whole");
   ASSERT_TRUE(check.ok()) << check.error().message();
   EXPECT_TRUE(check->whole()) << check->to_do;

@@ -23,6 +23,13 @@ constexpr TimePoint kNow{1'795'317'309'000'000'000};  // 2026-11-22 03:15:09
 
 SessionStore store_in(const TempFolder& temp) { return SessionStore::open(temp / "store").value(); }
 
+TEST(SessionStore, ExportsGoBesideItWhereItsNameEndsInASlash) {
+  const TempFolder temp;
+  const auto store = SessionStore::open(temp / "store/");
+  ASSERT_TRUE(store) << store.error().message();
+  EXPECT_EQ(store->path_for_export("take 1", "png").value(), temp / "exports" / "take 1" / "png");
+}
+
 TEST(SessionStore, ExportsGoBesideItAndFollowNoLink) {
   const TempFolder temp;
   const SessionStore store = store_in(temp);

@@ -2,7 +2,9 @@
 #include "session/sync_ledger.h"
 
 #include <cerrno>
+#include <functional>
 #include <set>
+#include <utility>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -20,6 +22,7 @@ using ::testing::Contains;
 struct Disk {
   static inline std::set<ino_t> refuses;
   static inline std::set<ino_t> flushed;
+  static inline std::function<void()> meanwhile;  ///< a refused flush takes its time
   static ino_t inode(int descriptor) {
     struct stat info {};
     EXPECT_EQ(::fstat(descriptor, &info), 0);
@@ -28,6 +31,7 @@ struct Disk {
   static int flush(int descriptor) {
     const ino_t file = inode(descriptor);
     if (refuses.erase(file) > 0) {
+      if (meanwhile) std::exchange(meanwhile, nullptr)();
       errno = EIO;
       return -1;
     }
@@ -100,6 +104,21 @@ TEST_F(SyncLedgerTest, ASecondTryAfterAFailedSyncProvesNothing) {
   EXPECT_TRUE(ledger_.sync().ok());
   EXPECT_EQ(ledger_.safe(), 5);
   EXPECT_EQ(ledger_.handed(), 5);
+}
+
+TEST_F(SyncLedgerTest, TheErrorOfASegmentThatWasCutOffMeanwhileIsForgotten) {
+  ledger_.handed(5);
+  refuse_the_segment();
+  const UniqueFd next = create("b.nut");
+  Disk::meanwhile = [&] {
+    ledger_.cut(0);
+    EXPECT_TRUE(ledger_.begun(next.get(), temp_ / "b.nut").ok());
+    ledger_.handed(2);
+  };
+  EXPECT_TRUE(ledger_.sync().ok());
+  EXPECT_TRUE(ledger_.failure().ok());
+  EXPECT_TRUE(ledger_.sync().ok());
+  EXPECT_EQ(ledger_.safe(), 2);
 }
 
 TEST_F(SyncLedgerTest, AnIndexThatTheDiskRefusesMakesNothingSafe) {

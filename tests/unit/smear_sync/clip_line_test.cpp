@@ -111,6 +111,16 @@ DarkDirection told_by_dark(int direction, double tau, test::LightPattern pattern
   return direction_by_dark_frames(frames);
 }
 
+TEST(ClipClock, CountsEachLossFromItsPlaceInTheFile) {
+  ClipClock clock;
+  clock.numbers.drops = {{.after = 99, .before = 100, .frames = 5},
+                         {.after = 199, .before = 200, .frames = 3}};
+  EXPECT_EQ(clock.count_of(99), 99);
+  EXPECT_EQ(clock.count_of(100), 105);
+  EXPECT_EQ(clock.count_of(199), 204);
+  EXPECT_EQ(clock.count_of(200), 208);
+}
+
 TEST(DarkDirection, IsToldWhereTheDotDoesNotWalkAtAllOnEitherSideOfTheLamp) {
   for (const int direction : {-1, +1}) {
     for (const double tau : {0.006, 0.033}) {

@@ -136,8 +136,8 @@ Result<rig::AlignRunResult> align_live(const AlignArguments& arguments, const ri
   for (drivers::VirtualCameraOptions& camera : setup.cameras) {
     camera.reset_jitter = milliseconds(arguments.latency_jitter_ms);
     if (arguments.trim_range_ppm > 0) {
-      camera.trim = drivers::FrameRateTrim{PartsPerMillion(arguments.trim_range_ppm),
-                                           PartsPerMillion(arguments.trim_step_ppm), kTrimLatency};
+      camera.trim = FrameRateTrim{PartsPerMillion(arguments.trim_range_ppm),
+                                  PartsPerMillion(arguments.trim_step_ppm), kTrimLatency};
     }
     // What a data sheet says of the model: the direction, the rows and the shifts. t_row is measured.
     options.timing.push_back(

@@ -9,22 +9,9 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "base/sensor_kind.h"
+#include "base/shutter.h"
 
 namespace emberlock::drivers {
-
-/// How a camera's shutter phase can be drawn anew.
-enum class ShutterReset {
-  none,
-  by_hand,     ///< an operator presses a button; the phase that follows is uniform over the frame period
-  on_command,  ///< the driver does it, a latency with some jitter after the moment asked for
-};
-
-/// How a camera's frame rate can be trimmed while it films.
-struct FrameRateTrim {
-  PartsPerMillion range;  ///< to either side of its own rate, > 0
-  PartsPerMillion step;   ///< between two settings, > 0
-  Seconds latency;        ///< from the order to the first frame at the new rate, on average, >= 0
-};
 
 /// What a frame's device_time marks.
 enum class DeviceTimeOf { unknown, exposure_start, frame_end };
@@ -40,6 +27,7 @@ struct CameraInfo {
   std::optional<FrameRateTrim> trim = {};  ///< absent: it films at its own rate alone
   SensorKind sensor = SensorKind::ccd;
   DeviceTimeOf device_time_of = DeviceTimeOf::unknown;
+  Seconds transport{0};  ///< at most, from a frame's last row to its arrival: what camera and bus hold back
 };
 
 /// What became of the frames that a camera made since it was opened. Each is in exactly one of these; a new

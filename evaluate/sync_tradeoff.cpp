@@ -77,7 +77,7 @@ smear::AlignSimulation simulation_of(const SyncTradeoffOptions& o, smear::AlignP
   sim.options.max_rounds = kMostRounds;
   sim.options.round_time = o.round_time;
   sim.options.reset_time = by_hand(policy) ? o.reset_time : Seconds(0);
-  sim.method = by_hand(policy) ? smear::ResetMethod::by_hand : smear::ResetMethod::on_command;
+  sim.method = by_hand(policy) ? ShutterReset::by_hand : ShutterReset::on_command;
   sim.latency_jitter = o.latency_jitter;
   sim.latency_spread = o.latency_spread;
   sim.rate_spread = o.crystal_spread;
@@ -87,7 +87,7 @@ smear::AlignSimulation simulation_of(const SyncTradeoffOptions& o, smear::AlignP
   sim.round_seconds = o.round_time.value();
   sim.reset_seconds = sim.options.reset_time.value();
   if (policy == smear::AlignPolicy::trimmed)
-    sim.trim = smear::RateTrim{o.trim_range, o.trim_step, 2 * sim.options.period};
+    sim.trim = FrameRateTrim{o.trim_range, o.trim_step, 2 * sim.options.period};
   return sim;
 }
 

@@ -109,7 +109,7 @@ Status align_twice(Rig& rig, DemoResult& result, const std::filesystem::path& fo
                    const ProgressFactory& progress) {
   AlignRunOptions options;
   options.seed = result.options.seed;
-  rig.rig->set_reset(drivers::ShutterReset::by_hand);
+  rig.rig->set_reset(ShutterReset::by_hand);
   EMBERLOCK_ASSIGN_OR_RETURN(AlignStage by_hand,
                              align(rig,
                                    {.title = "within 100 rows, buttons pressed by hand",
@@ -121,7 +121,7 @@ Status align_twice(Rig& rig, DemoResult& result, const std::filesystem::path& fo
       return Error{ErrorKind::device, "a camera's row time was not measured", "comb", "Try another --seed"};
     result.row_clocks.push_back(*clock);
   }
-  rig.rig->set_reset(drivers::ShutterReset::on_command);
+  rig.rig->set_reset(ShutterReset::on_command);
   rig.timing = by_hand.result.timing;
   options.measure_row_time = false;
   options.delays = by_hand.result.delays;

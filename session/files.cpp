@@ -129,6 +129,10 @@ Status check_manifest(const v1::Manifest& manifest, const std::string& where) {
       return Error{ErrorKind::bad_input, "must be finite and not negative", field + ", field frame_rate_hz",
                    "Mend the rate"};
     }
+    if (!std::isfinite(camera.transport_s()) || camera.transport_s() < 0) {
+      return Error{ErrorKind::bad_input, "must be finite and not negative", field + ", field transport_s",
+                   "Mend the time"};
+    }
     if (camera.has_calibration()) EMBERLOCK_RETURN_IF_ERROR(check_calibration(camera.calibration(), field));
   }
   if (manifest.has_box()) EMBERLOCK_RETURN_IF_ERROR(check_box(manifest.box(), where));

@@ -69,7 +69,10 @@ void Conductor::begin_recording() {
       parts_.board.notice(v1::AMBER,
                           "The strobe is set by hand: switch it off while the flame is recorded, or its "
                           "flashes are too.");
-    record_began_ = now + 2 * alignment_->options().period;
+    Seconds transport;
+    for (const drivers::Camera* camera : devices_.cameras)
+      transport = std::max(transport, camera->info().transport);
+    record_began_ = now + 2 * alignment_->options().period + transport;
   }
   v1::Manifest manifest;
   manifest.set_session_id(state_.session);

@@ -232,7 +232,7 @@ void Conductor::describe_alignment(v1::AlignmentStatus& status) const {
     set_cost(*shown.mutable_cost(), offer.effort);
   }
   for (std::size_t i = 0; i < last.cameras.size(); ++i) {
-    if (last.cameras[i].reset && alignment_->cameras()[i].method == smear::ResetMethod::by_hand) {
+    if (last.cameras[i].reset && alignment_->cameras()[i].method == ShutterReset::by_hand) {
       status.set_reset_next(alignment_->cameras()[i].id);
       break;
     }

@@ -168,20 +168,20 @@ std::uint64_t AravisCamera::record(std::optional<std::uint64_t> frame_id, TimePo
 }
 
 void AravisCamera::note_drought() {
-  if (link_->starving()) droughts_ended_.push_back(wall_clock());
+  if (link_->starving()) droughts_ended_.push_back(clock_.now());
 }
 
 void AravisCamera::drop(Arrived arrived, Fate fate) {
   if (arrived.arrival == Arrival::transport) fate = Fate::transport;
   if (arrived.arrival == Arrival::resend) fate = Fate::resend;
-  record(arrived.frame_id, arrived.system_time, fate);
+  record(arrived.frame_id, arrived.came, fate);
   note_drought();
   link_->recycle(std::move(arrived));
 }
 
 std::optional<Frame> AravisCamera::hand_on(Arrived arrived) {
   if (arrived.arrival == Arrival::transport || arrived.arrival == Arrival::resend ||
-      arrived.arrival == Arrival::cleared || arrived.system_time < wanted_from_ || !arrived.frame_id) {
+      arrived.arrival == Arrival::cleared || arrived.came < wanted_from_ || !arrived.frame_id) {
     drop(std::move(arrived), Fate::passed_over);
     return {};
   }
@@ -190,17 +190,18 @@ std::optional<Frame> AravisCamera::hand_on(Arrived arrived) {
   Frame frame;
   frame.stamp.device_time = device_time_ = arrived.device_time;
   frame.stamp.system_time = arrived.system_time;
-  frame.stamp.monotonic_time = clock_.now() - (wall_clock() - arrived.system_time);
+  frame.stamp.monotonic_time = arrived.came;
   frame.stamp.status = damaged ? FrameStatus::damaged : FrameStatus::complete;
   const auto frame_id = arrived.frame_id;
   note_drought();
   auto image = link_->take(std::move(arrived));
   if (!image) {
-    record(frame_id, frame.stamp.system_time, Fate::transport);
+    record(frame_id, frame.stamp.monotonic_time, Fate::transport);
     log(LogCategory::drivers).warn("camera {}: {}", id_, image.error().message());
     return {};
   }
-  frame.stamp.frame_id = record(frame_id, frame.stamp.system_time, damaged ? Fate::damaged : Fate::delivered);
+  frame.stamp.frame_id =
+      record(frame_id, frame.stamp.monotonic_time, damaged ? Fate::damaged : Fate::delivered);
   frame.image = std::move(image).value();
   return frame;
 }
@@ -244,13 +245,13 @@ Result<Frame> AravisCamera::next_frame(Seconds deadline) {
 
 std::uint64_t AravisCamera::pass_over(TimePoint until) {
   if (!filming_) return 0;
-  return pass_over_before(wall_clock() - (clock_.now() - until) + nanoseconds(1));
+  return pass_over_before(until + nanoseconds(1));
 }
 
-std::uint64_t AravisCamera::pass_over_before(TimePoint wall) {
+std::uint64_t AravisCamera::pass_over_before(TimePoint instant) {
   const std::uint64_t before = ledger_.counts().passed_over;
   while (auto arrived = next_arrived(Seconds(0))) {
-    if (arrived->system_time >= wall) {
+    if (arrived->came >= instant) {
       held_ = std::move(arrived);
       break;
     }

@@ -47,8 +47,8 @@ class AravisCamera final : public Camera {
   std::optional<Arrived> next_arrived(Seconds deadline);
   /// The frame, if it is to be handed on; counts it whatever it is.
   std::optional<Frame> hand_on(Arrived arrived);
-  /// Frames that came before an instant of the wall clock.
-  std::uint64_t pass_over_before(TimePoint wall);
+  /// Frames that came before an instant.
+  std::uint64_t pass_over_before(TimePoint instant);
   /// To be called before a buffer is given back.
   void note_drought();
   void drop(Arrived arrived, Fate fate);
@@ -74,14 +74,14 @@ class AravisCamera final : public Camera {
   std::shared_ptr<const std::atomic<bool>> hanging_;  ///< true once the call that hung has returned
   TimePoint hangs_since_;
   std::optional<Arrived> held_;  ///< popped, but not taken yet
-  TimePoint wanted_from_;    ///< frames that came before it, by the wall clock, are of an older shutter phase
-  TimePoint device_time_;    ///< of the last frame
-  TimePoint last_sign_;      ///< when something last came from the camera
-  TimePoint next_question_;  ///< to a camera that is silent
+  TimePoint wanted_from_;        ///< frames that came before it are of an older shutter phase
+  TimePoint device_time_;        ///< of the last frame
+  TimePoint last_sign_;          ///< when something last came from the camera
+  TimePoint next_question_;      ///< to a camera that is silent
   std::optional<TimePoint> unanswered_since_;
   std::uint64_t signs_ = 0;
-  TimePoint last_came_;                   ///< the last frame, by the wall clock
-  std::deque<TimePoint> droughts_ended_;  ///< when a stream without a buffer got one, by the wall clock
+  TimePoint last_came_;                   ///< the last frame
+  std::deque<TimePoint> droughts_ended_;  ///< when a stream without a buffer got one
 };
 
 }  // namespace emberlock::drivers::aravis

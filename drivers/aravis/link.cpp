@@ -128,6 +128,7 @@ Status Link::start() {
     enlarge_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())), bytes);
   }
   EMBERLOCK_RETURN_IF_ERROR(queue_buffers());
+  last_came_ = SteadyClock().now();
   arv_camera_start_acquisition(camera_.get(), error.out());
   if (!error.failed()) return {};
   stream_.reset();
@@ -154,7 +155,7 @@ Status Link::stop_acquisition() {
 Result<TimePoint> Link::restart_acquisition() {
   ErrorSlot error;
   arv_camera_stop_acquisition(camera_.get(), error.out());
-  const TimePoint restarted = wall_clock();
+  const TimePoint restarted = SteadyClock().now();
   if (!error.failed()) arv_camera_start_acquisition(camera_.get(), error.out());
   if (error.failed()) return error.error(ErrorKind::device, where_);
   return restarted;
@@ -212,6 +213,10 @@ std::optional<Arrived> Link::pop(Seconds deadline) {
   if (id != kNoId) arrived.frame_id = id;
   arrived.device_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer.get()))};
   arrived.system_time = {static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer.get()))};
+  // Aravis knows the wall clock alone, which may be set while a buffer waits here; buffers come in order.
+  const TimePoint now = SteadyClock().now();
+  arrived.came = std::clamp(now - (wall_clock() - arrived.system_time), last_came_, now);
+  last_came_ = arrived.came;
   arrived.buffer = std::move(buffer);
   return arrived;
 }

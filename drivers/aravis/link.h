@@ -31,6 +31,7 @@ struct Arrived {
   std::optional<std::uint64_t> frame_id;  ///< none where that part never came
   TimePoint device_time;
   TimePoint system_time;  ///< when its first packet came, by the wall clock
+  TimePoint came;         ///< the same on the host's monotonic clock, not before the one popped before it
   ObjectPtr<ArvBuffer> buffer;
 };
 
@@ -58,7 +59,7 @@ class Link {
   Status stop_acquisition();
   /// No longer has a stream.
   void close_stream() { stream_.reset(); }
-  /// Stops and starts the sensor's cycle, the stream goes on. When it was started, by the wall clock.
+  /// Stops and starts the sensor's cycle, the stream goes on. When it was started.
   Result<TimePoint> restart_acquisition();
 
   std::optional<Arrived> pop(Seconds deadline);
@@ -88,6 +89,7 @@ class Link {
   bool given_up_ = false;
   std::shared_ptr<std::atomic<bool>> control_lost_ = std::make_shared<std::atomic<bool>>(false);
   ObjectPtr<ArvCamera> camera_;
+  TimePoint last_came_;          ///< of the buffer popped last
   ObjectPtr<ArvStream> stream_;  ///< while it films; let go before the camera
 };
 

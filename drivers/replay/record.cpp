@@ -43,6 +43,7 @@ v1::CameraStream to_proto(const CameraInfo& info) {
   stream.set_shutter_reset(kResets.second_of(info.reset).value_or(v1::CameraStream::NONE));
   stream.set_sensor(kSensors.second_of(info.sensor).value_or(v1::CameraStream::CCD));
   stream.set_device_time_of(kDeviceTimes.second_of(info.device_time_of).value_or(v1::CameraStream::UNKNOWN));
+  stream.set_transport_s(info.transport.value());
   if (info.trim) {
     stream.set_trim_range_ppm(info.trim->range.value());
     stream.set_trim_step_ppm(info.trim->step.value());
@@ -60,6 +61,7 @@ Result<CameraInfo> camera_info(const v1::CameraStream& stream) {
   info.reset = kResets.first_of(stream.shutter_reset()).value_or(ShutterReset::none);
   info.sensor = kSensors.first_of(stream.sensor()).value_or(SensorKind::ccd);
   info.device_time_of = kDeviceTimes.first_of(stream.device_time_of()).value_or(DeviceTimeOf::unknown);
+  info.transport = Seconds(stream.transport_s());
   if (stream.trim_range_ppm() > 0 && stream.trim_step_ppm() > 0) {
     info.trim = FrameRateTrim{PartsPerMillion(stream.trim_range_ppm()),
                               PartsPerMillion(stream.trim_step_ppm()), Seconds(stream.trim_latency_s())};

@@ -16,6 +16,7 @@ namespace {
 constexpr std::uint32_t kBuffers = 8;
 /// How long one wait is: a device that goes away silently is noticed within.
 constexpr Seconds kSlice = milliseconds(200);
+constexpr double kUvcHolds = 3;  // frames, in the camera and on the bus: one exposed, one coded, one sent
 
 TimePoint now() { return SteadyClock().now(); }
 
@@ -103,7 +104,8 @@ Result<V4l2Camera::SetUp> V4l2Camera::set_up(const std::string& id, const Camera
     EMBERLOCK_RETURN_IF_ERROR(set_control(device.as_ioctl(), name, value, where));
   }
   EMBERLOCK_ASSIGN_OR_RETURN(const std::uint32_t flags, device.map_buffers(kBuffers));
-  return SetUp{std::move(device), *card, mode, frame_rate, stride, meaning_of(flags)};
+  const Seconds transport = device.is_uvc() ? kUvcHolds * period(frame_rate) : Seconds(0);
+  return SetUp{std::move(device), *card, mode, frame_rate, stride, meaning_of(flags), transport};
 }
 
 Result<std::unique_ptr<Camera>> V4l2Camera::open(const std::string& id, const CameraRequest& request) {
@@ -117,7 +119,8 @@ V4l2Camera::V4l2Camera(const std::string& id, const CameraRequest& request, SetU
             .layout = set_up.mode.mode.layout,
             .frame_rate = set_up.frame_rate,
             .reset = ShutterReset::on_command,
-            .device_time_of = set_up.time_of},
+            .device_time_of = set_up.time_of,
+            .transport = set_up.transport},
       request_(request),
       mode_(set_up.mode),
       set_up_(std::move(set_up)),

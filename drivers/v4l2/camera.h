@@ -37,6 +37,7 @@ class V4l2Camera final : public Camera {
     Hertz frame_rate;
     std::size_t stride;
     DeviceTimeOf time_of;
+    Seconds transport;
   };
   /// In the mode that suits the request best, or as it was before.
   static Result<SetUp> set_up(const std::string& id, const CameraRequest& request,

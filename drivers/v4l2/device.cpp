@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <string_view>
 #include <thread>
 
 #include <fcntl.h>
@@ -83,6 +84,12 @@ std::optional<std::string> V4l2Device::camera_card() const {
   if ((can & kNeeded) != kNeeded) return {};
   const auto* const card = reinterpret_cast<const char*>(about.card);
   return std::string(card, ::strnlen(card, sizeof about.card));
+}
+
+bool V4l2Device::is_uvc() const {
+  v4l2_capability about{};
+  if (ioctl(VIDIOC_QUERYCAP, &about) != 0) return false;
+  return std::string_view(reinterpret_cast<const char*>(about.driver)) == "uvcvideo";
 }
 
 bool V4l2Device::in_use() const {

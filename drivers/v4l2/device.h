@@ -30,6 +30,8 @@ class V4l2Device {
   [[nodiscard]] Error refused(const std::string& what, int error) const;
   /// That a capture by mapped buffers can be had from it, and its card's name.
   [[nodiscard]] std::optional<std::string> camera_card() const;
+  /// That the kernel's USB Video Class driver has it.
+  [[nodiscard]] bool is_uvc() const;
   /// Whether somebody, maybe ourselves, has its buffers.
   [[nodiscard]] bool in_use() const;
 

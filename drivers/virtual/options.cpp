@@ -46,6 +46,7 @@ Status check(const VirtualCameraOptions& c) {
   EMBERLOCK_RETURN_IF_ERROR(in_range(where, "lamp.radius", c.lamp.radius, 0.5, 50));
   EMBERLOCK_RETURN_IF_ERROR(in_range(where, "reset_latency", c.reset_latency.value(), 0, 10));
   EMBERLOCK_RETURN_IF_ERROR(in_range(where, "reset_jitter", c.reset_jitter.value(), 0, 1));
+  EMBERLOCK_RETURN_IF_ERROR(in_range(where, "transport", c.transport.value(), 0, 2));
   EMBERLOCK_RETURN_IF_ERROR(in_range(where, "wander", c.wander.value(), 0, 20));
   if (c.trim) {
     EMBERLOCK_RETURN_IF_ERROR(in_range(where, "trim.range", c.trim->range.value(), 1e-3, 1000));

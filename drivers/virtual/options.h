@@ -39,6 +39,7 @@ struct VirtualCameraOptions {
   ShutterReset reset = ShutterReset::on_command;
   Seconds reset_latency = milliseconds(180);  ///< from the action to the new read cycle, 0..10 s
   Seconds reset_jitter = milliseconds(0.2);   ///< RMS of the latency when on_command, 0..1 s
+  Seconds transport{0};  ///< from a frame's last row to its arrival, as USB cameras hold frames back; 0..2 s
   std::optional<FrameRateTrim> trim{};  ///< range up to 1000 ppm; in force from the read phase nearest to its
                                         ///< latency after the order
   PartsPerMillion wander{0};  ///< of its crystal, as temperature goes: RMS change within an hour, 0..20

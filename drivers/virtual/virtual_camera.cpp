@@ -60,10 +60,14 @@ VirtualCamera::VirtualCamera(VirtualCameraOptions options, int number, const Vir
                              std::shared_ptr<const VirtualRoom> room)
     : options_(std::move(options)),
       room_(std::move(room)),
-      info_{options_.id,     std::string(model(options_.sensor)),
-            options_.layout, options_.nominal_rate,
-            options_.reset,  options_.trim,
-            options_.sensor},
+      info_{.id = options_.id,
+            .model = std::string(model(options_.sensor)),
+            .layout = options_.layout,
+            .frame_rate = options_.nominal_rate,
+            .reset = options_.reset,
+            .trim = options_.trim,
+            .sensor = options_.sensor,
+            .transport = options_.transport},
       sensor_(options_, number, rig.seed),
       seed_(stream_seed(rig.seed, options_.id)),
       crystal_(options_.wander, mix64(seed_ ^ kCrystalStream)),
@@ -95,8 +99,8 @@ Status VirtualCamera::reset_shutter(TimePoint at) {
                             ? options_.timing.frame_period * random_uniform(seed_, kPhaseStream, draw)
                             : options_.reset_jitter * random_normal(seed_, kJitterStream, draw);
   const Seconds latency = std::max(Seconds(0), options_.reset_latency + drawn);
-  // The old cycle runs until `at`; what it delivered or would have is counted, and dropped.
-  const std::uint64_t first_wanted = delivered_by(at);
+  // The old cycle runs until `at`; what it read until then is counted, and dropped.
+  const std::uint64_t first_wanted = read_by(at);
   counts_.passed_over += first_wanted - next_id_;
   begin_cycle(at + latency, first_wanted);
   log(LogCategory::drivers).debug("{}: shutter reset {}", info_.id, draw);
@@ -156,7 +160,7 @@ TimePoint VirtualCamera::read_start_after(TimePoint after) const {
 
 TimePoint VirtualCamera::read_end(std::uint64_t frame_id) const { return read_start(frame_id) + shifting(); }
 
-std::uint64_t VirtualCamera::delivered_by(TimePoint t) const {
+std::uint64_t VirtualCamera::read_by(TimePoint t) const {
   // A cycle ends where the next one begins, whatever it would have delivered since.
   std::uint64_t end = std::numeric_limits<std::uint64_t>::max();
   for (auto cycle = cycles_.rbegin(); cycle != cycles_.rend(); ++cycle) {
@@ -171,7 +175,7 @@ std::uint64_t VirtualCamera::delivered_by(TimePoint t) const {
 }
 
 void VirtualCamera::drop_overflow() {
-  const std::uint64_t delivered = delivered_by(room_->clock().now());
+  const std::uint64_t delivered = read_by(room_->clock().now() - options_.transport);
   if (delivered <= next_id_ + queue_frames_) return;
   const std::uint64_t oldest = delivered - queue_frames_;
   log(LogCategory::drivers).warn("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
@@ -186,7 +190,7 @@ Result<Frame> VirtualCamera::next_frame(Seconds deadline) {
   const Seconds wait = std::min(std::max(Seconds(0), deadline), kLongestWait);
   Clock& clock = room_->clock();
   const TimePoint until = clock.now() + wait;
-  const TimePoint ready = read_end(next_id_);
+  const TimePoint ready = read_end(next_id_) + options_.transport;
   if (ready > until) {
     clock.sleep_until(until);
     return Error{ErrorKind::timed_out, "no frame within " + std::to_string(wait.value()) + " s",
@@ -201,7 +205,8 @@ Result<Frame> VirtualCamera::next_frame(Seconds deadline) {
 
 std::uint64_t VirtualCamera::pass_over(TimePoint until) {
   if (!filming_) return 0;
-  const std::uint64_t first_wanted = std::max(next_id_, delivered_by(std::min(until, room_->clock().now())));
+  const std::uint64_t first_wanted =
+      std::max(next_id_, read_by(std::min(until, room_->clock().now()) - options_.transport));
   const std::uint64_t dropped = first_wanted - std::exchange(next_id_, first_wanted);
   counts_.passed_over += dropped;
   return dropped;
@@ -227,7 +232,7 @@ Frame VirtualCamera::draw(std::uint64_t frame_id) {
   const Seconds exposed = exposure(*scene);
   Image image = sensor_.expose(scene, light_on(frame_id), {frame_id, begin - exposed, exposed});
 
-  const TimePoint arrival = read_end(frame_id);
+  const TimePoint arrival = read_end(frame_id) + options_.transport;
   // The camera's clock runs on the crystal that also times its frames.
   const double own_rate = 1 / (options_.nominal_rate * options_.timing.frame_period);
   FrameStamp stamp;

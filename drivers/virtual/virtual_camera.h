@@ -74,8 +74,8 @@ class VirtualCamera final : public Camera {
   };
 
   [[nodiscard]] TimePoint read_end(std::uint64_t frame_id) const;
-  /// The first frame that hasn't been delivered by `t`.
-  [[nodiscard]] std::uint64_t delivered_by(TimePoint t) const;
+  /// The first frame whose last row hasn't been read by `t`.
+  [[nodiscard]] std::uint64_t read_by(TimePoint t) const;
   /// What its crystal counted from one instant to the other.
   [[nodiscard]] Seconds counted(TimePoint from, TimePoint to) const;
   /// The start of read phase i.

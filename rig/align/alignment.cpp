@@ -47,23 +47,6 @@ constexpr double kAhead = 0.05;
 /// Where people press shutters they are filmed at least this often: what a press does is seen at once.
 constexpr Seconds kLongestWaitForPeople{0.25};
 
-smear::ResetMethod method_of(drivers::ShutterReset reset) {
-  switch (reset) {
-    case drivers::ShutterReset::none:
-      return smear::ResetMethod::none;
-    case drivers::ShutterReset::by_hand:
-      return smear::ResetMethod::by_hand;
-    case drivers::ShutterReset::on_command:
-      return smear::ResetMethod::on_command;
-  }
-  return smear::ResetMethod::none;
-}
-
-std::optional<smear::RateTrim> trim_of(const drivers::CameraInfo& info) {
-  if (!info.trim) return std::nullopt;
-  return smear::RateTrim{info.trim->range, info.trim->step, info.trim->latency};
-}
-
 Result<Seconds> common_period(const AlignRig& rig, const AlignRunOptions& options) {
   const auto refuse = [](std::string what, std::string where, std::string remedy) {
     return Error{ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
@@ -171,8 +154,8 @@ std::vector<smear::AlignCamera> describe(const AlignRig& rig, const AlignRunOpti
   std::vector<smear::AlignCamera> cameras;
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
     const drivers::CameraInfo& info = rig.cameras[i]->info();
-    cameras.push_back({info.id, info.model, method_of(info.reset),
-                       options.delays.empty() ? std::nullopt : options.delays[i], trim_of(info)});
+    cameras.push_back({info.id, info.model, info.reset,
+                       options.delays.empty() ? std::nullopt : options.delays[i], info.trim});
   }
   return cameras;
 }
@@ -321,7 +304,7 @@ Seconds Alignment::next_check(TimePoint now) const {
   const Seconds ahead = std::max(kAhead * promised, result_.options.round_time);
   const bool pressed = result_.options.reset_by == smear::ResetBy::anybody &&
                        std::any_of(cameras_.begin(), cameras_.end(), [](const smear::AlignCamera& camera) {
-                         return camera.method == smear::ResetMethod::by_hand;
+                         return camera.method == ShutterReset::by_hand;
                        });
   const Seconds wait = pressed ? std::min(promised - ahead, kLongestWaitForPeople) : promised - ahead;
   return std::max(wait - (now - at_), Seconds(0));
@@ -383,7 +366,7 @@ Status Alignment::carry_out() {
     }
     if (!camera.reset) continue;
     EMBERLOCK_ASSIGN_OR_RETURN(const TimePoint at, bench_.reset(i, camera.moment, state_.cameras[i].resets));
-    const bool told = cameras_[i].method == smear::ResetMethod::on_command;
+    const bool told = cameras_[i].method == ShutterReset::on_command;
     resets_.push_back({i, told ? std::optional(at) : std::nullopt});
   }
   return {};

@@ -227,7 +227,8 @@ Result<std::optional<Frame>> AlignBench::fresh_frame(std::size_t camera) {
                                 std::exchange(passed_over_[camera], 0));
     }
     filmed_ = std::max(filmed_, frame->stamp.monotonic_time);
-    const bool usable = frame->stamp.monotonic_time >= fresh_ && frame->stamp.status == FrameStatus::complete;
+    const TimePoint read = frame->stamp.monotonic_time - rig_.cameras[camera]->info().transport;
+    const bool usable = read >= fresh_ && frame->stamp.status == FrameStatus::complete;
     if (usable) return std::optional<Frame>(std::move(*frame));
   }
   return std::optional<Frame>();

@@ -84,7 +84,7 @@ class AlignBench {
   std::vector<std::size_t> all_;
   drivers::StrobeSettings strobe_;
   std::optional<drivers::StrobeSettings> asked_;  ///< as asked for
-  TimePoint fresh_;                               ///< frames that came before are passed over
+  TimePoint fresh_;                               ///< frames that may have been read before are passed over
   TimePoint filmed_;                              ///< when the last frame came
   std::vector<std::uint64_t> passed_over_;        ///< frames of each camera since its last one
   std::vector<std::uint64_t> taken_;              ///< frames of each camera

@@ -37,8 +37,8 @@ struct CameraConfig {
   int count = 1;  ///< virtual alone
   drivers::CameraRequest
       request{};  ///< virtual cameras know size, format, frame rate and exposure; replayed ones nothing
-  std::optional<SensorKind> sensor{};            ///< else the driver's word, of virtual ones ccd
-  std::optional<drivers::ShutterReset> reset{};  ///< else the driver's word
+  std::optional<SensorKind> sensor{};       ///< else the driver's word, of virtual ones ccd
+  std::optional<ShutterReset> reset{};      ///< else the driver's word
   std::optional<int> rows{}, shifts{};      ///< as CcdTiming; else the picture's height, and as many shifts
   std::optional<SecondsPerRow> row_time{};  ///< where it isn't measured
   smear::ReadDirection direction = smear::ReadDirection::top_first;

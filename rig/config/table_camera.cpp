@@ -128,9 +128,9 @@ Keys sensor_keys() {
                    "\"ccd\"")),
       of(kFilming,
          choice<C>("reset", EMBERLOCK_AT(reset),
-                   {{"none", drivers::ShutterReset::none},
-                    {"by-hand", drivers::ShutterReset::by_hand},
-                    {"on-command", drivers::ShutterReset::on_command}},
+                   {{"none", ShutterReset::none},
+                    {"by-hand", ShutterReset::by_hand},
+                    {"on-command", ShutterReset::on_command}},
                    "How its shutter phase is drawn anew: not at all, by an operator who presses the "
                    "button, or by the driver. As the driver says if absent.",
                    "\"by-hand\"")),

@@ -20,13 +20,13 @@ using nlohmann::ordered_json;
 
 constexpr std::string_view kSerialPorts = "strobe_serial";
 
-std::string_view name(drivers::ShutterReset reset) {
+std::string_view name(ShutterReset reset) {
   switch (reset) {
-    case drivers::ShutterReset::none:
+    case ShutterReset::none:
       return "none";
-    case drivers::ShutterReset::by_hand:
+    case ShutterReset::by_hand:
       return "by hand";
-    case drivers::ShutterReset::on_command:
+    case ShutterReset::on_command:
       return "on command";
   }
   return "none";

@@ -42,7 +42,7 @@ PacedCamera::PacedCamera(std::shared_ptr<session::SessionReader> session, std::s
       pace_(std::move(pace)),
       // The reader has checked the layout, the one thing that can be wrong.
       info_(drivers::camera_info(session_->manifest().cameras(static_cast<int>(camera))).value()) {
-  info_.reset = drivers::ShutterReset::none;
+  info_.reset = ShutterReset::none;
   info_.trim.reset();
 }
 

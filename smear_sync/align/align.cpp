@@ -24,8 +24,8 @@ namespace {
 /// A tolerance of fewer standard errors of a phase can't be told.
 constexpr double kTellable = 2;
 
-std::vector<std::optional<RateTrim>> trims_of(const std::vector<AlignCamera>& cameras) {
-  std::vector<std::optional<RateTrim>> trims;
+std::vector<std::optional<FrameRateTrim>> trims_of(const std::vector<AlignCamera>& cameras) {
+  std::vector<std::optional<FrameRateTrim>> trims;
   trims.reserve(cameras.size());
   for (const AlignCamera& camera : cameras) trims.push_back(camera.trim);
   return trims;
@@ -37,7 +37,7 @@ AlignScene scene_of(const AlignState& state, const std::vector<Drift>& drifts, c
   const Seconds jitter = learnt_jitter(state, c.options);
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     scene.tau.push_back(drifts[i].tau);
-    ResetLanding landing{c.cameras[i].method, std::nullopt, state.cameras[i].hand_shifts};
+    ResetLanding landing{c.cameras[i].method, std::nullopt, state.cameras[i].hand_shifts, c.cameras[i].model};
     if (const auto delay = expected_delay(state, c.cameras, c.options, i))
       landing.aim = Seconds(std::hypot(delay->sigma.value(), jitter.value()));
     scene.landings.push_back(landing);
@@ -92,7 +92,7 @@ void order_resets(AlignDecision& decision, const AlignContext& c, const AlignSce
       camera.reason = stands + out + ", and can't be reset";
     } else if (!chosen[i]) {
       camera.reason = stands + out + ": waits, the target may yet come to it";
-    } else if (scene.landings[i].method == ResetMethod::by_hand) {
+    } else if (scene.landings[i].method == ShutterReset::by_hand) {
       camera.reason = stands + out + ": reset its shutter by hand";
     } else {
       camera.reason = stands + out + ": its shutter is reset";
@@ -108,7 +108,7 @@ void ask_for_one(AlignState& state, AlignDecision& decision, const AlignContext&
   const std::optional<std::size_t> before = std::exchange(state.asked, std::nullopt);
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
-    if (!camera.reset || c.cameras[i].method != ResetMethod::by_hand) continue;
+    if (!camera.reset || c.cameras[i].method != ShutterReset::by_hand) continue;
     if (before == i) state.asked = i;
     if (!farthest || abs(*camera.error) > abs(*decision.cameras[*farthest].error)) farthest = i;
   }
@@ -116,7 +116,7 @@ void ask_for_one(AlignState& state, AlignDecision& decision, const AlignContext&
   decision.reset_next = state.asked;
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
-    if (!camera.reset || c.cameras[i].method != ResetMethod::by_hand) continue;
+    if (!camera.reset || c.cameras[i].method != ShutterReset::by_hand) continue;
     camera.reset = false;
     if (i == state.asked) continue;
     camera.reason = standing(*camera.error, c.options.row_time) +

@@ -10,6 +10,7 @@
 
 #include "base/quantity.h"
 #include "base/result.h"
+#include "base/shutter.h"
 #include "base/strobe_dial.h"
 #include "base/time_point.h"
 #include "smear_sync/align/phase_track.h"
@@ -47,9 +48,6 @@ struct Tolerance {
 /// From "100rows", "5.4ms" or "500us": a positive number and its unit.
 Result<Tolerance> parse_tolerance(std::string_view text);
 
-/// How a camera's shutter phase can be drawn anew.
-enum class ResetMethod { none, by_hand, on_command };
-
 /// Who resets shutters while an alignment runs.
 enum class ResetBy {
   orders,   ///< the alignment alone, also those by hand: it knows of each
@@ -68,10 +66,10 @@ struct ResetDelay {
 struct AlignCamera {
   std::string id;
   std::string model;  ///< cameras of one model teach each other their delay
-  ResetMethod method = ResetMethod::on_command;
+  ShutterReset method = ShutterReset::on_command;
   std::optional<ResetDelay>
       expected_delay;  ///< known before (from an earlier session, or the model's data); else learnt
-  std::optional<RateTrim> trim = {};  ///< where its frame rate can be trimmed
+  std::optional<FrameRateTrim> trim = {};  ///< where its frame rate can be trimmed
 };
 
 /// What an operator will spend on an alignment. One that can't be had for it is refused before anything is

@@ -17,11 +17,11 @@ constexpr double kNever = 1e6;
 double chance(const AlignScene& scene, std::size_t camera, Seconds target) {
   const ResetLanding& landing = scene.landings[camera];
   switch (landing.method) {
-    case ResetMethod::none:
+    case ShutterReset::none:
       return 0;
-    case ResetMethod::by_hand:
+    case ShutterReset::by_hand:
       return chance_by_hand(landing.shifts, -scene.error(camera, target), scene.tolerance, scene.period);
-    case ResetMethod::on_command:
+    case ShutterReset::on_command:
       break;
   }
   const double even = std::min(1.0, 2 * (scene.tolerance / scene.period));

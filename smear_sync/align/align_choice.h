@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "smear_sync/align/align.h"
@@ -20,9 +21,10 @@ inline std::int64_t in_picoseconds(Seconds t) { return std::llround(t.value() * 
 
 /// What a camera's next reset does.
 struct ResetLanding {
-  ResetMethod method = ResetMethod::on_command;
+  ShutterReset method = ShutterReset::on_command;
   std::optional<Seconds> aim;  ///< standard error of where a timed reset lands; absent: it can't be timed
   std::span<const Seconds> shifts;  ///< by which resets by hand have moved tau
+  std::string_view model{};         ///< cameras of one model teach each other where resets land
 };
 
 /// Cameras of which all phases are known, at one instant.
@@ -41,11 +43,11 @@ struct AlignScene {
     return in_picoseconds(abs(error(camera, target))) <= in_picoseconds(tolerance);
   }
   [[nodiscard]] bool movable(std::size_t camera) const {
-    return landings[camera].method != ResetMethod::none;
+    return landings[camera].method != ShutterReset::none;
   }
   /// Whether its resets are ordered for a moment.
   [[nodiscard]] bool timed(std::size_t camera) const {
-    return policy >= AlignPolicy::timed && landings[camera].method == ResetMethod::on_command;
+    return policy >= AlignPolicy::timed && landings[camera].method == ShutterReset::on_command;
   }
 };
 

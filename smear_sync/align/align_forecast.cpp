@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string_view>
+#include <vector>
 
 #include "base/random.h"
 
@@ -37,20 +39,21 @@ Seconds landed(const AlignScene& scene, std::size_t camera, Seconds target, Rand
 int carry_out(AlignScene& scene, const std::vector<bool>& chosen, Seconds target, Seconds jitter,
               RandomStream& random) {
   int resets = 0;
-  bool teaching = false;
+  std::vector<std::string_view> taught;
+  const auto is_taught = [&](const ResetLanding& landing) {
+    return std::find(taught.begin(), taught.end(), landing.model) != taught.end();
+  };
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     if (!chosen[i]) continue;
     const bool teaches = scene.timed(i) && !scene.landings[i].aim;
-    if (teaches && teaching) continue;
-    teaching |= teaches;
+    if (teaches && is_taught(scene.landings[i])) continue;
+    if (teaches) taught.push_back(scene.landings[i].model);
     scene.tau[i] = wrap_positive(landed(scene, i, target, random), scene.period);
     scene.landings[i].aim = jitter * std::sqrt(2.0);
     ++resets;
   }
-  if (teaching) {
-    for (ResetLanding& landing : scene.landings) {
-      if (!landing.aim) landing.aim = kUntaughtSpread;
-    }
+  for (ResetLanding& landing : scene.landings) {
+    if (!landing.aim && is_taught(landing)) landing.aim = kUntaughtSpread;
   }
   return resets;
 }
@@ -116,7 +119,7 @@ bool within_limits(const AlignEffort& effort, const AlignOptions& options) {
 bool possible(const Prospect& prospect, AlignPolicy policy, const AlignOptions& options) {
   const auto& landings = prospect.scene.landings;
   const bool on_command = std::all_of(landings.begin(), landings.end(), [](const ResetLanding& landing) {
-    return landing.method == ResetMethod::on_command;
+    return landing.method == ShutterReset::on_command;
   });
   if (policy == AlignPolicy::timed) return on_command;
   if (policy == AlignPolicy::trimmed) return trim_reach(prospect.trims, options) > Seconds(0);
@@ -125,7 +128,7 @@ bool possible(const Prospect& prospect, AlignPolicy policy, const AlignOptions& 
 
 }  // namespace
 
-Seconds trim_reach(const std::vector<std::optional<RateTrim>>& trims, const AlignOptions& options) {
+Seconds trim_reach(const std::vector<std::optional<FrameRateTrim>>& trims, const AlignOptions& options) {
   Seconds reach = options.period;
   for (const auto& trim : trims) {
     if (!trim) return Seconds(0);

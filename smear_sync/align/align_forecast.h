@@ -12,9 +12,9 @@ namespace emberlock::smear {
 /// Where a rig stands and what is known of how its cameras move.
 struct Prospect {
   AlignScene scene;
-  std::vector<Drift> drifts;                   ///< by camera
-  std::vector<std::optional<RateTrim>> trims;  ///< by camera
-  Seconds jitter;                              ///< of one reset's delay about its camera's mean
+  std::vector<Drift> drifts;                        ///< by camera
+  std::vector<std::optional<FrameRateTrim>> trims;  ///< by camera
+  Seconds jitter;                                   ///< of one reset's delay about its camera's mean
 };
 
 /// What it takes to bring the prospect's cameras within `tolerance` by `policy`: the policy's choices played
@@ -27,6 +27,6 @@ std::vector<AlignOffer> find_offers(const Prospect& prospect, const AlignOptions
 
 /// How far from the target trimming may start: what the weakest trim covers in options.trim_time. Zero when a
 /// camera can't be trimmed.
-Seconds trim_reach(const std::vector<std::optional<RateTrim>>& trims, const AlignOptions& options);
+Seconds trim_reach(const std::vector<std::optional<FrameRateTrim>>& trims, const AlignOptions& options);
 
 }  // namespace emberlock::smear

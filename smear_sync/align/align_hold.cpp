@@ -124,8 +124,8 @@ bool renew(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
     who += (who.empty() ? "" : ", ") + c.cameras[i].id;
     camera.reason = standing(*camera.error, c.options.row_time) + ", and may leave tolerance in " +
                     words(stays[i]) +
-                    (c.cameras[i].method == ResetMethod::by_hand ? ": reset its shutter by hand"
-                                                                 : ": its shutter is reset before");
+                    (c.cameras[i].method == ShutterReset::by_hand ? ": reset its shutter by hand"
+                                                                  : ": its shutter is reset before");
   }
   decision.reason = who + " would leave tolerance before long";
   if (decision.renews) state.renewal = 1;

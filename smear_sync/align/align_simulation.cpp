@@ -164,7 +164,7 @@ class Rig {
     }
     Body& body = bodies_[camera];
     body.start = at + body.latency + random_.normal(0, sim_.latency_jitter.value());
-    const bool told = sim_.method == ResetMethod::on_command;
+    const bool told = sim_.method == ShutterReset::on_command;
     resets_.push_back({camera, told ? std::optional(TimePoint{} + Seconds(at)) : std::nullopt});
   }
 

@@ -14,7 +14,7 @@ struct AlignSimulation {
   int cameras = 11;
   AlignOptions options;
   bool delay_known = false;  ///< whether align_step is told the mean delay of the model
-  ResetMethod method = ResetMethod::on_command;
+  ShutterReset method = ShutterReset::on_command;
   Seconds latency_jitter = milliseconds(0.2);
   Seconds latency_spread{0};       ///< of the cameras' mean latencies
   Seconds latency_bias{0};         ///< by which the delay told is wrong
@@ -27,9 +27,9 @@ struct AlignSimulation {
   double visible_rows = 720;       ///< nor does the rest after these
   double round_seconds = 0.6;      ///< of filming one round
   double reset_seconds = 0;        ///< of one reset more in a round
-  std::optional<RateTrim> trim;    ///< of every camera
-  double spread_rows = 0;          ///< the cameras start within so many rows to either side; 0: anywhere
-  double hold_seconds = 0;         ///< once aligned: go on, checking when the policy asks for it
+  std::optional<FrameRateTrim> trim;  ///< of every camera
+  double spread_rows = 0;             ///< the cameras start within so many rows to either side; 0: anywhere
+  double hold_seconds = 0;            ///< once aligned: go on, checking when the policy asks for it
 };
 
 struct AlignOutcome {

@@ -29,7 +29,9 @@ struct Timing {
   TimePoint at;      ///< the round's instant
   Seconds interval;  ///< between two rounds
   /// When an order of now comes into force.
-  [[nodiscard]] TimePoint in_force(const RateTrim& trim) const { return at + interval / 2 + trim.latency; }
+  [[nodiscard]] TimePoint in_force(const FrameRateTrim& trim) const {
+    return at + interval / 2 + trim.latency;
+  }
 };
 
 /// A camera's free course: seconds of tau beside the middle of them all, parts of one.
@@ -83,7 +85,7 @@ std::vector<std::size_t> latecomers(std::vector<Course> courses, const std::vect
     std::optional<std::size_t> outermost;
     double gap = all.from - all.to;
     for (std::size_t i = 0; i < courses.size(); ++i) {
-      if (cameras[index[i]].method != ResetMethod::on_command) continue;
+      if (cameras[index[i]].method != ShutterReset::on_command) continue;
       std::vector<Course> others = courses;
       others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
       const Common rest = common(others, t);

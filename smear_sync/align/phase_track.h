@@ -11,13 +11,6 @@
 
 namespace emberlock::smear {
 
-/// How a camera's frame rate can be trimmed.
-struct RateTrim {
-  PartsPerMillion range;  ///< to either side of its own rate, > 0
-  PartsPerMillion step;   ///< between two settings, > 0
-  Seconds latency;        ///< from the order to the first frame at the new rate, on average, >= 0
-};
-
 struct TrackOptions {
   Seconds period{1 / 23.976};        ///< T
   PartsPerMillion rate_spread{20};   ///< of the cameras' rates about the beat, before anything was seen

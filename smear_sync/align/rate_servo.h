@@ -4,6 +4,7 @@
 #include <string_view>
 
 #include "base/quantity.h"
+#include "base/shutter.h"
 #include "smear_sync/align/phase_track.h"
 
 namespace emberlock::smear {
@@ -35,6 +36,6 @@ struct ServoStep {
 
 /// Full rate while the target is out of reach of one step of `interval`; then just what arrives; then, while
 /// the error is within its noise, a quarter of that, so that the noise isn't followed.
-ServoStep rate_servo(const ServoSample& sample, const RateTrim& camera, Seconds interval);
+ServoStep rate_servo(const ServoSample& sample, const FrameRateTrim& camera, Seconds interval);
 
 }  // namespace emberlock::smear

@@ -23,7 +23,7 @@ smear::AlignSimulation by_resets(smear::AlignPolicy policy, double rows) {
 /// From +-100 rows. Phases as four frames of a 20 us flash show them: whole-row shifts, and 0.16 rows a dot.
 smear::AlignSimulation by_trims(PartsPerMillion crystals) {
   smear::AlignSimulation sim = by_resets(smear::AlignPolicy::trimmed, 1);
-  sim.trim = smear::RateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
+  sim.trim = FrameRateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
   sim.flash_rows = 20.0 / 54;
   sim.noise_rows = 0.08;
   sim.rate_spread = crystals;

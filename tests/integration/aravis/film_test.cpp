@@ -134,7 +134,7 @@ TEST_F(FilmTest, AResetShowsTheNewCycleAndLosesNothing) {
   const auto processes = fakes(1, "RESET");
   auto camera = driver.open("RESET1", small_film());
   ASSERT_TRUE(camera.ok()) << camera.error().message();
-  EXPECT_EQ((*camera)->info().reset, drivers::ShutterReset::on_command);
+  EXPECT_EQ((*camera)->info().reset, ShutterReset::on_command);
   ASSERT_TRUE((*camera)->start().ok());
   Film film = film_for(**camera, milliseconds(300));
   std::vector<double> latencies;

@@ -35,7 +35,7 @@ TEST_F(FindAndSetUp, ElevenCamerasAreFoundBySerialWithWhatTheyCan) {
     EXPECT_EQ(it->address, fake->address());
     EXPECT_EQ(it->model, "Aravis Fake");
     EXPECT_EQ(it->modes.size(), 7U);  // Mono8, Mono16, RGB8, four Bayer mosaics
-    EXPECT_EQ(it->reset, drivers::ShutterReset::on_command);
+    EXPECT_EQ(it->reset, ShutterReset::on_command);
     EXPECT_EQ(it->trigger, drivers::ExternalTrigger::present);
     EXPECT_FALSE(it->holder.has_value());
     EXPECT_THAT(it->notes, Contains(HasSubstr("packets of 1400 bytes, the network takes 65536")));

@@ -54,7 +54,7 @@ class PluggedCamera final : public drivers::Camera {
 class AlignByHand : public testing::Test {
  protected:
   AlignByHand() {
-    bench.rig->set_reset(drivers::ShutterReset::by_hand);
+    bench.rig->set_reset(ShutterReset::by_hand);
     bench.options.align.reset_by = smear::ResetBy::anybody;
     bench.options.align.tolerance.amount = Rows(30);
   }

@@ -61,7 +61,7 @@ class AlignReplay : public testing::Test {
 TEST_F(AlignReplay, GivesTheSameTrimsToTheBit) {
   drivers::VirtualRigOptions setup = small_rig(4, 2);
   for (drivers::VirtualCameraOptions& camera : setup.cameras) {
-    camera.trim = drivers::FrameRateTrim{PartsPerMillion(500), PartsPerMillion(0.5), milliseconds(80)};
+    camera.trim = FrameRateTrim{PartsPerMillion(500), PartsPerMillion(0.5), milliseconds(80)};
     camera.reset_jitter = milliseconds(1.5);  // ten rows, which leaves trims something to do
   }
   SmallBench bench(setup);

@@ -34,7 +34,7 @@ INSTANTIATE_TEST_SUITE_P(AlignRun, EveryPolicy,
 drivers::VirtualRigOptions trimmable_rig(std::uint64_t seed) {
   drivers::VirtualRigOptions setup = small_rig(seed);
   for (drivers::VirtualCameraOptions& camera : setup.cameras)
-    camera.trim = drivers::FrameRateTrim{PartsPerMillion(200), PartsPerMillion(0.5), milliseconds(80)};
+    camera.trim = FrameRateTrim{PartsPerMillion(200), PartsPerMillion(0.5), milliseconds(80)};
   return setup;
 }
 

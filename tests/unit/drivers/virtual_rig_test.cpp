@@ -58,6 +58,24 @@ class DriversLog {
   std::shared_ptr<spdlog::sinks::sink> sink_ = std::make_shared<spdlog::sinks::ostream_sink_mt>(text_);
 };
 
+TEST(VirtualRig, FramesThatAreHeldBackComeLaterAndShowTheSame) {
+  VirtualCameraOptions camera = small_camera();
+  const auto at_once = small_rig({camera}, {Pass::lamp});
+  camera.transport = milliseconds(125);
+  const auto held = small_rig({camera}, {Pass::lamp});
+  EXPECT_EQ(held->camera(0).info().transport, milliseconds(125));
+  for (const auto& rig : {at_once.get(), held.get()}) ASSERT_TRUE(rig->camera(0).start().ok());
+  for (int i = 0; i < 3; ++i) {
+    const Frame a = at_once->camera(0).next_frame(Seconds(1)).value();
+    const Frame b = held->camera(0).next_frame(Seconds(1)).value();
+    EXPECT_EQ(a.stamp.frame_id, b.stamp.frame_id);
+    EXPECT_EQ(b.stamp.monotonic_time - a.stamp.monotonic_time, milliseconds(125));
+    EXPECT_EQ(a.image->bytes().size(), b.image->bytes().size());
+    EXPECT_TRUE(std::equal(a.image->bytes().begin(), a.image->bytes().end(), b.image->bytes().begin()));
+  }
+  EXPECT_EQ(held->camera(0).pass_over(held->clock().now()), 0U) << "what hasn't come can't be passed over";
+}
+
 TEST(VirtualRig, FramesThatAreLostAreWarnedOf) {
   const DriversLog said;
   const auto rig = small_rig({small_camera()}, {});

@@ -50,6 +50,39 @@ TEST_F(AlignBenchTest, FramesFromBeforeAChangeOfTheStrobeArePassedOver) {
   EXPECT_LT(bench.film_all(1)->frames[0][0].stamp.monotonic_time, before + 1.5 * period);
 }
 
+/// As USB cameras hold them back: what comes first after a change was read before it.
+TEST(AlignBench, FramesInFlightShowWhatWasBeforeAndArePassedOver) {
+  drivers::VirtualRigOptions setup = small_rig(3, 3);
+  for (drivers::VirtualCameraOptions& camera : setup.cameras)
+    camera.transport = 3 * camera.timing.frame_period;
+  test::SmallBench devices(setup);
+  for (drivers::Camera* camera : devices.align.cameras) ASSERT_TRUE(camera->start().ok());
+  const Seconds period = emberlock::period(devices.align.cameras[0]->info().frame_rate);
+  AlignBench bench{devices.align, devices.options, period};
+  ASSERT_TRUE(bench.film_all(1).ok());
+  drivers::StrobeSettings settings{
+      .output = drivers::StrobeOutput::flashing, .rate = rate(period), .width = microseconds(20)};
+  ASSERT_TRUE(bench.set_strobe(settings).ok());
+  ASSERT_TRUE(bench.film_all(2).ok());
+  settings.phase = 0.4 * period;
+  const TimePoint changed = devices.align.clock->now();
+  ASSERT_TRUE(bench.set_strobe(settings).ok());
+  const auto film = bench.film_all(3);
+  ASSERT_TRUE(film.ok());
+  for (std::size_t camera = 0; camera < film->frames.size(); ++camera) {
+    for (const Frame& frame : film->frames[camera])
+      EXPECT_GE(frame.stamp.monotonic_time - setup.cameras[camera].transport,
+                changed + AlignBench::kSettlingPeriods * period);
+    // One and the same flashes: dots stand where they stood in the frame before, or there are none.
+    const auto& readings = film->readings[camera];
+    for (std::size_t i = 1; i < readings.size(); ++i) {
+      ASSERT_EQ(readings[i].dots.size(), readings[0].dots.size()) << camera;
+      for (std::size_t d = 0; d < readings[0].dots.size(); ++d)
+        EXPECT_NEAR(readings[i].dots[d].y.value(), readings[0].dots[d].y.value(), 2) << camera;
+    }
+  }
+}
+
 TEST_F(AlignBenchTest, OnlyCamerasThatAreAskedForAreRead) {
   ASSERT_TRUE(bench.set_strobe(flashes).ok());
   const auto film = bench.film({0, 2}, 3);

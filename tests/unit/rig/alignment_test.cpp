@@ -139,7 +139,7 @@ TEST_F(AlignmentTest, CamerasAreResetBeforeTheyLeaveAndTheLockIsMissedForSeconds
 TEST_F(AlignmentTest, APressOfAShutterIsSeenWithinASecondWhetherAwaitedOrNot) {
   bench.options.align.reset_by = smear::ResetBy::anybody;
   align();
-  bench.rig->set_reset(drivers::ShutterReset::by_hand);
+  bench.rig->set_reset(ShutterReset::by_hand);
   auto made = Alignment::create(bench.align, bench.options);
   ASSERT_TRUE(made.ok());
   alignment = std::move(made).value();

@@ -110,7 +110,7 @@ scpi_phase = "delay"
   EXPECT_THAT(real.request.controls,
               ::testing::UnorderedElementsAre(std::pair("Gain", "3"), std::pair("PacketResend", "never"),
                                               std::pair("ReverseX", "1"), std::pair("Gamma", "0.5")));
-  EXPECT_EQ(real.reset, drivers::ShutterReset::by_hand);
+  EXPECT_EQ(real.reset, ShutterReset::by_hand);
   EXPECT_EQ(real.sensor, SensorKind::rolling_shutter);
   EXPECT_EQ(real.direction, smear::ReadDirection::bottom_first);
   EXPECT_EQ(rig.strobe.request.dialect, drivers::StrobeDialect::scpi);

@@ -20,7 +20,7 @@ drivers::CameraFound camera(const std::string& id) {
   found.address = "/dev/video3";
   found.modes = {{{.size = {640, 480}}, "GREY", Hertz(30)},
                  {{.size = {1280, 720}, .format = PixelFormat::rgb8}, "YUYV", Hertz(10)}};
-  found.reset = drivers::ShutterReset::on_command;
+  found.reset = ShutterReset::on_command;
   return found;
 }
 
@@ -84,7 +84,7 @@ TEST(Devices, WhatADriverHadStaysWhileItCannotLook) {
 TEST(Devices, TheTableSaysWhatACameraCanDoAndWhoHoldsIt) {
   DeviceList list = list_cameras(kDrivers);
   list.cameras[0].found.holder = drivers::Holder{4711, "gvfsd-gphoto2"};
-  list.cameras[0].found.trim = drivers::FrameRateTrim{PartsPerMillion(200), PartsPerMillion(5), Seconds(.1)};
+  list.cameras[0].found.trim = FrameRateTrim{PartsPerMillion(200), PartsPerMillion(5), Seconds(.1)};
   list.cameras[1].found.modes.clear();
   list.cameras[2].found.trigger = drivers::ExternalTrigger::present;
   list.ports.push_back({"SN7", "Pico", "/dev/ttyACM0", drivers::Holder{12, "minicom"}});

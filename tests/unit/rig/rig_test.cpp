@@ -80,7 +80,7 @@ TEST(Rig, CamerasOfSeveralBlocksKeepTheirOrderAndDifferInTruth) {
   RigConfig config = fast_rig(2);
   CameraConfig other = virtual_cameras(1, {160, 120});
   other.id = "left one";
-  other.reset = drivers::ShutterReset::by_hand;
+  other.reset = ShutterReset::by_hand;
   other.direction = smear::ReadDirection::bottom_first;
   config.cameras.push_back(other);
   auto rig = Rig::open(config);
@@ -89,7 +89,7 @@ TEST(Rig, CamerasOfSeveralBlocksKeepTheirOrderAndDifferInTruth) {
   std::vector<std::string> ids;
   for (std::size_t i = 0; i < 3; ++i) ids.push_back((*rig)->camera(i).info().id);
   EXPECT_THAT(ids, ElementsAre("virtual-00", "virtual-01", "left one"));
-  EXPECT_EQ((*rig)->camera(2).info().reset, drivers::ShutterReset::by_hand);
+  EXPECT_EQ((*rig)->camera(2).info().reset, ShutterReset::by_hand);
   const auto timing = (*rig)->timing();
   EXPECT_EQ(timing[0].rows, 240);
   EXPECT_EQ(timing[2].rows, 120);
@@ -151,7 +151,7 @@ class RigInRealTime : public testing::Test {
     CameraConfig real;
     real.source = CameraSource::v4l2;
     real.id = "c1";
-    real.reset = drivers::ShutterReset::by_hand;
+    real.reset = ShutterReset::by_hand;
     rig.cameras.push_back(real);
     rig.strobe.source = StrobeSource::virtual_;
     return rig;
@@ -182,7 +182,7 @@ TEST_F(RigInRealTime, ACameraThatIsAbsentAtStartIsLostUntilItComes) {
   EXPECT_FALSE((*rig)->trouble(2));
   EXPECT_EQ(late.info().layout.size, (ImageSize{64, 48})) << "learnt";
   EXPECT_EQ(late.info().model, "socket camera");
-  EXPECT_EQ(late.info().reset, drivers::ShutterReset::by_hand) << "configured";
+  EXPECT_EQ(late.info().reset, ShutterReset::by_hand) << "configured";
   EXPECT_EQ((*rig)->timing()[2].rows, 48);
 
   test::unplug("c1");

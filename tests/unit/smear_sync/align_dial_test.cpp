@@ -21,7 +21,7 @@ AlignOptions dialled() {
 std::vector<AlignCamera> dialled_rig(std::size_t n) {
   std::vector<AlignCamera> cameras;
   for (std::size_t i = 0; i < n; ++i)
-    cameras.push_back({"cam" + std::to_string(i), "ccd", ResetMethod::on_command, {}});
+    cameras.push_back({"cam" + std::to_string(i), "ccd", ShutterReset::on_command, {}});
   return cameras;
 }
 

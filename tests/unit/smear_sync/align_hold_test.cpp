@@ -50,7 +50,7 @@ class HeldCameras : public testing::Test {
     options.strobe_step = Seconds(0);
     for (const char* id : {"a", "b", "c"})
       cameras.push_back(
-          {id, "ccd", ResetMethod::on_command, ResetDelay{milliseconds(10), milliseconds(0.1)}});
+          {id, "ccd", ShutterReset::on_command, ResetDelay{milliseconds(10), milliseconds(0.1)}});
   }
 
   /// A round at which the cameras stand so many rows beside row 300.
@@ -152,7 +152,7 @@ TEST_F(HeldCameras, OneThatShowsNoDotIsBroughtOutByTheNextCheck) {
 }
 
 TEST_F(HeldCameras, OneThatIsResetByHandIsAskedForBeforeItLeaves) {
-  cameras[2].method = ResetMethod::by_hand;
+  cameras[2].method = ShutterReset::by_hand;
   options.reset_by = ResetBy::anybody;
   film_until_known();
   const AlignDecision soon = film_drifting(1024);

@@ -26,7 +26,7 @@ AlignRound round_at(const std::vector<double>& rows) {
   return round;
 }
 
-std::vector<AlignCamera> rig(std::size_t n, ResetMethod method = ResetMethod::on_command) {
+std::vector<AlignCamera> rig(std::size_t n, ShutterReset method = ShutterReset::on_command) {
   std::vector<AlignCamera> cameras;
   for (std::size_t i = 0; i < n; ++i) cameras.push_back({"cam" + std::to_string(i), "ccd", method, {}});
   return cameras;
@@ -146,10 +146,10 @@ TEST(Align, AnUnreadableCameraNeedsAHandNotAnotherStrobePhase) {
 
 TEST(Align, ACameraThatCannotBeResetBecomesTheReference) {
   auto cameras = rig(4);
-  cameras[3].method = ResetMethod::none;
+  cameras[3].method = ShutterReset::none;
   const auto step = align_step({}, round_at({300, 310, 320, 600}), cameras, {});
   EXPECT_EQ(step.decision.reference, 3u);
-  cameras[0].method = ResetMethod::none;
+  cameras[0].method = ShutterReset::none;
   const auto stuck = align_step({}, round_at({300, 310, 320, 600}), cameras, {});
   EXPECT_EQ(stuck.decision.verdict, AlignVerdict::given_up);
   EXPECT_THAT(reset_in(stuck.decision), testing::IsEmpty());
@@ -174,7 +174,7 @@ TEST(Align, ATimedResetLandsOnTheReference) {
 
 TEST(Align, AnOperatorsResetIsNeverTimed) {
   AlignOptions options{.policy = AlignPolicy::timed};
-  const auto step = align_step({}, round_at({300, 600}), rig(2, ResetMethod::by_hand), options);
+  const auto step = align_step({}, round_at({300, 600}), rig(2, ShutterReset::by_hand), options);
   EXPECT_THAT(reset_in(step.decision), testing::ElementsAre(1));
   EXPECT_FALSE(step.decision.cameras[1].moment);
   EXPECT_THAT(step.decision.cameras[1].reason, HasSubstr("by hand"));

@@ -17,7 +17,7 @@ AlignSimulation trimmed(PartsPerMillion crystals) {
   sim.options.tolerance = {Rows(1)};
   sim.options.round_time = Seconds(0.3);
   sim.options.max_rounds = 1000;
-  sim.trim = RateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
+  sim.trim = FrameRateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
   sim.flash_rows = 20.0 / 54;
   sim.noise_rows = 0.08;
   sim.round_seconds = 0.3;
@@ -78,7 +78,7 @@ TEST(AlignTrim, CamerasThatTrimsWouldTakeTooLongForAreResetFirst) {
 
 TEST(AlignTrim, CamerasThatCantBeResetOnCommandAreWaitedFor) {
   AlignSimulation sim = trimmed(PartsPerMillion(15));
-  sim.method = ResetMethod::by_hand;
+  sim.method = ShutterReset::by_hand;
   const AlignStatistics s = simulate_many(sim, 20);
   EXPECT_EQ(s.aligned, 20);
   EXPECT_EQ(s.resets, 0);

@@ -86,9 +86,9 @@ class ThreeCameras {
 
  private:
   std::vector<double> gains_;
-  std::vector<AlignCamera> cameras_{{"a", "ccd", ResetMethod::on_command, {}, {}},
-                                    {"b", "ccd", ResetMethod::on_command, {}, {}},
-                                    {"c", "ccd", ResetMethod::on_command, {}, {}}};
+  std::vector<AlignCamera> cameras_{{"a", "ccd", ShutterReset::on_command, {}, {}},
+                                    {"b", "ccd", ShutterReset::on_command, {}, {}},
+                                    {"c", "ccd", ShutterReset::on_command, {}, {}}};
   AlignState state_;
   Seconds strobe_;
   Seconds rough_;
@@ -164,8 +164,8 @@ TEST(MoveTogether, AStrobeThatDoesntObeyIsNamedNotTheCameras) {
   AlignRound round;
   for (int i = 0; i < 2; ++i)
     round.cameras.push_back({{PhaseState::known, milliseconds(16), microseconds(16), {}}, {}});
-  const std::vector<AlignCamera> cameras{{"a", "ccd", ResetMethod::on_command, {}, {}},
-                                         {"b", "ccd", ResetMethod::on_command, {}, {}}};
+  const std::vector<AlignCamera> cameras{{"a", "ccd", ShutterReset::on_command, {}, {}},
+                                         {"b", "ccd", ShutterReset::on_command, {}, {}}};
   const AlignStep first = align_step({}, round, cameras, {});
   round.at = round.at + Seconds(0.6);
   round.strobe_phase = *first.decision.strobe_phase;
@@ -180,7 +180,7 @@ TEST(MoveTogether, NoTrueDotIsDoubted) {
   sim.flash_rows = 0.37;
   sim.noise_rows = 0.05;
   sim.rate_spread = PartsPerMillion(20);
-  sim.trim = RateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
+  sim.trim = FrameRateTrim{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
   for (const auto policy :
        {AlignPolicy::fixed_reference, AlignPolicy::densest, AlignPolicy::timed, AlignPolicy::trimmed}) {
     sim.options.policy = policy;

@@ -6,7 +6,7 @@
 namespace emberlock::smear {
 namespace {
 
-const RateTrim kCamera{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
+const FrameRateTrim kCamera{PartsPerMillion(100), PartsPerMillion(0.5), milliseconds(80)};
 
 ServoStep step(double error_us, double holding_ppm, double sigma_us = 5) {
   return rate_servo({microseconds(error_us), microseconds(sigma_us), PartsPerMillion(holding_ppm)}, kCamera,

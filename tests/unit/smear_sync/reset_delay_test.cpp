@@ -16,7 +16,7 @@ struct Taught {
   AlignState state;
   explicit Taught(const std::vector<double>& delays) {
     for (std::size_t i = 0; i <= delays.size(); ++i)
-      cameras.push_back({"cam" + std::to_string(i), "ccd", ResetMethod::on_command, {}, {}});
+      cameras.push_back({"cam" + std::to_string(i), "ccd", ShutterReset::on_command, {}, {}});
     state.cameras.resize(cameras.size());
     for (std::size_t i = 0; i < delays.size(); ++i)
       learn_delay(state, cameras, kAlignOptions, i,
@@ -55,7 +55,7 @@ TEST(ResetDelay, ABiasOfAllThatWasToldIsLearntFromTheFirst) {
   for (int i = 0; i < 3; ++i) {
     rig.cameras.push_back({"told" + std::to_string(i),
                            "told",
-                           ResetMethod::on_command,
+                           ShutterReset::on_command,
                            ResetDelay{milliseconds(5.0 + i), milliseconds(0.2)},
                            {}});
   }

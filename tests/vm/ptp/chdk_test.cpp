@@ -76,7 +76,7 @@ TEST_F(ChdkOnUsb, IsFoundWithWhatItCanDo) {
   ASSERT_EQ(found->size(), 1u);
   EXPECT_EQ(found->front().id, kId);
   EXPECT_EQ(found->front().model, "Canon PowerShot E1");
-  EXPECT_EQ(found->front().reset, drivers::ShutterReset::on_command);
+  EXPECT_EQ(found->front().reset, ShutterReset::on_command);
   EXPECT_THAT(found->front().notes, testing::Contains(HasSubstr("CHDK 2.9")));
   EXPECT_THAT(found->front().address, testing::StartsWith("usb-"));
   EXPECT_GE(found->front().link_megabits.value_or(0), 12);

@@ -42,7 +42,7 @@ TEST_F(Mtp, IsListedAsACameraThatCanNotBeFilmedWith) {
   ASSERT_EQ(found->size(), 1u);
   EXPECT_EQ(found->front().model, "QEMU filesharing");
   EXPECT_FALSE(found->front().id.empty());
-  EXPECT_EQ(found->front().reset, drivers::ShutterReset::none);
+  EXPECT_EQ(found->front().reset, ShutterReset::none);
   EXPECT_THAT(found->front().notes.at(0), testing::HasSubstr("can't be filmed with"));
   EXPECT_FALSE(found->front().holder);
   const auto opened = drivers::ptp_driver().open(found->front().id, {});

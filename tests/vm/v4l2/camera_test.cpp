@@ -45,7 +45,7 @@ TEST_F(V4l2Vivid, IsFoundByWhereItIsWithItsModes) {
   for (int i = 0; i < 2; ++i) EXPECT_EQ((*found)[i].id, id(i));
   EXPECT_EQ((*found)[0].model, "vivid");
   EXPECT_THAT((*found)[0].address, HasSubstr("/dev/video"));
-  EXPECT_EQ((*found)[0].reset, drivers::ShutterReset::on_command);
+  EXPECT_EQ((*found)[0].reset, ShutterReset::on_command);
   const drivers::CameraMode yuyv{{{640, 360}, PixelFormat::rgb8, 8}, "YUYV", Hertz(40)};
   const drivers::CameraMode gray{{{1280, 720}, PixelFormat::gray8, 8}, "GREY", Hertz(12.5)};
   const auto has = [&](const drivers::CameraMode& wanted) {

@@ -2,6 +2,7 @@
 #include "drivers/camera_thread.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <condition_variable>
 #include <deque>
@@ -9,6 +10,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -31,7 +33,15 @@ Seconds since(Time t) { return Seconds(std::chrono::duration<double>(now() - t).
 
 /// How long one wait for a frame is, so that orders are soon heard.
 constexpr Seconds kSlice = milliseconds(20);
-constexpr const char* kReset = "reset_shutter";
+
+/// What the thread has the camera do.
+enum class Task { start, stop, next_frame, reset_shutter, trim_rate };
+std::string_view name(Task task) {
+  constexpr std::array<std::string_view, 5> kNames{"start", "stop", "next_frame", "reset_shutter",
+                                                   "trim_rate"};
+  return kNames[static_cast<std::size_t>(task)];
+}
+
 /// How long before its instant a camera is told of a reset.
 constexpr Seconds kPrepared = milliseconds(5);
 
@@ -81,12 +91,12 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   }
 
   /// Has the thread call `act`, and waits for what comes of it. One that isn't done in time never is.
-  Status call(const std::string& what, std::function<Status(Camera&)> act) {
+  Status call(Task task, std::function<Status(Camera&)> act) {
     std::unique_lock lock(mutex_);
     if (hangs()) return hanging();
     const auto answer = std::make_shared<std::optional<Status>>();
     const auto given_up = std::make_shared<bool>(false);
-    order(what, now(), [act = std::move(act), answer, given_up, this](Camera& camera) {
+    order(task, now(), [act = std::move(act), answer, given_up, this](Camera& camera) {
       {
         const std::lock_guard inner(mutex_);
         if (*given_up) return;
@@ -100,7 +110,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     owner_wakes_.wait_until(lock, until, [&] { return answer->has_value(); });
     if (answer->has_value()) return **answer;
     *given_up = true;
-    return hangs() ? hanging() : silent(what);
+    return hangs() ? hanging() : silent(task);
   }
 
   Status start() {
@@ -110,7 +120,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       if (filming_ && !hangs()) return {};
       film = ++film_;
     }
-    Status started = call("start", [film, this](Camera& camera) {
+    Status started = call(Task::start, [film, this](Camera& camera) {
       Status status = camera.start();
       const std::lock_guard lock(mutex_);
       if (film != film_) return status;  // too late: nobody waits for it
@@ -143,7 +153,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     drop_frames();
     waiting_.clear();
     const auto stopped = std::make_shared<bool>(false);
-    order("stop", now(), [stopped, this](Camera& camera) {
+    order(Task::stop, now(), [stopped, this](Camera& camera) {
       camera.stop();
       const std::lock_guard inner(mutex_);
       *stopped = true;
@@ -153,7 +163,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       owner_wakes_.wait_until(lock, busy_until_ ? std::min(until, *busy_until_) : until);
     }
     if (*stopped) return {};
-    return hangs() ? hanging() : silent("stop");
+    return hangs() ? hanging() : silent(Task::stop);
   }
 
   Result<Frame> next_frame(Seconds deadline) {
@@ -203,7 +213,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     if (lost_) return away();
     ++resets_to_do_;
     const Time begins = after(now(), at - SteadyClock().now());
-    order(kReset, begins, [at, film = film_, this](Camera& camera) {
+    order(Task::reset_shutter, begins, [at, film = film_, this](Camera& camera) {
       const Status status = camera.reset_shutter(at);
       const std::lock_guard inner(mutex_);
       if (film != film_) return;
@@ -217,7 +227,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
 
  private:
   struct Order {
-    std::string what;
+    Task task;
     Time begins;  ///< when the camera shall do it
     std::function<void(Camera&)> act;
   };
@@ -228,20 +238,20 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   [[nodiscard]] bool hangs() const { return busy_until_ && now() > *busy_until_; }
   [[nodiscard]] Error hanging() const {
     return {ErrorKind::device,
-            fmt::format("it hangs, for {:.1f} s so far, in {}", since(busy_since_).value(), busy_with_),
+            fmt::format("it hangs, for {:.1f} s so far, in {}", since(busy_since_).value(), name(busy_with_)),
             where(), "unplug it or switch it off and on again; the other cameras go on"};
   }
   [[nodiscard]] Error away() const {
     return {ErrorKind::timed_out, fmt::format("it has been away for {:.1f} s", since(lost_since_).value()),
             where(), "plug it in again, or switch it on; it films on by itself"};
   }
-  [[nodiscard]] Error silent(const std::string& what) const {
+  [[nodiscard]] Error silent(Task task) const {
     return {ErrorKind::timed_out,
-            fmt::format("{} wasn't done within {:g} s", what, options_.call_deadline.value()), where(),
+            fmt::format("{} wasn't done within {:g} s", name(task), options_.call_deadline.value()), where(),
             "unplug it or switch it off and on again"};
   }
-  void order(std::string what, Time begins, std::function<void(Camera&)> act) {
-    orders_.push_back({std::move(what), begins, std::move(act)});
+  void order(Task task, Time begins, std::function<void(Camera&)> act) {
+    orders_.push_back({task, begins, std::move(act)});
     thread_wakes_.notify_all();
   }
   void lose(const Error& error) {
@@ -251,7 +261,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     lost_since_ = now();
     retry_at_ = after(now(), options_.retry);
     waiting_.push_back(error);
-    std::erase_if(orders_, [](const Order& order) { return order.what == kReset; });
+    std::erase_if(orders_, [](const Order& order) { return order.task == Task::reset_shutter; });
     resets_to_do_ = 0;
   }
   void learn(const CameraInfo& info) { learnt_info_ = info; }
@@ -266,7 +276,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
 
   /// Calls the camera without the lock; meanwhile it may be seen to hang.
   template <class Act>
-  auto busy(std::unique_lock<std::mutex>& lock, const std::string& with, Time begins, const Act& act) {
+  auto busy(std::unique_lock<std::mutex>& lock, Task with, Time begins, const Act& act) {
     busy_with_ = with;
     busy_since_ = now();
     busy_until_ = after(std::max(begins, busy_since_), options_.call_deadline);
@@ -308,7 +318,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     std::unique_lock lock(mutex_);
     while (!quit_) {
       if (const auto order = due()) {
-        busy(lock, order->what, order->begins, order->act);
+        busy(lock, order->task, order->begins, order->act);
       } else if (filming_ && !lost_) {
         take_frame(lock);
       } else if (filming_ && now() >= retry_at_) {
@@ -319,7 +329,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
         thread_wakes_.wait(lock);
       }
     }
-    busy(lock, "stop", now(), [](Camera& camera) { camera.stop(); });
+    busy(lock, Task::stop, now(), [](Camera& camera) { camera.stop(); });
     busy_until_ = after(now(), options_.call_deadline);
     lock.unlock();
     camera_.reset();
@@ -332,7 +342,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   void take_frame(std::unique_lock<std::mutex>& lock) {
     const std::uint64_t film = film_;
     const Seconds slice = until_next_order();
-    Result<Frame> next = busy(lock, "next_frame", after(now(), slice), [slice, this](Camera& camera) {
+    Result<Frame> next = busy(lock, Task::next_frame, after(now(), slice), [slice, this](Camera& camera) {
       Result<Frame> frame = camera.next_frame(slice);
       if (frame && options_.on_frame) options_.on_frame(*frame);
       return frame;
@@ -371,7 +381,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   }
 
   void look_for_it(std::unique_lock<std::mutex>& lock) {
-    const Status back = busy(lock, "start", now(), [](Camera& camera) { return camera.start(); });
+    const Status back = busy(lock, Task::start, now(), [](Camera& camera) { return camera.start(); });
     retry_at_ = after(now(), options_.retry);
     if (!back) {
       lost_by_ = back.error();
@@ -405,7 +415,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   std::optional<CameraInfo> learnt_info_;
   Time lost_since_;
   Time retry_at_;
-  std::string busy_with_;
+  Task busy_with_ = Task::stop;  ///< while it is busy
   Time busy_since_;
   std::optional<Time> busy_until_;  ///< while a call into the camera goes on: when it is overdue
   bool quit_ = false;
@@ -435,7 +445,7 @@ Result<Frame> CameraThread::next_frame(Seconds deadline) { return worker_->next_
 std::uint64_t CameraThread::pass_over(TimePoint until) { return worker_->pass_over(until); }
 Status CameraThread::reset_shutter(TimePoint at) { return worker_->reset(at); }
 Status CameraThread::trim_rate(PartsPerMillion trim) {
-  return worker_->call("trim_rate", [trim](Camera& camera) { return camera.trim_rate(trim); });
+  return worker_->call(Task::trim_rate, [trim](Camera& camera) { return camera.trim_rate(trim); });
 }
 
 }  // namespace emberlock::drivers

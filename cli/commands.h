@@ -10,6 +10,7 @@ namespace emberlock::cli {
 
 // Each function adds one verb; its callback does the work and ends in fail() or normally.
 void add_devices(CLI::App& app);
+void add_clips(CLI::App& devices);
 void add_smear(CLI::App& app);
 void add_align(CLI::App& app);
 void add_reconstruct(CLI::App& app);

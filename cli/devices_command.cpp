@@ -276,6 +276,7 @@ void add_devices(CLI::App& app) {
     if (verb->get_subcommands().empty()) list(*a);
   });
   add_probe(*verb);
+  add_clips(*verb);
   verb->add_subcommand("watch", "Lists devices as they come and go, until Ctrl-C.")->callback(watch);
 }
 

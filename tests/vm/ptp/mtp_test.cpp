@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "drivers/ptp/clips.h"
 #include "drivers/ptp/driver.h"
+#include "tests/support/shell.h"
 #include "tests/vm/ptp/usb_bed.h"
 
 namespace emberlock {
@@ -70,6 +71,26 @@ TEST_F(Mtp, ClipsComeByteForByte) {
   const TimePoint begin = clock_.now();
   for (int i = 0; i < kTransactions; ++i) ASSERT_TRUE(connection->session->storages().ok());
   fmt::print("{:.0f} transactions/s\n", kTransactions / (clock_.now() - begin).value());
+}
+
+/// The program itself; a second run finds them there.
+TEST_F(Mtp, TheVerbDownloadsClipsOnce) {
+  plug_mtp();
+  ASSERT_TRUE(connect(false).ok());
+  const auto found = drivers::ptp_driver().find();
+  ASSERT_TRUE(found.ok() && found->size() == 1);
+  const std::string& id = found->front().id;
+  const std::string command =
+      std::string(EMBERLOCK_PROGRAM) + " devices clips '" + id + "' --out " + folder_.string() + " 2>&1";
+  const Shell first = shell(command);
+  ASSERT_EQ(first.status, 0) << first.output;
+  EXPECT_EQ(read_file(folder_ / id / "MVI_0002.MOV").value(),
+            read_file("/run/vm/mtp/DCIM/100CANON/MVI_0002.MOV").value());
+  const Shell second = shell(command);
+  ASSERT_EQ(second.status, 0) << second.output;
+  EXPECT_THAT(second.output, testing::HasSubstr("there already"));
+  EXPECT_EQ(shell(std::string(EMBERLOCK_PROGRAM) + " devices clips nobody --out " + folder_.string()).status,
+            1);
 }
 
 TEST_F(Mtp, UnpluggedInMidTransferIsSaidWithinASecondAndTheDownloadGoesOnAfterwards) {

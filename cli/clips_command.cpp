@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emberlock devices clips`: what a camera has filmed onto its card comes to the disk, for `emberlock import`.
+// `emberlock devices clips`: what a camera has filmed onto its card comes to the disk, for `emberlock
+// import`.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -35,7 +36,8 @@ Status fetch_clip(drivers::PtpSession& session, const drivers::Clip& clip, const
 
 Status fetch_clips(const ClipsArguments& arguments) {
   EMBERLOCK_ASSIGN_OR_RETURN(const drivers::PtpConnection connection, drivers::connect_ptp(arguments.id));
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<drivers::Clip> clips, drivers::list_clips(*connection.session));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<drivers::Clip> clips,
+                             drivers::list_clips(*connection.session));
   if (clips.empty()) {
     return Error{ErrorKind::bad_input, "its card shows no movies", arguments.id,
                  "Switch the camera to playback, and try again; many list their card in that mode only"};
@@ -46,7 +48,8 @@ Status fetch_clips(const ClipsArguments& arguments) {
   if (ec) return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), folder.string()};
   for (const drivers::Clip& clip : clips) {
     if (!session::is_folder_name(clip.name))
-      return Error{ErrorKind::device, fmt::format("a movie's name can't be a file's: '{}'", clip.name), arguments.id};
+      return Error{ErrorKind::device, fmt::format("a movie's name can't be a file's: '{}'", clip.name),
+                   arguments.id};
     EMBERLOCK_RETURN_IF_ERROR(fetch_clip(*connection.session, clip, folder / clip.name));
   }
   return {};
@@ -56,10 +59,11 @@ Status fetch_clips(const ClipsArguments& arguments) {
 
 void add_clips(CLI::App& devices) {
   auto a = std::make_shared<ClipsArguments>();
-  CLI::App* verb = devices.add_subcommand(
-      "clips",
-      "Downloads the movies on a USB camera's card, with their checksums; what is there already stays. The card is "
-      "only read. `emberlock import OUT` makes a session of several cameras' movies.");
+  CLI::App* verb =
+      devices.add_subcommand("clips",
+                             "Downloads the movies on a USB camera's card, with their checksums; what is "
+                             "there already stays. The card is "
+                             "only read. `emberlock import OUT` makes a session of several cameras' movies.");
   verb->add_option("ID", a->id, "The camera, as `emberlock devices` names it")->required();
   verb->add_option("--out", a->out, "The folder that gets a folder a camera")->required();
   verb->callback([a] {

@@ -25,7 +25,7 @@ std::optional<HttpTarget> parse_target(std::string_view target);
 /// What a form of ours sends as its body: "token=T". Empty: nothing that is a token.
 std::string token_of_form(std::string_view body);
 
-/// What a browser tells of whence it asks, and who asks. Empty: not told.
+/// The headers that say which page a request comes from, and who sends it. Empty: not sent.
 struct HttpHead {
   std::string_view host;
   std::string_view origin;

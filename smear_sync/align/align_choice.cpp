@@ -9,7 +9,7 @@
 namespace emberlock::smear {
 namespace {
 
-/// Resets that a camera which can't be moved is as good as.
+/// The number of resets that a camera counts for which can't be moved: more than anybody makes.
 constexpr double kNever = 1e6;
 
 }  // namespace

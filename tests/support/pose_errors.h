@@ -15,10 +15,11 @@ namespace emberlock::test {
 struct PoseErrors {
   double place = 0;  ///< metres, of the worst camera's centre
   double turn = 0;   ///< radians, of the worst camera's axes
-  double rays = 0;   ///< radians: the turn of the worst camera's rays, seen over its whole picture. A turn of
-                     ///< the axes that the principal point takes back moves no ray, and no reconstruction
-  double chi2 = 0;   ///< e' C^-1 e of all placed cameras' centres and turns, in the world's frame
-  int freedom = 0;   ///< of chi2
+  double rays =
+      0;  ///< radians: the turn of the worst camera's rays, seen over its whole picture. A turn of
+          ///< the axes that a shift of the principal point undoes moves no ray, and no reconstruction
+  double chi2 = 0;  ///< e' C^-1 e of all placed cameras' centres and turns, in the world's frame
+  int freedom = 0;  ///< of chi2
 };
 
 /// A camera's centre and turn, found less true, in the order of the covariance.

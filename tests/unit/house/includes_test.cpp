@@ -2,6 +2,7 @@
 // The layers of the house: a room includes only what stands above it (README.md, "Folders").
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <map>
 #include <regex>
 #include <set>
@@ -34,8 +35,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
 // Inside these a folder includes itself, the ones before it, and what lies directly in the house's folder.
 const std::map<std::string, std::vector<std::string>> kInnerOrder{
     {"recon",
-     {"kernels", "compute", "calibrate", "preprocess", "hull", "effects", "render", "adjust", "temperature",
-      "synthetic", "baselines", "apply", "export", "pipeline"}},
+     {"kernels", "compute", "calibrate", "preprocess", "hull", "effects", "render", "adjust", "synthetic",
+      "export", "pipeline"}},
     {"smear_sync", {"detect", "clocks", "sensors", "align", "verify"}},
     {"session", {"media"}},
 };
@@ -111,6 +112,31 @@ TEST(House, InsideAFolderOnlyLowerOnesAreIncluded) {
       EXPECT_LE(rank(part(header, 1)), from) << file << " includes \"" << header << '"';
     }
   }
+}
+
+TEST(House, TheListOfInnerFoldersIsTheirs) {
+  for (const auto& [house, order] : kInnerOrder)
+    for (const std::string& inner : order)
+      EXPECT_TRUE(fs::is_directory(kRoot / house / inner)) << house << '/' << inner;
+}
+
+/// Headers that include each other are one in two files.
+TEST(House, NoHeaderIncludesItselfByWayOfOthers) {
+  std::map<std::string, std::vector<std::string>> headers_of;
+  for (const auto& [folder, allowed] : kMayInclude)
+    for (const auto& [file, header] : includes_below(folder))
+      if (file.extension() != ".cpp") headers_of[file.string()].push_back(header);
+  enum class Mark { unseen, open, done };
+  std::map<std::string, Mark> marks;
+  const std::function<void(const std::string&)> visit = [&](const std::string& file) {
+    Mark& mark = marks[file];
+    EXPECT_NE(mark, Mark::open) << file << " includes itself by way of others";
+    if (mark != Mark::unseen) return;
+    mark = Mark::open;
+    for (const std::string& header : headers_of[file]) visit(header);
+    marks[file] = Mark::done;
+  };
+  for (const auto& [file, headers] : std::map(headers_of)) visit(file);
 }
 
 TEST(House, NothingIncludesTests) {

@@ -43,9 +43,6 @@ Status fetch_clips(const ClipsArguments& arguments) {
                  "Switch the camera to playback, and try again; many list their card in that mode only"};
   }
   const fs::path folder = fs::path(arguments.out) / connection.id;
-  std::error_code ec;
-  fs::create_directories(folder, ec);
-  if (ec) return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), folder.string()};
   for (const drivers::Clip& clip : clips) {
     if (!session::is_folder_name(clip.name))
       return Error{ErrorKind::device, fmt::format("a movie's name can't be a file's: '{}'", clip.name),

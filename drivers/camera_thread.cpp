@@ -36,11 +36,8 @@ constexpr Seconds kSlice = milliseconds(20);
 
 /// What the thread has the camera do.
 enum class Task { start, stop, next_frame, reset_shutter, trim_rate };
-std::string_view name(Task task) {
-  constexpr std::array<std::string_view, 5> kNames{"start", "stop", "next_frame", "reset_shutter",
-                                                   "trim_rate"};
-  return kNames[static_cast<std::size_t>(task)];
-}
+constexpr std::array<std::string_view, 5> kTasks{"start", "stop", "next_frame", "reset_shutter", "trim_rate"};
+std::string_view name(Task task) { return kTasks[static_cast<std::size_t>(task)]; }
 
 /// How long before its instant a camera is told of a reset.
 constexpr Seconds kPrepared = milliseconds(5);

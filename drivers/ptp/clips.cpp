@@ -262,6 +262,10 @@ Status download_clip(PtpSession& session, const Clip& clip, const fs::path& targ
     return Error{ErrorKind::bad_input, "it is there already", target.string(),
                  "choose another name, or remove it"};
   }
+  fs::create_directories(target.parent_path(), error);
+  if (error)
+    return Error{ErrorKind::io, "cannot create the folder: " + error.message(),
+                 target.parent_path().string()};
   const fs::path part = beside(target, ".part");
   Download download(session, clip, part);
   EMBERLOCK_RETURN_IF_ERROR(download.run(progress));

@@ -30,11 +30,11 @@ Status stop_movie(Chdk& chdk, Clock& clock, Seconds deadline = Seconds(30));
 /// warning. Many cameras list their card in playback mode only (Chdk::change_mode).
 Result<std::vector<Clip>> list_clips(PtpSession& session);
 
-/// Downloads a clip to `target`, and beside it `target`.sha256 as `sha256sum -c` reads it. Until it is whole
-/// it grows as `target`.part: called again after an interruption it goes on from there, once the last of what
-/// is there was found to be what the camera has; else, and with a camera that can't send parts, it starts
-/// anew. What was written is read back and compared before the file gets its name. Errors: the session's; io;
-/// bad_input when `target` is there already.
+/// Downloads a clip to `target`, whose folder it makes if need be, and beside it `target`.sha256 as
+/// `sha256sum -c` reads it. Until it is whole it grows as `target`.part: called again after an interruption
+/// it goes on from there, once the last of what is there was found to be what the camera has; else, and with
+/// a camera that can't send parts, it starts anew. What was written is read back and compared before the file
+/// gets its name. Errors: the session's; io; bad_input when `target` is there already.
 Status download_clip(PtpSession& session, const Clip& clip, const std::filesystem::path& target,
                      const Progress& progress = {});
 

@@ -73,7 +73,7 @@ TEST_F(Completion, BashOffersVerbsTheirVerbsAndTheirOptions) {
   EXPECT_THAT(bash_offers("emberlock "), ElementsAre("devices", "align", "--help", "--version"));
   EXPECT_THAT(bash_offers("emberlock al"), ElementsAre("align"));
   EXPECT_THAT(bash_offers("emberlock devices "),
-              ElementsAre("probe", "watch", "--help", "--modes", "--json"));
+              ElementsAre("probe", "clips", "watch", "--help", "--modes", "--json"));
   EXPECT_THAT(bash_offers("emberlock devices probe --res"), ElementsAre("--resets"));
   EXPECT_THAT(bash_offers("emberlock align --json --max-r"), ElementsAre("--max-rounds", "--max-resets"));
 }
@@ -84,7 +84,8 @@ TEST_F(Completion, BashOffersFilesBehindAnOptionThatTakesAValue) {
 
 TEST_F(Completion, ZshOffersVerbsTheirVerbsAndTheirOptions) {
   EXPECT_THAT(zsh_offers("emberlock "), ElementsAre("devices", "align", "--help", "--version"));
-  EXPECT_THAT(zsh_offers("emberlock devices "), ElementsAre("probe", "watch", "--help", "--modes", "--json"));
+  EXPECT_THAT(zsh_offers("emberlock devices "),
+              ElementsAre("probe", "clips", "watch", "--help", "--modes", "--json"));
   EXPECT_THAT(zsh_offers("emberlock devices probe "), Contains("--resets"));
   EXPECT_THAT(zsh_offers("emberlock align --json "), Contains("--max-rounds"));
 }

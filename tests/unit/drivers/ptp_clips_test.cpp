@@ -160,11 +160,13 @@ TEST_F(PtpClips, AFileThatIsThereAlreadyIsNotTouched) {
   EXPECT_EQ(read_file(target()).value(), "mine");
 }
 
-TEST_F(PtpClips, AFolderThatIsMissingIsAnErrorThatNamesTheFile) {
-  const Status refused = download_clip(bench_.session, clip(), folder_ / "nowhere" / "A.AVI");
+TEST_F(PtpClips, AFolderThatIsMissingIsMadeAndOneThatCannotBeIsNamed) {
+  EXPECT_TRUE(download_clip(bench_.session, clip(), folder_ / "new" / "A.AVI").ok());
+  ASSERT_TRUE(write_file_atomically(folder_ / "file", "no folder").ok());
+  const Status refused = download_clip(bench_.session, clip(), folder_ / "file" / "A.AVI");
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().kind, ErrorKind::io);
-  EXPECT_THAT(refused.error().message(), HasSubstr("nowhere/A.AVI.part"));
+  EXPECT_THAT(refused.error().message(), HasSubstr("file"));
 }
 
 TEST_F(PtpClips, ACameraThatCannotSendPartsSendsTheWhole) {

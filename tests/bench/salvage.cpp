@@ -36,7 +36,7 @@ namespace fs = std::filesystem;
 struct Arguments {
   int width = 1280, height = 720, cameras = 11;
   double seconds = 65, rate = 24;
-  std::string folder = "salvage-bench";
+  std::string folder = "out/salvage-bench";
   std::string daemon;
 };
 

@@ -7,13 +7,13 @@
 
 namespace emberlock {
 
-/// A source of time for wrappers (threads, drivers, command loops). Pure code takes instants as arguments
-/// instead. Thread-safe.
+/// A source of time for code that drives threads, devices or command loops. Pure functions take instants as
+/// arguments instead. Thread-safe.
 class Clock {
  public:
   virtual ~Clock() = default;
   [[nodiscard]] virtual TimePoint now() const = 0;
-  /// Returns once now() >= t; at once when t has passed.
+  /// Returns as soon as now() >= t; immediately when t has already passed.
   virtual void sleep_until(TimePoint t) = 0;
 };
 
@@ -24,10 +24,10 @@ class SteadyClock final : public Clock {
   void sleep_until(TimePoint t) override;
 };
 
-/// Now by the wall clock, since 1970-01-01 UTC. It may jump.
+/// The wall clock, since 1970-01-01 UTC. It may jump.
 TimePoint wall_clock();
 
-/// The same in words, as ISO 8601 in UTC with milliseconds: "2026-11-22T02:50:00.123Z".
+/// wall_clock() as ISO 8601 text in UTC with milliseconds: "2026-11-22T02:50:00.123Z".
 std::string utc_now();
 
 }  // namespace emberlock

@@ -68,7 +68,7 @@ Result<std::string> read_file(const fs::path& path, std::size_t max_bytes) {
 Status sync_folder(const fs::path& folder) {
   const UniqueFd fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!fd) return system_error(folder, "cannot open the folder");
-  // Some file systems over a network can't, and needn't.
+  // Some network file systems can't sync a folder, and don't need to.
   if (::fsync(fd.get()) == 0 || errno == EINVAL || errno == ENOTSUP) return {};
   return system_error(folder, "cannot flush the folder", "Check the disk's health");
 }

@@ -9,15 +9,16 @@
 
 namespace emberlock {
 
-/// The whole file; an Error that names it otherwise. Refuses files above `max_bytes`.
+/// Reads a whole file. Refuses files above `max_bytes`. The error names the file.
 Result<std::string> read_file(const std::filesystem::path& path,
                               std::size_t max_bytes = std::size_t{1} << 30);
 
-/// Has the disk hold what was created, renamed or removed in `folder`: without it a power cut may undo that.
+/// Flushes a folder's entries to the disk. Without it, a power cut may undo files created, renamed or removed
+/// in it.
 Status sync_folder(const std::filesystem::path& folder);
 
-/// Writes beside the target, flushes to disk, then renames: a reader sees the old content or the new, never
-/// half, and after a power cut too.
+/// Writes to a file beside the target, flushes it to the disk, then renames it. A reader sees either the old
+/// or the new content, never a part; also after a power cut.
 Status write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
 }  // namespace emberlock

@@ -11,13 +11,13 @@ namespace emberlock {
 
 enum class FrameStatus : std::uint8_t {
   complete,
-  damaged,  ///< delivered, but the transport or the checksum says that pixels are missing or wrong
+  damaged,  ///< delivered, but the transport or a checksum reports missing or wrong pixels
 };
 
-/// When and as what a frame came. The three clocks are the camera's own (its origin unknown), the wall clock
-/// (since 1970-01-01 UTC) and the host's monotonic clock at arrival.
+/// Identity and times of a frame. It has three times: the camera's own clock (unknown origin), the wall clock
+/// (since 1970-01-01 UTC) and the host's monotonic clock, both at arrival.
 struct FrameStamp {
-  std::uint64_t frame_id = 0;  ///< the camera's own count; a gap is a frame not delivered
+  std::uint64_t frame_id = 0;  ///< counted by the camera; a gap is a frame that wasn't delivered
   TimePoint device_time;
   TimePoint system_time;
   TimePoint monotonic_time;
@@ -25,7 +25,7 @@ struct FrameStamp {
   friend bool operator==(const FrameStamp&, const FrameStamp&) = default;
 };
 
-/// One frame as a camera or a recording delivers it. The pixels are shared and never change.
+/// A frame as a camera or a recording delivers it. The pixels are shared and immutable.
 struct Frame {
   FrameStamp stamp;
   std::shared_ptr<const Image> image;

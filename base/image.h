@@ -8,10 +8,10 @@
 
 namespace emberlock {
 
-// Conventions: row 0 is the top displayed row, column 0 the leftmost; coordinates in pixel units count from 0
-// at the CENTRE of the top left pixel in smear_sync (readings), and from 0 at its CORNER in recon
-// (projection, centres at +0.5). Samples of 16-bit formats are native-endian and right-aligned: a 12-bit
-// camera fills 0..4095.
+// Conventions: row 0 is the top displayed row, column 0 the leftmost. Coordinates are in pixels. In
+// smear_sync (readings) they count from 0 at the CENTRE of the top left pixel; in recon (projection) from 0
+// at its CORNER, so pixel centres lie at +0.5. Samples of 16-bit formats are native-endian and right-aligned:
+// a 12-bit camera fills 0..4095.
 
 enum class PixelFormat : std::uint8_t {
   gray8,
@@ -41,7 +41,7 @@ struct ImageSize {
 struct ImageLayout {
   ImageSize size;
   PixelFormat format = PixelFormat::gray8;
-  int bit_depth = 8;  ///< significant bits a sample: 8, or 9..16 for the 16-bit formats
+  int bit_depth = 8;  ///< significant bits per sample: 8, or 9..16 for the 16-bit formats
   friend constexpr bool operator==(ImageLayout, ImageLayout) = default;
 
   [[nodiscard]] constexpr int white() const { return (1 << bit_depth) - 1; }  ///< the saturated value
@@ -50,7 +50,8 @@ struct ImageLayout {
   }
 };
 
-/// Pixels that somebody else owns. `stride` is bytes from one row to the next, >= layout.row_bytes().
+/// A non-owning view of pixels. `stride` is the number of bytes from one row to the next, >=
+/// layout.row_bytes().
 struct ImageView {
   ImageLayout layout;
   const std::byte* data = nullptr;
@@ -63,14 +64,14 @@ struct ImageView {
   [[nodiscard]] const Sample* row_as(int y) const {
     return reinterpret_cast<const Sample*>(row(y));
   }
-  /// One sample as an integer, whatever the depth; c is 0 unless the format is RGB.
+  /// One sample as an integer, for any bit depth; c is 0 unless the format is RGB.
   [[nodiscard]] int sample(int x, int y, int c = 0) const {
     const int i = x * channels(layout.format) + c;
     return bytes_per_sample(layout.format) == 1 ? row_as<std::uint8_t>(y)[i] : row_as<std::uint16_t>(y)[i];
   }
 };
 
-/// An image that owns its pixels, rows packed without gaps, zero at construction.
+/// An image that owns its pixels. Rows are packed without gaps; pixels are zero at construction.
 class Image {
  public:
   Image() = default;

@@ -9,9 +9,9 @@
 
 namespace emberlock {
 
-/// Does `part` for each number below `count`, on as many threads as the machine has processors, this one
-/// among them; the others have its priority. `observer` is told of all of it, by one thread at a time. After
-/// a failure no part is begun and those under way are ended: the first failure is the answer.
+/// Calls `part` for each number below `count`, on one thread per processor, the calling thread included. The
+/// other threads get its priority. `observer` is told the overall progress, by one thread at a time. After a
+/// failure no further part begins, and the parts that run are told to stop. Returns the first failure.
 Status in_parallel(std::size_t count, const Observer& observer,
                    const std::function<Status(std::size_t number, const Observer& observer)>& part);
 

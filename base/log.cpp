@@ -68,8 +68,7 @@ class JsonFormatter final : public spdlog::formatter {
   }
 };
 
-/// sd-daemon(3): a line begins with its priority, as syslog counts them. Further lines of a message have it
-/// too.
+/// Formats lines as sd-daemon(3) asks: each line of a message begins with its syslog priority.
 class JournalFormatter final : public spdlog::formatter {
  public:
   void format(const spdlog::details::log_msg& message, spdlog::memory_buf_t& out) override {

@@ -7,22 +7,22 @@
 
 namespace emberlock {
 
-/// One category a folder that logs, so that `EMBERLOCK_LOG=session=debug` speaks of one stage alone.
+/// One category for each folder that logs, so that `EMBERLOCK_LOG=session=debug` shows one stage alone.
 enum class LogCategory { base, smear_sync, session, drivers, recon, rig, films, daemon, cli };
 
-/// The category's logger: to stderr, level `warn` unless the environment variable EMBERLOCK_LOG
-/// ("debug", or "session=debug,recon=info") says otherwise. Thread-safe.
+/// The category's logger. It writes to stderr. Its level is `warn` unless the environment variable
+/// EMBERLOCK_LOG ("debug", or "session=debug,recon=info") sets another. Thread-safe.
 spdlog::logger& log(LogCategory category);
 
 enum class LogFormat {
   text,     ///< "[2026-11-22 03:00:00.000] [daemon] [warning] ...", in colour on a terminal
-  json,     ///< one object a line: {"time": (ISO 8601, UTC), "level", "category", "thread", "message"}
-  journal,  ///< "<4>[daemon] ...": the journal knows the time, and reads the priority
+  json,     ///< one object per line: {"time": (ISO 8601, UTC), "level", "category", "thread", "message"}
+  journal,  ///< "<4>[daemon] ...": no time, since the journal adds it; the priority in front
 };
 
-/// How every category writes from now on; text until then. Thread-safe.
+/// Sets the format of all categories from now on. The default is text. Thread-safe.
 void set_log_format(LogFormat format);
-/// Whether stderr is the system's journal (JOURNAL_STREAM, as systemd sets it).
+/// Whether stderr is connected to the system's journal (by JOURNAL_STREAM, which systemd sets).
 bool logs_to_journal();
 std::unique_ptr<spdlog::formatter> log_formatter(LogFormat format);
 

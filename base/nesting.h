@@ -8,12 +8,13 @@
 
 namespace emberlock {
 
-/// Deeper than any file of ours, or that we read, and far from what a thread's stack holds of a parser that
-/// calls itself.
+/// Deeper than any file that we write or read, and far less than a recursive parser needs to exhaust a
+/// thread's stack.
 inline constexpr int kDeepestNesting = 64;
 
-/// Before foreign JSON is parsed: brackets outside strings, at most `deepest` in each other. What isn't JSON
-/// is the parser's to refuse, which reads no further than its first fault. Errors: bad_input with the line.
+/// Limits the nesting of foreign JSON before it is parsed: at most `deepest` open brackets, those in strings
+/// aside. Other syntax errors are left to the parser, which stops at the first one. Errors: bad_input with
+/// the line.
 Status check_json_nesting(std::string_view text, const std::string& where, int deepest = kDeepestNesting);
 
 }  // namespace emberlock

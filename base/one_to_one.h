@@ -8,8 +8,8 @@
 
 namespace emberlock {
 
-/// A short list of pairs, looked up either way: an enumeration's names, or its numbers in a file. No two
-/// pairs share a side.
+/// A short list of pairs that is searched by either side: an enumeration's names, or its numbers in a file.
+/// No value occurs twice on a side.
 template <class A, class B, std::size_t N>
 struct OneToOne {
   std::array<std::pair<A, B>, N> pairs;

@@ -35,7 +35,7 @@ Status write_list(const fs::path& folder, const ResultList& list) {
   return write_file_atomically(folder / kResultList, result_list_text(list));
 }
 
-/// Whether the file system lets what is kept be linked into the new folder.
+/// Whether the file system allows hard links from kept files into the new folder.
 Status try_links(const Survey& found, const fs::path& target, const fs::path& staging) {
   const fs::path probe = staging / ".probe";
   for (const Kept& kept : found.kept) {
@@ -51,7 +51,7 @@ Status try_links(const Survey& found, const fs::path& target, const fs::path& st
   return {};
 }
 
-/// The new folder's files, and its folders, the deepest last.
+/// The new folder's files, and its subfolders with the deepest last.
 struct Contents {
   std::vector<ListedFile> files;
   std::vector<fs::path> folders;
@@ -75,7 +75,7 @@ Result<Contents> contents_of(const fs::path& staging, const std::string& verb) {
   return contents;
 }
 
-/// All begin to be written before the first is waited for, so that the disk may order them.
+/// Starts the write-back of all files before it waits for the first, so that the disk can order the writes.
 Status flush(const fs::path& staging, const Contents& contents) {
   std::vector<fs::path> paths;
   for (const ListedFile& file : contents.files) paths.push_back(staging / file.path);
@@ -98,7 +98,7 @@ Status flush_folders(const fs::path& staging) {
   return flush(staging, contents);
 }
 
-/// A folder with the mode of the one that it stands for.
+/// Creates a folder with the mode of `model`.
 Status make_like(const fs::path& model, const fs::path& folder) {
   struct stat info {};
   if (::mkdir(folder.c_str(), 0777) != 0)
@@ -107,14 +107,15 @@ Status make_like(const fs::path& model, const fs::path& folder) {
   return {};
 }
 
-/// Links what is kept into the new folder, or nothing.
+/// Links the kept files into the new folder: all of them, or none.
 class Carrier {
  public:
   Carrier(const fs::path& target, const fs::path& staging) : target_(target), staging_(staging) {}
 
   Status carry(const Survey& found, ResultList& list) {
     for (const Kept& kept : found.kept) {
-      if (is_there(staging_ / kept.path)) continue;  // conflict() allowed it: the new one takes its place
+      if (is_there(staging_ / kept.path))
+        continue;  // conflict() allowed it: the new file replaces the kept one
       if (Status done = carry(kept); !done.ok()) {
         for (const fs::path& link : made_) ::unlink(link.c_str());
         return done;
@@ -151,7 +152,7 @@ Error cannot_move(const fs::path& target) {
                            "Check that the folder's parent is writable");
 }
 
-/// Puts `staging` where an earlier result stands. Returns where that is now.
+/// Puts `staging` in the place of an earlier result. Returns the path to which the earlier result moved.
 Result<fs::path> exchange(const fs::path& staging, const fs::path& target, Replace how) {
   if (how == Replace::at_once) {
     if (::renameat2(AT_FDCWD, staging.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) == 0)
@@ -170,7 +171,7 @@ Result<fs::path> exchange(const fs::path& staging, const fs::path& target, Repla
   return error;
 }
 
-/// The first of NAME, NAME-2, NAME-3, ... that is free, given to `folder`.
+/// Renames `folder` to the first free name among NAME, NAME-2, NAME-3, ...
 Result<fs::path> give_free_name(const fs::path& folder, const fs::path& name) {
   for (int i = 1; i < 10'000; ++i) {
     fs::path free = name;
@@ -184,7 +185,7 @@ Result<fs::path> give_free_name(const fs::path& folder, const fs::path& name) {
   return refused_by_system(folder, "cannot be renamed");
 }
 
-/// Whether `path`, or a folder that it lies in, is `folder`.
+/// Whether `path` is `folder` or lies in it.
 bool lies_in(const fs::path& path, const fs::path& folder) {
   std::error_code ec;
   for (fs::path at = path;; at = at.parent_path()) {
@@ -193,7 +194,7 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
   }
 }
 
-/// Makes a folder and those that it lies in, as far as they are absent; `made` says which.
+/// Creates a folder and its missing parents; `made` receives those that were created.
 Status make_folders(const fs::path& folder, std::vector<fs::path>& made) {
   std::vector<fs::path> absent;
   for (fs::path at = folder; !is_there(at); at = at.parent_path()) absent.push_back(at);
@@ -207,7 +208,7 @@ Status make_folders(const fs::path& folder, std::vector<fs::path>& made) {
   return {};
 }
 
-/// No other folder can take the place of one that something is mounted at.
+/// A mount point can't be replaced by another folder.
 Status check_not_mounted(const fs::path& target) {
   struct statx info {};
   struct statx parent {};
@@ -223,13 +224,13 @@ Status check_not_mounted(const fs::path& target) {
                "Name a folder within it: " + (target / "result").string()};
 }
 
-/// Owner, as far as that is allowed, and mode of what stands at `target`; the owner may always write.
+/// Copies the owner (where allowed) and the mode of `target`; the owner can always write.
 void take_after(const fs::path& target, const fs::path& staging) {
   struct stat info {};
   if (::stat(target.c_str(), &info) != 0) return;
   if (::chown(staging.c_str(), info.st_uid, info.st_gid) != 0)
     static_cast<void>(::chown(staging.c_str(), static_cast<uid_t>(-1), info.st_gid) == 0);
-  ::chmod(staging.c_str(), (info.st_mode & 07777) | S_IRWXU);  // last: chown takes bits away
+  ::chmod(staging.c_str(), (info.st_mode & 07777) | S_IRWXU);  // after chown, which clears mode bits
 }
 
 }  // namespace
@@ -239,7 +240,7 @@ Status check_apart(const fs::path& target, const std::vector<fs::path>& inputs) 
   for (const fs::path& input : inputs) {
     std::error_code ec;
     const fs::path real = fs::canonical(input, ec);
-    if (ec) continue;  // whoever reads it says so
+    if (ec) continue;  // the step that reads it reports the error
     const char* remedy = "Name a folder apart from what is read";
     if (lies_in(real, resolved))
       return Error{ErrorKind::bad_input, "lies in the folder that is to be written, " + target.string(),
@@ -280,7 +281,7 @@ bool remove_ours(const fs::path& folder,
 }
 
 Status OutputFolder::check(const OutputRequest& request) {
-  // Making the hidden folder and letting it go asks the same questions as the real thing.
+  // Creating the hidden folder and removing it again makes exactly the checks of a real run.
   const auto probe = create(request);
   return probe ? Status() : Status(probe.error());
 }
@@ -329,7 +330,7 @@ OutputFolder::~OutputFolder() {
 
 Status OutputFolder::commit() {
   const fs::path& target = request_.target;
-  // What takes long comes before the lock, which others wait for.
+  // The slow part comes before the lock, because others wait for the lock.
   EMBERLOCK_ASSIGN_OR_RETURN(const Contents contents, contents_of(staging_, std::string(request_.verb.name)));
   EMBERLOCK_RETURN_IF_ERROR(flush(staging_, contents));
   const auto parent = lock_folder(target.parent_path());
@@ -337,8 +338,9 @@ Status OutputFolder::commit() {
   Survey found;
   Status moves = parent ? look_again(found) : Status(parent.error());
   if (moves.ok()) moves = Carrier(target, staging_).carry(found, list);
-  lock_ = UniqueFd();  // of the list that is replaced now: over NFS who holds it would keep its file alive
-  // The result is complete and on the disk: from here on it isn't lost, whatever fails.
+  lock_ = UniqueFd();  // on the old list, which is replaced now: over NFS an open handle would keep that file
+                       // alive
+  // The result is complete and on the disk. From here on no failure loses it.
   made_.clear();
   if (const Status listed = write_list(staging_, list); !listed.ok()) moves = listed;
   if (moves.ok()) moves = flush_folders(staging_);
@@ -379,7 +381,7 @@ Error OutputFolder::leave_beside(Error why) {
   fs::path beside = request_.target;
   beside += ".new";
   const auto name = give_free_name(staging_, beside);
-  // Without its list nobody takes a folder of a hidden name for one that can be cleared away.
+  // A hidden folder without its list is never cleared away.
   if (!name) ::unlink((staging_ / kResultList).c_str());
   why.what += "; the result is complete in " + (name ? *name : staging_).string();
   staging_.clear();

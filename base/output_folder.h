@@ -18,67 +18,65 @@ namespace emberlock {
 
 struct Survey;
 
-/// The list of a result's files, which lies in it: {"format": "emberlock result", "version": 1, "files":
-/// [{"path", "verb", "bytes", "modified_ns"}]}. A folder is an earlier result if it holds such a list, never
-/// by any other file's name; what the list doesn't name, or what was changed since, is somebody else's.
+/// The list of a result's files, stored in the result's folder: {"format": "emberlock result", "version": 1,
+/// "files": [{"path", "verb", "bytes", "modified_ns"}]}. Only this list makes a folder an earlier result.
+/// Files that it doesn't name, or that changed since, belong to somebody else.
 inline constexpr const char* kResultList = "emberlock-files.json";
 
-/// Who makes an output folder.
+/// The verb that writes an output folder.
 struct OutputVerb {
   std::string_view name;  ///< as typed: "calibrate cameras"
-  /// Verbs whose results may lie in the same folder: their files stay, but for those of a name that is
-  /// written anew.
+  /// Verbs whose results may share the folder. Their files are kept, except those that are written again.
   std::span<const std::string_view> beside = {};
 };
 
-/// How an earlier result gives way to a new one.
+/// How a new result replaces an earlier one.
 enum class Replace {
-  at_once,       ///< the kernel exchanges both folders; in two steps where the file system can't
-  in_two_steps,  ///< the earlier one is called "TARGET.emberlock-earlier" for a moment; for file systems
-                 ///< without exchange
+  at_once,       ///< the kernel exchanges both folders; two steps where the file system can't exchange
+  in_two_steps,  ///< for file systems without exchange: the earlier one is called "TARGET.emberlock-earlier"
+                 ///< for a moment
 };
 
 struct OutputRequest {
   std::filesystem::path target;
   OutputVerb verb;
-  /// What is read: none of it may be the target, lie in it, or be a folder in which the target lies.
+  /// Inputs of the verb. The target may not be one of them, contain one, or lie in one.
   std::vector<std::filesystem::path> inputs = {};
-  /// Inputs that may lie in the target all the same, if they are files of the earlier result, unchanged: the
-  /// verb writes them anew.
+  /// Inputs that may lie in the target if they are unchanged files of the earlier result: the verb rewrites
+  /// them.
   std::vector<std::filesystem::path> updated = {};
   Replace replace = Replace::at_once;
 };
 
-/// Whether a folder may be made at `target` from these inputs. Errors: bad_input, with the input that is in
-/// the way. Symlinks and relative paths are seen through, and where one of these very folders is mounted
-/// elsewhere too.
+/// Whether a folder at `target` is separate from these inputs. Symlinks, relative paths and bind mounts of
+/// the same folders are resolved. Errors: bad_input, naming the input that is in the way.
 Status check_apart(const std::filesystem::path& target, const std::vector<std::filesystem::path>& inputs);
 
-/// Whether `folder` is absent, or an empty folder. Errors: bad_input.
+/// Succeeds when `folder` is absent or an empty folder. Errors: bad_input.
 Status check_new_folder(const std::filesystem::path& folder);
 
-/// Removes the files below `folder` (symlinks are files, and never followed) that `ours` says yes to, by
-/// their path within it, then the folders that are empty. Returns whether nothing is left, `folder` itself
-/// included.
+/// Removes the files below `folder` for which `ours` (called with the path within it) returns true, then all
+/// empty folders. Symlinks count as files and are never followed. Returns whether everything is gone,
+/// `folder` included.
 bool remove_ours(const std::filesystem::path& folder,
                  const std::function<bool(const std::string& path, const struct stat& info)>& ours);
 
-/// Every folder that a verb writes: filled in a hidden folder beside it (`path()`), and under its final name
-/// only when it is complete and on the disk (`commit()`). Abandoned (destroyed without commit) it removes
-/// what was written.
+/// The output folder of a verb. It is filled as a hidden folder beside the target (`path()`) and renamed to
+/// the target only when it is complete and on the disk (`commit()`). When it is destroyed without commit(),
+/// it removes what was written.
 ///
-/// An existing target is refused unless it is empty, or an earlier result of this verb. Of an earlier result
-/// only those files are replaced that its list names and that are as it left them; whatever else lies there
-/// is carried over into the new folder (as hard links, so nothing is copied), and where it can't be, or has a
-/// name that the new result needs, the target stays as it is. Killed at any moment either the earlier folder
-/// or the new one stands whole, each with everything that was somebody else's.
+/// An existing target is refused unless it is empty or an earlier result of this verb. Of an earlier
+/// result, only unchanged files named in its list are replaced. All other files are carried over into the new
+/// folder as hard links, without copying. If one of them can't be linked, or has a name that the new result
+/// needs, the target stays as it is. If the process is killed at any moment, either the earlier or the new
+/// folder is complete, each with everybody else's files.
 class OutputFolder {
  public:
-  /// Makes the hidden folder, and the target's parents where they are absent. The new folder has the mode of
-  /// one that stands there, and its owner where that is allowed. Errors: bad_input (what is in the way, and
-  /// what to do; a target that something is mounted at), io.
+  /// Creates the hidden folder, and missing parents of the target. The new folder has the mode of an existing
+  /// target, and its owner where that is allowed. Errors: bad_input (what is in the way and what to do about
+  /// it; the target is a mount point), io.
   static Result<OutputFolder> create(const OutputRequest& request);
-  /// What create() would say; leaves nothing behind. For verbs that work for long before they write.
+  /// Makes the checks of create() and leaves nothing behind. For verbs that work for long before they write.
   static Status check(const OutputRequest& request);
 
   OutputFolder(OutputFolder&& o) noexcept;
@@ -86,22 +84,22 @@ class OutputFolder {
   ~OutputFolder();
 
   [[nodiscard]] const std::filesystem::path& path() const { return staging_; }
-  /// Lists what lies in path(), flushes it and gives it its name. Where that can't be, because the target has
-  /// meanwhile come to hold what can't be carried over, or the system refuses, what stands there stays, the
-  /// result is complete in "TARGET.new" and the error says so.
+  /// Lists the files in path(), flushes them and renames the folder to the target. If that fails, because
+  /// files that can't be carried over have appeared in the target or the system refuses, the target stays as
+  /// it is; the complete result is left in "TARGET.new" and the error says so.
   Status commit();
 
  private:
   explicit OutputFolder(OutputRequest request) : request_(std::move(request)) {}
-  /// The target as it is now, and whether the new result can still take its place.
+  /// Surveys the target again and checks that the new result can still replace it.
   Status look_again(Survey& found) const;
-  /// Gives the complete result a name of its own. Returns why, and where it is.
+  /// Gives the complete result a name of its own. The error adds that name to `why`.
   Error leave_beside(Error why);
 
-  OutputRequest request_;  // its target resolved
+  OutputRequest request_;  // its target is resolved
   std::filesystem::path staging_;
-  std::vector<std::filesystem::path> made_;  // parents, which go again if nothing comes to lie in them
-  UniqueFd lock_;                            // on the list, while it says that the result isn't finished
+  std::vector<std::filesystem::path> made_;  // created parents; removed again if nothing was put in them
+  UniqueFd lock_;                            // on the list, held while the result isn't finished
 };
 
 }  // namespace emberlock

@@ -26,11 +26,11 @@ bool same_inode(const fs::path& path, const struct stat& info) {
   return ::lstat(path.c_str(), &other) == 0 && other.st_dev == info.st_dev && other.st_ino == info.st_ino;
 }
 
-/// A folder that OutputFolder::create() made. While nobody fills it any more, and its list says that it
-/// wasn't finished, all of it goes.
+/// Cleans up after a hidden folder of OutputFolder::create(). It is removed if no process fills it any more
+/// and its list says that it wasn't finished.
 void clean_up_hidden(const fs::path& folder, const fs::path& target) {
   const auto list = read_result_list(folder);
-  if (!list) {  // killed before there was one
+  if (!list) {  // killed before the list was written
     const std::string partial = "." + std::string(kResultList) + ".partial.";
     remove_ours(folder, [&](const std::string& path, const struct stat& /*info*/) {
       return path.starts_with(partial);
@@ -93,7 +93,7 @@ Result<UniqueFd> lock_folder(const fs::path& folder, Seconds patience) {
 }
 
 UniqueFd lock_list(const fs::path& folder) {
-  // For writing: over NFS nothing else can be locked for oneself alone.
+  // Opened for writing, because NFS grants an exclusive lock on nothing else.
   UniqueFd fd(::open((folder / kResultList).c_str(), O_RDWR | O_NOFOLLOW | O_CLOEXEC));
   if (fd && ::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) fd = UniqueFd();
   return fd;
@@ -116,11 +116,11 @@ bool discard(const fs::path& folder, const fs::path& target) {
 Status clean_up(const fs::path& target) {
   const fs::path earlier = earlier_of(target);
   if (const auto list = read_result_list(earlier); list && list->finished) {
-    // Back to its name, where nothing has taken that or an empty folder alone.
+    // Back to its name, if that is free or taken only by an empty folder.
     if (::rename(earlier.c_str(), target.c_str()) != 0 && (errno == ENOTEMPTY || errno == EEXIST))
       discard(earlier, target);
   } else {
-    ::rmdir(earlier.c_str());  // where it is empty
+    ::rmdir(earlier.c_str());  // if it is empty
   }
   const std::string prefix = hidden_prefix(target);
   std::error_code ec;

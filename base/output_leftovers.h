@@ -10,35 +10,35 @@
 
 namespace emberlock {
 
-// What runs put beside their targets, and how what killed runs left is put right.
+// Names of the folders that a run makes beside its target, and the cleanup of what killed runs left.
 
-/// The beginning of the name of every folder that `target` was ever filled in.
+/// The prefix of the names of all hidden folders in which results for `target` are filled.
 std::string hidden_prefix(const std::filesystem::path& target);
-/// What the earlier result is called for a moment where the file system can't exchange two folders.
+/// The temporary name of the earlier result on file systems that can't exchange two folders.
 std::filesystem::path earlier_of(const std::filesystem::path& target);
 
-/// Something of this name; what a symlink leads to doesn't matter.
+/// Whether anything of this name exists; symlinks aren't followed.
 bool is_there(const std::filesystem::path& path);
 
-/// Of kind io, with what errno says.
+/// An error of kind io with errno's text.
 Error refused_by_system(const std::filesystem::path& path, const std::string& action,
                         std::string remedy = "Check the disk's space and the folder's permissions");
 
-/// Holds off all others who replace, or clean up, in one folder, until it is closed. Waits for them while
-/// patience lasts, and says so. Errors: io.
+/// Locks a folder against other processes that replace results or clean up in it, until the descriptor is
+/// closed. Waits up to `patience`, and reports that it waits. Errors: io.
 Result<UniqueFd> lock_folder(const std::filesystem::path& folder, Seconds patience = Seconds(120));
 
-/// Locks the list in a folder, if nobody else has: as long as it is held the folder is being filled. Empty
-/// otherwise.
+/// Locks the list in a folder. While the lock is held, the folder counts as being filled. Empty if another
+/// process holds it.
 UniqueFd lock_list(const std::filesystem::path& folder);
 
-/// Removes what is left of a folder that `target` has taken the place of: the files of its own list, and
-/// those that `target` holds too (hard links of the same). The list goes last, so that who is killed here
-/// leaves a folder that can be known. Returns whether nothing is left.
+/// Removes the rest of a folder that `target` has replaced: the files of its own list, and hard links of
+/// files that `target` holds too. The list is removed last, so a killed cleanup can be continued. Returns
+/// whether everything is gone.
 bool discard(const std::filesystem::path& folder, const std::filesystem::path& target);
 
-/// Puts right what runs left that were killed; its parent is locked. Errors: bad_input where something else
-/// has the name of earlier_of(target).
+/// Cleans up what killed runs left beside `target`. The parent folder must be locked. Errors: bad_input where
+/// something else has the name earlier_of(target).
 Status clean_up(const std::filesystem::path& target);
 
 }  // namespace emberlock

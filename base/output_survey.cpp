@@ -24,7 +24,7 @@ Error cannot(const fs::path& path, const std::string& action, int code) {
           "Check the folder's permissions, or name a new one"};
 }
 
-/// Compares what lies in a target with what its list says.
+/// Compares the contents of a target with its list.
 class Surveyor {
  public:
   Surveyor(fs::path target, const OutputVerb& verb, const struct stat& root)
@@ -108,8 +108,8 @@ class Surveyor {
   const OutputVerb& verb_;
   dev_t device_;
   std::map<std::string, ListedFile> listed_;
-  std::set<std::string> ours_;   // folders of listed files
-  std::set<std::string> holds_;  // folders of anything
+  std::set<std::string> ours_;   // folders that hold listed files
+  std::set<std::string> holds_;  // folders that hold anything
   std::vector<std::string> folders_;
   Survey found_;
 };

@@ -11,28 +11,29 @@
 
 namespace emberlock {
 
-/// Something in a target that a new result doesn't replace.
+/// An entry of the target that a new result doesn't replace.
 struct Kept {
-  std::string path;                  ///< within the target
-  bool folder = false;               ///< an empty one
-  std::optional<ListedFile> listed;  ///< a verb's that may lie beside: gives way to a new file of its name
+  std::string path;     ///< within the target
+  bool folder = false;  ///< an empty folder
+  std::optional<ListedFile>
+      listed;  ///< file of a verb whose results may share the folder: a new file of its name replaces it
 };
 
-/// What stands at a target before a result takes its place.
+/// The contents of a target before a result replaces it.
 struct Survey {
-  bool earlier = false;  ///< an earlier result; otherwise absent or empty
+  bool earlier = false;  ///< holds an earlier result; else it is absent or empty
   std::vector<Kept> kept;
-  std::vector<std::string> replaced;  ///< files of the earlier result, unchanged
+  std::vector<std::string> replaced;  ///< unchanged files of the earlier result
 };
 
-/// `target` is resolved. Errors: bad_input where `verb` can't replace it, with what is in the way: no folder,
-/// no list in it, another verb's result, a file that was changed; io where it can't be read whole.
+/// Surveys a resolved target. Errors: bad_input where `verb` can't replace it, saying why (not a folder, no
+/// list in it, another verb's result, a file that was changed); io where it can't be read completely.
 Result<Survey> survey(const std::filesystem::path& target, const OutputVerb& verb);
 
-/// The target's own name: absolute, symlinks resolved. Errors: bad_input where it can't name a folder.
+/// The target as an absolute path with symlinks resolved. Errors: bad_input where it can't name a folder.
 Result<std::filesystem::path> resolve_target(const std::filesystem::path& target);
 
-/// Why `path`, of the new result, can't take its place beside what is kept; nothing where it can.
+/// Why `path` of the new result conflicts with what is kept; empty if it doesn't.
 std::optional<Error> conflict(const Survey& survey, const std::filesystem::path& staging,
                               const std::filesystem::path& target);
 

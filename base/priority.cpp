@@ -10,7 +10,7 @@ namespace emberlock {
 
 void give_way() {
   constexpr int kLowest = 19;
-  // On Linux a priority is a thread's own, and its turn at the disk goes by it too.
+  // On Linux each thread has its own priority, which also orders its disk accesses.
   if (::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowest) != 0)
     log(LogCategory::base).warn("a thread that should give way runs at normal priority");
 }

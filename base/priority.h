@@ -3,8 +3,8 @@
 
 namespace emberlock {
 
-/// From now on this thread gets what processor and disk the others leave: for work that may take its time
-/// while something is recorded. For good: a thread that isn't privileged can't take it back.
+/// Gives this thread the lowest priority for processor and disk: for background work while something is
+/// recorded. Permanent, since an unprivileged thread can't raise its priority again.
 void give_way();
 
 }  // namespace emberlock

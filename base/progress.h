@@ -9,27 +9,27 @@
 
 namespace emberlock {
 
-/// How far a long step has come: fraction in 0..1 and a few words. May be empty. Called by a thread that
-/// works, one at a time.
+/// Receives the progress of a long step: a fraction in 0..1 and a few words. May be empty. Called from a
+/// working thread, never by two at a time.
 using Progress = std::function<void(double fraction, std::string_view what)>;
 
-/// The most that is reported before the end.
+/// The largest fraction that is reported before the end.
 inline constexpr double kNearlyDone = 0.999;
 
 inline void tell(const Progress& progress, double fraction, std::string_view what) {
   if (progress) progress(fraction, what);
 }
 
-/// As Progress, of a step that can be ended early: false says that nobody wants the rest.
+/// Like Progress, for a step that can be cancelled: false asks the step to stop.
 using Observer = std::function<bool(double fraction, std::string_view what)>;
 
-/// Error `refused` where the observer wants no more.
+/// Reports progress. Error `refused` when the observer asks to stop.
 inline Status observe(const Observer& observer, double fraction, std::string_view what) {
   if (!observer || observer(fraction, what)) return {};
   return Error{ErrorKind::refused, "ended early, as asked", std::string(what)};
 }
 
-/// The part of a step from `from` to `to` of it, as a step of its own.
+/// An observer for a part of a step: maps its 0..1 to from..to of the whole.
 inline Observer part_of(const Observer& whole, double from, double to) {
   if (!whole) return {};
   return [&whole, from, to](double fraction, std::string_view what) {

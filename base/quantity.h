@@ -6,8 +6,9 @@
 
 namespace emberlock {
 
-/// A number with its unit in the type. `value()` is in the unit that the alias names (SI, or image rows).
-/// Quantities of one unit add, compare and scale; the products below are the only ones between units.
+/// A number whose type is its unit. `value()` is in the unit that the alias names (SI, or image rows).
+/// Quantities of one unit can be added, compared and scaled. The products below are the only ones between
+/// units.
 template <class Unit>
 class Quantity {
  public:
@@ -60,7 +61,7 @@ constexpr double operator*(Hertz f, Seconds t) { return f.value() * t.value(); }
 constexpr Seconds period(Hertz f) { return Seconds(1 / f.value()); }
 constexpr Hertz rate(Seconds t) { return Hertz(1 / t.value()); }
 
-/// a modulo n in [0, n), for n > 0; never n itself, whatever the rounding.
+/// a modulo n in [0, n), for n > 0. Rounding never yields n itself.
 inline double wrap_positive(double a, double n) {
   const double r = a - n * std::floor(a / n);
   return r >= n || r < 0 ? 0 : r;

@@ -32,13 +32,13 @@ HOST_DEVICE constexpr double random_uniform(std::uint64_t seed, std::uint64_t st
   return uniform(random_bits(seed, stream, counter));
 }
 
-/// Standard normal by Box and Muller (1958).
+/// Standard normal, by Box and Muller (1958).
 HOST_DEVICE inline double random_normal(std::uint64_t seed, std::uint64_t stream, std::uint64_t counter) {
   const std::uint64_t bits = random_bits(seed, stream, counter);
   return std::sqrt(-2 * std::log(uniform(bits))) * std::cos(6.283185307179586 * uniform(mix64(bits)));
 }
 
-/// The same laws as a stateful stream, for code that draws one number after the other.
+/// The same generators as a stateful stream, for code that draws one number after another.
 class RandomStream {
  public:
   RandomStream(std::uint64_t seed, std::uint64_t stream) : seed_(seed), stream_(stream) {}

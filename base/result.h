@@ -9,13 +9,13 @@
 namespace emberlock {
 
 enum class ErrorKind {
-  bad_input,      ///< a file, an option or a value that the user can mend (exit code 2)
+  bad_input,      ///< a file, an option or a value that the user can correct (exit code 2)
   io,             ///< the operating system refused: disk, permissions, sockets
   device,         ///< a camera, strobe or accelerator failed or is absent
   out_of_data,    ///< the stream, file or recording has ended
   timed_out,      ///< a deadline passed
-  refused,        ///< it can't be done in the present state; another moment may do
-  not_converged,  ///< an iteration's numbers don't settle: its result would be worse than none
+  refused,        ///< impossible in the present state; may succeed later
+  not_converged,  ///< an iteration didn't converge: its result would be worse than none
 };
 
 /// What went wrong, where (file, field, device), and what to do about it.
@@ -29,7 +29,8 @@ struct Error {
   [[nodiscard]] std::string message() const;
 };
 
-/// A value, or the error that explains why there is none. Accessing the absent one is a logic error (throws).
+/// A value, or the error that explains why there is none. Reading the one that is absent throws (a logic
+/// error).
 template <class T>
 class [[nodiscard]] Result {
  public:
@@ -75,14 +76,15 @@ using Status = Result<void>;
 #define EMBERLOCK_CONCAT_INNER(a, b) a##b
 #define EMBERLOCK_CONCAT(a, b) EMBERLOCK_CONCAT_INNER(a, b)
 
-/// Returns the error of a Result<> from the enclosing function; goes on otherwise.
+/// Returns the error of a Result<> from the enclosing function, if it has one.
 #define EMBERLOCK_RETURN_IF_ERROR(expression)                         \
   if (auto emberlock_status = (expression); !emberlock_status.ok()) { \
     return emberlock_status.error();                                  \
   }                                                                   \
   static_assert(true)
 
-/// EMBERLOCK_ASSIGN_OR_RETURN(auto x, f()): x is f()'s value; its error returns from the enclosing function.
+/// EMBERLOCK_ASSIGN_OR_RETURN(auto x, f()): sets x to f()'s value, or returns its error from the enclosing
+/// function.
 #define EMBERLOCK_ASSIGN_OR_RETURN(declaration, expression)          \
   auto EMBERLOCK_CONCAT(emberlock_result_, __LINE__) = (expression); \
   if (!EMBERLOCK_CONCAT(emberlock_result_, __LINE__).ok())           \

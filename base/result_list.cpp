@@ -82,7 +82,8 @@ std::string result_list_text(const ResultList& list) {
     json["files"].push_back(
         {{"path", file.path}, {"verb", file.verb}, {"bytes", file.bytes}, {"modified_ns", file.modified_ns}});
   }
-  // A name that isn't UTF-8 comes back as another one: that file then counts as somebody else's, and stays.
+  // A name that isn't UTF-8 doesn't survive the round trip. Its file then counts as somebody else's and is
+  // kept.
   return json.dump(1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 

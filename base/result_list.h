@@ -12,28 +12,28 @@ struct stat;
 
 namespace emberlock {
 
-/// A file as the verb left it.
+/// A file as the verb wrote it.
 struct ListedFile {
-  std::string path;  ///< within the result
+  std::string path;  ///< relative to the result's folder
   std::string verb;
   std::uint64_t bytes = 0;
   std::int64_t modified_ns = 0;
 };
 
-/// What kResultList says.
+/// The content of kResultList.
 struct ResultList {
   std::vector<ListedFile> files;
   bool finished = true;  ///< false while the folder is being filled
 };
 
-/// Errors: bad_input where there is none, or it isn't one: another format or version, a path that leads out
-/// of the folder, a symlink.
+/// Reads the list of a result's folder. Errors: bad_input where there is none or it isn't valid: another
+/// format or version, a path that leads out of the folder, a symlink.
 Result<ResultList> read_result_list(const std::filesystem::path& folder);
 std::string result_list_text(const ResultList& list);
 
-/// A regular file, as it is now.
+/// Describes a regular file from its stat().
 ListedFile listed_as(std::string path, std::string verb, const struct stat& info);
-/// Whether it is still the file that was listed.
+/// Whether the file is still as listed.
 bool is_unchanged(const ListedFile& listed, const struct stat& info);
 
 }  // namespace emberlock

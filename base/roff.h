@@ -6,7 +6,7 @@
 
 namespace emberlock {
 
-/// Text as roff shows it, the language of manual pages: what it would take for its own is escaped.
+/// Escapes text for roff, the language of manual pages.
 std::string roff(std::string_view text);
 
 }  // namespace emberlock

@@ -7,12 +7,13 @@
 
 namespace emberlock {
 
-/// How a camera's sensor is exposed and read, which decides what a flash leaves in its pictures. In each,
-/// t_start ends the exposure of what is read first.
+/// How a camera's sensor is exposed and read out. This decides which trace a flash leaves in its pictures.
+/// For each kind, t_start is the end of the exposure of the part that is read first.
 enum class SensorKind {
-  ccd,  ///< interline CCD: charge is shifted past the lamp, and a flash in the read phase leaves a dot
-  rolling_shutter,  ///< each row is exposed a row time after the one before: a flash lights a band of rows
-  global_shutter,   ///< the whole frame is exposed at once: a flash falls into it or doesn't
+  ccd,  ///< interline CCD: charge is shifted past the lamp's image; a flash during the read phase leaves a
+        ///< dot
+  rolling_shutter,  ///< rows are exposed one after another, a row time apart: a flash lights a band of rows
+  global_shutter,   ///< the whole frame is exposed at once: a flash falls into the exposure or not
 };
 
 inline constexpr OneToOne<SensorKind, std::string_view, 3> kSensorNames{

@@ -7,11 +7,12 @@
 
 namespace emberlock {
 
-/// How loud a clip's sound track is: the root mean square of all channels, step by step, on any scale.
+/// The loudness of a clip's sound track: the RMS over all channels in consecutive time steps, in arbitrary
+/// units.
 struct SoundTrack {
-  Seconds begin{};  ///< of the first step, after the clip's first frame
+  Seconds begin{};  ///< of the first step, relative to the clip's first frame
   Seconds step = milliseconds(1);
-  std::vector<float> levels{};  ///< empty: the clip has no sound
+  std::vector<float> levels{};  ///< empty if the clip has no sound
 };
 
 }  // namespace emberlock

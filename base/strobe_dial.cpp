@@ -15,7 +15,7 @@ constexpr int kMostDigits = 4;
 }  // namespace
 
 Hertz StrobeDial::nearest(Hertz rate) const {
-  // In flashes a minute, whose steps people count: 0.1 is a tenth of them, not of a second's.
+  // The dial steps in flashes per minute: a step of 0.1 is a tenth of a flash per minute, not per second.
   const double steps_a_flash = 1 / (60 * step.value());
   const double steps = std::round(60 * rate.value() * steps_a_flash);
   return std::clamp(Hertz(steps / steps_a_flash / 60), slowest, fastest);

@@ -8,16 +8,16 @@
 
 namespace emberlock {
 
-/// The knob of a strobe that somebody sets by hand, and that no program can talk to. People read it in
-/// flashes per minute.
+/// The dial of a strobe that is set by hand and has no interface to a program. Its scale is in flashes per
+/// minute.
 struct StrobeDial {
   Hertz slowest{30.0 / 60};
   Hertz fastest{20000.0 / 60};
   Hertz step{0.1 / 60};  ///< between two settings, > 0
 
-  /// The setting nearest to a rate.
+  /// The setting closest to a rate.
   [[nodiscard]] Hertz nearest(Hertz rate) const;
-  /// "1438.6", as far as the dial's steps tell.
+  /// The rate as the dial shows it, with as many digits as its step has: "1438.6".
   [[nodiscard]] std::string per_minute(Hertz rate) const;
   friend bool operator==(const StrobeDial&, const StrobeDial&) = default;
 };

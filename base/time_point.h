@@ -8,8 +8,8 @@
 
 namespace emberlock {
 
-/// An instant on one clock, in whole nanoseconds since that clock's origin. Integer, so that a recorded
-/// instant replays to the same bits. Differences are `Seconds`.
+/// An instant on one clock, in whole nanoseconds since that clock's origin. An integer, so that a recorded
+/// instant is replayed exactly. Differences are `Seconds`.
 struct TimePoint {
   std::int64_t ns = 0;
 

@@ -7,7 +7,7 @@
 
 namespace emberlock {
 
-/// Owns a file descriptor; closes it once.
+/// Owns a file descriptor and closes it.
 class UniqueFd {
  public:
   UniqueFd() = default;

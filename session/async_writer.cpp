@@ -10,6 +10,8 @@
 #include <thread>
 #include <utility>
 
+#include "base/thread_load.h"
+
 namespace emberlock::session {
 namespace {
 
@@ -25,7 +27,7 @@ Seconds since(Clock::time_point t) {
 
 }  // namespace
 
-/// What all threads use. The writer itself lets distinct cameras write at the same time.
+/// State shared by all threads. The writer itself allows different cameras to write at the same time.
 struct AsyncWriter::Shared {
   Shared(SessionWriter w, const AsyncWriterOptions& o) : writer(std::move(w)), options(o) {}
 
@@ -42,7 +44,7 @@ struct AsyncWriter::Shared {
   std::optional<Error> failure;  ///< guarded by mutex
 };
 
-/// Has the disk hold what was handed on, again and again.
+/// Thread that syncs what was handed to the operating system, periodically.
 class AsyncWriter::Syncer {
  public:
   explicit Syncer(Shared& shared) : shared_(shared), thread_([this] { work(); }) {}
@@ -58,7 +60,7 @@ class AsyncWriter::Syncer {
   }
 
  private:
-  /// A disk that is slow gets time between two syncs, too.
+  /// Pauses between two syncs even when the disk is slow.
   void work() {
     constexpr auto kPause = std::chrono::milliseconds(50);
     std::unique_lock lock(mutex_);
@@ -76,7 +78,7 @@ class AsyncWriter::Syncer {
   std::mutex mutex_;
   std::condition_variable wake_;
   bool ended_ = false;
-  std::thread thread_;  ///< last: it uses all of the above
+  std::thread thread_;  ///< last member: the thread uses all of the above
 };
 
 /// One camera's queue and encoder thread.
@@ -117,9 +119,10 @@ class AsyncWriter::Lane {
     const std::scoped_lock lock(mutex_);
     CameraProgress now;
     now.arrived = arrivals_.delivered();
-    now.written = written_.frames;
-    now.safe = std::min(shared_.writer.safe(camera_), written_.frames);
-    now.queued = now.arrived - std::min(now.arrived, lost(LossCause::queue) + written_.refused + now.written);
+    now.written = written_.written;
+    now.safe = std::min(shared_.writer.safe(camera_), written_.written);
+    now.queued =
+        now.arrived - std::min(now.arrived, lost(LossCause::queue) + written_.counts.disk() + now.written);
     now.queue_fill = std::min(fill(0), 1.0);
     now.bytes = written_.bytes;
     forget_what_is_settled(now.safe);
@@ -128,14 +131,29 @@ class AsyncWriter::Lane {
     now.counts.set_transport(lost(LossCause::transport));
     now.counts.set_underrun(lost(LossCause::underrun));
     now.counts.set_queue(lost(LossCause::queue));
-    now.counts.set_disk(written_.refused + lost(LossCause::disk));
+    now.counts.set_disk(written_.counts.disk() + lost(LossCause::disk));
     now.counts.set_passed_over(lost(LossCause::passed_over));
     const std::uint64_t by_driver = now.counts.transport() + now.counts.underrun() + now.counts.passed_over();
     now.counts.set_camera_gap(arrivals_.missing() - std::min(arrivals_.missing(), by_driver));
     return now;
   }
 
-  /// Ends the thread once the queue is empty, and tells the writer what it couldn't see.
+  WriterLoad load() {
+    const std::scoped_lock lock(mutex_);
+    const Seconds busy = busy_ + (busy_since_ ? since(*busy_since_) : Seconds(0));
+    if (const auto now = thread_load(thread_id_)) worked_ = now->ran + now->waited;  // else it has ended
+    return {worked_, std::max(busy - worked_, Seconds(0))};
+  }
+
+  /// Lets the thread end once the queue is empty. Whether it has, after waiting so long at most.
+  bool drained(std::chrono::milliseconds longest) {
+    std::unique_lock lock(mutex_);
+    ended_ = true;
+    wake_.notify_one();
+    return room_.wait_for(lock, longest, [this] { return encoded_; });
+  }
+
+  /// Ends the thread once the queue is empty, and passes the writer the counts that it couldn't see.
   void finish() {
     end(Ending::drain);
     const std::scoped_lock lock(mutex_);
@@ -143,11 +161,11 @@ class AsyncWriter::Lane {
     for (const auto& [cause, frames] : lost_) shared_.writer.count_lost(camera_, cause, frames);
   }
 
-  /// What has become of the frames so far; asked by the thread that encodes, or once that has ended.
+  /// Updates the counts. Called by the encoding thread, or after it ended.
   void look() {
     const std::scoped_lock lock(mutex_);
-    written_ = shared_.writer.written(camera_);
-    forget_what_is_settled(std::min(shared_.writer.safe(camera_), written_.frames));
+    written_ = shared_.writer.progress(camera_);
+    forget_what_is_settled(std::min(shared_.writer.safe(camera_), written_.written));
   }
 
  private:
@@ -159,7 +177,7 @@ class AsyncWriter::Lane {
 
   static std::uint64_t bytes_of(const Frame& frame) { return frame.image ? frame.image->bytes().size() : 0; }
 
-  /// How full the queue would be with so much more.
+  /// How full the queue would be with this many more bytes.
   [[nodiscard]] double fill(std::uint64_t more) const {
     if (queue_.empty()) return 0;
     const double by_bytes = static_cast<double>(queued_bytes_ + more) /
@@ -173,9 +191,9 @@ class AsyncWriter::Lane {
     return found == lost_.end() ? 0 : found->second;
   }
 
-  /// Of the frames that were taken so many are safe, or given up, in their order.
+  /// Of the frames taken from the queue, drops those that are safe or given up, in order.
   void forget_what_is_settled(std::uint64_t safe) {
-    for (; settled_ < safe + written_.refused && !at_risk_.empty(); ++settled_) at_risk_.pop_front();
+    for (; settled_ < safe + written_.counts.disk() && !at_risk_.empty(); ++settled_) at_risk_.pop_front();
   }
 
   void end(Ending ending) {
@@ -211,9 +229,22 @@ class AsyncWriter::Lane {
     return ended_ && queue_.empty();
   }
 
+  /// Begins or ends a stretch of work that isn't waiting for frames.
+  void be_busy(bool busy) {
+    const std::scoped_lock lock(mutex_);
+    if (!busy && busy_since_) busy_ += since(*busy_since_);
+    busy_since_ = busy ? std::optional(Clock::now()) : std::nullopt;
+  }
+
   void encode() {
+    {
+      const std::scoped_lock lock(mutex_);
+      thread_id_ = emberlock::thread_id();
+    }
     while (!is_over()) {
-      if (const auto frame = pop()) {
+      const auto frame = pop();
+      be_busy(true);
+      if (frame) {
         shared_.note(shared_.writer.write(camera_, *frame));
         if (!flush_due_) flush_due_ = Clock::now() + as_duration(kFlushInterval);
       }
@@ -222,26 +253,37 @@ class AsyncWriter::Lane {
         shared_.note(shared_.writer.flush(camera_));
       }
       look();
+      be_busy(false);
     }
     shared_.note(shared_.writer.flush(camera_));
     look();
+    {
+      const std::scoped_lock lock(mutex_);
+      encoded_ = true;
+    }
+    room_.notify_all();
   }
 
   Shared& shared_;
   const std::size_t camera_;
-  std::optional<Clock::time_point> flush_due_;  ///< the thread's own: there is something to flush
-  std::mutex mutex_;                            ///< guards what follows
+  std::optional<Clock::time_point>
+      flush_due_;     ///< used by the encoding thread only: something is to be flushed then
+  std::mutex mutex_;  ///< guards the members below
   std::condition_variable wake_;
-  std::condition_variable room_;
+  std::condition_variable room_;  ///< in the queue; or the thread has ended
   std::deque<Waiting> queue_;
   std::uint64_t queued_bytes_ = 0;
-  bool ended_ = false;
+  bool ended_ = false;    ///< no frame comes any more
+  bool encoded_ = false;  ///< the thread is done
   Arrivals arrivals_;
   std::map<LossCause, std::uint64_t> lost_;
-  WrittenSoFar written_;
-  std::deque<Clock::time_point> at_risk_;  ///< when frames arrived that aren't safe yet
+  CameraProgress written_;                 ///< without the queue
+  std::deque<Clock::time_point> at_risk_;  ///< arrival times of frames that aren't safe yet
   std::uint64_t settled_ = 0;
-  std::thread thread_;  ///< last: it uses all of the above
+  int thread_id_ = -1;
+  Seconds busy_, worked_;  ///< of the thread: with frames in hand; on or waiting for a processor
+  std::optional<Clock::time_point> busy_since_;
+  std::thread thread_;  ///< last member: the thread uses all of the above
 };
 
 AsyncWriter::AsyncWriter(SessionWriter writer, AsyncWriterOptions options)
@@ -271,10 +313,43 @@ std::optional<Error> AsyncWriter::failure() const {
 
 CameraProgress AsyncWriter::progress(std::size_t camera) const { return lanes_.at(camera)->progress(); }
 
-Result<v1::Manifest> AsyncWriter::finish() {
+WriterLoad AsyncWriter::load() const {
+  WriterLoad all;
+  for (const auto& lane : lanes_) {
+    const WriterLoad one = lane->load();
+    all.worked += one.worked;
+    all.blocked += one.blocked;
+  }
+  return all;
+}
+
+std::uint64_t AsyncWriter::queued() const {
+  std::uint64_t queued = 0;
+  for (const auto& lane : lanes_) queued += lane->progress().queued;
+  return queued;
+}
+
+Result<v1::Manifest> AsyncWriter::finish(const Progress& progress) {
+  constexpr std::chrono::milliseconds kLook{50};
+  constexpr double kDrained = 0.9;  // of the progress
+  const double at_first = std::max<double>(1, static_cast<double>(queued()));
+  double told = -1;
+  const auto all_drained = [&] {
+    return std::all_of(lanes_.begin(), lanes_.end(),
+                       [](const auto& lane) { return lane->drained(std::chrono::milliseconds(0)); });
+  };
+  for (const auto& lane : lanes_) static_cast<void>(lane->drained(std::chrono::milliseconds(0)));
+  while (!all_drained()) {
+    const double share = std::max(0.0, 1 - static_cast<double>(queued()) / at_first);
+    if (std::exchange(told, share) != share) tell(progress, kDrained * share, "writes the last frames");
+    for (const auto& lane : lanes_)
+      if (!lane->drained(kLook)) break;
+  }
   for (const auto& lane : lanes_) lane->finish();
   syncer_.reset();
-  auto manifest = shared_->writer.finish();
+  auto manifest = shared_->writer.finish([&progress](double fraction, std::string_view doing) {
+    tell(progress, kDrained + fraction * (kNearlyDone - kDrained), doing);
+  });
   for (const auto& lane : lanes_) lane->look();
   return manifest;
 }

@@ -39,7 +39,7 @@ Error not_a_video(const std::filesystem::path& path, const std::string& reason) 
       "Known are PGM, PPM, PNG, JPEG, TIFF, FITS and what FFmpeg reads; a truncated file may lack its index"};
 }
 
-/// The file with its streams, none of them chosen.
+/// Opens the file without selecting a stream.
 Result<AvInput> open_file(const std::filesystem::path& path, Checking checking) {
   quiet_libav();
   AvInput input;
@@ -58,7 +58,7 @@ Result<AvInput> open_file(const std::filesystem::path& path, Checking checking) 
   return input;
 }
 
-/// Opens the decoder of the chosen stream, and drops all others' packets; libav's code.
+/// Opens the decoder of the selected stream and discards the packets of all others. Returns libav's code.
 int open_decoder(AvInput& input, const AVCodec* codec, Checking checking) {
   AVFormatContext* format = input.format.get();
   for (unsigned i = 0; i < format->nb_streams; ++i) {

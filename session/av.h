@@ -16,8 +16,8 @@ extern "C" {
 #include "base/result.h"
 #include "base/unique_fd.h"
 
-// Owners of libav's objects, and files for it that are plain descriptors: no protocols, no names with a
-// meaning.
+// RAII owners of libav's objects. Files are passed to libav as descriptors, so protocols and special file
+// names have no effect.
 namespace emberlock::session {
 
 struct AvFree {
@@ -38,12 +38,12 @@ struct AvFreeOutput {
 template <class T>
 using AvPtr = std::unique_ptr<T, AvFree>;
 
-/// libav's words for one of its error codes.
+/// libav's text for an error code.
 std::string av_message(int code);
-/// Sends libav's chatter to the session log at level debug; idempotent.
+/// Redirects libav's messages to the session log at level debug. Idempotent.
 void quiet_libav();
 
-/// A file behind an AVIOContext. Never moves, since libav holds its address.
+/// An AVIOContext over a file. Not movable, because libav holds its address.
 class AvFile {
  public:
   enum class Mode { read, create };
@@ -67,7 +67,7 @@ class AvFile {
   AvPtr<AVIOContext> io_;
 };
 
-/// A video stream of a local file, opened for reading, with its decoder.
+/// A video stream of a local file opened for reading, with its decoder.
 struct AvInput {
   std::unique_ptr<AvFile> file;
   std::unique_ptr<AVFormatContext, AvCloseInput> format;
@@ -76,21 +76,21 @@ struct AvInput {
 };
 
 enum class Checking {
-  lenient,  ///< what the decoder makes of the bytes
-  strict,   ///< checksums are verified, damage is an error
+  lenient,  ///< errors are concealed as far as the decoder can
+  strict,   ///< checksums are verified; damage is an error
 };
 
-/// Opens the first video stream of `path`. Only the file itself is read, whatever it refers to.
+/// Opens the first video stream of `path`. No other file is read, even if the file refers to one.
 Result<AvInput> open_av_input(const std::filesystem::path& path, Checking checking);
 
-/// The sound of a local video file, opened for reading.
+/// The sound track of a local video file opened for reading.
 struct AvSound {
-  AvInput input;         ///< without a decoder where there is no sound that can be decoded
-  Seconds begins;        ///< the first sample, by the file's clock
-  Seconds video_begins;  ///< the first frame
+  AvInput input;         ///< has no decoder where there is no decodable sound
+  Seconds begins;        ///< of the first sample, by the file's clock
+  Seconds video_begins;  ///< of the first frame
 };
 
-/// Opens the sound that belongs to the first video stream of `path`. Errors: no video.
+/// Opens the sound track that belongs to the first video stream of `path`. Errors: no video.
 Result<AvSound> open_av_sound(const std::filesystem::path& path);
 
 }  // namespace emberlock::session

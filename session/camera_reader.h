@@ -15,8 +15,7 @@
 
 namespace emberlock::session {
 
-/// One camera's part of a SessionReader: its index, and whichever segment was read last. One thread at a
-/// time.
+/// One camera's part of a SessionReader: its index, and the segment that was read last. One thread at a time.
 class CameraReader {
  public:
   CameraReader(std::filesystem::path folder, std::string camera_id, ImageLayout layout,
@@ -26,7 +25,7 @@ class CameraReader {
   [[nodiscard]] const std::vector<FrameStamp>& stamps() const { return stamps_; }
   [[nodiscard]] const std::vector<IndexRecord>& records() const { return records_; }
   Result<Frame> read(std::size_t i);
-  /// Whether read(i) would succeed, as far as that shows without decoding: SegmentReader::check.
+  /// Whether read(i) would succeed, as far as this can be told without decoding: SegmentReader::check.
   Status check(std::size_t i);
 
  private:
@@ -41,14 +40,14 @@ class CameraReader {
   std::uint32_t number_ = 0;  ///< of segment_
 };
 
-/// The first record of another segment than that of `first`, from there on; the end if there is none.
+/// Index of the first record after `first` that is in another segment; the end if there is none.
 std::size_t end_of_segment(const std::vector<IndexRecord>& records, std::size_t first);
 
-/// The manifest's list of segments, as the records have them.
+/// Builds the manifest's list of segments from the records.
 void list_segments(const std::filesystem::path& folder, const std::vector<IndexRecord>& records,
                    v1::CameraStream& stream);
 
-/// The records of a camera's index file, with what is wrong with it.
+/// The records of a camera's index file, and the damage found in it.
 Result<ParsedIndex> read_index(const std::filesystem::path& folder, const std::string& camera_id);
 
 }  // namespace emberlock::session

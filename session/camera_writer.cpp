@@ -22,7 +22,7 @@ constexpr Seconds kSpaceCheckInterval{1};
 constexpr Seconds kRetryInterval{1};
 constexpr std::uint64_t kSpaceCheckBytes = std::uint64_t{64} << 20;
 constexpr std::uint32_t kLongestGapMs = 60'000;
-/// Without anybody who syncs meanwhile no more of them stay open.
+/// The limit of segments kept open when no other thread syncs.
 constexpr std::size_t kEndedSegmentsAtMost = 8;
 
 }  // namespace
@@ -50,7 +50,7 @@ Result<std::unique_ptr<CameraWriter>> CameraWriter::create(const fs::path& folde
   UniqueFd for_ledger(::fcntl(index.get(), F_DUPFD_CLOEXEC, 0));
   if (!for_ledger) return errno_error(path, "cannot keep the index open");
   writer->index_ = std::move(index);
-  // The session's own folder lasts since it was made.
+  // The session's own folder was synced when it was created.
   writer->ledger_ = std::make_unique<SyncLedger>(std::move(for_ledger), path,
                                                  std::vector<fs::path>{folder / stream.camera_id(), folder});
   return writer;
@@ -70,14 +70,14 @@ Status CameraWriter::write_pixels(const Frame& frame) {
                  "camera " + camera_id_ + ", frame " + std::to_string(frame.stamp.frame_id),
                  "Give each layout a session of its own"};
   }
-  if (Status synced = heed_sync(); !synced) {
+  if (Status synced = check_sync(); !synced) {
     refuse(synced.error(), frame.stamp);
     return synced;
   }
   if (refusal_ && frame.stamp.monotonic_time < retry_at_) return *refusal_;
   refusal_.reset();
   if (Status room = make_room(frame.stamp); !room) {
-    // A disk below its floor is asked for each frame: that costs little, and every frame counts.
+    // Below the floor, free space is checked for each frame: it is cheap, and a frame may fit again.
     if (!space_low_) refuse(room.error(), frame.stamp);
     return room;
   }
@@ -107,7 +107,7 @@ Status CameraWriter::write_pixels(const Frame& frame) {
   return {};
 }
 
-/// Sees to it that a segment is open, and that the disk has room.
+/// Ensures that a segment is open and that the disk has enough space.
 Status CameraWriter::make_room(const FrameStamp& stamp) {
   const bool full = segment_ && (segments_.rbegin()->frames() >= options_.frames_per_segment ||
                                  segment_->bytes() >= options_.bytes_per_segment);
@@ -160,14 +160,14 @@ Status CameraWriter::close_segment() {
   segment_.reset();
   ledger_->handed(counts_.recorded());
   ledger_->ended();
-  // Who syncs meanwhile leaves one at most.
+  // With a syncing thread at most one is left.
   return ledger_->waiting() > kEndedSegmentsAtMost ? sync() : Status{};
 }
 
-/// Of what was written nothing stays in this process after it.
+/// Afterwards no written data is left in this process.
 Status CameraWriter::flush() {
   if (failed_) return *failed_;
-  EMBERLOCK_RETURN_IF_ERROR(heed_sync());
+  EMBERLOCK_RETURN_IF_ERROR(check_sync());
   if (!segment_) return {};
   if (Status flushed = segment_->flush(); !flushed) {
     abandon_segment(flushed.error());
@@ -177,9 +177,9 @@ Status CameraWriter::flush() {
   return {};
 }
 
-/// What another thread's sync met: which of the frames after the last that went well the disk has, nobody
-/// knows, so they don't count as recorded.
-Status CameraWriter::heed_sync() {
+/// Handles a failure of another thread's sync. It isn't known which frames after the last good sync are on
+/// the disk, so they don't count as recorded.
+Status CameraWriter::check_sync() {
   Status synced = ledger_->failure();
   if (!synced) drop_what_is_not_safe(synced.error());
   return synced;
@@ -201,7 +201,7 @@ void CameraWriter::drop_what_is_not_safe(const Error& why) {
 }
 
 void CameraWriter::warn(const Error& why) {
-  // A disk that stays full is said once.
+  // A full disk is reported once.
   const auto level = std::exchange(warned_, true) ? spdlog::level::debug : spdlog::level::warn;
   log(LogCategory::session).log(level, "camera {}: {}", camera_id_, why.message());
 }
@@ -211,8 +211,8 @@ void CameraWriter::refuse(const Error& why, const FrameStamp& stamp) {
   retry_at_ = stamp.monotonic_time + kRetryInterval;
 }
 
-/// After a failed write: the segment stays as it is, and its frames that aren't whole on the disk are counted
-/// as the disk's instead.
+/// After a failed write: leaves the segment as it is and counts those of its frames that aren't complete on
+/// the disk as lost to it.
 void CameraWriter::abandon_segment(const Error& why) {
   warn(why);
   bytes_closed_ += segment_->bytes();
@@ -234,8 +234,8 @@ void CameraWriter::abandon_segment(const Error& why) {
   segments_.RemoveLast();
 }
 
-/// How many of the last segment's frames can be read back, the index's records among them, which a failed
-/// write may have torn too. What was written before them reached the disk, so the search goes from the end.
+/// How many of the last segment's frames can be read back. The index is checked too, because a failed write
+/// may have torn it. Earlier frames reached the disk, so the search runs from the end.
 Result<std::uint64_t> CameraWriter::readable_frames() {
   const v1::Segment& segment = *segments_.rbegin();
   const fs::path path = index_path(folder_, camera_id_);
@@ -251,7 +251,7 @@ Result<std::uint64_t> CameraWriter::readable_frames() {
   return kept;
 }
 
-/// Takes off the index, and off what is to be synced, the frames behind the first `frames`.
+/// Removes the frames behind the first `frames` from the index and from the ledger.
 Status CameraWriter::cut_index(std::uint64_t frames) {
   const auto size = static_cast<off_t>(kIndexHeaderBytes + frames * kIndexRecordBytes);
   if (::ftruncate(index_.get(), size) != 0) {
@@ -261,7 +261,7 @@ Status CameraWriter::cut_index(std::uint64_t frames) {
   return {};
 }
 
-/// The frame's arrival within its segment, for players; made to rise, whatever the clock does.
+/// The frame's arrival time within its segment, for players; always rising, whatever the clock does.
 std::uint32_t CameraWriter::next_milliseconds(const FrameStamp& stamp) const {
   if (segments_.rbegin()->frames() == 0) return 0;
   const std::int64_t elapsed = (stamp.monotonic_time.ns - segment_start_.ns) / 1'000'000;
@@ -269,10 +269,13 @@ std::uint32_t CameraWriter::next_milliseconds(const FrameStamp& stamp) const {
       elapsed, std::int64_t{last_milliseconds_} + 1, std::int64_t{last_milliseconds_} + kLongestGapMs));
 }
 
-WrittenSoFar CameraWriter::written() const {
-  return {ledger_->handed(), counts_.disk(),
-          bytes_closed_ + (segment_ ? segment_->bytes() : 0) + kIndexHeaderBytes +
-              counts_.recorded() * kIndexRecordBytes};
+CameraProgress CameraWriter::progress() const {
+  CameraProgress now;
+  now.written = ledger_->handed();
+  now.counts.set_disk(counts_.disk());
+  now.bytes = bytes_closed_ + (segment_ ? segment_->bytes() : 0) + kIndexHeaderBytes +
+              counts_.recorded() * kIndexRecordBytes;
+  return now;
 }
 
 void CameraWriter::count_lost(LossCause cause, std::uint64_t frames) {
@@ -319,12 +322,12 @@ Result<v1::Counts> CameraWriter::reconcile() const {
 
 Status CameraWriter::finish(v1::CameraStream& stream) {
   if (segment_) static_cast<void>(close_segment());
-  if (const Status synced = sync(); !synced && !failed_) static_cast<void>(heed_sync());
+  if (const Status synced = sync(); !synced && !failed_) static_cast<void>(check_sync());
   if (!failed_ && ledger_->safe() < counts_.recorded()) {
     drop_what_is_not_safe({ErrorKind::io, "is no regular file, and keeps nothing",
                            (folder_ / segments_.rbegin()->file()).string(), "Remove it"});
   }
-  // What was cut off is to be gone after a power cut too.
+  // The removed frames must stay removed after a power cut.
   if (!failed_) EMBERLOCK_RETURN_IF_ERROR(sync());
   if (failed_) return *failed_;
   EMBERLOCK_ASSIGN_OR_RETURN(*stream.mutable_counts(), reconcile());

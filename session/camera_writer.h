@@ -18,11 +18,11 @@
 
 namespace emberlock::session {
 
-/// One camera's part of a SessionWriter: its folder, index, segments and counts. One thread at a time, but
-/// for sync() and safe().
+/// One camera's part of a SessionWriter: its folder, index, segments and counts. One thread at a time, except
+/// sync() and safe().
 class CameraWriter {
  public:
-  /// `folder` is the session's, from the root.
+  /// `folder` is the session's, as an absolute path.
   static Result<std::unique_ptr<CameraWriter>> create(const std::filesystem::path& folder,
                                                       const v1::CameraStream& stream,
                                                       const WriterOptions& options);
@@ -31,10 +31,10 @@ class CameraWriter {
   Status sync() { return ledger_->sync(); }
   [[nodiscard]] std::uint64_t safe() const { return ledger_->safe(); }
   void count_lost(LossCause cause, std::uint64_t frames);
-  [[nodiscard]] WrittenSoFar written() const;
+  [[nodiscard]] CameraProgress progress() const;
   void set_arrivals(const Arrivals& arrivals) { arrivals_ = arrivals; }
-  /// Closes the last segment and fills in the stream's segments and counts, reconciled with the index on
-  /// disk. That the disk refused frames is no error: they are counted.
+  /// Closes the last segment, fills in the stream's segments and counts, and reconciles the counts with the
+  /// index on disk. Frames that the disk refused are counted and are no error.
   Status finish(v1::CameraStream& stream);
 
  private:
@@ -49,7 +49,7 @@ class CameraWriter {
   void abandon_segment(const Error& why);
   Result<std::uint64_t> readable_frames();
   Status cut_index(std::uint64_t frames);
-  Status heed_sync();
+  Status check_sync();
   void drop_what_is_not_safe(const Error& why);
   void warn(const Error& why);
   [[nodiscard]] std::uint32_t next_milliseconds(const FrameStamp& stamp) const;
@@ -64,22 +64,22 @@ class CameraWriter {
   UniqueFd index_;
   std::unique_ptr<SyncLedger> ledger_;
   std::unique_ptr<SegmentWriter> segment_;
-  std::uint32_t next_segment_ = 0;                            ///< number of the one that is begun next
-  google::protobuf::RepeatedPtrField<v1::Segment> segments_;  ///< the last is open while segment_ is
+  std::uint32_t next_segment_ = 0;                            ///< of the next segment
+  google::protobuf::RepeatedPtrField<v1::Segment> segments_;  ///< the last one is open while segment_ is set
   TimePoint segment_start_;
   std::uint32_t last_milliseconds_ = 0;
 
   TimePoint space_checked_;  ///< by the frames' clock
   std::uint64_t bytes_since_check_ = 0;
-  std::uint64_t bytes_closed_ = 0;  ///< of segments that are closed
-  bool space_low_ = true;           ///< or not yet looked
+  std::uint64_t bytes_closed_ = 0;  ///< of closed segments
+  bool space_low_ = true;           ///< also true before the first check
 
   Arrivals arrivals_;
   v1::Counts counts_;
-  std::optional<Error> refusal_;  ///< the disk's last, a retry of which is due at retry_at_
+  std::optional<Error> refusal_;  ///< the disk's last error; the next try is due at retry_at_
   TimePoint retry_at_;            ///< by the frames' clock
   bool warned_ = false;
-  std::optional<Error> failed_;  ///< the index on disk isn't known any more: nothing can be written
+  std::optional<Error> failed_;  ///< the state of the index on disk is unknown: nothing more can be written
 };
 
 }  // namespace emberlock::session

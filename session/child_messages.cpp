@@ -12,14 +12,14 @@
 namespace emberlock::session {
 namespace {
 
-constexpr std::size_t kLongestPrefix = 4;  // bytes; 28 bits are more than any length that we take
+constexpr std::size_t kLongestPrefix = 4;  // bytes; 28 bits cover every length that is accepted
 
 struct Prefix {
   std::size_t length = 0;
   std::size_t bytes = 0;
 };
 
-/// Nothing while it isn't whole.
+/// nullopt while the prefix is incomplete.
 Result<std::optional<Prefix>> read_prefix(std::string_view bytes) {
   Prefix prefix;
   for (const char c : bytes) {

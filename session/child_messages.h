@@ -11,17 +11,17 @@
 
 namespace emberlock::session {
 
-/// A child that sends more in one message is not understood. Two pictures and 64^3 voxels take a tenth.
+/// The largest accepted message of a child process. Two pictures and 64^3 voxels take a tenth of it.
 inline constexpr std::size_t kLargestChildMessage = std::size_t{4} << 20;
 
-/// The message behind its length as a varint.
+/// The message, preceded by its length as a varint.
 std::string framed(const v1::ChildMessage& message);
 
-/// Makes messages of the bytes of a pipe, in whatever pieces they come.
+/// Splits the bytes of a pipe into messages. The bytes may arrive in pieces of any size.
 class ChildMessageParser {
  public:
-  /// Calls `take` with each message that is whole now. An Error when the bytes are none of ours; nothing that
-  /// follows can be understood then.
+  /// Appends bytes and calls `take` with each message that is now complete. An Error when the bytes aren't in
+  /// this format; the rest of the stream can't be read then.
   Status add(std::string_view bytes, const std::function<void(v1::ChildMessage&&)>& take);
 
  private:

@@ -55,7 +55,7 @@ Status EventLog::append(const v1::Event& event) {
   const off_t end = ::lseek(fd_.get(), 0, SEEK_END);
   Status written = write_fully(fd_.get(), encode(event), path_);
   disk_->behind = true;
-  // A part of an event would hide those that follow.
+  // A partial event would make all later ones unreadable.
   if (!written && ::ftruncate(fd_.get(), end) != 0) return errno_error(path_, "cannot cut off a torn event");
   return written;
 }

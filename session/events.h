@@ -16,28 +16,28 @@
 
 namespace emberlock::session {
 
-// events.binpb: each Event in protobuf's wire format behind its length as a varint; append-only.
+// events.binpb: each Event in protobuf's wire format, preceded by its length as a varint. Append-only.
 
 struct ParsedEvents {
   std::vector<v1::Event> events;
-  std::size_t valid_bytes = 0;  ///< behind these the file is torn or foreign
+  std::size_t valid_bytes = 0;  ///< the bytes after these are torn or foreign
 };
 
-/// The events up to the first that can't be read; any bytes are accepted.
+/// Parses the events up to the first unreadable one. Accepts any bytes.
 ParsedEvents parse_events(std::string_view bytes);
 
-/// The event as the file holds it.
+/// The event as it is stored in the file.
 std::string encode(const v1::Event& event);
 
-/// The file, open for appending, locked against a second writer for as long as it lives.
+/// The file, open for appending. Locked against a second writer while this object exists.
 class EventLog {
  public:
   enum class Mode { create, reopen };
-  /// Error `refused` where another process holds the lock: the session is being recorded.
+  /// Error `refused` where another process holds the lock, because it is recording the session.
   static Result<EventLog> open(const std::filesystem::path& path, Mode mode);
   Status append(const v1::Event& event);
-  /// Has the disk hold what was appended. An error stays: the kernel tells of a write that failed once only.
-  /// Any thread.
+  /// Syncs what was appended to the disk. After an error every later call fails too, because the kernel
+  /// reports a failed write only once. Any thread.
   Status sync();
 
  private:

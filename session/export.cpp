@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 #include <memory>
+#include <numeric>
 #include <system_error>
 #include <utility>
 
@@ -21,8 +22,7 @@ namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kLongestGap =
-    60;  // seconds that a video shows one frame for; what lasts longer is cut to this
+constexpr double kLongestGap = 60;  // seconds: the longest time for which a video repeats one frame
 
 /// Takes the frames of one camera, in order.
 class CameraExport {
@@ -82,30 +82,49 @@ class PngExport final : public CameraExport {
   std::uint64_t count_ = 0;
 };
 
-/// Frames of a camera in time: those that follow each other, and where others are missing between.
+/// Timing of a camera's frames: where frames follow each other and where some are missing.
 struct Pace {
   Hertz rate;
-  /// Places of the video that the frame stands for, 1 where it follows the one before.
+  /// How many frames of the video this frame takes; 1 if it directly follows the one before. Cameras number
+  /// the frames that were lost too; where the numbers begin again, the clock tells.
   [[nodiscard]] std::int64_t steps(const FrameStamp& before, const FrameStamp& now) const {
     if (now.frame_id == before.frame_id + 1) return 1;
+    const double longest = kLongestGap * rate.value();
     const double seconds = std::clamp((now.monotonic_time - before.monotonic_time).value(), 0.0, kLongestGap);
-    return std::max<std::int64_t>(1, std::llround(seconds * rate.value()));
+    const double frames = now.frame_id > before.frame_id ? static_cast<double>(now.frame_id - before.frame_id)
+                                                         : seconds * rate.value();
+    return std::max<std::int64_t>(1, std::llround(std::min(frames, longest)));
   }
 };
 
-/// By arrivals of frames that follow each other; as the manifest claims where there are none.
-Pace pace_of(const std::vector<FrameStamp>& stamps, double claimed) {
-  double seconds = 0;
-  double count = 0;
+/// The rate of frames that follow each other, by one of their clocks: of the intervals near the median one,
+/// as coarse stamps are right on average only. 0: it doesn't tell.
+template <class TimeOf>
+double rate_by(const std::vector<FrameStamp>& stamps, TimeOf time_of) {
+  constexpr double kNear = 0.25;
+  std::vector<double> intervals;
   for (std::size_t i = 1; i < stamps.size(); ++i) {
-    const double apart = (stamps[i].monotonic_time - stamps[i - 1].monotonic_time).value();
-    if (stamps[i].frame_id != stamps[i - 1].frame_id + 1 || apart <= 0) continue;
-    seconds += apart;
-    ++count;
+    const double apart = (time_of(stamps[i]) - time_of(stamps[i - 1])).value();
+    if (stamps[i].frame_id == stamps[i - 1].frame_id + 1 && apart > 0) intervals.push_back(apart);
   }
+  if (intervals.empty()) return 0;
+  const auto middle = intervals.begin() + static_cast<std::ptrdiff_t>(intervals.size() / 2);
+  std::nth_element(intervals.begin(), middle, intervals.end());
+  const double median = *middle;
+  std::erase_if(intervals, [&](double apart) { return std::abs(apart / median - 1) > kNear; });
+  return static_cast<double>(intervals.size()) / std::accumulate(intervals.begin(), intervals.end(), 0.0);
+}
+
+/// The camera's own rate: by its clock, or as it claims if that is the same within what clocks differ by (so
+/// that 23.976 stays 23.976). How fast frames arrived says something of the machine too, and comes last.
+Pace pace_of(const std::vector<FrameStamp>& stamps, double claimed) {
+  constexpr double kClocksDiffer = 0.005;
   constexpr double kSlowest = 0.1;
   constexpr double kFastest = 10'000;
-  const double rate = count > 0 ? count / seconds : claimed > 0 ? claimed : 25;
+  double rate = rate_by(stamps, [](const FrameStamp& s) { return s.device_time; });
+  if (claimed > 0 && (rate == 0 || std::abs(rate / claimed - 1) < kClocksDiffer)) rate = claimed;
+  if (rate == 0) rate = rate_by(stamps, [](const FrameStamp& s) { return s.monotonic_time; });
+  if (rate == 0) rate = 25;
   return {Hertz(std::clamp(rate, kSlowest, kFastest))};
 }
 
@@ -132,7 +151,7 @@ class VideoExport final : public CameraExport {
   std::optional<FrameStamp> last_;
 };
 
-/// One camera of a session, on its way to `target`.
+/// Exports one camera of a session to `target`.
 class Exporter {
  public:
   Exporter(SessionReader& reader, std::size_t camera, fs::path target)

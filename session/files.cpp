@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::size_t kMaxManifestBytes = std::size_t{64} << 20;
-constexpr off_t kReserveBytes = off_t{1} << 20;  // some 10 000 segments in the manifest
+constexpr off_t kReserveBytes = off_t{1} << 20;  // enough for some 10 000 segments in the manifest
 
 fs::path reserve_path(const fs::path& folder) { return folder / "reserve"; }
 

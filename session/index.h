@@ -15,13 +15,13 @@
 
 namespace emberlock::session {
 
-// <camera id>/index.bin: a header of 16 bytes, then one record of 68 bytes a frame; all numbers
+// <camera id>/index.bin: a header of 16 bytes, then one record of 68 bytes per frame; all numbers
 // little-endian.
 //   header: "EMBRIDX\0", u32 version = 1, u32 record size = 68
 //   record: u64 frame id, i64 device ns, i64 system ns, i64 monotonic ns, u64 pixel hash, u64 file offset,
 //           u32 segment, u32 frame in segment, u32 milliseconds in segment, u32 status, u32 CRC-32 of the 64
 //           bytes before
-// The CRC makes each record stand for itself: a torn or flipped one is left out, the others stay good.
+// Each record has its own CRC: a torn or damaged record is skipped, the others stay valid.
 
 struct IndexRecord {
   FrameStamp stamp;
@@ -42,28 +42,29 @@ inline constexpr std::size_t kMaxIndexBytes = std::size_t{4} << 30;  ///< 63 mil
 std::string encode_index_header();
 std::array<char, kIndexRecordBytes> encode(const IndexRecord& record);
 
-/// The record that these kIndexRecordBytes bytes hold; none where their checksum is wrong.
+/// Decodes kIndexRecordBytes bytes; nullopt where the checksum is wrong.
 std::optional<IndexRecord> decode_record(std::span<const char> bytes);
 
-/// Whether `b` may stand behind `a` in an index: segments rise, and within one, frames and times do.
+/// Whether `b` may follow `a` in an index: the segment number never falls; within a segment, frame and time
+/// rise.
 bool follows(const IndexRecord& a, const IndexRecord& b);
 
-/// A whole file of them.
+/// The content of an index file.
 std::string encode_index(const std::vector<IndexRecord>& records);
 
 struct ParsedIndex {
   std::vector<IndexRecord> records;  ///< the good ones, in order
-  std::uint64_t bad_records = 0;     ///< checksum wrong, or contradicts an earlier record
-  std::size_t torn_bytes = 0;        ///< a started record at the end
+  std::uint64_t bad_records = 0;     ///< wrong checksum, or contradicts an earlier record
+  std::size_t torn_bytes = 0;        ///< an incomplete record at the end
   [[nodiscard]] bool whole() const { return bad_records == 0 && torn_bytes == 0; }
 };
 
-/// Any bytes are accepted but a foreign header (bad_input). `where` names the file in errors. An index cut
-/// within its header is an empty one, torn.
+/// Accepts any bytes except a foreign header (bad_input). An index that ends within its header counts as
+/// empty and torn. `where` names the file in errors.
 Result<ParsedIndex> parse_index(std::string_view bytes, const std::string& where);
 
-/// 64-bit hash of an image's packed bytes, as the index keeps it: four lanes of 8-byte little-endian words,
-/// lane = mix64(lane ^ word), the last word zero-padded, then the lanes and the length mixed together.
+/// The index's 64-bit hash of an image's packed bytes: four lanes of 8-byte little-endian words, lane =
+/// mix64(lane ^ word), the last word zero-padded, then lanes and length are mixed together.
 std::uint64_t pixel_hash(std::span<const std::byte> bytes);
 
 }  // namespace emberlock::session

@@ -2,31 +2,38 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
 #include <string_view>
 
 #include "base/result.h"
 
 namespace emberlock::session {
 
-/// Whatever the locale.
+/// Independent of the locale.
 constexpr bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Whether `name` may name a camera's folder: letters, digits, space and . _ : - alone, no point in
-/// front, 1..200 bytes; so it can't lead out of the folder that it stands in.
+/// Whether `name` can be a camera's folder: only letters, digits, space and . _ : -, no leading point, 1..200
+/// bytes. Such a name can't lead out of its parent folder.
 bool is_folder_name(std::string_view name);
 
-/// Whether `name` may name a session: as is_folder_name, no space or hyphen in front, which shells and
-/// programs take for something else, no space or point at its end, and none of the names that Windows keeps
-/// for devices ("con", "nul.txt", ...), as recordings are copied there. Error bad_input says what is wrong.
-/// Whatever takes a session's name from outside asks here first.
+/// Whether `name` can name a session: letters of any script, in UTF-8, and of ASCII only what is_folder_name
+/// allows; 1..200 bytes, as the disk counts them. Refused are what leads elsewhere or can't be seen (control
+/// characters, invisible ones, those that turn the direction of writing, spaces other than the plain one,
+/// what looks like a slash); a point in front; a leading space or hyphen, which shells and programs misread;
+/// a trailing space or point, and device names of Windows ("con", "nul.txt", ...), because recordings are
+/// copied there. Error bad_input says what is wrong. All code that takes a session's name from outside checks
+/// it here first.
 Status check_session_name(std::string_view name);
 
-/// The most bytes that a field of free text may have.
+/// The name under which a new session is stored: composed() (text.h), so that what looks the same is the
+/// same. `name` must have passed the check.
+std::string stored_name(std::string_view name);
+
+/// Maximum length of a free text field in bytes.
 inline constexpr std::size_t kMaxTextBytes = 1000;
 
-/// Whether free text that somebody gives, or that a manifest holds, may stand in the field `field`: at most
-/// kMaxTextBytes, and no control characters; that it is UTF-8 protobuf sees to. Error bad_input names the
-/// field.
+/// Whether free text, given by a user or in a manifest, is valid for the field `field`: at most
+/// kMaxTextBytes, no control characters (protobuf checks UTF-8). Error bad_input names the field.
 Status check_text(std::string_view field, std::string_view text);
 
 }  // namespace emberlock::session

@@ -6,6 +6,8 @@ extern "C" {
 #include <libswscale/swscale.h>
 }
 
+#include <algorithm>
+#include <cstddef>
 #include <cstring>
 #include <utility>
 
@@ -15,7 +17,7 @@ namespace emberlock::session {
 namespace {
 
 constexpr int kMpeg4Quality = 3;
-constexpr int kLargestRateTerm = 60'000;  // MPEG-4 counts time in 16 bits
+constexpr int kLargestRateTerm = 60'000;  // MPEG-4 stores times in 16 bits
 constexpr int kEven = ~1;
 
 struct FreeScaler {
@@ -40,7 +42,7 @@ AVPixelFormat scaled_from(PixelFormat format) {
   return AV_PIX_FMT_NONE;
 }
 
-/// The samples over the whole range of their type: 12 bits come in the lower ones of 16.
+/// Stretches the samples to the full range of their type: 12 bits come right-aligned in 16.
 Image stretched(const Image& image) {
   Image wide = image;
   const int shift = 16 - image.layout().bit_depth;
@@ -50,6 +52,25 @@ Image stretched(const Image& image) {
     for (int i = 0; i < samples; ++i) row[i] = static_cast<std::uint16_t>(row[i] << shift);
   }
   return wide;
+}
+
+/// Black and white, slanted, over the picture's last rows: nothing that is filmed looks so.
+void draw_hatched_bar(AVFrame& frame) {
+  constexpr int kShare = 24;  // of the picture's height
+  constexpr int kStripe = 8;
+  constexpr std::uint8_t kBlack = 16;
+  constexpr std::uint8_t kWhite = 235;
+  constexpr std::uint8_t kColourless = 128;
+  const int height = std::max(2, frame.height / kShare) & kEven;
+  for (int y = frame.height - height; y < frame.height; ++y) {
+    std::uint8_t* const row = frame.data[0] + static_cast<std::ptrdiff_t>(y) * frame.linesize[0];
+    for (int x = 0; x < frame.width; ++x) row[x] = (x + y) / kStripe % 2 == 0 ? kBlack : kWhite;
+  }
+  for (int plane = 1; plane < 3; ++plane) {
+    for (int y = (frame.height - height) / 2; y < frame.height / 2; ++y)
+      std::memset(frame.data[plane] + static_cast<std::ptrdiff_t>(y) * frame.linesize[plane], kColourless,
+                  static_cast<std::size_t>(frame.width / 2));
+  }
 }
 
 }  // namespace
@@ -66,11 +87,11 @@ struct PlayerVideo::Libav {
     return {ErrorKind::io, std::string(action) + ": " + av_message(code), file->path().string(),
             "Check the disk's space and health"};
   }
-  int open(const ImageLayout& layout, Hertz frame_rate);
-  int open_encoder(const ImageLayout& layout, Hertz frame_rate);
+  int open(const ImageLayout& layout, Hertz frame_rate, int key_interval);
+  int open_encoder(const ImageLayout& layout, Hertz frame_rate, int key_interval);
 };
 
-int PlayerVideo::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate) {
+int PlayerVideo::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate, int key_interval) {
   const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
   const bool h264 = codec != nullptr;
   if (!h264) codec = avcodec_find_encoder(AV_CODEC_ID_MPEG4);
@@ -83,7 +104,8 @@ int PlayerVideo::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate
   c.framerate = av_d2q(frame_rate.value(), kLargestRateTerm);
   c.time_base = av_inv_q(c.framerate);
   c.flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
-  c.thread_count = 0;  // as many as the machine has
+  c.thread_count = 0;  // one per processor
+  if (key_interval > 0) c.gop_size = key_interval;
   if (h264) {
     av_opt_set(c.priv_data, "preset", "veryfast", 0);
     av_opt_set_int(c.priv_data, "crf", 18, 0);
@@ -94,8 +116,8 @@ int PlayerVideo::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate
   return avcodec_open2(&c, codec, nullptr);
 }
 
-int PlayerVideo::Libav::open(const ImageLayout& layout, Hertz frame_rate) {
-  int code = open_encoder(layout, frame_rate);
+int PlayerVideo::Libav::open(const ImageLayout& layout, Hertz frame_rate, int key_interval) {
+  int code = open_encoder(layout, frame_rate, key_interval);
   if (code < 0) return code;
   const AVCodecContext& c = *encoder;
   frame->format = c.pix_fmt;
@@ -127,11 +149,12 @@ PlayerVideo::PlayerVideo(ImageLayout layout, std::unique_ptr<Libav> av)
 PlayerVideo::~PlayerVideo() = default;
 
 Result<std::unique_ptr<PlayerVideo>> PlayerVideo::create(const std::filesystem::path& path,
-                                                         const ImageLayout& layout, Hertz frame_rate) {
+                                                         const ImageLayout& layout, Hertz frame_rate,
+                                                         int key_interval) {
   quiet_libav();
   auto av = std::make_unique<Libav>();
   EMBERLOCK_ASSIGN_OR_RETURN(av->file, AvFile::open(path, AvFile::Mode::create));
-  if (const int code = av->open(layout, frame_rate); code < 0)
+  if (const int code = av->open(layout, frame_rate, key_interval); code < 0)
     return av->failure(code, "cannot write a video");
   return std::unique_ptr<PlayerVideo>(new PlayerVideo(layout, std::move(av)));
 }
@@ -148,10 +171,17 @@ Status PlayerVideo::show(const Image& image) {
   const int stride = static_cast<int>(view.stride);
   sws_scale(av_->scaler.get(), &rows, &stride, 0, av_->encoder->height, av_->frame->data,
             av_->frame->linesize);
-  return repeat();
+  return send();
 }
 
 Status PlayerVideo::repeat() {
+  if (const int code = av_frame_make_writable(av_->frame.get()); code < 0)
+    return av_->failure(code, "cannot encode");
+  draw_hatched_bar(*av_->frame);
+  return send();
+}
+
+Status PlayerVideo::send() {
   av_->frame->pts = shown_++;
   if (const int code = avcodec_send_frame(av_->encoder.get(), av_->frame.get()); code < 0) {
     return av_->failure(code, "cannot encode");

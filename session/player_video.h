@@ -12,19 +12,21 @@
 
 namespace emberlock::session {
 
-/// A video file that any player shows: MP4 with H.264 where libav has its encoder, else MPEG-4; 8 bits, a
-/// constant frame rate. Sides are cut to even numbers of pixels.
+/// Writes a video that any player can show: MP4 with H.264 if libav has its encoder, else MPEG-4; 8 bits,
+/// constant frame rate. Odd sides lose one pixel. `key_interval`: at most so many frames from one that stands
+/// by itself to the next; the encoder's own choice where 0.
 class PlayerVideo {
  public:
   static Result<std::unique_ptr<PlayerVideo>> create(const std::filesystem::path& path,
-                                                     const ImageLayout& layout, Hertz frame_rate);
+                                                     const ImageLayout& layout, Hertz frame_rate,
+                                                     int key_interval = 0);
   PlayerVideo(const PlayerVideo&) = delete;
   PlayerVideo& operator=(const PlayerVideo&) = delete;
   ~PlayerVideo();
 
-  /// The image has the video's layout.
+  /// The image must have the video's layout.
   Status show(const Image& image);
-  /// The last image again.
+  /// Repeats the last image, with a hatched bar at its lower edge.
   Status repeat();
   Status close();
   [[nodiscard]] std::string codec() const;
@@ -32,6 +34,7 @@ class PlayerVideo {
  private:
   struct Libav;
   PlayerVideo(ImageLayout layout, std::unique_ptr<Libav> av);
+  Status send();
   Status drain();
 
   ImageLayout layout_;

@@ -14,32 +14,32 @@ namespace emberlock::session {
 
 class CameraReader;
 
-/// Reads a finished session's folder. Distinct cameras may be read from distinct threads at the same time,
-/// one camera by one thread at a time.
+/// Reads the folder of a finished session. Different cameras may be read by different threads at the same
+/// time; one camera by one thread at a time.
 class SessionReader {
  public:
-  /// Errors: bad_input (no session, damaged manifest, index or events, or not finished: `salvage` it first),
+  /// Errors: bad_input (no session; damaged manifest, index or events; not finished: run `salvage` first),
   /// io.
   static Result<SessionReader> open(const std::filesystem::path& folder);
   SessionReader(SessionReader&&) noexcept;
   SessionReader& operator=(SessionReader&&) noexcept;
   ~SessionReader();
 
-  /// Whether `folder` holds a session at all (a manifest), finished or not.
+  /// Whether `folder` holds a session (a manifest), finished or not.
   static bool is_session(const std::filesystem::path& folder);
 
   [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
   [[nodiscard]] const v1::Manifest& manifest() const { return manifest_; }
   [[nodiscard]] std::size_t camera_count() const { return cameras_.size(); }
   [[nodiscard]] const ImageLayout& layout(std::size_t camera) const;
-  /// One stamp a recorded frame, in the order of recording.
+  /// One stamp per recorded frame, in the order of recording.
   [[nodiscard]] const std::vector<FrameStamp>& stamps(std::size_t camera) const;
   /// In the order of recording.
   [[nodiscard]] const std::vector<v1::Event>& events() const { return events_; }
 
-  /// Frame `i` of stamps(camera). In order is fastest; any order works. The pixels are those recorded, or
-  /// there are none: a segment that is missing or whose pixels don't match their hash is an Error (bad_input)
-  /// that names file and frame, and other frames stay readable. Past the end: out_of_data.
+  /// Frame `i` of stamps(camera). Any order works; ascending order is fastest. The pixels are exactly those
+  /// recorded: a missing segment, or pixels that don't match their hash, are an Error (bad_input) that names
+  /// file and frame; other frames stay readable. Past the end: out_of_data.
   Result<Frame> read(std::size_t camera, std::size_t i);
 
  private:

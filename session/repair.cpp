@@ -17,7 +17,7 @@ namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-/// The places of the frames from `first` to `end` that can be read back.
+/// Places of the frames from `first` to `end` that can be read back.
 Result<std::vector<std::size_t>> good_frames(CameraReader& reader, const std::string& camera_id,
                                              std::size_t first, std::size_t end, const Observer& observer) {
   std::vector<std::size_t> good;
@@ -30,8 +30,8 @@ Result<std::vector<std::size_t>> good_frames(CameraReader& reader, const std::st
   return good;
 }
 
-/// Leaves in the camera's files and index what is good. The segments come first: as long as the index is the
-/// old one, it only lists frames too that couldn't be read before either.
+/// Keeps only the good frames in the camera's files and index. The segments are replaced first: until the
+/// index is replaced, it lists only additional frames that were unreadable before.
 Result<RepairedCamera> repair_camera(const fs::path& folder, v1::CameraStream& stream,
                                      const Observer& observer) {
   EMBERLOCK_ASSIGN_OR_RETURN(const ImageLayout layout, layout_of(stream));
@@ -78,7 +78,7 @@ Result<RepairedCamera> repair_camera(const fs::path& folder, v1::CameraStream& s
 }  // namespace
 
 Result<RepairReport> repair_session(const fs::path& folder, const Observer& observer) {
-  constexpr double kSalvaged = .2;  // of the work, where the recorder was killed
+  constexpr double kSalvaged = .2;  // share of the work, if the recorder was killed
   EMBERLOCK_ASSIGN_OR_RETURN(const SalvageReport salvaged, salvage(folder, part_of(observer, 0, kSalvaged)));
   const Observer rest = part_of(observer, kSalvaged, 1);
   EMBERLOCK_ASSIGN_OR_RETURN(v1::Manifest manifest, read_manifest(folder));

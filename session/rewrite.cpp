@@ -61,7 +61,7 @@ Status rewrite_segment(CameraReader& reader, const SegmentRewrite& what, const f
   }
   fs::rename(partial, target, ec);
   if (ec) return Error{ErrorKind::io, "cannot rename into place: " + ec.message(), target.string()};
-  return sync_folder(target.parent_path());  // before what it was made from may go
+  return sync_folder(target.parent_path());  // before the source may be deleted
 }
 
 }  // namespace emberlock::session

@@ -11,20 +11,19 @@
 
 namespace emberlock::session {
 
-/// Frames of one segment that are to lie in a file of their own.
+/// Frames of one segment that are moved to a new file.
 struct SegmentRewrite {
-  std::vector<std::size_t> frames;  ///< places in the reader's records, rising
+  std::vector<std::size_t> frames;  ///< indices of the reader's records, rising
   Encoding encoding = Encoding::ffv1;
   Hertz rate;
 };
 
-/// Writes them as `target`.partial, reads every one back, compares it with its hash, and only then gives the
-/// file its name, whatever bore it before. A failure leaves all as it was.
+/// Writes the frames as `target`.partial, reads each back, compares it with its hash, and only then renames
+/// the file to `target`, replacing an existing one. A failure changes nothing.
 Status rewrite_segment(CameraReader& reader, const SegmentRewrite& what, const std::filesystem::path& target,
                        const Observer& observer);
 
-/// Whether each of the records' frames can be read from the file `path`; the error tells of the first that
-/// can't.
+/// Whether the frame of every record can be read from the file `path`. The error names the first that can't.
 Status read_back(const std::filesystem::path& path, const ImageLayout& layout,
                  std::span<const IndexRecord> records, const Observer& observer);
 

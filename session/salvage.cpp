@@ -26,7 +26,7 @@ namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-/// The index's records as far as each stands for itself, even behind a damaged header.
+/// The index's valid records, even behind a damaged header.
 Result<ParsedIndex> read_what_is_left(const fs::path& path) {
   EMBERLOCK_ASSIGN_OR_RETURN(std::string bytes, read_file(path, kMaxIndexBytes));
   const std::string header = encode_index_header();
@@ -41,9 +41,9 @@ std::pair<std::uint32_t, std::uint32_t> place(const IndexRecord& record) {
   return {record.segment, record.frame_in_segment};
 }
 
-/// The segments of a killed recording that may have holes or lack their ends. While one sync went from the
-/// data to the index, more frames came into both, and perhaps a segment was ended and the next begun: so the
-/// last two, and every other that is shorter than the index says.
+/// Segments of a killed recording that may have holes or a missing end. While one sync ran from the data to
+/// the index, more frames were written to both, and a segment may have ended and the next begun. So these are
+/// the last two segments, and every other one that is shorter than the index says.
 std::set<std::uint32_t> segments_in_doubt(const fs::path& folder, const std::string& camera_id,
                                           const std::vector<IndexRecord>& all) {
   std::set<std::uint32_t> doubted;
@@ -57,8 +57,8 @@ std::set<std::uint32_t> segments_in_doubt(const fs::path& folder, const std::str
   return doubted;
 }
 
-/// Which of a recording's frames lie whole on the disk. What stands in the index does, but for the segments
-/// in doubt, and of frames that only the segments tell of nobody knows.
+/// The frames of a recording that are complete on the disk. Frames in the index are, except in the segments
+/// in doubt. Frames that only the segments know must be checked.
 Result<std::vector<IndexRecord>> keep_whole(const fs::path& folder, const v1::CameraStream& stream,
                                             v1::Manifest::State state, const std::vector<IndexRecord>& index,
                                             const std::vector<IndexRecord>& found, const Observer& observer) {
@@ -68,12 +68,12 @@ Result<std::vector<IndexRecord>> keep_whole(const fs::path& folder, const v1::Ca
   std::set<std::uint32_t> doubted;
   if (state == v1::Manifest::RECORDING) doubted = segments_in_doubt(folder, stream.camera_id(), all);
   std::vector<IndexRecord> kept;
-  std::optional<std::size_t> last_checked;  // of those kept: not decoded
+  std::optional<std::size_t> last_checked;  // the last kept frame that was checked; it isn't decoded
   auto next_found = found.begin();
   for (std::size_t i = 0; i < all.size(); ++i) {
     EMBERLOCK_RETURN_IF_ERROR(
         observe(observer, static_cast<double>(i) / static_cast<double>(all.size()), "salvaging"));
-    // One that contradicts its neighbours isn't among them all.
+    // A record that contradicts its neighbours isn't in the merged list.
     while (next_found != found.end() && place(*next_found) < place(all[i])) ++next_found;
     const bool is_new = next_found != found.end() && all[i] == *next_found;
     if (!is_new && !doubted.contains(all[i].segment)) {
@@ -83,7 +83,7 @@ Result<std::vector<IndexRecord>> keep_whole(const fs::path& folder, const v1::Ca
       last_checked = i;
     }
   }
-  // The one that was written last stands for all that the checksums say.
+  // FFV1's checksums are trusted; of all frames checked by them only the last one is decoded.
   while (last_checked && !kept.empty() && kept.back() == all[*last_checked] &&
          !reader.read(*last_checked).ok()) {
     kept.pop_back();
@@ -92,8 +92,8 @@ Result<std::vector<IndexRecord>> keep_whole(const fs::path& folder, const v1::Ca
   return kept;
 }
 
-/// What the manifest says of a killed recording's frames: `kept` of `known` stay, of those that have a record
-/// `told`.
+/// The manifest's counts for a killed recording: `kept` of `known` frames are kept, of which `told` have a
+/// record.
 v1::Counts counts_of_killed(std::uint64_t kept, std::uint64_t known, const std::vector<IndexRecord>& told) {
   Arrivals arrivals;
   for (const IndexRecord& record : told) arrivals.add(record.stamp.frame_id);
@@ -101,7 +101,7 @@ v1::Counts counts_of_killed(std::uint64_t kept, std::uint64_t known, const std::
   v1::Counts counts;
   counts.set_recorded(kept);
   counts.set_disk(known - std::min(known, kept));
-  // Which cause took the other ids that are missing died with the recorder's counters.
+  // The causes of the other missing ids were lost with the recorder's counters.
   counts.set_camera_gap(arrivals.missing() - std::min(arrivals.missing(), untold));
   return counts;
 }
@@ -113,7 +113,7 @@ v1::Counts counts_of_finished(const v1::Counts& before, std::uint64_t kept) {
   return counts;
 }
 
-/// One camera as salvage leaves it.
+/// One camera's stream after salvage.
 struct SalvagedStream {
   SalvagedCamera report;
   v1::CameraStream stream;
@@ -126,7 +126,7 @@ Result<SalvagedStream> examine_camera(const fs::path& folder, v1::Manifest::Stat
   ParsedIndex index;
   std::error_code ec;
   const fs::path path = index_path(folder, stream.camera_id());
-  if (fs::exists(path, ec)) {  // else killed before this camera's turn came
+  if (fs::exists(path, ec)) {  // missing if the recorder was killed before it created this camera
     EMBERLOCK_ASSIGN_OR_RETURN(index, read_what_is_left(path));
   }
   const bool recording = state == v1::Manifest::RECORDING;
@@ -139,8 +139,8 @@ Result<SalvagedStream> examine_camera(const fs::path& folder, v1::Manifest::Stat
       static_cast<std::uint64_t>(std::count_if(found.begin(), found.end(), [&](const IndexRecord& record) {
         return std::binary_search(records.begin(), records.end(), record, follows);
       }));
-  // Bad records are of frames that the segments told of again, or of none that is known; behind the index
-  // there are no records.
+  // Bad records belong to frames that the segments list again, or to unknown ones. There are no records
+  // behind the index.
   const auto behind =
       static_cast<std::uint64_t>(std::count_if(found.begin(), found.end(), [&](const IndexRecord& record) {
         return index.records.empty() || follows(index.records.back(), record);
@@ -158,7 +158,7 @@ Result<SalvagedStream> examine_camera(const fs::path& folder, v1::Manifest::Stat
   return left;
 }
 
-/// Where a killed recording's new index waits until the manifest tells of it.
+/// The path at which a killed recording's new index waits until the manifest refers to it.
 fs::path new_index_path(const fs::path& folder, const std::string& camera_id) {
   fs::path path = index_path(folder, camera_id);
   path += ".salvaged";
@@ -172,7 +172,7 @@ Status write_new_index(const fs::path& folder, const SalvagedStream& left) {
   return write_file_atomically(path, encode_index(left.records));
 }
 
-/// Nothing where there is none: it has been done before.
+/// Does nothing if there is no new index: it was installed before.
 Status install_new_index(const fs::path& folder, const std::string& camera_id) {
   const fs::path path = new_index_path(folder, camera_id);
   std::error_code ec;
@@ -217,7 +217,7 @@ Result<SalvageReport> salvage(const fs::path& folder, const Observer& observer) 
   EMBERLOCK_RETURN_IF_ERROR(salvage_events(folder, report));
   const auto cameras = static_cast<std::size_t>(manifest.cameras_size());
   report.cameras.resize(cameras);
-  std::mutex mutex;  // of the manifest and what was repaired
+  std::mutex mutex;  // guards the manifest and the results
   bool repaired = killed;
   const auto salvage_camera = [&](std::size_t i, const Observer& seen) -> Status {
     v1::CameraStream& of_manifest = *manifest.mutable_cameras(static_cast<int>(i));
@@ -225,7 +225,7 @@ Result<SalvageReport> salvage(const fs::path& folder, const Observer& observer) 
       const std::lock_guard guard(mutex);
       return of_manifest;
     }();
-    // Of a recording that was killed only an earlier salvage has written counts.
+    // In a killed recording only an earlier salvage can have written counts.
     const bool was_here = killed && before.has_counts();
     if (was_here) EMBERLOCK_RETURN_IF_ERROR(install_new_index(folder, before.camera_id()));
     if ((was_here || !killed) && index_is_whole(folder, before)) {
@@ -240,7 +240,8 @@ Result<SalvageReport> salvage(const fs::path& folder, const Observer& observer) 
       const std::lock_guard guard(mutex);
       of_manifest = left.stream;
       repaired = true;
-      // A salvage that is cut short knows by it what was lost, which the new index doesn't tell.
+      // If salvage is interrupted now, the next run learns the losses from the manifest, since the new index
+      // doesn't show them.
       if (killed) EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder, manifest));
     }
     return install_new_index(folder, left.report.camera_id);

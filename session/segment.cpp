@@ -27,7 +27,7 @@ constexpr AVRational kMilliseconds{1, 1000};
 constexpr int kClusterMilliseconds = 250;
 constexpr int kClusterBytes = 4 << 20;
 constexpr int kSmallestSliced = 16;
-/// Before a frame's record in its packet's side data: the id of Matroska's BlockAdditional, big-endian.
+/// Precedes a frame's record in its packet's side data: the id of Matroska's BlockAdditional, big-endian.
 constexpr std::array<std::uint8_t, 8> kAdditionalId{0, 0, 0, 0, 0, 0, 0, 1};
 
 AVCodecID codec_of(const ImageLayout& layout, Encoding encoding) {
@@ -55,7 +55,7 @@ Result<std::unique_ptr<SegmentWriter>> SegmentWriter::create(const std::filesyst
 SegmentWriter::~SegmentWriter() = default;
 
 Error SegmentWriter::failure(int code, const char* action) const {
-  // libav's codes of the operating system's errors are theirs, negated.
+  // libav reports the operating system's errors as negated errno values.
   errno = AVUNERROR(code);
   return code == AVERROR(EROFS) || code == AVERROR(EIO)
              ? errno_error(file_->path(), action)
@@ -74,12 +74,12 @@ Status SegmentWriter::open(const std::filesystem::path& path, Hertz frame_rate) 
   c.pix_fmt = coded_format(layout_, encoding_);
   c.time_base = kMilliseconds;
   c.framerate = as_rational(frame_rate);
-  c.gop_size = 1;  // every frame stands for itself
+  c.gop_size = 1;  // every frame is a key frame
   c.thread_count = 1;
   c.flags |= AV_CODEC_FLAG_BITEXACT;
   if (encoding_ == Encoding::ffv1) {
     c.level = 3;
-    // libav's default of at least four slices corrupts images of a few pixels.
+    // libav's default of four slices or more corrupts images of a few pixels.
     if (c.width < kSmallestSliced || c.height < kSmallestSliced) c.slices = 1;
     c.color_range = AVCOL_RANGE_JPEG;
     av_opt_set_int(c.priv_data, "slicecrc", 1, 0);
@@ -116,7 +116,7 @@ Status SegmentWriter::write_header(Hertz frame_rate) {
     av_dict_set_int(&options, "cluster_time_limit", kClusterMilliseconds, 0);
     av_dict_set_int(&options, "cluster_size_limit", kClusterBytes, 0);
   } else {
-    // Side data is of NUT's version 4, which libav takes for granted only with this.
+    // Side data needs NUT version 4, which libav writes only with this setting.
     format->strict_std_compliance = FF_COMPLIANCE_EXPERIMENTAL;
     av_dict_set(&options, "syncpoints", "timestamped", 0);
   }
@@ -126,13 +126,13 @@ Status SegmentWriter::write_header(Hertz frame_rate) {
     format_.reset();
     return failure(code, "cannot write");
   }
-  file_->io()->direct = uncompressed() ? 1 : 0;  // pixels go from the image to the kernel
+  file_->io()->direct = uncompressed() ? 1 : 0;  // pixels go from the image to the kernel without a copy
   return {};
 }
 
-/// What the encoder for raw video would hand on, less its copy: rows without gaps between them.
+/// Writes a packet like that of libav's raw video encoder, but without its copy: rows without gaps.
 Status SegmentWriter::put_uncompressed(const Image& image, const IndexRecord& record) {
-  // The packet is only read.
+  // libav only reads the packet.
   packet_->data = const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(image.bytes().data()));
   packet_->size = static_cast<int>(image.bytes().size());
   packet_->pts = record.segment_ms;
@@ -157,7 +157,7 @@ Status SegmentWriter::write(const Image& image, const IndexRecord& record) {
   return {};
 }
 
-/// The encoders keep no frame back, so what comes out is what `record` is of.
+/// The encoders delay no frame, so their output belongs to `record`.
 Status SegmentWriter::drain(const IndexRecord* record) {
   for (;;) {
     const int code = avcodec_receive_packet(encoder_.get(), packet_.get());
@@ -187,7 +187,7 @@ Status SegmentWriter::put_packet(const IndexRecord* record) {
 
 Status SegmentWriter::flush() {
   if (!std::exchange(waiting_, false)) return {};
-  int code = av_write_frame(format_.get(), nullptr);  // ends Matroska's cluster
+  int code = av_write_frame(format_.get(), nullptr);  // ends the Matroska cluster
   avio_flush(file_->io());
   if (code >= 0) code = file_->io()->error;
   if (code < 0) return failure(code, "cannot write");
@@ -195,13 +195,13 @@ Status SegmentWriter::flush() {
   return {};
 }
 
-/// Left to itself the kernel keeps seconds of frames in memory, and flushing them when the segment is closed,
-/// of all cameras at once, would fill the queues.
+/// Starts the write-back early. Otherwise the kernel keeps seconds of frames in memory; flushing them when
+/// the segments of all cameras close at once would fill the queues.
 void SegmentWriter::start_writeback() {
   constexpr std::uint64_t kStep = std::uint64_t{1} << 20;
   const std::uint64_t written = bytes();
   if (written - on_its_way_ < kStep) return;
-  // Where it isn't known how to, the next sync does it all.
+  // If the call isn't supported, the next sync writes everything.
   ::sync_file_range(file_->fd(), static_cast<off64_t>(on_its_way_),
                     static_cast<off64_t>(written - on_its_way_), SYNC_FILE_RANGE_WRITE);
   on_its_way_ = written;
@@ -237,7 +237,7 @@ std::vector<IndexRecord> records_in(const std::filesystem::path& segment) {
     std::size_t size = 0;
     const std::uint8_t* const side =
         av_packet_get_side_data(packet.get(), AV_PKT_DATA_MATROSKA_BLOCKADDITIONAL, &size);
-    // libav's NUT puts another id before it: the record is what stands last.
+    // libav's NUT puts another id before it, so the record is taken from the end.
     if (side == nullptr || size < kIndexRecordBytes) continue;
     const char* const at = reinterpret_cast<const char*>(side) + (size - kIndexRecordBytes);
     if (const auto record = decode_record({at, kIndexRecordBytes})) records.push_back(*record);
@@ -290,16 +290,16 @@ Status SegmentReader::check(std::uint32_t milliseconds, std::uint64_t hash) {
 
 template <class T>
 Result<T> SegmentReader::at(std::uint32_t milliseconds, const std::function<Result<T>()>& take) {
-  constexpr std::uint32_t kNear = 200;  // reading on beats seeking
+  constexpr std::uint32_t kNear = 200;  // up to this distance reading on is faster than seeking
   const std::int64_t target = ticks(milliseconds);
   const bool ahead = position_ >= 0 && target >= position_ && target - position_ <= ticks(kNear);
   if (ahead || seek(milliseconds)) {
     Result<T> found = scan_to(milliseconds, From::here, take);
     if (found || target >= beyond_) return found;
   }
-  // A damaged seek table must not cost a good frame.
+  // A damaged seek table must not cost good frames.
   EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(path_, Checking::strict));
-  input_.format.reset();  // before its file
+  input_.format.reset();  // before the file that it reads
   input_ = std::move(fresh);
   return scan_to(milliseconds, From::start, take);
 }
@@ -324,9 +324,9 @@ Result<T> SegmentReader::scan_to(std::uint32_t milliseconds, From from,
   }
 }
 
-/// A frame of FFV1 version 3 is a chain of slices, each ending in its length (24 bits), a byte of errors and
-/// a checksum (32 bits), over all of which together with the slice the CRC is 0: RFC 9043, 4.9. The chain is
-/// followed from its end.
+/// A frame of FFV1 version 3 is a chain of slices. Each slice ends with its length (24 bits), an error byte
+/// and a checksum (32 bits); the CRC over the slice and these is 0 (RFC 9043, 4.9). The chain is walked from
+/// its end.
 Status SegmentReader::check_slices() const {
   constexpr int kFooter = 8;
   const AVCRC* const table = av_crc_get_table(AV_CRC_32_IEEE);
@@ -336,7 +336,7 @@ Status SegmentReader::check_slices() const {
     const std::uint8_t* const footer = packet_->data + end - kFooter;
     const int length = (footer[0] << 16 | footer[1] << 8 | footer[2]) + kFooter;
     if (length > end) return damaged("the frame's slices don't join");
-    if (length == kFooter) return damaged("a slice is empty");  // of zeros the checksum would be right
+    if (length == kFooter) return damaged("a slice is empty");  // zeros would pass the checksum
     end -= length;
     if (av_crc(table, 0, packet_->data + end, static_cast<std::size_t>(length)) != 0)
       return damaged("a slice's checksum is wrong");

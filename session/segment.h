@@ -14,14 +14,13 @@
 #include "session/index.h"
 #include "session/writer.h"
 
-// One file of frames. Which libav pixel format carries which layout stands in segment_pixels.h. With each
-// frame goes its record of the index, so that a segment tells by itself all that is known of its frames: in
-// Matroska as a BlockAdditional of id 1, in NUT (version 4) as side data "CodecSpecificSide1". Players pass
-// it over.
+// One file of frames. segment_pixels.h says which libav pixel format holds which layout. Each frame carries
+// its index record, so the index can be rebuilt from the segment: in Matroska as a BlockAdditional of id 1,
+// in NUT (version 4) as side data "CodecSpecificSide1". Players ignore it.
 namespace emberlock::session {
 
-/// Encodes frames into one segment file. Frames wait in memory for flush(), in Matroska a quarter of a second
-/// of them at most; a killed process loses those.
+/// Encodes frames into one segment file. Frames wait in memory until flush(), in Matroska for at most a
+/// quarter of a second; they are lost if the process is killed.
 class SegmentWriter {
  public:
   static Result<std::unique_ptr<SegmentWriter>> create(const std::filesystem::path& path,
@@ -31,12 +30,12 @@ class SegmentWriter {
   SegmentWriter& operator=(const SegmentWriter&) = delete;
   ~SegmentWriter();
 
-  /// `record.segment_ms`, the frame's time stamp, rises from frame to frame. The image has the segment's
-  /// layout.
+  /// `record.segment_ms`, the frame's time stamp, must rise from frame to frame. The image must have the
+  /// segment's layout.
   Status write(const Image& image, const IndexRecord& record);
-  /// Hands all frames written so far to the operating system: a player, and salvage, find them.
+  /// Hands all frames written so far to the operating system, where players and salvage can read them.
   Status flush();
-  /// Writes the container's end. sync() has the disk hold it.
+  /// Writes the end of the container. sync() makes it durable.
   Status close();
   Status sync();
   [[nodiscard]] int fd() const { return file_->fd(); }
@@ -62,12 +61,12 @@ class SegmentWriter {
   AvPtr<AVCodecContext> encoder_;
   AvPtr<AVFrame> frame_;
   AvPtr<AVPacket> packet_;
-  bool waiting_ = false;          ///< frames, for flush()
-  std::uint64_t on_its_way_ = 0;  ///< bytes that the kernel has been told to write
+  bool waiting_ = false;          ///< some frames haven't been flushed
+  std::uint64_t on_its_way_ = 0;  ///< bytes whose write-back the kernel has been asked to start
 };
 
-/// The records that a segment's frames carry, in the order of the file, as far as it can be read; pixels
-/// aren't looked at. Empty for one that was written before frames carried them, or that isn't a segment.
+/// The index records of a segment's frames in file order, as far as the file can be read. Pixels are not
+/// checked. Empty for old segments without records, and for other files.
 std::vector<IndexRecord> records_in(const std::filesystem::path& segment);
 
 /// Decodes frames of one segment file by their time stamps.
@@ -78,16 +77,16 @@ class SegmentReader {
   /// The frame with this time stamp. Rising stamps are fastest. Errors: bad_input (absent, damaged, other
   /// layout).
   Result<Image> read(std::uint32_t milliseconds);
-  /// Whether the frame with this time stamp lies there as it was written, `hash` being pixel_hash of its
-  /// pixels. FFV1 is told by the checksums of its slices, without decoding it; what has none is decoded and
-  /// compared with the hash. A frame that it calls whole can be read; one that it doesn't may be readable, as
-  /// a few bytes matter to checksums alone. Errors: as read().
+  /// Whether the frame with this time stamp is intact; `hash` is the pixel_hash of its pixels. FFV1 frames
+  /// are checked by their slice checksums without decoding; others are decoded and compared with the hash. A
+  /// frame that passes can be read. One that fails may still be readable, since a few bytes affect only the
+  /// checksums. Errors: as read().
   Status check(std::uint32_t milliseconds, std::uint64_t hash);
 
  private:
   SegmentReader(std::filesystem::path path, ImageLayout layout, AvInput input);
   enum class From { here, start };
-  /// Finds the packet with this time stamp, and returns what `take` makes of it.
+  /// Finds the packet with this time stamp and returns the result of `take`.
   template <class T>
   Result<T> at(std::uint32_t milliseconds, const std::function<Result<T>()>& take);
   template <class T>
@@ -103,8 +102,8 @@ class SegmentReader {
   AvInput input_;
   AvPtr<AVPacket> packet_;
   AvPtr<AVFrame> frame_;
-  std::int64_t beyond_;        ///< reading from the start ends before this time stamp
-  std::int64_t position_ = 0;  ///< every packet before this time stamp has been read; -1: unknown
+  std::int64_t beyond_;        ///< reading from the start stops before this time stamp
+  std::int64_t position_ = 0;  ///< all packets before this time stamp have been read; -1: unknown
 };
 
 }  // namespace emberlock::session

@@ -27,7 +27,7 @@ AVPixelFormat coded_format(const ImageLayout& layout, Encoding encoding) {
 
 namespace {
 
-// Where libav's GBRP keeps red, green and blue.
+// The planes of libav's GBRP that hold red, green and blue.
 constexpr std::array<std::size_t, 3> kPlaneOf{2, 0, 1};
 
 std::uint8_t* row(const AVFrame& frame, std::size_t plane, int y) {

@@ -11,13 +11,13 @@ extern "C" {
 
 namespace emberlock::session {
 
-/// The libav format in which a layout is encoded. Grey and Bayer go as they are, 10 and 12 bits within 16
-/// (libav 59's FFV1 corrupts its own gray10). FFV1 takes 8-bit RGB as BGR0, which it codes as three planes,
-/// and wider RGB as GBRP16; raw video takes both interleaved, Ut Video
-/// 8-bit RGB as planes.
+/// The libav format in which a layout is encoded. Grey and Bayer are stored as they are; 10 and 12 bits are
+/// stored in 16, because FFV1 of libav 59 corrupts its gray10. 8-bit RGB is BGR0 in FFV1 (coded as three
+/// planes), wider RGB is GBRP16; raw video stores both interleaved; Ut Video stores 8-bit RGB as planes.
 AVPixelFormat coded_format(const ImageLayout& layout, Encoding encoding);
 
-/// Both copy whole images; `frame` has the image's size and coded_format of its layout (either encoding's).
+/// Both copy whole images; `frame` must have the image's size and the coded_format of its layout (of either
+/// encoding).
 void to_av(const Image& image, AVFrame& frame);
 void from_av(const AVFrame& frame, Image& image);
 

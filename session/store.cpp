@@ -19,7 +19,7 @@ namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-/// Bytes of all files below `folder`, as far as they can be asked.
+/// Bytes of all files below `folder` whose size can be read.
 std::uint64_t bytes_below(const fs::path& folder) {
   std::uint64_t bytes = 0;
   std::error_code ec;
@@ -32,7 +32,7 @@ std::uint64_t bytes_below(const fs::path& folder) {
   return bytes;
 }
 
-/// Of a recording that isn't finished the manifest doesn't tell; its index does.
+/// For an unfinished recording, whose frames are counted in its index, not in its manifest.
 std::uint64_t frames_in_index(const fs::path& folder, const std::string& camera_id) {
   std::error_code ec;
   const std::uintmax_t size = fs::file_size(index_path(folder, camera_id), ec);
@@ -71,16 +71,25 @@ v1::ListSessionsResponse::Entry entry_of(const fs::path& folder) {
   return entry;
 }
 
-/// The folders of all sessions, finished or not; what lies beside them is none of ours.
+/// The folders of all sessions, finished or not. Other entries are ignored.
 std::vector<fs::path> folders_in(const fs::path& folder) {
   std::vector<fs::path> found;
   std::error_code ec;
   for (fs::directory_iterator at(folder, ec), end; !ec && at != end; at.increment(ec)) {
-    if (is_folder_name(at->path().filename().string()) && SessionReader::is_session(at->path()))
+    const std::string name = at->path().filename().string();
+    if ((is_folder_name(name) || check_session_name(name)) && SessionReader::is_session(at->path()))
       found.push_back(at->path());
   }
   std::sort(found.begin(), found.end());
   return found;
+}
+
+/// Whether a folder that came from elsewhere has this name with its marks apart.
+bool looks_taken(const fs::path& folder, const std::string& stored) {
+  std::error_code ec;
+  for (fs::directory_iterator at(folder, ec), end; !ec && at != end; at.increment(ec))
+    if (stored_name(at->path().filename().string()) == stored) return true;
+  return false;
 }
 
 std::string name_of_time(TimePoint wall_clock) {
@@ -94,7 +103,7 @@ std::string name_of_time(TimePoint wall_clock) {
 }  // namespace
 
 Result<SessionStore> SessionStore::open(fs::path folder, StoreOptions options) {
-  if (!folder.has_filename()) folder = folder.parent_path();  // a slash at its end
+  if (!folder.has_filename()) folder = folder.parent_path();  // a trailing slash
   std::error_code ec;
   fs::create_directories(folder, ec);
   if (ec || ::access(folder.c_str(), W_OK | X_OK) != 0) {
@@ -127,8 +136,9 @@ Result<fs::path> SessionStore::path_for_new(std::string_view name, TimePoint wal
   std::error_code ec;
   if (!name.empty()) {
     EMBERLOCK_RETURN_IF_ERROR(check_session_name(name));
-    fs::path path = folder_ / name;
-    if (!fs::exists(fs::symlink_status(path, ec))) return path;
+    fs::path path = folder_ / stored_name(name);
+    if (!fs::exists(fs::symlink_status(path, ec)) && !looks_taken(folder_, path.filename().string()))
+      return path;
     return Error{ErrorKind::bad_input, "there is a session of this name", path.string(),
                  "Choose another name"};
   }
@@ -170,7 +180,7 @@ Result<v1::StorageStatus> SessionStore::storage(double bytes_per_s) const {
 std::vector<fs::path> SessionStore::unfinished() const {
   std::vector<fs::path> found;
   for (const fs::path& folder : folders_in(folder_)) {
-    // Most are finished, which shows sooner than their manifest is parsed.
+    // Most sessions are finished; the text shows that before the manifest is parsed.
     const auto text = read_file(manifest_path(folder));
     const std::string& word = v1::Manifest::State_Name(v1::Manifest::RECORDING);
     if (!text || text->find(word) == std::string::npos) continue;

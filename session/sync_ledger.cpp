@@ -57,8 +57,8 @@ void SyncLedger::cut(std::uint64_t frames) {
   dirty_ = true;
 }
 
-/// Data before the index. Frames that are written meanwhile may still reach the disk in the index alone:
-/// salvage doubts the last segments.
+/// Syncs data before the index. Of frames written during the sync, the index may reach the disk without the
+/// data; that is why salvage checks the last segments.
 Status SyncLedger::sync(const Due& due, std::shared_ptr<UniqueFd>& failed) const {
   for (const File& segment : due.segments) {
     if (!segment.regular || flush_(segment.fd->get()) == 0) continue;
@@ -85,12 +85,12 @@ Status SyncLedger::sync() {
     dirty_ = false;
     due_.folders = false;
   }
-  // A stream's data is on its way since it was written (SegmentWriter): this waits for the rest.
+  // A stream's write-back was started when it was written (SegmentWriter); this waits for the rest.
   std::shared_ptr<UniqueFd> failed;
   Status done = sync(due, failed);
   const std::scoped_lock lock(mutex_);
   if (!done) {
-    // The segment that it is of may have been cut off meanwhile.
+    // The failed segment may have been cut off meanwhile.
     const bool cut_off = failed != nullptr && cuts != cuts_ &&
                          std::none_of(due_.segments.begin(), due_.segments.end(),
                                       [&](const File& file) { return file.fd == failed; });
@@ -103,7 +103,7 @@ Status SyncLedger::sync() {
       std::all_of(due.segments.begin(), due.segments.end(), [](const File& f) { return f.regular; });
   if (cuts != cuts_ || !all_regular) return {};
   safe_ = std::max(safe_, due.frames);
-  // What ended before this sync began needs none any more.
+  // Segments that ended before this sync began are done.
   const auto is_done = [&](const File& file) {
     return std::any_of(due.segments.begin(), due.segments.end(),
                        [&](const File& synced) { return synced.ended && synced.fd == file.fd; });

@@ -14,40 +14,41 @@
 
 namespace emberlock::session {
 
-/// What one camera's writer has handed to the operating system, and what of it is on the disk. The writer
-/// hands on and another thread syncs; neither waits for the other. Any thread may call anything.
+/// Tracks which of a camera's frames have been handed to the operating system and which are on the disk. The
+/// writer hands frames on and another thread syncs; neither waits for the other. Thread-safe.
 class SyncLedger {
  public:
-  /// fdatasync(2), or what a test puts in its place.
+  /// fdatasync(2), or its replacement in a test.
   using Flush = int (*)(int descriptor);
 
-  /// `index` and `folders` (the innermost first) are synced too: the index after the segments, the folders
-  /// whenever a file was begun.
+  /// `index` and `folders` (innermost first) are synced too: the index after the segments, the folders when a
+  /// file was created.
   SyncLedger(UniqueFd index, std::filesystem::path index_path, std::vector<std::filesystem::path> folders,
              Flush flush = ::fdatasync);
 
-  /// A segment was begun. The ledger keeps a descriptor of its own until its last frame is on the disk.
+  /// A segment was created. The ledger keeps its own descriptor until the segment's last frame is on the
+  /// disk.
   Status begun(int segment, const std::filesystem::path& path);
-  /// The frames up to `frames`, counted from the recording's first, are with the operating system: whole in
-  /// their segment, and in the index.
+  /// The first `frames` frames of the recording have been handed to the operating system, in segment and
+  /// index.
   void handed(std::uint64_t frames);
-  /// The segment begun last holds all that it ever will, and so do those before it.
+  /// The last segment, and all before it, are complete.
   void ended();
-  /// After a failure: of the frames only the first `frames` stay. Those of them that aren't safe are synced
-  /// yet; a cut to what is safe forgets the error of a sync.
+  /// After a failure: keeps only the first `frames` frames. Those that aren't safe are still to be synced. A
+  /// cut down to the safe frames clears the error of a sync.
   void cut(std::uint64_t frames);
 
-  /// Syncs what was handed on until now. An error stays, and nothing more becomes safe, until what isn't safe
-  /// was cut off: the kernel tells of a write that failed once only (fsync(2)), so a second try proves
+  /// Syncs everything handed on so far. After an error nothing more becomes safe until the frames that aren't
+  /// safe have been cut off: the kernel reports a failed write only once (fsync(2)), so a second sync proves
   /// nothing.
   Status sync();
-  /// The error that sync() met, until it is cut off.
+  /// The error of sync(), until it is cleared by cut().
   [[nodiscard]] Status failure() const;
 
   [[nodiscard]] std::uint64_t handed() const;
-  /// Frames that a power cut can't take any more.
+  /// Number of frames that would survive a power cut.
   [[nodiscard]] std::uint64_t safe() const;
-  /// Segments that are ended, but not on the disk yet.
+  /// Number of segments that are complete but not on the disk yet.
   [[nodiscard]] std::size_t waiting() const;
 
  private:
@@ -55,14 +56,14 @@ class SyncLedger {
     std::shared_ptr<UniqueFd> fd;
     std::filesystem::path path;
     bool ended = false;
-    bool regular = true;  ///< else nothing of it, nor of what follows, ever is safe
+    bool regular = true;  ///< false (a pipe or device): this file and the following ones never count as safe
   };
   struct Due {
     std::vector<File> segments;
     std::uint64_t frames = 0;
     bool folders = false;
   };
-  /// `failed` is the segment whose error this is, if it is a segment's.
+  /// `failed` receives the segment that caused the error, if a segment did.
   Status sync(const Due& due, std::shared_ptr<UniqueFd>& failed) const;
 
   const Flush flush_;
@@ -71,11 +72,11 @@ class SyncLedger {
   const std::vector<std::filesystem::path> folders_;
 
   std::mutex syncing_;        ///< one sync at a time
-  mutable std::mutex mutex_;  ///< guards what follows
+  mutable std::mutex mutex_;  ///< guards the members below
   Due due_{.segments = {}, .frames = 0, .folders = true};
   bool dirty_ = true;
   std::uint64_t safe_ = 0;
-  std::uint64_t cuts_ = 0;  ///< a sync that began before a cut says nothing of the frames after it
+  std::uint64_t cuts_ = 0;  ///< a sync that began before a cut proves nothing about later frames
   Status failure_;
 };
 

@@ -15,7 +15,7 @@ namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-/// Replaces one uncompressed segment. The reader prefers the compressed one as soon as it has its name.
+/// Replaces one uncompressed segment. The reader prefers the compressed file as soon as it exists.
 Status transcode_segment(const fs::path& folder, const v1::CameraStream& stream, CameraReader& reader,
                          std::size_t first, std::size_t end, const Observer& observer) {
   const std::uint32_t number = reader.records()[first].segment;
@@ -23,8 +23,7 @@ Status transcode_segment(const fs::path& folder, const v1::CameraStream& stream,
   const fs::path target = folder / segment_name(stream.camera_id(), number, Encoding::ffv1);
   std::error_code ec;
   if (!fs::exists(raw, ec)) return {};
-  if (fs::exists(target,
-                 ec)) {  // cut short between two steps, or somebody else's: only what can be read back counts
+  if (fs::exists(target, ec)) {  // by an interrupted run, or foreign: must be readable
     const std::span records(reader.records());
     Status whole = read_back(target, reader.layout(), records.subspan(first, end - first), observer);
     if (!whole && whole.error().kind == ErrorKind::refused) return whole;

@@ -19,7 +19,7 @@ using Place = std::pair<std::uint32_t, std::uint32_t>;  ///< segment, millisecon
 
 Place place_of(const IndexRecord& record) { return {record.segment, record.segment_ms}; }
 
-/// Numbers of the segments that lie in the camera's folder.
+/// Numbers of the segments in the camera's folder.
 std::set<std::uint32_t> segments_in(const fs::path& folder, const std::string& camera_id) {
   std::set<std::uint32_t> numbers;
   std::error_code ec;

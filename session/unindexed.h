@@ -9,17 +9,17 @@
 
 namespace emberlock::session {
 
-/// Which segments are asked for frames that the index lacks. An index is only ever appended to: while its
-/// records are good, what it lacks lies behind the last of them.
+/// Which segments are searched for frames that the index lacks. The index is append-only: while its records
+/// are valid, missing frames lie behind its last record.
 enum class Search { behind_the_index, everywhere };
 
-/// Records of frames that lie in a camera's segments and not in its index, by what the segments themselves
-/// carry (segment.h): what a power cut leaves, or a damaged index. Whether their pixels are whole isn't
-/// known. In the index's order.
+/// Index records of frames that are in a camera's segments but not in its index, read from the segments
+/// (segment.h). They appear after a power cut or when the index is damaged. Their pixels haven't been
+/// checked. Sorted like the index.
 std::vector<IndexRecord> unindexed_frames(const std::filesystem::path& folder, const std::string& camera_id,
                                           const std::vector<IndexRecord>& index, Search search);
 
-/// Both in the index's order; of two that contradict each other the index's stays.
+/// Merges two lists in the index's order. Where two records contradict each other, that of the index wins.
 std::vector<IndexRecord> merged(const std::vector<IndexRecord>& index, const std::vector<IndexRecord>& found);
 
 }  // namespace emberlock::session

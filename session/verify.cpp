@@ -23,7 +23,7 @@ std::string of(std::uint64_t part, std::uint64_t whole) {
   return std::to_string(part) + " of " + std::to_string(whole) + " frames";
 }
 
-/// What the index of a camera holds; what is wrong with it goes to the check's problems.
+/// The records of a camera's index; faults are added to the check's problems.
 std::vector<IndexRecord> check_index(const fs::path& folder, v1::Manifest::State state,
                                      const v1::CameraStream& stream, CameraCheck& check) {
   const std::string file = index_path(folder, stream.camera_id()).lexically_relative(folder).string();
@@ -48,7 +48,8 @@ std::vector<IndexRecord> check_index(const fs::path& folder, v1::Manifest::State
   return std::move(index->records);
 }
 
-/// The manifest's list against what the index says, files' endings aside, which transcoding changes.
+/// Compares the manifest's list of segments with the index. File extensions are ignored, since transcoding
+/// changes them.
 void check_segments(const fs::path& folder, const std::vector<IndexRecord>& records,
                     const v1::CameraStream& stream, CameraCheck& check) {
   v1::CameraStream expected = stream;
@@ -90,19 +91,21 @@ Status check_frames(const fs::path& folder, CameraReader& reader, const std::str
   return {};
 }
 
-/// Frames that lie there, and of which the index doesn't tell.
-void check_unindexed(const fs::path& folder, const std::string& camera_id, const CameraReader& indexed,
-                     std::uint64_t lost_to_the_disk, CameraCheck& check) {
-  const Search search = check.missing > 0 ? Search::everywhere : Search::behind_the_index;
-  CameraReader reader(folder, camera_id, indexed.layout(),
-                      unindexed_frames(folder, camera_id, indexed.records(), search));
-  for (std::size_t i = 0; i < reader.records().size(); ++i)
+/// Reads the frames that are in the segments but not in the index.
+Status check_unindexed(const fs::path& folder, CameraReader& reader, const std::string& camera_id,
+                       std::uint64_t lost_to_the_disk, CameraCheck& check, const Observer& observer) {
+  const std::size_t frames = reader.records().size();
+  for (std::size_t i = 0; i < frames; ++i) {
+    EMBERLOCK_RETURN_IF_ERROR(observe(observer, static_cast<double>(i) / static_cast<double>(frames),
+                                      "reading what the index of " + camera_id + " lacks"));
     if (reader.read(i).ok()) ++check.unindexed;
-  // What a failing disk had taken all the same is counted as lost to it.
-  if (check.unindexed <= lost_to_the_disk) return;
+  }
+  // Frames that a failing disk stored after all are counted as lost to it.
+  if (check.unindexed <= lost_to_the_disk) return {};
   check.problems.push_back(fmt::format("{}: lacks {} frames that lie in the segments",
                                        index_path(folder, camera_id).lexically_relative(folder).string(),
                                        check.unindexed));
+  return {};
 }
 
 Result<CameraCheck> check_camera(const fs::path& folder, const v1::Manifest& manifest,
@@ -112,10 +115,18 @@ Result<CameraCheck> check_camera(const fs::path& folder, const v1::Manifest& man
   check.camera_id = stream.camera_id();
   std::vector<IndexRecord> records = check_index(folder, manifest.state(), stream, check);
   if (manifest.state() != v1::Manifest::RECORDING) check_segments(folder, records, stream, check);
-  CameraReader reader(folder, stream.camera_id(), layout, std::move(records));
-  EMBERLOCK_RETURN_IF_ERROR(check_frames(folder, reader, stream.camera_id(), check, observer));
+  const Search search = check.missing > 0 ? Search::everywhere : Search::behind_the_index;
+  std::vector<IndexRecord> lacking;
   if (manifest.state() != v1::Manifest::RECORDING)
-    check_unindexed(folder, stream.camera_id(), reader, stream.counts().disk(), check);
+    lacking = unindexed_frames(folder, stream.camera_id(), records, search);
+  const auto all = static_cast<double>(std::max<std::size_t>(1, records.size() + lacking.size()));
+  const double indexed = static_cast<double>(records.size()) / all;
+  CameraReader reader(folder, stream.camera_id(), layout, std::move(records));
+  EMBERLOCK_RETURN_IF_ERROR(
+      check_frames(folder, reader, stream.camera_id(), check, part_of(observer, 0, indexed)));
+  CameraReader unindexed(folder, stream.camera_id(), layout, std::move(lacking));
+  EMBERLOCK_RETURN_IF_ERROR(check_unindexed(folder, unindexed, stream.camera_id(), stream.counts().disk(),
+                                            check, part_of(observer, indexed, 1)));
   if (check.good == 0) check.problems.push_back(stream.camera_id() + ": not one frame of it can be read");
   return check;
 }
@@ -133,7 +144,7 @@ void check_events(const fs::path& folder, SessionCheck& check) {
   }
 }
 
-/// Not even what could be repaired.
+/// Nothing that could be repaired.
 bool holds_nothing(const SessionCheck& check) {
   return std::all_of(check.cameras.begin(), check.cameras.end(), [](const CameraCheck& c) {
     return c.good == 0 && c.unindexed == 0 && c.bad == 0 && c.missing == 0;

@@ -19,13 +19,13 @@ namespace emberlock::session {
 namespace fs = std::filesystem;
 namespace {
 
-/// From the root, without a slash at its end: the folder that it stands in is its parent_path().
+/// Absolute, without a trailing slash: the enclosing folder is its parent_path().
 fs::path full_path(const fs::path& folder) {
   fs::path path = fs::absolute(folder);
   return path.has_filename() ? path : path.parent_path();
 }
 
-/// What a device says of itself, fit for a manifest.
+/// A device's text on one line, fit for a manifest.
 std::string in_one_line(std::string text) {
   for (char& c : text) {
     if (static_cast<unsigned char>(c) < ' ' || c == '\x7f') c = ' ';
@@ -33,8 +33,8 @@ std::string in_one_line(std::string text) {
   return text.substr(0, kMaxTextBytes);
 }
 
-/// The folder of a session that is being begun; taken away again unless it is kept. Of what it holds only
-/// from ours() on, which another recorder of the same folder doesn't reach.
+/// The folder of a session that is being created; removed again unless it is kept. Of its contents only those
+/// from ours() on are removed, which no other recorder of the same folder creates.
 class NewFolder {
  public:
   explicit NewFolder(fs::path path) : path_(std::move(path)) {}
@@ -46,7 +46,7 @@ class NewFolder {
     if (ours_) {
       for (const auto& entry : fs::directory_iterator(path_, ec)) fs::remove_all(entry.path(), ec);
     }
-    // Of the folders around it those that hold something by now stay.
+    // Of the created parents, those that aren't empty stay.
     for (const fs::path& folder : made_) fs::remove(folder, ec);
   }
   Status create() {
@@ -60,8 +60,8 @@ class NewFolder {
     if (ec)
       return Error{ErrorKind::io, "cannot create the folder: " + ec.message(), path_.string(),
                    "Check that its parent is writable"};
-    // A folder lasts when the one that it stands in is synced. One that may not be read can't be: then it
-    // lasts from when its first file does.
+    // A folder is durable once its parent is synced. If the parent may not be read, this folder becomes
+    // durable with its first file.
     for (const fs::path& folder : made_) {
       const fs::path parent = folder.parent_path();
       if (::access(parent.c_str(), R_OK) == 0) EMBERLOCK_RETURN_IF_ERROR(sync_folder(parent));
@@ -74,8 +74,8 @@ class NewFolder {
  private:
   fs::path path_;
   bool ours_ = false;
-  std::vector<fs::path> made_;  ///< the innermost first
-  bool kept_ = true;            ///< nothing of it is ours before create()
+  std::vector<fs::path> made_;  ///< innermost first
+  bool kept_ = true;            ///< before create() nothing is ours
 };
 
 Status check_options(const WriterOptions& options) {
@@ -108,7 +108,7 @@ Result<SessionWriter> SessionWriter::create(const fs::path& where, v1::Manifest 
   NewFolder created(folder);
   EMBERLOCK_RETURN_IF_ERROR(created.create());
   SessionWriter writer(folder, std::move(manifest));
-  // First of all: of several recorders that begin in one folder, one makes this file.
+  // First: if several recorders start in one folder, only one can create this file.
   EMBERLOCK_ASSIGN_OR_RETURN(EventLog events, EventLog::open(events_path(folder), EventLog::Mode::create));
   created.ours();
   EMBERLOCK_RETURN_IF_ERROR(write_manifest(folder, writer.manifest_));
@@ -143,7 +143,7 @@ Status SessionWriter::sync() {
 
 std::uint64_t SessionWriter::safe(std::size_t camera) const { return cameras_.at(camera)->safe(); }
 
-WrittenSoFar SessionWriter::written(std::size_t camera) const { return cameras_.at(camera)->written(); }
+CameraProgress SessionWriter::progress(std::size_t camera) const { return cameras_.at(camera)->progress(); }
 
 void SessionWriter::set_arrivals(std::size_t camera, const Arrivals& arrivals) {
   cameras_.at(camera)->set_arrivals(arrivals);
@@ -151,9 +151,10 @@ void SessionWriter::set_arrivals(std::size_t camera, const Arrivals& arrivals) {
 
 Status SessionWriter::append(const v1::Event& event) { return events_->append(event); }
 
-Result<v1::Manifest> SessionWriter::finish() {
+Result<v1::Manifest> SessionWriter::finish(const Progress& progress) {
   Status first;
   for (int i = 0; i < manifest_.cameras_size(); ++i) {
+    tell(progress, static_cast<double>(i) / manifest_.cameras_size(), "sees that the disk has all frames");
     const Status done = cameras_[static_cast<std::size_t>(i)]->finish(*manifest_.mutable_cameras(i));
     if (first && !done) first = done;
   }

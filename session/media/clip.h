@@ -18,21 +18,21 @@ namespace emberlock::session {
 struct ClipPart {
   std::filesystem::path path;
   VideoScan scan;
-  std::int64_t first = 0;  ///< place of its first frame within the film
+  std::int64_t first = 0;  ///< index of its first frame within the film
 };
 
-/// A camera's film in one file or several, one after the other: a video that the camera split, or pictures.
-/// The files are only read.
+/// A camera's film in one or several consecutive files: a video that the camera split, or pictures.
+/// Read-only.
 class ClipReader {
  public:
   explicit ClipReader(std::vector<ClipPart> parts, Colours colours);
 
   [[nodiscard]] std::int64_t frames() const;
-  /// next() goes on with the frame at this place.
+  /// The next call of next() returns the frame at this place.
   Status seek(std::int64_t place);
-  /// The place of the frame that next() gives.
+  /// The place of the frame that next() will return.
   [[nodiscard]] std::int64_t place() const { return place_; }
-  /// Errors: out_of_data after the last frame; bad_input where a file is damaged, with its name and frame.
+  /// Errors: out_of_data after the last frame; bad_input where a file is damaged, naming file and frame.
   Result<Image> next();
 
  private:
@@ -41,7 +41,7 @@ class ClipReader {
   std::vector<ClipPart> parts_;
   Colours colours_;
   std::int64_t place_ = 0;
-  std::size_t open_ = 0;  ///< which part `file_` is
+  std::size_t open_ = 0;  ///< the part that `file_` reads
   std::unique_ptr<FrameFile> file_;
 };
 

@@ -37,7 +37,7 @@ struct FitsImage {
   double zero = 0;
 };
 
-/// Moves to the first HDU that holds a picture: two axes, further ones of length 1.
+/// Moves to the first HDU that holds a picture: two axes, all further axes of length 1.
 Result<FitsImage> find_image(fitsfile* file, const std::string& where) {
   int status = 0;
   int units = 0;
@@ -66,7 +66,7 @@ Result<FitsImage> find_image(fitsfile* file, const std::string& where) {
                "Export a single image, or copy it again"};
 }
 
-/// cfitsio reads zeros behind a file's end.
+/// Needed because cfitsio reads zeros beyond the end of a truncated file.
 Status check_whole(fitsfile* file, const FitsImage& image, std::size_t size, const std::string& where) {
   int status = 0;
   LONGLONG header_start = 0;
@@ -75,7 +75,7 @@ Status check_whole(fitsfile* file, const FitsImage& image, std::size_t size, con
   fits_get_hduaddrll(file, &header_start, &data_start, &data_end, &status);
   const bool compressed = fits_is_compressed_image(file, &status) != 0;
   if (status != 0) return fits_error(status, where);
-  // Some writers leave out the padding behind the last pixel.
+  // Some writers omit the padding after the last pixel.
   const LONGLONG pixels_end = data_start + image.width * image.height * (std::abs(image.bitpix) / 8);
   if ((compressed ? data_end : pixels_end) <= static_cast<LONGLONG>(size)) return {};
   return Error{ErrorKind::bad_input, "the FITS file is truncated", where, "Copy or record it again"};
@@ -86,7 +86,7 @@ Status check_whole(fitsfile* file, const FitsImage& image, std::size_t size, con
 bool is_fits(std::string_view head) { return head.starts_with("SIMPLE  ="); }
 
 Result<Image> decode_fits(std::string_view content, const std::string& where) {
-  // From memory: cfitsio gives file names a syntax of their own (filters, programs, network).
+  // Read from memory, because cfitsio interprets file names (filters, programs, network).
   auto* bytes = static_cast<void*>(const_cast<char*>(content.data()));
   std::size_t size = content.size();
   fitsfile* opened = nullptr;

@@ -9,7 +9,7 @@
 #include "base/result.h"
 #include "session/media/frame_file.h"
 
-// What FrameFile chooses from by the first bytes of a file.
+// The decoders from which FrameFile chooses by the first bytes of a file.
 namespace emberlock::session {
 
 /// PNM, PNG, JPEG or TIFF, by their magic numbers.
@@ -20,14 +20,14 @@ Result<Image> decode_still_image(std::string_view content, const std::string& wh
 bool is_fits(std::string_view head);
 /// The first two-dimensional image of a FITS file. 8-bit unscaled data become gray8, everything else gray16:
 /// physical values (after BZERO and BSCALE) rounded and clamped to 0..65535, blanks 0. The file's first row
-/// becomes row 0: the order of the detector's readout, which smear is measured along, not the upward order in
-/// which FITS viewers draw.
+/// becomes row 0. This is the detector's readout order, along which smear is measured; FITS viewers draw it
+/// upwards.
 Result<Image> decode_fits(std::string_view content, const std::string& where);
 
-/// Anything that libavformat recognises.
+/// Any file that libavformat recognises.
 Result<std::unique_ptr<FrameFile>> open_video(const std::filesystem::path& path, Colours colours);
 
-/// A size that may be decoded: both sides within 1..kMaxImageSide.
+/// Whether an image of this size may be decoded: both sides within 1..kMaxImageSide.
 Status check_image_size(std::int64_t width, std::int64_t height, const std::string& where);
 
 }  // namespace emberlock::session

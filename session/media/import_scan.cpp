@@ -50,7 +50,7 @@ std::optional<std::int64_t> last_number(const std::string& stem) {
 
 bool hidden(const fs::path& path) { return path.filename().string().starts_with('.'); }
 
-/// The files below a folder, whatever lies between: cards bury films in DCIM/100CANON.
+/// All files below a folder, at any depth: camera cards store films in folders like DCIM/100CANON.
 Result<std::vector<fs::path>> files_below(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code ec;

@@ -17,9 +17,9 @@ extern "C" {
 namespace emberlock::session {
 namespace {
 
-constexpr double kLongest = 4 * 3600;  // seconds: what comes later is left out
+constexpr double kLongest = 4 * 3600;  // seconds: later sound is ignored
 
-/// Adds up squares by millisecond.
+/// Sums the squares of samples per millisecond.
 class Loudness {
  public:
   void add(double at, double square) {
@@ -45,10 +45,10 @@ class Loudness {
   std::vector<int> counts_;
 };
 
-/// Floating-point samples beyond this many full scales are no sound.
+/// Floating-point samples above this multiple of full scale are invalid.
 constexpr double kLoudest = 1e6;
 
-/// The mean square of all channels at sample i, of a full scale of one.
+/// Mean square of all channels at sample i, relative to full scale.
 template <class Sample>
 double mean_square(const AVFrame& frame, int channels, bool planar, int i) {
   double sum = 0;
@@ -89,7 +89,7 @@ double mean_square(const AVFrame& frame, int i) {
   }
 }
 
-/// Where time stands: what was decoded last ended there.
+/// `clock` is the end of the last decoded frame.
 void take(const AVFrame& frame, double tick, double origin, double& clock, Loudness& loudness) {
   if (frame.sample_rate <= 0) return;
   if (frame.best_effort_timestamp != AV_NOPTS_VALUE)
@@ -107,7 +107,7 @@ Result<SoundTrack> read_sound(const std::filesystem::path& path) {
   if (!sound.input.decoder) return track;
   const AvInput& input = sound.input;
   const double tick = av_q2d(input.format->streams[input.stream]->time_base);
-  // Sound may begin before the first frame: count from the earlier of the two.
+  // Sound may begin before the first frame; count from the earlier of the two.
   const double begin = std::min(0.0, sound.begins.value() - sound.video_begins.value());
   const double origin = sound.video_begins.value() + begin;
   double clock = sound.begins.value();

@@ -8,9 +8,9 @@
 
 namespace emberlock::session {
 
-/// How loud the sound track that goes with a file's video is, millisecond by millisecond, counted from its
-/// first frame. Empty levels where it has none, or none that can be decoded; a track that is damaged ends
-/// there. Errors (bad_input): no readable video.
+/// The loudness of the sound track of a file's video in steps of a millisecond, counted from the first frame.
+/// No levels where there is no sound or none that can be decoded; a damaged track ends at the damage. Errors
+/// (bad_input): no readable video.
 Result<SoundTrack> read_sound(const std::filesystem::path& path);
 
 }  // namespace emberlock::session

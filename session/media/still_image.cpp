@@ -55,7 +55,7 @@ class PnmHeader {
     if (at_ == first) return std::nullopt;
     return v;
   }
-  /// One white space ends the header; the samples follow.
+  /// A single white space ends the header; the samples follow.
   [[nodiscard]] std::string_view samples() const { return s_.substr(std::min(at_ + 1, s_.size())); }
 
  private:
@@ -69,7 +69,7 @@ class PnmHeader {
   std::size_t at_ = 2;
 };
 
-/// Binary PGM and PPM, by hand: OpenCV neither tells maxval nor a truncated file from a whole one.
+/// Binary PGM and PPM. Parsed here because OpenCV reports neither maxval nor truncation.
 Result<Image> decode_binary_pnm(std::string_view content, const std::string& where) {
   PnmHeader header(content);
   const auto width = header.number();
@@ -198,7 +198,7 @@ bool is_still_image(std::string_view head) {
 
 Result<Image> decode_still_image(std::string_view content, const std::string& where) {
   if (is_pnm(content) && (content[1] == '5' || content[1] == '6')) return decode_binary_pnm(content, where);
-  // OpenCV allocates what the header asks for and takes a truncated file for a whole one: check both before.
+  // OpenCV allocates whatever the header states and accepts truncated files, so both are checked first.
   if (!is_pnm(content)) {
     EMBERLOCK_ASSIGN_OR_RETURN(const StillSize size, is_png(content)    ? check_png(content, where)
                                                      : is_jpeg(content) ? check_jpeg(content, where)
@@ -208,10 +208,10 @@ Result<Image> decode_still_image(std::string_view content, const std::string& wh
   if (content.size() > static_cast<std::size_t>(std::numeric_limits<int>::max())) {
     return Error{ErrorKind::bad_input, "larger than 2 GiB", where, "Crop the image"};
   }
-  // As stored: rows and columns are the sensor's, whatever an EXIF orientation says.
+  // As stored: an EXIF orientation is ignored, because rows and columns must be the sensor's.
   const int flags = cv::IMREAD_ANYCOLOR | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
   try {
-    // imdecode only reads, but cv::Mat has no view of constant bytes.
+    // imdecode doesn't write, but cv::Mat has no view of constant bytes.
     const cv::Mat bytes(1, static_cast<int>(content.size()), CV_8U, const_cast<char*>(content.data()));
     const cv::Mat mat = cv::imdecode(bytes, flags);
     if (mat.empty()) return damaged(where, "image", "it can't be decoded");

@@ -26,12 +26,12 @@ struct SwsFree {
 };
 
 enum class Transfer {
-  rows,     ///< the decoder's rows already are the image's
+  rows,     ///< the decoder's rows are the image's rows
   samples,  ///< the same values in another order or byte order
-  scaler,   ///< libswscale converts; wide samples come out at 16 bits
+  scaler,   ///< libswscale converts; samples above 8 bits become 16 bits
 };
 
-/// What a decoded frame becomes, and how.
+/// The image format that a decoded frame is converted to, and the way of conversion.
 struct Target {
   ImageLayout layout;
   Transfer transfer = Transfer::scaler;
@@ -48,7 +48,7 @@ Target target_of(const AVFrame& frame, Colours colours) {
   const bool wide = depth > 8;
   constexpr std::uint64_t kIndirect =
       AV_PIX_FMT_FLAG_PAL | AV_PIX_FMT_FLAG_FLOAT | AV_PIX_FMT_FLAG_BAYER | AV_PIX_FMT_FLAG_HWACCEL;
-  const bool limited = d->nb_components > 2 && !rgb;  // brightness may stand for 16..235
+  const bool limited = d->nb_components > 2 && !rgb;  // brightness may be limited to 16..235
   const bool direct = (gray || rgb) && !limited && (flags & kIndirect) == 0 && depth >= 8 && depth <= 16;
 
   Target t;
@@ -90,8 +90,8 @@ void copy_samples(const AVFrame& frame, Image& image) {
   }
 }
 
-/// What libswscale makes of a frame: planes of 8-bit RGB, which take it a quarter of the time of interleaved
-/// samples.
+/// The libav format to which libswscale converts: planar 8-bit RGB, which takes a quarter of the time of
+/// interleaved RGB.
 AVPixelFormat scaled_format(PixelFormat format) {
   const bool wide = bytes_per_sample(format) == 2;
   if (channels(format) == 3) return wide ? AV_PIX_FMT_RGB48LE : AV_PIX_FMT_GBRP;
@@ -113,7 +113,7 @@ class VideoFile final : public FrameFile {
       if (code == 0) {
         const std::int64_t here = frame_->best_effort_timestamp;
         if (wanted_ && here != AV_NOPTS_VALUE && here < *wanted_) continue;
-        if (wanted_ && here != *wanted_ && jumped_) {  // the index led past it
+        if (wanted_ && here != *wanted_ && jumped_) {  // the index led past the wanted frame
           EMBERLOCK_RETURN_IF_ERROR(start_anew());
           continue;
         }
@@ -158,12 +158,12 @@ class VideoFile final : public FrameFile {
   Status start_anew() {
     jumped_ = false;
     EMBERLOCK_ASSIGN_OR_RETURN(AvInput fresh, open_av_input(where_, Checking::lenient));
-    input_.format.reset();  // before its file
+    input_.format.reset();  // before the file that it reads
     input_ = std::move(fresh);
     return {};
   }
 
-  /// Hands the decoder its next packet, or the end of the stream.
+  /// Feeds the decoder the next packet, or the end of the stream.
   Status feed() {
     for (;;) {
       av_packet_unref(packet_.get());
@@ -192,8 +192,8 @@ class VideoFile final : public FrameFile {
     if (ends_early()) return damaged("the file is truncated, it promises more frames");
     return {ErrorKind::out_of_data, "the video has ended", position()};
   }
-  /// Containers that state their duration betray a cut: many demuxers take the end of the file for the end of
-  /// the film.
+  /// Whether the file is truncated. Many demuxers take the end of the file for the end of the film;
+  /// containers that state a duration reveal the difference.
   [[nodiscard]] bool ends_early() const {
     const AVFormatContext& format = *input_.format;
     const AVStream& stream = *format.streams[input_.stream];
@@ -206,7 +206,7 @@ class VideoFile final : public FrameFile {
     const double promised = stream.duration == AV_NOPTS_VALUE
                                 ? static_cast<double>(format.duration) / AV_TIME_BASE
                                 : static_cast<double>(stream.duration) * tick;
-    const double other_streams = format.nb_streams > 1 ? 1 : 0;  // sound may last longer
+    const double other_streams = format.nb_streams > 1 ? 1 : 0;  // a sound track may be longer
     return seen < 0.98 * promised - 3 * av_q2d(av_inv_q(stream.avg_frame_rate)) - other_streams;
   }
 
@@ -234,10 +234,10 @@ class VideoFile final : public FrameFile {
     if (!scaler_) return damaged("its pixel format can't be converted");
     const int matrix = frame_->colorspace == AVCOL_SPC_BT709 ? SWS_CS_ITU709 : SWS_CS_DEFAULT;
     const int full_in = frame_->color_range == AVCOL_RANGE_JPEG ? 1 : 0;
-    // Refused for RGB input, where it has nothing to say.
+    // libswscale refuses this for RGB input, where it isn't needed.
     sws_setColorspaceDetails(scaler_.get(), sws_getCoefficients(matrix), full_in,
                              sws_getCoefficients(SWS_CS_DEFAULT), 1, 0, 1 << 16, 1 << 16);
-    // libswscale may write a little past a row's end: into a row of its own, padded, then copied.
+    // libswscale may write beyond the end of a row, so it writes to a padded row, which is then copied.
     const bool planar = image.layout().format == PixelFormat::rgb8;
     const std::size_t row_bytes = image.layout().row_bytes() / (planar ? 3 : 1);
     const std::size_t stride = (row_bytes + 127) / 64 * 64;
@@ -255,7 +255,8 @@ class VideoFile final : public FrameFile {
     for (int y = 0; y < frame_->height; ++y) {
       const std::uint8_t* row = scratch_.data() + static_cast<std::size_t>(y) * stride;
       if (planar) {
-        interleave(row + 2 * plane, row, row + plane, image.row_as<std::uint8_t>(y));  // G, B and R they are
+        interleave(row + 2 * plane, row, row + plane,
+                   image.row_as<std::uint8_t>(y));  // the planes are G, B, R
       } else {
         std::memcpy(image.row_as<std::byte>(y), row, row_bytes);
       }
@@ -280,8 +281,8 @@ class VideoFile final : public FrameFile {
   std::string where_;
   Colours colours_;
   std::uint64_t count_ = 0;
-  std::optional<std::int64_t> wanted_{};  ///< frames before this time stamp are passed over
-  bool jumped_ = false;                   ///< by the index, on the way to `wanted_`
+  std::optional<std::int64_t> wanted_{};  ///< frames before this time stamp are skipped
+  bool jumped_ = false;                   ///< the index was used to seek to `wanted_`
   std::int64_t last_pts_ = AV_NOPTS_VALUE;
 };
 

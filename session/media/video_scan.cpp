@@ -19,9 +19,9 @@ namespace emberlock::session {
 namespace {
 
 constexpr double kUneven = 0.1;          // of an interval
-constexpr double kFarOff = 0.25;         // of a period, gathered over many frames
+constexpr double kFarOff = 0.25;         // of a period, accumulated over many frames
 constexpr double kRounding = 1.01;       // ticks
-constexpr std::int64_t kUnpromised = 3;  // frames that durations may be rounded by
+constexpr std::int64_t kUnpromised = 3;  // frames: tolerance for rounded durations
 
 struct Packet {
   std::int64_t ticks;
@@ -90,7 +90,7 @@ std::optional<std::int64_t> first_irregular(const std::vector<std::int64_t>& tic
     if (interval <= 0 || std::abs(interval - median) > kUneven * median + kRounding)
       return static_cast<std::int64_t>(i);
   }
-  // Slow changes: off the even pace of all of them.
+  // Slow changes: drift from the mean rate of all frames.
   const double pace =
       static_cast<double>(ticks.back() - ticks.front()) / static_cast<double>(ticks.size() - 1);
   for (std::size_t i = 1; i < ticks.size(); ++i) {
@@ -128,7 +128,7 @@ Result<VideoScan> scan_video(const std::filesystem::path& path) {
   if (stream.nb_frames > 0) {
     scan.promised = stream.nb_frames;
   } else if (claims.frames && input.format->duration_estimation_method == AVFMT_DURATION_FROM_STREAM) {
-    scan.promised = *claims.frames - *claims.frames / 50 - kUnpromised;  // sound may last longer
+    scan.promised = *claims.frames - *claims.frames / 50 - kUnpromised;  // a sound track may be longer
   }
   judge_evenness(scan);
   return scan;

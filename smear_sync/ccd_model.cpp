@@ -7,14 +7,14 @@
 namespace emberlock::smear {
 namespace {
 
-/// Rounding allowance for K t_row <= T, relative.
+/// Relative rounding tolerance for K t_row <= T.
 constexpr double kFullReadTolerance = 1e-9;
 
 Error bad_timing(std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), "CCD timing", std::move(remedy)};
 }
 
-/// One stretch of time in which the register stands still.
+/// An interval in which the register doesn't move.
 struct Standstill {
   int frame;
   int shifts;  // K: the rest
@@ -36,7 +36,7 @@ Standstill next(const CcdTiming& timing, Standstill s) {
   return s.shifts < timing.shifts ? Standstill{s.frame, s.shifts + 1} : Standstill{s.frame + 1, 0};
 }
 
-/// Displayed row to place in the order of reading, and back (an involution).
+/// Converts a displayed row to its place in read order, and back (an involution).
 int read_order(const CcdTiming& timing, int row) {
   return timing.direction == ReadDirection::top_first ? row : timing.rows - 1 - row;
 }
@@ -73,7 +73,8 @@ std::vector<FlashPart> split(const CcdTiming& timing, Flash flash) {
   Standstill at = standstill_at(timing, begin);
   std::vector<FlashPart> parts;
   Seconds from = begin;
-  // Standstills are counted on, not found anew from the time, so rounding at a border can't stop the walk.
+  // Intervals are enumerated by counting, not computed from the time, so rounding at a border can't stall the
+  // loop.
   for (; from < end; at = next(timing, at)) {
     const Seconds to = std::min(end, end_of(timing, at));
     if (to <= from) continue;
@@ -99,7 +100,7 @@ std::vector<SmearDeposit> smear_deposits(const CcdTiming& timing, int row, Flash
     if (!at) continue;
     if (!deposits.empty() && Landing{deposits.back().image, deposits.back().row} == *at) {
       deposits.back().fraction +=
-          part.fraction;  // rest, then the next frame's k = 0: the lamp's own row twice
+          part.fraction;  // rest, then the next frame's k = 0: the lamp's own row, twice
     } else {
       deposits.push_back({at->image, at->row, part.fraction});
     }
@@ -110,7 +111,7 @@ std::vector<SmearDeposit> smear_deposits(const CcdTiming& timing, int row, Flash
 std::optional<SmearCentre> smear_centre(const CcdTiming& timing, Rows lamp, const FlashPart& part,
                                         SweepOut sweep_out) {
   const Rows packet = read_order(timing, lamp) + Rows(std::min(part.shifts, timing.shifts));
-  const Rows half(0.5);  // a packet reaches half a row to each side of its centre
+  const Rows half(0.5);  // a packet extends half a row to each side of its centre
   if (packet + half < Rows(timing.rows)) return SmearCentre{part.frame, read_order(timing, packet)};
   if (packet + half < Rows(timing.shifts) || sweep_out == SweepOut::before_transfer) return std::nullopt;
   return SmearCentre{part.frame + 1, read_order(timing, packet - Rows(timing.shifts))};

@@ -10,71 +10,70 @@
 
 namespace emberlock::smear {
 
-// The forward model of smear in an interline CCD: light that leaks into the vertical shift register while it
-// moves.
+// The forward model of smear in an interline CCD: light that leaks into the vertical shift register while the
+// register moves.
 //
-// Conventions. Frame i's read phase starts at t_start + i T and delivers IMAGE i; all times here are relative
-// to the start of frame 0's read phase and may be negative. At that instant the picture enters the register.
-// During [k t_row, (k + 1) t_row) the register stands k rows further towards the output; after K shifts it
-// rests until the next frame. Charge that leaks in then is delivered with whatever packet stands under the
-// light: a packet of this image, of the dummy lines behind it, or (wrapped, or at rest) one that the next
-// picture will enter.
+// Conventions. Frame i's read phase starts at t_start + i T and delivers IMAGE i. All times here are relative
+// to the start of frame 0's read phase and may be negative. At that instant the picture is transferred to the
+// register. During [k t_row, (k + 1) t_row) the register is shifted k rows towards the output; after K shifts
+// it rests until the next frame. Charge that leaks in is added to the packet that is then below the light: a
+// packet of this image, of the dummy lines behind it, or (wrapped, or at rest) one that will receive the next
+// picture.
 //
-// Source: the paper, "Smear-Based CCD Camera Synchronization", equations (1) to (4), with K and the circular
-// k of a simulated register.
+// Source: the paper, "Smear-Based CCD Camera Synchronization", equations (1) to (4), with the K and the
+// circular k of a simulated register.
 
-/// Whether the register is emptied just before the next picture enters it. `before_transfer` removes what
-/// leaked in behind the image (the wrapped dots and those of the rest), so that dots are seen on one side of
-/// the lamp only.
+/// Whether the register is emptied just before the next picture is transferred to it. `before_transfer`
+/// removes the charge that leaked in behind the image (wrapped dots and those of the rest), so that dots
+/// appear only on one side of the lamp.
 enum class SweepOut { none, before_transfer };
 
-/// n > 0, K >= n, K t_row <= T, all finite; otherwise bad_input that names the field and its range.
+/// Checks n > 0, K >= n, K t_row <= T, all finite. Error bad_input names the field and its range.
 Status check(const CcdTiming& timing);
 
-/// One flash of the lamp: `centre` after the start of frame 0's read phase; `width` >= 0.
+/// One flash of the lamp: `centre` relative to the start of frame 0's read phase; `width` >= 0.
 struct Flash {
   Seconds centre;
   Seconds width;
 };
 
-/// The part of a flash that fell while the register stood still.
+/// The part of a flash that fell into one position of the register.
 struct FlashPart {
-  int frame = 0;        ///< whose read phase, or the rest after it
+  int frame = 0;        ///< frame whose read phase, or the rest after it, it fell into
   int shifts = 0;       ///< k in 0..K-1; K stands for the rest
   double fraction = 0;  ///< of the flash's charge
 };
 
-/// Splits a flash over the row periods that it overlaps, in order of time; the fractions sum to 1. `timing`
-/// is valid.
+/// Splits a flash into the row periods that it overlaps, in order of time. The fractions sum to 1. `timing`
+/// must be valid.
 std::vector<FlashPart> split(const CcdTiming& timing, Flash flash);
 
-/// Where charge is displayed.
+/// The place at which charge is displayed.
 struct Landing {
   int image = 0;
   int row = 0;
   friend bool operator==(Landing, Landing) = default;
 };
 
-/// Where the charge that leaks in at displayed row `row` (0..n-1) during `part` is displayed; nothing when it
-/// goes with the dummy lines or is swept out.
+/// The place at which charge is displayed that leaked in at displayed row `row` (0..n-1) during `part`;
+/// nullopt if it is in the dummy lines or swept out.
 std::optional<Landing> landing(const CcdTiming& timing, int row, const FlashPart& part,
                                SweepOut sweep_out = SweepOut::none);
 
-/// One row's share of a flash's charge.
+/// The share of a flash's charge in one row.
 struct SmearDeposit {
   int image = 0;
   int row = 0;
   double fraction = 0;
 };
 
-/// All that is seen of a flash on displayed row `row`: at most one deposit an image and row, in order of
+/// All visible traces of a flash on displayed row `row`: at most one deposit per image and row, in order of
 /// time.
 std::vector<SmearDeposit> smear_deposits(const CcdTiming& timing, int row, Flash flash,
                                          SweepOut sweep_out = SweepOut::none);
 
-/// Where the centre of a lamp imaged at (fractional) row `lamp` lands after `part`: an image and a fractional
-/// row in
-/// [-0.5, n - 0.5), or nothing when that centre is not displayed.
+/// The place of the centre of a lamp at (fractional) row `lamp` after `part`: an image and a fractional row
+/// in [-0.5, n - 0.5), or nullopt if the centre isn't displayed.
 struct SmearCentre {
   int image = 0;
   Rows row;

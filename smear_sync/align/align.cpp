@@ -3,10 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <string>
 #include <utility>
-
-#include <fmt/format.h>
 
 #include "smear_sync/align/align_choice.h"
 #include "smear_sync/align/align_context.h"
@@ -15,14 +13,10 @@
 #include "smear_sync/align/align_hold.h"
 #include "smear_sync/align/align_look.h"
 #include "smear_sync/align/align_trim.h"
-#include "smear_sync/align/align_words.h"
 #include "smear_sync/align/reset_delay.h"
 
 namespace emberlock::smear {
 namespace {
-
-/// A tolerance of fewer standard errors of a phase can't be told.
-constexpr double kTellable = 2;
 
 std::vector<std::optional<FrameRateTrim>> trims_of(const std::vector<AlignCamera>& cameras) {
   std::vector<std::optional<FrameRateTrim>> trims;
@@ -61,41 +55,35 @@ void time_resets(const AlignState& state, AlignDecision& decision, const std::ve
                               ? aim_of(courses[i], scene.landings[i].aim.value_or(c.tolerance), c)
                               : Seconds(0);
       camera.moment = *c.round.cameras[i].stamp + *camera.error - aim - delay->mean;
-      camera.reason += aim == Seconds(0) ? " at the moment that lands it on the target"
-                                         : " at the moment that lets it drift through the tolerance";
+      camera.reason.timing = aim == Seconds(0) ? ResetTiming::on_target : ResetTiming::far_side;
     } else if (std::find(teaching.begin(), teaching.end(), who.model) == teaching.end()) {
       teaching.push_back(who.model);
-      camera.reason += ", which teaches how long its reset takes";
+      camera.reason.timing = ResetTiming::teaches;
     } else {
       camera.reset = false;
-      camera.reason = standing(*camera.error, c.options.row_time) +
-                      ", out of tolerance: waits until another " + who.model +
-                      " has taught how long a reset takes";
+      camera.reason = {CameraCause::untaught};
     }
   }
 }
 
-/// Orders for the cameras out of tolerance, and a sentence for every camera.
+/// Orders for the cameras out of tolerance, and why every camera gets what it gets.
 void order_resets(AlignDecision& decision, const AlignContext& c, const AlignScene& scene, Seconds target) {
   const std::vector<bool> chosen = choose_resets(scene, target);
-  const std::string out = c.reach > Seconds(0) ? ", further than trims reach" : ", out of tolerance";
   for (std::size_t i = 0; i < scene.tau.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
-    const std::string stands = standing(*camera.error, c.options.row_time);
     camera.reset = chosen[i];
     if (c.options.policy == AlignPolicy::fixed_reference && i == scene.reference) {
-      camera.reason = "is the reference: the others are brought to its phase";
+      camera.reason = {CameraCause::reference};
     } else if (scene.within(i, target)) {
-      camera.reason = stands + (c.reach > Seconds(0) ? ", within reach of its trim" : ", within tolerance") +
-                      ": leave it";
+      camera.reason = {CameraCause::within};
     } else if (!scene.movable(i)) {
-      camera.reason = stands + out + ", and can't be reset";
+      camera.reason = {CameraCause::fixed};
     } else if (!chosen[i]) {
-      camera.reason = stands + out + ": waits, the target may yet come to it";
+      camera.reason = {CameraCause::waits};
     } else if (scene.landings[i].method == ShutterReset::by_hand) {
-      camera.reason = stands + out + ": reset its shutter by hand";
+      camera.reason = {CameraCause::by_hand};
     } else {
-      camera.reason = stands + out + ": its shutter is reset";
+      camera.reason = {CameraCause::reset};
     }
   }
 }
@@ -119,8 +107,7 @@ void ask_for_one(AlignState& state, AlignDecision& decision, const AlignContext&
     if (!camera.reset || c.cameras[i].method != ShutterReset::by_hand) continue;
     camera.reset = false;
     if (i == state.asked) continue;
-    camera.reason = standing(*camera.error, c.options.row_time) +
-                    ", out of tolerance: its turn comes after " + c.cameras[*state.asked].id + "'s";
+    camera.reason = {.cause = CameraCause::in_turn, .after = state.asked};
   }
 }
 
@@ -132,14 +119,9 @@ bool can_be_met(AlignState& state, AlignDecision& decision, const AlignContext& 
   decision.effort = foretell(prospect, c.options.policy, c.tolerance, c.options);
   Seconds noise;
   for (const Drift& drift : drifts) noise = std::max(noise, drift.tau_sigma);
-  const double rows = c.options.tolerance.in_rows(c.options.row_time).value();
   if (c.tolerance < kTellable * noise) {
     decision.verdict = AlignVerdict::refused;
-    decision.reason =
-        fmt::format("{:.2g} rows can't be told: phases are known to {:.2g} rows. Ask for {:.2g} rows", rows,
-                    (noise / c.options.row_time).value(),
-                    std::ceil(10 * kTellable * (noise / c.options.row_time).value()) / 10) +
-        " or more, or let the flash be about a row long";
+    decision.reason = {.cause = AlignCause::untellable, .sigma = noise};
     return false;
   }
   if (decision.effort->within >= c.options.limits->probability) {
@@ -148,7 +130,7 @@ bool can_be_met(AlignState& state, AlignDecision& decision, const AlignContext& 
   }
   decision.verdict = AlignVerdict::refused;
   decision.offers = find_offers(prospect, c.options);
-  decision.reason = refusal(*decision.effort, decision.offers, c.options);
+  decision.reason = {AlignCause::too_costly};
   return false;
 }
 
@@ -192,25 +174,51 @@ void look_for_blind(AlignDecision& decision, const AlignContext& c) {
     decision.strobe_phase = next_look(c);
 }
 
-void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
-           const AlignContext& c) {
+/// All are within tolerance, and aren't trimmed: whether that is a lock, for how long, and what makes it one.
+void settle(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
+            const AlignContext& c, const AlignScene& scene, Seconds target) {
+  const std::vector<Drift> courses = courses_of(state, decision, drifts, c);
+  const bool asks = c.options.shortest_take > Seconds(0);
+  // What is held is known as well as it was when it was called aligned.
+  if (std::vector<std::size_t> unknown = unknown_drifts(courses, c);
+      asks && !state.held && !unknown.empty()) {
+    decision.reason = {AlignCause::drift_unknown, std::move(unknown)};
+    return;
+  }
+  if ((state.held || asks) && renew(state, decision, courses, c, scene)) {
+    time_resets(state, decision, drifts, c, scene);
+    return;
+  }
+  if (std::vector<std::size_t> leaving = leaving_at_once(courses, c); !leaving.empty()) {
+    decision.reason = {AlignCause::leaving, std::move(leaving)};
+    return;
+  }
+  decision.verdict = AlignVerdict::aligned;
+  decision.reason = {AlignCause::within};
+  decision.renewed = renewed_stay(courses, c, scene);
+  hold_target(state, drifts, c, scene, target);
+}
+
+void decide(AlignState& state, AlignDecision& decision, const std::vector<Drift>& drifts,
+            const AlignContext& c) {
   const int looks = std::exchange(state.looks, 0);
   const AlignScene scene = scene_of(state, drifts, c);
   const Seconds target = keep_target(state, c, scene).value_or(choose_target(scene));
-  decision.target = wrap_positive(target + c.round.strobe_phase, c.options.period);
+  decision.target = target;
   decision.worst_pair = Seconds(0);
-  std::size_t out = 0;
-  std::string stuck;
+  decision.goal = c.reach > Seconds(0) ? AlignGoal::reach : AlignGoal::tolerance;
+  std::vector<std::size_t> out;
+  std::vector<std::size_t> stuck;
   for (std::size_t i = 0; i < drifts.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
     camera.error = scene.error(i, target);
     camera.sigma = drifts[i].tau_sigma;
-    camera.reason = standing(*camera.error, c.options.row_time);
+    camera.reason = {CameraCause::stands};
     for (std::size_t k = 0; k < i; ++k)
       decision.worst_pair = std::max(*decision.worst_pair, abs(scene.error(i, scene.tau[k])));
     if (scene.within(i, target)) continue;
-    ++out;
-    if (!scene.movable(i)) stuck += (stuck.empty() ? "" : ", ") + c.cameras[i].id;
+    out.push_back(i);
+    if (!scene.movable(i)) stuck.push_back(i);
   }
   decision.reference = nearest(decision, c.options);
   if (!can_be_met(state, decision, c, scene, drifts)) return;
@@ -220,23 +228,17 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
 
   if (!stuck.empty()) {
     decision.verdict = AlignVerdict::given_up;
-    decision.reason =
-        stuck + " can't be reset and lies out of tolerance: make it the reference, or widen the tolerance";
-  } else if (out > 0) {
-    decision.reason = plural(out, "camera") + (c.reach > Seconds(0) ? " out of reach" : " out of tolerance");
-  } else if (c.reach == Seconds(0) && state.held &&
-             renew(state, decision, courses_of(state, decision, drifts, c), c, scene)) {
-    time_resets(state, decision, drifts, c, scene);
+    decision.reason = {AlignCause::stuck, std::move(stuck)};
+  } else if (!out.empty()) {
+    decision.reason = {AlignCause::out, std::move(out)};
   } else if (c.reach == Seconds(0)) {
-    decision.verdict = AlignVerdict::aligned;
-    decision.reason = "every camera lies within tolerance of the target";
-    hold_target(state, drifts, c, scene, target);
+    settle(state, decision, drifts, c, scene, target);
   } else if (trim_rates(state, decision, c.round, c.cameras, c.options)) {
     decision.verdict = AlignVerdict::aligned;
-    decision.reason = "every camera is locked within tolerance of the target";
+    decision.reason = {AlignCause::locked};
   } else {
     time_resets(state, decision, drifts, c, scene);
-    decision.reason = "trims bring the cameras to the target";
+    decision.reason = {AlignCause::trimming};
     // Where a dot is missing trims go by what was foretold; that ages.
     for (std::size_t i = 0; i < c.cameras.size(); ++i) {
       const bool blind = c.round.cameras[i].phase.state == PhaseState::blind;
@@ -251,21 +253,29 @@ void judge(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
   foresee(state, decision, drifts, c);
 }
 
-/// A policy that trims needs cameras that can be.
-std::optional<std::string> untrimmable(const AlignContext& c) {
+/// A policy that trims needs cameras that can be: the first that can't.
+std::optional<std::size_t> untrimmable(const AlignContext& c) {
   if (c.options.policy != AlignPolicy::trimmed) return std::nullopt;
-  for (const AlignCamera& camera : c.cameras) {
-    if (!camera.trim)
-      return "the frame rate of " + camera.id +
-             " can't be trimmed: use the timed policy, whose resets reach " +
-             "as far as their latency is steady";
+  for (std::size_t i = 0; i < c.cameras.size(); ++i) {
+    if (!c.cameras[i].trim) return i;
   }
   return std::nullopt;
 }
 
+/// The round as it would be if the flashes weren't delayed: nobody but who fills a round, and who is told its
+/// target, knows of phases that hold the delay.
+AlignRound without_delay(AlignRound round, Seconds period) {
+  for (CameraView& camera : round.cameras) {
+    if (camera.phase.state == PhaseState::known)
+      camera.phase.tau = wrap_positive(camera.phase.tau - round.strobe_phase, period);
+  }
+  return round;
+}
+
 /// One round of flashes whose delay is known.
-AlignStep step_at(const AlignState& before, const AlignRound& round, const std::vector<AlignCamera>& cameras,
-                  const AlignOptions& options) {
+AlignStep step_at(const AlignState& before, const AlignRound& delayed,
+                  const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
+  const AlignRound round = without_delay(delayed, options.period);
   AlignState state = before;
   state.cameras.resize(cameras.size());
   ++state.rounds;
@@ -284,18 +294,19 @@ AlignStep step_at(const AlignState& before, const AlignRound& round, const std::
   decision.cameras.resize(cameras.size());
   std::vector<Drift> drifts;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const bool doubted = !state.cameras[i].doubt.empty();
+    const bool doubted = state.cameras[i].doubt.has_value();
     decision.cameras[i].state = doubted ? PhaseState::unusable : round.cameras[i].phase.state;
     if (const auto drift = where(state.cameras[i], c)) drifts.push_back(*drift);
   }
-  if (const auto reason = untrimmable(c)) {
+  if (const auto camera = untrimmable(c)) {
     decision.verdict = AlignVerdict::refused;
-    decision.reason = *reason;
+    decision.reason = {AlignCause::untrimmable, {*camera}};
   } else if (drifts.size() < cameras.size()) {
     look_again(state, decision, c);
   } else {
-    judge(state, decision, drifts, c);
+    decide(state, decision, drifts, c);
   }
+  if (decision.target) decision.target = wrap_positive(*decision.target + round.strobe_phase, options.period);
   follow_renewal(state, decision, c);
   state.held = decision.verdict == AlignVerdict::aligned || decision.renews;
   state.last_round = round.at;
@@ -308,8 +319,7 @@ AlignStep step_at(const AlignState& before, const AlignRound& round, const std::
   if (decision.verdict == AlignVerdict::aligned) state.rounds_out = 0;
   if (decision.verdict == AlignVerdict::go_on && state.rounds_out >= options.max_rounds) {
     decision.verdict = AlignVerdict::given_up;
-    decision.reason = "not aligned after " + plural(static_cast<std::size_t>(state.rounds_out), "round") +
-                      ": " + decision.reason;
+    decision.reason.rounds = state.rounds_out;
   }
   if (decision.verdict != AlignVerdict::go_on) {
     if (decision.verdict != AlignVerdict::aligned) decision.strobe_phase.reset();
@@ -324,6 +334,10 @@ AlignStep step_at(const AlignState& before, const AlignRound& round, const std::
 
 }  // namespace
 
+TrackOptions track_options(const AlignOptions& options) {
+  return {.period = options.period, .rate_spread = options.rate_spread, .rate_wander = options.rate_wander};
+}
+
 AlignStep align_step(const AlignState& before, const AlignRound& round,
                      const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
   if (!options.dial) return step_at(before, round, cameras, options);
@@ -334,7 +348,7 @@ AlignStep align_step(const AlignState& before, const AlignRound& round,
   if (!advice.ready) return wait_for_dial(std::move(state), weighed, std::move(advice));
   const AlignRound seen = without_walk(state, weighed, options);
   AlignStep step = step_at(state, seen, cameras, options);
-  let_walk(step, seen, std::move(advice), cameras, options);
+  let_walk(step, seen, std::move(advice), options);
   return step;
 }
 

@@ -13,6 +13,7 @@
 #include "base/shutter.h"
 #include "base/strobe_dial.h"
 #include "base/time_point.h"
+#include "smear_sync/align/align_reason.h"
 #include "smear_sync/align/phase_track.h"
 #include "smear_sync/align/rate_servo.h"
 #include "smear_sync/clocks/drift.h"
@@ -39,14 +40,27 @@ std::string_view name(AlignPolicy policy);
 /// From "fixed-reference", "densest", "timed" or "trimmed"; the error lists them.
 Result<AlignPolicy> parse_align_policy(std::string_view text);
 
+using MetersPerSecond = Quantity<struct MetersPerSecondUnit>;
+
 /// How far a camera may lie from the target, to either side; two cameras may differ by twice as much.
 struct Tolerance {
   std::variant<Rows, Seconds> amount = Rows(100);
   [[nodiscard]] Seconds in_time(SecondsPerRow row_time) const;
   [[nodiscard]] Rows in_rows(SecondsPerRow row_time) const;
 };
-/// From "100rows", "5.4ms" or "500us": a positive number and its unit.
+/// From "0.5ms", "500us" or "10rows": a positive number and its unit.
 Result<Tolerance> parse_tolerance(std::string_view text);
+
+/// What the tolerance of a recording follows from.
+struct FlameMotion {
+  MetersPerSecond speed{2};  ///< of what moves fastest in the flame, > 0
+  Meters detail{0.004};      ///< the smallest that shall be resolved, > 0: some voxels
+};
+/// That in which a detail moves by a quarter of itself: two cameras, a tolerance to either side of the
+/// target, then see it displaced by half of itself at most.
+Tolerance tolerance_for(const FlameMotion& flame);
+/// "0.50 ms (9.3 rows)": people think in rows and flames move in time.
+std::string words(const Tolerance& tolerance, SecondsPerRow row_time);
 
 /// Who resets shutters while an alignment runs.
 enum class ResetBy {
@@ -123,14 +137,23 @@ struct AlignOptions {
   /// Of a strobe that somebody sets by hand: it is told nothing, and its flashes walk through the frames at a
   /// rate that the frames tell (align_dial.h). `strobe_step` is then how far dots shall be seen to follow.
   std::optional<StrobeDial> dial = {};
+  /// Cameras are called aligned once they surely stay so for this long, as far as it can be had: drifts are
+  /// measured before, and cameras are reset that would leave before although a reset lets them stay. While
+  /// they are held that is renewed before less is left. Zero, as in older recordings: whenever all are within
+  /// tolerance.
+  Seconds shortest_take{0};
 };
+
+/// How phases are followed under these options.
+TrackOptions track_options(const AlignOptions& options);
 
 /// One camera in one round.
 struct CameraView {
-  Phase phase;  ///< at the round's instant
+  Phase phase;  ///< at the round's instant, of flashes that are delayed by the round's strobe_phase
   std::optional<TimePoint>
-      stamp;          ///< an instant, near the round's, at which its frames are stamped (modulo T)
-  bool away = false;  ///< no frame came in time: switched off, unplugged, or somebody resets it
+      stamp;             ///< an instant, near the round's, at which its frames are stamped (modulo T)
+  bool away = false;     ///< no frame came in time: switched off, unplugged, or somebody resets it
+  bool unheard = false;  ///< its phase was left out: too few cameras agree on how the flashes walk
 };
 
 struct ResetDone {
@@ -148,7 +171,7 @@ struct TrimDone {
 /// What a round of filming showed, and what was done since the one before.
 struct AlignRound {
   TimePoint at;  ///< the instant to which all phases refer
-  Beat beat;
+  PeriodOffset period_offset;
   Seconds strobe_phase;  ///< the delay of the flashes during the round; tau grows by as much as it does
   std::vector<CameraView> cameras;
   std::vector<ResetDone> resets;     ///< carried out since the round before
@@ -161,7 +184,7 @@ struct AlignRound {
 
 /// A dot, or what passes for one, where it stood when it was seen.
 struct Sighting {
-  Seconds tau;           ///< strobe_phase included
+  Seconds tau;           ///< strobe_phase taken out
   Seconds strobe_phase;  ///< of that round
 };
 
@@ -177,10 +200,12 @@ struct CameraTrack {
   std::optional<Sighting> sighted;  ///< the newest
   bool moved = false;               ///< its dot was seen to move with the strobe
   std::optional<Seconds> rough;  ///< seen at two places of the strobe, but only to this: too roughly to tell
-  std::string doubt;      ///< why what is seen isn't taken for its dot: it moved otherwise; empty if it is
-  bool disputed = false;  ///< the doubt is that it and another camera contradict each other: either may err
-  bool away = false;      ///< in the last round
-  bool renewed = false;   ///< reset in the renewal under way
+  std::optional<Doubt> doubt;    ///< why what is seen isn't taken for its dot; absent if it is
+  bool away = false;             ///< in the last round
+  bool renewed = false;          ///< reset in the renewal under way
+
+  /// Whether it is doubted because it and another camera contradict each other, of which either may err.
+  [[nodiscard]] bool disputed() const { return doubt && doubt->cause == DoubtCause::walked_apart; }
 };
 
 /// The phase to which cameras are brought, strobe_phase taken out: it moves as a camera of this rate would.
@@ -229,7 +254,8 @@ struct CameraDecision {
   std::optional<PartsPerMillion> trim;  ///< trim its frame rate to this from now on, aligned or not
   std::optional<ServoState> servo;      ///< of a camera that is trimmed
   std::optional<TimeLeft> time_left;    ///< in tolerance, as it drifts now
-  std::string reason;                   ///< a sentence that an operator can act on
+  std::optional<Seconds> sure_stay;  ///< in tolerance (three standard errors): `next_check` is the shortest
+  CameraReason reason;
 };
 
 /// What is asked of whoever sets the strobe by its dial, and what it was seen to do.
@@ -240,7 +266,12 @@ struct DialAdvice {
   std::vector<Hertz> others{};    ///< rates that would have shown the same (flash_rate.h)
   bool ready = false;             ///< the flashes can be followed; if not, nothing goes on
   bool act = false;               ///< somebody must turn it
-  std::string words;              ///< a sentence to them, or what was seen
+  DialCause cause = DialCause::leave;
+  FlashesSeen seen = FlashesSeen::none;
+  std::optional<Hertz> slower_than{};  ///< of flashes too slow to tell their rate
+  // Of turn_off_rate:
+  std::optional<Hertz> from{};        ///< the rate that it is turned from
+  std::vector<std::size_t> hidden{};  ///< cameras whose dots shall walk into sight; none: dots shall follow
 };
 
 enum class AlignVerdict {
@@ -251,10 +282,12 @@ enum class AlignVerdict {
 };
 std::string_view name(AlignVerdict verdict);
 
+/// What a round decided: codes and numbers. align_words.h says them.
 struct AlignDecision {
   int round = 0;  ///< from 1
   AlignVerdict verdict = AlignVerdict::go_on;
-  std::optional<Seconds> target;         ///< tau of the target in this round; absent while phases are missing
+  std::optional<Seconds> target;  ///< tau of the target in this round, strobe_phase included; absent while
+                                  ///< phases are missing
   std::optional<std::size_t> reference;  ///< the camera nearest to the target; of fixed_reference that one
   std::vector<CameraDecision> cameras;
   std::optional<Seconds>
@@ -272,10 +305,13 @@ struct AlignDecision {
   std::vector<std::size_t> jumped;        ///< likewise: those that somebody has reset, as this round shows
   std::optional<Seconds> next_check;  ///< once aligned: film again by then, before the drift may have led a
                                       ///< camera out (three standard errors)
+  std::optional<Seconds> renewed;  ///< once aligned: what next_check would be if cameras were reset now for
+                                   ///< it; absent where nobody can tell
   std::optional<AlignEffort> effort;  ///< foretold in the first round that has all phases, given limits
   std::vector<AlignOffer> offers;     ///< of a refusal
   std::optional<DialAdvice> dial;     ///< of a strobe that somebody sets by hand
-  std::string reason;                 ///< of the verdict, or what the rig waits for
+  AlignGoal goal = AlignGoal::tolerance;
+  AlignReason reason;
 };
 
 struct AlignStep {

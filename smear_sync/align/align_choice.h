@@ -13,7 +13,7 @@
 
 namespace emberlock::smear {
 
-// The core of the policy, without words: where the cameras stand gives the phase to which they are brought,
+// The core of the policy: where the cameras stand gives the phase to which they are brought,
 // and which of them are reset.
 
 /// For comparisons: times that rounding alone tells apart are equal.

@@ -13,9 +13,12 @@ namespace emberlock::smear {
 constexpr double kMemoryPart = 0.25;
 constexpr double kMemoryPartOfReach = 0.05;
 
+/// A tolerance of fewer standard errors of a phase can't be told.
+constexpr double kTellable = 2;
+
 /// What is the same for all of a round's steps.
 struct AlignContext {
-  const AlignRound& round;
+  const AlignRound& round;  ///< its strobe_phase taken out of all taus
   const std::vector<AlignCamera>& cameras;
   const AlignOptions& options;
   TrackOptions track;

@@ -4,13 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <utility>
-
-#include <fmt/format.h>
-
-#include "smear_sync/align/align_words.h"
-#include "smear_sync/align/dial_words.h"
 
 namespace emberlock::smear {
 namespace {
@@ -121,12 +115,12 @@ Hearing hear(const AlignState& state, const AlignRound& round, Seconds walk, Sec
     const Drift drift = track.phase.at(round.at, track_options(options));
     all.push_back({i, wrap_symmetric(phase.tau - drift.tau - walk, options.period),
                    Seconds(std::hypot(drift.tau_sigma.value(), phase.sigma.value()))});
-    if (track.doubt.empty() || track.disputed) heard.voices.push_back(all.back());
+    if (!track.doubt || track.disputed()) heard.voices.push_back(all.back());
   }
   // Two that contradicted each other agree by chance whenever they have walked apart by a whole period.
   const bool chance = heard.voices.size() == 2 &&
                       std::all_of(heard.voices.begin(), heard.voices.end(),
-                                  [&](const Voice& v) { return state.cameras[v.camera].disputed; });
+                                  [&](const Voice& v) { return state.cameras[v.camera].disputed(); });
   if (!chance) heard.shift = told_by_most(heard.voices, options.period);
   if (!heard.shift && heard.voices.size() != 1) {
     // Who was doubted on a disputed word may turn out to be right.
@@ -153,30 +147,19 @@ Hearing hear(const AlignState& state, const AlignRound& round, Seconds walk, Sec
 void dispute(AlignState& state, const std::vector<std::size_t>& cameras) {
   for (const std::size_t i : cameras) {
     CameraTrack& track = state.cameras[i];
-    if (!track.doubt.empty() && !track.disputed) continue;
+    if (track.doubt && !track.disputed()) continue;
     track.moved = false;
-    track.disputed = true;
-    track.doubt =
-        "its dot and another camera's moved apart as the flashes walked, and too few cameras were seen to "
-        "say "
-        "which is wrong: see whether the read direction of each is set right, and look for reflections of "
-        "the "
-        "lamp";
+    track.doubt = Doubt{DoubtCause::walked_apart};
   }
 }
 
-/// What a camera's own dots tell, against the beat that most tell, both with their standard errors.
-std::string doubt_of_rate(Beat own, Beat all) {
+/// What a camera's own dots tell, against the period offset that most tell, both with their standard errors.
+std::optional<DoubtCause> doubt_of_rate(PeriodOffset own, PeriodOffset all) {
   const double sigma = std::hypot(own.sigma.value(), all.sigma.value());
   const double against = std::abs((own.rate + all.rate).value());
   const double still = std::abs(own.rate.value());
-  if (std::min(against, still) > kSameShift * sigma) return {};
-  return against < still
-             ? "its dot moves the other way than the others' as the flashes walk: set its read direction the "
-               "other way round"
-             : "its dot stands still while the others' follow the flashes as they walk: look for a "
-               "reflection "
-               "of the lamp in the lamp's own columns, shade it, or turn the camera";
+  if (std::min(against, still) > kSameShift * sigma) return std::nullopt;
+  return against < still ? DoubtCause::walked_against : DoubtCause::stood_in_walk;
 }
 
 /// Cameras whose dots alone, in this round's film, tell another walk than most do. Returns whether as many
@@ -184,9 +167,9 @@ std::string doubt_of_rate(Beat own, Beat all) {
 bool doubt_by_rates(AlignState& state, const AlignRound& round, const AlignOptions& options) {
   const FlashRate& flashes = round.flashes;
   if (flashes.seen != FlashesSeen::rate) return false;
-  const Beat all = expected_beat(flashes.rate, options.period, flashes.sigma);
+  const PeriodOffset all = expected_period_offset(flashes.rate, options.period, flashes.sigma);
   std::vector<std::size_t> agree;
-  std::vector<std::pair<std::size_t, std::string>> doubts;
+  std::vector<std::pair<std::size_t, DoubtCause>> doubts;
   for (std::size_t i = 0; i < flashes.own.size(); ++i) {
     const auto& own = flashes.own[i];
     if (!own) continue;
@@ -194,23 +177,20 @@ bool doubt_by_rates(AlignState& state, const AlignRound& round, const AlignOptio
       agree.push_back(i);
       continue;
     }
-    std::string doubt = doubt_of_rate(expected_beat(own->rate, options.period, own->sigma), all);
-    if (!doubt.empty()) doubts.emplace_back(i, std::move(doubt));
+    const auto doubt = doubt_of_rate(expected_period_offset(own->rate, options.period, own->sigma), all);
+    if (doubt) doubts.emplace_back(i, *doubt);
   }
   if (agree.size() > doubts.size()) {
-    for (auto& [i, doubt] : doubts) {
+    for (const auto& [i, doubt] : doubts) {
       state.cameras[i].moved = false;
-      state.cameras[i].disputed = false;
-      state.cameras[i].doubt = std::move(doubt);
+      state.cameras[i].doubt = Doubt{doubt};
     }
     return false;
   }
   if (doubts.empty()) return false;
   std::vector<std::size_t> both = agree;
   for (const auto& [i, doubt] : doubts) both.push_back(i);
-  const auto trusted = [&](std::size_t i) {
-    return state.cameras[i].doubt.empty() || state.cameras[i].disputed;
-  };
+  const auto trusted = [&](std::size_t i) { return !state.cameras[i].doubt || state.cameras[i].disputed(); };
   if (!std::all_of(both.begin(), both.end(), trusted)) return false;
   dispute(state, both);
   return true;
@@ -221,7 +201,7 @@ bool told_in_doubt(const AlignState& state, const FlashRate& flashes) {
   bool agree = false;
   for (std::size_t i = 0; i < flashes.own.size(); ++i) {
     if (!flashes.own[i] || !flashes.own[i]->agrees) continue;
-    if (state.cameras[i].doubt.empty() || state.cameras[i].disputed) return false;
+    if (!state.cameras[i].doubt || state.cameras[i].disputed()) return false;
     agree = true;
   }
   return agree;
@@ -230,9 +210,10 @@ bool told_in_doubt(const AlignState& state, const FlashRate& flashes) {
 /// No phase of the round is taken over, but `kept`'s.
 void leave_out(AlignRound& round, std::optional<std::size_t> kept) {
   for (std::size_t i = 0; i < round.cameras.size(); ++i) {
-    Phase& phase = round.cameras[i].phase;
-    if (phase.state == PhaseState::known && kept != i)
-      phase = {PhaseState::unusable, {}, {}, "too few cameras agree on how the flashes walk"};
+    CameraView& view = round.cameras[i];
+    if (view.phase.state != PhaseState::known || kept == i) continue;
+    view.phase = {PhaseState::unusable, {}, {}, {}};
+    view.unheard = true;
   }
 }
 
@@ -266,13 +247,13 @@ double followed_at_most(const AlignOptions& options) {
 
 DialAdvice look_at_dial(AlignState& state, const AlignRound& round, const AlignOptions& options) {
   const FlashRate& flashes = round.flashes;
-  const StrobeDial& dial = *options.dial;
   DialAdvice advice;
   // It was followed a moment ago: the flashes walk on through a place where nobody shows them.
   const bool in_step = state.dial.walk.phase_known();
   if (flashes.seen == FlashesSeen::hidden && !in_step) state.dial.wanted = detuned(options);
   advice.set = wanted_of(state, options);
   advice.others = flashes.others;
+  advice.seen = flashes.seen;
   if (flashes.seen == FlashesSeen::rate) {
     advice.measured = flashes.rate;
     advice.sigma = flashes.sigma;
@@ -281,14 +262,12 @@ DialAdvice look_at_dial(AlignState& state, const AlignRound& round, const AlignO
   } else {
     advice.ready = flashes.seen == FlashesSeen::hidden && in_step;
   }
+  if (flashes.seen == FlashesSeen::too_slow) advice.slower_than = flashes.rate;
   advice.act = !advice.ready && flashes.seen != FlashesSeen::unsteady;
   if (!advice.ready) {
-    advice.words = what_to_do(flashes, advice.set, dial);
-  } else if (advice.measured) {
-    advice.words = "the strobe flashes at " + dial.per_minute(*advice.measured) + " a minute, set to " +
-                   dial.per_minute(advice.set) + ": leave it";
+    advice.cause = DialCause::set;
   } else {
-    advice.words = "the strobe, set to " + dial.per_minute(advice.set) + " a minute, is out of sight for now";
+    advice.cause = advice.measured ? DialCause::leave : DialCause::out_of_sight;
   }
   return advice;
 }
@@ -301,8 +280,8 @@ AlignStep wait_for_dial(AlignState state, const AlignRound& round, DialAdvice ad
   decision.round = ++state.rounds;
   decision.resets_so_far = state.resets;
   decision.cameras.resize(state.cameras.size());
-  for (CameraDecision& camera : decision.cameras) camera.reason = "waits until the strobe is set";
-  decision.reason = advice.words;
+  for (CameraDecision& camera : decision.cameras) camera.reason = {CameraCause::waits_for_dial};
+  decision.reason = {AlignCause::dial};
   decision.dial = std::move(advice);
   state.held = false;
   return {std::move(state), std::move(decision)};
@@ -334,8 +313,8 @@ AlignRound without_walk(AlignState& state, const AlignRound& round, const AlignO
   bool goes_on = dial.walk.phase_known();
   if (goes_on) {
     now = dial.walk.at(round.at, walk);
-    const double apart = std::abs((round.beat.rate - now.rate).value());
-    const double sigma = std::hypot(round.beat.sigma.value(), now.rate_sigma.value());
+    const double apart = std::abs((round.period_offset.rate - now.rate).value());
+    const double sigma = std::hypot(round.period_offset.sigma.value(), now.rate_sigma.value());
     goes_on =
         apart <= kTurnedSigmas * sigma + kTurnedLeast.value() || round.flashes.seen != FlashesSeen::rate;
   }
@@ -348,7 +327,7 @@ AlignRound without_walk(AlignState& state, const AlignRound& round, const AlignO
   const bool lost = !goes_on && !heard.shift && seen_before(state, seen);
   if (heard.shift || !goes_on) {
     const Seconds sigma = best_sigma(seen, 0.01 * options.period);
-    dial.walk.observe(round.at, {PhaseState::known, tau, sigma, {}}, round.beat, walk);
+    dial.walk.observe(round.at, {PhaseState::known, tau, sigma, {}}, round.period_offset, walk);
   }
   const double speed = std::abs(dial.walk.at(round.at, walk).rate.value()) * 1e-6;
   if (lost) dial.walk.forget_phase();
@@ -372,19 +351,17 @@ AlignRound without_walk(AlignState& state, const AlignRound& round, const AlignO
     dial.walked = Seconds(0);
   }
   seen.strobe_phase = tau;
-  seen.beat = {PartsPerMillion(0), PartsPerMillion(1)};
+  seen.period_offset = {PartsPerMillion(0), PartsPerMillion(1)};
   return seen;
 }
 
-void let_walk(AlignStep& step, const AlignRound& seen, DialAdvice advice,
-              const std::vector<AlignCamera>& cameras, const AlignOptions& options) {
+void let_walk(AlignStep& step, const AlignRound& seen, DialAdvice advice, const AlignOptions& options) {
   AlignDecision& decision = step.decision;
   const bool wants_elsewhere = std::exchange(decision.strobe_phase, std::nullopt).has_value();
   if (wants_elsewhere && decision.verdict == AlignVerdict::go_on) {
-    std::string hidden;
-    for (std::size_t i = 0; i < cameras.size(); ++i) {
-      if (decision.cameras[i].state == PhaseState::known) continue;
-      hidden += (hidden.empty() ? "" : ", ") + cameras[i].id;
+    std::vector<std::size_t> hidden;
+    for (std::size_t i = 0; i < decision.cameras.size(); ++i) {
+      if (decision.cameras[i].state != PhaseState::known) hidden.push_back(i);
     }
     const Seconds in_a_second =
         hidden.empty() ? kToFollow * options.strobe_step : kIntoSight * options.period;
@@ -393,14 +370,12 @@ void let_walk(AlignStep& step, const AlignRound& seen, DialAdvice advice,
     const double given = kNearlyDetuned * (detuned(options) / frame_rate_of(options) - 1);
     if (std::abs(walk.rate.value()) * 1e-6 < std::min(in_a_second.value(), given)) {
       step.state.dial.wanted = detuned(options);
-      const Hertz from = advice.measured.value_or(advice.set);
+      advice.from = advice.measured.value_or(advice.set);
       advice.set = wanted_of(step.state, options);
       advice.act = true;
-      advice.words =
-          "the flashes stand nearly still in the frames: " + turning(from, advice.set, *options.dial) +
-          (hidden.empty() ? ", so that dots are seen to follow them"
-                          : ", so that the dot of " + hidden + " walks into sight");
-      decision.reason = advice.words;
+      advice.cause = DialCause::turn_off_rate;
+      advice.hidden = std::move(hidden);
+      decision.reason = {AlignCause::dial};
       step.state.rounds_out = std::max(0, step.state.rounds_out - 1);
     }
   }

@@ -21,7 +21,7 @@ double followed_at_most(const AlignOptions& options);
 /// doubted: it is read the other way, or its dot is a reflection; and by doubted ones alone no rate is told.
 AlignRound weigh_flashes(AlignState& state, const AlignRound& round, const AlignOptions& options);
 
-/// What is to be said of the dial, by what the round's frames tell of it.
+/// What is asked of the dial, by what the round's frames tell of it.
 DialAdvice look_at_dial(AlignState& state, const AlignRound& round, const AlignOptions& options);
 
 /// A round in which nothing was learnt but that the dial must be turned: it counts for nothing.
@@ -34,7 +34,6 @@ AlignRound without_walk(AlignState& state, const AlignRound& round, const AlignO
 
 /// Where a step wants the flashes elsewhere, they walk there by themselves; if they stand still, the dial is
 /// to be turned.
-void let_walk(AlignStep& step, const AlignRound& seen, DialAdvice advice,
-              const std::vector<AlignCamera>& cameras, const AlignOptions& options);
+void let_walk(AlignStep& step, const AlignRound& seen, DialAdvice advice, const AlignOptions& options);
 
 }  // namespace emberlock::smear

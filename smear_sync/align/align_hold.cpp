@@ -5,10 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <string>
+#include <utility>
 
 #include "smear_sync/align/align_look.h"
-#include "smear_sync/align/align_words.h"
 
 namespace emberlock::smear {
 namespace {
@@ -34,6 +33,13 @@ constexpr double kDuePart = 0.08;
 constexpr double kDueRounds = 2;
 /// One that would leave before the next reset can be needed goes with it if that gives it so much more.
 constexpr double kWorthwhile = 1.1;
+/// Where resets give more than the shortest take by this factor, they are made for it.
+constexpr double kAmple = 1.1;
+/// A drift is known when its error (three standard errors) leads through less than this part of the tolerance
+/// in the shortest take.
+constexpr double kKnownPart = 0.5;
+/// However long a take is wanted: longer forecasts are bound by how rates wander, whatever is measured.
+constexpr Seconds kKnownFor{60};
 /// Rounds after which a renewal isn't one any more.
 constexpr int kLongestRenewal = 12;
 
@@ -48,11 +54,31 @@ Seconds sure_stay(const Drift& course, const AlignContext& c) {
   return time_left(course, c.round.at, schedule(c)).earliest;
 }
 
+/// What a lock has to last for, where a reset would let a camera stay for so long.
+Seconds wanted_stay(Seconds fresh, const AlignContext& c) {
+  return fresh > kAmple * c.options.shortest_take ? c.options.shortest_take
+                                                  : std::min(c.options.shortest_take, 0.5 * fresh);
+}
+
 /// How long it would if it stood at this error.
 Seconds stay_from(Drift course, Seconds error, Seconds sigma, const AlignContext& c) {
   course.tau = wrap_positive(error, c.options.period);
   course.tau_sigma = sigma;
   return sure_stay(course, c);
+}
+
+/// Where a reset lets a camera stand, and how long it then stays.
+struct Fresh {
+  bool aimed = false;
+  Seconds stay;
+};
+
+Fresh fresh_of(std::size_t i, const std::vector<Drift>& courses, const AlignContext& c,
+               const AlignScene& scene) {
+  const auto& landing = scene.landings[i].aim;
+  const bool aimed = scene.timed(i) && landing && *landing < kAimedPart * c.tolerance;
+  return {aimed, stay_from(courses[i], aimed ? aim_of(courses[i], *landing, c) : Seconds(0),
+                           aimed ? *landing : courses[i].tau_sigma, c)};
 }
 
 }  // namespace
@@ -98,13 +124,12 @@ bool renew(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
   Seconds soonest(std::numeric_limits<double>::infinity());  // that one which is aimed is needed again
   bool due = false;
   for (std::size_t i = 0; i < courses.size(); ++i) {
-    const auto& landing = scene.landings[i].aim;
-    aimed.push_back(scene.timed(i) && landing && *landing < kAimedPart * c.tolerance);
+    const Fresh after = fresh_of(i, courses, c, scene);
+    aimed.push_back(after.aimed);
     stays.push_back(sure_stay(courses[i], c));
-    fresh.push_back(stay_from(courses[i], aimed[i] ? aim_of(courses[i], *landing, c) : Seconds(0),
-                              aimed[i] ? *landing : courses[i].tau_sigma, c));
+    fresh.push_back(after.stay);
     if (aimed[i]) soonest = std::min(soonest, fresh[i]);
-    const Seconds rounds = kDueRounds * c.options.round_time;
+    const Seconds rounds = std::max(kDueRounds * c.options.round_time, wanted_stay(fresh[i], c));
     const Seconds least = aimed[i] ? std::max(rounds, kDuePart * fresh[i]) : rounds;
     // Where nothing is surer after a reset than before there is no use in it.
     const bool now = scene.movable(i) && stays[i] < least && fresh[i] > kWorthwhile * stays[i];
@@ -113,7 +138,7 @@ bool renew(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
   }
   if (!due) return false;
   decision.renews = decision.in_time = true;
-  std::string who;
+  std::vector<std::size_t> who;
   for (std::size_t i = 0; i < courses.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
     if (aimed[i] && stays[i] < soonest && fresh[i] > kWorthwhile * stays[i]) camera.reset = true;
@@ -121,15 +146,48 @@ bool renew(AlignState& state, AlignDecision& decision, const std::vector<Drift>&
     // One that is drawn at random may take long to come back.
     decision.renews = decision.renews && scene.timed(i);
     state.cameras[i].renewed = true;
-    who += (who.empty() ? "" : ", ") + c.cameras[i].id;
-    camera.reason = standing(*camera.error, c.options.row_time) + ", and may leave tolerance in " +
-                    words(stays[i]) +
-                    (c.cameras[i].method == ShutterReset::by_hand ? ": reset its shutter by hand"
-                                                                  : ": its shutter is reset before");
+    who.push_back(i);
+    camera.reason = {.cause = c.cameras[i].method == ShutterReset::by_hand ? CameraCause::leaving_by_hand
+                                                                           : CameraCause::leaving,
+                     .stay = stays[i]};
   }
-  decision.reason = who + " would leave tolerance before long";
+  decision.reason = {AlignCause::leaving, std::move(who)};
   if (decision.renews) state.renewal = 1;
   return true;
+}
+
+std::vector<std::size_t> unknown_drifts(const std::vector<Drift>& courses, const AlignContext& c) {
+  std::vector<std::size_t> unknown;
+  const Seconds take = std::min(c.options.shortest_take, kKnownFor);
+  for (std::size_t i = 0; i < courses.size(); ++i) {
+    const Seconds errs = kScheduleSigmas * courses[i].rate_sigma.value() * 1e-6 * take;
+    if (errs > kKnownPart * c.tolerance && sure_stay(courses[i], c) < take) unknown.push_back(i);
+  }
+  return unknown;
+}
+
+std::vector<std::size_t> leaving_at_once(const std::vector<Drift>& courses, const AlignContext& c) {
+  std::vector<std::size_t> leaving;
+  if (c.options.shortest_take <= Seconds(0)) return leaving;
+  for (std::size_t i = 0; i < courses.size(); ++i)
+    if (sure_stay(courses[i], c) < c.options.round_time) leaving.push_back(i);
+  return leaving;
+}
+
+std::optional<Seconds> renewed_stay(const std::vector<Drift>& courses, const AlignContext& c,
+                                    const AlignScene& scene) {
+  Seconds soonest(std::numeric_limits<double>::infinity());
+  bool aimed = false;  // the first one to leave
+  for (std::size_t i = 0; i < courses.size(); ++i) {
+    const Fresh after = fresh_of(i, courses, c, scene);
+    const Seconds stay = sure_stay(courses[i], c);
+    // As wanted_stay() resets for it.
+    const Seconds renewed = after.aimed ? std::max(stay, 1 / kAmple * after.stay) : stay;
+    if (renewed >= soonest) continue;
+    soonest = renewed;
+    aimed = after.aimed;
+  }
+  return aimed && std::isfinite(soonest.value()) ? std::optional(soonest) : std::nullopt;
 }
 
 void follow_renewal(AlignState& state, AlignDecision& decision, const AlignContext& c) {
@@ -158,16 +216,14 @@ void foresee(const AlignState& state, AlignDecision& decision, const std::vector
         courses[i], c.round.at,
         {.tolerance = c.tolerance, .period = c.options.period, .wander_per_minute = c.options.rate_wander});
     const Seconds sure = sure_stay(courses[i], c);
+    decision.cameras[i].sure_stay = sure;
     if (sure >= soonest) continue;
     soonest = sure;
     first = i;
   }
   if (decision.verdict != AlignVerdict::aligned) return;
   decision.next_check = soonest;
-  if (std::isfinite(soonest.value())) {
-    decision.reason += "; film the strobe again within " + words(soonest) + ", before " +
-                       c.cameras[first].id + " may have drifted out";
-  }
+  if (std::isfinite(soonest.value())) decision.reason.first_out = first;
 }
 
 }  // namespace emberlock::smear

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "smear_sync/align/align.h"
@@ -25,6 +27,18 @@ Seconds aim_of(const Drift& course, Seconds landing, const AlignContext& c);
 /// can't be reset is. False when it is nobody's time.
 bool renew(AlignState& state, AlignDecision& decision, const std::vector<Drift>& courses,
            const AlignContext& c, const AlignScene& scene);
+
+/// The cameras whose drift must be known better before anybody can say whether they stay for the shortest
+/// take.
+std::vector<std::size_t> unknown_drifts(const std::vector<Drift>& courses, const AlignContext& c);
+
+/// Those that may have left before another round is filmed.
+std::vector<std::size_t> leaving_at_once(const std::vector<Drift>& courses, const AlignContext& c);
+
+/// For how long all would surely stay if they were reset now; absent where resets can't be aimed and would
+/// have to be.
+std::optional<Seconds> renewed_stay(const std::vector<Drift>& courses, const AlignContext& c,
+                                    const AlignScene& scene);
 
 /// Whether the renewal under way goes on: nothing but what it reset is missing or out of tolerance.
 void follow_renewal(AlignState& state, AlignDecision& decision, const AlignContext& c);

@@ -3,11 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <string>
+#include <utility>
 
-#include <fmt/format.h>
-
-#include "smear_sync/align/align_words.h"
 #include "smear_sync/align/move_together.h"
 #include "smear_sync/align/reset_delay.h"
 #include "smear_sync/align/unordered_reset.h"
@@ -24,68 +21,30 @@ constexpr double kLookStep = 0.381966011250105 * kLookRange;  // 1 - 1 / golden 
 /// Shifts by hand that are remembered of a camera.
 constexpr std::size_t kShifts = 16;
 
-std::string when_moved(const DotMove& move) {
-  return fmt::format("when the strobe's flashes were moved by {:.2f} ms", in_milliseconds(move.strobe));
-}
-
 /// Of a camera that shows this while another's dot did move.
-std::string doubt_of(DotMotion motion, const DotMove& move) {
-  const std::string moved = when_moved(move);
+std::optional<Doubt> doubt_of(DotMotion motion, const DotMove& move) {
   switch (motion) {
     case DotMotion::untold:
     case DotMotion::with_all:
       break;
     case DotMotion::none:
-      return "its dot stood still " + moved +
-             ": look for a reflection of the lamp in the lamp's own columns, shade it, or turn the camera";
+      return Doubt{DoubtCause::stood, move.strobe, move.seen};
     case DotMotion::against:
-      return "its dot moved the other way " + moved + ": set its read direction the other way round";
+      return Doubt{DoubtCause::against, move.strobe, move.seen};
     case DotMotion::otherwise:
-      return fmt::format("its dot moved by {:.2f} ms ", in_milliseconds(move.seen)) + moved +
-             ": see whether its row time is right, its shutter was reset, or a reflection stands in its "
-             "columns";
+      return Doubt{DoubtCause::otherwise, move.strobe, move.seen};
   }
-  return {};
+  return std::nullopt;
 }
 
-/// The cameras whose dots haven't been seen to move: those that nothing was seen of, and those seen too
-/// roughly.
-struct Unmoved {
-  std::string unseen;
-  std::string rough;
-  Seconds sigma;  ///< of the roughest
-
-  [[nodiscard]] std::string all() const {
-    return unseen + (unseen.empty() || rough.empty() ? "" : ", ") + rough;
-  }
-};
-
-Unmoved unmoved_of(const AlignState& state, const std::vector<AlignCamera>& cameras) {
-  Unmoved unmoved;
-  for (std::size_t i = 0; i < cameras.size(); ++i) {
+/// Adds the cameras whose dots haven't been seen to move.
+void note_unmoved(AlignReason& reason, const AlignState& state) {
+  for (std::size_t i = 0; i < state.cameras.size(); ++i) {
     const CameraTrack& track = state.cameras[i];
     if (track.moved) continue;
-    std::string& list = track.rough ? unmoved.rough : unmoved.unseen;
-    list += (list.empty() ? "" : ", ") + cameras[i].id;
-    unmoved.sigma = std::max(unmoved.sigma, track.rough.value_or(Seconds(0)));
+    (track.rough ? reason.rough : reason.unmoved).push_back(i);
+    reason.sigma = std::max(reason.sigma, track.rough.value_or(Seconds(0)));
   }
-  return unmoved;
-}
-
-/// Why a run ends whose cameras lie in tolerance as far as anybody can tell.
-std::string why_untold(const Unmoved& unmoved, const AlignOptions& options, int looks) {
-  std::string why;
-  if (!unmoved.unseen.empty()) {
-    why = "no dot of " + unmoved.unseen + " was seen at two places of the strobe in " +
-          plural(static_cast<std::size_t>(looks), "look") +
-          ": check that the lamp is in view and not over-exposed";
-  }
-  if (unmoved.rough.empty()) return why;
-  if (!why.empty()) why += "; ";
-  return why + fmt::format(
-                   "the phase of {} is known to {:.2f} ms, too roughly to see it follow the "
-                   "strobe by {:.2f} ms: ask for a finer tolerance, or give it more of the flash",
-                   unmoved.rough, in_milliseconds(unmoved.sigma), in_milliseconds(options.strobe_step));
 }
 
 /// Compares what the round shows with what was seen before the strobe was moved: notes in `state` which
@@ -101,10 +60,10 @@ void watch_moves(AlignState& state, const AlignContext& c) {
     if (track.sighted && !round.moves_told) continue;
     if (track.sighted && track.phase.phase_known()) {
       const Drift drift = track.phase.at(round.at, c.track);
+      const Seconds strobe = round.strobe_phase - track.sighted->strobe_phase;
       const Seconds before = track.sighted->tau;
-      moves[i] = DotMove{round.strobe_phase - track.sighted->strobe_phase,
-                         wrap_symmetric(drift.tau + round.strobe_phase - before, c.options.period),
-                         wrap_symmetric(phase.tau - before, c.options.period),
+      moves[i] = DotMove{strobe, wrap_symmetric(drift.tau + strobe - before, c.options.period),
+                         wrap_symmetric(phase.tau + strobe - before, c.options.period),
                          Seconds(std::hypot(drift.tau_sigma.value(), phase.sigma.value()))};
     }
     track.sighted = Sighting{phase.tau, round.strobe_phase};
@@ -122,9 +81,7 @@ void watch_moves(AlignState& state, const AlignContext& c) {
     }
     track.moved = motions[i] == DotMotion::with_all;
     track.rough.reset();
-    track.disputed = false;
-    track.doubt = all_stand ? "no camera's dot moved " + when_moved(*moves[i]) +
-                                  ": see whether the strobe does as it is told"
+    track.doubt = all_stand ? Doubt{DoubtCause::strobe_stood, moves[i]->strobe, moves[i]->seen}
                             : doubt_of(motions[i], *moves[i]);
   }
 }
@@ -136,8 +93,7 @@ void forget(CameraTrack& track, std::optional<Drift> before) {
   track.sighted.reset();
   track.moved = false;
   track.rough.reset();
-  track.doubt.clear();
-  track.disputed = false;
+  track.doubt.reset();
 }
 
 /// What people did: cameras that were switched off, and phases that jumped. Returns the latter.
@@ -181,11 +137,10 @@ std::vector<std::size_t> remember(AlignState& state, const AlignContext& c) {
   std::vector<std::size_t> jumped = notice_people(state, c);
   watch_moves(state, c);
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
-    Phase phase = round.cameras[i].phase;
+    const Phase& phase = round.cameras[i].phase;
     if (phase.state != PhaseState::known) continue;
-    phase.tau = wrap_positive(phase.tau - round.strobe_phase, c.options.period);
     CameraTrack& track = state.cameras[i];
-    track.phase.observe(round.at, phase, round.beat, c.track);
+    track.phase.observe(round.at, phase, round.period_offset, c.track);
     if (!track.before_hand) continue;
     const Drift& before = *track.before_hand;
     const Seconds moved = (round.at - before.at) * (before.rate.value() * 1e-6);
@@ -205,7 +160,7 @@ std::vector<std::size_t> remember(AlignState& state, const AlignContext& c) {
 }
 
 std::optional<Drift> where(const CameraTrack& track, const AlignContext& c) {
-  if (!track.doubt.empty()) return std::nullopt;
+  if (track.doubt) return std::nullopt;
   if (!track.phase.phase_known() || track.phase.aged(c.round.at, c.track) > c.remembered())
     return std::nullopt;
   return track.phase.at(c.round.at, c.track);
@@ -215,48 +170,40 @@ Seconds next_look(const AlignContext& c) { return moved_strobe(c, kLookStep * c.
 
 void look_again(AlignState& state, AlignDecision& decision, const AlignContext& c) {
   ++state.looks;
-  std::string missing;
-  std::string why;
+  std::vector<std::size_t> missing;
   bool hidden = false;
   bool away = false;
   for (std::size_t i = 0; i < c.cameras.size(); ++i) {
     CameraDecision& camera = decision.cameras[i];
-    const std::string& doubt = state.cameras[i].doubt;
-    const Phase& phase = c.round.cameras[i].phase;
+    const std::optional<Doubt>& doubt = state.cameras[i].doubt;
+    const CameraView& view = c.round.cameras[i];
     if (where(state.cameras[i], c)) {
-      camera.reason = "its phase is known: waits for the cameras whose phase isn't";
+      camera.reason = {CameraCause::waits_for_others};
       continue;
     }
-    missing += (missing.empty() ? "" : ", ") + c.cameras[i].id;
-    if (c.round.cameras[i].away) {
+    missing.push_back(i);
+    if (view.away) {
       away = true;
-      camera.reason = "sends no frames: switch it on, or plug it in; it goes on by itself";
-    } else if (!doubt.empty()) {
+      camera.reason = {CameraCause::away};
+    } else if (doubt) {
       hidden = true;
-      camera.reason = doubt;
-      if (why.empty()) why = doubt;
-    } else if (phase.state == PhaseState::blind) {
+      camera.reason = {.cause = CameraCause::doubted, .doubt = doubt};
+    } else if (view.phase.state == PhaseState::blind) {
       hidden = true;
-      camera.reason = (c.options.dial ? "shows no phase: waits until the flashes have walked on ("
-                                      : "shows no phase: the strobe's is moved to bring it out (") +
-                      phase.reason + ")";
+      camera.reason = {CameraCause::blind};
     } else {
-      camera.reason = "can't be read: see to its view of the lamp and to the strobe (" + phase.reason + ")";
-      if (why.empty()) why = phase.reason;
+      camera.reason = {view.unheard ? CameraCause::unheard : CameraCause::unreadable};
     }
   }
   if (away) {
     state.looks = 0;  // looks find nobody who isn't there
   } else if (state.looks > c.options.max_looks) {
     decision.verdict = AlignVerdict::given_up;
-    decision.reason =
-        "no phase of " + missing + " after " + plural(static_cast<std::size_t>(state.looks), "look") +
-        " at different phases of the strobe: " +
-        (why.empty() ? "check that the lamp is in view, not over-exposed, and flashes once a frame" : why);
+    decision.reason = {.cause = AlignCause::unseen, .cameras = std::move(missing), .looks = state.looks};
     return;
   }
   if (hidden) decision.strobe_phase = next_look(c);
-  decision.reason = (away ? "waits for " : "looks again for ") + missing;
+  decision.reason = {away ? AlignCause::waits_for_away : AlignCause::looks_again, std::move(missing)};
 }
 
 void ask_for_moves(AlignState& state, AlignDecision& decision, const AlignContext& c, int looks) {
@@ -264,22 +211,20 @@ void ask_for_moves(AlignState& state, AlignDecision& decision, const AlignContex
                                   [](const CameraDecision& camera) { return camera.reset; });
   const bool open = decision.verdict == AlignVerdict::go_on || decision.verdict == AlignVerdict::aligned;
   if (c.options.strobe_step == Seconds(0) || resets || !open) return;
-  const Unmoved unmoved = unmoved_of(state, c.cameras);
-  const std::string all = unmoved.all();
-  if (all.empty()) return;
+  AlignReason reason = decision.reason;
+  note_unmoved(reason, state);
+  if (reason.unmoved.empty() && reason.rough.empty()) return;
   if (!decision.strobe_phase) decision.strobe_phase = moved_strobe(c, c.options.strobe_step);
   if (decision.verdict == AlignVerdict::go_on) return;
   state.looks = looks + 1;
+  decision.reason = std::move(reason);
   if (state.looks > c.options.max_looks) {
     decision.verdict = AlignVerdict::given_up;
-    decision.reason = why_untold(unmoved, c.options, state.looks);
+    decision.reason.cause = AlignCause::unmoved;
+    decision.reason.looks = state.looks;
     return;
   }
   decision.verdict = AlignVerdict::go_on;
-  decision.reason += c.options.dial
-                         ? "; the dot of " + all + " must be seen to follow the flashes as they walk"
-                         : fmt::format("; the strobe is moved by {:.2f} ms, which the dot of {} must follow",
-                                       in_milliseconds(c.options.strobe_step), all);
 }
 
 }  // namespace emberlock::smear

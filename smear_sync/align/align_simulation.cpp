@@ -48,7 +48,7 @@ class Rig {
         random_(seed, kStream),
         period_(sim.options.period.value()),
         row_(sim.options.row_time.value()),
-        flash_period_(period_ * (1 + sim.beat.value() * 1e-6)) {
+        flash_period_(period_ * (1 + sim.period_offset.value() * 1e-6)) {
     const double centre = random_.uniform(0, period_);
     for (int i = 0; i < sim.cameras; ++i) {
       const double rate = random_.normal(0, sim.rate_spread.value()) * 1e-6;
@@ -69,7 +69,7 @@ class Rig {
   AlignRound film() {
     AlignRound round;
     round.at = TimePoint{} + Seconds(now_);
-    round.beat = {sim_.beat + sim_.beat_error, PartsPerMillion(5)};
+    round.period_offset = {sim_.period_offset + sim_.period_offset_error, PartsPerMillion(5)};
     round.strobe_phase = strobe_phase_;
     round.resets = std::move(resets_);
     round.trims = std::move(trims_);
@@ -218,10 +218,14 @@ AlignOutcome simulate(const AlignSimulation& sim, std::uint64_t seed) {
   AlignOutcome outcome;
   const double began = rig.now();
   for (;;) {
-    AlignStep step = align_step(outcome.state, rig.film(), rig.cameras(), sim.options);
+    const AlignRound round = rig.film();
+    AlignStep step = align_step(outcome.state, round, rig.cameras(), sim.options);
     outcome.state = std::move(step.state);
     outcome.decision = std::move(step.decision);
-    if (outcome.decision.verdict != AlignVerdict::go_on) break;
+    if (outcome.decision.verdict != AlignVerdict::go_on) {
+      outcome.words = words(outcome.decision, round, rig.cameras(), sim.options);
+      break;
+    }
     rig.carry_out(outcome.decision);
   }
   outcome.resets = outcome.state.resets;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "smear_sync/align/align.h"
+#include "smear_sync/align/align_words.h"
 
 namespace emberlock::smear {
 
@@ -16,17 +17,17 @@ struct AlignSimulation {
   bool delay_known = false;  ///< whether align_step is told the mean delay of the model
   ShutterReset method = ShutterReset::on_command;
   Seconds latency_jitter = milliseconds(0.2);
-  Seconds latency_spread{0};       ///< of the cameras' mean latencies
-  Seconds latency_bias{0};         ///< by which the delay told is wrong
-  PartsPerMillion rate_spread{0};  ///< of the cameras' rates
-  PartsPerMillion beat{167};       ///< strobe period against the cameras', as 23.98 against 23.976
-  PartsPerMillion beat_error{2};   ///< by which the beat told is wrong
-  double noise_rows = 0.3;         ///< of a round's phase
-  double flash_rows = 0;           ///< the flash's width where whole-row shifts are simulated; 0: they aren't
-  double bloom_rows = 25;          ///< phases this near to the lamp show no dot
-  double visible_rows = 720;       ///< nor does the rest after these
-  double round_seconds = 0.6;      ///< of filming one round
-  double reset_seconds = 0;        ///< of one reset more in a round
+  Seconds latency_spread{0};           ///< of the cameras' mean latencies
+  Seconds latency_bias{0};             ///< by which the delay told is wrong
+  PartsPerMillion rate_spread{0};      ///< of the cameras' rates
+  PartsPerMillion period_offset{167};  ///< strobe period against the cameras', as 23.972 Hz against 23.976
+  PartsPerMillion period_offset_error{2};  ///< error of the offset that the policy is told
+  double noise_rows = 0.3;                 ///< of a round's phase
+  double flash_rows = 0;       ///< the flash's width where whole-row shifts are simulated; 0: they aren't
+  double bloom_rows = 25;      ///< phases this near to the lamp show no dot
+  double visible_rows = 720;   ///< nor does the rest after these
+  double round_seconds = 0.6;  ///< of filming one round
+  double reset_seconds = 0;    ///< of one reset more in a round
   std::optional<FrameRateTrim> trim;  ///< of every camera
   double spread_rows = 0;             ///< the cameras start within so many rows to either side; 0: anywhere
   double hold_seconds = 0;            ///< once aligned: go on, checking when the policy asks for it
@@ -34,6 +35,7 @@ struct AlignSimulation {
 
 struct AlignOutcome {
   AlignDecision decision;  ///< the last, or the one that found the cameras aligned
+  AlignWords words;        ///< of that
   AlignState state;
   int resets = 0;
   int rounds = 0;

@@ -6,10 +6,6 @@
 #include <numeric>
 #include <optional>
 
-#include <fmt/format.h>
-
-#include "smear_sync/align/align_words.h"
-
 namespace emberlock::smear {
 namespace {
 
@@ -140,18 +136,16 @@ Plan plan(const AlignState& state, const Timing& timing, const std::vector<Align
           std::move(late)};
 }
 
-std::string words(Seconds error, const ServoStep& step, SecondsPerRow row_time) {
-  std::string stands = standing(error, row_time);
-  const std::string by = fmt::format(" {:+.1f} ppm", step.trim.value());
+CameraReason reason_of(const ServoStep& step) {
   switch (step.state) {
     case ServoState::slewing:
-      return stands + ": comes at full rate, trimmed by" + by;
+      return {.cause = CameraCause::slewing, .trim = step.trim};
     case ServoState::settling:
-      return stands + ": is stopped on the target, trimmed by" + by;
+      return {.cause = CameraCause::settling, .trim = step.trim};
     case ServoState::locked:
-      return stands + ", locked: held there by" + by;
+      break;
   }
-  return stands;
+  return {.cause = CameraCause::locked, .trim = step.trim};
 }
 
 }  // namespace
@@ -165,15 +159,16 @@ bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& ro
   const Timing timing{round.at, state.last_round ? round.at - *state.last_round : options.round_time};
   const TrackOptions track = track_options(options);
   if (!state.target || !state.target->settled) {
-    const Seconds middle = wrap_positive(*decision.target - round.strobe_phase, options.period);
+    // Rounded as by those who made the first recordings, which replay to the last digit.
+    const Seconds delayed = wrap_positive(*decision.target + round.strobe_phase, options.period);
+    const Seconds middle = wrap_positive(delayed - round.strobe_phase, options.period);
     if (!state.trimming) state.trimming = round.at;
     Plan planned = plan(state, timing, cameras, options, middle);
     state.target = planned.target;
     for (const std::size_t i : planned.late) decision.cameras[i].reset = true;
   }
   const AlignTarget& target = *state.target;
-  decision.target =
-      wrap_positive(target_at(target, round.at, options.period) + round.strobe_phase, options.period);
+  decision.target = target_at(target, round.at, options.period);
   const Seconds tolerance = options.tolerance.in_time(options.row_time);
   bool all_in = true;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -188,14 +183,13 @@ bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& ro
     const PartsPerMillion ordered = phase.trim(from);
     const ServoStep step = rate_servo({to_go, then.tau_sigma, holding}, *cameras[i].trim, timing.interval);
     if (camera.reset) {
-      camera.reason =
-          standing(*camera.error, options.row_time) + ", which trims take too long for: its shutter is reset";
+      camera.reason = {CameraCause::late};
       all_in = false;
       continue;
     }
     camera.servo = step.state;
     if (abs(step.trim - ordered) > cameras[i].trim->step / 2) camera.trim = step.trim;
-    camera.reason = words(*camera.error, step, options.row_time);
+    camera.reason = reason_of(step);
     const bool in =
         abs(*camera.error) + 2 * now.tau_sigma <= tolerance && abs(to_go) + 2 * now.tau_sigma <= tolerance;
     all_in = all_in && in;
@@ -208,7 +202,7 @@ bool trim_rates(AlignState& state, AlignDecision& decision, const AlignRound& ro
     const ServoStep step = rate_servo({Seconds(0), Seconds(1), holding}, *cameras[i].trim, timing.interval);
     camera.servo = ServoState::locked;
     camera.trim = step.trim;
-    camera.reason = words(*camera.error, {step.trim, ServoState::locked}, options.row_time);
+    camera.reason = reason_of({step.trim, ServoState::locked});
   }
   return true;
 }

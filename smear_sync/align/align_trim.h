@@ -11,7 +11,7 @@ namespace emberlock::smear {
 Seconds target_at(const AlignTarget& target, TimePoint at, Seconds period);
 
 /// One step of the phase-locked loop: plans the target anew while trims are on their way to it, holds it once
-/// the last is near, and gives every camera its servo's state, its trim where that changes, and a sentence.
+/// the last is near, and gives every camera its servo's state, its trim where that changes, and its reason.
 /// Every camera can be trimmed, and its phase is known. True when all are within tolerance by two standard
 /// errors; the trims given then hold them there. The outermost cameras are to be reset (`reset` is set) where
 /// trims would take longer than options.trim_time in all.

@@ -32,9 +32,9 @@ constexpr double kToldPartOfStep = 1.0 / 20;
 
 /// The motions of all the cameras that filmed the same flashes, by camera; nothing of one that wasn't seen
 /// twice. What most of them differ by from what is expected, counting the strobe's word for one camera more,
-/// is their common motion: a beat that is known too roughly, a strobe that isn't where it says. Differences
-/// of up to five standard errors are none; a move is told from standing still from twice as much on, and one
-/// way from the other where twice the way isn't whole periods to that.
+/// is their common motion: a period offset that is known too roughly, a strobe that isn't where it says.
+/// Differences of up to five standard errors are none; a move is told from standing still from twice as much
+/// on, and one way from the other where twice the way isn't whole periods to that.
 std::vector<DotMotion> move_together(std::span<const std::optional<DotMove>> cameras, Seconds period);
 
 }  // namespace emberlock::smear

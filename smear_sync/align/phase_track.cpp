@@ -66,13 +66,14 @@ Seconds PhaseTrack::aged(TimePoint at, const TrackOptions& options) const {
   return Seconds(t * std::sqrt(belief_.rate_variance + wander_variance(t, options) / 3));
 }
 
-void PhaseTrack::observe(TimePoint at, const Phase& phase, const Beat& beat, const TrackOptions& options) {
+void PhaseTrack::observe(TimePoint at, const Phase& phase, const PeriodOffset& period_offset,
+                         const TrackOptions& options) {
   if (phase.state != PhaseState::known) return;
   const double variance = std::max(square(phase.sigma.value()), 1e-18);
   if (!rate_known_) {
-    belief_.rate = beat.rate.value() * 1e-6;
+    belief_.rate = period_offset.rate.value() * 1e-6;
     belief_.rate_variance =
-        1e-12 * std::max(square(beat.sigma.value()) + square(options.rate_spread.value()), 1e-6);
+        1e-12 * std::max(square(period_offset.sigma.value()) + square(options.rate_spread.value()), 1e-6);
     rate_known_ = true;
     seen_ = at;
   }

@@ -24,7 +24,8 @@ class PhaseTrack {
  public:
   /// A phase was seen; known ones count alone. One that can't be true (six standard errors off) replaces what
   /// was believed of the phase.
-  void observe(TimePoint at, const Phase& phase, const Beat& beat, const TrackOptions& options);
+  void observe(TimePoint at, const Phase& phase, const PeriodOffset& period_offset,
+               const TrackOptions& options);
   /// The phase has been drawn anew; the rate is the crystal's and stays.
   void forget_phase() { phase_known_ = false; }
   /// From `from` on, give or take half a frame, the rate differs from the camera's own by `trim`.

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <string>
 
+#include <fmt/format.h>
+
 #include "base/one_to_one.h"
 #include "smear_sync/align/align.h"
 
@@ -30,7 +32,7 @@ Rows Tolerance::in_rows(SecondsPerRow row_time) const {
 Result<Tolerance> parse_tolerance(std::string_view text) {
   const auto refuse = [&](const std::string& what) {
     return Error{ErrorKind::bad_input, what, "tolerance '" + std::string(text) + "'",
-                 "give a positive number with its unit: 100rows, 5.4ms or 500us"};
+                 "give a positive number with its unit: 0.5ms, 500us or 10rows"};
   };
   double amount = 0;
   const auto [rest, code] = std::from_chars(text.data(), text.data() + text.size(), amount);
@@ -41,6 +43,21 @@ Result<Tolerance> parse_tolerance(std::string_view text) {
   if (unit == "ms") return Tolerance{milliseconds(amount)};
   if (unit == "us") return Tolerance{microseconds(amount)};
   return refuse(unit.empty() ? "has no unit" : "has an unknown unit '" + std::string(unit) + "'");
+}
+
+Tolerance tolerance_for(const FlameMotion& flame) {
+  constexpr double kPartOfDetail = 0.25;
+  return {Seconds(kPartOfDetail * flame.detail.value() / flame.speed.value())};
+}
+
+std::string words(const Tolerance& tolerance, SecondsPerRow row_time) {
+  const double ms = in_milliseconds(tolerance.in_time(row_time));
+  const double rows = tolerance.in_rows(row_time).value();
+  return fmt::format("{:.{}f} ms ({:.{}f} rows)", ms,
+                     ms < 0.1 ? 4
+                     : ms < 1 ? 3
+                              : 2,
+                     rows, rows < 100 ? 1 : 0);
 }
 
 std::string_view name(AlignPolicy policy) { return kPolicyNames.second_of(policy).value_or("unknown"); }

@@ -24,15 +24,14 @@ struct Surprise {
 };
 
 std::optional<Surprise> surprise_of(const CameraTrack& track, const CameraView& view, const AlignContext& c) {
-  if (!track.phase.phase_known() || !track.doubt.empty() || view.away) return std::nullopt;
+  if (!track.phase.phase_known() || track.doubt || view.away) return std::nullopt;
   const Drift drift = track.phase.at(c.round.at, c.track);
-  const Seconds expected = drift.tau + c.round.strobe_phase;
   Surprise surprise;
   surprise.allowed = allowed(Seconds(std::hypot(drift.tau_sigma.value(), view.phase.sigma.value())), c);
   const auto apart = [&](Seconds a, Seconds b) { return wrap_symmetric(a - b, c.options.period); };
   if (view.phase.state == PhaseState::known) {
     surprise.seen = true;
-    surprise.by = apart(view.phase.tau, expected);
+    surprise.by = apart(view.phase.tau, drift.tau);
     // What stood still, or moved the other way, is another matter.
     const Seconds strobe =
         track.sighted ? apart(c.round.strobe_phase, track.sighted->strobe_phase) : Seconds(0);
@@ -43,7 +42,7 @@ std::optional<Surprise> surprise_of(const CameraTrack& track, const CameraView& 
   } else if (view.phase.state == PhaseState::blind && track.sighted) {
     // Seen at this very place a round ago.
     surprise.vanished = c.round.strobe_phase == track.sighted->strobe_phase &&
-                        abs(apart(expected, track.sighted->tau)) <= surprise.allowed;
+                        abs(apart(drift.tau, track.sighted->tau)) <= surprise.allowed;
   }
   return surprise;
 }

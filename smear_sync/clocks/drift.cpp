@@ -16,7 +16,7 @@
 namespace emberlock::smear {
 namespace {
 
-constexpr double kHuber = 1.345;  // 95 % efficient on normal errors
+constexpr double kHuber = 1.345;  // 95 % efficiency for normal errors
 constexpr int kRobustRounds = 8;
 
 struct Sample {
@@ -25,8 +25,8 @@ struct Sample {
   double sigma;
 };
 
-/// The rate under which the points gather best: the largest resultant of tau - rate t on the circle. A coarse
-/// search over all rates, then a fine one about its best.
+/// The rate at which the points concentrate best: the largest resultant of tau - rate t on the circle. A
+/// coarse search over all rates, then a fine one around the best.
 double gathering_rate(const std::vector<Sample>& points, double span, const DriftOptions& options) {
   const double period = options.period.value();
   const auto resultant = [&](double rate) {
@@ -50,7 +50,7 @@ double gathering_rate(const std::vector<Sample>& points, double span, const Drif
   };
   const double expected = options.expected.value() * 1e-6;
   const double fastest = options.fastest.value() * 1e-6;
-  // Half a lobe of the resultant is period / span wide; an eighth of it can't miss the top.
+  // Half a lobe of the resultant is period / span wide; steps of an eighth of that can't miss the maximum.
   const double step = std::min(period / span / 8, fastest / 8);
   const double coarse = best_of(expected - fastest, expected + fastest, step);
   return best_of(coarse - step, coarse + step, step / 8);
@@ -62,7 +62,7 @@ double median(std::vector<double> v) {
   return *middle;
 }
 
-/// Iteratively reweighted least squares. The scatter may be wider than the sigmas say, never narrower.
+/// Iteratively reweighted least squares. The scatter may be larger than the sigmas state, never smaller.
 WeightedLine robust_line(const std::vector<Sample>& points) {
   std::vector<LinePoint> weighted;
   weighted.reserve(points.size());
@@ -87,17 +87,18 @@ WeightedLine robust_line(const std::vector<Sample>& points) {
   return line;
 }
 
-/// RMS of the whole rows by which the lamp may stand elsewhere, when it is `missed` rows, of at most a half,
-/// off the row that the stairs tell. Outlines of saturated lamps err with a long tail: by a third of what is
-/// stated on average, now and then by more than half a row.
+/// RMS of the whole rows by which the lamp may be elsewhere, if its measured row is `missed` rows (at most a
+/// half) off the row given by the staircase. Outlines of saturated lamps have errors with a long tail: on
+/// average a third of the stated error, sometimes more than half a row.
 double whole_rows_off(double missed, double lamp_sigma) {
   if (lamp_sigma <= 0) return 0;
   const double scale = lamp_sigma / 3;
-  const double further = 1 - 2 * std::abs(missed);  // rows that the next whole row lies further off
+  const double further = 1 - 2 * std::abs(missed);  // distance of the next row's candidate
   return std::sqrt(1 / (1 + std::exp(std::min(700.0, further / scale))));
 }
 
-/// By how much, and how fast, a line moves when rows take longer by `more`: every sample by its own rows.
+/// Change of a line's level and rate if rows take longer by `more`: every sample shifts by its own number of
+/// rows.
 struct ByRowTime {
   double level = 0;
   double rate = 0;
@@ -113,17 +114,19 @@ ByRowTime by_row_time(std::span<const PhaseSample> samples, TimePoint middle, do
   return {more * (line.level - line.rate * line.middle), more * line.rate};
 }
 
-/// Leaves the tolerance upwards: the first t >= 0 with error + rate t + curve t^2 / 2 = tolerance.
+/// When the error leaves the tolerance upwards: the first t >= 0 with error + rate t + curve t^2 / 2 =
+/// tolerance.
 double first_reached(double error, double rate, double curve, double tolerance) {
   const double gap = tolerance - error;
   if (gap <= 0) return 0;
   const double root = square(rate) + 2 * curve * gap;
   if (root < 0) return std::numeric_limits<double>::infinity();
-  const double down = rate + std::sqrt(root);  // 2 gap / down is the nearer root, without a difference
+  const double down =
+      rate + std::sqrt(root);  // 2 gap / down is the smaller root, computed without cancellation
   return down > 0 ? 2 * gap / down : std::numeric_limits<double>::infinity();
 }
 
-/// The staircase that whole rows of charge make of the line; none of fewer than three frames.
+/// The staircase that whole-row shifts make of the line; nullopt for fewer than three frames.
 std::optional<StairFit> stairs_of(std::span<const PhaseSample> samples, TimePoint first, double span,
                                   const WeightedLine& line, const DriftOptions& options) {
   std::vector<StairPoint> seen;
@@ -150,7 +153,7 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
     if (s.phase.state != PhaseState::known) continue;
     if (points.empty()) first = s.at;
     const double t = (s.at - first).value();
-    // A sigma of zero would be a sample that can't be wrong.
+    // A sigma of zero would give infinite weight.
     points.push_back({t, s.phase.tau.value(), std::max(s.phase.sigma.value(), 1e-12)});
   }
   if (!points.empty()) {
@@ -194,7 +197,7 @@ Result<Drift> fit_drift(std::span<const PhaseSample> samples, const DriftOptions
     rate = stairs->line(1) * row_time;
     rate_sigma = stairs->sigma(1) * row_time;
   }
-  // Without stairs the lamp errs as stated.
+  // Without a staircase the lamp's error is as stated.
   const double lamp_sigma = options.lamp_sigma.value();
   const double lamp_rows = stairs ? whole_rows_off(stairs->lamp, lamp_sigma) : lamp_sigma;
   const ByRowTime common = by_row_time(samples, drift.at, options.row_time_sigma.value());
@@ -216,7 +219,7 @@ Phase phase_at(const Drift& line, TimePoint at, Seconds period) {
 }
 
 Drift difference(const Drift& a, const Drift& b, Seconds period) {
-  // Between the two middles both phases are known best.
+  // The instant between both middles at which the phases are known best.
   const double wa = 1 / std::max(square(a.rate_sigma.value()), 1e-18);
   const double wb = 1 / std::max(square(b.rate_sigma.value()), 1e-18);
   const TimePoint at = a.at + (b.at - a.at) * (wb / (wa + wb));
@@ -238,7 +241,7 @@ TimeLeft time_left(const Drift& error, TimePoint now, const TimeLeftOptions& opt
   const double elapsed = (now - error.at).value();
   const double rate = error.rate.value() * 1e-6;
   const double curve = options.wander_per_minute.value() * 1e-6 / 60;
-  // What wandered between the fit's middle and now is unknown as well.
+  // The wander between the middle of the fit and now is also unknown.
   const double wandered = curve * std::abs(elapsed);
   const double rate_spread = options.sigmas * error.rate_sigma.value() * 1e-6 + wandered;
   const double level = wrap_symmetric(error.tau.value() + rate * elapsed, options.period.value());
@@ -259,8 +262,8 @@ TimeLeft time_left(const Drift& error, TimePoint now, const TimeLeftOptions& opt
       earliest = std::min(earliest, leaves(e, r, curve));
   }
   left.earliest = Seconds(earliest);
-  // The slowest way out starts as far from the bound as may be, and brakes; one that may stand still stays
-  // for ever.
+  // The latest exit: start as far from the bound as possible, and slow down. A rate that may become zero
+  // never leaves.
   const double sign = std::copysign(1.0, rate);
   const double slowest = std::abs(rate) - rate_spread;
   const double start = std::max(sign * level - level_spread, -bound);

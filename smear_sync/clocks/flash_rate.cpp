@@ -22,22 +22,22 @@ constexpr OneToOne<FlashesSeen, std::string_view, 6> kSeenNames{{{{FlashesSeen::
                                                                   {FlashesSeen::none, "none"}}}};
 
 constexpr std::size_t kFewestFlashes = 3;
-/// Two flashes that were seen may have so many times the period between them, all those between hidden.
+/// Two observed flashes may be up to this many periods apart, with all flashes between them hidden.
 constexpr int kMostHidden = 4;
-/// Part of the frame period by which a flash may miss its place: what a row time that is 1 % off makes of it.
+/// Tolerance for the time of a flash, as part of the frame period: the effect of a row time that is 1 % off.
 constexpr double kMisplaced = 0.01;
-/// Nor by more than this part of the flashes' own period, lest any period fit.
+/// The same as part of the flash period, so that not every period fits.
 constexpr double kMisplacedOfOwn = 0.12;
-/// Two cameras' periods are one when they differ by less, or by six standard errors.
+/// Two cameras' periods agree if they differ by less than this, or by less than six standard errors.
 constexpr double kAlike = 500e-6;
 constexpr double kAlikeSigmas = 6;
-/// A dot isn't looked for so near the lamp, nor the picture's edge: radii, and rows.
+/// No dot is expected this close to the lamp (radii, rows) or to the picture's edge (rows).
 constexpr double kBloomRadii = 4;
 constexpr Rows kBloomRows{12};
 constexpr Rows kHiddenEdge{4};
-/// A camera may miss this part of the dots that it should show.
+/// A camera may miss this share of the dots that it should show.
 constexpr double kMissedPart = 0.1;
-/// Places where a flash would show and doesn't, so many together, rule a rate out.
+/// This many places where a flash should show but doesn't rule a rate out.
 constexpr int kMissed = 2;
 
 struct FlashInstant {
@@ -48,7 +48,7 @@ struct FlashInstant {
 struct CameraFlashes {
   const FlashFilm* film = nullptr;
   std::vector<FlashInstant> flashes;
-  LampReading lamp{};  ///< as it was seen last
+  LampReading lamp{};  ///< the last observed one
 };
 
 struct FlashPeriod {
@@ -66,7 +66,7 @@ std::vector<FlashInstant> instants_of(const FlashFilm& film, Seconds flash_width
     for (const DotReading& dot : reading.dots) {
       const Rows below = static_cast<double>(timing.direction) * (dot.y - reading.lamp->y);
       const Rows shifted = wrap_positive(below, Rows(timing.shifts)) + Rows(0.5);
-      // A wrapped dot is of the read phase before its own frame's.
+      // A wrapped dot belongs to the read phase before its own frame's.
       const double frames = static_cast<double>(frame.frame) - (below < Rows(0) ? 1 : 0);
       flashes.push_back({frames * timing.frame_period.value() + (shifted * timing.row_time).value(),
                          std::hypot((dot.sigma * timing.row_time).value(), resolution)});
@@ -77,14 +77,14 @@ std::vector<FlashInstant> instants_of(const FlashFilm& film, Seconds flash_width
   return flashes;
 }
 
-/// The period near `guess` of which all flashes are whole multiples apart; none where some aren't.
+/// The period near `guess` of which all intervals between flashes are multiples; nullopt if some aren't.
 std::optional<FlashPeriod> fit_period(const std::vector<FlashInstant>& flashes, double guess,
                                       const CcdTiming& timing, double resolution) {
   const double allowed = std::min(kMisplaced * timing.frame_period.value(), kMisplacedOfOwn * guess);
   std::vector<LinePoint> points{{0, flashes[0].t, 1 / square(flashes[0].sigma)}};
   double period = guess;
   for (std::size_t i = 1; i < flashes.size(); ++i) {
-    // The flash before stands for how long the period is by now: it was refined by all before it.
+    // Counted from the last flash: the period isn't accurate enough yet for longer intervals.
     const double apart = flashes[i].t - flashes[i - 1].t;
     const double whole = std::round(apart / period);
     if (whole < 1 || std::abs(apart - whole * period) > allowed) return std::nullopt;
@@ -96,19 +96,19 @@ std::optional<FlashPeriod> fit_period(const std::vector<FlashInstant>& flashes, 
     if (std::abs(p.y - line.level - line.rate * (p.t - line.middle)) > allowed) return std::nullopt;
   }
   const double span = points.back().t;
-  const double stairs = 2.1 * resolution / span;  // as staircase_rate_error(), of the period
+  const double stairs = 2.1 * resolution / span;  // like staircase_rate_error(), for the period
   return FlashPeriod{line.rate, std::sqrt(line.rate_variance + square(stairs))};
 }
 
-/// Whether the lamp was lit while the picture was exposed, and a dot of any flash would be read.
+/// Whether the lamp was lit during the exposure, and a dot of any flash would be read.
 bool shows_lamp(const SmearReading& reading) {
   return reading.state == SmearState::dot || reading.state == SmearState::comb ||
          reading.state == SmearState::no_dot;
 }
 
-/// Whether a flash at `t` would show as a dot, in a frame that was filmed and could be read. A flash lights
-/// the lamp in the picture that is exposed meanwhile, the next image: a wrapped dot is in that, too; one that
-/// didn't wrap is in the image being read, and is read where an earlier flash lit the lamp of that.
+/// Whether a flash at `t` would show as a dot in a frame that was filmed and readable. The flash lights the
+/// lamp in the next image, which is then being exposed. A wrapped dot is in that image too. A dot that isn't
+/// wrapped is in the image being read out; it can be read if an earlier flash lit the lamp in that image.
 bool would_show(double t, const FlashFilm& film, const LampReading& lamp) {
   const CcdTiming& timing = film.timing;
   const double period = timing.frame_period.value();
@@ -129,7 +129,7 @@ bool would_show(double t, const FlashFilm& film, const LampReading& lamp) {
   });
 }
 
-/// Whether flashes of this period would show between those that a camera saw, and don't.
+/// Whether flashes of this period should be visible between those that a camera saw, but aren't.
 bool too_fast_for(const CameraFlashes& camera, double period) {
   const std::vector<FlashInstant>& flashes = camera.flashes;
   std::size_t missed = 0;
@@ -157,7 +157,7 @@ std::optional<FlashPeriod> period_of(const CameraFlashes& camera, Seconds flash_
   return std::nullopt;
 }
 
-/// How many times the period a camera saw, whose flashes are those of `period`, some of them hidden; 0: none.
+/// The ratio of a camera's period to `period`, if some of its flashes are hidden; 0: not an integer.
 int times(const FlashPeriod& seen, const FlashPeriod& period) {
   const double ratio = seen.period / period.period;
   const double whole = std::round(ratio);
@@ -167,14 +167,14 @@ int times(const FlashPeriod& seen, const FlashPeriod& period) {
   return apart <= std::max(kAlike * seen.period, kAlikeSigmas * sigma) ? static_cast<int>(whole) : 0;
 }
 
-/// times(), of a camera that doesn't contradict the period either.
+/// times() for a camera, or 0 if it contradicts the period.
 int of_period(const CameraFlashes& camera, const std::optional<FlashPeriod>& seen,
               const FlashPeriod& period) {
   const int whole = seen ? times(*seen, period) : 0;
   return whole > 1 && too_fast_for(camera, period.period) ? 0 : whole;
 }
 
-/// Whether the flashes that a strobe `faster` times as fast gives between those seen are hidden from all.
+/// Whether all additional flashes of a strobe `faster` times as fast would be hidden from all cameras.
 bool all_hidden(const std::vector<CameraFlashes>& cameras, double period, int faster) {
   int missed = 0;
   for (const CameraFlashes& camera : cameras) {
@@ -189,10 +189,10 @@ bool all_hidden(const std::vector<CameraFlashes>& cameras, double period, int fa
   return true;
 }
 
-/// Whether flashes of this period explain the pictures in which the lamp is lit.
+/// Whether flashes of this period explain all pictures in which the lamp is lit.
 bool lights_all(const std::vector<CameraFlashes>& cameras, double period) {
   int lit = 0;
-  int dark = 0;  // of those, without a flash in their exposure
+  int dark = 0;  // of those, without a flash during the exposure
   for (const CameraFlashes& camera : cameras) {
     const double frame_period = camera.film->timing.frame_period.value();
     for (const FrameReading& frame : camera.film->frames) {
@@ -207,7 +207,7 @@ bool lights_all(const std::vector<CameraFlashes>& cameras, double period) {
   return dark <= std::max(1.0, kMissedPart * lit);
 }
 
-/// Why no rate can be told.
+/// Why no rate can be determined.
 FlashRate without_rate(std::span<const FlashFilm> cameras, bool unsteady) {
   int lit = 0;
   int lines = 0;
@@ -252,7 +252,7 @@ FlashRate see_flashes(std::span<const FlashFilm> films, Seconds flash_width) {
     periods.push_back(period_of(camera, flash_width));
     cameras.push_back(std::move(camera));
   }
-  // The period of most: a camera that shows some of the flashes alone agrees with one that shows all.
+  // The period of the majority; a camera that shows only some of the flashes agrees with one that shows all.
   std::optional<FlashPeriod> best;
   int most = 0;
   for (const auto& candidate : periods) {
@@ -284,7 +284,7 @@ FlashRate see_flashes(std::span<const FlashFilm> films, Seconds flash_width) {
     agreeing.push_back(std::move(cameras[i]));
   }
   const double period = moment / weights;
-  std::vector<int> possible;  // times as fast as dots tell
+  std::vector<int> possible;  // multiples of the rate given by the dots
   for (int faster = 1; faster <= kMostHidden; ++faster) {
     if (all_hidden(agreeing, period, faster)) possible.push_back(faster);
   }

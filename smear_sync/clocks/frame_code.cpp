@@ -13,16 +13,17 @@ namespace emberlock::smear {
 namespace {
 
 constexpr int kWordLength = 31;
-// A flash so near the exposure's border may light either picture, in flash periods: a phase that is known
-// errs by jitter, one that is tried by half of the distance to the next.
+// Margin in flash periods: a flash this close to the exposure's border may light either picture. A known
+// phase has jitter; a tried one is off by up to half the step.
 constexpr double kKnownEdge = 0.005;
 constexpr double kTriedEdge = 0.02;
-constexpr int kPhases = 32;         // tried where the phase isn't known: one lies within kTriedEdge of it
-constexpr double kTie = 1;          // log-likelihoods that differ by less don't decide
-constexpr double kPlaceSlack = 3;   // a loss may lie where it is at most e^3 less likely than at best
+constexpr int kPhases = 32;         // number tried if the phase is unknown: one is within kTriedEdge of it
+constexpr double kTie = 1;          // smaller differences of log-likelihood decide nothing
+constexpr double kPlaceSlack = 3;   // a loss may be wherever its likelihood is at least e^-3 of the largest
 constexpr std::size_t kFewest = 8;  // frames
 
-/// A maximum-length sequence by its recurrence: a flash is the sum modulo 2 of those `lags` before it.
+/// A maximum-length sequence by its recurrence: each flash is the sum modulo 2 of the flashes `lags` before
+/// it.
 template <std::size_t N>
 std::array<bool, kWordLength> sequence(const std::array<std::size_t, N>& lags) {
   std::array<bool, kWordLength> bits{true, false, false, false, false};
@@ -65,8 +66,8 @@ Status check(std::span<const CodeFrame> frames, const DecodeOptions& o) {
   return {};
 }
 
-/// What every flash number says of every frame: read phase i begins at base + phase + i T / P, and its
-/// picture is lit by the flashes of the T before.
+/// The likelihood of every frame for every flash number. Read phase i begins at base + phase + i T / P, and
+/// its picture is lit by the flashes of the T before.
 class Course {
  public:
   Course(std::span<const CodeFrame> frames, const DecodeOptions& o, const std::vector<bool>& pattern,
@@ -85,12 +86,12 @@ class Course {
     }
   }
 
-  /// The log-likelihood of frame i for every base.
+  /// Adds the log-likelihood of frame i for every base.
   void add(std::size_t i, std::vector<double>& score) const {
     const FlashSeen seen = frames_[i].seen;
     if (seen == FlashSeen::unknown) return;
     const Lit lit = lit_of(i);
-    if (lit.first == lit.last && lit.edge_count == 0) {  // nearly every frame
+    if (lit.first == lit.last && lit.edge_count == 0) {  // the usual case
       const auto cycle = static_cast<std::int64_t>(score.size());
       const double* logs =
           (seen == FlashSeen::yes ? if_seen_ : if_dark_).data() + (lit.first % cycle + cycle) % cycle;
@@ -110,7 +111,7 @@ class Course {
   }
 
  private:
-  /// Flashes, against the base: those within the exposure, and those on its borders.
+  /// Flashes relative to the base: those within the exposure, and those at its borders.
   struct Lit {
     std::int64_t first = 0, last = -1;
     std::array<std::int64_t, 4> edges{};
@@ -145,7 +146,7 @@ class Course {
       for (int e = 0; e < lit.edge_count; ++e)
         edges += given(base, lit.edges[static_cast<std::size_t>(e)]) ? 1 : 0;
       if (edges == 1) return std::log(0.5);
-      yes = edges > 0;  // one of two on opposite borders lights it
+      yes = edges > 0;  // one of two flashes at opposite borders lights it
     }
     return yes == (seen == FlashSeen::yes) ? right_ : wrong_;
   }
@@ -154,10 +155,10 @@ class Course {
   double step_, phase_, edge_;
   const std::vector<bool>& pattern_;
   double right_, wrong_;
-  std::vector<double> if_seen_, if_dark_;  ///< log-likelihoods by flash number, twice round
+  std::vector<double> if_seen_, if_dark_;  ///< log-likelihoods by flash number, repeated twice
 };
 
-/// The most probable base of every frame, which stays or, now and then, jumps (Viterbi).
+/// The most probable base of every frame; it is constant except for rare jumps (Viterbi).
 struct Path {
   double score = -std::numeric_limits<double>::infinity();
   double phase = 0;
@@ -200,7 +201,7 @@ struct Stretch {
   double confidence;
 };
 
-/// How probable the frames are without any code: lit at random, as often as they are.
+/// Log-probability of the frames without any code: lit at random, with the observed frequency.
 double log_chance(std::span<const CodeFrame> frames) {
   double yes = 0;
   double no = 0;
@@ -230,10 +231,10 @@ std::vector<Stretch> stretches(std::span<const CodeFrame> frames, const Course& 
   return found;
 }
 
-/// Between which frames the course may have left a's base for b's.
+/// The frames between which the base may have changed from a's to b's.
 DroppedFrames loss_between(std::span<const CodeFrame> frames, const Course& course, const Stretch& a,
                            const Stretch& b, std::size_t cycle) {
-  std::vector<double> scores;  // of b's base from frame a.begin + 1 + index on
+  std::vector<double> scores;  // for b's base, from frame a.begin + 1 + index on
   double score = 0;
   for (std::size_t i = a.begin + 1; i < b.end; ++i) {
     scores.push_back(score);
@@ -304,7 +305,7 @@ Result<FrameNumbers> number_frames(std::span<const CodeFrame> frames, const Deco
       std::any_of(frames.begin(), frames.end(), [](const CodeFrame& f) { return f.seen == FlashSeen::no; });
   if (frames.size() < kFewest || !some_no) return numbers;
 
-  // Without a phase, all are tried that differ; those that say the same leave a slack.
+  // Without a known phase, all distinguishable ones are tried; equally good ones give the slack.
   const double slip = std::abs(options.flashes_per_frame - 1) *
                       static_cast<double>(frames.back().frame - frames.front().frame);
   std::vector<double> phases;

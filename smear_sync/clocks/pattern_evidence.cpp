@@ -8,11 +8,12 @@
 namespace emberlock::smear {
 namespace {
 
-constexpr double kEdge = 0.005;  // flash periods: one so near the exposure's border may light either picture
-constexpr double kSlip = 0.02;   // a repetition may fail that often
-constexpr double kRepeats = 5;   // log-likelihood ratio from which on a clip is taken to repeat itself
+constexpr double kEdge =
+    0.005;  // flash periods: a flash this close to the exposure's border may light either picture
+constexpr double kSlip = 0.02;  // probability that a repetition fails
+constexpr double kRepeats = 5;  // log-likelihood ratio above which a clip counts as repeating itself
 
-/// The flashes whose light a frame's picture surely has, and whether another may or may not be in it.
+/// The flashes that certainly light a frame's picture, and whether another one may.
 struct LitBy {
   std::int64_t first = 0, last = -1;
   bool doubtful = false;
@@ -27,7 +28,7 @@ LitBy lit_by(double start, double step) {
   return by;
 }
 
-/// Whether the frame lies beside a change.
+/// Whether the frame is beside a change.
 bool at_change(const std::vector<PatternFrame>& frames, std::size_t i) {
   const auto differs = [&](std::size_t other) {
     return frames[other].seen != FlashSeen::unknown && frames[other].seen != frames[i].seen;
@@ -35,12 +36,13 @@ bool at_change(const std::vector<PatternFrame>& frames, std::size_t i) {
   return (i > 0 && differs(i - 1)) || (i + 1 < frames.size() && differs(i + 1));
 }
 
-/// How much better a clip is told by what it showed `lag` flashes before than by its last flash alone: the
-/// log-likelihood ratio of the stretch where that is most.
+/// How much better a clip is predicted by what it showed `lag` flashes before than by its previous flash: the
+/// log-likelihood ratio of the best interval.
 double repetition(const PatternEvidence& e, std::size_t lag) {
   const auto known = [&](std::size_t i) { return e.lit[i] != e.unlit[i]; };
   const auto is_lit = [&](std::size_t i) { return e.lit[i] > e.unlit[i]; };
-  std::array<std::array<double, 2>, 2> counts{{{1, 0.1}, {1, 0.1}}};  // by what went before: stayed, changed
+  std::array<std::array<double, 2>, 2> counts{
+      {{1, 0.1}, {1, 0.1}}};  // by the previous event: stayed, changed
   for (std::size_t i = 1; i < e.lit.size(); ++i) {
     if (known(i - 1) && known(i)) counts[is_lit(i - 1) ? 1 : 0][is_lit(i - 1) != is_lit(i) ? 1 : 0] += 1;
   }
@@ -76,7 +78,8 @@ PatternEvidence evidence_of(const PatternClip& clip, const SharedPatternOptions&
     if (frame.seen == FlashSeen::unknown) continue;
     const LitBy by = lit_by(frame.start, o.flashes_per_frame);
     const bool lit = frame.seen == FlashSeen::yes;
-    if (lit && (by.doubtful || by.last != by.first)) continue;  // by one of them, who knows which
+    if (lit && (by.doubtful || by.last != by.first))
+      continue;  // lit by one of several flashes, unknown which
     const double misread = at_change(clip.frames, i) ? o.misread_at_change : o.misread;
     for (std::int64_t flash = by.first; flash <= by.last; ++flash) put(flash, lit, misread);
   }

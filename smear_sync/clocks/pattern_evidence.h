@@ -9,7 +9,8 @@
 
 namespace emberlock::smear {
 
-/// What is known of a row of flashes: log-likelihoods of what was seen, were each lit, and were it not.
+/// Evidence for a sequence of flashes: log-likelihoods of the observation if the flash was lit, and if it
+/// wasn't.
 struct PatternEvidence {
   std::int64_t first = 0;
   std::vector<double> lit{}, unlit{};
@@ -23,20 +24,21 @@ struct PatternEvidence {
   }
 };
 
-/// What a clip's frames say of its flashes. A lit frame that may have been lit by either of two says nothing.
+/// Evidence from a clip's frames. A lit frame that two flashes may have lit is no evidence.
 PatternEvidence evidence_of(const PatternClip& clip, const SharedPatternOptions& options);
 
-/// Both, the second's flashes renumbered.
+/// Combines both; the flashes of the second are renumbered by `shift`.
 PatternEvidence together(const PatternEvidence& a, const PatternEvidence& b, std::int64_t shift);
 
-/// On how many flashes both tell of they agree, under a shift of the second; its probability is left out.
+/// Compares the flashes observed in both, with the second shifted. The result's probability isn't set.
 PatternShift count_agreement(const PatternEvidence& a, const PatternEvidence& b, std::int64_t shift);
 
-/// Whether some flashes are lit and some aren't: else all places are as good.
+/// Whether some flashes are lit and some aren't. Otherwise no shift can be preferred.
 bool shows_change(const PatternEvidence& e);
 
-/// The lags, in flashes, at which one of the clips is seen to repeat itself, in order. Only these are allowed
-/// for: that one clip repeats what only another showed is no better explanation than that both show the same.
+/// The lags, in flashes, at which one of the clips repeats its own pattern, ascending. Only these are
+/// modelled: that one clip should repeat a pattern seen only in another is no better explanation than a
+/// common pattern.
 std::vector<std::size_t> lags_of_repetition(const PatternEvidence& a, const PatternEvidence& b,
                                             const SharedPatternOptions& options);
 

@@ -8,14 +8,15 @@
 namespace emberlock::smear {
 namespace {
 
-constexpr double kMarkov = 0.6;     // of what copies leave, before anything was seen; the rest is the runs'
-constexpr double kCopy = 1e-3;      // of each copy
-constexpr double kAllCopies = 0.3;  // at most
-constexpr double kShare = 0.02;     // of each rule's weight, that begins anew with each flash
-constexpr double kCopySlip = 0.02;  // a copy may fail that often
-constexpr double kSureOf = 0.75;    // a flash counts as lit, or not, when it is that probable
-constexpr double kFewCounts = 0.5;  // of Krichevsky and Trofimov
-constexpr std::size_t kFirstCopy = 2;  // of the rules
+constexpr double kMarkov =
+    0.6;  // initial weight, as a share of what the copies leave; the rest is for the run lengths
+constexpr double kCopy = 1e-3;         // initial weight of each copy
+constexpr double kAllCopies = 0.3;     // largest total of these
+constexpr double kShare = 0.02;        // share of each rule's weight that is redistributed at each flash
+constexpr double kCopySlip = 0.02;     // probability that a copy fails
+constexpr double kSureOf = 0.75;       // a flash counts as lit (or unlit) above this probability
+constexpr double kFewCounts = 0.5;     // of Krichevsky and Trofimov
+constexpr std::size_t kFirstCopy = 2;  // index of the rule
 
 }  // namespace
 
@@ -53,7 +54,7 @@ double PatternModel::next(double if_lit, double if_unlit) {
   const double by_markov = markov();
   chances_[0] = by_markov;
   chances_[1] = renewal(by_markov);
-  // A copy of what wasn't seen is no better than the rest.
+  // A copy of an unobserved flash predicts no better than the others.
   const std::size_t seen = past_.size();
   for (std::size_t rule = kFirstCopy; rule < chances_.size(); ++rule) {
     const std::size_t lag = lags_[rule - kFirstCopy];

@@ -7,19 +7,21 @@
 
 namespace emberlock::smear {
 
-/// How probable a row of lit and unlit flashes is, whoever made it: a hand before the lamp, a torch, a burst,
-/// a code. Each flash is predicted from those before it by several rules at once, which count by how well
-/// they did so far (a Bayesian mixture whose rule may change on the way: fixed share, Herbster and Warmuth
-/// 1998): that it is lit as often after its like as before (Markov, learnt on the way); that its run lasts as
-/// long as runs did before; that it repeats what was `d` flashes ago, for each d given. So what repeats costs
-/// next to nothing the second time, and proves nothing: one more turn of a periodic pattern is no evidence.
+/// The probability of a sequence of lit and unlit flashes of any origin: a hand in front of the lamp, a
+/// torch, a burst, a code. Each flash is predicted from the flashes before it by several rules, which are
+/// weighted by their success so far (a Bayesian mixture in which the best rule may change: fixed share,
+/// Herbster and Warmuth 1998). The rules: the flash depends on the one before (Markov chain, learnt during
+/// the sequence); runs have the same lengths as earlier ones; the flash repeats the one `d` flashes ago, for
+/// each given d. So a repetition has a probability close to 1 and is no evidence: another turn of a periodic
+/// pattern proves nothing.
 class PatternModel {
  public:
-  /// `lags`: the d, each >= 1.
+  /// `lags`: the values of d, each >= 1.
   explicit PatternModel(std::vector<std::size_t> lags);
 
-  /// The log of the probability of what was seen of the next flash, given all before: of likelihoods > 0 of
-  /// what was seen, were it lit and were it not. Equal ones are a flash of which nothing was seen.
+  /// The log-probability of the observation of the next flash, given all before. The arguments are the
+  /// likelihoods (> 0) of the observation if the flash was lit, and if it wasn't; equal values mean that
+  /// nothing was observed.
   double next(double if_lit, double if_unlit);
 
  private:
@@ -33,14 +35,14 @@ class PatternModel {
   struct Counts {
     double went_on = 0, changed = 0;
   };
-  std::array<Counts, 2> after_{};                          ///< by what went before
-  std::array<std::array<Counts, kLongestRun>, 2> runs_{};  ///< and by how long it had lasted
+  std::array<Counts, 2> after_{};                          ///< by the state before
+  std::array<std::array<Counts, kLongestRun>, 2> runs_{};  ///< and by the length of its run
   Bit last_ = unknown;
-  int run_ = 0;               ///< how long it has lasted; 0: its beginning wasn't seen
-  std::vector<double> past_;  ///< that each flash was lit; negative: nothing was seen of it
+  int run_ = 0;               ///< length of the current run; 0: its beginning wasn't observed
+  std::vector<double> past_;  ///< probability that each flash was lit; negative: not observed
   std::vector<std::size_t> lags_;
-  std::vector<double> prior_, weights_;  ///< Markov, runs, copies by lag
-  std::vector<double> chances_;          ///< that the flash is lit, by rule
+  std::vector<double> prior_, weights_;  ///< by rule: Markov, runs, one per lag
+  std::vector<double> chances_;          ///< probability of a lit flash, by rule
 };
 
 }  // namespace emberlock::smear

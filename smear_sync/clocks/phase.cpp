@@ -21,9 +21,9 @@ constexpr OneToOne<PhaseState, std::string_view, 3> kPhaseNames{
 
 constexpr double kOutlierSigmas = 5;
 
-/// A frame that shows a dot, as a point on the circle at a common instant.
+/// A frame with a dot, as a point on the circle.
 struct TimedTau {
-  double seconds;  ///< when the frame came, against that instant
+  double seconds;  ///< arrival of the frame relative to the common instant
   double tau;
   double sigma;
 };
@@ -34,14 +34,14 @@ std::vector<TimedTau> points_at(std::span<const PhaseSample> samples, TimePoint 
   for (const PhaseSample& s : samples) {
     if (s.phase.state != PhaseState::known) continue;
     const double elapsed = (at - s.at).value();
-    const double walked = options.beat.rate.value() * 1e-6 * elapsed;
-    const double unsure = options.beat.sigma.value() * 1e-6 * elapsed;
+    const double walked = options.period_offset.rate.value() * 1e-6 * elapsed;
+    const double unsure = options.period_offset.sigma.value() * 1e-6 * elapsed;
     points.push_back({-elapsed, s.phase.tau.value() + walked, std::hypot(s.phase.sigma.value(), unsure)});
   }
   return points;
 }
 
-/// The point that is nearest to all the others: a median that knows no beginning of the circle.
+/// The point closest to all others: a median that doesn't depend on the circle's origin.
 double circular_median(const std::vector<TimedTau>& points, double period) {
   double best = 0;
   double best_sum = std::numeric_limits<double>::infinity();
@@ -56,18 +56,18 @@ double circular_median(const std::vector<TimedTau>& points, double period) {
   return best;
 }
 
-/// The points, as offsets from the centre, without those that disagree with it.
+/// The points as offsets from the centre, without those that disagree with it.
 std::vector<TimedTau> offsets_that_agree(std::vector<TimedTau> points, double centre, double period) {
   for (TimedTau& p : points) p.tau = wrap_symmetric(p.tau - centre, period);
-  // The centre is itself one of the points, with an error of its own.
+  // The centre is one of the points and has its own error.
   std::erase_if(points, [](const TimedTau& p) {
     return std::abs(p.tau) > kOutlierSigmas * std::numbers::sqrt2 * p.sigma;
   });
   return points;
 }
 
-/// What one camera's frames say about the beat that is left after options.beat was taken out: a weighted
-/// line.
+/// What one camera's frames say about the remaining rate offset, after removal of options.period_offset: a
+/// weighted line.
 struct Slope {
   double rate;
   double variance;
@@ -94,7 +94,7 @@ std::optional<Slope> slope_of(std::span<const PhaseSample> samples, TimePoint at
                line.rate_variance + square(staircase_rate_error(options.resolution, Seconds(span)))};
 }
 
-/// Why most of the frames without a phase have none, and whether moving the strobe may help.
+/// Why most frames without a phase have none, and whether shifting the strobe may help.
 Phase majority_of_unknown(std::span<const PhaseSample> samples) {
   std::map<std::string, int> counts[2];
   int totals[2] = {0, 0};
@@ -116,7 +116,7 @@ Phase majority_of_unknown(std::span<const PhaseSample> samples) {
   return phase;
 }
 
-/// Of a reading with a lamp and one dot.
+/// For a reading with a lamp and one dot.
 ShiftedRows shifted_rows(const SmearReading& reading, const CcdTiming& timing) {
   const DotReading& dot = reading.dots.front();
   const Rows below = static_cast<double>(timing.direction) * (dot.y - reading.lamp->y);
@@ -180,7 +180,7 @@ PhaseSample sample_of(const SmearReading& reading, const CcdTiming& timing, Seco
   return sample;
 }
 
-Beat expected_beat(Hertz strobe_rate, Seconds period, PartsPerMillion sigma) {
+PeriodOffset expected_period_offset(Hertz strobe_rate, Seconds period, PartsPerMillion sigma) {
   return {PartsPerMillion((1 / (strobe_rate * period) - 1) * 1e6), sigma};
 }
 
@@ -218,11 +218,11 @@ CommonPhases refer(std::span<const std::vector<PhaseSample>> samples, const Circ
     }
   }
   CommonPhases common;
-  common.beat = options.beat;
+  common.period_offset = options.period_offset;
   if (first <= last) common.at = {first.ns + (last.ns - first.ns) / 2};
 
-  // What was known before counts as one more camera.
-  const double known_before = options.beat.sigma.value() * 1e-6;
+  // The prior counts as one more camera.
+  const double known_before = options.period_offset.sigma.value() * 1e-6;
   if (known_before > 0) {
     double weights = 1 / square(known_before);
     double moment = 0;
@@ -232,12 +232,12 @@ CommonPhases refer(std::span<const std::vector<PhaseSample>> samples, const Circ
         moment += slope->rate / slope->variance;
       }
     }
-    common.beat.rate += PartsPerMillion(moment / weights * 1e6);
-    common.beat.sigma = PartsPerMillion(std::sqrt(1 / weights) * 1e6);
+    common.period_offset.rate += PartsPerMillion(moment / weights * 1e6);
+    common.period_offset.sigma = PartsPerMillion(std::sqrt(1 / weights) * 1e6);
   }
 
   CircleOptions refined = options;
-  refined.beat = common.beat;
+  refined.period_offset = common.period_offset;
   for (const auto& camera : samples) common.phases.push_back(combine(camera, common.at, refined));
   return common;
 }

@@ -21,29 +21,29 @@ namespace {
 constexpr double kRowScatter = 0.35;  // of one dot: whole rows, and the fit of a faint dot
 constexpr double kReadScatter = 0.2;  // the latter alone
 constexpr std::size_t kHarmonics = 12;
-constexpr double kStrayRows = 1.5;  // rows off its walk: not a dot of this strobe
-constexpr double kLeastPart = 0.7;  // of the dots that must follow
-constexpr double kDecisive = 25;    // difference of chi squares: five standard deviations
+constexpr double kStrayRows = 1.5;  // a dot further off the walk isn't this strobe's
+constexpr double kLeastPart = 0.7;  // share of the dots that must follow
+constexpr double kDecisive = 25;    // difference of chi-squares: five standard deviations
 constexpr std::size_t kFewestDots = 4;
 constexpr int kFewestFrames = 3;
-/// Another K is ruled out when it lies so many standard errors off.
+/// Another K is ruled out if it is this many standard errors off.
 constexpr double kShiftSigmas = 4;
 constexpr double kRateSigmas = 3;
 
 struct SeenDot {
-  double frame = 0;  ///< against the middle one
-  double below = 0;  ///< the lamp, rows; negative above
+  double frame = 0;  ///< relative to the middle one
+  double below = 0;  ///< distance below the lamp, rows; negative above
   double sigma = 0;
 };
 
-/// What one direction makes of the dots: v = d (y - y_s) t_row gathers at phi + c_side - i T modulo P.
+/// The walk of the dots for one direction: v = d (y - y_s) t_row concentrates at phi + c_side - i T modulo P.
 struct Walk {
   double cost = std::numeric_limits<double>::infinity();
   double frame_period_change = 0;  ///< of T, seconds
   double frame_period_sigma = 0;
-  std::array<double, 2> place{};  ///< seconds: of the side reached first, and of the one after the wrap
+  std::array<double, 2> place{};  ///< seconds: of the side reached first, and of the side after the wrap
   std::array<int, 2> dots{};
-  double apart_sigma = 0;  ///< of the places' difference, seconds
+  double apart_sigma = 0;  ///< of the difference of the places, seconds
   double residual = 0;     ///< RMS, rows
 };
 
@@ -54,7 +54,7 @@ std::vector<SeenDot> dots_of(std::span<const FrameReading> frames) {
   }
   std::vector<SeenDot> dots;
   if (lamps.empty()) return dots;
-  // The lamp stands still: its median errs less than each frame's.
+  // The lamp doesn't move: the median over frames is more accurate than a single frame.
   const auto middle = lamps.begin() + static_cast<std::ptrdiff_t>(lamps.size() / 2);
   std::nth_element(lamps.begin(), middle, lamps.end());
   const std::size_t half = frames.size() / 2;
@@ -86,7 +86,7 @@ class SeenFit {
     span_ = last - first;
   }
 
-  /// The walk under one direction, T free about the nominal one.
+  /// The walk in one direction, with T free around the nominal value.
   [[nodiscard]] Walk along(int direction) const {
     const double change = gathering(direction);
     Walk walk;
@@ -115,7 +115,7 @@ class SeenFit {
     }
     return sum;
   }
-  /// The change of T under which the dots of each side stand together best.
+  /// The change of T at which the dots of each side concentrate best.
   [[nodiscard]] double gathering(int direction) const {
     const double reach = kRateSigmas * rate_sigma_;
     const double step = flash_period_ / std::max(span_, 1.0) / 8;
@@ -130,10 +130,10 @@ class SeenFit {
     }
     return best;
   }
-  /// Where the dots of a side stand, whatever strays: the median of the densest stretch of an eighth of P,
-  /// over which the step of gathering() may leave them.
+  /// The place of the dots of one side, robust against stray dots: the median of the densest interval of P /
+  /// 8. The step of gathering() may spread them that far.
   [[nodiscard]] double densest_place(int direction, int which, double change) const {
-    std::vector<double> at;  // modulo P, and once more around
+    std::vector<double> at;  // modulo P, and repeated once
     for (const SeenDot& dot : dots_) {
       if (side(dot, direction) == which)
         at.push_back(wrap_positive(seconds(dot, direction) + dot.frame * change, flash_period_));
@@ -150,8 +150,8 @@ class SeenFit {
     }
     return last > first ? at[(first + last) / 2] : 0;
   }
-  /// Least squares for T and the two sides' places, T held by what was known before; dots further than
-  /// `stray` rows cost no more than a stray.
+  /// Least squares for T and the places of both sides; T has its prior. The residual of a dot is limited to
+  /// `stray` rows.
   void straighten(int direction, double stray, Walk& walk) const {
     Eigen::Matrix3d matrix = known_before();
     Eigen::Vector3d right(0, 0, -walk.frame_period_change * matrix(2, 2));
@@ -177,13 +177,14 @@ class SeenFit {
     walk.place[1] += move.y();
     walk.frame_period_change += move.z();
   }
-  /// Whole rows err as the fraction of a row that was cut off: alike wherever a walk of whole rows a frame
-  /// comes back to the same fraction. The walk tells each dot's fraction but for a part common to a side's;
-  /// over all such parts, the mean square of a sum of such errors follows from the harmonics of a sawtooth.
+  /// Standard errors in spite of whole-row shifts. The error of a dot is the fraction of a row that was cut
+  /// off; these errors are equal whenever the walk returns to the same fraction. The walk gives each dot's
+  /// fraction up to a constant per side. Averaged over all such constants, the mean square of a weighted sum
+  /// of these errors follows from the harmonics of a sawtooth.
   void state_errors(int direction, Walk& walk) const {
     Eigen::Matrix3d matrix = known_before();
     std::vector<std::pair<Eigen::Vector3d, double>>
-        used;  // and the row that the walk says, with its fraction
+        used;  // design row, and the row predicted by the walk, with its fraction
     for (const SeenDot& dot : dots_) {
       const int s = side(dot, direction);
       const double at = seconds(dot, direction) + dot.frame * walk.frame_period_change;
@@ -194,8 +195,8 @@ class SeenFit {
       matrix += used.back().first * used.back().first.transpose();
     }
     const Eigen::Matrix3d inverse = matrix.inverse();
-    // Stairs draw a walk to whole rows in a few frames: the true one, whose fractions err, may be any near
-    // by.
+    // In a few frames, whole-row steps pull a fitted walk towards whole rows. The true walk may be any nearby
+    // one, so take the largest error over those.
     for (const double more : {-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0}) {
       const double bent = more / std::max(span_, 1.0);
       walk.frame_period_sigma =
@@ -204,8 +205,8 @@ class SeenFit {
           std::max(walk.apart_sigma, row_time_ * error_of(inverse.col(1) - inverse.col(0), used, bent));
     }
   }
-  /// Of the sum, over dots, of (combination . place) times their errors, were the walk `bent` rows a frame
-  /// faster; rows.
+  /// RMS in rows of the sum over dots of (combination . place) times their errors, if the walk were `bent`
+  /// rows per frame faster.
   [[nodiscard]] static double error_of(const Eigen::Vector3d& combination,
                                        const std::vector<std::pair<Eigen::Vector3d, double>>& used,
                                        double bent) {
@@ -247,13 +248,13 @@ Status check(const ReadModeOptions& o) {
   return {};
 }
 
-/// Whether, and why, one of the two walks is the camera's.
+/// Decides whether one of the two walks is the camera's, and why.
 void decide_direction(const Walk& top_first, const Walk& bottom_first, std::size_t dots, int frames,
                       const ReadModeOptions& o, ReadMode& mode) {
   const bool top = top_first.cost <= bottom_first.cost;
   const Walk& best = top ? top_first : bottom_first;
   const double follow = static_cast<double>(best.dots[0] + best.dots[1]);
-  // Rows a frame that flashes walk: what is left of T after whole flash periods.
+  // The walk of flashes in rows per frame: the part of T beyond whole flash periods.
   const double flash_period = 1 / o.flash_rate.value();
   const double walk = wrap_symmetric(-1 / o.frame_rate.value(), flash_period) / o.row_time.value();
   if (dots < kFewestDots || frames < kFewestFrames) {
@@ -274,7 +275,8 @@ void decide_direction(const Walk& top_first, const Walk& bottom_first, std::size
         o.flash_rate.value(), walk, frames, 0.01 * o.frame_rate.value());
     return;
   }
-  // Near a whole number of flashes a frame the other direction may be told, of a camera that can't be.
+  // Close to an integer number of flashes per frame, the wrong direction may fit, with a frame rate that no
+  // such camera has.
   const double off = -best.frame_period_change * o.frame_rate.value() * 1e6;
   if (std::abs(off) > kRateSigmas * o.rate_sigma.value()) {
     mode.direction_reason = fmt::format(
@@ -287,7 +289,7 @@ void decide_direction(const Walk& top_first, const Walk& bottom_first, std::size
                                       top ? "top" : "bottom", best.residual);
 }
 
-/// K from how far apart the two sides of the lamp stand: c_after - c_first = T - K t_row modulo P.
+/// K from the distance between the places of both sides: c_after - c_first = T - K t_row modulo P.
 void find_shifts(const Walk& walk, const ReadModeOptions& o, ReadMode& mode) {
   if (walk.dots[0] < 2 || walk.dots[1] < 2) {
     mode.shifts_reason =

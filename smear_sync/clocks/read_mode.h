@@ -13,52 +13,53 @@
 
 namespace emberlock::smear {
 
-/// What one frame showed, by the camera's own count of frames.
+/// The reading of one frame, with the camera's frame number.
 struct FrameReading {
-  std::int64_t frame = 0;  ///< frames that weren't delivered are gaps; a count that hides one misleads
+  std::int64_t frame = 0;  ///< undelivered frames must be gaps; an unreported loss falsifies the result
   SmearReading reading;
 };
 
 struct ReadModeOptions {
   Hertz flash_rate{24.2};                             ///< f, of the strobe
-  Hertz frame_rate{23.976};                           ///< 1 / T, as believed
+  Hertz frame_rate{23.976};                           ///< 1 / T, approximately
   PartsPerMillion rate_sigma{30};                     ///< standard error of f T: of both clocks together, > 0
-  SecondsPerRow row_time = microseconds_per_row(54);  ///< t_row, of a comb
+  SecondsPerRow row_time = microseconds_per_row(54);  ///< t_row, measured with a comb
   SecondsPerRow row_time_sigma = SecondsPerRow(5e-9);  ///< its standard error
   int rows = 720;                                      ///< n
 };
 
-/// How a camera reads its chip, told from how dots walk.
+/// How a camera reads its sensor, determined from the walk of the dots.
 struct ReadMode {
-  std::optional<ReadDirection> direction;  ///< d; absent where the walk is too short to tell
-  std::string direction_reason;            ///< what was seen, or why d isn't known and what would tell it
+  std::optional<ReadDirection> direction;  ///< d; absent if the walk is too short to tell
+  std::string direction_reason;            ///< the observation; or why d isn't known and how to find it
 
-  std::optional<int> shifts;  ///< K; absent where several values fit
-  std::string shifts_reason;  ///< what was seen, or why K isn't known and what would tell it
-  Rows shifts_measured{};     ///< K before it was rounded; modulo shifts_modulo. Zero where none was measured
+  std::optional<int> shifts;  ///< K; absent if several values fit
+  std::string shifts_reason;  ///< the observation; or why K isn't known and how to find it
+  Rows shifts_measured{};     ///< K before rounding; modulo shifts_modulo. Zero if not measured
   Rows shifts_sigma{};        ///< its standard error
-  Rows shifts_modulo{};       ///< the flashes' distance, P / t_row
+  Rows shifts_modulo{};       ///< the distance of two flashes, P / t_row
 
-  /// The camera's frame rate against the one believed, both measured by the strobe. Absent without d.
+  /// Deviation of the camera's frame rate from the assumed one, measured with the strobe. Absent without d.
   std::optional<PartsPerMillion> frame_rate_error;
   PartsPerMillion frame_rate_sigma{};  ///< standard error
-  Rows residual{};                     ///< RMS of the dots about the walk that d explains
-  int dots = 0;                        ///< used
-  int frames = 0;                      ///< they stand in
+  Rows residual{};                     ///< RMS deviation of the dots from the walk with this d
+  int dots = 0;                        ///< number of dots used
+  int frames = 0;                      ///< number of frames with these dots
 };
 
-/// Tells d and K from flashes that are not in step with the frames: one a frame from a strobe detuned by some
-/// rows a second, or a comb, whose dots walk by what is left of T / P. Read phase i begins at t_0 + i T, so
-/// its flashes stand at tau = phi - i T modulo the flash period P = 1 / f; a dot stands d tau / t_row rows
-/// from its lamp, or K rows less once it wrapped. Both directions are fitted, each with the frame rate free
-/// within three rate_sigma; d is known when one explains the dots and the other doesn't, and not where that
-/// one wants a rate beyond (a strobe so near a whole rate of the frames' that a wrong one may seem to walk).
-/// The two sides of the lamp then differ by K - T / t_row modulo P / t_row rows, and K is known when one
-/// whole number from n to T / t_row fits: so a comb of 300 flashes a second tells d and K of most cameras in
-/// a second, a single dot K once it was seen on both sides.
+/// Determines d and K from flashes that aren't synchronous with the frames: one flash per frame from a strobe
+/// detuned by some rows per second, or a comb, whose dots walk by the fractional part of T / P. Read phase i
+/// begins at t_0 + i T, so its flashes are at tau = phi - i T modulo the flash period P = 1 / f. A dot is d
+/// tau / t_row rows from its lamp, or K rows less if it wrapped. Both directions are fitted, each with the
+/// frame rate free within three rate_sigma. d is known when one direction explains the dots and the other
+/// doesn't, but not if that one needs a frame rate outside the range (when the flash rate is close to a
+/// multiple of the frame rate, the wrong direction may also seem to walk). The two sides of the lamp differ
+/// by K - T / t_row modulo P / t_row rows; K is known when exactly one integer from n to T / t_row fits. So a
+/// comb of 300 flashes per second gives d and K of most cameras within a second; a single dot gives K once it
+/// was seen on both sides.
 ///
-/// Readings with dots (states `dot` and `comb`) are used, others passed over; stray dots are outvoted. With
-/// sweep-out dots are seen on one side only, and K stays unknown (and isn't needed). Errors (bad_input):
+/// Uses readings with dots (states `dot` and `comb`) and ignores the others; stray dots are outvoted. With
+/// sweep-out, dots appear on one side only; K then stays unknown (and isn't needed). Errors (bad_input):
 /// rates, row time or rows that aren't positive and finite.
 Result<ReadMode> find_read_mode(std::span<const FrameReading> frames, const ReadModeOptions& options);
 

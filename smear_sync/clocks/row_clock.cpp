@@ -14,18 +14,19 @@
 namespace emberlock::smear {
 namespace {
 
-/// Whole rows of charge and the fit of a faint dot leave a row or so; what is further off isn't of this comb.
+/// Whole-row shifts and the fit of a faint dot cause up to about a row; a dot further off isn't part of this
+/// comb.
 constexpr double kOutlier = 1.5;
 
 struct Dot {
   double row = 0;
   double sigma = 0;
-  double pitches = 0;  ///< whole number of pitches from its side's anchor
+  double pitches = 0;  ///< number of pitches from its side's anchor
   bool used = false;
 };
 
 struct Comb {
-  double frame = 0;  ///< which of all readings
+  double frame = 0;  ///< index among all readings
   std::vector<Dot> above, below;
 };
 
@@ -51,8 +52,8 @@ std::vector<Comb> combs(std::span<const SmearReading> frames) {
   return result;
 }
 
-/// The pitch that most gaps between neighbours are multiples of; gaps of one pitch count most, so that half a
-/// pitch, which divides every gap as well, loses.
+/// The pitch of which most gaps between neighbours are multiples. Gaps of a single pitch have the largest
+/// weight, so that half the pitch, which divides every gap too, loses.
 double first_pitch(const std::vector<Comb>& all) {
   std::vector<double> gaps;
   for (const Comb& comb : all) {
@@ -60,7 +61,7 @@ double first_pitch(const std::vector<Comb>& all) {
       for (std::size_t i = 1; i < side->size(); ++i) gaps.push_back((*side)[i].row - (*side)[i - 1].row);
     }
   }
-  // Every distinct gap is a candidate; a few hundred tell as much as thousands.
+  // Every distinct gap is a candidate; a few hundred suffice.
   const std::size_t step = std::max<std::size_t>(1, gaps.size() / 300);
   double best = 0;
   double best_score = 0;
@@ -84,7 +85,7 @@ double first_pitch(const std::vector<Comb>& all) {
   return best_score >= 0.3 * static_cast<double>(gaps.size()) ? best : 0;
 }
 
-/// Counts pitches from the dot that most others agree with; returns that anchor's row.
+/// Counts pitches from the dot that agrees with most others; returns that anchor's row.
 double number(std::vector<Dot>& side, double pitch) {
   double anchor = 0;
   int most = -1;
@@ -104,7 +105,7 @@ double number(std::vector<Dot>& side, double pitch) {
   return anchor;
 }
 
-/// Normal equations of one frame for (pitch, offset of the lower side), its phase eliminated.
+/// Normal equations of one frame for (pitch, offset of the lower side), with its phase eliminated.
 struct FrameNormal {
   Eigen::Matrix2d matrix = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
@@ -136,7 +137,7 @@ FrameNormal reduce(const Comb& comb) {
 
 struct Fit {
   double pitch = 0;
-  double offset = 0;  ///< of the lower side against the upper one, rows
+  double offset = 0;  ///< of the lower side relative to the upper one, rows
   double sigma = 0;   ///< of the pitch
   int dots = 0;
   int frames = 0;
@@ -144,12 +145,12 @@ struct Fit {
 };
 
 Eigen::Vector2d solve(Eigen::Matrix2d matrix, const Eigen::Vector2d& right) {
-  matrix.diagonal().array() += 1e-12;  // one side alone leaves the offset free
+  matrix.diagonal().array() += 1e-12;  // with one side only, the offset is free
   return matrix.ldlt().solve(right);
 }
 
-/// How far the rounding to whole rows may shift the pitch because the dots sample the row grid unevenly: the
-/// two lowest harmonics of the sawtooth x - floor(x), sin(2 pi k x) / (pi k), pushed through the least
+/// How much rounding to whole rows may shift the pitch, because the dots sample the row grid unevenly: the
+/// two lowest harmonics of the sawtooth x - floor(x), sin(2 pi k x) / (pi k), propagated through the least
 /// squares.
 double rounding_error(const std::vector<Comb>& all, const Eigen::Matrix2d& covariance, double pitch,
                       double offset) {
@@ -193,14 +194,14 @@ Fit least_squares(const std::vector<Comb>& all) {
   }
   const Eigen::Vector2d best = solve(sum.matrix, sum.right);
   Fit fit{.pitch = best.x(), .offset = best.y(), .dots = sum.dots, .frames = static_cast<int>(all.size())};
-  fit.both_sides = sum.matrix(1, 1) > 0.1;  // rounding leaves less than that where no frame has dots on both
+  fit.both_sides = sum.matrix(1, 1) > 0.1;  // rounding leaves less if no frame has dots on both sides
   const double residual = std::max(0.0, sum.squares - best.dot(sum.right));
   const int freedom = std::max(1, sum.dots - fit.frames - (fit.both_sides ? 2 : 1));
   const Eigen::Matrix2d covariance = (sum.matrix + 1e-12 * Eigen::Matrix2d::Identity()).inverse();
   fit.sigma = std::sqrt(residual / freedom * covariance(0, 0));
   fit.sigma = std::hypot(fit.sigma, rounding_error(all, covariance, fit.pitch, fit.offset));
   if (frames.size() < 4) return fit;
-  // What changes from frame to frame (a strobe that jitters) shows in the scatter between frames.
+  // Variation between frames (jitter of the strobe) shows in the scatter between frames.
   double scatter = 0;
   for (const FrameNormal& f : frames) {
     const double without = solve(sum.matrix - f.matrix, sum.right - f.right).x();
@@ -219,7 +220,7 @@ Fit fit_pitch(std::vector<Comb>& all, double pitch) {
       const double above = number(comb.above, pitch);
       const double below = number(comb.below, pitch);
       if (comb.above.empty() || comb.below.empty()) continue;
-      // The offset across the lamp is known but for whole pitches: the same ones in every frame.
+      // The offset across the lamp is known up to whole pitches, the same in every frame.
       const double across = below - above;
       if (!offset) offset = across;
       const double whole = std::round((across - *offset) / pitch);
@@ -231,7 +232,7 @@ Fit fit_pitch(std::vector<Comb>& all, double pitch) {
   return fit;
 }
 
-/// Where the comb's dot of no pitches stands, above the lamp.
+/// The row of the comb's dot number 0 above the lamp.
 double phase_of_comb(const Comb& comb, const Fit& fit) {
   double sum = 0;
   double count = 0;
@@ -247,7 +248,7 @@ double phase_of_comb(const Comb& comb, const Fit& fit) {
   return count > 0 ? sum / count : std::nan("");
 }
 
-/// How far the comb walks from frame to frame, modulo the pitch: the walk under which all combs gather.
+/// The walk of the comb from frame to frame, modulo the pitch: the one at which all combs concentrate.
 double gathering_walk(const std::vector<Comb>& all, const Fit& fit) {
   const double frames = all.back().frame - all.front().frame + 1;
   const int steps = static_cast<int>(8 * frames);
@@ -294,9 +295,9 @@ std::vector<StairPoint> one_comb(const std::vector<Comb>& all, const Fit& fit) {
   return points;
 }
 
-/// The same least squares over all frames as one walk, then through the stairs of whole rows: no phase is
-/// free but one. Nothing where the frames don't make one walk (frames were lost, the strobe drifts) or stairs
-/// can't be seen.
+/// The same least squares for all frames as one walk with a single phase, then the fit to the staircase of
+/// whole rows. nullopt if the frames aren't one walk (lost frames, a drifting strobe) or no staircase is
+/// visible.
 std::optional<StairFit> fit_as_one(const std::vector<Comb>& all, const Fit& fit, double width) {
   constexpr double kCoherent = 0.5;  // RMS, rows
   if (all.size() < 3 || !fit.both_sides) return std::nullopt;
@@ -311,13 +312,13 @@ std::optional<StairFit> fit_as_one(const std::vector<Comb>& all, const Fit& fit,
   double squares = 0;
   for (const StairPoint& p : points) squares += std::pow(p.u - p.place.dot(line), 2);
   if (squares > kCoherent * kCoherent * static_cast<double>(points.size())) return std::nullopt;
-  // Three times what rows leave open, and what a lamp may err by, which moves both phases.
+  // Three times the uncertainty by whole rows, plus the possible error of the lamp, which shifts both phases.
   Eigen::Matrix4d covariance = kOutlier * kOutlier * matrix.inverse();
   covariance.topLeftCorner<2, 2>().array() += 0.04;
-  // Dots stand half a row before the middle of their row's time.
+  // A dot lies half a row before the middle of its row period.
   auto one = fit_stairs(
       points, {.line = line + Eigen::Vector4d(0.5, 0.5, 0, 0), .covariance = covariance, .width = width});
-  // Stairs of another width than the flash's lead astray; the straight line doesn't know of any.
+  // A staircase of another width than the flash's misleads the fit; the straight line is immune to that.
   const double straight_sigma =
       std::sqrt(squares / static_cast<double>(points.size()) * matrix.inverse()(2, 2));
   if (one && std::abs(one->line(2) - line(2)) > 3 * straight_sigma) one.reset();
@@ -374,7 +375,7 @@ Result<RowClock> fit_row_clock(std::span<const SmearReading> frames, Hertz flash
   clock.frames = fit.frames;
   clock.near_integer_pitch = near_integer;
   if (frame_period && fit.both_sides) {
-    // Dots on the later side of the wrap were shifted one read phase earlier: offset = K - T / t_row, modulo
+    // Dots on the side after the wrap were shifted in the previous read phase: offset = K - T / t_row, modulo
     // p.
     clock.shifts_modulo_pitch =
         Rows(wrap_positive(fit.offset + (*frame_period / clock.row_time).value(), fit.pitch));

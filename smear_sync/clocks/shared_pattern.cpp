@@ -16,12 +16,12 @@
 namespace emberlock::smear {
 namespace {
 
-constexpr double kNegligible = 25;     // log-probabilities that lie so far below the best don't count
+constexpr double kNegligible = 25;     // log-probabilities this far below the best are ignored
 constexpr int kFewestCommon = 8;       // flashes
-constexpr double kDisagreeing = 0.04;  // of the common flashes, and
+constexpr double kDisagreeing = 0.04;  // share of the common flashes; added to kDisagreeingAnyhow
 constexpr int kDisagreeingAnyhow = 2;
 
-/// The log-probability of all that was seen, or -infinity once it falls below a bound.
+/// The log-probability of all observations, or -infinity once it falls below a bound.
 double log_probability(const PatternEvidence& e, PatternModel& model, double bound) {
   double sum = 0;
   for (std::size_t i = 0; i < e.lit.size(); ++i) {
@@ -31,16 +31,16 @@ double log_probability(const PatternEvidence& e, PatternModel& model, double bou
   return sum;
 }
 
-/// What the other witness says of a shift: its mean and standard error.
+/// The shift according to the other source: mean and standard error.
 struct Told {
   double shift, sigma;
 };
 
-/// A shift and how probable it is before the pattern was modelled.
+/// A shift and its prior probability.
 struct Candidate {
   std::int64_t shift;
   double prior;  ///< log
-  double bound;  ///< log: it can't be more probable, prior included
+  double bound;  ///< log: upper limit of its probability, prior included
 };
 
 std::vector<Candidate> candidates(const PatternEvidence& a, const PatternEvidence& b,
@@ -77,11 +77,11 @@ std::vector<Candidate> candidates(const PatternEvidence& a, const PatternEvidenc
   return all;
 }
 
-/// The shift of one group of clips against another.
+/// The shift of one group of clips relative to another.
 struct Verdict {
   PatternShift best;
   double unrelated = 1;     ///< probability that they have no flash in common
-  std::int64_t second = 0;  ///< the next best shift
+  std::int64_t second = 0;  ///< the second best shift
   double second_probability = 0;
 };
 
@@ -121,12 +121,12 @@ Verdict compare(const PatternEvidence& a, const PatternEvidence& b, const std::o
   return verdict;
 }
 
-/// Clips whose flashes are numbered alike.
+/// Clips with a common numbering of their flashes.
 struct Group {
   std::vector<std::size_t> clips;
   std::vector<std::int64_t> shifts;   ///< flash j of the clip is flash j + shift of the group
-  std::vector<double> probabilities;  ///< that it is, of the first clip's scale
-  double joint = 1;                   ///< that all are
+  std::vector<double> probabilities;  ///< of the shift, relative to the first clip
+  double joint = 1;                   ///< probability that all are right
   PatternEvidence evidence;
 };
 
@@ -162,7 +162,8 @@ class Matcher {
  private:
   [[nodiscard]] Group alone(std::size_t clip) const { return {{clip}, {0}, {1.0}, 1, evidence_[clip]}; }
 
-  /// What the other witness says of two groups, by the first clips that it knows of both.
+  /// The shift of two groups according to the other source, from the first clips of both for which it is
+  /// known.
   [[nodiscard]] std::optional<Told> told(const Group& a, const Group& b) const {
     for (std::size_t i = 0; i < a.clips.size(); ++i) {
       for (std::size_t j = 0; j < b.clips.size(); ++j) {
@@ -192,7 +193,7 @@ class Matcher {
     a.evidence = together(a.evidence, b.evidence, shift.flashes);
   }
 
-  /// Takes into the first group what belongs to it, the surest first; false where nothing does.
+  /// Merges the surest matching group into the first group; false if none matches.
   bool grow_first() {
     std::vector<std::pair<Verdict, std::size_t>> verdicts;
     for (std::size_t g = 1; g < groups_.size(); ++g) {
@@ -209,7 +210,7 @@ class Matcher {
     return !verdicts.empty();
   }
 
-  /// Joins two groups that don't belong to the first yet; together they may.
+  /// Merges two groups that don't yet match the first one; together they may.
   bool join_others() {
     for (std::size_t a = 1; a < groups_.size(); ++a) {
       for (std::size_t b = a + 1; b < groups_.size(); ++b) {
@@ -223,7 +224,7 @@ class Matcher {
     return false;
   }
 
-  /// A clip of the first group, tried once more against all the others of it.
+  /// Tries a clip of the first group once more against all its other clips.
   [[nodiscard]] PatternMatch stands(std::size_t i) const {
     const Group& main = groups_.front();
     const std::size_t clip = main.clips[i];
@@ -278,7 +279,7 @@ class Matcher {
   std::span<const PatternClip> clips_;
   SharedPatternOptions options_;
   std::vector<PatternEvidence> evidence_;
-  std::vector<Group> groups_;  ///< the first is the reference's
+  std::vector<Group> groups_;  ///< the first contains the reference
 };
 
 Status check(std::span<const PatternClip> clips, std::size_t reference, const SharedPatternOptions& o) {

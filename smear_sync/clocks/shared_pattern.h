@@ -13,22 +13,22 @@
 
 namespace emberlock::smear {
 
-// Which frames of several clips belong together, told by whatever pattern of lit and unlit frames they share:
-// nobody needs to have chosen it. Time is counted in the strobe's flashes, on a scale of each clip's own that
-// lacks a whole number of flashes; that number, the shift, is what is found.
+// Finds which frames of several clips belong together, from any pattern of lit and unlit frames that they
+// share; nobody needs to have chosen the pattern. Time is counted in flashes of the strobe, for each clip
+// from its own origin. The origins differ by an unknown integer, the shift, which is found here.
 
 /// One frame of a clip.
 struct PatternFrame {
-  /// When its read phase begins, in flash periods: flash j comes at j. The picture is lit by the flashes of
-  /// the frame period before.
+  /// Start of its read phase in flash periods: flash j happens at j. The picture is lit by the flashes of the
+  /// frame period before.
   double start = 0;
   FlashSeen seen = FlashSeen::unknown;
 };
 
-/// One clip's frames, in order, and what else is known of it.
+/// The frames of one clip, in order, and further knowledge of it.
 struct PatternClip {
   std::vector<PatternFrame> frames;
-  /// Where the start of flash 0 lies on a scale that the clips share, by another witness (a clap in their
+  /// Position of the start of flash 0 on a scale common to the clips, from another source (a clap in their
   /// sound tracks), in flash periods, and its standard error.
   std::optional<double> told_origin{};
   double told_sigma = 1;
@@ -37,42 +37,43 @@ struct PatternClip {
 struct SharedPatternOptions {
   double flashes_per_frame = 1;  ///< T / P, within 1 +- 0.05
   double misread = 0.005;        ///< probability that a frame's FlashSeen is wrong, in (0, 0.2)
-  /// The same beside a change: a hand that covers half the lamp shows to one camera and not to another. In
-  /// (0, 0.5)
+  /// The same for frames beside a change: a hand that covers half of the lamp is visible to one camera and
+  /// not to another. In (0, 0.5)
   double misread_at_change = 0.015;
-  double unrelated = 0.5;  ///< probability, before anything was seen, that two clips have no flash in common
-  double confidence = 0.999;  ///< of a shift, below which it isn't claimed, in [0.5, 1)
-  double told_wrong = 0.05;   ///< probability that the other witness is wrong altogether, in (0, 1)
-  int longest_period = 256;   ///< that a clip is looked at for, in flashes
+  double unrelated = 0.5;     ///< prior probability that two clips have no flash in common
+  double confidence = 0.999;  ///< required probability of a shift, in [0.5, 1)
+  double told_wrong = 0.05;   ///< probability that the other source is entirely wrong, in (0, 1)
+  int longest_period = 256;   ///< the longest repetition that is searched for in a clip, in flashes
 };
 
-/// How one clip's flashes are numbered by another's.
+/// The numbering of one clip's flashes in terms of another's.
 struct PatternShift {
   std::int64_t flashes = 0;  ///< flash j of the clip is flash j + flashes of the reference
-  double probability = 0;    ///< that it is
-  int common = 0;            ///< flashes that both clips tell of
-  int disagree = 0;          ///< of them, on which they differ
+  double probability = 0;    ///< of this shift
+  int common = 0;            ///< number of flashes observed in both clips
+  int disagree = 0;          ///< number of those in which the clips differ
 };
 
-/// What became of one clip.
+/// The result for one clip.
 struct PatternMatch {
-  std::optional<PatternShift> shift;  ///< against the reference; absent where the pattern leaves it open
-  std::string reason;                 ///< one sentence: how it is known, or why it isn't and what would tell
+  std::optional<PatternShift> shift;  ///< relative to the reference; absent where the pattern leaves it open
+  std::string reason;  ///< one sentence: the evidence; or why it isn't known and how to find it
 };
 
-/// Matches all clips to the reference: pairs, and groups of clips that belong together, the surest first;
-/// each is then tried against all others once more. A shift's probability is that of all the merges that it
-/// rests on, against every other overlap of the clips and against none; a pattern that repeats leaves several
-/// and is given up. Frames that were lost from a clip show as disagreement, and it is given up too. Pure.
-/// Errors (bad_input): no clips, no such reference, options out of range.
+/// Matches all clips to the reference. It merges pairs, and groups of clips that belong together, starting
+/// with the surest, and then tries each clip once more against all others. A shift's probability is that of
+/// all the merges on which it rests, against every other overlap of the clips and against none. With a
+/// repeating pattern several shifts remain and the match is given up. Frames lost from a clip cause
+/// disagreement, and the match is given up too. Pure. Errors (bad_input): no clips, no such reference,
+/// options out of range.
 Result<std::vector<PatternMatch>> match_patterns(std::span<const PatternClip> clips, std::size_t reference,
                                                  const SharedPatternOptions& options);
 
-/// How two clips agree under a shift of the second: PatternShift with its counts alone.
+/// How well two clips agree under a shift of the second: a PatternShift with counts only.
 PatternShift agreement(const PatternClip& reference, const PatternClip& clip, std::int64_t shift,
                        const SharedPatternOptions& options);
 
-/// Whether so many of the common flashes may disagree by misreadings alone.
+/// Whether misreadings alone can explain the number of disagreements.
 bool agrees(const PatternShift& shift);
 
 }  // namespace emberlock::smear

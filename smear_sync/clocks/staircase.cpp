@@ -16,23 +16,23 @@ namespace emberlock::smear {
 namespace {
 
 constexpr double kLeastOrder =
-    0.3;  // resultant of the dots' fractions of a row below which no stairs are seen
-constexpr double kStraySigmas = 3.5;  // a dot further off its step, in its own sigmas, is of no use
-constexpr double kFloor = 0.01;       // no dot is placed better than this, rows
+    0.3;  // resultant of the dots' fractions of a row; below it no staircase is visible
+constexpr double kStraySigmas = 3.5;  // a dot further off its step, in its own sigmas, is ignored
+constexpr double kFloor = 0.01;       // lower limit of a dot's error, rows
 constexpr double kFirstBlur = 0.5;    // rows
-constexpr double kSharpen = 0.6;      // from round to round
+constexpr double kSharpen = 0.6;      // per round
 constexpr int kRounds = 32;
-constexpr int kDraws = 150;  // for each number of the line
+constexpr int kDraws = 150;  // per parameter of the line
 constexpr int kLastDraws = 600;
-constexpr double kLeastShare = 12;  // of the draws, for each number of the line, that must carry the weight
-constexpr double kReach = 3.5;      // deviations about the mean that are drawn from, evenly
+constexpr double kLeastShare = 12;  // share of the draws, per parameter, that must carry the weight
+constexpr double kReach = 3.5;      // the sampled range around the mean, in standard deviations
 
 class Stairs {
  public:
   Stairs(std::span<const StairPoint> points, const StairStart& start)
       : points_(points), start_(start), precision_(start.covariance.inverse()) {}
 
-  /// The lamp's error from the fractions of a row at which dots stand; false when they show no stairs.
+  /// Finds the lamp's error from the dots' fractions of a row; false if no staircase is visible.
   bool find_lamp() {
     std::complex<double> sum = 0;
     for (const StairPoint& p : points_) sum += std::polar(1.0, 2 * std::numbers::pi * p.u);
@@ -41,9 +41,9 @@ class Stairs {
     return std::abs(sum) >= kLeastOrder;
   }
 
-  /// The lamp's error and the scatter of the dots, once a line is known; and the stairs a little sharper.
-  /// Blurred ones lead to the line from afar, where sharp ones are a needle in a haystack. Whether they are
-  /// sharp now.
+  /// Updates the lamp's error and the dots' scatter for a line, and makes the staircase a little sharper. A
+  /// blurred staircase leads to the line from a distance, where a sharp one would have a tiny target. Returns
+  /// whether it is sharp now.
   bool refine(const StairLine& line, double heat) {
     double sum = 0;
     double weights = 0;
@@ -61,7 +61,8 @@ class Stairs {
     const double before = widen_;
     widen_ = std::max(1.0, 1.4826 * *middle);
     const bool sharp = blur_ < kFloor && widen_ > 0.8 * before && widen_ < 1.25 * before;
-    if (heat == 1) blur_ *= kSharpen;  // not before the draws cover what the blurred stairs leave possible
+    if (heat == 1)
+      blur_ *= kSharpen;  // only when the draws cover all lines compatible with the blurred staircase
     return sharp;
   }
 
@@ -71,7 +72,7 @@ class Stairs {
       sum -= std::min(square(miss(p, line) / scale(p)), square(kStraySigmas)) / 2;
     return sum;
   }
-  /// Of the lamp's error, which moves the first number with it.
+  /// The lamp's error; the line's phase shifts with it.
   [[nodiscard]] double lamp() const { return wrap_symmetric(lamp_, 1); }
   [[nodiscard]] double lamp_sigma() const {
     double weights = 0;
@@ -84,7 +85,7 @@ class Stairs {
   }
 
  private:
-  /// What a dot misses its step by.
+  /// The distance of a dot from its step.
   [[nodiscard]] double miss(const StairPoint& p, const StairLine& line) const {
     const double x = p.place.dot(line);
     if (start_.turn <= 0) return p.u - stair(x, start_.width) - lamp_;
@@ -101,20 +102,20 @@ class Stairs {
   double blur_ = kFirstBlur;
 };
 
-/// Lines drawn evenly from an ellipsoid, and what they are worth.
+/// Lines drawn evenly from an ellipsoid, with their likelihoods.
 struct Draws {
   std::vector<StairLine> lines;
-  std::vector<double> logs;   ///< of likelihood
-  std::vector<double> prior;  ///< log of what was known before
+  std::vector<double> logs;   ///< log-likelihood
+  std::vector<double> prior;  ///< log of the prior
 };
 
 struct Moments {
   StairLine mean;
   Eigen::MatrixXd covariance;
-  double heat = 1;  ///< power of the likelihood, below 1 while the draws are too coarse for it
+  double heat = 1;  ///< exponent of the likelihood, below 1 while the draws are too coarse for it
 };
 
-/// Each draw's weight under the likelihood to the power `heat`; returns how many share it.
+/// Sets each draw's weight to its likelihood to the power `heat`; returns the effective number of draws.
 double weigh(const Draws& draws, double heat, std::vector<double>& weights) {
   double most = -1e300;
   for (std::size_t i = 0; i < weights.size(); ++i) {
@@ -132,8 +133,8 @@ double weigh(const Draws& draws, double heat, std::vector<double>& weights) {
   return square(sum) / squares;
 }
 
-/// Weighted by the likelihood to the largest power that leaves enough of the draws their weight (or else the
-/// most): one finer than the draws would pick one of them by chance.
+/// Moments with the likelihood to the largest power that leaves enough effective draws (or otherwise the
+/// most). A higher power would select a single draw by chance.
 Moments moments(const Draws& draws) {
   const std::size_t n = draws.lines.size();
   std::vector<double> weights(n);
@@ -163,13 +164,13 @@ Moments moments(const Draws& draws) {
 double stair(double x, double width) {
   if (width >= 1) return x - 0.5;
   const double step = std::floor(x - width / 2);
-  const double past = x + width / 2 - (step + 1);  // of the flash, beyond the row period that it began in
+  const double past = x + width / 2 - (step + 1);  // part of the flash after the row period in which it began
   return past <= 0 ? step : step + past / width;
 }
 
 StairMoments invert_stair(double u, double sigma, double width) {
   if (width >= 1) return {u + 0.5, sigma};
-  // Beyond three rows from u nothing that was read can come from.
+  // An x more than three rows from u can't have caused the reading.
   constexpr int kSteps = 240;
   const double s = std::max(sigma, kFloor);
   const double reach = 1.5 + 3 * s;
@@ -196,7 +197,8 @@ std::optional<StairFit> fit_stairs(std::span<const StairPoint> points, const Sta
   bool last = false;
   for (int round = 0; round < kRounds; ++round) {
     const Eigen::MatrixXd spread = m.covariance.llt().matrixL();
-    const Eigen::MatrixXd least = 0.01 * spread * spread.transpose();  // where few draws carry the weight
+    const Eigen::MatrixXd least =
+        0.01 * spread * spread.transpose();  // lower limit when few draws carry the weight
     Draws draws;
     for (int i = 0; i < (last ? kLastDraws : kDraws) * static_cast<int>(size); ++i) {
       StairLine z(size);
@@ -207,7 +209,8 @@ std::optional<StairFit> fit_stairs(std::span<const StairPoint> points, const Sta
       const double radius =
           std::pow(random_uniform(18, static_cast<std::uint64_t>(round), static_cast<std::uint64_t>(i / 2)),
                    1.0 / static_cast<double>(size));
-      z *= (i % 2 == 0 ? kReach : -kReach) * radius / z.norm();  // in pairs: the draws' own mean is no error
+      z *= (i % 2 == 0 ? kReach : -kReach) * radius /
+           z.norm();  // in pairs, so that the draws' own mean adds no error
       draws.lines.emplace_back(m.mean + spread * z);
       draws.logs.push_back(stairs.log_likelihood(draws.lines.back()));
       draws.prior.push_back(stairs.log_prior(draws.lines.back()));

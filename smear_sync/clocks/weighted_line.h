@@ -11,16 +11,17 @@ struct LinePoint {
   double weight = 0;  ///< 1 / sigma^2
 };
 
-/// y = level + rate (t - middle); about their weighted mean the two don't err together.
+/// y = level + rate (t - middle). `middle` is the weighted mean of t, where the errors of level and rate are
+/// independent.
 struct WeightedLine {
   double middle = 0;
   double level = 0;
   double rate = 0;
   double level_variance = 0;
-  double rate_variance = 0;  ///< not finite where all points are of one t, as is rate then
+  double rate_variance = 0;  ///< not finite (like rate) if all points have the same t
 };
 
-/// Least squares. At least one point, weights > 0.
+/// Weighted least squares. Needs at least one point and weights > 0.
 inline WeightedLine weighted_line(std::span<const LinePoint> points) {
   double w = 0;
   double wt = 0;

@@ -12,9 +12,9 @@ namespace emberlock::smear::detail {
 
 namespace {
 
-constexpr int kBlock = 6;  // pixels: about a dot
+constexpr int kBlock = 6;  // pixels: about the size of a dot
 
-/// Differences of the sums of neighbouring blocks of kBlock x kBlock pixels.
+/// Differences between the sums of neighbouring blocks of kBlock x kBlock pixels.
 void add_blocks(const Plane& plane, int left, int top, int length, std::vector<float>& differences) {
   std::array<float, 8 * kBlock> row{};
   std::array<float, 8> sums{};
@@ -33,17 +33,17 @@ void add_blocks(const Plane& plane, int left, int top, int length, std::vector<f
 
 Background measure_background(const Plane& plane, int runs) {
   constexpr int kRun = 36;
-  constexpr int kLag = 2;  // neighbours may share noise (cells of a mosaic, interpolated colour)
+  constexpr int kLag = 2;  // neighbouring pixels may share noise (cells of a mosaic, interpolated colour)
   const int length = std::min(kRun, plane.size.width);
   std::vector<float> differences;
-  std::vector<float> few;  // a few hundred of all tell the middle well enough
+  std::vector<float> few;  // a few hundred of all suffice for the median
   std::vector<float> few_differences;
   std::vector<float> blocks;
   differences.reserve(static_cast<std::size_t>(runs) * kRun);
   std::array<float, kRun> run{};
   for (int i = 0; i < runs; ++i) {
     const int y = static_cast<int>((i + 0.5) / runs * plane.size.height);
-    const double turn = i * 0.6180339887;  // of the golden section: columns spread evenly
+    const double turn = i * 0.6180339887;  // golden ratio: spreads the columns evenly
     const int left = static_cast<int>((turn - std::floor(turn)) * (plane.size.width - length));
     plane.read(y, left, length, run.data());
     add_blocks(plane, left, std::min(y, plane.size.height - kBlock), length, blocks);
@@ -69,9 +69,9 @@ Background measure_background(const Plane& plane, int runs) {
   }
   const double variance = count > 0 ? sum / (2 * count) : 0;
   background.noise = std::max(plane.rounding, std::sqrt(variance));
-  // Quantisers leave most neighbours equal, or where noise survives them take the fine grain and leave the
-  // coarse, or spare it in some blocks and not in others: then more neighbours are equal than of Gaussian
-  // noise of the same variance.
+  // Compression makes more neighbours equal than Gaussian noise of the same variance would: quantisation
+  // leaves most neighbours equal, or removes the fine noise and leaves the coarse, or leaves it in some
+  // blocks only.
   const auto pairs = static_cast<double>(std::max<std::size_t>(1, differences.size()));
   const double equals = equal / pairs;
   background.flat = equals > 0.6;
@@ -96,7 +96,7 @@ std::vector<float> column_medians(const Patch& patch, Field field) {
   constexpr int kRows = 81;
   const int rows = std::max(1, (patch.height - field.first + field.step - 1) / field.step);
   const auto row = [&](int i) {
-    // Any whole step might keep time with a comb; this order doesn't.
+    // A constant step could be in phase with a comb; this order can't.
     const double turn = i * 0.6180339887;
     const int y = field.first + field.step * static_cast<int>((turn - std::floor(turn)) * rows);
     return patch.row(std::min(y, patch.height - 1));

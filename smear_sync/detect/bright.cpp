@@ -6,34 +6,34 @@
 #include <cmath>
 #include <limits>
 
-#include "smear_sync/detect/clones.h"
+#include "smear_sync/detect/target_clones.h"
 
 namespace emberlock::smear::detail {
 namespace {
 
-constexpr int kChunk = 256;          // bytes looked at at once
-constexpr int kWidest = 2;           // pixels that a hot cluster spans
+constexpr int kChunk = 256;          // bytes tested at once
+constexpr int kWidest = 2;           // width of a hot cluster in pixels
 constexpr std::size_t kMost = 4000;  // runs of bright pixels; a lamp has tens
 
 template <class Sample>
 inline Sample largest_of(const Sample* v, int count) {
   constexpr int kWhole = kChunk / static_cast<int>(sizeof(Sample));
   Sample top = 0;
-  if (count == kWhole) {  // of a length that the compiler knows
+  if (count == kWhole) {  // a length known at compile time
     for (int i = 0; i < kWhole; ++i) top = top > v[i] ? top : v[i];
   } else {
     for (int i = 0; i < count; ++i) top = top > v[i] ? top : v[i];
   }
   return top;
 }
-EMBERLOCK_VECTOR_CLONES std::uint8_t largest(const std::uint8_t* v, int count) {
+EMBERLOCK_TARGET_CLONES std::uint8_t largest(const std::uint8_t* v, int count) {
   return largest_of(v, count);
 }
-EMBERLOCK_VECTOR_CLONES std::uint16_t largest(const std::uint16_t* v, int count) {
+EMBERLOCK_TARGET_CLONES std::uint16_t largest(const std::uint16_t* v, int count) {
   return largest_of(v, count);
 }
 
-/// Runs of more than kWidest neighbours above the threshold in columns [first, last] of a row.
+/// Finds runs of more than kWidest neighbouring pixels above the threshold in columns [first, last] of a row.
 void find_runs(const Plane& plane, int y, int first, int last, float threshold, std::vector<Extent>& runs) {
   constexpr int kBuffer = 512;
   std::array<float, kBuffer> v;  // NOLINT(cppcoreguidelines-pro-type-member-init): read() fills what is used
@@ -57,7 +57,7 @@ void find_runs(const Plane& plane, int y, int first, int last, float threshold, 
   end(last + 1);
 }
 
-/// In samples of the view: at least one of a sum over the threshold exceeds it.
+/// In samples of the view: if a sum exceeds the threshold, at least one of its samples exceeds the mean.
 template <class Sample>
 Sample sample_limit(const Plane& plane, float threshold) {
   return static_cast<Sample>(std::clamp<double>(std::floor(static_cast<double>(threshold) * plane.level), 0,
@@ -78,7 +78,7 @@ void scan(const Plane& plane, float threshold, RowStep rows, BrightAreas& found)
       peak = std::max(peak, top);
       if (top <= limit) continue;
       int first = at;
-      while (at + chunk < samples && top > limit) {  // neighbours of it that are bright too
+      while (at + chunk < samples && top > limit) {  // extends to its bright neighbours
         at += chunk;
         top = largest(row + at, std::min(chunk, samples - at));
         peak = std::max(peak, top);
@@ -106,7 +106,7 @@ void scan_columns(const Plane& plane, int left, int right, float threshold, std:
   }
 }
 
-/// Joins runs that share columns or touch.
+/// Joins runs that share columns or touch each other.
 std::vector<Extent> merge(std::vector<Extent> runs) {
   std::sort(runs.begin(), runs.end(), [](const Extent& a, const Extent& b) { return a.left < b.left; });
   std::vector<Extent> merged;
@@ -126,7 +126,7 @@ std::vector<Extent> merge(std::vector<Extent> runs) {
 }  // namespace
 
 RowStep every_lamp(const Plane& plane) {
-  // A mosaic's rows see different colours: a red lamp stands in every other of them.
+  // In a Bayer mosaic a red lamp is visible only in every other row.
   return {0, is_bayer(plane.view.layout.format) ? 1 : 2};
 }
 

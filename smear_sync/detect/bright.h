@@ -11,20 +11,20 @@ namespace emberlock::smear::detail {
 struct RowStep {
   int first = 0, step = 1;
 };
-/// Rows enough that no lamp of 1.8 pixels of radius or more is missed.
+/// Enough rows that no lamp with a radius of 1.8 pixels or more is missed.
 RowStep every_lamp(const Plane& plane);
 
-/// What is brighter than a threshold and wider than two hot pixels.
+/// Areas that are brighter than a threshold and wider than two hot pixels.
 struct BrightAreas {
-  std::vector<Extent> areas;  ///< left to right, none sharing a column with another
-  int pixels = 0;             ///< in them, in the rows looked at
-  double peak = 0;            ///< the largest sample of the view in the rows looked at, times 1 / plane.level
-  bool everywhere = false;    ///< too many to be a lamp's; `areas` is cut short
+  std::vector<Extent> areas;  ///< left to right; no two share a column
+  int pixels = 0;             ///< in the areas, in the rows searched
+  double peak = 0;            ///< the largest sample of the view in the rows searched, times 1 / plane.level
+  bool everywhere = false;    ///< too many for a lamp; `areas` is incomplete
 };
-/// Reads the frame in its own samples: a sum over the threshold has at least one sample over its mean.
+/// Works on the frame's own samples: a sum above the threshold has at least one sample above the mean.
 BrightAreas find_bright(const Plane& plane, double threshold, RowStep rows);
 
-/// The same in some columns, ends included, in rows enough that no lamp is missed: not merged.
+/// The same in a range of columns, ends included, in enough rows that no lamp is missed; areas aren't merged.
 std::vector<Extent> find_bright_in(const Plane& plane, int left, int right, double threshold);
 
 }  // namespace emberlock::smear::detail

@@ -10,11 +10,11 @@
 namespace emberlock::smear::detail {
 namespace {
 
-constexpr double kOnCircle = 0.5;  // pixels; an outline's points scatter by a few tenths
+constexpr double kOnCircle = 0.5;  // pixels; the points of an outline scatter by a few tenths
 
 double tolerance(double radius) { return std::max(kOnCircle, 0.04 * radius); }
 
-/// Gauss-Newton on the distances to the circle, Tukey weights with a support that shrinks to the tolerance.
+/// Gauss-Newton on the distances to the circle, with Tukey weights whose support shrinks to the tolerance.
 bool refine(const std::vector<Point>& outline, Circle& circle) {
   constexpr int kIterations = 12;
   for (int i = 0; i < kIterations; ++i) {
@@ -45,7 +45,7 @@ bool refine(const std::vector<Point>& outline, Circle& circle) {
   return true;
 }
 
-void judge(const std::vector<Point>& outline, ImageSize image, Circle& circle) {
+void score(const std::vector<Point>& outline, ImageSize image, Circle& circle) {
   constexpr std::size_t kSectors = 24;
   std::array<bool, kSectors> seen{};
   double squares = 0;
@@ -70,7 +70,7 @@ void judge(const std::vector<Point>& outline, ImageSize image, Circle& circle) {
   }
   constexpr int kEnough = 5;  // an arc of fewer sectors fits any circle
   circle.agreement = inside < kEnough ? 0 : static_cast<double>(on_outline) / inside;
-  constexpr double kSystematic = 0.02;  // pixels: what sampling leaves even without noise
+  constexpr double kSystematic = 0.02;  // pixels: error by sampling, even without noise
   circle.sigma = std::hypot(kSystematic, on > 3 ? std::sqrt(squares / (on - 3) * 2 / on) : circle.radius);
 }
 
@@ -88,11 +88,11 @@ std::optional<Circle> fit_circle(const std::vector<Point>& outline, ImageSize im
   const auto start_at = [&](double y) {
     Circle circle{.x = middle, .y = y, .radius = radius};
     if (!refine(outline, circle)) return;
-    judge(outline, image, circle);
+    score(outline, image, circle);
     if (!best || circle.agreement > best->agreement) best = circle;
   };
   start_at((top->y + bottom->y) / 2);
-  constexpr double kWhole = 0.95;  // of a circumference: no other start finds more
+  constexpr double kWhole = 0.95;  // of a circumference: no other start can find more
   if (best && best->agreement >= kWhole) return best;
   const double step = std::max(0.5, radius / 3);
   for (double y = top->y; y <= bottom->y + step / 2; y += step) start_at(y);

@@ -4,32 +4,31 @@
 #include <algorithm>
 #include <cmath>
 
-#include "smear_sync/detect/across.h"
 #include "smear_sync/detect/column_patch.h"
 #include "smear_sync/detect/dot_search.h"
+#include "smear_sync/detect/width_gate.h"
 
 namespace emberlock::smear::detail {
 namespace {
 
-constexpr double kQuantiserGate = 2;  // its errors aren't Gaussian: rare blocks keep one whole coefficient
-// What a quantiser leaves of the frames that it predicted from, and of edges, lies along the dot's rim like a
-// shift of it: grey levels times rows, RMS, where noise survives it and where none does (H.264 at a CRF of
-// 28).
+constexpr double kQuantiserGate = 2;  // compression errors aren't Gaussian: rare blocks keep a coefficient
+// Residues of frames used for prediction, and of edges, lie along the dot's rim and act like a shift of
+// it. Unit: grey levels times rows, RMS, with and without remaining noise (H.264 at CRF 28).
 constexpr double kGrainyShift = 1.8;
 constexpr double kFlatShift = 5.5;
-constexpr double kLoosest = 0.7;  // rows: a spot less sharply placed is none that could be used
-// Grey levels: what is weaker is what a compressor leaves of noise, and up to the second may be.
+constexpr double kLoosest = 0.7;  // rows: a spot whose position is less certain can't be used
+// Grey levels: weaker spots are compression residues of noise; up to the second value they may be.
 constexpr double kQuantiserWeakest = 1.5;
 constexpr double kQuantiserSure = 4;
 constexpr double kEightBitSure =
-    2.5;  // and in frames of 8 bits that don't look compressed: a gentle compressor's
+    2.5;  // the same for 8-bit frames that don't look compressed: residues of mild compression
 
 constexpr double kBrightLine = 0.2;  // of saturation
 
 enum class Verdict { dot, suspect, half_field, nothing };
 
-/// Whether the spot hangs on the rows that lamp and bloom hide, with no valley between: then it is their
-/// flank, or can't be told from it.
+/// Whether the spot adjoins the rows hidden by lamp and bloom, with no valley between. Then it is their
+/// flank, or can't be distinguished from it.
 bool attached(const Column& c, const DotFit& f) {
   const int guard = static_cast<int>(std::ceil(f.radius + 2));
   const int row = static_cast<int>(std::lround(f.y));
@@ -45,26 +44,25 @@ bool attached(const Column& c, const DotFit& f) {
   return false;
 }
 
-/// Whether the spot has the lamp's shape: a part of its size, as bright everywhere, fitted well and in one
-/// place.
+/// Whether the spot has the lamp's shape: similar in size, evenly bright, well fitted and well localised.
 bool lamp_like(const Column& c, const DotFit& f, const Evenness& e) {
   return f.misfit <= 1.6 + 0.12 * f.amplitude / c.noise && e.least_half > 0.4 - 3 * e.half_sigma &&
          f.radius <= 1.4 * c.radius + 0.7 && f.sigma_y < kLoosest;
 }
 
-Verdict judge(const Column& c, const DotFit& f, const FitWindow& w, double min_snr,
-              const DetectOptions& options) {
+Verdict classify_spot(const Column& c, const DotFit& f, const FitWindow& w, double min_snr,
+                      const DetectOptions& options) {
   if (f.amplitude <= (c.compressed ? kQuantiserWeakest / c.sample_level : 0) || f.snr < min_snr)
     return Verdict::nothing;
   if (f.y < -0.5 || f.y > c.patch.height - 0.5 || f.radius > 2.2 * c.radius + 2 || attached(c, f))
     return Verdict::nothing;
-  // What is left of a halo whose shape isn't quite round looks like a dot of a part of it.
+  // The residue of a slightly asymmetric halo looks like a dot with a part of its brightness.
   if (f.amplitude < 0.3 * c.halo_at(std::abs(f.y - c.y))) return Verdict::nothing;
   const Evenness e = evenness(c.patch, w, f, c.noise);
-  // Hot pixels: much smaller than the lamp, or nearly all of the light in a pixel or two.
+  // Hot pixels: much smaller than the lamp, or nearly all light in one or two pixels.
   const double smallest = std::max(0.7, 0.33 * c.radius);
   if (f.radius < smallest || e.brightest_two > 0.62) return Verdict::nothing;
-  // Charge moves along its column and no other; only the lamp's own place is a little uncertain.
+  // Charge stays in its column; only the lamp's own position is slightly uncertain.
   if (std::abs(f.x - c.x) > std::max(0.5, 0.12 * c.radius) + 3 * f.sigma_x) return Verdict::nothing;
   if (e.least_field < 0.35 && e.least_field + 4 * e.half_sigma < 0.9 && e.least_half > 0.4)
     return Verdict::half_field;
@@ -74,8 +72,8 @@ Verdict judge(const Column& c, const DotFit& f, const FitWindow& w, double min_s
   return c.compressed && f.snr < kQuantiserGate * min_snr ? Verdict::suspect : Verdict::dot;
 }
 
-/// A lamp's own line is brightest in the lamp's middle. One that is brighter elsewhere leaves of its lamp a
-/// rim.
+/// A lamp's own line is brightest in the middle of the lamp. If a line is brightest elsewhere, only the rim
+/// of this lamp stands out.
 bool beside_brighter_line(const Column& c, double line_level, float outside) {
   const float brightest = *std::max_element(c.level.begin(), c.level.begin() + c.patch.width) - outside;
   if (static_cast<double>(brightest) < std::max(kBrightLine * c.saturation, 1.2 * line_level)) return false;
@@ -89,7 +87,7 @@ bool beside_brighter_line(const Column& c, double line_level, float outside) {
   return std::abs(sum / count - c.x) > c.radius + 0.5;
 }
 
-/// The lamp's lane against its neighbours, in blocks of rows: a line is there in nearly all of them.
+/// Compares the lamp's lane with its neighbours in blocks of rows: a line is present in nearly all of them.
 void find_line(const Column& c, ColumnReading& reading) {
   const int core = c.core();
   const int centre = static_cast<int>(std::lround(c.x));
@@ -114,7 +112,7 @@ void find_line(const Column& c, ColumnReading& reading) {
   std::vector<float> deviations = beside;
   const float outside = median(beside);
   for (float& v : deviations) v -= outside;
-  const double spread = robust_scale(deviations);  // of one column's level, fixed pattern included
+  const double spread = robust_scale(deviations);  // of one column's level, including fixed pattern noise
   reading.line_level = inside / columns_inside - static_cast<double>(outside);
   reading.rim = beside_brighter_line(c, reading.line_level, outside);
   const double rows = std::max(1.0, c.patch.height * (1 - reading.hidden));
@@ -139,7 +137,7 @@ void find_line(const Column& c, ColumnReading& reading) {
   reading.line = blocks >= 3 && bright >= 0.85 * blocks;
 }
 
-/// What the lamp's columns were levelled by, in the middle of its lane.
+/// The level that was subtracted in the core of the lamp's lane.
 double core_level(const Column& c) {
   const int centre = std::clamp(static_cast<int>(std::lround(c.x)), 0, c.patch.width - 1);
   return static_cast<double>(
@@ -148,13 +146,13 @@ double core_level(const Column& c) {
          2;
 }
 
-/// A spot whose samples reach saturation, or nearly.
+/// Whether samples of the spot reach saturation, or nearly.
 bool clips(const Column& c, const DotFit& f) {
   return core_level(c) + f.amplitude + 3 * std::sqrt(c.noise * c.noise + f.gain * f.amplitude) >=
          c.saturation;
 }
 
-/// A spot on a bright line that could be the line's own: brighter where the light that draws it is, or
+/// Whether a spot on a bright line may be part of the line: brighter where the line's light source is, or
 /// clipped.
 bool on_bright_line(const Column& c, const ColumnReading& reading, const DotFit& f) {
   constexpr double kUneven = 0.2;
@@ -162,8 +160,8 @@ bool on_bright_line(const Column& c, const ColumnReading& reading, const DotFit&
   return f.amplitude < kUneven * reading.line_level || clips(c, f);
 }
 
-/// The slope along y that levelling may have left near a row: a part of what it took out, anything beside the
-/// bloom.
+/// The slope along y that may remain near a row after levelling: a part of what was subtracted; any slope
+/// next to the bloom.
 double left_slope(const Column& c, int row) {
   const double distance = std::abs(row - c.y);
   const double halo = std::abs(c.halo_at(std::max(0.0, distance - 1)) - c.halo_at(distance + 1)) / 2;
@@ -171,7 +169,7 @@ double left_slope(const Column& c, int row) {
   bool clear = !c.compressed;
   for (int y = std::max(0, row - reach); y <= std::min(c.patch.height - 1, row + reach); ++y)
     clear = clear && c.visible(y);
-  constexpr double kNone = 1e-3;  // of the noise, a row
+  constexpr double kNone = 1e-3;  // of the noise, per row
   return clear ? 0.3 * halo + kNone * c.noise : c.noise;
 }
 
@@ -205,7 +203,7 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
   reading.line = reading.line || reading.rim;
   if (reading.clipped || reading.rim) return reading;
   const Responses found = search_lanes(c, options.min_dot_snr);
-  // Grain that only the lanes show: a quantiser's too.
+  // Coarse noise that only shows in the lanes is caused by compression too.
   constexpr double kCoarse = 1.5;
   c.compressed = c.compressed || found.scale > kCoarse;
   reading.compressed = c.compressed;
@@ -221,7 +219,7 @@ ColumnReading read_column(const Plane& plane, const Background& background, cons
     start.radius = list[i].radius;
     start.amplitude = std::max(1.0, c.core_mean(list[i].row));
     DotFit fit = fit_dot(c.patch, window, start, {c.noise, left_slope(c, list[i].row)});
-    Verdict verdict = judge(c, fit, window, min_snr, options);
+    Verdict verdict = classify_spot(c, fit, window, min_snr, options);
     if (verdict == Verdict::dot && on_bright_line(c, reading, fit)) {
       reading.clipped = reading.clipped || clips(c, fit);
       verdict = Verdict::nothing;

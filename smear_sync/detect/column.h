@@ -9,19 +9,19 @@
 
 namespace emberlock::smear::detail {
 
-/// What one lamp's column shows, in the coordinates of the plane.
+/// The content of one lamp's column, in the coordinates of the plane.
 struct ColumnReading {
   std::vector<DotFit> dots;  ///< top to bottom
-  bool line = false;         ///< brighter than its neighbours over the full height
-  bool clipped = false;      ///< saturated, or so nearly that a dot has no room
-  bool rim = false;          ///< the line is brighter beside the lamp: of the lamp only its rim stands out
-  bool half_field = false;   ///< a spot that stands in every other row only: interlaced
+  bool line = false;         ///< a line: brighter than its neighbours over the full height
+  bool clipped = false;      ///< saturated, or so close to it that no dot could stand out
+  bool rim = false;         ///< the line is brightest beside the lamp, so only the rim of the lamp stands out
+  bool half_field = false;  ///< a spot in every other row only: an interlaced frame
   std::vector<DotFit>
-      suspects;  ///< spots above the noise that might be dots, but don't look enough like the lamp
-  std::optional<Rows> reflection;  ///< where one of them looks like the lamp, but is wider or as bright
-  bool compressed = false;         ///< gates are a quantiser's
-  double hidden = 0;               ///< fraction of the rows in which a dot would not be seen
-  double line_level = 0;           ///< of the line above its neighbours, samples
+      suspects;  ///< spots above the noise that might be dots, but don't resemble the lamp enough
+  std::optional<Rows> reflection;  ///< a spot that resembles the lamp, but is wider or as bright
+  bool compressed = false;         ///< the thresholds for compressed frames are used
+  double hidden = 0;               ///< share of the rows in which a dot wouldn't be visible
+  double line_level = 0;           ///< brightness of the line above its neighbours, samples
 };
 
 ColumnReading read_column(const Plane& plane, const Background& background, const Lamp& lamp,

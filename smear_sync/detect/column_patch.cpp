@@ -11,10 +11,11 @@
 namespace emberlock::smear::detail {
 namespace {
 
-/// Of the darkest rows, of which most of a comb's column leave a fifth at least.
+/// Level of the darkest rows; in a column with a comb usually at least a fifth of the rows are dark.
 float dark_level(std::span<float> values, double noise) {
   constexpr double kFifth = 0.2;
-  constexpr double kItsSigma = 0.84;  // of normal values: so far below their mean
+  constexpr double kItsSigma =
+      0.84;  // sigmas: the darkest fifth of normal values ends this far below the mean
   const auto fifth =
       values.begin() + static_cast<std::ptrdiff_t>(kFifth * static_cast<double>(values.size()));
   std::nth_element(values.begin(), fifth, values.end());
@@ -30,10 +31,9 @@ float dark_level(std::span<float> values, double noise) {
   return count > 0 ? sum / count : centre;
 }
 
-/// The mean of what lies within four sigma of the column's median, in some rows of a field.
+/// The mean of the values within four sigma of the column's median, in some rows of a field.
 void find_level(const Column& c, Field field, double noise, float* level) {
-  // The level's error is the same in all rows of a column: it moves no dot, and a few rows tell it well
-  // enough.
+  // The level's error is common to all rows of a column, so it doesn't shift a dot, and a few rows suffice.
   constexpr int kEnough = 80;
   const int step = field.step * std::max(1, c.patch.height / (field.step * kEnough));
   const std::vector<float> centres = column_medians(c.patch, field);
@@ -55,15 +55,15 @@ void find_level(const Column& c, Field field, double noise, float* level) {
       level[x] += sum[x] / counts[x];
       continue;
     }
-    // The centre lies on a comb's dots or on a slope. The column's dark rows are its level.
+    // The median lies on a comb's dots or on a slope: use the column's dark rows.
     values.clear();
     for (int y = field.first; y < c.patch.height; y += field.step) values.push_back(c.patch.row(y)[x]);
     level[x] = dark_level(values, noise);
   }
 }
 
-/// Takes each column's level out, even and odd rows apart (interlaced fields differ), lamp and dots ignored.
-/// Marks the rows in which something is brighter than `bright`.
+/// Subtracts each column's level, ignoring lamp and dots. Even and odd rows are treated separately, because
+/// interlaced fields differ. Marks the rows in which something is brighter than `bright`.
 std::vector<char> subtract_levels(Column& c, double noise, double bright) {
   const auto stride = static_cast<std::size_t>(c.patch.stride);
   c.level.assign(2 * stride, 0);
@@ -77,7 +77,7 @@ std::vector<char> subtract_levels(Column& c, double noise, double bright) {
   return marks;
 }
 
-/// Replaces pixels that tower over all their neighbours: a dot of a lamp never falls off that fast.
+/// Replaces pixels much brighter than all their neighbours: a dot's brightness never falls off that fast.
 void mend_hot_pixels(Column& c, double bright, const std::vector<char>& bright_rows) {
   struct Mend {
     int x, y;
@@ -91,8 +91,7 @@ void mend_hot_pixels(Column& c, double bright, const std::vector<char>& bright_r
     const float* row = c.patch.row(y);
     for (int x = 1; x + 1 < c.patch.width; ++x) {
       const float v = row[x];
-      // Bright to the left and right: perhaps a row of a dot that only one field of an interlaced frame
-      // holds.
+      // Bright on the left and right: perhaps a row of a dot in one field of an interlaced frame.
       if (v <= threshold || v < kTowers * std::min(row[x - 1], row[x + 1])) continue;
       std::array<float, 9> around{};
       for (int i = 0; i < 9; ++i)
@@ -112,7 +111,8 @@ struct Ring {
   [[nodiscard]] double mean() const { return count > 0 ? sum / count : 0; }
 };
 
-/// Means of the pixels to the lamp's sides by whole pixels of radius, of those within `clip` of `around`'s.
+/// Means of the pixels on the lamp's sides, by radius in whole pixels; ignores values further than `clip`
+/// from `around`.
 std::vector<Ring> side_rings(const Column& c, int reach, double clip, const std::vector<Ring>* around) {
   std::vector<Ring> rings(static_cast<std::size_t>(reach) + 1);
   const int last = std::min(c.patch.height - 1, static_cast<int>(c.y + 0.65 * reach));
@@ -155,8 +155,8 @@ bool has_halo(const Column& c) {
   return beside.mean() > 3 * c.noise / std::sqrt(std::max(1, beside.count));
 }
 
-/// The lamp's round halo (glare) is the same to the sides, where there is no smear: measured there in rings
-/// and taken out. Beyond the patch's sides it goes on as the power of r with which it falls there.
+/// Measures the lamp's round halo (glare) in rings on its sides, where there is no smear, and subtracts it
+/// everywhere. Beyond the patch's sides it is extrapolated by a power of r.
 void subtract_halo(Column& c) {
   const int reach = static_cast<int>(std::min(c.x, c.patch.width - 1 - c.x));
   if (reach < c.radius + 6 || !has_halo(c)) return;
@@ -169,7 +169,7 @@ void subtract_halo(Column& c) {
   const double near = (c.halo[last / 2] + c.halo[last / 2 + 1]) / 2;
   c.halo_power = far > 0 ? std::clamp(std::log2(std::max(near, far) / far), 0.5, 6.0) : 6;
   c.halo_end = far;
-  // Far out it is less than a tenth of the noise.
+  // Further out the halo is below a tenth of the noise.
   int extent = reach;
   while (extent < c.patch.height && c.halo_at(extent) > 0.1 * c.noise) ++extent;
   std::vector<float> by_radius(static_cast<std::size_t>(std::hypot(extent, c.patch.width)) + 3);
@@ -190,7 +190,7 @@ void subtract_halo(Column& c) {
   }
 }
 
-/// Of the lane's middle around a row, whatever two rows with hot pixels in them say.
+/// Mean of the lane's core around a row, robust against two rows with hot pixels.
 double steady_mean(const Column& c, int row) {
   std::array<float, 5> means{};
   for (int i = 0; i < 5; ++i)
@@ -199,14 +199,15 @@ double steady_mean(const Column& c, int row) {
   return static_cast<double>(median(means));
 }
 
-/// Marks the lamp's disk and, walking away from it, its bloom: rows until the column has come down to its
-/// level, or until it rises again (a dot on the bloom's flank).
+/// Marks the lamp's disk and its bloom as hidden: rows away from the disk until the column has fallen to its
+/// level, or rises again (a dot on the bloom's flank).
 void hide_bloom(Column& c) {
   c.hidden.assign(static_cast<std::size_t>(c.patch.height), 0);
   const double gate = 4 * c.noise / std::sqrt((2.0 * c.core() + 1) * 3);
   const int guard = c.compressed ? 9 : 2;  // a compressed edge rings through its 8 x 8 block
-  constexpr int kQuiet = 8;  // rows at the column's level end a bloom: fewer, and it may just pass through it
-  constexpr int kStillBloom = 3;  // of them
+  constexpr int kQuiet =
+      8;  // rows at the column's level that end a bloom; with fewer it may just cross the level
+  constexpr int kStillBloom = 3;  // of these rows
   for (const int step : {-1, +1}) {
     const int start = static_cast<int>(std::lround(c.y));
     const auto show_back_to = [&](int first, int last) {
@@ -237,7 +238,7 @@ void hide_bloom(Column& c) {
   }
   const int centre = static_cast<int>(std::lround(c.x));
   for (const int parity : {0, 1}) {
-    // `level` was taken out: put it back to see what the sensor saw.
+    // `level` was subtracted: add it to get the sensor's value.
     const float* level = c.level.data() + static_cast<std::ptrdiff_t>(parity) * c.patch.stride;
     const float limit = static_cast<float>(c.saturation) - level[centre];
     for (int row = parity; row < c.patch.height; row += 2) {
@@ -246,9 +247,8 @@ void hide_bloom(Column& c) {
   }
 }
 
-/// Noise in the lamp's own lane, which photon noise on a bright line raises. Dense dots raise the differences
-/// from row to row, glare and lines those from column to column: the smaller of the two holds less of what
-/// isn't noise.
+/// Noise in the lamp's own lane; photon noise raises it on a bright line. Many dots raise the differences
+/// between rows, glare and lines those between columns, so the smaller of the two is closer to the noise.
 double lane_noise(const Column& c, double noise) {
   const int centre = static_cast<int>(std::lround(c.x));
   const int first = std::max(0, centre - c.core());
@@ -264,8 +264,8 @@ double lane_noise(const Column& c, double noise) {
         take(std::abs(below[x] - row[x]), std::abs(row[x + 2] - row[x]));
     }
   };
-  // The median knows the noise to a few percent: less than that is no difference. Where half of the values
-  // are small, it needn't be found.
+  // The median is accurate to a few per cent, so smaller differences don't count. If half of the values are
+  // small, it needn't be computed.
   constexpr double kNoDifference = 1.15;
   const auto usual = static_cast<float>(kNoDifference * noise * std::numbers::sqrt2 / kMadSigma);
   int count = 0;
@@ -322,13 +322,13 @@ double Column::core_mean(int row) const {
 
 Column level_column(const Plane& plane, const Background& background, const Lamp& lamp) {
   constexpr double kQuantiserNoise =
-      1.1;  // grey levels a pixel: JPEG of quality 75 on a dot of a few grey levels
+      1.1;  // grey levels per pixel: JPEG of quality 75 for a dot of a few grey levels
   Column c;
   c.radius = std::max(1.0, lamp.radius);
   c.half_width = static_cast<int>(std::ceil(0.9 * c.radius)) + 2;
   const int reach = (2 * c.half_width + 3) * (Column::kLanes / 2) + c.half_width + 1;
   const int centre = static_cast<int>(std::lround(lamp.x));
-  const int whole = (2 * reach + 1 + 7) / 8 * 8;  // no vector of the columns is cut
+  const int whole = (2 * reach + 1 + 7) / 8 * 8;  // no vector crosses the end of the columns
   c.patch = cut(plane, {centre - reach, centre - reach + whole - 1, 0, plane.size.height - 1});
   c.x = lamp.x - c.patch.x0;
   c.y = lamp.y;
@@ -344,7 +344,7 @@ Column level_column(const Plane& plane, const Background& background, const Lamp
   subtract_halo(c);
   hide_bloom(c);
   c.noise = lane_noise(c, background.noise) * plane.correlation;
-  // A compressor has removed the noise and left its rounding errors, which no flat area shows.
+  // A compressor replaced the noise by rounding errors, which flat areas don't show.
   if (c.compressed)
     c.noise = std::max(c.noise * std::max(1.0, background.grain), kQuantiserNoise / c.sample_level);
   return c;

@@ -3,16 +3,16 @@
 
 #include <fmt/format.h>
 
-#include "smear_sync/detect/judge.h"
-#include "smear_sync/detect/look.h"
+#include "smear_sync/detect/classify.h"
+#include "smear_sync/detect/frame_scan.h"
 
 namespace emberlock::smear {
 
 SmearReading detect(const ImageView& frame, const DetectOptions& options) {
   if (const std::string why = detail::unreadable(frame); !why.empty()) return detail::nothing(why);
   const detail::Plane plane = detail::to_plane(frame);
-  const detail::Look look = detail::whole_look(plane, options);
-  return detail::read_lamps(plane, look.background, look.search, options);
+  const detail::FrameScan scan = detail::scan_frame(plane, options);
+  return detail::read_lamps(plane, scan.background, scan.search, options);
 }
 
 }  // namespace emberlock::smear

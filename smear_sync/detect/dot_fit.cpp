@@ -18,7 +18,7 @@ constexpr int kParameters = NormalSums::kParameters;  // amplitude, level, slope
 using Vector6 = Eigen::Matrix<double, kParameters, 1>;
 using Matrix6 = Eigen::Matrix<double, kParameters, kParameters>;
 
-/// The window's pixels, filled up to whole vectors by some of weight 0.
+/// The window's pixels, padded to whole vectors with weight 0.
 struct Pixels {
   int count = 0;
   std::vector<float> x, y, value, weight;
@@ -79,7 +79,7 @@ Normal linearise(const Pixels& p, const DotFit& f) {
   return n;
 }
 
-/// With what is known of the slope: `stiffness` is (dark noise / slope_sigma)^2.
+/// With the prior of the slope: `stiffness` is (dark noise / slope_sigma)^2.
 Normal linearise(const Pixels& p, const DotFit& f, double stiffness) {
   Normal n = linearise(p, f);
   n.matrix(2, 2) += stiffness;
@@ -99,8 +99,8 @@ DotFit stepped(const DotFit& f, const Vector6& step) {
   return next;
 }
 
-/// Levenberg-Marquardt until less than `still` of chi-square is left to gain; the normal equations near the
-/// end.
+/// Levenberg-Marquardt until the next step would gain less than `still` in chi-square. Returns the normal
+/// equations near the end.
 Normal minimise(const Pixels& p, DotFit& f, const FitNoise& noise, double still) {
   constexpr int kIterations = 12;
   const double variance = noise.dark * noise.dark;
@@ -115,7 +115,7 @@ Normal minimise(const Pixels& p, DotFit& f, const FitNoise& noise, double still)
     if (!step.allFinite()) return normal;
     const double gain = step.dot(normal.right) / variance;
     const DotFit next = stepped(f, step);
-    if (gain < still) {  // so small a step needs no proof
+    if (gain < still) {  // so small a step needn't be checked
       f = next;
       break;
     }
@@ -138,12 +138,12 @@ std::vector<float> disk_of(const Pixels& p, const DotFit& f) {
   return disk;
 }
 
-/// What the model's level and slope leave of a pixel.
+/// A pixel minus the model's level and slope.
 float above_level(const Pixels& p, const DiskModel& m, std::size_t i) {
   return p.value[i] - m.level - m.slope * (p.y[i] - m.y);
 }
 
-/// Variance a sample of signal: the slope of squared residuals on the disk, where it stands out of its own
+/// Variance per sample of signal: the regression of squared residuals on the disk, if it exceeds its own
 /// error.
 double photon_gain(const Pixels& p, const DotFit& f, const std::vector<float>& disk, double dark) {
   const DiskModel model = model_of(f);
@@ -169,10 +169,10 @@ DotFit fit_dot(const Patch& patch, const FitWindow& window, DotFit f, const FitN
   if (window.right < window.left || window.bottom < window.top) return f;
   Pixels pixels = gather(patch, window);
   if (pixels.count < kFewest) return f;
-  // Half a sigma is near enough to tell photon noise; in the end all parameters are within a thirtieth of
-  // theirs.
+  // Half a sigma is accurate enough to estimate photon noise; in the end all parameters are within a
+  // thirtieth of theirs.
   constexpr double kNear = 0.25;
-  constexpr double kStill = 1e-3;  // floats know chi-square to 1e-4
+  constexpr double kStill = 1e-3;  // chi-square in floats is accurate to 1e-4
   minimise(pixels, f, noise, kNear);
   if (f.amplitude > 0) {
     const std::vector<float> disk = disk_of(pixels, f);

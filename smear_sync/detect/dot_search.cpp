@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kOwn = Column::kLanes / 2;
 
-/// The disk's marginal stands for the disk: exact enough to find a dot, which is then fitted in two
+/// Approximates the disk by its marginal profile: accurate enough to find a dot, which is then fitted in two
 /// dimensions.
 double profile(double radius, double d) {
   constexpr double kBlurred = 0.6;
@@ -22,12 +22,13 @@ double profile(double radius, double d) {
   return std::max(half, kBlurred / (1 + std::exp((std::abs(d) - radius) / DotFit::kEdge)));
 }
 
-/// A lane summed over its columns, weighted by the lamp's profile; the sum of the squared weights in `power`.
+/// Sums a lane over its columns, weighted by the lamp's profile; `power` receives the sum of the squared
+/// weights.
 std::vector<float> collapse(const Column& c, int lane, double radius, double& power) {
   const int height = c.patch.height;
   const int centre = c.lane_centre(lane);
   const double shift = lane == kOwn ? c.x - centre : 0;
-  // The lane of a lamp at the image's edge is cut by it.
+  // The lane of a lamp at the image's edge is cut off there.
   const int first = std::max(0, centre - c.half_width);
   const int last = std::min(c.patch.width - 1, centre + c.half_width);
   std::vector<float> across(static_cast<std::size_t>(last - first + 8) / 8 * 8);
@@ -44,11 +45,11 @@ std::vector<float> collapse(const Column& c, int lane, double radius, double& po
 }
 
 enum class RowsWanted {
-  all,    ///< where part of the profile is hidden, by its visible rows
-  whole,  ///< only where the whole profile lies in the frame; 0 elsewhere
+  all,    ///< where a part of the profile is hidden, its visible rows are used
+  whole,  ///< only where the whole profile is in the frame; 0 elsewhere
 };
 
-/// For each row the amplitude of the profile on a free level, over its noise: a filter of mean zero.
+/// For each row the amplitude of the profile above a free level, divided by its noise: a zero-mean filter.
 std::vector<float> response(const Column& c, int lane, double radius, RowsWanted rows) {
   const int height = c.patch.height;
   double across_power = 0;
@@ -96,7 +97,7 @@ std::vector<float> response(const Column& c, int lane, double radius, RowsWanted
   };
   refilter(0, reach - 1);
   refilter(std::max(reach, height - reach), height - 1);
-  int done = reach;  // rows from here on aren't refiltered yet
+  int done = reach;  // rows from here on aren't filtered again yet
   for (int y = 0; y < height; ++y) {
     if (c.visible(y)) continue;
     refilter(std::max(done, y - reach), y + reach);
@@ -105,9 +106,9 @@ std::vector<float> response(const Column& c, int lane, double radius, RowsWanted
   return z;
 }
 
-/// How far noise, grain and hot pixels take the response, from the lanes beside the lamp's own.
+/// The response's range due to noise, grain and hot pixels, from the lanes beside the lamp's own.
 void compare_lanes(const Column& c, double radius, Responses& r) {
-  constexpr int kApart = 5;  // rows: neighbours share theirs, one in a few tells the scale
+  constexpr int kApart = 5;  // rows: neighbours are correlated, so every fifth suffices
   std::vector<float> sample;
   sample.reserve(c.hidden.size());
   std::vector<double> extremes;
@@ -125,7 +126,7 @@ void compare_lanes(const Column& c, double radius, Responses& r) {
     extremes.push_back(static_cast<double>(largest(z.data(), c.patch.height)));
   }
   if (!sample.empty()) r.scale = std::max(1.0, robust_scale(sample));
-  // Far more in one lane than in the other is another lamp's dot or hot pixels.
+  // If one lane has much more than the other, it contains another lamp's dot or hot pixels.
   constexpr double kAlike = 2;
   if (extremes.size() == 2)
     r.extreme = std::min(std::max(extremes[0], extremes[1]), kAlike * std::min(extremes[0], extremes[1]));
@@ -135,7 +136,7 @@ void compare_lanes(const Column& c, double radius, Responses& r) {
 
 Responses search_lanes(const Column& c, double min_snr) {
   Responses r;
-  constexpr double kPart = 0.55;  // of the lamp's radius: a dot may be smaller, where the lamp is overexposed
+  constexpr double kPart = 0.55;  // of the lamp's radius: the dots of an overexposed lamp are smaller
   const double radius = std::max(1.0, c.radius);
   const double small = std::max(1.0, kPart * c.radius);
   compare_lanes(c, radius, r);
@@ -156,7 +157,7 @@ Responses search_lanes(const Column& c, double min_snr) {
       top = best(o) < z || (best(o) == z && o >= y);
     if (!top) continue;
     double peak = y;
-    if (y > 0 && y + 1 < c.patch.height) {  // of the parabola through three rows
+    if (y > 0 && y + 1 < c.patch.height) {  // maximum of the parabola through three rows
       const float before = best(y - 1);
       const float after = best(y + 1);
       const float bend = 2 * z - before - after;

@@ -7,21 +7,21 @@
 
 namespace emberlock::smear::detail {
 
-/// A row of the lamp's lane that looks like the middle of a dot.
+/// A row of the lamp's lane that may be the middle of a dot.
 struct Candidate {
   int row = 0;
-  double y = 0;  ///< of the response's peak, near that row
+  double y = 0;  ///< peak of the response, near that row
   double radius = 0;
-  float z = 0;  ///< matched-filter response over its noise
+  float z = 0;  ///< matched-filter response divided by its noise
 };
 
 struct Responses {
   std::vector<Candidate> candidates;  ///< top to bottom
-  double scale = 1;                   ///< of the empty lanes' responses: 1 when noise is white
-  double extreme = 0;                 ///< of the empty lanes' responses: what is no dot reaches so high
+  double scale = 1;                   ///< standard deviation of the empty lanes' responses; 1 for white noise
+  double extreme = 0;                 ///< largest response in the empty lanes: the level that noise reaches
 };
 
-/// Matched filter along the lamp's lane, and along the empty ones beside it for comparison.
+/// Applies the matched filter along the lamp's lane, and along the empty lanes beside it for comparison.
 Responses search_lanes(const Column& column, double min_snr);
 
 }  // namespace emberlock::smear::detail

@@ -20,9 +20,10 @@ struct EdgeNormal {
   double squares = 0;
 };
 
-/// What a free parameter moves of the model's, both by as much; the amplitude is stepped as a logarithm.
+/// The model parameters changed by a free parameter, both by the same amount. The amplitude is stepped on a
+/// logarithmic scale.
 struct EdgeDirection {
-  int first, second;  ///< the same, where it is one
+  int first, second;  ///< equal if there is only one
   double factor = 1;
 };
 using EdgeDirections = std::vector<EdgeDirection>;
@@ -207,7 +208,7 @@ EdgeFit fit_edge(const EdgeSamples& samples, EdgeFit f, const std::vector<EdgeFr
   const EdgeMatrix covariance = stiff.inverse() * std::pow(std::max(1.0, f.misfit), 2);
   Eigen::Index column = 0;
   for (const EdgeFree what : free) {
-    // What the samples don't tell is anybody's guess, not certain.
+    // Parameters that the samples don't determine get a large error, not a small one.
     const double variance = covariance(column, column);
     const double sigma = variance > 0 ? std::sqrt(variance) : std::numeric_limits<double>::infinity();
     if (what == EdgeFree::across || what == EdgeFree::radius) f.across_sigma = sigma;
@@ -220,15 +221,14 @@ EdgeFit fit_edge(const EdgeSamples& samples, EdgeFit f, const std::vector<EdgeFr
 double residual_gain(const EdgeSamples& samples, const EdgeFit& f, double dark) {
   std::vector<float> signal(samples.value.size());
   edge_values(f, samples, signal.data());
-  // Weighted by 1 / variance^2 of the squared residuals, so that the brightest don't speak alone.
+  // Squared residuals weighted by 1 / variance^2, so that the brightest samples don't dominate.
   double excess = 0;
   double power = 0;
   for (std::size_t i = 0; i < static_cast<std::size_t>(samples.count); ++i) {
     const double s = std::max(0.0, static_cast<double>(signal[i]));
     const double residual = static_cast<double>(samples.value[i] - signal[i]);
     const double weight = std::pow(static_cast<double>(samples.weight[i]), 2);
-    const auto one =
-        1 / static_cast<double>(samples.pixels[i]);  // a mean's variance is that of one over their number
+    const auto one = 1 / static_cast<double>(samples.pixels[i]);  // variance of a mean
     excess += weight * s * one * (residual * residual - dark * dark * one);
     power += weight * s * s * one * one;
   }

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
 
-#include "smear_sync/detect/clones.h"
 #include "smear_sync/detect/edge_fit.h"
+#include "smear_sync/detect/target_clones.h"
 #include "smear_sync/detect/vec8.h"
 
 namespace emberlock::smear::detail {
 namespace {
 
-/// The model in floats.
+/// The model's parameters as floats.
 struct EdgeConstants {
   float amplitude, level, x, y, across, along, inverse_blur, glare, inverse_spread;  // of spread^2
 };
@@ -27,7 +27,7 @@ EdgeConstants constants_of(const EdgeFit& f) {
 struct EdgePoint {
   Vec8 dx, dy, r2, r, cos2, t, q, density, glare;  // density: of the normal distribution at t
 };
-/// erfc as Abramowitz and Stegun 7.1.26, to 1.5e-7.
+/// erfc by Abramowitz and Stegun 7.1.26, to 1.5e-7.
 [[gnu::always_inline]] inline EdgePoint edge_point(const EdgeConstants& m, Vec8 x, Vec8 y) {
   EdgePoint p{};
   p.dx = x - m.x;
@@ -51,7 +51,7 @@ struct EdgePoint {
   return p;
 }
 
-/// The slopes by the first kCount parameters, products and all.
+/// The products of the derivatives by the first kCount parameters.
 template <int kCount>
 [[gnu::always_inline]] inline EdgeSums edge_sums_of(const EdgeConstants& m, const EdgeSamples& samples) {
   constexpr int kProducts = kCount * (kCount + 1) / 2;
@@ -97,14 +97,14 @@ template <int kCount>
 
 }  // namespace
 
-EMBERLOCK_VECTOR_CLONES EdgeSums edge_sums(const EdgeFit& f, const EdgeSamples& samples, int count) {
+EMBERLOCK_TARGET_CLONES EdgeSums edge_sums(const EdgeFit& f, const EdgeSamples& samples, int count) {
   const EdgeConstants m = constants_of(f);
   if (count <= EdgeSums::kWithoutBlur) return edge_sums_of<EdgeSums::kWithoutBlur>(m, samples);
   if (count <= EdgeSums::kWithoutGlare) return edge_sums_of<EdgeSums::kWithoutGlare>(m, samples);
   return edge_sums_of<EdgeSums::kParameters>(m, samples);
 }
 
-EMBERLOCK_VECTOR_CLONES void edge_values(const EdgeFit& f, const EdgeSamples& samples, float* out) {
+EMBERLOCK_TARGET_CLONES void edge_values(const EdgeFit& f, const EdgeSamples& samples, float* out) {
   const EdgeConstants m = constants_of(f);
   const int whole = static_cast<int>(samples.value.size());
   for (int i = 0; i < whole; i += 8) {

@@ -10,12 +10,13 @@
 namespace emberlock::smear {
 namespace {
 
-constexpr double kSamePlace = 0.8;  // rows: what doesn't move stays within
-// Spots of a frame: hot pixels and reflections are fewer. The dots of a comb at a multiple of the frame rate
-// stand.
+constexpr double kSamePlace = 0.8;  // rows: the range of a spot that doesn't move
+// Limit of standing spots per frame: there are few hot pixels and reflections. More are the dots of a comb at
+// a multiple of the frame rate, which stand still too.
 constexpr std::size_t kStandingComb = 3;
-// Unsaturated readings of a lamp that else is saturated, below which they count for nothing: a flash that the
-// transfer cut in two is as dim, and its dot, a row from the lamp, bends it by most of a row.
+// Minimum number of unsaturated readings of an otherwise saturated lamp. Fewer are ignored: a flash cut in
+// two by the transfer is that dim too, and its dot, a row from the lamp, distorts the lamp's outline by most
+// of a row.
 constexpr std::ptrdiff_t kFewestClear = 3;
 
 double middle(std::vector<double> values) {
@@ -23,7 +24,7 @@ double middle(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-/// Everything in the lamp's column of a frame that is a dot or might be one.
+/// All spots in the lamp's column that are dots or might be.
 std::vector<DotReading> all_spots(const SmearReading& reading) {
   std::vector<DotReading> spots = reading.dots;
   spots.insert(spots.end(), reading.spots.begin(), reading.spots.end());
@@ -31,7 +32,7 @@ std::vector<DotReading> all_spots(const SmearReading& reading) {
   return spots;
 }
 
-/// The rows at which something stands in most of the frames that show anything.
+/// The rows at which a spot is present in most frames that show any.
 std::vector<double> standing_rows(std::span<const SmearReading> film) {
   std::vector<double> rows;
   int frames = 0;
@@ -58,11 +59,11 @@ bool among(const std::vector<double>& rows, double row) {
   return from != rows.end() && *from - row < kSamePlace;
 }
 
-/// The lamps whose dots fall into the columns of the reading's own, top to bottom.
+/// The lamps whose dots fall into the columns of the reading's own lamp, top to bottom.
 std::vector<LampReading> lamps_of_column(const SmearReading& reading) {
   std::vector<LampReading> lamps;
-  const double reach =
-      std::max(0.6, 0.15 * reading.lamp->radius);  // about where the detector takes dots from
+  const double reach = std::max(
+      0.6, 0.15 * reading.lamp->radius);  // approximately the range in which the detector accepts dots
   for (const LampReading& lamp : reading.lamps) {
     if (std::abs(lamp.x - reading.lamp->x) < reach) lamps.push_back(lamp);
   }
@@ -71,8 +72,8 @@ std::vector<LampReading> lamps_of_column(const SmearReading& reading) {
   return lamps;
 }
 
-/// The one dot of the reading's lamp among the spots that move; nothing when they aren't one for each lamp,
-/// moved alike.
+/// The dot of the reading's own lamp among the moving spots; nullopt if there isn't exactly one for each
+/// lamp, with equal motion.
 std::optional<DotReading> own_dot(const SmearReading& reading, const std::vector<DotReading>& moving) {
   const std::vector<LampReading> lamps = lamps_of_column(reading);
   if (moving.size() != lamps.size()) return std::nullopt;
@@ -167,7 +168,7 @@ std::vector<SmearReading> settle(std::span<const SmearReading> film, Rows least_
   const bool moved = Rows(last - first) >= least_travel;
   for (std::size_t i = 0; i < settled.size(); ++i) {
     SmearReading& reading = settled[i];
-    // A dot that stands while another spot walks is none either.
+    // A dot that stands still while another spot moves isn't a dot.
     const bool standing_dot =
         moved && reading.state == SmearState::dot && among(standing, reading.dots[0].y.value());
     const bool open =

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "smear_sync/detect/follow.h"
 
-#include "smear_sync/detect/judge.h"
-#include "smear_sync/detect/look.h"
+#include "smear_sync/detect/classify.h"
+#include "smear_sync/detect/frame_scan.h"
 
 namespace emberlock::smear {
 namespace {
@@ -15,7 +15,7 @@ bool shows_dots(const SmearReading& reading) {
 
 struct FollowingDetector::Known {
   ImageLayout layout;
-  detail::Look look;
+  detail::FrameScan scan;
 };
 
 FollowingDetector::FollowingDetector(const DetectOptions& options) : options_(options) {}
@@ -29,20 +29,20 @@ SmearReading FollowingDetector::read(const ImageView& frame) {
     return detail::nothing(why);
   }
   const detail::Plane plane = detail::to_plane(frame);
-  constexpr unsigned kWholeLook = 128;  // frames: a few seconds
+  constexpr unsigned kFullScan = 128;  // frames: a few seconds
   const unsigned turn = turn_++;
-  if (known_ && known_->layout == frame.layout && turn % kWholeLook != 0) {
-    if (std::optional<detail::Look> look = detail::look_again(plane, known_->look, turn, options_)) {
-      SmearReading reading = detail::read_lamps(plane, look->background, look->search, options_);
-      known_->look = std::move(*look);
-      known_->look.clear_of_dots |= shows_dots(reading);
+  if (known_ && known_->layout == frame.layout && turn % kFullScan != 0) {
+    if (std::optional<detail::FrameScan> scan = detail::rescan(plane, known_->scan, turn, options_)) {
+      SmearReading reading = detail::read_lamps(plane, scan->background, scan->search, options_);
+      known_->scan = std::move(*scan);
+      known_->scan.clear_of_dots |= shows_dots(reading);
       return reading;
     }
   }
-  detail::Look look = detail::whole_look(plane, options_);
-  SmearReading reading = detail::read_lamps(plane, look.background, look.search, options_);
-  look.clear_of_dots = shows_dots(reading);
-  known_ = std::make_unique<Known>(Known{frame.layout, std::move(look)});
+  detail::FrameScan scan = detail::scan_frame(plane, options_);
+  SmearReading reading = detail::read_lamps(plane, scan.background, scan.search, options_);
+  scan.clear_of_dots = shows_dots(reading);
+  known_ = std::make_unique<Known>(Known{frame.layout, std::move(scan)});
   return reading;
 }
 

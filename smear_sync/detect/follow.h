@@ -8,15 +8,14 @@
 
 namespace emberlock::smear {
 
-/// Reads the frames of one camera in turn, in half of detect()'s time: once a lamp is found, only its columns
-/// and a sparse sample of the rest are read. All of the frame is looked at again whenever anything but the
+/// Reads the frames of one camera in sequence, in half of detect()'s time: once a lamp is found, only its
+/// columns and a sparse sample of the rest are read. The whole frame is scanned again when anything but the
 /// dots has changed (the lamp, its surroundings, the noise, the format), when a spot is as bright as a lamp,
-/// and every 128th frame. So a new lamp elsewhere is noticed at once when it is 16 rows tall, within 16
-/// frames when it is smaller. A saturated lamp that was measured while its dots stood elsewhere, and looks
-/// as it did, is not measured again: its readings then share one error.
+/// and every 128th frame. So a new lamp elsewhere is noticed at once if it is 16 rows tall, within 16 frames
+/// if it is smaller. A saturated lamp that was measured clear of dots and looks the same is not measured
+/// again; its readings then have a common error.
 ///
-/// The result depends on the frames since construction and on nothing else. One for each camera; not for two
-/// threads at once.
+/// The result depends only on the frames since construction. Use one object per camera. Not thread-safe.
 class FollowingDetector {
  public:
   explicit FollowingDetector(const DetectOptions& options = {});
@@ -31,7 +30,7 @@ class FollowingDetector {
  private:
   struct Known;
   DetectOptions options_;
-  std::unique_ptr<Known> known_;  ///< of the frame before
+  std::unique_ptr<Known> known_;  ///< from the previous frame
   unsigned turn_ = 0;
 };
 

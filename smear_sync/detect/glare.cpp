@@ -8,11 +8,11 @@
 namespace emberlock::smear::detail {
 namespace {
 
-constexpr int kGap = 2;      // columns beside the outline that its blur still reaches
+constexpr int kGap = 2;      // columns beside the outline affected by its blur
 constexpr int kFlank = 8;    // columns of glare on each side
 constexpr int kBeyond = 12;  // rows above and below the saturated area
 
-/// The flanks' brightness above the background, summed over columns, from row `first` on.
+/// The brightness of both flanks above the background, summed over columns, from row `first` on.
 struct Profile {
   int first = 0;
   std::vector<double> v;
@@ -57,8 +57,8 @@ std::optional<double> value(const Profile& p, double y) {
   return p.v[k] + fraction * (p.v[k + 1] - p.v[k]);
 }
 
-/// Whether P and its mirror image about c differ by no more than noise and a fifth of their own height: what
-/// is brighter on one side is no glare of a lamp alone.
+/// Whether P and its mirror image about c differ by no more than noise and a fifth of their height. A larger
+/// excess on one side isn't the lamp's glare alone.
 bool symmetric(const Profile& p, double c) {
   double peak = 0;
   for (const double v : p.v) peak = std::max(peak, v);
@@ -85,7 +85,7 @@ std::optional<GlareCentre> glare_centre(const Plane& plane, const Background& ba
     squares += kernel * kernel;
   }
   const double noise = p.noise * std::sqrt(squares);
-  // The asymmetry falls through zero at the centre of a bright band; elsewhere in the range it need not.
+  // The asymmetry crosses zero at the centre of a bright band; elsewhere in the range it may not.
   double low = lamp.top;
   double high = lamp.bottom;
   if (asymmetry(p, low, s) < 5 * noise || asymmetry(p, high, s) > -5 * noise) return std::nullopt;

@@ -13,9 +13,9 @@ struct GlareCentre {
   double sigma = 0;  ///< standard error
 };
 
-/// The row about which the glare to the left and right of a lamp is symmetric. Charge that overflows runs
-/// along the lamp's own columns, so it moves the outline of a saturated lamp but not the glare beside it.
-/// Nothing when there is too little glare to tell. `lamp` is the saturated area's extent.
+/// The row about which the glare to the left and right of a lamp is symmetric. Overflowing charge runs along
+/// the lamp's own columns, so it shifts the outline of a saturated lamp but not the glare beside it. nullopt
+/// if there is too little glare. `lamp` is the extent of the saturated area.
 std::optional<GlareCentre> glare_centre(const Plane& plane, const Background& background, const Extent& lamp);
 
 }  // namespace emberlock::smear::detail

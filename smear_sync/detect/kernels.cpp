@@ -6,14 +6,14 @@
 #include <cmath>
 #include <cstdint>
 
-#include "smear_sync/detect/clones.h"
+#include "smear_sync/detect/target_clones.h"
 #include "smear_sync/detect/vec8.h"
 
 namespace emberlock::smear::detail {
 namespace {
 
-/// Adds the normal equations' products, and the right side's, of parameters [kFirst, kEnd) with all before
-/// them.
+/// Adds the products of the normal equations and of the right side for parameters [kFirst, kEnd) with all
+/// earlier ones.
 template <int kFirst, int kEnd>
 [[gnu::always_inline]] inline void add_products(const Vec8 (*j)[NormalSums::kParameters],
                                                 const Vec8* residual, const float* weights, int vectors,
@@ -42,7 +42,7 @@ template <int kFirst, int kEnd>
 
 }  // namespace
 
-EMBERLOCK_VECTOR_CLONES void subtract_rows(float* __restrict rows, std::ptrdiff_t stride, int height,
+EMBERLOCK_TARGET_CLONES void subtract_rows(float* __restrict rows, std::ptrdiff_t stride, int height,
                                            const float* __restrict even, const float* __restrict odd,
                                            int count, float limit, char* __restrict bright) {
   for (int y = 0; y < height; ++y, rows += stride) {
@@ -60,7 +60,7 @@ EMBERLOCK_VECTOR_CLONES void subtract_rows(float* __restrict rows, std::ptrdiff_
   }
 }
 
-EMBERLOCK_VECTOR_CLONES void add_near(const float* __restrict row, const float* __restrict centre,
+EMBERLOCK_TARGET_CLONES void add_near(const float* __restrict row, const float* __restrict centre,
                                       float reach, int count, float* __restrict sum, float* __restrict counts,
                                       float* __restrict darker) {
   for (int x = 0; x < count; ++x) {
@@ -72,7 +72,7 @@ EMBERLOCK_VECTOR_CLONES void add_near(const float* __restrict row, const float* 
   }
 }
 
-EMBERLOCK_VECTOR_CLONES float largest(const float* v, int count) {
+EMBERLOCK_TARGET_CLONES float largest(const float* v, int count) {
   Vec8 top{};
   int i = 0;
   for (; i + 8 <= count; i += 8) {
@@ -85,7 +85,7 @@ EMBERLOCK_VECTOR_CLONES float largest(const float* v, int count) {
   return most;
 }
 
-EMBERLOCK_VECTOR_CLONES void median_of_three(const float* a, const float* b, const float* c, int count,
+EMBERLOCK_TARGET_CLONES void median_of_three(const float* a, const float* b, const float* c, int count,
                                              float* out) {
   for (int x = 0; x < count; x += 8) {
     const Vec8 first = load(a + x);
@@ -98,7 +98,7 @@ EMBERLOCK_VECTOR_CLONES void median_of_three(const float* a, const float* b, con
   }
 }
 
-EMBERLOCK_VECTOR_CLONES void weighted_rows(const float* __restrict rows, std::ptrdiff_t stride, int height,
+EMBERLOCK_TARGET_CLONES void weighted_rows(const float* __restrict rows, std::ptrdiff_t stride, int height,
                                            const float* __restrict weights, int count,
                                            float* __restrict out) {
   constexpr int kBlock = 8;
@@ -115,7 +115,7 @@ EMBERLOCK_VECTOR_CLONES void weighted_rows(const float* __restrict rows, std::pt
   }
 }
 
-EMBERLOCK_VECTOR_CLONES void filter_rows(const float* __restrict v, int height,
+EMBERLOCK_TARGET_CLONES void filter_rows(const float* __restrict v, int height,
                                          const float* __restrict kernel, int reach, float* __restrict out) {
   constexpr int kBlock = 32;
   int y = reach;
@@ -134,12 +134,12 @@ EMBERLOCK_VECTOR_CLONES void filter_rows(const float* __restrict v, int height,
   }
 }
 
-EMBERLOCK_VECTOR_CLONES NormalSums normal_sums(const DiskModel& m, const PixelSpan& pixels) {
+EMBERLOCK_TARGET_CLONES NormalSums normal_sums(const DiskModel& m, const PixelSpan& pixels) {
   constexpr int kParameters = NormalSums::kParameters;
   constexpr int kProducts = NormalSums::kProducts;
   constexpr int kBlock = 32;
   Vec8 sums[NormalSums::kSums] = {};  // NOLINT(*-avoid-c-arrays)
-  // What is summed of a block's pixels, then the sums: all at once they are more than there are registers.
+  // The values of a block of pixels first, then the sums: together they need too many registers.
   Vec8 j[kBlock][kParameters];  // NOLINT(*-avoid-c-arrays)
   Vec8 residual[kBlock];        // NOLINT(*-avoid-c-arrays)
   for (int block = 0; block < pixels.count; block += 8 * kBlock) {
@@ -173,7 +173,7 @@ EMBERLOCK_VECTOR_CLONES NormalSums normal_sums(const DiskModel& m, const PixelSp
   return result;
 }
 
-EMBERLOCK_VECTOR_CLONES void disk_at(const DiskModel& m, const PixelSpan& pixels, float* __restrict out) {
+EMBERLOCK_TARGET_CLONES void disk_at(const DiskModel& m, const PixelSpan& pixels, float* __restrict out) {
   for (int i = 0; i < pixels.count; i += 8) {
     const Vec8 dx = load(pixels.x + i) - m.x;
     const Vec8 dy = load(pixels.y + i) - m.y;

@@ -12,9 +12,9 @@
 namespace emberlock::smear::detail {
 namespace {
 
-constexpr double kLow = 0.15;  // of the peak: where a lamp's outline ends and its halo begins
+constexpr double kLow = 0.15;  // of the peak: the border between the lamp's outline and its halo
 constexpr double kHalf = 0.5;  // of the peak: its disk
-constexpr int kAside = 3;      // columns beside a bright area that its blur still reaches
+constexpr int kAside = 3;      // columns beside a bright area affected by its blur
 
 struct Blob {
   std::vector<int> pixels;  // row by row: y * patch.stride + x
@@ -27,7 +27,7 @@ std::vector<Blob> blobs(const Patch& patch, float threshold) {
   std::vector<char> seen(patch.size());
   std::vector<int> stack;
   for (int start = 0; start < static_cast<int>(patch.size()); ++start) {
-    // The padding is zero and stays below.
+    // The padding is zero, so it is below the threshold.
     if (seen[static_cast<std::size_t>(start)] != 0 || patch.v[static_cast<std::size_t>(start)] <= threshold)
       continue;
     Blob blob{.pixels = {}, .left = patch.width, .right = -1, .top = patch.height, .bottom = -1};
@@ -58,7 +58,7 @@ std::vector<Blob> blobs(const Patch& patch, float threshold) {
   return found;
 }
 
-/// The blob's n-th brightest value: a peak that a few hot pixels can't set.
+/// The blob's n-th brightest value: a peak that a few hot pixels don't affect.
 float robust_peak(const Patch& patch, const Blob& blob, std::size_t n) {
   std::vector<float> values;
   values.reserve(blob.pixels.size());
@@ -69,8 +69,8 @@ float robust_peak(const Patch& patch, const Blob& blob, std::size_t n) {
   return values[n];
 }
 
-/// Where the outline at `level` crosses the pixel grid inside the blob's box, to a fraction of a pixel.
-/// Crossings at the image's edge don't exist, so a cut disk just has fewer.
+/// The points where the outline at `level` crosses the pixel grid within the blob's box, with subpixel
+/// accuracy. A disk cut by the image's edge has fewer points.
 std::vector<Point> outline(const Patch& patch, const Blob& blob, float level) {
   std::vector<Point> points;
   const auto crossing = [level](float a, float b) { return static_cast<double>((level - a) / (b - a)); };
@@ -92,8 +92,8 @@ std::vector<Point> outline(const Patch& patch, const Blob& blob, float level) {
   return points;
 }
 
-/// Centroid with weights that rise from 0 at `low` to 1 at `high`: for high at the peak the ordinary centroid
-/// of an unsaturated lamp, for high near the outline the centre of a clipped one's area.
+/// Centroid with weights that rise from 0 at `low` to 1 at `high`. With `high` at the peak it is the usual
+/// centroid of an unsaturated lamp; with `high` near the outline, the centre of a clipped lamp's area.
 Point centroid(const Patch& patch, const Blob& blob, double low, double high) {
   double sum = 0;
   double sx = 0;
@@ -109,7 +109,7 @@ Point centroid(const Patch& patch, const Blob& blob, double low, double high) {
   return {sx / sum, sy / sum};
 }
 
-/// A lamp's disk is bright all over; an outline with gaps and holes inside is something else's.
+/// Whether the disk is bright everywhere. An outline with gaps and holes inside isn't a lamp's.
 bool solid(const Patch& patch, const Circle& circle, double level) {
   int inside = 0;
   int bright = 0;
@@ -128,9 +128,10 @@ bool solid(const Patch& patch, const Circle& circle, double level) {
   return bright >= 0.85 * inside;
 }
 
-/// What overflows up and down a saturated lamp's columns draws its outline out into a capsule, unevenly if it
-/// likes. The glare beside the lamp doesn't move. A source whose columns are bright over their full height
-/// shines steadily: its glare is that of a scene, and no phase hangs on its row.
+/// Determines a saturated lamp's row from its glare. Charge that overflows along the lamp's columns stretches
+/// the outline into a capsule, often asymmetrically, but doesn't move the glare beside the lamp. Not for a
+/// source whose columns are bright over their full height: it shines steadily, its surroundings are lit by
+/// the scene, and its row isn't needed for a phase.
 void place_by_glare(const Plane& plane, const Background& background, const Patch& patch, const Blob& blob,
                     double& y, double& sigma) {
   if (blob.bottom - blob.top <= blob.right - blob.left + 1) return;
@@ -168,13 +169,13 @@ Lamp measure(const Plane& plane, const Background& background, const Patch& patc
     lamp.radius = circle->radius;
     lamp.sigma = circle->sigma;
   } else if (lamp.saturated) {
-    // No disk (a planet's crescent, a filament): the centre of its area inside the outline.
+    // Not a disk (a planet's crescent, a filament): use the centroid of its area.
     centre = centroid(patch, blob, kLow * peak / 3, kLow * peak * 5 / 3);
     lamp.sigma = 0.05 * lamp.radius;
   } else {
     const double low = std::max(0.02 * peak, 2 * background.noise);
     centre = centroid(patch, blob, low, peak * 1.5);
-    // noise * sqrt(sum of dy^2) / flux is about half of noise / peak, whatever the radius.
+    // noise * sqrt(sum of dy^2) / flux is about half of noise / peak, for any radius.
     lamp.sigma = std::hypot(0.01, background.noise / peak * 0.6);
   }
   const auto flash = [&] {
@@ -193,8 +194,8 @@ Lamp measure(const Plane& plane, const Background& background, const Patch& patc
   return lamp;
 }
 
-/// The area's columns, from some rows above its brightest to some below, each column's own level taken out,
-/// so that a lamp on its own bright line still stands alone. Grows until its first and last row are dark.
+/// The area's columns, from some rows above it to some below, minus each column's own level, so that a lamp
+/// on its own bright line stands alone. Grows until its first and last row are dark.
 Patch level_area(const Plane& plane, const Extent& area, const std::vector<float>& level) {
   constexpr int kMargin = 12;
   Extent e{area.left - kAside, area.right + kAside, area.top - kMargin, area.bottom + kMargin};
@@ -224,19 +225,19 @@ Patch level_area(const Plane& plane, const Extent& area, const std::vector<float
 }  // namespace
 
 double lamp_gate(const Background& background, const DetectOptions& options) {
-  // In a frame of little noise less contrast suffices, in one of much noise more is needed.
+  // A frame with little noise needs less contrast, one with much noise more.
   return std::max(std::min(options.min_lamp_contrast * background.saturation, 400 * background.noise),
                   15 * background.noise);
 }
 
-bool LampGlance::same_as(const LampGlance& other) const {
+bool LampMoments::same_as(const LampMoments& other) const {
   constexpr double kSameMass = 0.02;
   constexpr double kSamePlace = 0.05;  // pixels
   return std::abs(mass - other.mass) < kSameMass * other.mass && std::abs(x - other.x) < kSamePlace &&
          std::abs(y - other.y) < kSamePlace;
 }
 
-LampGlance glance_at(const Plane& plane, const Background& background, const Lamp& lamp) {
+LampMoments moments_at(const Plane& plane, const Background& background, const Lamp& lamp) {
   constexpr double kAround = 3;  // pixels
   const auto near = [&](double centre, double side) {
     return static_cast<int>(std::lround(centre + side * (lamp.radius + kAround)));
@@ -299,7 +300,7 @@ LampSearch find_lamps(const Plane& plane, const Background& background, const Br
     for (const Blob& blob : blobs(patch, static_cast<float>(kLow) * top)) {
       if (static_cast<double>(blob.pixels.size()) < min_area) continue;
       const double peak = static_cast<double>(robust_peak(patch, blob, 5));
-      // On a bright line only the headroom above the line is left for the lamp.
+      // On a bright line the lamp has only the headroom above the line.
       if (peak < (lit >= 3 ? 0.5 : 1) * gate || blob.right - blob.left < 2 || blob.bottom - blob.top < 2)
         continue;
       const Lamp lamp = measure(plane, background, patch, level, blob, peak);
@@ -317,8 +318,8 @@ LampSearch find_lamps(const Plane& plane, const Background& background, const Br
   if (!search.lamps.empty()) {
     const Lamp first = search.lamps.front();
     std::erase_if(search.lamps, [&](const Lamp& l) {
-      // A dot is never as bright as its lamp. So a small spot as bright as the largest one, in its column, is
-      // kept: that may be the lamp, and the large one its reflection.
+      // A dot is never as bright as its lamp. So a small spot in the column of the largest one and as bright
+      // is kept: it may be the lamp, and the large one its reflection.
       const bool source = std::abs(l.x - first.x) < 0.5 * first.radius && l.peak > 0.98 * first.peak;
       return l.peak < 0.6 * first.peak || (l.flux < 0.35 * first.flux && !source);
     });

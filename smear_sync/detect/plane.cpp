@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "smear_sync/detect/clones.h"
+#include "smear_sync/detect/target_clones.h"
 
 namespace emberlock::smear::detail {
 namespace {
@@ -17,7 +17,7 @@ inline void read_gray(const ImageView& view, int y, int first, int count, float*
   for (int i = 0; i < count; ++i) out[i] = static_cast<float>(in[i]);
 }
 
-/// Holds the sum of four samples: no wider than it must be, so that more fit into a vector.
+/// The type for the sum of four samples: as narrow as possible, so that more fit into a vector.
 template <class Sample>
 using SumOf = std::conditional_t<sizeof(Sample) == 1, std::uint16_t, std::int32_t>;
 
@@ -55,7 +55,7 @@ inline void read_colours(const ImageView& view, int y, int first, int count, flo
 
 }  // namespace
 
-EMBERLOCK_VECTOR_CLONES void Plane::read_rows(int y, int rows, int first, int count, float* out,
+EMBERLOCK_TARGET_CLONES void Plane::read_rows(int y, int rows, int first, int count, float* out,
                                               std::ptrdiff_t stride) const {
   const auto each = [&](auto row) {
     for (int i = 0; i < rows; ++i) row(view, y + i, first, count, out + i * stride);
@@ -89,7 +89,7 @@ Plane to_plane(const ImageView& view) {
     plane.size = {view.width() - 1, view.height() - 1};
     plane.offset = 0.5;
     plane.correlation = 2;
-    // Samples weigh 1 2 2 2 2 2 0 -2 ... -1 across and 1 2 2 2 2 2 1 along, against 4 a pixel.
+    // Samples have weights 1 2 2 2 2 2 0 -2 ... -1 across and 1 2 2 2 2 2 1 along; a pixel has 4.
     plane.block_correlation = 42.0 * 22 / (2 * 36 * 4);
   }
   return plane;

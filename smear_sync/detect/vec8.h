@@ -7,8 +7,8 @@
 
 namespace emberlock::smear::detail {
 
-// Eight floats in the compiler's own vector type, for the loops that sum: without vectors of its own a
-// processor takes them in parts.
+// Eight floats in the compiler's vector type, for summing loops. A processor without such wide vectors
+// processes them in parts.
 using Vec8 = float __attribute__((vector_size(32)));
 using Int8 = std::int32_t __attribute__((vector_size(32)));
 
@@ -39,7 +39,7 @@ using Int8 = std::int32_t __attribute__((vector_size(32)));
   Vec8 power = t * 1.44269504F;
   power = power < 60 ? power : Vec8{} + 60;
   power = power > -60 ? power : Vec8{} - 60;
-  constexpr float kMagic = 12582912;  // 1.5 * 2^23: adding it rounds to whole numbers
+  constexpr float kMagic = 12582912;  // 1.5 * 2^23: adding it rounds to an integer
   const Vec8 whole = (power + kMagic) - kMagic;
   const Vec8 f = power - whole;
   Vec8 p = f * 1.5403530e-4F + 1.3333558e-3F;  // coefficients of 2^f: ln(2)^k / k!

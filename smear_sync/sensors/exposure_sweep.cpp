@@ -9,10 +9,10 @@ namespace emberlock::smear {
 namespace {
 
 constexpr std::size_t kFewestDelays = 4;
-constexpr int kFirstDelays = 24;  // over the period: an exposure of a tenth of it is met twice
-constexpr int kSteps = 4;         // until one of 1/192 of it is
-constexpr int kStride = 7;        // between delays that are filmed one after the other; no divisor of theirs
-constexpr double kPartial = 6;    // sigmas off both levels: a flash that an edge cuts
+constexpr int kFirstDelays = 24;  // over the period: an exposure of a tenth of it is hit twice
+constexpr int kSteps = 4;         // the last step hits an exposure of 1/192 of the period
+constexpr int kStride = 7;        // between consecutive delays; coprime to their number
+constexpr double kPartial = 6;    // sigmas from both levels: a flash cut by an edge
 
 Error refuse(std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), "exposure sweep", std::move(remedy)};
@@ -22,7 +22,7 @@ struct Levels {
   double dark = 0;
   double lit = 0;
   double sigma = 0;       ///< the largest of the samples'
-  std::size_t whole = 0;  ///< samples that are fully lit
+  std::size_t whole = 0;  ///< fully lit samples
   [[nodiscard]] double part(double level) const { return (level - dark) / (lit - dark); }
 };
 
@@ -46,7 +46,7 @@ Result<Levels> levels_of(const std::vector<SweepSample>& samples, const SweepOpt
                   "shorten an exposure that lasts the whole period, or bring the strobe into view");
   };
   if (!(high > low)) return alike();
-  // Flashes that an edge cut are neither.
+  // Samples with a partial flash are neither dark nor lit.
   std::vector<double> dark;
   std::vector<double> lit;
   for (const SweepSample& s : samples) {
@@ -56,7 +56,7 @@ Result<Levels> levels_of(const std::vector<SweepSample>& samples, const SweepOpt
   levels.dark = median(dark);
   levels.lit = median(lit);
   levels.whole = lit.size();
-  // The extremes of many pictures of nothing lie as far apart; the middles of what is near them don't.
+  // The extremes of many equal pictures may differ that much; the medians near them don't.
   if (!(levels.lit - levels.dark > options.min_snr * levels.sigma)) return alike();
   return levels;
 }
@@ -67,17 +67,18 @@ struct WindowEdge {
   double sigma = 0;
 };
 
-/// `out` and `in` are the last dark and the first lit delay (or reversed, at the end), `sign` +1 where the
-/// window begins.
+/// `out` and `in` are the last dark and the first lit delay (reversed at the end of the window); `sign` is +1
+/// at the beginning of the window.
 WindowEdge place_edge(const SweepSample& out, const SweepSample& in, double sign, const Levels& levels,
                       const SweepOptions& options, bool saturated) {
   const double period = options.period.value();
   const double width = options.flash_width.value();
   const double gap = wrap_symmetric(in.delay.value() - out.delay.value(), period);
   const double middle = out.delay.value() + gap / 2;
-  // Any part of a clipped flash may pass for the whole: half of the gap and of the flash are two sigmas.
+  // A clipped partial flash can't be distinguished from a whole one: half of the gap and of the flash are two
+  // sigmas.
   if (saturated) return {middle, (std::abs(gap) + width) / 4};
-  // Parts this near to nothing and to the whole pass for them.
+  // Partial flashes this close to zero or to a whole flash can't be distinguished from these.
   const auto blurred = [&](const SweepSample& s) { return kPartial * s.sigma / (levels.lit - levels.dark); };
   const auto cut = [&](const SweepSample& s) {
     const double part = levels.part(s.level);
@@ -86,7 +87,7 @@ WindowEdge place_edge(const SweepSample& out, const SweepSample& in, double sign
   };
   for (const SweepSample* s : {&out, &in}) {
     if (!cut(*s)) continue;
-    // The window holds the part of the flash on its side of the edge.
+    // The window contains the part of the flash on its side of the edge.
     const double place = s->delay.value() - sign * (levels.part(s->level) - 0.5) * width;
     return {place, s->sigma / (levels.lit - levels.dark) * width};
   }
@@ -155,19 +156,19 @@ std::vector<Seconds> next_delays(std::span<const SweepSample> samples, const Swe
   const std::vector<SweepSample> sorted = in_order(samples, options.period);
   const auto levels = levels_of(sorted, options);
   if (!levels.ok()) {
-    int step = 1;  // all that was filmed are steps before this one
+    int step = 1;  // the steps before it have been filmed
     while (step < kSteps && samples.size() >= static_cast<std::size_t>(kFirstDelays) << step) ++step;
     return even_delays(step, options.period);
   }
   const auto window = fit_exposure(samples, options);
   if (!window.ok()) return delays;
-  // A short exposure may have been met by one flash, which its edge cut.
+  // A short exposure may have been hit by only one flash, cut by an edge.
   if (levels->whole < 2) {
     const auto brightest = std::max_element(sorted.begin(), sorted.end(),
                                             [](const auto& a, const auto& b) { return a.level < b.level; });
     return {brightest->delay - options.flash_width, brightest->delay + options.flash_width};
   }
-  // Clipped flashes tell an edge to a quarter of their width at best.
+  // With clipped flashes an edge can't be located better than a quarter of their width.
   if (window->saturated) resolution = std::max(resolution, options.flash_width / 3);
   if (window->end_sigma > resolution) delays.push_back(window->end);
   if (edges == SweepEdges::both && window->begin_sigma > resolution) delays.push_back(window->begin);

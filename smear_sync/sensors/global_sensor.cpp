@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "smear_sync/detect/judge.h"
+#include "smear_sync/detect/classify.h"
 #include "smear_sync/sensors/exposure_sweep.h"
 #include "smear_sync/sensors/phase_sensor.h"
 #include "smear_sync/sensors/rolling_band.h"
@@ -13,15 +13,16 @@
 namespace emberlock::smear {
 namespace {
 
-/// A look tells nothing of an edge that may have moved past it since: so many standard errors of the way.
+/// A look isn't used if the edge may have moved past it since; in standard errors of that motion.
 constexpr double kMoved = 3;
-/// Looks that are kept.
+/// Maximum number of stored looks.
 constexpr std::size_t kMost = 400;
-/// Where clipped samples hold more of a flash's light, its parts aren't told: what they are off by is less
-/// than this, and the edge by this part of the flash's width, which is as fine as edges are told at all.
+/// If clipped samples hold more of a flash's light than this, partial flashes can't be measured. Below it
+/// their error shifts the edge by at most this part of the flash's width, which is the resolution of an edge
+/// anyway.
 constexpr double kClipped = 0.1;
 
-/// Even delays tell an edge to this part of the period, twenty-fourths apart.
+/// Evenly spaced delays locate an edge to this part of the period.
 constexpr double kCoarse = 1.0 / 24;
 
 class GlobalSensor final : public PhaseSensor {
@@ -30,7 +31,7 @@ class GlobalSensor final : public PhaseSensor {
       : timing_(options.timing),
         sweep_{.period = options.timing.frame_period, .flash_width = options.flash_width} {}
 
-  void begin_round(const Beat& own) override {
+  void begin_round(const PeriodOffset& own) override {
     own_ = own;
     if (untold_) forget_phase();
     dark_.reset();
@@ -42,9 +43,10 @@ class GlobalSensor final : public PhaseSensor {
     std::vector<Look> looks;
     if (!dark_) looks.emplace_back();
     if (window_ && round_begins_ == seen_.size()) {
-      // What was seen in earlier rounds is as old as the first look of this one tells.
+      // The age of earlier looks is known only with the first look of this round.
       looks.push_back(look_at(window_->end));
-      looks.push_back(look_at(window_->end - window_->exposure / 2));  // what a whole flash looks like now
+      looks.push_back(
+          look_at(window_->end - window_->exposure / 2));  // shows the present brightness of a whole flash
       return looks;
     }
     forget_what_moved(wanted);
@@ -85,7 +87,7 @@ class GlobalSensor final : public PhaseSensor {
       return {sample};
     }
     Seconds exposure = wrap_positive(window->end - window->begin, sweep_.period);
-    // Where it begins isn't looked after from round to round.
+    // The beginning of the exposure isn't tracked from round to round.
     if (exposure_ && window->begin_sigma > kCoarse * sweep_.period) exposure = *exposure_;
     sample.phase.reason = detail::too_short(exposure, sweep_.flash_width);
     if (unexpected(window->end)) {
@@ -97,7 +99,7 @@ class GlobalSensor final : public PhaseSensor {
     if (!sample.phase.reason.empty()) return {sample};
     untold_ = false;
     sample.phase = phase_of(*window, delay, sweep_.period);
-    // The looks at both sides of the edge were taken earlier, and what the edge did since isn't quite known.
+    // The looks on both sides of the edge are older, and the edge's motion since then is uncertain.
     sample.phase.sigma =
         Seconds(std::hypot(sample.phase.sigma.value(), own_.sigma.value() * 1e-6 * age_of(window->end)));
     window_ = Window{sample.at, window->end, sample.phase.sigma, exposure};
@@ -117,18 +119,18 @@ class GlobalSensor final : public PhaseSensor {
   [[nodiscard]] std::optional<Seconds> exposure() const override { return exposure_; }
 
  private:
-  /// Of a whole picture, in grey levels.
+  /// Mean brightness of a whole picture, in grey levels.
   struct Light {
     double level = 0;
     double sigma = 0;
-    double clipped = 0;  ///< what saturated samples hold of it
+    double clipped = 0;  ///< part of it in saturated samples
   };
   struct Seen {
     TimePoint at;
     Seconds delay;
-    Light light;  ///< beyond the round's dark look
+    Light light;  ///< minus the dark look of the round
   };
-  /// Where the exposure ended, as a delay.
+  /// End of the exposure, as a delay.
   struct Window {
     TimePoint at;
     Seconds end;
@@ -136,15 +138,15 @@ class GlobalSensor final : public PhaseSensor {
     Seconds exposure;
   };
 
-  /// What lets the end of this round's be expected.
+  /// What is needed to predict the end for this round.
   struct Expected {
     Window before;
-    Seconds open;  ///< by which it may be off though nothing moved
+    Seconds open;  ///< uncertainty of the end without motion
   };
 
   [[nodiscard]] Look look_at(Seconds delay) const { return {wrap_positive(delay, sweep_.period)}; }
 
-  /// The delay that would have met the window now where this look met it then.
+  /// The delay that would now hit the window at the same place as this look did.
   [[nodiscard]] Seconds delay_now(const Seen& s) const {
     const Seconds age = seen_.back().at - s.at;
     return wrap_positive(s.delay - age * (own_.rate.value() * 1e-6), sweep_.period);
@@ -158,7 +160,7 @@ class GlobalSensor final : public PhaseSensor {
     return all;
   }
 
-  /// The looks that tell where an edge is, by their index: the one that it cut, or those to either side.
+  /// The indices of the looks that locate an edge: the one that it cut, or those on either side.
   [[nodiscard]] std::vector<std::size_t> beside(Seconds edge) const {
     std::optional<std::size_t> nearest[2];
     const auto off = [&](std::size_t i) { return wrap_symmetric(delay_now(seen_[i]) - edge, sweep_.period); };
@@ -174,25 +176,25 @@ class GlobalSensor final : public PhaseSensor {
     return looks;
   }
 
-  /// Seconds since the oldest of the looks that tell an edge.
+  /// Age in seconds of the oldest of these looks.
   [[nodiscard]] double age_of(Seconds edge) const {
     Seconds age;
     for (const std::size_t i : beside(edge)) age = std::max(age, seen_.back().at - seen_[i].at);
     return age.value();
   }
 
-  /// Where the window's end should be now.
+  /// The predicted end of the window.
   [[nodiscard]] Seconds end_now(const Window& window) const {
     return window.end - (seen_.back().at - window.at) * (own_.rate.value() * 1e-6);
   }
-  /// How far it may be from there, given its sigma then.
+  /// How far it may be from there, given its sigma at that time.
   [[nodiscard]] Seconds way(TimePoint since, Seconds sigma) const {
     const Seconds unsure = (seen_.back().at - since) * (own_.sigma.value() * 1e-6);
     return Seconds(kMoved * std::hypot(unsure.value(), sigma.value()));
   }
 
-  /// What was seen in rounds before about the edges is forgotten, so far as they may have moved since, and
-  /// beyond what `wanted` leaves open: an edge that this round finds further off was moved by something else.
+  /// Forgets earlier looks near the edges that may have been passed by the motion since, beyond `wanted`. If
+  /// this round finds an edge further off, something else moved it.
   void forget_what_moved(Seconds wanted) {
     if (!window_ || round_begins_ == seen_.size()) return;
     const Seconds end = end_now(*window_);
@@ -211,7 +213,7 @@ class GlobalSensor final : public PhaseSensor {
     window_.reset();
   }
 
-  /// An edge at this delay isn't where the rounds before let it be expected.
+  /// Whether an edge at this delay contradicts the prediction from earlier rounds.
   [[nodiscard]] bool unexpected(Seconds end) const {
     if (!expected_) return false;
     const Seconds off = wrap_symmetric(end - end_now(expected_->before), sweep_.period);
@@ -240,12 +242,12 @@ class GlobalSensor final : public PhaseSensor {
 
   CcdTiming timing_;
   SweepOptions sweep_;
-  Beat own_{};
-  std::vector<Seen> seen_;        ///< by time
-  std::size_t round_begins_ = 0;  ///< the first look of this round among them
+  PeriodOffset own_{};
+  std::vector<Seen> seen_;        ///< sorted by time
+  std::size_t round_begins_ = 0;  ///< index of the first look of this round
   std::optional<Light> dark_;     ///< of this round, without the strobe
-  bool untold_ = false;           ///< the round's looks told no phase
-  std::optional<Window> window_;  ///< of the round before, until this one's first look
+  bool untold_ = false;           ///< the round gave no phase
+  std::optional<Window> window_;  ///< of the previous round, until the first look of this one
   std::optional<Expected> expected_;
   std::optional<Seconds> exposure_;
 };

@@ -10,7 +10,7 @@ namespace emberlock::smear {
 namespace detail {
 namespace {
 
-/// An exposure of fewer flash widths has no plateau whose end could be told.
+/// An exposure shorter than this many flash widths has no plateau with a detectable end.
 constexpr double kLeastExposure = 2;
 
 }  // namespace
@@ -40,7 +40,7 @@ class SmearSensor final : public PhaseSensor {
  public:
   explicit SmearSensor(const SensorOptions& options) : options_(options) {}
 
-  void begin_round(const Beat& /*own*/) override { taken_.clear(); }
+  void begin_round(const PeriodOffset& /*own*/) override { taken_.clear(); }
   std::vector<Look> next_looks(Seconds /*wanted*/) override { return {}; }
   SmearReading take(const ImageView& frame, TimePoint at, const Look& look) override {
     taken_.push_back({at, look, detector_.read(frame)});

@@ -6,16 +6,16 @@
 #include <limits>
 #include <utility>
 
-#include "smear_sync/detect/judge.h"
+#include "smear_sync/detect/classify.h"
 #include "smear_sync/detect/plane.h"
 
 namespace emberlock::smear {
 namespace {
 
-constexpr double kLeastContrast = 8;  // of a row's two levels, in their noise
-constexpr std::size_t kReach = 3;     // rows to each side of an edge that tell its place, and must agree
+constexpr double kLeastContrast = 8;  // difference of a row's two levels, relative to their noise
+constexpr std::size_t kReach = 3;     // rows on each side of an edge that determine its place and must agree
 
-/// The part of a row's flash that it gathered: 0 dark, 1 in the band.
+/// The share of the flash's light in each row: 0 dark, 1 in the band.
 std::vector<double> parts(const RowProfile& frame, const BandReference& reference, ReadDirection direction) {
   std::vector<double> part(frame.level.size());
   for (std::size_t r = 0; r < part.size(); ++r) {
@@ -25,7 +25,7 @@ std::vector<double> parts(const RowProfile& frame, const BandReference& referenc
   return part;
 }
 
-/// Places in the order of reading where the band begins (rising) or ends, to parts of a row.
+/// Places in read order where a band begins (rising) or ends, with sub-row resolution.
 struct Edge {
   double row = 0;
   bool rising = false;
@@ -41,11 +41,11 @@ std::vector<Edge> edges_of(const std::vector<double>& part) {
     bool clean = true;
     for (std::size_t i = 0; i < kReach; ++i) {
       sum += part[r + i] + part[r - 1 - i];
-      // Beyond the rows next to the edge each side must be what it is said to be.
+      // Apart from the rows next to the edge, each side must be entirely lit or dark.
       if (i > 0) clean = clean && (part[r + i] >= 0.5) == rising && (part[r - 1 - i] >= 0.5) == falling;
     }
     if (!clean) continue;
-    // As many rows are lit as lie beyond the edge.
+    // The sum of the lit parts equals the number of lit rows beyond the edge.
     const double lit = rising ? static_cast<double>(kReach) - sum : sum - static_cast<double>(kReach);
     edges.push_back({static_cast<double>(r) - 0.5 + lit, rising});
   }
@@ -63,7 +63,7 @@ RowProfile row_profile(const ImageView& frame) {
   for (int y = 0; y < plane.size.height; ++y) {
     plane.read(y, 0, plane.size.width, row.data());
     double sum = row.front();
-    double differences = 0;  // of neighbours: noise, without the scene's slopes
+    double differences = 0;  // between neighbours: noise without the scene's gradients
     double clipped = row.front() >= plane.white ? row.front() : 0;
     for (std::size_t x = 1; x < row.size(); ++x) {
       sum += row[x];
@@ -74,7 +74,7 @@ RowProfile row_profile(const ImageView& frame) {
     profile.clipped += clipped / plane.size.width / plane.size.height * plane.level;
     squares.push_back(differences / (plane.size.width - 1));
   }
-  // The lamp's own rows and those of hot pixels are few.
+  // Rows of the lamp itself and of hot pixels are few.
   const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
   std::nth_element(squares.begin(), middle, squares.end());
   const double square = std::max(*middle, plane.rounding * plane.rounding);
@@ -101,7 +101,7 @@ Result<BandReference> learn_band_reference(std::span<const RowProfile> frames) {
     }
     if (!(high - low > kLeastContrast * noise) || high <= low)
       return refuse("row " + std::to_string(r) + " was never lit, or never dark");
-    // Means of what is near either end: rows at the band's edge are neither.
+    // Means of the values near either extreme; rows at the band's edge are in neither.
     double sums[2] = {0, 0};
     double counts[2] = {0, 0};
     for (const RowProfile& f : frames) {

@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "smear_sync/detect/judge.h"
+#include "smear_sync/detect/classify.h"
 #include "smear_sync/sensors/exposure_sweep.h"
 #include "smear_sync/sensors/phase_sensor.h"
 #include "smear_sync/sensors/rolling_band.h"
@@ -14,7 +14,7 @@
 namespace emberlock::smear {
 namespace {
 
-/// Edges that tell a row time.
+/// Minimum number of edges for a row time.
 constexpr std::size_t kFewestEdges = 6;
 
 class RollingSensor final : public PhaseSensor {
@@ -23,7 +23,7 @@ class RollingSensor final : public PhaseSensor {
     options_.timing.shifts = options_.timing.rows;
   }
 
-  void begin_round(const Beat& /*own*/) override {
+  void begin_round(const PeriodOffset& /*own*/) override {
     taken_.clear();
     if (nothing_read_) sweep_anew();
   }
@@ -95,7 +95,7 @@ class RollingSensor final : public PhaseSensor {
     nothing_read_ = false;
   }
 
-  /// What the sweep shows so far; where that isn't enough, and there is nothing `still_to_come`, it says why.
+  /// Evaluates the sweep so far. If it isn't sufficient and nothing is `still_to_come`, sets the reason.
   void learn(const std::vector<Seconds>& still_to_come) {
     const Status learnt = learn_reference();
     if (learnt.ok() || !still_to_come.empty()) return;
@@ -103,7 +103,7 @@ class RollingSensor final : public PhaseSensor {
                   ": let the strobe light what the camera sees from top to bottom, or lengthen its exposure";
   }
 
-  /// An error where the sweep doesn't show all rows dark and lit.
+  /// An error if the sweep doesn't show all rows dark and lit.
   Status learn_reference() {
     std::vector<RowProfile> profiles;
     for (const Swept& s : swept_) profiles.push_back(s.profile);
@@ -124,7 +124,7 @@ class RollingSensor final : public PhaseSensor {
     }
     // A row is lit at the delays that fall into its exposure.
     exposure_ = options_.timing.frame_period * (lit / looks);
-    judge(edges);
+    fit_row_time(edges);
     reference_ = reference;
     swept_.clear();
     return {};
@@ -137,8 +137,8 @@ class RollingSensor final : public PhaseSensor {
     return part / static_cast<double>(profile.level.size());
   }
 
-  /// t_row, or why edges can't be told.
-  void judge(const std::vector<SweptEdge>& edges) {
+  /// Fits t_row, or sets the reason why edges can't be measured.
+  void fit_row_time(const std::vector<SweptEdge>& edges) {
     const Seconds period = options_.timing.frame_period;
     unreadable_ = detail::too_short(*exposure_, options_.flash_width);
     if (!unreadable_.empty()) return;
@@ -163,8 +163,8 @@ class RollingSensor final : public PhaseSensor {
   std::optional<BandReference> reference_;
   std::optional<RowClock> clock_;
   std::optional<Seconds> exposure_;
-  std::string unreadable_;     ///< why no phase can be told, and what to do about it
-  bool nothing_read_ = false;  ///< in the round before
+  std::string unreadable_;     ///< why no phase can be determined, and what to do about it
+  bool nothing_read_ = false;  ///< in the previous round
 };
 
 }  // namespace

@@ -11,15 +11,15 @@ namespace emberlock::smear {
 namespace {
 
 constexpr std::size_t kFewestSweptEdges = 6;
-constexpr double kWholeRow = 0.2887;  // rows RMS: what rounding to whole rows leaves
+constexpr double kWholeRow = 0.2887;  // rows RMS: error by rounding to whole rows
 constexpr double kOutlier = 3;        // rows
 
 Error refuse_bands(std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), "row time of a rolling shutter", std::move(remedy)};
 }
 
-/// The slope that most neighbours in delay agree on: a median, which the one pair across the wrap of the
-/// period doesn't move.
+/// The median slope between neighbours in delay, which isn't affected by the one pair across the wrap of the
+/// period.
 double slope_of(std::vector<SweptEdge> edges) {
   std::sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) { return a.delay < b.delay; });
   std::vector<double> slopes;
@@ -69,7 +69,7 @@ Result<RowClock> fit_swept_row_clock(std::span<const SweptEdge> edges, Seconds p
     return refuse_bands("its bands move against the flashes' delay",
                         "give it the other read direction: it reads from the other end of the picture");
   }
-  // Turns are counted from the edge that most others agree with.
+  // Periods are counted from the edge that agrees with most others.
   std::vector<Point> points;
   for (const SweptEdge& from : edges) {
     std::vector<Point> agreeing;

@@ -7,21 +7,21 @@
 
 #include "smear_sync/sensors/phase_sensor.h"
 
-// What the sensors share.
+// Shared by the sensors.
 namespace emberlock::smear::detail {
 
-/// A frame: when it came, how it was lit, and what it shows.
+/// A frame: its arrival, the strobe's setting, and its reading.
 struct TakenLook {
   TimePoint at;
   Look look;
   SmearReading reading;
 };
 
-/// The phases of those whose flashes came `delay` late.
+/// The phases of the frames whose flashes had this delay.
 std::vector<PhaseSample> phases_at(Seconds delay, std::span<const TakenLook> taken,
                                    const SensorOptions& options);
 
-/// Why no flash tells an edge of this exposure: it is hardly longer than the flash. Empty when it is longer.
+/// Why no edge of this exposure can be seen: it is hardly longer than the flash. Empty if it is long enough.
 std::string too_short(Seconds exposure, Seconds flash_width);
 
 }  // namespace emberlock::smear::detail

@@ -14,12 +14,12 @@
 namespace emberlock::smear {
 namespace {
 
-constexpr PartsPerMillion kRateSigma{40};  // of a camera's clock against a strobe's, as bought
+constexpr PartsPerMillion kRateSigma{40};  // of a camera's clock relative to a strobe's, by specification
 constexpr int kMostTurns = 4;
 
-/// The lamp stands still: its place is the median of all frames', each frame's dot is told from there, and
-/// what shines elsewhere (a dot whose lamp wasn't lit, a reflection) isn't the lamp. Its error is one for all
-/// frames, and no frame's own.
+/// The lamp doesn't move. Its place is the median over all frames; each frame's dot is measured relative to
+/// that, and a bright spot elsewhere (a dot whose lamp wasn't lit, a reflection) isn't the lamp. Its error is
+/// common to all frames.
 std::vector<FrameReading> with_one_lamp(const ClipReading& clip, Rows& lamp, Rows& lamp_sigma) {
   std::vector<FrameReading> frames;
   std::vector<double> rows;
@@ -52,7 +52,7 @@ std::vector<FrameReading> with_one_lamp(const ClipReading& clip, Rows& lamp, Row
   return frames;
 }
 
-/// The frame rates that a file's claim may stand for: itself, and the ones in use that are often rounded to
+/// Frame rates that a file's claim may stand for: the claim itself, and usual rates that are often rounded to
 /// it.
 std::vector<Hertz> rates_to_try(const ClipReading& clip, const ClipOptions& options) {
   if (options.frame_rate) return {*options.frame_rate};
@@ -164,7 +164,7 @@ Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& op
     clock.reason = fmt::format(
         "the file claims {:.3f} frames a second: flash the strobe about once a frame, or give --frame-rate",
         clip.claimed_rate->value());
-    clock.believed_period = period(*clip.claimed_rate);  // for who places the clip by its sound
+    clock.believed_period = period(*clip.claimed_rate);  // for callers that place the clip by its sound
     clock.timing.rows = clock.timing.shifts = clip.rows;
     clock.timing.frame_period = clock.believed_period;
     return clock;
@@ -186,9 +186,8 @@ Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& op
       .row_time = options.row_time,
       .direction = clock.mode.direction.value_or(options.direction.value_or(ReadDirection::top_first))};
 
-  // The code counts the frames that were lost on the way, which the line needs; the line says where in the
-  // frame the flash falls, which the code needs where that is near the frame's border. Both agree after a
-  // turn or two.
+  // The code counts lost frames, which the line needs. The line gives the flash's position in the frame,
+  // which the code needs if it is close to the frame's border. A few iterations make both consistent.
   const std::vector<CodeFrame> seen = flashes_seen(frames);
   for (const CodeFrame& f : seen) clock.seen.push_back(f.seen);
   DecodeOptions decode{.code = options.code,

@@ -15,85 +15,85 @@
 
 namespace emberlock::smear {
 
-// A clip is a film of the strobe whose file says nothing of when its frames were taken: timestamps of files
-// are nominal or jitter, and the clocks of several cameras have nothing in common. The strobe is the clock
-// instead: frame i begins to be read at tau_i before a flash, modulo the flashes' period P, and the code of
-// skipped flashes says which flash that was. All phases here go around modulo P, not the frame period: a
-// detuned strobe puts its dot off by P - T once a beat.
+// A clip is a film of the strobe in a file without reliable times: time stamps in files are nominal or
+// jitter, and the clocks of several cameras are unrelated. So the strobe is the clock. The read phase of
+// frame i begins tau_i before a flash, modulo the flash period P, and the code of skipped flashes identifies
+// the flash. All phases here are modulo P, not the frame period: with a detuned strobe, a phase modulo T
+// would jump by P - T once per beat.
 
-/// What was read off one video file.
+/// The readings of one video file.
 struct ClipReading {
   std::string file;
-  std::string name;                     ///< what people call it
+  std::string name;                     ///< for display
   int rows = 0;                         ///< n, the picture's height
-  std::optional<Hertz> claimed_rate{};  ///< by the file
-  std::vector<SmearReading> frames;     ///< by place in the file
+  std::optional<Hertz> claimed_rate{};  ///< the file's own claim
+  std::vector<SmearReading> frames;     ///< by index in the file
 };
 
 struct ClipOptions {
-  Hertz flash_rate{24.2};                             ///< 1 / P, about one flash a frame
+  Hertz flash_rate{24.2};                             ///< 1 / P, about one flash per frame
   SecondsPerRow row_time = microseconds_per_row(54);  ///< t_row
   SecondsPerRow row_time_sigma = SecondsPerRow(5e-9);
   Seconds flash_width = microseconds(20);
-  std::optional<Hertz> frame_rate{};         ///< 1 / T to within 100 ppm, where the file's claim is wrong
-  std::optional<ReadDirection> direction{};  ///< d, where the dots' walk doesn't tell it
-  std::optional<int> shifts{};               ///< K, where the dots' walk doesn't tell it; else n
-  FrameCode code{};                          ///< what the strobe skips
+  std::optional<Hertz> frame_rate{};         ///< 1 / T to within 100 ppm, if the file's claim is wrong
+  std::optional<ReadDirection> direction{};  ///< d, if the dots' walk doesn't show it
+  std::optional<int> shifts{};               ///< K, if the dots' walk doesn't show it; default: n
+  FrameCode code{};                          ///< the flashes that the strobe skips
 };
 
-/// One frame with a dot, against the line.
+/// One frame with a dot, relative to the fitted line.
 struct ClipPoint {
-  int frame = 0;     ///< place in the file
-  Rows y;            ///< the dot's
-  Seconds tau;       ///< as the dot says
-  Seconds residual;  ///< tau less the line's, to the nearest side
+  int frame = 0;     ///< index in the file
+  Rows y;            ///< row of the dot
+  Seconds tau;       ///< from the dot
+  Seconds residual;  ///< tau minus that of the line, wrapped
 };
 
-/// A clip's frames on the strobe's time. Frame i of the file is the camera's frame count_of(i): frames that
-/// were lost on the way are counted.
+/// A clip's frames on the strobe's clock. Frame i of the file is the camera's frame count_of(i), which
+/// includes lost frames.
 struct ClipClock {
   CcdTiming timing;      ///< n, K, d and T as measured; t_row as given
-  Rows lamp;             ///< y_s, over all frames
-  Rows lamp_sigma{};     ///< its error, as the detector states it
-  ReadMode mode;         ///< what the walk of the dots told, and why it didn't
-  FrameNumbers numbers;  ///< what the code told, and why it didn't
+  Rows lamp;             ///< y_s, from all frames
+  Rows lamp_sigma{};     ///< its standard error, by the detector
+  ReadMode mode;         ///< result of the dots' walk, with reasons
+  FrameNumbers numbers;  ///< result of the code, with reasons
   std::optional<Drift>
-      line;  ///< tau modulo P, where frame number c is at c believed_period; absent: see `reason`
-  Seconds believed_period;  ///< T before it was measured
+      line;  ///< tau modulo P; frame number c is at time c believed_period; absent: see `reason`
+  Seconds believed_period;  ///< T before the measurement
   Seconds flash_period;     ///< P
-  Seconds period_sigma;     ///< standard error of timing.frame_period, in the strobe's seconds
+  Seconds period_sigma;     ///< standard error of timing.frame_period, in seconds of the strobe
   std::vector<ClipPoint> points;
-  /// How much more all taus may be: K isn't known, and the dots that tell them had wrapped. Zero where it is.
+  /// How much larger all taus may be, if K isn't known and the dots used had wrapped. Zero if K is known.
   Seconds tau_slack{};
-  int lit = 0;                              ///< frames that show the lamp
-  std::vector<FlashSeen> seen;              ///< by place: whether the strobe lit it
-  PhaseState state = PhaseState::unusable;  ///< known when there is a line and d is known
-  std::string reason;                       ///< one sentence when it isn't
+  int lit = 0;                              ///< number of frames that show the lamp
+  std::vector<FlashSeen> seen;              ///< by frame: whether the strobe lit it
+  PhaseState state = PhaseState::unusable;  ///< known if there is a line and d is known
+  std::string reason;                       ///< one sentence if it isn't known
 
-  /// Where the camera's count stands at place `i` of the file: a count of frames from that of place 0.
+  /// The camera's frame count at index `i` of the file, starting at that of index 0.
   [[nodiscard]] std::int64_t count_of(std::int64_t i) const;
-  /// tau of the read phase of place `i`, modulo P. There must be a line.
+  /// tau of the read phase of frame `i`, modulo P. Requires a line.
   [[nodiscard]] Phase phase_of_frame(std::int64_t i) const;
-  /// Whether d was told, by the dots' walk or by `options`.
+  /// Whether d is known, from the dots' walk or from `options`.
   [[nodiscard]] bool direction_known(const ClipOptions& options) const {
     return mode.direction.has_value() || options.direction.has_value();
   }
-  /// The run of numbered frames that holds place `i`, or the nearest; nullptr when there is none.
+  /// The run of numbered frames that contains index `i`, or the nearest; nullptr if there is none.
   [[nodiscard]] const NumberedRun* run_at(std::int64_t i) const;
 };
 
-/// What the walk of a clip's dots tells, and the frame rate under which it does: the file's claim, or one in
-/// use that is often rounded to it.
+/// The result of the walk of a clip's dots, and the frame rate with which it fits: the file's claim, or a
+/// usual rate that is often rounded to it.
 struct ClipWalk {
   Hertz frame_rate;
   ReadMode mode;
 };
 
-/// d and K of the camera, of a clip under one flash a frame or under a comb (options.flash_rate). A walk that
-/// wants a frame rate more than 120 ppm off tells nothing. Errors: those of find_read_mode.
+/// d and K of the camera, from a clip under one flash per frame or under a comb (options.flash_rate). A walk
+/// that needs a frame rate more than 120 ppm off is rejected. Errors: those of find_read_mode.
 Result<ClipWalk> read_walk(const ClipReading& clip, const ClipOptions& options);
 
-/// Puts a clip on the strobe's time: the lamp's place from all frames; d, K and T from the dots' walk; lost
+/// Puts a clip on the strobe's clock: the lamp's place from all frames; d, K and T from the dots' walk; lost
 /// frames and flash numbers from the code; tau from the line through all dots. Errors (bad_input): options
 /// that aren't positive and finite.
 Result<ClipClock> read_clip_clock(const ClipReading& clip, const ClipOptions& options);

@@ -16,37 +16,38 @@
 namespace emberlock::smear {
 namespace {
 
-constexpr PartsPerMillion kNextToTheWalk{60};  // a line may differ that much from what the walk told
+constexpr PartsPerMillion kNextToTheWalk{
+    60};  // the largest difference between the rates of a line and of the walk
 constexpr PartsPerMillion kNextToTheClaim{500};
-constexpr std::size_t kFewestDots = 5;   // of a side, too: fewer may be strays
-constexpr double kOneLine = 1.5;         // rows: half of the dots lie that near to a line that is theirs
-constexpr double kSigmasOfShifts = 4;    // another K is ruled out beyond, as find_read_mode() does
-constexpr double kMostMiss = 3;          // standard errors of a dot; what is further off strays
-constexpr double kLeastMiss = 0.05;      // rows: no dot is read better
-constexpr double kLeastProbable = 1e-3;  // of a K, against the most probable one
+constexpr std::size_t kFewestDots = 5;   // also per side: fewer may be stray dots
+constexpr double kOneLine = 1.5;         // rows: at least half of the dots must lie this close to their line
+constexpr double kSigmasOfShifts = 4;    // beyond these another K is ruled out, as in find_read_mode()
+constexpr double kMostMiss = 3;          // limit of a dot's residual in standard errors; stray dots have more
+constexpr double kLeastMiss = 0.05;      // rows: lower limit of a dot's error
+constexpr double kLeastProbable = 1e-3;  // of a K, relative to the most probable one
 
-/// Whether the frame's dot is of the read phase before its own: behind the lamp in the order of reading.
+/// Whether the frame's dot belongs to the previous read phase: it is behind the lamp in read order.
 bool wrapped(const SmearReading& reading, ReadDirection direction) {
   if (reading.dots.size() != 1 || !reading.lamp) return false;
   return static_cast<double>(direction) * (reading.dots.front().y - reading.lamp->y) < Rows(0);
 }
 
-/// Which dots a line goes through.
+/// The dots used for a line.
 enum class DotsUsed { all, ahead, behind };
 
-/// One K, and how probable it is.
+/// A value of K with its probability.
 struct ShiftsGuess {
   int shifts;
   double probability;
 };
 
-/// What is known of K, and the dots that it lets be used.
+/// The knowledge of K, and which dots can be used with it.
 struct ShiftsKnown {
-  std::vector<ShiftsGuess> guesses;  ///< the most probable first; of probabilities that sum to 1
+  std::vector<ShiftsGuess> guesses;  ///< sorted by probability, the largest first; the sum is 1
   DotsUsed use = DotsUsed::all;
 };
 
-/// Those that the two sides of the lamp allow; none where they contradict every K.
+/// The values of K compatible with both sides of the lamp; empty if none is.
 std::vector<ShiftsGuess> measured_shifts(const ReadMode& mode, const ShiftsRange& range) {
   std::vector<ShiftsGuess> guesses;
   const double sigma = std::max(mode.shifts_sigma.value(), 1e-3);
@@ -83,7 +84,7 @@ ShiftsKnown what_is_known(std::span<const FrameReading> frames, const ClipOption
   return {{{range.least, 1}}, dots[1] > dots[0] ? DotsUsed::behind : DotsUsed::ahead};
 }
 
-/// Phases by the camera's own count; frames between which some were lost are left out.
+/// Phases against the camera's own count. Frames whose count is uncertain because of losses are left out.
 std::vector<PhaseSample> samples_of(std::span<const FrameReading> frames, const ClipClock& clock,
                                     Seconds flash_width, DotsUsed use) {
   std::vector<PhaseSample> samples;
@@ -101,13 +102,13 @@ std::vector<PhaseSample> samples_of(std::span<const FrameReading> frames, const 
                                      : nullptr;
     samples.push_back(why_not != nullptr ? PhaseSample{start, {PhaseState::unusable, {}, {}, why_not}}
                                          : sample_of(f.reading, clock.timing, flash_width, start));
-    samples.back().at = start;  // modulo P phases are straight against the read phases' starts
+    samples.back().at = start;  // modulo P, phases are linear in the starts of the read phases
   }
   return samples;
 }
 
-/// How badly dots miss the stairs of whole rows under a line: the mean square in their own standard errors,
-/// of at most kMostMiss each and at least 1; and how many rows they stand on.
+/// The deviation of dots from the staircase of a line: the mean square in their own standard errors, each
+/// limited to kMostMiss, at least 1 in total; and the number of distinct rows.
 struct Misfit {
   double squares = 1;
   std::size_t rows = 0;
@@ -127,15 +128,15 @@ Misfit misfit_of(std::span<const PhaseSample> samples, const Drift& line, const 
     rows.insert(std::lround(s.shifted->rows.value()));
   }
   if (offs.empty()) return {};
-  const double lamp = median(offs);  // by which the lamp's row errs
+  const double lamp = median(offs);  // error of the lamp's row
   double sum = 0;
   for (std::size_t i = 0; i < offs.size(); ++i)
     sum += std::min(square((offs[i] - lamp) / sigmas[i]), square(kMostMiss));
   return {std::max(1.0, sum / static_cast<double>(offs.size())), rows.size()};
 }
 
-/// Fits the line through the samples and puts down how far each dot lies from it; false, with the reason,
-/// when there is none.
+/// Fits the line through the samples and stores each dot's residual; false, with the reason, if there is
+/// none.
 bool fit_line(std::span<const FrameReading> frames, const ClipOptions& options, DotsUsed use,
               ClipClock& clock, Misfit& misfit) {
   const std::vector<PhaseSample> samples = samples_of(frames, clock, options.flash_width, use);
@@ -177,14 +178,14 @@ bool fit_line(std::span<const FrameReading> frames, const ClipOptions& options, 
   return true;
 }
 
-/// A line that one K makes, and how probable it is.
+/// The line for one K, with its probability.
 struct LineGuess {
   Drift line;
   double probability;
 };
 
-/// By how many rows the dots that wrapped stand off the line's others: what K is too large. A walk that
-/// counted a lost frame as none tells a wrong K.
+/// The number of rows by which wrapped dots deviate from the line of the others: the excess of K. A walk in
+/// which a lost frame wasn't counted gives a wrong K.
 int excess_shifts(std::span<const FrameReading> frames, const ClipClock& clock) {
   std::array<std::vector<double>, 2> residuals;
   for (const ClipPoint& p : clock.points) {
@@ -196,8 +197,8 @@ int excess_shifts(std::span<const FrameReading> frames, const ClipClock& clock) 
   return static_cast<int>(std::lround(median(residuals[1]) - median(residuals[0])));
 }
 
-/// Makes the lines less probable on whose stairs the dots don't stand: by the likelihood of normal errors
-/// whose size isn't known. Dots on one row err alike and count as one.
+/// Reduces the probability of lines whose staircase the dots don't fit: the likelihood for normal errors of
+/// unknown size. Dots in the same row have the same error and count once.
 void weigh_by_misfit(std::span<const Misfit> misfits, std::vector<LineGuess>& lines) {
   double least = misfits[0].squares;
   for (const Misfit& m : misfits) least = std::min(least, m.squares);
@@ -205,15 +206,15 @@ void weigh_by_misfit(std::span<const Misfit> misfits, std::vector<LineGuess>& li
     lines[i].probability *= std::pow(misfits[i].squares / least, -0.5 * static_cast<double>(misfits[0].rows));
 }
 
-/// Mean and deviation of lines of which one is the right one, each with its own errors. Where they differ in
-/// phase and rate at once, the mean's two errors are independent at another instant than the lines' middle:
-/// that is the one it refers to.
+/// Mean and deviation of alternative lines, of which one is right, each with its own errors. If they differ
+/// in both phase and rate, the errors of the mean line are independent at another instant than the lines'
+/// middle; the result refers to that instant.
 Drift mean_line(std::span<const LineGuess> guesses, Seconds period) {
   Drift mean = guesses.front().line;
   double sum = 0;
   double tau = 0;
   double rate = 0;
-  std::vector<std::pair<double, double>> offs;  // of each line at mean.at: tau in s, rate
+  std::vector<std::pair<double, double>> offs;  // deviation of each line at mean.at: tau in s, rate
   for (const LineGuess& g : guesses) {
     const Phase there = phase_at(g.line, mean.at, period);
     offs.emplace_back(wrap_symmetric(there.tau - guesses.front().line.tau, period).value(),

@@ -10,19 +10,18 @@
 
 namespace emberlock::smear {
 
-/// The least K that a camera of so many rows may have, and the most that its frame period has room for.
+/// The range of K for a camera with this number of rows and this frame period.
 struct ShiftsRange {
   int least = 0, most = 0;
 };
 ShiftsRange possible_shifts(const CcdTiming& timing);
 
-/// Puts the line through a clip's dots: clock.line, points, timing.shifts, tau_slack, T and its error, the
-/// state, and the reason where there is no line. Dots that wrapped stand K rows off the others. Where K is
-/// known, all are used. Where the dots' walk leaves a few K open, each has its line and its probability, and
-/// the line is their mean, with the deviation that they leave. Where it tells nothing of K, only the dots of
-/// the side that most stand on are used, and tau_slack is what K leaves open of those that wrapped.
-/// `frames`: all of one lamp, whose row clock.lamp is; clock.mode, timing and numbers are what is known so
-/// far.
+/// Fits the line through a clip's dots. Sets clock.line, points, timing.shifts, tau_slack, T and its error,
+/// the state, and the reason if there is no line. Wrapped dots are K rows off the others. If K is known, all
+/// dots are used. If the dots' walk leaves a few values of K open, each gives a line with a probability; the
+/// result is their mean, with the resulting deviation. If nothing is known of K, only the dots on the side
+/// with more of them are used, and tau_slack is the uncertainty that K causes if those had wrapped. `frames`
+/// must all have the lamp at row clock.lamp; clock.mode, timing and numbers contain what is known so far.
 void find_line(std::span<const FrameReading> frames, const ClipOptions& options, ClipClock& clock);
 
 }  // namespace emberlock::smear

@@ -60,7 +60,7 @@ ClipTimes strobe_times(const ClipClock& clock) {
   times.period_sigma = clock.period_sigma;
   times.at = static_cast<double>(clock.line->at.ns) * 1e-9 / clock.believed_period.value();
   times.start_sigma = clock.line->tau_sigma;
-  // Flashes lie whole periods from a frame's own tau, not from that of the instant between two frames.
+  // Flashes are whole periods from a frame's own tau, not from that of an instant between two frames.
   const double frame = std::round(times.at);
   const Seconds tau = clock.line->tau + (clock.flash_period - times.period) * (frame - times.at);
   times.start = times.period * (times.at - frame) - tau;
@@ -94,7 +94,7 @@ Result<ClipTimes> clip_times(const ClipClock& clock, const ClipOptions& options,
     return Error{ErrorKind::bad_input, "its frames can't be numbered: " + clock.numbers.reason, clip,
                  "Let the strobe skip flashes in its code while all cameras film it"};
   }
-  // The place in the run that is nearest to the line's middle.
+  // The place in the run that is closest to the line's middle.
   std::int64_t place = middle - (clock.count_of(run->first) - run->first);
   place = std::clamp(place, run->first, run->last);
   const double coarse = run->start + static_cast<double>(place - run->first) * run->flashes_per_frame;

@@ -13,14 +13,14 @@ namespace emberlock::smear {
 namespace {
 
 constexpr double kOdds = 7;       // log: 1000 to 1
-constexpr double kStray = 0.05;   // of frames show a dot that isn't there, or are misread
-constexpr std::size_t kNear = 8;  // frames within which a neighbour tells where a dot would stand
+constexpr double kStray = 0.05;   // probability that a frame shows a false dot or is misread
+constexpr std::size_t kNear = 8;  // distance in frames within which a neighbour shows where a dot would be
 
 class DarkEnds {
  public:
   explicit DarkEnds(std::span<const FrameReading> frames) : frames_(frames) {}
 
-  /// Counts dots at both ends of lit stretches.
+  /// Counts dots at both ends of lit intervals.
   void count() {
     for (std::size_t i = 0; i < frames_.size(); ++i) {
       const SmearState state = frames_[i].reading.state;
@@ -43,12 +43,12 @@ class DarkEnds {
     DarkDirection told;
     if (ends_.empty()) return told;
     const double when_wrapped = (1 - kStray) * (begun_with_dot_ + 1) / (begun_ + 2);
-    double odds = 0;  // log, of the top row being read first
+    double odds = 0;  // log-odds of the top row being read first
     int with_dot = 0;
     for (const End& end : ends_) {
       const double wrapped =
           end.has_dot ? std::log(when_wrapped / kStray) : std::log((1 - when_wrapped) / (1 - kStray));
-      odds -= end.side * wrapped;  // below the lamp, a dot that wrapped was read bottom first
+      odds -= end.side * wrapped;  // a wrapped dot below the lamp: the bottom row is read first
       with_dot += end.has_dot ? 1 : 0;
     }
     const std::string seen =
@@ -64,11 +64,11 @@ class DarkEnds {
 
  private:
   struct End {
-    int side;  ///< of the lamp, on which its dot stands or would: +1 is below
+    int side;  ///< side of the lamp where its dot is or would be: +1 is below
     bool has_dot;
   };
 
-  /// Whether the frame next to it, which must not be lacking, isn't lit.
+  /// Whether the neighbouring frame (which must exist) isn't lit.
   [[nodiscard]] bool dark(std::size_t i, int step) const {
     if ((step < 0 && i == 0) || (step > 0 && i + 1 == frames_.size())) return false;
     const FrameReading& next = frames_[step < 0 ? i - 1 : i + 1];
@@ -78,7 +78,7 @@ class DarkEnds {
     if (reading.state != SmearState::dot || reading.dots.size() != 1 || !reading.lamp) return 0;
     return reading.dots.front().y > reading.lamp->y ? 1 : -1;
   }
-  /// Of the dots in the frames about it, if they stand on one side; else 0.
+  /// The side of the dots in the frames around it, if they agree; else 0.
   [[nodiscard]] int side_near(std::size_t i) const {
     int side = 0;
     for (std::size_t k = i > kNear ? i - kNear : 0; k < frames_.size() && k <= i + kNear; ++k) {

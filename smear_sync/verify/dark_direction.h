@@ -10,17 +10,18 @@
 
 namespace emberlock::smear {
 
-/// What the ends of a clip's lit stretches tell of d, without any walk of the dots.
+/// The read direction d, determined from the ends of a clip's lit intervals, without a walk of the dots.
 struct DarkDirection {
-  std::optional<ReadDirection> direction;  ///< absent where they tell too little
-  std::string reason;                      ///< what was seen; empty where no stretch ended
+  std::optional<ReadDirection> direction;  ///< absent if the evidence is too weak
+  std::string reason;                      ///< the observation; empty if no lit interval ended
 };
 
-/// A dot that wrapped is of the flash that lit its frame's picture, one that did not is of the flash after
-/// (frame_code.h). So the last frame before a dark one has its dot when dots wrap, and lacks it when they
-/// don't: with the side of the lamp on which the neighbours' dots stand, that is d, however slow the beat. A
-/// half covered lamp may lack its dot either way: how often, the first frames after dark ones tell, whose dot
-/// is there under both. Claimed at odds of 1000 to 1. Frames in order; pure.
+/// A wrapped dot belongs to the flash that lit its frame's picture, other dots to the next flash
+/// (frame_code.h). So the last lit frame before a dark one shows its dot if dots wrap, and doesn't if they
+/// don't. Together with the side of the lamp on which neighbouring dots lie, this gives d, however slow the
+/// beat is. A half covered lamp may lose its dot in either case; how often is estimated from the first frames
+/// after dark ones, whose dot is visible in both cases. A direction is accepted at odds of 1000 to 1. Frames
+/// must be in order. Pure.
 DarkDirection direction_by_dark_frames(std::span<const FrameReading> frames);
 
 }  // namespace emberlock::smear

@@ -7,7 +7,7 @@
 
 namespace emberlock::smear {
 
-/// The upper one of two; `v` isn't empty.
+/// The upper median if the count is even; `v` mustn't be empty.
 template <class Number>
 Number median(std::vector<Number> v) {
   const auto middle = v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2);

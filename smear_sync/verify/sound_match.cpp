@@ -9,15 +9,16 @@
 namespace emberlock::smear {
 namespace {
 
-constexpr double kSudden = 6;  // times as loud
+constexpr double kSudden = 6;  // ratio of loudness
 constexpr Seconds kBefore = milliseconds(100);
-constexpr Seconds kEcho = milliseconds(150);  // after a sudden sound nothing else is one
-constexpr Seconds kRise = milliseconds(10);   // within which its loudest comes
-constexpr Seconds kSame = milliseconds(15);   // two clips' instants of one sound, their places apart
-constexpr Seconds kSigma = milliseconds(30);  // of sound against picture, between two cameras
-constexpr double kUnshared = 0.5;        // what a sound counts that the other clip should hold and doesn't
-constexpr double kClearly = 0.9;         // by so much the best place must lead
-constexpr std::size_t kMostSounds = 60;  // of a track: more are no claps
+constexpr Seconds kEcho = milliseconds(150);  // dead time after a sudden sound
+constexpr Seconds kRise = milliseconds(10);   // time within which its maximum is reached
+constexpr Seconds kSame = milliseconds(
+    15);  // tolerance for the times of the same sound in two clips, for different positions of the cameras
+constexpr Seconds kSigma = milliseconds(30);  // of sound relative to picture, between two cameras
+constexpr double kUnshared = 0.5;        // penalty for a sound that the other clip should contain and doesn't
+constexpr double kClearly = 0.9;         // minimum lead of the best offset
+constexpr std::size_t kMostSounds = 60;  // per track: more aren't claps
 
 std::size_t steps(Seconds time, const SoundTrack& track) {
   return static_cast<std::size_t>(std::max(1.0, std::round(time / track.step)));
@@ -27,7 +28,7 @@ Seconds end_of(const SoundTrack& track) {
   return track.begin + track.step * static_cast<double>(track.levels.size());
 }
 
-/// Whether the track was running at an instant, with room to tell a sudden sound.
+/// Whether the track covers an instant, with enough margin to detect a sudden sound.
 bool covers(const SoundTrack& track, Seconds at) {
   return at >= track.begin + kBefore && at <= end_of(track) - kRise;
 }
@@ -38,7 +39,7 @@ struct Place {
   int shared = 0;
 };
 
-/// How well sounds fit when the clip begins `later`.
+/// The score of the sounds if the clip begins `later`.
 Place try_place(const SoundTrack& a, const std::vector<Seconds>& in_a, const SoundTrack& b,
                 const std::vector<Seconds>& in_b, Seconds later) {
   Place place;

@@ -12,24 +12,24 @@
 
 namespace emberlock::smear {
 
-// A clap in the clips' sound tracks is a second witness of which frames belong together. It tells no single
-// frame: sound takes 3 ms a metre, and cameras put sound and picture tens of milliseconds apart, each model
-// others.
+// A clap in the clips' sound tracks is a second source for which frames belong together. It isn't accurate to
+// a single frame: sound takes 3 ms per metre, and cameras shift sound against picture by tens of
+// milliseconds, depending on the model.
 
-/// What the sound tracks of two clips say of them.
+/// The offset of a clip according to the sound tracks.
 struct SoundOffset {
-  Seconds later;       ///< the clip's first frame comes so much after the reference's
+  Seconds later;       ///< delay of the clip's first frame relative to the reference's
   Seconds sigma;       ///< standard error
   std::string reason;  ///< one sentence: what was heard
 };
 
-/// Sudden sounds of a track: instants, after the clip's first frame, at which it becomes at least six times
-/// as loud as it was in the tenth of a second before and is in the median. Of what follows within 0.15 s the
-/// first.
+/// The sudden sounds of a track, as times relative to the clip's first frame: the sound becomes at least six
+/// times as loud as in the tenth of a second before, and as the median. Within 0.15 s only the first one
+/// counts.
 std::vector<Seconds> sudden_sounds(const SoundTrack& track);
 
-/// By the sudden sounds that each clip shares with the reference: nothing for a clip without any, or whose
-/// sounds fit in several places. The reference's own is zero. Pure.
+/// Matches the sudden sounds that each clip shares with the reference. nullopt for a clip without such
+/// sounds, or whose sounds fit at several offsets. The reference's own offset is zero. Pure.
 std::vector<std::optional<SoundOffset>> match_sounds(std::span<const SoundTrack> tracks,
                                                      std::size_t reference);
 

@@ -32,7 +32,7 @@ double per_frame_walk(const ClipClock& clock) {
   return std::abs((clock.flash_period / clock.timing.frame_period) - 1);
 }
 
-/// The error of two phases of the same strobe, and its standard error.
+/// Sets the error between two phases of the same strobe, and its standard error.
 void compare(const CameraVerdict& reference, CameraVerdict& camera, const WholeFrames& whole,
              std::int64_t middle, const VerifyOptions& options) {
   const Seconds flashes = reference.clock.flash_period;
@@ -52,8 +52,8 @@ void compare(const CameraVerdict& reference, CameraVerdict& camera, const WholeF
   if (offset) {
     error = error + flashes * std::round((flashes * offset->lag - error) / flashes);
   } else {
-    // Which flash belongs to which isn't known: frames of equal place may lie apart by the spread of the
-    // starts, or by what the sound leaves open.
+    // The flashes can't be matched: frames with the same index may be apart by the spread of the starts, or
+    // by the uncertainty of the sound.
     const double walk = std::max(per_frame_walk(reference.clock), per_frame_walk(camera.clock));
     const Seconds spread = whole.about ? frame * std::hypot(whole.about_sigma, 0.5) : options.start_spread;
     camera.sigma = Seconds(std::hypot(camera.sigma.value(), walk * spread.value()));
@@ -77,7 +77,7 @@ void compare(const CameraVerdict& reference, CameraVerdict& camera, const WholeF
       time_left(line, {}, {.tolerance = options.tolerance.in_time(options.clip.row_time), .period = frame});
 }
 
-void judge(const CameraVerdict& reference, CameraVerdict& camera, const VerifyOptions& options) {
+void set_state(const CameraVerdict& reference, CameraVerdict& camera, const VerifyOptions& options) {
   if (camera.clock.state == PhaseState::blind) {
     camera.state = ClipState::blind;
     camera.reason = camera.clock.reason;
@@ -270,7 +270,7 @@ Result<VerifyResult> verify_clips(std::span<const ClipReading> clips, const Veri
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<WholeFrames> whole, match_all(result, options, sounds));
   for (std::size_t i = 0; i < result.cameras.size(); ++i) {
     compare(reference, result.cameras[i], whole[i], result.middle, options);
-    judge(reference, result.cameras[i], options);
+    set_state(reference, result.cameras[i], options);
   }
   CameraVerdict& itself = result.cameras[result.reference];
   if (itself.clock.state == PhaseState::known) {

@@ -23,9 +23,9 @@ constexpr OneToOne<FrameWitness, std::string_view, 4> kWitnessNames{
 constexpr double kContradicts = 3;  // standard errors
 constexpr double kMostDetuned = 0.05;
 constexpr double kTie = 0.001;             // flash periods
-constexpr double kWalkTheOtherWay = 0.04;  // the same, where a line was taken to fall that may rise
+constexpr double kWalkTheOtherWay = 0.04;  // the same if the sign of the line's slope is uncertain
 
-/// How the counts of two clips belong together, where the code tells it.
+/// The frame offset of two clips, if the code gives it.
 std::optional<FrameOffset> offset_by_code(const ClipClock& reference, const ClipClock& clip,
                                           const FrameCode& code, std::int64_t frame) {
   const NumberedRun* from = reference.run_at(frame);
@@ -48,7 +48,7 @@ std::optional<FrameOffset> offset_by_code(const ClipClock& reference, const Clip
 struct OwnScale {
   ClipTimes times;
   Seconds flash_period;
-  /// By how much all starts may be off that scale, in flash periods; 0 is one of them.
+  /// Alternative offsets of all starts relative to that scale, in flash periods; 0 is one of them.
   std::vector<double> slacks{0.0};
   [[nodiscard]] double start(std::int64_t place) const { return times.read_start(place) / flash_period; }
 };
@@ -66,11 +66,11 @@ OwnScale own_scale(const ClipClock& clock, const ClipOptions& options, std::int6
   own.times = strobe_times(clock);
   if (clock.tau_slack > Seconds(0)) own.slacks.push_back(-(clock.tau_slack / clock.flash_period));
   if (!clock.direction_known(options)) {
-    // Read the other way, a dot stands K rows less those that it stands away: the flash that lit the picture
-    // is the same, the frame's start isn't.
+    // With the other read direction, the dot would be K rows minus its distance from the lamp. The flash that
+    // lit the picture would be the same, but not the frame's start.
     const double start = own.start(at_place);
     const double tau = 1 - (start - std::floor(start));
-    // Were K unknown too, a dot that had not wrapped has, read the other way.
+    // If K is unknown too, a dot that isn't wrapped would be wrapped with the other direction.
     const bool shifts_known = clock.mode.shifts || options.shifts;
     const double most = std::floor((clock.timing.frame_period / options.row_time).value());
     for (const double shifts : {static_cast<double>(clock.timing.shifts),
@@ -79,7 +79,7 @@ OwnScale own_scale(const ClipClock& clock, const ClipOptions& options, std::int6
       own.slacks.push_back(tau - std::clamp(other, 0.0, 1.0));
     }
   }
-  // Half-way between two frames either is as near: then what the phase leaves open decides nothing.
+  // Halfway between two frames both are equally close, so the uncertainty of the phase decides nothing.
   const double margin = clock.direction_known(options)
                             ? kContradicts * (clock.line->tau_sigma / clock.flash_period) + kTie
                             : kWalkTheOtherWay;
@@ -97,15 +97,15 @@ PatternClip pattern_of(const ClipClock& clock, const OwnScale& own) {
   return pattern;
 }
 
-/// The frame of the clip that starts nearest to the reference's, were both starts off by so much.
+/// The clip's frame that starts closest to the reference's, if both starts are off by these slacks.
 std::int64_t nearest_count(const OwnScale& reference, double reference_slack, const OwnScale& clip,
                            double slack, std::int64_t flashes, std::int64_t frame) {
   const double instant = reference.start(frame) + reference_slack - static_cast<double>(flashes) - slack;
   return clip.times.nearest_count(clip.flash_period * instant);
 }
 
-/// Turns a shift of flashes into one of frames; nothing, with the reason, where a phase that isn't known
-/// leaves open which frame is nearest.
+/// Converts a shift of flashes to one of frames; nothing, with the reason, if an unknown phase leaves open
+/// which frame is closest.
 void frames_of_shift(const OwnScale& reference, const OwnScale& clip, std::int64_t frame,
                      WholeFrames& found) {
   const std::int64_t count = nearest_count(reference, 0, clip, 0, found.flashes, frame);
@@ -162,8 +162,8 @@ class FrameMatcher {
     return i < sounds_.size() && sounds_[i] ? &*sounds_[i] : nullptr;
   }
 
-  /// By the code, if what else the two clips share doesn't contradict: a pattern that happens to look like a
-  /// piece of it must not be numbered by it.
+  /// By the code, unless other evidence contradicts: a pattern that happens to resemble a part of the code
+  /// must not be numbered by it.
   [[nodiscard]] WholeFrames by_code(std::size_t i) const {
     WholeFrames found;
     found.offset = offset_by_code(clocks_[reference_], clocks_[i], options_.code, frame_);
@@ -229,7 +229,8 @@ class FrameMatcher {
     frames_of_shift(own_[reference_], own_[i], frame_, found);
   }
 
-  /// What the sound says of an offset: that it may be, or can't; and without one, roughly where it lies.
+  /// Compares an offset with the sound: compatible or not; without an offset, the approximate one by the
+  /// sound.
   void hear(std::size_t i, WholeFrames& found) const {
     const SoundOffset* heard = sound(i);
     if (heard == nullptr) return;

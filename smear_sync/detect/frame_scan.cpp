@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "smear_sync/detect/look.h"
+#include "smear_sync/detect/frame_scan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 namespace emberlock::smear::detail {
 namespace {
 
-/// Just below white, or below the plateau of a signal that is clipped in a deeper container.
+/// Just below white, or below the plateau of a signal that was clipped at fewer bits.
 double saturation_of(const Plane& plane) {
   constexpr double kNearly = 0.98;
   if (plane.view.layout.bit_depth == 8) return kNearly * plane.white;
@@ -19,7 +19,7 @@ double saturation_of(const Plane& plane) {
   return kNearly * (count * rows.step >= kPlateau ? peak : plane.white);
 }
 
-/// The background from few samples, averaged with what was known of it; nothing when it has changed.
+/// The background from few samples, averaged with the previous one; nullopt if it has changed.
 std::optional<Background> still_the_same(const Plane& plane, const Background& before) {
   constexpr int kRuns = 16;
   constexpr double kNew = 0.1;
@@ -33,7 +33,7 @@ std::optional<Background> still_the_same(const Plane& plane, const Background& b
   return background;
 }
 
-/// Measures the one lamp where it was; nothing when it isn't there.
+/// Measures the only lamp at its previous place; nullopt if it isn't there.
 std::optional<LampSearch> find_again(const Plane& plane, const Background& background, const Lamp& lamp,
                                      const DetectOptions& options) {
   const auto near = [](double centre, double reach) { return static_cast<int>(std::lround(centre + reach)); };
@@ -53,12 +53,12 @@ std::optional<LampSearch> find_again(const Plane& plane, const Background& backg
   return search;
 }
 
-/// Whether all that is as bright as a lamp, in a sample of the frame and in the lamp's own columns, is the
-/// lamp. A reflection in the columns would pass for a very bright dot, or hide one.
+/// Whether the lamp is the only bright area in a sample of the frame and in the lamp's own columns. A
+/// reflection in the columns would be taken for a very bright dot, or hide one.
 bool alone(const Plane& plane, const Background& background, const Lamp& lamp, unsigned turn,
            const DetectOptions& options) {
   constexpr int kSparse = 16;
-  constexpr double kAround = 12;  // pixels around the lamp's disk that its halo and bloom may light
+  constexpr double kAround = 12;  // pixels around the disk that halo and bloom may light
   const double threshold = background.level + lamp_gate(background, options);
   const double around = lamp.radius + kAround;
   const auto known = [&](const Extent& area) {
@@ -75,38 +75,37 @@ bool alone(const Plane& plane, const Background& background, const Lamp& lamp, u
 
 }  // namespace
 
-Look whole_look(const Plane& plane, const DetectOptions& options) {
-  Look look;
-  look.background = measure_background(plane);
-  look.background.saturation = saturation_of(plane);
-  const double threshold = look.background.level + lamp_gate(look.background, options);
-  look.search = find_lamps(plane, look.background, find_bright(plane, threshold, every_lamp(plane)), options);
-  if (look.search.lamps.size() == 1)
-    look.glance = glance_at(plane, look.background, look.search.lamps.front());
-  look.clear_of_dots = false;
-  return look;
+FrameScan scan_frame(const Plane& plane, const DetectOptions& options) {
+  FrameScan scan;
+  scan.background = measure_background(plane);
+  scan.background.saturation = saturation_of(plane);
+  const double threshold = scan.background.level + lamp_gate(scan.background, options);
+  scan.search = find_lamps(plane, scan.background, find_bright(plane, threshold, every_lamp(plane)), options);
+  if (scan.search.lamps.size() == 1)
+    scan.moments = moments_at(plane, scan.background, scan.search.lamps.front());
+  return scan;
 }
 
-std::optional<Look> look_again(const Plane& plane, const Look& before, unsigned turn,
-                               const DetectOptions& options) {
+std::optional<FrameScan> rescan(const Plane& plane, const FrameScan& before, unsigned turn,
+                                const DetectOptions& options) {
   constexpr unsigned kBackgroundTurn = 16;
   if (before.search.lamps.size() != 1 || before.search.bright_line) return std::nullopt;
   const Lamp& lamp = before.search.lamps.front();
-  Look look = before;
+  FrameScan scan = before;
   if (turn % kBackgroundTurn == 0) {
     const std::optional<Background> background = still_the_same(plane, before.background);
     if (!background) return std::nullopt;
-    look.background = *background;
+    scan.background = *background;
   }
-  if (!alone(plane, look.background, lamp, turn, options)) return std::nullopt;
+  if (!alone(plane, scan.background, lamp, turn, options)) return std::nullopt;
   if (lamp.saturated && before.clear_of_dots &&
-      glance_at(plane, look.background, lamp).same_as(before.glance))
-    return look;
-  std::optional<LampSearch> search = find_again(plane, look.background, lamp, options);
+      moments_at(plane, scan.background, lamp).same_as(before.moments))
+    return scan;
+  std::optional<LampSearch> search = find_again(plane, scan.background, lamp, options);
   if (!search) return std::nullopt;
-  look.search = std::move(*search);
-  look.glance = glance_at(plane, look.background, look.search.lamps.front());
-  return look;
+  scan.search = std::move(*search);
+  scan.moments = moments_at(plane, scan.background, scan.search.lamps.front());
+  return scan;
 }
 
 }  // namespace emberlock::smear::detail

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "smear_sync/detect/judge.h"
+#include "smear_sync/detect/classify.h"
 
 #include <algorithm>
 #include <cmath>
@@ -28,8 +28,8 @@ DotReading dot_reading(const Plane& plane, const Lamp& lamp, const DotFit& fit) 
           .side = fit.y < lamp.y ? Side::above : Side::below};
 }
 
-/// Dots of one strobe are of one brightness, and three or more on one side of the lamp stand at multiples of
-/// one pitch.
+/// Dots of one strobe have the same brightness, and three or more on one side of the lamp are multiples of
+/// one pitch apart.
 bool one_strobe(const std::vector<DotFit>& dots, double lamp_row) {
   const auto [weakest, strongest] = std::minmax_element(
       dots.begin(), dots.end(), [](const DotFit& a, const DotFit& b) { return a.amplitude < b.amplitude; });
@@ -44,7 +44,7 @@ bool one_strobe(const std::vector<DotFit>& dots, double lamp_row) {
     for (std::size_t i = 2; i < rows.size(); ++i) pitch = std::min(pitch, rows[i] - rows[i - 1]);
     for (std::size_t i = 1; i < rows.size(); ++i) {
       const double gap = (rows[i] - rows[i - 1]) / pitch;
-      // Whole rows of charge: a gap may be a row longer or shorter than the last one.
+      // Because of whole-row shifts, a gap may be a row longer or shorter than the next.
       if (std::abs(gap - std::round(gap)) * pitch > 1.5 + 0.5 * std::round(gap)) return false;
     }
   }
@@ -63,9 +63,9 @@ SmearReading ambiguous(SmearReading reading, std::string reason) {
   return reading;
 }
 
-/// The state of one lamp whose column is its own.
-SmearReading judge(const Plane& plane, const Lamp& lamp, const ColumnReading& column,
-                   const DetectOptions& options) {
+/// The state of one lamp that doesn't share its column.
+SmearReading classify_lamp(const Plane& plane, const Lamp& lamp, const ColumnReading& column,
+                           const DetectOptions& options) {
   SmearReading reading;
   reading.lamp = lamp_reading(plane, lamp);
   if (column.clipped) {
@@ -122,7 +122,7 @@ SmearReading judge(const Plane& plane, const Lamp& lamp, const ColumnReading& co
   return reading;
 }
 
-/// Several lamps: the one that behaves like a strobe is it; more than one must agree on the shift.
+/// Several lamps: chooses the one that behaves like a strobe. If several do, they must have the same shift.
 SmearReading choose(std::vector<SmearReading> readings) {
   std::vector<const SmearReading*> strobes;
   for (const SmearReading& r : readings) {
@@ -156,7 +156,7 @@ SmearReading choose(std::vector<SmearReading> readings) {
   return first;
 }
 
-/// A reading for every lamp, and what they say together.
+/// Reads every lamp and combines the results.
 SmearReading several(const Plane& plane, const Background& background, const std::vector<Lamp>& lamps,
                      const DetectOptions& options) {
   constexpr std::size_t kMostLamps = 4;
@@ -169,11 +169,11 @@ SmearReading several(const Plane& plane, const Background& background, const std
   std::vector<SmearReading> readings;
   readings.reserve(lamps.size());
   for (const Lamp& lamp : lamps)
-    readings.push_back(judge(plane, lamp, read_column(plane, background, lamp, options), options));
+    readings.push_back(classify_lamp(plane, lamp, read_column(plane, background, lamp, options), options));
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < lamps.size(); ++j) {
       if (!same_column(lamps[i], lamps[j])) continue;
-      // The other one stands in this one's column too, and is no dot of it.
+      // The other lamp is visible in this one's column, but isn't a dot of it.
       const auto is_lamp = [&](const DotReading& dot) {
         return std::any_of(lamps.begin(), lamps.end(), [&](const Lamp& lamp) {
           return std::abs(dot.y.value() - plane.offset - lamp.y) < 1.5 * lamp.radius + 2;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "smear_sync/detect/across.h"
+#include "smear_sync/detect/width_gate.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,21 +10,21 @@ namespace emberlock::smear::detail {
 namespace {
 
 constexpr double kInFocus =
-    0.85;  // pixels: blur of a lens in focus and of the pixel itself, as DotFit::kEdge
-constexpr double kSharpest = 0.35;   // no lens is taken for sharper
+    0.85;  // pixels: blur of a focused lens and of the pixel itself, like DotFit::kEdge
+constexpr double kSharpest = 0.35;   // pixels: the sharpest lens assumed
 constexpr double kWiderErrors = 4;   // standard errors
-constexpr double kLikeBright = 0.6;  // of the lamp's peak: what is so bright is no faint copy
+constexpr double kLikeBright = 0.6;  // of the lamp's peak: a brighter spot isn't a faint copy
 constexpr double kRoundness =
-    0.25;  // pixels: a spot's two half widths differ as the lamp's do, or by so much
+    0.25;  // pixels: tolerance for the difference of a spot's two half-widths from the lamp's
 constexpr double kEnoughGain = 0.3;  // of chi-square
-// Errors of the model, as a part of the signal; at first also what photons add.
+// Error of the model, relative to the signal; at first it also covers photon noise.
 constexpr double kModelError = 0.01;
 constexpr double kFirstError = 0.03;
 
 int whole(double v) { return static_cast<int>(std::lround(v)); }
 
-/// The sharpest lens that a spot of this blur allows. Pixels, and a mosaic's sums of 2 x 2, blur a spot, but
-/// not how the flanks of a clipped lamp fall far out.
+/// The sharpest lens compatible with a spot of this blur. Pixels, and a mosaic's sums of 2 x 2, add to the
+/// blur of a spot, but not to that of a clipped lamp's outer flanks.
 double sharpest_lens(const Plane& plane, const EdgeFit& spot) {
   constexpr double kPixel = 1.0 / 12;  // variances
   constexpr double kCell = 0.25;
@@ -40,11 +40,10 @@ bool overflows(const Column& c) {
   return hidden(whole(c.y) - beyond) || hidden(whole(c.y) + beyond);
 }
 
-/// What isn't clipped around the lamp, the columns' own level taken out, and the rings of its halo farther
-/// out. Charge that overflows runs along its column: where it does, all of a column with a clipped sample is
-/// left out.
+/// The unclipped samples around the lamp minus the columns' level, and the rings of its halo further out.
+/// Where charge overflows along a column, a column with a clipped sample is left out completely.
 EdgeSamples around_lamp(const Plane& plane, const Column& c, const Lamp& lamp) {
-  constexpr int kDark = 4;   // pixels beside the edge
+  constexpr int kDark = 4;   // pixels beside the edge, without halo
   constexpr int kGlare = 9;  // with a halo
   const int reach = whole(lamp.radius) + (c.halo.empty() ? kDark : kGlare);
   const int rows = whole(lamp.radius) + kDark - 1;
@@ -72,7 +71,7 @@ EdgeSamples around_lamp(const Plane& plane, const Column& c, const Lamp& lamp) {
       samples.add(column, y + patch.y0, patch.row(y)[x] - level[column]);
     }
   }
-  constexpr double kRing = 1.3;  // pixels in a ring of radius 1: column_patch's
+  constexpr double kRing = 1.3;  // number of pixels in a ring of radius 1, as in column_patch
   for (std::size_t r = static_cast<std::size_t>(reach) + 1; r < c.halo.size(); ++r)
     samples.add(whole(c.x) + static_cast<int>(r), whole(c.y), static_cast<float>(c.halo[r]),
                 kRing * static_cast<double>(r));
@@ -80,8 +79,7 @@ EdgeSamples around_lamp(const Plane& plane, const Column& c, const Lamp& lamp) {
   return samples;
 }
 
-/// Where a clipped lamp's search begins: so much brighter than what clips it, its outline where it was
-/// measured.
+/// Start values for a clipped lamp: brighter than the clipping level by a guess, with the measured outline.
 void start_clipped(const Column& c, const Lamp& lamp, EdgeFit& f) {
   constexpr double kOver = 5;
   f.amplitude = kOver * c.saturation;
@@ -112,11 +110,11 @@ LampAcross lamp_across(const Plane& plane, const Column& c, const Lamp& lamp, do
     unknown.insert(unknown.end(), {across, along, blur});
   }
   constexpr int kMost = 15;
-  constexpr double kNearEnough = 5;  // of chi-square, to tell the photons
+  constexpr double kNearEnough = 5;  // of chi-square, for estimating the photon noise
   constexpr double kRound = 1.5;     // misfit
   samples.weigh(c.noise, 0, kFirstError);
   EdgeFit first = fit_edge(samples, f, unknown, {}, kNearEnough, kMost);
-  if (lamp.saturated && first.misfit > kRound) {  // of a field, or of pixels that aren't square
+  if (lamp.saturated && first.misfit > kRound) {  // one field only, or pixels that aren't square
     unknown.back() = across;
     unknown.push_back(along);
     first = fit_edge(samples, first, unknown, {}, kNearEnough, kMost);
@@ -133,7 +131,7 @@ struct SpotAcross {
 
 SpotAcross spot_across(const Column& c, FitWindow w, const DotFit& spot, const LampAcross& lamp) {
   using enum EdgeFree;
-  const double reach = spot.radius + 3.5;  // enough of the level around it
+  const double reach = spot.radius + 3.5;  // includes enough of the level around the spot
   w = {std::max(w.left, whole(spot.x - reach)), std::min(w.right, whole(spot.x + reach)),
        std::max(w.top, whole(spot.y - reach)), std::min(w.bottom, whole(spot.y + reach))};
   SpotAcross s;
@@ -157,7 +155,8 @@ SpotAcross spot_across(const Column& c, FitWindow w, const DotFit& spot, const L
   return s;
 }
 
-/// Light beside the spot, farther out than a lamp's copy reaches, that ends above it or below it.
+/// Whether there is light beside the spot, further out than a copy of the lamp would reach, that ends above
+/// or below it.
 bool light_beside(const Column& c, const DotFit& spot) {
   const int first = whole(c.radius) + 2;
   const int last = first + std::max(2, whole(0.5 * c.radius));
@@ -195,7 +194,7 @@ bool light_beside(const Column& c, const DotFit& spot) {
 }
 
 bool exceeds(const Column& c, const EdgeFit& spot, const LampAcross& lamp) {
-  constexpr double kArtefacts = 0.1;  // of the half width: what a quantiser adds to it
+  constexpr double kArtefacts = 0.1;  // of the half-width: contribution of compression artefacts
   const double allowed = c.compressed ? kArtefacts * lamp.half_width : 0;
   return spot.across - lamp.half_width > allowed + kWiderErrors * std::hypot(spot.across_sigma, lamp.sigma);
 }
@@ -211,7 +210,7 @@ bool wider_than_lamp(const Plane& plane, const Column& c, const Lamp& lamp, cons
   const SpotAcross s = spot_across(c, window, spot, as_taken);
   if (!exceeds(c, s.fit, as_taken)) return false;
   if (!lamp.saturated) return true;
-  // Were it a dot, its blur would be the lens's.
+  // If it were a dot, it would have the lens's blur.
   using enum EdgeFree;
   constexpr int kMost = 15;
   const EdgeFit own = fit_edge(s.samples, s.fit, {amplitude, level, x, y, across, along, blur},

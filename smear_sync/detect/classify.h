@@ -9,11 +9,11 @@
 
 namespace emberlock::smear::detail {
 
-/// What the lamps that were found and their columns mean: the state and its reason.
+/// Classifies the found lamps and their columns: the state and its reason.
 SmearReading read_lamps(const Plane& plane, const Background& background, const LampSearch& search,
                         const DetectOptions& options);
 
-/// Why a frame holds nothing that could be read; empty when it does.
+/// Why a frame can't be read; empty if it can.
 std::string unreadable(const ImageView& frame);
 
 SmearReading nothing(std::string reason);

@@ -23,8 +23,8 @@ ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std:
   std::vector<RadianceImage> behind;
   std::vector<double> pixels(views.size());
   for (std::size_t v = 0; v < views.size(); ++v) {
-    const RadianceImage& image = views[v]->image;
-    const RadianceImage* own = views[v]->background ? &*views[v]->background : nullptr;
+    const RadianceImage& image = *views[v]->image;
+    const RadianceImage* own = views[v]->background.get();
     behind.push_back(background.kind == Background::Kind::black ? RadianceImage{}
                                                                 : backdrop(background, image.size, own));
     std::array<double, 3> sum = {};
@@ -45,14 +45,14 @@ ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std:
   for (std::size_t r = 0; r < weight_.size(); ++r) {
     const std::size_t v = problem.list.rays[r].view;
     const PixelBox& box = boxes[v];
-    const int width = views[v]->image.size.width;
+    const int width = views[v]->image->size.width;
     const int x = static_cast<int>(problem.list.pixels[r]) % width;
     const int y = static_cast<int>(problem.list.pixels[r]) / width;
     if (x < box.x0 || x >= box.x1 || y < box.y0 || y >= box.y1) continue;
     weight_[r] = static_cast<float>(1 / (std::max(1.0, pixels[v]) * static_cast<double>(views.size())));
     const std::size_t at = 3 * static_cast<std::size_t>(problem.list.pixels[r]);
     for (std::size_t c = 0; c < 3; ++c) {
-      const double b = static_cast<double>(views[v]->image.rgb[at + c] - value(behind[v], at + c));
+      const double b = static_cast<double>(views[v]->image->rgb[at + c] - value(behind[v], at + c));
       unreached_[c] -= static_cast<double>(weight_[r]) * b * b;
     }
   }

@@ -11,23 +11,24 @@
 
 namespace emberlock::recon {
 
-/// Mean squared error over each view's box, from the residuals of a problem whose first `rays` (all, if not
-/// said) are every stride-th pixel of the views along both axes.
+/// The mean squared error over each view's box, from the residuals of a problem whose first `rays` rays
+/// (default: all) are every stride-th pixel of the views along both axes.
 class ErrorOverBoxes {
  public:
   ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
                  const Problem& problem, const Background& background, int stride = 1,
                  std::optional<std::size_t> rays = std::nullopt);
-  /// RMSE for R, G, B: the mean square over each view's box, then over the views. Takes the residuals of
-  /// those rays, or more.
+  /// RMSE for R, G, B: the mean square over each view's box, then over the views. Expects the residuals of at
+  /// least those rays.
   [[nodiscard]] std::array<double, 3> operator()(const std::vector<Rgba>& residual) const;
-  /// The same of pictures that show nothing but the background.
+  /// The same for pictures that show only the background.
   [[nodiscard]] std::array<double, 3> black() const;
 
  private:
-  std::vector<float> weight_;             // of each ray: 1 / (pixels of its box * views), 0 outside
-  std::array<double, 3> black_ = {};      // squared
-  std::array<double, 3> unreached_ = {};  // what pixels that no ray reaches add: they show the background
+  std::vector<float> weight_;         // by ray: 1 / (pixels of its box * views), 0 outside
+  std::array<double, 3> black_ = {};  // squared
+  std::array<double, 3> unreached_ =
+      {};  // contribution of pixels that no ray reaches: they show the background
 };
 
 }  // namespace emberlock::recon

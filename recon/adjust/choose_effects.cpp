@@ -10,7 +10,6 @@
 #include "recon/adjust/find_motion.h"
 #include "recon/adjust/left_out_views.h"
 #include "recon/adjust/predict_effects.h"
-#include "recon/adjust/prepared_scene.h"
 #include "recon/effects/motion.h"
 #include "recon/preprocess/picture_clues.h"
 
@@ -54,16 +53,15 @@ ShownFromElsewhere show_from_elsewhere(const SolverSetup& setup, const Extinctio
 /// extinction is.
 class MotionChoice {
  public:
-  MotionChoice(const Scene& scene, const Grid& grid, const EffectRequest& request,
+  MotionChoice(const PreparedScene& scene, const Grid& grid, const EffectRequest& request,
                const SolveOptions& options, Pool& pool, const Elapsed& elapsed)
       : scene_(scene), grid_(grid), request_(request), options_(options), pool_(pool), elapsed_(elapsed) {}
 
   /// None, or about how the flame rises.
-  Motion rough(const Effects& known) {
+  Motion rough() {
     if (request_.fixed) return request_.fixed->motion;
     const Seconds start = now();
-    const PreparedScene linear(scene_, known);
-    found_ = find_rise({linear.scene(), grid_, known, options_, pool_}, request_.tolerance);
+    found_ = find_rise({scene_.scene(), grid_, scene_.effects(), options_, pool_}, request_.tolerance);
     seconds_ = now() - start;
     on_ = found_.gain >= request_.tolerance;
     return on_ ? found_.motion : Motion{};
@@ -73,14 +71,14 @@ class MotionChoice {
     const Motion rough = known.motion;
     known.motion = {};
     const Seconds start = now();
+    const PreparedScene still = scene_.under(known);
+    const MotionSearch search{still.scene(), grid_, known, options_, pool_};
     if (request_.fixed) {
-      on_ = moves(scene_, rough);
-      if (on_)
-        found_ = judge_motion({PreparedScene(scene_, known).scene(), grid_, known, options_, pool_}, rough);
+      on_ = moves(scene_.told(), rough);
+      if (on_) found_ = measure_motion(search, rough);
       found_.motion = rough;
     } else if (on_) {
-      const PreparedScene linear(scene_, known);
-      found_ = refine_motion({linear.scene(), grid_, known, options_, pool_}, rough);
+      found_ = refine_motion(search, rough);
     }
     seconds_ += now() - start;
     return on_ ? found_.motion : rough;
@@ -90,7 +88,7 @@ class MotionChoice {
  private:
   [[nodiscard]] Seconds now() const { return elapsed_ ? elapsed_() : Seconds(0); }
   [[nodiscard]] std::string reason() const {
-    if (!any_late(scene_)) return "no view is known to be late";
+    if (!any_late(scene_.told())) return "no view is known to be late";
     if (request_.fixed && !on_) return "left out by hand";
     const auto& v = found_.motion.velocity;
     const std::string what = fmt::format(
@@ -105,14 +103,15 @@ class MotionChoice {
           request_.tolerance);
     const std::string gain = fmt::format(", and the held-out error by about {:.2g}", found_.gain);
     if (!on_) return what + gain + fmt::format(", less than {:.2g}", request_.tolerance);
-    const bool averaged = std::all_of(scene_.views.begin(), scene_.views.end(), [](const View& view) {
+    const std::vector<View>& told = scene_.told().views;
+    const bool averaged = std::all_of(told.begin(), told.end(), [](const View& view) {
       return view.average || view.lateness == Seconds(0);
     });
     return what + gain +
            (averaged ? "" : " (what stays where it is isn't known: pictures of other instants would tell)");
   }
 
-  const Scene& scene_;
+  const PreparedScene& scene_;
   const Grid& grid_;
   const EffectRequest& request_;
   const SolveOptions& options_;
@@ -134,45 +133,52 @@ Status check_gamma(const Scene& scene, const EffectRequest& request) {
       "--effects", "Leave gamma out, or reconstruct with a rig that has no colour"};
 }
 
-}  // namespace
-
-Effects told_by_the_pictures(const Scene& scene, const EffectRequest& request) {
-  Effects known;
-  const std::vector<FlameMask> masks = flame_masks(scene);
-  const bool pictured = std::any_of(scene.views.begin(), scene.views.end(), [](const View& view) {
-    return view.role == ViewRole::input && view.background;
-  });
-  const std::optional<BorderLevel> border = border_level(scene, masks);
-  if (pictured)
-    known.background.kind = Background::Kind::image;
-  else if (border && *std::max_element(border->level.begin(), border->level.end()) >= request.tolerance)
-    known.background = {Background::Kind::constant, border->level};
-  known.sensor = request.assumed.sensor;
-  if (known.sensor.gamma != 1) known.sensor.response = Sensor::Response::gamma;
-  const std::vector<PixelBox> boxes = flame_boxes(scene, masks);
-  const double white = clip_level(scene, boxes, known.sensor.white);
-  if (white > 0 && clipped_pixels(scene, boxes, white).excess >= request.tolerance) {
-    known.sensor.clipping = Sensor::Clipping::at_white;
-    known.sensor.white = white;
+/// The sensor, with the level at which it clips where enough of the flame is clipped.
+Sensor clipping_sensor(const Scene& filmed, Sensor sensor, double tolerance) {
+  const std::vector<PixelBox> boxes = flame_boxes(filmed, flame_masks(filmed));
+  const double white = clip_level(filmed, boxes, sensor.white);
+  if (white > 0 && clipped_pixels(filmed, boxes, white).excess >= tolerance) {
+    sensor.clipping = Sensor::Clipping::at_white;
+    sensor.white = white;
   }
-  return known;
+  return sensor;
 }
 
-Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
-                                    const SolveOptions& options, const Elapsed& elapsed) try {
-  EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
-  EMBERLOCK_RETURN_IF_ERROR(check_gamma(scene, request));
-  EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
+/// In linear grey levels: what the pictures of the background show, else the level along the borders.
+Background known_background(const Scene& linear, double tolerance) {
+  const bool pictured = std::any_of(linear.views.begin(), linear.views.end(), [](const View& view) {
+    return view.role == ViewRole::input && view.background;
+  });
+  if (pictured) return {Background::Kind::image, {}};
+  const std::optional<BorderLevel> border = border_level(linear, flame_masks(linear));
+  if (!border || *std::max_element(border->level.begin(), border->level.end()) < tolerance) return {};
+  return {Background::Kind::constant, border->level};
+}
+
+}  // namespace
+
+PreparedScene under_known_effects(const PreparedScene& filmed, const EffectRequest& request) {
+  if (request.fixed) return filmed.under(*request.fixed);
   Effects known;
-  if (request.fixed)
-    known = *request.fixed;
-  else
-    known = told_by_the_pictures(scene, request);
+  known.sensor = request.assumed.sensor;
+  if (known.sensor.gamma != 1) known.sensor.response = Sensor::Response::gamma;
+  known.sensor = clipping_sensor(filmed.told(), known.sensor, request.tolerance);
+  const PreparedScene linear = filmed.under(known);
+  known.background = known_background(linear.scene(), request.tolerance);
+  return linear.under(known);
+}
+
+Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid,
+                                    const EffectRequest& request, const SolveOptions& options,
+                                    const Elapsed& elapsed) try {
+  EMBERLOCK_RETURN_IF_ERROR(check_gamma(scene.told(), request));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
+  Effects known = scene.effects();
   Pool pool(options.compute.threads, device);
   MotionChoice motion(scene, grid, request, options, pool, elapsed);
-  known.motion = motion.rough(known);
+  known.motion = motion.rough();
   const Seconds start = elapsed ? elapsed() : Seconds(0);
-  const PreparedScene prepared(scene, known);
+  const PreparedScene prepared = scene.under(known);
   const Scene& linear = prepared.scene();
   const std::vector<FlameMask> masks = masks_before(linear, known.background, options.flame_threshold);
   EMBERLOCK_ASSIGN_OR_RETURN(const Hull hull, carve(linear, masks, grid, options.compute));
@@ -227,6 +233,12 @@ Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const 
   return e.error();
 } catch (const Diverged& e) {
   return e.error();
+}
+
+Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
+                                    const SolveOptions& options, const Elapsed& elapsed) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
+  return choose_effects(under_known_effects(told, request), grid, request, options, elapsed);
 }
 
 }  // namespace emberlock::recon

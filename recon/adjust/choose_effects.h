@@ -1,19 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/solver.h"
 #include "recon/effects/effects.h"
 
 namespace emberlock::recon {
 
-/// The background and the clipped pixels: before the flame can be looked at, these must be known.
-Effects told_by_the_pictures(const Scene& scene, const EffectRequest& request);
+/// A scene under what must be known before the flame can be looked at: what is set by hand, else response,
+/// clipped pixels and background, as far as the pictures tell them.
+PreparedScene under_known_effects(const PreparedScene& filmed, const EffectRequest& request);
 
-/// Decides which effects the pictures call for. With `request.fixed` it takes those and only predicts their
-/// change. Otherwise the extinction is found by a global search: cold solves on a coarse grid from a fraction
-/// of the pixels, judged on held-out pixels of the input views, then refined by a parabola; an effect whose
-/// predicted change lies below the tolerance is off. Errors: check_scene()'s; a gamma for pictures that are
-/// linearised.
+/// Decides which effects the pictures of a scene that is under_known_effects() call for. With `request.fixed`
+/// it takes those and only predicts their change. Otherwise the extinction is found by a global search: cold
+/// solves on a coarse grid from a fraction of the pixels, judged on held-out pixels of the input views, then
+/// refined by a parabola; an effect whose predicted change lies below the tolerance is off. Errors: a gamma
+/// for pictures that are linearised; a device that can't run; no hull.
+Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid,
+                                    const EffectRequest& request, const SolveOptions& options,
+                                    const Elapsed& elapsed = {});
+/// The same from a scene as it was filmed. Errors: check_scene()'s too.
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
                                     const SolveOptions& options, const Elapsed& elapsed = {});
 

@@ -56,7 +56,7 @@ RadianceImage small_picture(const RadianceImage& full, const PixelBox& box, int 
 std::vector<PixelBox> flame_boxes(const Scene& scene, const std::vector<FlameMask>& masks) {
   std::vector<PixelBox> boxes;
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    const ImageSize size = scene.views[v].image.size;
+    const ImageSize size = scene.views[v].image->size;
     boxes.push_back(masks[v].box.empty() ? PixelBox{0, 0, size.width, size.height} : masks[v].box);
   }
   return boxes;

@@ -8,29 +8,31 @@
 
 namespace emberlock::recon {
 
-/// A scene whose flame is known roughly.
+/// A scene with a rough estimate of its flame.
 struct CoarseFlame {
   const Scene& scene;
-  const std::vector<FlameMask>& masks;  ///< one a view
-  const Volume& volume;                 ///< some 64 voxels along: it predicts what effects change
-  const Hull& medium;                   ///< on the volume's grid
-  double finer = 1;  ///< voxel edges of the reconstruction's grid in one of the volume's, for its costs
+  const std::vector<FlameMask>& masks;  ///< one per view
+  const Volume& volume;  ///< about 64 voxels along the longest edge: predicts the effects' changes
+  const Hull& medium;    ///< on the volume's grid
+  double finer =
+      1;  ///< voxel edges of the reconstruction's grid per edge of this volume, for predicted costs
 };
 
-/// Each view's flame box, the whole picture where its mask is empty.
+/// Each view's flame box; the whole picture if its mask is empty.
 std::vector<PixelBox> flame_boxes(const Scene& scene, const std::vector<FlameMask>& masks);
 
-/// What the input views show of a coarse flame: their flame boxes at every stride-th pixel, about `pixels` in
-/// all. Enough for what an effect changes, at a hundredth of the time of full pictures.
+/// Rendered pictures of a coarse flame for the input views: their flame boxes at every stride-th pixel, about
+/// `pixels` in all. Sufficient to measure the change by an effect, in a hundredth of the time of full
+/// pictures.
 class CoarsePictures {
  public:
   CoarsePictures(const CoarseFlame& flame, const ComputeOptions& compute, int pixels = 20000);
 
-  /// One picture a view. `options` may bring the scattered light and the gas.
+  /// One picture per view. `options` may provide the scattered light and the gas.
   [[nodiscard]] std::vector<RadianceImage> operator()(const Effects& effects,
                                                       RenderOptions options = {}) const;
 
-  /// The flame, cut to its medium.
+  /// The flame, cropped to its medium.
   [[nodiscard]] const Volume& volume() const { return volume_; }
   [[nodiscard]] const Hull& medium() const { return medium_; }
   [[nodiscard]] int stride() const { return stride_; }
@@ -41,11 +43,11 @@ class CoarsePictures {
   Hull medium_;
   int stride_ = 1;
   std::vector<CameraModel> cameras_;
-  std::vector<RadianceImage> backgrounds_;  ///< of size 0 where a view has none
+  std::vector<RadianceImage> backgrounds_;  ///< with size 0 for views without one
 };
 
-/// RMS difference of two sets of pictures after the best gain on the second, all channels; the mean square is
-/// taken over each picture, then over them. 0 where the second set is black.
+/// RMS difference of two sets of pictures over all channels, after scaling the second set by the best gain;
+/// the mean square is taken over each picture, then over the pictures. 0 if the second set is black.
 double change(const std::vector<RadianceImage>& with, const std::vector<RadianceImage>& without);
 
 }  // namespace emberlock::recon

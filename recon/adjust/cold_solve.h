@@ -7,13 +7,13 @@
 
 namespace emberlock::recon {
 
-/// What a few passes from darkness make of a level, for comparing candidates.
+/// The result of a few passes on a level, starting from darkness, for comparing candidates.
 struct ColdSolve {
-  double error = 0;     ///< RMS over the level's held-out pixels, grey levels; infinite where it diverged
-  std::vector<Rgba> x;  ///< as Engine::get()
+  double error = 0;     ///< RMS over the level's held-out pixels, grey levels; infinite if it diverged
+  std::vector<Rgba> x;  ///< as from Engine::get()
 };
 
-/// `extinction`: none, constant, or a field's first guess.
+/// `extinction`: none, constant, or the initial value of a field.
 ColdSolve cold_solve(const SolverSetup& setup, const Level& level, const Extinction& extinction);
 
 }  // namespace emberlock::recon

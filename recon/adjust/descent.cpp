@@ -104,7 +104,7 @@ Hull coarsen_to(const Hull& hull, int most_voxels) {
   return coarse;
 }
 
-Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets,
+Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets,
                  std::optional<std::size_t> left_out) {
   Level level;
   level.subsets = subsets_for(setup.sigma(hull.grid), pixels_per_voxel(setup, hull.grid) / stride,
@@ -116,7 +116,7 @@ Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
     if (left_out ? view == *left_out : held_out(x, y)) return subsets;
     return bayer(x / stride, y / stride) * subsets / 16;
   };
-  level.problem = pose(setup.views, hull, options, setup.pool);
+  level.problem = make_problem(setup.views, hull, options, setup.pool);
   return level;
 }
 
@@ -198,22 +198,26 @@ Guard::Finding Descent::pass() {
   return finding;
 }
 
-void Descent::settle() {
-  const auto judge = [&] {
-    engine_->rest();
-    for (int s = 0; s <= level_.subsets; ++s)
-      if (rays_of(s) > 0) engine_->residual(s);
-  };
-  judge();
-  const double last = fit_error();
-  if (guard_.halvings() == 0 && guard_.allows(last)) return;
+double Descent::judge() {
+  engine_->rest();
+  for (int s = 0; s <= level_.subsets; ++s)
+    if (rays_of(s) > 0) engine_->residual(s);
+  return fit_error();
+}
+
+bool Descent::take_kept(double judged) {
   engine_->mark();
   engine_->restore();
-  judge();
-  if (!(last < fit_error())) return;
+  if (!(judged < judge())) return true;
   engine_->keep();
   engine_->restore();
   judge();
+  return false;
+}
+
+void Descent::settle() {
+  const double last = judge();
+  if (guard_.halvings() > 0 || !guard_.allows(last)) take_kept(last);
 }
 
 double Descent::fit_error() const {

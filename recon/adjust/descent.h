@@ -30,7 +30,7 @@ Hull coarsen_to(const Hull& hull, int most_voxels);
 
 /// Every `stride`-th pixel along both axes. `most_subsets` is 1, 4 or 16; a thick medium or few pixels take
 /// fewer. What is held out is some of all views' pixels, or one view as a whole.
-Level pose_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets = 16,
+Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int most_subsets = 16,
                  std::optional<std::size_t> left_out = {});
 
 /// How firmly two neighbours are tied at least, over the mean of A^T A 1.
@@ -65,8 +65,15 @@ class Descent {
   /// What the rays show besides the volume's light has changed (Engine::set_offset): earlier errors say
   /// nothing.
   void begin_anew();
-  /// Judges x itself, which no pass has yet, by all of the level's rays (engine().residuals()). Where steps
-  /// went too far, now or before, x becomes the best that was kept if that shows less. For who ends here.
+  /// Judges x itself, which no pass has yet, by all of the level's rays (engine().residuals()); fit_error().
+  double judge();
+  /// Whether the guard has nothing against such an error.
+  [[nodiscard]] bool allows(double error) const { return guard_.allows(error); }
+  /// x, of that judge(), becomes the best that was kept if that shows no more; whether it did.
+  bool take_kept(double judged);
+  /// The error of the best that was kept, as a pass found it: that of x as the pass began.
+  [[nodiscard]] double kept_error() const { return guard_.best(); }
+  /// judge(), and where steps went too far, now or before, take_kept(). For who ends here.
   void settle();
   /// RMS over the fitted rays, each as its subset's step found it; grey levels.
   [[nodiscard]] double fit_error() const;

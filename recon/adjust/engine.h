@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "recon/adjust/problem.h"
@@ -11,9 +12,40 @@
 
 namespace emberlock::recon {
 
-/// Holds a problem's volume and does the heavy steps of the solvers, on one device. x is the solution, y the
-/// point that residuals are taken at (x itself, or a look-ahead of it).
-class Engine {
+/// Holds a volume x on one device, and says what it shows beyond what was seen. All calls that need another
+/// one before them throw std::logic_error where that is missing, on every device: the program is wrong.
+class ResidualEngine {
+ public:
+  ResidualEngine() = default;
+  virtual ~ResidualEngine() = default;
+  ResidualEngine(ResidualEngine&&) = delete;
+  ResidualEngine& operator=(ResidualEngine&&) = delete;
+
+  void set(const std::vector<Rgba>& x);
+  /// residual = A x - seen for the subset's rays, x being `other`'s, which is read where it lies: nothing is
+  /// copied. Both have the same grid, precision and device; `other` has been set.
+  void residual_of(const ResidualEngine& other, int subset);
+  /// What another pass adds to the radiance of each ray; part of all residuals against what was seen from
+  /// here on.
+  virtual void set_offset(const std::vector<Rgba>& offset) = 0;
+  [[nodiscard]] virtual std::vector<Rgba> residuals() const = 0;
+  /// Those of one subset's rays alone.
+  [[nodiscard]] virtual std::vector<Rgba> residuals(int subset) const = 0;
+
+ protected:
+  /// The subsets whose residuals are those of y as it is now, the last one last.
+  std::vector<int> marched_;
+
+ private:
+  virtual void put(const std::vector<Rgba>& x) = 0;
+  virtual void march_other(const ResidualEngine& other, int subset) = 0;
+  [[nodiscard]] virtual std::size_t grid_points() const = 0;
+  [[nodiscard]] virtual std::size_t held_points() const = 0;  ///< as many, or none before set()
+};
+
+/// Does the heavy steps of the solvers. x is the solution, y the point that residuals are taken at (x itself,
+/// or a look-ahead of it); set() sets both. Begins with darkness.
+class Engine : public ResidualEngine {
  public:
   struct Step {
     float scale;  ///< of the gradient: all rays over the rays that it was taken from
@@ -27,42 +59,35 @@ class Engine {
     std::uint64_t stream;
   };
 
-  Engine() = default;
-  virtual ~Engine() = default;
-  Engine(Engine&&) = delete;
-  Engine& operator=(Engine&&) = delete;
-
-  virtual void set(const std::vector<Rgba>& x) = 0;   ///< x and y
-  virtual void hold(const std::vector<Rgba>& x) = 0;  ///< x alone: enough for who judges
-  [[nodiscard]] virtual std::vector<Rgba> get() const = 0;
+  [[nodiscard]] virtual std::vector<Rgba> get() const = 0;  ///< x
   /// x for whoever watches: never makes the device wait. Each call starts a copy and gives the last that has
   /// arrived, so x as it was some calls ago; empty before the first has.
   [[nodiscard]] virtual std::vector<Rgba> recent() = 0;
   /// residual = A y - seen for the subset's rays.
-  virtual void residual(int subset) = 0;
-  /// residual = A x - seen, x being another engine's, which is read where it lies: nothing is copied. Both
-  /// have the same grid, precision and device.
-  virtual void residual_of(const Engine& other, int subset) = 0;
-  /// What another pass adds to the radiance of each ray; part of residual() from here on.
-  virtual void set_offset(const std::vector<Rgba>& offset) = 0;
+  void residual(int subset);
+  /// residual = A y - target, for targets other than what was seen. With Behind::background A y includes the
+  /// background's light that the medium lets through.
+  void residual_against(const std::vector<Rgba>& target, int subset, Behind behind);
   /// residual = A y.
-  virtual void project(int subset) = 0;
-  [[nodiscard]] virtual std::vector<Rgba> residuals() const = 0;
-  /// Those of one subset's rays alone.
-  [[nodiscard]] virtual std::vector<Rgba> residuals(int subset) const = 0;
-  /// gradient += A^T residual; under Absorb::field lane 3 is the slope by extinction, and residual() must
-  /// have come last.
-  virtual void backproject(int subset) = 0;
+  void project(int subset);
+  /// gradient += A^T residual; under Absorb::field lane 3 is the slope by extinction. The subset's residual()
+  /// or residual_against() must have come last, and y be as it was.
+  void backproject(int subset);
   [[nodiscard]] virtual std::vector<Rgba> gradient() const = 0;
   /// x as it is now, for keep(): one copy, on the device.
-  virtual void mark() = 0;
-  /// What was marked last, and not kept yet, is what restore() goes back to: nothing is copied.
-  virtual void keep() = 0;
+  void mark();
+  /// What was marked, and not kept yet, is what restore() goes back to: nothing is copied.
+  void keep();
   /// x and y become what was kept last.
-  virtual void restore() = 0;
+  void restore();
+  /// x as it is now, for go_back(): one more copy, on the device, in memory that is taken when first called.
+  void save();
+  /// x and y become what was saved last.
+  void go_back();
   /// y = x: the look-ahead is forgotten.
-  virtual void rest() = 0;
-  /// The weights of descend(): one a key point, 0 for those that take no part. Clears the gradient.
+  void rest();
+  /// The weights of descend(): one a key point, 0 for those that take no part, as all are before. Clears the
+  /// gradient.
   virtual void set_weights(const std::vector<float>& weights) = 0;
   /// weights = max(weights, scale * lane 0 of the gradient), which is cleared. From a subset's gradient of
   /// A x at x = 1 this is how weights come to majorise every subset.
@@ -71,7 +96,7 @@ class Engine {
   /// Renews how firmly descend() ties key points to each other, see Stiffen: by `most` at most, in units of
   /// the weights, falling where the light changes by more than `soft` a voxel edge.
   virtual void stiffen(float most, float soft) = 0;
-  virtual void descend(const Step& step) = 0;
+  void descend(const Step& step);
 
   struct FieldStep {
     Step emission;
@@ -79,19 +104,42 @@ class Engine {
     float soft;       ///< differences below it count quadratically, a voxel edge
     float most;       ///< extinction, a voxel edge
   };
-  /// Where the extinction is unknown too: curvature of the residual by it, and what it is thought to be, one
-  /// a key point.
-  /// Clears the gradient.
-  virtual void set_field(const std::vector<float>& weights, const std::vector<float>& reference) = 0;
-  /// As raise_weights() and weights(), from lane 3: the curvature by the extinction.
-  virtual void raise_field_weights(float scale) = 0;
-  [[nodiscard]] virtual std::vector<float> field_weights() const = 0;
-  virtual void descend_field(const FieldStep& step) = 0;
-  /// residual = A y - target, for targets other than what was seen. With Behind::background A y includes the
-  /// background's light that the medium lets through.
-  virtual void residual_against(const std::vector<Rgba>& target, int subset, Behind behind) = 0;
-  /// x and y += the paper's adjustment from the subset's residuals.
-  virtual void adjust(int subset, const PaperStep& step) = 0;
+  /// Where the extinction is unknown too (Absorb::field): curvature of the residual by it, and what it is
+  /// thought to be, one a key point. Clears the gradient.
+  void set_field(const std::vector<float>& weights, const std::vector<float>& reference);
+  /// After set_field(): as raise_weights() and weights(), from lane 3: the curvature by the extinction.
+  void raise_field_weights(float scale);
+  [[nodiscard]] std::vector<float> field_weights() const;
+  /// After set_field(): emission and extinction at once.
+  void descend_field(const FieldStep& step);
+  /// x and y += the paper's adjustment from the subset's residual(), since when y must be as it was. Only in
+  /// float32, along straight rays and with none or constant extinction.
+  void adjust(int subset, const PaperStep& step);
+
+ private:
+  virtual void march_residual(int subset) = 0;
+  virtual void march_against(const std::vector<Rgba>& target, int subset, Behind behind) = 0;
+  virtual void march_radiance(int subset) = 0;
+  virtual void spread(int subset) = 0;  ///< the gradient's sum
+  virtual void copy_to_mark() = 0;
+  virtual void swap_mark_and_kept() = 0;
+  virtual void copy_from_kept() = 0;
+  virtual void copy_to_saved() = 0;
+  virtual void copy_from_saved() = 0;
+  virtual void forget_look_ahead() = 0;
+  virtual void step_emission(const Step& step) = 0;
+  [[nodiscard]] virtual bool takes_a_field() const = 0;
+  [[nodiscard]] virtual bool takes_paper_steps() const = 0;
+  virtual void put_field(const std::vector<float>& weights, const std::vector<float>& reference) = 0;
+  virtual void raise_curvature(float scale) = 0;
+  [[nodiscard]] virtual std::vector<float> curvature() const = 0;
+  virtual void step_field(const FieldStep& step) = 0;
+  virtual void step_paper(int subset, const PaperStep& step) = 0;
+
+  bool is_marked_ = false;
+  bool is_kept_ = false;
+  bool is_saved_ = false;
+  bool has_field_ = false;
 };
 
 /// What light does on its way through a problem's medium, as the engine needs it.
@@ -104,15 +152,17 @@ struct Optics {
 /// Constant extinction of sigma a voxel edge, or none where it is 0.
 Optics absorbing_optics(float sigma);
 
-/// What an engine is for. One that only judges has memory for no more than what it is told to hold(), and
-/// can't step: residual_of(), set_offset() and residuals() are all else that it does.
-enum class EngineRole { solve, judge };
-
 /// On the pool's device. The problem and the pool must outlive the engine. Throws a DeviceError.
 std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
-                                    Pool& pool, EngineRole role = EngineRole::solve);
+                                    Pool& pool);
+/// The same, with memory for no more than a volume that it is told to set().
+std::unique_ptr<ResidualEngine> make_residual_engine(const Problem& problem, const Optics& optics,
+                                                     Precision precision, Pool& pool);
+
+/// How much memory an engine takes: for a solver's steps, or for residuals alone.
+enum class EngineMemory { steps, residuals };
 std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics, Precision precision,
-                                         EngineRole role);
+                                         EngineMemory memory);
 
 /// In another precision.
 template <class To, class From>

@@ -12,12 +12,13 @@ namespace {
 template <class Real>
 class CpuEngine final : public Engine {
  public:
-  CpuEngine(const Problem& problem, const Optics& optics, Pool& pool, EngineRole role)
+  CpuEngine(const Problem& problem, const Optics& optics, Pool& pool, EngineMemory memory)
       : problem_(problem),
         optics_(optics),
         travel_(problem.list.bends.empty() ? Travel::straight : Travel::curved),
+        memory_(memory),
         pool_(pool),
-        x_(role == EngineRole::solve ? problem.grid().size() : 0),
+        x_(memory == EngineMemory::steps ? problem.grid().size() : 0),
         y_(x_.size()),
         next_y_(x_.size()),
         gradient_(x_.size()),
@@ -29,8 +30,6 @@ class CpuEngine final : public Engine {
     if (optics.absorb == Absorb::field) samples_.resize(problem.most_samples());
   }
 
-  void set(const std::vector<Rgba>& x) override { x_ = y_ = next_y_ = converted<Real>(x); }
-  void hold(const std::vector<Rgba>& x) override { x_ = converted<Real>(x); }
   [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_); }
   [[nodiscard]] std::vector<Rgba> recent() override { return get(); }
   [[nodiscard]] std::vector<Rgba> residuals() const override { return converted<float>(residual_); }
@@ -43,37 +42,59 @@ class CpuEngine final : public Engine {
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
-  void residual(int subset) override { residual(subset, problem_.judge<Real>(offset_, optics_.white)); }
-  void residual_of(const Engine& other, int subset) override {
+  void set_offset(const std::vector<Rgba>& offset) override { offset_ = offset; }
+  void set_weights(const std::vector<float>& weights) override {
+    weight_.assign(weights.begin(), weights.end());
+    clear_gradient();
+  }
+  void raise_weights(float scale) override { raise(weight_, 0, scale); }
+  [[nodiscard]] std::vector<float> weights() const override { return {weight_.begin(), weight_.end()}; }
+
+  void stiffen(float most, float soft) override {
+    each_row(table_.stiffen, Stiffen<Real>{problem_.grid(), weight_.data(), y_.data(), stiffness_.data(),
+                                           Real(most), Real(soft)});
+  }
+
+ private:
+  void put(const std::vector<Rgba>& x) override {
+    x_ = converted<Real>(x);
+    if (memory_ == EngineMemory::steps) y_ = next_y_ = x_;
+  }
+  [[nodiscard]] std::size_t grid_points() const override { return problem_.grid().size(); }
+  [[nodiscard]] std::size_t held_points() const override { return x_.size(); }
+  void march_other(const ResidualEngine& other, int subset) override {
     shown_ = &dynamic_cast<const CpuEngine&>(other).x_;
-    residual(subset);
+    march_residual(subset);
     shown_ = &y_;
   }
-  void set_offset(const std::vector<Rgba>& offset) override { offset_ = offset; }
-  void residual_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
-    const bool lit = behind == Behind::background && !problem_.background.empty();
-    residual(subset, Judge<Real>{target.data(), lit ? problem_.background.data() : nullptr, nullptr, 0});
+  void march_residual(int subset) override {
+    residual(subset, problem_.pixel_residual<Real>(offset_, optics_.white));
   }
-  void residual(int subset, const Judge<Real>& judge) {
+  void march_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
+    const bool lit = behind == Behind::background && !problem_.background.empty();
+    residual(subset,
+             PixelResidual<Real>{target.data(), lit ? problem_.background.data() : nullptr, nullptr, 0});
+  }
+  void residual(int subset, const PixelResidual<Real>& pixel) {
     expose();
     if (optics_.absorb == Absorb::field) {
       const auto march = table_.field_forward[static_cast<int>(travel_)];
-      each_slice(subset, [&](std::size_t begin, std::size_t end) { march(work(subset), judge, begin, end); });
+      each_slice(subset, [&](std::size_t begin, std::size_t end) { march(work(subset), pixel, begin, end); });
       return;
     }
     const auto march = table_.forward_of(optics_.absorb, travel_);
     each_slice(subset, [&](std::size_t begin, std::size_t end) {
       march(work(subset), begin, end);
-      for (std::size_t r = begin; r < end; ++r) residual_[r] = judge(r, residual_[r]);
+      for (std::size_t r = begin; r < end; ++r) residual_[r] = pixel(r, residual_[r]);
     });
   }
-  void project(int subset) override {
+  void march_radiance(int subset) override {
     expose();
     const auto march = table_.forward_of(optics_.absorb, travel_);
     each_slice(subset, [&](std::size_t begin, std::size_t end) { march(work(subset), begin, end); });
   }
 
-  void backproject(int subset) override {
+  void spread(int subset) override {
     const auto march = table_.adjoint_of(optics_.absorb, travel_);
     std::vector<Quad<Real>>
         before;  // with an exposure: what the gradient was, before the transpose of B adds to it
@@ -88,40 +109,35 @@ class CpuEngine final : public Engine {
     for (std::size_t p = 0; p < before.size(); ++p) gradient_[p] = gradient_[p] + before[p];
   }
 
-  void clear_gradient() { std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{}); }
-  void mark() override { marked_ = x_; }
-  void keep() override { kept_.swap(marked_); }
-  void restore() override { x_ = y_ = next_y_ = kept_; }
-  void rest() override { y_ = x_; }
-  void set_weights(const std::vector<float>& weights) override {
-    weight_.assign(weights.begin(), weights.end());
-    clear_gradient();
-  }
-  void raise_weights(float scale) override { raise(weight_, 0, scale); }
-  [[nodiscard]] std::vector<float> weights() const override { return {weight_.begin(), weight_.end()}; }
+  void copy_to_mark() override { marked_ = x_; }
+  void swap_mark_and_kept() override { kept_.swap(marked_); }
+  void copy_from_kept() override { x_ = y_ = next_y_ = kept_; }
+  void copy_to_saved() override { saved_ = x_; }
+  void copy_from_saved() override { x_ = y_ = next_y_ = saved_; }
+  void forget_look_ahead() override { y_ = x_; }
 
-  void stiffen(float most, float soft) override {
-    each_row(table_.stiffen, Stiffen<Real>{problem_.grid(), weight_.data(), y_.data(), stiffness_.data(),
-                                           Real(most), Real(soft)});
+  [[nodiscard]] bool takes_a_field() const override { return optics_.absorb == Absorb::field; }
+  [[nodiscard]] bool takes_paper_steps() const override {
+    return std::is_same_v<Real, float> && optics_.absorb != Absorb::field && travel_ == Travel::straight;
   }
-  void descend(const Step& step) override { update(table_.update, emission_step(step)); }
+  void step_emission(const Step& step) override { update(table_.update, emission_step(step)); }
 
-  void set_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
+  void put_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
     field_weight_.assign(weights.begin(), weights.end());
     reference_.assign(reference.begin(), reference.end());
     clear_gradient();
   }
-  void raise_field_weights(float scale) override { raise(field_weight_, 3, scale); }
-  [[nodiscard]] std::vector<float> field_weights() const override {
+  void raise_curvature(float scale) override { raise(field_weight_, 3, scale); }
+  [[nodiscard]] std::vector<float> curvature() const override {
     return {field_weight_.begin(), field_weight_.end()};
   }
-  void descend_field(const FieldStep& step) override {
+  void step_field(const FieldStep& step) override {
     update(table_.field_update,
            DescendField<Real>{emission_step(step.emission), field_weight_.data(), reference_.data(),
                               Real(step.variation), Real(step.soft), Real(step.most)});
   }
 
-  void adjust(int subset, const PaperStep& step) override {
+  void step_paper(int subset, const PaperStep& step) override {
     if constexpr (std::is_same_v<Real, float>) {
       if (optics_.absorb == Absorb::constant)
         adjust_by(subset, step, ConstantExtinction<float>{optics_.sigma});
@@ -130,7 +146,7 @@ class CpuEngine final : public Engine {
     }
   }
 
- private:
+  void clear_gradient() { std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{}); }
   /// B y, where the exposure is long enough to matter.
   void expose() {
     if (blur_) blurred_ = converted<Real>(blur_->forward(converted<float>(*shown_), pool_));
@@ -220,9 +236,10 @@ class CpuEngine final : public Engine {
   const Problem& problem_;
   Optics optics_;
   Travel travel_;
+  EngineMemory memory_;
   Pool& pool_;
   const MarchTable<Real>& table_ = march_table<Real>();
-  std::vector<Quad<Real>> x_, y_, next_y_, gradient_, marked_, kept_;
+  std::vector<Quad<Real>> x_, y_, next_y_, gradient_, marked_, kept_, saved_;
   const std::vector<Quad<Real>>* shown_ = &y_;  // what is marched
   std::vector<Real> weight_, stiffness_, field_weight_, reference_;
   std::vector<Quad<Real>> residual_;
@@ -243,14 +260,28 @@ Optics absorbing_optics(float sigma) {
   return optics;
 }
 
-std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
-                                    Pool& pool, EngineRole role) {
+namespace {
+
+std::unique_ptr<Engine> make_here(const Problem& problem, const Optics& optics, Precision precision,
+                                  Pool& pool, EngineMemory memory) {
   if constexpr (kCudaBuilt) {
-    if (pool.device() == Device::cuda) return make_cuda_engine(problem, optics, precision, role);
+    if (pool.device() == Device::cuda) return make_cuda_engine(problem, optics, precision, memory);
   }
   if (precision == Precision::float64)
-    return std::make_unique<CpuEngine<double>>(problem, optics, pool, role);
-  return std::make_unique<CpuEngine<float>>(problem, optics, pool, role);
+    return std::make_unique<CpuEngine<double>>(problem, optics, pool, memory);
+  return std::make_unique<CpuEngine<float>>(problem, optics, pool, memory);
+}
+
+}  // namespace
+
+std::unique_ptr<Engine> make_engine(const Problem& problem, const Optics& optics, Precision precision,
+                                    Pool& pool) {
+  return make_here(problem, optics, precision, pool, EngineMemory::steps);
+}
+
+std::unique_ptr<ResidualEngine> make_residual_engine(const Problem& problem, const Optics& optics,
+                                                     Precision precision, Pool& pool) {
+  return make_here(problem, optics, precision, pool, EngineMemory::residuals);
 }
 
 }  // namespace emberlock::recon

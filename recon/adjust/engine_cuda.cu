@@ -2,6 +2,7 @@
 // The engine's launches on a GPU, of the functors that the CPU runs. Sums into key points are gathered, so
 // results have the same bits on every run.
 #include <optional>
+#include <stdexcept>
 
 #include "recon/adjust/engine.h"
 #include "recon/adjust/sort_cuda.h"
@@ -57,9 +58,10 @@ class CudaVolume {
 template <class Real, class Extinction, class Path>
 class CudaEngine final : public Engine, public CudaVolume<Real> {
  public:
-  CudaEngine(const Problem& problem, const Optics& optics, Extinction extinction, EngineRole role)
-      : CudaVolume<Real>(role == EngineRole::solve ? problem.grid().size() : 0),
+  CudaEngine(const Problem& problem, const Optics& optics, Extinction extinction, EngineMemory memory)
+      : CudaVolume<Real>(memory == EngineMemory::steps ? problem.grid().size() : 0),
         problem_(problem),
+        memory_(memory),
         optics_(optics),
         extinction_(extinction),
         lists_(problem.list),
@@ -73,13 +75,13 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
         residual_(problem.list.rays.size()),
         samples_(CudaBuffer<Quad<Real>>::unfilled(Extinction::kField ? problem.most_samples() : 0)),
         deposits_(
-            CudaBuffer<Deposit<Real>>::unfilled(role == EngineRole::solve ? problem.most_samples() : 0)) {
+            CudaBuffer<Deposit<Real>>::unfilled(memory == EngineMemory::steps ? problem.most_samples() : 0)) {
     const ExposureBlur blur(optics.exposure, problem.grid());
     if (!blur.identity()) {
       blur_.emplace(blur, problem.grid());
       exposed_gradient_ = CudaBuffer<Quad<Real>>(x_.size());
     }
-    if (role == EngineRole::judge) return;
+    if (memory == EngineMemory::residuals) return;
     for (int s = 0; s < problem.list.subsets(); ++s) {
       const auto voxels = CudaBuffer<std::uint32_t>::unfilled(first_sample(s + 1) - first_sample(s));
       each_run(s, NameVoxels<Real, Path>{lists_.table(), voxels.data(), first_sample(s)}, "naming voxels");
@@ -87,12 +89,6 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     }
   }
 
-  void set(const std::vector<Rgba>& x) override {
-    x_.upload(converted<Real>(x));
-    y_.copy_from(x_);
-    next_y_.copy_from(x_);
-  }
-  void hold(const std::vector<Rgba>& x) override { x_.upload(converted<Real>(x)); }
   [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_.download()); }
   [[nodiscard]] std::vector<Rgba> recent() override {
     if (!snapshot_) snapshot_.emplace(size());
@@ -110,34 +106,61 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_.download()); }
 
-  void residual(int subset) override {
-    residual(subset, Judge<Real>{seen_.data(), background_.data(), offset_.data(), Real(optics_.white)});
+  void set_offset(const std::vector<Rgba>& offset) override { offset_.upload(offset); }
+
+  void set_weights(const std::vector<float>& weights) override {
+    weight_.upload({weights.begin(), weights.end()});
+    gradient_.clear();
   }
-  void residual_of(const Engine& other, int subset) override {
+
+  void raise_weights(float scale) override { raise(weight_, 0, scale); }
+  [[nodiscard]] std::vector<float> weights() const override { return as_floats(weight_); }
+
+  void stiffen(float most, float soft) override {
+    each_key_point(
+        Stiffen<Real>{problem_.grid(), weight_.data(), y_.data(), stiffness_.data(), Real(most), Real(soft)},
+        "stiffening");
+  }
+
+ private:
+  using Radiance = Forward<Real, Extinction, Path>;
+
+  void put(const std::vector<Rgba>& x) override {
+    x_.upload(converted<Real>(x));
+    if (memory_ == EngineMemory::residuals) return;
+    y_.copy_from(x_);
+    next_y_.copy_from(x_);
+  }
+  [[nodiscard]] std::size_t grid_points() const override { return problem_.grid().size(); }
+  [[nodiscard]] std::size_t held_points() const override { return x_.size(); }
+  void march_other(const ResidualEngine& other, int subset) override {
     shown_ = &dynamic_cast<const CudaVolume<Real>&>(other).volume();
-    residual(subset);
+    march_residual(subset);
     shown_ = &y_;
   }
-  void set_offset(const std::vector<Rgba>& offset) override { offset_.upload(offset); }
-  void residual_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
+  void march_residual(int subset) override {
+    residual(subset,
+             PixelResidual<Real>{seen_.data(), background_.data(), offset_.data(), Real(optics_.white)});
+  }
+  void march_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
     target_.upload(target);
     const Rgba* background = behind == Behind::background ? background_.data() : nullptr;
-    residual(subset, Judge<Real>{target_.data(), background, nullptr, 0});
+    residual(subset, PixelResidual<Real>{target_.data(), background, nullptr, 0});
   }
-  void residual(int subset, const Judge<Real>& judge) {
-    const JudgeAndKeep<Real> keep{judge, residual_.data()};
+  void residual(int subset, const PixelResidual<Real>& pixel) {
+    const KeepResidual<Real> keep{pixel, residual_.data()};
     if constexpr (Extinction::kField) {
       const FieldForward<Real, Path> march{lists_.table(), exposed(), samples_.data(), first_sample(subset)};
-      each_ray(subset, MarchJudged<FieldForward<Real, Path>, JudgeAndKeep<Real>>{march, keep});
+      each_ray(subset, MarchByResidual<FieldForward<Real, Path>, KeepResidual<Real>>{march, keep});
     } else {
-      each_ray(subset, MarchAndKeep<Radiance, JudgeAndKeep<Real>>{radiance(), keep});
+      each_ray(subset, MarchAndKeep<Radiance, KeepResidual<Real>>{radiance(), keep});
     }
   }
-  void project(int subset) override {
+  void march_radiance(int subset) override {
     each_ray(subset, MarchAndKeep<Radiance, KeepRadiance<Real>>{radiance(), {residual_.data()}});
   }
 
-  void backproject(int subset) override {
+  void spread(int subset) override {
     const LayAside<Real> aside{deposits_.data(), first_sample(subset)};
     if constexpr (Extinction::kField) {
       each_run(subset,
@@ -156,46 +179,41 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     launch(size(), AddAt<Real>{blur_->adjoint(exposed_gradient_), gradient_.data()}, "adding up");
   }
 
-  void mark() override {
+  void copy_to_mark() override {
     if (marked_.size() != size()) marked_ = CudaBuffer<Quad<Real>>::unfilled(size());
     marked_.copy_from(x_);
   }
-  void keep() override { kept_.swap(marked_); }
-  void restore() override {
-    x_.copy_from(kept_);
-    rest();
+  void swap_mark_and_kept() override { kept_.swap(marked_); }
+  void copy_from_kept() override { return_to(kept_); }
+  void copy_to_saved() override {
+    if (saved_.size() != size()) saved_ = CudaBuffer<Quad<Real>>::unfilled(size());
+    saved_.copy_from(x_);
+  }
+  void copy_from_saved() override { return_to(saved_); }
+  void return_to(const CudaBuffer<Quad<Real>>& earlier) {
+    x_.copy_from(earlier);
+    forget_look_ahead();
     next_y_.copy_from(x_);
   }
-  void rest() override { y_.copy_from(x_); }
-  void set_weights(const std::vector<float>& weights) override {
-    weight_.upload({weights.begin(), weights.end()});
-    gradient_.clear();
-  }
+  void forget_look_ahead() override { y_.copy_from(x_); }
 
-  void raise_weights(float scale) override { raise(weight_, 0, scale); }
-  [[nodiscard]] std::vector<float> weights() const override { return as_floats(weight_); }
-
-  void stiffen(float most, float soft) override {
-    each_key_point(
-        Stiffen<Real>{problem_.grid(), weight_.data(), y_.data(), stiffness_.data(), Real(most), Real(soft)},
-        "stiffening");
-  }
-  void descend(const Step& step) override { update(emission_step(step)); }
-
-  void set_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
+  void step_emission(const Step& step) override { update(emission_step(step)); }
+  [[nodiscard]] bool takes_a_field() const override { return Extinction::kField; }
+  [[nodiscard]] bool takes_paper_steps() const override { return kPaperSteps; }
+  void put_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
     field_weight_.upload({weights.begin(), weights.end()});
     reference_.upload({reference.begin(), reference.end()});
     gradient_.clear();
   }
-  void raise_field_weights(float scale) override { raise(field_weight_, 3, scale); }
-  [[nodiscard]] std::vector<float> field_weights() const override { return as_floats(field_weight_); }
-  void descend_field(const FieldStep& step) override {
+  void raise_curvature(float scale) override { raise(field_weight_, 3, scale); }
+  [[nodiscard]] std::vector<float> curvature() const override { return as_floats(field_weight_); }
+  void step_field(const FieldStep& step) override {
     update(DescendField<Real>{emission_step(step.emission), field_weight_.data(), reference_.data(),
                               Real(step.variation), Real(step.soft), Real(step.most)});
   }
 
-  void adjust([[maybe_unused]] int subset, [[maybe_unused]] const PaperStep& step) override {
-    if constexpr (std::is_same_v<Real, float> && !Extinction::kField && std::is_same_v<Path, StraightPath>) {
+  void step_paper([[maybe_unused]] int subset, [[maybe_unused]] const PaperStep& step) override {
+    if constexpr (kPaperSteps) {
       each_run(subset,
                PaperAdjust<Extinction, LayAside<float>>{lists_.table(),
                                                         residual_.data(),
@@ -210,8 +228,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     }
   }
 
- private:
-  using Radiance = Forward<Real, Extinction, Path>;
+  static constexpr bool kPaperSteps =
+      std::is_same_v<Real, float> && !Extinction::kField && std::is_same_v<Path, StraightPath>;
 
   [[nodiscard]] std::size_t size() const { return problem_.grid().size(); }
   /// y, or B y where the exposure is long enough to matter.
@@ -267,12 +285,13 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   }
 
   const Problem& problem_;
+  EngineMemory memory_;
   Optics optics_;
   Extinction extinction_;
   DeviceRayList lists_;
   CudaBuffer<Rgba> seen_, background_, offset_, target_;  // null where there is none
   using CudaVolume<Real>::x_;
-  CudaBuffer<Quad<Real>> y_, next_y_, gradient_, marked_, kept_;
+  CudaBuffer<Quad<Real>> y_, next_y_, gradient_, marked_, kept_, saved_;
   const CudaBuffer<Quad<Real>>* shown_ = &y_;  // what is marched
   CudaBuffer<Real> weight_, stiffness_, field_weight_, reference_;
   CudaBuffer<Quad<Real>> residual_, samples_;  // samples of one subset
@@ -285,31 +304,31 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
 
 template <class Real, class Extinction>
 std::unique_ptr<Engine> make_with(const Problem& problem, const Optics& optics, Extinction extinction,
-                                  EngineRole role) {
+                                  EngineMemory memory) {
   if (problem.list.bends.empty())
-    return std::make_unique<CudaEngine<Real, Extinction, StraightPath>>(problem, optics, extinction, role);
-  return std::make_unique<CudaEngine<Real, Extinction, CurvedPath>>(problem, optics, extinction, role);
+    return std::make_unique<CudaEngine<Real, Extinction, StraightPath>>(problem, optics, extinction, memory);
+  return std::make_unique<CudaEngine<Real, Extinction, CurvedPath>>(problem, optics, extinction, memory);
 }
 
 template <class Real>
-std::unique_ptr<Engine> make_in(const Problem& problem, const Optics& optics, EngineRole role) {
+std::unique_ptr<Engine> make_in(const Problem& problem, const Optics& optics, EngineMemory memory) {
   switch (optics.absorb) {
     case Absorb::field:
-      return make_with<Real>(problem, optics, FieldExtinction<Real>{}, role);
+      return make_with<Real>(problem, optics, FieldExtinction<Real>{}, memory);
     case Absorb::constant:
-      return make_with<Real>(problem, optics, ConstantExtinction<Real>{Real(optics.sigma)}, role);
+      return make_with<Real>(problem, optics, ConstantExtinction<Real>{Real(optics.sigma)}, memory);
     case Absorb::nothing:
-      break;
+      return make_with<Real>(problem, optics, NoExtinction<Real>{}, memory);
   }
-  return make_with<Real>(problem, optics, NoExtinction<Real>{}, role);
+  throw std::logic_error("an extinction that the CUDA engine doesn't know");
 }
 
 }  // namespace
 
 std::unique_ptr<Engine> make_cuda_engine(const Problem& problem, const Optics& optics, Precision precision,
-                                         EngineRole role) {
-  return precision == Precision::float64 ? make_in<double>(problem, optics, role)
-                                         : make_in<float>(problem, optics, role);
+                                         EngineMemory memory) {
+  return precision == Precision::float64 ? make_in<double>(problem, optics, memory)
+                                         : make_in<float>(problem, optics, memory);
 }
 
 }  // namespace emberlock::recon

@@ -8,9 +8,9 @@
 
 namespace emberlock::recon {
 
-/// What a field of extinction is thought to be at the problem's key points, a voxel edge: `value` times the
-/// share of each key point's eight voxels that belong to the medium, and `soot` spread like the luminance of
-/// x (evenly where x is dark).
+/// The expected extinction field at the problem's key points, per voxel edge: `value` times the share of each
+/// key point's eight voxels that belong to the medium, for `soot` distributed like the luminance of x
+/// (uniformly if x is dark).
 std::vector<float> expected_extinction(const Problem& problem, const Extinction& extinction,
                                        const std::vector<Rgba>& x);
 

@@ -30,7 +30,7 @@ class Probe {
   explicit Probe(const SolverSetup& setup)
       : setup_(setup),
         hull_(coarsen_to(setup.hull, kCoarse)),
-        level_(pose_level(setup, hull_, stride_for_rays(setup, kRays), 4)) {}
+        level_(make_level(setup, hull_, stride_for_rays(setup, kRays), 4)) {}
 
   [[nodiscard]] Candidate solve(const Extinction& extinction) const {
     ColdSolve solved = cold_solve(setup_, level_, extinction);

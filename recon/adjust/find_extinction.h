@@ -5,23 +5,23 @@
 
 namespace emberlock::recon {
 
-/// What the pictures say of the extinction, from a coarse grid.
+/// The extinction found from the pictures on a coarse grid.
 struct FoundExtinction {
-  Extinction extinction;  ///< a field's first guess, or none
+  Extinction extinction;  ///< initial value of a field, or none
   double error = 0;       ///< RMS over held-out pixels, grey levels
-  Volume volume;          ///< the coarse solution: emission, and extinction where there is any
+  Volume volume;          ///< the coarse solution: emission, and extinction if there is any
   Hull hull;              ///< its medium
 };
 
-/// Finds out how much light the medium takes, and whether evenly or like soot. Descent from a wrong scale
-/// stays wrong, so this is a global search: cold solves for emission and extinction together from a fraction
-/// of the pixels, each expecting another extinction, judged on held-out pixels of the input views.
-/// `setup.hull` is the hull of the fine grid.
+/// Finds how much light the medium absorbs, and whether uniformly or like soot. Descent from a wrong scale
+/// doesn't recover, so this is a global search: cold solves for emission and extinction together, with a
+/// fraction of the pixels, each with another expected extinction, compared on held-out pixels of the input
+/// views. `setup.hull` is the hull of the fine grid.
 ///
-/// Under a budget the search ends once it has taken a third of it.
+/// With a budget, the search ends when it has used a third of it.
 FoundExtinction find_extinction(const SolverSetup& setup, const Elapsed& elapsed = {});
 
-/// The same solve for an extinction that is given.
+/// The same solve for a given extinction.
 FoundExtinction try_extinction(const SolverSetup& setup, const Extinction& extinction);
 
 }  // namespace emberlock::recon

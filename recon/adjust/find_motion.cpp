@@ -9,6 +9,7 @@
 #include "recon/adjust/box_error.h"
 #include "recon/adjust/coarse_pictures.h"
 #include "recon/adjust/descent.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/small_scene.h"
 #include "recon/effects/motion.h"
@@ -62,16 +63,15 @@ class MotionProbe {
 
   /// RMS over the flames' boxes that a cold solve leaves; infinite where no hull is left, or it diverges.
   [[nodiscard]] double error(const Eigen::Vector3d& velocity) const try {
-    Effects effects = effects_;
-    effects.motion = carried(velocity);
-    const PreparedScene prepared(small_, effects);
-    const Scene& scene = prepared.scene();
-    const auto hull = carve(scene, masks_before(scene, effects.background, options_.flame_threshold), grid_,
+    const Sensor& sensor = effects_.sensor;
+    const double white = sensor.clipping == Sensor::Clipping::at_white ? sensor.white : 0;
+    const Scene scene = at_one_instant(small_, carried(velocity), white);
+    const auto hull = carve(scene, masks_before(scene, effects_.background, options_.flame_threshold), grid_,
                             options_.compute);
     if (!hull) return std::numeric_limits<double>::infinity();
     SolverSetup setup{{}, boxes_, *hull, effects_, options_, pool_};
     for (const View& view : scene.views) setup.views.push_back(&view);
-    const Level level = pose_level(setup, *hull, 1, 4);
+    const Level level = make_level(setup, *hull, 1, 4);
     Descent descent(level, setup.optics(hull->grid), setup, std::vector<Rgba>(level.problem.active.size()));
     for (int p = 0; p < kMotionPasses; ++p) descent.pass();
     descent.settle();
@@ -87,7 +87,7 @@ class MotionProbe {
     for (std::size_t v = 0; v < small_.views.size(); ++v) {
       const View& view = small_.views[v];
       if (view.lateness == Seconds(0)) continue;
-      RadianceImage carried_part = view.image;
+      RadianceImage carried_part = *view.image;
       if (view.average)
         for (std::size_t i = 0; i < carried_part.rgb.size(); ++i) carried_part.rgb[i] -= view.average->rgb[i];
       const RadianceImage change = change_of_place(carried_part, view, carried(velocity), small_.box.center);
@@ -139,7 +139,7 @@ double first_step(const MotionProbe& probe) {
 
 /// Two errors that have nothing to do with each other add up like this: what the motion puts into the
 /// pictures and what a reconstruction leaves anyway. Uncertain times leave their share of it.
-FoundMotion judge(const MotionProbe& probe, const Eigen::Vector3d& velocity) {
+FoundMotion found_at(const MotionProbe& probe, const Eigen::Vector3d& velocity) {
   FoundMotion found;
   found.motion = carried(velocity);
   found.change = probe.change(velocity);
@@ -166,7 +166,7 @@ FoundMotion find_rise(const MotionSearch& search, double tolerance) {
   const MotionProbe probe(search);
   if (probe.change({0, 0, kFastestFlame}) < tolerance) return {};
   const double rise = search_along(probe, Eigen::Vector3d::Zero(), 2, first_step(probe));
-  return judge(probe, {0, 0, rise});
+  return found_at(probe, {0, 0, rise});
 }
 
 FoundMotion refine_motion(const MotionSearch& search, const Motion& from) {
@@ -183,10 +183,10 @@ FoundMotion refine_motion(const MotionSearch& search, const Motion& from) {
     velocity = sideways;
     error = moved;
   }
-  return judge(probe, velocity);
+  return found_at(probe, velocity);
 }
 
-FoundMotion judge_motion(const MotionSearch& search, const Motion& motion) {
+FoundMotion measure_motion(const MotionSearch& search, const Motion& motion) {
   FoundMotion found;
   found.motion = motion;
   if (!moves(search.scene, motion)) return found;

@@ -36,6 +36,6 @@ FoundMotion find_rise(const MotionSearch& search, double tolerance);
 FoundMotion refine_motion(const MotionSearch& search, const Motion& from);
 
 /// Change and gain of a motion that is given; nothing is solved.
-FoundMotion judge_motion(const MotionSearch& search, const Motion& motion);
+FoundMotion measure_motion(const MotionSearch& search, const Motion& motion);
 
 }  // namespace emberlock::recon

@@ -6,7 +6,7 @@
 
 #include "recon/adjust/coarse_pictures.h"
 #include "recon/adjust/descent.h"
-#include "recon/adjust/prepared_scene.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/small_scene.h"
 #include "recon/effects/background.h"
 #include "recon/render/render.h"
@@ -105,7 +105,7 @@ class PointingProbe {
     if (!hull) return true;
     std::vector<const View*> views;
     for (const View& view : small_.views) views.push_back(&view);
-    const Problem problem = pose(views, *hull, {}, pool_);
+    const Problem problem = make_problem(views, *hull, {}, pool_);
     std::vector<double> reached(views.size());
     for (std::size_t r = 0; r < problem.seen.size(); ++r)
       if (in_mask(problem.list.rays[r].view, problem.list.pixels[r]))
@@ -132,17 +132,17 @@ class PointingProbe {
         setup.views.push_back(&others.views[v]);
         setup.boxes.push_back(boxes_[v]);
       }
-    const Level level = pose_level(setup, *hull, 1, 4);
+    const Level level = make_level(setup, *hull, 1, 4);
     Descent descent(level, setup.optics(hull->grid), setup, std::vector<Rgba>(level.problem.active.size()));
     for (int p = 0; p < kPointingPasses; ++p) descent.pass();
     descent.settle();
     const Volume volume = to_volume(descent.engine().get(), level.problem, *hull, effects_);
     const View& left = small_.views[view];
-    const RadianceImage shown = render_view(
-        volume, *hull, effects_, left.camera,
-        {.compute = options_.compute, .background = left.background ? &*left.background : nullptr});
-    const double error = all_channels(rmse(shown, left.image, boxes_[view]));
-    return LeftOut{error * error, register_to(left.image, shown, boxes_[view])};
+    const RadianceImage shown =
+        render_view(volume, *hull, effects_, left.camera,
+                    {.compute = options_.compute, .background = left.background.get()});
+    const double error = all_channels(rmse(shown, *left.image, boxes_[view]));
+    return LeftOut{error * error, register_to(*left.image, shown, boxes_[view])};
   } catch (const Diverged&) {
     return std::nullopt;
   }
@@ -152,7 +152,7 @@ class PointingProbe {
     return masks_[view].flame[pixel] != 0;
   }
   [[nodiscard]] static double light_of(const View& view, std::size_t pixel) {
-    const float* rgb = &view.image.rgb[3 * pixel];
+    const float* rgb = &view.image->rgb[3 * pixel];
     return static_cast<double>(rgb[0] + rgb[1] + rgb[2]);
   }
 
@@ -219,8 +219,8 @@ FoundPointing find_pointing(const Scene& scene, const Effects& effects, const So
     probe.move(v, by);
     const Round next = leave_each_out(probe, look_at_input);
     if (!(next.error < (1 - kLeastPointingGain) * now.error)) break;
-    const double scale = static_cast<double>(scene.views[inputs[v]].image.size.width) /
-                         static_cast<double>(probe.scene().views[v].image.size.width);
+    const double scale = static_cast<double>(scene.views[inputs[v]].image->size.width) /
+                         static_cast<double>(probe.scene().views[v].image->size.width);
     found.off[inputs[v]].x += scale * by.x;
     found.off[inputs[v]].y += scale * by.y;
     found.error_after = next.error;
@@ -229,12 +229,14 @@ FoundPointing find_pointing(const Scene& scene, const Effects& effects, const So
   return found;
 }
 
-Scene pointed(Scene scene, const FoundPointing& found) {
-  for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    scene.views[v].camera.intrinsics.cx += found.off[v].x;
-    scene.views[v].camera.intrinsics.cy += found.off[v].y;
+PreparedScene pointed(const PreparedScene& scene, const FoundPointing& found) {
+  std::vector<CameraModel> cameras;
+  for (std::size_t v = 0; v < found.off.size(); ++v) {
+    cameras.push_back(scene.told().views[v].camera);
+    cameras.back().intrinsics.cx += found.off[v].x;
+    cameras.back().intrinsics.cy += found.off[v].y;
   }
-  return scene;
+  return scene.through(cameras);
 }
 
 }  // namespace emberlock::recon

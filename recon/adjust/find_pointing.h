@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "base/progress.h"
+#include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/tracker.h"
 
 namespace emberlock::recon {
@@ -33,6 +34,6 @@ FoundPointing find_pointing(const Scene& scene, const Effects& effects, const So
                             Pool& pool, const Elapsed& elapsed = {}, const Progress& progress = {});
 
 /// The scene with each camera's principal point moved by what was found.
-Scene pointed(Scene scene, const FoundPointing& found);
+PreparedScene pointed(const PreparedScene& scene, const FoundPointing& found);
 
 }  // namespace emberlock::recon

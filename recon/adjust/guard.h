@@ -9,7 +9,7 @@
 
 namespace emberlock::recon {
 
-/// An iteration that its guard gave up. Of kind `not_converged`.
+/// Thrown when the guard gives up an iteration; of kind `not_converged`.
 class Diverged : public std::exception {
  public:
   Diverged(double error, double best);
@@ -20,34 +20,36 @@ class Diverged : public std::exception {
   Error error_;
 };
 
-/// Watches an iteration's error and knows nothing of why it should fall. Where it rises beyond what the
-/// iteration began with, or isn't a finite number, the steps are too long: the iteration goes back to its
-/// best and takes shorter ones, a few times; then it has failed.
+/// Checks an iteration's error, independently of any proof that it falls. If the error rises above its
+/// initial value, or isn't finite, the steps are too long: the iteration returns to its best state and halves
+/// its steps. After a limited number of these it fails.
 class Guard {
  public:
   enum class Finding {
-    best,      ///< the lowest so far: worth keeping
-    fair,      ///< not the lowest, but below the beginning
-    diverged,  ///< go back to the best and halve the steps
+    best,      ///< the lowest so far: save this state
+    fair,      ///< not the lowest, but below the initial value
+    diverged,  ///< return to the best state and halve the steps
   };
   static constexpr int kMostHalvings = 8;
 
-  /// `black`: the error of a volume without light, which no result may exceed. What the iteration really
-  /// begins with may be better: then the first error counts.
+  /// `black`: the error of a volume without light, which no result may exceed. If the iteration starts with a
+  /// smaller error, that one is the limit.
   explicit Guard(double black) : black_(black), start_(black) {}
-  /// Throws Diverged where that happens once more than kMostHalvings times.
+  /// Throws Diverged when it would be the (kMostHalvings + 1)-th return.
   Finding look(double error);
-  /// Whether look() would have nothing against it.
+  /// Whether look() would accept this error.
   [[nodiscard]] bool allows(double error) const { return is_bearable(error, start_); }
-  /// What the iteration went back to shows this error. Later ones may be as large: a look at several steps
-  /// together sees less than what the first of them began with.
+  /// Sets the error of the state to which the iteration returned. Later errors may be as large: a check after
+  /// several steps may not see the error that the first of them began with.
   void went_back_to(double error);
-  /// What is minimised has changed, so that errors before say nothing of those to come: they are held
-  /// against `black` once more. What was halved stays so, and counts on.
+  /// The objective has changed, so earlier errors aren't comparable: the limit is `black` again. Halvings
+  /// still count.
   void begin_anew();
-  /// At most `start`, beyond rounding and what the order of subsets lets an error waver by.
+  /// error <= `start`, with tolerance for rounding and for fluctuations due to the order of subsets.
   static bool is_bearable(double error, double start);
   [[nodiscard]] int halvings() const { return halvings_; }
+  /// The lowest error that look() was shown; infinite before the first.
+  [[nodiscard]] double best() const { return best_; }
 
  private:
   double black_;

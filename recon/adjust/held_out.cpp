@@ -29,8 +29,8 @@ int stride_of(const SolverSetup& setup, const std::vector<PixelBox>& boxes) {
 }
 
 /// Pixels outside of the boxes count nowhere, and nothing is projected back.
-Problem pose_sampled(const SolverSetup& setup, const std::vector<const View*>& views,
-                     const std::vector<PixelBox>& boxes, int stride) {
+Problem sampled_problem(const SolverSetup& setup, const std::vector<const View*>& views,
+                        const std::vector<PixelBox>& boxes, int stride) {
   ProblemOptions options = setup.problem_options();
   options.subsets = 2;
   options.adjoint = false;
@@ -39,7 +39,7 @@ Problem pose_sampled(const SolverSetup& setup, const std::vector<const View*>& v
     if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return -1;
     return x % stride == 0 && y % stride == 0 ? 0 : 1;
   };
-  return pose(views, setup.hull, options, setup.pool);
+  return make_problem(views, setup.hull, options, setup.pool);
 }
 
 /// Of a box, the pixels whose both coordinates are multiples of the stride.
@@ -55,9 +55,9 @@ std::size_t pixels_on(const PixelBox& b, int stride) {
 HeldOut::HeldOut(const SolverSetup& setup, std::vector<const View*> views, const std::vector<PixelBox>& boxes)
     : views_(std::move(views)),
       stride_(stride_of(setup, boxes)),
-      problem_(pose_sampled(setup, views_, boxes, stride_)),
-      engine_(make_engine(problem_, setup.optics(problem_.grid()), setup.options.precision, setup.pool,
-                          EngineRole::judge)),
+      problem_(sampled_problem(setup, views_, boxes, stride_)),
+      engine_(
+          make_residual_engine(problem_, setup.optics(problem_.grid()), setup.options.precision, setup.pool)),
       sample_error_(views_, boxes, problem_, setup.effects.background, stride_,
                     problem_.list.subset_begin[1]),
       error_(views_, boxes, problem_, setup.effects.background) {
@@ -67,18 +67,18 @@ HeldOut::HeldOut(const SolverSetup& setup, std::vector<const View*> views, const
   }
 }
 
-std::array<double, 3> HeldOut::sampled(const Engine& solution) {
+std::array<double, 3> HeldOut::sampled(const ResidualEngine& solution) {
   engine_->residual_of(solution, 0);
   return sample_error_(engine_->residuals(0));
 }
 
-std::array<double, 3> HeldOut::all(const Engine& solution) {
+std::array<double, 3> HeldOut::all(const ResidualEngine& solution) {
   for (int subset = 0; subset < 2; ++subset) engine_->residual_of(solution, subset);
   return error_(engine_->residuals());
 }
 
 HeldOut::Both HeldOut::both(const std::vector<Rgba>& x) {
-  engine_->hold(x);
+  engine_->set(x);
   return {sampled(*engine_), all(*engine_)};
 }
 

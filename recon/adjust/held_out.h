@@ -33,8 +33,8 @@ class HeldOut {
     engine_->set_offset(offset(views_, problem_));
   }
   /// RMSE for R, G, B of the sample, and of all pixels. `solution` is of the setup's hull.
-  [[nodiscard]] std::array<double, 3> sampled(const Engine& solution);
-  [[nodiscard]] std::array<double, 3> all(const Engine& solution);
+  [[nodiscard]] std::array<double, 3> sampled(const ResidualEngine& solution);
+  [[nodiscard]] std::array<double, 3> all(const ResidualEngine& solution);
   /// The same of a solution that no engine holds (any longer).
   struct Both {
     std::array<double, 3> sampled, all;
@@ -48,7 +48,7 @@ class HeldOut {
   std::vector<const View*> views_;
   int stride_;
   Problem problem_;  // subset 0: the sample, 1: all others
-  std::unique_ptr<Engine> engine_;
+  std::unique_ptr<ResidualEngine> engine_;
   ErrorOverBoxes sample_error_, error_;
   TraceSample sample_;
 };

@@ -24,7 +24,7 @@ LeftOutViews::LeftOutViews(const SolverSetup& setup, const Hull& fine)
   const std::size_t folds = std::min(kMostFolds, views);
   const int stride = std::max(stride_for(setup, hull_.grid), stride_for_rays(setup, kFoldPixels));
   for (std::size_t f = 0; f < folds; ++f)
-    levels_.push_back(pose_level(setup, hull_, stride, 4, f * views / folds));
+    levels_.push_back(make_level(setup, hull_, stride, 4, f * views / folds));
 }
 
 double LeftOutViews::error(const Extinction& extinction, double smoothness) const {

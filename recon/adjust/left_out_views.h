@@ -10,34 +10,35 @@
 
 namespace emberlock::recon {
 
-/// What pixels between fitted pixels can't tell, a view that wasn't fitted does: whether a model shows the
-/// medium as it looks from elsewhere. One input view after the other is left out of cold solves on a coarse
-/// grid, and looked at (cross-validation: Stone 1974).
+/// Tests whether a model also describes the medium from other directions, which pixels between fitted pixels
+/// don't show (cross-validation: Stone 1974). The input views are left out of cold solves on a coarse grid,
+/// one at a time, and compared with the result.
 class LeftOutViews {
  public:
-  /// At most four of the input views are left out, spread over them. The setup and the hull's grid must
-  /// outlive it.
+  /// Leaves out at most four of the input views, spread over them. The setup and the hull's grid must outlive
+  /// it.
   LeftOutViews(const SolverSetup& setup, const Hull& fine);
 
-  /// Whether there are views enough: two must be left.
+  /// Whether there are enough views: two must remain.
   [[nodiscard]] bool any() const { return !levels_.empty(); }
-  /// RMS over the left-out views' pixels that see the hull, grey levels; infinite where a solve diverged.
-  /// `extinction`: as cold_solve()'s.
+  /// RMS over the left-out views' pixels that see the hull, grey levels; infinite if a solve diverged.
+  /// `extinction`: as in cold_solve().
   [[nodiscard]] double error(const Extinction& extinction, double smoothness) const;
 
  private:
   const SolverSetup& setup_;
   Hull hull_;
-  std::vector<Level> levels_;  // one a left-out view
+  std::vector<Level> levels_;  // one per left-out view
 };
 
 struct FoundSmoothness {
   double value = kLeastSmoothness;
-  double error = std::numeric_limits<double>::infinity();  ///< LeftOutViews::error() with it, if looked at
+  double error =
+      std::numeric_limits<double>::infinity();  ///< LeftOutViews::error() with it, if it was computed
 };
-/// How firmly neighbours are tied that shows left-out views best: kLeastSmoothness, or one of a few
-/// multiples, where it lowers the error by a share that counts. Ends with the best so far once `late` says
-/// so; each value that is tried takes up to four cold solves.
+/// The smoothness (stiffness between neighbours) with the lowest left-out error: kLeastSmoothness, or one of
+/// a few multiples if it lowers the error enough. Ends with the best so far once `late` returns true; each
+/// value needs up to four cold solves.
 FoundSmoothness find_smoothness(const LeftOutViews& views, const Extinction& extinction,
                                 const std::function<bool()>& late = {});
 

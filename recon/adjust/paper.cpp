@@ -5,11 +5,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <fmt/format.h>
 
 #include "base/random.h"
 #include "recon/adjust/guard.h"
+#include "recon/adjust/picture_error.h"
+#include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/tracker.h"
 #include "recon/effects/background.h"
 
@@ -26,17 +29,9 @@ constexpr int kMostIterations = 1000;  // "until the change is small" has no bou
 constexpr float kDeviation = 0.05F;    // of G(s); the paper gives the mean alone
 
 /// What stands out from the background, grey levels; the pictures themselves where it is black.
-std::vector<RadianceImage> flames_before_backgrounds(const SolverSetup& setup) {
-  std::vector<RadianceImage> flames;
-  for (const View* view : setup.views) {
-    flames.push_back(view->image);
-    const Background& background = setup.effects.background;
-    if (background.kind == Background::Kind::black) continue;
-    const RadianceImage behind =
-        backdrop(background, view->image.size, view->background ? &*view->background : nullptr);
-    std::vector<float>& rgb = flames.back().rgb;
-    for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] = std::abs(rgb[i] - behind.rgb[i]);
-  }
+std::vector<SharedImage> flames_before_backgrounds(const SolverSetup& setup) {
+  std::vector<SharedImage> flames;
+  for (const View* view : setup.views) flames.push_back(before_background(*view, setup.effects.background));
   return flames;
 }
 
@@ -44,6 +39,23 @@ std::vector<RadianceImage> flames_before_backgrounds(const SolverSetup& setup) {
 void blacken(Problem& problem) {
   for (std::size_t r = problem.list.subset_begin[1]; r < problem.seen.size(); ++r)
     problem.seen[r] = problem.background.empty() ? Rgba{} : problem.background[r];
+}
+
+/// The best iteration's volume becomes the engine's, as the default solver takes it.
+template <class FindError>
+void take_the_best(Engine& engine, const Tracker& tracker, const Guard& guard, int lowest_at,
+                   const FindError& find_error, Solution& solution) {
+  if (const std::optional<int> better = tracker.better_before()) {
+    engine.go_back();
+    solution.kept = {*better, KeptBy::held_out};
+  }
+  solution.input_rmse = find_error();
+  const double error = all_channels(solution.input_rmse);
+  const bool rose = !tracker.holds_out() && guard.best() * (1 + kRiseThatCounts) < error;
+  if (!rose && guard.allows(error)) return;
+  engine.restore();
+  solution.input_rmse = find_error();
+  solution.kept = {lowest_at, KeptBy::input};
 }
 
 }  // namespace
@@ -74,8 +86,8 @@ Status check_paper(const Scene& scene, const Effects& effects, const SolveOption
     return refuse("the paper's solver knows no exposure time", "effects",
                   "Use --solver default, or leave exposure out");
   const bool bounds = std::any_of(scene.views.begin(), scene.views.end(), [](const View& view) {
-    return view.role == ViewRole::input &&
-           std::any_of(view.bounds.begin(), view.bounds.end(), [](std::uint8_t bits) { return bits != 0; });
+    return view.role == ViewRole::input && view.bounds &&
+           std::any_of(view.bounds->begin(), view.bounds->end(), [](std::uint8_t bits) { return bits != 0; });
   });
   if (effects.sensor.clipping == Sensor::Clipping::at_white || bounds)
     return refuse(bounds ? "the paper's solver takes saturated pixels for what they show, and some are"
@@ -94,18 +106,16 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
   const double threshold = setup.options.flame_threshold.value_or(kPaperFlameThreshold);
   ProblemOptions options = setup.problem_options();
   options.subsets = 2;  // flame rays, which adjust, and the rest, which are only rendered
-  const std::vector<RadianceImage> flames = flames_before_backgrounds(setup);
+  const std::vector<SharedImage> flames = flames_before_backgrounds(setup);
   options.subset_of = [&](std::size_t view, int x, int y) {
-    const RadianceImage& flame = flames[view];
+    const RadianceImage& flame = *flames[view];
     const float* rgb =
         &flame.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(flame.size.width) +
                         static_cast<std::size_t>(x))];
     return static_cast<double>(std::max({rgb[0], rgb[1], rgb[2]})) > threshold ? 0 : 1;
   };
-  Solution solution;
-  solution.problem = pose(setup.views, setup.hull, options, setup.pool);
-  blacken(solution.problem);
-  const Problem& problem = solution.problem;
+  Problem problem = make_problem(setup.views, setup.hull, options, setup.pool);
+  blacken(problem);
   const float sigma = setup.sigma(problem.grid());
   const auto engine = make_engine(problem, absorbing_optics(sigma), Precision::float32, setup.pool);
   engine->set(std::vector<Rgba>(problem.grid().size()));
@@ -117,21 +127,24 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
   Engine::PaperStep step{static_cast<float>(kAlphaL * emission_of_intensity),
                          static_cast<float>(kAlphaD * box_edge / kPaperEdge), kDeviation, 0};
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostIterations;
+  Solution solution;
   double last = -1;
   std::optional<Guard> guard;  // the first error is that of no light
-  const auto judge = [&] {
+  int lowest_at = 0;
+  const auto find_error = [&] {
     engine->residual(0);
     engine->residual(1);
     return error(engine->residuals());
   };
   while (solution.iterations < most) {
-    const std::array<double, 3> before = judge();
+    const std::array<double, 3> before = find_error();
     if (!guard) guard.emplace(all_channels(before));
     // alpha_l isn't normalised by the number of views: with many of them it is too large.
     const Guard::Finding finding = guard->look(all_channels(before));
     if (finding == Guard::Finding::best) {
       engine->mark();
       engine->keep();
+      lowest_at = solution.iterations;
     }
     if (finding == Guard::Finding::diverged) {
       engine->restore();
@@ -146,12 +159,9 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
     if (setup.options.iterations == 0 && std::abs(all_channels(before) - last) < kLeastChange) break;
     last = all_channels(before);
   }
-  solution.input_rmse = judge();
-  if (guard && !guard->allows(all_channels(solution.input_rmse))) {  // the last adjustment went too far
-    engine->restore();
-    solution.input_rmse = judge();
-  }
+  if (guard) take_the_best(*engine, tracker, *guard, lowest_at, find_error, solution);
   solution.x = engine->get();
+  solution.volume = to_volume(solution.x, problem, setup.hull, setup.effects);
   solution.black_error = all_channels(error.black());
   solution.halvings = guard ? guard->halvings() : 0;
   return solution;

@@ -296,7 +296,7 @@ void Predictor::choose_saturation() {
   if (white <= 0) {
     const std::vector<View>& views = flame_.scene.views;
     const bool marked =
-        std::any_of(views.begin(), views.end(), [](const View& view) { return !view.bounds.empty(); });
+        std::any_of(views.begin(), views.end(), [](const View& view) { return view.bounds != nullptr; });
     return leave_out("saturation",
                      marked ? "saturated pixels are bounds already" : "no pixels pile up at white");
   }

@@ -1,34 +1,51 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
+#include "base/result.h"
 #include "recon/effects/effects.h"
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
 
-/// The views as a solver works on them: linear in light, and all of the scene's instant. Copies them only
-/// where the sensor isn't linear, or late views move.
+/// A scene that has passed check_scene(), and its views as a solver works on them under some effects: linear
+/// in light, and all of the scene's instant. Pictures that come out as they were are shared with the scene as
+/// told; what the sensor bends is made linear once, also for whoever asks for the same sensor later.
 class PreparedScene {
  public:
-  /// The scene must outlive it.
-  PreparedScene(const Scene& scene, const Effects& effects);
-  PreparedScene(PreparedScene&&) = delete;
-  PreparedScene& operator=(PreparedScene&&) = delete;
-  [[nodiscard]] const Scene& scene() const { return copy_ ? *copy_ : scene_; }
+  /// Errors: those of check_scene().
+  static Result<PreparedScene> create(Scene told, const Effects& effects);
+  /// The same scene under other effects. Of what both have in common no pixels are copied.
+  [[nodiscard]] PreparedScene under(const Effects& effects) const;
+  /// The same scene through other cameras, one a view, that take pictures of the same size.
+  [[nodiscard]] PreparedScene through(const std::vector<CameraModel>& cameras) const;
+
+  [[nodiscard]] const Scene& scene() const { return prepared_; }
+  /// Pictures as filmed, cameras as put right by through().
+  [[nodiscard]] const Scene& told() const { return told_; }
+  [[nodiscard]] const Effects& effects() const { return effects_; }
+  /// Makes of a render by scene()'s camera of view `i` what the view itself shows: at its own instant.
+  void at_own_instant(RadianceImage& render, std::size_t i) const;
 
  private:
-  const Scene& scene_;
-  std::optional<Scene> copy_;
+  PreparedScene(Scene told, const Effects& effects);
+  void make_linear();
+  void bring_together();
+
+  Scene told_;
+  Effects effects_;
+  Scene linear_;    // as filmed, linear in light
+  Scene prepared_;  // and of one instant
 };
 
-/// A render by the prepared scene's camera of view `i` as the view itself was filmed: at its own instant.
-void at_own_instant(RadianceImage& render, const Scene& scene, std::size_t i, const Effects& effects);
+/// What stands out from the background, brighter or darker; the picture itself where that is black.
+SharedImage before_background(const View& view, const Background& background);
 
-/// flame_masks() of what stands out from the background, brighter or darker.
+/// flame_masks() of what stands out from the background.
 std::vector<FlameMask> masks_before(const Scene& scene, const Background& background,
                                     std::optional<double> threshold = std::nullopt);
 

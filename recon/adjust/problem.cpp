@@ -62,8 +62,8 @@ std::size_t Problem::most_samples() const {
   return most;
 }
 
-Problem pose(const std::vector<const View*>& views, const Hull& hull, const ProblemOptions& options,
-             Pool& pool) {
+Problem make_problem(const std::vector<const View*>& views, const Hull& hull, const ProblemOptions& options,
+                     Pool& pool) {
   Problem problem;
   problem.crop = crop_to_medium(hull);
   std::vector<const CameraModel*> cameras;
@@ -84,8 +84,8 @@ Problem pose(const std::vector<const View*>& views, const Hull& hull, const Prob
   for (std::size_t r = 0; r < problem.seen.size(); ++r) {
     const View& view = *views[problem.list.rays[r].view];
     const std::size_t pixel = problem.list.pixels[r];
-    const float* rgb = &view.image.rgb[3 * pixel];
-    const float bounds = view.bounds.empty() ? 0.F : static_cast<float>(view.bounds[pixel]);
+    const float* rgb = &view.image->rgb[3 * pixel];
+    const float bounds = view.bounds ? static_cast<float>((*view.bounds)[pixel]) : 0.F;
     problem.seen[r] = Rgba{{rgb[0], rgb[1], rgb[2], bounds}};
   }
   problem.background = behind_rays(options.background, problem.list, views);

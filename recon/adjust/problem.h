@@ -7,7 +7,7 @@
 #include "recon/compute/pool.h"
 #include "recon/effects/effects.h"
 #include "recon/hull/ray_list.h"
-#include "recon/kernels/judge.h"
+#include "recon/kernels/residual.h"
 #include "recon/kernels/rgba.h"
 
 namespace emberlock::recon {
@@ -35,7 +35,7 @@ struct Problem {
   [[nodiscard]] const Grid& grid() const { return crop.hull.grid; }
   /// `offset` is what another pass adds to each ray's radiance; empty for nothing.
   template <class Real>
-  [[nodiscard]] Judge<Real> judge(const std::vector<Rgba>& offset, float white) const {
+  [[nodiscard]] PixelResidual<Real> pixel_residual(const std::vector<Rgba>& offset, float white) const {
     return {seen.data(), background.empty() ? nullptr : background.data(),
             offset.empty() ? nullptr : offset.data(), Real(white)};
   }
@@ -54,8 +54,8 @@ struct ProblemOptions {
       subset_of;  ///< -1 leaves a pixel out; all in subset 0 where empty
 };
 
-Problem pose(const std::vector<const View*>& views, const Hull& hull, const ProblemOptions& options,
-             Pool& pool);
+Problem make_problem(const std::vector<const View*>& views, const Hull& hull, const ProblemOptions& options,
+                     Pool& pool);
 
 /// Emission a voxel edge at the fine problem's active key points, from the next coarser solution by trilinear
 /// interpolation.

@@ -26,28 +26,28 @@ RadianceImage shrunk(const RadianceImage& image, int factor) {
 }
 
 /// A mean over pixels is a lower bound as soon as one of them is.
-std::vector<std::uint8_t> shrunk_bounds(const View& view, int factor) {
-  if (view.bounds.empty()) return {};
-  const int width = view.image.size.width / factor;
-  const int height = view.image.size.height / factor;
+SharedBounds shrunk_bounds(const View& view, int factor) {
+  if (!view.bounds) return nullptr;
+  const int width = view.image->size.width / factor;
+  const int height = view.image->size.height / factor;
   std::vector<std::uint8_t> small(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   for (int y = 0; y < height * factor; ++y)
     for (int x = 0; x < width * factor; ++x)
       small[static_cast<std::size_t>(y / factor) * static_cast<std::size_t>(width) +
             static_cast<std::size_t>(x / factor)] |=
-          view.bounds[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.image.size.width) +
-                      static_cast<std::size_t>(x)];
-  return small;
+          (*view.bounds)[static_cast<std::size_t>(y) * static_cast<std::size_t>(view.image->size.width) +
+                         static_cast<std::size_t>(x)];
+  return share(std::move(small));
 }
 
 View shrunk(const View& view, int factor) {
-  View small{view.name, view.camera, shrunk(view.image, factor), view.role};
+  View small{view.name, view.camera, share(shrunk(*view.image, factor)), view.role};
   Intrinsics& lens = small.camera.intrinsics;
-  lens.size = small.image.size;
+  lens.size = small.image->size;
   for (double* length : {&lens.fx, &lens.fy, &lens.cx, &lens.cy}) *length /= factor;
   small.bounds = shrunk_bounds(view, factor);
-  if (view.background) small.background = shrunk(*view.background, factor);
-  if (view.average) small.average = shrunk(*view.average, factor);
+  if (view.background) small.background = share(shrunk(*view.background, factor));
+  if (view.average) small.average = share(shrunk(*view.average, factor));
   small.lateness = view.lateness;
   small.lateness_sigma = view.lateness_sigma;
   return small;
@@ -62,7 +62,7 @@ Scene small_scene(const Scene& scene, const std::vector<FlameMask>& masks, doubl
     if (scene.views[v].role != ViewRole::input) continue;
     const PixelBox& box = masks[v].box;
     pixels += static_cast<double>(box.x1 - box.x0) * (box.y1 - box.y0);
-    narrowest = std::min({narrowest, scene.views[v].image.size.width, scene.views[v].image.size.height});
+    narrowest = std::min({narrowest, scene.views[v].image->size.width, scene.views[v].image->size.height});
   }
   const int factor =
       std::clamp(static_cast<int>(std::lround(std::sqrt(pixels / pixels_looked_at))), 1, narrowest);

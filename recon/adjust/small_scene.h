@@ -8,8 +8,8 @@
 
 namespace emberlock::recon {
 
-/// The input views alone, every picture shrunk by one whole factor so that the masks' boxes hold about so
-/// many pixels together.
+/// The input views only, with every picture reduced by one common integer factor so that the masks' boxes
+/// contain about this many pixels together.
 Scene small_scene(const Scene& scene, const std::vector<FlameMask>& masks, double pixels_looked_at);
 
 }  // namespace emberlock::recon

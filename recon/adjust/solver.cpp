@@ -8,7 +8,7 @@
 
 #include "recon/adjust/guard.h"
 #include "recon/adjust/paper.h"
-#include "recon/adjust/prepared_scene.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/tracker.h"
 #include "recon/effects/background.h"
 #include "recon/effects/refraction.h"
@@ -19,7 +19,6 @@ namespace {
 
 Status check_request(const Scene& scene, const Grid& grid, const Effects& effects,
                      const SolveOptions& options, const Elapsed& elapsed) {
-  EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
   const auto refuse = [](const char* what, const char* where, const char* remedy) {
     return Error{ErrorKind::bad_input, what, where, remedy};
   };
@@ -84,17 +83,23 @@ Result<Solver> parse_solver(std::string_view name) {
                "Use default or paper"};
 }
 
-Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects& effects,
-                             const SolveOptions& options, const Elapsed& elapsed,
-                             const std::function<void(const Preview&)>& preview) try {
-  EMBERLOCK_RETURN_IF_ERROR(check_request(scene, grid, effects, options, elapsed));
+std::string_view name(KeptBy by) {
+  if (by == KeptBy::input) return "input";
+  return by == KeptBy::held_out ? "held_out" : "last";
+}
+
+std::string_view name(Solver solver) { return solver == Solver::paper ? "paper" : "default"; }
+
+Result<Reconstruction> solve(const PreparedScene& scene, const Grid& grid, const SolveOptions& options,
+                             const Elapsed& elapsed, const std::function<void(const Preview&)>& preview) try {
+  const Effects& effects = scene.effects();
+  EMBERLOCK_RETURN_IF_ERROR(check_request(scene.told(), grid, effects, options, elapsed));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   const auto now = [&] { return elapsed ? elapsed() : Seconds(0); };
   const Seconds start = now();
 
   const bool paper = options.solver == Solver::paper;
-  const PreparedScene prepared(scene, effects);
-  const Scene& linear = prepared.scene();
+  const Scene& linear = scene.scene();
   // Errors are counted over these boxes, whatever the threshold.
   const std::vector<FlameMask> own = masks_before(linear, effects.background);
   std::optional<double> threshold = options.flame_threshold;
@@ -112,7 +117,7 @@ Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects
   for (std::size_t v = 0; v < linear.views.size(); ++v) {
     const bool input = linear.views[v].role == ViewRole::input;
     (input ? setup.views : held_out).push_back(&linear.views[v]);
-    const ImageSize size = linear.views[v].image.size;
+    const ImageSize size = linear.views[v].image->size;
     (input ? setup.boxes : held_out_boxes)
         .push_back(own[v].box.empty() ? PixelBox{0, 0, size.width, size.height} : own[v].box);
   }
@@ -124,8 +129,8 @@ Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects
   }
   Tracker tracker(setup, held_out, held_out_boxes, elapsed, preview);
   const double longest = static_cast<double>(grid.edge) * (std::max({grid.nx, grid.ny, grid.nz}) - 1);
-  const Solution solution = paper ? solve_paper(setup, longest, tracker) : solve_standard(setup, tracker);
-  result.volume = to_volume(solution.x, solution.problem, result.hull, effects);
+  Solution solution = paper ? solve_paper(setup, longest, tracker) : solve_standard(setup, tracker);
+  result.volume = std::move(solution.volume);
   if (effects.scattering.order != Scattering::Order::none)
     take_out_in_scatter(result.volume, result.hull, effects, pool);
   result.iterations = solution.iterations;
@@ -139,6 +144,13 @@ Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects
   return e.error();
 } catch (const Diverged& e) {
   return e.error();
+}
+
+Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects& effects,
+                             const SolveOptions& options, const Elapsed& elapsed,
+                             const std::function<void(const Preview&)>& preview) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene prepared, PreparedScene::create(scene, effects));
+  return solve(prepared, grid, options, elapsed, preview);
 }
 
 }  // namespace emberlock::recon

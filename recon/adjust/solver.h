@@ -10,6 +10,7 @@
 
 #include "base/quantity.h"
 #include "base/result.h"
+#include "recon/adjust/prepared_scene.h"
 #include "recon/compute/device.h"
 #include "recon/effects/effects.h"
 #include "recon/hull/hull.h"
@@ -25,6 +26,7 @@ enum class Solver {
 
 /// "default" or "paper"; an Error that lists them otherwise.
 Result<Solver> parse_solver(std::string_view name);
+std::string_view name(Solver solver);
 
 struct SolveOptions {
   Solver solver = Solver::standard;
@@ -44,6 +46,8 @@ struct SolveOptions {
     whole,    ///< all: for who measures what accuracy costs, off the clock
   };
   Trace trace = Trace::sampled;
+  /// Asked between passes: true ends the run as a spent budget does, with the best so far.
+  std::function<bool()> stop = {};
   ComputeOptions compute;
 };
 
@@ -67,6 +71,21 @@ struct TraceSample {
   std::size_t of = 0;
 };
 
+/// What decided which iteration's volume is the result.
+enum class KeptBy {
+  last,      ///< none was better than the last one
+  input,     ///< the last one shows the input views worse than an earlier one did
+  held_out,  ///< the same of the held-out views: later iterations fitted the input views alone
+};
+std::string_view name(KeptBy by);
+/// An earlier volume is taken only where the last one's error is higher by more than this share.
+inline constexpr double kRiseThatCounts = 0.005;
+
+struct Kept {
+  int iteration = 0;  ///< after which the volume was as it is given; of Reconstruction::iterations
+  KeptBy by = KeptBy::last;
+};
+
 struct Reconstruction {
   Volume volume;
   Hull hull;
@@ -74,7 +93,10 @@ struct Reconstruction {
   int iterations = 0;
   double smoothness = 0;  ///< as in SolveOptions; 0 for the paper's solver
   int halvings = 0;       ///< so often the error rose beyond its beginning, and the steps were halved
-  std::vector<TracePoint> trace;
+  Kept kept;
+  bool stopped = false;               ///< by SolveOptions::stop
+  std::vector<TracePoint> trace;      ///< up to the iteration that was kept, whose errors are the volume's
+  std::vector<TracePoint> discarded;  ///< the trace's continuation after it
   std::optional<std::array<double, 3>> heldout_rmse;  ///< of the volume, over all of the held-out pixels
   std::array<double, 3> heldout_black = {};           ///< the same of a volume without light
   TraceSample trace_sample;
@@ -97,18 +119,28 @@ struct Preview {
 /// Time since the solve began, as the caller measures it.
 using Elapsed = std::function<Seconds()>;
 
-/// Whether so much of the budget is spent; false where there is none, or no clock.
+inline bool is_stopped(const SolveOptions& options) { return options.stop && options.stop(); }
+
+/// Whether so much of the budget is spent, or the run is to stop; otherwise false where there is no budget,
+/// or no clock.
 inline bool is_spent(double share, const SolveOptions& options, const Elapsed& elapsed) {
+  if (is_stopped(options)) return true;
   return options.budget && elapsed && elapsed().value() >= share * options.budget->value();
 }
 
-/// Reconstructs the emission at the grid's key points from the input views, under the given effects. Held-out
-/// views are never fitted: a sample of their pixels is rendered for the trace, all of them at the end and
-/// before `target_rmse` counts as reached. Deterministic: the same bits for every number of threads, unless a
-/// budget ends it. Without `elapsed` all times are 0 and a budget is refused. Errors: check_scene's and
-/// carve's, a target without held-out views, options out of range, a device that can't run; of kind
-/// not_converged where the error diverges whatever the steps (guard.h), where the input views are shown no
-/// better than by a volume without light or held-out ones worse, or where a number isn't finite.
+/// Reconstructs the emission at the grid's key points from the input views, under the scene's effects.
+/// Held-out views are never fitted: a sample of their pixels is rendered for the trace, all of them at the
+/// end and before `target_rmse` counts as reached. The volume is the last iteration's, or an earlier one's
+/// that was better (Reconstruction::kept): so where views are held out they choose among the iterations.
+/// Deterministic: the same bits for every number of threads, unless a budget or `stop` ends it. Without
+/// `elapsed` all times are 0 and a budget is refused. Errors: carve's, a target without held-out views,
+/// options out of range, a device that can't run; of kind not_converged where the error diverges whatever the
+/// steps (guard.h), where the input views are shown no better than by a volume without light or held-out ones
+/// worse, or where a number isn't finite.
+Result<Reconstruction> solve(const PreparedScene& scene, const Grid& grid, const SolveOptions& options,
+                             const Elapsed& elapsed = {},
+                             const std::function<void(const Preview&)>& preview = {});
+/// The same from a scene as it was filmed. Errors: check_scene()'s too.
 Result<Reconstruction> solve(const Scene& scene, const Grid& grid, const Effects& effects,
                              const SolveOptions& options, const Elapsed& elapsed = {},
                              const std::function<void(const Preview&)>& preview = {});

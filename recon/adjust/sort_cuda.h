@@ -13,7 +13,7 @@ struct SortedSamples {
   CudaBuffer<std::uint32_t> begin;
 };
 
-/// Sorts samples by their voxels, one each, < key_points; those of one voxel stay in order.
+/// Sorts samples by their voxels (one each, < key_points); those of one voxel keep their order.
 SortedSamples sort_by_voxel(const CudaBuffer<std::uint32_t>& voxels, std::size_t key_points);
 
 }  // namespace emberlock::recon

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The default solver: non-negative least squares with the exact adjoint, coarse to fine.
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "recon/adjust/descent.h"
 #include "recon/adjust/extinction_field.h"
 #include "recon/adjust/left_out_views.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/tracker.h"
 #include "recon/adjust/uneven_light.h"
 
@@ -29,6 +35,29 @@ std::unique_ptr<Descent> begin(const Level& level, const SolverSetup& setup, std
   return std::make_unique<Descent>(level, setup.optics(problem.grid()), setup, x);
 }
 
+/// The best of the finest level's iterations becomes the descent's x: by the held-out views where the
+/// tracker says so, otherwise by the input views. `shine` renews the light that is scattered; `lowest_at` is
+/// the iteration after which the input error was lowest.
+struct Ending {
+  Kept kept;
+  std::array<double, 3> input_rmse = {};
+};
+template <class Shine>
+Ending end_with_the_best(Descent& descent, const Tracker& tracker, const ErrorOverBoxes& error, int lowest_at,
+                         const Shine& shine) {
+  const auto input_rmse = [&] { return error(descent.engine().residuals()); };
+  if (const std::optional<int> better = tracker.better_before()) {
+    descent.engine().go_back();
+    shine();
+    if (descent.allows(descent.judge())) return {{*better, KeptBy::held_out}, input_rmse()};
+  }
+  const double last = descent.judge();
+  const bool sound = descent.halvings() == 0 && descent.allows(last);
+  const bool rose = !tracker.holds_out() && descent.kept_error() * (1 + kRiseThatCounts) < last;
+  if ((!sound || rose) && descent.take_kept(last)) return {{lowest_at, KeptBy::input}, input_rmse()};
+  return {{}, input_rmse()};
+}
+
 }  // namespace
 
 Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
@@ -45,7 +74,7 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
   std::unique_ptr<Descent> descent;
   int halvings = 0;
   for (std::size_t l = hulls.size(); l-- > 0;) {
-    auto finer = std::make_unique<const Level>(pose_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
+    auto finer = std::make_unique<const Level>(make_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
     if (descent) descent->settle();  // nobody has judged the last pass yet
     std::vector<Rgba> x = descent ? refine(descent->engine().get(), level->problem, finer->problem)
                                   : std::vector<Rgba>(finer->problem.active.size());
@@ -63,18 +92,23 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;
   double last = std::numeric_limits<double>::infinity();
   int iteration = 0;
+  int lowest_at = 0;  // iterations before the pass that found the lowest error
+  const auto shine = [&] {
+    if (!uneven) return;
+    const UnevenLight light(setup,
+                            to_volume(descent->engine().get(), level->problem, setup.hull, setup.effects));
+    descent->engine().set_offset(light(setup.views, level->problem));
+    descent->begin_anew();
+    tracker.add_offset(light);
+  };
   while (iteration < most) {
-    if (uneven && iteration > 0) {  // the light is known well enough to be scattered
-      const UnevenLight light(setup,
-                              to_volume(descent->engine().get(), level->problem, setup.hull, setup.effects));
-      descent->engine().set_offset(light(setup.views, level->problem));
-      descent->begin_anew();
-      tracker.add_offset(light);
-    }
-    if (descent->pass() == Guard::Finding::diverged) {  // what was taken back is no iteration
+    if (iteration > 0) shine();  // the light is known well enough to be scattered
+    const Guard::Finding finding = descent->pass();
+    if (finding == Guard::Finding::diverged) {  // what was taken back is no iteration
       if (tracker.out_of_time()) break;
       continue;
     }
+    if (finding == Guard::Finding::best) lowest_at = iteration;
     ++iteration;
     const double validation = descent->validation_error();
     if (tracker.record(iteration, error(descent->engine().residuals()), descent->engine(), level->problem))
@@ -83,15 +117,11 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
     if (setup.options.iterations == 0 && validation > (1 - kLeastGain) * last) break;
     last = validation;
   }
-  descent->settle();
-  const std::array<double, 3> reached = error(descent->engine().residuals());
-  return {descent->engine().get(),
-          level->problem,
-          iteration,
-          halvings + descent->halvings(),
-          *setup.smoothness,
-          all_channels(error.black()),
-          reached};
+  const Ending ending = end_with_the_best(*descent, tracker, error, lowest_at, shine);
+  std::vector<Rgba> x = descent->engine().get();
+  Volume volume = to_volume(x, level->problem, setup.hull, setup.effects);
+  return {std::move(x),      std::move(volume),           iteration,         halvings + descent->halvings(),
+          *setup.smoothness, all_channels(error.black()), ending.input_rmse, ending.kept};
 }
 
 }  // namespace emberlock::recon

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/adjust/tracker.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "recon/adjust/picture_error.h"
 
 namespace emberlock::recon {
 
@@ -36,6 +39,12 @@ bool Tracker::record(int iteration, const std::array<double, 3>& input_rmse, Eng
     const Seconds start = now();
     point.heldout_rmse = held_out_->sampled(engine);
     done = reached(point.heldout_rmse, engine);
+    last_ = all_channels(point.heldout_rmse);
+    if (last_ < lowest_) {
+      lowest_ = last_;
+      lowest_at_ = iteration;
+      engine.save();
+    }
     excluded_ += now() - start;
   }
   trace_.push_back(point);
@@ -50,21 +59,37 @@ bool Tracker::record(int iteration, const std::array<double, 3>& input_rmse, Eng
               },
               setup_.hull, setup_.effects});
   }
-  return done || out_of_time();
+  const bool late = out_of_time();
+  return done || late;
+}
+
+std::optional<int> Tracker::better_before() const {
+  if (lowest_at_ == 0 || last_ <= (1 + kRiseThatCounts) * lowest_) return std::nullopt;
+  return lowest_at_;
 }
 
 void Tracker::conclude(const Solution& solution, Reconstruction& result) {
   std::erase_if(trace_, [](const TracePoint& p) {
     return !std::isfinite(all_channels(p.input_rmse)) || !std::isfinite(all_channels(p.heldout_rmse));
   });
-  if (trace_.empty()) trace_.push_back({time(), solution.iterations, {}, {}});
+  result.kept = solution.kept;
+  if (result.kept.by == KeptBy::last) result.kept.iteration = solution.iterations;
+  const auto later = std::find_if(trace_.begin(), trace_.end(),
+                                  [&](const TracePoint& p) { return p.iteration > result.kept.iteration; });
+  result.discarded.assign(later, trace_.end());
+  trace_.erase(later, trace_.end());
+  if (trace_.empty()) {
+    const Seconds then = result.discarded.empty() ? time() : result.discarded.front().time;
+    trace_.push_back({then, result.kept.iteration, {}, {}});
+  }
   trace_.back().input_rmse = solution.input_rmse;
   if (held_out_) {
     const Seconds start = now();
     const HeldOut::Both errors = held_out_->both(solution.x);
-    for (TracePoint& point : trace_)
-      for (std::size_t c = 0; c < 3; ++c)
-        if (errors.sampled[c] > 0) point.heldout_rmse[c] *= errors.all[c] / errors.sampled[c];
+    for (std::vector<TracePoint>* points : {&trace_, &result.discarded})
+      for (TracePoint& point : *points)
+        for (std::size_t c = 0; c < 3; ++c)
+          if (errors.sampled[c] > 0) point.heldout_rmse[c] *= errors.all[c] / errors.sampled[c];
     trace_.back().heldout_rmse = errors.all;
     result.heldout_rmse = errors.all;
     result.heldout_black = held_out_->black();
@@ -73,6 +98,7 @@ void Tracker::conclude(const Solution& solution, Reconstruction& result) {
   }
   result.trace_time = excluded_;
   result.trace = std::move(trace_);
+  result.stopped = stopped_;
 }
 
 Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull& hull,

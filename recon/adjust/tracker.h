@@ -37,7 +37,7 @@ struct SolverSetup {
     if (field) optics.absorb = Absorb::field;
     if (effects.sensor.clipping == Sensor::Clipping::at_white)
       optics.white = static_cast<float>(effects.sensor.white);
-    else if (std::any_of(views.begin(), views.end(), [](const View* v) { return !v->bounds.empty(); }))
+    else if (std::any_of(views.begin(), views.end(), [](const View* v) { return v->bounds != nullptr; }))
       optics.white = std::numeric_limits<float>::infinity();
     optics.exposure = effects.exposure;
     return optics;
@@ -70,13 +70,23 @@ class Tracker {
   }
   /// Adds a point to the trace; true when the budget is spent or the target reached.
   bool record(int iteration, const std::array<double, 3>& input_rmse, Engine& engine, const Problem& problem);
-  [[nodiscard]] bool out_of_time() const { return is_spent(1); }
+  /// Whether the budget is spent, or the run was told to stop.
+  [[nodiscard]] bool out_of_time() {
+    stopped_ = stopped_ || is_stopped(setup_.options);
+    return stopped_ || is_spent(1);
+  }
+  /// Whether views are held out, which then choose among the iterations.
+  [[nodiscard]] bool holds_out() const { return held_out_ != nullptr; }
+  /// The iteration that the sample shows best, where the last one is worse than that by kRiseThatCounts: its
+  /// x is what the engine has saved.
+  [[nodiscard]] std::optional<int> better_before() const;
   /// Whether so much of the budget is spent.
   [[nodiscard]] bool is_spent(double share) const { return recon::is_spent(share, setup_.options, elapsed_); }
   /// Time since the beginning without the held-out evaluations.
   [[nodiscard]] Seconds time() const;
-  /// Ends the trace, whose last point becomes the solution's: judges it by all held-out pixels, and scales
-  /// the trace's estimates by them. Points of what wasn't finite, and was taken back, go.
+  /// Ends the trace with the iteration that was kept, whose point becomes the solution's: judges it by all
+  /// held-out pixels, and scales the trace's estimates by them. Later points are set aside. Points of what
+  /// wasn't finite, and was taken back, go.
   void conclude(const Solution& solution, Reconstruction& result);
 
  private:
@@ -87,7 +97,11 @@ class Tracker {
   const Elapsed& elapsed_;
   const std::function<void(const Preview&)>& preview_;
   std::unique_ptr<HeldOut> held_out_;
-  double all_over_sampled_ = 1;  // when both were last looked at
+  double all_over_sampled_ = 1;                              // when both were last looked at
+  double lowest_ = std::numeric_limits<double>::infinity();  // of the sample, all channels
+  int lowest_at_ = 0;                                        // iteration
+  double last_ = 0;
+  bool stopped_ = false;
   Seconds excluded_{0};
   std::vector<TracePoint> trace_;
 };
@@ -97,15 +111,17 @@ class Tracker {
 Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull& hull,
                  const Effects& effects);
 
-/// x, as it was judged at the end, and its problem; iterations done at full resolution.
+/// x, as it was judged at the end, and the volume that it makes on the whole grid; iterations done at full
+/// resolution.
 struct Solution {
   std::vector<Rgba> x;
-  Problem problem;
+  Volume volume;
   int iterations = 0;
   int halvings = 0;  ///< see Reconstruction
   double smoothness = 0;
   double black_error = 0;  ///< of the input views, all channels: what a volume without light leaves
   std::array<double, 3> input_rmse = {};  ///< of x, as in TracePoint
+  Kept kept = {};                         ///< `iteration` counts unless it was the last one
 };
 /// Both throw Diverged where their guard gives up.
 Solution solve_standard(const SolverSetup& setup, Tracker& tracker);

@@ -6,14 +6,14 @@
 
 namespace emberlock::recon {
 
-/// What scattering that favours a direction adds to each ray, beyond the even light that a solver's emission
-/// holds already: the source's own light is scattered towards each camera. How it depends on the emission is
-/// not followed by the adjoint, so it is found anew as the emission becomes known.
+/// The contribution of anisotropic scattering to each ray, in addition to the isotropic part, which a
+/// solver's emission already contains: the source's own light scattered towards each camera. The adjoint
+/// neglects its dependence on the emission, so it is recomputed as the emission becomes known.
 class UnevenLight {
  public:
-  /// `source` holds all of the medium's light, what it scatters included. The setup must outlive it.
+  /// `source` contains all of the medium's light, including scattered light. The setup must outlive it.
   UnevenLight(const SolverSetup& setup, Volume source);
-  /// One a ray of the problem through these views.
+  /// One value per ray of the problem through these views.
   std::vector<Rgba> operator()(const std::vector<const View*>& views, const Problem& problem) const;
 
  private:

@@ -15,9 +15,9 @@ namespace emberlock::recon {
 namespace {
 
 constexpr int kFewestCorners = 6;
-constexpr double kChessWindow = 0.5;  // of the least distance between corners, to either side
-constexpr int kWidestWindow = 11;     // pixels to either side
-constexpr int kMostSquares = 100;     // along a side
+constexpr double kChessWindow = 0.5;  // of the smallest distance between corners, on either side
+constexpr int kWidestWindow = 11;     // pixels on either side
+constexpr int kMostSquares = 100;     // per side
 constexpr const char* kBoardFormats =
     "Give chessboard:COLUMNSxROWS:SQUARE in inner corners (chessboard:9x6:25mm), or "
     "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY in squares (charuco:11x8:30mm:22mm:5X5_100)";
@@ -87,18 +87,19 @@ cv::Ptr<cv::aruco::CharucoBoard> aruco_board(const Board& board) {
       static_cast<float>(board.marker.value()), cv::aruco::getPredefinedDictionary(known->second));
 }
 
-/// 8 bits of grey, the picture's white becoming 255.
+/// The picture as 8-bit grey, with its white at 255.
 cv::Mat grey_of(const ImageView& picture) {
   const auto& layout = picture.layout;
   const bool wide = bytes_per_sample(layout.format) == 2;
   const int depth = wide ? CV_16U : CV_8U;
-  // OpenCV only reads through it.
+  // OpenCV doesn't write to it.
   const cv::Mat raw(picture.height(), picture.width(), CV_MAKETYPE(depth, channels(layout.format)),
                     const_cast<std::byte*>(picture.data),
                     picture.stride);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   cv::Mat grey;
   if (is_bayer(layout.format)) {
-    cv::cvtColor(raw, grey, cv::COLOR_BayerBG2GRAY);  // RGGB, by the second row's second pixel
+    cv::cvtColor(raw, grey,
+                 cv::COLOR_BayerBG2GRAY);  // RGGB; OpenCV's names start at the second pixel of the second row
   } else if (channels(layout.format) == 3) {
     cv::cvtColor(raw, grey, cv::COLOR_RGB2GRAY);
   } else {
@@ -109,7 +110,7 @@ cv::Mat grey_of(const ImageView& picture) {
   return result;
 }
 
-/// Rows from the left as seen, and of the two ends that are left, the one whose inner square is black.
+/// Orders the corners by rows from the left as seen, beginning at the end whose inner square is black.
 void order_corners(std::vector<cv::Point2f>& corners, const Board& board, const cv::Mat& grey) {
   const auto at = [&](int column, int row) -> cv::Point2f& {
     return corners[static_cast<std::size_t>(row) * static_cast<std::size_t>(board.columns) +
@@ -122,7 +123,7 @@ void order_corners(std::vector<cv::Point2f>& corners, const Board& board, const 
       std::reverse(corners.begin() + row * board.columns, corners.begin() + (row + 1) * board.columns);
   }
   if (board.ambiguous()) return;
-  double first = 0;  // brightness of the squares of the first one's colour, less the others'
+  double first = 0;  // brightness of the squares of the first one's colour, minus the others'
   for (int row = 0; row + 1 < board.rows; ++row) {
     for (int column = 0; column + 1 < board.columns; ++column) {
       const cv::Point2f middle =
@@ -135,7 +136,7 @@ void order_corners(std::vector<cv::Point2f>& corners, const Board& board, const 
   if (first > 0) std::reverse(corners.begin(), corners.end());
 }
 
-/// The least distance between neighbouring corners, pixels.
+/// The smallest distance between neighbouring corners, pixels.
 double least_step(const std::vector<cv::Point2f>& corners, const std::vector<int>& ids, const Board& board) {
   double least = INFINITY;
   for (std::size_t i = 0; i < ids.size(); ++i) {
@@ -148,8 +149,8 @@ double least_step(const std::vector<cv::Point2f>& corners, const std::vector<int
   return least;
 }
 
-/// Moves corners to where the gradients around them meet, to a fraction of a pixel, in a window that reaches
-/// no other edge: `share` of the least distance between corners to either side.
+/// Moves corners to where the gradients around them meet, with subpixel accuracy, in a window that contains
+/// no other edge: `share` of the smallest distance between corners, on either side.
 void refine(std::vector<cv::Point2f>& corners, const std::vector<int>& ids, const Board& board,
             const cv::Mat& grey, double share) {
   if (corners.empty()) return;
@@ -159,7 +160,7 @@ void refine(std::vector<cv::Point2f>& corners, const std::vector<int>& ids, cons
                    {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 50, 1e-3});
 }
 
-/// The detector that bears glare and blur, then the other.
+/// Tries the detector that tolerates glare and blur, then the other one.
 std::vector<BoardCorner> find_chessboard(const cv::Mat& grey, const Board& board) {
   const cv::Size size(board.columns, board.rows);
   std::vector<cv::Point2f> corners;
@@ -190,7 +191,7 @@ std::vector<BoardCorner> find_charuco(const cv::Mat& grey, const Board& board) {
   std::vector<cv::Point2f> corners;
   std::vector<int> ids;
   cv::aruco::interpolateCornersCharuco(markers, marker_ids, grey, aruco, corners, ids);
-  // OpenCV's are half a pixel off towards the lower right. A marker's edge is as near as its margin.
+  // OpenCV's corners are half a pixel too far to the lower right. The marker's edge limits the window.
   refine(corners, ids, board, grey, 0.5 * (1 - board.marker.value() / board.square.value()));
   std::vector<BoardCorner> result;
   for (std::size_t i = 0; i < ids.size(); ++i)

@@ -16,65 +16,65 @@
 namespace emberlock::recon {
 
 enum class BoardKind : std::uint8_t {
-  chessboard,  ///< seen whole or not at all
-  charuco,     ///< markers number its corners: any part of it will do
-  lamp,        ///< no board but a small lamp, taken for one corner: it has a place and no pose
+  chessboard,  ///< must be visible completely
+  charuco,     ///< markers number its corners, so a part of it is enough
+  lamp,  ///< not a board but a small lamp, treated as a single corner: it has a position and no orientation
 };
 
-/// A flat board of squares. Its own frame, as whoever looks at it sees it: x along a row, y up, z out of the
-/// board, metres, 0 at its first corner. Corners are the inner ones, counted row by row from the first.
+/// A flat board of squares. Its frame, for a viewer in front of it: x along a row, y up, z out of the board,
+/// in metres, with the origin at its first corner. Corners are the inner ones, counted row by row from the
+/// first.
 struct Board {
   BoardKind kind = BoardKind::chessboard;
-  int columns = 9;  ///< of inner corners
-  int rows = 6;     ///< of inner corners
+  int columns = 9;  ///< number of inner corners
+  int rows = 6;     ///< number of inner corners
   Meters square{0.025};
-  Meters marker{0};             ///< edge of a ChArUco board's markers
-  std::string dictionary = {};  ///< of these, as OpenCV names it: "4X4_50", "5X5_100", ...
+  Meters marker{0};             ///< edge length of a ChArUco board's markers
+  std::string dictionary = {};  ///< of the markers, by OpenCV's names: "4X4_50", "5X5_100", ...
 
   [[nodiscard]] int corners() const { return columns * rows; }
   [[nodiscard]] Eigen::Vector3d point(int corner) const {
     const int row = corner / columns;
     return {square.value() * (corner % columns), -square.value() * row, 0};
   }
-  /// Whether it looks the same upside down: then cameras on different sides may take its corners for each
-  /// other's opposites. A chessboard does, if both of its numbers of corners are even or both odd.
+  /// Whether it looks the same upside down. Then cameras on different sides may assign its corners in
+  /// opposite order. A chessboard does if its numbers of corners are both even or both odd.
   [[nodiscard]] bool ambiguous() const { return kind == BoardKind::chessboard && (columns - rows) % 2 == 0; }
 };
 
-/// "chessboard:9x6:25mm": 9 x 6 INNER CORNERS (as cv::findChessboardCorners counts), squares of 25 mm.
-/// "charuco:11x8:30mm:22mm:5X5_100": 11 x 8 SQUARES (as cv::aruco::CharucoBoard counts), squares, markers,
-/// dictionary. Lengths in mm, cm or m. Error with the format as remedy.
+/// "chessboard:9x6:25mm": 9 x 6 INNER CORNERS (as in cv::findChessboardCorners), squares of 25 mm.
+/// "charuco:11x8:30mm:22mm:5X5_100": 11 x 8 SQUARES (as in cv::aruco::CharucoBoard), squares, markers,
+/// dictionary. Lengths in mm, cm or m. The error's remedy is the format.
 Result<Board> parse_board(std::string_view text);
-/// What parse_board() reads; "lamp" of a lamp.
+/// The text that parse_board() reads; "lamp" for a lamp.
 std::string board_words(const Board& board);
 /// "board" or "lamp".
 std::string noun_of(const Board& board);
-/// A lamp as the board of one corner.
+/// A lamp, as a board with one corner.
 Board lamp_as_board();
 
-/// A corner of the board as a picture shows it.
+/// A corner of the board in a picture.
 struct BoardCorner {
-  int id = 0;             ///< of the board's, from 0
+  int id = 0;             ///< index of the corner, from 0
   Eigen::Vector2d pixel;  ///< recon's convention: pixel centres at +0.5
 };
 
-/// The corners of a board (no lamp: smear_sync detects those) in a picture of any format, to a fraction of a
-/// pixel; none where it isn't seen, or too little of it (fewer than 6 corners, or all on one line). A
-/// chessboard that isn't ambiguous() gets the same corners from any side: its first is the one whose square
-/// inside the corners is black.
+/// Finds the corners of a board (not of a lamp, for which smear_sync has a detector) in a picture of any
+/// format, with subpixel accuracy. Empty if it isn't visible, or too little of it (fewer than 6 corners, or
+/// all on one line). If a chessboard isn't ambiguous(), its corners are numbered the same from every side:
+/// the first is the one whose inner square is black.
 std::vector<BoardCorner> find_board(const ImageView& picture, const Board& board);
 
-/// What is looked for in pictures, and how.
+/// The board to search for, and the method.
 struct BoardSearch {
   Board board;
   std::function<std::vector<BoardCorner>(const ImageView& picture)> find;  ///< called by several threads
 };
-/// By find_board().
+/// A search with find_board().
 BoardSearch search_for(const Board& board);
 
-/// The board as a picture to print or to render, `square` pixels a square, a white margin of one square
-/// around. A corner (column, row) lies at ((column + 2) * square, (row + 2) * square) from the picture's
-/// corner.
+/// Draws the board for printing or rendering, `square` pixels per square, with a white margin of one square.
+/// Corner (column, row) is at ((column + 2) * square, (row + 2) * square) from the picture's corner.
 Image draw_board(const Board& board, int square);
 
 }  // namespace emberlock::recon

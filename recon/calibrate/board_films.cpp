@@ -16,13 +16,13 @@ namespace {
 
 constexpr double kLeastDifference = 0.01;  // of the picture's diagonal
 
-/// What one camera shows at the searched instants.
+/// The frames and corners of one camera at the searched instants.
 struct CameraFilm {
-  std::vector<std::optional<std::size_t>> frames;  ///< by searched instant; none where it has no frame
+  std::vector<std::optional<std::size_t>> frames;  ///< by searched instant; nullopt without a frame
   struct Look {
     std::size_t look = 0;
     std::vector<BoardCorner> corners;
-    double motion = 0;  ///< pixels a frame; infinite where the neighbouring frame doesn't show the board
+    double motion = 0;  ///< pixels per frame; infinite if the neighbouring frame doesn't show the board
   };
   std::vector<Look> seen;
   std::vector<BoardReading::Unused> unreadable;
@@ -37,7 +37,7 @@ std::vector<std::size_t> complete_frames(const session::SessionReader& reader, s
   return frames;
 }
 
-/// The frame nearest to `t`, half a period away at most. `frames` in order of time.
+/// The frame closest to `t`, at most half a period away. `frames` must be in order of time.
 std::optional<std::size_t> nearest_frame(const session::SessionReader& reader, std::size_t camera,
                                          const std::vector<std::size_t>& frames, TimePoint t) {
   const std::vector<FrameStamp>& stamps = reader.stamps(camera);
@@ -53,7 +53,7 @@ std::optional<std::size_t> nearest_frame(const session::SessionReader& reader, s
   return best;
 }
 
-/// The median corner's step between two frames.
+/// The median motion of corners between two frames.
 double motion_between(const std::vector<BoardCorner>& a, const std::vector<BoardCorner>& b) {
   std::vector<double> steps;
   for (const BoardCorner& corner : a)
@@ -65,12 +65,12 @@ double motion_between(const std::vector<BoardCorner>& a, const std::vector<Board
   return *middle;
 }
 
-/// Reads one camera's frames in order, and the neighbours of those that show the board.
+/// Searches one camera's frames in order, and the neighbours of those that show the board.
 Status search_film(session::SessionReader& reader, std::size_t camera, const BoardSearch& search,
                    const FilmSearchOptions& options, const Observer& observer, CameraFilm& film) {
   const std::string id = reader.manifest().cameras(static_cast<int>(camera)).camera_id();
   const std::size_t count = reader.stamps(camera).size();
-  // Of a short film the neighbour is searched next.
+  // In a short film the neighbour is the frame searched next.
   std::optional<std::pair<std::size_t, std::vector<BoardCorner>>> last;
   const auto corners_in = [&](std::size_t frame) -> Result<std::vector<BoardCorner>> {
     if (!last || last->first != frame) {
@@ -102,7 +102,7 @@ Status search_film(session::SessionReader& reader, std::size_t camera, const Boa
   return {};
 }
 
-/// Numbers below `count`, `most` at most, spread evenly.
+/// At most `most` numbers below `count`, at even intervals.
 std::vector<std::size_t> spread_evenly(std::size_t count, std::size_t most) {
   const std::size_t taken = std::min(count, most);
   std::vector<std::size_t> result;
@@ -111,7 +111,7 @@ std::vector<std::size_t> spread_evenly(std::size_t count, std::size_t most) {
   return result;
 }
 
-/// Which of the cameras' frames belong to the searched instants, and the instants' names.
+/// The cameras' frames of the searched instants, and the instants' names.
 std::vector<CameraFilm> plan_films(const session::SessionReader& reader, const FilmSearchOptions& options,
                                    FilmCounts& counts, std::vector<std::string>& names) {
   const std::vector<std::size_t> first = complete_frames(reader, 0);
@@ -157,7 +157,7 @@ Status nothing_found(const std::filesystem::path& folder, const BoardReading& re
   return {};
 }
 
-/// Instants by the motion of the board in the camera that shows most of it.
+/// The board's motion at each instant, in the camera where it is largest.
 std::vector<double> motions_of(const std::vector<CameraFilm>& films, std::size_t looks) {
   std::vector<double> motions(looks, -1);
   for (const CameraFilm& film : films)
@@ -180,7 +180,7 @@ double mean_distance(const std::vector<BoardCorner>& a, const std::vector<BoardC
   return count > 0 ? sum / count : INFINITY;
 }
 
-/// Of the views of two instants, in diagonals of the picture; 1 where no camera sees both.
+/// The difference between the views of two instants, in diagonals of the picture; 1 if no camera sees both.
 double difference(const BoardSightings& sightings, const std::vector<std::size_t>& a,
                   const std::vector<std::size_t>& b) {
   double least = 1;
@@ -197,7 +197,7 @@ double difference(const BoardSightings& sightings, const std::vector<std::size_t
   return least;
 }
 
-/// Leaves the instants of `kept` (rising) alone.
+/// Keeps only the instants in `kept` (ascending).
 void keep_instants(BoardSightings& sightings, const std::vector<std::size_t>& kept) {
   std::map<std::size_t, std::size_t> place;
   std::vector<std::string> names;
@@ -216,7 +216,7 @@ std::vector<std::size_t> spread_instants(const BoardSightings& sightings, std::s
   std::vector<std::vector<std::size_t>> views(sightings.instants.size());
   for (std::size_t s = 0; s < sightings.sightings.size(); ++s)
     views[sightings.sightings[s].instant].push_back(s);
-  std::vector<double> apart(views.size(), 1);  // from all that are kept
+  std::vector<double> apart(views.size(), 1);  // distance to the kept ones
   std::vector<std::size_t> kept;
   while (kept.size() < most) {
     const auto worth = [&](std::size_t i) { return apart[i] * static_cast<double>(views[i].size()); };

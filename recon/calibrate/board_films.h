@@ -9,27 +9,27 @@
 namespace emberlock::recon {
 
 struct FilmSearchOptions {
-  std::size_t instants = 160;  ///< are taken at most; 1..10000
-  std::size_t looks = 4;       ///< so many instants are searched for each one that may be taken; >= 1
-  /// Pixels a frame: where the board moves more in any camera, the instant isn't taken, for cameras expose up
-  /// to half a frame apart. 0: taken however it moves (pictures a frame, no film).
+  std::size_t instants = 160;  ///< maximum number of instants used; 1..10000
+  std::size_t looks = 4;       ///< instants searched per instant that may be used; >= 1
+  /// Pixels per frame. Instants at which the board moves faster in any camera are skipped, because cameras
+  /// may expose up to half a frame apart. 0: no limit (pictures instead of a film).
   double stillness = 0.5;
 };
 
-/// The board in a session's frames: each of its cameras is a camera, each frame of the first with the others'
-/// nearest, half a frame period away at most, an instant, named by that frame's place in the recording.
-/// Searches instants spread evenly over the recording, on all processors, and of those where the board stands
-/// takes ones that show it in other poses and places than those taken. Frames that can't be read are named
-/// and passed over. Errors: those of SessionReader::open(); frames none of which can be read; no board; a
-/// board that stands nowhere.
+/// Finds the board in a session's frames. An instant is a frame of the first camera together with the closest
+/// frames of the others (at most half a frame period away); its name is the index of that frame. Searches
+/// instants at even intervals over the recording, on all processors. Of those where the board stands still it
+/// uses the ones that show the board in different poses and places. Unreadable frames are reported and
+/// skipped. Errors: those of SessionReader::open(); no readable frames; no board; a board that never stands
+/// still.
 Result<BoardReading> find_boards_in_session(const std::filesystem::path& folder, const BoardSearch& search,
                                             const FilmSearchOptions& options = {},
                                             const Progress& progress = {});
 
-/// Of `sightings` by instant, which instants to keep: `most` at most, first one that most cameras see, then
-/// always the one that differs most from all that are kept, the more cameras the better; none that differs by
-/// less than a hundredth of the picture's diagonal. Two instants differ by the distance of their corners on
-/// average, in the camera where that is least. Rising.
+/// Selects at most `most` instants from `sightings`: first one seen by most cameras, then repeatedly the one
+/// that differs most from all selected ones, preferring those seen by more cameras. Instants that differ by
+/// less than a hundredth of the picture's diagonal are skipped. The difference of two instants is the mean
+/// distance of their corners, in the camera where it is smallest. Ascending.
 std::vector<std::size_t> spread_instants(const BoardSightings& sightings, std::size_t most);
 
 }  // namespace emberlock::recon

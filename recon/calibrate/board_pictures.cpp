@@ -29,7 +29,7 @@ bool is_picture(const fs::path& path) {
                      [&](const char* known) { return extension == known; });
 }
 
-/// A name's text and the number at its end.
+/// Splits a name into its text and the number at its end.
 std::pair<std::string, std::string> part_name(const std::string& stem) {
   std::size_t digits = stem.size();
   while (digits > 0 && std::isdigit(static_cast<unsigned char>(stem[digits - 1])) != 0) --digits;
@@ -67,7 +67,7 @@ Status list_folder(const fs::path& folder, std::vector<BoardPicture>& pictures) 
 struct Found {
   ImageSize size;
   std::vector<BoardCorner> corners;
-  std::string unreadable;  ///< why
+  std::string unreadable;  ///< the reason
 };
 
 std::vector<Found> find_in_all(const std::vector<BoardPicture>& pictures, const BoardSearch& search,
@@ -77,7 +77,7 @@ std::vector<Found> find_in_all(const std::vector<BoardPicture>& pictures, const 
     tell(progress, fraction, what);
     return true;
   };
-  // No part fails: a picture that can't be read is told of with the others.
+  // The parts don't fail: an unreadable picture is reported with the others.
   (void)in_parallel(pictures.size(), observer, [&](std::size_t i, const Observer& part) -> Status {
     const auto picture = session::read_image(pictures[i].path);
     if (picture) {

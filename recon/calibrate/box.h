@@ -5,7 +5,7 @@
 
 namespace emberlock::recon {
 
-/// An axis-aligned box in the world: the volume to reconstruct.
+/// An axis-aligned box in the world: the volume that is reconstructed.
 struct Box {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< metres
   Eigen::Vector3d size = Eigen::Vector3d::Zero();    ///< metres, every component > 0

@@ -17,10 +17,10 @@
 namespace emberlock::recon {
 namespace {
 
-/// The bundle's numbers as Ceres moves them.
+/// The parameters of the bundle in the form for Ceres.
 struct Blocks {
   std::vector<LensBlock> lenses;
-  std::vector<PoseBlock> cameras;  ///< place: the camera's centre
+  std::vector<PoseBlock> cameras;  ///< the position is the camera's centre
   std::vector<PoseBlock> boards;
 
   explicit Blocks(const Bundle& bundle) {
@@ -66,7 +66,7 @@ CornerEquations corner_equations(const Bundle& bundle, const BundleView& view, s
           view.corners[i].pixel, weight};
 }
 
-/// As Ceres asks for them.
+/// The cost function in the form for Ceres.
 class CornerCost final : public ceres::SizedCostFunction<2, kLensUnknowns, kPoseUnknowns, kPoseUnknowns> {
  public:
   explicit CornerCost(const CornerEquations& equations) : equations_(equations) {}
@@ -85,11 +85,11 @@ class CornerCost final : public ceres::SizedCostFunction<2, kLensUnknowns, kPose
   CornerEquations equations_;
 };
 
-/// How far a pose is from what was known of it beforehand, in standard deviations.
+/// The deviation of a pose from its prior, in standard deviations.
 struct PriorCost {
-  Eigen::Matrix3d start_from_known;  ///< camera axes: where the block is linearised, of the known ones
+  Eigen::Matrix3d start_from_known;  ///< rotation in camera axes from the prior to the linearisation point
   Eigen::Vector3d center;
-  Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns> root;  ///< of the covariance's inverse
+  Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns> root;  ///< of the inverse covariance
 
   template <class T>
   bool operator()(const T* camera, T* out) const {
@@ -116,8 +116,7 @@ void add_prior(const BundleCamera& camera, PoseBlock& block, ceres::Problem& pro
       nullptr, block.data());
 }
 
-/// The problem over `blocks`, which must outlive it. Cameras and boards that no used corner shows are left
-/// out.
+/// The problem over `blocks`, which must outlive it. Cameras and boards without used corners are omitted.
 std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks, BundleLoss loss,
                                            Weigh weigh = Weigh::by_noise) {
   auto problem = std::make_unique<ceres::Problem>();
@@ -157,14 +156,14 @@ std::unique_ptr<ceres::Problem> problem_of(const Bundle& bundle, Blocks& blocks,
   return problem;
 }
 
-/// Ceres tells its log what the results tell their callers.
+/// Silences Ceres's log, since the results contain the same information.
 void quieten_ceres() { FLAGS_minloglevel = google::GLOG_FATAL; }
 
 constexpr std::size_t kFewestForPose = 4;       // corners
 constexpr std::size_t kFewestForJackknife = 6;  // views
 constexpr double kChance = 3;                   // standard deviations
 
-/// A view's residuals and how they change with the lens and with the board's pose.
+/// A view's residuals, and their derivatives by the lens and by the board's pose.
 struct ViewEquations {
   Eigen::VectorXd residuals;
   Eigen::MatrixXd lens;
@@ -181,7 +180,7 @@ ViewEquations equations_of(const Bundle& bundle, const BundleView& view, const B
     CornerEquations::Slopes slopes;
     Eigen::Vector2d residuals = Eigen::Vector2d::Zero();
     const auto equations = corner_equations(bundle, view, i, 1 / bundle.cameras[view.camera].noise);
-    // A used corner lies in front of its camera.
+    // A used corner is always in front of its camera.
     (void)equations(blocks.lenses[view.camera].data(), blocks.cameras[view.camera].data(),
                     blocks.boards[view.board].data(), residuals.data(), &slopes);
     result.residuals.segment<2>(row) = residuals;
@@ -221,7 +220,7 @@ Status adjust(Bundle& bundle, BundleLoss loss) {
   options.linear_solver_ordering = ordering;
   options.max_num_iterations = 60;
   options.function_tolerance = loss == BundleLoss::squares ? 1e-10 : 1e-6;
-  options.num_threads = 1;  // several would add in the order in which they finish
+  options.num_threads = 1;  // several would add in a varying order
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, problem.get(), &summary);
@@ -246,7 +245,7 @@ std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle) {
   Blocks blocks(bundle);
   const auto problem = problem_of(bundle, blocks, BundleLoss::squares, Weigh::by_inflated_noise);
   std::vector<const double*> free;
-  std::vector<Eigen::Index> rows;  // of each free unknown, in the answer
+  std::vector<Eigen::Index> rows;  // index of each free unknown in the result
   const auto add = [&](const double* block, Eigen::Index at, std::initializer_list<int> order) {
     if (!is_free(*problem, block)) return;
     free.push_back(block);
@@ -255,7 +254,7 @@ std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle) {
   for (std::size_t i = 0; i < bundle.cameras.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i) * kCameraUnknowns;
     add(blocks.lenses[i].data(), at, {0, 1, 2, 3, 4, 5, 6, 7, 8});
-    add(blocks.cameras[i].data(), at, {12, 13, 14, 9, 10, 11});  // its block turns first
+    add(blocks.cameras[i].data(), at, {12, 13, 14, 9, 10, 11});  // in the block the rotation comes first
   }
   const auto size = static_cast<Eigen::Index>(bundle.cameras.size()) * kCameraUnknowns;
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size, size);
@@ -279,7 +278,7 @@ double jackknife_inflation(const Bundle& bundle) {
   const BundleCamera& camera = bundle.cameras.front();
   const Blocks blocks(bundle);
   const Eigen::Index unknowns = camera.k3 == ThirdRadial::free ? kLensUnknowns : kLensUnknowns - 1;
-  std::vector<Eigen::MatrixXd> normals;  // of each view, its board's pose eliminated
+  std::vector<Eigen::MatrixXd> normals;  // of each view, with its board's pose eliminated
   std::vector<Eigen::VectorXd> gradients;
   Eigen::MatrixXd all = Eigen::MatrixXd::Zero(unknowns, unknowns);
   for (const BundleView& view : bundle.views) {

@@ -13,32 +13,32 @@
 
 namespace emberlock::recon {
 
-/// Bundle adjustment of boards that cameras see (Triggs et al. 2000): all lenses, all cameras' poses and one
-/// pose of the board an instant, so that each corner falls where its picture shows it. A lamp is a board of
-/// one corner whose turn is held.
+/// Bundle adjustment of boards seen by cameras (Triggs et al. 2000). The unknowns are all lenses, all
+/// cameras' poses and one pose of the board per instant; each corner should be projected to where its picture
+/// shows it. A lamp is a board with one corner and fixed orientation.
 
-/// A camera's unknowns in the order of every covariance and of v1::Calibration.sigma: fx, fy, cx, cy, k1, k2,
-/// p1, p2, k3, centre x, y, z (world, metres), turn about its own x, y, z (radians).
+/// A camera's unknowns, in the order of all covariances and of v1::Calibration.sigma: fx, fy, cx, cy, k1, k2,
+/// p1, p2, k3, centre x, y, z (world, metres), rotation about its own x, y, z (radians).
 inline constexpr int kCameraUnknowns = 15;
 inline constexpr int kLensUnknowns = 9;
 inline constexpr int kPoseUnknowns = 6;
 
 enum class Held {
   none,
-  lens,  ///< its lens is known
-  pose,  ///< its pose is known
+  lens,  ///< its lens is fixed
+  pose,  ///< its pose is fixed
   both,
 };
 
-/// What is known of a camera's pose beforehand: the covariance of its centre (world, metres) and its turn
-/// about its own axes (radians).
+/// Prior of a camera's pose: the covariance of its centre (world, metres) and of its rotation about its own
+/// axes (radians).
 struct PosePrior {
   Rigid3 camera_from_world;
   Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns> covariance;
 };
 
 enum class ThirdRadial {
-  held,  ///< k3 stays as it is
+  held,  ///< k3 is fixed
   free,
 };
 
@@ -46,28 +46,29 @@ struct BundleCamera {
   CameraModel model;
   Held held = Held::none;
   ThirdRadial k3 = ThirdRadial::held;
-  /// Pixels: standard deviation of a corner's coordinate, by which its residuals are weighed.
+  /// Standard deviation of a corner's coordinate in pixels, for weighting its residuals.
   double noise = 1;
-  double inflation = 1;  ///< of the standard deviations: a view's corners err together (jackknife_inflation)
+  double inflation = 1;  ///< factor on the standard deviations, because the corners of a view have correlated
+                         ///< errors (jackknife_inflation)
   std::optional<PosePrior> prior = {};
 };
 
 struct BundleBoard {
   Rigid3 world_from_board;
-  Held held = Held::none;  ///< `pose`, or none
+  Held held = Held::none;  ///< `pose` or none
 };
 
 enum class CornerUse : std::uint8_t {
   used,
-  outlier,  ///< by itself, or with its whole view
+  outlier,  ///< rejected, alone or with its whole view
 };
 
-/// What one camera sees of the board at one instant.
+/// The corners that one camera sees at one instant.
 struct BundleView {
-  std::size_t camera = 0;  ///< of Bundle.cameras
-  std::size_t board = 0;   ///< of Bundle.boards
+  std::size_t camera = 0;  ///< index in Bundle.cameras
+  std::size_t board = 0;   ///< index in Bundle.boards
   std::vector<BoardCorner> corners;
-  std::vector<CornerUse> use;  ///< one a corner
+  std::vector<CornerUse> use;  ///< one per corner
   [[nodiscard]] std::size_t used() const;
 };
 
@@ -80,26 +81,26 @@ struct Bundle {
 
 enum class BundleLoss {
   squares,
-  cauchy,  ///< scaled by 2 standard deviations of the noise: wrong corners pull little
+  cauchy,  ///< scaled by 2 standard deviations of the noise: wrong corners have little influence
 };
 
-/// Moves what isn't held to the least sum of weighed residuals. Error where there is no finite solution.
+/// Minimises the sum of weighted residuals over all free unknowns. Error if there is no finite solution.
 Status adjust(Bundle& bundle, BundleLoss loss);
 
-/// Where corner `i` of a view is drawn less where it was seen, pixels; not finite behind the camera.
+/// Projection of corner `i` of a view minus its observation, pixels; not finite behind the camera.
 Eigen::Vector2d residual(const Bundle& bundle, const BundleView& view, std::size_t i);
 
-/// By what factor a lens's standard deviations exceed those of independent corners: corners of one view err
-/// together where a board isn't quite flat or blur shifts them. By the jackknife over views, one step each
-/// (Efron 1982), on average over the lens's unknowns; 1 where chance explains it (3 standard deviations), and
-/// below 6 views. Of a bundle of one camera.
+/// The factor by which a lens's standard deviations exceed those for independent corners. The errors of a
+/// view's corners are correlated if the board isn't quite flat or blur shifts them. Computed by the jackknife
+/// over views with one step each (Efron 1982), averaged over the lens's unknowns; 1 if it is explained by
+/// chance (3 standard deviations) or for fewer than 6 views. For a bundle of one camera.
 double jackknife_inflation(const Bundle& bundle);
 
-/// Covariance of all cameras' unknowns at the solution, kCameraUnknowns rows a camera, zero for what is held;
-/// for residuals of the stated, inflated noise. None where the views don't determine them.
+/// Covariance of all cameras' unknowns at the solution, kCameraUnknowns rows per camera, zero for fixed ones;
+/// for residuals with the stated, inflated noise. nullopt if the views don't determine them.
 std::optional<Eigen::MatrixXd> covariance(const Bundle& bundle);
 
-/// RMS distance of the used corners of a camera (of all of them, if none is given), pixels.
+/// RMS distance of the used corners of a camera (default: all cameras), pixels.
 double rms_of(const Bundle& bundle, std::optional<std::size_t> camera = std::nullopt);
 
 }  // namespace emberlock::recon

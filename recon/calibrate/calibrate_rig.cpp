@@ -176,7 +176,7 @@ void move_world(Bundle& bundle, std::size_t board) {
 }
 
 /// Uncertainty of b's pose as a sees it: along and about the worst axes.
-void judge_pair(const RigCalibration& result, std::size_t a, std::size_t b, CameraPair& pair) {
+void find_uncertainty(const RigCalibration& result, std::size_t a, std::size_t b, CameraPair& pair) {
   const Rigid3& pose_a = result.bundle.cameras[a].model.camera_from_world;
   const Rigid3& pose_b = result.bundle.cameras[b].model.camera_from_world;
   const Eigen::Vector3d place = pose_a * pose_b.inverse().translation;
@@ -215,7 +215,7 @@ std::vector<CameraPair> pairs_of(const RigCalibration& result) {
   std::vector<CameraPair> pairs;
   for (const auto& [cameras, instants] : shared) {
     CameraPair pair{result.bundle_camera[cameras.first], result.bundle_camera[cameras.second], instants};
-    judge_pair(result, cameras.first, cameras.second, pair);
+    find_uncertainty(result, cameras.first, cameras.second, pair);
     pairs.push_back(pair);
   }
   return pairs;

@@ -9,8 +9,8 @@
 
 namespace emberlock::recon {
 
-// Conventions of recon: world in metres, right-handed; camera axes as OpenCV's (x right, y down, z forward);
-// pixel coordinates count from 0 at the corner of the top left pixel, so that its centre is (0.5, 0.5).
+// Conventions of recon: world in metres, right-handed; camera axes as in OpenCV (x right, y down, z forward);
+// pixel coordinates count from 0 at the corner of the top left pixel, so its centre is (0.5, 0.5).
 
 struct Intrinsics {
   ImageSize size;
@@ -36,7 +36,7 @@ struct Ray {
   Eigen::Vector3d direction;  ///< unit length
 };
 
-/// A calibrated camera: pixels from world points, world rays from pixels.
+/// A calibrated camera: converts world points to pixels, and pixels to world rays.
 struct CameraModel {
   Intrinsics intrinsics;
   Rigid3 camera_from_world;
@@ -44,11 +44,12 @@ struct CameraModel {
   [[nodiscard]] Eigen::Vector3d center() const { return camera_from_world.inverse().translation; }
   /// Pixel of a world point; the point must lie in front of the camera (z > 0).
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& world) const;
-  /// The ray through a pixel position, from the camera's centre, distortion removed by fixed-point iteration.
+  /// The ray from the camera's centre through a pixel position; distortion is removed by fixed-point
+  /// iteration.
   [[nodiscard]] Ray ray(const Eigen::Vector2d& pixel) const;
 };
 
-/// A camera at `center` that looks at `target`, the world's `up` pointing up in its image.
+/// A camera at `center` that looks at `target`, with the world's `up` pointing up in its image.
 CameraModel look_at(const Intrinsics& intrinsics, const Eigen::Vector3d& center,
                     const Eigen::Vector3d& target, const Eigen::Vector3d& up = Eigen::Vector3d::UnitZ());
 

@@ -9,7 +9,7 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr double kFarOff = 50;  // pixels: a corner further off says no more
+constexpr double kFarOff = 50;  // pixels: larger deviations count the same
 
 using Sightings = std::vector<const PlacedSighting*>;
 
@@ -36,7 +36,8 @@ double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
   return std::acos(std::clamp(0.5 * ((a.transpose() * b).trace() - 1), -1.0, 1.0));
 }
 
-/// The one with the least sum of distances to the others, a radian counted as the poses' own length.
+/// The pose with the smallest sum of distances to the others; a radian counts like the length of the
+/// translations.
 Rigid3 medoid(const std::vector<Rigid3>& poses) {
   double best = INFINITY;
   std::size_t chosen = 0;
@@ -54,7 +55,8 @@ Rigid3 medoid(const std::vector<Rigid3>& poses) {
   return poses[chosen];
 }
 
-/// Sum of how far a board at `world_from_board` is drawn from where the instant's views show it.
+/// Sum of the distances between projected and observed corners at an instant, for a board at
+/// `world_from_board`.
 double misfit(const BoardSightings& sightings, const std::vector<Intrinsics>& lenses, const Sightings& seen,
               const std::map<std::size_t, Rigid3>& cameras, const Rigid3& world_from_board) {
   double sum = 0;
@@ -111,7 +113,7 @@ ChainPoses chain_poses(const BoardSightings& sightings, const std::vector<Intrin
       if (!result.camera_from_world.contains(from) || result.camera_from_world.contains(to)) continue;
       if (best == nullptr || step.second.size() > best->second.size()) best = &step;
     }
-    if (best == nullptr) break;  // the group is connected: doesn't happen
+    if (best == nullptr) break;  // can't happen: the group is connected
     result.camera_from_world[best->first.second] =
         chained(medoid(best->second), result.camera_from_world.at(best->first.first));
   }

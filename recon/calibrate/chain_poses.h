@@ -9,7 +9,7 @@
 
 namespace emberlock::recon {
 
-/// A sighting with a first idea of its pose.
+/// A sighting with an initial estimate of its pose.
 struct PlacedSighting {
   std::size_t sighting = 0;
   std::size_t camera = 0;
@@ -17,12 +17,13 @@ struct PlacedSighting {
   Rigid3 camera_from_board;
 };
 
-/// The largest group of cameras that shared instants connect; the first of equally large ones. Sorted.
+/// The largest group of cameras connected by shared instants; of equally large ones the first. Sorted.
 std::vector<std::size_t> largest_group(const std::vector<PlacedSighting>& sightings, std::size_t cameras);
 
-/// Where the group's cameras and its instants' boards stand, the group's first camera at the origin: along
-/// the spanning tree of cameras that share most instants, each step by the one of their shared instants that
-/// agrees best with the others. By camera and by instant; none for those that the group doesn't reach.
+/// The poses of the group's cameras and of the boards at its instants, with the group's first camera at the
+/// origin. They are chained along the spanning tree of cameras that share most instants; each step uses the
+/// shared instant that agrees best with the others. By camera and by instant; nullopt for those outside the
+/// group.
 struct ChainPoses {
   std::map<std::size_t, Rigid3> camera_from_world;
   std::map<std::size_t, Rigid3> world_from_board;

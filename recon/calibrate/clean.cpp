@@ -39,7 +39,7 @@ double robust_noise(const Bundle& bundle, const std::vector<bool>& rejected, std
 }
 
 /// Corners by their distance alone; true if one changed. Views left out stay so.
-bool judge_corners(Bundle& bundle, const std::vector<bool>& rejected, const std::vector<double>& noise,
+bool mark_outliers(Bundle& bundle, const std::vector<bool>& rejected, const std::vector<double>& noise,
                    double limit) {
   bool changed = false;
   for (std::size_t v = 0; v < bundle.views.size(); ++v) {
@@ -157,7 +157,7 @@ Result<std::vector<RejectedView>> clean(Bundle& bundle, const CleanOptions& opti
       noise.push_back(robust_noise(bundle, rejected, c));
       bundle.cameras[c].noise = noise.back();
     }
-    bool changed = judge_corners(bundle, rejected, noise, options.corner_limit);
+    bool changed = mark_outliers(bundle, rejected, noise, options.corner_limit);
     // Views only once the corners' own errors are out of the solution.
     if (round >= 1) {
       for (Suspect& view : worst_views(bundle, rejected, options)) {

@@ -10,23 +10,23 @@
 namespace emberlock::recon {
 
 struct CleanOptions {
-  double corner_limit = 4;   ///< a corner further off than so many standard deviations is wrong
-  double view_limit = 2;     ///< a view whose RMS is so many times its camera's median view's is wrong,
-  double view_spread = 5;    ///< if it also lies so many robust standard deviations above that median
-  double wrong_share = 0.5;  ///< a view more of whose corners are wrong is wrong
-  int rounds = 12;           ///< of solving and rejecting, at most
+  double corner_limit = 4;   ///< standard deviations; a corner with a larger residual is wrong
+  double view_limit = 2;     ///< a view is wrong if its RMS exceeds its camera's median view by this factor,
+  double view_spread = 5;    ///< and by this many robust standard deviations
+  double wrong_share = 0.5;  ///< a view with a larger share of wrong corners is wrong
+  int rounds = 12;           ///< maximum number of rounds of solving and rejecting
 };
 
-/// A view left out, and why.
+/// A rejected view, and the reason.
 struct RejectedView {
-  std::size_t view = 0;  ///< of Bundle.views
+  std::size_t view = 0;  ///< index in Bundle.views
   std::string why;
 };
 
-/// Adjusts and rejects by turns until nothing changes: wrong corners and views (by their cameras' median
-/// absolute deviations, so that what is wrong doesn't judge), and finds each camera's noise. At first wrong
-/// corners pull little, at the end not at all. Of an instant that several cameras see, only the worst view is
-/// rejected at a time: it spoils the others'.
+/// Alternates between adjusting and rejecting until nothing changes: rejects wrong corners and views (by
+/// their cameras' median absolute deviations, which are robust against them), and estimates each camera's
+/// noise. Wrong corners have little influence at first, and none at the end. Of the views of one instant only
+/// the worst is rejected per round, because it spoils the others.
 Result<std::vector<RejectedView>> clean(Bundle& bundle, const CleanOptions& options = {});
 
 }  // namespace emberlock::recon

@@ -35,7 +35,7 @@ struct Line {
   std::string_view text;
 };
 
-/// Without comments. Empty lines count: an image without points has one.
+/// The lines without comments. Empty lines count: an image without points has one.
 std::vector<Line> lines_of(std::string_view text) {
   std::vector<Line> lines;
   for (std::size_t from = 0, number = 1; from < text.size(); ++number) {
@@ -54,7 +54,7 @@ std::optional<double> number_of(std::string_view word) {
   return value;
 }
 
-/// How many parameters a model has, and Distortion's or the focal lengths' place of each.
+/// The number of a model's parameters, and their indices for Distortion and focal lengths.
 struct ColmapModel {
   const char* name;
   std::size_t parameters;
@@ -140,13 +140,13 @@ Result<ColmapImage> colmap_image(const Line& line, const std::string& where) {
   return image;
 }
 
-/// One camera an image: by its folder, else its name without extension.
+/// One camera per image: named after its folder, else its name without extension.
 std::string camera_of_name(const std::string& name) {
   const fs::path path(name);
   return path.has_parent_path() ? path.begin()->string() : path.stem().string();
 }
 
-/// Numbers that read back as the same double.
+/// Prints numbers so that they are read back as the same double.
 template <class Numbers>
 std::string joined(const Numbers& numbers) {
   std::string text;
@@ -174,7 +174,7 @@ Result<v1::Rig> parse_colmap(std::string_view cameras, std::string_view images, 
                         "cameras.txt has no camera " + image.camera, "Export both files together");
     }
     *rig.add_cameras() = rig_camera_of(camera_of_name(image.name), {lens->second, image.camera_from_world});
-    ++i;  // the line of its points, which may be empty
+    ++i;  // skips the line of its points, which may be empty
   }
   EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, where + "/images.txt"));
   return rig;

@@ -11,9 +11,11 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr double kSmallTurn = 1e-4;  // radians: below, three terms of the series are exact to a double
+constexpr double kSmallTurn =
+    1e-4;  // radians: for smaller rotations three terms of the series are exact in double precision
 
-/// How rotation * v changes with the turn (Gallego and Yezzi 2015, with the rotation group's right Jacobian).
+/// The derivative of rotation * v by the rotation vector (Gallego and Yezzi 2015, with the right Jacobian of
+/// the rotation group).
 Eigen::Matrix3d slope_of_rotated(const Eigen::Matrix3d& rotation, const Eigen::Vector3d& turn,
                                  const Eigen::Vector3d& v) {
   const double angle = turn.norm();

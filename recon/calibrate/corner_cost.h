@@ -9,25 +9,26 @@
 
 namespace emberlock::recon {
 
-/// A pose's block: a turn (angle times axis) on top of where it was linearised, and a place.
+/// The parameters of a pose: a rotation (angle times axis) relative to its linearisation point, and a
+/// position.
 using PoseBlock = std::array<double, kPoseUnknowns>;
 using LensBlock = std::array<double, kLensUnknowns>;
 
-/// Rodrigues' rotation by a block's turn.
+/// Rodrigues' rotation by the rotation part of a block.
 Eigen::Matrix3d rotation_by(const double* block);
 
-inline constexpr double kNearest = 1e-6;  // metres in front of a camera
+inline constexpr double kNearest = 1e-6;  // minimum distance in front of a camera, metres
 
-/// One corner's residuals, in standard deviations of its noise, and how they change with the unknowns. Poses
-/// turn about where they were linearised, so their three angles are small and have no singularity. The
-/// derivatives are written out: by automatic differentiation, of 21 unknowns each, they took more than half
-/// of a calibration.
+/// The residuals of one corner in standard deviations of its noise, and their derivatives by the unknowns.
+/// Rotations are relative to the linearisation point, so their three angles are small and have no
+/// singularity. The derivatives are written by hand: automatic differentiation, with 21 unknowns each, took
+/// more than half of a calibration's time.
 struct CornerEquations {
   const Eigen::Matrix3d* camera_rotation;  ///< camera_from_world
   const Eigen::Matrix3d* board_rotation;   ///< world_from_board
   Eigen::Vector3d corner;                  ///< board
   Eigen::Vector2d pixel;
-  double weight;  ///< a pixel
+  double weight;  ///< per pixel
 
   struct Slopes {
     Eigen::Matrix<double, 2, kLensUnknowns, Eigen::RowMajor> lens;
@@ -35,7 +36,8 @@ struct CornerEquations {
     Eigen::Matrix<double, 2, kPoseUnknowns, Eigen::RowMajor> board;
   };
 
-  /// Of the blocks' numbers; false where the corner isn't in front of the camera. `slopes` may be null.
+  /// For the parameters in the blocks; false if the corner isn't in front of the camera. `slopes`
+  /// (derivatives) may be null.
   bool operator()(const double* lens, const double* camera, const double* board, double* residuals,
                   Slopes* slopes) const;
 };

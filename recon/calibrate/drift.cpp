@@ -269,8 +269,8 @@ std::optional<Freed> freed(const Bundle& bundle, std::size_t camera) {
   return result;
 }
 
-void judge(const Freed& fit, double cost_as_calibrated, const Known& known, std::size_t camera,
-           CameraDrift& drift) {
+void describe_drift(const Freed& fit, double cost_as_calibrated, const Known& known, std::size_t camera,
+                    CameraDrift& drift) {
   const auto spread = covariance(fit.bundle);
   if (!spread) {
     drift.verdict = DriftVerdict::unknown;
@@ -313,7 +313,7 @@ Status find_moved(Bundle& bundle, const std::vector<Known>& known, DriftReport& 
       if (camera.instants == 0 || free.contains(c)) continue;
       auto fit = freed(bundle, c);
       if (!fit) continue;
-      judge(*fit, cost, known[c], c, camera);
+      describe_drift(*fit, cost, known[c], c, camera);
       camera.limit = chi2_limit(fit->freedom, report.cameras.size());
       if (camera.chi2 <= camera.limit || (best_fit && best_fit->cost <= fit->cost)) continue;
       best = c;

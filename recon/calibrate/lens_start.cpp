@@ -13,7 +13,7 @@ namespace emberlock::recon {
 namespace {
 
 constexpr std::size_t kFewestViews = 3;
-constexpr std::size_t kViewsForStart = 25;  // more only cost time: the bundle follows
+constexpr std::size_t kViewsForStart = 25;  // more only cost time, since the bundle adjustment follows
 constexpr double kFarCorner = 0.85;         // of the half diagonal
 constexpr double kParallel = 0.1;           // radians: boards closer than that are parallel
 constexpr double kWorstFocal = 0.05;
@@ -48,7 +48,7 @@ Error lens_error(const BoardSightings& sightings, std::size_t camera, std::strin
   return {ErrorKind::bad_input, std::move(what), "camera " + sightings.cameras[camera].id, std::move(remedy)};
 }
 
-/// Views spread evenly over all of them.
+/// Views at even intervals.
 std::vector<std::size_t> chosen_views(const std::vector<std::size_t>& all) {
   if (all.size() <= kViewsForStart) return all;
   std::vector<std::size_t> chosen;
@@ -101,7 +101,7 @@ double widest_tilt(const Bundle& bundle) {
   return widest;
 }
 
-/// How far from the picture's middle its corners reach, in half diagonals.
+/// Largest distance of a corner from the picture's middle, in half diagonals.
 double reach_of_corners(const Bundle& bundle) {
   const ImageSize size = bundle.cameras[0].model.intrinsics.size;
   const Eigen::Vector2d middle(0.5 * size.width, 0.5 * size.height);
@@ -112,7 +112,7 @@ double reach_of_corners(const Bundle& bundle) {
   return reach / middle.norm();
 }
 
-/// Frees k3 where corners reach far out, and keeps it where it shows.
+/// Frees k3 if corners are far enough out, and keeps it free if it is significant.
 Status choose_k3(Bundle& bundle) {
   if (reach_of_corners(bundle) < kFarCorner) return {};
   Bundle freed = bundle;
@@ -169,13 +169,13 @@ std::optional<Rigid3> board_pose(const Intrinsics& lens, const Board& board,
   for (const BoardCorner& corner : corners) {
     const Eigen::Vector3d p = board.point(corner.id);
     object.emplace_back(p.x(), p.y(), p.z());
-    // Without lens: a pixel's own ray, as a pinhole with this focal length would draw it.
+    // Without lens: the direction of a pixel, as imaged by a pinhole with this focal length.
     Eigen::Vector2d n((corner.pixel.x() - lens.cx) / lens.fx, (corner.pixel.y() - lens.cy) / lens.fy);
     if (!lens.distortion.none()) lens.distortion.undistort(n.x(), n.y());
     image.emplace_back(n.x() * lens.fx, n.y() * lens.fx);
   }
   const cv::Mat matrix = (cv::Mat_<double>(3, 3) << lens.fx, 0, 0, 0, lens.fx, 0, 0, 0, 1);
-  // A homography that wrong corners don't move tells which corners are right.
+  // A homography fitted robustly shows which corners are right.
   std::vector<cv::Point2d> flat;
   flat.reserve(object.size());
   for (const cv::Point3d& p : object) flat.emplace_back(p.x, p.y);

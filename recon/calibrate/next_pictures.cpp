@@ -12,10 +12,10 @@ namespace emberlock::recon {
 namespace {
 
 constexpr double kEnoughTilt = 0.5;         // radians between two of a camera's boards
-constexpr std::size_t kEnoughInstants = 5;  // that a pair shares
+constexpr std::size_t kEnoughInstants = 5;  // shared by a pair
 constexpr double kDegrees = 180 / M_PI;
 
-/// The cells' names by thirds of the picture: "top left", "middle", ...
+/// The names of the empty cells by thirds of the picture: "top left", "middle", ...
 std::vector<std::string> empty_regions(const CornerCoverage& coverage) {
   constexpr std::array kVertical = {"top", "middle", "bottom"};
   constexpr std::array kHorizontal = {"left", "middle", "right"};
@@ -39,7 +39,8 @@ std::string joined_words(const std::vector<std::string>& words) {
   return text;
 }
 
-/// Of the pairs that hold the cameras together best (a spanning tree of the surest), the least sure.
+/// Of the pairs that connect the cameras best (the spanning tree of the most accurate ones), the least
+/// accurate.
 const CameraPair* weakest_link(const RigCalibration& calibration) {
   std::vector<const CameraPair*> pairs;
   for (const CameraPair& pair : calibration.pairs) pairs.push_back(&pair);

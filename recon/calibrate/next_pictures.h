@@ -9,7 +9,7 @@
 
 namespace emberlock::recon {
 
-/// Used corners in each cell of a camera's picture, row by row from the top left.
+/// Number of used corners in each cell of a camera's picture, row by row from the top left.
 struct CornerCoverage {
   static constexpr int kColumns = 6;
   static constexpr int kRows = 4;
@@ -19,16 +19,16 @@ struct CornerCoverage {
   }
   [[nodiscard]] std::size_t empty_cells() const;
 };
-/// Of each camera of the bundle.
+/// For each camera of the bundle.
 std::vector<CornerCoverage> corner_coverage(const RigCalibration& calibration);
 
-/// Which pictures would help most, a sentence each, from what this calibration lacks: cameras left out, cells
-/// of pictures without corners, boards that differ little in tilt, the pair of cameras that holds the rig
-/// together worst. Empty where nothing stands out.
+/// Which pictures would help most, one sentence each, from the weaknesses of this calibration: cameras left
+/// out, cells without corners, boards with similar tilt, the worst connected pair of cameras. Empty if there
+/// is no obvious weakness.
 std::vector<std::string> next_pictures(const RigCalibration& calibration);
 
-/// By what factor uncertainties fall with `more` views beside the `views` used, all as good as these: the
-/// square root law. An estimate: where the board is and how it tilts counts as well.
+/// The factor by which uncertainties decrease with `more` views in addition to `views`, all equally good, by
+/// the square root law. An estimate: the positions and tilts of the board matter too.
 double expected_factor(std::size_t views, std::size_t more);
 
 }  // namespace emberlock::recon

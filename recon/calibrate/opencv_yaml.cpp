@@ -25,12 +25,12 @@ Error bad_opencv(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
 }
 
-/// The numbers under each key that is wanted: one, or a matrix row by row.
+/// The numbers of each wanted key: one, or a matrix row by row.
 using NumbersByKey = std::map<std::string, std::vector<double>>;
 constexpr std::array kWanted = {
     "image_width", "image_height", "camera_matrix", "distortion_coefficients", "R", "T"};
 
-/// Of a matrix's own account of itself; a plain list has none.
+/// Checks a matrix's stated size; a plain list has none.
 Status check_shape(const std::string& key, int rows, int columns, std::size_t count) {
   if (rows > 0 && columns > 0 &&
       static_cast<std::size_t>(rows) * static_cast<std::size_t>(columns) == count) {

@@ -10,7 +10,7 @@ namespace {
 constexpr double kRotationTolerance = 0.01;
 constexpr double kDistortionTolerance = 0.01;  // pixels
 
-// Its own inverse: OpenGL's y and z point the other way.
+// Its own inverse: OpenGL's y and z have the opposite direction.
 const Eigen::DiagonalMatrix<double, 3> kOpenglFromOpencv(1, -1, -1);
 
 }  // namespace
@@ -21,7 +21,7 @@ Result<Eigen::Matrix3d> nearest_rotation(const Eigen::Matrix3d& matrix) {
   };
   if (!matrix.allFinite()) return error("is not finite", "Give finite numbers");
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  // A copy: through a reference GCC 12 thinks that the values may be unset.
+  // A copy, because with a reference GCC 12 warns that the values may be uninitialized.
   const Eigen::Vector3d scales = svd.singularValues();  // NOLINT(performance-unnecessary-copy-initialization)
   const double largest = scales.maxCoeff();
   const double smallest = scales.minCoeff();

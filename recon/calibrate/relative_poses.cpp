@@ -11,7 +11,7 @@
 namespace emberlock::recon {
 namespace {
 
-/// Of all poses, given all lenses. Numbers that are held have no variance.
+/// Covariance of all poses for given lenses. Fixed parameters have no variance.
 Eigen::MatrixXd given_lenses(const Eigen::MatrixXd& covariance, std::size_t cameras) {
   std::vector<Eigen::Index> poses;
   std::vector<Eigen::Index> lenses;
@@ -25,7 +25,7 @@ Eigen::MatrixXd given_lenses(const Eigen::MatrixXd& covariance, std::size_t came
       }
     }
   }
-  // In standard deviations: k1 and pixels differ by orders of magnitude.
+  // In standard deviations, because k1 and pixels differ by orders of magnitude.
   const Eigen::VectorXd scale = covariance(lenses, lenses).diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd own = scale.asDiagonal() * covariance(lenses, lenses) * scale.asDiagonal();
   const Eigen::MatrixXd across = covariance(poses, lenses) * scale.asDiagonal();
@@ -47,7 +47,7 @@ std::vector<PoseCovariance> relative_pose_covariances(const Bundle& bundle,
     extent += (camera.model.center() - middle).squaredNorm() / static_cast<double>(count);
   extent = std::max(std::sqrt(extent), 1e-6);
   const auto size = static_cast<Eigen::Index>(count) * kPoseUnknowns;
-  Eigen::MatrixXd together(size, kPoseUnknowns);  // how all poses change with a motion of the whole rig
+  Eigen::MatrixXd together(size, kPoseUnknowns);  // derivatives of all poses by a motion of the whole rig
   Eigen::VectorXd weight(size);
   for (std::size_t c = 0; c < count; ++c) {
     const CameraModel& camera = bundle.cameras[c].model;

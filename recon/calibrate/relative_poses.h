@@ -11,11 +11,12 @@ namespace emberlock::recon {
 
 using PoseCovariance = Eigen::Matrix<double, kPoseUnknowns, kPoseUnknowns>;
 
-/// What a later check with the same lenses may expect of each camera's pose: its covariance given the lenses
-/// (a turn that a shift of the principal point undoes shows nowhere), the motion of all cameras together
-/// taken out (nor does that show), as if cameras were independent. `covariance` is covariance(bundle). By
-/// conditioning, then Baarda's S-transformation with turns weighed as the rig's extent; times n / (n - 1), by
-/// which the difference of two of n like cameras keeps its own.
+/// The covariance of each camera's pose for a later check with the same lenses: given the lenses (a rotation
+/// that compensates for a shift of the principal point has no visible effect), without the common motion of
+/// all cameras (which isn't visible either), and treating cameras as independent. `covariance` is
+/// covariance(bundle). Computed by conditioning, then Baarda's S-transformation with rotations weighted by
+/// the rig's extent; times n / (n - 1), because of n similar cameras the difference of two has their full
+/// covariance.
 std::vector<PoseCovariance> relative_pose_covariances(const Bundle& bundle,
                                                       const Eigen::MatrixXd& covariance);
 

@@ -118,7 +118,7 @@ v1::Box message_of(const Box& box) {
 }
 
 Status apply_rig(v1::Manifest& manifest, const v1::Rig& rig, const std::string& where) {
-  v1::Manifest applied = manifest;  // whole or not at all
+  v1::Manifest applied = manifest;  // all or nothing
   for (v1::CameraStream& stream : *applied.mutable_cameras()) {
     const auto camera = std::find_if(rig.cameras().begin(), rig.cameras().end(), [&](const v1::RigCamera& c) {
       return c.camera_id() == stream.camera_id();

@@ -13,28 +13,28 @@
 
 namespace emberlock::recon {
 
-/// A camera from its file's numbers. `where` names what holds the calibration ("manifest.json: cameras[2]"),
+/// A camera from the numbers of its file. `where` names the calibration ("manifest.json: cameras[2]"),
 /// `camera_id` the camera. Errors: not calibrated (no pose), not finite, no focal length, a distortion that
-/// folds the picture, a pose that is no rotation.
+/// folds the picture, a pose that isn't a rotation.
 Result<CameraModel> camera_model_of(const v1::Calibration& calibration, ImageSize size,
                                     const std::string& camera_id, const std::string& where);
-/// The other way, without uncertainties.
+/// The inverse, without uncertainties.
 v1::Calibration calibration_of(const CameraModel& camera);
 
 /// A rig without cameras.
 v1::Rig empty_rig();
-/// A placed camera as a rig's file has it.
+/// A placed camera, in the format of a rig's file.
 v1::RigCamera rig_camera_of(const std::string& id, const CameraModel& camera);
-/// A rig's placed cameras by id. Those of a rig that wasn't checked may be left out.
+/// A rig's placed cameras by id. If the rig wasn't checked, invalid ones are omitted.
 std::vector<std::pair<std::string, CameraModel>> placed_cameras(const v1::Rig& rig);
 
-/// Error where a number isn't finite, three are not there, or an edge is 0 or less.
+/// Error where a number isn't finite, there aren't three of them, or an edge isn't positive.
 Result<Box> box_of(const v1::Box& box, const std::string& where);
 v1::Box message_of(const Box& box);
 
-/// Gives a session's cameras what the rig knows of them, by camera id: geometry, colour, and the box where
-/// the rig has one. What the rig doesn't know stays as it was. `where` names the rig. Errors: a camera of the
-/// session that the rig lacks; pictures of another size than calibrated (names both).
+/// Copies the rig's data to a session's cameras by id: geometry, colour, and the box if the rig has one.
+/// Other data are unchanged. `where` names the rig. Errors: a camera of the session that isn't in the rig;
+/// pictures of another size than calibrated (names both).
 Status apply_rig(v1::Manifest& manifest, const v1::Rig& rig, const std::string& where);
 
 }  // namespace emberlock::recon

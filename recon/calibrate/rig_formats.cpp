@@ -114,7 +114,7 @@ Result<v1::Rig> import_rig(const fs::path& path) {
     EMBERLOCK_ASSIGN_OR_RETURN(rig, import_opencv({path}));
   } else {
     EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path, kLargestRigText));
-    // Which of the two it is shows by the key that only one of them has.
+    // The format is recognised by a key that only one of them has.
     const bool transforms = text.find("\"frames\"") != std::string::npos;
     return transforms ? rig_of_transforms(text, path) : session::parse_rig(text, path.string());
   }

@@ -18,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-// Beyond these a value is a slip, not a laboratory, and its powers would overflow downstream.
+// Larger values are mistakes, and their powers would overflow later.
 constexpr double kLargestLength = 1e6;  // metres
 constexpr double kLargestPixels = 1e7;
 constexpr double kLargestImage = 65536;
@@ -27,7 +27,7 @@ constexpr std::size_t kLargestFile = std::size_t{64} << 20;
 constexpr std::array kLensKeys = {
     "fl_x", "fl_y", "camera_angle_x", "camera_angle_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "p1",
     "p2",   "k4",   "is_fisheye",     "camera_model"};
-// Written by Blender's NeRF export, instant-ngp and nerfstudio; none of them moves a ray.
+// Written by Blender's NeRF export, instant-ngp and nerfstudio; none of them affects rays.
 constexpr std::array kIgnoredKeys = {"aabb",
                                      "aabb_scale",
                                      "applied_scale",
@@ -58,7 +58,7 @@ bool contains(const List& list, std::string_view word) {
   return std::any_of(list.begin(), list.end(), [&](const char* w) { return word == w; });
 }
 
-/// A field of the file, as messages name it: "transforms.json: frames[3].transform_matrix".
+/// The path of a field in messages: "transforms.json: frames[3].transform_matrix".
 struct Place {
   std::string file;
   std::string field;
@@ -82,10 +82,10 @@ Result<double> as_number(const json& value, const Place& place) {
 }
 
 struct Range {
-  double low, high;  // both allowed
+  double low, high;  // inclusive
 };
 
-/// Overwrites `out` where the key is there and in range; leaves it otherwise.
+/// Sets `out` if the key exists and is in range; otherwise leaves it.
 template <class T>
 Status read(const json& object, const char* key, const Place& place, Range range, std::optional<T>& out) {
   const auto it = object.find(key);
@@ -136,7 +136,7 @@ Status read_lens(const json& object, const Place& place, LensFields& lens) {
   constexpr Range kCenter = {-kLargestPixels, kLargestPixels};
   constexpr Range kSize = {1, kLargestImage};
   constexpr Range kCoefficient = {-1e3, 1e3};
-  // A frame's own angle stands before the focal length of the file.
+  // A frame's own angle overrides the focal length of the file.
   if (object.contains("camera_angle_x")) lens.fl_x.reset();
   if (object.contains("camera_angle_y")) lens.fl_y.reset();
   EMBERLOCK_RETURN_IF_ERROR(read(object, "fl_x", place, kFocal, lens.fl_x));
@@ -218,7 +218,7 @@ Result<Rigid3> read_pose(const json& value, const Place& place) {
   return camera_from_world_of_opengl(m);
 }
 
-/// NeRF's own data omit the extension: then the first image of that name counts.
+/// NeRF's own data omit the extension: use the first image of that name.
 fs::path find_image(const fs::path& folder, const std::string& file_path) {
   fs::path path = folder / file_path;
   std::error_code ec;

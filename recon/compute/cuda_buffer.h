@@ -11,17 +11,16 @@
 
 namespace emberlock::recon {
 
-/// Throws a DeviceError: after cuda_status() has answered, it tells of a failing device or a defect of ours.
+/// Throws a DeviceError. As cuda_status() succeeded before, this means a failing device or a bug.
 void check_cuda(cudaError_t code, const char* what);
 
-/// Memory on the GPU, in order with the launches and copies of the default stream, so that nobody waits for
-/// it; a DeviceError that says how much was asked for and how much there is. What is freed stays with the
-/// process for the next to ask.
+/// Allocates memory on the GPU in the order of the default stream's launches and copies, so that nothing has
+/// to wait; the DeviceError says how much was requested and how much is free. Freed memory stays with the
+/// process for reuse.
 void* cuda_allocate(std::size_t bytes);
 void cuda_free(void* data) noexcept;
 
-/// Owns an array in the GPU's memory. Its launches and copies run in order with all others of the default
-/// stream.
+/// Owns an array in the GPU's memory. Its launches and copies run in the order of the default stream.
 template <class T>
 class CudaBuffer {
  public:
@@ -39,7 +38,7 @@ class CudaBuffer {
   }
   ~CudaBuffer() { cuda_free(data_); }
 
-  /// Contents undefined: for what a kernel writes before any other reads it.
+  /// With undefined content, for kernels that write it before it is read.
   static CudaBuffer unfilled(std::size_t size) { return CudaBuffer(size, Unfilled{}); }
 
   [[nodiscard]] T* data() const { return data_; }
@@ -52,12 +51,12 @@ class CudaBuffer {
   void clear() {
     if (size_ > 0) check_cuda(cudaMemsetAsync(data_, 0, bytes()), "clearing memory of the GPU");
   }
-  /// As large as `from` from here on.
+  /// Takes the size of `from`.
   void upload(const std::vector<T>& from) {
     if (from.size() != size_) *this = CudaBuffer(from.size(), Unfilled{});
     copy(data_, from.data(), cudaMemcpyHostToDevice);
   }
-  /// Of the same size.
+  /// Sizes must be equal.
   void copy_from(const CudaBuffer& o) { copy(data_, o.data_, cudaMemcpyDeviceToDevice); }
   void download(T* to) const { copy(to, data_, cudaMemcpyDeviceToHost); }
   [[nodiscard]] T download_one(std::size_t at) const {
@@ -65,7 +64,7 @@ class CudaBuffer {
     check_cuda(cudaMemcpy(&to, data_ + at, sizeof(T), cudaMemcpyDeviceToHost), "copying from the GPU");
     return to;
   }
-  /// `count` of them from number `first` on.
+  /// Downloads `count` elements from index `first` on.
   [[nodiscard]] std::vector<T> download(std::size_t first, std::size_t count) const {
     std::vector<T> to(count);
     if (count > 0)
@@ -85,7 +84,7 @@ class CudaBuffer {
     if (size > 0) data_ = static_cast<T*>(cuda_allocate(bytes()));
   }
 
-  /// Waits for copies from and to the CPU's memory.
+  /// Copies from and to the CPU's memory wait until they are complete.
   void copy(T* to, const T* from, cudaMemcpyKind kind) const {
     if (size_ > 0) check_cuda(cudaMemcpy(to, from, bytes(), kind), "copying memory");
   }

@@ -11,7 +11,7 @@
 namespace emberlock::recon {
 namespace {
 
-/// Why the first GPU can't be used; empty where it can.
+/// Why the first GPU isn't usable; empty if it is.
 std::string missing() {
   int devices = 0;
   const cudaError_t code = cudaGetDeviceCount(&devices);
@@ -24,7 +24,7 @@ std::string missing() {
       cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, 0) != cudaSuccess ||
       cudaDeviceGetAttribute(&pools, cudaDevAttrMemoryPoolsSupported, 0) != cudaSuccess)
     return "the GPU doesn't answer";
-  constexpr int kOldest = 75;  // as the build compiles for
+  constexpr int kOldest = 75;  // the oldest architecture for which the build compiles
   if (10 * major + minor < kOldest)
     return "the GPU has compute capability " + std::to_string(major) + "." + std::to_string(minor) +
            ", less than 7.5";
@@ -40,7 +40,7 @@ Status ask_cuda() {
       "Install an NVIDIA GPU of compute capability 7.5 or later and its driver, or use --device cpu"};
 }
 
-/// Freed memory is kept for the next allocation instead of going back to the driver at every wait.
+/// Keeps freed memory for the next allocation, instead of returning it to the driver at every wait.
 void keep_freed_memory() {
   int device = 0;
   cudaMemPool_t pool = nullptr;
@@ -73,7 +73,7 @@ void* cuda_allocate(std::size_t bytes) {
     check_cuda(code, "allocating memory");
     return data;
   }
-  (void)cudaGetLastError();  // this error is told here and by nobody later
+  (void)cudaGetLastError();  // clears this error, which is reported here
   std::size_t free = 0;
   std::size_t total = 0;
   check_cuda(cudaMemGetInfo(&free, &total), "asking for its memory");
@@ -89,8 +89,7 @@ void* cuda_allocate(std::size_t bytes) {
 }
 
 void cuda_free(void* data) noexcept {
-  if (data != nullptr)
-    (void)cudaFreeAsync(data, nullptr);  // a failure shows at the next call that can tell of it
+  if (data != nullptr) (void)cudaFreeAsync(data, nullptr);  // a failure is reported by a later call
 }
 
 }  // namespace emberlock::recon

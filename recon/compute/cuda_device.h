@@ -5,8 +5,7 @@
 
 namespace emberlock::recon {
 
-/// Ok where the CUDA backend was built and a GPU answers; otherwise an Error that says which of them is
-/// missing.
+/// Ok if the CUDA backend was built and a GPU answers; otherwise the Error says which is missing.
 Status cuda_status();
 
 }  // namespace emberlock::recon

@@ -7,7 +7,7 @@
 
 namespace emberlock::recon {
 
-// For .cu files: how functors of recon/kernels run on the GPU, one thread for each call.
+// For .cu files: runs functors of recon/kernels on the GPU, one thread per call.
 
 inline constexpr unsigned kThreadsABlock = 128;
 
@@ -17,8 +17,8 @@ __global__ void call_each(const Act act, std::size_t first, std::size_t last) {
   if (i < last) act(i);
 }
 
-/// act(first) .. act(last - 1), in any order and at the same time, on the default stream. `what` names them
-/// in errors.
+/// Calls act(first) .. act(last - 1) concurrently in any order, on the default stream. `what` names them in
+/// errors.
 template <class Act>
 void launch(std::size_t first, std::size_t last, const Act& act, const char* what) {
   if (first >= last) return;

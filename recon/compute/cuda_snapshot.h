@@ -7,9 +7,9 @@
 
 namespace emberlock::recon {
 
-/// Brings an array of the GPU to the CPU beside the work of the default stream, which only makes a copy on
-/// the GPU for it: a stream of its own carries that copy into one of two page-locked buffers, while the other
-/// one holds what has arrived.
+/// Copies an array from the GPU to the CPU without stopping the default stream. The default stream only makes
+/// a copy on the GPU; another stream transfers it to one of two page-locked buffers, while the other buffer
+/// holds the last complete transfer.
 template <class T>
 class CudaSnapshot {
  public:
@@ -28,8 +28,8 @@ class CudaSnapshot {
   CudaSnapshot& operator=(CudaSnapshot&&) = delete;
   ~CudaSnapshot() { release(); }
 
-  /// Starts a copy of what the default stream leaves in `from`, which is as large as this, unless one is
-  /// under way.
+  /// Starts a transfer of the content that the default stream leaves in `from` (of the same size), unless one
+  /// is under way.
   void start(const CudaBuffer<T>& from) {
     if (under_way_) return;
     staging_.copy_from(from);
@@ -42,7 +42,7 @@ class CudaSnapshot {
     under_way_ = true;
   }
 
-  /// The last copy that has arrived; null before the first has. It stays until the next call.
+  /// The last complete transfer; null before the first. Valid until the next call.
   [[nodiscard]] const T* latest() {
     if (under_way_) {
       const cudaError_t code = cudaEventQuery(arrived_);

@@ -8,6 +8,15 @@
 
 namespace emberlock::recon {
 
+Result<Precision> parse_precision(std::string_view name) {
+  if (name == "float32") return Precision::float32;
+  if (name == "float64") return Precision::float64;
+  return Error{ErrorKind::bad_input, "unknown precision '" + std::string(name) + "'", "precision",
+               "Use float32 or float64"};
+}
+
+std::string_view name(Precision precision) { return precision == Precision::float32 ? "float32" : "float64"; }
+
 Result<Device> parse_device(std::string_view name) {
   if (name == "auto") return Device::automatic;
   if (name == "cpu") return Device::cpu;

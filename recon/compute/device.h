@@ -10,28 +10,32 @@
 namespace emberlock::recon {
 
 enum class Device {
-  automatic,  ///< CUDA where it was built and a GPU answers, the CPU otherwise
+  automatic,  ///< CUDA if it was built and a GPU answers, else the CPU
   cpu,
   cuda,
 };
 
-/// Whether this build has the launches on a GPU: where it hasn't, no Pool says Device::cuda.
+/// Whether this build can launch on a GPU. If not, no Pool has Device::cuda.
 #ifdef EMBERLOCK_HAVE_CUDA
 inline constexpr bool kCudaBuilt = true;
 #else
 inline constexpr bool kCudaBuilt = false;
 #endif
 
-/// Of the march and of all that is stored at key points.
+/// Precision of the march and of all values at key points.
 enum class Precision { float32, float64 };
 
-/// Where and how wide to compute. Results are bit-identical for every number of threads on the CPU.
+/// "float32" or "float64"; an Error that lists them otherwise.
+Result<Precision> parse_precision(std::string_view name);
+std::string_view name(Precision precision);
+
+/// Device and number of threads. On the CPU results are bit-identical for any number of threads.
 struct ComputeOptions {
   Device device = Device::automatic;
-  int threads = 0;  ///< CPU threads, 1..256; 0 takes every core
+  int threads = 0;  ///< CPU threads, 1..256; 0: all cores
 };
 
-/// A device that fails, can't run, or has too little memory. Functions that give a Result turn it into its
+/// A device failed, isn't usable, or has too little memory. Functions that return a Result convert it to its
 /// Error.
 class DeviceError : public std::exception {
  public:
@@ -43,12 +47,12 @@ class DeviceError : public std::exception {
   Error error_;
 };
 
-/// "auto", "cpu" or "cuda"; an Error that lists them otherwise.
+/// "auto", "cpu" or "cuda"; otherwise the Error lists these.
 Result<Device> parse_device(std::string_view name);
 
-/// The device that a choice means on this machine: cpu or cuda, never automatic. An Error of kind `device`
-/// says why CUDA can't run (not built in, no driver, no GPU). EMBERLOCK_DEVICE=cpu|cuda in the environment is
-/// what automatic means, for tests and comparisons.
+/// The device selected on this machine: cpu or cuda, never automatic. An Error of kind `device` says why CUDA
+/// isn't usable (not built, no driver, no GPU). EMBERLOCK_DEVICE=cpu|cuda in the environment overrides
+/// automatic, for tests and comparisons.
 Result<Device> resolve(Device choice);
 
 }  // namespace emberlock::recon

@@ -15,8 +15,8 @@
 namespace emberlock::recon {
 namespace {
 
-// Debian's oneTBB is not instrumented: ThreadSanitizer doesn't see that starting a task and waiting for it
-// order memory. These two calls say so; elsewhere they are nothing.
+// Debian's oneTBB isn't instrumented, so ThreadSanitizer doesn't see that starting a task and waiting for it
+// order memory accesses. These two calls tell it; in other builds they do nothing.
 void publish([[maybe_unused]] void* address) {
 #ifdef EMBERLOCK_THREAD_SANITIZER
   __tsan_release(address);

@@ -8,14 +8,14 @@
 
 namespace emberlock::recon {
 
-/// A pool of CPU threads, and the device that heavy passes run on beside them. The work is cut into tasks by
-/// the caller, never by the number of threads, so results whose tasks write to separate places, or are
-/// combined in the order of the tasks, have the same bits for any number of threads. One caller at a time.
+/// A pool of CPU threads, and the device for heavy passes. The caller divides the work into tasks,
+/// independently of the number of threads. So results whose tasks write to separate places, or are combined
+/// in the order of the tasks, are bit-identical for any number of threads. One caller at a time.
 class Pool {
  public:
-  /// 0 threads takes every core. The device is resolved: cpu, or cuda where resolve() gave it.
+  /// 0 threads: all cores. The device must be resolved: cpu, or cuda if resolve() returned it.
   explicit Pool(int threads, Device device = Device::cpu);
-  /// Throws a DeviceError where resolve() has one.
+  /// Throws a DeviceError if resolve() fails.
   explicit Pool(const ComputeOptions& compute);
   ~Pool();
   Pool(Pool&&) = delete;
@@ -23,8 +23,7 @@ class Pool {
 
   [[nodiscard]] Device device() const { return device_; }
 
-  /// Calls task(0) .. task(tasks - 1), each once, in any order and at the same time; returns when all have
-  /// ended.
+  /// Calls task(0) .. task(tasks - 1) once each, concurrently in any order; returns when all are done.
   void run(int tasks, const std::function<void(int)>& task);
 
  private:
@@ -33,7 +32,7 @@ class Pool {
   Device device_;
 };
 
-/// Element range of task `task` out of `tasks` nearly equal ones.
+/// The range of elements for task `task` of `tasks` nearly equal ones.
 struct Slice {
   std::size_t begin, end;
 };

@@ -35,8 +35,7 @@ std::vector<Rgba> behind_rays(const Background& background, const RayList& list,
   std::vector<RadianceImage> backdrops;
   backdrops.reserve(views.size());
   for (const View* view : views)
-    backdrops.push_back(
-        backdrop(background, view->camera.intrinsics.size, view->background ? &*view->background : nullptr));
+    backdrops.push_back(backdrop(background, view->camera.intrinsics.size, view->background.get()));
   std::vector<Rgba> out(list.rays.size());
   for (std::size_t r = 0; r < out.size(); ++r) {
     const float* pixel = &backdrops[list.rays[r].view].rgb[3 * static_cast<std::size_t>(list.pixels[r])];

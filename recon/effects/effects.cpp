@@ -21,7 +21,8 @@ Error bad(std::string what) {
 
 Error unknown(std::string_view text) { return bad("can't read '" + std::string(text) + "'"); }
 
-/// Takes what stands before the first `mark` off the front of `text`, and the mark; all of it without one.
+/// Returns the part of `text` before the first `mark`, and removes it and the mark; all of it if there is no
+/// mark.
 std::string_view take(std::string_view& text, char mark) {
   const std::size_t at = text.find(mark);
   const std::string_view head = text.substr(0, at);
@@ -34,7 +35,7 @@ bool read(std::string_view text, double& value) {
   return error == std::errc() && end == text.data() + text.size() && std::isfinite(value);
 }
 
-/// One effect of the list, name=choice:key=value:key=value. Parameters are taken out as they are understood.
+/// One effect of the list, name=choice:key=value:key=value. Parameters are removed as they are read.
 class Item {
  public:
   explicit Item(std::string_view text) : text_(text) {
@@ -55,7 +56,7 @@ class Item {
   [[nodiscard]] bool is(std::string_view choice) const { return choice_ == choice; }
   bool number(double& value) const { return read(choice_, value); }
 
-  /// Reads the parameter where it is given; its absence leaves the default.
+  /// Reads an optional parameter; if it is absent, the default stays.
   void parameter(std::string_view key, double& value) {
     const auto at = std::find_if(parameters_.begin(), parameters_.end(),
                                  [&](const auto& parameter) { return parameter.first == key; });
@@ -63,7 +64,7 @@ class Item {
     understood_ = understood_ && read(at->second, value);
     parameters_.erase(at);
   }
-  /// No parameter is left over, and those that were asked for were numbers.
+  /// Whether no parameter is left, and all that were read were valid numbers.
   [[nodiscard]] bool understood() const { return understood_ && parameters_.empty(); }
 
  private:
@@ -219,7 +220,7 @@ Result<EffectRequest> parse_auto(std::string_view text) {
 
 Status check(const Effects& effects) {
   const auto& [extinction, scattering, refraction, background, exposure, sensor, motion] = effects;
-  constexpr double kMost = 1e30;  // what a float holds with room to spare; also refuses infinity
+  constexpr double kMost = 1e30;  // far below the largest float; also excludes infinity
   constexpr double kColdest = 100;
   constexpr double kHottest = 1e5;
   if (!within(extinction.value.value(), 0, kMost)) return bad("extinction must be 0 or more");

@@ -71,6 +71,7 @@ struct Motion {
   enum class Carry { none, uniform };
   Carry carry = Carry::none;
   std::array<double, 3> velocity = {};  ///< m/s in the world
+  friend bool operator==(const Motion&, const Motion&) = default;
 };
 
 /// From radiance to pixel values: value = white * (radiance / white)^(1 / gamma), clipped at white. A clipped
@@ -82,6 +83,7 @@ struct Sensor {
   Clipping clipping = Clipping::none;
   double gamma = 1;    ///< of `gamma`
   double white = 255;  ///< grey levels
+  friend bool operator==(const Sensor&, const Sensor&) = default;
 };
 
 struct Effects {

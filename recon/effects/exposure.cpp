@@ -10,9 +10,10 @@
 namespace emberlock::recon {
 namespace {
 
-/// How far the instants of a motion by `way` edges are spread. Linear interpolation between key points blurs
-/// too, by the mean of f (1 - f): so much less than the motion itself that the mean square displacement is
-/// the motion's own, way^2 / 12. For a spread up to 2 it is spread / 4, beyond that spread^2 / 12 + 1 / 6.
+/// The spread of the instants for a motion by `way` edges. Linear interpolation between key points blurs too,
+/// by the mean of f (1 - f). So the spread is smaller than the motion, such that the mean square displacement
+/// equals that of the motion, way^2 / 12. For a spread up to 2 it is spread / 4, above that spread^2 / 12 + 1
+/// / 6.
 double spread_of(double way) { return way * way <= 6 ? way * way / 3 : std::sqrt(way * way - 2); }
 
 std::vector<float> shift_weights(double way) {

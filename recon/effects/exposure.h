@@ -10,12 +10,12 @@
 
 namespace emberlock::recon {
 
-/// B: what a shutter makes of a flame that rises while it is open. The volume is the flame at the middle of
-/// the exposure; B x is the mean of x shifted along z by many equally spaced parts of the way, linear between
-/// key points, spread so that their mean square is the motion's own. Pictures of B x are the mean of the
-/// pictures at all instants where nothing absorbs; where the medium absorbs they leave out that it moves too
-/// (exposure_test.cpp measures both). Light that B carries out of the grid or the medium isn't seen: the hull
-/// of pictures with this exposure holds it. Motion of at most half a voxel edge is left out.
+/// The operator B: the effect of a finite exposure on a rising flame. The volume is the flame at the middle
+/// of the exposure. B x is the mean of x shifted along z in many equal parts of the distance, linear between
+/// key points, spread so that the mean square shift equals that of the motion. If nothing absorbs, pictures
+/// of B x are the mean of the pictures at all instants; if the medium absorbs, its own motion is neglected
+/// (exposure_test.cpp measures both). Light that B moves out of the grid or the medium is lost, so the hull
+/// must come from pictures with this exposure. Motion of at most half a voxel edge is neglected.
 class ExposureBlur {
  public:
   /// `exposure` must pass `check`.
@@ -23,11 +23,11 @@ class ExposureBlur {
 
   /// B x = x.
   [[nodiscard]] bool identity() const { return weights_.size() == 1; }
-  /// Of x shifted by m = -reach..reach edges: 2 * reach + 1, none negative; they sum to 1.
+  /// Weights of x shifted by m = -reach..reach edges: 2 * reach + 1 values, none negative, with sum 1.
   [[nodiscard]] const std::vector<float>& weights() const { return weights_; }
 
-  /// B x and its transpose B^T y, at the grid's key points, all four lanes. The same bits for any number of
-  /// threads.
+  /// B x and its transpose B^T y at the grid's key points, for all four lanes. Bit-identical for any number
+  /// of threads.
   [[nodiscard]] std::vector<Rgba> forward(const std::vector<Rgba>& x, Pool& pool) const;
   [[nodiscard]] std::vector<Rgba> adjoint(const std::vector<Rgba>& y, Pool& pool) const;
 

@@ -8,7 +8,7 @@
 
 namespace emberlock::recon {
 
-/// AverageAlongZ at all key points of a grid, on the GPU; weights as ExposureBlur has them. Throws a
+/// AverageAlongZ at all key points of a grid, on the GPU, with the weights of ExposureBlur. Throws a
 /// DeviceError.
 std::vector<Rgba> average_on_cuda(const std::vector<Rgba>& in, const Grid& grid,
                                   const std::vector<float>& weights, int direction);

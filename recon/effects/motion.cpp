@@ -124,14 +124,24 @@ void bring_to_instant(View& view, const Motion& motion, const Eigen::Vector3d& f
       for (std::size_t i = 0; i < steady.rgb.size(); ++i) steady.rgb[i] -= view.background->rgb[i];
     const RadianceImage change = change_of_place(steady, view, motion, flame);
     const auto bound = static_cast<float>(white);
+    RadianceImage image = *view.image;
     for (std::size_t i = 0; i < change.rgb.size(); ++i) {
-      float& value = view.image.rgb[i];
+      float& value = image.rgb[i];
       // There is no light below black, which noise alone reaches.
       if (change.rgb[i] != 0 && (white <= 0 || value < bound))
         value = std::max(std::min(value, 0.F), value - change.rgb[i]);
     }
+    view.image = share(std::move(image));
   }
   view.camera = camera_at_instant(view, motion);
+}
+
+Scene at_one_instant(Scene scene, const Motion& motion, double white) {
+  for (View& view : scene.views) {
+    bring_to_instant(view, motion, scene.box.center, white);
+    view.average.reset();
+  }
+  return scene;
 }
 
 }  // namespace emberlock::recon

@@ -26,4 +26,8 @@ RadianceImage change_of_place(const RadianceImage& picture, const View& view, co
 /// in light. Pixels from `white` on (> 0) are bounds and stay.
 void bring_to_instant(View& view, const Motion& motion, const Eigen::Vector3d& flame, double white = 0);
 
+/// All views of a scene, whose pictures must be linear in light, at its instant. Averages, which belong to
+/// the cameras where they stood, are left out.
+Scene at_one_instant(Scene scene, const Motion& motion, double white = 0);
+
 }  // namespace emberlock::recon

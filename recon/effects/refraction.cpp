@@ -9,8 +9,8 @@ namespace {
 
 constexpr int kCells = 32;     // along the medium's longest side, at most
 constexpr int kSmoothing = 2;  // passes of (1 2 1) / 4 along each axis
-// Cells around the medium: each pass and the spread of voxels into key points take one, and the gradient on
-// the surface needs two layers that are the surroundings'.
+// Cells around the medium: each smoothing pass and the distribution of voxels to key points need one, and the
+// gradient on the surface needs two layers with the surroundings' temperature.
 constexpr int kMargin = kSmoothing + 3;
 
 Grid coarse_grid(const Grid& fine) {
@@ -26,7 +26,7 @@ Grid coarse_grid(const Grid& fine) {
   return coarse;
 }
 
-/// Luminance of each voxel of the medium over their mean, 1 at most; 1 where there is no emission.
+/// Luminance of each voxel of the medium divided by the mean, at most 1; 1 without emission.
 std::vector<float> heat(const Hull& medium, const std::vector<Rgba>& emission) {
   std::vector<float> out(medium.inside.begin(), medium.inside.end());
   if (emission.empty()) return out;
@@ -50,8 +50,8 @@ std::vector<float> heat(const Hull& medium, const std::vector<Rgba>& emission) {
   return out;
 }
 
-/// Spreads every voxel's value over the eight coarse key points around its middle: a medium of ones gives
-/// ones.
+/// Distributes every voxel's value to the eight coarse key points around its middle, so that a medium of ones
+/// gives ones.
 std::vector<float> spread(const std::vector<float>& voxels, const Grid& fine, const Grid& coarse) {
   std::vector<float> out(coarse.size());
   const float ratio = fine.edge / coarse.edge;
@@ -84,7 +84,7 @@ std::vector<float> spread(const std::vector<float>& voxels, const Grid& fine, co
 void smooth(std::vector<float>& values, const Grid& g) {
   const std::size_t stride[3] = {1, g.index(0, 1, 0), g.index(0, 0, 1)};
   for (const std::size_t s : stride) {
-    const std::vector<float> in = values;  // whatever wraps around is on the margin and 0
+    const std::vector<float> in = values;  // indices that wrap around are in the margin, where values are 0
     for (std::size_t p = s; p + s < values.size(); ++p)
       values[p] = 0.25F * in[p - s] + 0.5F * in[p] + 0.25F * in[p + s];
   }

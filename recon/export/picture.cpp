@@ -12,10 +12,10 @@
 namespace emberlock::recon {
 namespace {
 
-/// Gray8 as it is, rgb8 as blue, green, red.
+/// gray8 unchanged, rgb8 as blue, green, red.
 cv::Mat as_opencv_orders(const ImageView& image) {
   const bool colour = image.layout.format == PixelFormat::rgb8;
-  // OpenCV takes the pixels as writable, imencode only reads them.
+  // OpenCV takes mutable pixels, but imencode doesn't write to them.
   cv::Mat view(image.height(), image.width(), colour ? CV_8UC3 : CV_8UC1, const_cast<std::byte*>(image.data),
                image.stride);
   if (!colour) return view;

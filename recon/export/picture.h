@@ -9,10 +9,10 @@
 
 namespace emberlock::recon {
 
-/// Writes an 8-bit PNG; `image` is gray8 or rgb8. Atomically.
+/// Writes an 8-bit PNG atomically; `image` must be gray8 or rgb8.
 Status write_png(const ImageView& image, const std::filesystem::path& path);
 
-/// `image` (rgb8) as a JPEG of quality 85, for screens.
+/// `image` (rgb8) as a JPEG of quality 85, for display.
 Result<std::string> to_jpeg(const ImageView& image);
 
 }  // namespace emberlock::recon

@@ -28,7 +28,7 @@ CameraModel resized(CameraModel camera, ImageSize size) {
 
 RadianceImage shrunk(const RadianceImage& image, ImageSize size) {
   RadianceImage small(size);
-  // OpenCV takes the pixels as writable, resize only reads them.
+  // OpenCV takes mutable pixels, but resize doesn't write to its source.
   const cv::Mat from(image.size.height, image.size.width, CV_32FC3, const_cast<float*>(image.rgb.data()));
   cv::Mat to(size.height, size.width, CV_32FC3, small.rgb.data());
   cv::resize(from, to, to.size(), 0, 0, cv::INTER_AREA);
@@ -53,7 +53,7 @@ CoarseBrightness coarse_brightness(const Volume& volume, int longest) {
       for (int i = 0; i < grid.nx; ++i, light += 3) row[i / block] += light[0] + light[1] + light[2];
     }
 
-  // Blocks at the far ends may hold fewer points.
+  // The last blocks may hold fewer points.
   const auto points = [block](int n, std::size_t at) {
     return std::min(block, n - static_cast<int>(at) * block);
   };

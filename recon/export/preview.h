@@ -11,26 +11,27 @@
 
 namespace emberlock::recon {
 
-// What is shown of a running solve: small, since it is made again and again and sent away.
+// Previews of a running solve: small, because they are made and sent repeatedly.
 
-/// `full` at most `widest` pixels wide, its proportions kept; never larger.
+/// `full` reduced to at most `widest` pixels in width, with the same aspect ratio; never enlarged.
 ImageSize preview_size(ImageSize full, int widest);
 
-/// The same view in other pixels.
+/// The same view with another resolution.
 CameraModel resized(CameraModel camera, ImageSize size);
 
-/// Each pixel the mean over what it covers; `size` is no larger than the picture's.
+/// Each pixel is the mean of the area that it covers; `size` must not be larger than the picture's.
 RadianceImage shrunk(const RadianceImage& image, ImageSize size);
 
-/// How bright a volume is, in blocks of key points.
+/// The brightness of a volume in blocks of key points.
 struct CoarseBrightness {
   int nx = 0, ny = 0, nz = 0;
   Box box;                           ///< of the blocks
-  double brightest = 0;              ///< grey levels per metre, mean of R, G, B: value 255
+  double brightest = 0;              ///< grey levels per metre, mean of R, G, B, for value 255
   std::vector<std::uint8_t> voxels;  ///< x fastest; nx ny nz
 };
 
-/// The mean over cubic blocks, as small as `longest` (>= 1) of them along the longest edge allow.
+/// The mean over cubic blocks, as small as possible with at most `longest` (>= 1) blocks along the longest
+/// edge.
 CoarseBrightness coarse_brightness(const Volume& volume, int longest);
 
 }  // namespace emberlock::recon

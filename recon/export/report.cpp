@@ -10,9 +10,9 @@ using nlohmann::ordered_json;
 
 ordered_json vector_json(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
-ordered_json trace_json(const Report& report) {
+ordered_json trace_json(const Report& report, const std::vector<TracePoint>& points) {
   auto trace = ordered_json::array();
-  for (const TracePoint& point : report.trace) {
+  for (const TracePoint& point : points) {
     trace.push_back(
         {{"seconds", point.time.value()},
          {"iteration", point.iteration},
@@ -82,8 +82,10 @@ ordered_json plan_json(const std::optional<PlanReport>& plan) {
           {"effects_searched", plan->effects_searched},
           {"predicted_seconds", plan->predicted_time.value()},
           {"predicted_rmse", or_null(plan->predicted_rmse)},
+          {"predicted_rmse_without", or_null(plan->predicted_rmse_without)},
           {"over_budget", plan->over_budget.value()},
           {"missed_by", plan->missed_by},
+          {"remedy", plan->remedy},
           {"words", plan->words}};
 }
 
@@ -101,13 +103,15 @@ std::string to_json(const Report& report) {
   json["threads"] = report.threads;
   json["seed"] = report.seed;
   json["step"] = report.step;
-  json["precision"] = report.precision == Precision::float32 ? "float32" : "float64";
+  json["precision"] = name(report.precision);
   json["box"] = {{"center", vector_json(report.box.center)}, {"size", vector_json(report.box.size)}};
   json["voxels"] = report.voxels;
   json["voxel_edge"] = report.voxel_edge.value();
   json["finest_voxels"] = report.finest_voxels;
   json["hull_voxels"] = report.hull_voxels;
   json["iterations"] = report.iterations;
+  json["kept"] = {{"iteration", report.kept.iteration}, {"by", name(report.kept.by)}};
+  json["stopped"] = report.stopped;
   json["seconds"] = {{"effects", report.effects_time.value()}, {"hull", report.hull_time.value()},
                      {"solve", report.solve_time.value()},     {"trace", report.trace_time.value()},
                      {"render", report.render_time.value()},   {"total", report.total_time.value()}};
@@ -117,7 +121,8 @@ std::string to_json(const Report& report) {
   json["effects"] = effects_json(report);
   json["views"] = views_json(report);
   json["trace_sample"] = {{"pixels", report.trace_sample.pixels}, {"of", report.trace_sample.of}};
-  json["trace"] = trace_json(report);
+  json["trace"] = trace_json(report, report.trace);
+  json["discarded"] = trace_json(report, report.discarded);
   return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 

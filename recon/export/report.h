@@ -14,7 +14,7 @@
 
 namespace emberlock::recon {
 
-/// Error of one view, or of several together (root of the mean square over the views): R, G, B in grey levels
+/// The error of one view, or of several (root of the mean square over the views): R, G, B in grey levels
 /// (0..255) over the bounding box of the flame's pixels in the captured picture.
 using ChannelRmse = std::array<double, 3>;
 
@@ -24,63 +24,68 @@ struct ViewReport {
   ChannelRmse rmse = {};
 };
 
-/// How a budget or a target was met: what the front promised, and what came of it.
+/// How a budget or a target was met: prediction of the front, and result.
 struct PlanReport {
   std::optional<Seconds> budget;
   std::optional<double> target_rmse;  ///< held-out, all channels
   Seconds reference_time{0};
   int attempts = 0;
-  int voxels = 0, iterations = 0;        ///< chosen last; iterations: at most, 0 for the solver's rule
-  bool effects_searched = false;         ///< as against left out, or set by hand
-  Seconds predicted_time{0};             ///< of the last attempt, the reference left out
-  std::optional<double> predicted_rmse;  ///< none when nothing is held out
-  Seconds over_budget{0};                ///< 0 when it was kept
-  double missed_by = 0;                  ///< grey levels above the target; 0 when it was reached
-  std::vector<std::string> words;        ///< all this in sentences
+  int voxels = 0, iterations = 0;  ///< of the last attempt; iterations: maximum, 0 for the solver's own rule
+  bool effects_searched = false;   ///< false: left out, or set by the user
+  Seconds predicted_time{0};       ///< of the last attempt, without the reference
+  /// Absent without held-out views. At most this if effects matter as they do in the front's flames; up to
+  /// `predicted_rmse_without` if they don't.
+  std::optional<double> predicted_rmse, predicted_rmse_without;
+  Seconds over_budget{0};          ///< 0 if the budget was kept
+  double missed_by = 0;            ///< grey levels above the target; 0 if it was reached
+  std::string remedy;              ///< what would keep the budget or reach the target; empty if both were met
+  std::vector<std::string> words;  ///< the same as sentences
 };
 
-/// How the number of voxels came about, and what else could be asked for.
+/// How the number of voxels was chosen, and the alternatives.
 struct VoxelChoice {
   std::string rule = "asked";   ///< "knee", "paper", "finest" (VoxelRule), "plan" (PlanReport), or "asked"
   int voxels = 0;               ///< along the longest edge
   int by_the_paper = 0;         ///< voxels_by_the_paper()
-  Seconds calibration_time{0};  ///< what measuring this machine took; 0 where it wasn't needed
-  Seconds expected_time{0};     ///< of the run, by the shipped front; 0 where nothing was measured
+  Seconds calibration_time{0};  ///< duration of measuring this machine; 0 if it wasn't needed
+  Seconds expected_time{0};     ///< in all, with measuring, by the reference front; 0 if nothing was measured
   struct Option {
     int voxels = 0;
     Seconds time{0};
-    double error = 1;  ///< over that of the chosen voxels, by the shipped front
+    double error = 1;  ///< relative to the chosen number of voxels, by the reference front
   };
-  std::vector<Option> options;     ///< by the knee: what else there is
-  std::vector<std::string> words;  ///< all this in sentences
+  std::vector<Option> options;     ///< for the knee rule: the alternatives
+  std::vector<std::string> words;  ///< the same as sentences
 };
 
-/// What a reconstruction did and how good it is.
+/// What a reconstruction did, and its quality.
 struct Report {
-  std::string input;                    ///< as the user named it
+  std::string input;                    ///< as the user typed it
   std::string solver;                   ///< "default" or "paper"
   std::vector<std::string> deviations;  ///< of the paper's solver from the paper (paper.h)
   std::string device;                   ///< "cpu" or "cuda"
-  int threads = 0;                      ///< 0: every core
+  int threads = 0;                      ///< 0: all cores
   std::uint64_t seed = 0;
   double step = 1;  ///< voxel edges
   Precision precision = Precision::float32;
   Box box;
   std::array<int, 3> voxels = {};
   Meters voxel_edge{0};
-  int finest_voxels =
-      0;  ///< along the longest edge: the finest grid that is chosen unasked (finest_voxels())
+  int finest_voxels = 0;  ///< along the longest edge: the finest grid chosen automatically (finest_voxels())
   std::size_t hull_voxels = 0;
 
-  std::optional<ChannelRmse> heldout_rmse;  ///< none when nothing is held out
+  std::optional<ChannelRmse> heldout_rmse;  ///< absent without held-out views
   ChannelRmse input_rmse = {};
   std::vector<ViewReport> views;  ///< in the input's order
 
   Seconds effects_time{0}, hull_time{0}, solve_time{0}, render_time{0};
-  Seconds trace_time{0};  ///< the held-out views' evaluation for the trace, beside the solve
+  Seconds trace_time{0};  ///< evaluation of the held-out views for the trace, in addition to the solve
   Seconds total_time{0};  ///< from the scene in memory to the views rendered
   int iterations = 0;
-  std::vector<TracePoint> trace;
+  Kept kept;                          ///< which of them the volume and every error are of
+  bool stopped = false;               ///< ended early because it was told to
+  std::vector<TracePoint> trace;      ///< up to the one that was kept
+  std::vector<TracePoint> discarded;  ///< after it
   TraceSample trace_sample;
   VoxelChoice voxel_choice;
   std::vector<EffectReport> effects;
@@ -90,13 +95,14 @@ struct Report {
 };
 
 /// As report.json: `heldout_rmse`, `input_rmse`, `voxels` [nx, ny, nz], `seconds` {effects, hull, solve,
-/// trace, render, total}, `iterations`, `effects` [{name, on, predicted_change, seconds, reason}],
-/// `preprocessing` [{step, on, reason}], `trace`
-/// [{seconds, iteration, input_rmse, heldout_rmse}], `trace_sample` {pixels, of} (its held-out errors are
-/// estimates from so many pixels, scaled so that the last is that of all), `views` [{index, name, role,
-/// rmse}], `deviations` (of the paper's solver from the paper), `voxel_choice` {rule, voxels, by_the_paper,
-/// calibration_seconds, expected_seconds, options [{voxels, seconds, error}], words}, `plan` (null without a
-/// budget or target) and what describes the run. Held-out errors are null when nothing is held out.
+/// trace, render, total}, `iterations`, `kept` {iteration, by: "last", "input" or "held_out"}, `stopped`,
+/// `effects` [{name, on, predicted_change, seconds, reason}], `preprocessing` [{step, on, reason}], `trace`
+/// [{seconds, iteration, input_rmse, heldout_rmse}] up to the iteration that was kept, `discarded` (the same
+/// of those after it), `trace_sample` {pixels, of} (its held-out errors are estimates from so many pixels,
+/// scaled so that the last is that of all), `views` [{index, name, role, rmse}], `deviations` (of the paper's
+/// solver from the paper), `voxel_choice` {rule, voxels, by_the_paper, calibration_seconds, expected_seconds,
+/// options [{voxels, seconds, error}], words}, `plan` (null without a budget or target) and what describes
+/// the run. Held-out errors are null when nothing is held out.
 std::string to_json(const Report& report);
 
 }  // namespace emberlock::recon

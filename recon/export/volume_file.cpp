@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The only file that meets OpenVDB's headers: they take half a minute to compile.
+// The only file that includes OpenVDB's headers: they take half a minute to compile.
 #include "recon/export/volume_file.h"
 
 #include <cmath>
@@ -18,7 +18,7 @@ namespace {
 constexpr const char* kDimensions = "emberlock_dimensions";
 constexpr int kLargestDimension = 4096;
 /// OpenVDB refuses voxels whose volume is below 3e-15 of its units: smaller ones are written in millimetres,
-/// and this says so.
+/// with this key.
 constexpr const char* kMetresPerUnit = "emberlock_metres_per_unit";
 constexpr double kSmallestVoxel = 2e-5;  // metres
 
@@ -77,8 +77,8 @@ Result<Grid> geometry(const openvdb::GridBase& from, const std::filesystem::path
   return grid;
 }
 
-/// OpenVDB's readers go by offsets and never come here. Of a file that was cut short they would take any
-/// bytes for sizes, and ask for as much memory.
+/// A marker at the end of the file, which OpenVDB's readers don't read (they use offsets). For a truncated
+/// file they would take any bytes for sizes, and allocate that much memory.
 constexpr std::string_view kEnd = "emberlock: end of volume";
 
 bool is_whole(const std::filesystem::path& path) {
@@ -106,7 +106,7 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path) {
       volume.grid, "emission", "grey levels (0..255) per metre", [&](std::size_t i) {
         return openvdb::Vec3s(emission[3 * i], emission[3 * i + 1], emission[3 * i + 2]);
       });
-  emission_grid->setVectorType(openvdb::VEC_INVARIANT);  // a colour: no transform rotates it
+  emission_grid->setVectorType(openvdb::VEC_INVARIANT);  // a colour: not rotated by transforms
   auto density_grid = sparse_grid<openvdb::FloatGrid>(volume.grid, "density", "1/m", [&](std::size_t i) {
     return volume.extinction.empty() ? 0.0F : volume.extinction[i];
   });

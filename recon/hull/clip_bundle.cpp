@@ -4,7 +4,7 @@
 #include <bit>
 #include <cstdint>
 
-// Targets whose vectors no struct can hold.
+// Targets whose vectors can't be members of a struct.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "recon/hull/clip_bundle.cpp"
@@ -34,8 +34,8 @@ struct Rays {
   Float direction[3];
 };
 
-/// walk_voxels() in lanes that take their steps together. cross(where, entering, t) at every border; those
-/// that end inside are told to leave at `leave`.
+/// walk_voxels() for several rays at once, one per lane. Calls cross(where, entering, t) at every border;
+/// rays that end inside leave at `leave`.
 template <class Cross>
 HWY_INLINE void walk(const VoxelMask& mask, const Rays& rays, Float t, Float leave, const Cross& cross) {
   const Float never = all(1e30F);
@@ -80,7 +80,7 @@ HWY_INLINE void walk(const VoxelMask& mask, const Rays& rays, Float t, Float lea
     next[2] = hn::Add(next[2], hn::IfThenElseZero(z, delta[2]));
     t = hn::IfThenElse(hn::Gt(t, face), t, face);
     walking = hn::Lt(t, leave);
-    // A ray that has left stays where it was: its next voxel may lie beyond the mask.
+    // A ray that has left doesn't move any more: its next voxel may be outside the mask.
     at = hn::Add(at, hn::IfThenElseZero(hn::RebindMask(kInts, walking), step));
   }
   cross(hn::RebindMask(kFloats, hn::Ne(before, all(0))), hn::FirstN(kFloats, 0), leave);
@@ -107,7 +107,7 @@ HWY_INLINE void clip(const VoxelMask& mask, const Rays& rays, Float& enter, Floa
   }
 }
 
-/// clip_to_medium() of the rays from `first` on that vectors hold.
+/// clip_to_medium() for as many rays from `first` on as the vectors hold.
 void clip_rays(const VoxelMask& mask, const VoxelMask& blocks, const RayBundle& bundle, int first,
                Crossings& crossings) {
   Rays rays{bundle.origin, {}};
@@ -131,7 +131,7 @@ void clip_rays(const VoxelMask& mask, const VoxelMask& blocks, const RayBundle& 
          from = hn::IfThenElse(earliest, t, from);
          to = hn::IfThenElse(hn::AndNot(entering, where), t, to);
        });
-  constexpr float kMargin = 0.01F;  // as clip_to_medium() has it
+  constexpr float kMargin = 0.01F;  // as in clip_to_medium()
   from = hn::Sub(hn::Mul(all(static_cast<float>(kBlock)), from), all(kMargin));
   to = hn::Add(hn::Mul(all(static_cast<float>(kBlock)), to), all(kMargin));
   const Float start = hn::IfThenElse(hn::Gt(from, enter), from, enter);

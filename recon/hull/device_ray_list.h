@@ -21,7 +21,7 @@ class DeviceRayList {
   CudaBuffer<float> origins_;
   CudaBuffer<MarchRay> rays_;
   CudaBuffer<Run> runs_;
-  CudaBuffer<Bend> bends_;  // none where rays are straight
+  CudaBuffer<Bend> bends_;  // empty for straight rays
 };
 
 }  // namespace emberlock::recon

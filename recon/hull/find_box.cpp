@@ -13,10 +13,11 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr double kFar = 20;        // times the cameras' spread: what reaches so far has no end
+constexpr double kFar = 20;        // times the cameras' spread: further away the region counts as unbounded
 constexpr int kCoarseVoxels = 48;  // along the longest side
-constexpr int kRounds = 6;         // of carving, at most
-constexpr double kSettled = 0.97;  // of the last round's longest side: smaller steps aren't worth a round
+constexpr int kRounds = 6;         // of carving, maximum
+constexpr double kSettled =
+    0.97;  // of the last round's longest side: for a smaller reduction no further round is made
 constexpr double kMarginShare = 0.05;
 
 const char* const kRemedy = "Give --box cx,cy,cz,sx,sy,sz in metres, or a box in the input";
@@ -37,7 +38,8 @@ struct Bounds {
   [[nodiscard]] bool empty() const { return !((high - low).minCoeff() > 0); }
 };
 
-/// In front of the camera and between the planes through its centre and the sides of its mask's box.
+/// The region in front of the camera and between the planes through its centre and the sides of its mask's
+/// bounding box.
 void add_cone(const CameraModel& camera, const PixelBox& box, std::vector<HalfSpace>& cone) {
   const Eigen::Vector3d center = camera.center();
   const Eigen::Vector3d forward = camera.camera_from_world.rotation.row(2);
@@ -53,8 +55,8 @@ void add_cone(const CameraModel& camera, const PixelBox& box, std::vector<HalfSp
   }
 }
 
-/// Each half-space bounds each coordinate by the least that the others can take; repeated until it settles.
-/// Never cuts away a point of the intersection.
+/// Limits each coordinate by each half-space, given the ranges of the others; repeated until nothing changes.
+/// Never removes a point of the intersection.
 void tighten(const std::vector<HalfSpace>& cones, Bounds& bounds) {
   constexpr int kMostPasses = 200;
   for (int pass = 0; pass < kMostPasses && !bounds.empty(); ++pass) {
@@ -78,7 +80,7 @@ void tighten(const std::vector<HalfSpace>& cones, Bounds& bounds) {
   }
 }
 
-/// The bounds of the voxels that are left and lie within the cones, to a voxel.
+/// The bounds of the remaining voxels within the cones, to a voxel.
 Bounds bounds_of(const Hull& hull, const std::vector<HalfSpace>& cones) {
   const Grid& g = hull.grid;
   const auto edge = static_cast<double>(g.edge);
@@ -92,7 +94,7 @@ Bounds bounds_of(const Hull& hull, const std::vector<HalfSpace>& cones) {
         const Eigen::Vector3d low = origin + edge * Eigen::Vector3d(i, j, k);
         const Eigen::Vector3d middle = low + Eigen::Vector3d::Constant(0.5 * edge);
         if (std::any_of(cones.begin(), cones.end(), [&](const HalfSpace& side) {
-              return side.normal.dot(middle) > side.most + 0.87 * edge;  // half a voxel's diagonal
+              return side.normal.dot(middle) > side.most + 0.87 * edge;  // half of a voxel's diagonal
             }))
           continue;
         bounds.low = bounds.low.cwiseMin(low);

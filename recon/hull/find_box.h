@@ -10,13 +10,13 @@
 
 namespace emberlock::recon {
 
-/// The box around what every view's mask allows: the paper's section "Sampling Step and Volume Dimension"
-/// measures position and size of the flame by the calibration; so does this, from the masks alone. The views'
-/// cones through their masks are intersected, and what is left is carved coarsely, each time in the box of
-/// what the last carving left. A speck that one view alone shows leaves no trace. 5 % and a coarse voxel of
-/// margin on every side, sizes in whole millimetres. `scene.box` isn't read; every view counts, whatever its
-/// role. Errors name the view: fewer than two views, a view without flame, cones that don't meet, or that
-/// meet without an end (parallel views).
+/// Finds the box around the region that every view's mask allows. Like the paper's section "Sampling Step and
+/// Volume Dimension" it determines position and size of the flame from the calibration, but only from the
+/// masks. It intersects the views' cones through their masks, then carves coarsely and repeats that in the
+/// box of the result. A speck in a single view has no effect. The margin is 5 % plus one coarse voxel on
+/// every side; sizes are whole millimetres. `scene.box` isn't used; all views count, whatever their role.
+/// Errors name the view: fewer than two views, a view without flame, cones that don't intersect, or whose
+/// intersection is unbounded (parallel views).
 Result<Box> find_box(const Scene& scene, const std::vector<FlameMask>& masks,
                      const ComputeOptions& compute = {});
 

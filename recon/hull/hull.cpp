@@ -38,7 +38,7 @@ std::vector<std::uint32_t> summed_area(const FlameMask& mask) {
 /// Descends from large cubes to voxels.
 class Carver {
  public:
-  Carver(const JudgeCubes& cubes, Hull& hull) : cubes_(cubes), hull_(hull) {}
+  Carver(const ClassifyCubes& cubes, Hull& hull) : cubes_(cubes), hull_(hull) {}
 
   /// `open` holds the views that the cube's ancestors did not settle.
   void carve(int i, int j, int k, int size, std::uint64_t open) {
@@ -66,7 +66,7 @@ class Carver {
                     width, std::uint8_t{1});
   }
 
-  const JudgeCubes& cubes_;
+  const ClassifyCubes& cubes_;
   Hull& hull_;
 };
 
@@ -91,14 +91,14 @@ void carve_voxels(const std::vector<Seen>& seen, Hull& hull, Pool& pool) {
     tables[v] = summed_area(*seen[v].mask);
     views[v].flame_pixels = tables[v].data();
   });
-  const JudgeCubes judge{{hull.grid}, views.data(), static_cast<int>(views.size())};
-  constexpr int kRoot = JudgeCubes::kRoot;
+  const ClassifyCubes classify{{hull.grid}, views.data(), static_cast<int>(views.size())};
+  constexpr int kRoot = ClassifyCubes::kRoot;
   const auto cubes = [](int key_points) { return (key_points - 2 + kRoot) / kRoot; };
   const int bx = cubes(hull.grid.nx);
   const int by = cubes(hull.grid.ny);
   pool.run(bx * by * cubes(hull.grid.nz), [&](int cube) {
-    Carver(judge, hull)
-        .carve(cube % bx * kRoot, cube / bx % by * kRoot, cube / bx / by * kRoot, kRoot, judge.all());
+    Carver(classify, hull)
+        .carve(cube % bx * kRoot, cube / bx % by * kRoot, cube / bx / by * kRoot, kRoot, classify.all());
   });
 }
 

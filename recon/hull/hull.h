@@ -11,18 +11,18 @@
 
 namespace emberlock::recon {
 
-/// A grid of cubic voxels over a box, `voxels` (>= 1) along its longest side; the shorter sides are rounded
-/// up to whole voxels, centred on the box.
+/// A grid of cubic voxels over a box, with `voxels` (>= 1) along its longest side; the shorter sides are
+/// rounded up to whole voxels, centred on the box.
 Grid grid_over(const Box& box, int voxels);
 
-/// Every voxel belongs to the medium.
+/// A medium that consists of all voxels.
 Hull whole_grid(const Grid& grid);
 
-/// The visual hull (Laurentini 1994) of the input views (held-out ones don't carve; at most 64): a voxel
-/// stays unless some view sees it wholly and no pixel that its projection's bounding rectangle touches is a
-/// flame pixel. A voxel that reaches out of a view's frame, or behind its camera, is not carved by that view.
-/// The same voxels on every device. Errors: no input view, more than 64, an empty hull (naming the view that
-/// carved most and its threshold), a device that can't run.
+/// The visual hull (Laurentini 1994) of the input views (at most 64; held-out views don't carve). A voxel is
+/// removed if some view sees it completely and the bounding rectangle of its projection touches no flame
+/// pixel. A view doesn't carve voxels that extend beyond its frame or lie behind its camera. The same voxels
+/// on every device. Errors: no input view, more than 64, an empty hull (names the view that carved most, and
+/// its threshold), an unusable device.
 Result<Hull> carve(const Scene& scene, const std::vector<FlameMask>& masks, const Grid& grid,
                    const ComputeOptions& compute);
 

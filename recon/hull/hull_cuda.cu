@@ -8,7 +8,7 @@ namespace emberlock::recon {
 
 void carve_on_cuda(const Grid& grid, std::vector<Silhouette> views,
                    const std::vector<const std::uint8_t*>& masks, std::vector<std::uint8_t>& inside) {
-  std::vector<std::uint8_t> pixels;  // of all views, so that one copy takes them
+  std::vector<std::uint8_t> pixels;  // of all views, for a single copy
   std::size_t corners = 0;
   std::size_t rows = 0;
   std::size_t columns = 0;

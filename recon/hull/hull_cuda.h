@@ -8,8 +8,8 @@
 
 namespace emberlock::recon {
 
-/// The voxels that the views (at most 64, their tables not yet made) leave of a grid, on the GPU; `masks` are
-/// their flame pixels. Throws a DeviceError.
+/// Carves a grid with the views (at most 64, their tables not yet built) on the GPU; `masks` are their flame
+/// pixels. Throws a DeviceError.
 void carve_on_cuda(const Grid& grid, std::vector<Silhouette> views,
                    const std::vector<const std::uint8_t*>& masks, std::vector<std::uint8_t>& inside);
 

@@ -10,14 +10,14 @@
 
 namespace emberlock::recon {
 
-// Cameras and media as kernels need them.
+// Cameras and media in the form for kernels.
 
 /// Without its table.
 Silhouette silhouette(const CameraModel& camera);
 
 PixelRays pixel_rays(const CameraModel& camera);
 
-/// The medium as rays are cut against it, with the step and the gas of the options. Holds what it points to,
+/// The medium for cutting rays, with the step and the gas from the options. Owns the data that it points to,
 /// except for the gas.
 class Cutter {
  public:

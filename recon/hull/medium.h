@@ -9,8 +9,8 @@
 
 namespace emberlock::recon {
 
-/// The voxels that can hold the medium. Voxel (i, j, k) lies between key points (i, j, k) and (i + 1, j + 1,
-/// k + 1) and is stored at i + (nx - 1) * (j + (ny - 1) * k).
+/// The voxels that may contain the medium. Voxel (i, j, k) lies between key points (i, j, k) and (i + 1, j +
+/// 1, k + 1) and is stored at i + (nx - 1) * (j + (ny - 1) * k).
 struct Hull {
   Grid grid;
   std::vector<std::uint8_t> inside;  ///< 1 or 0; (nx - 1) * (ny - 1) * (nz - 1) values

@@ -23,8 +23,8 @@ std::size_t voxel_index(const Grid& g, int i, int j, int k) {
              (static_cast<std::size_t>(j) + static_cast<std::size_t>(g.ny - 1) * static_cast<std::size_t>(k));
 }
 
-/// Pixels whose rays can meet the grid's box: the rectangle around its projected corners, or the whole frame
-/// when the camera is so close that a corner lies behind it, or when distortion bends the box's edges
+/// The pixels whose rays may hit the grid's box: the rectangle around its projected corners; or the whole
+/// frame if the camera is so close that a corner lies behind it, or if distortion bends the box's edges
 /// outwards.
 PixelBox reach(const CameraModel& camera, const Grid& g) {
   const ImageSize size = camera.intrinsics.size;
@@ -49,25 +49,25 @@ PixelBox reach(const CameraModel& camera, const Grid& g) {
           bound(std::ceil(high.x()) + 1, size.width), bound(std::ceil(high.y()) + 1, size.height)};
 }
 
-/// Neighbouring rays read the same key points: what a tile's rays read stays in the nearest cache.
+/// Neighbouring rays read the same key points: the data for the rays of a tile stay in the L1 cache.
 constexpr int kTile = 16;
 struct PixelTile {
   std::uint32_t view;
   int x0, y0, x1, y1;
 };
 
-/// What one tile of pixels gives; runs are counted from the tile's own first.
+/// The rays of one tile of pixels; runs are counted from the first in the tile.
 struct TileRays {
   std::vector<MarchRay> rays;
   std::vector<Run> runs;
-  std::vector<Bend> bends;  // of curved rays, one a run
+  std::vector<Bend> bends;  // for curved rays, one per run
   std::vector<std::uint32_t> pixels;
   std::vector<int> subsets;
   std::uint32_t samples = 0;
-  std::vector<RayCounts> counts;  // of each subset
+  std::vector<RayCounts> counts;  // by subset
 };
 
-/// act(subset, pixel of the view) for all of a tile's pixels that belong to one.
+/// Calls act(subset, pixel of the view) for all of a tile's pixels that belong to a subset.
 template <class Act>
 void each_pixel(const PixelTile& tile, const PixelRays& camera, const RayListOptions& options,
                 const Act& act) {
@@ -79,7 +79,7 @@ void each_pixel(const PixelTile& tile, const PixelRays& camera, const RayListOpt
     }
 }
 
-/// Adds one ray; each_run(emit) gives its runs, of straight rays or of curved ones, whose runs have bends.
+/// Adds one ray; each_run(emit) gives its runs. Runs of curved rays have bends.
 enum class Rays { straight, curved };
 template <class EachRun>
 void add_ray(TileRays& out, int subset, std::uint32_t pixel, MarchRay ray, Rays rays,
@@ -102,7 +102,7 @@ void add_ray(TileRays& out, int subset, std::uint32_t pixel, MarchRay ray, Rays 
   counts = counts + RayCounts{1, ray.runs, out.samples - before};
 }
 
-/// Straight rays, a bundle at a time.
+/// Straight rays, one bundle at a time.
 class BundledPixels {
  public:
   BundledPixels(const CutRay& cut, const float* origin, TileRays& out) : cut_(cut), out_(out) {
@@ -159,14 +159,14 @@ TileRays clip_tile(const CutRay& cut, const PixelRays& camera, const float* orig
   return out;
 }
 
-/// Sorts by subset, tiles in order, so that the list doesn't depend on which thread did which tile.
+/// Sorts by subset, with tiles in order, so that the list is independent of the threads.
 void assemble(std::vector<TileRays>& tiles, int subsets, bool curved, RayList& list, Pool& pool) {
   RayCounts next;
   list.subset_begin.push_back(0);
   for (int s = 0; s < subsets; ++s) {
     for (TileRays& tile : tiles) {
       RayCounts& counts = tile.counts[static_cast<std::size_t>(s)];
-      std::swap(counts, next);  // from how many there are to where they go
+      std::swap(counts, next);  // converts counts to offsets
       next = next + counts;
     }
     list.subset_begin.push_back(next.rays);
@@ -306,7 +306,7 @@ PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, co
   for (std::size_t s = 0; s < subsets; ++s) {
     out.subset_begin.push_back(next);
     for (auto& tile : place) {
-      std::swap(tile[s], next);  // from how many there are to where they go
+      std::swap(tile[s], next);  // converts counts to offsets
       next += tile[s];
     }
   }

@@ -14,33 +14,33 @@ namespace emberlock::recon {
 
 struct CameraModel;
 
-/// The part of a hull's grid that holds all of it: its own grid, and where that starts in the whole one.
+/// A hull cropped to the part of its grid that contains it: its own grid, and its origin in the original one.
 struct CroppedHull {
   Hull hull;
   int offset[3] = {0, 0, 0};
 };
 CroppedHull crop_to_medium(const Hull& hull);
 
-/// A coarser hull: cubes of 2 x 2 x 2 voxels, kept where any of them is; key point (i, j, k) is the finer
-/// (2i, 2j, 2k).
+/// A coarser hull: cubes of 2 x 2 x 2 voxels, which are inside if any of their voxels is; key point (i, j, k)
+/// is the finer (2i, 2j, 2k).
 Hull coarsen(const Hull& hull);
 
-/// Every pixel ray that crosses a medium, clipped to it and cut where it enters another slab. Rays are sorted
+/// All pixel rays that cross a medium, clipped to it and divided into runs at slab borders. Rays are sorted
 /// by (subset, view, tile of pixels, row, column), runs and samples by ray.
 struct RayList {
   Grid grid;
-  std::vector<float> origins;  ///< 3 a view, in voxel edges from the grid's origin
+  std::vector<float> origins;  ///< 3 per view, in voxel edges from the grid's origin
   std::vector<MarchRay> rays;
   std::vector<Run> runs;
-  std::vector<Bend> bends;                ///< one a run, or empty where rays are straight
-  std::vector<std::uint32_t> pixels;      ///< a ray's pixel, y * width + x
+  std::vector<Bend> bends;                ///< one per run; empty for straight rays
+  std::vector<std::uint32_t> pixels;      ///< pixel of each ray, y * width + x
   std::vector<std::size_t> subset_begin;  ///< subsets + 1 values
   [[nodiscard]] RayTable table() const {
     return {origins.data(), rays.data(), runs.data(), bends.empty() ? nullptr : bends.data(),
             grid.nx,        grid.ny,     grid.nz};
   }
   [[nodiscard]] int subsets() const { return static_cast<int>(subset_begin.size()) - 1; }
-  /// The first run, or sample, of the ray `ray` or of those behind it; the number of all where there is none.
+  /// The first run (or sample) of ray `ray` or of the rays after it; the total number if there is none.
   [[nodiscard]] std::size_t first_run(std::size_t ray) const {
     return ray < rays.size() ? rays[ray].first_run : runs.size();
   }
@@ -48,11 +48,11 @@ struct RayList {
 };
 
 struct RayListOptions {
-  float step = 1;  ///< the longest step, voxel edges
+  float step = 1;  ///< maximum step, voxel edges
   int subsets = 1;
-  /// The subset of a pixel, or -1 to leave it out; all in subset 0 where empty.
+  /// The subset of a pixel, or -1 to omit it. If empty, all pixels are in subset 0.
   std::function<int(std::size_t view, int x, int y)> subset_of;
-  /// Gas that bends the rays, in the medium's voxel edges; the list then has bends. Straight where null.
+  /// Gas that bends the rays, in the medium's voxel edges; the list then has bends. Null: straight rays.
   const IndexField* gas = nullptr;
 };
 

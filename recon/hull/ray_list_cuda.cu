@@ -11,7 +11,7 @@ struct SumOfCounts {
   HOST_DEVICE RayCounts operator()(const RayCounts& a, const RayCounts& b) const { return a + b; }
 };
 
-/// Sums of those in front of each.
+/// Exclusive prefix sums.
 CudaBuffer<RayCounts> sums_before(const CudaBuffer<RayCounts>& counts) {
   auto sums = CudaBuffer<RayCounts>::unfilled(counts.size());
   std::size_t bytes = 0;
@@ -44,7 +44,7 @@ void cut_on_cuda(const CutRay& cut, const std::vector<PixelRays>& cameras, const
   of.cut.blocks.inside = occupied.data();
   of.cut.gas.values = gas.data();
 
-  // One more than there are pixels: the last sum is that of all.
+  // One more than the number of pixels: the last sum is the total.
   const CudaBuffer<RayCounts> counts(count + 1);
   launch(count, CountPixelRuns{of, counts.data()}, "counting runs");
   const CudaBuffer<RayCounts> before = sums_before(counts);

@@ -8,18 +8,18 @@
 
 namespace emberlock::recon {
 
-/// Pixels of some views, sorted by subset; subsets + 1 values in subset_begin.
+/// Pixels of some views, sorted by subset; subset_begin has subsets + 1 values.
 struct PixelsInOrder {
   std::vector<PixelOfView> pixels;
   std::vector<std::size_t> subset_begin;
 };
 
-/// Those that may have a ray, in the order of the list that their rays make.
+/// The pixels that may have a ray, in the order of the resulting list.
 PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, const Grid& grid,
                               const RayListOptions& options, Pool& pool);
 
-/// Cuts the pixels' rays on the GPU; `cut` points to the CPU's memory. `list` has its grid and origins, and
-/// gets all the rest. Throws a DeviceError.
+/// Computes the pixels' rays on the GPU; `cut` points to the CPU's memory. `list` must have its grid and
+/// origins, and receives the rest. Throws a DeviceError.
 void cut_on_cuda(const CutRay& cut, const std::vector<PixelRays>& cameras, const PixelsInOrder& pixels,
                  RayList& list);
 

@@ -70,7 +70,7 @@ enum class Verdict {
 
 /// What a view says of a cube of `size` voxels whose lowest key point is (i, j, k): the flame pixels inside
 /// the bounding rectangle of its eight projected corners.
-struct JudgeCube {
+struct ClassifyCube {
   Grid grid;
 
   HOST_DEVICE Verdict operator()(const Silhouette& s, int i, int j, int k, int size) const {
@@ -130,8 +130,8 @@ struct JudgeCube {
 
 /// The verdicts of all views, at most 64, on the way from large cubes to the voxels in them: what settles a
 /// cube for a view settles it for all that lies inside. A set of views has bit v for view v.
-struct JudgeCubes {
-  JudgeCube judge;
+struct ClassifyCubes {
+  ClassifyCube classify;
   const Silhouette* views = nullptr;
   int count = 0;
 
@@ -142,7 +142,7 @@ struct JudgeCubes {
   HOST_DEVICE bool carved(int i, int j, int k, int size, std::uint64_t& open) const {
     for (int v = 0; v < count; ++v) {
       if ((open >> v & 1) == 0) continue;
-      const Verdict verdict = judge(views[v], i, j, k, size);
+      const Verdict verdict = classify(views[v], i, j, k, size);
       if (verdict == Verdict::carved) return true;
       if (verdict == Verdict::flame) open &= ~(std::uint64_t{1} << v);
     }
@@ -152,11 +152,11 @@ struct JudgeCubes {
 
 /// One voxel of the hull: from the largest cube around it down to itself.
 struct CarveVoxel {
-  JudgeCubes cubes;
+  ClassifyCubes cubes;
   std::uint8_t* inside = nullptr;  ///< 1 or 0, voxel (i, j, k) as Hull stores it
 
   HOST_DEVICE void operator()(std::size_t voxel) const {
-    const Grid& g = cubes.judge.grid;
+    const Grid& g = cubes.classify.grid;
     const auto mx = static_cast<std::size_t>(g.nx - 1);
     const auto my = static_cast<std::size_t>(g.ny - 1);
     const int i = static_cast<int>(voxel % mx);
@@ -164,7 +164,7 @@ struct CarveVoxel {
     const int k = static_cast<int>(voxel / (mx * my));
     std::uint64_t open = cubes.all();
     inside[voxel] = 1;
-    for (int size = JudgeCubes::kRoot; size > 0 && open != 0; size /= 2) {
+    for (int size = ClassifyCubes::kRoot; size > 0 && open != 0; size /= 2) {
       if (cubes.carved(i & -size, j & -size, k & -size, size, open)) {
         inside[voxel] = 0;
         return;

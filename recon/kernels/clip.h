@@ -8,9 +8,9 @@
 
 namespace emberlock::recon {
 
-/// The voxels of a medium, mx by my by mz of them, within a border of empty ones: bytes, 1 or 0, voxel (i, j,
-/// k) at index(i, j, k). Coordinates are in voxel edges, voxel (i, j, k) being [i, i + 1) x [j, j + 1) x [k,
-/// k + 1); the last one is closed.
+/// The voxels of a medium, mx * my * mz of them, surrounded by a border of empty ones: bytes, 1 or 0, voxel
+/// (i, j, k) at index(i, j, k). Coordinates are in voxel edges; voxel (i, j, k) is [i, i + 1) x [j, j + 1) x
+/// [k, k + 1); the last one is closed.
 struct VoxelMask {
   int mx = 0, my = 0, mz = 0;
   const std::uint8_t* inside = nullptr;
@@ -24,9 +24,8 @@ struct VoxelMask {
   }
 };
 
-/// Clips a ray to the box [0, mx] x [0, my] x [0, mz]: false where it misses. A ray parallel to an axis is
-/// judged by its coordinate alone, because 0 * infinity in the usual form would lose rays that run along a
-/// face.
+/// Clips a ray to the box [0, mx] x [0, my] x [0, mz]; false if it misses. For a ray parallel to an axis only
+/// its coordinate is tested, because 0 * infinity in the usual formula would lose rays along a face.
 HOST_DEVICE inline bool clip_to_box(const VoxelMask& mask, const float* origin, const float* direction,
                                     float& enter, float& leave) {
   const int size[3] = {mask.mx, mask.my, mask.mz};
@@ -46,10 +45,10 @@ HOST_DEVICE inline bool clip_to_box(const VoxelMask& mask, const float* origin, 
   return enter < leave;
 }
 
-/// Walks the voxels that a ray crosses between t and leave (Amanatides and Woo 1987), within the box, and
-/// emits every stretch [t0, t1] inside the medium, front to back; t counts voxel edges from the origin
-/// (direction of unit length). Which face comes next is chosen without branches: nobody could predict them.
-/// Rounding can lead one voxel past the box, into the border.
+/// Walks through the voxels that a ray crosses between t and leave (Amanatides and Woo 1987), within the box,
+/// and emits every interval [t0, t1] inside the medium, front to back. t counts voxel edges from the origin
+/// (direction of unit length). The next face is selected without branches, which would be unpredictable.
+/// Rounding can lead one voxel beyond the box, into the border.
 template <class Emit>
 HOST_DEVICE inline void walk_voxels(const VoxelMask& mask, const float* origin, const float* direction,
                                     float t, float leave, const Emit& emit) {
@@ -96,9 +95,8 @@ HOST_DEVICE inline void walk_voxels(const VoxelMask& mask, const float* origin, 
   if (before != 0) emit(start, leave);
 }
 
-/// Every stretch of a ray inside the medium, front to back, from t = 0 on. `blocks` holds a 1 for each
-/// kBlock^3 voxels that aren't all empty: what lies before the first of them, and behind the last, is never
-/// walked.
+/// All intervals of a ray inside the medium, front to back, from t = 0 on. `blocks` has a 1 for each kBlock^3
+/// voxels that aren't all empty: the parts before the first and behind the last of them are skipped.
 inline constexpr int kBlock = 4;
 template <class Emit>
 HOST_DEVICE inline void clip_to_medium(const VoxelMask& mask, const VoxelMask& blocks, const float* origin,
@@ -115,7 +113,7 @@ HOST_DEVICE inline void clip_to_medium(const VoxelMask& mask, const VoxelMask& b
     last = t1;
   });
   if (first < 0) return;
-  constexpr float kMargin = 0.01F;  // voxel edges: the two walks round differently
+  constexpr float kMargin = 0.01F;  // voxel edges; the two walks round differently
   const float from = kBlock * first - kMargin;
   const float to = kBlock * last + kMargin;
   walk_voxels(mask, origin, direction, from > enter ? from : enter, to < leave ? to : leave, emit);

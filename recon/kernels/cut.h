@@ -12,8 +12,8 @@
 
 namespace emberlock::recon {
 
-/// Cuts samples [0, count) of a stretch at the slabs' borders: piece(first, size), front to back. `z` is
-/// where the line starts and `dz` its direction along z.
+/// Divides samples [0, count) of an interval at the slabs' borders: calls piece(first, size), front to back.
+/// `z` is the start of the line and `dz` its direction along z.
 template <class Piece>
 HOST_DEVICE inline void cut_at_slabs(float z, float dz, float start, float step, int count, int layers,
                                      const Piece& piece) {
@@ -37,15 +37,15 @@ HOST_DEVICE inline void cut_at_slabs(float z, float dz, float start, float step,
   }
 }
 
-/// Finds a ray's runs: where it crosses the medium, in equal steps, cut where it enters another slab.
+/// Finds a ray's runs: its intervals inside the medium, in equal steps, divided at slab borders.
 struct CutRay {
   VoxelMask voxels;
-  VoxelMask blocks;  ///< as clip_to_medium() takes them
-  float step = 1;    ///< the longest, voxel edges
-  IndexField gas;    ///< bends the rays where it has values
+  VoxelMask blocks;  ///< as for clip_to_medium()
+  float step = 1;    ///< maximum, voxel edges
+  IndexField gas;    ///< bends the rays if it has values
 
-  /// emit(run, origin, direction) for every run, front to back; ray and first_sample are left to the caller.
-  /// Origin and direction are those of the straight line that the run lies on.
+  /// Calls emit(run, origin, direction) for every run, front to back; the caller sets ray and first_sample.
+  /// Origin and direction are those of the straight line that contains the run.
   template <class Emit>
   HOST_DEVICE inline void operator()(const float* origin, const float* direction, const Emit& emit) const {
     float before = 0;
@@ -58,19 +58,19 @@ struct CutRay {
     });
   }
 
-  /// The runs of a stretch [t0, t1] of a straight line, all of it inside the medium; `before` is what lies
-  /// there in front of it, and then with it.
+  /// The runs of an interval [t0, t1] of a straight line, which lies inside the medium; `before` is the
+  /// length of the medium in front of it, and is increased by it.
   template <class Emit>
   HOST_DEVICE inline void cut_stretch(const float* origin, const float* direction, float t0, float t1,
                                       float& before, const Emit& emit) const {
-    constexpr float kSliver = 1e-4F;  // voxel edges; a corner that is barely touched adds nothing
+    constexpr float kSliver = 1e-4F;  // voxel edges; a touched corner contributes nothing
     if (t1 - t0 < kSliver) return;
     const int steps = static_cast<int>(ceilf((t1 - t0) / step - 1e-3F));
     const int count = steps > 1 ? steps : 1;
     const float ds = (t1 - t0) / static_cast<float>(count);
     cut_at_slabs(origin[2], direction[2], t0, ds, count, voxels.mz, [&](int first, int size) {
       const float ahead = static_cast<float>(first) * ds;
-      // The middle sample tells the slab: the first may have been rounded across the border.
+      // The middle sample determines the slab, because rounding may put the first one across the border.
       const int middle = first + size / 2;
       const float t = t0 + (static_cast<float>(middle) + 0.5F) * ds;
       const int slab = clamp_cell(origin[2] + direction[2] * t, voxels.mz + 1) / kSlab;
@@ -80,7 +80,7 @@ struct CutRay {
   }
 
  private:
-  /// The runs of a straight line's first `length` edges.
+  /// The runs of the first `length` edges of a straight line.
   template <class Emit>
   HOST_DEVICE inline void cut_line(const float* origin, const float* direction, float length, float& before,
                                    const Emit& emit) const {
@@ -104,17 +104,17 @@ struct RayCounts {
   }
 };
 
-/// Cuts the rays of a list of pixels, in two passes, so that each knows its place: counts, whose sums over
-/// those before it are taken in between, and the list itself.
+/// Computes the rays of a list of pixels in two passes, so that each knows its place in the list: first
+/// counts, which are then summed over the preceding pixels, then the list itself.
 struct CutPixels {
   CutRay cut;
-  const PixelRays* cameras = nullptr;  ///< one a view
-  const float* origins = nullptr;      ///< 3 a view, in voxel edges
+  const PixelRays* cameras = nullptr;  ///< one per view
+  const float* origins = nullptr;      ///< 3 per view, in voxel edges
   const PixelOfView* pixels = nullptr;
 };
 struct CountPixelRuns {
   CutPixels of;
-  RayCounts* counts = nullptr;  ///< one a pixel
+  RayCounts* counts = nullptr;  ///< one per pixel
 
   HOST_DEVICE inline void operator()(std::size_t n) const {
     const PixelOfView at = of.pixels[n];
@@ -131,11 +131,11 @@ struct CountPixelRuns {
 };
 struct WritePixelRuns {
   CutPixels of;
-  const RayCounts* before = nullptr;  ///< of the pixels in front, one a pixel
+  const RayCounts* before = nullptr;  ///< of the preceding pixels, one per pixel
   MarchRay* rays = nullptr;
   Run* runs = nullptr;
-  Bend* bends = nullptr;            ///< null where rays are straight
-  std::uint32_t* pixels = nullptr;  ///< one a ray
+  Bend* bends = nullptr;            ///< null for straight rays
+  std::uint32_t* pixels = nullptr;  ///< one per ray
 
   HOST_DEVICE inline void operator()(std::size_t n) const {
     const PixelOfView at = of.pixels[n];

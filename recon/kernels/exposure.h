@@ -8,15 +8,15 @@
 
 namespace emberlock::recon {
 
-/// One key point of a column average along z: out(k) = sum of weight(m) * in(k - m) over m = -reach..reach,
-/// nothing outside the grid. With `direction` -1 it reads in(k + m): the transpose.
+/// One key point of an average along z: out(k) = sum of weight(m) * in(k - m) over m = -reach..reach, with
+/// zeros outside the grid. With `direction` -1 it reads in(k + m): the transpose.
 template <class Real>
 struct AverageAlongZ {
   const Quad<Real>* in = nullptr;
   Quad<Real>* out = nullptr;
-  std::size_t plane = 0;  ///< key points of a layer
+  std::size_t plane = 0;  ///< key points per layer
   int nz = 0;
-  const float* weights = nullptr;  ///< 2 * reach + 1, that of m = -reach first
+  const float* weights = nullptr;  ///< 2 * reach + 1 values, from m = -reach on
   int reach = 0;
   int direction = 1;
 

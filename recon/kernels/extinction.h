@@ -7,7 +7,7 @@
 
 namespace emberlock::recon {
 
-/// Named functions of the C library: unlike <cmath>'s overloads they are no inline functions of ours.
+/// Functions of the C library: unlike <cmath>'s overloads they aren't inline functions of this program.
 HOST_DEVICE inline float exp_of(float x) { return expf(x); }
 HOST_DEVICE inline double exp_of(double x) { return exp(x); }
 HOST_DEVICE inline float expm1_of(float x) { return expm1f(x); }
@@ -15,11 +15,11 @@ HOST_DEVICE inline double expm1_of(double x) { return expm1(x); }
 HOST_DEVICE inline float sqrt_of(float x) { return sqrtf(x); }
 HOST_DEVICE inline double sqrt_of(double x) { return sqrt(x); }
 
-// What the medium takes from the light, as policies of the march: chosen once on the host, so that the code
-// of the others isn't there at all. x is the optical depth of a step, sigma ds; phi(x) = (1 - exp(-x)) / x.
+// The extinction as policies of the march, selected once on the host, so that the code contains no trace of
+// the others. x is the optical depth of a step, sigma ds; phi(x) = (1 - exp(-x)) / x.
 
-/// phi(x) and its derivative by their series, to single precision for 0 <= x <= 0.5, to double for x <= 1e-3:
-/// no branch and no call, so that loops over it become vector code.
+/// phi(x) and its derivative by their series: single precision for 0 <= x <= 0.5, double precision for x <=
+/// 1e-3. Without branches and calls, so that loops over it are vectorized.
 template <class Real>
 HOST_DEVICE inline Real phi_series(Real x) {
   constexpr Real c2 = Real(1.0 / 2), c3 = Real(1.0 / 6), c4 = Real(1.0 / 24), c5 = Real(1.0 / 120),
@@ -32,7 +32,7 @@ HOST_DEVICE inline Real phi_slope_series(Real x) {
                  c6 = Real(1.0 / 144), c7 = Real(1.0 / 840), c8 = Real(1.0 / 5760);
   return -c2 + x * (c3 - x * (c4 - x * (c5 - x * (c6 - x * (c7 - x * c8)))));
 }
-/// Up to which depth the series serve.
+/// The largest depth for the series.
 template <class Real>
 HOST_DEVICE constexpr Real series_limit() {
   return sizeof(Real) == sizeof(float) ? Real(0.5) : Real(0.01);
@@ -49,7 +49,7 @@ HOST_DEVICE inline Real phi_slope(Real x) {
   return (exp_of(-x) * (1 + x) - 1) / (x * x);
 }
 
-/// Nothing of the transmittance is ever computed.
+/// No extinction: the transmittance isn't computed at all.
 template <class Real>
 struct NoExtinction {
   static constexpr bool kField = false;
@@ -58,7 +58,7 @@ struct NoExtinction {
   [[nodiscard]] HOST_DEVICE Real weight(Real step) const { return step; }
 };
 
-/// Constant inside the medium, `sigma` a voxel edge.
+/// Constant inside the medium: `sigma` per voxel edge.
 template <class Real>
 struct ConstantExtinction {
   static constexpr bool kField = false;
@@ -69,7 +69,7 @@ struct ConstantExtinction {
   [[nodiscard]] HOST_DEVICE Real weight(Real step) const { return step * phi(sigma * step); }
 };
 
-/// Lane 3 of the volume, a voxel edge, trilinear between key points.
+/// Lane 3 of the volume, per voxel edge, trilinear between key points.
 template <class Real>
 struct FieldExtinction {
   static constexpr bool kField = true;

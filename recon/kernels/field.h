@@ -11,19 +11,19 @@ namespace emberlock::recon {
 //   dL/dsigma_k = T_k j_k ds^2 phi'(x_k) - ds (L - A_k)
 // where A_k is the radiance up to and through step k, and L includes what lies behind the medium.
 
-/// What a batch of samples does to the light, from their optical depths.
+/// The effect of a batch of samples on the light, from their optical depths.
 template <class Real>
 struct Steps {  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
   Real depth[kBatch];
   Real mean[kBatch];   ///< phi(depth)
   Real slope[kBatch];  ///< phi'(depth)
-  bool thin = false;   ///< the series serve for all of them
+  bool thin = false;   ///< the series are accurate for all of them
 
-  /// Depths of the samples whose extinction is lane 3 of `values`; the rest of the batch, from `here` on, has
-  /// none.
+  /// Sets the depths of the samples, with the extinction in lane 3 of `values`; the rest of the batch, from
+  /// `here` on, gets 0.
   HOST_DEVICE void take(const Quad<Real>* values, int here, Real step) {
     for (int i = 0; i < here; ++i) depth[i] = values[i].c[3] * step;
-    for (int i = here; i < kBatch; ++i) depth[i] = 0;  // what comes next may be another thread's
+    for (int i = here; i < kBatch; ++i) depth[i] = 0;  // the following samples may belong to another thread
     Real deepest = 0;
     for (int i = 0; i < kBatch; ++i) deepest = deepest > depth[i] ? deepest : depth[i];
     thin = deepest < series_limit<Real>();
@@ -48,7 +48,7 @@ struct Steps {  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before
 /// What a ray leaves at each of its samples for the adjoint: the radiance's weight of the emission, and the
 /// residual's derivative by the extinction.
 ///
-/// Marches a ray, takes its residual by `judge(ray, radiance with the transmittance in lane 3)`, and fills
+/// Marches a ray, takes its residual by `keep(ray, radiance with the transmittance in lane 3)`, and fills
 /// `samples` from the first sample of the ray on: lane 0 the emission's weight, lane 1 the slope by
 /// extinction.
 template <class Real, class Path>
@@ -58,8 +58,8 @@ struct FieldForward {
   Quad<Real>* samples = nullptr;  ///< first_sample counts from `first_sample` on
   std::size_t first_sample = 0;
 
-  template <class Judge>
-  HOST_DEVICE void operator()(std::size_t ray, const Judge& judge) const {
+  template <class Keep>
+  HOST_DEVICE void operator()(std::size_t ray, const Keep& keep) const {
     const MarchRay& r = table.rays[ray];
     const std::size_t row = static_cast<std::size_t>(table.nx);
     const std::size_t plane = row * static_cast<std::size_t>(table.ny);
@@ -86,8 +86,8 @@ struct FieldForward {
       }
     }
     radiance.c[3] = transmittance;
-    const Quad<Real> residual = judge(ray, radiance);
-    // `behind` is R . (L - A): lane 3 carries what the medium's far end passes on, judged by the caller.
+    const Quad<Real> residual = keep(ray, radiance);
+    // `behind` is R . (L - A): lane 3 carries what the medium's far end passes on, weighed by the caller.
     Real behind = residual.c[0] * radiance.c[0] + residual.c[1] * radiance.c[1] +
                   residual.c[2] * radiance.c[2] + residual.c[3] * transmittance;
     transmittance = 1;
@@ -115,13 +115,13 @@ struct FieldForward {
   }
 };
 
-/// The transpose, for one run: puts where its samples lie the residual times the emission's weight, and the
-/// slope by extinction in lane 3.
+/// The transpose for one run: puts at its samples' places the residual times the emission's weight, and the
+/// derivative by extinction in lane 3.
 template <class Real, class Path, class Put = IntoKeyPoints<Real>>
 struct FieldAdjoint {
   RayTable table;
-  const Quad<Real>* residual = nullptr;  ///< one a ray
-  const Quad<Real>* samples = nullptr;   ///< as FieldForward left them
+  const Quad<Real>* residual = nullptr;  ///< one per ray
+  const Quad<Real>* samples = nullptr;   ///< the output of FieldForward
   std::size_t first_sample = 0;
   Put put;
 

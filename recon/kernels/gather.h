@@ -10,18 +10,18 @@
 
 namespace emberlock::recon {
 
-// Transposes where thousands of threads run at once: nobody adds to a key point that another adds to. Every
-// sample's share is laid aside at its own place; then each key point takes what lies in the eight voxels
-// around it, in the list's order, which no run of the program changes.
+// Transposes for thousands of concurrent threads: no two threads add to the same key point. Every sample's
+// contribution is stored at its own place; then each key point sums those in the eight voxels around it, in
+// the order of the list, which is the same in every run.
 
-/// What a sample gives, and where in its voxel it lies. The size of what the GPU reads at once.
+/// A sample's contribution, and its position within its voxel. Its size is that of one GPU memory access.
 template <class Real>
 struct alignas(8 * sizeof(Real)) Deposit {
   Quad<Real> w;
   Real fx = 0, fy = 0, fz = 0;
 };
 
-/// Where a transpose puts what its samples give: aside. `first_sample` is the first that has a place.
+/// Stores the contributions of a transpose. `first_sample` is the first sample with a place.
 template <class Real>
 struct LayAside {
   Deposit<Real>* deposits = nullptr;
@@ -41,7 +41,7 @@ struct LayAside {
 template <class Real, class Path>
 struct NameVoxels {
   RayTable table;
-  std::uint32_t* voxels = nullptr;  ///< one a sample
+  std::uint32_t* voxels = nullptr;  ///< one per sample
   std::size_t first_sample = 0;
 
   HOST_DEVICE void operator()(std::size_t n) const {
@@ -66,7 +66,7 @@ struct Number {
   HOST_DEVICE void operator()(std::size_t i) const { to[i] = static_cast<std::uint32_t>(i); }
 };
 
-/// begin[v]: how many of the sorted voxels come before v.
+/// begin[v]: number of sorted voxels before v.
 struct FindBegin {
   const std::uint32_t* sorted = nullptr;
   std::uint32_t count = 0;
@@ -86,13 +86,13 @@ struct FindBegin {
   }
 };
 
-/// Samples by voxel: those of voxel v are order[begin[v]] .. order[begin[v + 1] - 1], rising.
+/// Samples by voxel: those of voxel v are order[begin[v]] .. order[begin[v + 1] - 1], ascending.
 struct SamplesByVoxel {
   const std::uint32_t* order = nullptr;
-  const std::uint32_t* begin = nullptr;  ///< key points + 1
+  const std::uint32_t* begin = nullptr;  ///< key points + 1 values
 };
 
-/// Adds to one key point what the samples around it have laid aside.
+/// Adds the stored contributions of the samples around one key point.
 template <class Real, class Spread = Trilinear>
 struct GatherDeposits {
   int nx = 2, ny = 2;
@@ -120,7 +120,7 @@ struct GatherDeposits {
   }
 
  private:
-  /// The key point being the voxel's corner `corner` (bit 0 along x, 1 along y, 2 along z).
+  /// For a key point at the voxel's corner `corner` (bit 0 along x, 1 along y, 2 along z).
   template <int corner>
   HOST_DEVICE void take(std::size_t voxel, Quad<Real>& sum) const {
     const std::uint32_t end = samples.begin[voxel + 1];

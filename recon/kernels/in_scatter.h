@@ -13,22 +13,23 @@
 
 namespace emberlock::recon {
 
-// Light that arrives at coarse key points, by long characteristics: from a key point against the direction of
-// travel to the face of the grid's box. Coordinates and lengths count coarse edges.
+// Light that arrives at coarse key points, by long characteristics: from a key point, against the direction
+// of travel, to the face of the grid's box. Coordinates and lengths are in coarse edges.
 
 /// One direction of the discrete ordinates.
 struct Ordinate {
-  float travel[3] = {0, 0, 1};  ///< where light goes, unit length
-  float weight = 0;             ///< its solid angle, sr; all sum to 4 pi
+  float travel[3] = {0, 0, 1};  ///< direction of the light, unit length
+  float weight = 0;             ///< its solid angle, sr; the sum is 4 pi
 };
 
-/// What shines at a coarse grid's key points, trilinear between them: lanes 0..2 the source an edge, lane 3
-/// sigma_t an edge.
+/// The source at the key points of a coarse grid, trilinear between them: lanes 0..2 the source per edge,
+/// lane 3 sigma_t per edge.
 struct ShiningGrid {
   int nx = 2, ny = 2, nz = 2;
   const Rgba* shine = nullptr;
 
-  /// In the voxel whose lowest key point is p; four lanes at a time, for code without wider ones.
+  /// Inside the voxel whose lowest key point is p; processes four lanes at a time, for CPUs without wider
+  /// vectors.
   [[nodiscard]] HOST_DEVICE Rgba inside(const Rgba* p, float fx, float fy, float fz) const {
     const auto row = static_cast<std::size_t>(nx);
     const std::size_t plane = row * static_cast<std::size_t>(ny);
@@ -53,7 +54,8 @@ struct ShiningGrid {
                   z - static_cast<float>(k));
   }
 
-  /// From p against `travel` to the box's face; 0 where p lies on a face that the light enters by.
+  /// Distance from p against `travel` to the box's face; 0 if p lies on a face through which the light
+  /// enters.
   [[nodiscard]] HOST_DEVICE float way_out(const float* p, const float* travel) const {
     const int last[3] = {nx - 1, ny - 1, nz - 1};
     float length = 1e30F;
@@ -66,7 +68,7 @@ struct ShiningGrid {
   }
 };
 
-/// L += T S ds phi(sigma ds), T *= exp(-sigma ds), phi(x) = (1 - exp(-x)) / x, from an eye outwards.
+/// L += T S ds phi(sigma ds), T *= exp(-sigma ds), phi(x) = (1 - exp(-x)) / x, outwards from an eye.
 struct Radiance {
   Rgba sum;
   float transmittance = 1;
@@ -77,9 +79,9 @@ struct Radiance {
     sum = sum + (transmittance * ds * mean) * shine;
     transmittance *= 1 - x * mean;
   }
-  /// Less than this gets through: nothing beyond it is looked at.
+  /// Almost nothing gets through, so the march can stop.
   [[nodiscard]] HOST_DEVICE bool opaque() const { return transmittance < 1e-5F; }
-  /// Lanes 0..2 the radiance, lane 3 the share of light that the way takes away, 1 - T.
+  /// Lanes 0..2: the radiance; lane 3: the share of light absorbed on the way, 1 - T.
   [[nodiscard]] HOST_DEVICE Rgba arrived() const {
     Rgba all = sum;
     all.c[3] = 1 - transmittance;
@@ -87,9 +89,9 @@ struct Radiance {
   }
 };
 
-/// The middle of a step of one edge along an ordinate: how far its voxel lies from the eye's key point (an
-/// index), and the position inside. The same for every eye, because key points have whole coordinates. No
-/// ordinate runs along a face, so a step that ends inside the box has its middle's voxel inside too.
+/// The middle of a step of one edge along an ordinate: its voxel as an index offset from the eye's key point,
+/// and the position within the voxel. The same for every eye, because key points have integer coordinates. No
+/// ordinate runs along a face, so if a step ends inside the box, the voxel of its middle is inside too.
 struct Footstep {
   std::ptrdiff_t voxel = 0;
   float fx = 0, fy = 0, fz = 0;
@@ -110,15 +112,15 @@ HOST_DEVICE inline Footstep footstep(const ShiningGrid& grid, const float* trave
           x - i, y - j, z - k};
 }
 
-/// The radiance that arrives at the key point p, of index `eye`, travelling along `travel`: S and sigma at
-/// the middles of steps of one edge and of the rest up to the face. `footsteps` are those of an ordinate, as
-/// many as the grid's diagonal is long; null for other directions.
+/// The radiance that arrives at the key point p, of index `eye`, along `travel`: S and sigma are sampled at
+/// the middles of steps of one edge and of the remainder up to the face. `footsteps` are those of an
+/// ordinate, as many as the length of the grid's diagonal; null for other directions.
 struct ArrivingRadiance {
   ShiningGrid grid;
   const Footstep* footsteps = nullptr;
 
   HOST_DEVICE Rgba operator()(const float* p, std::size_t eye, const float* travel) const {
-    constexpr float kTouch = 1e-4F;  // shorter rests are rounding on a face
+    constexpr float kTouch = 1e-4F;  // shorter remainders are rounding errors at a face
     const float length = grid.way_out(p, travel);
     const int whole = static_cast<int>(length);
     Radiance radiance;
@@ -152,12 +154,12 @@ HOST_DEVICE inline void key_point(int nx, int ny, std::size_t at, float* p) {
   p[2] = static_cast<float>(at / (row * rows));  // NOLINT(bugprone-integer-division): a whole row or layer
 }
 
-/// What arrives at the n-th active key point along ordinate m.
+/// The radiance that arrives at the n-th active key point along ordinate m.
 struct ArriveAt {
   ShiningGrid grid;        ///< of ordinate 0
-  std::size_t stride = 0;  ///< ordinate m sees grid.shine + m * stride
+  std::size_t stride = 0;  ///< ordinate m uses grid.shine + m * stride
   const Ordinate* ordinates = nullptr;
-  const Footstep* footsteps = nullptr;  ///< `reach` an ordinate
+  const Footstep* footsteps = nullptr;  ///< `reach` per ordinate
   std::size_t reach = 0;
   const std::size_t* active = nullptr;
 
@@ -169,28 +171,28 @@ struct ArriveAt {
     return arriving(p, active[n], ordinates[m].travel);
   }
 };
-/// All of them, [ordinate][active point].
+/// The same for all, [ordinate][active point].
 struct Arrive {
   ArriveAt at;
-  std::size_t count = 0;  ///< active points
+  std::size_t count = 0;  ///< number of active points
   Rgba* radiance = nullptr;
 
   HOST_DEVICE void operator()(std::size_t i) const { radiance[i] = at(i % count, i / count); }
 };
 
-/// The in-scatter integral, Int p L dw', towards one of the ordinates or, with one row of equal values, of
-/// isotropic scattering: a row of the discrete phase matrix times the radiances.
+/// The in-scatter integral, Int p L dw', towards one of the ordinates, or for isotropic scattering with one
+/// row of equal values: a row of the discrete phase matrix times the radiances.
 HOST_DEVICE inline Rgba scattered(const float* row, const Rgba* radiance, std::size_t stride, int ordinates) {
   Rgba sum;
   for (int m = 0; m < ordinates; ++m) sum = sum + row[m] * radiance[static_cast<std::size_t>(m) * stride];
   return sum;
 }
 
-/// All of them, [row][active point].
+/// The same for all, [row][active point].
 struct Scatter {
   const float* phase = nullptr;  ///< [row][ordinate]
   int ordinates = 0;
-  std::size_t count = 0;  ///< active points
+  std::size_t count = 0;  ///< number of active points
   const Rgba* radiance = nullptr;
   Rgba* out = nullptr;
 
@@ -200,8 +202,8 @@ struct Scatter {
   }
 };
 
-/// The same integral towards any direction: the phase function's values at the ordinates, scaled to integrate
-/// to 1.
+/// The same integral towards any direction: the phase function's values at the ordinates, normalised to
+/// integrate to 1.
 struct ScatteredTowards {
   HenyeyGreenstein<float> phase;
   const Ordinate* ordinates = nullptr;
@@ -221,12 +223,12 @@ struct ScatteredTowards {
   }
 };
 
-/// From a key point to a camera's centre.
+/// The direction from a key point to a camera's centre.
 struct WayToCamera {
   int nx = 2, ny = 2;
   double center[3] = {0, 0, 0};  ///< in coarse edges
 
-  /// `direction` of unit length; up where the camera is the point.
+  /// `direction` has unit length; up if the camera is at the point.
   HOST_DEVICE void operator()(std::size_t at, float* point, float* direction) const {
     key_point(nx, ny, at, point);
     double d[3];
@@ -237,14 +239,14 @@ struct WayToCamera {
   }
 };
 
-/// Anisotropic G of what the ordinates resolve, from the n-th active point towards a camera.
+/// The part of anisotropic G that the ordinates resolve, from the n-th active point towards a camera.
 struct BluntTowards {
   WayToCamera way;
   ScatteredTowards towards;
   const std::size_t* active = nullptr;
-  std::size_t count = 0;           ///< active points
+  std::size_t count = 0;           ///< number of active points
   const Rgba* radiance = nullptr;  ///< [ordinate][active point]
-  Rgba* out = nullptr;             ///< one a key point
+  Rgba* out = nullptr;             ///< one per key point
 
   HOST_DEVICE void operator()(std::size_t n) const {
     float point[3];
@@ -256,15 +258,15 @@ struct BluntTowards {
   }
 };
 
-/// Mixes the peak's light into it: what comes from straight behind the point, or from the camera's side.
+/// Adds the peak's light: from straight behind the point, or from the camera's side.
 struct MixPeak {
   WayToCamera way;
   ShiningGrid grid;
   const std::size_t* active = nullptr;
-  std::size_t count = 0;  ///< active points
-  float peak = 0;         ///< its share
+  std::size_t count = 0;  ///< number of active points
+  float peak = 0;         ///< share of the peak
   bool back = false;
-  Rgba* out = nullptr;  ///< one a key point
+  Rgba* out = nullptr;  ///< one per key point
 
   HOST_DEVICE void operator()(std::size_t n) const {
     float point[3];

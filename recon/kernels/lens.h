@@ -8,8 +8,8 @@
 
 namespace emberlock::recon {
 
-/// Where Brown-Conrady distortion moves normalised image coordinates; numbers may be double, or carry
-/// derivatives. Arguments by value: the target may be the source.
+/// Applies Brown-Conrady distortion to normalised image coordinates; numbers may be double, or carry
+/// derivatives. Arguments are passed by value, so the output may be the input.
 template <class T>
 HOST_DEVICE inline void brown_conrady(T k1, T k2, T p1, T p2, T k3, T x, T y, T& to_x, T& to_y) {
   const T r2 = x * x + y * y;
@@ -18,7 +18,7 @@ HOST_DEVICE inline void brown_conrady(T k1, T k2, T p1, T p2, T k3, T x, T y, T&
   to_y = y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y;
 }
 
-/// Brown-Conrady distortion of normalised image coordinates, as OpenCV's first five coefficients.
+/// Brown-Conrady distortion of normalised image coordinates, with OpenCV's first five coefficients.
 struct Distortion {
   double k1 = 0, k2 = 0, p1 = 0, p2 = 0, k3 = 0;
 
@@ -45,7 +45,7 @@ struct Distortion {
   }
 };
 
-/// A camera's rays as a kernel needs them: the direction, of unit length, through the centre of a pixel.
+/// A camera's rays for kernels: the direction, of unit length, through the centre of a pixel.
 struct PixelRays {
   double world_from_camera[9] = {};  ///< row-major
   double fx = 1, fy = 1, cx = 0, cy = 0;

@@ -10,21 +10,22 @@
 
 namespace emberlock::recon {
 
-// One source for the march, on the CPU and on the GPU, in single and in double precision. Coordinates count
-// voxel edges from key point (0, 0, 0). Policies: what extinguishes (extinction.h) and how rays run
-// (StraightPath, CurvedPath).
+// The source code of the march for CPU and GPU, single and double precision. Coordinates are in voxel edges
+// from key point (0, 0, 0). Policies: the extinction (extinction.h) and the paths of rays (StraightPath,
+// CurvedPath).
 
-/// Layers of voxels along z that one run may touch. Slabs that have one between them share no key point.
+/// Maximum number of voxel layers along z that a run may touch. Two slabs with another one between them share
+/// no key point.
 inline constexpr int kSlab = 8;
 
-/// A stretch of a ray inside the medium, cut into equal steps; sample i lies at start + (i + 0.5) * step. Its
-/// samples' voxels all lie in one slab of layers along z.
+/// An interval of a ray inside the medium, divided into equal steps; sample i lies at start + (i + 0.5) *
+/// step. The voxels of its samples all lie in one slab of layers along z.
 struct Run {
   float start = 0;
   float step = 0;
-  float before = 0;  ///< length inside the medium in front of this run
+  float before = 0;  ///< length of the medium in front of this run
   std::uint32_t ray = 0;
-  std::uint32_t first_sample = 0;  ///< samples of the whole list in front of this run
+  std::uint32_t first_sample = 0;  ///< number of samples in the whole list in front of this run
   int count = 0;
   int slab = 0;
 };
@@ -36,18 +37,18 @@ struct MarchRay {
   std::uint32_t runs = 0;
 };
 
-/// Where a run of a curved ray starts to count, and where it heads (unit length).
+/// The start and direction (unit length) of a run of a curved ray.
 struct Bend {
   float origin[3] = {0, 0, 0};
   float direction[3] = {0, 0, 1};
 };
 
-/// Rays and the key points that they march through; plain pointers, so that it lives on either side.
+/// Rays, and the key points of the grid; plain pointers, so that it can be used on CPU and GPU.
 struct RayTable {
-  const float* origins = nullptr;  ///< 3 a view
+  const float* origins = nullptr;  ///< 3 per view
   const MarchRay* rays = nullptr;
   const Run* runs = nullptr;
-  const Bend* bends = nullptr;  ///< one a run; null where rays are straight
+  const Bend* bends = nullptr;  ///< one per run; null for straight rays
   int nx = 2, ny = 2, nz = 2;   ///< key points
 };
 
@@ -66,8 +67,8 @@ struct StraightPath {
     return {t.origins + 3 * static_cast<std::size_t>(ray.view), ray.direction};
   }
 };
-/// The adjoint on curved paths is that of the fixed path: what the medium does to the path itself is not
-/// followed.
+/// For curved paths the adjoint is that of the fixed path: the medium's influence on the path itself is
+/// neglected.
 struct CurvedPath {
   template <class Real>
   HOST_DEVICE static Line<Real> line(const RayTable& t, std::size_t run) {
@@ -75,14 +76,15 @@ struct CurvedPath {
   }
 };
 
-/// Samples that are located at once: on the CPU the loop over them becomes vector code.
+/// Number of samples located at once: on the CPU the loop over them is vectorized.
 #ifdef __CUDA_ARCH__
 inline constexpr int kBatch = 1;
 #else
 inline constexpr int kBatch = 16;
 #endif
 
-/// The voxels of consecutive samples: index of each one's lowest key point, and the position inside.
+/// The voxels of consecutive samples: the index of each one's lowest key point, and the position within the
+/// voxel.
 template <class Real>
 struct Batch {
   alignas(64) Real fx[kBatch];
@@ -91,7 +93,7 @@ struct Batch {
   alignas(64) std::int32_t base[kBatch];
 };
 
-/// `low` for what is not a number.
+/// Returns `low` for NaN.
 template <class T>
 HOST_DEVICE inline T clamp_to(T i, T low, T high) {
   const T above = i > low ? i : low;
@@ -102,9 +104,9 @@ HOST_DEVICE inline int clamp_cell(float p, int key_points) {
   return clamp_to(static_cast<int>(p), 0, key_points - 2);
 }
 
-/// Samples `first` .. first + kBatch - 1 of a run; those beyond its end are places nearby that nobody asks
-/// for. A sample that rounding puts across the border of its run's slab is counted to the slab by the march
-/// and its transpose alike.
+/// Samples `first` .. first + kBatch - 1 of a run; those beyond its end are nearby places that aren't used. A
+/// sample that rounding puts across the border of its run's slab is treated as in the slab, by the march and
+/// by its transpose.
 template <class Real>
 HOST_DEVICE inline void locate(const RayTable& table, const Line<Real>& line, const Run& run, int first,
                                Batch<Real>& batch) {
@@ -152,8 +154,7 @@ HOST_DEVICE inline void each_sample(const RayTable& table, const Line<Real>& lin
   }
 }
 
-/// Adds w to the eight key points of a voxel, p the lowest, with the weights that trilinear() reads them
-/// with.
+/// Adds w to the eight key points of a voxel (p is the lowest) with the weights of trilinear().
 struct Trilinear {
   template <class Real>
   HOST_DEVICE void operator()(Quad<Real>* p, std::size_t row, std::size_t plane, Real fx, Real fy, Real fz,
@@ -175,7 +176,7 @@ struct Trilinear {
   }
 };
 
-/// Where a transpose puts what its samples give: at once into their key points. For callers that own them.
+/// Adds a transpose's contributions directly to their key points. For callers that own these.
 template <class Real, class Spread = Trilinear>
 struct IntoKeyPoints {
   Quad<Real>* target = nullptr;
@@ -195,7 +196,7 @@ struct IntoKeyPoints {
 
 /// Radiance of one ray in lanes 0..2, its transmittance to the far end in lane 3:
 ///   L += T S ds phi(sigma ds), T *= exp(-sigma ds)
-/// Lengths in voxel edges, so S is per voxel edge here.
+/// Lengths are in voxel edges, so S is per voxel edge here.
 template <class Real, class Extinction, class Path>
 struct Forward {
   RayTable table;
@@ -256,12 +257,12 @@ struct Forward {
   }
 };
 
-/// The exact transpose of Forward's lanes 0..2 under no or constant extinction, for one run: puts its ray's
-/// residual where its samples lie, weighted as Forward weights them.
+/// The exact transpose of Forward's lanes 0..2 without extinction or with constant extinction, for one run:
+/// puts its ray's residual at its samples' places, with Forward's weights.
 template <class Real, class Extinction, class Path, class Put = IntoKeyPoints<Real>>
 struct Adjoint {
   RayTable table;
-  const Quad<Real>* residual = nullptr;  ///< one a ray
+  const Quad<Real>* residual = nullptr;  ///< one per ray
   Extinction extinction;
   Put put;
 

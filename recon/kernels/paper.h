@@ -12,8 +12,8 @@
 
 namespace emberlock::recon {
 
-/// exp(x) for -20 <= x <= 0 to 1e-4 (smaller x counts as -20): a Taylor polynomial of x / 32, squared five
-/// times; loops over it become vector code.
+/// exp(x) for -20 <= x <= 0 to 1e-4 (smaller x is treated as -20): a Taylor polynomial of x / 32, squared
+/// five times; loops over it are vectorized.
 HOST_DEVICE inline float exp_of_distance(float x) {
   const float u = (x < -20 ? -20.F : x) * (1.F / 32);
   float e = 1 + u * (1 + u * (0.5F + u * (1.F / 6 + u * (1.F / 24 + u * (1.F / 120)))));
@@ -24,16 +24,16 @@ HOST_DEVICE inline float exp_of_distance(float x) {
   return e * e;
 }
 
-/// Mean 1 and the given deviation, nearly normal: the sum of the four 16-bit words of a hash (Irwin and Hall
-/// 1927).
+/// A random number with mean 1 and the given deviation, nearly normal: the sum of the four 16-bit words of a
+/// hash (Irwin and Hall 1927).
 HOST_DEVICE inline float gaussian_weight(std::uint64_t bits, float deviation) {
   const auto sum =
       static_cast<float>((bits & 0xffff) + (bits >> 16 & 0xffff) + (bits >> 32 & 0xffff) + (bits >> 48));
   return 1 + deviation * (sum - 131070.F) * (1.F / 37837.2F);
 }
 
-/// Adds a exp(-decay D) to each of the eight key points of a voxel, p the lowest; D is its distance, voxel
-/// edges.
+/// Adds a exp(-decay D) to each of the eight key points of a voxel (p is the lowest); D is the distance to
+/// the key point in voxel edges.
 struct Fade {
   float decay = 1;
 
@@ -56,14 +56,15 @@ struct Fade {
   }
 };
 
-/// The paper's equations (10) and (11) for one run: every sample gives G(s) alpha_l dL T(s, s_e), T of (12),
-/// to its eight key points, which `put` multiplies by exp(-alpha_d D(j, s)), D in voxel edges (Fade).
+/// The paper's equations (10) and (11) for one run: every sample contributes G(s) alpha_l dL T(s, s_e), with
+/// T of (12), to its eight key points; `put` multiplies it by exp(-alpha_d D(j, s)), with D in voxel edges
+/// (Fade).
 template <class Extinction, class Put = IntoKeyPoints<float, Fade>>
 struct PaperAdjust {
   RayTable table;
-  const Rgba* residual = nullptr;  ///< rendered - captured, one a ray
+  const Rgba* residual = nullptr;  ///< rendered - captured, one per ray
   Extinction extinction;
-  float gain = 0.001F;       ///< alpha_l, times what turns the paper's colour intensity into emission
+  float gain = 0.001F;       ///< alpha_l, times the factor from the paper's colour intensity to emission
   float deviation = 0.05F;   ///< of G(s)
   std::uint64_t stream = 0;  ///< hash of seed and iteration
   Put put;

@@ -9,13 +9,13 @@ namespace emberlock::recon {
 
 /// The phase function of Henyey and Greenstein (1941), 1/sr, the paper's equation (9):
 ///   p(mu) = (1 - g^2) / (4 pi (1 + g^2 - 2 g mu)^(3/2))
-/// mu is the cosine of the angle between the directions in which light travels before and after. g > 0
-/// scatters forwards, and the mean of mu is g; the paper's g has the opposite sign. |g| < 1; 0 is isotropic.
+/// mu is the cosine of the angle between the light's directions of travel before and after. g > 0 scatters
+/// forwards, and the mean of mu is g; the paper's g has the opposite sign. |g| < 1; 0 is isotropic.
 template <class Real>
 struct HenyeyGreenstein {
   Real g = 0;
 
-  /// The denominator is written as (1 - |g|)^2 + 2 |g| (1 -+ mu), which doesn't cancel near its peak.
+  /// The denominator is written as (1 - |g|)^2 + 2 |g| (1 -+ mu), which avoids cancellation near its peak.
   [[nodiscard]] HOST_DEVICE Real operator()(Real mu) const {
     constexpr Real kInverseSphere = Real(0.079577471545947668);  // 1 / (4 pi)
     const Real a = g < 0 ? -g : g;
@@ -24,9 +24,9 @@ struct HenyeyGreenstein {
     return kInverseSphere * (1 - a) * (1 + a) / (d * sqrt(d));
   }
 
-  /// The cosine whose cumulative probability is u in [0, 1]. With s = 2 u - 1 the usual inverse
-  /// (1 + g^2 - ((1 - g^2) / (1 + g s))^2) / (2 g) is written without the division by g, so that it holds for
-  /// g = 0.
+  /// The cosine at which the cumulative probability is u in [0, 1]. With s = 2 u - 1, the usual inverse (1 +
+  /// g^2 - ((1 - g^2) / (1 + g s))^2) / (2 g) is rewritten without the division by g, so that it also holds
+  /// for g = 0.
   [[nodiscard]] HOST_DEVICE Real sample(Real u) const {
     const Real s = 2 * u - 1;
     const Real g2 = g * g;

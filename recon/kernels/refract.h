@@ -9,12 +9,12 @@
 
 namespace emberlock::recon {
 
-// Rays through gas of uneven temperature, by geometrical optics: d/ds (n dr/ds) = grad n. With p = n dr/ds
+// Rays through gas of varying temperature, by geometrical optics: d/ds (n dr/ds) = grad n. With p = n dr/ds
 // and dtau = ds / n these are Hamilton's equations of a particle, dr/dtau = p, dp/dtau = grad(n^2) / 2, which
-// the leapfrog solves without drift. n is relative to the air around, because a common factor bends nothing.
-// Positions count voxel edges of the medium's grid.
+// the leapfrog method solves without drift. n is relative to the surrounding air, because a common factor has
+// no effect. Positions are in voxel edges of the medium's grid.
 
-/// n at the key points of a box of its own, trilinear between them; 1 outside.
+/// n at the key points of a separate box, trilinear between them; 1 outside.
 struct IndexField {
   float origin[3] = {0, 0, 0};  ///< key point (0, 0, 0)
   float edge = 1;               ///< between its key points
@@ -28,7 +28,7 @@ struct IndexField {
 
 inline constexpr float kEndless = 1e30F;
 
-/// How far a ray's straight stretches may lie from its true path, voxel edges.
+/// The largest distance of a ray's straight segments from its true path, voxel edges.
 inline constexpr double kLargestDeparture = 0.0025;
 
 namespace detail {
@@ -63,7 +63,7 @@ HOST_DEVICE inline bool kick(const IndexField& field, const double* r, double st
   return true;
 }
 
-/// Where a straight ray enters the field's box; false where it misses.
+/// The point where a straight ray enters the field's box; false if it misses.
 HOST_DEVICE inline bool enter_field(const IndexField& field, const float* origin, const float* direction,
                                     double& enter) {
   const int size[3] = {field.nx, field.ny, field.nz};
@@ -83,7 +83,7 @@ HOST_DEVICE inline bool enter_field(const IndexField& field, const float* origin
   return enter < leave;
 }
 
-/// A straight stretch in the making: its start, and the momentum there.
+/// A straight segment under construction: its start, and the momentum there.
 struct Stretch {
   float origin[3] = {};
   float direction[3] = {};
@@ -97,7 +97,7 @@ struct Stretch {
       momentum[a] = p[a];
     }
   }
-  /// The first one is the straight ray itself, to the last bit.
+  /// The first segment is exactly the straight ray.
   HOST_DEVICE Stretch(const float* o, const float* d) {
     for (int a = 0; a < 3; ++a) {
       origin[a] = o[a];
@@ -108,7 +108,7 @@ struct Stretch {
   [[nodiscard]] HOST_DEVICE bool bent(const double* p) const {
     return p[0] != momentum[0] || p[1] != momentum[1] || p[2] != momentum[2];
   }
-  /// Splits what lies between its start and r into a part along it and the square of a part across.
+  /// Splits the vector from its start to r into the component along it and the squared component across it.
   HOST_DEVICE void split(const double* r, double& along, double& across2) const {
     double v[3];
     along = 0;
@@ -126,10 +126,10 @@ struct Stretch {
 
 }  // namespace detail
 
-/// Follows a ray (direction of unit length) and emits it as a chain of straight stretches, front to back:
-/// emit(origin[3], direction[3], length). Each starts on the path, heads along it, and ends where the path
-/// has departed from it by kLargestDeparture; the last one is endless. A ray that nothing bends is one
-/// stretch and has its own bits.
+/// Traces a ray (direction of unit length) and emits it as a chain of straight segments, front to back:
+/// emit(origin[3], direction[3], length). Each starts on the path, in its direction, and ends where the path
+/// has departed from it by kLargestDeparture; the last one is infinite. A ray that isn't bent is one segment,
+/// bit for bit.
 template <class Emit>
 HOST_DEVICE inline void trace(const IndexField& field, const float* origin, const float* direction,
                               const Emit& emit) {
@@ -147,9 +147,9 @@ HOST_DEVICE inline void trace(const IndexField& field, const float* origin, cons
   }
   constexpr int kStepsAnEdge = 2;
   const double step = static_cast<double>(field.edge) / kStepsAnEdge;
-  const int most = 4 * kStepsAnEdge * (field.nx + field.ny + field.nz);  // no ray is caught in a flame
+  const int most = 4 * kStepsAnEdge * (field.nx + field.ny + field.nz);  // no ray is trapped in a flame
   detail::kick(field, r, step / 2, p);
-  double reached = enter;  // along the stretch
+  double reached = enter;  // along the segment
   double across2 = 0;
   for (int i = 0; i < most; ++i) {
     double before[3];

@@ -8,8 +8,9 @@
 
 namespace emberlock::recon {
 
-// Four numbers that move together: R, G, B and a fourth lane, extinction or transmittance where one is called
-// for. nvcc sees arrays, other compilers vector registers; both look the same in memory, and c[i] is lane i.
+// Four numbers that are processed together: R, G, B and a fourth lane, for extinction or transmittance. They
+// are arrays for nvcc, vector registers for other compilers; the memory layout is the same, and c[i] is lane
+// i.
 
 #ifdef __CUDACC__
 
@@ -78,8 +79,8 @@ struct Lanes<double> {
 };
 }  // namespace detail
 
-/// Aligned alike for every level of vector instructions: left alone, GCC aligns double's lanes to 16 bytes
-/// below AVX and to 32 from there on.
+/// With the same alignment for all levels of vector instructions: by default GCC aligns the lanes of double
+/// to 16 bytes without AVX and to 32 with it.
 template <class Real>
 struct alignas(4 * sizeof(Real)) Quad {
   typename detail::Lanes<Real>::Four c = {0, 0, 0, 0};
@@ -106,7 +107,7 @@ HOST_DEVICE inline Quad<Real> non_negative(const Quad<Real>& a) {
   const typename detail::Lanes<Real>::Four zero = {0, 0, 0, 0};
   return {a.c > zero ? a.c : zero};
 }
-/// By one wide load.
+/// With one wide load.
 template <class Real>
 HOST_DEVICE inline Pair<Real> load_pair(const Quad<Real>* p) {
   Pair<Real> a;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read

@@ -11,16 +11,16 @@
 
 namespace emberlock::recon {
 
-/// How firmly light at a key point is tied to its six neighbours: the parabola that majorises the Huber total
-/// variation of lanes 0..2 at y (lagged diffusivity: Vogel and Oman 1996). Differences below `soft` count
-/// quadratically, those across a flame's edge by their size alone.
+/// The stiffness that ties the light at a key point to its six neighbours: the parabola that majorises the
+/// Huber total variation of lanes 0..2 at y (lagged diffusivity: Vogel and Oman 1996). Differences below
+/// `soft` count quadratically, larger ones (edges of a flame) linearly.
 ///   stiffness = most / 2 * min(1, soft / |grad y|),  |grad y|^2 = mean over the colours, sum over the axes,
 ///   of half the squared differences to both neighbours; what lies outside the grid is 0
-/// Key points that no ray comes to tie nobody.
+/// Key points that no ray reaches have no stiffness.
 template <class Real>
 struct Stiffen {
   Grid grid;
-  const Real* weight = nullptr;  ///< as Descend's
+  const Real* weight = nullptr;  ///< the same as in Descend
   const Quad<Real>* y = nullptr;
   Real* stiffness = nullptr;
   Real most = 0;
@@ -46,8 +46,8 @@ struct Stiffen {
   }
 };
 
-/// The default solver's step at one key point, for lanes 0..2 (lane 3 stays as it is): a gradient step with
-/// its own length, projection on x >= 0, Nesterov's look-ahead.
+/// The default solver's step at one key point, for lanes 0..2 (lane 3 is unchanged): a gradient step with its
+/// own length, projection on x >= 0, Nesterov's look-ahead.
 ///   x' = max(0, y - length * (scale * gradient + slope) / (weight + curvature))
 ///   y' = x' + momentum * (x' - x)
 /// weight = A^T A 1 majorises A^T A (A >= 0); slope = sum of t (y - y_n) over the six neighbours, tied by the
@@ -55,7 +55,7 @@ struct Stiffen {
 template <class Real>
 struct Descend {
   Grid grid;
-  const Real* weight = nullptr;  ///< 0 where no ray comes: such key points stay as they are
+  const Real* weight = nullptr;  ///< 0 where no ray arrives: such key points are unchanged
   Quad<Real>* x = nullptr;
   const Quad<Real>* y = nullptr;
   Quad<Real>* next_y = nullptr;
@@ -88,7 +88,7 @@ struct Descend {
   }
 
  private:
-  /// To neighbour q, or to the darkness where that lies outside the grid.
+  /// Adds the tie to neighbour q, or to darkness if that lies outside the grid.
   HOST_DEVICE void tie(bool inside, std::size_t p, std::size_t q, Quad<Real>& slope, Real& curvature) const {
     const Real t = inside ? stiffness[p] + stiffness[q] : stiffness[p];
     slope = slope + t * (inside ? y[p] - y[q] : y[p]);
@@ -96,17 +96,16 @@ struct Descend {
   }
 };
 
-/// The step where the extinction is unknown too. Lanes 0..2 as in Descend. Lane 3 descends the residual and a
+/// The step if the extinction is unknown too. Lanes 0..2 as in Descend. Lane 3 minimises the residual and a
 /// Huber total variation of u = lane 3 - reference over the medium, each term majorised by its own parabola
-/// (lagged diffusivity: Vogel and Oman 1996), and is kept within 0 .. most.
+/// (lagged diffusivity: Vogel and Oman 1996), within 0 .. most.
 template <class Real>
 struct DescendField {
   Descend<Real> emission;
-  const Real* weight =
-      nullptr;  ///< curvature of the residual by lane 3; <= 0 where the extinction stays as it is
-  const Real* reference = nullptr;  ///< what the extinction is thought to be, a voxel edge
+  const Real* weight = nullptr;  ///< curvature of the residual by lane 3; <= 0 where the extinction is fixed
+  const Real* reference = nullptr;  ///< the expected extinction, per voxel edge
   Real variation = 0;               ///< weight of the total variation
-  Real soft = 1;                    ///< differences below it count quadratically, a voxel edge
+  Real soft = 1;                    ///< smaller differences count quadratically, per voxel edge
   Real most = 0;
 
   HOST_DEVICE void operator()(int i, int j, int k) const {
@@ -143,8 +142,8 @@ struct DescendField {
   }
 };
 
-/// weight = max(weight, scale * one lane of the gradient), which is cleared: over all subsets of the rays,
-/// what majorises each of them.
+/// weight = max(weight, scale * one lane of the gradient), which is then cleared: after all subsets of the
+/// rays, the weight majorises each of them.
 template <class Real>
 struct RaiseWeight {
   Real* weight = nullptr;
@@ -159,7 +158,7 @@ struct RaiseWeight {
   }
 };
 
-/// What is done at a key point, by its index.
+/// Runs an action at a key point, by its index.
 template <class Act>
 struct ActAt {
   Act act;

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "base/result.h"
 #include "recon/export/report.h"
 
 namespace emberlock::recon {
@@ -14,8 +15,15 @@ namespace emberlock::recon {
 /// points, one more iteration brings at most what the last one brought. Empty with fewer than two.
 std::string next_step(const Report& report);
 
-/// What half as many voxels again would cost and bring by the shipped front, scaled by this run; empty where
-/// the front can't tell: nothing held out, or the paper's solver.
+/// Which iteration's volume is the result and why, where it isn't the last one's; otherwise empty.
+std::string what_was_kept(const Report& report);
+
+/// Whether the time and the error that were asked for were met: within a twentieth of the budget, as a run
+/// ends between iterations. Otherwise what was reached, and what would do.
+Status goals_met(const SolveOptions& asked, const Report& report);
+
+/// What half as many voxels again would cost and bring by the reference front, scaled by this run; empty
+/// where the front can't tell: nothing held out, or the paper's solver.
 std::string more_voxels(const Report& report);
 
 /// Both, as far as there is something to say.

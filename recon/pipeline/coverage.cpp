@@ -27,10 +27,10 @@ double spread_degrees(const std::vector<Eigen::Vector3d>& directions) {
 std::vector<std::string> coverage_warnings(const Scene& scene) {
   std::vector<std::string> warnings;
   std::vector<Eigen::Vector3d> directions;
-  bool judged = false;
+  bool held_out = false;
   for (const View& view : scene.views) {
     if (view.role == ViewRole::held_out) {
-      judged = true;
+      held_out = true;
     } else {
       directions.emplace_back((view.camera.center() - scene.box.center).normalized());
     }
@@ -44,7 +44,7 @@ std::vector<std::string> coverage_warnings(const Scene& scene) {
     warnings.emplace_back("only " + std::to_string(directions.size()) +
                           " input views: many volumes give the same pictures, add views to tell them apart");
   }
-  if (!judged) {
+  if (!held_out) {
     warnings.emplace_back(
         "no view is held out: the input error proves nothing about the volume (--hold-out i keeps a view for "
         "judging)");

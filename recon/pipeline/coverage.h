@@ -8,9 +8,9 @@
 
 namespace emberlock::recon {
 
-/// Why the error that will be reported may say little about the volume, in sentences for the user; none when
-/// all is well. Looks at how many input views there are, how far apart they stand as seen from the box,
-/// opposite views counting as one (they see the same silhouette), and whether a view is held out.
+/// Why the reported error may say little about the volume, as sentences for the user; empty if all is well.
+/// Considers the number of input views, their angles as seen from the box (opposite views count as one,
+/// because they see the same silhouette), and whether a view is held out.
 std::vector<std::string> coverage_warnings(const Scene& scene);
 
 }  // namespace emberlock::recon

@@ -7,8 +7,8 @@
 
 namespace emberlock::recon {
 
-/// The largest grid that is chosen unasked, and the largest that may be asked for, in voxels along the
-/// longest edge.
+/// The largest grid chosen automatically, and the largest that may be requested, in voxels along the longest
+/// edge.
 inline constexpr int kLargestChosenVoxels = 256;
 inline constexpr int kLargestVoxels = 1024;
 
@@ -22,8 +22,8 @@ inline constexpr int kLargestVoxels = 1024;
 /// other the answer is kLargestChosenVoxels. At most kLargestVoxels.
 int voxels_by_the_paper(const Scene& scene);
 
-/// The finest grid that is chosen unasked: the paper's rule, but at most kLargestChosenVoxels. Memory and
-/// time grow with the cube, and the error hardly falls any more.
+/// The finest grid chosen automatically: the paper's rule, but at most kLargestChosenVoxels. Memory and time
+/// grow with the cube, while the error hardly decreases any more.
 int finest_voxels(const Scene& scene);
 
 }  // namespace emberlock::recon

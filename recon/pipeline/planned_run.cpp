@@ -7,10 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/pipeline/grid_choice.h"
+#include "recon/pipeline/reference_front.h"
 #include "recon/pipeline/reference_run.h"
-#include "recon/pipeline/shipped_front.h"
-#include "recon/preprocess/flame_mask.h"
 
 namespace emberlock::recon {
 namespace {
@@ -29,8 +29,9 @@ double heldout_error(const Outcome& outcome) {
 class Choices {
  public:
   Choices(const Scene& scene, const ReconstructOptions& asked, const Reference& reference)
-      : all_(scaled(shipped_front(), finest_voxels(scene), std::max(1e-9, reference.seconds.value()),
-                    std::max(1e-9, reference.error))) {
+      : all_(scaled(reference_front(), finest_voxels(scene), std::max(1e-9, reference.seconds.value()),
+                    std::max(1e-9, reference.error))),
+        whole_(all_) {
     std::erase_if(all_, [&](const WorkPoint& p) {
       return !choose_grid(scene, p.settings.voxels, asked.solve.precision).ok();
     });
@@ -69,12 +70,21 @@ class Choices {
     };
     const double slower = ratio(seconds, nearest->seconds);
     const double worse = ratio(error, nearest->error);
-    for (auto* points : {&all_, &open_}) {
+    for (auto* points : {&all_, &open_, &whole_}) {
       for (WorkPoint& p : *points) {
         p.seconds *= slower;
         p.error *= worse;
       }
     }
+  }
+
+  /// What is to be expected of a point where effects change nothing, unlike in the front's flames.
+  [[nodiscard]] double error_without_effects(const WorkPoint& point) const {
+    Settings same = point.settings;
+    same.effects = "none";
+    for (const WorkPoint& p : whole_)
+      if (p.settings == same) return std::max(p.error, point.error);
+    return point.error;
   }
 
   void only_above(int voxels) {
@@ -94,6 +104,14 @@ class Choices {
         best->error, best->settings.voxels, best->seconds);
   }
 
+  /// What would keep to a budget that a run of so many seconds didn't.
+  [[nodiscard]] static std::string quicker(Seconds took) {
+    const double enough = 1.05 * took.value();
+    return enough < 10
+               ? fmt::format("--budget {:.1f} or fewer --voxels would do", std::ceil(10 * enough) / 10)
+               : fmt::format("--budget {:.0f} or fewer --voxels would do", std::ceil(enough));
+  }
+
  private:
   /// Keeps the points of at most so many iterations.
   void keep_iterations(int most) {
@@ -103,6 +121,7 @@ class Choices {
 
   std::vector<WorkPoint> all_;
   std::vector<WorkPoint> open_;
+  std::vector<WorkPoint> whole_;  // also what can't be chosen
 };
 
 class PlannedRun {
@@ -112,12 +131,14 @@ class PlannedRun {
 
   Result<Outcome> run() {
     EMBERLOCK_RETURN_IF_ERROR(measure());
-    Choices choices(task_.scene, asked_, reference_);
+    Choices choices(task_.scene(), asked_, reference_);
     const WorkPoint* point = choices.next(goal());
-    if (point == nullptr) return run_settled(task_, asked_, progress_);
+    if (point == nullptr) return run_once(task_, asked_, progress_);
     std::optional<Outcome> best;
-    if (!fits(*point)) best = from_reference();
-    while (!best || (missed(*best) > 0 && plan_.attempts < kMostAttempts && another(*best, choices, point))) {
+    bool cut_short = false;
+    if (!fits(*point) || stopped()) best = from_reference();
+    while (!best || (missed(*best) > 0 && !stopped() && plan_.attempts < kMostAttempts &&
+                     another(*best, choices, point))) {
       const Seconds begin = task_.elapsed();
       EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, attempt(*point, choices));
       const double error = heldout_error(outcome);
@@ -126,8 +147,10 @@ class PlannedRun {
         choices.correct(tried, outcome.report.iterations, (task_.elapsed() - begin).value(), error);
         choices.only_above(tried.voxels);
       }
+      cut_short = cut_short || outcome.report.stopped;
       if (!best || error < heldout_error(*best)) best = std::move(outcome);
     }
+    best->report.stopped = best->report.stopped || cut_short;
     conclude(*best, choices);
     return std::move(*best);
   }
@@ -138,21 +161,21 @@ class PlannedRun {
     plan_.target_rmse = asked_.solve.target_rmse;
     tell(progress_, 0, "measuring this machine on a coarse grid");
     if (asked_.voxels)
-      EMBERLOCK_RETURN_IF_ERROR(as_status(choose_grid(task_.scene, asked_.voxels, asked_.solve.precision)));
-    const int voxels = reference_voxels(finest_voxels(task_.scene));
+      EMBERLOCK_RETURN_IF_ERROR(as_status(choose_grid(task_.scene(), asked_.voxels, asked_.solve.precision)));
+    const int voxels = reference_voxels(finest_voxels(task_.scene()));
     EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
-                               choose_grid(task_.scene, std::min(voxels, asked_.voxels.value_or(voxels))));
-    const Effects effects = asked_.effects && asked_.effects->fixed ? *asked_.effects->fixed : Effects{};
-    EMBERLOCK_ASSIGN_OR_RETURN(reference_,
-                               measure_reference(task_.scene, grid, effects, asked_.solve, task_.elapsed));
+                               choose_grid(task_.scene(), std::min(voxels, asked_.voxels.value_or(voxels))));
+    const PreparedScene scene =
+        task_.prepared.under(asked_.effects && asked_.effects->fixed ? *asked_.effects->fixed : Effects{});
+    EMBERLOCK_ASSIGN_OR_RETURN(reference_, measure_reference(scene, grid, asked_.solve, task_.elapsed));
     plan_.reference_time = reference_.seconds;
     return {};
   }
 
   static Status as_status(const Result<Grid>& result) { return result ? Status() : Status(result.error()); }
 
-  [[nodiscard]] bool judged() const {
-    return std::any_of(task_.scene.views.begin(), task_.scene.views.end(),
+  [[nodiscard]] bool holds_out() const {
+    return std::any_of(task_.scene().views.begin(), task_.scene().views.end(),
                        [](const View& v) { return v.role == ViewRole::held_out; });
   }
 
@@ -172,13 +195,20 @@ class PlannedRun {
     return asked_.voxels || point.seconds <= seconds_left();
   }
 
+  [[nodiscard]] bool stopped() const { return is_stopped(asked_.solve); }
+
   Outcome from_reference() {
-    plan_.words.push_back(
-        fmt::format("{:.3g} s left no time for more than the reference run", asked_.solve.budget->value()));
+    const bool told_to = stopped();
+    plan_.words.push_back(told_to ? "stopped after the reference run"
+                                  : fmt::format("{:.3g} s left no time for more than the reference run",
+                                                asked_.solve.budget->value()));
     const Grid& grid = reference_.reconstruction.hull.grid;
     plan_.voxels = std::max({grid.nx, grid.ny, grid.nz}) - 1;
     plan_.iterations = reference_.reconstruction.iterations;
-    return finish(task_, asked_.solve, reference_.reconstruction, progress_);
+    Outcome outcome = finish(task_, task_.prepared.under(reference_.reconstruction.effects), asked_.solve,
+                             reference_.reconstruction, progress_);
+    outcome.report.stopped = outcome.report.stopped || told_to;
+    return outcome;
   }
 
   Result<Outcome> attempt(const WorkPoint& point, const Choices& choices) {
@@ -191,10 +221,10 @@ class PlannedRun {
       options.solve.iterations = choices.iterations(point.settings);
     if (asked_.solve.budget)
       options.solve.budget = Seconds(std::max(1e-6, asked_.solve.budget->value() - rendering(point)));
-    describe(point, options);
+    describe(point, options, choices);
     const double from = progress_from(plan_.attempts++);
     const double to = progress_from(plan_.attempts);
-    return run_settled(task_, options, [&](double fraction, std::string_view words) {
+    return run_once(task_, options, [&](double fraction, std::string_view words) {
       tell(progress_, from + (to - from) * std::min(fraction, 0.999), words);
     });
   }
@@ -204,7 +234,7 @@ class PlannedRun {
     const Grid& grid = reference_.reconstruction.hull.grid;
     const double finer = point.settings.voxels / (std::max({grid.nx, grid.ny, grid.nz}) - 1.0);
     return kRenderReserve * reference_.seconds_to_render.value() * finer *
-           static_cast<double>(task_.scene.views.size());
+           static_cast<double>(task_.scene().views.size());
   }
 
   /// Later attempts may follow only where there is a target; each gets half of what is left of the bar.
@@ -213,7 +243,7 @@ class PlannedRun {
     return asked_.solve.target_rmse ? 1 - 0.95 * std::pow(0.5, attempts) : 1;
   }
 
-  void describe(const WorkPoint& point, const ReconstructOptions& options) {
+  void describe(const WorkPoint& point, const ReconstructOptions& options, const Choices& choices) {
     plan_.voxels = point.settings.voxels;
     plan_.iterations = options.solve.iterations;
     plan_.effects_searched = !options.effects || !options.effects->fixed;
@@ -226,9 +256,12 @@ class PlannedRun {
         plan_.effects_searched ? "searched for" : (asked_.effects ? "set by hand" : "left out");
     std::string words = fmt::format("{} voxels, {}, effects {}: by the front about {:.2g} s", plan_.voxels,
                                     iterations, effects, point.seconds);
-    if (judged()) {
+    if (holds_out()) {
       plan_.predicted_rmse = point.error;
+      plan_.predicted_rmse_without = choices.error_without_effects(point);
       words += fmt::format(" and {:.2g} grey levels", point.error);
+      if (*plan_.predicted_rmse_without > point.error)
+        words += fmt::format(", or up to {:.2g} where effects change little", *plan_.predicted_rmse_without);
     }
     plan_.words.push_back(words + fmt::format(" (reference run: {:.2g} s)", reference_.seconds.value()));
   }
@@ -253,9 +286,10 @@ class PlannedRun {
     if (plan_.target_rmse) {
       plan_.missed_by = missed(best);
       if (plan_.missed_by > 0) {
+        plan_.remedy = choices.needed(*plan_.target_rmse);
         plan_.words.push_back(fmt::format("the target of {:.3g} grey levels was missed by {:.2f}: ",
                                           *plan_.target_rmse, plan_.missed_by) +
-                              choices.needed(*plan_.target_rmse));
+                              plan_.remedy);
       } else {
         plan_.words.push_back(fmt::format("the target of {:.3g} grey levels was reached after {:.2g} s",
                                           *plan_.target_rmse,
@@ -267,6 +301,7 @@ class PlannedRun {
       if (plan_.over_budget.value() > 0) {
         plan_.words.push_back(fmt::format("the budget of {:.3g} s was exceeded by {:.2g} s",
                                           plan_.budget->value(), plan_.over_budget.value()));
+        if (plan_.remedy.empty()) plan_.remedy = choices.quicker(result.total_time);
       }
     }
     result.plan = plan_;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "recon/pipeline/settled_run.h"
+#include "recon/pipeline/single_run.h"
 
 namespace emberlock::recon {
 
@@ -9,7 +9,7 @@ namespace emberlock::recon {
 bool has_goal(const ReconstructOptions& options);
 
 /// Chooses what is left open, runs, and says in Report::plan what was promised and what came of it:
-/// - a reference run (reference_run.h) scales the shipped front to this machine and scene;
+/// - a reference run (reference_run.h) scales the reference front to this machine and scene;
 /// - choose() takes a point that fits into nine tenths of what is left of the budget; effects are searched
 /// for
 ///   only if that fits too; iterations go on to the front's lowest error for these voxels (on the way to a

@@ -22,38 +22,38 @@ namespace emberlock::recon {
 namespace fs = std::filesystem;
 namespace {
 
-/// The scene as it is told, or with cameras put right that point beside their calibration; and what is said
-/// of them.
-class PointedScene {
- public:
-  PointedScene(const Scene& told, const ReconstructOptions& options, Device device, const Elapsed& elapsed,
-               const Progress& progress)
-      : told_(told) {
-    if (!options.correct_pointing || any_late(told)) return;  // what is late looks as if it pointed elsewhere
-    const EffectRequest request = options.effects.value_or(EffectRequest{});
-    const Effects known = request.fixed ? *request.fixed : told_by_the_pictures(told, request);
-    Pool pool(options.solve.compute.threads, device);
-    found_ = find_pointing(PreparedScene(told, known).scene(), known, options.solve, pool, elapsed, progress);
-    if (found_.any()) corrected_ = pointed(told, found_);
-  }
-  [[nodiscard]] const Scene& scene() const { return corrected_ ? *corrected_ : told_; }
-  void tell(Report& report) const {
-    for (std::size_t v = 0; v < found_.off.size(); ++v)
-      if (const PointingError& off = found_.off[v]; off.x != 0 || off.y != 0)
-        report.warnings.push_back(
-            fmt::format("{} points {:+.1f} pixels across and {:+.1f} down beside what its calibration says, "
-                        "and was put right: the "
-                        "flame's outlines didn't meet (left-out views are shown to {:.3g} grey levels "
-                        "instead of {:.3g} on a coarse "
-                        "grid). Calibrate it anew, or keep its pose with --keep-poses",
-                        told_.views[v].name, off.x, off.y, found_.error_after, found_.error_before));
-  }
+/// A camera that is late looks as if it pointed elsewhere.
+bool may_correct_pointing(const Scene& scene, const ReconstructOptions& options) {
+  return options.correct_pointing && !any_late(scene);
+}
 
- private:
-  const Scene& told_;
-  FoundPointing found_;
-  std::optional<Scene> corrected_;
+void tell_pointing(const Scene& scene, const FoundPointing& found, Report& report) {
+  for (std::size_t v = 0; v < found.off.size(); ++v)
+    if (const PointingError& off = found.off[v]; off.x != 0 || off.y != 0)
+      report.warnings.push_back(
+          fmt::format("{} points {:+.1f} pixels across and {:+.1f} down beside what its calibration says, "
+                      "and was put right: the "
+                      "flame's outlines didn't meet (left-out views are shown to {:.3g} grey levels "
+                      "instead of {:.3g} on a coarse "
+                      "grid). Calibrate it anew, or keep its pose with --keep-poses",
+                      scene.views[v].name, off.x, off.y, found.error_after, found.error_before));
+}
+
+struct PutRight {
+  PreparedScene scene;  // under what is known of its effects
+  FoundPointing pointing;
 };
+
+PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOptions& options, Device device,
+                                const Elapsed& elapsed, const Progress& progress) {
+  PutRight result{under_known_effects(told, options.effects.value_or(EffectRequest{})), {}};
+  if (!may_correct_pointing(told.told(), options)) return result;
+  Pool pool(options.solve.compute.threads, device);
+  result.pointing =
+      find_pointing(result.scene.scene(), result.scene.effects(), options.solve, pool, elapsed, progress);
+  if (result.pointing.any()) result.scene = pointed(result.scene, result.pointing);
+  return result;
+}
 
 }  // namespace
 
@@ -61,22 +61,23 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
                             const Progress& progress,
                             const std::function<void(const Preview&)>& preview) try {
   const TimePoint start = clock.now();
-  EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
+  EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const Elapsed elapsed = [&] { return clock.now() - start; };
-  const PointedScene pointed(scene, options, device, elapsed, progress);
-  const Task task{pointed.scene(), device, elapsed, preview};
+  const PutRight put_right = with_cameras_put_right(told, options, device, elapsed, progress);
+  const FoundPointing& pointing = put_right.pointing;
+  const Task task{put_right.scene, device, elapsed, preview};
   if (has_goal(options)) {
     EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_planned(task, options, progress));
-    pointed.tell(outcome.report);
+    tell_pointing(scene, pointing, outcome.report);
     return outcome;
   }
   EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
-  ReconstructOptions settled = options;
-  settled.voxels = choice.voxels;
-  EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_settled(task, settled, progress));
+  ReconstructOptions chosen = options;
+  chosen.voxels = choice.voxels;
+  EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_once(task, chosen, progress));
   outcome.report.voxel_choice = std::move(choice);
-  pointed.tell(outcome.report);
+  tell_pointing(scene, pointing, outcome.report);
   return outcome;
 } catch (const DeviceError& e) {
   return e.error();
@@ -89,10 +90,12 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
 Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
                                 const Progress& progress) try {
   const TimePoint start = clock.now();
-  EMBERLOCK_RETURN_IF_ERROR(check_scene(scene));
+  EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const std::function<void(const Preview&)> nobody;
-  const Task task{scene, device, [&] { return clock.now() - start; }, nobody};
+  const Elapsed elapsed = [&] { return clock.now() - start; };
+  const Task task{with_cameras_put_right(told, options, device, elapsed, progress).scene, device, elapsed,
+                  nobody};
   EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
   EMBERLOCK_RETURN_IF_ERROR(choose_grid(scene, choice.voxels, options.solve.precision));
   if (choice.rule == "knee" && has_goal(options)) {
@@ -100,14 +103,14 @@ Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& op
                     choice.words.front()};
     choice.expected_time = Seconds(0);
   }
-  // The shipped front tells of the default solver's own end alone.
+  // The reference front tells of the default solver's own end alone.
   if (choice.rule == "knee" || has_goal(options) || options.solve.solver != Solver::standard) return choice;
-  ReconstructOptions settled = options;
-  settled.voxels = choice.voxels;
-  EMBERLOCK_ASSIGN_OR_RETURN(const Calibration measured, calibrate(task, settled));
+  ReconstructOptions chosen = options;
+  chosen.voxels = choice.voxels;
+  EMBERLOCK_ASSIGN_OR_RETURN(const Calibration measured, calibrate(task, chosen));
   choice.calibration_time = measured.took;
-  const std::vector<WorkPoint> expected = expected_runs(scene, settled, measured);
-  if (!expected.empty()) choice.expected_time = Seconds(expected.front().seconds);
+  const std::vector<WorkPoint> expected = expected_runs(scene, chosen, measured);
+  if (!expected.empty()) choice.expected_time = elapsed() + Seconds(expected.front().seconds);
   return choice;
 } catch (const DeviceError& e) {
   return e.error();
@@ -119,7 +122,8 @@ Status check_output(const fs::path& folder, const std::vector<fs::path>& inputs)
   return OutputFolder::check({folder, kReconstruct, inputs});
 }
 
-Status write_outcome(const Outcome& outcome, const fs::path& folder, const std::vector<fs::path>& inputs) {
+Status write_outcome(const Outcome& outcome, const fs::path& folder, const std::vector<fs::path>& inputs,
+                     std::string_view page) {
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create({folder, kReconstruct, inputs}));
   EMBERLOCK_RETURN_IF_ERROR(write_volume(outcome.reconstruction.volume, staging.path() / "volume.vdb"));
   std::error_code ec;
@@ -129,6 +133,7 @@ Status write_outcome(const Outcome& outcome, const fs::path& folder, const std::
     EMBERLOCK_RETURN_IF_ERROR(write_png(to_rgb8(outcome.renders[i]).view(), staging.path() / "views" / name));
   }
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "report.json", to_json(outcome.report)));
+  if (!page.empty()) EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "report.html", page));
   return staging.commit();
 }
 

@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/clock.h"
@@ -33,7 +34,7 @@ struct ReconstructOptions {
   /// and the rendering too. Without a flame_threshold the paper's solver takes the paper's 30 grey levels.
   SolveOptions solve;
   /// Given a budget or a target, whatever of voxels, effects and iterations is left open is chosen by the
-  /// shipped front, in units of a reference run of the scene at hand (planned_run.h). The paper's solver,
+  /// reference front, in units of a reference run of the scene at hand (planned_run.h). The paper's solver,
   /// which the front doesn't know, takes the budget and the target as limits alone, as every solver does if
   /// false.
   bool choose_by_front = true;
@@ -69,8 +70,9 @@ inline constexpr OutputVerb kReconstruct{"reconstruct"};
 Status check_output(const std::filesystem::path& folder,
                     const std::vector<std::filesystem::path>& inputs = {});
 
-/// Writes volume.vdb, views/NNNN.png (8 bits, numbered as in the input) and report.json as an OutputFolder.
+/// Writes volume.vdb, views/NNNN.png (8 bits, numbered as in the input) and report.json as an OutputFolder;
+/// and `page` as report.html, unless it is empty.
 Status write_outcome(const Outcome& outcome, const std::filesystem::path& folder,
-                     const std::vector<std::filesystem::path>& inputs = {});
+                     const std::vector<std::filesystem::path>& inputs = {}, std::string_view page = {});
 
 }  // namespace emberlock::recon

@@ -6,8 +6,8 @@
 
 namespace emberlock::recon {
 
-/// The yardstick of shipped fronts: a coarse solve of the scene at hand, which takes in the machine's speed,
-/// the pictures' size and how hard the flame is.
+/// The yardstick of reference fronts: a coarse solve of the scene at hand, which takes in the machine's
+/// speed, the pictures' size and how hard the flame is.
 struct Reference {
   Reconstruction reconstruction;
   Seconds seconds{0};            ///< hull and solve
@@ -20,7 +20,7 @@ int reference_voxels(int finest);
 
 /// Takes step, precision, device, threads, threshold, budget and a limit of iterations from `options`.
 /// Errors: those of solve().
-Result<Reference> measure_reference(const Scene& scene, const Grid& grid, const Effects& effects,
-                                    const SolveOptions& options, const Elapsed& elapsed);
+Result<Reference> measure_reference(const PreparedScene& scene, const Grid& grid, const SolveOptions& options,
+                                    const Elapsed& elapsed);
 
 }  // namespace emberlock::recon

@@ -40,7 +40,7 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
     view.name = frame.image.filename().string();
     EMBERLOCK_ASSIGN_OR_RETURN(view.camera.intrinsics, intrinsics_of(frame, image->layout().size));
     view.camera.camera_from_world = frame.camera_from_world;
-    view.image = to_radiance(image->view());
+    view.image = share(to_radiance(image->view()));
     scene.views.push_back(std::move(view));
   }
   if (options.box || transforms.box) {
@@ -144,10 +144,9 @@ Status each_of_some_frames(SessionPictures& session, std::size_t count, const Pr
                static_cast<double>(reader.camera_count()),
            doing);
       // The middle of each of `taken` equal parts: the recording's own middle where it is one.
-      const std::size_t frame = complete[(2 * n + 1) * complete.size() / (2 * taken)];
-      EMBERLOCK_ASSIGN_OR_RETURN(const DevelopedPicture picture,
-                                 session.developers[i].develop(reader, frame));
-      act(i, picture.image, taken);
+      EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame,
+                                 reader.read(i, complete[(2 * n + 1) * complete.size() / (2 * taken)]));
+      act(i, session.developers[i].develop(frame).image, taken);
     }
   }
   return {};
@@ -176,13 +175,17 @@ Status find_box_of_session(SessionPictures& session, const Progress& progress, S
 /// What each camera shows on average over frames of the whole recording.
 Status average(SessionPictures& session, const Progress& progress, Scene& scene) {
   constexpr std::size_t kFrames = 32;  // leave a sixth of what changes in the average
-  for (View& view : scene.views) view.average.emplace(view.image.size);
-  return each_of_some_frames(session, kFrames, progress, "averaging the recording",
-                             [&](std::size_t i, const RadianceImage& image, std::size_t taken) {
-                               std::vector<float>& sum = scene.views[i].average->rgb;
-                               const auto share = 1 / static_cast<float>(taken);
-                               for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += share * image.rgb[p];
-                             });
+  std::vector<RadianceImage> averages;
+  for (const View& view : scene.views) averages.emplace_back(view.image->size);
+  EMBERLOCK_RETURN_IF_ERROR(
+      each_of_some_frames(session, kFrames, progress, "averaging the recording",
+                          [&](std::size_t i, const RadianceImage& image, std::size_t taken) {
+                            std::vector<float>& sum = averages[i].rgb;
+                            const auto part = 1 / static_cast<float>(taken);
+                            for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += part * image.rgb[p];
+                          }));
+  for (std::size_t i = 0; i < averages.size(); ++i) scene.views[i].average = share(std::move(averages[i]));
+  return {};
 }
 
 Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
@@ -231,13 +234,14 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
                  "Choose another --frame; the index tells which frames were lost");
     }
     if (times) tell_lateness(reader, i, *nearest, instant, times->cameras(static_cast<int>(i)), view);
+    EMBERLOCK_ASSIGN_OR_RETURN(const Frame shown, reader.read(i, *nearest));
     EMBERLOCK_ASSIGN_OR_RETURN(FrameDeveloper developer,
-                               FrameDeveloper::create(reader, i, stream, *nearest, options.frames));
-    EMBERLOCK_ASSIGN_OR_RETURN(DevelopedPicture picture, developer.develop(reader, *nearest));
+                               FrameDeveloper::create(reader, i, stream, shown, *nearest, options.frames));
+    DevelopedPicture picture = developer.develop(shown);
     scene.linearised = scene.linearised || developer.linearises();
     session.developers.push_back(std::move(developer));
-    view.image = std::move(picture.image);
-    view.bounds = std::move(picture.bounds);
+    view.image = share(std::move(picture.image));
+    if (!picture.bounds.empty()) view.bounds = share(std::move(picture.bounds));
     steps.emplace_back(view.name, std::move(picture.steps));
     scene.views.push_back(std::move(view));
   }
@@ -270,6 +274,38 @@ std::vector<fs::path> files_of(const fs::path& input, const SceneOptions& option
   if (const auto transforms = read_transforms(input))
     for (const TransformsFrame& frame : transforms->frames) files.push_back(frame.image);
   return files;
+}
+
+Scene with_views(const Scene& scene, int count) {
+  const auto sight = [&](std::size_t i) {
+    return Eigen::Vector3d((scene.views[i].camera.center() - scene.box.center).normalized());
+  };
+  std::vector<std::size_t> left;
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    if (scene.views[i].role == ViewRole::input) left.push_back(i);
+  }
+  if (count <= 0 || count >= static_cast<int>(left.size())) return scene;
+  std::vector<std::size_t> kept{left.front()};
+  left.erase(left.begin());
+  while (static_cast<int>(kept.size()) < count) {
+    // Opposite views lie on one line and see the same outline, hence the cosine's absolute value.
+    const auto nearness = [&](std::size_t i) {
+      double largest = 0;
+      for (const std::size_t k : kept) largest = std::max(largest, std::abs(sight(i).dot(sight(k))));
+      return largest;
+    };
+    const auto next = std::min_element(
+        left.begin(), left.end(), [&](std::size_t a, std::size_t b) { return nearness(a) < nearness(b); });
+    kept.push_back(*next);
+    left.erase(next);
+  }
+  Scene fewer = scene;
+  fewer.views.clear();
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    if (scene.views[i].role == ViewRole::held_out || std::find(kept.begin(), kept.end(), i) != kept.end())
+      fewer.views.push_back(scene.views[i]);
+  }
+  return fewer;
 }
 
 Status hold_out(Scene& scene, const std::vector<int>& views) {

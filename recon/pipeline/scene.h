@@ -41,4 +41,8 @@ std::vector<std::filesystem::path> files_of(const std::filesystem::path& input,
 /// Gives the views of these indices the role held_out. Errors: no such view, none left to reconstruct from.
 Status hold_out(Scene& scene, const std::vector<int>& views);
 
+/// The scene with `count` of its input views, spread as far as possible (greedily, by the angle between lines
+/// of sight), and all held-out ones; the scene itself with 0, or with as many as there are.
+Scene with_views(const Scene& scene, int count);
+
 }  // namespace emberlock::recon

@@ -40,13 +40,15 @@ Result<Frames> read_frames(session::SessionReader& reader, std::size_t camera, s
 /// The first look costs one frame.
 Result<Frames> dark_end(session::SessionReader& reader, std::size_t camera, std::size_t first,
                         const Samples& flame) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Frames look, read_frames(reader, camera, first, 1));
-  if (look.empty()) return Frames{};
-  const Samples start = samples_of(look.front().image->view());
+  EMBERLOCK_ASSIGN_OR_RETURN(Frames frames, read_frames(reader, camera, first, 1));
+  if (frames.empty()) return Frames{};
+  const Samples start = samples_of(frames.front().image->view());
   if (light_change(flame, start) != LightChange::gone_out) return Frames{};
-  EMBERLOCK_ASSIGN_OR_RETURN(Frames frames, read_frames(reader, camera, first, kDarkFrames));
-  for (std::size_t i = 1; i < frames.size(); ++i)
-    if (light_change(start, samples_of(frames[i].image->view())) != LightChange::none) return Frames{};
+  EMBERLOCK_ASSIGN_OR_RETURN(Frames others, read_frames(reader, camera, first + 1, kDarkFrames - 1));
+  for (Frame& frame : others) {
+    if (light_change(start, samples_of(frame.image->view())) != LightChange::none) return Frames{};
+    frames.push_back(std::move(frame));
+  }
   return frames.size() > kDarkFrames / 2 ? std::move(frames) : Frames{};
 }
 
@@ -135,10 +137,9 @@ Status parse_smear(const std::string& text, FrameOptions& options) {
 }
 
 Result<FrameDeveloper> FrameDeveloper::create(session::SessionReader& reader, std::size_t camera,
-                                              const v1::CameraStream& stream, std::size_t flame,
-                                              const FrameOptions& options) {
+                                              const v1::CameraStream& stream, const Frame& flame,
+                                              std::size_t number, const FrameOptions& options) {
   FrameDeveloper developer;
-  developer.camera_ = camera;
   developer.sensor_ = sensor_of(stream);
   developer.options_ = options.develop;
   if (stream.has_colour()) {
@@ -146,18 +147,16 @@ Result<FrameDeveloper> FrameDeveloper::create(session::SessionReader& reader, st
                                                               "camera " + stream.camera_id()));
   }
   if (options.background == FrameOptions::Background::automatic) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(camera, flame));
-    EMBERLOCK_ASSIGN_OR_RETURN(developer.dark_, find_dark(reader, camera, flame, picture.image->view()));
+    EMBERLOCK_ASSIGN_OR_RETURN(developer.dark_, find_dark(reader, camera, number, flame.image->view()));
   } else if (options.background == FrameOptions::Background::frames) {
     EMBERLOCK_ASSIGN_OR_RETURN(developer.dark_, told_dark(reader, camera, options));
   }
   return developer;
 }
 
-Result<DevelopedPicture> FrameDeveloper::develop(session::SessionReader& reader, std::size_t frame) const {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Frame picture, reader.read(camera_, frame));
+DevelopedPicture FrameDeveloper::develop(const Frame& frame) const {
   CameraFrame from;
-  from.frame = picture.image->view();
+  from.frame = frame.image->view();
   from.sensor = sensor_;
   from.colour = colour_;
   for (const Frame& f : dark_) from.dark.push_back(f.image->view());

@@ -38,21 +38,21 @@ Status parse_smear(const std::string& text, FrameOptions& options);
 class FrameDeveloper {
  public:
   /// `stream`: the camera as it is known by now, by the manifest or a rig. `flame`: a frame that shows the
-  /// flame. Reads it, up to two frames to see whether there is a part without flame, and eight of that.
-  /// Errors: those of SessionReader::read() and read_colour(); dark frames that the camera doesn't have.
+  /// flame, number `number` of the camera's. Reads up to two frames to see whether there is a part without
+  /// flame, and all eight of that. Errors: those of SessionReader::read() and read_colour(); dark frames that
+  /// the camera doesn't have.
   static Result<FrameDeveloper> create(session::SessionReader& reader, std::size_t camera,
-                                       const v1::CameraStream& stream, std::size_t flame,
+                                       const v1::CameraStream& stream, const Frame& flame, std::size_t number,
                                        const FrameOptions& options);
 
-  /// A frame as radiance. `reader` is that of create(). Errors: those of SessionReader::read().
-  Result<DevelopedPicture> develop(session::SessionReader& reader, std::size_t frame) const;
+  /// A frame of the camera as radiance.
+  [[nodiscard]] DevelopedPicture develop(const Frame& frame) const;
 
   /// Whether the camera's calibrated response makes its pictures linear in light.
   [[nodiscard]] bool linearises() const { return colour_ && !colour_->response.empty(); }
 
  private:
   FrameDeveloper() = default;
-  std::size_t camera_ = 0;
   SensorKind sensor_ = SensorKind::ccd;
   std::optional<Colour> colour_;
   std::vector<Frame> dark_;

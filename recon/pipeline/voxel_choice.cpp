@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 
 #include "recon/pipeline/grid_choice.h"
+#include "recon/pipeline/reference_front.h"
 #include "recon/pipeline/reference_run.h"
-#include "recon/pipeline/shipped_front.h"
 
 namespace emberlock::recon {
 namespace {
@@ -31,10 +31,14 @@ const WorkPoint* next_better(const std::vector<WorkPoint>& points, const WorkPoi
   return next;
 }
 
-std::string why(const std::vector<WorkPoint>& points, const WorkPoint& chosen, const Calibration& measured) {
+/// `spent`: seconds that have passed already.
+std::string why(const std::vector<WorkPoint>& points, const WorkPoint& chosen, const Calibration& measured,
+                double spent) {
   std::string words = fmt::format(
-      "{} voxels along the longest edge: about {:.2g} s on this machine as it is now (measured in {:.2g} s)",
-      chosen.settings.voxels, chosen.seconds, measured.took.value());
+      "{} voxels along the longest edge: about {:.2g} s from the loaded pictures on, on this machine as it "
+      "is "
+      "now (measured in {:.2g} s)",
+      chosen.settings.voxels, spent + chosen.seconds, measured.took.value());
   Patience unhurried;
   unhurried.most_seconds = INFINITY;
   const WorkPoint& wanted = *knee(points, unhurried);
@@ -43,7 +47,7 @@ std::string why(const std::vector<WorkPoint>& points, const WorkPoint& chosen, c
                        ", which is slow or busy: {} voxels would {} but take about {:.2g} s, and no more "
                        "than {:.2g} s "
                        "are spent unasked",
-                       wanted.settings.voxels, lower_by(chosen, wanted), wanted.seconds,
+                       wanted.settings.voxels, lower_by(chosen, wanted), spent + wanted.seconds,
                        Patience{}.most_seconds);
   }
   if (const WorkPoint* next = next_better(points, chosen)) {
@@ -51,7 +55,7 @@ std::string why(const std::vector<WorkPoint>& points, const WorkPoint& chosen, c
                                next->settings.voxels, lower_by(chosen, *next),
                                next->seconds - chosen.seconds);
   }
-  return words + "; no finer grid lowers the error by the shipped front";
+  return words + "; no finer grid lowers the error by the reference front";
 }
 
 std::string what_else(const std::vector<VoxelChoice::Option>& options, const VoxelChoice& choice) {
@@ -76,26 +80,28 @@ VoxelChoice told(const Scene& scene, const char* rule, int voxels, std::string w
 }  // namespace
 
 Result<Calibration> calibrate(const Task& task, const ReconstructOptions& options) {
-  const int finest = finest_voxels(task.scene);
-  const Effects effects = options.effects && options.effects->fixed ? *options.effects->fixed : Effects{};
+  const int finest = finest_voxels(task.scene());
+  const PreparedScene scene =
+      task.prepared.under(options.effects && options.effects->fixed ? *options.effects->fixed : Effects{});
   SolveOptions coarse = options.solve;
   coarse.iterations = 0;
   coarse.budget.reset();  // a run that is cut short would make the machine seem quicker than it is
+  coarse.stop = {};
   const Seconds start = task.elapsed();
   Calibration result;
   double finer = 1;  // times the reference's voxels
   for (int run = 0;; ++run) {
     const int voxels = static_cast<int>(finer * reference_voxels(finest));
-    const Grid grid = grid_over(task.scene.box, voxels);
+    const Grid grid = grid_over(scene.told().box, voxels);
     const Seconds begin = task.elapsed();
     EMBERLOCK_ASSIGN_OR_RETURN(const Reference measured,
-                               measure_reference(task.scene, grid, effects, coarse, task.elapsed));
+                               measure_reference(scene, grid, coarse, task.elapsed));
     const Seconds last = task.elapsed() - begin;
     const auto step = static_cast<std::size_t>(std::lround(std::log2(finer)));
-    result.unit = measured.seconds / shipped_calibration()[step].seconds;
+    result.unit = measured.seconds / reference_calibration()[step].seconds;
     result.took = task.elapsed() - start;
     const bool repeat = run == 0;
-    if (!repeat && (step + 1 == shipped_calibration().size() || 2 * voxels > finest)) return result;
+    if (!repeat && (step + 1 == reference_calibration().size() || 2 * voxels > finest)) return result;
     if (result.took + (repeat ? 1.0 : kFinerCosts) * last > kMostCalibration) return result;
     if (!repeat) finer *= 2;
   }
@@ -106,11 +112,11 @@ std::vector<WorkPoint> expected_runs(const Scene& scene, const ReconstructOption
   const bool fixed = options.effects && options.effects->fixed;
   const int limit = options.solve.iterations;
   // Up to the solver's own end, or to the front's last iteration within a limit.
-  std::vector<WorkPoint> runs = shipped_ends();
+  std::vector<WorkPoint> runs = reference_ends();
   if (limit > 0) {
     for (WorkPoint& run : runs) {
       const double end = run.seconds;
-      for (const WorkPoint& p : shipped_front())
+      for (const WorkPoint& p : reference_front())
         if (p.settings.voxels == run.settings.voxels && p.settings.effects == run.settings.effects &&
             p.settings.iterations <= limit)
           run = {run.settings, std::min(end, p.seconds), p.error};
@@ -139,7 +145,7 @@ std::vector<WorkPoint> expected_runs(const Scene& scene, const ReconstructOption
 
 Result<VoxelChoice> choose_voxels(const Task& task, const ReconstructOptions& options,
                                   const Progress& progress) {
-  const Scene& scene = task.scene;
+  const Scene& scene = task.scene();
   if (options.voxels) return told(scene, "asked", *options.voxels, "");
   if (options.rule == VoxelRule::paper) {
     const int voxels = voxels_by_the_paper(scene);
@@ -167,12 +173,14 @@ Result<VoxelChoice> choose_voxels(const Task& task, const ReconstructOptions& op
   const std::vector<WorkPoint> points = expected_runs(scene, options, measured);
   const WorkPoint* chosen = knee(points);
   if (chosen == nullptr) return told(scene, "finest", finest_voxels(scene), "");  // choose_grid() says why
-  VoxelChoice choice = told(scene, "knee", chosen->settings.voxels, why(points, *chosen, measured));
+  const Seconds spent = task.elapsed();
+  VoxelChoice choice =
+      told(scene, "knee", chosen->settings.voxels, why(points, *chosen, measured, spent.value()));
   choice.calibration_time = measured.took;
-  choice.expected_time = Seconds(chosen->seconds);
+  choice.expected_time = spent + Seconds(chosen->seconds);
   for (const WorkPoint& p : points) {
     if (&p == chosen) continue;
-    choice.options.push_back({p.settings.voxels, Seconds(p.seconds), p.error / chosen->error});
+    choice.options.push_back({p.settings.voxels, spent + Seconds(p.seconds), p.error / chosen->error});
   }
   choice.words.push_back(what_else(choice.options, choice));
   return choice;

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "recon/pipeline/settled_run.h"
+#include "recon/pipeline/single_run.h"
 #include "recon/pipeline/work_precision.h"
 
 namespace emberlock::recon {
@@ -11,7 +11,7 @@ namespace emberlock::recon {
 /// What this machine, as busy as it is now, takes for a coarse solve of the scene at hand.
 struct Calibration {
   Seconds unit{
-      0};  ///< of shipped_ends(): a reference run's time, by the largest solve that there was time for
+      0};  ///< of reference_ends(): a reference run's time, by the largest solve that there was time for
   Seconds took{0};  ///< all of them
 };
 
@@ -19,9 +19,9 @@ struct Calibration {
 /// the start, as long as another fits into about a second.
 Result<Calibration> calibrate(const Task& task, const ReconstructOptions& options);
 
-/// What runs without a limit would take here, in seconds, by rising voxels; errors as multiples of one and
-/// the same unknown error. From the shipped front: its grids as far as they fit into the memory, and at the
-/// voxels that are asked for those alone.
+/// What runs without a limit would still take here, in seconds, by rising voxels; errors as multiples of one
+/// and the same unknown error. From the reference front: its grids as far as they fit into the memory, and at
+/// the voxels that are asked for those alone.
 std::vector<WorkPoint> expected_runs(const Scene& scene, const ReconstructOptions& options,
                                      const Calibration& calibration);
 

@@ -29,35 +29,6 @@ std::pair<int, int> neighbours(const std::vector<WorkPoint>& points, int voxels)
 
 }  // namespace
 
-std::vector<WorkPoint> pareto_front(std::vector<WorkPoint> points) {
-  std::stable_sort(points.begin(), points.end(), [](const WorkPoint& a, const WorkPoint& b) {
-    return a.seconds != b.seconds ? a.seconds < b.seconds : a.error < b.error;
-  });
-  std::vector<WorkPoint> front;
-  for (WorkPoint& p : points) {
-    if (front.empty() || p.error < front.back().error) front.push_back(std::move(p));
-  }
-  return front;
-}
-
-std::optional<double> error_within(const std::vector<WorkPoint>& front, double seconds) {
-  const auto later = std::upper_bound(front.begin(), front.end(), seconds,
-                                      [](double s, const WorkPoint& p) { return s < p.seconds; });
-  if (later == front.begin()) return std::nullopt;
-  const WorkPoint& a = *std::prev(later);
-  if (later == front.end()) return a.error;
-  return power_law(a.seconds, a.error, later->seconds, later->error, seconds);
-}
-
-std::optional<double> seconds_until(const std::vector<WorkPoint>& front, double error) {
-  const auto reached =
-      std::find_if(front.begin(), front.end(), [&](const WorkPoint& p) { return p.error <= error; });
-  if (reached == front.end()) return std::nullopt;
-  if (reached == front.begin()) return reached->seconds;
-  const WorkPoint& a = *std::prev(reached);
-  return power_law(a.error, a.seconds, reached->error, reached->seconds, error);
-}
-
 const WorkPoint* best_within(const std::vector<WorkPoint>& points, double seconds) {
   const WorkPoint* best = nullptr;
   for (const WorkPoint& p : points) {

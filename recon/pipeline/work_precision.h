@@ -3,10 +3,8 @@
 
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
-#include "base/result.h"
 #include "recon/adjust/solver.h"
 
 namespace emberlock::recon {
@@ -33,17 +31,6 @@ struct WorkPoint {
   double seconds = 0;
   double error = 0;
 };
-
-/// The points that no other one beats in both (Pareto), by rising seconds and strictly falling error. Of
-/// equal ones the first stays.
-std::vector<WorkPoint> pareto_front(std::vector<WorkPoint> points);
-
-/// The error that a front reaches within so many seconds: linear between its points on logarithmic axes, and
-/// so monotone; nothing before its first point, its last error beyond it.
-std::optional<double> error_within(const std::vector<WorkPoint>& front, double seconds);
-
-/// The inverse: seconds until the error is at most this; nothing below the front's last error.
-std::optional<double> seconds_until(const std::vector<WorkPoint>& front, double error);
 
 /// The lowest error among the points within so many seconds, the quicker of equal ones; nullptr without any.
 const WorkPoint* best_within(const std::vector<WorkPoint>& points, double seconds);
@@ -77,18 +64,5 @@ const WorkPoint* knee(const std::vector<WorkPoint>& points, const Patience& pati
 /// from the two last ones on) seconds and error follow a power of the voxels, for each combination of other
 /// settings that both have. From one number alone: as measured.
 std::vector<WorkPoint> at_voxels(const std::vector<WorkPoint>& points, int voxels);
-
-/// One line a point: seconds, heldout_rmse, the settings, and whether it lies on the front.
-std::string to_csv(const std::vector<WorkPoint>& points);
-/// The inverse, to the last bit. Errors name the line.
-Result<std::vector<WorkPoint>> parse_csv(std::string_view text);
-
-/// "float32" or "float64"; an Error that lists them otherwise.
-Result<Precision> parse_precision(std::string_view name);
-std::string_view name(Precision precision);
-std::string_view name(Solver solver);
-
-/// The options of `emberlock reconstruct` that mean these settings.
-std::string command_options(const Settings& settings);
 
 }  // namespace emberlock::recon

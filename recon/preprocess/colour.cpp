@@ -7,7 +7,7 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr double kLeastLight = 0.02;  // of the middle's: less is no lens
+constexpr double kLeastLight = 0.02;  // of the middle's: a lens has more
 
 template <class List>
 bool all_finite(const List& list) {
@@ -38,7 +38,7 @@ Status check_response(const std::vector<double>& response, const std::string& wh
   return {};
 }
 
-/// A coordinate between the middles of `cells` cells: the one before, the one after, and how far between.
+/// A coordinate between the middles of `cells` cells: the indices before and after it, and the fraction.
 struct BetweenCells {
   std::size_t before, after;
   double part;
@@ -52,7 +52,7 @@ BetweenCells between_cells(double share, int cells) {
 }
 
 Status read_flat(const v1::FlatField& message, FlatField& flat, const std::string& where) {
-  constexpr std::uint32_t kMostCells = 4096;  // along a side
+  constexpr std::uint32_t kMostCells = 4096;  // per side
   const std::uint32_t columns = message.columns();
   const std::uint32_t rows = message.rows();
   if (columns == 0 && rows == 0 && message.light().empty()) return {};

@@ -12,43 +12,43 @@
 
 namespace emberlock::recon {
 
-/// The share of the light that vignetting leaves out of account (dust on the sensor, shading by colour): at
-/// the middles of cells that divide the picture evenly, linear between them.
+/// The relative light that vignetting doesn't describe (dust on the sensor, coloured shading): values at the
+/// middles of cells that divide the picture evenly, linear between them.
 struct FlatField {
   int columns = 0, rows = 0;
   std::vector<float> light = {};  ///< [3 * (row * columns + column) + channel]; empty: 1 everywhere
 };
 
-/// How a camera's samples tell radiance: (response(sample / white) - dark) * gain / (vignetting * flat). By
-/// default nothing changes. Immutable in use; what `read` gives is valid.
+/// How a camera's samples are converted to radiance: (response(sample / white) - dark) * gain / (vignetting *
+/// flat). The default changes nothing. Immutable; results of `read_colour` are valid.
 struct Colour {
   std::vector<double> response = {};       ///< exposure 0..1 at even samples 0..1, rising; empty: linear
   std::array<double, 3> dark = {};         ///< exposure without light
-  std::array<double, 3> gain = {1, 1, 1};  ///< radiance of an exposure of 1
+  std::array<double, 3> gain = {1, 1, 1};  ///< radiance for an exposure of 1
   std::array<double, 3> vignetting = {};   ///< k2, k4, k6
   FlatField flat = {};
   std::vector<std::uint32_t> hot_pixels = {};  ///< y * width + x, rising
 };
 
-/// Relative exposure 0..1 of a sample 0..1, linear between the response's points.
+/// Relative exposure 0..1 of a sample 0..1, linear between the points of the response.
 double exposure_of(const Colour& colour, double sample);
 
-/// The share of the light that a pixel gets, 1 in the middle: 1 + k2 r^2 + k4 r^4 + k6 r^6, `r_squared` in
-/// half diagonals.
+/// The relative light at a pixel, 1 in the middle: 1 + k2 r^2 + k4 r^4 + k6 r^6, with `r_squared` in half
+/// diagonals.
 inline double falloff(const std::array<double, 3>& k, double r_squared) {
   return 1 + r_squared * (k[0] + r_squared * (k[1] + r_squared * k[2]));
 }
 
-/// A flat field's three shares at a place, x and y in 0..1 of the picture's sides.
+/// A flat field's three values at a place, with x and y in 0..1 of the picture's sides.
 std::array<double, 3> light_at(const FlatField& flat, double x, double y);
 
-/// How far a point (pixel centres at +0.5) lies from the picture's middle: squared, in half diagonals.
+/// Squared distance of a point (pixel centres at +0.5) from the picture's middle, in half diagonals.
 double radius_squared(ImageSize size, double x, double y);
 
-/// The message's meaning for pictures of `size`. Errors name the field below `where`: numbers that aren't
+/// Converts the message for pictures of `size`. Errors name the field below `where`: numbers that aren't
 /// finite, a response that doesn't rise from 0 to 1, other than three gains or dark levels, gains not above
-/// 0, a vignetting or a flat field that leaves no light, a flat field whose numbers don't fill its cells, hot
-/// pixels outside.
+/// 0, a vignetting or flat field without light somewhere, a flat field with a wrong number of values, hot
+/// pixels outside the picture.
 Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std::string& where);
 v1::Colour to_message(const Colour& colour);
 

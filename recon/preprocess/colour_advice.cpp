@@ -10,7 +10,7 @@
 
 namespace emberlock::recon {
 
-/// What would help most comes first: each is weighed by the error that it would take away.
+/// The most useful comes first: each is weighted by the error that it would remove.
 void advise_on_colours(ColourCalibration& out) {
   std::vector<std::pair<double, std::string>> wishes;
   for (const CalibratedColour& c : out.cameras) {

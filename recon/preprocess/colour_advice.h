@@ -5,10 +5,10 @@
 
 namespace emberlock::recon {
 
-/// Puts into `out` what isn't as it should be.
+/// Adds warnings on the calibration to `out`.
 void warn_of_colours(const ColourReadings& readings, ColourCalibration& out);
 
-/// Puts into `out` which picture would help most, first.
+/// Adds advice to `out`: which picture would help most, first.
 void advise_on_colours(ColourCalibration& out);
 
 }  // namespace emberlock::recon

@@ -25,8 +25,8 @@ Error bad_target(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
 }
 
-/// Which cameras see a common radiance, directly or by others, in one channel: each one's group by its first
-/// camera.
+/// The cameras connected by common radiances in one channel, directly or through others: each one's group,
+/// identified by its first camera.
 std::vector<std::size_t> groups_of(const std::vector<ColourEquation>& equations, std::size_t cameras,
                                    std::size_t channel) {
   std::vector<std::size_t> parent(cameras);
@@ -48,7 +48,7 @@ std::vector<std::size_t> groups_of(const std::vector<ColourEquation>& equations,
   return parent;
 }
 
-/// Largest group; the first of equals.
+/// The largest group; of equally large ones the first.
 std::size_t main_group(const std::vector<std::size_t>& groups) {
   std::size_t best = 0;
   std::ptrdiff_t most = 0;
@@ -76,7 +76,7 @@ ColourFit start_of(const Equations& equations, std::size_t cameras, const Colour
   return fit;
 }
 
-/// Corner's light and its standard deviation.
+/// Sets the light in the corner and its standard deviation.
 void tell_corner(const ColourFit& fit, std::size_t camera, CalibratedColour& out) {
   const auto at = static_cast<Eigen::Index>(10 * camera + 7);
   const Eigen::Vector3d ones = Eigen::Vector3d::Ones();
@@ -84,8 +84,8 @@ void tell_corner(const ColourFit& fit, std::size_t camera, CalibratedColour& out
   out.corner_sigma = std::sqrt(std::max(0.0, ones.dot(fit.covariance.block<3, 3>(at, at) * ones)));
 }
 
-/// Gains so that the geometric mean of those that share patches is 1, and their standard deviations against
-/// it.
+/// Normalises the gains so that their geometric mean over the cameras that share patches is 1, and sets their
+/// standard deviations relative to it.
 void tell_gains(const ColourFit& fit, const std::vector<std::size_t>& groups, std::size_t channel,
                 std::vector<CalibratedColour>& out) {
   const std::size_t group = main_group(groups);
@@ -146,7 +146,7 @@ void tell_residuals(const Equations& equations, const ColourFit& fit, ColourCali
   out.rms = std::sqrt(squares / std::max(1, used));
 }
 
-/// Each camera's flat field on top of what the fit says of its lens.
+/// Each camera's flat field, given its lens from the fit.
 std::vector<FoundFlat> find_flats(const ColourReadings& readings, const ColourFit& fit, double floor) {
   std::vector<FoundFlat> flats;
   for (std::size_t i = 0; i < readings.cameras.size(); ++i) {
@@ -168,14 +168,14 @@ void put_flats(const ColourReadings& readings, const std::vector<FoundFlat>& fla
   }
 }
 
-/// What is found of all cameras together.
+/// The result for all cameras.
 struct JointFit {
   ColourFit fit;
   std::vector<FoundFlat> flats;
 };
 
-/// The fit by the target alone, from where flat pictures lead it astray no more; `start` where that isn't
-/// enough.
+/// Fits again with the target only, starting from a fit that flat pictures may have biased; returns `start`
+/// if the target isn't sufficient.
 ColourFit fit_target(const ColourReadings& readings, const Equations& equations, const ColourFit& start,
                      ColourHeld held) {
   std::vector<ColourEquation> target;
@@ -185,8 +185,7 @@ ColourFit fit_target(const ColourReadings& readings, const Equations& equations,
   return target.size() == equations.all.size() ? start : fit_colour(target, start, held).value_or(start);
 }
 
-/// Patches behind dust would darken their cameras, so where there are flat fields, the fit is made again with
-/// them.
+/// Patches imaged through dust would seem darker, so with flat fields the fit is repeated.
 std::optional<JointFit> fit_jointly(const ColourReadings& readings, Equations& equations,
                                     const ColourFit& start, const ColourHeld& held, double floor) {
   auto fit = fit_colour(equations.all, fit_target(readings, equations, start, held), held);
@@ -203,7 +202,7 @@ std::optional<JointFit> fit_jointly(const ColourReadings& readings, Equations& e
   return JointFit{std::move(*fit), std::move(flats)};
 }
 
-/// A fit that a camera's readings contradict is no calibration.
+/// Error if a camera's readings contradict the fit.
 Status check_fit(const ColourReadings& readings, const Equations& equations) {
   for (std::size_t camera = 0; camera < readings.cameras.size(); ++camera) {
     double squares = 0;
@@ -234,7 +233,7 @@ Status check_colour_options(const ColourOptions& options) {
   return {};
 }
 
-/// A camera's colour as the fit found it.
+/// A camera's colour from the fit.
 CalibratedColour calibrated(const ColourCamera& camera, const ColourUnknowns& found, const FoundFlat& flat) {
   CalibratedColour out;
   out.camera = camera.id;

@@ -11,16 +11,16 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr double kLeastRatio = 1.3;  // of exposures that tell a response
-// Of a flat picture's patches, relative: dust, and light that isn't quite even. There are many of them, and
-// were they believed to the last per mille, the best response would be one that is blind where they lie.
+constexpr double kLeastRatio = 1.3;  // of exposures that can determine a response
+// Relative error of a flat picture's patches: dust, and slightly uneven light. They are many: with
+// smaller errors the best fit would be a response that is flat at their values.
 constexpr double kFlatFloor = 0.02;
 
 Error bad_picture(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
 }
 
-/// The lens's falloff needs a radiance at three or more distances that differ by much.
+/// The lens's falloff needs a radiance at three or more clearly different distances.
 bool vignetting_told(const std::vector<ColourEquation>& equations, std::size_t camera) {
   std::map<std::size_t, std::set<int>> places;  // by light: tenths of r^2
   for (const ColourEquation& e : equations)

@@ -11,10 +11,10 @@
 
 namespace emberlock::recon {
 
-/// Equations from readings, and what they came from.
+/// Equations made from readings, with their origins.
 struct Equations {
   std::vector<ColourEquation> all;
-  std::vector<std::size_t> reading;  ///< of each
+  std::vector<std::size_t> reading;  ///< index of the reading of each equation
   std::vector<ColourResidual> left_out;
   std::map<std::pair<std::string, std::size_t>, std::size_t>
       lights;  ///< unknown radiances, by name and channel
@@ -22,17 +22,17 @@ struct Equations {
 
 Equations equations_of(const ColourReadings& readings, const ColourOptions& options);
 
-/// Dark pictures brighter than every patch are swapped, or taken with the light on.
+/// Error if dark pictures are brighter than every patch: they were swapped, or taken with the light on.
 Status check_dark(const ColourReadings& readings);
 
-/// The same radiance with more exposure must give a larger sample.
+/// Error if a larger exposure of the same radiance gives a smaller sample.
 Status check_rising(const ColourReadings& readings, const Equations& equations);
 
-/// Whether anything says how samples grow with light: one radiance, up to known factors, seen at two of them.
+/// Whether the response can be determined: some radiance was seen at two known ratios of exposure.
 bool response_told(const std::vector<ColourEquation>& equations);
 
-/// Cameras that see no radiance at three or more distances from the middle that differ by much: nothing tells
-/// their lens's falloff.
+/// Cameras for which no radiance was seen at three or more clearly different distances from the middle, so
+/// that the lens's falloff can't be determined.
 std::vector<bool> vignetting_not_told(const std::vector<ColourEquation>& equations, std::size_t cameras);
 
 }  // namespace emberlock::recon

@@ -161,7 +161,7 @@ void weigh(std::vector<ColourEquation>& equations, const ColourFit& fit) {
   }
 }
 
-void judge_equations(std::vector<ColourEquation>& equations, ColourFit& fit) {
+void mark_outliers(std::vector<ColourEquation>& equations, ColourFit& fit) {
   std::vector<double> off;
   for (ColourEquation& e : equations) {
     ColourUnknowns& c = fit.cameras[e.camera];
@@ -190,7 +190,7 @@ std::optional<ColourFit> fit_colour(std::vector<ColourEquation>& equations, Colo
     weigh(equations, fit);
     ColourProblem problem(equations, fit, held);
     if (!problem.solve()) return std::nullopt;
-    judge_equations(equations, fit);
+    mark_outliers(equations, fit);
   }
   weigh(equations, fit);
   const auto covariance = ColourProblem(equations, fit, held).covariance();

@@ -9,8 +9,8 @@
 
 namespace emberlock::recon {
 
-/// ln g(v) = p0 ln v + p1 (1 - v) + p2 (1 - v)^2 + p3 (1 - v)^3: g(1) = 1 whatever the numbers, and a power
-/// law where the last three are 0.
+/// ln g(v) = p0 ln v + p1 (1 - v) + p2 (1 - v)^2 + p3 (1 - v)^3: always g(1) = 1, and a power law if the last
+/// three are 0.
 struct ResponseCurve {
   static constexpr int kParameters = 4;
   static constexpr double kLeastSample = 1e-4;

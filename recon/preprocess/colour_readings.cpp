@@ -95,7 +95,7 @@ struct PicturePath {
   std::optional<double> exposure;
 };
 
-/// A file by its name; nothing for others.
+/// Interprets a file's name; nullopt for other files.
 std::optional<PicturePath> by_name(const fs::path& path) {
   const std::string stem = path.stem().string();
   PicturePath out{path, Purpose::target, {}, {}};
@@ -216,7 +216,7 @@ Result<std::vector<PicturePath>> pictures_in(const fs::path& folder) {
   return out;
 }
 
-/// A picture without a told exposure among others with one would count as one second.
+/// Otherwise a picture without an exposure in its name would count as one second.
 Status check_exposures(const std::vector<PicturePath>& pictures) {
   const PicturePath* told = nullptr;
   const PicturePath* silent = nullptr;

@@ -29,7 +29,7 @@ std::vector<double> block_means(const Samples& of) {
   return blocks;
 }
 
-/// What the blocks hold above their median: the light of what stands out.
+/// The sum of the blocks above their median: the light that exceeds the background.
 double light_of(std::vector<double> blocks) {
   if (blocks.empty()) return 0;
   const auto middle = blocks.begin() + static_cast<std::ptrdiff_t>(blocks.size() / 2);
@@ -40,7 +40,7 @@ double light_of(std::vector<double> blocks) {
   return light;
 }
 
-/// Of a block's mean, from how neighbouring samples' differences scatter.
+/// Standard deviation of a block's mean, from the scatter of differences between neighbouring samples.
 double block_sigma(const Samples& from, const Samples& to) {
   std::vector<double> scatter;
   constexpr std::size_t kStep = 5;

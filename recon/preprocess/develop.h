@@ -15,17 +15,17 @@ namespace emberlock::recon {
 struct DevelopOptions {
   enum class SmearRemoval { automatic, off, told };
   SmearRemoval smear_removal =
-      SmearRemoval::automatic;  ///< automatic: where the sensor is a CCD and shows it
-  Smear smear = {};             ///< told: as it is
+      SmearRemoval::automatic;  ///< automatic: if the sensor is a CCD and shows smear
+  Smear smear = {};             ///< for `told`: used as it is
   Demosaicing demosaicing = Demosaicing::bilinear;
 };
 
-/// One camera's frame of the flame and what is known about the camera.
+/// One camera's frame of the flame, and the known properties of the camera.
 struct CameraFrame {
   ImageView frame;
   std::vector<ImageView> dark =
-      {};  ///< frames without flame; none: the picture's own dark half tells the level
-  std::optional<Colour> colour = {};  ///< none: samples are taken to be linear, and all cameras alike
+      {};  ///< frames without flame; if empty, the level comes from the picture's own dark half
+  std::optional<Colour> colour = {};  ///< absent: samples are assumed to be linear, and all cameras equal
   SensorKind sensor = SensorKind::ccd;
 };
 
@@ -35,13 +35,14 @@ struct DevelopedPicture {
   std::vector<PreprocessStep> steps;
 };
 
-/// From samples to radiance: linearise, hot pixels, background, smear, demosaic, level, gain and vignetting,
-/// in this order: what adds up in the sensor is taken out before anything is multiplied or interpolated. Each
-/// step says whether it ran and why. Dark frames have the frame's layout.
+/// Converts samples to radiance: linearise, hot pixels, background, smear, demosaic, level, gain and
+/// vignetting, in this order, so that additive effects of the sensor are removed before anything is
+/// multiplied or interpolated. Each step reports whether it ran and why. Dark frames must have the frame's
+/// layout.
 DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& options = {});
 
-/// The steps of several cameras as one list: on where any camera's is; where they differ, the reason counts
-/// them and names the first of each.
+/// Merges the steps of several cameras: a step is on if any camera's is; if they differ, the reason gives
+/// their numbers and the first camera of each kind.
 std::vector<PreprocessStep> together(
     const std::vector<std::pair<std::string, std::vector<PreprocessStep>>>& cameras);
 

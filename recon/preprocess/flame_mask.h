@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
-#include "base/result.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
@@ -45,20 +43,5 @@ FlameMask noise_mask(const RadianceImage& image);
 
 /// Masks of all views, in order; without a threshold each view's own noise_mask.
 std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold = std::nullopt);
-
-/// Refuses what no later stage can use, naming the view: no views, an image whose size differs from its
-/// camera's, NaN or infinite pixels or cameras, a box without extent.
-Status check_scene(const Scene& scene);
-
-/// Root mean square of (a - b) for each channel over a box of pixels, the whole image where the box is empty;
-/// grey levels.
-std::array<double, 3> rmse(const RadianceImage& a, const RadianceImage& b, const PixelBox& box);
-
-/// The same of a view against its rendering. A rendering that is brighter than a saturated pixel has no error
-/// there.
-std::array<double, 3> rmse(const View& view, const RadianceImage& rendered, const PixelBox& box);
-
-/// The three channels as one number: the root of the mean of their squares.
-double all_channels(const std::array<double, 3>& rmse);
 
 }  // namespace emberlock::recon

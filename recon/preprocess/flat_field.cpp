@@ -10,7 +10,7 @@
 namespace emberlock::recon {
 namespace {
 
-/// A cell's light over the falloff, in its picture's own unit, and the standard deviation of that.
+/// A cell's light divided by the falloff, in its picture's own unit, and its standard deviation.
 struct CellLight {
   double light, sigma;
 };
@@ -28,7 +28,7 @@ std::optional<CellLight> cell_light(const PatchReading& cell, std::size_t channe
                    slope * mean_sigma(cell, channel, step) / lens};
 }
 
-/// Sums over pictures, weighted by what each knows.
+/// Sums over pictures, weighted by their accuracy.
 struct Mean {
   double sum = 0, weight = 0;
   [[nodiscard]] double value() const { return weight > 0 ? sum / weight : 1; }
@@ -57,7 +57,7 @@ void add_picture(const FlatReading& flat, std::size_t channel, const ColourUnkno
 
 FoundFlat find_flat(const std::vector<FlatReading>& flats, const ColourUnknowns& camera,
                     const DarkReading& dark, double step, double floor) {
-  constexpr double kLeastLight = 0.1;  // less is no dust but something in front of the lens
+  constexpr double kLeastLight = 0.1;  // less isn't dust but an object in front of the lens
   FoundFlat found;
   if (flats.empty()) return found;
   const std::size_t cells = flats.front().cells.size();

@@ -27,7 +27,7 @@ struct Neighbours {
   }
 };
 
-/// On a mosaic: two pixels away, for green too, so that all colours are treated alike.
+/// In a mosaic they are two pixels away, also for green, so that all colours are treated alike.
 template <class Skip>
 Neighbours neighbours_of(const Samples& s, int x, int y, int c, const Skip& skip) {
   Neighbours out;
@@ -48,11 +48,11 @@ float difference_at(const Samples& s, int x, int y, int c) {
   return s.value[s.index(x, y, c)] - neighbours_of(s, x, y, c, kNone).median();
 }
 
-/// Six times the spread of samples about their neighbours' median, from some 20 000 of them.
+/// Six times the spread of samples around their neighbours' median, from about 20 000 of them.
 float six_sigma(const Samples& s) {
   constexpr double kEnough = 20000;
-  const int step =
-      1 + 2 * static_cast<int>(std::sqrt(static_cast<double>(s.value.size()) / kEnough) / 2);  // all phases
+  const int step = 1 + 2 * static_cast<int>(std::sqrt(static_cast<double>(s.value.size()) / kEnough) /
+                                            2);  // odd, to include all phases of a mosaic
   std::vector<float> values;
   for (int y = 0; y < s.size.height; y += step)
     for (int x = 0; x < s.size.width; x += step)
@@ -93,7 +93,7 @@ std::vector<std::uint32_t> hot_pixels_of_picture(const Samples& picture) {
   const int pitch = picture.pitch();
   return pixels_where(picture, [&](int x, int y, int c) {
     const float value = picture.value[picture.index(x, y, c)];
-    // Most pixels are done with here.
+    // Most pixels end here.
     const int beside = x >= pitch ? x - pitch : x + pitch;
     if (beside >= picture.size.width || !(value - picture.value[picture.index(beside, y, c)] > limit))
       return false;

@@ -15,7 +15,7 @@ constexpr const char* kFlatPrefix = "flat:";
 constexpr int kFlatBlocks = 12;  // along each side, as patches
 constexpr int kFlatCells = 48;   // along a row, as a field
 constexpr int kLeastFlatCell = 16;
-constexpr double kDarkest = 0.03;  // samples: below, noise and quantisation bend what the mean tells
+constexpr double kDarkest = 0.03;  // samples: below, noise and quantisation bias the mean
 constexpr double kBrightest = 0.985;
 
 struct ChannelSamples {
@@ -147,13 +147,14 @@ double dark_sample(const DarkReading& dark, std::size_t channel) {
 
 double mean_sigma(const PatchReading& reading, std::size_t channel, double step) {
   const double spread = std::sqrt(reading.variance[channel]);
-  // Noise of half a step makes quantisation one more noise; without it the whole patch is off by the same.
+  // Noise of half a step turns quantisation into noise; without it the whole patch has the same rounding
+  // error.
   const double rounding = spread > 0.4 * step ? 0 : step / std::sqrt(12.0);
   return std::hypot(spread / std::sqrt(static_cast<double>(reading.count[channel])), rounding);
 }
 
 ReadingUse use_of(const PatchReading& reading, std::size_t channel, double dark) {
-  // One clipped sample drags a patch's mean.
+  // A single clipped sample biases a patch's mean.
   if (reading.saturated[channel] > 0 || reading.mean[channel] > kBrightest) return ReadingUse::saturated;
   if (reading.mean[channel] < std::max(kDarkest, 1.5 * dark) ||
       std::sqrt(reading.variance[channel]) > 0.3 * reading.mean[channel])

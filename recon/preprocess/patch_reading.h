@@ -15,59 +15,60 @@ struct PatchPlace {
   int x = 0, y = 0, width = 0, height = 0;
 };
 
-/// What a picture shows of one patch. Samples are relative to the sensor's white: 0..1.
+/// The reading of one patch in a picture. Samples are relative to the sensor's white: 0..1.
 struct PatchReading {
   std::size_t camera = 0;
-  std::string patch;  ///< readings of one patch in one light saw one radiance, in whatever camera and place
+  std::string patch;  ///< readings of the same patch in the same light have the same radiance, in every
+                      ///< camera and place
   std::string light = {};
   std::string picture = {};  ///< for messages
   double exposure = 1;       ///< relative exposure time
-  double x = 0, y = 0;       ///< the patch's middle, pixel centres at +0.5
+  double x = 0, y = 0;       ///< middle of the patch, pixel centres at +0.5
   std::array<double, 3> mean = {};
   std::array<double, 3> variance = {};   ///< of one sample
-  std::array<double, 3> saturated = {};  ///< share of the samples
-  std::array<int, 3> count = {};         ///< samples; 0: the channel wasn't seen
+  std::array<double, 3> saturated = {};  ///< share of saturated samples
+  std::array<int, 3> count = {};         ///< number of samples; 0: the channel wasn't measured
 };
 
-/// A flat picture, which shows one radiance everywhere, in cells that divide it evenly.
+/// A flat picture (with uniform radiance), averaged in cells that divide it evenly.
 struct FlatReading {
   std::size_t camera = 0;
   ImageSize size;  ///< of the picture
   int columns = 0, rows = 0;
-  std::vector<PatchReading> cells;  ///< in rows
+  std::vector<PatchReading> cells;  ///< row by row
 };
 
 /// Samples without light.
 struct DarkReading {
-  /// Shares of samples in 256 steps from 0 to white, by channel; empty without dark pictures.
+  /// Share of samples in each of 256 steps from 0 to white, by channel; empty without dark pictures.
   std::array<std::vector<double>, 3> histogram = {};
   std::vector<std::uint32_t> hot_pixels;
 };
 
 /// Mean and variance of a patch, by channel; samples further than five robust sigma from the median (dirt,
-/// hot pixels) are left out. `place` lies inside the picture.
+/// hot pixels) are ignored. `place` must lie inside the picture.
 PatchReading read_patch(const ImageView& picture, const PatchPlace& place);
 
-/// A flat picture's cells, some 48 along a row, of at least 16 pixels a side.
+/// The cells of a flat picture, about 48 per row, with sides of at least 16 pixels.
 FlatReading read_flat(const ImageView& picture);
 
-/// The same in twelve by twelve coarse patches, which all saw one radiance: is_flat().
+/// The same as 12 x 12 coarse patches that all have the same radiance: is_flat().
 std::vector<PatchReading> flat_patches(const ImageView& picture, const std::string& name);
 [[nodiscard]] bool is_flat(const PatchReading& reading);
 
-/// Of at least one picture of one layout.
+/// From at least one picture; all of the same layout.
 DarkReading read_dark(const std::vector<Image>& pictures);
 
-/// The median of the samples without light, 0 where they aren't known. Not their mean: black clips noise from
-/// below, which light doesn't see.
+/// The median of the samples without light, 0 if they are unknown. Not their mean, because clipping at black
+/// changes it.
 double dark_sample(const DarkReading& dark, std::size_t channel);
 
-/// Standard deviation of a patch's mean, relative to white; `step`: of its camera's samples.
+/// Standard deviation of a patch's mean, relative to white; `step`: resolution of its camera's samples.
 double mean_sigma(const PatchReading& reading, std::size_t channel, double step);
 
 enum class ReadingUse { used, saturated, dark, outlier };
 
-/// Whether a patch's mean tells radiance: `used`, or saturated, or too dark, where samples without light are
+/// Whether a patch's mean is usable: `used`, saturated, or too dark, if samples without light have the value
 /// `dark`.
 ReadingUse use_of(const PatchReading& reading, std::size_t channel, double dark);
 

@@ -133,8 +133,8 @@ std::optional<BorderLevel> border_level(const Scene& scene, const std::vector<Fl
   std::vector<Levels> found;
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
     if (scene.views[v].role != ViewRole::input) continue;
-    for (const PixelBox& side : sides(scene.views[v].image.size))
-      if (const auto levels = median_outside(scene.views[v].image, masks[v], side)) found.push_back(*levels);
+    for (const PixelBox& side : sides(scene.views[v].image->size))
+      if (const auto levels = median_outside(*scene.views[v].image, masks[v], side)) found.push_back(*levels);
   }
   if (found.empty()) return std::nullopt;
   BorderLevel border;
@@ -150,10 +150,10 @@ double clip_level(const Scene& scene, const std::vector<PixelBox>& boxes, double
   constexpr double kBlackLevel = 16;
   double lowest = 0;
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    if (scene.views[v].role != ViewRole::input || !scene.views[v].bounds.empty()) continue;
+    if (scene.views[v].role != ViewRole::input || scene.views[v].bounds) continue;
     for (std::size_t c = 0; c < 3; ++c) {
       const double top =
-          static_cast<double>(Channel(scene.views[v].image, c, boxes[v]).shared_top().value_or(0));
+          static_cast<double>(Channel(*scene.views[v].image, c, boxes[v]).shared_top().value_or(0));
       if (top >= white - kBlackLevel && (lowest <= 0 || top < lowest)) lowest = top;
     }
   }
@@ -170,7 +170,7 @@ ClippedPixels clipped_pixels(const Scene& scene, const std::vector<PixelBox>& bo
     std::vector<std::uint8_t> mark(static_cast<std::size_t>(box.x1 - box.x0) *
                                    static_cast<std::size_t>(box.y1 - box.y0));
     for (std::size_t c = 0; c < 3; ++c) {
-      const Channel channel(scene.views[v].image, c, box);
+      const Channel channel(*scene.views[v].image, c, box);
       const std::vector<double> more = channel.missing(static_cast<float>(white));
       for (const double m : more) missing += m * m;
       channel.mark_clipped(static_cast<float>(white), mark);

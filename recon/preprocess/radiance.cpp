@@ -23,8 +23,9 @@ float midmean(std::vector<float>& values) {
 }
 
 void subtract_background(RadianceImage& image) {
-  // Which half is darker, by means of blocks, which noise doesn't sort; the level by pixels' midmean, which
-  // black doesn't move when it clips noise, and which isn't one of few sample values as the median is.
+  // Block means decide which half is darker, because noise doesn't sort them. The level is the midmean of
+  // pixels: unlike the mean it isn't biased by clipping at black, and unlike the median it isn't limited to
+  // sample values.
   constexpr int kBlocks = 12;  // at least, along the shorter side
   constexpr int kLargest = 8;
   const int edge = std::clamp(std::min(image.size.width, image.size.height) / kBlocks, 1, kLargest);

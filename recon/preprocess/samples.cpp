@@ -8,8 +8,8 @@
 namespace emberlock::recon {
 namespace {
 
-/// Bilinear interpolation written as a normalised convolution with (1 2 1) x (1 2 1) over the samples of one
-/// channel: the same weights inside, and at the border the neighbours that exist share them.
+/// Bilinear interpolation as a normalised convolution with (1 2 1) x (1 2 1) over the samples of one channel:
+/// the usual weights inside, and at the border they are distributed over the existing neighbours.
 float bilinear(const Samples& s, int x, int y, int channel, bool& bound) {
   float sum = 0;
   int weights = 0;
@@ -62,7 +62,7 @@ bool any_saturated_near(const Samples& s, int x, int y) {
   return false;
 }
 
-/// The three channels at a mosaic's pixel; bits of those that are bounds.
+/// The three channels at a mosaic's pixel. Returns the bits of those that are bounds.
 std::uint8_t colours_at(const Samples& s, int x, int y, Demosaicing demosaicing, float* out) {
   const int measured = mosaic_channel(x, y);
   const bool inside = x >= 2 && y >= 2 && x + 2 < s.size.width && y + 2 < s.size.height;

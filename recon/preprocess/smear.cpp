@@ -10,7 +10,7 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr int kBlock = 16;      // columns whose mean tells whether a row shows flame
+constexpr int kBlock = 16;      // columns whose mean shows whether a row contains flame
 constexpr int kFewestRows = 4;  // without flame
 constexpr double kSmearSigmas = 5;
 
@@ -35,7 +35,7 @@ class BlockMeans {
     return mean_[at(row) * at(blocks_) + at(block)];
   }
 
-  /// From the border inwards, in steps of one pitch: the rows that look like the first few.
+  /// The number of rows that look like the first few, from the border inwards in steps of one pitch.
   [[nodiscard]] int alike(int first, int step, int pitch) const {
     const double limit = std::max(0.5, kSmearSigmas * 1.2 * noise(pitch));
     const int most = rows_ / pitch;
@@ -70,7 +70,7 @@ class BlockMeans {
   std::vector<double> mean_;
 };
 
-/// What each column shows where there is no flame, and what light it holds where there is.
+/// Each column's values in rows without flame, and its light in the other rows.
 struct Columns {
   std::vector<std::array<double, 3>> free;  ///< mean of the rows without flame, by channel
   std::vector<double> light;                ///< sum over the other rows, mean of the channels
@@ -83,7 +83,7 @@ struct FreeRows {
   [[nodiscard]] bool holds(int y, int height) const { return y < top || y >= height - bottom; }
 };
 
-/// A quarter of the rows next to the flame is left aside: its glow reaches further than one sees.
+/// Leaves out a quarter of the rows next to the flame, because its glow extends further than is visible.
 FreeRows rows_without_flame(const Samples& s) {
   const BlockMeans means(s);
   const int pitch = s.pitch();
@@ -119,10 +119,10 @@ Columns columns_of(const Samples& s, const FreeRows& rows) {
   return out;
 }
 
-/// What rows without flame show is a level (a mosaic: one for each kind of column) that may bend across the
-/// picture, and a share of the column's light. Least squares over the columns without saturated samples.
+/// Models the rows without flame as a level that may vary across the picture (in a mosaic, one for each kind
+/// of column), plus a share of the column's light. Least squares over the columns without saturated samples.
 struct Share {
-  Eigen::VectorXd level;  ///< of all but the last term
+  Eigen::VectorXd level;  ///< all terms except the last
   double share = 0;
   double sigma = 0;
 };
@@ -151,7 +151,7 @@ std::optional<Share> fit_share(const Samples& s, const Columns& columns, int cha
   }
   if (used < 16) return std::nullopt;
   if (s.layout != SampleLayout::mosaic) normal(1, 1) = 1;
-  // One scale for all terms: the light's are large.
+  // Scales all terms to the same size, because the light's are large.
   const Eigen::VectorXd scale = normal.diagonal().cwiseMax(1e-12).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd even = scale.asDiagonal() * normal * scale.asDiagonal();
   const Eigen::LDLT<Eigen::MatrixXd> solver(even);
@@ -167,8 +167,7 @@ std::optional<Smear> not_found(std::string* why, std::string reason) {
   return std::nullopt;
 }
 
-/// Light of each column less what most columns have, which is the background's; a mosaic's columns by their
-/// kind.
+/// Each column's light minus that of most columns, which is the background's; in a mosaic, by kind of column.
 std::vector<double> light_above_level(const Samples& s, const std::vector<double>& sums) {
   std::vector<double> out = sums;
   for (int phase = 0; phase < s.pitch(); ++phase) {
@@ -236,7 +235,7 @@ std::optional<Smear> find_smear(const Samples& samples, std::string* why) {
   const int channels = samples.channels();
   const Columns both = columns_of(samples, rows);
   std::optional<Smear> found;
-  // Each side by itself: a flame that is cut by the border looks like smear, but on one side alone.
+  // Each side separately: a flame cut by the border looks like smear, but on one side only.
   for (const FreeRows& side : {FreeRows{rows.top, 0}, FreeRows{0, rows.bottom}}) {
     if (side.top + side.bottom == 0) continue;
     Columns columns = columns_of(samples, side);

@@ -3,8 +3,9 @@
 
 #include <array>
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/quantity.h"
@@ -23,24 +24,32 @@ struct RadianceImage {
       : size(s), rgb(3 * static_cast<std::size_t>(s.width) * static_cast<std::size_t>(s.height)) {}
 };
 
+/// What many may hold and nobody changes, so that copies of a view share its pixels.
+template <class T>
+std::shared_ptr<const T> share(T value) {
+  return std::make_shared<const T>(std::move(value));
+}
+using SharedImage = std::shared_ptr<const RadianceImage>;
+using SharedBounds = std::shared_ptr<const std::vector<std::uint8_t>>;
+
 enum class ViewRole { input, held_out };
 
-/// One camera's picture of the flame.
+/// One camera's picture of the flame. Copies share their pixels.
 struct View {
   std::string name;  ///< file or camera id, for messages
   CameraModel camera;
-  RadianceImage image;
+  SharedImage image;
   ViewRole role = ViewRole::input;
-  /// What lies behind the flame, of the image's size; absent is black.
-  std::optional<RadianceImage> background = {};
+  /// What lies behind the flame, of the image's size; null is black.
+  SharedImage background = {};
   /// Where the sensor was saturated and the image's value is a lower bound: one a pixel, bits 1, 2 and 4 for
-  /// R, G and B. Empty where no pixel is. Unlike Sensor::Clipping's one white for all views, it holds after
+  /// R, G and B. Null where no pixel is. Unlike Sensor::Clipping's one white for all views, it holds after
   /// gains and vignetting have been taken out.
-  std::vector<std::uint8_t> bounds = {};
+  SharedBounds bounds = {};
   Seconds lateness{0};        ///< by how much it was filmed after the scene's instant
   Seconds lateness_sigma{0};  ///< standard error of that
-  /// What the camera shows on average over the recording, of the image's size; absent is not known.
-  std::optional<RadianceImage> average = {};
+  /// What the camera shows on average over the recording, of the image's size; null is not known.
+  SharedImage average = {};
 };
 
 /// A step of preparing the pictures: whether it ran, and why.

@@ -13,9 +13,9 @@
 namespace emberlock::recon {
 namespace {
 
-/// The part of a fine voxel in the means around three coarse key points along one axis: the integral of a key
-/// point's tent over the voxel, of its integral over the grid. Means of this kind keep the integral of what
-/// they coarsen.
+/// The weights of a fine voxel in the means around three coarse key points along one axis: the integral of a
+/// key point's tent function over the voxel, divided by its integral over the grid. Such means preserve the
+/// integral.
 struct TentWeights {
   int first = 0;
   std::array<float, 3> weight{};
@@ -41,7 +41,7 @@ std::vector<TentWeights> tent_weights(double start, double size, int voxels, int
   return out;
 }
 
-/// Fine voxels onto coarse key points, one axis after the other.
+/// Averages fine voxels to coarse key points, one axis after another.
 class Coarsening {
  public:
   Coarsening(const Volume& volume, const CroppedHull& crop, const Extinction& extinction, const Grid& coarse)
@@ -79,8 +79,9 @@ class Coarsening {
   }
 
  private:
-  /// Means around a key point, read trilinearly, blur twice. Taking the second differences' sixth off undoes
-  /// one of the two and keeps the integral; where it would go below zero it stops there.
+  /// Averaging, followed by trilinear interpolation, blurs twice. Subtracting a sixth of the second
+  /// difference undoes one of the two and preserves the integral; it is limited where values would become
+  /// negative.
   void sharpen(std::vector<Rgba>& v) const {
     const int counts[3] = {coarse_.nx, coarse_.ny, coarse_.nz};
     std::size_t stride = 1;
@@ -124,7 +125,7 @@ class Coarsening {
     }
   }
 
-  /// A fine voxel's means, a metre.
+  /// A fine voxel's mean, per metre.
   [[nodiscard]] Rgba voxel(int i, int j, int k) const {
     const bool field = extinction_.model == Extinction::Model::field;
     Rgba sum;

@@ -11,17 +11,17 @@
 
 namespace emberlock::recon {
 
-/// A medium on few key points, for light that is smooth.
+/// A medium on few key points, for smooth light.
 struct CoarseMedium {
   Grid grid;                        ///< over the medium's box
-  std::vector<Rgba> shine;          ///< grid.size(): emission and (lane 3) sigma_t a coarse edge
-  std::vector<std::size_t> active;  ///< the key points with extinction in the voxels around them, rising
+  std::vector<Rgba> shine;          ///< grid.size() values: emission and (lane 3) sigma_t per coarse edge
+  std::vector<std::size_t> active;  ///< key points with extinction in an adjacent voxel, ascending
 };
 
-/// Means of the fine voxels inside the medium, weighted by each coarse key point's tent: its share of
-/// trilinear interpolation. Integrals of emission and extinction stay what they were, but for what sharpening
-/// would take below zero. `voxels` (>= 1) along the box's longest side, never more than the volume has there;
-/// a hull with no voxel, or no extinction, gives no active key point.
+/// Averages the fine voxels inside the medium, weighted by each coarse key point's tent function (its share
+/// of trilinear interpolation). Integrals of emission and extinction are preserved, except where values would
+/// become negative. `voxels` (>= 1) along the box's longest side, at most as many as the volume has; a hull
+/// without voxels or extinction gives no active key points.
 CoarseMedium coarse_medium(const Volume& volume, const Hull& medium, const Extinction& extinction, int voxels,
                            Pool& pool);
 

@@ -32,18 +32,18 @@ class Transport {
 
   /// The in-scatter of the emission alone.
   Lights from_emission(Lights* radiance = nullptr) { return sweep(field_.medium.shine.data(), 0, radiance); }
-  /// K g: the in-scatter of what scatters from g.
+  /// K g: the in-scatter of the light scattered with g.
   Lights from_scattered(const Lights& g) {
     set_shine(g, 0);
     return sweep(shine_.data(), field_.medium.shine.size(), nullptr);
   }
-  /// Of both.
+  /// Of both together.
   Lights from_all(const Lights& g, Lights* radiance) {
     set_shine(g, 1);
     return sweep(shine_.data(), field_.medium.shine.size(), radiance);
   }
 
-  /// y += a x, each channel with its own a.
+  /// y += a x, with an a per channel.
   void add(Lights& y, const Channels& a, const Lights& x) const {
     pool_.run(kSlices, [&](int task) {
       const Slice s = slice(y.size(), kSlices, task);
@@ -51,8 +51,7 @@ class Transport {
         for (std::size_t c = 0; c < 3; ++c) y[e].c[c] += static_cast<float>(a[c]) * x[e].c[c];
     });
   }
-  /// Sums over the medium (weight sigma_t, in which isotropic K is its own transpose), in an order that no
-  /// thread changes.
+  /// Sums over the medium with weight sigma_t (for which isotropic K is its own transpose), in a fixed order.
   [[nodiscard]] Channels dot(const Lights& x, const Lights& y) const {
     std::array<Channels, kSlices> part{};
     pool_.run(kSlices, [&](int task) {
@@ -131,7 +130,7 @@ class Transport {
   std::vector<float> phase_;
   std::size_t ordinates_;
   std::size_t rows_;
-  std::size_t reach_;                ///< steps along the longest way
+  std::size_t reach_;                ///< number of steps along the longest path
   std::vector<Footstep> footsteps_;  ///< [ordinate][step]
   std::vector<Rgba> shine_;          ///< [row][key point]
 };
@@ -143,9 +142,9 @@ Channels largest(const Lights& x) {
   return high;
 }
 
-/// Bound on the error of g whose next iterate differs by `change`, of the brightest g: |K| is at most
-/// `contraction` in the maximum norm, so what is left of the geometric series is c / (1 - c) times the last
-/// change.
+/// Bound on the error of g, relative to the brightest g, if the next iterate differs by `change`: |K| is at
+/// most `contraction` in the maximum norm, so the rest of the geometric series is at most c / (1 - c) times
+/// the last change.
 double relative_error(const Lights& change, const Lights& g, double contraction) {
   const Channels d = largest(change);
   const Channels high = largest(g);
@@ -161,14 +160,14 @@ Channels ratio(const Channels& a, const Channels& b, double sign) {
   return out;
 }
 
-/// (1 - K) q = p of Orthomin(1): the change of the residual along r, made orthogonal to the one before.
+/// (1 - K) q = p of Orthomin(1): the change of the residual along r, made orthogonal to the previous one.
 Lights through_medium(Transport& transport, const Lights& r) {
   Lights q = transport.from_scattered(r);
   for (std::size_t e = 0; e < q.size(); ++e) q[e] = r[e] - q[e];
   return q;
 }
 
-/// g = s + K g from g = s on; returns the number of iterations.
+/// Solves g = s + K g, starting with g = s; returns the number of iterations.
 int iterate(Transport& transport, double contraction, const InScatterOptions& options, Lights& g) {
   Lights r = transport.from_scattered(g);
   Lights p = r;
@@ -193,12 +192,12 @@ int iterate(Transport& transport, double contraction, const InScatterOptions& op
 }
 
 void solve_multiple(Transport& transport, const InScatterOptions& options, Lights g, ScatterField& field) {
-  // Lane 3 of the first sweep is the mean share 1 - T that ends on its way: albedo times it is K 1.
+  // Lane 3 of the first sweep is the mean share 1 - T absorbed on the way: times the albedo, this is K 1.
   double ends = 0;
   for (const Rgba& v : g) ends = std::max(ends, static_cast<double>(v.c[3]));
   const double contraction = std::min(field.albedo * ends, 1 - 1e-6);
   field.iterations = iterate(transport, contraction, options, g);
-  // One plain iteration more: G of a non-negative light is non-negative, and its change is the true residual.
+  // One more plain iteration: G of non-negative light is non-negative, and its change is the true residual.
   for (Rgba& v : g) v = non_negative(v);
   Lights radiance;
   Lights final_g = transport.from_all(g, field.phase.isotropic() ? nullptr : &radiance);
@@ -242,9 +241,9 @@ WayToCamera way_to(const Eigen::Vector3d& camera_center, const Grid& grid) {
   return way;
 }
 
-/// What shines along the peak: the emission, and of multiple scattering what the blunt part scatters. What
-/// the peak itself scatters stays on its way, so it isn't lost: sigma_t falls by as much. (Behind, light
-/// turned back twice is taken for light that was never turned.)
+/// The source along the peak: the emission and, for multiple scattering, the light scattered by the blunt
+/// part. Light scattered by the peak itself stays on its path and isn't lost, so sigma_t is reduced by that
+/// share. (For a peak straight back, light reversed twice is treated as never reversed.)
 std::vector<Rgba> shine_along_peak(const ScatterField& field, const std::vector<Rgba>& blunt) {
   std::vector<Rgba> shine = field.medium.shine;
   if (field.order == Scattering::Order::single) return shine;

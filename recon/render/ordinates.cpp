@@ -9,7 +9,7 @@
 namespace emberlock::recon {
 namespace {
 
-/// Node `i` of Gauss and Legendre's n on (-1, 1), by Newton's method, and its weight.
+/// Node `i` of the n Gauss-Legendre nodes on (-1, 1), by Newton's method, and its weight.
 std::array<double, 2> gauss_legendre(int n, int i) {
   double x = std::cos(std::numbers::pi * (i + 0.75) / (n + 0.5));
   double slope = 1;
@@ -29,8 +29,8 @@ std::array<double, 2> gauss_legendre(int n, int i) {
   return {x, 2 / ((1 - x * x) * slope * slope)};
 }
 
-/// Asymmetry whose moment of the ordinates' degree has fallen to 2 %: sharper peaks fall between the
-/// ordinates.
+/// The asymmetry at which the moment of the ordinates' degree has fallen to 2 %: sharper peaks lie between
+/// the ordinates.
 double resolved_asymmetry(int levels) { return std::pow(0.02, 1.0 / (2 * levels)); }
 
 }  // namespace

@@ -15,7 +15,7 @@
 namespace emberlock::recon {
 namespace {
 
-/// Emission, and in lane 3 extinction where it is a field, a voxel edge, at the cropped grid's key points.
+/// Emission, and in lane 3 the extinction if it is a field, per voxel edge, at the cropped grid's key points.
 std::vector<Rgba> crop_volume(const Volume& volume, const CroppedHull& crop, Extinction::Model extinction) {
   const Grid& c = crop.hull.grid;
   std::vector<Rgba> out(c.size());
@@ -45,7 +45,7 @@ constexpr Absorb absorb_of(Extinction::Model model) {
   return Absorb::nothing;
 }
 
-/// The rays of one camera, and what bends them.
+/// The rays of one camera, with the gas that bends them.
 RayList rays_of(const CameraModel& camera, const Hull& medium, const std::vector<Rgba>& source,
                 const Refraction& refraction, const RenderOptions& options, Pool& pool) {
   RayListOptions clip;
@@ -59,7 +59,7 @@ RayList rays_of(const CameraModel& camera, const Hull& medium, const std::vector
   return clip_rays({&camera}, medium, clip, pool);
 }
 
-/// Radiance and transmittance of rays, in front of what the image shows already.
+/// Puts the radiance and transmittance of rays in front of the image's present content.
 void put_in_front(const Rgba* seen, const std::uint32_t* pixels, std::size_t count, RadianceImage& image) {
   for (std::size_t r = 0; r < count; ++r) {
     float* pixel = &image.rgb[3 * static_cast<std::size_t>(pixels[r])];

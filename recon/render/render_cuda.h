@@ -8,8 +8,8 @@
 
 namespace emberlock::recon {
 
-/// Radiance and transmittance of a list's rays through `source`, at its grid's key points, on the GPU; sigma
-/// of constant extinction, a voxel edge. Throws a DeviceError.
+/// Radiance and transmittance of a list's rays through `source` (values at its grid's key points), on the
+/// GPU; sigma of constant extinction is per voxel edge. Throws a DeviceError.
 std::vector<Rgba> march_on_cuda(const RayList& list, const std::vector<Rgba>& source, Absorb absorb,
                                 float sigma);
 

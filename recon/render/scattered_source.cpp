@@ -30,15 +30,14 @@ void add_in_scatter(const ScatterField& field, const Eigen::Vector3d& camera_cen
 }
 
 void take_out_in_scatter(Volume& volume, const Hull& medium, const Effects& effects, Pool& pool) {
-  Effects once = effects;  // light from all of the source, straight to where it is scattered
+  Effects once = effects;  // light from the whole source, directly to the place of scattering
   once.scattering.order = Scattering::Order::single;
   once.scattering.asymmetry = 0;
   const bool scattered_again = effects.scattering.order == Scattering::Order::multiple;
   const std::vector<float> seen = volume.emission;
-  Volume source = volume;  // of the light that is scattered
+  Volume source = volume;  // the light that is scattered
   const float per_meter = 1 / volume.grid.edge;
-  constexpr int kRounds =
-      6;  // each finds more of the light that came from where less is emitted than thought
+  constexpr int kRounds = 6;  // each finds more of the light from places where less is emitted than assumed
   for (int round = 0; round < kRounds; ++round) {
     const ScatterField field = find_in_scatter(source, medium, once, {}, pool);
     if (field.empty()) return;

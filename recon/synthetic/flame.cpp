@@ -182,17 +182,20 @@ void film_average(const Flame& flame, const PaperSceneOptions& options, Scene& s
   constexpr double kRate = 24;
   constexpr int kVoxels = 96;  // an average is smooth
   const Grid grid = grid_over(scene.box, std::min(kVoxels, options.truth_voxels));
-  for (View& view : scene.views) view.average.emplace(view.image.size);
-  const auto share = 1 / static_cast<float>(options.averaged_frames);
+  std::vector<RadianceImage> averages;
+  for (const View& view : scene.views) averages.emplace_back(view.image->size);
+  const auto part = 1 / static_cast<float>(options.averaged_frames);
   const int before = options.averaged_frames / 2;
   for (int frame = 0; frame < options.averaged_frames; ++frame) {
     const Seconds time = options.time + Seconds((frame - before) / kRate);
     const FlameTruth truth = flame.at(time, grid);
-    for (View& view : scene.views) {
-      const RadianceImage image = render_view(truth.volume, truth.medium, truth.effects, view.camera);
-      for (std::size_t p = 0; p < image.rgb.size(); ++p) view.average->rgb[p] += share * image.rgb[p];
+    for (std::size_t v = 0; v < averages.size(); ++v) {
+      const RadianceImage image =
+          render_view(truth.volume, truth.medium, truth.effects, scene.views[v].camera);
+      for (std::size_t p = 0; p < image.rgb.size(); ++p) averages[v].rgb[p] += part * image.rgb[p];
     }
   }
+  for (std::size_t v = 0; v < averages.size(); ++v) scene.views[v].average = share(std::move(averages[v]));
 }
 
 }  // namespace
@@ -289,8 +292,9 @@ Scene paper_scene(const PaperSceneOptions& options) {
     std::optional<FlameTruth> moved;
     if (late != Seconds(0)) moved = flame.at(options.time + late, grid);
     const FlameTruth& truth = moved ? *moved : in_time;
-    view.image = render_view(truth.volume, truth.medium, truth.effects, view.camera, finer);
-    if (options.noise > 0) add_noise(view.image, options.noise, options.flame.seed, scene.views.size());
+    RadianceImage image = render_view(truth.volume, truth.medium, truth.effects, view.camera, finer);
+    if (options.noise > 0) add_noise(image, options.noise, options.flame.seed, scene.views.size());
+    view.image = share(std::move(image));
     scene.views.push_back(std::move(view));
   };
   for (int i = 0; i < 10; ++i)

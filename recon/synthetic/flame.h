@@ -14,13 +14,13 @@
 namespace emberlock::recon {
 
 enum class FlameShape {
-  plume,       ///< one turbulent plume around the z axis, dark core at its root, holes and tongues
+  plume,       ///< one turbulent plume around the z axis, with a dark core at its base, holes and tongues
   two_plumes,  ///< a tall one and a small one beside it, with a dark gap between them
 };
 
-/// How the flame's extinction is spread.
+/// The distribution of the flame's extinction.
 enum class Absorber {
-  medium,  ///< the same everywhere inside
+  medium,  ///< uniform inside
   soot,    ///< proportional to the medium's density, with the same mean inside
 };
 
@@ -29,21 +29,21 @@ struct FlameOptions {
   std::uint64_t seed = 1;
   Meters height{0.16};        ///< of the envelope, centred on the origin
   double rise_speed = 1.0;    ///< m/s, of the turbulence
-  double peak = 230;          ///< grey level of the brightest pixel from the side, about
-  PerMeter extinction{32.8};  ///< inside the flame; the default is the paper's 0.05 a step of 20 cm / 128
+  double peak = 230;          ///< approximate grey level of the brightest pixel seen from the side
+  PerMeter extinction{32.8};  ///< inside the flame; default: the paper's 0.05 per step of 20 cm / 128
   Absorber absorber = Absorber::medium;
-  Scattering scattering;  ///< needs extinction
+  Scattering scattering;  ///< requires extinction
 };
 
 /// A flame with known truth on a grid.
 struct FlameTruth {
   Volume volume;
-  Hull medium;  ///< the voxels that truly hold flame
+  Hull medium;  ///< the voxels that contain flame
   Effects effects;
 };
 
-/// A procedural flame: periodic fractal noise, carried upwards, shapes an envelope and its colours.
-/// Deterministic by seed; immutable and thread-safe once constructed.
+/// A procedural flame: periodic fractal noise moves upwards and shapes an envelope and its colours.
+/// Deterministic for a seed; immutable and thread-safe once constructed.
 class Flame {
  public:
   explicit Flame(const FlameOptions& options = {});
@@ -52,7 +52,7 @@ class Flame {
   ~Flame();
 
   [[nodiscard]] const FlameOptions& options() const;
-  /// The truth at an instant, on any grid (metres; z is up).
+  /// The true volume at an instant, on any grid (metres; z is up).
   [[nodiscard]] FlameTruth at(Seconds time, const Grid& grid) const;
 
  private:
@@ -65,18 +65,17 @@ class Flame {
 struct PaperSceneOptions {
   FlameOptions flame;
   Seconds time{0};
-  std::vector<Seconds> lateness = {};  ///< by view: by how much it is filmed after `time`; none: all at once
+  std::vector<Seconds> lateness = {};  ///< by view: delay relative to `time`; empty: no delays
   ImageSize image{640, 480};
-  int truth_voxels = 192;   ///< the truth's own grid, unlike any solver's
+  int truth_voxels = 192;   ///< the truth's own grid, different from any solver's
   double truth_step = 0.5;  ///< of the march that films it, in its voxel edges
   double noise = 0;         ///< standard deviation of the pixels, grey levels
-  int averaged_frames =
-      0;  ///< at 24 a second, around `time`, that make each View::average; 0: it isn't known
+  int averaged_frames = 0;  ///< number of frames, 24 per second around `time`, for View::average; 0: unknown
 };
 
-/// The paper's set-up: ten input views at intervals of 36 degrees, 30 cm from the origin, alternately
-/// somewhat above and below the plane, 60 degrees of view, around a volume of 20 cm; the eleventh view,
-/// between two of them, is held out. The views' lateness is theirs to know.
+/// The paper's set-up: ten input views every 36 degrees, 30 cm from the origin, alternately slightly above
+/// and below the plane, with a field of view of 60 degrees, around a volume of 20 cm. The eleventh view,
+/// between two of them, is held out. The views contain their delays.
 Scene paper_scene(const PaperSceneOptions& options = {});
 
 }  // namespace emberlock::recon

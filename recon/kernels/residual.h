@@ -10,7 +10,7 @@ namespace emberlock::recon {
 /// What a ray's radiance is held against. A background, an offset and a sensor's white are each there or not,
 /// for all rays.
 template <class Real>
-struct Judge {
+struct PixelResidual {
   const Rgba* seen =
       nullptr;  ///< captured radiance, one a ray; lane 3: View::bounds, looked at where white > 0
   const Rgba* background = nullptr;  ///< radiance behind the medium, one a ray
@@ -43,12 +43,12 @@ struct Judge {
 
 /// The same, and the ray keeps it.
 template <class Real>
-struct JudgeAndKeep {
-  Judge<Real> judge;
+struct KeepResidual {
+  PixelResidual<Real> pixel;
   Quad<Real>* residual = nullptr;  ///< one a ray
 
   HOST_DEVICE Quad<Real> operator()(std::size_t ray, const Quad<Real>& radiance) const {
-    return residual[ray] = judge(ray, radiance);
+    return residual[ray] = pixel(ray, radiance);
   }
 };
 
@@ -70,7 +70,7 @@ struct MarchAndKeep {
 };
 /// The same for marches that need it themselves.
 template <class March, class Keep>
-struct MarchJudged {
+struct MarchByResidual {
   March march;
   Keep keep;
 

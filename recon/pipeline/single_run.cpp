@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/pipeline/settled_run.h"
+#include "recon/pipeline/single_run.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 
 #include "recon/adjust/choose_effects.h"
 #include "recon/adjust/paper.h"
-#include "recon/adjust/prepared_scene.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/preprocess/flame_mask.h"
@@ -20,26 +20,26 @@ namespace emberlock::recon {
 namespace {
 
 constexpr double kPaperOpacity = 0.05;
-/// What a solve holds at once. Of numbers in its precision the engine has six of four lanes (x, its
-/// look-ahead, the next, the gradient, what is marked and what is kept) and four of one (weights, ties,
-/// weights and reference of the extinction), and the judge of the held-out views one of four; of floats there
-/// are what a level starts from, a copy while weights are found, and the next coarser level, an eighth of all
-/// that.
+/// What a solve holds at once. Of numbers in its precision the engine has seven of four lanes (x, its
+/// look-ahead, the next, the gradient, what is marked, kept and saved) and four of one (weights, ties,
+/// weights and reference of the extinction), and the engine of the held-out views one of four; of floats
+/// there are what a level starts from, a copy while weights are found, and the next coarser level, an eighth
+/// of all that.
 constexpr std::size_t bytes_per_key_point(Precision precision) {
   const std::size_t number = precision == Precision::float64 ? sizeof(double) : sizeof(float);
-  const std::size_t level = (7 * 4 + 4) * number + 2 * sizeof(Rgba);
+  const std::size_t level = (8 * 4 + 4) * number + 2 * sizeof(Rgba);
   return level + level / 8;
 }
 
-Result<EffectChoice> decide_effects(const Scene& scene, const Grid& grid, const ReconstructOptions& options,
-                                    const SolveOptions& solve_options, const Elapsed& elapsed) {
+Result<EffectChoice> decide_effects(const Task& task, const Grid& grid, const ReconstructOptions& options) {
   EffectRequest request = options.effects.value_or(EffectRequest{});
   const bool as_published = !options.effects && options.solve.solver == Solver::paper;
   if (as_published) {
     request.fixed = absorbing(extinction_of_opacity(kPaperOpacity, Meters(static_cast<double>(grid.edge))));
   }
+  const PreparedScene known = request.fixed ? task.prepared.under(*request.fixed) : task.prepared;
   EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
-                             choose_effects(scene, grid, request, solve_options, elapsed));
+                             choose_effects(known, grid, request, options.solve, task.elapsed));
   if (as_published) {
     for (EffectReport& report : choice.reports) {
       if (report.name == "extinction") report.reason = "the paper's constant opacity of 0.05 a step";
@@ -62,8 +62,8 @@ std::optional<ChannelRmse> over_views(const std::vector<ViewReport>& views, View
   return sum;
 }
 
-std::vector<ViewReport> judge(const Scene& scene, const std::vector<FlameMask>& masks,
-                              const std::vector<RadianceImage>& renders) {
+std::vector<ViewReport> errors_of_views(const Scene& scene, const std::vector<FlameMask>& masks,
+                                        const std::vector<RadianceImage>& renders) {
   std::vector<ViewReport> reports;
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     const View& view = scene.views[i];
@@ -74,7 +74,7 @@ std::vector<ViewReport> judge(const Scene& scene, const std::vector<FlameMask>& 
 
 Report describe(const Scene& scene, const Grid& grid, const SolveOptions& options, Device device) {
   Report report;
-  report.solver = options.solver == Solver::paper ? "paper" : "default";
+  report.solver = name(options.solver);
   if (options.solver == Solver::paper) report.deviations = paper_deviations();
   report.device = device == Device::cuda ? "cuda" : "cpu";
   report.threads = options.compute.threads;
@@ -117,25 +117,25 @@ Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels, P
   return grid;
 }
 
-Outcome finish(const Task& task, const SolveOptions& options, Reconstruction done, const Progress& progress) {
-  const Scene& scene = task.scene;
+Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions& options,
+               Reconstruction done, const Progress& progress) {
+  const Scene& scene = task.scene();
   Outcome outcome;
   const Seconds start = task.elapsed();
-  const PreparedScene prepared(scene, done.effects);
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     tell(progress,
          kSolveTo + (1 - kSolveTo) * static_cast<double>(i) / static_cast<double>(scene.views.size()),
          "rendering the views");
-    const View& view = prepared.scene().views[i];
-    outcome.renders.push_back(render_view(
-        done.volume, done.hull, done.effects, view.camera,
-        {.compute = options.compute, .background = view.background ? &*view.background : nullptr}));
-    at_own_instant(outcome.renders.back(), scene, i, done.effects);
+    const View& view = solved.scene().views[i];
+    outcome.renders.push_back(render_view(done.volume, done.hull, done.effects, view.camera,
+                                          {.compute = options.compute, .background = view.background.get()}));
+    solved.at_own_instant(outcome.renders.back(), i);
   }
   outcome.report = describe(scene, done.hull.grid, options, task.device);
   Report& result = outcome.report;
   result.hull_voxels = done.hull.count;
-  result.views = judge(scene, masks_before(prepared.scene(), done.effects.background), outcome.renders);
+  result.views =
+      errors_of_views(scene, masks_before(solved.scene(), done.effects.background), outcome.renders);
   result.input_rmse = over_views(result.views, ViewRole::input).value_or(ChannelRmse{});
   result.heldout_rmse = over_views(result.views, ViewRole::held_out);
   result.hull_time = done.hull_time;
@@ -144,21 +144,23 @@ Outcome finish(const Task& task, const SolveOptions& options, Reconstruction don
   result.total_time = task.elapsed();
   result.render_time = result.total_time - start;
   result.iterations = done.iterations;
+  result.kept = done.kept;
+  result.stopped = done.stopped;
   result.trace = done.trace;
+  result.discarded = done.discarded;
   result.trace_sample = done.trace_sample;
   outcome.reconstruction = std::move(done);
   tell(progress, 1, "done");
   return outcome;
 }
 
-Result<Outcome> run_settled(const Task& task, const ReconstructOptions& options, const Progress& progress) {
+Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, const Progress& progress) {
   const SolveOptions& solve_options = options.solve;
   const Seconds start = task.elapsed();
   EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
-                             choose_grid(task.scene, options.voxels, solve_options.precision));
+                             choose_grid(task.scene(), options.voxels, solve_options.precision));
   tell(progress, 0, "finding out which effects matter");
-  EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
-                             decide_effects(task.scene, grid, options, solve_options, task.elapsed));
+  EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice, decide_effects(task, grid, options));
   const Seconds effects_time = task.elapsed() - start;
 
   const auto watch = [&](const Preview& state) {
@@ -171,9 +173,9 @@ Result<Outcome> run_settled(const Task& task, const ReconstructOptions& options,
     if (task.preview) task.preview(state);
   };
   tell(progress, kSolveFrom, "carving the hull");
-  EMBERLOCK_ASSIGN_OR_RETURN(Reconstruction done,
-                             solve(task.scene, grid, choice.effects, solve_options, task.elapsed, watch));
-  Outcome outcome = finish(task, solve_options, std::move(done), progress);
+  const PreparedScene decided = task.prepared.under(choice.effects);
+  EMBERLOCK_ASSIGN_OR_RETURN(Reconstruction done, solve(decided, grid, solve_options, task.elapsed, watch));
+  Outcome outcome = finish(task, decided, solve_options, std::move(done), progress);
   outcome.report.effects_time = effects_time;
   outcome.report.effects = std::move(choice.reports);
   return outcome;

@@ -3,16 +3,18 @@
 
 #include <functional>
 
+#include "recon/adjust/prepared_scene.h"
 #include "recon/pipeline/reconstruct.h"
 
 namespace emberlock::recon {
 
 /// What every step of one reconstruct() shares.
 struct Task {
-  const Scene& scene;  ///< checked
-  Device device;       ///< cpu or cuda
-  Elapsed elapsed;     ///< since reconstruct() began
+  PreparedScene prepared;  ///< with cameras put right, under what is known of its effects
+  Device device;           ///< cpu or cuda
+  Elapsed elapsed;         ///< since reconstruct() began
   const std::function<void(const Preview&)>& preview;
+  [[nodiscard]] const Scene& scene() const { return prepared.told(); }
 };
 
 /// Of this machine, in bytes.
@@ -24,9 +26,10 @@ Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels,
                          Precision precision = Precision::float32, double memory = physical_memory());
 
 /// Effects, hull, solve and rendering, at settings that stay as they are.
-Result<Outcome> run_settled(const Task& task, const ReconstructOptions& options, const Progress& progress);
+Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, const Progress& progress);
 
-/// Renders every view and judges it; fills the report but its input and plan.
-Outcome finish(const Task& task, const SolveOptions& options, Reconstruction done, const Progress& progress);
+/// Renders every view of the scene that was solved, and judges it; fills the report but its input and plan.
+Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions& options,
+               Reconstruction done, const Progress& progress);
 
 }  // namespace emberlock::recon

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+// The order of an engine's calls, whatever the device.
+#include "recon/adjust/engine.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace emberlock::recon {
+namespace {
+
+void demand(bool met, const char* otherwise) {
+  if (!met) throw std::logic_error(otherwise);
+}
+
+void note_marched(std::vector<int>& marched, int subset) {
+  std::erase(marched, subset);
+  marched.push_back(subset);
+}
+
+}  // namespace
+
+void ResidualEngine::set(const std::vector<Rgba>& x) {
+  marched_.clear();
+  put(x);
+}
+
+void ResidualEngine::residual_of(const ResidualEngine& other, int subset) {
+  demand(other.held_points() == grid_points(),
+         "residual_of() an engine that holds no volume of this grid: set() it first");
+  marched_.clear();
+  march_other(other, subset);
+}
+
+void Engine::residual(int subset) {
+  march_residual(subset);
+  note_marched(marched_, subset);
+}
+
+void Engine::residual_against(const std::vector<Rgba>& target, int subset, Behind behind) {
+  march_against(target, subset, behind);
+  note_marched(marched_, subset);
+}
+
+void Engine::project(int subset) {
+  marched_.clear();
+  march_radiance(subset);
+}
+
+void Engine::backproject(int subset) {
+  demand(!marched_.empty() && marched_.back() == subset,
+         "backproject() of residuals that aren't the volume's: the subset's residual() comes last");
+  spread(subset);
+}
+
+void Engine::mark() {
+  copy_to_mark();
+  is_marked_ = true;
+}
+
+void Engine::keep() {
+  demand(is_marked_, "keep() without anything marked: mark() comes before each");
+  swap_mark_and_kept();
+  is_marked_ = false;
+  is_kept_ = true;
+}
+
+void Engine::restore() {
+  demand(is_kept_, "restore() without anything kept: mark() and keep() first");
+  marched_.clear();
+  copy_from_kept();
+}
+
+void Engine::save() {
+  copy_to_saved();
+  is_saved_ = true;
+}
+
+void Engine::go_back() {
+  demand(is_saved_, "go_back() without anything saved: save() first");
+  marched_.clear();
+  copy_from_saved();
+}
+
+void Engine::rest() {
+  marched_.clear();
+  forget_look_ahead();
+}
+
+void Engine::descend(const Step& step) {
+  marched_.clear();
+  step_emission(step);
+}
+
+void Engine::set_field(const std::vector<float>& weights, const std::vector<float>& reference) {
+  demand(takes_a_field(), "set_field() where the optics take none: make the engine with Absorb::field");
+  put_field(weights, reference);
+  has_field_ = true;
+}
+
+void Engine::raise_field_weights(float scale) {
+  demand(has_field_, "raise_field_weights() without a field: set_field() first");
+  raise_curvature(scale);
+}
+
+std::vector<float> Engine::field_weights() const {
+  demand(has_field_, "field_weights() without a field: set_field() first");
+  return curvature();
+}
+
+void Engine::descend_field(const FieldStep& step) {
+  demand(has_field_, "descend_field() without a field: set_field() first");
+  marched_.clear();
+  step_field(step);
+}
+
+void Engine::adjust(int subset, const PaperStep& step) {
+  demand(takes_paper_steps(),
+         "adjust() but in float32, along straight rays, with none or constant extinction");
+  demand(std::find(marched_.begin(), marched_.end(), subset) != marched_.end(),
+         "adjust() by residuals that aren't the volume's: the subset's residual() first");
+  marched_.clear();
+  step_paper(subset, step);
+}
+
+}  // namespace emberlock::recon

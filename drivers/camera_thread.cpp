@@ -18,6 +18,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "drivers/call_watch.h"
 
 namespace emberlock::drivers {
 namespace {
@@ -31,20 +32,20 @@ Time after(Time t, Seconds wait) {
 }
 Seconds since(Time t) { return Seconds(std::chrono::duration<double>(now() - t).count()); }
 
-/// How long one wait for a frame is, so that orders are soon heard.
+/// Duration of one wait for a frame; short, so that commands are executed soon.
 constexpr Seconds kSlice = milliseconds(20);
 
-/// What the thread has the camera do.
+/// The kinds of calls into the camera.
 enum class Task { start, stop, next_frame, reset_shutter, trim_rate };
 constexpr std::array<std::string_view, 5> kTasks{"start", "stop", "next_frame", "reset_shutter", "trim_rate"};
 std::string_view name(Task task) { return kTasks[static_cast<std::size_t>(task)]; }
 
-/// How long before its instant a camera is told of a reset.
+/// How long before its instant the reset command is passed to the camera.
 constexpr Seconds kPrepared = milliseconds(5);
 
 }  // namespace
 
-/// What the thread and its owner share. The camera is used by the thread alone.
+/// State shared by the thread and its owner. Only the thread uses the camera.
 class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
  public:
   Worker(std::unique_ptr<Camera> camera, CameraThreadOptions options)
@@ -54,7 +55,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     std::thread([self = shared_from_this()] { self->run(); }).detach();
   }
 
-  /// The thread shall end. Whether it did in time.
+  /// Tells the thread to end. Returns whether it did in time.
   bool finish() {
     std::unique_lock lock(mutex_);
     quit_ = true;
@@ -67,6 +68,11 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     if (hangs()) return State::quarantined;
     if (!filming_) return over_ ? State::ended : State::idle;
     return lost_ ? State::lost : State::filming;
+  }
+
+  bool overworked() const {
+    const std::lock_guard lock(mutex_);
+    return calls_.late(now()) && !hangs();
   }
 
   std::optional<Error> trouble() const {
@@ -87,7 +93,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     return all;
   }
 
-  /// Has the thread call `act`, and waits for what comes of it. One that isn't done in time never is.
+  /// Has the thread call `act` and waits for the result. If it takes too long, the call is cancelled.
   Status call(Task task, std::function<Status(Camera&)> act) {
     std::unique_lock lock(mutex_);
     if (hangs()) return hanging();
@@ -102,7 +108,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       const std::lock_guard inner(mutex_);
       *answer = std::move(status);
     });
-    // One wait for a frame may have to end first.
+    // The thread may have to finish a wait for a frame first.
     const Time until = after(now(), options_.call_deadline + kSlice);
     owner_wakes_.wait_until(lock, until, [&] { return answer->has_value(); });
     if (answer->has_value()) return **answer;
@@ -120,7 +126,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     Status started = call(Task::start, [film, this](Camera& camera) {
       Status status = camera.start();
       const std::lock_guard lock(mutex_);
-      if (film != film_) return status;  // too late: nobody waits for it
+      if (film != film_) return status;  // too late: the owner has stopped or restarted the camera
       filming_ = status.ok();
       lost_ = false;
       over_.reset();
@@ -138,7 +144,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     return {};
   }
 
-  /// Also of a camera that hangs: it is stopped when it goes on.
+  /// Works also when the camera hangs: it is stopped when the call returns.
   Status stop() {
     std::unique_lock lock(mutex_);
     filming_ = false;
@@ -157,7 +163,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     });
     const Time until = after(now(), options_.call_deadline + kSlice);
     while (!*stopped && now() < until && !hangs()) {
-      owner_wakes_.wait_until(lock, busy_until_ ? std::min(until, *busy_until_) : until);
+      owner_wakes_.wait_until(lock, calls_.next_look(now(), until));
     }
     if (*stopped) return {};
     return hangs() ? hanging() : silent(Task::stop);
@@ -167,7 +173,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     std::unique_lock lock(mutex_);
     const Time until = after(now(), deadline);
     while (waiting_.empty() && now() < until && !hangs()) {
-      owner_wakes_.wait_until(lock, busy_until_ ? std::min(until, *busy_until_) : until);
+      owner_wakes_.wait_until(lock, calls_.next_look(now(), until));
     }
     adopt_info();
     if (!waiting_.empty()) {
@@ -225,18 +231,17 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
  private:
   struct Order {
     Task task;
-    Time begins;  ///< when the camera shall do it
+    Time begins;  ///< when it is due
     std::function<void(Camera&)> act;
   };
 
-  // Behind the lock, all of them.
+  // These require the lock.
 
   [[nodiscard]] std::string where() const { return "camera " + id_; }
-  [[nodiscard]] bool hangs() const { return busy_until_ && now() > *busy_until_; }
+  [[nodiscard]] bool hangs() const { return calls_.hangs(now()); }
   [[nodiscard]] Error hanging() const {
-    return {ErrorKind::device,
-            fmt::format("it hangs, for {:.1f} s so far, in {}", since(busy_since_).value(), name(busy_with_)),
-            where(), "unplug it or switch it off and on again; the other cameras go on"};
+    return {ErrorKind::device, calls_.words(now()), where(),
+            "unplug it or switch it off and on again; the other cameras go on"};
   }
   [[nodiscard]] Error away() const {
     return {ErrorKind::timed_out, fmt::format("it has been away for {:.1f} s", since(lost_since_).value()),
@@ -245,7 +250,8 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   [[nodiscard]] Error silent(Task task) const {
     return {ErrorKind::timed_out,
             fmt::format("{} wasn't done within {:g} s", name(task), options_.call_deadline.value()), where(),
-            "unplug it or switch it off and on again"};
+            calls_.late(now()) && !hangs() ? "the processor has too much to do: end other programs"
+                                           : "unplug it or switch it off and on again"};
   }
   void order(Task task, Time begins, std::function<void(Camera&)> act) {
     orders_.push_back({task, begins, std::move(act)});
@@ -271,12 +277,10 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     std::erase_if(waiting_, [](const Result<Frame>& r) { return r.ok(); });
   }
 
-  /// Calls the camera without the lock; meanwhile it may be seen to hang.
+  /// Calls the camera without holding the lock; state() can then see that it hangs.
   template <class Act>
   auto busy(std::unique_lock<std::mutex>& lock, Task with, Time begins, const Act& act) {
-    busy_with_ = with;
-    busy_since_ = now();
-    busy_until_ = after(std::max(begins, busy_since_), options_.call_deadline);
+    calls_.begin(name(with), now(), after(std::max(begins, now()), options_.call_deadline));
     lock.unlock();
     struct Done {
       std::unique_lock<std::mutex>& lock;
@@ -285,15 +289,15 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
         const FrameCounts counted = worker.camera_->counts();
         lock.lock();
         worker.of_camera_ = counted;
-        worker.busy_until_.reset();
+        worker.calls_.end();
         worker.owner_wakes_.notify_all();
       }
     } const done{lock, *this};
     return act(*camera_);
   }
 
-  /// The first order whose time has come. What the camera shall do at an instant it is told a little before,
-  /// so that it needn't be woken for it.
+  /// The first order that is due. An order for an instant is passed to the camera slightly earlier, so that
+  /// the thread needn't wake at exactly that instant.
   std::optional<Order> due() {
     const Time soon = after(now(), kPrepared);
     const auto first = std::find_if(orders_.begin(), orders_.end(),
@@ -304,7 +308,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
     return found;
   }
 
-  /// How long the thread may wait for something else.
+  /// How long the thread may wait for a frame.
   [[nodiscard]] Seconds until_next_order() const {
     Seconds wait = kSlice;
     for (const Order& order : orders_) wait = std::min(wait, -since(order.begins) - kPrepared);
@@ -313,6 +317,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
 
   void run() {
     std::unique_lock lock(mutex_);
+    calls_.adopt_thread();
     while (!quit_) {
       if (const auto order = due()) {
         busy(lock, order->task, order->begins, order->act);
@@ -327,11 +332,11 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       }
     }
     busy(lock, Task::stop, now(), [](Camera& camera) { camera.stop(); });
-    busy_until_ = after(now(), options_.call_deadline);
+    calls_.begin(name(Task::stop), now(), after(now(), options_.call_deadline));
     lock.unlock();
     camera_.reset();
     lock.lock();
-    busy_until_.reset();
+    calls_.end();
     done_ = true;
     owner_wakes_.notify_all();
   }
@@ -351,7 +356,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
       filming_ = false;
       over_ = next.error();
     }
-    // The same trouble again and again is said once.
+    // A repeated error is reported once.
     if (waiting_.empty() || waiting_.back()) waiting_.push_back(std::move(next));
   }
 
@@ -371,10 +376,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
                                      [](const Result<Frame>& waiting) { return waiting.ok(); });
     if (oldest == waiting_.end()) return;
     waiting_.erase(oldest);
-    if (own_.queue++ == 0) {
-      log(LogCategory::drivers)
-          .warn("{}: frames are lost, the queue of {} is full", where(), options_.queue_frames);
-    }
+    ++own_.queue;
   }
 
   void look_for_it(std::unique_lock<std::mutex>& lock) {
@@ -390,7 +392,7 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   }
 
   const CameraThreadOptions options_;
-  CameraInfo info_;  ///< the owner's
+  CameraInfo info_;  ///< used by the owner only
   const std::string id_;
   std::unique_ptr<Camera> camera_;
 
@@ -401,20 +403,19 @@ class CameraThread::Worker : public std::enable_shared_from_this<Worker> {
   std::deque<Result<Frame>> waiting_;
   FrameCounts of_camera_;
   FrameCounts own_;
-  std::uint64_t passed_unsaid_ = 0;  ///< dropped after pass_over() returned; the next one says so
+  std::uint64_t passed_unsaid_ =
+      0;  ///< frames dropped after pass_over() returned; the next call reports them
   TimePoint wanted_from_;
   int resets_to_do_ = 0;
-  std::uint64_t film_ = 0;  ///< counts starts and stops: what was begun before one is nobody's any more
-  bool filming_ = false;    ///< as the owner wants it
+  std::uint64_t film_ = 0;  ///< number of starts and stops; calls begun before the last one are obsolete
+  bool filming_ = false;    ///< as requested by the owner
   bool lost_ = false;
-  std::optional<Error> over_;  ///< of a recording that has ended: what said so
+  std::optional<Error> over_;  ///< the error at the end of a recording
   std::optional<Error> lost_by_;
   std::optional<CameraInfo> learnt_info_;
   Time lost_since_;
   Time retry_at_;
-  Task busy_with_ = Task::stop;  ///< while it is busy
-  Time busy_since_;
-  std::optional<Time> busy_until_;  ///< while a call into the camera goes on: when it is overdue
+  CallWatch calls_;  ///< into the camera
   bool quit_ = false;
   bool done_ = false;
 };
@@ -430,6 +431,7 @@ CameraThread::~CameraThread() {
 }
 
 CameraThread::State CameraThread::state() const { return worker_->state(); }
+bool CameraThread::overworked() const { return worker_->overworked(); }
 std::optional<Error> CameraThread::trouble() const { return worker_->trouble(); }
 const CameraInfo& CameraThread::info() const { return worker_->info(); }
 FrameCounts CameraThread::counts() const { return worker_->counts(); }

@@ -12,36 +12,37 @@
 namespace emberlock::drivers {
 
 struct CameraThreadOptions {
-  std::size_t queue_frames = 64;      ///< frames that wait to be taken; beyond it the oldest is lost. >= 1
-  Seconds retry = milliseconds(250);  ///< between two looks for a camera that went away, > 0
-  Seconds call_deadline =
-      kCallDeadline * 1.5;  ///< what a call may take before the camera is held to hang, > 0
-  /// Whether start() fails while the camera isn't there, or has it looked for as one that went away.
+  std::size_t queue_frames = 64;  ///< capacity of the queue; when it is full the oldest frame is lost. >= 1
+  Seconds retry = milliseconds(250);            ///< interval between two searches for a lost camera, > 0
+  Seconds call_deadline = kCallDeadline * 1.5;  ///< a call that takes longer counts as hanging, > 0
+  /// What start() does while the camera is absent: it fails, or it searches for the camera as if it had been
+  /// lost.
   enum class Absent { fails, is_looked_for } absent = Absent::fails;
-  /// Shown every frame as it comes, also those that nobody takes. Called on the camera's thread; must return
-  /// at once.
+  /// Called with every frame on arrival, also with frames that are never fetched. Runs on the camera's
+  /// thread; must return at once.
   std::function<void(const Frame&)> on_frame = {};
 };
 
-/// A camera that is driven by a thread of its own, behind the same interface. What it adds:
-/// - frames are taken as they come and wait in a queue with a bound;
-/// - a camera that goes away is looked for until it is back, and films on. next_frame says `device` once when
-///   it goes, and `timed_out` while it is away;
-/// - no call takes longer than that deadline, whatever the camera does. One that hangs is quarantined: every
-///   call says `device` at once, until the hanging one returns. Destroyed meanwhile, thread and camera are
-///   left behind, and end by themselves should they ever return.
-/// reset_shutter() returns at once, and frames are passed over until it is done; an error of it comes from
-/// next_frame. Frames that wait in the queue are in none of the counts. What a camera says of itself once it
-/// has come is adopted by start() and next_frame(). One owner thread, but for state(), trouble() and
-/// counts(), which any may ask. On the machine's monotonic clock.
+/// A camera that is driven by its own thread, behind the same interface. In addition:
+/// - frames are fetched on arrival and wait in a bounded queue;
+/// - a lost camera is searched for until it is back and then films again. next_frame returns `device`
+///   once when it is lost, and `timed_out` while it is away;
+/// - no call takes longer than its deadline, whatever the camera does. A hanging camera is quarantined: every
+///   call returns `device` at once until the hanging call returns. One whose thread computes meanwhile
+///   doesn't hang: the processor is overloaded. If this object is destroyed meanwhile, thread and camera are
+///   left running; they end if the call ever returns.
+/// reset_shutter() returns at once; frames are skipped until the reset is done, and next_frame returns its
+/// error. Queued frames are in none of the counts. start() and next_frame() update info() when a camera has
+/// come back. One owner thread, except state(), overworked(), trouble() and counts(), which any thread may
+/// call. Uses the machine's monotonic clock.
 class CameraThread final : public Camera {
  public:
   enum class State {
     idle,
     filming,
-    lost,         ///< it went away, and is being looked for
-    quarantined,  ///< it hangs
-    ended,        ///< the recording that it replays is over: next_frame says out_of_data from now on
+    lost,         ///< disappeared, and is being searched for
+    quarantined,  ///< a call hangs
+    ended,        ///< the end of a replayed recording: next_frame returns out_of_data from now on
   };
 
   explicit CameraThread(std::unique_ptr<Camera> camera, CameraThreadOptions options = {});
@@ -50,7 +51,9 @@ class CameraThread final : public Camera {
   CameraThread& operator=(const CameraThread&) = delete;
 
   [[nodiscard]] State state() const;
-  /// Why it is lost or quarantined.
+  /// A call takes longer than its deadline, but the thread computes: the processor has too much to do.
+  [[nodiscard]] bool overworked() const;
+  /// Why the camera is lost or quarantined.
   [[nodiscard]] std::optional<Error> trouble() const;
 
   [[nodiscard]] const CameraInfo& info() const override;
@@ -64,7 +67,7 @@ class CameraThread final : public Camera {
 
  private:
   class Worker;
-  std::shared_ptr<Worker> worker_;  ///< shared with the thread, which may outlive this
+  std::shared_ptr<Worker> worker_;  ///< shared with the thread, which may outlive this object
 };
 
 }  // namespace emberlock::drivers

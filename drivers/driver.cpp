@@ -25,8 +25,8 @@ Error no_such_mode(std::span<const CameraMode> modes, const std::string& what, c
   return {ErrorKind::bad_input, what, camera, std::move(remedy)};
 }
 
-/// How much of a scene a mode keeps: colour first, then depth; what is sent as it was measured before what is
-/// computed from it, and that before JPEGs.
+/// How much of a scene a mode preserves, for comparison: colour first, then depth; then raw data before data
+/// computed by the camera, and these before JPEG.
 std::tuple<bool, int, int> fidelity(const CameraMode& mode) {
   const ImageLayout& layout = mode.layout;
   const bool jpeg = mode.encoding == "MJPG" || mode.encoding == "JPEG";
@@ -59,7 +59,7 @@ Result<CameraMode> choose_mode(std::span<const CameraMode> modes, const CameraRe
   if (request.format && !keep([&](const CameraMode& m) { return m.layout.format == *request.format; })) {
     return no_such_mode(modes, fmt::format("it doesn't send {} so", name(*request.format)), camera);
   }
-  constexpr double kRounding = 1.001;  // 23.976 is often said as 23.98 or 24
+  constexpr double kRounding = 1.001;  // 23.976 is often given as 23.98 or 24
   if (request.frame_rate &&
       !keep([&](const CameraMode& m) { return m.frame_rate * kRounding >= *request.frame_rate; })) {
     return no_such_mode(modes, fmt::format("it doesn't film {} frames/s so", request.frame_rate->value()),

@@ -17,7 +17,7 @@ std::optional<int> pid_of(const fs::path& proc_entry) {
   return std::stoi(name);
 }
 
-/// A descriptor that only names a file (O_PATH), as udev has one of a device while it sets its rights.
+/// Whether the descriptor was opened with O_PATH, as udev does while it sets a device's permissions.
 bool only_names(const fs::path& process, const fs::path& fd) {
   std::ifstream info(process / "fdinfo" / fd.filename());
   std::string key;
@@ -34,7 +34,7 @@ bool has_open(const fs::path& process, const fs::path& file) {
   return false;
 }
 
-/// Another process one of whose descriptors shows this target in /proc.
+/// Another process with a descriptor to this target, according to /proc.
 std::optional<Holder> who_has(const fs::path& file) {
   std::error_code error;
   for (fs::directory_iterator process("/proc", error), end; !error && process != end;

@@ -15,13 +15,14 @@ struct Holder {
   std::string program;  ///< as the kernel names it: "gvfsd-gphoto2"
 };
 
-/// Another process that has this file open, links followed; none where nobody has, or where we may not look.
+/// Another process that has this file open (links are followed). nullopt if there is none, or if it may not
+/// be inspected.
 std::optional<Holder> holder_of(const std::filesystem::path& device);
 
-/// The same of a socket, by its inode as /proc/net lists it.
+/// The same for a socket, given its inode as listed in /proc/net.
 std::optional<Holder> holder_of_socket(const std::string& inode);
 
-/// The error of a device that another process has, naming it where it can be.
+/// The error for a device that another process holds; names the process if possible.
 Error held_error(const std::filesystem::path& device, const std::string& where);
 
 }  // namespace emberlock::drivers

@@ -22,14 +22,14 @@ struct HotplugEvent {
   std::string node;       ///< "/dev/video3"
 };
 
-/// Hears of devices that are plugged in and out, from udev where it runs (nodes then have their links and
-/// groups already), else from the kernel. Network cameras don't show here. One owner thread.
+/// Reports devices that are plugged in or out. Events come from udev if it runs (the nodes then have their
+/// links and groups already), else from the kernel. Network cameras are not reported. One owner thread.
 class HotplugMonitor {
  public:
-  /// Error io: the system gives no such events.
+  /// Error io: the system provides no such events.
   static Result<HotplugMonitor> open(const std::vector<std::string>& subsystems);
-  /// The next event, waiting at most `deadline`; what isn't plugging in or out is left out, as are
-  /// parts without a node of their own (a USB device's interfaces).
+  /// The next event; waits at most `deadline`. Only plugging in and out is reported, and only for devices
+  /// with a node (not for a USB device's interfaces).
   std::optional<HotplugEvent> next(Seconds deadline);
 
  private:

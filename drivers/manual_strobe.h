@@ -8,18 +8,18 @@
 
 namespace emberlock::drivers {
 
-/// A strobe with a dial, that somebody sets by hand. It is told nothing and says nothing: apply() notes what
-/// somebody is to set, rounded to the dial's steps, and read_back() gives that, not what the dial shows; what
-/// it really does is read from the frames (smear_sync/clocks/flash_rate.h). The lamp is left flashing: what
-/// is asked for is a rate. Of flash widths it knows nothing, and takes any.
+/// A strobe with a dial that is set by hand. There is no connection to it. apply() stores the requested
+/// setting, rounded to the dial's steps, for a person to set; read_back() returns that request, not the
+/// dial's position. The true rate is measured from the frames (smear_sync/clocks/flash_rate.h). The lamp is
+/// expected to flash always. The flash width is unknown; any is accepted.
 class ManualStrobe : public Strobe {
  public:
-  /// `dial` is valid.
+  /// `dial` must be valid.
   explicit ManualStrobe(std::string id, const StrobeDial& dial = {});
 
   [[nodiscard]] const std::string& id() const override { return id_; }
-  /// Error bad_input: a rate beyond the dial. Error refused: anything but flashing at a rate, which no dial
-  /// does: another phase, a code of skipped flashes, steady light, or darkness.
+  /// Error bad_input: a rate outside the dial's range. Error refused: a setting that a dial doesn't have:
+  /// another phase, a code of skipped flashes, steady light, or darkness.
   Status apply(const StrobeSettings& settings) override;
   Result<StrobeSettings> read_back() override { return asked_; }
   [[nodiscard]] std::optional<StrobeDial> dial() const override { return dial_; }

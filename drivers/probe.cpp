@@ -11,16 +11,17 @@
 namespace emberlock::drivers {
 namespace {
 
-/// The camera's own rate may be off by this, which alignment copes with: crystals are within 100 ppm.
+/// Tolerance for the camera's nominal rate. Crystals are within 100 ppm; alignment copes with this much.
 constexpr PartsPerMillion kRateTolerance{2000};
-/// Arrivals tell frames of different cameras apart as long as they err by less than this part of a period.
+/// Arrival times identify frames of different cameras as long as they deviate by less than this part of a
+/// period.
 constexpr double kArrivalPart = 0.25;
-/// A link that is fuller than this part loses frames as soon as something else uses it.
+/// A link with a higher load loses frames as soon as it is used for something else.
 constexpr double kFullLink = 0.8;
-/// Losses above this part leave holes in a flame's film.
+/// A larger share of lost frames leaves gaps in a film of a flame.
 constexpr double kManyLost = 0.01;
 constexpr Seconds kFirstFrame{3};
-constexpr Seconds kAfterReset{30};  // by a power cycle it takes many seconds
+constexpr Seconds kAfterReset{30};  // a power cycle takes many seconds
 
 struct EvenRate {
   Seconds period;
@@ -28,7 +29,7 @@ struct EvenRate {
   Seconds worst;
 };
 
-/// Instants against frame numbers, by least squares.
+/// Fits instants to frame numbers by least squares.
 std::optional<EvenRate> even_rate(const std::vector<FrameStamp>& stamps, TimePoint FrameStamp::*instant) {
   if (stamps.size() < 3) return {};
   const auto id = [&](const FrameStamp& s) {
@@ -59,18 +60,6 @@ std::optional<EvenRate> even_rate(const std::vector<FrameStamp>& stamps, TimePoi
   }
   even.rms = Seconds(std::sqrt(squares / n));
   return even;
-}
-
-FrameCounts operator-(FrameCounts a, const FrameCounts& b) {
-  a.delivered -= b.delivered;
-  a.damaged -= b.damaged;
-  a.camera_gap -= b.camera_gap;
-  a.transport -= b.transport;
-  a.resend -= b.resend;
-  a.underrun -= b.underrun;
-  a.queue -= b.queue;
-  a.passed_over -= b.passed_over;
-  return a;
 }
 
 std::string losses_in_words(const FrameCounts& counts) {
@@ -209,7 +198,7 @@ Result<ProbeFilm> film_probe(Camera& camera, const ProbeOptions& options, Clock&
   return film;
 }
 
-ProbeVerdict judge(const ProbeFilm& film, std::optional<double> link_megabits) {
+ProbeVerdict assess(const ProbeFilm& film, std::optional<double> link_megabits) {
   ProbeVerdict verdict;
   const auto arrival = even_rate(film.stamps, &FrameStamp::monotonic_time);
   const auto own = film.info.device_time_of == DeviceTimeOf::unknown

@@ -12,8 +12,8 @@
 namespace emberlock::drivers {
 namespace {
 
-/// What a packing is: significant bits, bits a pixel takes on the wire, and the smallest number of columns
-/// that fills whole bytes.
+/// Properties of a packing: significant bits, bits per pixel as transmitted, and the smallest number of
+/// columns that fills whole bytes.
 struct Kind {
   PixelFormat format;
   int depth;
@@ -57,7 +57,7 @@ Kind kind_of(PixelPacking packing) {
   return {PixelFormat::gray8, 8, 8, 1};
 }
 
-/// Where red is first, as column and row.
+/// Position of the first red pixel: column, row.
 std::pair<int, int> first_red(const PackedPixels& pixels) {
   if (!is_bayer(kind_of(pixels.packing).format)) return {0, 0};
   switch (pixels.phase) {
@@ -121,7 +121,7 @@ void copy_bgr(const std::byte* from, std::byte* to, int count) {
   }
 }
 
-/// ITU-R BT.601, Y 16..235 and chroma 16..240 about 128, in 1/65536.
+/// ITU-R BT.601, Y 16..235 and chroma 16..240 around 128, in 1/65536.
 void yuv_to_rgb(int y, int u, int v, std::byte* rgb) {
   constexpr int kHalf = 1 << 15;
   const int luma = 76309 * (y - 16) + kHalf;
@@ -141,7 +141,7 @@ void copy_yuv422(const std::byte* from, std::byte* to, int count, int first_luma
   }
 }
 
-/// `count` pixels of a row, `from` its first that counts.
+/// Copies `count` pixels of a row; `from` points to the first used one.
 void copy_row(PixelPacking packing, const std::byte* from, std::byte* to, int count) {
   auto* const to16 = reinterpret_cast<std::uint16_t*>(to);
   switch (packing) {

@@ -10,18 +10,18 @@
 
 namespace emberlock::drivers {
 
-/// How devices lay out pixels that aren't compressed, by V4L2's and GenICam's PFNC's descriptions. Samples of
-/// more than 8 bits are little-endian in 16, right-aligned, but for the packed ones.
+/// Layouts of uncompressed pixels, after V4L2's and GenICam's (PFNC) descriptions. Samples of more than 8
+/// bits are little-endian in 16 bits, right-aligned, except in the packed formats.
 enum class PixelPacking {
   gray8,
   gray10,
   gray12,
   gray14,
   gray16,
-  gray10_packed,      ///< MIPI and PFNC Mono10p differ: this is PFNC's, 4 samples in 5 bytes, LSB first
+  gray10_packed,      ///< PFNC Mono10p, which differs from MIPI's: 4 samples in 5 bytes, LSB first
   gray12_packed,      ///< PFNC Mono12p: 2 samples in 3 bytes, LSB first
-  gray12_gev_packed,  ///< GigE Vision's Mono12Packed: high bytes outside, both low nibbles in the middle
-  gray10_mipi,        ///< V4L2 Y10P: 4 high bytes, then the low bits of all
+  gray12_gev_packed,  ///< GigE Vision Mono12Packed: high bytes outside, both low nibbles in the middle
+  gray10_mipi,        ///< V4L2 Y10P: 4 high bytes, then their low bits
   bayer8,
   bayer10,
   bayer12,
@@ -32,25 +32,25 @@ enum class PixelPacking {
   uyvy,
 };
 
-/// Which of the first four pixels of a Bayer mosaic is red.
+/// Order of the first four pixels of a Bayer mosaic.
 enum class BayerPhase { rggb, grbg, gbrg, bggr };
 
-/// Pixels of a device. A mosaic that doesn't begin with red is handed on from its first row and column of red
-/// on, with the last ones left out, so that both sides stay even.
+/// The format of a device's pixels. A mosaic that doesn't begin with red is cropped to start at its first red
+/// pixel; the last row or column is dropped too, so that both sides stay even.
 struct PackedPixels {
-  ImageSize size;  ///< as the device sends it
+  ImageSize size;  ///< as sent by the device
   PixelPacking packing = PixelPacking::gray8;
-  BayerPhase phase = BayerPhase::rggb;  ///< of Bayer packings
+  BayerPhase phase = BayerPhase::rggb;  ///< for Bayer packings
 };
 
-/// The image that comes of it. Error bad_input: sides that the packing can't have.
+/// The layout of the unpacked image. Error bad_input: a size that the packing doesn't allow.
 Result<ImageLayout> layout_of(const PackedPixels& pixels);
 
-/// Bytes of a row without gaps.
+/// Bytes of a row without padding.
 std::size_t row_bytes(const PackedPixels& pixels);
 
-/// Copies into an image, once. `stride` is bytes from one row to the next, >= row_bytes(). Error bad_input:
-/// `bytes` is too short for that.
+/// Unpacks into a new image, with one copy. `stride` is the number of bytes from one row to the next, >=
+/// row_bytes(). Error bad_input: `bytes` is too short.
 Result<Image> unpack(const PackedPixels& pixels, std::span<const std::byte> bytes, std::size_t stride);
 
 }  // namespace emberlock::drivers

@@ -13,18 +13,18 @@
 namespace emberlock::drivers::aravis {
 namespace {
 
-/// Of kCallDeadline, what a call of the library may take; the rest is ours.
+/// The part of kCallDeadline that a library call may take; the rest is for our own code.
 constexpr Seconds kLibraryDeadline = kCallDeadline - milliseconds(100);
 constexpr TimePoint kEver{std::numeric_limits<std::int64_t>::max()};
-constexpr Seconds kSlice = milliseconds(100);  // between two looks for a camera that went away
-/// A GigE camera that is silent so long is asked for a register again and again, and given up when it hasn't
-/// answered for so long: sooner than its heartbeat is, which takes the library 5 .. 6.1 s.
+constexpr Seconds kSlice = milliseconds(100);  // between two searches for a lost camera
+/// After this silence a GigE camera is asked repeatedly for a register, and given up when it doesn't answer
+/// for kUnanswered. This is sooner than the heartbeat fails, which takes the library 5 .. 6.1 s.
 constexpr Seconds kSilent{1}, kAskEvery{0.5}, kUnanswered{2};
 
 CameraInfo info_of(const std::string& id, const Link& link) {
   CameraInfo info;
   info.id = id;
-  info.model = link.seen().model;
+  info.model = link.discovered().model;
   info.layout = link.applied().offer.mode.layout;
   info.frame_rate = link.applied().frame_rate;
   info.reset = ShutterReset::on_command;
@@ -137,12 +137,12 @@ void AravisCamera::stop() {
   const auto stopped =
       bounded<bool>(kLibraryDeadline, [](Link& link) { return link.stop_acquisition().ok(); });
   if (!stopped) return;
-  if (!*stopped) return let_go(Seconds(0));  // it went away; start() looks for it
-  // The last frame is given up 0.1 s after its last packet.
+  if (!*stopped) return let_go(Seconds(0));  // the camera is gone; start() searches for it
+  // The library gives up an incomplete last frame 0.1 s after its last packet.
   while (clock_.now() < until) {
     auto arrived = next_arrived(milliseconds(150));
     if (!arrived) break;
-    drop(*std::move(arrived), Fate::passed_over);
+    drop(*std::move(arrived), FrameOutcome::passed_over);
   }
   ledger_.begin_anew();
   bounded<bool>(until - clock_.now(), [](Link& link) { return link.close_stream(), true; });
@@ -153,28 +153,29 @@ std::optional<Arrived> AravisCamera::next_arrived(Seconds deadline) {
   return link_->pop(deadline);
 }
 
-std::uint64_t AravisCamera::record(std::optional<std::uint64_t> frame_id, TimePoint came, Fate fate) {
+std::uint64_t AravisCamera::record(std::optional<std::uint64_t> frame_id, TimePoint came,
+                                   FrameOutcome outcome) {
   if (!frame_id) {
-    ledger_.unnumbered(fate);
+    ledger_.unnumbered(outcome);
     return {};
   }
-  // Frames are missing for want of buffers where the want ended between the two that came.
+  // Missing frames are underruns if the stream got a free buffer again between the two frames that arrived.
   bool starved = false;
   for (; !droughts_ended_.empty() && droughts_ended_.front() <= came; droughts_ended_.pop_front()) {
     starved = starved || droughts_ended_.front() > last_came_;
   }
   last_came_ = came;
-  return ledger_.record(*frame_id, fate, starved ? Fate::underrun : Fate::camera_gap);
+  return ledger_.record(*frame_id, outcome, starved ? FrameOutcome::underrun : FrameOutcome::camera_gap);
 }
 
 void AravisCamera::note_drought() {
   if (link_->starving()) droughts_ended_.push_back(clock_.now());
 }
 
-void AravisCamera::drop(Arrived arrived, Fate fate) {
-  if (arrived.arrival == Arrival::transport) fate = Fate::transport;
-  if (arrived.arrival == Arrival::resend) fate = Fate::resend;
-  record(arrived.frame_id, arrived.came, fate);
+void AravisCamera::drop(Arrived arrived, FrameOutcome outcome) {
+  if (arrived.arrival == Arrival::transport) outcome = FrameOutcome::transport;
+  if (arrived.arrival == Arrival::resend) outcome = FrameOutcome::resend;
+  record(arrived.frame_id, arrived.came, outcome);
   note_drought();
   link_->recycle(std::move(arrived));
 }
@@ -182,10 +183,10 @@ void AravisCamera::drop(Arrived arrived, Fate fate) {
 std::optional<Frame> AravisCamera::hand_on(Arrived arrived) {
   if (arrived.arrival == Arrival::transport || arrived.arrival == Arrival::resend ||
       arrived.arrival == Arrival::cleared || arrived.came < wanted_from_ || !arrived.frame_id) {
-    drop(std::move(arrived), Fate::passed_over);
+    drop(std::move(arrived), FrameOutcome::passed_over);
     return {};
   }
-  // A clock that goes backward shows a frame made of two. Cameras without one say 0.
+  // A clock that goes backward shows that parts of two frames were mixed. Cameras without a clock report 0.
   const bool damaged = arrived.arrival == Arrival::odd || arrived.device_time < device_time_;
   Frame frame;
   frame.stamp.device_time = device_time_ = arrived.device_time;
@@ -196,18 +197,18 @@ std::optional<Frame> AravisCamera::hand_on(Arrived arrived) {
   note_drought();
   auto image = link_->take(std::move(arrived));
   if (!image) {
-    record(frame_id, frame.stamp.monotonic_time, Fate::transport);
+    record(frame_id, frame.stamp.monotonic_time, FrameOutcome::transport);
     log(LogCategory::drivers).warn("camera {}: {}", id_, image.error().message());
     return {};
   }
   frame.stamp.frame_id =
-      record(frame_id, frame.stamp.monotonic_time, damaged ? Fate::damaged : Fate::delivered);
+      record(frame_id, frame.stamp.monotonic_time, damaged ? FrameOutcome::damaged : FrameOutcome::delivered);
   frame.image = std::move(image).value();
   return frame;
 }
 
 bool AravisCamera::silent() {
-  if (link_->seen().transport != Transport::gige) return false;  // USB tells at once
+  if (link_->discovered().transport != Transport::gige) return false;  // USB reports it at once
   const std::uint64_t signs = link_->signs_of_life();
   const TimePoint now = clock_.now();
   if (std::exchange(signs_, signs) != signs) {
@@ -216,7 +217,7 @@ bool AravisCamera::silent() {
   }
   if (now - last_sign_ < kSilent || now < next_question_) return false;
   next_question_ = now + kAskEvery;
-  if (answers(link_->seen().address)) {
+  if (answers(link_->discovered().address)) {
     last_sign_ = clock_.now();
     unanswered_since_.reset();
     return false;
@@ -255,7 +256,7 @@ std::uint64_t AravisCamera::pass_over_before(TimePoint instant) {
       held_ = std::move(arrived);
       break;
     }
-    drop(*std::move(arrived), Fate::passed_over);
+    drop(*std::move(arrived), FrameOutcome::passed_over);
   }
   return ledger_.counts().passed_over - before;
 }

@@ -18,15 +18,15 @@
 
 namespace emberlock::drivers::aravis {
 
-/// A GigE Vision or USB3 Vision camera. What of the library may hang runs on a thread that is left behind
-/// when it does: the camera then says `device` until that call has returned, and the others film on.
-/// A reset of the shutter is AcquisitionStop and AcquisitionStart; it waits for its instant, at most
-/// kLongestReset ahead. Times are on the machine's monotonic clock.
+/// A GigE Vision or USB3 Vision camera. Library calls that may hang run on a thread of their own, which is
+/// left behind when one hangs: this camera then returns `device` until that call has returned; other cameras
+/// aren't affected. A shutter reset is AcquisitionStop and AcquisitionStart; it waits for its instant, which
+/// may be at most kLongestReset ahead. Times are on the machine's monotonic clock.
 class AravisCamera final : public Camera {
  public:
   static constexpr Seconds kLongestReset = milliseconds(500);
 
-  /// The link is filming or not; `request` sets the camera up again after it was lost.
+  /// The link may be filming or not. `request` restores the settings after the camera was lost.
   AravisCamera(std::string id, CameraRequest request, std::shared_ptr<Link> link);
   ~AravisCamera() override;
 
@@ -37,7 +37,7 @@ class AravisCamera final : public Camera {
   Result<Frame> next_frame(Seconds deadline) override;
   std::uint64_t pass_over(TimePoint until) override;
   Status reset_shutter(TimePoint at) override;
-  /// Error device always: no standard feature says in which steps a rate can be set.
+  /// Always error device: GenICam has no standard feature for the steps of a frame rate.
   Status trim_rate(PartsPerMillion trim) override;
 
  private:
@@ -45,21 +45,21 @@ class AravisCamera final : public Camera {
 
   [[nodiscard]] Error failure(std::string what, std::string remedy) const;
   std::optional<Arrived> next_arrived(Seconds deadline);
-  /// The frame, if it is to be handed on; counts it whatever it is.
+  /// Counts the frame and returns it if it is to be handed on.
   std::optional<Frame> hand_on(Arrived arrived);
-  /// Frames that came before an instant.
+  /// Drops frames that arrived before an instant.
   std::uint64_t pass_over_before(TimePoint instant);
-  /// To be called before a buffer is given back.
+  /// Call this before a buffer is given back.
   void note_drought();
-  void drop(Arrived arrived, Fate fate);
-  std::uint64_t record(std::optional<std::uint64_t> frame_id, TimePoint came, Fate fate);
-  /// Whether it went away: it sends nothing, and doesn't answer when it is asked for something.
+  void drop(Arrived arrived, FrameOutcome outcome);
+  std::uint64_t record(std::optional<std::uint64_t> frame_id, TimePoint came, FrameOutcome outcome);
+  /// Whether the camera is gone: it sends nothing and doesn't answer a query.
   [[nodiscard]] bool silent();
-  /// Calls the library on a thread of its own. None if that takes longer: the camera is quarantined then, the
-  /// link left to that thread.
+  /// Runs a library call on its own thread. nullopt if it takes too long: the camera is then quarantined and
+  /// the link is left to that thread.
   template <class T>
   std::optional<T> bounded(Seconds deadline, std::function<T(Link&)> call);
-  /// Closes the link on a thread of its own, as that may hang, and waits for it until the deadline.
+  /// Closes the link on its own thread, because that may hang; waits until the deadline.
   void let_go(Seconds deadline);
   Error lose(std::string what);
 
@@ -68,20 +68,20 @@ class AravisCamera final : public Camera {
   CameraInfo info_;
   SteadyClock clock_;
   FrameLedger ledger_;
-  std::shared_ptr<Link> link_;  ///< none while the camera is lost, or hangs
+  std::shared_ptr<Link> link_;  ///< null while the camera is lost or hangs
   bool filming_ = false;
-  std::optional<std::future<Linked>> starting_;       ///< a start that nobody has the answer of yet
-  std::shared_ptr<const std::atomic<bool>> hanging_;  ///< true once the call that hung has returned
+  std::optional<std::future<Linked>> starting_;       ///< a start that hasn't been answered yet
+  std::shared_ptr<const std::atomic<bool>> hanging_;  ///< becomes true when the hanging call has returned
   TimePoint hangs_since_;
-  std::optional<Arrived> held_;  ///< popped, but not taken yet
-  TimePoint wanted_from_;        ///< frames that came before it are of an older shutter phase
+  std::optional<Arrived> held_;  ///< popped, but not handed on yet
+  TimePoint wanted_from_;        ///< earlier frames show an older shutter phase
   TimePoint device_time_;        ///< of the last frame
-  TimePoint last_sign_;          ///< when something last came from the camera
-  TimePoint next_question_;      ///< to a camera that is silent
+  TimePoint last_sign_;          ///< last time that anything came from the camera
+  TimePoint next_question_;      ///< next query of a silent camera
   std::optional<TimePoint> unanswered_since_;
   std::uint64_t signs_ = 0;
-  TimePoint last_came_;                   ///< the last frame
-  std::deque<TimePoint> droughts_ended_;  ///< when a stream without a buffer got one
+  TimePoint last_came_;                   ///< arrival of the last frame
+  std::deque<TimePoint> droughts_ended_;  ///< times at which a stream without free buffers got one
 };
 
 }  // namespace emberlock::drivers::aravis

@@ -18,14 +18,14 @@ using namespace aravis;
 constexpr Seconds kFindDeadline{2.9};
 constexpr Seconds kOpenDeadline{5};
 
-/// What is found so far; shared with the thread that goes on looking should it hang.
+/// The results so far; shared with the thread, which continues if it hangs.
 struct Findings {
   std::mutex mutex;
   std::vector<CameraFound> found;
 };
 
-/// What isn't known before the camera is asked itself.
-void ask(const Seen& seen, CameraFound& found) {
+/// Queries the camera for what discovery doesn't know.
+void ask(const DiscoveredCamera& seen, CameraFound& found) {
   if (seen.transport == Transport::gige) {
     if (const auto controller = controller_of(seen.address)) {
       found.holder = controller->holder;
@@ -47,10 +47,10 @@ void ask(const Seen& seen, CameraFound& found) {
 }
 
 bool find_all(Findings& findings) {
-  const auto seen = look();
+  const auto seen = discover();
   {
     const std::lock_guard lock(findings.mutex);
-    for (const Seen& one : seen) {
+    for (const DiscoveredCamera& one : seen) {
       CameraFound found;
       found.id = one.id;
       found.model = one.model;
@@ -91,7 +91,7 @@ Result<std::unique_ptr<Camera>> open(const std::string& id, const CameraRequest&
   auto opening = in_background<Linked>([id, request] {
     const auto seen = locate(id);
     if (!seen) return Linked(seen.error());
-    // To be refused control takes some cameras long.
+    // Some cameras take long to refuse control.
     if (auto error = held(*seen)) return Linked(*std::move(error));
     return Link::open(*seen, request);
   });

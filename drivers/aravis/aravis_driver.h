@@ -5,8 +5,9 @@
 
 namespace emberlock::drivers {
 
-/// GigE Vision and USB3 Vision cameras, by Aravis 0.8. Their ids are serial numbers, else MACs; controls are
-/// GenICam's names, and PacketResend ("always", "never") and PacketDelayNs (drivers/aravis/settings.h).
+/// GigE Vision and USB3 Vision cameras, through Aravis 0.8. Ids are serial numbers, else MACs. Controls have
+/// GenICam's names; in addition PacketResend ("always", "never") and PacketDelayNs
+/// (drivers/aravis/settings.h).
 CameraDriver aravis_driver();
 
 }  // namespace emberlock::drivers

@@ -16,11 +16,11 @@ namespace {
 
 using Now = std::chrono::steady_clock;
 
-/// Guards the library's lists. Never destroyed: a call that hangs may outlast main().
+/// Guards the library's lists. Never destroyed, because a hanging call may outlast main().
 struct Guarded {
   std::mutex mutex;
-  std::vector<Seen> seen;             ///< by the last look
-  std::map<std::string, Seen> known;  ///< wherever each was seen last, by id
+  std::vector<DiscoveredCamera> seen;             ///< by the last discovery
+  std::map<std::string, DiscoveredCamera> known;  ///< last known data of every camera, by id
   Now::time_point seen_at;
 };
 Guarded& guarded() {
@@ -30,7 +30,7 @@ Guarded& guarded() {
 
 std::string text(const char* s) { return s == nullptr ? "" : s; }
 
-/// Fit for a folder's name.
+/// Makes an id a valid folder name.
 std::string fit(std::string id) {
   for (char& c : id) {
     const auto u = static_cast<unsigned char>(c);
@@ -39,13 +39,13 @@ std::string fit(std::string id) {
   return id;
 }
 
-std::vector<Seen> ask_library() {
+std::vector<DiscoveredCamera> ask_library() {
   arv_update_device_list();
-  std::vector<Seen> seen;
+  std::vector<DiscoveredCamera> seen;
   for (unsigned i = 0; i < arv_get_n_devices(); ++i) {
     const std::string protocol = text(arv_get_device_protocol(i));
     if (protocol != "GigEVision" && protocol != "USB3Vision") continue;
-    Seen one;
+    DiscoveredCamera one;
     one.physical_id = fit(text(arv_get_device_physical_id(i)));
     const std::string serial = fit(text(arv_get_device_serial_nbr(i)));
     one.id = serial.empty() ? one.physical_id : serial;
@@ -55,19 +55,20 @@ std::vector<Seen> ask_library() {
     one.library_id = text(arv_get_device_id(i));
     seen.push_back(std::move(one));
   }
-  std::sort(seen.begin(), seen.end(), [](const Seen& a, const Seen& b) { return a.id < b.id; });
+  std::sort(seen.begin(), seen.end(),
+            [](const DiscoveredCamera& a, const DiscoveredCamera& b) { return a.id < b.id; });
   return seen;
 }
 
-bool shows(const std::vector<Seen>& seen, const std::string& id) {
-  return std::any_of(seen.begin(), seen.end(), [&](const Seen& one) { return one.id == id; });
+bool shows(const std::vector<DiscoveredCamera>& seen, const std::string& id) {
+  return std::any_of(seen.begin(), seen.end(), [&](const DiscoveredCamera& one) { return one.id == id; });
 }
 
-/// The one with this id. Error device: none or several; says what is there.
-Result<Seen> choose(const std::vector<Seen>& seen, const std::string& id) {
-  std::vector<Seen> fitting;
+/// The camera with this id. Error device: none or several; lists the cameras found.
+Result<DiscoveredCamera> choose(const std::vector<DiscoveredCamera>& seen, const std::string& id) {
+  std::vector<DiscoveredCamera> fitting;
   std::string there;
-  for (const Seen& one : seen) {
+  for (const DiscoveredCamera& one : seen) {
     if (one.id == id || one.physical_id == id) fitting.push_back(one);
     there += (there.empty() ? "" : ", ") + one.id + " (" + one.model + ")";
   }
@@ -84,13 +85,13 @@ Result<Seen> choose(const std::vector<Seen>& seen, const std::string& id) {
 }
 
 /// Whether the same GigE camera answers at the same address.
-bool is_where_it_was(const Seen& before) {
+bool is_where_it_was(const DiscoveredCamera& before) {
   if (before.transport != Transport::gige) return false;
   const auto identity = identity_at(before.address);
   return identity && fit(identity->serial.empty() ? identity->mac : identity->serial) == before.id;
 }
 
-Result<ObjectPtr<ArvCamera>> open_locked(const Seen& seen) {
+Result<ObjectPtr<ArvCamera>> open_locked(const DiscoveredCamera& seen) {
   ErrorSlot error;
   ObjectPtr<ArvCamera> camera(arv_camera_new(seen.library_id.c_str(), error.out()));
   if (camera == nullptr) {
@@ -101,7 +102,7 @@ Result<ObjectPtr<ArvCamera>> open_locked(const Seen& seen) {
 
 }  // namespace
 
-std::vector<Seen> look(const std::string& wanted) {
+std::vector<DiscoveredCamera> discover(const std::string& wanted) {
   const auto asked_at = Now::now();
   Guarded& library = guarded();
   const std::lock_guard lock(library.mutex);
@@ -109,13 +110,13 @@ std::vector<Seen> look(const std::string& wanted) {
   if (!fresh) {
     library.seen = ask_library();
     library.seen_at = Now::now();
-    for (const Seen& one : library.seen) library.known[one.id] = one;
+    for (const DiscoveredCamera& one : library.seen) library.known[one.id] = one;
   }
   return library.seen;
 }
 
-Result<Seen> locate(const std::string& id) {
-  std::optional<Seen> known;
+Result<DiscoveredCamera> locate(const std::string& id) {
+  std::optional<DiscoveredCamera> known;
   {
     const std::lock_guard lock(guarded().mutex);
     const auto it = guarded().known.find(id);
@@ -125,10 +126,10 @@ Result<Seen> locate(const std::string& id) {
     known->library_id = known->address;
     return *known;
   }
-  return choose(look(id), id);
+  return choose(discover(id), id);
 }
 
-std::optional<Error> held(const Seen& seen) {
+std::optional<Error> held(const DiscoveredCamera& seen) {
   if (seen.transport != Transport::gige) return {};
   const auto controller = controller_of(seen.address);
   if (!controller) return {};
@@ -144,12 +145,12 @@ std::optional<Error> held(const Seen& seen) {
                where, "close that program; control that it left behind ends some seconds later"};
 }
 
-Result<ObjectPtr<ArvCamera>> open_seen(const Seen& seen) {
+Result<ObjectPtr<ArvCamera>> open_discovered(const DiscoveredCamera& seen) {
   const std::lock_guard lock(guarded().mutex);
   return open_locked(seen);
 }
 
-Status inspect(const Seen& seen, const std::function<void(ArvCamera*)>& question) {
+Status inspect(const DiscoveredCamera& seen, const std::function<void(ArvCamera*)>& question) {
   const std::lock_guard lock(guarded().mutex);
   EMBERLOCK_ASSIGN_OR_RETURN(const auto camera, open_locked(seen));
   question(camera.get());

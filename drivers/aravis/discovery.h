@@ -14,31 +14,32 @@ namespace emberlock::drivers::aravis {
 enum class Transport { gige, usb3 };
 
 /// A camera that answered.
-struct Seen {
-  std::string id;           ///< its serial number, else its MAC
-  std::string physical_id;  ///< its MAC, or what USB says
+struct DiscoveredCamera {
+  std::string id;           ///< serial number, else MAC
+  std::string physical_id;  ///< MAC, or USB's identification
   std::string model;
-  std::string address;  ///< "192.168.1.7"; of USB as Aravis says
+  std::string address;  ///< "192.168.1.7"; for USB, Aravis's text
   Transport transport = Transport::gige;
-  std::string library_id;  ///< what Aravis opens it by
+  std::string library_id;  ///< the name by which Aravis opens it
 };
 
-/// The cameras that answer now, of both transports; takes about 1 s. Never two at a time, and never beside
-/// open_seen(): the library keeps lists without guarding them (its issues 159 and 164). Who waited for
-/// another's look takes what that saw, if it shows `wanted`. Thread-safe.
-std::vector<Seen> look(const std::string& wanted = {});
+/// All cameras that answer, GigE and USB3; takes about 1 s. Serialized with itself and with
+/// open_discovered(), because the library's lists aren't thread-safe (Aravis issues 159 and 164). A call that
+/// waited for another discovery returns that one's result if it contains `wanted`. Thread-safe.
+std::vector<DiscoveredCamera> discover(const std::string& wanted = {});
 
-/// The one camera with this id (or MAC): at once where it answers at the address where it was seen last, else
-/// after a look. Thread-safe. Error device: none or several; says what is there.
-Result<Seen> locate(const std::string& id);
+/// The one camera with this id (or MAC). At once if it answers at its last known address, else after a
+/// discovery. Thread-safe. Error device: none or several; lists the cameras found.
+Result<DiscoveredCamera> locate(const std::string& id);
 
-/// The error of a camera that somebody controls, naming the program where it can be; none if nobody does.
-std::optional<Error> held(const Seen& seen);
+/// The error for a camera that another program controls, naming the program if possible; nullopt if none
+/// does.
+std::optional<Error> held(const DiscoveredCamera& seen);
 
-/// Opens it, and takes control if nobody else has it. Thread-safe.
-Result<ObjectPtr<ArvCamera>> open_seen(const Seen& seen);
+/// Opens the camera and takes control if nobody else has it. Thread-safe.
+Result<ObjectPtr<ArvCamera>> open_discovered(const DiscoveredCamera& seen);
 
-/// Opens it for one question and closes it, while nobody else opens any. Thread-safe.
-Status inspect(const Seen& seen, const std::function<void(ArvCamera*)>& question);
+/// Opens the camera for one query and closes it; no other camera is opened meanwhile. Thread-safe.
+Status inspect(const DiscoveredCamera& seen, const std::function<void(ArvCamera*)>& question);
 
 }  // namespace emberlock::drivers::aravis

@@ -23,7 +23,7 @@ namespace emberlock::drivers::aravis {
 namespace {
 
 constexpr std::uint16_t kPort = 3956;
-constexpr std::uint32_t kControl = 0x0a00, kControlled = 0b11;  // control, or exclusive
+constexpr std::uint32_t kControl = 0x0a00, kControlled = 0b11;  // control, or exclusive access
 constexpr std::uint32_t kPrimaryPort = 0x0a04, kPrimaryAddress = 0x0a14;
 constexpr std::uint32_t kStreamPort = 0x0d00, kStreamAddress = 0x0d18;
 
@@ -49,7 +49,7 @@ void each_interface(const std::string& address, const Found& found) {
   }
 }
 
-/// The process of this machine whose UDP socket has this address and port.
+/// The process on this machine that owns the UDP socket with this address and port.
 std::optional<Holder> owner_of(const std::string& address, std::uint16_t port) {
   bool here = false;
   each_interface(address, [&here](const ifaddrs&) { here = true; });
@@ -61,7 +61,7 @@ std::optional<Holder> owner_of(const std::string& address, std::uint16_t port) {
     std::istringstream words(line);
     std::string slot, local, remote, skipped;
     words >> slot >> local >> remote;
-    // "0100007F:CB5B": the address as the machine keeps it, and the port
+    // "0100007F:CB5B": the address in host byte order, and the port
     const auto colon = local.find(':');
     if (colon == std::string::npos) continue;
     std::uint32_t ip = 0, its_port = 0;
@@ -111,7 +111,7 @@ std::optional<std::uint32_t> read_register(const std::string& camera_address, st
 }
 
 bool answers(const std::string& camera_address) {
-  // Any register would do, but the one for control: to read that is a heartbeat to some cameras.
+  // Any register would do except the control register, whose reading some cameras take for a heartbeat.
   return read_register(camera_address, kStreamPort, milliseconds(100)).has_value();
 }
 
@@ -139,7 +139,7 @@ std::optional<Controller> controller_of(const std::string& camera_address) {
     return read_register(camera_address, address, kAnswer).value_or(0);
   };
   if ((ask(kControl) & kControlled) == 0) return {};
-  // Where the camera doesn't know its controller, the pictures go to it all the same.
+  // If the camera doesn't know its controller, the stream's destination is used.
   for (const auto& [address, port] :
        {std::pair(kPrimaryAddress, kPrimaryPort), {kStreamAddress, kStreamPort}}) {
     const std::uint32_t ip = ask(address);
@@ -164,7 +164,7 @@ std::optional<int> network_mtu(const std::string& interface_address) {
 std::optional<double> network_megabits(const std::string& interface_address) {
   std::optional<double> megabits;
   each_interface(interface_address, [&megabits](const ifaddrs& interface) {
-    double speed = 0;  // unreadable where it is down, or has none as the loopback
+    double speed = 0;  // unreadable if the interface is down or has no speed, like the loopback
     if (std::ifstream("/sys/class/net/" + name_of(interface) + "/speed") >> speed && speed > 0)
       megabits = speed;
   });

@@ -14,13 +14,13 @@
 #include "base/quantity.h"
 #include "base/result.h"
 
-// What of GLib and Aravis needs an owner, and calls that may hang.
+// RAII owners for GLib and Aravis, and a wrapper for calls that may hang.
 namespace emberlock::drivers::aravis {
 
 struct Unref {
   void operator()(gpointer object) const { g_object_unref(object); }
 };
-/// Owns one reference of a GObject.
+/// Owns one reference to a GObject.
 template <class T>
 using ObjectPtr = std::unique_ptr<T, Unref>;
 
@@ -30,7 +30,7 @@ struct Free {
 template <class T>
 using MemoryPtr = std::unique_ptr<T, Free>;
 
-/// Where a call of the library leaves its error: `arv_...(camera, error.out())`.
+/// Receives a library call's error: `arv_...(camera, error.out())`.
 class ErrorSlot {
  public:
   ErrorSlot() = default;
@@ -38,7 +38,7 @@ class ErrorSlot {
   ErrorSlot& operator=(const ErrorSlot&) = delete;
   ~ErrorSlot() { g_clear_error(&error_); }
 
-  /// To be handed to one call; forgets an error of the call before.
+  /// Pass this to one call; it clears an earlier error.
   GError** out() {
     g_clear_error(&error_);
     return &error_;
@@ -53,8 +53,8 @@ class ErrorSlot {
   GError* error_ = nullptr;
 };
 
-/// Runs work that may hang on a thread of its own, which is left behind if nobody waits. What the work holds
-/// and an answer that nobody took are destroyed on that thread: that may hang too.
+/// Runs work that may hang on its own thread, which is left behind if nobody waits for it. The captured
+/// objects and an unused result are destroyed on that thread, because that may hang too.
 template <class T>
 std::future<T> in_background(std::function<T()> work) {
   std::promise<T> promise;

@@ -20,7 +20,8 @@
 namespace emberlock::drivers::aravis {
 namespace {
 
-constexpr std::uint64_t kNoId = ~std::uint64_t{0};  // never a frame's: GigE has 16 bits, or starts low
+constexpr std::uint64_t kNoId =
+    ~std::uint64_t{0};  // not the id of any frame: GigE uses 16 bits, USB3 starts low
 
 /// The memory of a buffer that becomes an image.
 struct ImageMemory {
@@ -31,8 +32,9 @@ void free_memory(gpointer memory) { delete static_cast<ImageMemory*>(memory); }
 using Flag = std::shared_ptr<std::atomic<bool>>;
 void on_control_lost(ArvDevice* device, gpointer flag) {
   **static_cast<Flag*>(flag) = true;
-  // The thread that tells us holds a reference meanwhile. Were it the last, the device would wait for the end
-  // of that thread on that thread: so there is another one, until all others are gone.
+  // The thread that calls us (the heartbeat's) holds a reference to the device. If it were the last one, the
+  // device would be destroyed on that thread and wait for it forever. So another reference is held until all
+  // others are gone.
   std::thread([device = ObjectPtr<ArvDevice>(ARV_DEVICE(g_object_ref(device)))] {
     while (g_atomic_int_get(&G_OBJECT(device.get())->ref_count) > 1) {
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -41,7 +43,7 @@ void on_control_lost(ArvDevice* device, gpointer flag) {
 }
 void free_flag(gpointer flag, GClosure*) { delete static_cast<Flag*>(flag); }
 
-/// Of this process's UDP socket that is bound to `port`.
+/// Sets the receive buffer of this process's UDP socket bound to `port`.
 void enlarge_socket(std::uint16_t port, int bytes) {
   std::error_code gone;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", gone)) {
@@ -61,12 +63,12 @@ void enlarge_socket(std::uint16_t port, int bytes) {
 
 }  // namespace
 
-Result<std::shared_ptr<Link>> Link::open(const Seen& seen, const CameraRequest& request) {
+Result<std::shared_ptr<Link>> Link::open(const DiscoveredCamera& seen, const CameraRequest& request) {
   const std::string where = "camera " + seen.id;
   std::shared_ptr<Link> link(new Link);
-  EMBERLOCK_ASSIGN_OR_RETURN(link->camera_, open_seen(seen));
+  EMBERLOCK_ASSIGN_OR_RETURN(link->camera_, open_discovered(seen));
   link->where_ = where;
-  link->seen_ = seen;
+  link->discovered_ = seen;
   ArvCamera* camera = link->camera_.get();
   ArvDevice* device = arv_camera_get_device(camera);
   g_signal_connect_data(device, "control-lost", G_CALLBACK(on_control_lost), new Flag(link->control_lost_),
@@ -89,7 +91,7 @@ Result<std::shared_ptr<Link>> Link::open(const Seen& seen, const CameraRequest& 
     return Error{ErrorKind::device, "it announces fewer bytes than its pictures have", where,
                  "choose another format"};
   }
-  // USB3's stream remembers where each of its buffers lies, so there they must stay.
+  // A USB3 stream remembers the address of each buffer, so its buffers can't be exchanged.
   link->into_images_ =
       arv_camera_is_gv_device(camera) != 0 && lies_as_image(pixels) && link->payload_ == bytes;
   for (const std::string& note : notes_of(camera)) log(LogCategory::drivers).info("{}: {}", where, note);
@@ -103,8 +105,8 @@ Link::~Link() {
 Status Link::start() {
   ErrorSlot error;
   if (arv_camera_is_gv_device(camera_.get()) != 0) {
-    // Aravis opens a packet socket before it says whose packets it wants, and takes what other cameras send
-    // in between for this one's frames. A socket that is bound to its own port can't err so, nor needs root.
+    // Aravis opens a packet socket before it sets its filter, and takes packets of other cameras in between
+    // for this camera's frames. A socket bound to its own port doesn't have this fault and doesn't need root.
     arv_camera_gv_set_stream_options(camera_.get(), ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   }
   stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, error.out()));
@@ -119,12 +121,12 @@ Status Link::start() {
     ArvGvStreamPacketResend policy = ARV_GV_STREAM_PACKET_RESEND_NEVER;
     g_object_get(stream_.get(), "packet-resend", &policy, nullptr);
     resends_ = policy == ARV_GV_STREAM_PACKET_RESEND_ALWAYS;
-    // Bursts of whole frames must fit into the socket; the kernel gives what net.core.rmem_max allows.
+    // The socket's buffer must hold bursts of whole frames; the kernel limits it to net.core.rmem_max.
     constexpr std::size_t kFrames = 4;
     const auto bytes = static_cast<int>(std::min<std::size_t>(kFrames * payload_, 64U << 20U));
     g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
                  bytes, nullptr);
-    // Aravis does so when the first packet has come, which is too late for the first frame.
+    // Aravis does this when the first packet has arrived, which is too late for the first frame.
     enlarge_socket(arv_gv_stream_get_port(ARV_GV_STREAM(stream_.get())), bytes);
   }
   EMBERLOCK_RETURN_IF_ERROR(queue_buffers());
@@ -170,12 +172,12 @@ ObjectPtr<ArvBuffer> Link::new_buffer() const {
 }
 
 void Link::push(ObjectPtr<ArvBuffer> buffer) {
-  // The library leaves the id of an earlier frame there when the packet with the id is lost.
+  // If the packet with the id is lost, the library leaves the id of an earlier frame there.
   arv_buffer_set_frame_id(buffer.get(), kNoId);
   arv_stream_push_buffer(stream_.get(), buffer.release());
 }
 
-Arrival Link::judge(ArvBuffer* buffer) const {
+Arrival Link::classify(ArvBuffer* buffer) const {
   switch (arv_buffer_get_status(buffer)) {
     case ARV_BUFFER_STATUS_SUCCESS:
       break;
@@ -185,7 +187,7 @@ Arrival Link::judge(ArvBuffer* buffer) const {
     case ARV_BUFFER_STATUS_ABORTED:
     case ARV_BUFFER_STATUS_FILLING:
       return Arrival::cleared;
-    default:  // packets missing, or with wrong numbers, or too many
+    default:  // packets missing, wrongly numbered, or too many
       return Arrival::transport;
   }
   if (arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_IMAGE &&
@@ -208,12 +210,13 @@ std::optional<Arrived> Link::pop(Seconds deadline) {
                                         : arv_stream_timeout_pop_buffer(stream_.get(), wait));
   if (buffer == nullptr) return {};
   Arrived arrived;
-  arrived.arrival = judge(buffer.get());
+  arrived.arrival = classify(buffer.get());
   const std::uint64_t id = arv_buffer_get_frame_id(buffer.get());
   if (id != kNoId) arrived.frame_id = id;
   arrived.device_time = {static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer.get()))};
   arrived.system_time = {static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer.get()))};
-  // Aravis knows the wall clock alone, which may be set while a buffer waits here; buffers come in order.
+  // Aravis gives only the wall clock, which may be changed while a buffer waits here; buffers arrive in
+  // order.
   const TimePoint now = SteadyClock().now();
   arrived.came = std::clamp(now - (wall_clock() - arrived.system_time), last_came_, now);
   last_came_ = arrived.came;
@@ -248,7 +251,7 @@ std::uint64_t Link::signs_of_life() const {
 bool Link::starving() const {
   gint waiting = 0;
   arv_stream_get_n_buffers(stream_.get(), &waiting, nullptr);
-  return waiting <= 0 && ARV_IS_GV_STREAM(stream_.get());  // USB3 takes all at once
+  return waiting <= 0 && ARV_IS_GV_STREAM(stream_.get());  // USB3 uses all buffers at once
 }
 
 }  // namespace emberlock::drivers::aravis

@@ -67,7 +67,7 @@ bool lies_as_image(const PackedPixels& pixels) {
     case PixelPacking::bayer16:
       return std::endian::native == std::endian::little && pixels.phase == BayerPhase::rggb &&
              pixels.size.width % 2 == 0 && pixels.size.height % 2 == 0;
-    default:  // the rest are reordered, or have bits to be masked
+    default:  // the others are reordered, or need masking
       return false;
   }
 }

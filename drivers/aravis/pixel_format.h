@@ -8,11 +8,11 @@
 
 namespace emberlock::drivers::aravis {
 
-/// The packing that a name of the Pixel Format Naming Convention means, its size left open; none for what
-/// can't be unpacked.
+/// The packing of a name from the Pixel Format Naming Convention, without its size; nullopt if it can't be
+/// unpacked.
 std::optional<PackedPixels> packing_of(std::string_view name);
 
-/// Whether such pixels lie in memory as an Image of theirs does, so that nothing needs to be unpacked.
+/// Whether these pixels have the memory layout of an Image, so that they needn't be unpacked.
 bool lies_as_image(const PackedPixels& pixels);
 
 }  // namespace emberlock::drivers::aravis

@@ -49,7 +49,7 @@ Hertz fastest(ArvCamera* camera) {
   ErrorSlot error;
   arv_camera_get_frame_rate_bounds(camera, &least, &most, error.out());
   if (error.failed() || !(most > 0) || !std::isfinite(most) || most > 1e6) {
-    most = arv_camera_get_frame_rate(camera, error.out());  // it can't be set, or has no bound
+    most = arv_camera_get_frame_rate(camera, error.out());  // the rate can't be set, or has no limit
   }
   return Hertz(error.failed() ? 0 : most);
 }
@@ -62,7 +62,7 @@ std::optional<Offer> offer(const std::string& encoding, PackedPixels pixels, Her
 
 std::string list(const std::vector<std::string>& names) { return fmt::format("{}", fmt::join(names, ", ")); }
 
-/// Of the network interface by which a GigE camera is reached.
+/// The address of the network interface through which a GigE camera is reached.
 std::string interface_address(ArvCamera* camera) {
   GSocketAddress* here = arv_gv_device_get_interface_address(ARV_GV_DEVICE(arv_camera_get_device(camera)));
   const MemoryPtr<char> address(
@@ -112,7 +112,7 @@ Error not_a(const char* what, const std::string& name, const std::string& value,
   return {ErrorKind::bad_input, fmt::format("\"{}\" is not {} for {}", value, what, name), where, remedy};
 }
 
-/// Sets an enumeration, boolean, integer, float or string, whichever it is.
+/// Sets an enumeration, boolean, integer, float or string feature.
 Status set_value(ArvCamera* camera, ArvGcNode* node, const std::string& name, const std::string& value,
                  const std::string& where) {
   const char* feature = name.c_str();
@@ -187,14 +187,14 @@ Status set_rate(ArvCamera* camera, Hertz rate, const std::string& where) {
   }
   if (!has(camera, "AcquisitionFrameRate") && !has(camera, "AcquisitionFrameRateAbs") &&
       !has(camera, "FPS")) {
-    return {};  // it films at its own rate
+    return {};  // it films at its present rate
   }
   arv_camera_set_frame_rate(camera, rate.value(), error.out());
   if (error.failed()) return error.error(ErrorKind::device, where);
   return {};
 }
 
-/// Selectors first: they say what the others speak of.
+/// Sets selectors first, because they determine what the other controls refer to.
 Status set_controls(ArvCamera* camera, const CameraRequest& request, const std::string& where) {
   for (const bool selectors : {true, false}) {
     for (const auto& [name, value] : request.controls) {
@@ -219,7 +219,7 @@ std::vector<Offer> offers(ArvCamera* camera, const std::optional<ImageSize>& siz
     if (!largest) continue;
     all.push_back(*largest);
     if (!size || *size == largest->mode.layout.size) continue;
-    // A mosaic that doesn't begin with red loses a row or a column when it is handed on.
+    // A mosaic that doesn't begin with red loses a row or a column in unpacking.
     pixels->size.width = size->width + (width.most - largest->mode.layout.size.width);
     pixels->size.height = size->height + (height.most - largest->mode.layout.size.height);
     const auto asked = offer(encoding, *pixels, rate);
@@ -262,7 +262,7 @@ std::vector<std::string> notes_of(ArvCamera* camera) {
 
 Status set_control(ArvCamera* camera, const std::string& name, const std::string& value,
                    const std::string& where) {
-  if (name == kPacketResend) {  // the stream's, when there is one
+  if (name == kPacketResend) {  // a control of the stream, which may not exist yet
     if (value == "always" || value == "never") return {};
     return not_a("a value", name, value, where, "say always or never");
   }
@@ -287,9 +287,10 @@ Status set_control(ArvCamera* camera, const std::string& name, const std::string
 
 Result<Applied> apply(ArvCamera* camera, const CameraRequest& request, const std::string& where) {
   arv_camera_set_range_check_policy(camera, ARV_RANGE_CHECK_POLICY_ENABLE);
-  EMBERLOCK_RETURN_IF_ERROR(set_controls(camera, request, where));  // binning and such change what it can
+  EMBERLOCK_RETURN_IF_ERROR(
+      set_controls(camera, request, where));  // before the modes are read: binning and others change them
   CameraRequest wanted = request;
-  wanted.frame_rate.reset();  // how fast it films is known only once size, format and exposure are set
+  wanted.frame_rate.reset();  // the range of the rate depends on size, format and exposure
   const auto offered = offers(camera, request.size);
   std::vector<CameraMode> modes;
   modes.reserve(offered.size());
@@ -301,7 +302,8 @@ Result<Applied> apply(ArvCamera* camera, const CameraRequest& request, const std
   EMBERLOCK_RETURN_IF_ERROR(set_size_and_format(camera, applied.offer, where));
   if (request.exposure) EMBERLOCK_RETURN_IF_ERROR(set_exposure(camera, *request.exposure, where));
   EMBERLOCK_RETURN_IF_ERROR(set_rate(camera, request.frame_rate.value_or(fastest(camera)), where));
-  EMBERLOCK_RETURN_IF_ERROR(set_controls(camera, request, where));  // to set the rate switches triggers off
+  EMBERLOCK_RETURN_IF_ERROR(
+      set_controls(camera, request, where));  // again: setting the rate switches triggers off
   applied.frame_rate = Hertz(arv_camera_get_frame_rate(camera, nullptr));
   if (!(applied.frame_rate.value() > 0)) applied.frame_rate = request.frame_rate.value_or(Hertz(1));
   applied.offer.mode.frame_rate = applied.frame_rate;

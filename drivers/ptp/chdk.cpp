@@ -19,7 +19,7 @@ enum Command : std::uint32_t {
 enum ValueType : std::uint32_t { kNil = 1, kBoolean = 2, kInteger = 3 };
 
 constexpr std::uint32_t kLua = 0;
-constexpr std::uint32_t kViewport = 1;  // of the display's data
+constexpr std::uint32_t kViewport = 1;  // flag in the request for live view data
 constexpr std::size_t kLargestLiveView = std::size_t{32} << 20;
 constexpr Seconds kScriptPause = milliseconds(2);
 constexpr int kMostStaleMessages = 64;
@@ -56,7 +56,7 @@ Result<ChdkMessage> parse_chdk_message(const PtpAnswer& answer) {
   }
   ChdkMessage message{static_cast<ChdkMessageType>(type), answer.param(2)};
   if (message.type == ChdkMessageType::none) return message;
-  // An error's subtype says what failed, not what its data are: always text.
+  // The subtype of an error is its cause, not a type: its data are always text.
   const std::uint32_t value_type = message.type == ChdkMessageType::error ? 0 : answer.param(1);
   EMBERLOCK_ASSIGN_OR_RETURN(message.value, parse_value(value_type, std::span(answer.data).first(length)));
   return message;
@@ -78,7 +78,7 @@ Result<ChdkVersion> Chdk::version() {
 }
 
 Result<std::uint32_t> Chdk::start_script(std::string_view lua) {
-  const std::string script(lua);  // sent with its NUL
+  const std::string script(lua);  // sent with its closing NUL
   EMBERLOCK_ASSIGN_OR_RETURN(
       const PtpAnswer answer,
       ask(kExecuteScript, kLua, std::as_bytes(std::span(script.c_str(), script.size() + 1))));
@@ -138,7 +138,7 @@ Result<std::vector<ChdkValue>> Chdk::run(std::string_view lua, Seconds deadline)
     EMBERLOCK_ASSIGN_OR_RETURN(const ChdkScriptStatus status, script_status());
     if (status.message_waits) {
       EMBERLOCK_ASSIGN_OR_RETURN(ChdkMessage message, read_message());
-      if (message.script != script) continue;  // left by one before
+      if (message.script != script) continue;  // left by an earlier script
       if (message.type == ChdkMessageType::error) {
         return Error{ErrorKind::device,
                      fmt::format("its script \"{}\" failed: {}", lua, text_of(message.value)),

@@ -13,7 +13,7 @@ namespace emberlock::drivers {
 namespace {
 
 constexpr Seconds kPollPause = milliseconds(15);
-/// A question without an answer for that long is given up.
+/// A request that isn't answered for this long is abandoned.
 constexpr Seconds kAnswerDeadline{1};
 constexpr int kMostLostInARow = 3;
 constexpr Seconds kEndOfQuestion = milliseconds(300);
@@ -153,7 +153,7 @@ Result<bool> ChdkCamera::power_cycled() {
     case PowerCommand::State::succeeded:
       break;
   }
-  // Only a connection that was made since is one to the camera as it was switched on.
+  // The camera was switched on again only if the old connection is dead and a new one succeeds.
   if (session_) {
     if (!chdk().version().ok()) session_.reset();
     return false;
@@ -283,7 +283,7 @@ Result<std::optional<Frame>> ChdkCamera::fetch(TimePoint until) {
     clock_->sleep_until(std::min(until, next_question_));
     if (clock_->now() < next_question_) return std::optional<Frame>();
     EMBERLOCK_RETURN_IF_ERROR(chdk().ask_for_live_view());
-    // A camera that was late isn't asked for what it missed.
+    // A late camera isn't asked for the frames that it missed.
     next_question_ = std::max(next_question_ + period(info_.frame_rate), clock_->now());
   }
   const TimePoint asked = *session_->pending_since();

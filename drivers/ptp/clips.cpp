@@ -28,7 +28,8 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr std::uint32_t kPart = 1u << 20;
-constexpr std::uint32_t kCompared = 1u << 16;  // of an interrupted download, before it goes on
+constexpr std::uint32_t kCompared =
+    1u << 16;  // bytes of an interrupted download that are compared before it continues
 constexpr Seconds kPartDeadline{10};
 constexpr Seconds kChangePause = milliseconds(20);
 constexpr double kSlowestBytesPerSecond = 200e3;
@@ -61,7 +62,7 @@ class Sha256 {
   std::unique_ptr<AVSHA, Free> context_;
 };
 
-/// Of the file's first `size` bytes.
+/// Hash of the file's first `size` bytes.
 Result<Sha256> hash_of(const fs::path& file, std::uint64_t size) {
   std::ifstream in(file, std::ios::binary);
   Sha256 hash;
@@ -78,7 +79,7 @@ Result<Sha256> hash_of(const fs::path& file, std::uint64_t size) {
 fs::path beside(const fs::path& target, const char* suffix) { return target.string() + suffix; }
 
 bool is_movie(const PtpObjectInfo& info) {
-  // AVI, MPEG, ASF, QuickTime by the standard; MP4 by MTP. Others by their names.
+  // AVI, MPEG, ASF, QuickTime by the PTP standard; MP4 by MTP. Other films are recognised by name.
   constexpr std::uint16_t kFormats[] = {0x300a, 0x300b, 0x300c, 0x300d, 0xb982};
   if (std::find(std::begin(kFormats), std::end(kFormats), info.format) != std::end(kFormats)) return true;
   std::string extension = fs::path(info.name).extension();
@@ -102,7 +103,7 @@ Status wait_for(Chdk& chdk, Clock& clock, ChdkMovie wanted, Seconds deadline) {
   }
 }
 
-/// One download under way.
+/// One download.
 class Download {
  public:
   Download(PtpSession& session, const Clip& clip, fs::path part)
@@ -112,7 +113,7 @@ class Download {
   Result<std::string> verified_hash();
 
  private:
-  /// How many of the bytes that are there are the clip's.
+  /// How many of the existing bytes belong to the clip.
   Result<std::uint32_t> usable();
   Status append(std::span<const std::byte> bytes);
   Result<std::uint64_t> next_part();
@@ -230,7 +231,7 @@ Status stop_movie(Chdk& chdk, Clock& clock, Seconds deadline) {
 }
 
 Result<std::vector<Clip>> list_clips(PtpSession& session) {
-  // Folder by folder: some cameras give what lies in all of them at once, others only seem to.
+  // One folder after another: some cameras list the objects of all folders at once, others only pretend to.
   EMBERLOCK_ASSIGN_OR_RETURN(std::vector<std::uint32_t> left, session.objects());
   std::set<std::uint32_t> seen;
   std::vector<Clip> clips;

@@ -30,8 +30,8 @@ bool is_blank(const std::string& serial) {
   return std::all_of(serial.begin(), serial.end(), [](char c) { return c == '0' || c == ' '; });
 }
 
-/// The ids of devices that were connected to once: a held one can't be asked again. A device has another
-/// number on its bus each time that it is plugged in.
+/// The ids of devices that were connected before, since a held device can't be queried. A device gets a new
+/// bus address each time it is plugged in.
 class KnownIds {
  public:
   void remember(const UsbPtpDevice& usb, const std::string& id) {
@@ -88,11 +88,11 @@ Result<PtpConnection> connect_ptp(const UsbPtpDevice& usb) {
 
 Result<PtpConnection> connect_ptp(const std::string& id) {
   EMBERLOCK_ASSIGN_OR_RETURN(std::vector<UsbPtpDevice> devices, list_usb_ptp());
-  // First those that look like it. Those that are known to be others are left alone.
+  // Likely devices first. Devices known to have another id are left alone.
   const auto looks_like_it = [&](const UsbPtpDevice& d) { return ptp_id(d) == id || d.path == id; };
   std::erase_if(devices, [&](const UsbPtpDevice& d) { return known_ids().of(d) && !looks_like_it(d); });
   std::stable_partition(devices.begin(), devices.end(), looks_like_it);
-  // One search at a time: several would hold each other's cameras.
+  // One search at a time: concurrent ones would hold each other's cameras.
   static std::mutex searching;
   const std::lock_guard lock(searching);
   SteadyClock clock;

@@ -188,7 +188,7 @@ std::string PtpReader::text() {
 }
 
 std::vector<std::uint16_t> PtpReader::u16_array() {
-  // A count that the bytes can't hold asks for no memory.
+  // The count is checked against the remaining bytes before memory is allocated.
   const std::size_t count = u32();
   std::vector<std::uint16_t> values(std::min(count, left() / 2));
   for (std::uint16_t& value : values) value = u16();

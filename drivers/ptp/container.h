@@ -9,24 +9,24 @@
 
 #include "base/result.h"
 
-// What travels over PTP, as bytes: ISO 15740 and, for how it is wrapped on USB, PIMA 15740:2000 annex D.
-// Everything is little-endian. Whatever the bytes, parsing gives a value or the error that says where they
-// break the rules; errors are of kind `device`, as it is a device that sent them.
+// The byte formats of PTP: ISO 15740 and, for its transport over USB, PIMA 15740:2000 annex D. Everything is
+// little-endian. Parsing accepts any bytes and returns a value, or an error that says which rule they break.
+// Errors are of kind `device`, because a device sent the bytes.
 namespace emberlock::drivers {
 
 enum class PtpType : std::uint16_t { command = 1, data = 2, response = 3, event = 4 };
 
 inline constexpr std::size_t kPtpHeaderBytes = 12;
 inline constexpr std::size_t kPtpMostParams = 5;
-/// A header's length when the sender doesn't know it. Sessions refuse such data: nothing would tell its end
-/// from a loss.
+/// The header's length when the sender doesn't know it. Sessions refuse such data, because a loss couldn't be
+/// told from the end.
 inline constexpr std::uint32_t kPtpLengthUnknown = 0xffffffff;
 
-/// What every container begins with.
+/// The header of every container.
 struct PtpHeader {
-  std::uint32_t length = 0;  ///< of the container, header included, in bytes
+  std::uint32_t length = 0;  ///< of the container in bytes, header included
   PtpType type = PtpType::command;
-  std::uint16_t code = 0;  ///< operation, response or event
+  std::uint16_t code = 0;  ///< of the operation, response or event
   std::uint32_t transaction = 0;
   friend bool operator==(const PtpHeader&, const PtpHeader&) = default;
 };
@@ -40,15 +40,17 @@ struct PtpMessage {
   friend bool operator==(const PtpMessage&, const PtpMessage&) = default;
 };
 
-/// Of the first kPtpHeaderBytes of `bytes`. Error: too few, a length below the header's, no such type.
+/// Parses the first kPtpHeaderBytes of `bytes`. Error: too few bytes, a length below the header's, an unknown
+/// type.
 Result<PtpHeader> parse_ptp_header(std::span<const std::byte> bytes);
-/// Of all of `bytes`. Error: also when the length isn't theirs, or the parameters aren't whole.
+/// Parses all of `bytes`. Error: also when the length differs, or a parameter is incomplete.
 Result<PtpMessage> parse_ptp_message(std::span<const std::byte> bytes);
 
 std::vector<std::byte> encode(const PtpHeader& header);
 std::vector<std::byte> encode(const PtpMessage& message);
 
-/// Reads a dataset front to back. What lies beyond its end reads as zero or empty, and `check` tells.
+/// Reads a dataset from front to back. Reading beyond the end yields zeros or empty texts, and `check`
+/// reports it.
 class PtpReader {
  public:
   explicit PtpReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
@@ -58,13 +60,13 @@ class PtpReader {
   std::uint32_t u32() { return static_cast<std::uint32_t>(little_endian(4)); }
   std::int32_t i32() { return static_cast<std::int32_t>(u32()); }
   void skip(std::size_t bytes);
-  /// A count of 16-bit units, its closing NUL included, and UTF-16; given as UTF-8 up to the first NUL.
-  /// Halves of surrogate pairs become U+FFFD.
+  /// A PTP string: a count of 16-bit units including the closing NUL, then UTF-16. Returned as UTF-8 up to
+  /// the first NUL. Unpaired surrogates become U+FFFD.
   std::string text();
   std::vector<std::uint16_t> u16_array();
   std::vector<std::uint32_t> u32_array();
 
-  /// Error: something was read beyond the end of `what`.
+  /// Error: `what` was shorter than what was read.
   [[nodiscard]] Status check(const std::string& what) const;
 
  private:
@@ -76,9 +78,9 @@ class PtpReader {
   bool overrun_ = false;
 };
 
-/// What a device says of itself (ISO 15740, 5.5.1), without what nothing here asks for.
+/// A device's DeviceInfo dataset (ISO 15740, 5.5.1), without the parts that aren't used here.
 struct PtpDeviceInfo {
-  std::uint32_t vendor_extension = 0;  ///< 0x0b is Canon's
+  std::uint32_t vendor_extension = 0;  ///< 0x0b is Canon
   std::vector<std::uint16_t> operations;
   std::string manufacturer;
   std::string model;
@@ -89,23 +91,23 @@ struct PtpDeviceInfo {
 };
 Result<PtpDeviceInfo> parse_ptp_device_info(std::span<const std::byte> bytes);
 
-/// A file or folder on the card (ISO 15740, 5.5.2), likewise.
+/// The ObjectInfo dataset of a file or folder on the card (ISO 15740, 5.5.2), likewise.
 struct PtpObjectInfo {
   std::uint32_t storage = 0;
-  std::uint16_t format = 0;  ///< 0x3001 is a folder, 0x300a AVI, 0x300d QuickTime
+  std::uint16_t format = 0;  ///< 0x3001: folder, 0x300a: AVI, 0x300d: QuickTime
   std::uint32_t bytes = 0;   ///< 0xffffffff: 4 GiB or more
   std::uint32_t parent = 0;
   std::string name;
-  std::string captured;  ///< as the camera says it: "20261121T225747"
+  std::string captured;  ///< as the camera reports it: "20261121T225747"
 };
 Result<PtpObjectInfo> parse_ptp_object_info(std::span<const std::byte> bytes);
 
-/// A dataset that is one list of numbers: storages, object handles.
+/// Parses a dataset that is one list of numbers: storage ids, object handles.
 Result<std::vector<std::uint32_t>> parse_ptp_u32_array(std::span<const std::byte> bytes);
 
-/// What a response code means, in words and as its number: "device busy (0x2019)".
+/// A response code as text and number: "device busy (0x2019)".
 std::string ptp_response_words(std::uint16_t code);
-/// An operation by name: "GetDeviceInfo".
+/// An operation's name: "GetDeviceInfo".
 std::string ptp_operation_name(std::uint16_t code);
 
 }  // namespace emberlock::drivers

@@ -66,14 +66,14 @@ CameraFound look_at(const UsbPtpDevice& usb) {
 
 Result<std::vector<CameraFound>> find() {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<UsbPtpDevice> devices, list_usb_ptp());
-  // One that hangs takes its deadlines: all are asked at the same time.
+  // All devices are queried at the same time, because a hanging one uses its whole deadline.
   std::vector<CameraFound> found(devices.size());
   std::vector<std::thread> threads;
   for (std::size_t i = 0; i < devices.size(); ++i) {
     threads.emplace_back([&found, &devices, i] { found[i] = look_at(devices[i]); });
   }
   for (std::thread& thread : threads) thread.join();
-  // Serial numbers of a whole series aren't identities.
+  // A serial number that several devices share isn't an identity.
   const std::vector<CameraFound> all = found;
   for (CameraFound& camera : found) {
     const auto same =

@@ -5,7 +5,7 @@
 
 namespace emberlock::drivers {
 
-/// Cameras on the USB that speak PTP. All are found; those with CHDK can be opened, as ChdkCamera says.
+/// USB cameras that speak PTP. All are found; those with CHDK can be opened (ChdkCamera).
 CameraDriver ptp_driver();
 
 }  // namespace emberlock::drivers

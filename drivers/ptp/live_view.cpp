@@ -26,12 +26,12 @@ struct Group {
 constexpr Group group_of(LiveViewPacking packing) {
   return packing == LiveViewPacking::uyvyyy ? Group{4, 6} : Group{2, 4};
 }
-/// Where in a group its pixels' brightness lies.
+/// Offsets of the brightness values within a group of pixels.
 constexpr int kBrightnessAt[] = {1, 3, 4, 5};
 
 std::uint8_t clamped(int v) { return static_cast<std::uint8_t>(std::clamp(v, 0, 255)); }
 
-/// JFIF's coefficients in 16 bits.
+/// JFIF's coefficients in 16-bit fixed point.
 void put_rgb(int y, int u, int v, std::uint8_t* rgb) {
   constexpr int kHalf = 1 << 15;
   rgb[0] = clamped(y + ((91881 * v + kHalf) >> 16));
@@ -42,7 +42,7 @@ void put_rgb(int y, int u, int v, std::uint8_t* rgb) {
 template <LiveViewPacking packing>
 void unpack_row(const std::uint8_t* from, int width, PixelFormat format, std::uint8_t* to) {
   constexpr Group kGroup = group_of(packing);
-  // Signed bytes and bytes offset by 128 differ in the top bit alone.
+  // Signed bytes and bytes offset by 128 differ only in the top bit.
   constexpr int kFlip = packing == LiveViewPacking::uyvyyy ? 0x80 : 0;
   for (int x = 0; x < width; x += kGroup.pixels, from += kGroup.bytes) {
     const int u = (from[0] ^ kFlip) - 128;
@@ -81,7 +81,7 @@ Result<std::optional<LiveView>> parse_live_view(std::span<const std::byte> bytes
   EMBERLOCK_RETURN_IF_ERROR(description.check("live view's description"));
   if (start == 0) return std::optional<LiveView>();
 
-  // 0 is UYVYYY; 2 and 3 are UYVY; the others are overlays.
+  // 0 is UYVYYY; 2 and 3 are UYVY; the others are overlay formats.
   if (type != 0 && type != 2 && type != 3) return malformed_view(fmt::format("has pixels of type {}", type));
   view.packing = type == 0 ? LiveViewPacking::uyvyyy : LiveViewPacking::uyvy;
   const Group group = group_of(view.packing);

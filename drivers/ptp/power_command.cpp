@@ -16,7 +16,7 @@
 namespace emberlock::drivers {
 namespace {
 
-/// How long a command may go on that nobody waits for any more.
+/// How long an abandoned command may continue.
 constexpr std::chrono::milliseconds kLongest{60000};
 
 }  // namespace
@@ -36,7 +36,8 @@ Result<PowerCommand> PowerCommand::start(const std::string& command_line, const 
 
   posix_spawnattr_t attributes;
   posix_spawnattr_init(&attributes);
-  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETPGROUP);  // so that what it starts can be ended too
+  posix_spawnattr_setflags(&attributes,
+                           POSIX_SPAWN_SETPGROUP);  // so that its child processes can be killed too
   pid_t pid = 0;
   const int error = ::posix_spawn(&pid, shell.c_str(), nullptr, &attributes, arguments, environment.data());
   posix_spawnattr_destroy(&attributes);

@@ -9,20 +9,21 @@
 
 namespace emberlock::drivers {
 
-/// A command line of the user's that switches a camera's power off and on, run by the shell. It is told which
-/// camera by the environment variable EMBERLOCK_CAMERA. Destroyed while it runs it is left to end by itself,
-/// as a camera that it has switched off would stay off; after a minute it is killed with what it started.
+/// A command line given by the user that switches a camera's power off and on, run by the shell. The
+/// environment variable EMBERLOCK_CAMERA holds the camera's id. If this object is destroyed while it runs, it
+/// continues, because otherwise the camera could stay switched off; after a minute it is killed with all its
+/// child processes.
 class PowerCommand {
  public:
   enum class State { running, succeeded, failed };
 
-  /// Error io: no process could be started.
+  /// Error io: the process couldn't be started.
   static Result<PowerCommand> start(const std::string& command_line, const std::string& camera);
   PowerCommand(PowerCommand&& o) noexcept;
   PowerCommand& operator=(PowerCommand&& o) noexcept;
   ~PowerCommand();
 
-  /// Without waiting.
+  /// Doesn't block.
   State state();
 
  private:

@@ -60,13 +60,13 @@ std::optional<TimePoint> PtpSession::pending_since() const {
 Status PtpSession::open() {
   Status opened = open_once();
   if (opened.ok() || state_ != State::in_doubt) return opened;
-  // A program that died may have left the pipes in the middle of something.
+  // A program that died may have left a transaction unfinished.
   const Status recovered = transport_->recover(0);
   return recovered.ok() ? open_once() : named(recovered.error());
 }
 
 Status PtpSession::open_once() {
-  // It may have left its session open too, which is closed, so that transactions count from the start.
+  // It may also have left its session open; close it so that transaction numbers restart.
   for (int attempt = 0; attempt < 2; ++attempt) {
     next_transaction_ = 0;
     EMBERLOCK_ASSIGN_OR_RETURN(const PtpAnswer answer,
@@ -85,7 +85,7 @@ Status PtpSession::open_once() {
 
 void PtpSession::close() {
   if (state_ == State::closed) return;
-  // What is under way would have to be recovered first: whoever opens it next does so.
+  // With a transaction pending the pipes would need recovery first; the next opener does that.
   if (state_ == State::open && !exchange_) (void)exchange({kCloseSession}, kPtpDeadline);
   exchange_.reset();
   state_ = State::closed;
@@ -158,7 +158,7 @@ Result<PtpAnswer> PtpSession::any_answer(Seconds deadline) {
 Status PtpSession::take(const PtpPiece& piece) {
   if (exchange_->await == Await::data) return take_data(piece.bytes, piece.end);
   if (piece.bytes.empty()) {
-    // Data that fill their last packet may be followed by an empty one, or not.
+    // Data that fill their last packet may or may not be followed by an empty packet.
     if (std::exchange(exchange_->empty_packet_seen, true)) return broken("it sends empty packets only");
     return {};
   }
@@ -180,7 +180,7 @@ Status PtpSession::take_first(const PtpPiece& piece) {
                               exchange_->request.most_data));
   }
   const auto payload = piece.bytes.subspan(kPtpHeaderBytes);
-  // Some devices send the header as a transfer of its own.
+  // Some devices send the header in a transfer of its own.
   const bool header_alone = payload.empty() && exchange_->data_left > 0;
   return take_data(payload, header_alone ? PtpPieceEnd::more : piece.end);
 }
@@ -256,7 +256,7 @@ Result<std::vector<std::uint32_t>> PtpSession::storages() {
 }
 
 Result<std::vector<std::uint32_t>> PtpSession::objects(std::uint32_t folder) {
-  // On any card, of any format.
+  // On any storage, of any format.
   EMBERLOCK_ASSIGN_OR_RETURN(const PtpAnswer answer,
                              transact({kGetObjectHandles, {kAny, 0, folder}}, kListDeadline));
   auto list = parse_ptp_u32_array(answer.data);

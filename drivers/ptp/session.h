@@ -18,22 +18,22 @@
 
 namespace emberlock::drivers {
 
-/// How long a device may take for an answer without much data.
+/// Time limit for an answer without much data.
 inline constexpr Seconds kPtpDeadline{1};
 
 inline constexpr std::uint16_t kPtpGetPartialObject = 0x101b;
-/// The folder that holds what lies in none.
+/// The parent handle of objects that are in no folder.
 inline constexpr std::uint32_t kPtpRoot = 0xffffffff;
 
-/// Takes the data of an answer piece by piece; its error ends the transaction.
+/// Receives the data of an answer piece by piece; its error ends the transaction.
 using PtpSink = std::function<Status(std::span<const std::byte>)>;
 
 struct PtpRequest {
   std::uint16_t operation = 0;
   std::vector<std::uint32_t> params = {};  ///< at most kPtpMostParams
   std::span<const std::byte> data = {};    ///< to send; must live until the transaction ends
-  PtpSink sink = {};                       ///< of what comes; else it is collected in the answer
-  std::uint64_t most_data = 64ULL << 20;   ///< bytes that may come; more is an error
+  PtpSink sink = {};                       ///< receives the data; if empty, the answer collects them
+  std::uint64_t most_data = 64ULL << 20;   ///< limit of the received bytes; more is an error
 };
 
 struct PtpAnswer {
@@ -41,16 +41,16 @@ struct PtpAnswer {
   std::vector<std::uint32_t> params;
   std::vector<std::byte> data;
 
-  /// Parameters that a device leaves out are zero.
+  /// Parameters that the device omitted are zero.
   [[nodiscard]] std::uint32_t param(std::size_t i) const { return i < params.size() ? params[i] : 0; }
 };
 
-/// A session with one PTP device: one transaction at a time, numbered, each answer checked against what was
-/// asked. One owner thread.
+/// A session with one PTP device: one numbered transaction at a time; each answer is checked against its
+/// request. One owner thread.
 ///
-/// Errors are of kind `device` (it is gone, it refuses, or what it sent breaks the rules) or timed_out, and
-/// name it as `where`. After one that leaves the pipes in doubt the next transaction first recovers them and
-/// opens the session again.
+/// Errors are of kind `device` (gone, refuses, or sent invalid data) or timed_out, and name the device as
+/// `where`. After an error that leaves the state of the pipes unknown, the next transaction first recovers
+/// them and reopens the session.
 class PtpSession {
  public:
   PtpSession(std::unique_ptr<PtpTransport> transport, std::string where, std::shared_ptr<Clock> clock);
@@ -59,33 +59,34 @@ class PtpSession {
   PtpSession& operator=(const PtpSession&) = delete;
 
   Status open();
-  /// Within kPtpDeadline; harmless when it isn't open.
+  /// Takes at most kPtpDeadline; no effect when it isn't open.
   void close();
 
-  /// A whole transaction that the device does; asks again while it is busy. Error timed_out: it is given up.
+  /// A whole transaction; repeated while the device is busy. Error timed_out: the transaction was abandoned.
   Result<PtpAnswer> transact(const PtpRequest& request, Seconds deadline = kPtpDeadline);
 
-  /// The same in two parts, so that a caller needn't wait: between them nothing else may be asked. finish()
-  /// says timed_out while the answer isn't whole, and may be called again, or the transaction given up.
+  /// The same in two parts, so that the caller needn't block. No other request is allowed between them.
+  /// finish() returns timed_out while the answer is incomplete; then call it again, or abandon the
+  /// transaction.
   Status begin(const PtpRequest& request);
   Result<PtpAnswer> finish(Seconds deadline);
   void give_up();
-  /// When the transaction under way began; absent: there is none.
+  /// When the pending transaction began; nullopt if there is none.
   [[nodiscard]] std::optional<TimePoint> pending_since() const;
 
   Result<PtpDeviceInfo> device_info();
   Result<std::vector<std::uint32_t>> storages();
-  /// Handles of the files and folders in a folder; of a full one that may take seconds.
+  /// Handles of the files and folders in a folder. This may take seconds for a full folder.
   Result<std::vector<std::uint32_t>> objects(std::uint32_t folder = kPtpRoot);
   Result<PtpObjectInfo> object_info(std::uint32_t handle);
-  /// The whole of a file, into `sink`.
+  /// Reads a whole file into `sink`.
   Status object(std::uint32_t handle, std::uint64_t bytes, const PtpSink& sink, Seconds deadline);
-  /// At most `bytes` of it from `offset` on; how many came.
+  /// Reads at most `bytes` of a file from `offset` on. Returns the number of bytes received.
   Result<std::uint64_t> partial_object(std::uint32_t handle, std::uint32_t offset, std::uint32_t bytes,
                                        const PtpSink& sink, Seconds deadline);
 
   [[nodiscard]] const std::string& where() const { return where_; }
-  /// How errors name the device from now on.
+  /// Sets the name of the device in errors.
   void rename(std::string where) { where_ = std::move(where); }
   [[nodiscard]] Clock& clock() const { return *clock_; }
 
@@ -105,7 +106,7 @@ class PtpSession {
   Status open_once();
   Status ready();
   Status send(const PtpRequest& request, std::uint32_t transaction);
-  /// Asks outside of a session or in one, and takes any response.
+  /// Sends a request, inside or outside a session, and accepts any response.
   Result<PtpAnswer> exchange(const PtpRequest& request, Seconds deadline);
   Result<PtpAnswer> any_answer(Seconds deadline);
   Status take(const PtpPiece& piece);

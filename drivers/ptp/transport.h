@@ -10,34 +10,35 @@
 
 namespace emberlock::drivers {
 
-/// How a piece that was received ends.
+/// How a received piece ends.
 enum class PtpPieceEnd {
-  more,          ///< it is as long as was asked for: more may follow
-  short_packet,  ///< the device ended its transfer with it
+  more,          ///< as long as requested: more may follow
+  short_packet,  ///< with a short packet, which ends the device's transfer
 };
 
 struct PtpPiece {
   std::span<const std::byte>
-      bytes;  ///< the transport's, valid until it is called again; empty is an empty packet
+      bytes;  ///< owned by the transport, valid until the next call; empty for an empty packet
   PtpPieceEnd end = PtpPieceEnd::more;
 };
 
-/// The two bulk pipes to one PTP device, which knows nothing of what they carry. One owner thread. Error
-/// `device`, from any call: the device is gone, or its pipe is broken until recover().
+/// The two bulk pipes to a PTP device, without knowledge of their content. One owner thread. Error `device`,
+/// from any call: the device is gone, or its pipe is unusable until recover().
 class PtpTransport {
  public:
   virtual ~PtpTransport() = default;
 
-  /// The size of the pipes' packets: what receive() is asked for must be a multiple.
+  /// The packet size of the pipes: lengths passed to receive() must be multiples of it.
   [[nodiscard]] virtual std::size_t packet_bytes() const = 0;
-  /// Sends one transfer, with an empty packet behind it where its size asks for one. Error timed_out: a part
-  /// may have been sent.
+  /// Sends one transfer, with an empty packet behind it if its size requires one. Error timed_out: a part may
+  /// have been sent.
   virtual Status send(std::span<const std::byte> transfer, Seconds deadline) = 0;
-  /// The next bytes that the device sends, at most `most`. Error timed_out: none yet; nothing is lost, and
-  /// the next call must ask for the same `most`.
+  /// The next bytes from the device, at most `most`. Error timed_out: none yet; nothing is lost, and the next
+  /// call must pass the same `most`.
   virtual Result<PtpPiece> receive(std::size_t most, Seconds deadline) = 0;
-  /// Makes both pipes usable after an error or in the middle of a transaction, within 1.6 s, unless the
-  /// device doesn't even let a halt be cleared (the kernel gives that 5 s). It may have closed its session.
+  /// Makes both pipes usable again after an error or during a transaction. Takes up to 1.6 s, or longer if
+  /// the device doesn't even allow a halt to be cleared (the kernel waits 5 s for that). The device may have
+  /// closed its session.
   virtual Status recover(std::uint32_t transaction) = 0;
 };
 

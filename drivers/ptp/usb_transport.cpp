@@ -24,18 +24,18 @@ constexpr std::uint16_t kCanon = 0x04a9;
 constexpr Seconds kControlDeadline = milliseconds(150);
 constexpr Seconds kCancelDeadline = milliseconds(500);
 constexpr Seconds kDrainPause = milliseconds(20);
-/// How long a recovery may go on draining; what comes before takes 1.1 s at the most.
+/// How long a recovery may drain the pipes; the steps before it take at most 1.1 s.
 constexpr Seconds kRecovery = milliseconds(1500);
 constexpr std::size_t kBuffer = std::size_t{1} << 18;
 
-// Requests of the still image class (PIMA 15740:2000, annex D.5.2).
+// Class-specific requests of the still image class (PIMA 15740:2000, annex D.5.2).
 enum ClassRequest : std::uint8_t { kCancel = 0x64, kDeviceReset = 0x66, kGetDeviceStatus = 0x67 };
 constexpr std::uint8_t kToInterface = 0x21, kFromInterface = 0xa1, kFromEndpoint = 0x82;
 constexpr std::uint16_t kCancellationCode = 0x4001;
 constexpr std::uint16_t kStatusOk = 0x2001;
 
 unsigned as_milliseconds(Seconds t) {
-  return static_cast<unsigned>(std::max(1.0, std::ceil(in_milliseconds(t))));  // 0 is for ever
+  return static_cast<unsigned>(std::max(1.0, std::ceil(in_milliseconds(t))));  // 0 means no timeout
 }
 
 timeval as_timeval(Seconds t) {
@@ -54,7 +54,8 @@ using Handle = std::unique_ptr<libusb_device_handle, Release>;
 using Config = std::unique_ptr<libusb_config_descriptor, Release>;
 using Transfer = std::unique_ptr<libusb_transfer, Release>;
 
-/// The bus as it is at this moment: a context that lives longer hears of changes only where udev runs.
+/// The bus at this moment. A new context for each use, because an older one sees changes only where udev
+/// runs.
 struct Bus {
   Context context;
   std::vector<libusb_device*> devices;
@@ -126,7 +127,7 @@ std::string read_line(const std::filesystem::path& file) {
   return line;
 }
 
-/// What the bus hangs on, as buses are numbered in the order of their finding.
+/// The controller of a bus. Bus numbers aren't stable, because they depend on the order of discovery.
 std::string controller_of(const std::filesystem::path& sysfs, int bus) {
   std::error_code error;
   const std::filesystem::path root = "usb" + std::to_string(bus);
@@ -145,7 +146,7 @@ UsbPtpDevice describe(libusb_device* device, std::uint16_t vendor) {
   std::string plug;
   for (int i = 0; i < depth; ++i)
     plug += (i == 0 ? '-' : '.') + std::to_string(ports.at(static_cast<std::size_t>(i)));
-  // The kernel has read its descriptor already: a device that hangs isn't asked.
+  // From sysfs, where the kernel keeps the descriptor, so that a hanging device isn't queried.
   const std::filesystem::path sysfs = "/sys/bus/usb/devices/" + std::to_string(found.bus) + plug;
   found.path = "usb-" + controller_of(sysfs, found.bus) + plug;
   found.name = read_line(sysfs / "product");
@@ -178,9 +179,9 @@ class UsbTransport final : public PtpTransport {
   Status write(std::span<const std::byte> bytes, Seconds deadline);
   void wait_for_landing(Seconds deadline);
   Fly cancel_receiving();
-  /// A request of the class to the interface; how many bytes it moved, or libusb's error.
+  /// Sends a class request to the interface. Returns the number of bytes transferred, or libusb's error.
   int ask(ClassRequest request, std::uint8_t direction, std::span<std::uint8_t> data);
-  /// Whether the device takes the cancellation and is ready again.
+  /// Cancels a transaction. Returns whether the device accepts that and is ready again.
   bool cancel(std::uint32_t transaction);
   int clear_halt(std::uint8_t endpoint);
   int drain(TimePoint until);
@@ -190,8 +191,8 @@ class UsbTransport final : public PtpTransport {
   PtpInterface interface_;
   Transfer transfer_;
   std::unique_ptr<std::byte[]> buffer_;  ///< of kBuffer bytes
-  int flying_most_ = 0;                  ///< > 0 while a transfer is under way
-  int landed_ = 0;                       ///< set by libusb when it ends
+  int flying_most_ = 0;                  ///< size of the pending receive transfer; 0 if there is none
+  int landed_ = 0;                       ///< set by libusb when the transfer ends
   SteadyClock clock_;
 };
 
@@ -205,7 +206,7 @@ Error UsbTransport::failed(int error) {
 }
 
 Status UsbTransport::write(std::span<const std::byte> bytes, Seconds deadline) {
-  // libusb doesn't write to what it sends.
+  // libusb doesn't write to outgoing data.
   auto* data = const_cast<unsigned char*>(reinterpret_cast<const unsigned char*>(bytes.data()));
   int sent = 0;
   const int error = libusb_bulk_transfer(handle_.get(), interface_.out, data, static_cast<int>(bytes.size()),
@@ -227,7 +228,8 @@ void UsbTransport::wait_for_landing(Seconds deadline) {
 }
 
 Result<PtpPiece> UsbTransport::receive(std::size_t most, Seconds deadline) {
-  // A transfer flies on while nobody waits for it: to cancel one may lose what it brought.
+  // A pending transfer continues when the caller stops waiting, because cancelling it could lose received
+  // data.
   if (flying_most_ == 0) {
     const int size = static_cast<int>(std::min(most, kBuffer));
     landed_ = 0;
@@ -286,7 +288,7 @@ bool UsbTransport::cancel(std::uint32_t transaction) {
 }
 
 int UsbTransport::clear_halt(std::uint8_t endpoint) {
-  // Clearing what isn't halted makes some devices lose count of their packets.
+  // Only halted pipes are cleared: otherwise some devices lose their packet toggle.
   std::array<std::uint8_t, 2> status{1, 0};
   const int error = libusb_control_transfer(
       handle_.get(), kFromEndpoint, LIBUSB_REQUEST_GET_STATUS, 0, endpoint, status.data(),
@@ -314,7 +316,7 @@ Status UsbTransport::recover(std::uint32_t transaction) {
   if (!cancel(transaction)) {
     const int error = ask(kDeviceReset, kToInterface, {});
     if (error == LIBUSB_ERROR_NO_DEVICE) return failed(error);
-    if (error == LIBUSB_ERROR_TIMEOUT) return failed(error);  // it doesn't even answer to control
+    if (error == LIBUSB_ERROR_TIMEOUT) return failed(error);  // it doesn't even answer on the control pipe
   }
   for (const std::uint8_t endpoint : {interface_.in, interface_.out}) {
     const int error = clear_halt(endpoint);
@@ -331,7 +333,7 @@ Error unopened(const UsbPtpDevice& device, int error) {
 
 UsbTransport::~UsbTransport() {
   if (cancel_receiving() == Fly::flying) {
-    // The kernel may still write to them: rather lost than used after they are gone.
+    // The kernel may still write to this memory, so it is leaked rather than freed.
     log(LogCategory::drivers).error("ptp: a transfer can't be cancelled, its memory is left behind");
     (void)transfer_.release();
     (void)buffer_.release();

@@ -65,7 +65,7 @@ ReplayCamera::ReplayCamera(std::shared_ptr<session::SessionReader> session, std:
     : session_(std::move(session)),
       camera_(camera),
       clock_(std::move(clock)),
-      // The reader has checked the layout, the one thing that can be wrong.
+      // Safe: the only possible error is the layout, which the reader has checked.
       info_(camera_info(session_->manifest().cameras(static_cast<int>(camera))).value()) {
   for (const v1::Event& event : session_->events()) {
     if (auto late = late_frame(event); late && late->camera_id == info_.id) late_.push_back(*late);

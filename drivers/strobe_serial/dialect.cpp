@@ -152,7 +152,7 @@ std::optional<double> number_in(std::string_view text, std::string_view unit) {
 
 Result<std::string> identity(std::string_view reply) {
   const auto fields = split(reply, ',');
-  constexpr std::size_t kFields = 4;  // IEEE 488.2, 10.14; makers add more
+  constexpr std::size_t kFields = 4;  // IEEE 488.2, 10.14; some makers add more
   if (fields.size() < kFields || fields[0].empty() || number_in(fields[0]))
     return garbled(reply, "maker, model, serial number and version");
   return fmt::format("{} {} {}", fields[0], fields[1], fields[2]);

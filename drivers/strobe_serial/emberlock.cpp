@@ -8,7 +8,7 @@
 #include "drivers/strobe_serial/controller/protocol.h"
 #include "drivers/strobe_serial/dialects.h"
 
-// Our own controller: PROTOCOL.md says every line.
+// Our own controller; see PROTOCOL.md for every line.
 namespace emberlock::drivers::strobe_serial {
 namespace {
 
@@ -23,7 +23,7 @@ constexpr Limits kControllerLimits{.device = "Emberlock's controller",
                                    .steady = Limits::Steady::yes};
 constexpr std::array<std::string_view, 3> kOutputs{"off", "flash", "steady"};
 
-/// Eight flashes to a byte, the first in its highest bit; the last byte ends in skips.
+/// Eight flashes per byte, the first in the highest bit; unused bits are 0.
 std::string packed(const std::vector<bool>& code) {
   std::string bytes((code.size() + 7) / 8, '\0');
   for (std::size_t i = 0; i < code.size(); ++i) {
@@ -66,7 +66,7 @@ std::optional<Report> report(std::string_view answer) {
   return Report{static_cast<StrobeOutput>(output - kOutputs.begin()), per, pha, wid, len, sum};
 }
 
-/// The packed code from the answers to "bits".
+/// The packed code from the replies to "bits".
 std::optional<std::string> bits(std::span<const std::string> answers, std::size_t length) {
   std::string bytes;
   for (std::size_t i = 0; i < answers.size(); ++i) {
@@ -163,7 +163,7 @@ class Controller final : public Dialect {
                  "apply the settings again"};
   }
 
-  /// A nanosecond of the period, a tick of the others.
+  /// 1 ns for the period, a tick for the rest.
   Rounding rounding(const StrobeSettings& to) const override {
     constexpr Seconds kLongestTick = microseconds(1);
     return {.rate = to.rate * (to.rate * nanoseconds(1)), .phase = kLongestTick, .width = kLongestTick};

@@ -6,9 +6,9 @@
 
 #include "drivers/strobe_serial/dialects.h"
 
-// Gardasoft's RT and VTR lighting controllers (RT 20 user manual, section 12). Every command ends with the
-// prompt ">", an error comes before it. The flash follows the internal trigger by 10 us to 999 ms; the
-// shortest delay counts as phase 0.
+// Gardasoft's RT and VTR lighting controllers (RT 20 user manual, section 12). Every reply ends with the
+// prompt ">"; an error precedes it. The flash follows the internal trigger by 10 us to 999 ms; the shortest
+// delay counts as phase 0.
 namespace emberlock::drivers::strobe_serial {
 namespace {
 
@@ -20,7 +20,8 @@ constexpr Limits kGardasoftLimits{.device = "a Gardasoft controller",
 
 using Fields = std::map<std::string, std::string, std::less<>>;
 
-/// "CH 1, MD 1, S 50.0,0.0, DL 1.000ms" by its keys; a second number after a comma goes with the first.
+/// Splits "CH 1, MD 1, S 50.0,0.0, DL 1.000ms" by keys; a second number after a comma belongs to the key
+/// before it.
 std::optional<Fields> fields_of(std::string_view reply) {
   Fields fields;
   for (const std::string_view part : split(reply, ',')) {
@@ -33,7 +34,7 @@ std::optional<Fields> fields_of(std::string_view reply) {
   return fields;
 }
 
-/// A time as it is printed: milliseconds unless it says otherwise.
+/// A time as the device prints it; in milliseconds unless it has another unit.
 std::optional<Seconds> time_in(std::string_view text) {
   if (const auto us = number_in(text, "us"); us && text.ends_with("us")) return microseconds(*us);
   if (const auto ms = number_in(text, "ms")) return milliseconds(*ms);
@@ -50,7 +51,7 @@ class Gardasoft final : public Dialect {
   std::string frame(std::string_view text, std::uint8_t /*number*/) const override {
     return std::string(text) + "\r";
   }
-  /// Nothing before the prompt is an answer too.
+  /// An empty reply (only the prompt) is valid.
   Result<std::optional<std::string>> unframe(std::string_view line, std::uint8_t /*number*/) const override {
     return std::optional<std::string>(trim(line));
   }
@@ -72,14 +73,14 @@ class Gardasoft final : public Dialect {
                    {},
                    fmt::format("give at most {} s", (kLongestDelay - kShortestDelay).value())};
     }
-    std::vector<Command> commands{{"GR", Answer::ignored}};  // errors of the past
+    std::vector<Command> commands{{"GR", Answer::ignored}};  // clears earlier errors
     if (to.output == StrobeOutput::steady) {
       commands.push_back({fmt::format("RS{},{:.4g}", channel_, brightness_), Answer::status});
     } else {
       const Command pulse{fmt::format("RT{},{:.3f},{:.3f},{:.4g}", channel_, in_milliseconds(to.width),
                                       in_milliseconds(delay), brightness_),
                           Answer::status};
-      // Dark means no triggers of its own; the period can't be set without them.
+      // Off: no internal trigger; the period can't be set then.
       const Command rate{to.output == StrobeOutput::off
                              ? std::string("TT0")
                              : fmt::format("TT1,{:.3f}", in_milliseconds(period(to.rate))),
@@ -103,14 +104,14 @@ class Gardasoft final : public Dialect {
     if (!text.starts_with("Err")) return garbled(reply, "the prompt alone");
     const auto code = number_in(trim(text.substr(3)));
     if (!code) return garbled(reply, "a number of an error");
-    constexpr double kAdjusted = 5;  // a warning: settings() says what it became
+    constexpr double kAdjusted = 5;  // a warning; settings() shows the adjusted value
     if (*code == kAdjusted) return {};
     if (*code == 1) return refuse(ErrorKind::bad_input, "a value is out of range");
     return refuse(ErrorKind::device, "the command isn't taken");
   }
 
   Rounding rounding(const StrobeSettings& to) const override {
-    constexpr Seconds kStep = milliseconds(0.01);  // of the trigger's period and the delay
+    constexpr Seconds kStep = milliseconds(0.01);  // of the trigger period and the delay
     return {.rate = to.rate * (to.rate * kStep), .phase = kStep, .width = microseconds(1)};
   }
 

@@ -10,10 +10,10 @@
 namespace emberlock::drivers {
 namespace {
 
-constexpr Seconds kReplyDeadline = milliseconds(400);  // instruments answer within 50 ms, at 9600 baud too
+constexpr Seconds kReplyDeadline = milliseconds(400);  // instruments reply within 50 ms, even at 9600 baud
 constexpr Seconds kQuiet = milliseconds(50);
-constexpr int kMostLines = 64;   // that nobody asked for, before an answer
-constexpr int kMostHellos = 32;  // to one that answers at once, and wrongly
+constexpr int kMostLines = 64;   // unrequested lines before a reply
+constexpr int kMostHellos = 32;  // to a device that replies at once, but wrongly
 
 Error silent(const Command& command) {
   return {ErrorKind::timed_out,
@@ -88,7 +88,7 @@ void Line::hush(TimePoint until) {
 }
 
 Result<std::string> Line::ask_once(const Command& command, std::string_view bytes, TimePoint until) {
-  // What comes unasked can't be the answer.
+  // Input that arrived before the command can't be its reply.
   EMBERLOCK_RETURN_IF_ERROR(drop_input());
   const Seconds left = std::max(until - clock_.now(), Seconds(0));
   if (const Status sent = wire_->write(bytes, std::min(left, kReplyDeadline)); !sent) {
@@ -106,7 +106,7 @@ Result<std::string> Line::ask_once(const Command& command, std::string_view byte
 Result<std::string> Line::ask(const Command& command, TimePoint until) {
   const std::string bytes = dialect_.frame(command.text, ++number_);
   auto said = ask_once(command, bytes, until);
-  // With numbers the same line again is the same command: it is done once, whichever copy arrives.
+  // With numbered commands a repetition is recognised: the command is executed once, whichever copy arrives.
   if (!said && !lost_ && framing_.numbered) said = ask_once(command, bytes, until);
   if (!said) return failed(said.error());
   return said;
@@ -120,7 +120,7 @@ Result<std::string> Line::greet(TimePoint until) {
   do {
     ++asked;
     auto said = ask_once(hello, dialect_.frame(hello.text, ++number_), until);
-    // Answers to what was asked before may come first.
+    // Replies to earlier commands may come first.
     for (int i = 0; said && i < kMostLines; ++i) {
       auto model = dialect_.model(*said);
       if (!model) {
@@ -128,7 +128,7 @@ Result<std::string> Line::greet(TimePoint until) {
         said = answer(std::min(until, clock_.now() + kReplyDeadline));
         continue;
       }
-      // It may have slept, and now answers each hello.
+      // The device may have been slow to start, and now replies to every hello.
       if (asked > 1) hush(std::min(until, clock_.now() + kQuiet * asked));
       in_step_ = !lost_;
       return model;

@@ -13,30 +13,30 @@
 
 namespace emberlock::drivers {
 
-/// Bytes to and from a device: a serial port, or a simulation of a device. Errors: timed_out, device (it is
-/// gone: close the wire and find the device again).
+/// A byte stream to and from a device: a serial port, or a simulated device. Errors: timed_out, device (gone:
+/// close the wire and find the device again).
 class Wire {
  public:
   virtual ~Wire() = default;
-  /// All bytes, within the deadline.
+  /// Writes all bytes within the deadline.
   virtual Status write(std::string_view bytes, Seconds deadline) = 0;
-  /// What has come, at least one byte, within the deadline.
+  /// Reads what has arrived, at least one byte, within the deadline.
   virtual Result<std::string> read(Seconds deadline) = 0;
 };
 
-/// Commands and their answers over a wire. Whatever the device says or doesn't, every call ends by the
-/// instant it is given, and an answer is never taken for that to another command: after one that is silent,
-/// late or garbled the line is out of step, and greet() must find the step again.
+/// Commands and their replies over a wire. Every call ends by its deadline, whatever the device does, and a
+/// reply is never taken for that of another command. After a missing, late or garbled reply the line is out
+/// of step, and greet() must resynchronize it.
 class Line {
  public:
   Line(std::unique_ptr<Wire> wire, const Dialect& dialect, Clock& clock);
 
-  /// Says hello until the device answers; returns its model.
+  /// Sends hello until the device answers. Returns its model.
   Result<std::string> greet(TimePoint until);
-  /// The answer; empty where there is none. Errors: timed_out (silent), device (garbled, gone).
+  /// Returns the reply; empty if the command has none. Errors: timed_out (silent), device (garbled, gone).
   Result<std::string> ask(const Command& command, TimePoint until);
 
-  /// Somebody found sense in no answer: greet() before the next question.
+  /// Marks the line as out of step, because a reply made no sense: greet() comes before the next command.
   void doubt() { in_step_ = false; }
 
   [[nodiscard]] bool lost() const { return lost_; }  ///< the wire is dead

@@ -33,8 +33,8 @@ std::string last_error() {
   return copy;
 }
 
-/// Where a USB port's interface is plugged in, "usb-0000:00:14.0-1.2:1.0", from where sysfs keeps the port:
-/// by its host controller, as buses are numbered in the order in which they are found.
+/// The place of a USB port's interface, "usb-0000:00:14.0-1.2:1.0", from its sysfs path. Contains the host
+/// controller's address, because bus numbers depend on the order of discovery.
 std::string usb_place(const std::string& name) {
   static const std::regex bus("usb[0-9]+"), interface("[0-9]+(-[0-9.]+:[0-9]+\\.[0-9]+)");
   std::error_code none;
@@ -60,13 +60,13 @@ class SerialPort final : public Wire {
   SerialPort(const SerialPort&) = delete;
   SerialPort& operator=(const SerialPort&) = delete;
   ~SerialPort() override {
-    // Else the kernel waits up to 30 s for a device that takes no more bytes.
+    // Otherwise the kernel waits up to 30 s for a device that accepts no more bytes.
     ::tcflush(fd_, TCIOFLUSH);
     sp_close(port_.get());
   }
 
   Status write(std::string_view bytes, Seconds deadline) override {
-    // To libserialport 0 ms means to wait for ever.
+    // In libserialport, 0 ms means no timeout.
     const unsigned ms = std::max(milliseconds_up(deadline), 1U);
     const int written = sp_blocking_write(port_.get(), bytes.data(), bytes.size(), ms);
     if (written < 0) return lost();
@@ -82,7 +82,7 @@ class SerialPort final : public Wire {
     const int found = ::poll(&ready, 1, static_cast<int>(milliseconds_up(deadline)));
     if (found < 0 && errno != EINTR) return lost();
     if (found <= 0) return Error{ErrorKind::timed_out, fmt::format("nothing came from {}", address_)};
-    // Bytes that came before the plug was pulled are no answer to anything that can still be acted on.
+    // After unplugging, remaining input is of no use.
     if ((ready.revents & (POLLHUP | POLLERR | POLLNVAL)) != 0) return lost();
     char bytes[512];
     const int count = sp_nonblocking_read(port_.get(), bytes, sizeof bytes);
@@ -99,7 +99,7 @@ class SerialPort final : public Wire {
   }
 
   PortHandle port_;
-  int fd_;  // the port's
+  int fd_;  // the port's descriptor
   std::string address_;
 };
 
@@ -107,7 +107,7 @@ struct FreeConfig {
   void operator()(sp_port_config* config) const { sp_free_config(config); }
 };
 
-/// One call for all, as each asks a USB device and may take as long as the kernel lets it.
+/// One call for all settings, since each call queries the USB device and may block in the kernel.
 sp_return configure(sp_port* port, int baud) {
   sp_port_config* made = nullptr;
   if (const sp_return status = sp_new_config(&made); status != SP_OK) return status;
@@ -138,7 +138,7 @@ Result<std::vector<Port>> list_ports() {
       const std::string maker = text(sp_get_port_usb_manufacturer(*at)),
                         model = text(sp_get_port_usb_product(*at));
       if (!model.empty()) port.description = maker.empty() ? model : fmt::format("{} {}", maker, model);
-      if (port.place.empty()) continue;  // unplugged while we looked
+      if (port.place.empty()) continue;  // unplugged meanwhile
     } else if (port.place.empty()) {
       port.place = name;
     }

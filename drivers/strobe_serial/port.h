@@ -8,26 +8,26 @@
 #include "base/result.h"
 #include "drivers/strobe_serial/line.h"
 
-// Serial ports as the kernel lists them, through libserialport; private to drivers/strobe_serial.
+// Serial ports that the kernel lists, through libserialport; private to drivers/strobe_serial.
 namespace emberlock::drivers::strobe_serial {
 
 struct Port {
   std::string address;  ///< "/dev/ttyACM0"
   std::string serial;   ///< of the USB device; may be empty
-  std::string place;    ///< "usb-0000:00:14.0-1.2:1.0"; of a port on the board its name
+  std::string place;    ///< "usb-0000:00:14.0-1.2:1.0"; for an on-board port, its name
   std::string description;
 };
 
 Result<std::vector<Port>> list_ports();
 
-/// Its serial number where nobody else has that, else its place.
+/// The serial number if it is unique, else the place.
 std::string id_of(const Port& port, const std::vector<Port>& all);
 
-/// The port that an id names: a serial number or a place. Error device: none has it, or several.
+/// The port with this id, a serial number or a place. Error device: none or several have it.
 Result<Port> find_port(const std::string& id);
 
-/// Opens it at 8N1, raw, without handshake lines, for us alone; what was on the line is dropped, and closing
-/// it leaves DTR as it is, as that resets many microcontrollers. Error device: gone, held (says by whom),
+/// Opens a port exclusively: 8N1, raw, no handshake lines. Pending input is dropped. Closing leaves DTR
+/// unchanged, because a change resets many microcontrollers. Error device: gone, held (names the holder),
 /// refused.
 Result<std::unique_ptr<Wire>> open_port(const Port& port, int baud);
 

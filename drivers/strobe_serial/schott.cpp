@@ -8,9 +8,8 @@
 #include "drivers/strobe_serial/dialects.h"
 
 // Schott's ColdVision light source, legacy protocol (CV-LS programming guide D20980.026): "&RF24" sets,
-// "&RF?" asks, both answer
-// "&rf24". Continuous strobe has whole Hertz, widths in thousandths of the period and no delay; &PD delays
-// flashes that something else triggers.
+// "&RF?" queries, both return "&rf24". Continuous strobe has whole Hertz, widths in thousandths of the period
+// and no delay; &PD delays only externally triggered flashes.
 namespace emberlock::drivers::strobe_serial {
 namespace {
 
@@ -64,14 +63,14 @@ class Schott final : public Dialect {
                    {},
                    "give what its manual allows"};
     }
-    // It says what it took, which read_back will tell; here it matters that it heard.
+    // The reply contains the accepted value, which read_back will check; here only its kind matters.
     const auto letters = command.text.find_first_of("0123456789");
     if (!reply.starts_with(lower(command.text.substr(0, letters))))
       return garbled(reply, lower(command.text));
     return {};
   }
 
-  /// To whole Hertz, and thousandths of the period that makes.
+  /// Whole Hertz, and thousandths of the resulting period.
   Rounding rounding(const StrobeSettings& to) const override {
     const Seconds every = period(Hertz(std::round(to.rate.value())));
     return {.rate = Hertz(0.5), .phase = Seconds(0), .width = every * (1 / kDutySteps)};

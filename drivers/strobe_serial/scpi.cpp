@@ -9,8 +9,8 @@
 
 #include "drivers/strobe_serial/dialects.h"
 
-// Pulse generators that trigger a strobe, by SCPI 1999 over IEEE 488.2. Commands are those that Keysight's
-// 33500 and 81100 and Rigol's DG share; levels and polarity stay as the front panel has them.
+// Pulse generators that trigger a strobe, by SCPI 1999 over IEEE 488.2. Uses the commands common to
+// Keysight's 33500 and 81100 and Rigol's DG; levels and polarity stay as set on the front panel.
 namespace emberlock::drivers::strobe_serial {
 namespace {
 
@@ -45,7 +45,7 @@ class Scpi final : public Dialect {
   Result<std::vector<Command>> apply(const StrobeSettings& to,
                                      const std::optional<StrobeSettings>& now) const override {
     EMBERLOCK_RETURN_IF_ERROR(check(to, kScpiLimits));
-    // What others left in the queue of errors isn't ours.
+    // Clears old errors from the queue.
     std::vector<Command> commands{{"*CLS"}};
     if (to.output == StrobeOutput::off) commands.push_back({output_ + " OFF"});
     commands.push_back({source_ + ":FUNC PULS"});
@@ -76,7 +76,7 @@ class Scpi final : public Dialect {
                  "give what its manual allows"};
   }
 
-  /// Agilent's 81100 keeps four digits of everything, the others six at least.
+  /// Agilent's 81100 keeps four digits, the others at least six.
   Rounding rounding(const StrobeSettings& to) const override {
     const double digits = phase_ == ScpiPhase::delay ? 1e-3 : 1e-5;
     constexpr double kAngle = 0.1 / 360;
@@ -116,7 +116,7 @@ class Scpi final : public Dialect {
 
  private:
   [[nodiscard]] double degrees(const StrobeSettings& to) const {
-    constexpr double kSteps = 1e4;  // a degree, as printed
+    constexpr double kSteps = 1e4;  // per degree, as printed
     const double turns = to.phase / period(to.rate);
     const double steps = std::round((phase_ == ScpiPhase::start ? -turns : turns) * 360 * kSteps);
     return wrap_positive(steps, 360 * kSteps) / kSteps;

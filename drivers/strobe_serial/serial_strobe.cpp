@@ -12,10 +12,10 @@
 namespace emberlock::drivers {
 namespace {
 
-constexpr Seconds kCall(4);        // a code of 4096 flashes and its read back at 115200 baud take 1 s
-constexpr Seconds kGreeting(0.8);  // by when a device that was there before answers
+constexpr Seconds kCall(4);        // a code of 4096 flashes, sent and read back at 115200 baud, takes 1 s
+constexpr Seconds kGreeting(0.8);  // time within which a device that was running replies
 
-/// Error device: it does something else than it was asked for, beyond its own steps.
+/// Error device: the settings differ from the request by more than the device's steps.
 Status verify(const StrobeSettings& told, const StrobeSettings& asked, const Rounding& rounding) {
   const auto refuse = [](std::string what, const char* remedy) {
     return Error{ErrorKind::device, "it took the settings, but " + std::move(what), {}, remedy};
@@ -30,12 +30,12 @@ Status verify(const StrobeSettings& told, const StrobeSettings& asked, const Rou
         fmt::format("says that its {} is {:.9g} {}, asked for {:.9g} {}", what, is, unit, wanted, unit),
         "ask for what it can do, or lift the limit on its front panel");
   };
-  constexpr double kDecimals = 1 + 1e-9;  // a whole step off, as floating point has it
+  constexpr double kDecimals = 1 + 1e-9;  // allows a full step in spite of floating-point rounding
   if (abs(told.rate - asked.rate) > rounding.rate * kDecimals)
     return differs("rate", asked.rate.value(), told.rate.value(), "flashes a second");
   if (abs(told.width - asked.width) > rounding.width * kDecimals)
     return differs("flash width", asked.width.value(), told.width.value(), "s");
-  // A phase near the period's end moves with that, and may wrap.
+  // A phase near the end of the period shifts with it, and may wrap.
   const Seconds every = period(told.rate);
   const Seconds late = abs(wrap_symmetric(told.phase - asked.phase, every));
   if (late > rounding.phase * kDecimals + abs(every - period(asked.rate)) + Seconds(1e-12))
@@ -72,7 +72,7 @@ auto SerialStrobe::with_device(const Call& call) -> decltype(call(TimePoint())) 
   const auto attempt = [&]() -> decltype(call(until)) {
     EMBERLOCK_RETURN_IF_ERROR(ready(until));
     auto made = call(until);
-    // An answer without sense may have been another question's.
+    // A senseless reply may belong to another command.
     if (!made.ok() && made.error().kind != ErrorKind::bad_input) line_->doubt();
     return made;
   };
@@ -110,7 +110,7 @@ Result<StrobeSettings> SerialStrobe::read_back() {
 }
 
 Status SerialStrobe::apply(const StrobeSettings& to) {
-  // What can't be is refused without a word to the device.
+  // Invalid settings are refused before anything is sent.
   if (const auto possible = dialect_->apply(to, std::nullopt); !possible) return named(possible.error());
   return with_device([&](TimePoint until) -> Status {
     std::optional<StrobeSettings> now;
@@ -126,7 +126,7 @@ Status SerialStrobe::apply(const StrobeSettings& to) {
         EMBERLOCK_RETURN_IF_ERROR(dialect_->accepted(command, answer));
       }
     }
-    // Its answer shows that all of it has taken effect.
+    // Its reply proves that all commands have taken effect.
     EMBERLOCK_ASSIGN_OR_RETURN(const StrobeSettings after, settings(until));
     return verify(after, to, dialect_->rounding(to));
   });

@@ -13,13 +13,14 @@
 
 namespace emberlock::drivers {
 
-/// A strobe that listens to a dialect on a wire. A wire that dies is closed, and the next call opens it anew;
-/// what the device lost with its power it says itself (read_back), nothing is set again unasked. A call that
-/// fails over silence or noise is made once more, as every command may be said twice. A silent device is
-/// reported within 2 s, and every call ends within 4 s.
+/// A strobe that speaks a dialect over a wire. A dead wire is closed, and the next call opens a new one.
+/// Settings that the device lost with its power show in read_back(); they aren't restored automatically. A
+/// call that fails because of silence or noise is repeated once; every command may be sent twice. A silent
+/// device is reported within 2 s, and every call ends within 4 s.
 class SerialStrobe final : public Strobe {
  public:
-  /// Finds the device again wherever it is plugged in. Error device: it isn't there, or somebody else has it.
+  /// Finds the device again, wherever it is plugged in. Error device: it is absent, or another process holds
+  /// it.
   using Opener = std::function<Result<std::unique_ptr<Wire>>()>;
 
   SerialStrobe(std::string id, std::unique_ptr<const Dialect> dialect, Opener open,
@@ -29,8 +30,8 @@ class SerialStrobe final : public Strobe {
   Status apply(const StrobeSettings& settings) override;
   Result<StrobeSettings> read_back() override;
 
-  /// Opens the wire where it isn't, and says hello for as long as `patience`: a microcontroller that the
-  /// port's opening has reset needs a while. Returns the device's model.
+  /// Opens the wire if necessary and sends hello for up to `patience`: a microcontroller that was reset by
+  /// the opening of the port needs some time. Returns the device's model.
   Result<std::string> greet(Seconds patience);
 
  private:

@@ -7,8 +7,8 @@
 
 #include "drivers/strobe_serial/dialects.h"
 
-// Siglent's SDG generators that know no SCPI tree (SDG programming guide, BSWV and OUTP). A pulse has no PHSE
-// there, but a delay in seconds. They report no errors and clip: what was taken is what reads back.
+// Siglent's SDG generators without a SCPI tree (SDG programming guide, BSWV and OUTP). Pulses have no PHSE,
+// but a delay in seconds. They report no errors and clip values; the accepted values are read back.
 namespace emberlock::drivers::strobe_serial {
 namespace {
 
@@ -40,7 +40,7 @@ class Siglent final : public Dialect {
     std::vector<Command> commands;
     if (to.output == StrobeOutput::off) commands.push_back({channel_ + "OUTP OFF"});
     commands.push_back({fmt::format("{}BSWV WVTP,PULSE,FRQ,{:.12g},{}", channel_, to.rate.value(), pulse)});
-    // Said again once the new period holds, as the old one may have cut them short.
+    // Repeated after the new period is set, because the old period may have clipped the values.
     commands.push_back({fmt::format("{}BSWV {}", channel_, pulse)});
     if (to.output == StrobeOutput::flashing) commands.push_back({channel_ + "OUTP ON"});
     return commands;
@@ -50,7 +50,7 @@ class Siglent final : public Dialect {
     return garbled(reply, "nothing to " + command.text);
   }
 
-  /// It says six digits of its parameters at least.
+  /// It prints at least six digits.
   Rounding rounding(const StrobeSettings& to) const override {
     constexpr double kDigits = 1e-5;
     return {.rate = std::max(Hertz(1e-6), to.rate * kDigits),
@@ -95,7 +95,7 @@ class Siglent final : public Dialect {
   }
 
  private:
-  /// What follows "C1:" and the command's name, which CHDR SHORT alone gives.
+  /// The text after "C1:" and the command's name; with CHDR SHORT replies consist of that text alone.
   [[nodiscard]] Result<std::string_view> body(std::string_view reply, std::string_view command) const {
     const std::string head = channel_ + std::string(command);
     if (!reply.starts_with(head)) return garbled(reply, head + "...");

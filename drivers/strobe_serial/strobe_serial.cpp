@@ -50,8 +50,8 @@ Result<std::unique_ptr<Strobe>> open_serial_strobe(const std::string& id,
 }
 
 Result<StrobeIdentity> identify_strobe(const std::string& id, std::optional<int> baud) {
-  // Ours first, as it alone may have to boot; then *IDN?, which others shrug off, of Siglents before all
-  // makers.
+  // Our controller first, because only it may need time to boot. Then those with *IDN?, which other devices
+  // tolerate; Siglent before the general one.
   constexpr StrobeDialect kOrder[] = {StrobeDialect::emberlock, StrobeDialect::siglent_bswv,
                                       StrobeDialect::scpi, StrobeDialect::gardasoft_rt,
                                       StrobeDialect::schott_cv_ls};

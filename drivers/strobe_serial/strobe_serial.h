@@ -14,27 +14,27 @@
 
 namespace emberlock::drivers {
 
-/// A serial port, which may lead to a strobe.
+/// A serial port to which a strobe may be connected.
 struct StrobeFound {
-  std::string id;       ///< the USB device's serial number, else (none, or several alike) its USB path
-                        ///< ("usb-0000:00:14.0-1.2:1.0"); of a port on the board its name ("ttyS0")
-  std::string model;    ///< what the USB device says of itself, else the kernel of the port
-  std::string address;  ///< where it is now: "/dev/ttyACM0"; may change
-  std::optional<Holder> holder = {};  ///< the process that has it, if one has
+  std::string id;  ///< the USB device's serial number, or its USB path ("usb-0000:00:14.0-1.2:1.0") if it has
+                   ///< none or several have the same; for an on-board port its name ("ttyS0")
+  std::string model;                  ///< the USB device's description, else the kernel's of the port
+  std::string address;                ///< current address: "/dev/ttyACM0"; may change
+  std::optional<Holder> holder = {};  ///< the process that has the port open
 };
 
-/// What is there now. Sends nothing.
+/// The connected ports. Sends nothing.
 Result<std::vector<StrobeFound>> find_serial_strobes();
 
 struct SerialStrobeRequest {
   StrobeDialect dialect = StrobeDialect::emberlock;
-  std::optional<int> baud = {};  ///< else the dialect's own
+  std::optional<int> baud = {};  ///< default: the dialect's
   DialectOptions options = {};
-  Seconds patience = Seconds(3);  ///< for its first answer: opening the port may have reset it
+  Seconds patience = Seconds(3);  ///< for the first reply: opening the port may have reset the device
 };
 
-/// Opens a strobe by its id, and again by it whenever the line is lost. Errors: bad_input (the request),
-/// device (not there, held, another dialect's), timed_out (silent).
+/// Opens a strobe by its id, and reopens it whenever the line is lost. Errors: bad_input (the request),
+/// device (absent, held, another dialect), timed_out (silent).
 Result<std::unique_ptr<Strobe>> open_serial_strobe(const std::string& id, const SerialStrobeRequest& request);
 
 struct StrobeIdentity {
@@ -42,9 +42,9 @@ struct StrobeIdentity {
   std::string model;
 };
 
-/// Asks at a port for one dialect after the other, first for those that take foreign words best. For ports
-/// that an operator names: what is behind others may be no strobe. Takes up to 8 s. Errors: device (not
-/// there, held), timed_out (nobody answers).
+/// Tries the dialects at a port one after another, first those that tolerate foreign commands best. Only for
+/// ports named by an operator, because other ports may have other devices. Takes up to 8 s. Errors: device
+/// (absent, held), timed_out (no reply).
 Result<StrobeIdentity> identify_strobe(const std::string& id, std::optional<int> baud = {});
 
 }  // namespace emberlock::drivers

@@ -12,11 +12,12 @@
 namespace emberlock::drivers {
 namespace {
 
-/// Pictures that wait in the kernel while nobody takes them: half a second at 15 frames/s.
+/// Frames queued in the kernel: half a second at 15 frames/s.
 constexpr std::uint32_t kBuffers = 8;
-/// How long one wait is: a device that goes away silently is noticed within.
+/// Duration of one wait: a device that disappears silently is noticed within this time.
 constexpr Seconds kSlice = milliseconds(200);
-constexpr double kUvcHolds = 3;  // frames, in the camera and on the bus: one exposed, one coded, one sent
+constexpr double kUvcHolds =
+    3;  // frames in the camera and on the bus: one being exposed, one encoded, one sent
 
 TimePoint now() { return SteadyClock().now(); }
 
@@ -33,7 +34,7 @@ DeviceTimeOf meaning_of(std::uint32_t flags) {
              : DeviceTimeOf::frame_end;
 }
 
-/// Tells the device the size and encoding; its bytes a row.
+/// Sets size and encoding. Returns the bytes per row.
 Result<std::size_t> set_format(const V4l2Device& device, const V4l2Mode& mode, const std::string& where) {
   v4l2_format format{};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -65,7 +66,7 @@ Result<V4l2Mode> choose(const std::vector<V4l2Mode>& offered, const CameraReques
   return offered[static_cast<std::size_t>(std::find(modes.begin(), modes.end(), chosen) - modes.begin())];
 }
 
-/// The rate that comes of it; the mode's own where the device can't be told.
+/// Sets the rate. Returns the resulting one; the mode's own if it can't be set.
 Hertz set_rate(const V4l2Device& device, const V4l2Mode& mode, std::optional<Hertz> wanted) {
   v4l2_streamparm parameters{};
   parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -176,7 +177,7 @@ std::uint64_t V4l2Camera::pass_over(TimePoint until) {
   while (films_) {
     if (!held_) {
       const auto taken = set_up_->device.take();
-      // That it is lost next_frame says, which hears it too.
+      // A lost device is reported by next_frame.
       if (!taken.filled) break;
       held_ = taken.filled;
     }
@@ -204,8 +205,8 @@ FrameStamp V4l2Camera::stamp(const v4l2_buffer& buffer) {
   const TimePoint device_time = time_of(buffer);
   const auto number = numbers_.next(buffer.sequence, device_time);
   (starved_ ? counts_.underrun : counts_.camera_gap) += number.missing;
-  // Once this one was filled the kernel had no other, if the oldest of those that it can have had came back
-  // later.
+  // The kernel had no further free buffer if, when this frame was filled, the oldest of the others hadn't
+  // been queued again.
   starved_ = given_back_.size() + 1 >= set_up_->device.buffers() && given_back_.front() > device_time;
   FrameStamp stamp{number.frame_id, device_time, wall_clock(), now(), FrameStatus::complete};
   const std::size_t needed =
@@ -221,7 +222,7 @@ DecodedJpeg V4l2Camera::picture(const V4l2Device::Filled& filled) const {
         filled.bytes.first(std::min<std::size_t>(filled.buffer.bytesused, filled.bytes.size())),
         mode_.pixels.size);
   }
-  // The one copy. What is missing of a damaged frame is what an older one left in the buffer.
+  // The only copy. Missing parts of a damaged frame show an older frame's content.
   auto image = unpack(mode_.pixels, filled.bytes, set_up_->stride);
   if (!image) return {Image(info_.layout), FrameStatus::damaged};
   return {std::move(image).value(), FrameStatus::complete};

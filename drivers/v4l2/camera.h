@@ -14,7 +14,7 @@
 
 namespace emberlock::drivers {
 
-/// A camera behind V4L2, its buffers mapped from opening on, so that no other process takes it.
+/// A V4L2 camera. Its buffers are mapped as soon as it is opened, so that no other process can use it.
 class V4l2Camera final : public Camera {
  public:
   static Result<std::unique_ptr<Camera>> open(const std::string& id, const CameraRequest& request);
@@ -29,7 +29,7 @@ class V4l2Camera final : public Camera {
   Status trim_rate(PartsPerMillion trim) override;
 
  private:
-  /// A device set up to film, and what came of it.
+  /// An opened device with its settings.
   struct SetUp {
     V4l2Device device;
     std::string model;
@@ -39,12 +39,12 @@ class V4l2Camera final : public Camera {
     DeviceTimeOf time_of;
     Seconds transport;
   };
-  /// In the mode that suits the request best, or as it was before.
+  /// Opens the device in the mode that fits the request best, or in the mode that it had before.
   static Result<SetUp> set_up(const std::string& id, const CameraRequest& request,
                               const std::optional<V4l2Mode>& before);
   V4l2Camera(const std::string& id, const CameraRequest& request, SetUp set_up);
 
-  /// The device's time of a frame, and its number; counts what is missing before it.
+  /// The frame's stamp from the device's time and sequence number; counts missing frames before it.
   FrameStamp stamp(const v4l2_buffer& buffer);
   [[nodiscard]] DecodedJpeg picture(const V4l2Device::Filled& filled) const;
   Frame hand_on(const V4l2Device::Filled& filled);
@@ -57,13 +57,13 @@ class V4l2Camera final : public Camera {
   CameraInfo info_;
   CameraRequest request_;
   V4l2Mode mode_;
-  std::optional<SetUp> set_up_;  ///< none: it went away
+  std::optional<SetUp> set_up_;  ///< empty: the camera is gone
   FrameNumbers numbers_;
   FrameCounts counts_;
   bool films_ = false;
-  std::optional<V4l2Device::Filled> held_;  ///< taken from the kernel while passing over, and wanted
-  std::deque<TimePoint> given_back_;        ///< when the last buffers were, the latest last
-  bool starved_ = false;                    ///< the kernel had no buffer when the frame before came
+  std::optional<V4l2Device::Filled> held_;  ///< fetched from the kernel by pass_over(), but to be handed on
+  std::deque<TimePoint> given_back_;        ///< times at which the last buffers were queued, latest last
+  bool starved_ = false;                    ///< the kernel had no free buffer at the frame before
 };
 
 }  // namespace emberlock::drivers

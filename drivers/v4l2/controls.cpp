@@ -64,7 +64,7 @@ std::vector<MenuItem> list_items(const Ioctl& device, const v4l2_query_ext_ctrl&
   return items;
 }
 
-/// The control's value that the text says; else the error that lists what it may say.
+/// The value given by the text; or an error that lists the valid texts.
 Result<std::int64_t> value_of(const Ioctl& device, const v4l2_query_ext_ctrl& control,
                               const std::string& text, const std::string& where) {
   const std::string name = text_of(control.name, sizeof control.name);

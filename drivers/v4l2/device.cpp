@@ -93,7 +93,7 @@ bool V4l2Device::is_uvc() const {
 }
 
 bool V4l2Device::in_use() const {
-  // To ask for none where nobody has any changes nothing.
+  // A request for no buffers has no effect if nobody has any.
   auto none = request_for(0);
   return ioctl(VIDIOC_REQBUFS, &none) == EBUSY;
 }
@@ -135,7 +135,7 @@ Status V4l2Device::stream_on() {
 
 void V4l2Device::stream_off() {
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  // A device that is gone has stopped.
+  // Fails if the device is gone, which doesn't matter.
   (void)ioctl(VIDIOC_STREAMOFF, &type);
   ours_.assign(buffers_.size(), true);
 }
@@ -156,7 +156,7 @@ void V4l2Device::wait(Seconds deadline) {
   }
   pollfd ready{fd_.get(), POLLIN, 0};
   (void)::poll(&ready, 1, static_cast<int>(std::ceil(std::max(in_milliseconds(deadline), 0.0))));
-  // Without a buffer that is queued it says so at once, again and again.
+  // With no buffer queued, poll returns this error at once and repeatedly.
   if ((ready.revents & (POLLERR | POLLIN)) == POLLERR)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }

@@ -16,50 +16,50 @@
 
 namespace emberlock::drivers {
 
-/// An opened device node, and the buffers that the kernel fills, once there are any.
+/// An opened device node, and the buffers that the kernel fills.
 class V4l2Device {
  public:
-  /// Errors: device (not there any more, or may not be opened).
+  /// Errors: device (gone, or permission denied).
   static Result<V4l2Device> open(const std::filesystem::path& node, const std::string& where);
 
-  /// 0, or errno; begun again when a signal came.
+  /// Returns 0 or errno; repeated when interrupted by a signal.
   [[nodiscard]] int ioctl(unsigned long request, void* argument) const;
-  /// What the pure parts ask by; valid as long as the device.
+  /// The ioctl function for the pure parts; valid as long as this device.
   [[nodiscard]] Ioctl as_ioctl() const;
-  /// The error of a call that failed so; names who has it when it is busy.
+  /// The error of a failed call; names the holder when the device is busy.
   [[nodiscard]] Error refused(const std::string& what, int error) const;
-  /// That a capture by mapped buffers can be had from it, and its card's name.
+  /// The card's name, if the device can capture with mapped buffers.
   [[nodiscard]] std::optional<std::string> camera_card() const;
-  /// That the kernel's USB Video Class driver has it.
+  /// Whether the kernel's USB Video Class driver drives it.
   [[nodiscard]] bool is_uvc() const;
-  /// Whether somebody, maybe ourselves, has its buffers.
+  /// Whether anybody, perhaps this process, has its buffers.
   [[nodiscard]] bool in_use() const;
 
-  /// Asks for so many buffers, and takes it for ourselves thereby. The flags of their timestamps.
+  /// Requests and maps buffers, which makes this process the owner. Returns the flags of their time stamps.
   Result<std::uint32_t> map_buffers(std::uint32_t count);
   [[nodiscard]] std::size_t buffers() const { return buffers_.size(); }
 
   Status stream_on();
-  /// Takes every buffer back from the kernel; what was in them is gone.
+  /// Takes all buffers back from the kernel; their content is lost.
   void stream_off();
 
   struct Filled {
     v4l2_buffer buffer;
     std::span<const std::byte> bytes;  ///< the whole buffer
   };
-  /// The next filled buffer, if there is one; errno when the device is gone or broken.
+  /// The next filled buffer, if there is one; or errno when the device is gone or broken.
   struct Taken {
     std::optional<Filled> filled;
     int error = 0;
   };
   Taken take();
-  /// Hands it to the kernel again. One that is refused is offered again by wait().
+  /// Queues a buffer in the kernel again. If the kernel refuses, wait() tries again.
   void queue(std::uint32_t index);
   /// Waits for a filled buffer, an error or the deadline.
   void wait(Seconds deadline);
 
  private:
-  /// A buffer of the kernel's in our address space.
+  /// A mapped kernel buffer.
   class Mapped {
    public:
     explicit Mapped(std::span<std::byte> bytes) : bytes_(bytes) {}
@@ -79,7 +79,7 @@ class V4l2Device {
   std::filesystem::path node_;
   std::string where_;
   std::vector<Mapped> buffers_;
-  std::vector<bool> ours_;  ///< which buffers the kernel doesn't have
+  std::vector<bool> ours_;  ///< buffers that aren't queued in the kernel
 };
 
 }  // namespace emberlock::drivers

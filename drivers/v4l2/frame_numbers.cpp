@@ -9,12 +9,12 @@ namespace emberlock::drivers {
 FrameNumbers::Number FrameNumbers::next(std::uint32_t sequence, TimePoint at) {
   std::uint64_t missing = 0;
   if (started_) {
-    // Modulo 2^32, as the kernel counts; a step back can't be a skip.
+    // Modulo 2^32, like the kernel's count. A step backward isn't a skip.
     const std::uint32_t step = sequence - sequence_;
     if (step > 1 && step < 1U << 31) missing = step - 1;
     const double periods = (at - at_) / period_;
     if (std::isfinite(periods) && periods > 0) {
-      constexpr double kLate = 0.25;  // the frame before the gap may have come that much of a period late
+      constexpr double kLate = 0.25;  // part of a period by which the frame before the gap may have been late
       const double passed = std::min(std::round(periods + kLate), 1e9);
       missing = std::min(missing, static_cast<std::uint64_t>(std::max(passed, 1.0)) - 1);
       constexpr double kFollow = 0.05;

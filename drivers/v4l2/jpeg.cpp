@@ -20,7 +20,7 @@ DecodedJpeg decode_jpeg(std::span<const std::byte> bytes, ImageSize size) {
       sent != size) {
     return decoded;
   }
-  // A warning is a failure too: libjpeg fills in what is corrupt, and says so by one.
+  // Warnings count as failures: libjpeg replaces corrupt data and only warns.
   if (tjDecompress2(decoder.get(), from, bytes.size(), decoded.image.row_as<unsigned char>(0), size.width, 0,
                     size.height, TJPF_RGB, TJFLAG_ACCURATEDCT) == 0) {
     decoded.status = FrameStatus::complete;

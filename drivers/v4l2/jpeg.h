@@ -14,8 +14,8 @@ struct DecodedJpeg {
   FrameStatus status = FrameStatus::complete;
 };
 
-/// A picture of a stream of JPEGs, as wide and high as the camera was told. What can't be read of a damaged
-/// one is grey or black.
+/// Decodes a picture of a JPEG stream, of the size that the camera was set to. Unreadable parts of a damaged
+/// picture are grey or black.
 DecodedJpeg decode_jpeg(std::span<const std::byte> bytes, ImageSize size);
 
 }  // namespace emberlock::drivers

@@ -9,10 +9,10 @@
 namespace emberlock::drivers {
 namespace {
 
-// Far more than devices have, so that one which counts without end is left in time.
+// Far more than real devices have; stops at a device that never ends its list.
 constexpr std::uint32_t kMostEntries = 256;
 constexpr std::size_t kMostModes = 4096;
-// What a camera may say of its rate.
+// The accepted range of frame rates.
 constexpr Hertz kSlowest{0.01};
 constexpr Hertz kFastest{10000};
 
@@ -31,7 +31,7 @@ constexpr std::array<ImageSize, 12> kUsualSizes = {{{160, 120},
 
 bool usable(Hertz rate) { return rate >= kSlowest && rate <= kFastest; }
 
-/// Asks for one entry after the other until the device has no more.
+/// Reads entries until the device has no more.
 template <class Entry>
 std::vector<Entry> list(const Ioctl& device, unsigned long request, Entry entry) {
   std::vector<Entry> all;
@@ -49,7 +49,7 @@ bool fits(std::int64_t n, std::uint32_t min, std::uint32_t max, std::uint32_t st
 }
 
 ImageSize size(std::uint32_t width, std::uint32_t height) {
-  constexpr std::uint32_t kBeyond = 1 << 30;  // which no image can have
+  constexpr std::uint32_t kBeyond = 1 << 30;  // larger than any image
   return {static_cast<int>(std::min(width, kBeyond)), static_cast<int>(std::min(height, kBeyond))};
 }
 
@@ -88,7 +88,7 @@ std::vector<ImageSize> list_sizes(const Ioctl& device, std::uint32_t fourcc,
   return sizes;
 }
 
-/// Sets the mode's intervals and rate, the fastest; whether there is one.
+/// Sets the mode's intervals and its highest rate. Returns whether there is one.
 bool add_intervals(const Ioctl& device, V4l2Mode& mode) {
   v4l2_frmivalenum entry{};
   entry.pixel_format = mode.fourcc;
@@ -226,7 +226,7 @@ v4l2_fract interval_for(const V4l2Mode& mode, std::optional<Hertz> wanted) {
   if (!wanted || !usable(*wanted)) return shortest;
   if (mode.between == V4l2Mode::Between::any && *wanted <= rate_of(shortest) &&
       *wanted >= rate_of(mode.intervals.back())) {
-    constexpr std::uint32_t kTicks = 100'000;  // so that rates up to kFastest keep six digits
+    constexpr std::uint32_t kTicks = 100'000;  // rates up to kFastest keep six digits
     return {kTicks, static_cast<std::uint32_t>(std::lround(wanted->value() * kTicks))};
   }
   return *std::min_element(mode.intervals.begin(), mode.intervals.end(), [&](v4l2_fract a, v4l2_fract b) {

@@ -16,32 +16,32 @@
 #include "drivers/driver.h"
 #include "drivers/unpack.h"
 
-// The tables by which a V4L2 device says how it can film. Nothing in them is believed: a device may
-// contradict itself, repeat itself without end or name sizes of zero.
+// The format tables of a V4L2 device. They aren't trusted: a device may contradict itself, repeat entries
+// endlessly or list sizes of zero.
 namespace emberlock::drivers {
 
-/// The kernel's ioctl on one device: 0, or errno.
+/// ioctl(2) on one device. Returns 0 or errno.
 using Ioctl = std::function<int(unsigned long request, void* argument)>;
 
-/// How a four-letter code of V4L2 lays out its pixels; none where we don't know it.
+/// The pixel layout of a V4L2 FourCC code; nullopt if unknown.
 struct V4l2Packing {
   PixelPacking packing = PixelPacking::gray8;
   BayerPhase phase = BayerPhase::rggb;
 };
 std::optional<V4l2Packing> packing_of(std::uint32_t fourcc);
 
-/// Each frame is a JPEG.
+/// Whether each frame is a JPEG.
 bool is_jpeg(std::uint32_t fourcc);
 
-/// "YUYV"; letters that can't be shown become '.'.
+/// "YUYV"; unprintable letters become '.'.
 std::string fourcc_name(std::uint32_t fourcc);
 
-/// A mode, and what the device has to be told for it.
+/// A mode, and the settings of the device that select it.
 struct V4l2Mode {
   CameraMode mode;
   std::uint32_t fourcc = 0;
-  PackedPixels pixels;  ///< of a JPEG only the size counts
-  /// Seconds a frame, shortest first, all > 0. Where any between two will do, those two.
+  PackedPixels pixels;  ///< for JPEG only the size matters
+  /// Seconds per frame, ascending, all > 0. If a range is allowed, its two ends.
   std::vector<v4l2_fract> intervals;
   enum class Between { none, any } between = Between::none;
 };
@@ -51,14 +51,14 @@ struct V4l2Modes {
   std::vector<std::string> unknown;  ///< encodings that can't be unpacked
 };
 
-/// What the device offers in formats that we know, at most 4096 modes. Of sizes by steps: the usual ones, the
-/// ends, and `wanted`. A device that names no sizes or rates is taken at what it is set to.
+/// The device's modes in known formats, at most 4096. For stepwise sizes: the usual sizes, both ends, and
+/// `wanted`. For a device that lists no sizes or rates, its present setting.
 V4l2Modes list_modes(const Ioctl& device, std::optional<ImageSize> wanted);
 
-/// The interval nearest to what is wanted, else the shortest.
+/// The interval closest to the wanted rate; the shortest if no rate is wanted.
 v4l2_fract interval_for(const V4l2Mode& mode, std::optional<Hertz> wanted);
 
-/// 1 / interval; 0 for what is none.
+/// 1 / interval; 0 for an invalid one.
 Hertz rate_of(v4l2_fract interval);
 
 }  // namespace emberlock::drivers

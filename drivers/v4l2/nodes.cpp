@@ -12,7 +12,7 @@ namespace emberlock::drivers {
 namespace fs = std::filesystem;
 namespace {
 
-/// The first line of a file of sysfs; empty where there is none.
+/// The first line of a sysfs file; empty if it doesn't exist.
 std::string attribute(const fs::path& file) {
   std::ifstream in(file);
   std::string line;
@@ -21,7 +21,7 @@ std::string attribute(const fs::path& file) {
   return line;
 }
 
-/// What can name a folder: other letters become '_'.
+/// Replaces characters that are invalid in a folder name by '_'.
 std::string fit_for_a_name(std::string text) {
   for (char& c : text) {
     const auto letter = static_cast<unsigned char>(c);
@@ -32,7 +32,7 @@ std::string fit_for_a_name(std::string text) {
   return text;
 }
 
-/// The folder of the USB device that a node is part of; empty where it is none.
+/// The sysfs folder of the USB device that a node belongs to; empty if there is none.
 fs::path usb_device(const fs::path& folder) {
   std::error_code error;
   for (fs::path device = folder; device.has_relative_path(); device = device.parent_path()) {
@@ -41,7 +41,7 @@ fs::path usb_device(const fs::path& folder) {
   return {};
 }
 
-/// Empty where it is none: some makers number all their devices 0.
+/// Empty if there is none, or if it is all zeros, which some makers use for every device.
 std::string usb_serial(const fs::path& device) {
   const std::string serial = attribute(device / "serial");
   return serial.find_first_not_of("0 ") == std::string::npos ? "" : fit_for_a_name(serial);
@@ -65,8 +65,7 @@ std::string plugged_in_at(const fs::path& folder, const std::string& name, int i
   if (node == parts.begin() || node == parts.end()) return fit_for_a_name(folder.filename());
   std::string at = *std::prev(node);
   if (is_usb_interface(at)) {
-    // The bus's number depends on the order in which controllers were found, the controller's address
-    // doesn't.
+    // The bus number depends on the order of discovery; the controller's address doesn't.
     const std::string bus = "usb" + at.substr(0, at.find('-'));
     const auto hub = std::find(parts.begin(), node, bus);
     const std::string controller = hub == parts.begin() || hub == node ? bus : *std::prev(hub);
@@ -93,7 +92,8 @@ std::vector<VideoNode> list_video_nodes(const fs::path& sysfs) {
     VideoNode node{"/dev/" + name, model, plugged_in_at(folder, model, index), {}, {}, {}};
     const fs::path usb = usb_device(folder);
     if (!usb.empty()) node.usb_megabits = usb_megabits(usb);
-    // A device's further nodes (a camera's metadata, say) have its number too; the first one is the camera.
+    // Further nodes of a device (for example a camera's metadata) have the same serial number; the first one
+    // is the camera.
     if (index == 0 && !usb.empty()) node.serial = usb_serial(usb);
     nodes.push_back(std::move(node));
   }

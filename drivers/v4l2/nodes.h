@@ -8,29 +8,29 @@
 #include <string_view>
 #include <vector>
 
-// Which video devices there are, and who they are: read from sysfs alone, so that no device has to be opened
-// and none can hang.
+// The video devices and their identities. Read from sysfs alone, so no device has to be opened and none can
+// hang.
 namespace emberlock::drivers {
 
-/// A device node of V4L2: a camera, or something else that has one.
+/// A V4L2 device node. Not every one is a camera.
 struct VideoNode {
   std::filesystem::path device;             ///< "/dev/video3"; may change
-  std::string model;                        ///< as the driver names it
+  std::string model;                        ///< the driver's name
   std::string path;                         ///< where it is plugged in: "usb-0000:00:14.0-1.2:1.0"
-  std::string serial;                       ///< empty: it says none
-  std::optional<double> usb_megabits = {};  ///< what its USB connection carries a second
-  std::string id;  ///< the serial number, else (or where another says the same one) the path
+  std::string serial;                       ///< empty if it reports none
+  std::optional<double> usb_megabits = {};  ///< bandwidth of its USB connection, Mbit/s
+  std::string id;  ///< the serial number; the path if there is none or another device has the same one
 };
 
-/// All there are, by path.
+/// All nodes, sorted by path.
 std::vector<VideoNode> list_video_nodes(const std::filesystem::path& sysfs = "/sys");
 
-/// The one whose id it is, now or before another with its serial number came or went.
+/// The node with this id. Also finds it when a device with the same serial number was added or removed since.
 std::optional<VideoNode> find_video_node(std::span<const VideoNode> nodes, std::string_view id);
 
-/// Where a node is plugged in, by its folder in sysfs, the driver's name of it and its number among its
-/// device's nodes: USB controller and ports with the interface; else the device that has it, and the name, as
-/// one device may have several cameras ("vivid.0-vivid-003-vid-cap").
+/// Where a node is plugged in, from its sysfs folder, its driver's name and its number among its device's
+/// nodes. For USB: controller, ports and interface. Else the device and the name, since one device may have
+/// several cameras ("vivid.0-vivid-003-vid-cap").
 std::string plugged_in_at(const std::filesystem::path& folder, const std::string& name, int index);
 
 }  // namespace emberlock::drivers

@@ -23,7 +23,7 @@
 namespace emberlock::drivers {
 namespace {
 
-/// What is known of a node without opening it.
+/// The properties of a node that are known without opening it.
 CameraFound known_of(const VideoNode& node) {
   CameraFound found;
   found.id = node.id;
@@ -34,7 +34,7 @@ CameraFound known_of(const VideoNode& node) {
   return found;
 }
 
-/// What a node says of itself when it is opened; none where it is no camera, or is gone by now.
+/// The properties of an opened node; nullopt if it isn't a camera or is gone.
 std::optional<CameraFound> ask(const VideoNode& node) {
   CameraFound found = known_of(node);
   const auto device = V4l2Device::open(node.device, "camera " + node.id);
@@ -63,7 +63,7 @@ std::optional<CameraFound> ask(const VideoNode& node) {
   return found;
 }
 
-/// Asks each node on a thread of its own: one that hangs is left behind.
+/// Queries each node on its own thread; a thread that hangs is left behind.
 Result<std::vector<CameraFound>> find() {
   struct Answers {
     std::mutex mutex;

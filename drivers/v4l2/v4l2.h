@@ -5,9 +5,9 @@
 
 namespace emberlock::drivers {
 
-/// Cameras that Linux drives by itself (USB webcams, frame grabbers), through V4L2. Uncompressed formats of
-/// one plane; ids are serial numbers, else where the camera is plugged in. The shutter is reset by ending the
-/// stream and beginning it anew.
+/// Cameras with a Linux V4L2 driver (USB webcams, frame grabbers). Single-plane uncompressed formats and
+/// JPEG; ids are serial numbers, else the place where the camera is plugged in. A shutter reset stops the
+/// stream and starts it again.
 CameraDriver v4l2_driver();
 
 }  // namespace emberlock::drivers

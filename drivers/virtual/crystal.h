@@ -9,24 +9,24 @@
 
 namespace emberlock::drivers {
 
-/// A camera's crystal, whose rate wanders as its temperature goes: a sum of sinusoids an octave apart, from
-/// ten minutes to about two days, whose powers rise with the period as those of a random walk do. A closed
-/// form, so that any instant can be asked for. Immutable.
+/// A camera's crystal. Its rate drifts with temperature: a sum of sinusoids an octave apart, with periods
+/// from ten minutes to about two days and powers that rise with the period like those of a random walk. It is
+/// a closed form, so it can be evaluated at any instant. Immutable.
 class Crystal {
  public:
-  /// `wander` is the RMS change of the rate within an hour; 0: it keeps its rate.
+  /// `wander` is the RMS change of the rate within an hour; 0: a constant rate.
   Crystal(PartsPerMillion wander, std::uint64_t seed);
 
-  /// By how much its rate exceeds what it was made for.
+  /// Deviation of the rate from its nominal value.
   [[nodiscard]] PartsPerMillion rate(TimePoint at) const;
-  /// The integral of that: by how much its own time went ahead from instant 0 on.
+  /// The integral of rate(): how far the crystal's time is ahead since instant 0.
   [[nodiscard]] Seconds ahead(TimePoint at) const;
   [[nodiscard]] bool steady() const { return waves_.empty(); }
 
  private:
   struct Wave {
-    double rate;     ///< amplitude, parts of one
-    double angular;  ///< radians a second
+    double rate;     ///< amplitude, relative (not ppm)
+    double angular;  ///< radians per second
     double phase;
   };
   std::vector<Wave> waves_;

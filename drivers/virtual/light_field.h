@@ -8,16 +8,16 @@
 
 namespace emberlock::drivers {
 
-/// Something luminous that virtual cameras film: the seam by which a flame comes into the picture.
-/// Implementations are called from the threads of several cameras at once and give the same light for the
-/// same arguments.
+/// A luminous object that virtual cameras film: the interface for adding a flame to their pictures.
+/// Implementations must be callable from the threads of several cameras at once, and give the same light for
+/// the same arguments.
 class LightField {
  public:
   virtual ~LightField() = default;
 
-  /// ADDS what camera number `camera` of the rig gathers during [exposure_start, exposure_start + exposure)
-  /// on the rig's clock. `rgb` holds 3 * width * height linear grey levels on the scale 0..255 (more
-  /// saturates), R, G, B interleaved, row by row from the top.
+  /// ADDS the light that camera number `camera` of the rig collects during [exposure_start, exposure_start +
+  /// exposure) on the rig's clock. `rgb` holds 3 * width * height linear grey levels on the scale 0..255
+  /// (higher values saturate), R, G, B interleaved, row by row from the top.
   virtual void add_radiance(int camera, TimePoint exposure_start, Seconds exposure,
                             std::span<float> rgb) const = 0;
 };

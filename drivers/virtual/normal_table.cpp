@@ -6,7 +6,7 @@
 namespace emberlock::drivers {
 namespace {
 
-/// The standard normal's quantile by bisection of its distribution function; 0 < p < 1.
+/// The quantile of the standard normal distribution, by bisection; 0 < p < 1.
 double normal_quantile(double p) {
   double low = -10, high = 10;
   for (int i = 0; i < 60; ++i) {

@@ -7,14 +7,14 @@
 namespace emberlock::drivers {
 
 /// Standard normal numbers for whole pictures, about four times as fast as Box and Muller: the sum of two
-/// quantiles from one table, divided by sqrt(2). Mean 0 and variance 1 exactly; tails reach 4.7 sigma.
+/// quantiles from one table, divided by sqrt(2). Mean 0 and variance 1 exactly; the tails reach 4.7 sigma.
 class NormalTable {
  public:
-  static constexpr int kBitsEach = 20;  ///< random bits that one number takes
+  static constexpr int kBitsEach = 20;  ///< random bits per number
 
   static const NormalTable& instance();
 
-  /// From the lowest kBitsEach bits.
+  /// Uses the lowest kBitsEach bits.
   [[nodiscard]] float operator()(std::uint64_t bits) const {
     return quantiles_[bits & kMask] + quantiles_[(bits >> 10) & kMask];
   }

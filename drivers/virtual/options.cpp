@@ -57,7 +57,7 @@ Status check(const VirtualCameraOptions& c) {
   return in_range(where, "first_phase", c.first_phase.value_or(Seconds(0)).value(), 0, 3600);
 }
 
-/// Of a group in a rig's name: a bare number is of CCDs.
+/// The kind of a group in a rig's name; none given means CCD.
 std::optional<SensorKind> sensor_kind(std::string_view text) {
   if (text.empty()) return SensorKind::ccd;
   return kSensorNames.first_of(text);

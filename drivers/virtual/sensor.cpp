@@ -12,14 +12,14 @@ namespace emberlock::drivers {
 namespace {
 
 constexpr double kEdgeSigma = 0.7;      // blur of the lamp's rim, pixels
-constexpr double kFaintest = 0.25;      // glare below this many grey levels is cut off
+constexpr double kFaintest = 0.25;      // grey levels; fainter glare is cut off
 constexpr double kOverflowLevel = 300;  // above white
 constexpr double kWhite = 255;
-constexpr double kRoomReach = 0.6;  // of the image's width, over which the room's light falls to 1 / e
+constexpr double kRoomReach = 0.6;  // part of the image's width over which the room's light falls to 1 / e
 
 enum SensorStream : std::uint64_t { kNoiseStream = 1, kHotPixelStream = 2 };
 
-/// The part of [x - reach, x + reach] by [y - up, y + down] that the image has.
+/// The part of [x - reach, x + reach] by [y - up, y + down] that lies in the image.
 Stamp stamp_about(const VirtualLamp& lamp, double reach, double up, double down, ImageSize size) {
   const auto column = [&](double x) { return static_cast<int>(std::clamp(x, 0.0, double(size.width))); };
   const auto line = [&](double y) { return static_cast<int>(std::clamp(y, 0.0, double(size.height))); };
@@ -48,7 +48,7 @@ double halo_reach(const VirtualScene& scene) {
   return scene.halo_length * std::log(std::max(1.0, scene.halo_level / kFaintest));
 }
 
-/// Glare all round, and columns of the disk that overflow up and down.
+/// Glare on all sides, and overflow of the disk's columns up and down.
 double bloom_at(const VirtualScene& scene, const VirtualLamp& lamp, double dx, double dy) {
   const double beyond_rim = std::max(0.0, std::hypot(dx, dy) - lamp.radius);
   double level = scene.halo_level * std::exp(-beyond_rim / scene.halo_length);
@@ -60,7 +60,7 @@ double bloom_at(const VirtualScene& scene, const VirtualLamp& lamp, double dx, d
   return level;
 }
 
-/// Where a saturated lamp's glare and overflow reach.
+/// The glare and overflow of a saturated lamp.
 Stamp bloom_shape(const VirtualScene& scene, const VirtualLamp& lamp, ImageSize size) {
   const double glare = lamp.radius + halo_reach(scene);
   const double tail = lamp.radius + std::log(kOverflowLevel / kFaintest);
@@ -78,7 +78,7 @@ void add_scaled(const float* from, int count, float scale, float* to) {
   for (int i = 0; i < count; ++i) to[i] += scale * from[i];
 }
 
-/// `to` spans the columns of `stamp` and every row of the image; scale(y) is a row's.
+/// `to` covers the columns of `stamp` and every row of the image; scale(y) is the factor of row y.
 void add_rows(const Stamp& stamp, const auto& scale, Stamp& to) {
   for (int y = stamp.y0; y < stamp.y1(); ++y) {
     add_scaled(stamp.row(y), stamp.width, scale(y), to.row(y) + (stamp.x0 - to.x0));
@@ -90,7 +90,7 @@ void add_stamp(const Stamp& stamp, float scale, Stamp& to) {
       stamp, [scale](int) { return scale; }, to);
 }
 
-/// How the room's light falls along one axis of `size` pixels.
+/// The decrease of the room's light along one axis of `size` pixels.
 std::vector<float> falloff(int size, double centre, double reach) {
   std::vector<float> part(static_cast<std::size_t>(size));
   for (int i = 0; i < size; ++i)
@@ -98,7 +98,7 @@ std::vector<float> falloff(int size, double centre, double reach) {
   return part;
 }
 
-/// Grey levels that a pulse leaves at the lamp's centre in all.
+/// Total grey levels that a pulse adds at the lamp's centre.
 double charge(const VirtualScene& scene, const LightPulse& pulse) {
   return pulse.kind == StrobeOutput::steady ? scene.steady_rate * pulse.width.value() : scene.flash_level;
 }
@@ -118,7 +118,7 @@ VirtualSensor::VirtualSensor(const VirtualCameraOptions& options, int number, st
       lamp_shape_(lamp_shape(options.lamp, options.layout.size)) {
   const auto samples = static_cast<std::size_t>(layout_.size.width) * channels(layout_.format);
   row_.resize(samples);
-  normal_.resize(samples + 2);  // noise comes three at a time
+  normal_.resize(samples + 2);  // noise is generated three samples at a time
 }
 
 template <class Variance>
@@ -195,7 +195,7 @@ void VirtualSensor::choose_strobe_light() {
     frame_passes_.emplace_back(rolls ? &VirtualSensor::draw_rolled_lamp : &VirtualSensor::draw_lamp);
   if (bloom) {
     VirtualScene glare = *scene_;
-    if (kind_ != SensorKind::ccd) glare.overflow_up = glare.overflow_down = 0;  // no columns to run along
+    if (kind_ != SensorKind::ccd) glare.overflow_up = glare.overflow_down = 0;  // only CCD columns overflow
     bloom_shape_ = bloom_shape(glare, lamp_, layout_.size);
     frame_passes_.emplace_back(rolls ? &VirtualSensor::draw_rolled_bloom : &VirtualSensor::draw_bloom);
   }
@@ -213,7 +213,7 @@ void VirtualSensor::choose_room() {
 }
 
 void VirtualSensor::choose_noise() {
-  // The sum of two independent normal numbers is one of the summed variance: both passes share a draw.
+  // The sum of two independent normal numbers has the summed variance, so both passes share one number.
   const auto read = static_cast<float>(scene_->read_noise * scene_->read_noise);
   const auto gain = static_cast<float>(1 / scene_->electrons_per_level);
   const auto add = [this](auto variance) {
@@ -304,7 +304,7 @@ void VirtualSensor::draw_smear(const Shot& shot) {
   for (const LightPulse& p : shot.pulses) {
     const double leak = charge(*scene_, p) * scene_->smear_leak;
     for (const smear::FlashPart& part : split(timing_, {p.begin + p.width / 2, p.width})) {
-      // Every lit row of the lamp leaks into the packet that stands under it.
+      // Every lit row of the lamp leaks into the charge packet below it.
       for (int y = lamp_shape_.y0; y < lamp_shape_.y1(); ++y) {
         const auto at = smear::landing(timing_, y, part, sweep_out_);
         if (!at || at->image != 0) continue;
@@ -329,7 +329,7 @@ void VirtualSensor::add_flame(const Shot& /*shot*/, int y) {
 
 void VirtualSensor::add_strobe_light(const Shot& /*shot*/, int y) {
   const int n = channels(layout_.format);
-  const float* white = light_.row(y);  // the strobe is white: the same for every colour
+  const float* white = light_.row(y);  // the strobe is white: equal in all colours
   for (int i = 0; i < light_.width; ++i) {
     for (int c = 0; c < n; ++c) row_[(light_.x0 + i) * n + c] += white[i];
   }

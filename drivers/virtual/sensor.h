@@ -14,7 +14,7 @@
 
 namespace emberlock::drivers {
 
-/// A rectangle of the image and what falls on each of its pixels.
+/// A rectangle of the image with a value for each pixel.
 struct Stamp {
   int x0 = 0;
   int y0 = 0;
@@ -29,24 +29,24 @@ struct Stamp {
   [[nodiscard]] int y1() const { return y0 + height; }
 };
 
-/// When a frame was exposed, on the rig's clock.
+/// The exposure of a frame, on the rig's clock.
 struct Exposure {
   std::uint64_t frame_id = 0;
   TimePoint begin;
-  Seconds duration;  ///< ends at the start of the read phase
+  Seconds duration;  ///< ends when the read phase starts
 };
 
-/// The chip of one camera, of any kind: light in, picture out. A rolling shutter's row r, in the order of
-/// reading, is exposed r t_row after the first; a flame is drawn as the first row sees it. Results depend on
-/// the arguments and (seed, camera id) alone. Not thread-safe: it keeps its work space.
+/// The sensor of one camera, of any kind: light in, picture out. In a rolling shutter, row r (in read order)
+/// is exposed r t_row after the first; a flame is drawn as the first row sees it. Results depend only on the
+/// arguments and (seed, camera id). Not thread-safe, because it keeps its work space.
 class VirtualSensor {
  public:
-  /// `number` is the camera's in the rig, as the scene's LightField counts. `options` are valid.
+  /// `number` is the camera's index in the rig, as passed to the scene's LightField. `options` must be valid.
   VirtualSensor(const VirtualCameraOptions& options, int number, std::uint64_t seed);
 
-  /// `pulses`: the strobe's light during [-T, K t_row) about the start of this frame's read phase. The passes
-  /// are chosen once, when `scene` isn't that of the call before: what it doesn't list is not asked after in
-  /// a frame, a row or a pixel.
+  /// `pulses`: the strobe's light during [-T, K t_row) relative to the start of this frame's read phase. The
+  /// passes are selected once, when `scene` differs from that of the call before; an unlisted pass costs
+  /// nothing per frame, row or pixel.
   Image expose(const std::shared_ptr<const VirtualScene>& scene, std::span<const LightPulse> pulses,
                const Exposure& exposure);
 
@@ -95,22 +95,22 @@ class VirtualSensor {
   int number_;
   std::uint64_t seed_;  // of this camera
 
-  // What the scene calls for, in the order of the work.
+  // The selected work, in order.
   std::shared_ptr<const VirtualScene> scene_;
   std::vector<std::function<void(VirtualSensor&, const Shot&)>> frame_passes_;
   std::vector<std::function<void(VirtualSensor&, const Shot&, int y)>> row_passes_;
   std::function<void(const VirtualSensor&, int y, Image&)> convert_;
 
   Stamp lamp_shape_;           // 1 at the lamp's centre
-  Stamp bloom_shape_;          // grey levels about a lamp that saturates
-  Stamp light_;                // of lamp, bloom and smear: the full height of the columns about the lamp
-  std::vector<float> lit_;     // by row: light at the lamp's centre in the row's exposure
-  std::vector<float> room_x_;  // by column and by row: what the room shows of that light is their product
+  Stamp bloom_shape_;          // grey levels around a saturated lamp
+  Stamp light_;                // of lamp, bloom and smear: the full height of the columns around the lamp
+  std::vector<float> lit_;     // by row: light at the lamp's centre during the row's exposure
+  std::vector<float> room_x_;  // by column and by row: the room's share of that light is their product
   std::vector<float> room_y_;
   std::vector<Point> hot_;     // by row
   std::vector<float> flame_;   // 3 w h
-  std::vector<float> row_;     // samples of the row in work, grey levels 0..255
-  std::vector<float> normal_;  // and its noise, standard normal
+  std::vector<float> row_;     // samples of the current row, grey levels 0..255
+  std::vector<float> normal_;  // its noise, standard normal
 };
 
 }  // namespace emberlock::drivers

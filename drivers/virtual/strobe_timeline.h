@@ -11,28 +11,28 @@
 
 namespace emberlock::drivers {
 
-/// Light of the strobe: one flash, or a stretch of steady light.
+/// Light of the strobe: a flash, or an interval of steady light.
 struct LightPulse {
-  Seconds begin;  ///< after the origin that was asked for; may be negative
+  Seconds begin;  ///< relative to the requested origin; may be negative
   Seconds width;
   StrobeOutput kind = StrobeOutput::flashing;
 };
 
-/// Everything that a strobe has been told, and so every flash it gave or will give: an exact function of the
-/// settings and of when they were applied. Flash j of a setting begins at base + phase + j / rate, j >= 0.
-/// The base is the moment of apply() when the rate changes or flashing begins, and stays otherwise, so that a
-/// changed phase moves the flashes by the difference. A code begins anew with the first flash after apply().
-/// A flash that has begun ends normally. Thread-safe.
+/// All settings that a strobe received, and so every flash that it gave or will give: an exact function of
+/// the settings and the times at which they were applied. Flash j of a setting begins at base + phase + j /
+/// rate, j >= 0. The base is the time of apply() when the rate changes or flashing starts, and unchanged
+/// otherwise, so that a new phase shifts the flashes by the difference. A code restarts at the first flash
+/// after apply(). A flash that has begun ends normally. Thread-safe.
 class StrobeTimeline {
  public:
-  /// `rate_error`: the true rate is the settings' times (1 + rate_error).
+  /// `rate_error`: the true rate is that of the settings times (1 + rate_error).
   explicit StrobeTimeline(PartsPerMillion rate_error) : rate_error_(rate_error) {}
 
-  /// `at` is not before that of the call before; `settings` are valid.
+  /// `at` must not be before that of the last call; `settings` must be valid.
   void apply(const StrobeSettings& settings, TimePoint at);
 
   /// The light that overlaps [origin + from, origin + to), in order of time; steady light is cut to that
-  /// window.
+  /// interval.
   [[nodiscard]] std::vector<LightPulse> light(TimePoint origin, Seconds from, Seconds to) const;
 
  private:
@@ -41,9 +41,10 @@ class StrobeTimeline {
     TimePoint applied;
     TimePoint base;
     Seconds period;
-    std::int64_t first_flash = 0;  // its number j: the code begins here
+    std::int64_t first_flash = 0;  // its number j, at which the code begins
   };
-  /// The segment's flashes that overlap [from, to) and begin before `end`; flash 0 would begin at `zero`.
+  /// Adds the segment's flashes that overlap [from, to) and begin before `end`; flash 0 would begin at
+  /// `zero`.
   static void add_flashes(const Segment& segment, Seconds zero, Seconds from, Seconds to, Seconds end,
                           std::vector<LightPulse>& pulses);
 

@@ -20,7 +20,7 @@ enum CameraStream : std::uint64_t {
   kCrystalStream = 14
 };
 
-constexpr double kRounding = 1e-6;    // of periods counted: instants are whole nanoseconds
+constexpr double kRounding = 1e-6;    // in counted periods, because instants are whole nanoseconds
 constexpr Seconds kLongestWait{1e8};  // keeps instants within 64 bits
 
 std::string_view model(SensorKind kind) {
@@ -99,7 +99,7 @@ Status VirtualCamera::reset_shutter(TimePoint at) {
                             ? options_.timing.frame_period * random_uniform(seed_, kPhaseStream, draw)
                             : options_.reset_jitter * random_normal(seed_, kJitterStream, draw);
   const Seconds latency = std::max(Seconds(0), options_.reset_latency + drawn);
-  // The old cycle runs until `at`; what it read until then is counted, and dropped.
+  // The old cycle runs until `at`; its frames read until then are counted and dropped.
   const std::uint64_t first_wanted = read_by(at);
   counts_.passed_over += first_wanted - next_id_;
   begin_cycle(at + latency, first_wanted);
@@ -139,7 +139,7 @@ Seconds VirtualCamera::counted(TimePoint from, TimePoint to) const {
 TimePoint VirtualCamera::read_start(const Cycle& cycle, double i) const {
   const TimePoint by_count = cycle.start + cycle.period * i;
   if (crystal_.steady()) return by_count;
-  // Rates differ by millionths, so that each step mends all but a millionth of what the one before left.
+  // Fixed-point iteration: rates differ by millionths, so each step leaves a millionth of the error.
   TimePoint at = by_count;
   for (int step = 0; step < 3; ++step) at = by_count - (crystal_.ahead(at) - crystal_.ahead(cycle.start));
   return at;
@@ -161,13 +161,13 @@ TimePoint VirtualCamera::read_start_after(TimePoint after) const {
 TimePoint VirtualCamera::read_end(std::uint64_t frame_id) const { return read_start(frame_id) + shifting(); }
 
 std::uint64_t VirtualCamera::read_by(TimePoint t) const {
-  // A cycle ends where the next one begins, whatever it would have delivered since.
+  // A cycle ends where the next one begins.
   std::uint64_t end = std::numeric_limits<std::uint64_t>::max();
   for (auto cycle = cycles_.rbegin(); cycle != cycles_.rend(); ++cycle) {
     const auto read_end = [&](std::uint64_t id) { return read_start(*cycle, id) + shifting(); };
     const double periods = std::floor(counted(read_end(cycle->first_id), t) / cycle->period - kRounding);
     auto next = cycle->first_id + static_cast<std::uint64_t>(std::max(0.0, periods));
-    while (read_end(next) <= t) ++next;  // instants are rounded to nanoseconds: settle the border
+    while (read_end(next) <= t) ++next;  // corrects for the rounding of instants to nanoseconds
     if (next > cycle->first_id) return std::min(next, end);
     end = cycle->first_id;
   }
@@ -178,7 +178,7 @@ void VirtualCamera::drop_overflow() {
   const std::uint64_t delivered = read_by(room_->clock().now() - options_.transport);
   if (delivered <= next_id_ + queue_frames_) return;
   const std::uint64_t oldest = delivered - queue_frames_;
-  log(LogCategory::drivers).warn("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
+  log(LogCategory::drivers).debug("{}: {} frames lost, the queue was full", info_.id, oldest - next_id_);
   counts_.queue += oldest - next_id_;
   next_id_ = oldest;
 }
@@ -233,7 +233,7 @@ Frame VirtualCamera::draw(std::uint64_t frame_id) {
   Image image = sensor_.expose(scene, light_on(frame_id), {frame_id, begin - exposed, exposed});
 
   const TimePoint arrival = read_end(frame_id) + options_.transport;
-  // The camera's clock runs on the crystal that also times its frames.
+  // The camera's clock uses the same crystal as its frames.
   const double own_rate = 1 / (options_.nominal_rate * options_.timing.frame_period);
   FrameStamp stamp;
   stamp.frame_id = frame_id;

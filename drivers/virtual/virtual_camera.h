@@ -16,7 +16,7 @@
 
 namespace emberlock::drivers {
 
-/// What all cameras of a rig share. Thread-safe.
+/// State shared by all cameras of a rig. Thread-safe.
 class VirtualRoom {
  public:
   VirtualRoom(std::shared_ptr<Clock> clock, PartsPerMillion strobe_error, VirtualScene scene);
@@ -25,7 +25,7 @@ class VirtualRoom {
   [[nodiscard]] const std::shared_ptr<StrobeTimeline>& strobe() const { return strobe_; }
   [[nodiscard]] TimePoint opened() const { return opened_; }
   void set_scene(VirtualScene scene);
-  /// The scene that a frame shows whose read phase begins at t.
+  /// The scene shown by a frame whose read phase begins at t.
   [[nodiscard]] std::shared_ptr<const VirtualScene> scene_at(TimePoint t) const;
 
  private:
@@ -40,8 +40,8 @@ class VirtualRoom {
   std::vector<Change> scenes_;  // in order of time, never empty
 };
 
-/// One camera of any kind of sensor. Frames are numbered from 0 at the first start() on, through stops and
-/// resets, and drawn when they are asked for.
+/// One camera with any kind of sensor. Frames are numbered from 0 at the first start(), continuing through
+/// stops and resets, and drawn when they are fetched.
 class VirtualCamera final : public Camera {
  public:
   VirtualCamera(VirtualCameraOptions options, int number, const VirtualRigOptions& rig,
@@ -65,8 +65,9 @@ class VirtualCamera final : public Camera {
   [[nodiscard]] std::shared_ptr<const VirtualScene> scene_of(std::uint64_t frame_id) const;
 
  private:
-  /// Read phases at `start` + i `period`, by the camera's crystal; that of i >= 1 delivers frame first_id + i
-  /// - 1. The image of i = 0 is kept back after a reset, and the last of the cycle before after a trim.
+  /// Read phases start at `start` + i `period`, by the camera's crystal; that of i >= 1 delivers frame
+  /// first_id + i - 1. The image of i = 0 is dropped after a reset; after a trim it is the last image of the
+  /// previous cycle.
   struct Cycle {
     TimePoint start;
     std::uint64_t first_id = 0;
@@ -76,7 +77,7 @@ class VirtualCamera final : public Camera {
   [[nodiscard]] TimePoint read_end(std::uint64_t frame_id) const;
   /// The first frame whose last row hasn't been read by `t`.
   [[nodiscard]] std::uint64_t read_by(TimePoint t) const;
-  /// What its crystal counted from one instant to the other.
+  /// The time that the camera's crystal counts between two instants.
   [[nodiscard]] Seconds counted(TimePoint from, TimePoint to) const;
   /// The start of read phase i.
   [[nodiscard]] TimePoint read_start(const Cycle& cycle, double i) const;
@@ -93,7 +94,7 @@ class VirtualCamera final : public Camera {
   std::shared_ptr<const VirtualRoom> room_;
   CameraInfo info_;
   VirtualSensor sensor_;
-  std::uint64_t seed_;  // of phases and latencies
+  std::uint64_t seed_;  // for phases and latencies
   Crystal crystal_;
   std::uint64_t draws_ = 0;
   std::uint64_t queue_frames_;
@@ -101,7 +102,7 @@ class VirtualCamera final : public Camera {
   Seconds device_origin_;  // of the camera's own clock
   std::vector<Cycle> cycles_;
   std::uint64_t next_id_ = 0;
-  Seconds period_;  ///< as trimmed
+  Seconds period_;  ///< with the trim applied
   bool filming_ = false;
   FrameCounts counts_;
 };

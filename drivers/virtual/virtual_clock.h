@@ -7,9 +7,9 @@
 
 namespace emberlock::drivers {
 
-/// A clock that moves only when somebody sleeps on it: sleeping takes no real time, and a run is the same
-/// each time. With one thread its instants are deterministic; with several the clock stands at the latest
-/// instant anybody slept until. Thread-safe.
+/// A clock that advances only when somebody sleeps on it. Sleeping takes no real time, and runs are
+/// reproducible. With one thread its instants are deterministic; with several it stands at the latest instant
+/// that any thread slept until. Thread-safe.
 class VirtualClock final : public Clock {
  public:
   explicit VirtualClock(TimePoint start = {}) : now_ns_(start.ns) {}

@@ -10,18 +10,17 @@
 
 namespace emberlock::drivers {
 
-/// A stroboscope that listens to nobody, with a dial for tests to turn: dark until it is first turned.
+/// A strobe without an interface, with a dial that tests turn. Dark until it is first turned.
 class VirtualDial final : public ManualStrobe {
  public:
   VirtualDial(const VirtualStrobeOptions& options, std::shared_ptr<Clock> clock,
               std::shared_ptr<StrobeTimeline> timeline);
 
-  /// Somebody turns the dial until it shows `shown`, or to its stop: from now on it flashes so often, but for
-  /// the dial's error.
+  /// Turns the dial to `shown`, or to its stop. From now on it flashes at that rate plus the dial's error.
   void turn(Hertz shown);
-  /// What it shows; 0 before it was turned.
+  /// The reading of the dial; 0 before it is first turned.
   [[nodiscard]] Hertz shown() const { return shown_; }
-  /// What it truly does.
+  /// The true flash rate.
   [[nodiscard]] Hertz truth() const;
 
  private:

@@ -23,7 +23,7 @@ struct VirtualRig::Parts {
 
   std::shared_ptr<VirtualRoom> room;
   VirtualStrobe strobe;
-  std::unique_ptr<VirtualDial> dial;  ///< instead of it, where there is one
+  std::unique_ptr<VirtualDial> dial;  ///< replaces it, if present
   std::vector<VirtualCamera> cameras;
 };
 

@@ -16,27 +16,28 @@ namespace emberlock::drivers {
 
 class VirtualDial;
 
-/// One dot as the model knows it.
+/// A dot as the model computes it.
 struct TrueDot {
-  Rows y;            ///< centre, mean over the row periods that the flash overlaps
-  double level = 0;  ///< grey levels at its centre, on the scale 0..255, for the scene of the frame
-  TimePoint flash;   ///< centre of the flash that made it
+  Rows y;            ///< centre, averaged over the row periods that the flash overlaps
+  double level = 0;  ///< grey levels at its centre, on the scale 0..255, in the scene of the frame
+  TimePoint flash;   ///< centre of the flash that caused it
 };
 
-/// Cameras and the strobe they film, interline CCDs unless told otherwise, behind the interfaces of real
-/// ones. With a VirtualClock the rig is deterministic by seed and as fast as the pictures are drawn; with a
-/// SteadyClock it runs in real time.
+/// Virtual cameras and the strobe that they film, behind the interfaces of real ones. Cameras are interline
+/// CCDs unless specified otherwise. With a VirtualClock the rig is deterministic for a seed and as fast as
+/// its pictures are drawn; with a SteadyClock it runs in real time.
 ///
-/// Each frame's pixels depend on (seed, camera id, frame id, phase, what strobe and scene did) alone: they
-/// are drawn when asked for, in any order. Cameras on a virtual clock may be used one after the other from
-/// one thread: frames that end while another camera is waited for queue up, and beyond `queue_frames` the
-/// oldest show as a gap in frame_id. Frame i is read during [t_start_i, t_start_i + K t_row) and arrives at
-/// its end; the first image after start() or a reset is kept back, since the register still held the old
-/// cycle. Read phases of rolling and global shutters begin as the exposure of what they read first ends, too.
+/// A frame's pixels depend only on (seed, camera id, frame id, phase, strobe, scene). They are drawn when
+/// fetched, in any order. On a virtual clock, one thread may use the cameras one after another: frames that
+/// end while another camera is waited for are queued; beyond `queue_frames` the oldest are dropped and show
+/// as a gap in frame_id. Frame i is read during [t_start_i, t_start_i + K t_row) and arrives at the end of
+/// that. The first image after start() or a reset is dropped, because the register still held the previous
+/// cycle. For rolling and global shutters too, the read phase begins when the exposure of the part that is
+/// read first ends.
 ///
-/// Thread safety: each camera and the strobe has one owner thread, different ones may differ. set_scene and
-/// the truth accessors may be called from any thread, but a camera's truth not while its owner starts, stops
-/// or resets it.
+/// Thread safety: each camera and the strobe has one owner thread; these may differ. set_scene and the
+/// accessors of the truth may be called from any thread, but those of a camera not while its owner starts,
+/// stops or resets it.
 class VirtualRig {
  public:
   /// Errors: bad_input, naming camera and field.
@@ -49,24 +50,25 @@ class VirtualRig {
   [[nodiscard]] int size() const;
   [[nodiscard]] Camera& camera(int index);
   [[nodiscard]] Strobe& strobe();
-  /// The strobe, where it is one that is set by hand; else null.
+  /// The strobe if it is set by hand; else null.
   [[nodiscard]] VirtualDial* dial();
   [[nodiscard]] Clock& clock();
 
-  /// Frames whose read phase begins from now on show this scene.
+  /// The scene of frames whose read phase begins from now on.
   Status set_scene(VirtualScene scene);
-  /// Who resets the shutters from now on: an operator, the driver, or nobody.
+  /// Sets how shutters are reset from now on: by an operator, by the driver, or not at all.
   void set_reset(ShutterReset reset);
 
-  // The truth, for tests and demonstrations.
+  // The true values, for tests and demonstrations.
 
   /// True timing, lamp and latency of a camera.
   [[nodiscard]] const VirtualCameraOptions& truth(int index) const;
   /// The start of the read phase that delivered (or will deliver) a frame.
   [[nodiscard]] TimePoint read_start(int index, std::uint64_t frame_id) const;
-  /// The same modulo the frame period, for the current read cycle: the first instant >= `after`.
+  /// The start of a read phase in the current cycle: the first instant >= `after`.
   [[nodiscard]] TimePoint read_start_after(int index, TimePoint after) const;
-  /// The dots of a CCD's frame by order of flash, whether a pass draws them or not; none for steady light.
+  /// The dots in a CCD's frame in the order of the flashes, whether a pass draws them or not; none for steady
+  /// light.
   [[nodiscard]] std::vector<TrueDot> dots(int index, std::uint64_t frame_id) const;
 
  private:

@@ -48,7 +48,7 @@ VirtualStrobe::VirtualStrobe(VirtualStrobeOptions options, std::shared_ptr<Clock
 Status VirtualStrobe::apply(const StrobeSettings& settings) {
   EMBERLOCK_RETURN_IF_ERROR(check(settings, options_.id));
   StrobeSettings rounded = settings;
-  // Dividing by the steps a second, a whole number, keeps a step's multiples exact.
+  // Dividing by the number of steps per second, an integer, keeps multiples of a step exact.
   const double rate_steps = std::round(1 / options_.rate_step.value());
   const double time_steps = std::round(1 / options_.time_step.value());
   rounded.rate = Hertz(std::round(settings.rate.value() * rate_steps) / rate_steps);

@@ -10,7 +10,7 @@
 
 namespace emberlock::drivers {
 
-/// A stroboscope with the paper's range (30..20000 flashes a minute) and steps; writes what it is told to a
+/// A strobe with the range (30..20000 flashes per minute) and steps of the paper's. Writes its settings to a
 /// timeline.
 class VirtualStrobe final : public Strobe {
  public:

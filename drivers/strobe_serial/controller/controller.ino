@@ -1,6 +1,7 @@
-// Emberlock's strobe controller on an AVR of 16 MHz with Arduino's core (Uno, Nano, Mega): ../PROTOCOL.md.
-// The light, or a lamp's trigger input, hangs on OC1A: pin 9 of an Uno or Nano, 11 of a Mega. Timer 1 sets and clears the
-// pin by itself at the tick, so that no interrupt's delay moves an edge; interrupts only get the next edge ready.
+// Emberlock's strobe controller for a 16 MHz AVR with Arduino's core (Uno, Nano, Mega): ../PROTOCOL.md. The
+// light, or a lamp's trigger input, is connected to OC1A: pin 9 of an Uno or Nano, pin 11 of a Mega. Timer 1
+// sets and clears the pin in hardware, so interrupt latency doesn't move an edge; interrupts only prepare the
+// next edge.
 #include "flashes.h"
 #include "protocol.h"
 
@@ -11,15 +12,15 @@ constexpr char kModel[] = "mega";
 constexpr uint8_t kLight = 9;
 constexpr char kModel[] = "uno";
 #endif
-constexpr char kSerial[] = "1";  // yours: each controller another, where several hang on one computer
+constexpr char kSerial[] = "1";  // change it: must be unique if several controllers are connected to one computer
 
 constexpr uint8_t mask(uint8_t bit) { return static_cast<uint8_t>(1 << bit); }
 
 constexpr uint32_t kTick = 500;            // ns: 16 MHz / 8
 constexpr uint32_t kLead = 400;            // ticks, 200 us
-constexpr uint32_t kShortestWidth = 20000;  // ns: what the interrupt at a flash's begin takes, and as much again
-constexpr uint16_t kFar = 0x7000, kHop = 0x4000;  // ticks: the timer has but 16 bits
-constexpr uint8_t kSet = mask(COM1A1) | mask(COM1A0), kClear = mask(COM1A1);  // what a match does to the pin
+constexpr uint32_t kShortestWidth = 20000;  // ns: duration of the interrupt at the start of a flash, doubled
+constexpr uint16_t kFar = 0x7000, kHop = 0x4000;  // ticks: the timer has only 16 bits
+constexpr uint8_t kSet = mask(COM1A1) | mask(COM1A0), kClear = mask(COM1A1);  // what a compare match does to the pin
 
 using emberlock_controller::Controller;
 using emberlock_controller::Flashes;
@@ -28,13 +29,13 @@ using emberlock_controller::Output;
 Controller controller({kModel, kSerial, kTick, kShortestWidth});
 Flashes flashes(kTick, kLead);
 
-// Shared with the interrupt. `last` is the instant of the match that is awaited, in ticks modulo 2^32.
+// Shared with the interrupt. `last` is the time of the next compare match, in ticks modulo 2^32.
 Flashes::Edge edge;
 uint32_t last = 0;
 bool hopping = true, lit = false;
 volatile uint32_t given = 0;
 
-// Gets the match ready that brings us to the edge, or nearer to it.
+// Prepares the compare match for the next edge, or an intermediate one if the edge is far away.
 void arm() {
   hopping = edge.at - last > kFar;
   const bool stays = hopping || edge.kind == Flashes::Kind::skip;
@@ -54,7 +55,8 @@ ISR(TIMER1_COMPA_vect) {
     arm();
     constexpr int16_t kNear = 4;
     if (ticks_left() > kNear) return;
-    // Too near for the timer, which would come round in 33 ms only if it was missed: act by hand.
+    // Too near for the timer, which after a missed match would match only 33 ms later: handle the edge in
+    // software.
     while (ticks_left() >= 0) {
     }
     TCCR1C = mask(FOC1A);
@@ -62,7 +64,7 @@ ISR(TIMER1_COMPA_vect) {
   }
 }
 
-// What the controller was told takes effect. A flash under way ends.
+// Applies new settings. A flash under way ends.
 void obey() {
   noInterrupts();
   TIMSK1 = 0;
@@ -70,11 +72,11 @@ void obey() {
   const emberlock_controller::Settings& told = controller.settings();
   digitalWrite(kLight, told.output == Output::steady ? HIGH : LOW);
   if (told.output == Output::flash) {
-    // Sets what the compare unit drives to low as well, before the pin is its.
+    // Sets the output of the compare unit low too, before it takes over the pin.
     TCCR1A = kClear;
     TCCR1C = mask(FOC1A);
     lit = false;
-    last -= static_cast<uint32_t>(static_cast<int32_t>(ticks_left()));  // now
+    last -= static_cast<uint32_t>(static_cast<int32_t>(ticks_left()));  // the current time
     flashes.begin({told.period, told.phase, told.width, told.code_length}, last);
     edge = flashes.next([](uint16_t place) { return controller.flashes(place); });
     arm();

@@ -5,25 +5,25 @@
 
 namespace emberlock_controller {
 
-struct Train {
+struct PulseTrain {
   uint32_t period, phase, width;  // ns
-  uint16_t code_length;           // flashes; 0: all are given
+  uint16_t code_length;           // flashes; 0: no flash is skipped
 };
 
-// When the light goes on and off, in ticks of a timer that counts modulo 2^32.
+// Computes when the light goes on and off, in ticks of a timer that counts modulo 2^32.
 class Flashes {
  public:
-  enum class Kind : uint8_t { on, off, skip };  // skip: nothing happens, but the next edge is to be asked for
+  enum class Kind : uint8_t { on, off, skip };  // skip: no action, but the next edge must be computed
   struct Edge {
     uint32_t at;
     Kind kind;
   };
 
-  // `lead`: ticks that it takes to get an edge ready.
+  // `lead`: ticks needed to prepare an edge.
   Flashes(uint32_t tick_ns, uint32_t lead) : tick_ns_(tick_ns), lead_(lead) {}
 
-  // Begins at `now`, or goes on at the same period with another phase, width or code.
-  void begin(const Train& train, uint32_t now) {
+  // Starts at `now`; or continues with the same period and another phase, width or code.
+  void begin(const PulseTrain& train, uint32_t now) {
     const bool goes_on = running_ && train.period == period_;
     if (!goes_on) {
       base_ = now + lead_;
@@ -40,8 +40,8 @@ class Flashes {
   }
   void stop() { running_ = false; }
 
-  // The edge after the last. Quick after `on`: the flash may be short. `given(place)`: whether the code gives
-  // that flash.
+  // Computes the next edge. Fast after `on`, since the flash may be short. `given(place)`: whether the code
+  // gives that flash.
   template <class Given>
   Edge next(const Given& given) {
     if (lit_) {
@@ -58,7 +58,7 @@ class Flashes {
   }
 
  private:
-  // What a period has beyond whole ticks is carried on, so that the mean rate is right.
+  // The fraction of a tick is carried to the next period, so that the mean rate is exact.
   void next_period() {
     const uint32_t ns = period_ + rest_ns_;
     base_ += ns / tick_ns_;
@@ -66,13 +66,13 @@ class Flashes {
   }
 
   uint32_t tick_ns_, lead_;
-  uint32_t base_ = 0, rest_ns_ = 0;  // of this period's start
+  uint32_t base_ = 0, rest_ns_ = 0;  // start of this period
   uint32_t period_ = 0;              // ns
   uint32_t phase_ = 0, width_ = 0;   // ticks
   uint16_t code_length_ = 0, place_ = 0;
   bool running_ = false;
-  bool lit_ = false;   // the next edge is its end
-  bool past_ = false;  // this period's flash was given or skipped
+  bool lit_ = false;   // the next edge ends the flash
+  bool past_ = false;  // this period's flash has been given or skipped
 };
 
 }  // namespace emberlock_controller

@@ -5,14 +5,14 @@
 #include <stdint.h>
 #include <string.h>
 
-// The protocol of Emberlock's own strobe controller, device side: ../PROTOCOL.md. Plain C++11 without a
-// library or an allocation, for a microcontroller of 2 kB; the host's tests run it against the driver.
+// Device side of the protocol of Emberlock's strobe controller: ../PROTOCOL.md. Plain C++11 without libraries
+// or allocation, for a microcontroller with 2 kB. Tests on the host run it against the driver.
 namespace emberlock_controller {
 
 constexpr uint16_t kVersion = 1;
 constexpr uint16_t kLongestCode = 4096;                                     // flashes
 constexpr uint8_t kLongestLine = 128;                                       // bytes, without its end
-constexpr uint8_t kCodeDigits = 64;                                         // hexadecimal, in one line
+constexpr uint8_t kCodeDigits = 64;                                         // hexadecimal digits per line
 constexpr uint32_t kShortestPeriod = 3000000, kLongestPeriod = 2000000000;  // ns
 constexpr uint32_t kShortestDog = 100, kLongestDog = 600000;                // ms
 
@@ -32,7 +32,7 @@ inline uint16_t crc16(const char* bytes, size_t count, uint16_t crc = 0xFFFF) {
 inline char hex_digit(uint8_t value) {
   return static_cast<char>(value < 10 ? '0' + value : 'A' + value - 10);
 }
-// 0..15; 16 where it isn't one.
+// 0..15; 16 if the character isn't a hexadecimal digit.
 inline uint8_t hex_value(char c) {
   if (c >= '0' && c <= '9') return static_cast<uint8_t>(c - '0');
   if (c >= 'A' && c <= 'F') return static_cast<uint8_t>(c - 'A' + 10);
@@ -46,14 +46,14 @@ struct Settings {
   uint32_t period = 41708375;  // ns
   uint32_t phase = 0;          // ns, < period
   uint32_t width = 20000;      // ns, < period
-  uint16_t code_length = 0;    // flashes; 0: all are given
+  uint16_t code_length = 0;    // flashes; 0: no flash is skipped
 };
 
-// What the controller is made of.
+// The controller's identity and limits.
 struct Board {
   const char* model;        // no spaces
   const char* serial;       // no spaces
-  uint32_t tick;            // ns: of phase and width
+  uint32_t tick;            // ns: resolution of phase and width
   uint32_t shortest_width;  // ns
 };
 
@@ -61,7 +61,7 @@ class Controller {
  public:
   explicit Controller(const Board& board) : board_(board) {}
 
-  // Takes a byte from the line. True when reply() is to be sent.
+  // Takes a byte from the line. Returns true when reply() is to be sent.
   bool take(char c, uint32_t now_ms) {
     if (c == '\r') return false;
     if (c != '\n') {
@@ -76,7 +76,8 @@ class Controller {
   }
   const char* reply() const { return reply_; }  // with its end
 
-  // Call it often: goes dark when nobody has spoken for as long as the host wished. True when it just did.
+  // Call it often. Switches the light off when no command came for the watchdog time. Returns true when it
+  // just did.
   bool watch(uint32_t now_ms) {
     if (dog_ == 0 || settings_.output == Output::off || now_ms - heard_ms_ < dog_) return false;
     settings_.output = Output::off;
@@ -85,12 +86,12 @@ class Controller {
   }
 
   const Settings& settings() const { return settings_; }
-  uint8_t changes() const { return changes_; }  // counts `set`s obeyed and the watchdog's bites
+  uint8_t changes() const { return changes_; }  // number of `set` commands applied plus watchdog events
   bool flashes(uint16_t place) const { return (active()[place >> 3] >> (7 - (place & 7)) & 1) != 0; }
   void set_flashes(uint32_t given) { flashes_ = given; }
 
  private:
-  // A line is ":NN text*CCCC".
+  // Whether the line is complete: ":NN text*CCCC".
   bool line_is_whole() {
     if (length_ < 10 || line_[0] != ':' || line_[3] != ' ' || line_[length_ - 5] != '*') return false;
     const uint8_t high = hex_value(line_[1]), low = hex_value(line_[2]);
@@ -109,8 +110,8 @@ class Controller {
 
   void answer(uint32_t now_ms) {
     heard_ms_ = now_ms;
-    // Said again, its checksum tells, because our answer was lost: it is given again, and nothing is done
-    // twice.
+    // The command was repeated because our reply was lost (same number and checksum): the reply is sent
+    // again, and the command isn't executed twice.
     char identity[6] = {line_[1], line_[2]};
     memcpy(identity + 2, line_ + length_ - 4, 4);
     if (memcmp(identity, last_, sizeof last_) == 0) return;
@@ -209,7 +210,7 @@ class Controller {
     say_settings();
   }
 
-  // code OFFSET HEX: flashes from OFFSET on, to be played once `set` says so.
+  // code OFFSET HEX: flashes from OFFSET on; takes effect with the next `set`.
   void stage() {
     uint32_t offset = 0;
     if (!number(offset) || offset % 8 != 0) {
@@ -229,7 +230,7 @@ class Controller {
     put("ok");
   }
 
-  // bits OFFSET: the code in force from there on.
+  // bits OFFSET: the code in force from OFFSET on.
   void say_bits() {
     uint32_t offset = 0;
     if (!number(offset) || offset % 8 != 0 || *at_ != '\0') {
@@ -259,7 +260,7 @@ class Controller {
     put_field(" ", most);
     return true;
   }
-  // Of the first `length` flashes, eight to a byte, the rest of the last byte as it was sent.
+  // Checksum of the first `length` flashes, eight per byte; unused bits of the last byte as received.
   static uint16_t sum(const char* code, uint16_t length) {
     return crc16(code, static_cast<size_t>((length + 7) >> 3));
   }
@@ -269,7 +270,7 @@ class Controller {
     return true;
   }
   bool ends() const { return *at_ == '\0'; }
-  // The next word, and the space after it.
+  // Reads the next word and the space after it.
   bool word(const char* text) {
     const size_t size = strlen(text);
     if (strncmp(at_, text, size) != 0 || (at_[size] != ' ' && at_[size] != '\0')) return false;

@@ -11,8 +11,8 @@
 namespace emberlock::films {
 namespace {
 
-/// Pixels: a lamp whose middle is less sure is none to measure a camera's pose by. Its radius bears on both
-/// coordinates alike, so the row's error is the column's.
+/// Pixels: a lamp with a larger standard error isn't used for a camera's pose. The radius affects both
+/// coordinates equally, so the row's error is also the column's.
 constexpr double kWorstLamp = 0.3;
 
 }  // namespace

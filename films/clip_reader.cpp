@@ -2,15 +2,14 @@
 #include "films/clip_reader.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <thread>
+#include <string_view>
 
+#include "base/in_parallel.h"
 #include "session/media/frame_file.h"
 #include "session/media/sound.h"
 #include "smear_sync/detect/film.h"
@@ -20,7 +19,7 @@ namespace emberlock::films {
 namespace {
 
 constexpr std::size_t kMostStrips = 10;
-constexpr int kHalfWidth = 64;  // columns of a strip to each side of the lamp
+constexpr int kHalfWidth = 64;  // columns of a strip on each side of the lamp
 
 Image columns_of(const ImageView& frame, int first, int count) {
   ImageLayout layout = frame.layout;
@@ -37,7 +36,7 @@ Image columns_of(const ImageView& frame, int first, int count) {
 ClipStrip cut_strip(const ImageView& frame, const smear::SmearReading& reading, int number) {
   const int width = std::min(2 * kHalfWidth, frame.width());
   const int centre = reading.lamp ? static_cast<int>(std::lround(reading.lamp->x)) : frame.width() / 2;
-  const int even = ~1;  // so that a mosaic's first column stays its first
+  const int even = ~1;  // keeps the phase of a Bayer mosaic
   const int left = std::clamp(centre - width / 2, 0, frame.width() - width) & even;
   ClipStrip strip{number, columns_of(frame, left, width), reading};
   if (strip.reading.lamp) strip.reading.lamp->x -= left;
@@ -45,7 +44,7 @@ ClipStrip cut_strip(const ImageView& frame, const smear::SmearReading& reading, 
   return strip;
 }
 
-/// Keeps every `stride`th of the frames that show a dot; when there are too many, every other goes and the
+/// Keeps every `stride`th frame that shows a dot. When there are too many, every other one is dropped and the
 /// stride doubles.
 class StripKeeper {
  public:
@@ -63,7 +62,7 @@ class StripKeeper {
     strips_ = std::move(kept);
     stride_ *= 2;
   }
-  /// Without a single dot, a frame of the lamp alone.
+  /// If no frame shows a dot, one frame with the lamp.
   std::vector<ClipStrip> take() {
     if (strips_.empty() && lamp_alone_) strips_.push_back(std::move(*lamp_alone_));
     return std::move(strips_);
@@ -110,7 +109,7 @@ Result<FilmedClip> read_clip(const std::string& file, const Advanced& advanced) 
   return clip;
 }
 
-/// The folder that all files lie in, with its last slash, so that names can do without it.
+/// Length of the common folder's name, including its last slash, so that names can be shortened.
 std::size_t common_folder(const std::vector<std::string>& files) {
   std::size_t same = files.front().size();
   for (const std::string& file : files) {
@@ -126,25 +125,15 @@ std::size_t common_folder(const std::vector<std::string>& files) {
 
 Result<std::vector<FilmedClip>> read_clips(const std::vector<std::string>& files, const Progress& progress) {
   std::vector<std::optional<Result<FilmedClip>>> read(files.size());
-  std::vector<double> done(files.size());
-  std::mutex mutex;  // of `done` and the progress bar
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < files.size(); i = next++) {
-      read[i] = read_clip(files[i], [&](double fraction) {
-        const std::lock_guard lock(mutex);
-        done[i] = fraction;
-        double sum = 0;
-        for (const double d : done) sum += d;
-        tell(progress, 0.999 * sum / static_cast<double>(files.size()), files[i]);
-      });
-    }
+  const Observer observer = [&](double fraction, std::string_view file) {
+    tell(progress, kNearlyDone * fraction, file);
+    return true;
   };
-  {
-    std::vector<std::jthread> threads;
-    const std::size_t most = std::max(1U, std::thread::hardware_concurrency());
-    for (std::size_t i = 0; i < std::min(most, files.size()); ++i) threads.emplace_back(work);
-  }
+  // A clip that can't be read doesn't keep the others from being read: all that are wrong are named.
+  static_cast<void>(in_parallel(files.size(), observer, [&](std::size_t i, const Observer& part) -> Status {
+    read[i] = read_clip(files[i], [&](double fraction) { part(fraction, files[i]); });
+    return {};
+  }));
   tell(progress, 1, "read");
 
   std::vector<FilmedClip> clips;

@@ -13,22 +13,22 @@
 
 namespace emberlock::films {
 
-/// The lamp's columns of one frame, kept to be shown.
+/// The lamp's columns of one frame, kept for display.
 struct ClipStrip {
-  int frame = 0;                ///< place in the file
+  int frame = 0;                ///< index of the frame in the file
   Image pixels;                 ///< full height
-  smear::SmearReading reading;  ///< in the strip's own columns
+  smear::SmearReading reading;  ///< in the strip's coordinates
 };
 
-/// A clip as read, and a few of its frames, evenly spread.
+/// The readings of a clip, and a few of its frames at even intervals.
 struct FilmedClip {
   smear::ClipReading reading;
   SoundTrack sound{};
   std::vector<ClipStrip> strips;
 };
 
-/// Decodes the files and reads every frame, one clip a thread; what is kept of a clip doesn't grow with its
-/// frames but for their readings. Errors: those of all files that can't be read, in one message.
+/// Decodes the files and reads every frame, one thread per clip. Memory grows with the number of frames only
+/// by their readings. Errors: one message with the errors of all unreadable files.
 Result<std::vector<FilmedClip>> read_clips(const std::vector<std::string>& files, const Progress& progress);
 
 }  // namespace emberlock::films

@@ -13,7 +13,7 @@
 namespace emberlock::films {
 namespace {
 
-constexpr SecondsPerRow kRowTimeAsGiven(20e-9);  // standard error of a row time given by hand
+constexpr SecondsPerRow kRowTimeAsGiven(20e-9);  // standard error of a row time given by the user
 
 }  // namespace
 

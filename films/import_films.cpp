@@ -12,10 +12,10 @@ namespace emberlock::films {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::int64_t kBeforeACut = 16;  // frames: H.264 may lack what they are decoded from
+constexpr std::int64_t kBeforeACut = 16;  // frames: after a cut, H.264 may lack reference frames
 constexpr double kSameRate = 1e-3;
-constexpr double kSecondsRounded = 1.5;              // times of creation are whole seconds
-constexpr std::uintmax_t kFilledUp = 1'900'000'000;  // bytes: cards' files end at 2 or 4 GB
+constexpr double kSecondsRounded = 1.5;              // creation times are whole seconds
+constexpr std::uintmax_t kFilledUp = 1'900'000'000;  // bytes: cameras split files at 2 or 4 GB
 
 Error film_error(const std::string& what, const fs::path& file, const std::string& remedy) {
   return {ErrorKind::bad_input, what, file.string(), remedy};
@@ -28,7 +28,7 @@ bool follows(const session::ClipPart& before, const session::ClipPart& next) {
     const double lasted =
         static_cast<double>(before.scan.frames()) / before.scan.frame_rate.value_or(Hertz(24)).value();
     const double apart = 1e-9 * static_cast<double>(*next.scan.created_ns - *before.scan.created_ns);
-    // Some cameras give all files of a film the time at which it began.
+    // Some cameras give all files of a film the creation time of the first.
     if (apart != 0) return std::abs(apart - lasted) <= kSecondsRounded;
   }
   return fs::file_size(before.path, ec) >= kFilledUp;
@@ -49,13 +49,13 @@ std::optional<Error> joined_wrongly(const session::ClipPart& before, const sessi
                                   before.scan.frame_rate->value()),
                       next.path, "Leave one of them out");
   }
-  if (options.joins == Joins::as_told || follows(before, next)) return {};
+  if (options.continuity == Continuity::as_told || follows(before, next)) return {};
   return film_error(fmt::format("may not go on where {} ends: nothing in the files says so",
                                 before.path.filename().string()),
                     next.path, "Where the camera split one film, add --joined; else leave one of them out");
 }
 
-/// Adds the file to the film; false where the film ends with it.
+/// Appends a file to the film; false if the film ends there.
 bool append(Film& film, session::ClipPart part, std::optional<Error>& problem) {
   part.first = film.parts.empty() ? 0 : film.parts.back().first + film.parts.back().scan.frames();
   const std::int64_t before = part.first;
@@ -85,7 +85,7 @@ ProbedFilm of_pictures(const session::CameraFiles& files, const FilmOptions& opt
   if (!first.ok()) return {{}, FilmProblem{first.error(), {}}};
   film.size = first->size;
   for (const fs::path& file : files.files) {
-    film.parts.push_back({file, *first, film.frames});  // each is decoded when it is written
+    film.parts.push_back({file, *first, film.frames});  // each part is decoded when it is written
     ++film.frames;
   }
   return {film, {}};

@@ -17,32 +17,32 @@
 
 namespace emberlock::films {
 
-/// Whether several videos of a camera are one film without a gap.
-enum class Joins {
-  proven,   ///< by the files' times of creation, or as the camera fills them up to a card's limit
+/// How we know that several videos of a camera are one film without a gap.
+enum class Continuity {
+  proven,   ///< by the files' creation times, or because the camera filled each up to the card's limit
   as_told,  ///< because the operator says so
 };
 
-/// A camera's film: its files, joined, and how far it can be used.
+/// A camera's film: its files, joined, and the part that can be used.
 struct Film {
   session::CameraFiles files;
   std::vector<session::ClipPart> parts;
   ImageSize size;
-  Hertz frame_rate{};       ///< by the time stamps; of pictures as told
-  std::int64_t frames = 0;  ///< usable, from the first on
+  Hertz frame_rate{};       ///< from the time stamps; for pictures, as given
+  std::int64_t frames = 0;  ///< number of usable frames, from the first on
   std::optional<std::int64_t> created_ns{};
-  std::vector<std::string> notes{};  ///< what is wrong with it and can be lived with
+  std::vector<std::string> notes{};  ///< faults that don't prevent its use
 };
 
-/// A film that can't be used as it is, and how much of it could.
+/// A film that can't be used as it is, and the usable part of it.
 struct FilmProblem {
   Error error;
-  std::optional<Film> partly;  ///< what is good of it
+  std::optional<Film> partly;  ///< the good part
 };
 
 struct FilmOptions {
-  Joins joins = Joins::proven;
-  Hertz picture_rate{25};  ///< of pictures, which have no time
+  Continuity continuity = Continuity::proven;
+  Hertz picture_rate{25};  ///< for pictures, which have no time stamps
 };
 
 struct ProbedFilm {
@@ -50,12 +50,12 @@ struct ProbedFilm {
   std::optional<FilmProblem> problem;
 };
 
-/// What a camera's files hold, told from their packets. A problem: no video, files of different size or rate,
-/// a variable frame rate, parts that may not follow one another. A truncated file is no problem: what is
-/// there is used, and noted.
+/// Examines a camera's files by their packets. A problem: no video, files of different size or rate, a
+/// variable frame rate, parts that may not be consecutive. A truncated file isn't a problem: the existing
+/// part is used, with a note.
 ProbedFilm probe_film(const session::CameraFiles& files, const FilmOptions& options);
 
-/// Places at which decoding may begin, of the whole film.
+/// Indices of the key frames in the whole film.
 std::vector<std::int64_t> keys_of(const Film& film);
 
 }  // namespace emberlock::films

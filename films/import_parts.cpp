@@ -25,13 +25,13 @@ namespace emberlock::films {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr std::int64_t kReadOn = 48;  // frames: beyond, seeking is faster
-/// What the lock of a folder of an import says, by which it is known.
+constexpr std::int64_t kReadOn = 48;  // frames; for larger distances seeking is faster
+/// The text in the lock file of an import's folder, which identifies the folder.
 constexpr std::string_view kWorkText = "emberlock import, unfinished\n";
 
 fs::path lock_of(const fs::path& work) { return work / "lock"; }
 
-/// Whether an import made this folder, or nobody has put anything into it.
+/// Whether an import made this folder, or it is empty.
 Status check_work(const fs::path& work) {
   std::error_code ec;
   const auto text = read_file(lock_of(work));
@@ -48,7 +48,7 @@ bool is_file_or_its_partial(const std::string& name, const fs::path& file) {
   return name == file.filename().string() || name.starts_with("." + file.filename().string() + ".partial.");
 }
 
-/// Whether a SessionWriter makes such a file in a camera's folder.
+/// Whether SessionWriter creates a file of this name in a camera's folder.
 bool is_of_camera(const std::string& name) {
   const std::size_t digits = std::min(name.find_first_not_of("0123456789"), name.size());
   const std::string rest = name.substr(digits);
@@ -56,14 +56,15 @@ bool is_of_camera(const std::string& name) {
          (digits >= 6 && (rest == ".mkv" || rest == ".nut"));
 }
 
-/// Whether a SessionWriter makes such a file in the folder of a session of this one camera.
+/// Whether SessionWriter creates a file of this name in the session's folder, for a session with this one
+/// camera.
 bool is_of_session(const std::string& path, const std::string& camera) {
   if (path.starts_with(camera + "/")) return is_of_camera(path.substr(camera.size() + 1));
   return path == "reserve" || is_file_or_its_partial(path, session::manifest_path("")) ||
          is_file_or_its_partial(path, session::events_path(""));
 }
 
-/// Removes an unfinished import's files. Errors: bad_input where something else lies among them.
+/// Removes an unfinished import's files. Errors: bad_input if other files are among them.
 Status remove_part(const fs::path& folder, const std::function<bool(const std::string& path)>& ours) {
   std::error_code ec;
   if (!fs::exists(fs::symlink_status(folder, ec))) return {};
@@ -73,7 +74,7 @@ Status remove_part(const fs::path& folder, const std::function<bool(const std::s
                "Move them away, and import again"};
 }
 
-/// Removes what is left of an import that has given its session its name.
+/// Removes the work folder after the session has its final name.
 void remove_work(const fs::path& work) {
   static constexpr std::string_view kPart = "camera-";
   static constexpr std::string_view kMark = ".done";
@@ -95,7 +96,7 @@ void remove_work(const fs::path& work) {
   if (!all) log(LogCategory::films).warn("{} holds files that no import made: they are kept", work.string());
 }
 
-/// Everything that a camera's frames depend on; what is written under one text needn't be written again.
+/// Everything that a camera's frames depend on. If it is unchanged, the frames needn't be written again.
 std::string fingerprint(const CameraPart& part) {
   std::string text = fmt::format("emberlock import 1\ncolours {} encoding {}\n",
                                  static_cast<int>(part.colours), static_cast<int>(part.writer.encoding));
@@ -127,7 +128,7 @@ Status write_frames(const CameraPart& part, session::SessionWriter& writer, cons
                     std::optional<std::int64_t>& damaged_at) {
   session::ClipReader film(part.files, part.colours);
   std::shared_ptr<const Image> image;
-  std::int64_t shown = -1;  // place of `image`
+  std::int64_t shown = -1;  // index of `image`
   const auto count = static_cast<double>(part.places.size());
   for (std::size_t i = 0; i < part.places.size(); ++i) {
     const std::int64_t place = part.places[i];
@@ -243,7 +244,7 @@ Result<v1::Manifest> ImportFolder::finish(v1::Manifest manifest, const std::vect
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "import.json", reports.json));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "import.html", reports.page));
   EMBERLOCK_RETURN_IF_ERROR(session::write_manifest(folder, manifest));
-  EMBERLOCK_RETURN_IF_ERROR(move(folder, session_));  // where an empty folder may be
+  EMBERLOCK_RETURN_IF_ERROR(move(folder, session_));  // an empty folder of that name is replaced
   EMBERLOCK_RETURN_IF_ERROR(sync_folder(session_.parent_path()));
   remove_work(work_);
   return manifest;

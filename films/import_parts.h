@@ -20,35 +20,36 @@
 
 namespace emberlock::films {
 
-/// What becomes of one camera's film.
+/// What is imported of one camera's film.
 struct CameraPart {
   v1::CameraStream stream{};  ///< without segments and counts
   std::vector<session::ClipPart> files{};
   session::Colours colours = session::Colours::keep;
   session::WriterOptions writer{};
-  std::vector<std::int64_t> places{};  ///< of the film, one a frame of the session
-  std::vector<FrameStamp> stamps{};    ///< as many
+  std::vector<std::int64_t> places{};  ///< indices in the film, one per frame of the session
+  std::vector<FrameStamp> stamps{};    ///< one per frame of the session
 };
 
-/// A session that grows in a folder beside its own, "NAME.importing": a camera at a time, each of which is
-/// kept when all its frames are there. Whoever is killed goes on with the cameras that lack, as long as the
-/// originals and what was asked for are the same.
+/// Builds a session in a folder beside the final one, "NAME.importing", one camera at a time. A camera is
+/// kept once all its frames are written. An interrupted import continues with the missing cameras, as long as
+/// originals and options are the same.
 class ImportFolder {
  public:
-  /// `inputs` are read, and must stay out of the session. Errors: bad_input (the session exists, one of the
-  /// inputs is in the way, "NAME.importing" is somebody else's), refused (another import is at work there),
-  /// io.
+  /// `inputs` are the files that are read; they must not lie in the session. Errors: bad_input (the session
+  /// exists, an input lies in the way, "NAME.importing" isn't an import's), refused (another import is
+  /// running there), io.
   static Result<ImportFolder> open(const std::filesystem::path& session,
                                    const std::vector<std::filesystem::path>& inputs);
 
-  /// Whether this camera is there already.
+  /// Whether this camera is already complete.
   [[nodiscard]] bool has(const CameraPart& part) const;
-  /// Decodes and writes the camera's frames, unless it is there. Distinct cameras may be written from
-  /// distinct threads. Errors: bad_input where an original is damaged, with its name and frame, whose place
-  /// in the film goes to `damaged_at`; io.
+  /// Decodes and writes the camera's frames, unless they exist. Different cameras may be written from
+  /// different threads. Errors: bad_input where an original is damaged, with its name and frame, whose index
+  /// in the film is stored in `damaged_at`; io.
   Status write(const CameraPart& part, const Observer& observer,
                std::optional<std::int64_t>& damaged_at) const;
-  /// Puts the session together and gives it its name. `manifest` has everything but what the writer fills in.
+  /// Assembles the session and renames it. `manifest` must contain everything that the writer doesn't fill
+  /// in.
   Result<v1::Manifest> finish(v1::Manifest manifest, const std::vector<CameraPart>& parts,
                               const v1::ShutterTimes* times, const ImportReports& reports) const;
 

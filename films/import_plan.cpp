@@ -9,13 +9,13 @@
 namespace emberlock::films {
 namespace {
 
-constexpr std::int64_t kGuard = 2;  // frames: a flash shows in the picture after its own, too
+constexpr std::int64_t kGuard = 2;  // frames: a flash may also show in the picture after its own
 
 struct Span {
   Seconds from, to;
 };
 
-/// The place of the film's frame that begins nearest to an instant, if the film has it.
+/// Index of the film's frame whose read phase begins closest to an instant, if the film has it.
 std::optional<std::int64_t> place_at(const TimedFilm& film, Seconds instant) {
   const auto place = film.times.place_of(film.times.nearest_count(instant));
   return place && *place >= 0 && *place < film.frames ? place : std::nullopt;
@@ -31,7 +31,7 @@ Span covered(const TimedFilm& film) {
   return {film.times.read_start(0), film.times.read_start(film.frames - 1)};
 }
 
-/// Places of the reference of which no film shows the strobe and that lie within all films: the longest run.
+/// The longest run of the reference's frames that lie within all films while no film shows the strobe.
 PlaceRange longest_unlit(std::span<const TimedFilm> films, std::size_t reference) {
   PlaceRange best;
   PlaceRange run;

@@ -23,11 +23,11 @@ namespace emberlock::films {
 namespace fs = std::filesystem;
 namespace {
 
-constexpr double kProbed = 0.03;  // of the whole import, as progress goes
+constexpr double kProbed = 0.03;  // share of the import's progress
 constexpr double kAnalysed = 0.15;
-constexpr int kMostPlans = 65;  // each but the first is cut short by another damaged film
+constexpr int kMostPlans = 65;  // each after the first was cut short by another damaged film
 
-/// Several errors as one, the first in front.
+/// Joins several errors; the first comes first.
 Error together(const std::vector<Error>& errors) {
   Error all = errors.front();
   for (std::size_t i = 1; i < errors.size(); ++i) all.remedy += "; and " + errors[i].message();
@@ -80,7 +80,7 @@ class Import {
     return {};
   }
 
-  /// What is read, and must stay out of the session.
+  /// The files that are read; they must not lie in the session.
   std::vector<fs::path> inputs() const {
     std::vector<fs::path> read{options_.folder};
     for (const fs::path& file : {options_.comb, options_.rig})
@@ -90,7 +90,7 @@ class Import {
 
   Observer stage(double from, double to) const { return part_of(observer_, from, to); }
 
-  /// With `partial` a fault becomes a note, else it is kept for the error.
+  /// With `partial` a fault becomes a note, otherwise it is kept for the error.
   bool forgive(const Error& error, std::vector<Error>& errors, const std::string& consequence) {
     if (options_.faults == Faults::partial && error.kind == ErrorKind::bad_input) {
       notes_.push_back(consequence + ": " + error.where + ": " + error.what +
@@ -239,7 +239,7 @@ class Import {
     return parts;
   }
 
-  /// What can be wrong with the rig is said before the films are searched.
+  /// Reads the rig file first, so that its faults are reported before the films are searched.
   Status read_calibration() {
     if (options_.rig.empty()) return {};
     EMBERLOCK_ASSIGN_OR_RETURN(rig_, session::read_rig(options_.rig));
@@ -253,7 +253,7 @@ class Import {
     return recon::apply_rig(manifest, *rig_, options_.rig.string());
   }
 
-  /// Gives the cameras, and the manifest its box, what the rig knows.
+  /// Copies the rig's calibration to the cameras, and its box to the manifest.
   Status calibrate(v1::Manifest& manifest, std::vector<CameraPart>& parts) const {
     if (!rig_) return {};
     for (const CameraPart& part : parts) *manifest.add_cameras() = part.stream;
@@ -270,7 +270,7 @@ class Import {
                        });
   }
 
-  /// With `partial` a film ends where it turned out to be damaged.
+  /// With `partial`, a film is cut where it proved to be damaged.
   bool cut_at_damage(const Error& error) {
     if (options_.faults == Faults::refuse) return false;
     for (std::size_t c = 0; c < films_.size(); ++c) {
@@ -325,7 +325,7 @@ class Import {
     return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(static_cast<std::time_t>(seconds)));
   }
 
-  /// A frame to know the camera by; none where it doesn't decode.
+  /// A frame to recognise the camera by; nullopt if it can't be decoded.
   static std::optional<Image> preview_of(const CameraPart& part, std::int64_t place) {
     session::ClipReader reader(part.files, part.colours);
     if (!reader.seek(place).ok()) return std::nullopt;
@@ -363,9 +363,9 @@ class Import {
   const ReportsOf& reports_;
   Alignment alignment_ = Alignment::strobe;
   std::optional<v1::Rig> rig_;
-  smear::ClipOptions clip_;  // with the row time learnt
+  smear::ClipOptions clip_;  // with the measured row time
   std::vector<Candidate> films_;
-  std::vector<std::optional<std::int64_t>> damaged_;  // by film: where writing found it so
+  std::vector<std::optional<std::int64_t>> damaged_;  // by film: the damaged frame found while writing
   std::vector<std::string> notes_;
 };
 

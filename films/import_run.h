@@ -26,14 +26,14 @@ namespace emberlock::films {
 
 /// How films are put on one clock.
 enum class Alignment {
-  strobe,   ///< by the smear of the strobe that all filmed
-  offsets,  ///< by frame offsets as told, 0 where none is: to the frame, if at all
+  strobe,   ///< by the smear of the strobe that all cameras filmed
+  offsets,  ///< by given frame offsets, default 0: accurate to a frame at best
 };
 
-/// What is done about films that are not as they should be.
+/// What to do about faulty films.
 enum class Faults {
-  refuse,   ///< nothing is imported
-  partial,  ///< what is good is imported, and what isn't is named
+  refuse,   ///< import nothing
+  partial,  ///< import the good parts and name the others
 };
 
 struct Part {
@@ -41,44 +41,47 @@ struct Part {
 };
 
 struct ImportOptions {
-  std::filesystem::path folder;  ///< of the films, or a transforms.json, or a folder that holds one
-  std::filesystem::path out;     ///< the session; must not exist, or be empty
+  std::filesystem::path folder;  ///< folder of the films; or a transforms.json, or a folder with one
+  std::filesystem::path out;     ///< the session; must be missing or empty
   std::map<std::string, std::string> ids{};  ///< by name within the folder: the camera's id
-  std::optional<Alignment> alignment{};      ///< absent: by the numbers of pictures; videos must be told how
-  smear::ClipOptions clip{};                 ///< its row time is that of the comb, else `row_time`
+  std::optional<Alignment> alignment{};      ///< default: by the numbers of pictures; required for videos
+  smear::ClipOptions clip{};                 ///< the row time comes from the comb, else from `row_time`
   std::optional<SecondsPerRow> row_time{};
-  std::filesystem::path comb{};  ///< a clip under comb_rate flashes a second
+  std::filesystem::path comb{};  ///< a clip under comb_rate flashes per second
   Hertz comb_rate{};
-  std::map<std::string, std::int64_t> offsets{};  ///< by id: frame i + offset belongs to frame i of others
-  std::optional<Part> strobe{};                   ///< of each film, where the strobe is; else it is found
-  std::optional<Part> flame{};  ///< of the first camera's film; else the longest without the strobe
+  std::map<std::string, std::int64_t>
+      offsets{};                 ///< by id: frame i + offset corresponds to frame i of the others
+  std::optional<Part> strobe{};  ///< part of each film with the strobe; default: searched
+  std::optional<Part> flame{};   ///< part of the first camera's film; default: the longest without the strobe
   FilmOptions films{};
   session::Colours colours = session::Colours::keep;
   session::Encoding encoding = session::Encoding::huffman_nut;
   Faults faults = Faults::refuse;
-  std::filesystem::path rig{};  ///< rig.json, whose calibration the cameras get; or none
-  std::uint64_t min_free_bytes = std::uint64_t{1} << 30;  ///< as WriterOptions
+  std::filesystem::path rig{};  ///< rig.json with the cameras' calibration; optional
+  std::uint64_t min_free_bytes = std::uint64_t{1} << 30;  ///< see WriterOptions
 };
 
-/// A camera as it was imported.
+/// An imported camera.
 struct ImportedCamera {
   std::string id;
-  std::string name;  ///< its file or subfolder, within the folder
+  std::string name;  ///< its file or subfolder, relative to the folder
   std::vector<std::string> files;
   Hertz frame_rate{};
-  std::int64_t frames = 0;             ///< of the film
-  std::vector<PlaceRange> strobe{};    ///< parts that show it
-  std::int64_t first = 0;              ///< place of the first imported frame
-  std::int64_t frame_offset = 0;       ///< its place less the reference's, of the first instant
-  std::vector<std::int64_t> places{};  ///< of the film, by instant
+  std::int64_t frames = 0;             ///< length of the film
+  std::vector<PlaceRange> strobe{};    ///< parts that show the strobe
+  std::int64_t first = 0;              ///< index of the first imported frame
+  std::int64_t frame_offset = 0;       ///< index of the first instant's frame, minus the reference's
+  std::vector<std::int64_t> places{};  ///< frame index in the film, by instant
   bool calibrated = false;
-  smear::ClipTimes times{};                   ///< of the film: seconds of the strobe, or frames as told
-  std::optional<Image> preview{};             ///< the middle instant's frame, small
-  std::optional<smear::WholeFrames> whole{};  ///< which frames belong to the reference's, and who told it
-  std::optional<smear::ClipClock> clock{};    ///< what the strobe told; then, by instant:
-  std::vector<double> late_s{};               ///< later than the reference
-  std::vector<double> sigma_s{};              ///< its standard error
-  std::optional<PartsPerMillion> drift{};     ///< its frame rate over the reference's, less one
+  smear::ClipTimes times{};        ///< of the film, in seconds of the strobe's clock, or in frames
+  std::optional<Image> preview{};  ///< the frame of the middle instant, reduced
+  std::optional<smear::WholeFrames>
+      whole{};  ///< which frames correspond to the reference's, and the evidence
+  std::optional<smear::ClipClock>
+      clock{};                    ///< the result of the strobe's readings. The next two are by instant:
+  std::vector<double> late_s{};   ///< delay relative to the reference
+  std::vector<double> sigma_s{};  ///< standard error of the delay
+  std::optional<PartsPerMillion> drift{};  ///< frame rate divided by the reference's, minus one
 };
 
 struct ImportResult {
@@ -86,21 +89,21 @@ struct ImportResult {
   std::vector<ImportedCamera> cameras;
   std::size_t reference = 0;
   std::int64_t instants = 0;
-  std::int64_t left_out = 0;                 ///< instants within that lack a frame of some camera
-  std::optional<smear::ClipOptions> clip{};  ///< with which the strobe was read
-  std::vector<std::string> notes;            ///< what an operator should know, a sentence each
+  std::int64_t left_out = 0;                 ///< instants in the range that lack a frame of some camera
+  std::optional<smear::ClipOptions> clip{};  ///< options with which the strobe was read
+  std::vector<std::string> notes;            ///< hints for the operator, one sentence each
 };
 
-/// What tells people and programs of an import; it lies in the session.
+/// The reports on an import that are stored in the session.
 struct ImportReports {
   std::string json;  ///< import.json
   std::string page;  ///< import.html
 };
 using ReportsOf = std::function<ImportReports(const ImportOptions&, const ImportResult&)>;
 
-/// Makes a session of films. The originals are only read. Whoever is ended goes on when called again with the
-/// same options. Errors: bad_input (what is wrong with which film, and the remedy), io, refused (ended by the
-/// observer).
+/// Creates a session from films. The originals are only read. An interrupted import continues when called
+/// again with the same options. Errors: bad_input (the film, its fault and the remedy), io, refused
+/// (cancelled by the observer).
 Result<ImportResult> run_import(const ImportOptions& options, const Observer& observer,
                                 const ReportsOf& reports);
 

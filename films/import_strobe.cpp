@@ -14,11 +14,12 @@
 namespace emberlock::films {
 namespace {
 
-constexpr double kSampleSeconds = 0.9;     // between two looks
-constexpr double kLongestBlind = 2.5;      // seconds
-constexpr double kShortestPart = 2;        // seconds
-constexpr double kSameLamp = 1.5;          // pixels: it stands still, flames don't
-constexpr std::int64_t kLongestDark = 48;  // frames: the code skips nine flashes in a row, a hand some more
+constexpr double kSampleSeconds = 0.9;  // interval between two sampled frames
+constexpr double kLongestBlind = 2.5;   // seconds
+constexpr double kShortestPart = 2;     // seconds
+constexpr double kSameLamp = 1.5;       // pixels: the lamp doesn't move; flames do
+constexpr std::int64_t kLongestDark =
+    48;  // frames: the code skips up to nine flashes in a row, a hand in front of the lamp more
 constexpr std::int64_t kSurelyOver = 60;
 constexpr int kFewestDots = 10;
 
@@ -36,7 +37,7 @@ bool at(const LampPlace& lamp, const smear::SmearReading& reading) {
   return reading.lamp && std::hypot(reading.lamp->x - lamp.x, reading.lamp->y.value() - lamp.y) <= kSameLamp;
 }
 
-/// Where most lamps with a dot stand; a flame seldom has one, and nowhere twice.
+/// The place of most lamps with a dot. A flame rarely resembles one, and never twice at the same place.
 std::optional<LampPlace> most_frequent_lamp(const std::map<std::int64_t, smear::SmearReading>& readings) {
   constexpr std::size_t kMostCandidates = 400;
   std::vector<LampPlace> lamps;
@@ -59,7 +60,7 @@ std::optional<LampPlace> most_frequent_lamp(const std::map<std::int64_t, smear::
   return best;
 }
 
-/// Reads frames, each once, until the film turns out to be damaged.
+/// Reads frames, each once, until a damaged one is found.
 class Looker {
  public:
   Looker(const FilmToSearch& film, const ReadPlace& read)
@@ -72,7 +73,7 @@ class Looker {
   [[nodiscard]] int looked_at() const { return looked_at_; }
   std::map<std::int64_t, smear::SmearReading>& glances() { return glances_; }
 
-  /// One frame for itself; false where it is damaged.
+  /// Reads a single frame; false if it is damaged.
   bool glance(std::int64_t place) {
     const auto image = take(place);
     if (image) glances_[place] = smear::detect(image->view());
@@ -98,7 +99,7 @@ class Looker {
   std::optional<Error> failure_;
 };
 
-/// About a frame a second, and every frame between keys that are far apart.
+/// Samples about a frame per second, and every frame between key frames that are far apart.
 void look_around(const FilmToSearch& film, Looker& looker) {
   const PlaceRange& range = looker.range();
   const auto step = std::max<std::int64_t>(1, std::llround(kSampleSeconds * film.frame_rate.value()));
@@ -118,8 +119,8 @@ void look_around(const FilmToSearch& film, Looker& looker) {
   }
 }
 
-/// Every frame from `from` on, until long after the last that shows the lamp and after all glances up to
-/// `last_glance` that did.
+/// Reads every frame from `from` until well after the last that shows the lamp, at least up to `last_glance`,
+/// the last sampled frame that showed it.
 std::map<std::int64_t, smear::SmearReading> read_on(Looker& looker, const LampPlace& lamp, std::int64_t from,
                                                     std::int64_t last_glance) {
   std::map<std::int64_t, smear::SmearReading> film;
@@ -135,7 +136,7 @@ std::map<std::int64_t, smear::SmearReading> read_on(Looker& looker, const LampPl
   return film;
 }
 
-/// What single frames left open is settled by the film.
+/// Resolves readings of single frames that are ambiguous, using the whole film.
 void settle_film(std::map<std::int64_t, smear::SmearReading>& film) {
   std::vector<smear::SmearReading> readings;
   readings.reserve(film.size());
@@ -145,7 +146,7 @@ void settle_film(std::map<std::int64_t, smear::SmearReading>& film) {
   for (auto& [place, reading] : film) reading = std::move(readings[i++]);
 }
 
-/// Runs of lit frames without a long dark between them.
+/// Finds runs of lit frames without a long dark interval.
 void take_runs(const std::map<std::int64_t, smear::SmearReading>& film, const LampPlace& lamp, Hertz rate,
                StrobeParts& parts) {
   PlaceRange run;
@@ -181,10 +182,10 @@ Result<StrobeParts> find_strobe(const FilmToSearch& film, const ReadPlace& read)
   look_around(film, looker);
   const auto lamp = most_frequent_lamp(looker.glances());
   const std::int64_t slack = std::llround(kLongestBlind * film.frame_rate.value());
-  std::int64_t done = looker.range().first;  // every frame before it was read, or needn't be
+  std::int64_t done = looker.range().first;  // every frame before it was read or isn't needed
   for (auto glance = looker.glances().begin(); lamp && glance != looker.glances().end(); ++glance) {
     if (glance->first < done || !shows_strobe(glance->second) || !at(*lamp, glance->second)) continue;
-    // As far as glances show it without a long break.
+    // The last sampled frame that shows the strobe without a long break.
     std::int64_t last = glance->first;
     for (auto later = glance; later != looker.glances().end() && later->first - last <= slack; ++later) {
       if (shows_strobe(later->second) && at(*lamp, later->second)) last = later->first;

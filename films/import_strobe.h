@@ -13,7 +13,7 @@
 
 namespace emberlock::films {
 
-/// Places of a film: [first, last).
+/// Frame indices of a film: [first, last).
 struct PlaceRange {
   std::int64_t first = 0;
   std::int64_t last = 0;
@@ -21,28 +21,28 @@ struct PlaceRange {
   friend bool operator==(const PlaceRange&, const PlaceRange&) = default;
 };
 
-/// Where a film shows the strobe, and what it shows there.
+/// The parts of a film that show the strobe, and their readings.
 struct StrobeParts {
-  std::vector<PlaceRange> lit;                ///< from the first flash to the last, in order; none: no strobe
-  std::vector<smear::SmearReading> readings;  ///< by place; outside `lit` ambiguous, which tells nothing
-  int looked_at = 0;                          ///< frames that were decoded
+  std::vector<PlaceRange> lit;                ///< from first to last flash, in order; empty: no strobe
+  std::vector<smear::SmearReading> readings;  ///< by frame index; ambiguous (no information) outside `lit`
+  int looked_at = 0;                          ///< number of decoded frames
 };
 
-/// A film, as far as looking for the strobe needs it.
+/// The properties of a film that the search needs.
 struct FilmToSearch {
   std::int64_t frames = 0;
   Hertz frame_rate{24};
-  std::vector<std::int64_t> keys{};    ///< places at which decoding may begin, in order
-  std::optional<PlaceRange> within{};  ///< nowhere else
+  std::vector<std::int64_t> keys{};    ///< indices of the key frames, ascending
+  std::optional<PlaceRange> within{};  ///< limits the search
 };
 
-/// Reads the frame at a place, after seeking there where it isn't the next one.
+/// Reads the frame at an index; seeks if it isn't the next one.
 using ReadPlace = std::function<Result<Image>(std::int64_t place)>;
 
-/// Finds the parts of a film that show the strobe. It looks at a frame a second where decoding may begin, and
-/// at every frame where that is further apart than 2.5 s; then at every frame about those that show a lamp
-/// where most dots have theirs. A part is two seconds long or more, and flashes in more than a quarter of its
-/// frames. Errors: those of `read`; frames that `read` finds damaged end the search there.
+/// Finds the parts of a film that show the strobe. It samples a key frame every second, or every frame where
+/// key frames are more than 2.5 s apart; then it reads all frames around the samples whose lamp is at the
+/// most frequent place of lamps with a dot. A part lasts at least two seconds and has flashes in more than a
+/// quarter of its frames. Errors: those of `read`; the search ends at a frame that `read` reports as damaged.
 Result<StrobeParts> find_strobe(const FilmToSearch& film, const ReadPlace& read);
 
 }  // namespace emberlock::films

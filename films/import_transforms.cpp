@@ -37,7 +37,7 @@ void put_calibration(const recon::Intrinsics& lens, const recon::Rigid3& pose, v
   }
 }
 
-/// As short a name as tells the pictures apart: that of the file, or with its folder.
+/// The shortest names that distinguish the pictures: of the file, or with its folder.
 std::vector<std::string> ids_of(const std::vector<recon::TransformsFrame>& frames) {
   std::vector<std::string> ids;
   std::set<std::string> distinct;
@@ -51,8 +51,7 @@ std::vector<std::string> ids_of(const std::vector<recon::TransformsFrame>& frame
   return ids;
 }
 
-/// The same with the names that `wanted` gives some of them. Errors: a name of none; one that can't name a
-/// folder.
+/// Replaces some names by those in `wanted`. Errors: a name that doesn't exist; an invalid folder name.
 Result<std::vector<std::string>> named(std::vector<std::string> ids,
                                        std::map<std::string, std::string> wanted,
                                        const fs::path& transforms) {

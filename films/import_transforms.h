@@ -10,12 +10,12 @@
 
 namespace emberlock::films {
 
-/// The transforms.json that a path names, or that the folder holds.
+/// The transforms.json given by a path, or in the given folder.
 std::optional<std::filesystem::path> transforms_in(const std::filesystem::path& path);
 
-/// One instant: the pictures of a transforms.json become a session of one frame a camera, calibrated, with
-/// the file's box. Cameras are called as their pictures are. Errors: those of the file, its pictures and
-/// lenses; ids there twice.
+/// Imports a single instant: the pictures of a transforms.json become a session of one frame per camera, with
+/// calibration and the file's box. Cameras are named after their pictures. Errors: those of the file, its
+/// pictures and lenses; duplicate ids.
 Result<ImportResult> import_transforms(const std::filesystem::path& transforms, const ImportOptions& options,
                                        const Observer& observer, const ReportsOf& reports);
 

@@ -7,7 +7,7 @@ namespace emberlock::films {
 
 inline constexpr int kPreviewWidth = 280;  ///< pixels
 
-/// The picture as a page shows it: 8 bits, kPreviewWidth wide at most; mosaics grey.
+/// A picture for a page: 8 bits, at most kPreviewWidth wide; Bayer mosaics become grey.
 Image small_picture(const Image& image);
 
 }  // namespace emberlock::films

@@ -8,7 +8,7 @@
 namespace emberlock::films {
 namespace {
 
-constexpr SecondsPerRow kRowTimeAsTold(20e-9);  // standard error of a row time given by hand
+constexpr SecondsPerRow kRowTimeAsTold(20e-9);  // standard error of a row time given by the user
 
 Status check(const VerifyRunOptions& options) {
   if (options.clips.size() < 2) {
@@ -27,7 +27,7 @@ Status check(const VerifyRunOptions& options) {
   return {};
 }
 
-/// The row time from the comb.
+/// Measures the row time in the comb.
 Status learn_from_comb(const VerifyRunOptions& options, VerifyRunResult& run, smear::VerifyOptions& verify) {
   const smear::ClipReading& comb = run.comb->reading;
   const auto clock = smear::fit_row_clock(comb.frames, options.comb_rate);
@@ -49,7 +49,7 @@ Status learn_from_comb(const VerifyRunOptions& options, VerifyRunResult& run, sm
   return {};
 }
 
-/// What the comb says of its own camera's direction, for an operator who knows that the others are of its
+/// Reports the read direction of the comb's camera, for an operator who knows that the others are of the same
 /// model.
 Status hint_from_comb(const VerifyRunOptions& options, VerifyRunResult& run) {
   const auto& cameras = run.result.cameras;

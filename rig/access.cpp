@@ -51,10 +51,10 @@ using Key = std::unique_ptr<EVP_PKEY, Free<EVP_PKEY_free>>;
 
 Bio bio_of(const std::string& pem) { return Bio(BIO_new_mem_buf(pem.data(), static_cast<int>(pem.size()))); }
 
-/// A daemon that runs without a terminal can't be asked for a key's password.
+/// Returns no password, because a daemon without a terminal can't ask for one.
 int no_password(char* /*buffer*/, int /*size*/, int /*writing*/, void* /*user*/) { return 0; }
 
-/// The first in the file.
+/// Parses the first certificate in the file.
 Result<Certificate> parse_certificate(const std::string& pem, const fs::path& file) {
   Certificate first(PEM_read_bio_X509(bio_of(pem).get(), nullptr, no_password, nullptr));
   if (!first)
@@ -75,7 +75,7 @@ Result<std::string> read_secret_file(const fs::path& file, std::size_t max_bytes
     return Error{ErrorKind::bad_input, fmt::format("{} {} (mode {:04o})", who, what, status.st_mode & 07777U),
                  file.string(), fmt::format("make it private: chmod {} {}", remedy, file.string())};
   };
-  // root tries a service user's files, too.
+  // root checks a service user's files too.
   if (status.st_uid != 0 && status.st_uid != ::geteuid() && ::geteuid() != 0)
     return Error{ErrorKind::bad_input, fmt::format("another user owns {} (uid {})", what, status.st_uid),
                  file.string(),
@@ -156,7 +156,7 @@ Result<ServerTls> ServerTls::read(const fs::path& certificate, const fs::path& k
 
 namespace {
 
-/// Takes away what a daemon left behind that has the lock no more; never anything but a socket.
+/// Removes a socket left behind by a daemon that no longer holds the lock; never any other file.
 Status remove_stale(const fs::path& socket) {
   struct stat found {};
   if (::lstat(socket.c_str(), &found) != 0) return {};
@@ -167,9 +167,21 @@ Status remove_stale(const fs::path& socket) {
   return {};
 }
 
+/// A folder of somebody else's would let them put their own socket there.
+Status check_owner(const fs::path& folder) {
+  struct stat found {};
+  const uid_t user = ::geteuid();
+  if (user == 0 || ::lstat(folder.c_str(), &found) != 0 || found.st_uid == user || found.st_uid == 0)
+    return {};
+  return Error{ErrorKind::refused, fmt::format("belongs to another user (uid {})", found.st_uid),
+               folder.string(), "choose another path for the socket"};
+}
+
+/// An ordinary user's is for them alone; their group may be everybody's.
 Status make_folder(const fs::path& folder) {
-  if (folder.empty() || fs::is_directory(folder)) return {};
-  if (::mkdir(folder.c_str(), S_IRWXU | S_IRGRP | S_IXGRP) == 0) return {};
+  if (folder.empty() || fs::is_directory(folder)) return check_owner(folder);
+  const mode_t group = ::geteuid() == 0 ? S_IRGRP | S_IXGRP : 0;
+  if (::mkdir(folder.c_str(), S_IRWXU | group) == 0) return {};
   return os_error(folder, "mkdir", "make the folder, or choose another path for the socket");
 }
 

@@ -8,30 +8,30 @@
 #include "base/result.h"
 #include "base/unique_fd.h"
 
-// Who may talk to the daemon. Over its Unix socket: whoever the folder's permissions let in. Over HTTP: a
-// browser that followed one of the daemon's links (console_sessions.h), or who has the token. From elsewhere:
-// who has the token.
+// Access to the daemon. Over its Unix socket: users permitted by the folder's mode. Over HTTP: a browser that
+// followed one of the daemon's links (console_sessions.h), or a client with the token. From other machines:
+// clients with the token.
 namespace emberlock::rig {
 
-/// What a file holds that must be kept from others. Error bad_input: others than its owner and its group can
-/// read it, or others than its owner can write to it; `what` names the secret: "the token".
+/// Reads a file with a secret. Error bad_input: users other than its owner and group can read it, or users
+/// other than its owner can write to it; `what` names the secret: "the token".
 Result<std::string> read_secret_file(const std::filesystem::path& file, std::size_t max_bytes,
                                      std::string_view what);
 
-/// 256 random bits as 64 hexadecimal digits. Error io: the kernel has none.
+/// 256 random bits as 64 hexadecimal digits. Error io: the kernel provides none.
 Result<std::string> random_secret();
 
-/// The secret that clients from elsewhere show.
+/// The secret that remote clients present.
 class Token {
  public:
   static constexpr std::size_t kShortest = 16;  ///< characters: letters, digits and - . _ ~ + / =
   static constexpr std::size_t kLongest = 256;
 
   static Result<Token> parse(std::string_view text);
-  /// A file that holds it alone. Errors as read_secret_file; bad_input where it holds no token.
+  /// Reads a file that contains only the token. Errors as read_secret_file; bad_input where it isn't a token.
   static Result<Token> read(const std::filesystem::path& file);
 
-  /// Takes as long whatever they have in common.
+  /// Compares in constant time.
   [[nodiscard]] bool matches(std::string_view shown) const;
 
  private:
@@ -39,35 +39,38 @@ class Token {
   std::string secret_;
 };
 
-/// Writes a new token, of 256 random bits, that only its owner can read. Error bad_input: the file exists.
+/// Writes a new token of 256 random bits to a file that only its owner can read. Error bad_input: the file
+/// exists.
 Status make_token(const std::filesystem::path& file);
 
-/// What one side of TLS shows to prove who it is, as PEM.
+/// The TLS certificate and key of one side, as PEM.
 struct TlsIdentity {
-  std::string certificate;  ///< with those that vouch for it, if any
+  std::string certificate;  ///< followed by its chain, if any
   std::string key;
 
-  /// Errors say what is wrong with which file: absent, no PEM, the key of another certificate, out of date;
-  /// of the key as read_secret_file, too.
+  /// Errors name the file and its fault: absent, not PEM, the key of another certificate, expired; for the
+  /// key also those of read_secret_file.
   static Result<TlsIdentity> read(const std::filesystem::path& certificate, const std::filesystem::path& key);
 };
 
-/// How the daemon speaks TLS, to all who come by network.
+/// The daemon's TLS settings for network clients.
 struct ServerTls {
   TlsIdentity identity;
-  std::string clients = {};  ///< PEM of who signs clients' certificates, demanded then; empty: none are
+  std::string clients = {};  ///< PEM of the authority that signs clients' certificates, which are then
+                             ///< required; empty: not required
 
   /// `clients` may be empty. Errors as those of TlsIdentity.
   static Result<ServerTls> read(const std::filesystem::path& certificate, const std::filesystem::path& key,
                                 const std::filesystem::path& clients);
 };
 
-/// The right to listen on a Unix socket: a lock on `socket`.lock, held until it goes, or until the process
-/// dies however.
+/// The exclusive right to listen on a Unix socket: a lock on `socket`.lock, held until this object is
+/// destroyed or the process ends in any way.
 class SocketLock {
  public:
-  /// Makes the socket's folder if need be (0750) and takes away a socket that a daemon left behind. Error
-  /// refused: another daemon, whose pid it names, has it.
+  /// Creates the socket's folder if necessary (0750 as root, else 0700) and removes a socket that a daemon
+  /// left behind. Error refused: another daemon, whose pid is named, holds the lock; the folder is another
+  /// user's.
   static Result<SocketLock> take(const std::filesystem::path& socket);
 
  private:

@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <thread>
+#include <string_view>
+
+#include <fmt/format.h>
 
 #include "base/clock.h"
+#include "base/in_parallel.h"
 #include "drivers/virtual/virtual_clock.h"
 #include "recon/calibrate/rig.h"
 #include "recon/pipeline/scene.h"
@@ -17,7 +20,7 @@ namespace {
 
 constexpr Rows kByHandTolerance{100};
 constexpr Rows kTimedTolerance{10};
-constexpr int kPaperIterations = 70;  // where the paper's figures end
+constexpr int kPaperIterations = 70;  // at which the paper's figures end
 
 Seconds since(TimePoint start) { return SteadyClock{}.now() - start; }
 
@@ -34,7 +37,9 @@ Status check(const DemoOptions& o) {
   return {};
 }
 
-/// The rig, opened, as an alignment sees it.
+bool asked(const StopAsked& stop) { return stop && stop(); }
+
+/// The opened rig, as an alignment uses it.
 struct Rig {
   std::shared_ptr<drivers::VirtualClock> clock = std::make_shared<drivers::VirtualClock>();
   std::unique_ptr<drivers::VirtualRig> rig;
@@ -52,13 +57,13 @@ Result<Rig> open_rig(const DemoOptions& options) {
   draw.cameras = options.cameras;
   draw.seed = options.seed;
   draw.layout = {options.image, PixelFormat::bayer_rggb8, 8};
-  // A sensor of fewer rows is read as long, row by row more slowly.
+  // A sensor with fewer rows has the same read time, with a longer row time.
   draw.row_time = microseconds_per_row(54) * (720.0 / options.image.height);
   Rig opened;
   EMBERLOCK_ASSIGN_OR_RETURN(opened.rig,
                              drivers::VirtualRig::create(drivers::draw_virtual_rig(draw), opened.clock));
   for (int i = 0; i < opened.rig->size(); ++i) {
-    // A datasheet's figures: what differs from camera to camera is for the alignment to find out.
+    // From a datasheet: the alignment must find out how cameras differ.
     smear::CcdTiming timing = opened.rig->truth(i).timing;
     timing.frame_period = period(draw.rate);
     timing.row_time = draw.row_time;
@@ -79,9 +84,11 @@ SmearSnapshot snapshot(const AlignRoundReport& report) {
   return shot;
 }
 
-/// Recorded in `record`, if one is named: `emberlock align --replay` then shows the same decisions.
+/// Aligns; writes a recording to `record`, if given, so that `emberlock align --replay` shows the same
+/// decisions.
 Result<AlignStage> align(const Rig& rig, AlignStage stage, AlignRunOptions options,
-                         const std::optional<std::filesystem::path>& record, const Progress& progress) {
+                         const std::optional<std::filesystem::path>& record, const Progress& progress,
+                         const StopAsked& stop) {
   options.align.policy = stage.policy;
   options.align.tolerance.amount = stage.tolerance;
   options.timing = rig.timing;
@@ -94,19 +101,19 @@ Result<AlignStage> align(const Rig& rig, AlignStage stage, AlignRunOptions optio
     stage.errors.push_back(std::move(errors));
   };
   EMBERLOCK_ASSIGN_OR_RETURN(stage.result,
-                             record ? record_align(*record, rig.devices(), options, observe, progress)
-                                    : run_align(rig.devices(), options, observe, progress));
+                             record ? record_align(*record, rig.devices(), options, observe, progress, stop)
+                                    : run_align(rig.devices(), options, observe, progress, stop));
   stage.seconds = since(start);
-  if (stage.result.last.verdict != smear::AlignVerdict::aligned) {
-    return Error{ErrorKind::device, "not aligned: " + stage.result.last.reason, stage.title,
+  if (stage.result.last.verdict != smear::AlignVerdict::aligned && !asked(stop)) {
+    return Error{ErrorKind::device, "not aligned: " + stage.result.words.reason, stage.title,
                  "Try another --seed"};
   }
   return stage;
 }
 
-/// Within 100 rows as an operator does it, then within 10 rows by timed resets; the latter is recorded.
+/// Aligns to 100 rows like an operator, then to 10 rows by timed resets; the latter is recorded.
 Status align_twice(Rig& rig, DemoResult& result, const std::filesystem::path& folder,
-                   const ProgressFactory& progress) {
+                   const ProgressFactory& progress, const StopAsked& stop) {
   AlignRunOptions options;
   options.seed = result.options.seed;
   rig.rig->set_reset(ShutterReset::by_hand);
@@ -115,7 +122,8 @@ Status align_twice(Rig& rig, DemoResult& result, const std::filesystem::path& fo
                                    {.title = "within 100 rows, buttons pressed by hand",
                                     .policy = smear::AlignPolicy::densest,
                                     .tolerance = kByHandTolerance},
-                                   options, std::nullopt, progress("align by hand, 100 rows")));
+                                   options, std::nullopt, progress("align by hand, 100 rows"), stop));
+  if (asked(stop)) return {};
   for (const auto& clock : by_hand.result.row_clocks) {
     if (!clock)
       return Error{ErrorKind::device, "a camera's row time was not measured", "comb", "Try another --seed"};
@@ -125,17 +133,18 @@ Status align_twice(Rig& rig, DemoResult& result, const std::filesystem::path& fo
   rig.timing = by_hand.result.timing;
   options.measure_row_time = false;
   options.delays = by_hand.result.delays;
-  EMBERLOCK_ASSIGN_OR_RETURN(
-      AlignStage timed, align(rig,
-                              {.title = "within 10 rows, timed resets",
-                               .policy = smear::AlignPolicy::timed,
-                               .tolerance = kTimedTolerance},
-                              options, folder / "alignment", progress("align by timed resets, 10 rows")));
+  EMBERLOCK_ASSIGN_OR_RETURN(AlignStage timed, align(rig,
+                                                     {.title = "within 10 rows, timed resets",
+                                                      .policy = smear::AlignPolicy::timed,
+                                                      .tolerance = kTimedTolerance},
+                                                     options, folder / "alignment",
+                                                     progress("align by timed resets, 10 rows"), stop));
+  result.kept.push_back(fmt::format("alignment/: {} rounds", timed.result.last.round));
   result.stages = {std::move(by_hand), std::move(timed)};
   return {};
 }
 
-/// The largest difference between two cameras' starts of read, as the rig knows it.
+/// The largest difference between two cameras' true starts of read-out.
 Seconds true_worst_pair(const Rig& rig) {
   const TimePoint now = rig.clock->now();
   Seconds worst;
@@ -148,10 +157,10 @@ Seconds true_worst_pair(const Rig& rig) {
   return worst;
 }
 
-/// Films one camera: `count` frames that were exposed after `from`.
+/// Films with one camera: `count` frames that were exposed after `from`, or fewer if it is stopped.
 Status film(drivers::Camera& camera, std::size_t index, TimePoint from, int count,
-            session::AsyncWriter& writer) {
-  for (int recorded = 0; recorded < count;) {
+            session::AsyncWriter& writer, const StopAsked& stop) {
+  for (int recorded = 0; recorded < count && !asked(stop);) {
     EMBERLOCK_ASSIGN_OR_RETURN(Frame frame, camera.next_frame(Seconds(3)));
     if (frame.stamp.monotonic_time < from) continue;
     if (!writer.push(index, std::move(frame))) {
@@ -162,9 +171,9 @@ Status film(drivers::Camera& camera, std::size_t index, TimePoint from, int coun
   return {};
 }
 
-/// The strobe goes out, the flame is lit, every camera films it on a thread of its own (a few at a time).
+/// Switches the strobe off and the flame on; the cameras film it in parallel.
 Status record_flame(Rig& rig, const Stage& stage, DemoResult& result, const std::filesystem::path& folder,
-                    const Progress& progress) {
+                    const Progress& progress, const StopAsked& stop) {
   EMBERLOCK_RETURN_IF_ERROR(rig.rig->strobe().apply({.output = drivers::StrobeOutput::off}));
   recon::FlameOptions flame;
   flame.seed = result.options.seed;
@@ -182,52 +191,54 @@ Status record_flame(Rig& rig, const Stage& stage, DemoResult& result, const std:
                              session::SessionWriter::create(folder / "flame", manifest));
   session::AsyncWriter writer(std::move(session), {.when_full = session::WhenFull::wait});
   const TimePoint from = rig.clock->now() + 3 * rig.timing[0].frame_period;
-  const std::size_t workers =
-      std::max(1U, result.options.threads > 0 ? static_cast<unsigned>(result.options.threads)
-                                              : std::thread::hardware_concurrency());
-  std::vector<Status> status(cameras);
-  for (std::size_t first = 0; first < cameras; first += workers) {
-    tell(progress, static_cast<double>(first) / static_cast<double>(cameras), "filming the flame");
-    std::vector<std::jthread> threads;
-    for (std::size_t i = first; i < std::min(first + workers, cameras); ++i) {
-      threads.emplace_back([&, i] {
-        status[i] = film(rig.rig->camera(static_cast<int>(i)), i, from, result.options.flame_frames, writer);
-      });
-    }
-  }
-  for (const Status& s : status) EMBERLOCK_RETURN_IF_ERROR(s);
+  const Observer observer = [&](double fraction, std::string_view what) {
+    tell(progress, kNearlyDone * fraction, what);
+    return true;
+  };
+  EMBERLOCK_RETURN_IF_ERROR(in_parallel(cameras, observer, [&](std::size_t i, const Observer& part) {
+    part(0, "filming the flame");
+    return film(rig.rig->camera(static_cast<int>(i)), i, from, result.options.flame_frames, writer, stop);
+  }));
   EMBERLOCK_ASSIGN_OR_RETURN(result.flame_session, writer.finish());
+  std::uint64_t frames = 0;
+  for (const v1::CameraStream& camera : result.flame_session.cameras()) frames += camera.counts().recorded();
+  result.kept.push_back(fmt::format("flame/: {} frames of {} cameras", frames, cameras));
   tell(progress, 1, "recorded");
   return {};
 }
 
 Status reconstruct_flame(DemoResult& result, const std::filesystem::path& folder,
-                         const ProgressFactory& progress) {
+                         const ProgressFactory& progress, const StopAsked& stop) {
   EMBERLOCK_ASSIGN_OR_RETURN(result.scene, recon::load_scene(folder / "flame"));
   result.held_out = result.options.cameras / 2;
   EMBERLOCK_RETURN_IF_ERROR(recon::hold_out(result.scene, {result.held_out}));
   recon::ReconstructOptions options;
   options.voxels = result.options.voxels;
   options.solve.compute.threads = result.options.threads;
+  options.solve.stop = stop;
   SteadyClock clock;
   EMBERLOCK_ASSIGN_OR_RETURN(result.outcome,
                              recon::reconstruct(result.scene, options, clock, progress("reconstruct")));
   result.outcome.report.input = "flame";
   EMBERLOCK_RETURN_IF_ERROR(recon::write_outcome(result.outcome, folder / "reconstruction"));
+  result.kept.emplace_back("reconstruction/: volume.vdb, views/, report.json");
+  if (asked(stop)) return {};
   options.solve.solver = recon::Solver::paper;
   options.solve.iterations = kPaperIterations;
-  // It refuses pictures with saturated pixels marked, as what it knows nothing of: here it shall ignore them.
+  // The paper's solver refuses pictures with marked saturated pixels, which it doesn't support: it gets them
+  // unmarked.
   recon::Scene unmarked = result.scene;
-  for (recon::View& view : unmarked.views) view.bounds.clear();
+  for (recon::View& view : unmarked.views) view.bounds.reset();
   EMBERLOCK_ASSIGN_OR_RETURN(
       result.paper, recon::reconstruct(unmarked, options, clock, progress("the paper's solver beside it")));
+  result.whole = true;
   return {};
 }
 
 }  // namespace
 
 Result<DemoResult> run_demo(const DemoOptions& options, const std::filesystem::path& folder,
-                            const ProgressFactory& progress) {
+                            const ProgressFactory& progress, const StopAsked& stop) {
   EMBERLOCK_RETURN_IF_ERROR(check(options));
   const TimePoint start = SteadyClock{}.now();
   DemoResult result;
@@ -235,13 +246,15 @@ Result<DemoResult> run_demo(const DemoOptions& options, const std::filesystem::p
   EMBERLOCK_ASSIGN_OR_RETURN(Rig rig, open_rig(options));
   for (int i = 0; i < rig.rig->size(); ++i)
     result.true_row_times.push_back(rig.rig->truth(i).timing.row_time);
-  EMBERLOCK_RETURN_IF_ERROR(align_twice(rig, result, folder, progress));
+  EMBERLOCK_RETURN_IF_ERROR(align_twice(rig, result, folder, progress, stop));
+  if (asked(stop)) return result;
   result.true_worst_pair = true_worst_pair(rig);
   const TimePoint recording = SteadyClock{}.now();
   const Stage stage = demo_stage(options.cameras, options.image);
-  EMBERLOCK_RETURN_IF_ERROR(record_flame(rig, stage, result, folder, progress("record the flame")));
+  EMBERLOCK_RETURN_IF_ERROR(record_flame(rig, stage, result, folder, progress("record the flame"), stop));
+  if (asked(stop)) return result;
   result.record_seconds = since(recording);
-  EMBERLOCK_RETURN_IF_ERROR(reconstruct_flame(result, folder, progress));
+  EMBERLOCK_RETURN_IF_ERROR(reconstruct_flame(result, folder, progress, stop));
   result.total_seconds = since(start);
   return result;
 }

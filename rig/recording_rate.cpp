@@ -6,8 +6,8 @@
 namespace emberlock::rig {
 
 double bytes_per_second(std::span<const drivers::CameraInfo> cameras, session::Encoding encoding) {
-  constexpr double kContainer = 64;      // NUT's and Matroska's bytes around a frame
-  constexpr double kNoiseInFfv1 = 1.25;  // the most that the tests see
+  constexpr double kContainer = 64;      // bytes that NUT and Matroska add per frame
+  constexpr double kNoiseInFfv1 = 1.25;  // the maximum in the tests
   double sum = 0;
   for (const drivers::CameraInfo& camera : cameras) {
     const double pixels =

@@ -8,8 +8,8 @@
 
 namespace emberlock::rig {
 
-/// What a recording of these cameras takes of the disk at most, each at its nominal rate. FFV1 is counted
-/// with what noise makes of it, which it can't compress: how well a flame does nobody knows before.
+/// Upper limit of a recording's data rate, with each camera at its nominal rate. For FFV1 it assumes noise,
+/// which can't be compressed; how well a flame compresses isn't known beforehand.
 double bytes_per_second(std::span<const drivers::CameraInfo> cameras, session::Encoding encoding);
 
 }  // namespace emberlock::rig

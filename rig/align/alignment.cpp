@@ -9,10 +9,9 @@
 
 #include <fmt/format.h>
 
+#include "rig/align/decision_proto.h"
 #include "rig/align/dial.h"
-#include "rig/align/json.h"
 #include "rig/align/row_times.h"
-#include "smear_sync/align/align_words.h"
 #include "smear_sync/align/move_together.h"
 #include "smear_sync/align/reset_delay.h"
 
@@ -106,10 +105,10 @@ void adopt_sensors(const AlignRig& rig, AlignBench& bench, const AlignRunOptions
 }
 
 /// How a camera's tau moves against the strobe, as far as earlier rounds tell.
-smear::Beat own_beat(const smear::AlignState& state, std::size_t camera, const smear::Beat& common,
-                     const smear::AlignOptions& options) {
+smear::PeriodOffset own_period_offset(const smear::AlignState& state, std::size_t camera,
+                                      const smear::PeriodOffset& common, const smear::AlignOptions& options) {
   const double spread = options.rate_spread.value();
-  smear::Beat own{common.rate, PartsPerMillion(std::hypot(common.sigma.value(), spread))};
+  smear::PeriodOffset own{common.rate, PartsPerMillion(std::hypot(common.sigma.value(), spread))};
   if (!state.last_round || !state.cameras[camera].phase.phase_known()) return own;
   const smear::PhaseTrack& track = state.cameras[camera].phase;
   const TimePoint later = *state.last_round + Seconds(1);  // when what was ordered is in force
@@ -120,12 +119,12 @@ smear::Beat own_beat(const smear::AlignState& state, std::size_t camera, const s
 }
 
 smear::AlignRound to_round(AlignBench& bench, const Film& film, const AlignRunResult& rig,
-                           smear::Beat expected) {
+                           smear::PeriodOffset expected) {
   const drivers::StrobeSettings& strobe = bench.strobe();
   smear::FlashRate flashes;
   if (rig.options.dial) {
     flashes = flashes_of(film, rig.timing, strobe.width);
-    expected = beat_of(flashes, rig.options.period).value_or(expected);
+    expected = period_offset_of(flashes, rig.options.period).value_or(expected);
   }
   std::vector<std::vector<smear::PhaseSample>> samples;
   for (std::size_t i = 0; i < film.frames.size(); ++i) {
@@ -137,8 +136,8 @@ smear::AlignRound to_round(AlignBench& bench, const Film& film, const AlignRunRe
   smear::CommonPhases common =
       smear::refer(samples, {.period = period,
                              .resolution = smear::row_resolution(rig.options.row_time, strobe.width),
-                             .beat = expected});
-  smear::AlignRound round{common.at, common.beat, strobe.phase, {}, {}, {}, std::move(flashes)};
+                             .period_offset = expected});
+  smear::AlignRound round{common.at, common.period_offset, strobe.phase, {}, {}, {}, std::move(flashes)};
   for (std::size_t i = 0; i < samples.size(); ++i) {
     std::vector<TimePoint> stamps;
     for (const Frame& frame : film.frames[i]) stamps.push_back(frame.stamp.monotonic_time);
@@ -175,33 +174,32 @@ Result<std::unique_ptr<Alignment>> Alignment::create(const AlignRig& rig, const 
                                                      AlignObserver observer, Progress progress,
                                                      StopAsked stop) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Seconds period, common_period(rig, options));
-  return std::unique_ptr<Alignment>(
-      new Alignment(rig, options, period, std::move(observer), std::move(progress), std::move(stop)));
+  return std::unique_ptr<Alignment>(new Alignment(rig, for_dial(at_period(options, period)),
+                                                  std::move(observer), std::move(progress), std::move(stop)));
 }
 
-Alignment::Alignment(const AlignRig& rig, const AlignRunOptions& options, Seconds period,
-                     AlignObserver observer, Progress progress, StopAsked stop)
+Alignment::Alignment(const AlignRig& rig, AlignRunOptions options, AlignObserver observer, Progress progress,
+                     StopAsked stop)
     : rig_(rig),
-      options_(for_dial(options, period)),
+      options_(std::move(options)),
       observer_(std::move(observer)),
       progress_(std::move(progress)),
       stop_(std::move(stop)),
-      bench_(rig_, options_, period, [this] { return stop_asked(); }),
-      cameras_(describe(rig, options)),
+      bench_(rig_, options_, [this] { return stop_asked(); }),
+      cameras_(describe(rig, options_)),
       sights_(rig.cameras.size()) {
+  const Seconds period = options_.align.period;
   result_.options = options_.align;
-  result_.options.period = period;
   result_.options.round_time = period * (options_.frames_per_round + AlignBench::kSettlingPeriods);
   if (const auto swept = bench_.cameras_with(SensorKind::global_shutter); !swept.empty()) {
     const Seconds look = period * (1 + AlignBench::kSettlingPeriods);
     result_.options.round_time += (1 + kLooks * static_cast<double>(swept.size())) * look;
     result_.options.sweep_time = kSweepLooks * look;
   }
-  for (smear::CcdTiming& timing : options_.timing) timing.frame_period = period;
   result_.timing = options_.timing;
   result_.row_clocks.resize(rig.cameras.size());
   for (const drivers::Camera* camera : rig.cameras) sensors_.push_back(camera->info().sensor);
-  flashes_ = {.output = drivers::StrobeOutput::flashing, .rate = rate(period), .width = options.flash_width};
+  flashes_ = {.output = drivers::StrobeOutput::flashing, .rate = rate(period), .width = options_.flash_width};
   if (options_.align.dial) flashes_.rate = options_.align.dial->nearest(flashes_.rate);
 }
 
@@ -222,10 +220,11 @@ Status Alignment::round() {
   EMBERLOCK_RETURN_IF_ERROR(bench_.set_strobe(flashes_));
   // What a round before saw of the beat is no better than the settings, whose error is common to all
   // rounds.
-  const smear::Beat expected =
-      smear::expected_beat(bench_.strobe().rate, result_.options.period, options_.rate_error);
+  const smear::PeriodOffset expected =
+      smear::expected_period_offset(bench_.strobe().rate, result_.options.period, options_.rate_error);
   for (std::size_t i = 0; i < cameras_.size(); ++i)
-    bench_.sensor(i).begin_round(own_beat(state_, i, beat_.value_or(expected), result_.options));
+    bench_.sensor(i).begin_round(
+        own_period_offset(state_, i, period_offset_.value_or(expected), result_.options));
   EMBERLOCK_RETURN_IF_ERROR(bench_.sweep(flashes_, wanted_of_sweeps(result_.options), progress_, reached_));
   adopt_sensors(rig_, bench_, options_, result_);
   emberlock::tell(progress_, std::min(reached_, kNearlyDone),
@@ -233,7 +232,7 @@ Status Alignment::round() {
   EMBERLOCK_ASSIGN_OR_RETURN(const Film film, bench_.film_all(options_.frames_per_round));
   if (stopped_) return {};
   smear::AlignRound round = to_round(bench_, film, result_, expected);
-  beat_ = round.beat;
+  period_offset_ = round.period_offset;
   at_ = round.at;
   round.resets = std::exchange(resets_, {});
   round.trims = std::exchange(trims_, {});
@@ -241,12 +240,13 @@ Status Alignment::round() {
   smear::AlignStep step = smear::align_step(state_, round, cameras_, result_.options);
   state_ = std::move(step.state);
   result_.last = std::move(step.decision);
+  result_.words = smear::words(result_.last, round, cameras_, result_.options);
   for (const std::size_t camera : result_.last.jumped) bench_.sensor(camera).forget_phase();
   promise();
   if (result_.last.reference) reached_ = 0.2 + 0.8 * part_within(result_.last, result_.options);
   look(film);
-  EMBERLOCK_RETURN_IF_ERROR(tell({round, result_.last, cameras_, sensors_, result_.options, bench_.strobe(),
-                                  film.frames, film.readings}));
+  EMBERLOCK_RETURN_IF_ERROR(tell({round, result_.last, result_.words, cameras_, sensors_, result_.options,
+                                  bench_.strobe(), film.frames, film.readings}));
   return carry_out();
 }
 
@@ -291,17 +291,30 @@ void Alignment::promise() {
 
 Seconds Alignment::time_left(TimePoint now) const {
   if (!locked(now)) return Seconds(0);
+  const Seconds left = *promised_until_ - now;
+  return left < kUntilStopped / 2 ? left : Seconds(std::numeric_limits<double>::infinity());
+}
+
+Seconds Alignment::likely_left(TimePoint now) const {
+  if (!locked(now)) return Seconds(0);
   Seconds left(std::numeric_limits<double>::infinity());
-  for (const smear::CameraDecision& camera : last().cameras) {
-    if (camera.time_left) left = std::min(left, camera.time_left->earliest - (now - at_));
-  }
-  return std::max(left, Seconds(0));
+  for (const smear::CameraDecision& camera : last().cameras)
+    if (camera.time_left) left = std::min(left, camera.time_left->expected - (now - at_));
+  return std::max(left, time_left(now));
+}
+
+std::optional<Seconds> Alignment::time_left(TimePoint now, std::size_t camera) const {
+  const auto& stay = last().cameras[camera].sure_stay;
+  if (!stay || !locked(now)) return std::nullopt;
+  return std::max(*stay - (now - at_), Seconds(0));
 }
 
 Seconds Alignment::next_check(TimePoint now) const {
   if (last().verdict != smear::AlignVerdict::aligned) return Seconds(0);
   const Seconds promised = std::min(last().next_check.value_or(kLongestWait), kLongestWait);
-  const Seconds ahead = std::max(kAhead * promised, result_.options.round_time);
+  Seconds ahead = std::max(kAhead * promised, result_.options.round_time);
+  // A renewal comes before less than the shortest take is left, where it can.
+  if (promised > result_.options.shortest_take) ahead = std::max(ahead, result_.options.shortest_take);
   const bool pressed = result_.options.reset_by == smear::ResetBy::anybody &&
                        std::any_of(cameras_.begin(), cameras_.end(), [](const smear::AlignCamera& camera) {
                          return camera.method == ShutterReset::by_hand;
@@ -348,8 +361,7 @@ void Alignment::look(const Film& film) {
 Status Alignment::tell(const AlignRoundReport& seen) {
   v1::Event event;
   event.set_monotonic_ns(seen.round.at.ns);
-  event.mutable_decision()->set_round(static_cast<std::uint32_t>(seen.decision.round));
-  event.mutable_decision()->set_json(round_json(seen).dump());
+  *event.mutable_decision() = to_proto(seen);
   EMBERLOCK_RETURN_IF_ERROR(bench_.record(event));
   if (observer_) observer_(seen);
   return {};

@@ -45,12 +45,16 @@ class Alignment {
   /// No flash from now on, until the next round. Its time base goes on. A strobe that somebody sets by hand
   /// is left as it is.
   Status darken();
+  /// Flashes from now on, as the next round has them.
+  Status light() { return bench_.set_strobe(flashes_); }
   /// Frames that came until `until` are of no use to the next round; those that still wait are dropped.
   void pass_over(TimePoint until) { bench_.pass_over(until); }
   /// Waits until `until`, or until it is asked to stop.
   void wait(TimePoint until);
 
   [[nodiscard]] const smear::AlignDecision& last() const { return result_.last; }
+  /// The sentences of that.
+  [[nodiscard]] const smear::AlignWords& words() const { return result_.words; }
   /// With period and row time as measured.
   [[nodiscard]] const smear::AlignOptions& options() const { return result_.options; }
   [[nodiscard]] const std::vector<smear::CcdTiming>& timing() const { return result_.timing; }
@@ -76,9 +80,15 @@ class Alignment {
   /// Whether all cameras are in tolerance, to three standard errors: as the last aligned round promised, as
   /// long as no round since has seen a camera out, reset or away.
   [[nodiscard]] bool locked(TimePoint now) const { return promised_until_ && now <= *promised_until_; }
-  /// How long until the first camera may leave tolerance (95 %); 0 when it may have, or isn't aligned.
-  /// Infinite where none ever does.
+  /// How long a take may be that begins now: until the first camera may leave tolerance, to three standard
+  /// errors, as locked() says; 0 when one may have, or isn't aligned. Infinite where none ever does.
   [[nodiscard]] Seconds time_left(TimePoint now) const;
+  /// Until the first camera leaves, most likely; infinite where none does.
+  [[nodiscard]] Seconds likely_left(TimePoint now) const;
+  /// For how long `camera` surely stays in tolerance; absent when it isn't locked.
+  [[nodiscard]] std::optional<Seconds> time_left(TimePoint now, std::size_t camera) const;
+  /// From now on locks are to hold for so long (AlignOptions::shortest_take), as far as resets can make them.
+  void hold_for(Seconds shortest_take) { result_.options.shortest_take = shortest_take; }
   /// How long round() may wait to come in time: at most until ten minutes after the last one; a quarter of a
   /// second where people press shutters and say nothing. 0 when not aligned.
   [[nodiscard]] Seconds next_check(TimePoint now) const;
@@ -88,8 +98,8 @@ class Alignment {
   [[nodiscard]] std::optional<PartsPerMillion> drift(std::size_t camera) const;
 
  private:
-  Alignment(const AlignRig& rig, const AlignRunOptions& options, Seconds period, AlignObserver observer,
-            Progress progress, StopAsked stop);
+  Alignment(const AlignRig& rig, AlignRunOptions options, AlignObserver observer, Progress progress,
+            StopAsked stop);
   Status tell(const AlignRoundReport& seen);
   Status carry_out();
   void look(const Film& film);
@@ -107,8 +117,8 @@ class Alignment {
   std::vector<SensorKind> sensors_;
   std::vector<CameraSight> sights_;
   drivers::StrobeSettings flashes_;
-  std::optional<smear::Beat> beat_;  ///< of the round before
-  TimePoint at_;                     ///< its instant
+  std::optional<smear::PeriodOffset> period_offset_;  ///< of the round before
+  TimePoint at_;                                      ///< its instant
   smear::AlignState state_;
   std::optional<TimePoint> promised_until_;
   std::vector<smear::ResetDone> resets_;  ///< since the last round

@@ -50,10 +50,15 @@ void add(Looks& looks, const smear::Look& look, std::size_t camera) {
 
 }  // namespace
 
-AlignBench::AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period, StopAsked stop)
+AlignRunOptions at_period(AlignRunOptions options, Seconds period) {
+  options.align.period = period;
+  for (smear::CcdTiming& timing : options.timing) timing.frame_period = period;
+  return options;
+}
+
+AlignBench::AlignBench(const AlignRig& rig, const AlignRunOptions& options, StopAsked stop)
     : rig_(rig),
       options_(options),
-      period_(period),
       stop_(std::move(stop)),
       all_(rig.cameras.size()),
       passed_over_(rig.cameras.size()),
@@ -62,9 +67,8 @@ AlignBench::AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seco
       away_(rig.cameras.size()) {
   std::iota(all_.begin(), all_.end(), std::size_t{0});
   for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
-    smear::SensorOptions sensor{options.timing[i], options.flash_width};
-    sensor.timing.frame_period = period;
-    sensors_.push_back(smear::make_phase_sensor(rig.cameras[i]->info().sensor, sensor));
+    sensors_.push_back(
+        smear::make_phase_sensor(rig.cameras[i]->info().sensor, {options.timing[i], options.flash_width}));
   }
 }
 
@@ -82,15 +86,16 @@ Status AlignBench::set_strobe(const drivers::StrobeSettings& wanted) {
   const TimePoint now = rig_.clock->now();
   EMBERLOCK_ASSIGN_OR_RETURN(strobe_, rig_.strobe->read_back());
   asked_ = wanted;
-  fresh_ = now + kSettlingPeriods * period_;
+  fresh_ = now + kSettlingPeriods * period();
   return record(drivers::strobe_event(now, strobe_));
 }
 
 Result<TimePoint> AlignBench::reset(std::size_t camera, std::optional<TimePoint> moment, int draw) {
   const TimePoint now = rig_.clock->now();
   const TimePoint earliest = now + options_.reset_lead;
-  TimePoint at = earliest + period_ * random_uniform(options_.seed, camera, static_cast<std::uint64_t>(draw));
-  if (moment) at = *moment + period_ * std::ceil((earliest - *moment) / period_);
+  TimePoint at =
+      earliest + period() * random_uniform(options_.seed, camera, static_cast<std::uint64_t>(draw));
+  if (moment) at = *moment + period() * std::ceil((earliest - *moment) / period());
   EMBERLOCK_RETURN_IF_ERROR(rig_.cameras[camera]->reset_shutter(at));
   sensors_[camera]->forget_phase();
   reset_ordered_[camera] = true;
@@ -190,7 +195,7 @@ void AlignBench::pass_over(TimePoint until) {
 
 Seconds AlignBench::deadline(std::size_t camera) const {
   if (!anybody_resets() || reset_ordered_[camera]) return options_.frame_deadline;
-  return std::min(options_.frame_deadline, (away_[camera] ? kPatienceWhileAway : kPatience) * period_);
+  return std::min(options_.frame_deadline, (away_[camera] ? kPatienceWhileAway : kPatience) * period());
 }
 
 Result<Frame> AlignBench::next_frame(std::size_t camera) {

@@ -21,15 +21,19 @@ struct Film {
   std::vector<bool> away;  ///< by camera: a frame didn't come in time
 };
 
+/// The options of a run whose cameras film at this period: align.period says it, and each timing repeats it.
+AlignRunOptions at_period(AlignRunOptions options, Seconds period);
+
 /// The devices of an alignment and what reads their frames, with everything that happens to them written
-/// down. `rig` and `options` must outlive it. Errors of what acts on devices are theirs and the recorder's.
+/// down. `rig` and `options`, at the cameras' period, must outlive it. Errors of what acts on devices are
+/// theirs and the recorder's.
 class AlignBench {
  public:
   /// Periods that pass before frames show a change of the strobe: a flash may show in the frame of the read
   /// phase before, or in that of the next, so frames are trusted from the second one on.
   static constexpr double kSettlingPeriods = 2;
 
-  AlignBench(const AlignRig& rig, const AlignRunOptions& options, Seconds period, StopAsked stop = {});
+  AlignBench(const AlignRig& rig, const AlignRunOptions& options, StopAsked stop = {});
 
   /// As it said of itself after the last change.
   [[nodiscard]] const drivers::StrobeSettings& strobe() const { return strobe_; }
@@ -73,12 +77,12 @@ class AlignBench {
   [[nodiscard]] Seconds deadline(std::size_t camera) const;
   /// The next frame, within that time.
   Result<Frame> next_frame(std::size_t camera);
+  [[nodiscard]] Seconds period() const { return options_.align.period; }
   [[nodiscard]] bool anybody_resets() const { return options_.align.reset_by == smear::ResetBy::anybody; }
   Result<std::optional<Frame>> fresh_frame(std::size_t camera);
 
   const AlignRig& rig_;
   const AlignRunOptions& options_;
-  Seconds period_;
   StopAsked stop_;
   std::vector<std::unique_ptr<smear::PhaseSensor>> sensors_;  ///< by camera
   std::vector<std::size_t> all_;

@@ -11,20 +11,19 @@ namespace {
 /// Frames of each camera in a round where the strobe's rate is read from them: half a second, which tells it
 /// to some 30 ppm, and three flashes where it flashes at a quarter of the frames' rate.
 constexpr int kFramesForDial = 12;
-/// What is told beforehand of the beat, in standard errors of the rate that was read from the same frames.
-constexpr double kLooseBeat = 3;
+/// What is told beforehand of the period offset, in standard errors of the rate that was read from the same
+/// frames.
+constexpr double kLooseOffset = 3;
 
 }  // namespace
 
-AlignRunOptions for_dial(AlignRunOptions options, Seconds period) {
+AlignRunOptions for_dial(AlignRunOptions options) {
   if (!options.align.dial) return options;
   options.measure_row_time = false;
   options.frames_per_round = std::max(options.frames_per_round, kFramesForDial);
   double mean = 0;
-  for (smear::CcdTiming& timing : options.timing) {
-    timing.frame_period = period;
+  for (const smear::CcdTiming& timing : options.timing)
     mean += timing.row_time.value() / static_cast<double>(options.timing.size());
-  }
   options.align.row_time = SecondsPerRow(mean);
   return options;
 }
@@ -43,9 +42,9 @@ smear::FlashRate flashes_of(const Film& film, const std::vector<smear::CcdTiming
   return smear::see_flashes(cameras, flash_width);
 }
 
-std::optional<smear::Beat> beat_of(const smear::FlashRate& flashes, Seconds period) {
+std::optional<smear::PeriodOffset> period_offset_of(const smear::FlashRate& flashes, Seconds period) {
   if (flashes.seen != smear::FlashesSeen::rate) return std::nullopt;
-  return smear::expected_beat(flashes.rate, period, kLooseBeat * flashes.sigma);
+  return smear::expected_period_offset(flashes.rate, period, kLooseOffset * flashes.sigma);
 }
 
 std::vector<smear::PhaseSample> flash_samples(const std::vector<Frame>& frames,

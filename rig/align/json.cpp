@@ -2,24 +2,12 @@
 #include "rig/align/json.h"
 
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 namespace emberlock::rig {
 namespace {
 
-using nlohmann::json;
 using nlohmann::ordered_json;
-
-ordered_json delay_json(const std::optional<smear::ResetDelay>& delay) {
-  if (!delay) return nullptr;
-  return {{"mean_s", delay->mean.value()}, {"sigma_s", delay->sigma.value()}};
-}
-
-ordered_json limits_json(const std::optional<smear::AlignLimits>& limits) {
-  if (!limits) return nullptr;
-  return {{"resets", limits->resets}, {"time_s", limits->time.value()}, {"probability", limits->probability}};
-}
 
 ordered_json effort_json(const smear::AlignEffort& effort) {
   return {{"resets", effort.resets},
@@ -34,6 +22,7 @@ ordered_json offers_json(const std::vector<smear::AlignOffer>& offers, SecondsPe
   for (const smear::AlignOffer& offer : offers) {
     list.push_back({{"policy", name(offer.policy)},
                     {"tolerance_rows", offer.tolerance.in_rows(row).value()},
+                    {"tolerance_ms", in_milliseconds(offer.tolerance.in_time(row))},
                     {"effort", effort_json(offer.effort)}});
   }
   return list;
@@ -52,90 +41,7 @@ ordered_json time_left_json(const std::optional<smear::TimeLeft>& left) {
           {"latest_s", seconds_json(left->latest)}};
 }
 
-double number(const json& object, const char* key) { return object.at(key).get<double>(); }
-int integer(const json& object, const char* key) { return object.at(key).get<int>(); }
-
-smear::CcdTiming timing_from(const json& object) {
-  smear::CcdTiming timing;
-  timing.rows = integer(object, "rows");
-  timing.shifts = integer(object, "shifts");
-  timing.frame_period = Seconds(number(object, "frame_period_s"));
-  timing.row_time = SecondsPerRow(number(object, "row_time_s"));
-  timing.direction =
-      integer(object, "direction") > 0 ? smear::ReadDirection::top_first : smear::ReadDirection::bottom_first;
-  return timing;
-}
-
-/// Recordings from before the strobe was moved have none; the first ones that did called it a nod.
-Seconds strobe_step_from(const json& object) {
-  for (const char* key : {"strobe_step_s", "nod_s"}) {
-    if (object.contains(key)) return Seconds(number(object, key));
-  }
-  return Seconds(0);
-}
-
-AlignRunOptions options_from(const json& object) {
-  AlignRunOptions options;
-  const auto policy = smear::parse_align_policy(object.at("policy").get<std::string>());
-  if (!policy.ok()) throw std::invalid_argument(policy.error().message());
-  options.align.policy = *policy;
-  const double tolerance = number(object, "tolerance");
-  if (object.at("tolerance_unit").get<std::string>() == "rows") {
-    options.align.tolerance.amount = Rows(tolerance);
-  } else {
-    options.align.tolerance.amount = Seconds(tolerance);
-  }
-  if (!(tolerance > 0)) throw std::invalid_argument("the tolerance is not positive");
-  options.align.reference = object.at("reference").get<std::size_t>();
-  options.align.row_time = SecondsPerRow(number(object, "row_time_s"));
-  options.align.delay_jitter = Seconds(number(object, "delay_jitter_s"));
-  options.align.rate_spread = PartsPerMillion(number(object, "rate_spread_ppm"));
-  options.align.rate_wander = PartsPerMillion(number(object, "rate_wander_ppm"));
-  options.align.trim_time = Seconds(number(object, "trim_time_s"));
-  options.align.reset_time = Seconds(number(object, "reset_time_s"));
-  if (const json& limits = object.at("limits"); !limits.is_null()) {
-    options.align.limits = smear::AlignLimits{integer(limits, "resets"), Seconds(number(limits, "time_s")),
-                                              number(limits, "probability")};
-  }
-  options.align.max_rounds = integer(object, "max_rounds");
-  options.align.max_looks = integer(object, "max_looks");
-  // Before people were asked there was no such key.
-  const auto reset_by = object.value("reset_by", std::string("orders"));
-  if (reset_by != "orders" && reset_by != "anybody") throw std::invalid_argument("reset_by is unknown");
-  if (reset_by == "anybody") options.align.reset_by = smear::ResetBy::anybody;
-  options.align.strobe_step = strobe_step_from(object);
-  options.measure_row_time = object.at("measure_row_time").get<bool>();
-  if (!object.at("comb_rate_hz").is_null()) options.comb_rate = Hertz(number(object, "comb_rate_hz"));
-  options.comb_frames = integer(object, "comb_frames");
-  options.frames_per_round = integer(object, "frames_per_round");
-  options.flash_width = Seconds(number(object, "flash_width_s"));
-  options.frame_deadline = Seconds(number(object, "frame_deadline_s"));
-  options.reset_lead = Seconds(number(object, "reset_lead_s"));
-  options.rate_error = PartsPerMillion(number(object, "rate_error_ppm"));
-  options.seed = object.at("seed").get<std::uint64_t>();
-  // Before runs could be held there was no such key.
-  if (const json hold = object.value("hold_s", json()); !hold.is_null())
-    options.hold = Seconds(hold.get<double>());
-  // Of a strobe that can be told there is none.
-  if (object.contains("dial")) {
-    const json& dial = object.at("dial");
-    options.align.dial = StrobeDial{Hertz(number(dial, "slowest_hz")), Hertz(number(dial, "fastest_hz")),
-                                    Hertz(number(dial, "step_hz"))};
-    if (!check(*options.align.dial).ok()) throw std::invalid_argument("the dial is impossible");
-  }
-  if (!object.at("cameras").is_array()) throw std::invalid_argument("cameras is not a list");
-  for (const json& camera : object.at("cameras")) {
-    options.timing.push_back(timing_from(camera));
-    const json& delay = camera.at("delay");
-    options.delays.emplace_back();
-    if (delay.is_null()) continue;
-    options.delays.back() =
-        smear::ResetDelay{Seconds(number(delay, "mean_s")), Seconds(number(delay, "sigma_s"))};
-  }
-  return options;
-}
-
-ordered_json dial_json(const smear::DialAdvice& dial) {
+ordered_json dial_json(const smear::DialAdvice& dial, const std::string& words) {
   ordered_json others = ordered_json::array();
   for (const Hertz other : dial.others) others.push_back(other.value());
   return {{"set_hz", dial.set.value()},
@@ -144,7 +50,7 @@ ordered_json dial_json(const smear::DialAdvice& dial) {
           {"others_hz", std::move(others)},
           {"ready", dial.ready},
           {"act", dial.act},
-          {"words", dial.words}};
+          {"words", words}};
 }
 
 }  // namespace
@@ -177,7 +83,7 @@ ordered_json round_json(const AlignRoundReport& report) {
          {"trim_ppm", camera.trim ? ordered_json(camera.trim->value()) : nullptr},
          {"servo", camera.servo ? ordered_json(name(*camera.servo)) : nullptr},
          {"time_left", time_left_json(camera.time_left)},
-         {"reason", camera.reason}});
+         {"reason", report.words.cameras[i]}});
   }
   ordered_json line;
   line["round"] = decision.round;
@@ -185,7 +91,7 @@ ordered_json round_json(const AlignRoundReport& report) {
   line["cameras"] = std::move(cameras);
   line["worst_pair_rows"] =
       decision.worst_pair ? ordered_json((*decision.worst_pair / row).value()) : nullptr;
-  line["beat_ppm"] = report.round.beat.rate.value();
+  line["beat_ppm"] = report.round.period_offset.rate.value();
   line["strobe_phase_ms"] = in_milliseconds(report.strobe.phase);
   line["resets_so_far"] = decision.resets_so_far;
   line["aligned"] = decision.verdict == smear::AlignVerdict::aligned;
@@ -194,10 +100,10 @@ ordered_json round_json(const AlignRoundReport& report) {
   line["next_check_s"] = seconds_json(decision.next_check);
   line["effort"] = decision.effort ? effort_json(*decision.effort) : nullptr;
   line["offers"] = offers_json(decision.offers, row);
-  line["reason"] = decision.reason;
+  line["reason"] = report.words.reason;
   if (decision.renews) line["renews"] = true;
   if (decision.reset_next) line["reset_next"] = report.cameras[*decision.reset_next].id;
-  if (decision.dial) line["dial"] = dial_json(*decision.dial);
+  if (decision.dial) line["dial"] = dial_json(*decision.dial, report.words.dial);
   for (const std::size_t camera : decision.jumped) line["jumped"].push_back(report.cameras[camera].id);
   return line;
 }
@@ -214,6 +120,7 @@ ordered_json summary_json(const AlignRunResult& result, std::uint64_t seed) {
   line["worst_pair_rows"] = last.worst_pair ? ordered_json((*last.worst_pair / row).value()) : nullptr;
   line["worst_pair_ms"] = last.worst_pair ? ordered_json(in_milliseconds(*last.worst_pair)) : nullptr;
   line["tolerance_rows"] = result.options.tolerance.in_rows(row).value();
+  line["tolerance_ms"] = in_milliseconds(result.options.tolerance.in_time(row));
   line["verdict"] = name(last.verdict);
   line["next_check_s"] = seconds_json(last.next_check);
   line["offers"] = offers_json(last.offers, row);
@@ -228,65 +135,8 @@ ordered_json summary_json(const AlignRunResult& result, std::uint64_t seed) {
          {"t_row_us", clock ? ordered_json(clock->row_time.value() * 1e6) : nullptr},
          {"exposure_ms", exposure ? ordered_json(in_milliseconds(*exposure)) : nullptr}});
   }
-  line["reason"] = last.reason;
+  line["reason"] = result.words.reason;
   return line;
-}
-
-ordered_json options_json(const AlignRunOptions& options) {
-  const smear::AlignOptions& align = options.align;
-  const auto* rows = std::get_if<Rows>(&align.tolerance.amount);
-  ordered_json cameras = ordered_json::array();
-  for (std::size_t i = 0; i < options.timing.size(); ++i) {
-    const smear::CcdTiming& timing = options.timing[i];
-    cameras.push_back({{"rows", timing.rows},
-                       {"shifts", timing.shifts},
-                       {"frame_period_s", timing.frame_period.value()},
-                       {"row_time_s", timing.row_time.value()},
-                       {"direction", static_cast<int>(timing.direction)},
-                       {"delay", delay_json(options.delays.empty() ? std::nullopt : options.delays[i])}});
-  }
-  ordered_json json = {
-      {"policy", name(align.policy)},
-      {"tolerance", rows ? rows->value() : std::get<Seconds>(align.tolerance.amount).value()},
-      {"tolerance_unit", rows ? "rows" : "s"},
-      {"reference", align.reference},
-      {"row_time_s", align.row_time.value()},
-      {"delay_jitter_s", align.delay_jitter.value()},
-      {"rate_spread_ppm", align.rate_spread.value()},
-      {"rate_wander_ppm", align.rate_wander.value()},
-      {"trim_time_s", align.trim_time.value()},
-      {"reset_time_s", align.reset_time.value()},
-      {"limits", limits_json(align.limits)},
-      {"max_rounds", align.max_rounds},
-      {"max_looks", align.max_looks},
-      {"reset_by", align.reset_by == smear::ResetBy::anybody ? "anybody" : "orders"},
-      {"strobe_step_s", align.strobe_step.value()},
-      {"measure_row_time", options.measure_row_time},
-      {"comb_rate_hz", options.comb_rate ? ordered_json(options.comb_rate->value()) : ordered_json()},
-      {"comb_frames", options.comb_frames},
-      {"frames_per_round", options.frames_per_round},
-      {"flash_width_s", options.flash_width.value()},
-      {"frame_deadline_s", options.frame_deadline.value()},
-      {"reset_lead_s", options.reset_lead.value()},
-      {"rate_error_ppm", options.rate_error.value()},
-      {"seed", options.seed},
-      {"hold_s", seconds_json(options.hold)},
-      {"cameras", cameras}};
-  if (align.dial) {
-    json["dial"] = {{"slowest_hz", align.dial->slowest.value()},
-                    {"fastest_hz", align.dial->fastest.value()},
-                    {"step_hz", align.dial->step.value()}};
-  }
-  return json;
-}
-
-Result<AlignRunOptions> options_from_json(const json& object) {
-  try {
-    return options_from(object);
-  } catch (const std::exception& e) {
-    return Error{ErrorKind::bad_input, std::string("its alignment settings can't be read: ") + e.what(),
-                 "recording", "replay a recording that `emberlock align --record` made"};
-  }
 }
 
 }  // namespace emberlock::rig

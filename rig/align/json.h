@@ -13,8 +13,4 @@ nlohmann::ordered_json round_json(const AlignRoundReport& report);
 /// The last line that it prints.
 nlohmann::ordered_json summary_json(const AlignRunResult& result, std::uint64_t seed);
 
-/// Everything in the options that the decisions depend on, and back: what a recording needs to be replayed.
-nlohmann::ordered_json options_json(const AlignRunOptions& options);
-Result<AlignRunOptions> options_from_json(const nlohmann::json& json);
-
 }  // namespace emberlock::rig

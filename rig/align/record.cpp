@@ -4,12 +4,16 @@
 #include <string>
 #include <utility>
 
+#include <nlohmann/json.hpp>
+
 #include "base/clock.h"
 #include "base/file.h"
 #include "base/nesting.h"
 #include "drivers/replay/record.h"
 #include "drivers/replay/replay.h"
-#include "rig/align/json.h"
+#include "rig/align/decision_proto.h"
+#include "rig/align/old_record.h"
+#include "rig/align/settings_proto.h"
 
 namespace emberlock::rig {
 namespace {
@@ -34,21 +38,21 @@ class RecordedAnswers final : public Clock {
   mutable std::size_t next_ = 0;
 };
 
-Status append_note(session::SessionWriter& writer, const Clock& clock, std::string text) {
-  v1::Event event;
-  event.set_monotonic_ns(clock.now().ns);
-  event.set_note(std::move(text));
-  return writer.append(event);
-}
-
 Result<AlignRunOptions> recorded_options(const session::SessionReader& session) {
   for (const v1::Event& event : session.events()) {
-    if (!event.has_note() || !check_json_nesting(event.note(), "note").ok()) continue;
-    const auto note = nlohmann::json::parse(event.note(), nullptr, false);
-    if (note.is_object() && note.contains("align")) return options_from_json(note["align"]);
+    if (event.has_settings()) return align_options(event.settings());
+    if (!event.has_note()) continue;
+    EMBERLOCK_ASSIGN_OR_RETURN(std::optional<AlignRunOptions> options, options_in_note(event.note()));
+    if (options) return std::move(*options);
   }
   return Error{ErrorKind::bad_input, "holds no alignment's settings", session.folder().string(),
                "replay a recording that `emberlock align --record` made"};
+}
+
+/// Whether a round reads and decides what was recorded, in codes and numbers, bit for bit.
+bool same_as_recorded(const v1::DecisionEvent& recorded, const AlignRoundReport& report) {
+  if (!recorded.json().empty()) return same_round(recorded.json(), report);
+  return recorded.SerializeAsString() == to_proto(report).SerializeAsString();
 }
 
 /// Compares the decisions of a replay with the recorded ones, in order.
@@ -56,12 +60,12 @@ class DecisionCheck {
  public:
   explicit DecisionCheck(const session::SessionReader& session) : folder_(session.folder().string()) {
     for (const v1::Event& event : session.events()) {
-      if (event.has_decision()) recorded_.push_back(event.decision().json());
+      if (event.has_decision()) recorded_.push_back(event.decision());
     }
   }
   void round(const AlignRoundReport& report) {
     const std::size_t i = rounds_++;
-    if (!different_ && (i >= recorded_.size() || recorded_[i] != round_json(report).dump()))
+    if (!different_ && (i >= recorded_.size() || !same_as_recorded(recorded_[i], report)))
       different_ = rounds_;
   }
   /// Every recorded decision was met: the run ended here, by its verdict or because it was stopped.
@@ -76,7 +80,7 @@ class DecisionCheck {
 
  private:
   std::string folder_;
-  std::vector<std::string> recorded_;
+  std::vector<v1::DecisionEvent> recorded_;
   std::size_t rounds_ = 0;
   std::optional<std::size_t> different_;
 };
@@ -95,8 +99,10 @@ Result<AlignRunResult> record_align(const std::filesystem::path& folder, AlignRi
   EMBERLOCK_ASSIGN_OR_RETURN(session::SessionWriter writer,
                              session::SessionWriter::create(folder, std::move(manifest)));
   rig.recorder = &writer;
-  EMBERLOCK_RETURN_IF_ERROR(
-      append_note(writer, *rig.clock, nlohmann::ordered_json{{"align", options_json(options)}}.dump()));
+  v1::Event settings;
+  settings.set_monotonic_ns(rig.clock->now().ns);
+  *settings.mutable_settings() = to_proto(options);
+  EMBERLOCK_RETURN_IF_ERROR(writer.append(settings));
   Result<AlignRunResult> result = run_align(rig, options, observer, progress, stop);
   // A run that failed leaves a readable recording too; its own error is the one to report.
   const auto finished = writer.finish();

@@ -17,8 +17,8 @@ Result<AlignRunResult> record_align(const std::filesystem::path& folder, AlignRi
                                     const Progress& progress = {}, const StopAsked& stop = {});
 
 /// Runs a recorded alignment again from its frames. Errors: the reader's; bad_input when the session is not
-/// an alignment's; device when a decision differs from the recorded one (named by its round). `seed` receives
-/// the recorded one.
+/// an alignment's; device when the codes and numbers of a decision differ from the recorded ones (named by
+/// its round). `seed` receives the recorded one.
 Result<AlignRunResult> replay_align(const std::filesystem::path& folder, const AlignObserver& observer = {},
                                     const Progress& progress = {}, std::uint64_t* seed = nullptr);
 

@@ -14,6 +14,7 @@
 #include "drivers/strobe.h"
 #include "session/writer.h"
 #include "smear_sync/align/align.h"
+#include "smear_sync/align/align_words.h"
 #include "smear_sync/ccd_timing.h"
 #include "smear_sync/clocks/row_clock.h"
 #include "smear_sync/detect/detect.h"
@@ -57,6 +58,7 @@ constexpr Seconds kUntilStopped{3e9};
 struct AlignRoundReport {
   const smear::AlignRound& round;
   const smear::AlignDecision& decision;
+  const smear::AlignWords& words;  ///< the sentences of that
   const std::vector<smear::AlignCamera>& cameras;
   const std::vector<SensorKind>& sensors;  ///< by camera
   const smear::AlignOptions& options;
@@ -68,6 +70,7 @@ using AlignObserver = std::function<void(const AlignRoundReport&)>;
 
 struct AlignRunResult {
   smear::AlignDecision last;
+  smear::AlignWords words;  ///< of that
   std::vector<drivers::CameraInfo> cameras;
   smear::AlignOptions options;                             ///< with period and row_time as used
   std::vector<smear::CcdTiming> timing;                    ///< with the row times measured

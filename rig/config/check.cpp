@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kMostVirtual = 64;
 
-/// Where a key or section stands, or what it stands in.
+/// The position of a key or section in the file, or of the section that contains it.
 toml::source_region place(const toml::table& root, const std::string& path) {
   if (const toml::node* node = root.at_path(path).node()) return node->source();
   const std::size_t dot = path.rfind('.');
@@ -32,7 +32,7 @@ bool is_real(CameraSource source) {
   return source == CameraSource::v4l2 || source == CameraSource::aravis || source == CameraSource::ptp;
 }
 
-void check_camera(const Together& t, const CameraConfig& camera, const std::string& path,
+void check_camera(const ConfigCheck& t, const CameraConfig& camera, const std::string& path,
                   std::set<std::pair<CameraSource, std::string>>& ids) {
   if (is_real(camera.source) && camera.id.empty()) {
     t.problem(place(t.root, path), "the camera has no id", "say id = as `emberlock devices` names it");
@@ -51,7 +51,7 @@ void check_camera(const Together& t, const CameraConfig& camera, const std::stri
   }
 }
 
-void check_rig(const Together& t) {
+void check_rig(const ConfigCheck& t) {
   const RigConfig& rig = t.config.rig;
   std::set<std::pair<CameraSource, std::string>> ids;
   int virtual_cameras = 0;
@@ -87,7 +87,7 @@ void check_rig(const Together& t) {
   }
 }
 
-/// The host of HOST:PORT or [HOST]:PORT; none where it is neither.
+/// The host of HOST:PORT or [HOST]:PORT; nullopt for other text.
 std::optional<std::string> host_of(const std::string& address) {
   const std::size_t colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0) return std::nullopt;
@@ -104,7 +104,7 @@ bool is_local(const std::string& host) {
   return host == "localhost" || host == "::1" || host.starts_with("127.");
 }
 
-void check_server(const Together& t) {
+void check_server(const ConfigCheck& t) {
   const ServerConfig& server = t.config.server;
   const auto host = [&](const std::string& address, const char* key) {
     auto found = address.empty() ? std::nullopt : host_of(address);
@@ -131,9 +131,9 @@ void check_server(const Together& t) {
 
 }  // namespace
 
-void check_together(const Together& together) {
-  check_rig(together);
-  check_server(together);
+void check_consistency(const ConfigCheck& check) {
+  check_rig(check);
+  check_server(check);
 }
 
 }  // namespace emberlock::rig::config

@@ -8,17 +8,16 @@
 
 #include "rig/config/config.h"
 
-// Rules that no single key can break; private to rig/config.
+// Rules that involve several keys; private to rig/config.
 namespace emberlock::rig::config {
 
-struct Together {
+struct ConfigCheck {
   const DaemonConfig& config;
   const toml::table& root;
   std::function<void(const toml::source_region& at, std::string what, std::string remedy)> problem;
 };
 
-/// Reports what doesn't fit together: ids that are missing or doubled, a network address without its token,
-/// ...
-void check_together(const Together& together);
+/// Reports inconsistencies: missing or duplicate ids, a network address without a token, ...
+void check_consistency(const ConfigCheck& check);
 
 }  // namespace emberlock::rig::config

@@ -2,8 +2,12 @@
 #include "rig/config/config.h"
 
 #include <algorithm>
+#include <system_error>
+
+#include <unistd.h>
 
 #include "base/file.h"
+#include "base/nearest.h"
 #include "rig/config/check.h"
 #include "rig/config/keys.h"
 
@@ -14,35 +18,6 @@ using config::Section;
 
 constexpr std::size_t kLargestFile = 1 << 20;
 
-/// Edits (a letter more, less or other) from one to the other.
-std::size_t edits(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i);
-    for (std::size_t j = 1; j <= b.size(); ++j) {
-      const std::size_t other = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
-      diagonal = row[j];
-      row[j] = std::min({other, row[j] + 1, row[j - 1] + 1});
-    }
-  }
-  return row.back();
-}
-
-/// The known name that was probably meant, none when all are far from it.
-std::optional<std::string> nearest(std::string_view given, const std::vector<std::string>& known) {
-  std::optional<std::string> best;
-  std::size_t fewest = std::max<std::size_t>(2, given.size() / 3) + 1;
-  if (given.size() > 64) return best;
-  for (const std::string& name : known) {
-    const std::size_t distance = edits(given, name);
-    if (distance >= fewest) continue;
-    fewest = distance;
-    best = name;
-  }
-  return best;
-}
-
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& file) : file_(file) {}
@@ -51,7 +26,7 @@ class Reader {
     check_names(root, "", known_in("", std::vector<Key<DaemonConfig>>{}));
     for (const auto& section : config::sections()) read_section(root, section);
     read_cameras(root);
-    config::check_together(
+    config::check_consistency(
         {reading_.config, root, [this](const toml::source_region& at, std::string what, std::string remedy) {
            problem(at, std::move(what), std::move(remedy));
          }});
@@ -64,7 +39,7 @@ class Reader {
         Error{ErrorKind::bad_input, std::move(what),
               fmt::format("{}:{}:{}", file_.string(), at.begin.line, at.begin.column), std::move(remedy)});
   }
-  /// With the problems in the order of the file.
+  /// The result, with problems in the order of the file.
   ConfigReading take() {
     std::stable_sort(problems_.begin(), problems_.end(),
                      [](const auto& a, const auto& b) { return a.first < b.first; });
@@ -73,7 +48,7 @@ class Reader {
   }
 
  private:
-  /// What may stand in a table: its keys, and the sections directly below it.
+  /// The allowed content of a table: its keys and direct subsections.
   template <class T>
   std::vector<std::string> known_in(const std::string& section, const std::vector<Key<T>>& keys) {
     std::vector<std::string> known(keys.size());
@@ -169,7 +144,7 @@ class Reader {
   std::vector<std::pair<toml::source_position, Error>> problems_;
 };
 
-/// Relative paths start from the file's folder.
+/// Makes relative paths relative to the file's folder.
 void anchor(DaemonConfig& config, const std::filesystem::path& folder) {
   const auto from_folder = [&](std::filesystem::path& path) {
     if (!path.empty() && path.is_relative()) path = (folder / path).lexically_normal();
@@ -186,13 +161,20 @@ void anchor(DaemonConfig& config, const std::filesystem::path& folder) {
   }
 }
 
-/// PREFIX/share/emberlock/console of PREFIX/sbin/emberlockd, else console of a build's bin/emberlockd.
-std::filesystem::path console_beside_program() {
+/// PREFIX/share/emberlock/console for PREFIX/sbin/emberlockd, or `console` beside a build's bin/.
+std::filesystem::path console_beside(const std::filesystem::path& program) {
   std::error_code error;
-  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
   const std::filesystem::path prefix = program.parent_path().parent_path();
   const std::filesystem::path built = prefix / "console";
   return std::filesystem::is_directory(built, error) ? built : prefix / "share/emberlock/console";
+}
+
+/// The emberlock of the same build or prefix; a bare name where there is none.
+std::filesystem::path emberlock_beside(const std::filesystem::path& program) {
+  const std::filesystem::path prefix = program.parent_path().parent_path();
+  for (const std::filesystem::path& path : {program.parent_path() / "emberlock", prefix / "bin/emberlock"})
+    if (::access(path.c_str(), X_OK) == 0) return path;
+  return "emberlock";
 }
 
 }  // namespace
@@ -216,10 +198,18 @@ Result<DaemonConfig> parse_config(std::string_view text, const std::filesystem::
   return std::move(reading.config);
 }
 
+void fill_in(DaemonConfig& config, const DaemonFolders& folders, const std::filesystem::path& program) {
+  if (config.server.socket.empty()) config.server.socket = folders.socket();
+  if (config.recording.folder.empty()) config.recording.folder = folders.sessions();
+  if (config.server.console.empty()) config.server.console = console_beside(program);
+  if (config.reconstruction.program.empty()) config.reconstruction.program = emberlock_beside(program);
+}
+
 Result<DaemonConfig> load_config(const std::filesystem::path& file) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(file, kLargestFile));
   EMBERLOCK_ASSIGN_OR_RETURN(DaemonConfig config, parse_config(text, file));
-  if (config.server.console.empty()) config.server.console = console_beside_program();
+  std::error_code unknown;
+  fill_in(config, daemon_folders(), std::filesystem::read_symlink("/proc/self/exe", unknown));
   return config;
 }
 

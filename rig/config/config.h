@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/daemon_folders.h"
 #include "base/quantity.h"
 #include "base/result.h"
 #include "base/sensor_kind.h"
@@ -21,39 +22,41 @@
 #include "session/writer.h"
 #include "smear_sync/ccd_timing.h"
 
-// What emberlockd is told by its configuration file (TOML). Each key stands in one table (table*.cpp), with
-// its unit, range and words; reading, errors, the commented file and the manual page come from there, the
-// defaults from the structs here. Where another header has the options already, the key sets them directly.
+// emberlockd's configuration file (TOML). Each key is defined in a table (table*.cpp) with its unit, range
+// and description; reading, errors, the commented file and the manual page use these tables. Defaults are in
+// the structs here. Where another header already has the options, the key sets them directly.
 namespace emberlock::rig {
 
 enum class CameraSource { virtual_, v4l2, aravis, ptp, replay };
 
-/// [[rig.camera]]: one camera, or several alike.
+/// [[rig.camera]]: one camera, or several of the same kind.
 struct CameraConfig {
   CameraSource source = CameraSource::virtual_;
-  /// Of a real camera as `emberlock devices` names it, never empty; of a recorded one as its session names
-  /// it, empty: all of the session; of virtual ones what their ids begin with (`count` > 1) or the id itself.
+  /// Real camera: its id as listed by `emberlock devices`, never empty. Recorded camera: its id in the
+  /// session; empty: all cameras of the session. Virtual cameras: the id, or the prefix of the ids if `count`
+  /// > 1.
   std::string id;
-  int count = 1;  ///< virtual alone
+  int count = 1;  ///< virtual cameras only
   drivers::CameraRequest
-      request{};  ///< virtual cameras know size, format, frame rate and exposure; replayed ones nothing
-  std::optional<SensorKind> sensor{};       ///< else the driver's word, of virtual ones ccd
-  std::optional<ShutterReset> reset{};      ///< else the driver's word
-  std::optional<int> rows{}, shifts{};      ///< as CcdTiming; else the picture's height, and as many shifts
-  std::optional<SecondsPerRow> row_time{};  ///< where it isn't measured
+      request{};  ///< virtual cameras use size, format, frame rate and exposure; replayed ones nothing
+  std::optional<SensorKind> sensor{};       ///< default: by the driver; ccd for virtual cameras
+  std::optional<ShutterReset> reset{};      ///< default: by the driver
+  std::optional<int> rows{}, shifts{};      ///< see CcdTiming; default: the picture's height for both
+  std::optional<SecondsPerRow> row_time{};  ///< if it isn't measured
   smear::ReadDirection direction = smear::ReadDirection::top_first;
 };
 
-/// [rig.virtual]: what all virtual cameras and their strobe share.
+/// [rig.virtual]: common to all virtual cameras and their strobe.
 struct VirtualConfig {
   enum class Time {
-    real,  ///< as real cameras film; the only one that mixes with them
+    real,  ///< at the speed of real cameras; required if the rig also has real cameras
     fast,  ///< the rig's clock runs as fast as pictures are drawn
   };
   enum class Scene { dark_room, lit_room, flame };
   Time time = Time::real;
   Scene scene = Scene::dark_room;
-  drivers::VirtualRigDraw draw{};  ///< but for cameras, sensors, layout and rate: those are the cameras'
+  drivers::VirtualRigDraw
+      draw{};  ///< except cameras, sensors, layout and rate, which are in the cameras' sections
 };
 
 enum class StrobeSource {
@@ -61,75 +64,80 @@ enum class StrobeSource {
   virtual_,
   serial,
   replay,
-  manual,  ///< somebody sets it by its dial
+  manual,  ///< set by hand on its dial
 };
 
 /// [rig.strobe]
 struct StrobeConfig {
   StrobeSource source = StrobeSource::none;
-  std::string id;     ///< of a serial port as `emberlock devices` names it, never empty
-  StrobeDial dial{};  ///< of a manual one
+  std::string id;     ///< id of a serial port as listed by `emberlock devices`, never empty
+  StrobeDial dial{};  ///< of a manual strobe
   drivers::SerialStrobeRequest request{};
 };
 
 struct RigConfig {
   std::string name = "rig";
-  /// A transforms.json with the cameras' poses, lenses and the box, each frame named by its camera's id
-  /// ("VIRTUAL-00.png"); empty: recordings carry no calibration.
+  /// A transforms.json with the cameras' poses, lenses and the box; each frame is named by its camera's id
+  /// ("VIRTUAL-00.png"). Empty: recordings contain no calibration.
   std::filesystem::path calibration;
   std::vector<CameraConfig> cameras;
   VirtualConfig virtual_rig{};
-  std::filesystem::path replay_session;  ///< [rig.replay]: of cameras and strobe that are replayed
+  std::filesystem::path replay_session;  ///< [rig.replay]: the session of replayed cameras and strobe
   StrobeConfig strobe{};
 };
 
 struct AlignmentConfig {
   enum class AtStart { nothing, align };
   AtStart at_start = AtStart::nothing;
+  std::optional<smear::Tolerance> tolerance{};  ///< default: as the flame needs it
+  smear::FlameMotion flame{};
+  /// Except timing, delays and the reference, which come from the rig's cameras, and the tolerance.
   AlignRunOptions run = [] {
     AlignRunOptions options;
+    options.align.policy = smear::AlignPolicy::timed;
     options.align.limits = smear::AlignLimits{};
+    options.align.shortest_take = Seconds(10);
     options.hold = kUntilStopped;
     return options;
-  }();                           ///< but for timing, delays and the reference, which the rig's cameras tell
-  std::string reference;         ///< of policy fixed-reference: a camera's id; empty: the first
-  std::filesystem::path delays;  ///< what is known of reset delays, kept between runs; empty: nowhere
+  }();
+  std::string reference;         ///< for policy fixed-reference: a camera's id; empty: the first camera
+  std::filesystem::path delays;  ///< file for learnt reset delays, kept between runs; empty: none
 };
 
 struct RecordingConfig {
   enum class Transcode { never, when_idle };
-  std::filesystem::path folder = "/var/lib/emberlock/sessions";
+  std::filesystem::path folder;  ///< of all sessions; empty: fill_in() names one
   session::WriterOptions writer{};
   session::AsyncWriterOptions queue{};
-  Transcode transcode = Transcode::when_idle;  ///< of raw spools, to FFV1, verified
+  Transcode transcode = Transcode::when_idle;  ///< conversion of uncompressed recordings to FFV1, verified
 };
 
 struct ReconstructionConfig {
-  std::filesystem::path program = "emberlock";  ///< searched for in PATH unless it has a slash
-  std::string device = "auto";                  ///< auto, cpu or cuda
-  std::optional<Seconds> budget{};              ///< else by the reconstruction's own rules
-  std::optional<int> voxels{};                  ///< along the longest edge; else likewise
-  std::vector<int> hold_out{};                  ///< views kept for judging the result, counted from 0
-  int threads = 0;                              ///< 0: every core
-  Seconds silence{600};                         ///< without a word of progress: it hangs, and is ended
+  std::filesystem::path program;  ///< searched in PATH unless it contains a slash; empty: fill_in() names it
+  std::string device = "auto";    ///< auto, cpu or cuda
+  std::optional<Seconds> budget{};  ///< default: the reconstruction's own rules
+  std::optional<int> voxels{};      ///< along the longest edge; default: the reconstruction's own rules
+  std::vector<int> hold_out{};      ///< views held out to assess the result, counted from 0
+  int threads = 0;                  ///< 0: all cores
+  Seconds silence{600};             ///< a reconstruction without progress for this long is killed
   int niceness = 10;
 };
 
 struct ServerConfig {
-  std::filesystem::path socket = "/run/emberlock/emberlockd.sock";  ///< gRPC
-  std::string listen;  ///< gRPC over TLS, "host:port"; empty: nowhere. Needs certificate, key and token
-  std::string http_listen =
-      "127.0.0.1:7140";  ///< console and JSON API; empty: nowhere. Beyond localhost as `listen`
+  std::filesystem::path socket;  ///< gRPC; empty: fill_in() names one
+  std::string listen;  ///< gRPC over TLS, "host:port"; empty: disabled. Requires certificate, key and token
+  std::string http_listen = "127.0.0.1:7140";  ///< console and JSON API; empty: disabled. For addresses other
+                                               ///< than localhost, the same requirements as `listen`
   std::filesystem::path tls_certificate, tls_key;  ///< PEM
   std::filesystem::path
-      tls_clients;  ///< PEM of the authority that signs clients' certificates; empty: none asked for
-  std::filesystem::path token_file;  ///< holds the token and nothing else
-  std::filesystem::path console;  ///< the console's files; empty: load_config finds them beside the program
-  int viewers = 64;               ///< at most so many WebSockets; one more displaces one
-  int picture_width = 480;        ///< pixels, at most
-  Hertz picture_rate{12};         ///< of a camera, at most
-  int picture_quality = 75;       ///< JPEG's, 1..100
-  std::uint64_t message_bytes = std::uint64_t{4} << 20;  ///< a client's request, at most
+      tls_clients;  ///< PEM of the authority that signs clients' certificates; empty: not required
+  std::filesystem::path token_file;  ///< contains only the token
+  std::filesystem::path console;     ///< folder of the console's files; empty: fill_in() names it
+  int viewers = 64;                  ///< maximum number of WebSockets; a further one replaces one of them
+  int picture_width = 480;           ///< maximum, in pixels
+  Hertz picture_rate{12};            ///< maximum per camera
+  int picture_quality = 75;          ///< JPEG quality, 1..100
+  std::uint64_t message_bytes = std::uint64_t{4} << 20;  ///< maximum size of a client's request
 };
 
 struct LogConfig {
@@ -147,25 +155,29 @@ struct DaemonConfig {
   LogConfig log{};
 };
 
-/// What a text says, and everything that is wrong with it: each problem's `where` is "file:line:column". The
-/// config is usable only without problems.
+/// The configuration in a text, and all its problems; each problem's `where` is "file:line:column". Use the
+/// config only if there are no problems.
 struct ConfigReading {
   DaemonConfig config;
   std::vector<Error> problems;
 };
-/// `file` is the text's path: it is named in problems, and relative paths start from its folder. Touches no
-/// disk.
+/// `file` is the path of the text: problems name it, and relative paths start from its folder. Doesn't access
+/// the disk.
 ConfigReading read_config(std::string_view toml, const std::filesystem::path& file);
 
-/// The same; the error is the first problem.
+/// The same, with the first problem as the error.
 Result<DaemonConfig> parse_config(std::string_view toml, const std::filesystem::path& file);
-/// Reads the file, too.
+/// Names what the file leaves to the machine: socket and recordings in `folders`, and beside `program`
+/// (PREFIX/bin/x or PREFIX/sbin/x) the console's files and the `emberlock` of reconstructions, which is
+/// searched for in PATH if it isn't there.
+void fill_in(DaemonConfig& config, const DaemonFolders& folders, const std::filesystem::path& program);
+/// Reads the file, parses it and fills it in for this process.
 Result<DaemonConfig> load_config(const std::filesystem::path& file);
 
-/// A configuration file with every key, its words, unit, range and default, commented out but for a simulated
-/// rig: a file to begin with.
+/// A configuration file with every key, its description, unit, range and default, commented out except for a
+/// simulated rig: a template.
 std::string commented_config();
-/// The configuration as TOML, every key that has a value.
+/// The configuration as TOML, with every key that has a value.
 std::string print_config(const DaemonConfig& config);
 
 }  // namespace emberlock::rig

@@ -15,22 +15,22 @@
 #include "base/quantity.h"
 #include "rig/config/config.h"
 
-// One key of the configuration, and the ways to make one; private to rig/config. A key knows where its
-// value lies in T and how TOML spells it: `at` below is a function from T& (const or not) to a reference to
-// the member.
+// A key of the configuration, and functions to define one; private to rig/config. A key knows its value's
+// place in T and its TOML format: `at` below is a function from T& (const or not) to a reference to the
+// member.
 namespace emberlock::rig::config {
 
 template <class T>
 struct Key {
-  std::string name;      ///< ends in its unit where it has one: "flash_width_us"
-  std::string takes;     ///< "a number from 0.1 to 1000": what a remedy and the manual say
-  std::string sentence;  ///< for the file and the manual
-  std::string example;   ///< TOML, where there is no default
-  /// Sets the value; false where `takes` doesn't hold.
+  std::string name;      ///< ends in its unit, if it has one: "flash_width_us"
+  std::string takes;     ///< "a number from 0.1 to 1000", for remedies and the manual
+  std::string sentence;  ///< description for the file and the manual
+  std::string example;   ///< TOML, for keys without a default
+  /// Sets the value; false for a node that isn't what `takes` says.
   std::function<bool(const toml::node&, T&)> read;
-  /// As TOML; empty where there is no value.
+  /// The value as TOML; empty if there is none.
   std::function<std::string(const T&)> write;
-  /// Whether it means anything beside the other values; always if absent.
+  /// Whether the key has a meaning together with the other values; absent: always.
   std::function<bool(const T&)> applies = {};
   std::string applies_words = {};  ///< "drivers virtual, v4l2"
 };
@@ -42,11 +42,11 @@ struct Section {
   std::vector<Key<T>> keys;
 };
 
-/// [rig] and what stands below it but [[rig.camera]].
+/// [rig] and its subsections, except [[rig.camera]].
 std::vector<Section<DaemonConfig>> rig_sections();
-/// All but [[rig.camera]], in the order of the file.
+/// All sections except [[rig.camera]], in the order of the file.
 const std::vector<Section<DaemonConfig>>& sections();
-/// [[rig.camera]]; `driver` comes first, as the other keys depend on it.
+/// [[rig.camera]]; `driver` comes first, because other keys depend on it.
 const Section<CameraConfig>& camera_section();
 
 std::string in_quotes(std::string_view text);
@@ -71,7 +71,7 @@ const M* value_in(const std::optional<M>& member) {
   return member ? &*member : nullptr;
 }
 
-/// A number of `unit` (SI or plain value = unit x number) in [low, high].
+/// A number in [low, high], in units of `unit` (SI value = unit x number).
 struct NumberRange {
   double low = 0, high = 0;
   double unit = 1;
@@ -111,7 +111,7 @@ Key<T> number(std::string name, At at, NumberRange range, std::string sentence, 
   return key;
 }
 
-/// Text that `parse` understands (std::optional<M>(const std::string&)) and `print` gives back.
+/// A text that `parse` (std::optional<M>(const std::string&)) reads and `print` writes.
 template <class T, class At, class Parse, class Print>
 Key<T> spelled(std::string name, At at, std::string takes, Parse parse, Print print, std::string sentence,
                std::string example = {}) {
@@ -163,7 +163,7 @@ Key<T> choice(std::string name, At at, std::vector<std::pair<std::string_view, M
                     std::move(example));
 }
 
-/// The way to a member.
+/// An accessor for a member.
 // NOLINTBEGIN(bugprone-macro-parentheses): a member can't stand in parentheses.
 #define EMBERLOCK_AT(member) \
   [](auto& c) -> auto& { return c.member; }
@@ -176,7 +176,7 @@ inline constexpr double kMebi = 1 << 20;
 inline constexpr const char* kPath = "a path";
 inline constexpr const char* kAddress = "HOST:PORT, or empty";
 
-/// From names and values as another header pairs them.
+/// An enumeration with the names and values that another header lists as pairs.
 template <class M, class Names>
 std::vector<std::pair<std::string_view, M>> named(std::initializer_list<M> values,
                                                   const Names& name_of_value) {

@@ -6,7 +6,7 @@
 
 namespace emberlock::rig {
 
-/// The manual page emberlockd.toml(5), in roff: every key with its words, range and default.
+/// The manual page emberlockd.toml(5), in roff: every key with its description, range and default.
 std::string config_manual(std::string_view version);
 
 }  // namespace emberlock::rig

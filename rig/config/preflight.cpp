@@ -45,7 +45,7 @@ class Preflight {
                          std::move(remedy)});
   }
 
-  /// It exists and can be written to, or can be made.
+  /// Checks that it exists and is writable, or can be created.
   void folder_for_writing(const char* key, const fs::path& folder) {
     std::error_code ignored;
     fs::path there = folder.empty() ? "." : folder;
@@ -102,7 +102,10 @@ std::vector<Error> check_config(const std::filesystem::path& file) {
   const auto text = read_file(file, kLargestSecret);
   if (!text) return {text.error()};
   ConfigReading reading = read_config(*text, file);
-  return reading.problems.empty() ? preflight(reading.config) : std::move(reading.problems);
+  if (!reading.problems.empty()) return std::move(reading.problems);
+  std::error_code unknown;
+  fill_in(reading.config, daemon_folders(), fs::read_symlink("/proc/self/exe", unknown));
+  return preflight(reading.config);
 }
 
 }  // namespace emberlock::rig

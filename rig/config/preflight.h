@@ -9,12 +9,12 @@
 
 namespace emberlock::rig {
 
-/// What can be found wrong with a configuration without opening devices or ports, as whoever runs this:
-/// folders that can't be written, certificates, keys, tokens and sessions that can't be read, secrets that
-/// others can read. `where` of each is the key and its path.
+/// Problems of a configuration that can be found without opening devices or ports, with the permissions of
+/// the current user: folders that can't be written; certificates, keys, tokens and sessions that can't be
+/// read; secrets that others can read. `where` is the key and its path.
 std::vector<Error> preflight(const DaemonConfig& config);
 
-/// Everything that is wrong with a configuration file: what its text says, else preflight().
+/// All problems of a configuration file: those of its text; if there are none, preflight().
 std::vector<Error> check_config(const std::filesystem::path& file);
 
 }  // namespace emberlock::rig

@@ -2,7 +2,7 @@
 #include "rig/config/keys.h"
 #include "smear_sync/align/align.h"
 
-// Every key of the configuration but the rig's.
+// All keys of the configuration except the rig's.
 namespace emberlock::rig::config {
 namespace {
 
@@ -21,13 +21,22 @@ Section<DaemonConfig> make_alignment_section() {
   };
   return {
       "alignment",
-      "How the shutters are brought together, and what that may cost.",
+      "How the shutters are aligned, and how long that may take.",
       {choice<C>("at_start", EMBERLOCK_AT(alignment.at_start),
                  {{"nothing", AtStart::nothing}, {"align", AtStart::align}},
                  "Whether the daemon begins to align by itself once the cameras film."),
-       spelled<C>("tolerance", EMBERLOCK_AT(alignment.run.align.tolerance),
-                  "a number with its unit: \"100rows\", \"5.4ms\", \"500us\"", parse, print_tolerance,
-                  "How far a camera may lie from the common target, to either side."),
+       number<C>("flame_speed_m_s", EMBERLOCK_AT(alignment.flame.speed), {0.001, 10000},
+                 "Speed of what moves fastest in the flame, in metres per second."),
+       number<C>("detail_mm", EMBERLOCK_AT(alignment.flame.detail), {0.001, 10000, kMilli},
+                 "Size of the smallest detail that shall be resolved: a few voxels."),
+       spelled<C>("tolerance", EMBERLOCK_AT(alignment.tolerance),
+                  "a number with its unit: \"0.5ms\", \"500us\", \"10rows\"", parse, print_tolerance,
+                  "Largest allowed distance of a camera from the common target, to either side. If absent: "
+                  "the time in which the flame moves by a quarter of that detail.",
+                  "\"0.5ms\""),
+       number<C>("shortest_take_s", EMBERLOCK_AT(alignment.run.align.shortest_take), {0, 3600},
+                 "Lock is called good when it surely holds for so long, as far as measured drifts and resets "
+                 "can make it; it is renewed before less is left."),
        choice<C>(
            "policy", EMBERLOCK_AT(alignment.run.align.policy),
            named<smear::AlignPolicy>({smear::AlignPolicy::fixed_reference, smear::AlignPolicy::densest,
@@ -36,40 +45,42 @@ Section<DaemonConfig> make_alignment_section() {
            "Which cameras are reset, towards what: the paper's (one camera stays), the target that takes the "
            "fewest resets, resets timed to land on it, or frame rates trimmed towards it."),
        text<C>("reference", EMBERLOCK_AT(alignment.reference), "a camera's id",
-               "The camera that stays, of policy \"fixed-reference\"; the first if absent.",
+               "Policy \"fixed-reference\" only: the camera that is never reset; the first if absent.",
                "\"virtual-00\""),
        number<C>("max_minutes", EMBERLOCK_AT(alignment.run.align.limits->time), {0.01, 1e6, 60},
-                 "A tolerance that would take longer is refused, with what could be met."),
+                 "A tolerance that would take longer is refused; the refusal names one that can be met."),
        number<C>("max_resets", EMBERLOCK_AT(alignment.run.align.limits->resets), {1, 1000000},
-                 "One that would take more resets is refused, likewise."),
+                 "A tolerance that would take more resets is refused likewise."),
        number<C>("probability", EMBERLOCK_AT(alignment.run.align.limits->probability), {0.01, 1},
                  "Probability with which the alignment must stay within these limits."),
        number<C>("max_rounds", EMBERLOCK_AT(alignment.run.align.max_rounds), {1, 1000000},
-                 "Rounds of filming without all within tolerance, then it is given up."),
+                 "The alignment is given up when not all cameras are within tolerance after so many rounds."),
        number<C>("reset_s", EMBERLOCK_AT(alignment.run.align.reset_time), {0, 3600},
-                 "An operator's way to the button, for what is foretold."),
+                 "Time that an operator needs for one reset by hand; the forecast uses it."),
        number<C>("delay_jitter_ms", EMBERLOCK_AT(alignment.run.align.delay_jitter), {0.001, 1000, kMilli},
-                 "Standard deviation of one reset's delay, until it has been seen."),
+                 "Assumed standard deviation of a reset's delay, until resets have been measured."),
        number<C>("flash_width_us", EMBERLOCK_AT(alignment.run.flash_width), {0.1, 10000, kMicro},
-                 "How long the strobe's flashes are."),
+                 "Duration of one flash of the strobe."),
        number<C>("frames_per_round", EMBERLOCK_AT(alignment.run.frames_per_round), {1, 1000},
-                 "That each camera films for one decision."),
+                 "Frames that each camera films in one round."),
        choice<C>("row_time", EMBERLOCK_AT(alignment.run.measure_row_time),
                  {{"measured", true}, {"configured", false}},
-                 "Whether a comb of flashes measures it first, or row_time_us of each camera holds."),
+                 "\"measured\": a comb of flashes measures each camera's row time first. \"configured\": "
+                 "row_time_us of each camera is used."),
        number<C>("comb_rate_hz", EMBERLOCK_AT(alignment.run.comb_rate), {30, 333},
-                 "Flashes a second of that comb; about ten a frame if absent.", "300"),
+                 "Flashes per second of the comb; about ten per frame if absent.", "300"),
        number<C>("comb_frames", EMBERLOCK_AT(alignment.run.comb_frames), {1, 1000},
-                 "Frames of it, of each camera."),
+                 "Frames of the comb that each camera films."),
        number<C>("frame_deadline_s", EMBERLOCK_AT(alignment.run.frame_deadline), {0.1, 60},
-                 "Longest wait for a frame, a reset's latency included."),
+                 "Longest wait for a frame; it includes the latency of a reset."),
        number<C>("reset_lead_ms", EMBERLOCK_AT(alignment.run.reset_lead), {0, 10000, kMilli},
-                 "Between ordering a reset and its earliest moment."),
+                 "Shortest time between the order of a reset and the reset."),
        number<C>("seed", EMBERLOCK_AT(alignment.run.seed), {0, 1e9},
-                 "Of the moments of resets that aren't timed."),
-       text<C>("delays", EMBERLOCK_AT(alignment.delays), kPath,
-               "Keeps what is known of the cameras' reset delays from run to run; nothing is kept if absent.",
-               "\"delays.json\"")}};
+                 "Seed of the random moments of resets that aren't timed."),
+       text<C>(
+           "delays", EMBERLOCK_AT(alignment.delays), kPath,
+           "File that keeps the measured reset delays of the cameras for the next run; not kept if absent.",
+           "\"delays.json\"")}};
 }
 
 Section<DaemonConfig> make_recording_section() {
@@ -77,36 +88,41 @@ Section<DaemonConfig> make_recording_section() {
   using Transcode = RecordingConfig::Transcode;
   return {
       "recording",
-      "Where recordings go, and how.",
-      {text<C>("folder", EMBERLOCK_AT(recording.folder), kPath, "Each session gets a folder in it."),
+      "Where and how recordings are written.",
+      {text<C>("folder", EMBERLOCK_AT(recording.folder), kPath,
+               "Each session gets a folder in it. If absent: /var/lib/emberlock/sessions for root and the "
+               "service, emberlock/sessions in $XDG_DATA_HOME (~/.local/share) for other users.",
+               "\"/var/lib/emberlock/sessions\""),
        choice<C>("encoding", EMBERLOCK_AT(recording.writer.encoding),
                  {{"ffv1", session::Encoding::ffv1}, {"raw", session::Encoding::raw_nut}},
-                 "Both are lossless: \"ffv1\" takes processor time, about 77 MB/s a thread, \"raw\" "
-                 "twice the disk."),
-       choice<C>("transcode", EMBERLOCK_AT(recording.transcode),
-                 {{"never", Transcode::never}, {"when-idle", Transcode::when_idle}},
-                 "Turns raw recordings into FFV1 while nothing is recorded, and verifies them."),
+                 "Both are lossless. \"ffv1\" takes processor time (one thread encodes about 77 MB/s), "
+                 "\"raw\" takes twice the disk space."),
+       choice<C>(
+           "transcode", EMBERLOCK_AT(recording.transcode),
+           {{"never", Transcode::never}, {"when-idle", Transcode::when_idle}},
+           "\"when-idle\" converts raw recordings to FFV1 and verifies them while nothing is recorded."),
        number<C>("free_space_floor_mib", EMBERLOCK_AT(recording.writer.min_free_bytes), {0, 1e9, kMebi},
-                 "Below so much free disk frames are refused, so that the disk never fills up."),
+                 "When less disk space is free, frames are refused, so that the disk never fills up."),
        number<C>("queue_s", EMBERLOCK_AT(recording.queue.queue_time), {0.05, 60},
-                 "A camera's frame waits in memory no longer for its encoder; then new ones are lost, and "
-                 "counted. A power cut loses the frames that still wait, and at most half a second more."),
+                 "Longest time that frames wait in memory for the encoder; beyond it new frames are dropped "
+                 "and counted. A power cut loses the waiting frames and at most half a second more."),
        number<C>("queue_mib", EMBERLOCK_AT(recording.queue.queue_bytes), {1, 1e6, kMebi},
-                 "Memory that one camera's waiting frames may take."),
+                 "Most memory for the waiting frames of one camera."),
        number<C>("frames_per_segment", EMBERLOCK_AT(recording.writer.frames_per_segment), {1, 1e9},
-                 "Frames after which a file is closed and the next begun."),
+                 "Frames per file; then the next file is begun."),
        number<C>("segment_mib", EMBERLOCK_AT(recording.writer.bytes_per_segment), {1, 1e6, kMebi},
-                 "Size at which a file is closed and the next begun.")}};
+                 "Size of a file; then the next file is begun.")}};
 }
 
 /// hold_out = [3, 7]
 Key<DaemonConfig> hold_out() {
-  Key<DaemonConfig> key{"hold_out",
-                        "a list of whole numbers from 0 to 63",
-                        "Views, counted from 0, that are kept for judging the result.",
-                        "[3]",
-                        {},
-                        {}};
+  Key<DaemonConfig> key{
+      "hold_out",
+      "a list of whole numbers from 0 to 63",
+      "Views, counted from 0, that the reconstruction doesn't use; the result is scored on them.",
+      "[3]",
+      {},
+      {}};
   key.read = [](const toml::node& node, DaemonConfig& config) {
     const toml::array* list = node.as_array();
     if (list == nullptr) return false;
@@ -127,67 +143,76 @@ Key<DaemonConfig> hold_out() {
 Section<DaemonConfig> make_reconstruction_section() {
   using C = DaemonConfig;
   return {"reconstruction",
-          "Turns a finished recording into a volume, in a process of its own.",
+          "Turns a finished recording into a volume, in a separate process.",
           {text<C>("program", EMBERLOCK_AT(reconstruction.program), kPath,
-                   "The `emberlock` to run; searched for in PATH unless it has a slash."),
+                   "The `emberlock` to run; searched for in PATH unless it has a slash. If absent: the one "
+                   "beside emberlockd, else the one in PATH.",
+                   "\"emberlock\""),
            choice<C>("device", EMBERLOCK_AT(reconstruction.device),
                      {{"auto", "auto"}, {"cpu", "cpu"}, {"cuda", "cuda"}}, "What it computes on."),
            number<C>("budget_s", EMBERLOCK_AT(reconstruction.budget), {1, 86400},
-                     "Be done within so long; by the reconstruction's own rules if absent.", "60"),
-           number<C>(
-               "voxels", EMBERLOCK_AT(reconstruction.voxels), {1, 1024},
-               "Along the longest edge. If absent, the knee of time against error, measured on this machine.",
-               "192"),
+                     "Time limit of a reconstruction; if absent, it stops by its own rules.", "60"),
+           number<C>("voxels", EMBERLOCK_AT(reconstruction.voxels), {1, 1024},
+                     "Voxels along the longest edge. If absent, the knee of time against error, measured on "
+                     "this machine.",
+                     "192"),
            hold_out(),
-           number<C>("threads", EMBERLOCK_AT(reconstruction.threads), {0, 256}, "On the CPU; 0: one a core."),
+           number<C>("threads", EMBERLOCK_AT(reconstruction.threads), {0, 256},
+                     "Threads on the CPU; 0: one per core."),
            number<C>("silence_s", EMBERLOCK_AT(reconstruction.silence), {1, 86400},
-                     "Without a word of progress for so long it hangs, and is ended."),
+                     "A reconstruction that reports no progress for so long is ended as hung."),
            number<C>("niceness", EMBERLOCK_AT(reconstruction.niceness), {0, 19},
-                     "How far it gives way to cameras and recordings.")}};
+                     "Unix niceness of the process, so that cameras and recordings go first.")}};
 }
 
 Section<DaemonConfig> make_server_section() {
   using C = DaemonConfig;
   return {
       "server",
-      "Who reaches the daemon, and how.",
-      {text<C>("socket", EMBERLOCK_AT(server.socket), kPath,
-               "Unix socket of the API (gRPC): who may enter its folder may use it."),
+      "Who may reach the daemon, and how.",
+      {text<C>(
+           "socket", EMBERLOCK_AT(server.socket), kPath,
+           "Unix socket of the API (gRPC). Every user who may enter its folder may use the API. If absent: "
+           "/run/emberlock/emberlockd.sock for root and the service, emberlock/emberlockd.sock in "
+           "$XDG_RUNTIME_DIR for other users. `emberlock` looks there too.",
+           "\"/run/emberlock/emberlockd.sock\""),
        text<C>("listen", EMBERLOCK_AT(server.listen), kAddress,
-               "The API over TCP; needs tls_certificate, tls_key and token_file. Nowhere if empty.",
+               "Address of the API over TCP; needs tls_certificate, tls_key and token_file. Off if empty.",
                "\"0.0.0.0:7141\""),
-       text<C>(
-           "http_listen", EMBERLOCK_AT(server.http_listen), kAddress,
-           "The console and the JSON API: browsers are let in by the link that `emberlock console` prints, "
-           "programs by the token. Beyond localhost over TLS: it needs tls_certificate, tls_key and "
-           "token_file "
-           "then. Nowhere if empty."),
+       text<C>("http_listen", EMBERLOCK_AT(server.http_listen), kAddress,
+               "Address of the console and the JSON API. Browsers sign in with the link that `emberlock "
+               "console` prints, programs with the token. An address other than localhost needs "
+               "tls_certificate, tls_key and token_file. Off if empty."),
        text<C>("tls_certificate", EMBERLOCK_AT(server.tls_certificate), kPath,
-               "Of listen and http_listen. PEM, with its chain.", "\"server.crt\""),
+               "Certificate of listen and http_listen: PEM, with its chain.", "\"server.crt\""),
        text<C>("tls_key", EMBERLOCK_AT(server.tls_key), kPath,
-               "PEM; others may not read it, nor its group write to it.", "\"server.key\""),
+               "Private key of tls_certificate: PEM. Other users must not be able to read it, its group must "
+               "not be able to write to it.",
+               "\"server.key\""),
        text<C>("tls_clients", EMBERLOCK_AT(server.tls_clients), kPath,
-               "PEM of the authority that signs clients' certificates: with it each client that comes by TLS "
-               "must have one, browsers too.",
+               "PEM of the authority that signs clients' certificates. If set, each TLS client must have a "
+               "certificate, browsers too.",
                "\"clients.crt\""),
-       text<C>("token_file", EMBERLOCK_AT(server.token_file), kPath,
-               "A file that holds the token and nothing else. Clients show it, by HTTP on this machine too; "
-               "others may not read it, nor its group write to it.",
-               "\"token\""),
-       text<C>("console", EMBERLOCK_AT(server.console), kPath,
-               "The folder of the console's files; share/emberlock/console beside the program's folder if "
-               "absent.",
-               "\"console\""),
-       number<C>(
-           "viewers", EMBERLOCK_AT(server.viewers), {1, 1000},
-           "Consoles that may watch at a time; when one more comes, one of whoever has most makes room."),
+       text<C>(
+           "token_file", EMBERLOCK_AT(server.token_file), kPath,
+           "File that holds the token and nothing else. Clients send the token, by HTTP on this machine too. "
+           "Other users must not be able to read the file, its group must not be able to write to it.",
+           "\"token\""),
+       text<C>(
+           "console", EMBERLOCK_AT(server.console), kPath,
+           "Folder of the console's files; share/emberlock/console beside the program's folder if absent.",
+           "\"console\""),
+       number<C>("viewers", EMBERLOCK_AT(server.viewers), {1, 1000},
+                 "Most consoles that watch at a time. When one more comes, the client with most of them "
+                 "loses one."),
        number<C>("picture_width", EMBERLOCK_AT(server.picture_width), {32, 4096},
-                 "Of live pictures, in pixels, at most."),
+                 "Largest width of live pictures, in pixels."),
        number<C>("picture_rate_hz", EMBERLOCK_AT(server.picture_rate), {0.1, 60},
-                 "Live pictures a second of each camera, at most."),
-       number<C>("picture_quality", EMBERLOCK_AT(server.picture_quality), {1, 100}, "Of their JPEG."),
+                 "Most live pictures per second of each camera."),
+       number<C>("picture_quality", EMBERLOCK_AT(server.picture_quality), {1, 100},
+                 "JPEG quality of live pictures."),
        number<C>("message_mib", EMBERLOCK_AT(server.message_bytes), {1, 64, kMebi},
-                 "A client's request, at most.")}};
+                 "Largest request of a client.")}};
 }
 
 Section<DaemonConfig> make_log_section() {
@@ -199,9 +224,9 @@ Section<DaemonConfig> make_log_section() {
   return {"log",
           "What the daemon writes to the journal (stderr).",
           {choice<C>("level", EMBERLOCK_AT(log.level), levels,
-                     "The least that is written; EMBERLOCK_LOG goes before it."),
+                     "Lowest level that is written; EMBERLOCK_LOG overrides it."),
            choice<C>("format", EMBERLOCK_AT(log.format), {{"text", Format::text}, {"json", Format::json}},
-                     "For people, or one JSON object a line.")}};
+                     "\"text\" for people, \"json\" for programs: one object per line.")}};
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rig/config/keys.h"
 
-// Every key of [rig] and below but [[rig.camera]].
+// All keys of [rig] and its subsections, except [[rig.camera]].
 namespace emberlock::rig::config {
 namespace {
 
@@ -9,13 +9,13 @@ Section<DaemonConfig> make_rig_section() {
   using C = DaemonConfig;
   return {
       "rig",
-      "What is filmed with. Cameras of all drivers mix freely in one rig.",
-      {text<C>("name", EMBERLOCK_AT(rig.name), "text", "What the console calls it."),
-       text<C>("calibration", EMBERLOCK_AT(rig.calibration), kPath,
-               "A transforms.json with poses, lenses and the box; the frame CAMERA-ID.png is that camera's. "
-               "Recordings "
-               "carry it, and can be reconstructed. None if absent.",
-               "\"transforms.json\"")}};
+      "The cameras and the strobe. One rig may mix cameras of all drivers.",
+      {text<C>("name", EMBERLOCK_AT(rig.name), "text", "Name of the rig in the console."),
+       text<C>(
+           "calibration", EMBERLOCK_AT(rig.calibration), kPath,
+           "A transforms.json with poses, lenses and the box; its frame CAMERA-ID.png belongs to the camera "
+           "with that id. It is stored in recordings, which only then can be reconstructed. None if absent.",
+           "\"transforms.json\"")}};
 }
 
 Section<DaemonConfig> make_virtual_section() {
@@ -25,23 +25,24 @@ Section<DaemonConfig> make_virtual_section() {
   using Models = drivers::VirtualRigDraw::Models;
   return {
       "rig.virtual",
-      "What virtual cameras and their strobe share.",
+      "Settings that virtual cameras and their strobe share.",
       {choice<C>("time", EMBERLOCK_AT(rig.virtual_rig.time), {{"real", Time::real}, {"fast", Time::fast}},
-                 "\"fast\" lets the rig's clock run as fast as pictures are drawn; not beside real devices."),
-       choice<C>("scene", EMBERLOCK_AT(rig.virtual_rig.scene),
-                 {{"dark-room", Scene::dark_room}, {"lit-room", Scene::lit_room}, {"flame", Scene::flame}},
-                 "What they see beside the strobe. Shutters without smear see flashes in a lit room alone."),
-       number<C>("seed", EMBERLOCK_AT(rig.virtual_rig.draw.seed), {0, 1e9},
-                 "Of everything that is drawn by chance."),
+                 "\"fast\": the rig's clock runs as fast as pictures are rendered; not possible together "
+                 "with real devices."),
+       choice<C>(
+           "scene", EMBERLOCK_AT(rig.virtual_rig.scene),
+           {{"dark-room", Scene::dark_room}, {"lit-room", Scene::lit_room}, {"flame", Scene::flame}},
+           "What the cameras see beside the strobe. Sensors without smear see flashes only in \"lit-room\"."),
+       number<C>("seed", EMBERLOCK_AT(rig.virtual_rig.draw.seed), {0, 1e9}, "Seed of all random numbers."),
        choice<C>("models", EMBERLOCK_AT(rig.virtual_rig.draw.models),
                  {{"same", Models::same}, {"mixed", Models::mixed}},
-                 "Whether the cameras are of one model, or differ in direction and shifts."),
+                 "\"same\": all cameras are of one model. \"mixed\": they differ in direction and shifts."),
        number<C>("crystal_spread_ppm", EMBERLOCK_AT(rig.virtual_rig.draw.crystal_spread), {0, 1000},
-                 "Each camera's clock is off by up to this."),
+                 "Largest frequency error of a camera's clock."),
        number<C>("reset_latency_ms", EMBERLOCK_AT(rig.virtual_rig.draw.reset_latency), {0, 10000, kMilli},
-                 "From a reset to the new phase, mean over cameras."),
+                 "Delay from a reset to the new phase, mean over cameras."),
        number<C>("reset_jitter_ms", EMBERLOCK_AT(rig.virtual_rig.draw.reset_jitter), {0, 1000, kMilli},
-                 "RMS of that, of resets on command.")}};
+                 "RMS jitter of that delay, for resets on command.")}};
 }
 
 Section<DaemonConfig> make_replay_section() {
@@ -64,34 +65,34 @@ Section<DaemonConfig> make_strobe_section() {
             {"serial", StrobeSource::serial},
             {"replay", StrobeSource::replay},
             {"manual", StrobeSource::manual}},
-           "How it is reached. \"manual\" is a stroboscope with a dial, that no program can talk to: the "
-           "daemon says what to set, and reads from the frames what was set. Without a strobe nothing can "
-           "be aligned."),
+           "Kind of strobe. \"manual\" is a stroboscope with a dial and no interface: the daemon says what "
+           "to set, and measures from the frames what was set. Without a strobe nothing can be aligned."),
        number<C>("dial_step", EMBERLOCK_AT(rig.strobe.dial.step), {0.001, 100, 1.0 / 60},
-                 "Between two settings of a manual strobe's dial, in flashes a minute."),
+                 "Step of a manual strobe's dial, in flashes per minute."),
        text<C>("id", EMBERLOCK_AT(rig.strobe.id), "text",
-               "Of the serial port, as `emberlock devices` names it.", "\"ttyUSB0\""),
+               "Id of the serial port, as `emberlock devices` prints it.", "\"ttyUSB0\""),
        choice<C>("dialect", EMBERLOCK_AT(rig.strobe.request.dialect),
                  named<drivers::StrobeDialect>(
                      {drivers::StrobeDialect::emberlock, drivers::StrobeDialect::scpi,
                       drivers::StrobeDialect::siglent_bswv, drivers::StrobeDialect::gardasoft_rt,
                       drivers::StrobeDialect::schott_cv_ls},
                      [](drivers::StrobeDialect d) { return drivers::name_of(d); }),
-                 "Its language on the serial line; `emberlock devices probe ID` finds it out."),
+                 "Command language on the serial line; `emberlock devices probe ID` detects it."),
        number<C>("baud", EMBERLOCK_AT(rig.strobe.request.baud), {300, 4000000},
-                 "The dialect's own if absent.", "115200"),
+                 "Baud rate of the serial line; the dialect's usual one if absent.", "115200"),
        number<C>("channel", EMBERLOCK_AT(rig.strobe.request.options.channel), {1, 8},
-                 "Of a device with several outputs."),
+                 "Output to use, for a device with several."),
        number<C>("brightness_percent", EMBERLOCK_AT(rig.strobe.request.options.brightness), {0.1, 100},
-                 "Of controllers that set it (Gardasoft)."),
-       choice<C>(
-           "scpi_phase", EMBERLOCK_AT(rig.strobe.request.options.phase),
-           {{"start", drivers::ScpiPhase::start}, {"delay", drivers::ScpiPhase::delay}},
-           "What a generator means by PHASe: the angle where a period starts, or a delay (Agilent 81100)."),
+                 "Brightness of the flashes, for controllers that can set it (Gardasoft)."),
+       choice<C>("scpi_phase", EMBERLOCK_AT(rig.strobe.request.options.phase),
+                 {{"start", drivers::ScpiPhase::start}, {"delay", drivers::ScpiPhase::delay}},
+                 "What the generator means by PHASe: the angle at which a period starts, or a delay (Agilent "
+                 "81100)."),
        number<C>("watchdog_s", EMBERLOCK_AT(rig.strobe.request.options.watchdog), {0, 600},
-                 "Our own controller goes dark when told nothing for so long; 0: never, else 0.1 at least."),
+                 "Emberlock's controller goes dark when it gets no command for so long; 0: never, else at "
+                 "least 0.1."),
        number<C>("patience_s", EMBERLOCK_AT(rig.strobe.request.patience), {0.1, 60},
-                 "For its first answer: opening the port may have reset it.")}};
+                 "Longest wait for the first answer; opening the port may have reset the device.")}};
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 
 #include "rig/config/keys.h"
 
-// The configuration as text: with every key commented out, and with the values that hold.
+// The configuration as text: as a template with every key commented out, and with the values in effect.
 namespace emberlock::rig {
 namespace {
 using config::Key;
@@ -11,7 +11,7 @@ using config::Section;
 
 constexpr std::size_t kWidth = 100;
 
-/// `text` in lines of comment.
+/// `text` as comment lines.
 std::string comment(std::string_view text) {
   std::string lines;
   std::size_t column = 0;
@@ -28,8 +28,8 @@ std::string comment(std::string_view text) {
   return lines + "\n";
 }
 
-/// Keys that `in_force` says otherwise than `unsaid` stand as they are, the others behind a # with their
-/// defaults.
+/// Writes a section. Keys whose value differs from `unsaid` are written as they are, others are commented out
+/// with their defaults.
 template <class T>
 std::string commented(const Section<T>& section, const char* open, const char* close, const T& in_force,
                       const T& unsaid) {
@@ -58,7 +58,7 @@ std::string printed(const Section<T>& section, const T& from) {
   for (const Key<T>& key : section.keys) {
     if (key.applies && !key.applies(from)) continue;
     std::string value = key.write(from);
-    if (value.empty() && !key.write(defaults).empty()) value = R"("")";  // emptied on purpose
+    if (value.empty() && !key.write(defaults).empty()) value = R"("")";  // set to empty on purpose
     if (!value.empty()) text += key.name + " = " + value + "\n";
   }
   return text + "\n";
@@ -67,7 +67,7 @@ std::string printed(const Section<T>& section, const T& from) {
 }  // namespace
 
 std::string commented_config() {
-  // A rig that everybody has, to see what happens. A camera's driver must be said.
+  // A rig that works on every machine, to try the program. A camera needs a driver.
   CameraConfig camera;
   camera.count = 4;
   camera.request.size = ImageSize{640, 480};
@@ -78,13 +78,10 @@ std::string commented_config() {
   config.rig.strobe.source = StrobeSource::virtual_;
 
   std::string text = comment(
-      "The configuration of emberlockd(8). To begin with it has a simulated rig; `emberlock devices` lists "
-      "the cameras "
-      "and serial ports that are there to take its place. A line behind a bare # is a key with its default: "
-      "take the # "
-      "away and change it. `emberlockd --check-config` says what is wrong with a file. Relative paths start "
-      "from the "
-      "file's folder.");
+      "The configuration of emberlockd(8). It starts with a simulated rig, so that it works everywhere; "
+      "replace it by the cameras and serial ports that `emberlock devices` lists. A line after a bare # is a "
+      "key with its default: remove the # and change the value. `emberlockd --check-config` says what is "
+      "wrong with a file. Relative paths are relative to the file's folder.");
   text += "\n";
   for (const auto& section : config::sections()) {
     text += commented(section, "[", "]", config, DaemonConfig{});

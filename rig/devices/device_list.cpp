@@ -101,7 +101,7 @@ ordered_json camera_json(const ListedCamera& camera) {
 const std::string& id_of(const ListedCamera& camera) { return camera.found.id; }
 const std::string& id_of(const drivers::StrobeFound& port) { return port.id; }
 
-/// Those of `devices` whose ids `others` lack.
+/// The items of `devices` whose ids aren't in `others`.
 template <class Found>
 std::vector<Found> without(const std::vector<Found>& devices, const std::vector<Found>& others) {
   std::vector<Found> left;

@@ -8,7 +8,7 @@
 #include "drivers/driver.h"
 #include "drivers/strobe_serial/strobe_serial.h"
 
-// Everything that is there, by all drivers.
+// All connected devices of all drivers.
 namespace emberlock::rig {
 
 struct ListedCamera {
@@ -16,7 +16,8 @@ struct ListedCamera {
   drivers::CameraFound found;
 };
 
-/// What was found: cameras by driver and id, and the serial ports, any of which may lead to a strobe.
+/// The connected devices: cameras by driver and id, and serial ports, to each of which a strobe may be
+/// connected.
 struct DeviceList {
   std::vector<ListedCamera> cameras;
   std::vector<drivers::StrobeFound> ports;
@@ -24,31 +25,31 @@ struct DeviceList {
     std::string_view driver;
     Error error;
   };
-  std::vector<Failure> failures;  ///< of drivers that couldn't look
+  std::vector<Failure> failures;  ///< drivers that failed to search
 };
 
-/// Every driver of real cameras.
+/// The drivers of all real cameras.
 std::span<const drivers::CameraDriver> camera_drivers();
 
-/// Asks all drivers at once.
+/// Queries all drivers in parallel.
 DeviceList list_cameras(std::span<const drivers::CameraDriver> drivers);
 /// The cameras of all drivers, and the serial ports.
 DeviceList list_devices();
 
-/// The camera of this id, with its driver. Error bad_input names what there is instead.
+/// The camera with this id, and its driver. Error bad_input lists the existing ones.
 Result<ListedCamera> find_camera(const DeviceList& list, const std::string& id);
 
-/// `now`, with what drivers that couldn't look this time had `before`.
+/// `now`, completed with the entries of `before` for drivers that failed this time.
 DeviceList keep_unseen(const DeviceList& before, DeviceList now);
 
-/// What came and what went from one list to the next, by id.
+/// The devices added and removed between two lists, by id.
 struct DeviceChanges {
   DeviceList came;
   DeviceList went;
 };
 DeviceChanges changes(const DeviceList& before, const DeviceList& after);
 
-/// Lines for people, a block a camera; `Detail::all_modes` with every mode.
+/// A list for display, one block per camera; `Detail::all_modes` includes every mode.
 enum class Detail { best_mode, all_modes };
 std::string device_table(const DeviceList& list, Detail detail);
 /// One JSON object: {"cameras": [...], "serial_ports": [...], "failures": [...]}.

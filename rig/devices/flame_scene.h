@@ -5,11 +5,16 @@
 
 #include "base/image.h"
 #include "drivers/virtual/light_field.h"
+#include "drivers/virtual/scene.h"
 
 namespace emberlock::rig {
 
-/// A flame that stands still amid so many cameras that film pictures of this size, on the stage of stage.h.
-/// Drawing it takes a moment.
+/// A flame that doesn't change, for `cameras` cameras with pictures of this size, in the arrangement of
+/// stage.h. Rendering it takes a moment.
 std::shared_ptr<const drivers::LightField> still_flame(int cameras, ImageSize size);
+
+/// The flame, exposed as it is recorded, in the strobe's room: flashes are seen beside it.
+drivers::VirtualScene flame_and_strobe(std::shared_ptr<const drivers::LightField> flame,
+                                       const drivers::VirtualScene& room);
 
 }  // namespace emberlock::rig

@@ -12,14 +12,14 @@
 
 namespace emberlock::rig {
 
-/// Where the cameras stand, as far as that is known: from the configured transforms.json, the replayed
-/// session, or of simulated cameras that film a flame, by construction.
+/// The poses of the cameras, as far as they are known: from the configured transforms.json, from the replayed
+/// session, or by construction for simulated cameras that film a flame.
 class Geometry {
  public:
-  /// Errors: bad_input (a file that can't be read, or has no word on one of the cameras).
+  /// Errors: bad_input (an unreadable file, or one without one of the cameras).
   static Result<Geometry> of(const RigConfig& config, Rig& rig);
 
-  /// The streams of all cameras, with their calibrations, and the box.
+  /// Adds the streams of all cameras, with their calibrations, and the box.
   void describe(Rig& rig, v1::Manifest& manifest) const;
 
  private:

@@ -40,7 +40,7 @@ PacedCamera::PacedCamera(std::shared_ptr<session::SessionReader> session, std::s
     : session_(std::move(session)),
       camera_(camera),
       pace_(std::move(pace)),
-      // The reader has checked the layout, the one thing that can be wrong.
+      // Safe: the only possible error is the layout, which the reader has checked.
       info_(drivers::camera_info(session_->manifest().cameras(static_cast<int>(camera))).value()) {
   info_.reset = ShutterReset::none;
   info_.trim.reset();

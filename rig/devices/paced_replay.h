@@ -11,14 +11,14 @@
 
 namespace emberlock::rig {
 
-/// A recorded session's time on the live clock: its first frame is due when the first of its cameras starts.
-/// Thread-safe.
+/// Maps a recorded session's time to the live clock: the first frame is due when the first of the session's
+/// cameras starts. Thread-safe.
 class ReplayPace {
  public:
   ReplayPace(const session::SessionReader& session, std::shared_ptr<Clock> clock);
   void begin();
   [[nodiscard]] Clock& clock() const { return *clock_; }
-  /// When what was recorded at `recorded` is due, once it has begun.
+  /// The due time of what was recorded at `recorded`; only after the start.
   [[nodiscard]] TimePoint due(TimePoint recorded) const;
 
  private:
@@ -28,8 +28,8 @@ class ReplayPace {
   std::optional<TimePoint> began_;
 };
 
-/// A recorded camera beside live ones: its frames come at the pace at which they came then, with the instants
-/// of now, and end as out_of_data. What it did then can't be changed: no resets, no trims.
+/// A recorded camera beside live ones: its frames arrive at their recorded pace, with present times, and end
+/// with out_of_data. No resets and no trims.
 class PacedCamera final : public drivers::Camera {
  public:
   PacedCamera(std::shared_ptr<session::SessionReader> session, std::size_t camera,

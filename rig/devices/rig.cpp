@@ -12,13 +12,13 @@
 #include "drivers/virtual/virtual_clock.h"
 #include "rig/align/record.h"
 #include "rig/devices/flame_scene.h"
-#include "rig/devices/late_devices.h"
+#include "rig/devices/lazy_devices.h"
 #include "rig/devices/virtual_setup.h"
 
 namespace emberlock::rig {
 namespace {
 
-/// Of cameras whose rate nothing tells before they come.
+/// For cameras whose rate is unknown before they are opened.
 constexpr Hertz kUsualRate{23.976};
 
 Error refuse(std::string what, std::string where, std::string remedy) {
@@ -46,7 +46,7 @@ bool all_are(const RigConfig& config, CameraSource source) {
                      [&](const CameraConfig& camera) { return camera.source == source; });
 }
 
-/// The rate at which the rig films, as far as the configuration tells.
+/// The frame rate of the rig, as far as the configuration gives it.
 Hertz rate_of(const RigConfig& config) {
   for (const CameraConfig& camera : config.cameras) {
     if (camera.request.frame_rate) return *camera.request.frame_rate;
@@ -130,7 +130,7 @@ Status Rig::open_strobe(const RigConfig& config) {
       strobe_ = &virtual_->strobe();
       return {};
     case StrobeSource::serial:
-      own_strobe_ = std::make_unique<LateStrobe>(config.strobe.id, [strobe = config.strobe] {
+      own_strobe_ = std::make_unique<LazyStrobe>(config.strobe.id, [strobe = config.strobe] {
         return drivers::open_serial_strobe(strobe.id, strobe.request);
       });
       strobe_ = own_strobe_.get();
@@ -140,7 +140,7 @@ Status Rig::open_strobe(const RigConfig& config) {
       return {};
     case StrobeSource::manual:
       EMBERLOCK_RETURN_IF_ERROR(check(config.strobe.dial));
-      if (virtual_) {  // its dial is turned by whoever plays the operator
+      if (virtual_) {  // its dial is turned by the caller, who plays the operator
         strobe_ = &virtual_->strobe();
       } else {
         own_strobe_ = std::make_unique<drivers::ManualStrobe>("manual", config.strobe.dial);
@@ -164,7 +164,7 @@ Status Rig::add_real(const CameraConfig& config, Hertz rate) {
     info.sensor = config.sensor.value_or(info.sensor);
     info.reset = config.reset.value_or(info.reset);
   };
-  add(std::make_unique<LateCamera>(
+  add(std::make_unique<LazyCamera>(
           std::move(expected), [open = driver->open, config] { return open(config.id, config.request); },
           configure),
       name, config);
@@ -204,16 +204,16 @@ void Rig::add(std::unique_ptr<drivers::Camera> camera, std::string_view driver, 
 }
 
 void Rig::add_borrowed(drivers::Camera& camera, std::string_view driver, const CameraConfig& config) {
-  if (pace_ == Pace::real_time) return add(std::make_unique<ShownCamera>(camera), driver, config);
+  if (pace_ == Pace::real_time) return add(std::make_unique<ObservedCamera>(camera), driver, config);
   std::function<void(const Frame&)> on_frame;
   if (options_.on_frame) {
     on_frame = [show = options_.on_frame, index = cameras_.size()](const Frame& frame) {
       show(index, frame);
     };
   }
-  auto shown = std::make_unique<ShownCamera>(camera, std::move(on_frame));
-  Member member{nullptr, driver, config, nullptr, shown.get()};
-  member.camera = std::move(shown);
+  auto observed = std::make_unique<ObservedCamera>(camera, std::move(on_frame));
+  Member member{nullptr, driver, config, nullptr, observed.get()};
+  member.camera = std::move(observed);
   cameras_.push_back(std::move(member));
 }
 
@@ -226,8 +226,9 @@ AlignRig Rig::devices() {
 drivers::CameraThread::State Rig::state(std::size_t index) const {
   const Member& member = cameras_.at(index);
   if (member.thread) return member.thread->state();
-  if (member.shown->ended()) return drivers::CameraThread::State::ended;
-  return member.shown->filming() ? drivers::CameraThread::State::filming : drivers::CameraThread::State::idle;
+  if (member.observed->ended()) return drivers::CameraThread::State::ended;
+  return member.observed->filming() ? drivers::CameraThread::State::filming
+                                    : drivers::CameraThread::State::idle;
 }
 
 std::optional<Error> Rig::trouble(std::size_t index) const {
@@ -246,7 +247,7 @@ std::vector<smear::CcdTiming> Rig::timing() const {
     timing.direction = config.direction;
     timing.row_time = config.row_time.value_or(timing.row_time);
     if (config.source == CameraSource::virtual_) {
-      // As a data sheet says it; t_row is measured.
+      // From a data sheet; t_row is measured.
       const smear::CcdTiming& truth = virtual_->truth(virtual_cameras++).timing;
       timing.rows = truth.rows;
       timing.shifts = truth.shifts;
@@ -260,11 +261,12 @@ std::vector<smear::CcdTiming> Rig::timing() const {
 
 Status Rig::show(Scene scene) {
   if (!flame_) return {};
-  return virtual_->set_scene(scene == Scene::flame ? drivers::flame_scene(flame_) : room_);
+  return virtual_->set_scene(scene == Scene::flame ? flame_and_strobe(flame_, room_) : room_);
 }
 
 Result<AlignRunOptions> Rig::align_options(const AlignmentConfig& config) {
   AlignRunOptions options = config.run;
+  options.align.tolerance = config.tolerance.value_or(smear::tolerance_for(config.flame));
   options.timing = timing();
   options.align.reset_by = smear::ResetBy::anybody;
   if (strobe_ != nullptr) options.align.dial = strobe_->dial();

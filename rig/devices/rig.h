@@ -19,34 +19,34 @@
 #include "rig/align/run.h"
 #include "rig/config/config.h"
 #include "rig/devices/device_list.h"
+#include "rig/devices/observed_camera.h"
 #include "rig/devices/paced_replay.h"
-#include "rig/devices/shown_camera.h"
 
 namespace emberlock::rig {
 
 struct RigOptions {
-  std::size_t queue_frames = 64;  ///< of each camera that has a thread
-  /// Shown every frame as it comes, also those that nobody takes: on the camera's own thread in a rig in real
-  /// time, so it must be thread-safe, and return at once.
+  std::size_t queue_frames = 64;  ///< of each camera with its own thread
+  /// Called with every frame on arrival, also with frames that are never fetched. In a real-time rig it is
+  /// called on the camera's own thread, so it must be thread-safe and return at once.
   std::function<void(std::size_t camera, const Frame&)> on_frame = {};
   std::span<const drivers::CameraDriver> drivers = camera_drivers();
 };
 
-/// The configured cameras and strobe, opened. In real time every camera has a thread of its own
-/// (drivers/camera_thread.h); one that isn't there is lost, and looked for. A rig whose cameras are all
-/// virtual and fast, or all recorded, strobe included, runs on its own clock and on its owner's thread alone,
-/// the same each time. Cameras keep the order of the configuration. One owner thread, but for state(),
-/// trouble() and counts().
+/// The configured cameras and strobe. In real time every camera has its own thread (drivers/camera_thread.h);
+/// an absent camera counts as lost and is searched for. A rig whose cameras are all virtual and fast, or all
+/// recorded with the strobe, runs on its own clock and on the owner's thread only, and is deterministic.
+/// Cameras are in the order of the configuration. One owner thread, except for state(), trouble() and
+/// counts().
 class Rig {
  public:
   enum class Pace {
     real_time,
     fast,      ///< virtual, as fast as pictures are drawn
-    recorded,  ///< a session, as fast as its frames are read; the clock gives its instants
+    recorded,  ///< a session, as fast as its frames are read; the clock returns recorded instants
   };
 
-  /// Opens nothing that takes time: cameras and strobe are looked for when they are started. Errors:
-  /// bad_input (what doesn't fit together; a session that can't be read).
+  /// Doesn't wait for devices: cameras and strobe are searched for when they are started. Errors: bad_input
+  /// (an inconsistent configuration; an unreadable session).
   static Result<std::unique_ptr<Rig>> open(const RigConfig& config, RigOptions options = {});
   Rig(const Rig&) = delete;
   Rig& operator=(const Rig&) = delete;
@@ -56,31 +56,37 @@ class Rig {
   [[nodiscard]] drivers::Camera& camera(std::size_t index) { return *cameras_.at(index).camera; }
   /// "virtual", "v4l2", ...
   [[nodiscard]] std::string_view driver(std::size_t index) const { return cameras_.at(index).driver; }
-  /// Null where the rig has none.
+  /// Null if the rig has none.
   [[nodiscard]] drivers::Strobe* strobe() { return strobe_; }
   [[nodiscard]] Clock& clock() { return *clock_; }
-  /// All of it, for an alignment; without a recorder.
+  /// All devices, for an alignment; without a recorder.
   [[nodiscard]] AlignRig devices();
 
   [[nodiscard]] drivers::CameraThread::State state(std::size_t index) const;
+  /// Its thread takes longer than it may, but computes: the processor has too much to do.
+  [[nodiscard]] bool overworked(std::size_t index) const {
+    return cameras_.at(index).thread != nullptr && cameras_.at(index).thread->overworked();
+  }
   /// Why a camera is lost or quarantined.
   [[nodiscard]] std::optional<Error> trouble(std::size_t index) const;
   [[nodiscard]] drivers::FrameCounts counts(std::size_t index) const {
     return cameras_.at(index).camera->counts();
   }
 
-  /// What is known of how each camera is read, from the configuration and, where that is silent, from its
-  /// picture.
+  /// Each camera's read-out timing from the configuration; for missing values, from its picture.
   [[nodiscard]] std::vector<smear::CcdTiming> timing() const;
-  /// The options of an alignment of this rig: with its timings, the reference by its id, and the delays that
-  /// were learnt. Errors: bad_input (no such camera; a file of delays that can't be read).
+  /// The options for aligning this rig: its timings, the reference by its id, and the learnt delays. Errors:
+  /// bad_input (no such camera; an unreadable file of delays).
   [[nodiscard]] Result<AlignRunOptions> align_options(const AlignmentConfig& config);
 
-  /// Of virtual cameras whose scene has a flame: it burns from now on, in a dark room, or the strobe's room
-  /// is there again. Of others nothing.
-  enum class Scene { strobe, flame };
+  /// Switches the scene of virtual cameras that have a flame: a flame in a dark room, or the room of the
+  /// strobe. No effect on others.
+  enum class Scene {
+    strobe,  ///< as the alignment wants it
+    flame,   ///< and the strobe's flashes, if it flashes
+  };
   Status show(Scene scene);
-  /// The virtual cameras' truth; null without virtual cameras.
+  /// The virtual cameras' true values; null without virtual cameras.
   [[nodiscard]] drivers::VirtualRig* virtual_rig() { return virtual_.get(); }
 
  private:
@@ -88,8 +94,8 @@ class Rig {
     std::unique_ptr<drivers::Camera> camera;
     std::string_view driver;
     CameraConfig config;
-    drivers::CameraThread* thread = nullptr;  ///< what `camera` is in real time
-    ShownCamera* shown = nullptr;             ///< what it is otherwise
+    drivers::CameraThread* thread = nullptr;  ///< the type of `camera` in real time
+    ObservedCamera* observed = nullptr;       ///< the type of `camera` otherwise
   };
   explicit Rig(RigOptions options) : options_(std::move(options)) {}
   Status open_virtual(const RigConfig& config);
@@ -104,13 +110,13 @@ class Rig {
   Pace pace_ = Pace::real_time;
   std::shared_ptr<Clock> clock_;
   std::unique_ptr<drivers::VirtualRig> virtual_;
-  drivers::VirtualScene room_;                        ///< of virtual cameras
-  std::shared_ptr<const drivers::LightField> flame_;  ///< null where none burns
+  drivers::VirtualScene room_;                        ///< scene of the virtual cameras
+  std::shared_ptr<const drivers::LightField> flame_;  ///< null if there is none
   std::optional<drivers::ReplayRig> replay_;
   std::shared_ptr<ReplayPace> replay_pace_;
   std::unique_ptr<drivers::Strobe> own_strobe_;
   drivers::Strobe* strobe_ = nullptr;
-  std::vector<Member> cameras_;  ///< gone before what they use
+  std::vector<Member> cameras_;  ///< last member: destroyed before what they use
 };
 
 }  // namespace emberlock::rig

@@ -12,7 +12,7 @@ namespace emberlock::rig {
 
 Stage demo_stage(int cameras, ImageSize image) {
   constexpr double kDistance = 1.0;  // metres
-  constexpr double kEdge = 0.2;      // of the volume, metres
+  constexpr double kEdge = 0.2;      // edge of the volume, metres
   constexpr double kArc = 300.0 / 180 * std::numbers::pi;
   const double focal = 0.8 * std::min(image.width, image.height) * kDistance / kEdge;
   const recon::Intrinsics intrinsics{image, focal, focal, image.width / 2.0, image.height / 2.0, {}};
@@ -37,7 +37,8 @@ void FlameLight::add_radiance(int camera, TimePoint exposure_start, Seconds expo
   options.compute = {recon::Device::cpu, 1};
   const recon::RadianceImage image = recon::render_view(
       truth.volume, truth.medium, truth.effects, stage_.cameras[static_cast<std::size_t>(camera)], options);
-  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] += image.rgb[i];
+  const auto gathered = static_cast<float>(exposure / kUsualExposure);
+  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] += gathered * image.rgb[i];
 }
 
 StillFlame::StillFlame(const FlameLight& flame, const Stage& stage, TimePoint instant) {
@@ -45,14 +46,16 @@ StillFlame::StillFlame(const FlameLight& flame, const Stage& stage, TimePoint in
     const ImageSize size = stage.cameras[i].intrinsics.size;
     rgb_.emplace_back(std::size_t{3} * static_cast<std::size_t>(size.width) *
                       static_cast<std::size_t>(size.height));
-    flame.add_radiance(static_cast<int>(i), instant, Seconds(0), rgb_.back());
+    const Seconds exposure = FlameLight::kUsualExposure;
+    flame.add_radiance(static_cast<int>(i), instant + -0.5 * exposure, exposure, rgb_.back());
   }
 }
 
-void StillFlame::add_radiance(int camera, TimePoint /*exposure_start*/, Seconds /*exposure*/,
+void StillFlame::add_radiance(int camera, TimePoint /*exposure_start*/, Seconds exposure,
                               std::span<float> rgb) const {
+  const auto gathered = static_cast<float>(exposure / FlameLight::kUsualExposure);
   const std::vector<float>& still = rgb_[static_cast<std::size_t>(camera)];
-  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] += still[i];
+  for (std::size_t i = 0; i < rgb.size(); ++i) rgb[i] += gathered * still[i];
 }
 
 v1::CameraStream describe(const drivers::CameraInfo& info, const recon::CameraModel& calibration) {

@@ -13,21 +13,22 @@
 
 namespace emberlock::rig {
 
-/// Where simulated cameras stand: an arc of cameras about one metre from a flame of some 15 cm, as in the
-/// paper's section "Data Capture".
+/// The arrangement of simulated cameras: an arc about one metre from a flame of some 15 cm, as in the paper's
+/// section "Data Capture".
 struct Stage {
   recon::Box box;                           ///< the flame's volume
   std::vector<recon::CameraModel> cameras;  ///< by camera of the rig
 };
 
-/// Cameras on an arc of 300 degrees, alternately above and below the flame, the flame filling most of the
-/// picture.
+/// Cameras on an arc of 300 degrees, alternately above and below the flame, which fills most of the picture.
 Stage demo_stage(int cameras, ImageSize image);
 
-/// A flame with known truth as the light that virtual cameras film. An exposure is taken as its middle
-/// instant.
+/// A flame with known truth, for virtual cameras. An exposure shows the flame at its middle instant.
 class FlameLight final : public drivers::LightField {
  public:
+  /// In which a picture gathers the flame's own levels: twice as long gives twice the light.
+  static constexpr Seconds kUsualExposure = milliseconds(1);
+
   FlameLight(Stage stage, const recon::FlameOptions& flame, int truth_voxels);
   void add_radiance(int camera, TimePoint exposure_start, Seconds exposure,
                     std::span<float> rgb) const override;
@@ -38,11 +39,10 @@ class FlameLight final : public drivers::LightField {
   recon::Grid grid_;
 };
 
-/// The flame as it is at one instant, drawn once for each camera: it costs cameras that film in real time
-/// next to nothing.
+/// The flame at one instant, rendered once for each camera, so that it costs next to nothing while filming.
 class StillFlame final : public drivers::LightField {
  public:
-  /// Renders it for every camera, which takes a moment.
+  /// Renders the flame for every camera, which takes a moment.
   StillFlame(const FlameLight& flame, const Stage& stage, TimePoint instant);
   void add_radiance(int camera, TimePoint exposure_start, Seconds exposure,
                     std::span<float> rgb) const override;
@@ -51,7 +51,7 @@ class StillFlame final : public drivers::LightField {
   std::vector<std::vector<float>> rgb_;  ///< by camera
 };
 
-/// The manifest's stream of a camera: identity and layout from the driver, geometry from its calibration.
+/// A camera's stream in the manifest: identity and layout from the driver, geometry from the calibration.
 v1::CameraStream describe(const drivers::CameraInfo& info, const recon::CameraModel& calibration);
 
 }  // namespace emberlock::rig

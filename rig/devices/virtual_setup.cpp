@@ -12,8 +12,8 @@ namespace {
 constexpr Hertz kRate{23.976};
 constexpr ImageSize kSize{1280, 720};
 
-/// Of a chip whose rows and dummy lines take the part of the frame period that the paper's 720 rows take at
-/// 54 us.
+/// The row time at which rows and dummy lines take the same part of the frame period as the paper's 720 rows
+/// at 54 us.
 SecondsPerRow usual_row_time(int rows, Hertz rate) {
   constexpr int kDummyLines = 20;
   return microseconds_per_row(54) * (740.0 / (rows + kDummyLines) * (kRate / rate));

@@ -9,9 +9,9 @@
 
 namespace emberlock::rig {
 
-/// The virtual cameras of a configuration, in its order, and the room that they see (no flame burns). Their
-/// row time follows from the picture's height, so that a read phase fills its frame period as the paper's
-/// does, unless it is said. Without virtual cameras there are none. Errors: bad_input, as check() has them.
+/// The virtual cameras of a configuration, in its order, and the room that they see (without a flame). Unless
+/// configured, the row time follows from the picture's height, so that a read phase takes the same part of
+/// the frame period as the paper's. Empty without virtual cameras. Errors: bad_input, as from check().
 Result<drivers::VirtualRigOptions> virtual_setup(const RigConfig& config);
 
 }  // namespace emberlock::rig

@@ -21,8 +21,11 @@
 #include <unistd.h>
 
 #include "base/clock.h"
+#include "base/daemon_folders.h"
+#include "base/file.h"
 #include "base/random.h"
 #include "base/unique_fd.h"
+#include "rig/config/config.h"
 #include "rig/config/preflight.h"
 #include "rig/doctor/doctor.h"
 
@@ -247,11 +250,19 @@ Facts collect(const CollectOptions& options) {
   Facts f;
   DaemonConfig config;
   std::error_code ignored;
+  DaemonFolders folders = daemon_folders();
   if (fs::exists(options.config_file, ignored)) {
     f.config_file = options.config_file;
     f.config_problems = check_config(options.config_file);
-    if (auto loaded = load_config(options.config_file)) config = std::move(*loaded);
+    if (auto loaded = read_file(options.config_file, std::size_t{1} << 20)) {
+      ConfigReading reading = read_config(*loaded, options.config_file);
+      if (reading.problems.empty()) config = std::move(reading.config);
+    }
+    if (options.config_file == CollectOptions().config_file) folders = system_daemon_folders();
+  } else if (config.server.socket.empty()) {
+    config.server.socket = usual_socket();
   }
+  fill_in(config, folders, fs::read_symlink("/proc/self/exe", ignored));
   look_at_user(f);
   look_at_rules(f);
   look_at_limits(f);

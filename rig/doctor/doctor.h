@@ -5,30 +5,17 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/quantity.h"
 #include "rig/config/config.h"
 #include "rig/devices/device_list.h"
+#include "rig/doctor/finding.h"
 
-// Whether this machine is fit for the rig: facts are collected from the system, and judged by a pure
-// function.
+// Whether this machine is fit for the rig: facts are collected from the system, a pure function finds what
+// they come to, and words.h says it.
 namespace emberlock::rig::doctor {
-
-enum class Health {
-  ok,
-  warn,  ///< it works, less well than it could
-  fail,  ///< it won't work
-};
-std::string_view name(Health health);
-
-struct Check {
-  std::string what;  ///< a word or two: "groups"
-  Health health = Health::ok;
-  std::string found;   ///< a sentence
-  std::string remedy;  ///< a command to paste where there is one; empty when ok
-};
 
 /// A network interface that leads to GigE Vision cameras.
 struct NetworkLink {
@@ -93,8 +80,8 @@ struct Facts {
   bool cuda_node = false;  ///< /dev/nvidia0 can be opened
 };
 
-/// In the order in which one would mend things.
-std::vector<Check> judge(const Facts& facts);
+/// One finding a matter, in the order of FindingCode.
+std::vector<Finding> diagnose(const Facts& facts);
 
 struct CollectOptions {
   std::filesystem::path config_file =

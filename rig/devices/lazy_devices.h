@@ -9,17 +9,16 @@
 #include "drivers/camera.h"
 #include "drivers/strobe.h"
 
-// Devices that may not be there yet.
+// Devices that are opened when they become available.
 namespace emberlock::rig {
 
-/// A camera that start() opens once it is there. Until then it says of itself what `expected` does; from then
-/// on what the device does, but for what `configured` sets. Start it on a CameraThread: opening takes a
-/// while.
-class LateCamera final : public drivers::Camera {
+/// A camera that is opened by start(). Until then info() is `expected`, afterwards the device's, in both
+/// cases changed by `configure`. Use it on a CameraThread, because opening takes time.
+class LazyCamera final : public drivers::Camera {
  public:
   using Open = std::function<Result<std::unique_ptr<drivers::Camera>>()>;
   using Configure = std::function<void(drivers::CameraInfo&)>;
-  LateCamera(drivers::CameraInfo expected, Open open, Configure configure);
+  LazyCamera(drivers::CameraInfo expected, Open open, Configure configure);
 
   [[nodiscard]] const drivers::CameraInfo& info() const override { return info_; }
   [[nodiscard]] drivers::FrameCounts counts() const override {
@@ -41,11 +40,11 @@ class LateCamera final : public drivers::Camera {
   std::unique_ptr<drivers::Camera> camera_;
 };
 
-/// A strobe that is opened when something is asked of it, and again until it is there.
-class LateStrobe final : public drivers::Strobe {
+/// A strobe that is opened by the first call; every call tries again until that succeeds.
+class LazyStrobe final : public drivers::Strobe {
  public:
   using Open = std::function<Result<std::unique_ptr<drivers::Strobe>>()>;
-  LateStrobe(std::string id, Open open) : id_(std::move(id)), open_(std::move(open)) {}
+  LazyStrobe(std::string id, Open open) : id_(std::move(id)), open_(std::move(open)) {}
 
   [[nodiscard]] const std::string& id() const override { return id_; }
   Status apply(const drivers::StrobeSettings& settings) override;

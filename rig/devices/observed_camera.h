@@ -8,14 +8,14 @@
 
 namespace emberlock::rig {
 
-/// A camera that somebody else owns, with its frames shown as they are taken.
-class ShownCamera final : public drivers::Camera {
+/// Passes on the calls to a camera owned by somebody else, and shows each frame to a callback.
+class ObservedCamera final : public drivers::Camera {
  public:
-  explicit ShownCamera(drivers::Camera& camera, std::function<void(const Frame&)> on_frame = {})
+  explicit ObservedCamera(drivers::Camera& camera, std::function<void(const Frame&)> on_frame = {})
       : camera_(camera), on_frame_(std::move(on_frame)) {}
 
   [[nodiscard]] bool filming() const { return filming_; }
-  /// The recording that it replays is over.
+  /// The end of the replayed recording was reached.
   [[nodiscard]] bool ended() const { return ended_; }
   [[nodiscard]] const drivers::CameraInfo& info() const override { return camera_.info(); }
   [[nodiscard]] drivers::FrameCounts counts() const override { return camera_.counts(); }

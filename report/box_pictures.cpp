@@ -30,11 +30,11 @@ Eigen::Vector3d key_point(const recon::Grid& g, double i, double j, double k) {
 
 Eigen::Vector3d sides(const recon::Grid& g) { return {g.nx - 1.0, g.ny - 1.0, g.nz - 1.0}; }
 
-/// A line in the world as the lens shows it, piece by piece; what lies behind the camera is left out.
+/// A line in the world as the lens images it, in short segments; the part behind the camera is omitted.
 void draw_line(cv::Mat& picture, const recon::CameraModel& camera, const Eigen::Vector3d& a,
                const Eigen::Vector3d& b, const cv::Scalar& colour) {
   constexpr int kPieces = 24;
-  constexpr int kFraction = 4;  // bits of a pixel
+  constexpr int kFraction = 4;  // fractional bits of a pixel coordinate
   constexpr double kFarthest = 1e5;
   std::optional<cv::Point> last;
   for (int n = 0; n <= kPieces; ++n) {
@@ -50,7 +50,7 @@ void draw_line(cv::Mat& picture, const recon::CameraModel& camera, const Eigen::
   }
 }
 
-/// The lines of the grid on the face across `axis` at `at` (0 or the last key point).
+/// The grid lines on the face at `at` on `axis` (0 or the last key point).
 void draw_face(cv::Mat& picture, const recon::CameraModel& camera, const recon::Grid& grid, int axis,
                double at, int spacing) {
   const Eigen::Vector3d size = sides(grid);
@@ -82,7 +82,7 @@ void draw_edges(cv::Mat& picture, const recon::CameraModel& camera, const recon:
     }
 }
 
-/// So that the brightest pixel is white: a box is checked against faint flames too.
+/// Scales the brightest pixel to white, so that the box can be checked against faint flames too.
 recon::RadianceImage brightened(const recon::RadianceImage& image) {
   const float most = image.rgb.empty() ? 0.F : *std::max_element(image.rgb.begin(), image.rgb.end());
   recon::RadianceImage bright = image;
@@ -91,7 +91,7 @@ recon::RadianceImage brightened(const recon::RadianceImage& image) {
   return bright;
 }
 
-/// Pixels that a voxel in the middle of the grid covers in a view.
+/// Size in pixels of a voxel in the middle of the grid.
 double pixels_a_voxel(const recon::View& view, const recon::Grid& grid) {
   const Eigen::Vector3d half = 0.5 * sides(grid);
   const double depth = (view.camera.camera_from_world * key_point(grid, half.x(), half.y(), half.z())).z();
@@ -110,7 +110,7 @@ int voxels_between_lines(const recon::Grid& grid) {
 }
 
 Image box_picture(const recon::View& view, const recon::Grid& grid) {
-  Image image = recon::to_rgb8(brightened(view.image));
+  Image image = recon::to_rgb8(brightened(*view.image));
   const ImageSize size = image.layout().size;
   cv::Mat picture(size.height, size.width, CV_8UC3, image.bytes().data());
   const Eigen::Vector3d center = view.camera.center();

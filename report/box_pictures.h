@@ -9,17 +9,16 @@
 
 namespace emberlock::report {
 
-/// How many voxels lie between two of the lines that box_picture() draws: 1, 2, 5, 10, ... so that the
-/// longest side has at most sixteen.
+/// Number of voxels between two lines of box_picture(): 1, 2, 5, 10, ..., so that the longest side has at
+/// most sixteen lines.
 int voxels_between_lines(const recon::Grid& grid);
 
-/// A view's picture, brightened to its brightest pixel, with the grid's box drawn on it: its twelve edges,
-/// and on the three faces that lie farther away the grid's lines, voxels_between_lines() apart. Lenses bend
-/// them.
+/// A view's picture, brightened to its brightest pixel, with the grid's box: its twelve edges and, on the
+/// three far faces, grid lines voxels_between_lines() apart. Lens distortion is applied.
 Image box_picture(const recon::View& view, const recon::Grid& grid);
 
-/// What a long run would work on: writes box/NNNN.png, one a view, and index.html with the box, the voxels
-/// and their size in pixels.
+/// Shows what a long run would work on: writes box/NNNN.png, one per view, and index.html with the box, the
+/// voxels and their size in pixels.
 Status write_plan(const recon::Scene& scene, const recon::Grid& grid, const OutputRequest& where);
 
 }  // namespace emberlock::report

@@ -10,6 +10,7 @@
 
 #include "films/board_search.h"
 #include "recon/calibrate/next_pictures.h"
+#include "report/camera_plan.h"
 #include "report/html.h"
 
 namespace emberlock::report {
@@ -63,13 +64,13 @@ std::vector<std::vector<std::string>> distortion_rows(const recon::RigCalibratio
   return rows;
 }
 
-/// Residuals as arrows, magnified, over the cells that hold corners.
+/// Residuals as magnified arrows, over the cells that contain corners.
 std::string coverage_svg(const recon::RigCalibration& calibration, std::size_t camera,
                          const recon::CornerCoverage& coverage) {
   const recon::Bundle& bundle = calibration.bundle;
   const ImageSize size = bundle.cameras[camera].model.intrinsics.size;
   constexpr double kWidth = 360;
-  constexpr double kMagnified = 60;  // times, in pixels of the drawing's own
+  constexpr double kMagnified = 60;  // magnification, in pixels of the drawing
   const double scale = kWidth / size.width;
   const double height = scale * size.height;
   const double cell_w = kWidth / recon::CornerCoverage::kColumns;
@@ -178,6 +179,14 @@ std::vector<std::vector<std::string>> cost_rows(const recon::RigCalibration& cal
   return rows;
 }
 
+/// Of the placed cameras: the others stand nowhere yet.
+std::vector<PlanCamera> placed_cameras(const recon::RigCalibration& calibration) {
+  std::vector<PlanCamera> placed;
+  for (const recon::CalibratedCamera& camera : calibration.cameras)
+    if (camera.placed) placed.push_back(plan_camera(camera.id, camera.fit.model));
+  return placed;
+}
+
 }  // namespace
 
 std::string calibration_words(const recon::BoardReading& reading, const recon::RigCalibration& calibration) {
@@ -211,6 +220,7 @@ std::string calibration_html(const recon::BoardReading& reading, const recon::Ri
                                box.size.x(), box.size.y(), box.size.z(), box.center.x(), box.center.y(),
                                box.center.z()));
   }
+  add_camera_plan(page, placed_cameras(calibration), calibration.box);
   page.heading("Take next");
   const auto advice = recon::next_pictures(calibration);
   for (const std::string& sentence : advice) page.paragraph(sentence);

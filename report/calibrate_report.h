@@ -9,11 +9,11 @@
 
 namespace emberlock::report {
 
-/// A calibration as a page: what each camera's numbers are worth, where its corners were and how far off,
-/// which views were left out and why, which pictures to take next and what more of them would bring.
+/// A calibration as a page: the accuracy of each camera's parameters, the positions and residuals of its
+/// corners, the views left out and why, which pictures to take next and how much they would improve it.
 std::string calibration_html(const recon::BoardReading& reading, const recon::RigCalibration& calibration);
 
-/// A sentence or two: pictures, views and corners used, how well they fit.
+/// One or two sentences: the pictures, views and corners used, and how well they fit.
 std::string calibration_words(const recon::BoardReading& reading, const recon::RigCalibration& calibration);
 
 }  // namespace emberlock::report

@@ -39,7 +39,7 @@ std::vector<std::vector<std::string>> camera_rows(const recon::ColourCalibration
   return rows;
 }
 
-/// A curve a camera, `curve` at even places 0..1; those that it has no curve of are left out.
+/// One curve per camera, with values at even intervals over 0..1; cameras without a curve are omitted.
 std::string camera_curves(const recon::ColourCalibration& calibration, const PlotOptions& options,
                           const std::function<double(const recon::CalibratedColour&, double)>& curve) {
   constexpr int kPoints = 51;
@@ -66,7 +66,7 @@ std::string response_plot(const recon::ColourCalibration& calibration) {
   });
 }
 
-/// Readings' exposures against what all cameras agree on, relative.
+/// Relative deviation of the readings' exposures from the common fit of all cameras.
 std::string residual_plot(const recon::ColourReadings& readings,
                           const recon::ColourCalibration& calibration) {
   std::vector<Series> series(readings.cameras.size());
@@ -99,7 +99,7 @@ std::string vignetting_plot(const recon::ColourCalibration& calibration) {
   });
 }
 
-/// The share of the light over the picture, vignetting and flat field: white is the middle's.
+/// Light falloff over the picture (vignetting and flat field); white is the value in the middle.
 std::string light_map(const recon::ColourCamera& camera, const recon::CalibratedColour& colour) {
   constexpr int kWidth = 160;
   const int height = std::clamp(kWidth * camera.size.height / std::max(1, camera.size.width), 16, 320);
@@ -116,7 +116,7 @@ std::string light_map(const recon::ColourCamera& camera, const recon::Calibrated
   return fmt::format("<img src=\"{}\" alt=\"\">", png_data_uri(map));
 }
 
-/// A patch's mean residual in each camera; "saturated" and the like where it has none.
+/// A patch's mean residual in each camera; or the reason why it has none, such as "saturated".
 void patch_table(HtmlPage& page, const recon::ColourReadings& readings,
                  const recon::ColourCalibration& calibration) {
   struct Cell {

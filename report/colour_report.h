@@ -7,8 +7,8 @@
 
 namespace emberlock::report {
 
-/// A page on a colour calibration: what it reached, responses, gains, vignetting, residuals by patch and
-/// camera, what was left out and why, and which pictures would improve it most.
+/// A page on a colour calibration: its accuracy, responses, gains, vignetting, residuals by patch and camera,
+/// what was left out and why, and which pictures would improve it most.
 std::string colour_report_page(const recon::ColourReadings& readings,
                                const recon::ColourCalibration& calibration);
 

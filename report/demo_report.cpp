@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "base/file.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/pipeline/advice.h"
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/radiance.h"
@@ -26,7 +27,7 @@ std::string rgb(const recon::ChannelRmse& e) {
 }
 std::string rgb(const std::optional<recon::ChannelRmse>& e) { return e ? rgb(*e) : "none held out"; }
 
-/// The largest error of a measured row time against the rig's truth.
+/// The largest error of a measured row time compared with the rig's true one.
 Seconds worst_row_time_error(const rig::DemoResult& r) {
   double worst = 0;
   for (std::size_t i = 0; i < r.row_clocks.size(); ++i) {
@@ -111,18 +112,18 @@ void alignment(HtmlPage& page, const rig::DemoResult& r) {
                                .y_label = "rows from the target",
                                .band = stage.tolerance.value()}));
     page.paragraph(fmt::format("{}: {} resets, {:.1f} s. {}", stage.title, stage.result.resets,
-                               stage.seconds.value(), stage.result.last.reason));
+                               stage.seconds.value(), stage.result.words.reason));
   }
 }
 
-/// Captured, rendered, and their difference, cut to the flame.
+/// Captured, rendered, and their difference, cropped to the flame.
 std::vector<Image> triptych(const recon::View& view, const recon::RadianceImage& rendered) {
-  const recon::FlameMask mask = recon::noise_mask(view.image);
-  const recon::PixelBox box = with_margin(mask.box, 12, view.image.size);
+  const recon::FlameMask mask = recon::noise_mask(*view.image);
+  const recon::PixelBox box = with_margin(mask.box, 12, view.image->size);
   const auto panel = [&](const recon::RadianceImage& image) {
     return scaled(crop(recon::to_rgb8(image), box), kPanelWidth);
   };
-  return {panel(view.image), panel(rendered), panel(difference(view.image, rendered, kDifferenceGain))};
+  return {panel(*view.image), panel(rendered), panel(difference(*view.image, rendered, kDifferenceGain))};
 }
 
 void pictures(HtmlPage& page, const rig::DemoResult& r) {

@@ -7,7 +7,7 @@
 
 namespace emberlock::report {
 
-/// report.html and summary.png in `folder`.
+/// Writes report.html and summary.png to `folder`.
 Status write_demo_report(const rig::DemoResult& result, const std::filesystem::path& folder);
 
 }  // namespace emberlock::report

@@ -30,7 +30,7 @@ recon::RadianceImage difference(const recon::RadianceImage& a, const recon::Radi
 Image scaled(const Image& image, int width) {
   const ImageSize from = image.layout().size;
   Image result({{width, std::max(1, from.height * width / from.width)}, PixelFormat::rgb8, 8});
-  // OpenCV takes mutable pointers, but only reads its source.
+  // OpenCV takes mutable pointers, but doesn't write to its source.
   const cv::Mat source(from.height, from.width, CV_8UC3,
                        const_cast<std::byte*>(image.bytes().data()));  // NOLINT
   cv::Mat target(result.layout().size.height, width, CV_8UC3, result.bytes().data());

@@ -9,19 +9,20 @@
 
 namespace emberlock::report {
 
-/// A rectangle of an 8-bit colour picture; all of it where the box is empty.
+/// A rectangle of an 8-bit colour picture; the whole picture if the box is empty.
 Image crop(const Image& image, const recon::PixelBox& box);
 
-/// |a - b| times `gain`; the two have one size.
+/// |a - b| times `gain`; both must have the same size.
 recon::RadianceImage difference(const recon::RadianceImage& a, const recon::RadianceImage& b, double gain);
 
-/// The picture at another width, its shape kept; each pixel is the mean of those that it covers.
+/// The picture resized to another width with the same aspect ratio; each pixel is the mean of those that it
+/// covers.
 Image scaled(const Image& image, int width);
 
 /// Pictures of equal height from left to right, `gap` black columns between them.
 Image side_by_side(const std::vector<Image>& pictures, int gap = 8);
 
-/// The box with a margin around it, inside the image.
+/// The box enlarged by a margin, clipped to the image.
 recon::PixelBox with_margin(const recon::PixelBox& box, int margin, ImageSize size);
 
 }  // namespace emberlock::report

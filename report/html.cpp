@@ -20,15 +20,17 @@ constexpr const char* kStyle = R"(
 @media (prefers-color-scheme: dark) { :root { --ink: #ddd; --paper: #151515; --line: #444; --soft: #222; } }
 body { font: 16px/1.5 system-ui, sans-serif; color: var(--ink); background: var(--paper); max-width: 78rem;
   margin: 2rem auto; padding: 0 1rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; border-bottom: 1px solid var(--line); }
+h1, h2, p, li, figcaption { overflow-wrap: anywhere; } h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; border-bottom: 1px solid var(--line); }
 table { border-collapse: collapse; margin: 1rem 0; } th, td { padding: .25rem .8rem; text-align: right; }
 th:first-child, td:first-child { text-align: left; } tr:nth-child(even) td { background: var(--soft); }
 .gallery { display: flex; flex-wrap: wrap; gap: .8rem; } figure { margin: 0; } img, svg { max-width: 100%; }
 figcaption { font-size: .85rem; width: 0; min-width: 100%; } .scroll { overflow-x: auto; }
 svg text { fill: var(--ink); font: 12px system-ui, sans-serif; } svg .grid { stroke: var(--line); }
+@media (max-width: 44rem) { .gallery { overflow-x: auto; } .gallery svg, .scroll svg { max-width: none; } }
+.narrow { display: none; } @media (max-width: 700px) { .wide { display: none; } .narrow { display: block; } }
 )";
 
-/// One plot axis: data to pixels, and where its ticks stand.
+/// One plot axis: maps data to pixels and places the ticks.
 class Scale {
  public:
   Scale(double low, double high, Axis axis, double from, double to)
@@ -154,7 +156,7 @@ std::string html_escape(std::string_view text) {
 
 std::string png_file(const Image& image) {
   const bool rgb = image.layout().format == PixelFormat::rgb8;
-  // OpenCV takes a mutable pointer, but only reads here.
+  // OpenCV takes a mutable pointer, but doesn't write here.
   const cv::Mat mat(image.layout().size.height, image.layout().size.width, rgb ? CV_8UC3 : CV_8UC1,
                     const_cast<std::byte*>(image.bytes().data()), image.layout().row_bytes());  // NOLINT
   cv::Mat bgr = mat;
@@ -164,21 +166,22 @@ std::string png_file(const Image& image) {
   return {png.begin(), png.end()};
 }
 
-std::string png_data_uri(const Image& image) {
+std::string data_uri(std::string_view type, std::string_view content) {
   static constexpr std::string_view kDigits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  const std::string png = png_file(image);
   std::string base64;
-  base64.reserve(png.size() * 4 / 3 + 4);
-  for (std::size_t i = 0; i < png.size(); i += 3) {
-    const std::size_t n = std::min<std::size_t>(3, png.size() - i);
+  base64.reserve(content.size() * 4 / 3 + 4);
+  for (std::size_t i = 0; i < content.size(); i += 3) {
+    const std::size_t n = std::min<std::size_t>(3, content.size() - i);
     unsigned block = 0;
     for (std::size_t k = 0; k < 3; ++k)
-      block = block << 8 | (k < n ? static_cast<unsigned char>(png[i + k]) : 0U);
+      block = block << 8 | (k < n ? static_cast<unsigned char>(content[i + k]) : 0U);
     for (std::size_t k = 0; k < 4; ++k) base64 += k <= n ? kDigits[block >> (18 - 6 * k) & 63U] : '=';
   }
-  return "data:image/png;base64," + base64;
+  return "data:" + std::string(type) + ";base64," + base64;
 }
+
+std::string png_data_uri(const Image& image) { return data_uri("image/png", png_file(image)); }
 
 std::string svg_plot(const std::vector<Series>& series, const PlotOptions& o) {
   Range xs;
@@ -198,14 +201,17 @@ std::string svg_plot(const std::vector<Series>& series, const PlotOptions& o) {
   const double left = 62;
   std::size_t longest = 0;
   for (const Series& s : series) longest = std::max(longest, s.name.size());
-  const double right = o.width - std::max(150.0, 40 + 6.7 * static_cast<double>(longest));
+  const bool below = o.legend == Legend::below;
+  const double right =
+      below ? o.width - 12.0 : o.width - std::max(150.0, 40 + 6.7 * static_cast<double>(longest));
   const double top = 24;
   const double bottom = o.height - 42;
+  const double height = o.height + (below ? 6 + 17 * static_cast<double>(series.size()) : 0);
   const Scale x(xs.low, xs.high, o.x_axis, left, right);
   const Scale y(ys.low, ys.high, o.y_axis, bottom, top);
   std::string svg =
       fmt::format(R"(<svg viewBox="0 0 {0} {1}" width="{0}" height="{1}" role="img" aria-label="{2}">)",
-                  o.width, o.height, html_escape(o.title));
+                  o.width, height, html_escape(o.title));
   if (o.band) {
     svg += fmt::format(R"(<rect x="{}" y="{:.1f}" width="{}" height="{:.1f}" fill="#009e73" opacity=".15"/>)",
                        left, y(*o.band), right - left, y(-*o.band) - y(*o.band));
@@ -218,16 +224,24 @@ std::string svg_plot(const std::vector<Series>& series, const PlotOptions& o) {
   svg += axes(x, y, o, left, right, top, bottom);
   for (std::size_t i = 0; i < series.size(); ++i) {
     const char* colour = kColours[series[i].colour.value_or(i) % kColours.size()];
-    const bool dashed = series[i].dashed || i >= kColours.size();  // the colours begin anew
+    const bool dashed = series[i].dashed || i >= kColours.size();  // colours repeat
     svg += polyline(series[i], x, y, colour, dashed);
-    const double line = top + 10 + 17 * static_cast<double>(i);
+    const double line = (below ? o.height + 2 : top + 10) + 17 * static_cast<double>(i);
+    const double from = below ? left : right + 12;
+    svg += fmt::format(R"(<line x1="{}" x2="{}" y1="{:.1f}" y2="{:.1f}" stroke="{}" stroke-width="3"{}/>)",
+                       from, from + 16, line, line, colour, dashed ? R"( stroke-dasharray="6 4")" : "");
     svg +=
-        fmt::format(R"(<line x1="{}" x2="{}" y1="{:.1f}" y2="{:.1f}" stroke="{}" stroke-width="3"{}/>)",
-                    right + 12, right + 28, line, line, colour, dashed ? R"( stroke-dasharray="6 4")" : "");
-    svg += fmt::format(R"(<text x="{}" y="{:.1f}">{}</text>)", right + 34, line + 4,
-                       html_escape(series[i].name));
+        fmt::format(R"(<text x="{}" y="{:.1f}">{}</text>)", from + 22, line + 4, html_escape(series[i].name));
   }
   return svg + "</svg>";
+}
+
+std::string svg_plot_for_any_width(const std::vector<Series>& series, PlotOptions options) {
+  std::string html = "<div class=\"wide\">" + svg_plot(series, options) + "</div>";
+  options.width = 350;
+  options.height = 300;
+  options.legend = Legend::below;
+  return html + "<div class=\"narrow\">" + svg_plot(series, options) + "</div>";
 }
 
 HtmlPage& HtmlPage::heading(std::string_view text) {

@@ -10,30 +10,35 @@
 
 namespace emberlock::report {
 
-/// Text made safe between tags and in attributes.
+/// Escapes text for use between tags and in attributes.
 std::string html_escape(std::string_view text);
 
-/// An image as a PNG file. gray8 and rgb8.
+/// An image as a PNG file; gray8 or rgb8.
 std::string png_file(const Image& image);
-/// The same as a `data:` URI, so that a page stands alone.
+/// The same as a `data:` URI, so that a page needs no other file.
 std::string png_data_uri(const Image& image);
+/// A file's content as a `data:` URI; `type` such as "image/jpeg".
+std::string data_uri(std::string_view type, std::string_view content);
 
 enum class Mark {
-  line,    ///< and points where there are few
-  points,  ///< alone
+  line,    ///< with points if they are few
+  points,  ///< without a line
 };
 
 struct Series {
   std::string name;
   std::vector<double> x;
-  std::vector<double> y;  ///< points that are not finite are gaps
+  std::vector<double> y;  ///< values that aren't finite are gaps
   bool dashed = false;
   Mark mark = Mark::line;
-  std::optional<std::size_t> colour = {};  ///< of the palette; the series' own place otherwise
-  std::vector<std::string> notes = {};     ///< shown when a point is pointed at; none, or one a point
+  std::optional<std::size_t> colour = {};  ///< of the palette; default: the index of the series
+  std::vector<std::string> notes = {};     ///< tooltips of the points; empty, or one per point
 };
 
 enum class Axis { linear, logarithmic };
+
+/// Where the names of the series stand.
+enum class Legend { right, below };
 
 struct PlotOptions {
   std::string title = {};
@@ -42,24 +47,27 @@ struct PlotOptions {
   Axis x_axis = Axis::linear;
   Axis y_axis = Axis::linear;
   std::optional<double> band = {};  ///< shades -band..band of y: a tolerance
-  std::optional<double> mark = {};  ///< an upright line at this x: a choice
+  std::optional<double> mark = {};  ///< vertical line at this x: a choice
   int width = 720;                  ///< pixels
-  int height = 320;
+  int height = 320;                 ///< without a legend below
+  Legend legend = Legend::right;
 };
 
-/// A line plot as inline SVG, colours told apart by colour-blind readers too (Okabe and Ito 2008).
+/// A line plot as inline SVG, in colours that colour-blind readers can distinguish (Okabe and Ito 2008).
 std::string svg_plot(const std::vector<Series>& series, const PlotOptions& options);
+/// The same for a desktop and for a phone, of which the page shows the one that fits.
+std::string svg_plot_for_any_width(const std::vector<Series>& series, PlotOptions options);
 
-/// A self-contained page: no script, no font, no picture from elsewhere.
+/// A page without external scripts, fonts or pictures.
 class HtmlPage {
  public:
   explicit HtmlPage(std::string title) : title_(std::move(title)) {}
   HtmlPage& heading(std::string_view text);
   HtmlPage& paragraph(std::string_view text);
-  /// Inner HTML as it is: plots, figures.
+  /// Inserts HTML unescaped: plots, figures.
   HtmlPage& raw(std::string_view html);
   HtmlPage& table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
-  /// Pictures side by side, each with its caption.
+  /// Pictures side by side, each with a caption.
   struct Picture {
     std::string html;  ///< an <svg> or <img>
     std::string caption;

@@ -13,24 +13,24 @@
 namespace emberlock::report {
 namespace {
 
-constexpr std::size_t kMostShown = 600;  // points of a plot: more only fill the file
+constexpr std::size_t kMostShown = 600;  // points in a plot: more would only enlarge the file
 constexpr const char* kNone = "–";
 constexpr const char* kGood = "#009e73";
 constexpr const char* kStrobeColour = "#e69f00";
 constexpr const char* kFlameColour = "#0072b2";
 constexpr const char* kDoubtful = "#d55e00";
 
-constexpr Seconds kNegligible = milliseconds(0.5);  // cameras this near to one another need no correction
-constexpr Seconds kDoubt = milliseconds(0.2);       // a time known no better is worth another film
+constexpr Seconds kNegligible = milliseconds(0.5);  // smaller delays need no correction
+constexpr Seconds kDoubt = milliseconds(0.2);       // a larger standard error calls for another film
 
 bool by_strobe(const films::ImportResult& r) { return r.clip.has_value(); }
 
-/// Every nth so that not too many are left.
+/// The stride that leaves at most kMostShown items.
 std::size_t thinned(std::size_t count) { return std::max<std::size_t>(1, count / kMostShown); }
 
 const films::ImportedCamera& reference_of(const films::ImportResult& r) { return r.cameras[r.reference]; }
 
-/// Seconds from the first common instant, as the reference counts them.
+/// Seconds since the first common instant, by the reference's count.
 double seconds_at(const films::ImportResult& r, std::size_t instant) {
   const films::ImportedCamera& c = reference_of(r);
   return (c.times.read_start(c.places[instant]) - c.times.read_start(c.places.front())).value();
@@ -106,7 +106,7 @@ std::vector<std::string> advice(const films::ImportResult& r) {
   return lines;
 }
 
-/// Which film is which camera's.
+/// Why a film belongs to this camera.
 std::string why_it_is(const films::ImportOptions& options, const films::ImportedCamera& c) {
   if (options.ids.contains(c.name)) return "--camera says so";
   return c.files.size() > 1 || c.name == c.id ? "its subfolder's name" : "its file's name";
@@ -146,7 +146,7 @@ void cameras(HtmlPage& page, const films::ImportOptions& options, const films::I
       "after the reference, with one standard error. Drift: its frame rate over the reference's.");
 }
 
-/// The films on one clock: strobe, flame, and what is neither.
+/// The films on the common clock: the parts with strobe, with flame, and the rest.
 void timeline(HtmlPage& page, const films::ImportResult& r) {
   if (r.instants < 2) return;
   page.heading("What was filmed when");

@@ -8,12 +8,12 @@
 
 namespace emberlock::report {
 
-/// What import.json in the session says.
+/// The content of import.json in the session.
 std::string import_json(const films::ImportOptions& options, const films::ImportResult& result);
 
-/// import.html in the session, which stands alone: which film is which camera and why, where the strobe was
-/// found, what its clock's fit leaves, the instants that are common, when each camera took them, what was
-/// left out, and what to do about it.
+/// The content of import.html in the session, a self-contained page: which film belongs to which camera and
+/// why, where the strobe was found, the residuals of its clock's fit, the common instants, when each camera
+/// took them, what was left out, and what to do about it.
 std::string import_page(const films::ImportOptions& options, const films::ImportResult& result);
 
 films::ImportReports reports_of(const films::ImportOptions& options, const films::ImportResult& result);

@@ -19,7 +19,7 @@ double brightness(const ImageView& frame, int x, int y) {
   return sum / n;
 }
 
-/// The strip at half size, as floating point brightness; each pixel is the mean of two by two.
+/// The strip at half size, as floating-point brightness; each pixel is the mean of 2 x 2.
 struct Strip {
   int left, width, height;
   std::vector<double> value;
@@ -42,7 +42,7 @@ Strip cut(const ImageView& frame, int center, int half_width) {
   return strip;
 }
 
-/// Stretched so that the background is nearly black and a faint dot is bright.
+/// Stretches the contrast so that the background is nearly black and a faint dot is bright.
 Image stretch(const Strip& strip, const smear::SmearReading& reading) {
   std::vector<double> sorted = strip.value;
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
@@ -62,7 +62,7 @@ Image stretch(const Strip& strip, const smear::SmearReading& reading) {
 }  // namespace
 
 std::vector<RowSpan> tolerance_band(const smear::CcdTiming& timing, Rows lamp, Seconds tau, Rows tolerance) {
-  // In the order of reading: row 0 leaves the chip first, whichever way it is displayed.
+  // In read order: row 0 is read first, however it is displayed.
   const bool top_first = timing.direction == smear::ReadDirection::top_first;
   const double last = timing.rows - 1;
   const double start = top_first ? lamp.value() : last - lamp.value();
@@ -86,7 +86,7 @@ std::string smear_strip_svg(const ImageView& frame, const smear::SmearReading& r
   std::string svg = fmt::format(
       R"(<svg viewBox="0 0 {0} {1}" width="{0}" height="{1}"><image href="{2}" width="{0}" height="{1}"/>)",
       strip.width, strip.height, png_data_uri(stretch(strip, reading)));
-  // Reading coordinates count from pixel centres; the strip shows them at half size.
+  // Readings count from pixel centres; the strip is at half size.
   const auto row = [](Rows y) { return (y.value() + 0.5) / 2; };
   for (const RowSpan& span : band) {
     svg += fmt::format(R"(<rect x="0" y="{:.1f}" width="{}" height="{:.1f}" fill="#009e73" opacity=".35"/>)",

@@ -16,14 +16,14 @@ struct RowSpan {
   Rows to;
 };
 
-/// Where the dot of a lamp imaged at row `lamp` is displayed while the phase lies within `tolerance` of
-/// `tau`: up to two spans, since rows go around modulo K; none where it would not be seen (rest, dummy
+/// The displayed rows in which the dot of a lamp at row `lamp` lies while the phase is within `tolerance` of
+/// `tau`. Up to two spans, since rows wrap modulo K; none where the dot wouldn't be visible (rest, dummy
 /// lines).
 std::vector<RowSpan> tolerance_band(const smear::CcdTiming& timing, Rows lamp, Seconds tau, Rows tolerance);
 
-/// The lamp's column of a frame, full height and `half_width` columns to each side, as inline SVG: contrast
-/// stretched so that a faint dot shows, a circle about the lamp, ticks at the dots, and the tolerance band:
-/// the rows where the dot must lie. Without a lamp the middle column is shown.
+/// The lamp's column of a frame as inline SVG, full height and `half_width` columns to each side. The
+/// contrast is stretched so that a faint dot is visible. It shows a circle around the lamp, ticks at the
+/// dots, and the tolerance band: the rows where the dot must lie. Without a lamp the middle column is shown.
 std::string smear_strip_svg(const ImageView& frame, const smear::SmearReading& reading,
                             const std::vector<RowSpan>& band, int half_width = 80);
 

@@ -14,7 +14,7 @@ namespace {
 constexpr int kPlotHeight = 300;
 constexpr int kPlotWidth = 1000;
 
-/// What the diagram needs where no page brings it: a page's own style has the same.
+/// Styles of a stand-alone diagram; a page's own style contains the same.
 constexpr const char* kPlotStyle = R"(<style>
 .sync { --ink: #222; --line: #ddd; }
 @media (prefers-color-scheme: dark) { .sync { --ink: #ddd; --line: #444; } }
@@ -25,13 +25,13 @@ bool is_recommended(const evaluate::SyncTradeoff& t, const evaluate::SyncCost& c
   return t.recommended && &cost == &t.costs[*t.recommended];
 }
 
-/// Why a point has no figures.
+/// Why a point has no numbers.
 std::string missing(const evaluate::SyncCost& cost) {
   if (cost.statistics.rigs == 0) return fmt::format("about {:.0f} resets: not simulated", cost.expected);
   return fmt::format("not met: by {} rigs of {}", cost.statistics.aligned, cost.statistics.rigs);
 }
 
-/// A policy's line over tolerances.
+/// A policy's curve over tolerances.
 Series line(const evaluate::SyncTradeoff& t, smear::AlignPolicy policy, const char* of, bool dashed,
             double (*value)(const smear::AlignStatistics&)) {
   Series s{std::string(name(policy)) + of, {}, {}, dashed};
@@ -104,7 +104,7 @@ std::vector<std::string> plots(const evaluate::SyncTradeoff& t) {
   return result;
 }
 
-/// Tolerances down, policies across.
+/// Tolerances as rows, policies as columns.
 void overview(HtmlPage& page, const evaluate::SyncTradeoff& t) {
   std::vector<std::string> header{"tolerance"};
   if (!t.errors.empty()) header.emplace_back("adds to the error");

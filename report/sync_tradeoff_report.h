@@ -8,7 +8,7 @@
 #include "base/output_folder.h"
 #include "evaluate/sync_tradeoff.h"
 
-// What synchrony costs, as CSV, SVG, HTML and JSON.
+// The cost of synchronization as CSV, SVG, HTML and JSON.
 namespace emberlock::report {
 
 std::string sync_tradeoff_csv(const evaluate::SyncTradeoff& tradeoff);

@@ -7,23 +7,29 @@
 
 #include <fmt/format.h>
 
+#include "evaluate/work_points.h"
 #include "report/html.h"
 #include "report/tradeoff_report.h"
 
 namespace emberlock::report {
 namespace {
 
-constexpr double kWidth = 1000;
-constexpr double kHeight = 560;
-constexpr double kLeft = 64;
-constexpr double kRight = 800;
-constexpr double kTop = 40;
-constexpr double kBottom = 500;
-constexpr double kPerCharacter = 6.2;  // width of the small labels, about
+/// Where things stand, in pixels. The legend is to the right, or below where there is no room for it.
+struct Sheet {
+  double width, height;
+  double left, right, top, bottom;
+  bool labels;  ///< of the front's points
+  double legend_x, legend_y;
+};
+constexpr Sheet kWide{1000, 560, 64, 800, 40, 500, true, 824, 50};
+constexpr Sheet kNarrow{360, 300, 52, 348, 34, 250, false, 62, 310};  // its height grows with the legend
+constexpr double kLegendLine = 22;
+constexpr double kPerCharacter = 6.2;  // approximate width of a character in small labels
 constexpr double kLabelHeight = 14;
-constexpr double kLabelGain = 0.95;  // of the error at the last label
+constexpr double kLabelGain =
+    0.95;  // labels a point if its error is below this share of the last labelled one's
 
-// From few voxels to many: light to dark blue reads as "more" for colour-blind readers too.
+// From few voxels to many: light to dark blue, which colour-blind readers see as an order too.
 constexpr std::array<const char*, 6> kShades{"#9ecae1", "#6baed6", "#4292c6",
                                              "#2171b5", "#08519c", "#08306b"};
 constexpr const char* kFront = "#d55e00";
@@ -53,29 +59,29 @@ struct LogScale {
   }
 };
 
-std::string axes(const LogScale& x, const LogScale& y) {
+std::string axes(const LogScale& x, const LogScale& y, const Sheet& f) {
   std::string svg;
   for (const double t : x.ticks()) {
-    svg += fmt::format(R"(<line class="grid" x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}"/>)", x(t), kTop,
-                       kBottom);
-    svg += fmt::format(R"(<text x="{:.1f}" y="{}" text-anchor="middle">{:g}</text>)", x(t), kBottom + 18, t);
+    svg += fmt::format(R"(<line class="grid" x1="{0:.1f}" x2="{0:.1f}" y1="{1}" y2="{2}"/>)", x(t), f.top,
+                       f.bottom);
+    svg += fmt::format(R"(<text x="{:.1f}" y="{}" text-anchor="middle">{:g}</text>)", x(t), f.bottom + 18, t);
   }
   for (const double t : y.ticks()) {
-    svg += fmt::format(R"(<line class="grid" x1="{1}" x2="{2}" y1="{0:.1f}" y2="{0:.1f}"/>)", y(t), kLeft,
-                       kRight);
-    svg += fmt::format(R"(<text x="{}" y="{:.1f}" text-anchor="end">{:g}</text>)", kLeft - 8, y(t) + 4, t);
+    svg += fmt::format(R"(<line class="grid" x1="{1}" x2="{2}" y1="{0:.1f}" y2="{0:.1f}"/>)", y(t), f.left,
+                       f.right);
+    svg += fmt::format(R"(<text x="{}" y="{:.1f}" text-anchor="end">{:g}</text>)", f.left - 8, y(t) + 4, t);
   }
-  svg += fmt::format(R"(<text class="title" x="{}" y="20">What accuracy costs</text>)", kLeft);
+  svg += fmt::format(R"(<text class="title" x="{}" y="20">What accuracy costs</text>)", f.left);
   svg +=
       fmt::format(R"(<text x="{}" y="{}" text-anchor="middle">seconds until the views are rendered</text>)",
-                  (kLeft + kRight) / 2, kBottom + 40);
+                  (f.left + f.right) / 2, f.bottom + 40);
   svg += fmt::format(R"svg(<text transform="translate(16 {}) rotate(-90)" text-anchor="middle">)svg"
                      "held-out RMS error, grey levels of 255</text>",
-                     (kTop + kBottom) / 2);
+                     (f.top + f.bottom) / 2);
   return svg;
 }
 
-/// Each number of voxels its shade.
+/// A shade for each number of voxels.
 std::map<int, const char*> shades(const std::vector<recon::WorkPoint>& points) {
   std::map<int, const char*> result;
   for (const recon::WorkPoint& p : points) result[p.settings.voxels] = kShades[0];
@@ -89,10 +95,10 @@ std::map<int, const char*> shades(const std::vector<recon::WorkPoint>& points) {
 
 std::string tooltip(const recon::WorkPoint& p) {
   return fmt::format("<title>{:.3g} s, {:.3g} grey levels&#10;{}</title>", p.seconds, p.error,
-                     html_escape(recon::command_options(p.settings)));
+                     html_escape(evaluate::command_options(p.settings)));
 }
 
-/// A run's points hang together; the paper's solver is drawn hollow and square.
+/// Connects the points of a run; those of the paper's solver are hollow squares.
 std::string runs(const std::vector<recon::WorkPoint>& points, const LogScale& x, const LogScale& y) {
   const auto shade = shades(points);
   std::string lines;
@@ -126,7 +132,7 @@ bool overlap(const Label& a, const Label& b) {
   return std::abs(a.y - b.y) < kLabelHeight && a.x < b.x + b.width && b.x < a.x + a.width;
 }
 
-/// What tells a front's point from the others, briefly.
+/// A short label that distinguishes a point of the front.
 std::string label_text(const recon::WorkPoint& p) {
   const recon::Settings& s = p.settings;
   std::string words =
@@ -136,10 +142,11 @@ std::string label_text(const recon::WorkPoint& p) {
   return words + ")";
 }
 
-/// The front as a staircase: what is reached by a time stays reached. Ringed points, those labelled that gain
-/// enough on the last label, below the line, where the front leaves room.
-std::string front(const std::vector<recon::WorkPoint>& points, const LogScale& x, const LogScale& y) {
-  const std::vector<recon::WorkPoint> best = recon::pareto_front(points);
+/// The Pareto front as a staircase, its points ringed. A point is labelled, below the line where there is
+/// space, if its error is sufficiently below that of the last label.
+std::string front(const std::vector<recon::WorkPoint>& points, const LogScale& x, const LogScale& y,
+                  const Sheet& f) {
+  const std::vector<recon::WorkPoint> best = evaluate::pareto_front(points);
   std::string path;
   std::string rings;
   std::vector<Label> placed;
@@ -150,34 +157,35 @@ std::string front(const std::vector<recon::WorkPoint>& points, const LogScale& x
     path += i == 0 ? fmt::format("M{:.1f} {:.1f}", px, py) : fmt::format("H{:.1f}V{:.1f}", px, py);
     rings += fmt::format(R"(<circle class="front" cx="{:.1f}" cy="{:.1f}" r="6" stroke="{}">{}</circle>)", px,
                          py, kFront, tooltip(best[i]));
+    if (!f.labels) continue;
     const std::string words = html_escape(label_text(best[i]));
     const double width = kPerCharacter * static_cast<double>(words.size());
-    const Label label{std::clamp(px - 10 - width, kLeft + 4, kRight - width), py + 17, width};
-    if (best[i].error > kLabelGain * said || label.y > kBottom ||
+    const Label label{std::clamp(px - 10 - width, f.left + 4, f.right - width), py + 17, width};
+    if (best[i].error > kLabelGain * said || label.y > f.bottom ||
         std::any_of(placed.begin(), placed.end(), [&](const Label& other) { return overlap(label, other); }))
       continue;
     placed.push_back(label);
     said = best[i].error;
     rings += fmt::format(R"(<text class="label" x="{:.1f}" y="{:.1f}">{}</text>)", label.x, label.y, words);
   }
-  path += fmt::format("H{}", kRight);
+  path += fmt::format("H{}", f.right);
   return fmt::format(R"(<path class="front" d="{}" stroke="{}"/>)", path, kFront) + rings;
 }
 
-std::string legend(const std::vector<recon::WorkPoint>& points) {
-  double line = kTop + 10;
-  const double x = kRight + 24;
+std::string legend(const std::vector<recon::WorkPoint>& points, const Sheet& f) {
+  double line = f.legend_y;
+  const double x = f.legend_x;
   std::string svg = fmt::format(R"(<line class="front" x1="{}" x2="{}" y1="{}" y2="{}" stroke="{}"/>)"
                                 R"(<text x="{}" y="{}">Pareto front: best so far</text>)",
                                 x - 8, x + 8, line, line, kFront, x + 16, line + 4);
   for (const auto& [voxels, shade] : shades(points)) {
-    line += 22;
+    line += kLegendLine;
     svg += fmt::format(R"(<circle cx="{}" cy="{}" r="4.5" fill="{}"/><text x="{}" y="{}">{} voxels</text>)",
                        x, line, shade, x + 16, line + 4, voxels);
   }
   if (std::any_of(points.begin(), points.end(),
                   [](const recon::WorkPoint& p) { return p.settings.solver == recon::Solver::paper; })) {
-    line += 22;
+    line += kLegendLine;
     svg += fmt::format(R"(<rect x="{}" y="{}" width="8" height="8" class="paper" stroke="{}"/>)"
                        R"(<text x="{}" y="{}">the paper's solver</text>)",
                        x - 4, line - 4, kShades[3], x + 16, line + 4);
@@ -197,20 +205,24 @@ constexpr const char* kDiagramStyle = R"(<style>
 
 }  // namespace
 
-std::string tradeoff_svg(const std::vector<recon::WorkPoint>& points) {
+std::string tradeoff_svg(const std::vector<recon::WorkPoint>& points, SheetSize size) {
+  Sheet f = size == SheetSize::desktop ? kWide : kNarrow;
+  if (size == SheetSize::phone)
+    f.height = f.legend_y + kLegendLine * static_cast<double>(shades(points).size() + 2);
   const auto seconds = std::minmax_element(
       points.begin(), points.end(),
       [](const recon::WorkPoint& a, const recon::WorkPoint& b) { return a.seconds < b.seconds; });
   const auto error = std::minmax_element(
       points.begin(), points.end(),
       [](const recon::WorkPoint& a, const recon::WorkPoint& b) { return a.error < b.error; });
-  const LogScale x(seconds.first->seconds, seconds.second->seconds, kLeft, kRight);
-  const LogScale y(error.first->error, error.second->error, kBottom, kTop);
+  const LogScale x(seconds.first->seconds, seconds.second->seconds, f.left, f.right);
+  const LogScale y(error.first->error, error.second->error, f.bottom, f.top);
   return fmt::format(
              R"(<svg xmlns="http://www.w3.org/2000/svg" class="work" viewBox="0 0 {0} {1}" width="{0}" )"
              R"(height="{1}" role="img" aria-label="Held-out error against seconds">)",
-             kWidth, kHeight) +
-         kDiagramStyle + axes(x, y) + runs(points, x, y) + front(points, x, y) + legend(points) + "</svg>";
+             f.width, f.height) +
+         kDiagramStyle + axes(x, y, f) + runs(points, x, y) + front(points, x, y, f) + legend(points, f) +
+         "</svg>";
 }
 
 }  // namespace emberlock::report

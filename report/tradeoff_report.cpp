@@ -7,12 +7,13 @@
 #include <fmt/format.h>
 
 #include "base/file.h"
+#include "evaluate/work_points.h"
 #include "report/html.h"
 
 namespace emberlock::report {
 namespace {
 
-constexpr double kLeastGain = 0.02;  // of the error; a doubling that buys less buys nothing
+constexpr double kLeastGain = 0.02;  // of the error; less per doubling of time doesn't count
 
 std::string views_text(int views) { return views == 0 ? "all" : std::to_string(views); }
 
@@ -20,7 +21,7 @@ std::string command_start(const Tradeoff& t) {
   return "emberlock reconstruct " + t.input + " --out result" + (t.options.empty() ? "" : " " + t.options);
 }
 
-/// Held-out error at each doubling of time, along the front.
+/// Held-out error along the front at each doubling of time.
 void doublings(HtmlPage& page, const std::vector<recon::WorkPoint>& front) {
   std::vector<std::vector<std::string>> rows;
   double before = NAN;
@@ -51,7 +52,7 @@ void front_table(HtmlPage& page, const Tradeoff& t, const std::vector<recon::Wor
                : fmt::format("{:.2g}", (front[i - 1].error - p.error) / (p.seconds - front[i - 1].seconds));
     rows.push_back({fmt::format("{:.3f}", p.seconds), fmt::format("{:.2f}", p.error), price,
                     std::to_string(s.voxels), std::to_string(s.iterations), views_text(s.views), s.effects,
-                    recon::command_options(s)});
+                    evaluate::command_options(s)});
   }
   page.raw("<p>To repeat a point, add its options to <code>" + html_escape(command_start(t)) + "</code></p>");
   page.raw(command_table(
@@ -59,7 +60,7 @@ void front_table(HtmlPage& page, const Tradeoff& t, const std::vector<recon::Wor
 }
 
 /// The last point of each run that differs from the first run in one setting.
-void knobs(HtmlPage& page, const recon::Sweep& sweep) {
+void knobs(HtmlPage& page, const evaluate::Sweep& sweep) {
   std::vector<recon::WorkPoint> ends;
   for (std::size_t i = 0; i < sweep.points.size(); ++i) {
     if (i + 1 == sweep.points.size() || sweep.run[i + 1] != sweep.run[i]) ends.push_back(sweep.points[i]);
@@ -85,7 +86,7 @@ void knobs(HtmlPage& page, const recon::Sweep& sweep) {
   if (rows.size() == 1) return;
   page.heading("What each setting does");
   page.paragraph("Each run to its end, one setting changed at a time. Base: " +
-                 recon::command_options(base.settings));
+                 evaluate::command_options(base.settings));
   page.table({"changed", "seconds", "held-out error", "time", "error"}, rows);
 }
 
@@ -94,7 +95,7 @@ void all_points(HtmlPage& page, const Tradeoff& t) {
   std::vector<std::vector<std::string>> rows;
   for (const recon::WorkPoint& p : t.sweep.points) {
     rows.push_back({fmt::format("{:.3f}", p.seconds), fmt::format("{:.2f}", p.error),
-                    command_start(t) + " " + recon::command_options(p.settings)});
+                    command_start(t) + " " + evaluate::command_options(p.settings)});
   }
   page.raw("<details><summary>" + std::to_string(rows.size()) +
            " points, each with the command that repeats it</summary>" +
@@ -118,13 +119,13 @@ std::string command_table(const std::vector<std::string>& header,
 }
 
 std::string what_a_second_buys(const std::vector<recon::WorkPoint>& points) {
-  const std::vector<recon::WorkPoint> front = recon::pareto_front(points);
+  const std::vector<recon::WorkPoint> front = evaluate::pareto_front(points);
   if (front.empty()) return {};
   std::string words = fmt::format("Within {:.2g} s the held-out error falls to {:.1f} grey levels",
                                   front.front().seconds, front.front().error);
   double said = front.front().error;
   double from = front.front().seconds;
-  for (double s = 2 * from; s < 2 * front.back().seconds; s *= 2) {  // the last one holds the whole front
+  for (double s = 2 * from; s < 2 * front.back().seconds; s *= 2) {  // the last one covers the whole front
     const recon::WorkPoint* best = recon::best_within(front, s);
     if (best->error > (1 - kLeastGain) * said) continue;
     words += fmt::format(", within {:.2g} s to {:.1f}", best->seconds, best->error);
@@ -141,14 +142,20 @@ std::string what_a_second_buys(const std::vector<recon::WorkPoint>& points) {
 }
 
 std::string tradeoff_html(const Tradeoff& t) {
-  const std::vector<recon::WorkPoint> front = recon::pareto_front(t.sweep.points);
+  const std::vector<recon::WorkPoint> front = evaluate::pareto_front(t.sweep.points);
   HtmlPage page("Emberlock: what accuracy costs, " + t.input);
   page.raw("<p style=\"font-size:1.25rem\">" + html_escape(what_a_second_buys(t.sweep.points)) + "</p>");
-  page.raw("<div class=\"scroll\">" + tradeoff_svg(t.sweep.points) + "</div>");
+  page.raw("<div class=\"scroll wide\">" + tradeoff_svg(t.sweep.points) + "</div><div class=\"narrow\">" +
+           tradeoff_svg(t.sweep.points, SheetSize::phone) + "</div>");
   page.paragraph(
       "Below and to the left is better. A line is one run, iteration by iteration; the orange staircase is "
       "the "
       "Pareto front: no other setting was both quicker and better. Point at a mark to see its settings.");
+  if (!t.sweep.skipped.empty()) {
+    std::string left_out = "<p>Not in the diagram:</p><ul>";
+    for (const std::string& skipped : t.sweep.skipped) left_out += "<li>" + html_escape(skipped) + "</li>";
+    page.raw(left_out + "</ul>");
+  }
   page.heading("What a doubling of time buys");
   doublings(page, front);
   page.heading("The front");
@@ -161,7 +168,6 @@ std::string tradeoff_html(const Tradeoff& t) {
                   "rendered; the judging of held-out views is left out. Errors are those of the held-out "
                   "views, which no run was given: RMS over R, G, B and the flame's bounding box.",
                   t.sweep.points.size(), t.sweep.total.value(), t.machine));
-  for (const std::string& skipped : t.sweep.skipped) page.paragraph("Left out: " + skipped);
   return page.str();
 }
 
@@ -175,7 +181,7 @@ Status write_tradeoff_files(const TradeoffFiles& files, const OutputRequest& whe
 
 Status write_tradeoff(const Tradeoff& tradeoff, const OutputRequest& where) {
   return write_tradeoff_files(
-      {recon::to_csv(tradeoff.sweep.points), tradeoff_svg(tradeoff.sweep.points), tradeoff_html(tradeoff)},
+      {evaluate::to_csv(tradeoff.sweep.points), tradeoff_svg(tradeoff.sweep.points), tradeoff_html(tradeoff)},
       where);
 }
 

@@ -5,32 +5,34 @@
 #include <vector>
 
 #include "base/output_folder.h"
-#include "recon/pipeline/sweep.h"
+#include "evaluate/recon_sweep.h"
 
 namespace emberlock::report {
 
-/// What a tradeoff page speaks of.
+/// The content of a tradeoff page.
 struct Tradeoff {
-  std::string input;    ///< as the user named it
-  std::string options;  ///< of `emberlock reconstruct` for all points alike: held-out views, box, device
-  std::string machine;  ///< where the seconds were measured
-  recon::Sweep sweep;   ///< has points
+  std::string input;  ///< as the user typed it
+  std::string
+      options;  ///< options of `emberlock reconstruct` common to all points: held-out views, box, device
+  std::string machine;    ///< on which the times were measured
+  evaluate::Sweep sweep;  ///< has at least one point
 };
 
 /// The work-precision diagram: held-out error against seconds on logarithmic axes, every point with its
-/// settings as a tooltip, the Pareto front as a marked line with its settings written beside it.
-std::string tradeoff_svg(const std::vector<recon::WorkPoint>& points);
+/// settings as a tooltip, the Pareto front as a marked line labelled with its settings.
+enum class SheetSize { desktop, phone };
+std::string tradeoff_svg(const std::vector<recon::WorkPoint>& points, SheetSize size = SheetSize::desktop);
 
-/// What a second buys, in one sentence a doubling of time.
+/// What more time buys: one sentence per doubling of time.
 std::string what_a_second_buys(const std::vector<recon::WorkPoint>& points);
 
 std::string tradeoff_html(const Tradeoff& tradeoff);
 
-/// A table whose last column is a command, to be copied whole; `header` names the others.
+/// A table whose last column is a complete command to copy; `header` names the other columns.
 std::string command_table(const std::vector<std::string>& header,
                           const std::vector<std::vector<std::string>>& rows);
 
-/// A tradeoff's files.
+/// The files of a tradeoff.
 struct TradeoffFiles {
   std::string csv, svg, html;
 };

@@ -14,7 +14,7 @@
 namespace emberlock::report {
 namespace {
 
-constexpr std::size_t kMostPoints = 800;  // of a plot: more only fill the file
+constexpr std::size_t kMostPoints = 800;  // points in a plot: more would only enlarge the file
 
 const char* colour(smear::ClipState state) {
   switch (state) {
@@ -29,7 +29,7 @@ const char* colour(smear::ClipState state) {
 
 std::string signed_ms(Seconds t) { return fmt::format("{:+.3f}", in_milliseconds(t)); }
 
-/// Begun with a capital and ended with a full stop.
+/// Adds a capital at the start and a full stop at the end.
 std::string sentence(std::string text) {
   if (text.empty()) return text;
   text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
@@ -37,7 +37,7 @@ std::string sentence(std::string text) {
   return text;
 }
 
-/// Never rounded up to certainty.
+/// Never rounds up to certainty.
 std::string probability_in_words(double p) {
   return p > 0.9999 ? "> 0.9999" : fmt::format("{:.4f}", std::floor(p * 1e4) / 1e4);
 }
@@ -111,7 +111,7 @@ void table(HtmlPage& page, const smear::VerifyResult& r) {
       "with 97.5 % probability.");
 }
 
-/// Errors on one scale, with the tolerance shaded and two standard errors as whiskers.
+/// Errors on a common scale; the tolerance is shaded, whiskers are two standard errors.
 void error_diagram(HtmlPage& page, const smear::VerifyResult& r) {
   const double tolerance = in_milliseconds(r.options.tolerance.in_time(r.options.clip.row_time));
   double reach = 1.3 * tolerance;
@@ -152,14 +152,14 @@ void error_diagram(HtmlPage& page, const smear::VerifyResult& r) {
                     x(ms - two_sigma), x(ms + two_sigma), y, y, colour(c.state));
     svg += fmt::format(R"(<circle cx="{:.1f}" cy="{:.1f}" r="5" fill="{}"/>)", x(ms), y, colour(c.state));
   }
-  page.raw(svg + "</svg>");
+  page.raw("<div class=\"scroll\">" + svg + "</svg></div>");
   page.paragraph(
       "Left: reads later than the reference. Right: reads earlier. Shaded: the tolerance. Whiskers: two "
       "standard "
       "errors.");
 }
 
-/// The row where the line says that the dot of place `i` stands, or NaN where it isn't displayed.
+/// The row at which the fitted line predicts the dot of frame `i`; NaN if it isn't displayed.
 double row_on_line(const smear::ClipClock& clock, std::int64_t i) {
   const smear::CcdTiming& t = clock.timing;
   const double shifted = std::floor((clock.phase_of_frame(i).tau / t.row_time).value());
@@ -173,7 +173,7 @@ double row_on_line(const smear::ClipClock& clock, std::int64_t i) {
   return top_first ? packet : last - packet;
 }
 
-/// Every nth so that not too many are left.
+/// The stride that leaves not too many items.
 std::size_t stride_of(std::size_t count) {
   return std::max<std::size_t>(1, (count + kMostPoints - 1) / kMostPoints);
 }
@@ -217,7 +217,7 @@ void plots(HtmlPage& page, const smear::CameraVerdict& c, const smear::VerifyOpt
            "</div>");
 }
 
-/// Lit and unlit frames beside what the code says of the flashes that the line gives them.
+/// Lit and unlit frames, and what the code predicts for the flashes assigned to them by the line.
 void code_diagram(HtmlPage& page, const smear::CameraVerdict& c, const smear::ClipReading& clip,
                   const smear::FrameCode& code) {
   const smear::ClipClock& clock = c.clock;
@@ -235,7 +235,7 @@ void code_diagram(HtmlPage& page, const smear::CameraVerdict& c, const smear::Cl
     const auto place = static_cast<std::int64_t>(i);
     const smear::NumberedRun& run = *clock.run_at(place);
     const double start = run.start + static_cast<double>(place - run.first) * run.flashes_per_frame;
-    // The picture is lit by the last flash before its read phase.
+    // A frame's picture is lit by the last flash before its read phase.
     const double flash = wrap_positive(std::ceil(start) - 1, code.flashes());
     const bool given = (*pattern)[static_cast<std::size_t>(flash)];
     const smear::FlashSeen seen = smear::flash_seen(clip.frames[i]);

@@ -6,7 +6,7 @@
 
 namespace emberlock::report {
 
-/// Writes report.html, which stands alone: the verdict, what to do, and the evidence.
+/// Writes report.html, a self-contained page: the verdict, what to do, and the evidence.
 Status write_verify_report(const films::VerifyRunResult& run, const OutputRequest& where);
 
 }  // namespace emberlock::report

@@ -15,9 +15,9 @@
 namespace emberlock::evaluate {
 namespace {
 
-constexpr int kViews = 10;  // of the flame, beside the one held out
+constexpr int kViews = 10;  // of the flame, plus one held-out view
 constexpr int kMostRounds = 600;
-constexpr double kHopeless = 1000;  // expected resets from which on nothing is simulated
+constexpr double kHopeless = 1000;  // expected resets above which nothing is simulated
 constexpr double kSteps[] = {1, 2, 5, 10, 20, 50, 100, 200};
 constexpr smear::AlignPolicy kPolicies[] = {smear::AlignPolicy::fixed_reference, smear::AlignPolicy::densest,
                                             smear::AlignPolicy::timed, smear::AlignPolicy::trimmed};
@@ -82,7 +82,7 @@ smear::AlignSimulation simulation_of(const SyncTradeoffOptions& o, smear::AlignP
   sim.latency_spread = o.latency_spread;
   sim.rate_spread = o.crystal_spread;
   sim.flash_rows = std::min(1.0, 20e-6 / o.row_time.value());
-  sim.noise_rows = 0.08;  // four dots of 0.16 rows
+  sim.noise_rows = 0.08;  // four dots of 0.16 rows each
   sim.visible_rows = std::min(720.0, 0.93 * (sim.options.period / o.row_time).value());
   sim.round_seconds = o.round_time.value();
   sim.reset_seconds = sim.options.reset_time.value();
@@ -91,7 +91,7 @@ smear::AlignSimulation simulation_of(const SyncTradeoffOptions& o, smear::AlignP
   return sim;
 }
 
-/// Resets by hand that a policy takes at least, about: each lands with this chance.
+/// Approximate minimum of resets by hand that a policy needs. Each reset succeeds with this probability.
 double expected_by_hand(const SyncTradeoffOptions& o, Rows tolerance) {
   const double lands = 2 * (tolerance * o.row_time / period(o.frame_rate));
   return 0.6 * o.cameras / std::min(1.0, lands);
@@ -113,12 +113,13 @@ SyncCost cost_of(const SyncTradeoffOptions& o, smear::AlignPolicy policy, Rows t
   return cost;
 }
 
-/// Held-out error of a flame filmed by cameras that are late by `lateness`.
+/// Held-out error of a flame filmed by cameras with these delays.
 Result<double> flame_error(const SyncTradeoffOptions& o, std::vector<Seconds> lateness) {
   recon::PaperSceneOptions scene;
   scene.flame.seed = o.seed;
   scene.flame.rise_speed = o.flame_speed;
-  scene.flame.extinction = PerMeter(0);  // light alone: what the medium takes would be found anew each time
+  scene.flame.extinction = PerMeter(
+      0);  // emission only: with extinction, the medium would have to be found in every reconstruction
   scene.image = {4 * o.voxels, 3 * o.voxels};
   scene.truth_voxels = 3 * o.voxels / 2;
   scene.truth_step = 1;
@@ -133,7 +134,7 @@ Result<double> flame_error(const SyncTradeoffOptions& o, std::vector<Seconds> la
   return std::sqrt((rmse[0] * rmse[0] + rmse[1] * rmse[1] + rmse[2] * rmse[2]) / 3);
 }
 
-/// The same draws at every tolerance, scaled: what differs between two tolerances is the tolerance alone.
+/// Uses the same random draws, scaled, for every tolerance, so that only the tolerance differs.
 Status measure_errors(SyncTradeoff& result, const Progress& progress) {
   const SyncTradeoffOptions& o = result.options;
   const double runs = 1 + static_cast<double>(o.tolerances.size()) * o.draws;
@@ -170,7 +171,7 @@ std::string effort_text(const SyncCost& cost) {
                      s.resets_p95, time_text(s.seconds), time_text(s.seconds_p95));
 }
 
-/// What hands alone reach, for rigs whose cameras take no commands.
+/// What resets by hand reach, for rigs whose cameras accept no commands.
 std::string by_hand_text(const SyncTradeoff& t) {
   const SyncCost* best = nullptr;
   for (const SyncCost& cost : t.costs) {
@@ -187,7 +188,8 @@ std::string by_hand_text(const SyncTradeoff& t) {
 
 double added_percent(const SyncTradeoff& t, const SyncError& e) { return 100 * (e.error / t.floor - 1); }
 
-/// The largest tolerance that adds little enough, all smaller ones doing so too, and what it is bought with.
+/// Recommends the largest tolerance that, like all smaller ones, adds little enough error; and the policy for
+/// it.
 void recommend(SyncTradeoff& t) {
   if (t.errors.empty()) {
     t.why = "Without a flame's speed nothing says which tolerance is enough: give --flame-speed.";

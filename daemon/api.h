@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
+#include <memory>
 
 #include "base/result.h"
 #include "daemon/board.h"
+#include "daemon/work/job.h"
 #include "emberlock/v1/services.pb.h"
 
 namespace emberlock::daemon {
-
-/// Takes how far a job is; false ends it early.
-using JobObserver = std::function<bool(const v1::JobProgress&)>;
 
 /// What clients ask of the daemon, whichever way they come: a method for each rpc of services.proto that
 /// isn't a plain stream (those are the board's). Any thread may call; calls may take seconds (devices, queues
@@ -31,10 +29,11 @@ class Api {
   virtual Result<v1::RecordingStatus> stop_recording() = 0;
   virtual Result<v1::ListSessionsResponse> list_sessions() = 0;
   virtual Result<v1::Manifest> session(const v1::SessionRequest& request) = 0;
-  // The last progress told has `done`; what they return is why none could begin, or why it failed on the way.
-  virtual Status verify_session(const v1::SessionRequest& request, const JobObserver& observer) = 0;
-  virtual Status repair_session(const v1::SessionRequest& request, const JobObserver& observer) = 0;
-  virtual Status export_session(const v1::ExportRequest& request, const JobObserver& observer) = 0;
+  // These begin jobs; none waits for its end.
+  virtual Result<std::shared_ptr<JobHandle>> verify_session(const v1::SessionRequest& request) = 0;
+  virtual Result<std::shared_ptr<JobHandle>> repair_session(const v1::SessionRequest& request) = 0;
+  virtual Result<std::shared_ptr<JobHandle>> export_session(const v1::ExportRequest& request) = 0;
+  virtual Status cancel_job(const v1::CancelJobRequest& request) = 0;
   virtual Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) = 0;
   virtual Result<v1::ReconstructionStatus> cancel_reconstruction() = 0;
 };

@@ -12,6 +12,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "base/version.h"
 #include "daemon/engine/engine.h"
 #include "daemon/server/grpc_server.h"
 #include "daemon/server/http_server.h"
@@ -63,7 +64,7 @@ void leave(Engine& engine) {
   ::sd_notify(0, "STOPPING=1");
   engine.end();
   const TimePoint told = SteadyClock().now();
-  std::uint64_t got_on = 0;
+  double got_on = -1;
   TimePoint asked;
   while (!engine.ended(kLook)) {
     const timespec at_once{0, 0};
@@ -73,9 +74,10 @@ void leave(Engine& engine) {
       std::_Exit(EXIT_FAILURE);
     }
     const TimePoint now = SteadyClock().now();
-    if (now - asked < kAsk || engine.finishing_progress() == got_on) continue;
+    const auto finishing = engine.finishing();
+    if (now - asked < kAsk || !finishing || finishing->fraction() == got_on) continue;
     asked = now;
-    got_on = engine.finishing_progress();
+    got_on = finishing->fraction();
     ::sd_notify(0, kMoreTime);
   }
 }
@@ -164,6 +166,8 @@ Status serve(const rig::DaemonConfig& config) {
     log(LogCategory::daemon)
         .info("the console is at {}: `emberlock console` prints a link that opens it", http_server->url());
   }
+  log(LogCategory::daemon)
+      .info("listens at {}, records to {}", config.server.socket.string(), config.recording.folder.string());
   ::sd_notify(0, "READY=1");
   stay(*engine);
   leave(*engine);
@@ -188,7 +192,7 @@ int main(int argc, char** argv) {
                "Prints a configuration file with every key, its range and default, and ends");
   app.add_option("--make-token", token_file,
                  "Writes a new token for clients by network and programs by HTTP to this file, and ends");
-  app.set_version_flag("--version", "emberlockd " EMBERLOCK_VERSION);
+  app.set_version_flag("--version", "emberlockd " + version());
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

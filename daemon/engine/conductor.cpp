@@ -5,6 +5,7 @@
 
 #include "base/clock.h"
 #include "base/log.h"
+#include "daemon/engine/words.h"
 #include "drivers/replay/record.h"
 
 namespace emberlock::daemon {
@@ -41,6 +42,8 @@ Conductor::Conductor(const ConductorParts& parts, rig::StopAsked stop, const rig
       devices_(parts.rig.devices()),
       stop_(std::move(stop)),
       watch_(ids_of(parts.rig)),
+      overload_(parts.rig.size()),
+      flame_(parts.config.alignment.flame),
       ended_(parts.rig.size(), false),
       trouble_told_(parts.rig.size(), false),
       began_(parts.rig.clock().now()) {
@@ -50,6 +53,7 @@ Conductor::Conductor(const ConductorParts& parts, rig::StopAsked stop, const rig
       parts_.board.notice(v1::AMBER, started.error().message());
   }
   strobe_status_ = strobe().ok() ? Status{} : strobe_status_;
+  set_scene();
 }
 
 Conductor::~Conductor() {
@@ -60,7 +64,7 @@ Conductor::~Conductor() {
 
 Status Conductor::reconstruct(const v1::ReconstructRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(parts_.store.path_of(request.session()));
-  EMBERLOCK_RETURN_IF_ERROR(check_not_salvaged(parts_.work, request.session()));
+  EMBERLOCK_RETURN_IF_ERROR(check_not_salvaged(parts_.jobs, request.session()));
   reconstruct_request_ = request;
   return happen(AskReconstruct{request.session()});
 }
@@ -77,8 +81,8 @@ Result<v1::StrobeState> Conductor::strobe() {
     return Error{ErrorKind::refused, "the rig has no strobe", "[rig.strobe]", "Configure one"};
   const Result<drivers::StrobeSettings> said = strobe->read_back();
   strobe_status_ = said.ok() ? Status{} : Status(said.error());
-  for (const Happening& happening : watch_.strobe(strobe->id(), strobe_status_))
-    static_cast<void>(happen(happening));
+  for (const MachineEvent& event : watch_.strobe(strobe->id(), strobe_status_))
+    static_cast<void>(happen(event));
   if (!said.ok()) return said.error();
   strobe_settings_ = *said;
   return drivers::strobe_event(parts_.rig.clock().now(), *said).strobe();
@@ -103,14 +107,18 @@ Result<v1::StrobeState> Conductor::apply_strobe(const v1::StrobeState& wanted) {
   return state;
 }
 
-Status Conductor::happen(const Happening& happening) {
-  MachineStep next = step(state_, happening, utc_now());
-  if (next.refusal) return *next.refusal;
+Status Conductor::happen(const MachineEvent& event) {
+  MachineStep next = step(state_, event, utc_now());
+  if (next.refusal) return words(*next.refusal);
+  const v1::Phase before = state_.phase;
   state_ = std::move(next.state);
-  for (const Remark& remark : next.remarks) parts_.board.notice(remark.light, remark.text);
+  if (before != state_.phase) set_scene();
+  for (const Remark& remark : next.remarks) note(remark);
   for (const Action action : next.actions) carry_out(action);
   return {};
 }
+
+void Conductor::note(const Remark& remark) { parts_.board.notice(remark.light, words(remark)); }
 
 void Conductor::carry_out(Action action) {
   switch (action) {
@@ -119,7 +127,7 @@ void Conductor::carry_out(Action action) {
     case Action::end_alignment:
       return end_alignment();
     case Action::check_lock:
-      if (std::exchange(phase_lost_, false)) return break_alignment("a camera went away meanwhile");
+      if (std::exchange(phase_lost_, false)) return break_alignment(Why::camera_was_away);
       alignment_->pass_over(parts_.rig.clock().now());
       check_now_ = true;
       return;
@@ -131,7 +139,7 @@ void Conductor::carry_out(Action action) {
       return begin_reconstruction();
     case Action::cancel_reconstruction:
       static_cast<void>(parts_.reconstruction.cancel());
-      return heed_reconstruction();
+      return watch_reconstruction();
   }
 }
 
@@ -141,19 +149,18 @@ void Conductor::begin_reconstruction() {
     reconstruct_request_.set_session(state_.reconstructing);
   }
   // A recording that is handed on may be in salvage, as it couldn't be finished.
-  Status started = check_not_salvaged(parts_.work, reconstruct_request_.session());
+  Status started = check_not_salvaged(parts_.jobs, reconstruct_request_.session());
   if (started.ok()) {
     const auto begun = parts_.reconstruction.start(reconstruct_request_);
     if (!begun.ok()) started = begun.error();
   }
-  if (!started.ok())
-    static_cast<void>(happen(ReconstructionEnded{false, started.error().what, started.error().remedy}));
+  if (!started.ok()) static_cast<void>(happen(ReconstructionEnded{false, started.error()}));
 }
 
 void Conductor::work() {
-  heed_devices();
-  heed_disk();
-  heed_reconstruction();
+  watch_devices();
+  watch_disk();
+  watch_reconstruction();
   switch (state_.phase) {
     case v1::CALIBRATING:
       return measure_row_time();
@@ -173,22 +180,23 @@ void Conductor::work() {
 
 bool Conductor::waits() const {
   if (state_.phase == v1::ALIGNING || (state_.phase == v1::CALIBRATING && alignment_)) return false;
-  return real_time() || state_.phase == v1::IDLE || finished_.valid();
+  return real_time() || state_.phase == v1::IDLE || finishing_ != nullptr;
 }
 
-void Conductor::heed_devices() {
+void Conductor::watch_devices() {
   const TimePoint now = parts_.rig.clock().now();
   const bool filmed = watch_.all_film();
-  for (const Happening& happening : watch_.cameras(camera_states())) static_cast<void>(happen(happening));
-  for (const Happening& happening : watch_.clocks(SteadyClock().now(), wall_clock()))
-    static_cast<void>(happen(happening));
+  for (const MachineEvent& event : watch_.cameras(camera_states())) static_cast<void>(happen(event));
+  for (const MachineEvent& event : watch_.clocks(SteadyClock().now(), wall_clock()))
+    static_cast<void>(happen(event));
   watch_.frames(counts(), now);
+  watch_load(now);
   if (filmed && !watch_.all_film() && alignment_) {
     if (recorder_) {
       phase_lost_ = true;  // the recording goes on without it
-      static_cast<void>(happen(LockExpired{"a camera went away: its shutter's phase is unknown"}));
+      static_cast<void>(happen(LockExpired{Why::phase_unknown}));
     } else {
-      break_alignment("waiting for a camera that went away");
+      break_alignment(Why::camera_away);
     }
   }
   // Waiting for one that is silent would cost frames of a recording.
@@ -199,18 +207,37 @@ void Conductor::heed_devices() {
   }
 }
 
-void Conductor::heed_reconstruction() {
+/// Frames of simulated cameras whose clock waits for them aren't lost to too much work.
+void Conductor::watch_load(TimePoint now) {
+  if (state_.phase == v1::CALIBRATING || state_.phase == v1::ALIGNING) aligned_at_ = now;
+  if (!real_time()) return;
+  WorkCounts work{counts()};
+  for (std::size_t i = 0; i < parts_.rig.size(); ++i) work.overworked += parts_.rig.overworked(i) ? 1 : 0;
+  if (recorder_) {
+    work.no_room = recorder_->no_room();
+    work.writer = recorder_->load();
+  }
+  for (const MachineEvent& event : overload_.look(work, now)) static_cast<void>(happen(event));
+}
+
+/// The flame burns while nothing is aligned, so that cameras can be exposed for it, and in recordings of it.
+void Conductor::set_scene() {
+  const bool records = state_.phase == v1::CAPTURING || state_.phase == v1::FINISHING;
+  const bool burns = state_.phase == v1::IDLE || (records && !records_strobe());
+  static_cast<void>(parts_.rig.show(burns ? rig::Rig::Scene::flame : rig::Rig::Scene::strobe));
+}
+
+void Conductor::watch_reconstruction() {
   if (state_.reconstructing.empty()) return;
   const auto status = parts_.reconstruction.status();
   if (!status || status->state() == v1::ReconstructionStatus::RUNNING) return;
-  const bool ok = status->state() == v1::ReconstructionStatus::DONE;
-  const bool cancelled = status->state() == v1::ReconstructionStatus::CANCELLED;
-  static_cast<void>(
-      happen(ReconstructionEnded{ok || cancelled,
-                                 ok          ? "done: the result is in " + status->result()
-                                 : cancelled ? "cancelled"
-                                             : status->error(),
-                                 "The recording is unharmed. Try again, or with --device cpu or cuda"}));
+  ReconstructionEnded ended{true, ReconstructionDone{status->result()}};
+  if (status->state() == v1::ReconstructionStatus::CANCELLED) {
+    ended.reason = Why::cancelled;
+  } else if (status->state() != v1::ReconstructionStatus::DONE) {
+    ended = {false, ReconstructionFailed{status->error()}};
+  }
+  static_cast<void>(happen(ended));
 }
 
 std::vector<v1::CameraStatus::State> Conductor::camera_states() const {

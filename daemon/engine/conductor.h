@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
-#include <future>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,15 +13,16 @@
 #include "daemon/board.h"
 #include "daemon/engine/device_watch.h"
 #include "daemon/engine/machine.h"
+#include "daemon/engine/overload_watch.h"
 #include "daemon/engine/recorder.h"
+#include "daemon/engine/words.h"
 #include "daemon/reconstruction/child.h"
+#include "daemon/work/jobs.h"
 #include "daemon/work/upkeep.h"
-#include "daemon/work/work_queue.h"
 #include "rig/align/alignment.h"
 #include "rig/config/config.h"
 #include "rig/devices/geometry.h"
 #include "rig/devices/rig.h"
-#include "session/salvage.h"
 #include "session/store.h"
 
 namespace emberlock::daemon {
@@ -34,7 +34,7 @@ struct ConductorParts {
   const rig::DaemonConfig& config;
   session::SessionStore& store;
   ReconstructionChild& reconstruction;
-  WorkQueue& work;  ///< stands still while something is recorded
+  Jobs& jobs;  ///< those in the background stand still while something is recorded
   Board& board;
   UpkeepTold told = {};  ///< what became of a session in the background
 };
@@ -63,14 +63,12 @@ class Conductor {
   Result<v1::StrobeState> apply_strobe(const v1::StrobeState& wanted);
 
   // What became of a session in the background.
-  void transcoded(const std::string& session, const Status& outcome);
-  void salvaged(const std::string& session, const Result<session::SalvageReport>& outcome);
+  void transcoded(const std::string& session, const JobResult& result);
+  void salvaged(const std::string& session, const JobResult& result);
 
   /// It shall end: a recording that runs is finished, for which work() goes on to be called, until is_done().
   void end();
   [[nodiscard]] bool is_done() const { return !recorder_; }
-  /// Rises while the recording that is being finished gets on.
-  [[nodiscard]] std::uint64_t finishing_progress() const;
 
   /// One slice of what the phase has to do: a round of filming, or the frames that have come. Returns after
   /// that; idle it has nothing to wait for.
@@ -82,7 +80,16 @@ class Conductor {
   [[nodiscard]] v1::DaemonStatus status() const;
 
  private:
-  Status happen(const Happening& happening);
+  Status happen(const MachineEvent& event);
+  Status renew(const v1::AlignRequest& request);
+  /// How long a take may be that begins now.
+  [[nodiscard]] TakeLength take_length(Seconds asked) const;
+  [[nodiscard]] LockLeft lock_left() const;
+  /// The strobe flashes during what is recorded: that is what the recording is of.
+  [[nodiscard]] bool records_strobe() const { return record_request_.purpose() == "alignment"; }
+  Status light_strobe();
+  void darken_strobe();
+  void note(const Remark& remark);
   void carry_out(Action action);
   void begin_alignment();
   void end_alignment();
@@ -98,14 +105,17 @@ class Conductor {
   void end_recording();
   [[nodiscard]] bool all_have_come() const;
   void drain();
-  void heed_trouble(std::size_t camera, const Error& error);
-  /// Why no camera films, by camera; empty where one does.
-  [[nodiscard]] std::string nobody_films() const;
+  void note_trouble(std::size_t camera, const Error& error);
+  /// All, where none films; empty where one does.
+  [[nodiscard]] std::vector<SilentCamera> silent_cameras() const;
   [[nodiscard]] Seconds longest_silence() const;
-  void heed_devices();
-  void heed_disk();
-  void heed_reconstruction();
-  void break_alignment(const std::string& reason);
+  void watch_devices();
+  void watch_disk();
+  void watch_load(TimePoint now);
+  /// What the room of simulated cameras shows now.
+  void set_scene();
+  void watch_reconstruction();
+  void break_alignment(Why why);
   /// Why alignment failed: a device that is gone, else itself.
   void explain_failure(const Error& error);
   [[nodiscard]] std::vector<drivers::FrameCounts> counts() const;
@@ -114,6 +124,7 @@ class Conductor {
   /// Of the alignment's last round.
   [[nodiscard]] v1::AlignmentStatus::Verdict verdict() const;
   void describe_cameras(v1::DaemonStatus& status) const;
+  void describe_frames(v1::CameraStatus& camera) const;
   void describe_alignment(v1::AlignmentStatus& status) const;
 
   [[nodiscard]] bool real_time() const { return parts_.rig.pace() == rig::Rig::Pace::real_time; }
@@ -123,8 +134,12 @@ class Conductor {
   rig::StopAsked stop_;
   MachineState state_;
   DeviceWatch watch_;
+  OverloadWatch overload_;
+  TimePoint aligned_at_;  ///< when cameras were last being aligned: resets make rates uneven
 
   rig::AlignRunOptions align_options_;
+  smear::FlameMotion flame_;  ///< as it was told last
+  bool tolerance_told_ = false;
   std::unique_ptr<rig::Alignment> alignment_;
   TimePoint align_began_;
   std::deque<v1::RoundPoint> history_;
@@ -135,11 +150,12 @@ class Conductor {
       false;  ///< a camera went away while it was recorded: what is known of its shutter is void
 
   std::unique_ptr<Recorder> recorder_;
-  /// What finishing recorder_ brings, on a thread of its own: a slow disk takes minutes. Gone before
-  /// recorder_.
-  std::future<v1::RecordingStatus> finished_;
+  /// The job that finishes recorder_: a slow disk takes minutes. While it runs recorder_ is the job's.
+  std::shared_ptr<JobHandle> finishing_;
+  std::shared_ptr<v1::RecordingStatus> finished_;  ///< what it brings
   v1::RecordRequest record_request_;
-  Status begun_;  ///< how the recording asked for last began
+  bool lit_for_recording_ = false;  ///< the strobe flashes for the recording alone
+  Status begun_;                    ///< how the recording asked for last began
   std::filesystem::path record_folder_;
   std::optional<v1::RecordingStatus> recording_;  ///< the last that ended
   TimePoint record_began_;

@@ -25,9 +25,27 @@ v1::RoundPoint point_of(const rig::AlignRoundReport& report, TimePoint began) {
   return point;
 }
 
+/// The flame as it was told before, with what is told now.
+Result<smear::FlameMotion> flame_of(const v1::AlignRequest& request, smear::FlameMotion flame) {
+  for (const auto& [field, value] :
+       {std::pair("flame_speed_m_s", request.flame_speed_m_s()), std::pair("detail_m", request.detail_m())}) {
+    if (!std::isfinite(value) || value < 0)
+      return Error{ErrorKind::bad_input, "is no speed or size", field,
+                   "Give a positive number; 0: as before"};
+  }
+  if (request.flame_speed_m_s() > 0) flame.speed = smear::MetersPerSecond(request.flame_speed_m_s());
+  if (request.detail_m() > 0) flame.detail = Meters(request.detail_m());
+  return flame;
+}
+
+bool tells_flame(const v1::AlignRequest& request) {
+  return request.flame_speed_m_s() > 0 || request.detail_m() > 0;
+}
+
 Result<rig::AlignRunOptions> options_of(const v1::AlignRequest& request, const rig::AlignmentConfig& config,
-                                        rig::Rig& rig) {
+                                        const smear::FlameMotion& flame, rig::Rig& rig) {
   EMBERLOCK_ASSIGN_OR_RETURN(rig::AlignRunOptions options, rig.align_options(config));
+  if (!config.tolerance || tells_flame(request)) options.align.tolerance = smear::tolerance_for(flame);
   if (!request.tolerance().empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, smear::parse_tolerance(request.tolerance()));
   }
@@ -45,12 +63,48 @@ Status Conductor::align(const v1::AlignRequest& request) {
     return Error{ErrorKind::refused, "the rig has no strobe, so nothing tells the shutters' phases",
                  "[rig.strobe]", "Configure one"};
   }
+  if (request.renew()) return renew(request);
+  EMBERLOCK_ASSIGN_OR_RETURN(const smear::FlameMotion flame, flame_of(request, flame_));
   EMBERLOCK_ASSIGN_OR_RETURN(rig::AlignRunOptions options,
-                             options_of(request, parts_.config.alignment, parts_.rig));
+                             options_of(request, parts_.config.alignment, flame, parts_.rig));
   std::swap(options, align_options_);
   Status asked = happen(AskAlign{});
-  if (!asked.ok()) std::swap(options, align_options_);
+  if (!asked.ok()) {
+    std::swap(options, align_options_);
+    return asked;
+  }
+  flame_ = flame;
+  tolerance_told_ =
+      !request.tolerance().empty() || (parts_.config.alignment.tolerance && !tells_flame(request));
   return asked;
+}
+
+Status Conductor::renew(const v1::AlignRequest& request) {
+  if (!std::isfinite(request.hold_s()) || request.hold_s() < 0)
+    return Error{ErrorKind::bad_input, "is no length of time", "hold_s", "Give 0 or more"};
+  EMBERLOCK_RETURN_IF_ERROR(happen(AskRenew{}));
+  constexpr Seconds kUntilItBegins{5};  // from the renewal's last round to the take
+  const Seconds usual = align_options_.align.shortest_take;
+  if (alignment_)
+    alignment_->hold_for(request.hold_s() > 0 ? Seconds(request.hold_s()) + kUntilItBegins : usual);
+  return {};
+}
+
+TakeLength Conductor::take_length(Seconds asked) const {
+  if (!alignment_) return {asked};
+  const Seconds sure = alignment_->time_left(parts_.rig.clock().now());
+  return {asked, std::isfinite(sure.value()) ? std::optional(sure) : std::nullopt,
+          alignment_->last().renewed};
+}
+
+LockLeft Conductor::lock_left() const {
+  if (!alignment_) return {};
+  const TimePoint now = parts_.rig.clock().now();
+  LockLeft left{take_length({}).sure, alignment_->likely_left(now), {}};
+  if (!std::isfinite(left.likely->value())) left.likely.reset();
+  if (const auto first = alignment_->last().reason.first_out)
+    left.leaves_first = alignment_->cameras()[*first].id;
+  return left;
 }
 
 Status Conductor::stop_sync() { return happen(AskIdle{}); }
@@ -63,7 +117,7 @@ void Conductor::begin_alignment() {
   auto alignment = rig::Alignment::create(
       devices_, align_options_, [this](const rig::AlignRoundReport& round) { remember(round); }, {}, stop_);
   if (!alignment.ok()) {
-    static_cast<void>(happen(RoundDone{v1::AlignmentStatus::REFUSED, alignment.error().message()}));
+    static_cast<void>(happen(RoundDone{v1::AlignmentStatus::REFUSED, alignment.error()}));
     return;
   }
   alignment_ = std::move(*alignment);
@@ -107,7 +161,8 @@ void Conductor::film_round() {
   }
   expired_ = false;
   const smear::AlignDecision& last = alignment_->last();
-  static_cast<void>(happen(RoundDone{verdict(), last.reason, last.renews, last.in_time}));
+  static_cast<void>(
+      happen(RoundDone{verdict(), AlignmentSays{alignment_->words().reason}, last.renews, last.in_time}));
 }
 
 void Conductor::hold() {
@@ -118,17 +173,17 @@ void Conductor::hold() {
   alignment_->wait(now + left);
 }
 
-void Conductor::break_alignment(const std::string& reason) {
+void Conductor::break_alignment(Why why) {
   alignment_.reset();
-  static_cast<void>(happen(AlignmentBroken{reason}));
+  static_cast<void>(happen(AlignmentBroken{why}));
 }
 
 void Conductor::explain_failure(const Error& error) {
-  heed_devices();
+  watch_devices();
   if (!alignment_) return;
-  if (!watch_.all_film()) return break_alignment("waiting for a camera that went away");
-  if (!strobe().ok()) return break_alignment("waiting for the strobe");
-  static_cast<void>(happen(RoundDone{v1::AlignmentStatus::GIVEN_UP, error.message()}));
+  if (!watch_.all_film()) return break_alignment(Why::camera_away);
+  if (!strobe().ok()) return break_alignment(Why::strobe_away);
+  static_cast<void>(happen(RoundDone{v1::AlignmentStatus::GIVEN_UP, error}));
 }
 
 void Conductor::remember(const rig::AlignRoundReport& round) {

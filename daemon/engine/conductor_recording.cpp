@@ -5,10 +5,9 @@
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
-
 #include "base/clock.h"
 #include "daemon/engine/conductor.h"
+#include "daemon/engine/words.h"
 #include "drivers/replay/record.h"
 #include "rig/recording_rate.h"
 #include "session/files.h"
@@ -39,18 +38,21 @@ Status Conductor::record(const v1::RecordRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(session::check_text("purpose", request.purpose()));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::filesystem::path folder,
                              parts_.store.path_for_new(request.name(), wall_clock()));
-  if (const std::string why = nobody_films(); !why.empty() && state_.phase != v1::CAPTURING)
-    return Error{ErrorKind::refused, "no camera films: " + why, "emberlockd",
+  if (const auto silent = silent_cameras(); !silent.empty() && state_.phase != v1::CAPTURING)
+    return Error{ErrorKind::refused, "no camera films: " + words(silent), "emberlockd",
                  "See to the cameras: those that were lost are taken up again by themselves, and restarting "
                  "emberlockd begins a replay anew"};
   const std::string name = folder.filename().string();
-  const MachineStep asked =
-      step(state_, AskRecord{name, request.unlocked(), request.reconstruct()}, utc_now());
-  if (asked.refusal) return *asked.refusal;
+  const AskRecord ask{name, request.unlocked(), request.reconstruct(),
+                      take_length(Seconds(request.seconds()))};
+  // A lock that was renewed for this take need not hold for so long again.
+  if (alignment_) alignment_->hold_for(align_options_.align.shortest_take);
+  const MachineStep asked = step(state_, ask, utc_now());
+  if (asked.refusal) return words(*asked.refusal);
   record_folder_ = folder;
   record_request_ = request;
   begun_ = {};
-  EMBERLOCK_RETURN_IF_ERROR(happen(AskRecord{name, request.unlocked(), request.reconstruct()}));
+  EMBERLOCK_RETURN_IF_ERROR(happen(ask));
   return begun_;
 }
 
@@ -60,15 +62,14 @@ void Conductor::begin_recording() {
   const TimePoint now = parts_.rig.clock().now();
   record_began_ = now;
   spread_.reset();
-  if (state_.lock == Lock::held) {
-    spread_ = alignment_->worst_pair(now);
+  if (state_.lock == Lock::held) spread_ = alignment_->worst_pair(now);
+  if (records_strobe()) {
+    if (const Status lit = light_strobe(); !lit.ok()) parts_.board.notice(v1::AMBER, lit.error().message());
+  } else if (state_.lock == Lock::held) {
     // A flash that was under way may show in the two frames that follow.
     if (const Status dark = alignment_->darken(); !dark.ok())
       parts_.board.notice(v1::AMBER, dark.error().message());
-    if (devices_.strobe->dial())
-      parts_.board.notice(v1::AMBER,
-                          "The strobe is set by hand: switch it off while the flame is recorded, or its "
-                          "flashes are too.");
+    if (devices_.strobe->dial()) note({v1::AMBER, Remark::Code::flashes_show});
     Seconds transport;
     for (const drivers::Camera* camera : devices_.cameras)
       transport = std::max(transport, camera->info().transport);
@@ -82,19 +83,47 @@ void Conductor::begin_recording() {
   RecorderOptions options{parts_.config.recording.writer, parts_.config.recording.queue};
   if (!real_time()) options.queue.when_full = session::WhenFull::wait;
   // Before the disk is asked for anything: it would stand behind what a salvage writes.
-  parts_.work.pause();
+  parts_.jobs.pause();
   auto recorder = Recorder::begin(record_folder_, manifest, options, counts(), record_began_);
   if (!recorder.ok()) {
-    parts_.work.resume();
+    parts_.jobs.resume();
+    darken_strobe();
     begun_ = recorder.error();
     static_cast<void>(happen(RecordingRefused{recorder.error()}));
     return;
   }
   recorder_ = std::move(*recorder);
-  static_cast<void>(parts_.rig.show(rig::Rig::Scene::flame));
+  if (records_strobe() && devices_.strobe != nullptr)
+    static_cast<void>(
+        recorder_->append(drivers::strobe_event(now, alignment_ ? alignment_->strobe() : strobe_settings_)));
   last_frame_.reset();
   expired_ = false;
   static_cast<void>(happen(RecordingBegun{}));
+}
+
+/// A locked rig's strobe flashes already; another's is set to once a frame, for the recording.
+Status Conductor::light_strobe() {
+  drivers::Strobe* strobe = devices_.strobe;
+  if (strobe == nullptr || strobe->dial()) return {};
+  if (alignment_) return alignment_->light();
+  if (strobe_settings_.output == drivers::StrobeOutput::flashing) return {};
+  const Hertz rate = devices_.cameras.front()->info().frame_rate;
+  EMBERLOCK_RETURN_IF_ERROR(strobe->apply({.output = drivers::StrobeOutput::flashing,
+                                           .rate = rate,
+                                           .width = parts_.config.alignment.run.flash_width}));
+  lit_for_recording_ = true;
+  EMBERLOCK_ASSIGN_OR_RETURN(strobe_settings_, strobe->read_back());
+  return {};
+}
+
+/// The strobe, if it flashed for a recording alone.
+void Conductor::darken_strobe() {
+  if (!std::exchange(lit_for_recording_, false)) return;
+  drivers::StrobeSettings dark = strobe_settings_;
+  dark.output = drivers::StrobeOutput::off;
+  if (const Status off = devices_.strobe->apply(dark); !off.ok())
+    parts_.board.notice(v1::AMBER, off.error().message());
+  static_cast<void>(strobe());
 }
 
 /// work() takes what is still on its way and finishes, so that whoever asked needn't wait.
@@ -115,22 +144,32 @@ bool Conductor::all_have_come() const {
   return true;
 }
 
-/// On a thread of its own: queues drain to the disk, and segments are flushed.
+/// A job: queues drain to the disk, and segments are flushed.
 void Conductor::begin_finishing() {
-  static_cast<void>(parts_.rig.show(rig::Rig::Scene::strobe));
-  finished_ = std::async(std::launch::async,
-                         [recorder = recorder_.get(), after = counts(), now = parts_.rig.clock().now()] {
-                           return recorder->finish(after, now);
-                         });
+  darken_strobe();
+  finished_ = std::make_shared<v1::RecordingStatus>();
+  const auto finish = [recorder = recorder_.get(), finished = finished_, after = counts(),
+                       now = parts_.rig.clock().now()](const Observer& observer) -> JobResult {
+    *finished = recorder->finish(after, now, [&](double fraction, std::string_view doing) {
+      static_cast<void>(observer(fraction, doing));
+    });
+    v1::JobOutcome outcome;
+    outcome.set_ok(finished->state() == v1::RecordingStatus::COMPLETE);
+    return outcome;
+  };
+  auto job = parts_.jobs.add({v1::Job::FINISH, state_.session, finish});
+  finishing_ = std::move(*job);  // no bound refuses it
 }
 
 /// A slice of it.
 void Conductor::finish_recording() {
-  if (!finished_.valid()) {
+  if (!finishing_) {
     if (all_have_come()) begin_finishing();
     return;
   }
-  if (finished_.wait_for(kFinishSlice) == std::future_status::ready) conclude_recording(finished_.get());
+  if (!finishing_->wait(kFinishSlice)) return;
+  finishing_.reset();
+  conclude_recording(*finished_);
 }
 
 void Conductor::conclude_recording(v1::RecordingStatus status) {
@@ -140,74 +179,49 @@ void Conductor::conclude_recording(v1::RecordingStatus status) {
   const auto manifest = session::read_manifest(record_folder_);
   const bool broken = failed && !(manifest && manifest->state() == v1::Manifest::COMPLETE);
   const bool nothing = !failed && status.frames() == 0 && lost(status.lost()) == 0;
+  Outcome outcome{failed ? Outcome::Code::incomplete : Outcome::Code::whole, status.verdict()};
   if (nothing) {
+    outcome = {Outcome::Code::nothing, {}, silent_cameras()};
     status.set_state(v1::RecordingStatus::FAILED);
-    const std::string why = nobody_films();
-    status.set_verdict("not one frame came from any camera" + (why.empty() ? "" : ": " + why));
+    status.set_verdict(words(outcome));
   }
   if (spread_) status.set_spread_s(spread_->value());
-  parts_.work.resume();
+  parts_.jobs.resume();
   // What an end that failed left behind; the other is compressed.
   const rig::RecordingConfig::Transcode transcode = parts_.config.recording.transcode;
-  if (broken) salvage_later(record_folder_, parts_.work, transcode, parts_.told);
+  if (broken) salvage_later(record_folder_, parts_.jobs, transcode, parts_.told);
   if (!broken && transcode == rig::RecordingConfig::Transcode::when_idle)
-    compress_later(record_folder_, parts_.work, parts_.told);
+    compress_later(record_folder_, parts_.jobs, parts_.told);
   if (lost(status.lost()) > 0) {
-    static_cast<void>(happen(
-        FaultRaised{{v1::Fault::FRAMES_LOST, status.session()},
-                    v1::AMBER,
-                    status.verdict(),
-                    "The recording is whole but for these. See which cause, and whether it comes again"}));
+    static_cast<void>(happen(FaultRaised{{v1::Fault::FRAMES_LOST, status.session()}, v1::AMBER, outcome}));
   }
   recording_ = status;
-  static_cast<void>(
-      happen(RecordingFinished{status.state() == v1::RecordingStatus::COMPLETE, status.verdict(), nothing}));
+  static_cast<void>(happen(RecordingFinished{outcome}));
 }
 
 void Conductor::end() {
   if (std::exchange(state_.reconstruct_after, false))
-    parts_.board.notice(v1::AMBER,
-                        fmt::format("{} is not handed on, as emberlockd is shutting down. Start it "
-                                    "later: emberlock reconstruct \"{}\" --daemon",
-                                    state_.session, state_.session));
-  static_cast<void>(happen(RecordingEnds{"emberlockd is shutting down"}));
+    note({v1::AMBER, Remark::Code::not_handed_on, state_.session, Why::shutting_down});
+  static_cast<void>(happen(RecordingEnds{Why::shutting_down}));
   // What is still on its way isn't waited for.
-  if (recorder_ && !finished_.valid()) begin_finishing();
+  if (recorder_ && !finishing_) begin_finishing();
 }
 
-std::uint64_t Conductor::finishing_progress() const { return recorder_ ? recorder_->progress() : 0; }
-
-void Conductor::salvaged(const std::string& session, const Result<session::SalvageReport>& outcome) {
-  if (!outcome.ok() && outcome.error().kind == ErrorKind::refused)  // by who still records it
-    return parts_.board.notice(v1::AMBER, session + ": " + outcome.error().message());
+void Conductor::salvaged(const std::string& session, const JobResult& outcome) {
+  if (!outcome.ok() && outcome.error().kind == ErrorKind::refused)  // by who still records it, or cancelled
+    return note({v1::AMBER, Remark::Code::not_salvaged, session, outcome.error()});
   if (!outcome.ok()) {
-    static_cast<void>(happen(FaultRaised{
-        {v1::Fault::SALVAGE_FAILED, session},
-        v1::AMBER,
-        "it wasn't finished, and can't be salvaged: " + outcome.error().message(),
-        outcome.error().remedy.empty() ? "What was written is kept. `emberlock sessions repair` tries again"
-                                       : outcome.error().remedy}));
+    static_cast<void>(happen(FaultRaised{{v1::Fault::SALVAGE_FAILED, session}, v1::AMBER, outcome.error()}));
     return;
   }
-  std::uint64_t kept = 0;
-  std::uint64_t gone = 0;
-  for (const session::SalvagedCamera& camera : outcome->cameras) {
-    kept += camera.kept;
-    gone += camera.lost;
-  }
-  parts_.board.notice(
-      v1::AMBER,
-      fmt::format("{} was not finished. It has been salvaged: {} frames of {} cameras are kept; the "
-                  "pixels of {} more never reached the disk",
-                  session, kept, outcome->cameras.size(), gone));
+  parts_.board.notice(v1::AMBER, words(session, outcome->salvage()));
 }
 
-void Conductor::transcoded(const std::string& session, const Status& outcome) {
-  if (outcome.ok()) return parts_.board.notice(v1::GREEN, session + ": compressed and verified");
-  static_cast<void>(happen(FaultRaised{{v1::Fault::TRANSCODE_FAILED, session},
-                                       v1::AMBER,
-                                       outcome.error().message(),
-                                       "The recording stays as it was written, uncompressed"}));
+void Conductor::transcoded(const std::string& session, const JobResult& outcome) {
+  if (outcome.ok()) return note({v1::GREEN, Remark::Code::compressed, session});
+  if (outcome.error().kind == ErrorKind::refused)  // cancelled, or another process works on it
+    return note({v1::AMBER, Remark::Code::not_compressed, session, outcome.error()});
+  static_cast<void>(happen(FaultRaised{{v1::Fault::TRANSCODE_FAILED, session}, v1::AMBER, outcome.error()}));
 }
 
 void Conductor::capture() {
@@ -215,26 +229,19 @@ void Conductor::capture() {
   const TimePoint now = parts_.rig.clock().now();
   const double seconds = record_request_.seconds();
   if (const auto failure = recorder_->failure()) {
-    static_cast<void>(happen(
-        FaultRaised{{v1::Fault::DISK_FAILED, state_.session},
-                    v1::RED,
-                    failure->what,
-                    failure->remedy.empty() ? "What was written until then is kept" : failure->remedy}));
-    static_cast<void>(happen(RecordingEnds{"the disk refused: " + failure->what}));
-  } else if (seconds > 0 && now - record_began_ >= Seconds(seconds)) {
-    static_cast<void>(happen(RecordingEnds{fmt::format("{:g} s are over", seconds)}));
-  } else if (std::all_of(ended_.begin(), ended_.end(), [](bool ended) { return ended; })) {
-    static_cast<void>(happen(RecordingEnds{"the recording that is replayed has ended"}));
-  } else if (now - last_frame_.value_or(record_began_) > longest_silence()) {
-    const std::string why = nobody_films();
     static_cast<void>(
-        happen(RecordingEnds{fmt::format("no frame has come from any camera for {:.0f} s{}{}",
-                                         longest_silence().value(), why.empty() ? "" : ": ", why)}));
+        happen(FaultRaised{{v1::Fault::DISK_FAILED, state_.session}, v1::RED, DiskRefused{*failure}}));
+    static_cast<void>(happen(RecordingEnds{DiskRefused{*failure}}));
+  } else if (seconds > 0 && now - record_began_ >= Seconds(seconds)) {
+    static_cast<void>(happen(RecordingEnds{TimeOver{Seconds(seconds)}}));
+  } else if (std::all_of(ended_.begin(), ended_.end(), [](bool ended) { return ended; })) {
+    static_cast<void>(happen(RecordingEnds{Why::replay_over}));
+  } else if (now - last_frame_.value_or(record_began_) > longest_silence()) {
+    static_cast<void>(happen(RecordingEnds{NoFrames{longest_silence(), silent_cameras()}}));
   }
   if (alignment_ && !expired_ && state_.phase == v1::CAPTURING && alignment_->time_left(now) <= Seconds(0)) {
     expired_ = true;
-    static_cast<void>(
-        happen(LockExpired{"a camera may have drifted out of tolerance while this was recorded"}));
+    static_cast<void>(happen(LockExpired{Why::may_have_drifted}));
   }
 }
 
@@ -250,13 +257,13 @@ Seconds Conductor::longest_silence() const {
 /// Takes the frames that are there; of cameras that film only while they are waited for, the next of each.
 void Conductor::drain() {
   const bool by_itself = real_time();
-  const bool recorded = recorder_ && !finished_.valid();
+  const bool recorded = recorder_ && !finishing_;
   const auto& cameras = devices_.cameras;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     while (!ended_[i]) {
       Result<Frame> frame = cameras[i]->next_frame(by_itself ? Seconds(0) : kFrameDeadline);
       if (!frame.ok()) {
-        heed_trouble(i, frame.error());
+        note_trouble(i, frame.error());
         break;
       }
       trouble_told_[i] = false;
@@ -268,7 +275,7 @@ void Conductor::drain() {
 }
 
 /// A camera that hangs says so each time that it is asked, many times a second: it is told once.
-void Conductor::heed_trouble(std::size_t camera, const Error& error) {
+void Conductor::note_trouble(std::size_t camera, const Error& error) {
   if (error.kind == ErrorKind::timed_out) return;
   if (error.kind == ErrorKind::out_of_data) {
     ended_[camera] = true;
@@ -279,31 +286,17 @@ void Conductor::heed_trouble(std::size_t camera, const Error& error) {
   parts_.board.notice(v1::AMBER, error.message());
 }
 
-std::string Conductor::nobody_films() const {
-  std::string why;
-  for (std::size_t i = 0; i < parts_.rig.size(); ++i) {
-    const char* words = "was stopped";
-    switch (parts_.rig.state(i)) {
-      case drivers::CameraThread::State::filming:
-        return {};
-      case drivers::CameraThread::State::lost:
-        words = "went away";
-        break;
-      case drivers::CameraThread::State::quarantined:
-        words = "doesn't answer";
-        break;
-      case drivers::CameraThread::State::ended:
-        words = "has replayed its recording to the end";
-        break;
-      case drivers::CameraThread::State::idle:
-        break;
-    }
-    why += fmt::format("{}{} {}", why.empty() ? "" : ", ", devices_.cameras[i]->info().id, words);
+std::vector<SilentCamera> Conductor::silent_cameras() const {
+  std::vector<SilentCamera> silent;
+  const std::vector<v1::CameraStatus::State> states = camera_states();
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    if (states[i] == v1::CameraStatus::FILMING) return {};
+    silent.push_back({devices_.cameras[i]->info().id, states[i]});
   }
-  return why;
+  return silent;
 }
 
-void Conductor::heed_disk() {
+void Conductor::watch_disk() {
   const TimePoint now = SteadyClock().now();
   if (disk_looked_ && now - *disk_looked_ < kDiskInterval) return;
   disk_looked_ = now;
@@ -312,8 +305,7 @@ void Conductor::heed_disk() {
   const auto storage =
       parts_.store.storage(rig::bytes_per_second(infos, parts_.config.recording.writer.encoding));
   if (!storage.ok()) {
-    static_cast<void>(happen(
-        FaultRaised{{v1::Fault::DISK_LOW}, v1::RED, storage.error().message(), storage.error().remedy}));
+    static_cast<void>(happen(FaultRaised{{v1::Fault::DISK_LOW}, v1::RED, storage.error()}));
     return;
   }
   storage_ = *storage;
@@ -321,10 +313,8 @@ void Conductor::heed_disk() {
   if (storage_.minutes_left() > kMinutesWanted) {
     static_cast<void>(happen(FaultMended{low}));
   } else {
-    static_cast<void>(
-        happen(FaultRaised{low, storage_.minutes_left() > 0 ? v1::AMBER : v1::RED,
-                           fmt::format("the disk has room for {:.1f} minutes", storage_.minutes_left()),
-                           "Free space, or record to another disk"}));
+    const v1::Light light = storage_.minutes_left() > 0 ? v1::AMBER : v1::RED;
+    static_cast<void>(happen(FaultRaised{low, light, RoomLeft{Seconds(60 * storage_.minutes_left())}}));
   }
 }
 

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <string>
 
-#include <fmt/format.h>
-
 #include "base/clock.h"
+#include "base/version.h"
 #include "daemon/engine/conductor.h"
+#include "daemon/engine/words.h"
 #include "drivers/replay/record.h"
 #include "smear_sync/align/align_words.h"
 
@@ -43,9 +43,10 @@ void show_sight(const rig::CameraSight& sight, v1::CameraStatus& camera) {
   }
 }
 
-void show_decision(const smear::CameraDecision& decision, SecondsPerRow row, v1::CameraStatus& camera) {
+void show_decision(const smear::CameraDecision& decision, const std::string& words, SecondsPerRow row,
+                   v1::CameraStatus& camera) {
   camera.set_sight(std::string(name(decision.state)));
-  camera.set_reason(decision.reason);
+  camera.set_reason(words);
   if (decision.error) {
     camera.set_error_s(decision.error->value());
     camera.set_error_rows((*decision.error / row).value());
@@ -64,39 +65,39 @@ std::string capitalized(std::string sentence) {
 void show_dial(const StrobeDial& dial, const rig::Alignment* alignment, v1::StrobeStatus& shown) {
   shown.set_by_hand(true);
   if (alignment == nullptr) {
-    shown.set_reason("is set by hand; the alignment says what to set");
+    shown.set_reason(words(dial, std::nullopt));
     return;
   }
-  const Hertz set = alignment->strobe().rate;
   const auto& advice = alignment->last().dial;
   if (!advice) {
-    shown.set_reason(fmt::format("is set by hand: set it to {} flashes a minute ({:.3f} Hz)",
-                                 dial.per_minute(set), set.value()));
+    shown.set_reason(words(dial, alignment->strobe().rate));
     return;
   }
   if (advice->measured) shown.set_measured_hz(advice->measured->value());
   if (!advice->ready || advice->act) shown.set_light(v1::AMBER);
-  shown.set_reason(advice->words);
+  shown.set_reason(alignment->words().dial);
 }
 
 /// What the operator does now, by what stands most in the way.
 std::string next_step(const MachineState& state, const std::string& reset_next,
-                      const std::optional<smear::DialAdvice>& dial, bool has_strobe) {
-  const v1::Fault* worst = nullptr;
-  for (const v1::Fault& fault : state.faults)
-    if (!fault.over() && (worst == nullptr || fault.light() > worst->light())) worst = &fault;
-  if (worst != nullptr && worst->light() == v1::RED)
-    return worst->subject().empty() ? worst->remedy() : worst->subject() + ": " + worst->remedy();
+                      const rig::Alignment* alignment, const LockLeft& left, bool has_strobe) {
+  const Fault* worst = nullptr;
+  for (const Fault& fault : state.faults)
+    if (!fault.over && (worst == nullptr || fault.light > worst->light)) worst = &fault;
+  if (worst != nullptr && worst->light == v1::RED) return remedy(*worst);
   const bool films = state.phase == v1::CALIBRATING || state.phase == v1::ALIGNING;
-  if (films && dial && (dial->act || !dial->ready)) return capitalized(dial->words);
-  if (!reset_next.empty()) return fmt::format("Press the shutter of {}", reset_next);
+  if (films && alignment != nullptr) {
+    const auto& dial = alignment->last().dial;
+    if (dial && (dial->act || !dial->ready)) return capitalized(alignment->words().dial);
+  }
+  if (!reset_next.empty()) return words(NextStep::press_shutter, reset_next);
   switch (state.phase) {
     case v1::IDLE:
-      return has_strobe ? "Align the cameras" : "Record";
+      return words(has_strobe ? NextStep::align : NextStep::record);
     case v1::LOCKED:
-      return "Record";
+      return words(NextStep::record, left);
     case v1::CAPTURING:
-      return "Stop the recording when the flame is over";
+      return words(NextStep::stop_recording, state.lock == Lock::held ? left : LockLeft{});
     default:
       return {};
   }
@@ -109,8 +110,8 @@ v1::DaemonStatus Conductor::status() const {
   v1::DaemonStatus status;
   status.set_phase(state_.phase);
   status.set_light(light(state_));
-  status.set_reason(state_.reason);
-  for (const v1::Fault& fault : state_.faults) *status.add_faults() = fault;
+  status.set_reason(words(state_.reason));
+  for (const Fault& fault : state_.faults) *status.add_faults() = to_proto(fault);
   describe_cameras(status);
   const drivers::Strobe* strobe = devices_.strobe;
   if (strobe != nullptr) {
@@ -129,18 +130,20 @@ v1::DaemonStatus Conductor::status() const {
     if (state_.phase == v1::FINISHING) status.mutable_recording()->set_state(v1::RecordingStatus::FINISHING);
   } else if (recording_) {
     *status.mutable_recording() = *recording_;
-    const auto compression = parts_.work.find(v1::BackgroundJob::COMPRESS, recording_->session());
+    const auto compression = parts_.jobs.find(v1::Job::COMPRESS, recording_->session());
     if (compression) status.mutable_recording()->set_transcoded(compression->fraction());
   }
   if (const auto reconstruction = parts_.reconstruction.status())
     *status.mutable_reconstruction() = *reconstruction;
   *status.mutable_storage() = storage_;
-  for (const v1::BackgroundJob& job : parts_.work.progress())
+  for (const v1::Job& job : parts_.jobs.list())
     if (!job.session().empty()) *status.add_jobs() = job;
-  status.set_next_step(next_step(state_, status.alignment().reset_next(),
-                                 alignment_ ? alignment_->last().dial : std::nullopt, strobe != nullptr));
+  status.set_next_step(
+      next_step(state_, status.alignment().reset_next(), alignment_.get(), lock_left(), strobe != nullptr));
+  if (status.light() == v1::GREEN && recorder_ && lost(status.recording().lost()) > 0)
+    status.set_light(v1::AMBER);
   status.set_rig(parts_.config.rig.name);
-  status.set_version(EMBERLOCK_VERSION);
+  status.set_version(version());
   status.set_now_ns(now.ns);
   status.set_now_utc(utc_now());
   status.set_uptime_s((now - began_).value());
@@ -175,34 +178,55 @@ void Conductor::describe_cameras(v1::DaemonStatus& status) const {
     shown.set_queue(counts.queue);
     shown.set_passed_over(counts.passed_over);
     camera.set_light(v1::GREEN);
-    camera.set_reason("films");
+    camera.set_reason(words(v1::CameraStatus::FILMING));
+    camera.set_lost_lately(overload_.lost_lately(i));
     if (alignment_ && alignment_->last().round > 0) {
       const smear::CameraDecision& decision = alignment_->last().cameras[i];
-      show_decision(decision, alignment_->options().row_time, camera);
+      show_decision(decision, alignment_->words().cameras[i], alignment_->options().row_time, camera);
       show_sight(alignment_->sights()[i], camera);
-      if (decision.time_left && alignment_->locked(now))
-        camera.set_time_left_s(
-            std::max(0.0, (decision.time_left->earliest - (now - alignment_->at())).value()));
+      const auto left = alignment_->time_left(now, i);
+      if (left && std::isfinite(left->value())) camera.set_time_left_s(left->value());
       if (const auto drift = alignment_->drift(i)) camera.set_drift_ppm(drift->value());
       if (const auto& clock = alignment_->row_clocks()[i]) camera.set_row_time_s(clock->row_time.value());
       camera.set_resets(static_cast<std::uint32_t>(alignment_->state().cameras[i].resets));
       const Seconds tolerance = alignment_->options().tolerance.in_time(alignment_->options().row_time);
       if (!decision.error || abs(*decision.error) > tolerance) camera.set_light(v1::AMBER);
     }
+    if (states[i] == v1::CameraStatus::FILMING) describe_frames(camera);
     if (states[i] == v1::CameraStatus::LOST || states[i] == v1::CameraStatus::QUARANTINED) {
       camera.set_light(v1::RED);
-      camera.set_reason(states[i] == v1::CameraStatus::LOST ? "went away, is being looked for"
-                                                            : "doesn't answer");
+      camera.set_reason(words(states[i]));
     }
     if (states[i] == v1::CameraStatus::ENDED) {
       camera.set_light(v1::AMBER);
-      camera.set_reason("the recording that it replays is over; restart emberlockd to begin it anew");
+      camera.set_reason(words(states[i]));
     }
+  }
+}
+
+/// One that loses frames, or sends others than it was asked for, isn't well, wherever the cause lies.
+void Conductor::describe_frames(v1::CameraStatus& camera) const {
+  constexpr double kRateOff = 0.05;
+  const double comes = camera.measured_rate_hz();
+  const double asked = camera.frame_rate_hz();
+  const bool steady = parts_.rig.clock().now() - aligned_at_ > 3 * DeviceWatch::kRateSpan;
+  if (camera.lost_lately() > 0) {
+    camera.set_light(v1::AMBER);
+    if (!camera.reset_next())
+      camera.set_reason(words(FramesMissed{camera.lost_lately(), OverloadWatch::kSpan}));
+  } else if (real_time() && steady && comes > 0 && asked > 0 && std::abs(comes / asked - 1) > kRateOff) {
+    camera.set_light(v1::AMBER);
+    camera.set_reason(words(RateOff{Hertz(comes), Hertz(asked)}));
   }
 }
 
 void Conductor::describe_alignment(v1::AlignmentStatus& status) const {
   const smear::AlignOptions& options = alignment_ ? alignment_->options() : align_options_.align;
+  if (!tolerance_told_) {
+    status.set_flame_speed_m_s(flame_.speed.value());
+    status.set_detail_m(flame_.detail.value());
+  }
+  status.set_shortest_take_s(options.shortest_take.value());
   status.set_policy(std::string(name(options.policy)));
   status.set_tolerance_rows(options.tolerance.in_rows(options.row_time).value());
   status.set_tolerance_s(options.tolerance.in_time(options.row_time).value());
@@ -216,19 +240,23 @@ void Conductor::describe_alignment(v1::AlignmentStatus& status) const {
   status.set_round(static_cast<std::uint32_t>(last.round));
   status.set_resets(static_cast<std::uint32_t>(alignment_->resets()));
   status.set_checks(static_cast<std::uint32_t>(alignment_->checks()));
-  status.set_reason(last.reason);
+  status.set_reason(alignment_->words().reason);
   if (last.round == 0) return;
   status.set_verdict(verdict());
   if (const auto worst = alignment_->worst_pair(now)) status.set_worst_pair_s(worst->value());
   if (last.verdict == smear::AlignVerdict::aligned) {
     status.set_next_check_s(alignment_->next_check(now).value());
-    if (const double left = alignment_->time_left(now).value(); std::isfinite(left))
-      status.set_time_left_s(left);
+    const LockLeft left = lock_left();
+    if (left.sure) status.set_time_left_s(left.sure->value());
+    if (left.likely) status.set_likely_left_s(left.likely->value());
+    if (last.renewed) status.set_renewed_left_s(last.renewed->value());
+    status.set_leaves_first(left.leaves_first);
   }
   for (const smear::AlignOffer& offer : last.offers) {
     v1::AlignmentOffer& shown = *status.add_offers();
     shown.set_policy(std::string(name(offer.policy)));
     shown.set_tolerance_rows(offer.tolerance.in_rows(options.row_time).value());
+    shown.set_tolerance_s(offer.tolerance.in_time(options.row_time).value());
     set_cost(*shown.mutable_cost(), offer.effort);
   }
   for (std::size_t i = 0; i < last.cameras.size(); ++i) {

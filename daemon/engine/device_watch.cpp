@@ -5,8 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include <fmt/format.h>
-
 namespace emberlock::daemon {
 namespace {
 
@@ -14,20 +12,12 @@ using State = v1::CameraStatus;
 
 bool gone(State::State state) { return state == State::LOST || state == State::QUARANTINED; }
 
-Happening raised(State::State state, const std::string& id) {
-  if (state == State::LOST) {
-    return FaultRaised{{v1::Fault::CAMERA_LOST, id},
-                       v1::RED,
-                       "the camera went away",
-                       "See to its cable and its power: it is taken up again by itself"};
-  }
-  return FaultRaised{{v1::Fault::CAMERA_HANGS, id},
-                     v1::RED,
-                     "the camera doesn't answer any more",
-                     "Unplug it and plug it in again; if that doesn't help, restart emberlockd"};
+MachineEvent raised(State::State state, const std::string& id) {
+  if (state == State::LOST) return FaultRaised{{v1::Fault::CAMERA_LOST, id}, v1::RED, Why::camera_lost};
+  return FaultRaised{{v1::Fault::CAMERA_HANGS, id}, v1::RED, Why::camera_hangs};
 }
 
-Happening mended(State::State state, const std::string& id) {
+MachineEvent mended(State::State state, const std::string& id) {
   return FaultMended{{state == State::LOST ? v1::Fault::CAMERA_LOST : v1::Fault::CAMERA_HANGS, id}};
 }
 
@@ -37,32 +27,31 @@ DeviceWatch::DeviceWatch(std::vector<std::string> camera_ids)
     : ids_(std::move(camera_ids)),
       states_(ids_.size(), State::FILMING),
       rates_(ids_.size(), 0.0),
-      made_(ids_.size(), 0) {}
+      came_(ids_.size(), 0) {}
 
-std::vector<Happening> DeviceWatch::cameras(const std::vector<v1::CameraStatus::State>& states) {
-  std::vector<Happening> happenings;
+std::vector<MachineEvent> DeviceWatch::cameras(const std::vector<v1::CameraStatus::State>& states) {
+  std::vector<MachineEvent> events;
   for (std::size_t i = 0; i < states.size(); ++i) {
     if (states[i] == states_[i]) continue;
-    if (gone(states_[i])) happenings.push_back(mended(states_[i], ids_[i]));
-    if (gone(states[i])) happenings.push_back(raised(states[i], ids_[i]));
-    if (states[i] == State::ENDED) happenings.emplace_back(CameraEnded{ids_[i]});
+    if (gone(states_[i])) events.push_back(mended(states_[i], ids_[i]));
+    if (gone(states[i])) events.push_back(raised(states[i], ids_[i]));
+    if (states[i] == State::ENDED) events.emplace_back(CameraEnded{ids_[i]});
   }
   states_ = states;
   const bool all_lost = !states_.empty() && std::all_of(states_.begin(), states_.end(), gone);
   if (all_lost != all_lost_) {
     const FaultKey key{v1::Fault::ALL_CAMERAS_LOST};
     if (all_lost) {
-      happenings.emplace_back(FaultRaised{key, v1::RED, "no camera is left",
-                                          "See to the hub, the switch or the power that they share"});
+      events.emplace_back(FaultRaised{key, v1::RED, Why::no_camera_left});
     } else {
-      happenings.emplace_back(FaultMended{key});
+      events.emplace_back(FaultMended{key});
     }
     all_lost_ = all_lost;
   }
-  return happenings;
+  return events;
 }
 
-std::vector<Happening> DeviceWatch::strobe(const std::string& id, const Status& answer) {
+std::vector<MachineEvent> DeviceWatch::strobe(const std::string& id, const Status& answer) {
   const FaultKey key{v1::Fault::STROBE_SILENT, id};
   if (answer.ok()) {
     if (!std::exchange(strobe_trouble_, {})) return {};
@@ -71,31 +60,24 @@ std::vector<Happening> DeviceWatch::strobe(const std::string& id, const Status& 
   const Error& trouble = answer.error();
   if (strobe_trouble_ == trouble.what) return {};
   strobe_trouble_ = trouble.what;
-  const std::string usual = "See to its power and its cable: it is asked again every second";
-  return {FaultRaised{key, v1::RED, trouble.what, trouble.remedy.empty() ? usual : trouble.remedy}};
+  return {FaultRaised{key, v1::RED, trouble}};
 }
 
-std::vector<Happening> DeviceWatch::clocks(TimePoint monotonic, TimePoint wall) {
+std::vector<MachineEvent> DeviceWatch::clocks(TimePoint monotonic, TimePoint wall) {
   const Seconds ahead = wall - monotonic;
   const Seconds step = ahead - wall_ahead_.value_or(ahead);
   wall_ahead_ = ahead;
   if (abs(step) < kClockStep) return {};
-  return {FaultRaised{
-      {v1::Fault::CLOCK_STEPPED},
-      v1::AMBER,
-      fmt::format("the wall clock was moved by {:+.1f} s", step.value()),
-      "See to what sets it (timedatectl). No frame is lost or misplaced: they are ordered "
-      "by a clock that can't be moved; the times of day in a recording that runs are off by that from here "
-      "on"}};
+  return {FaultRaised{{v1::Fault::CLOCK_STEPPED}, v1::AMBER, ClockMoved{step}}};
 }
 
 void DeviceWatch::frames(const std::vector<drivers::FrameCounts>& counts, TimePoint now) {
   const Seconds span = counted_ ? now - *counted_ : kRateSpan;
   if (span < kRateSpan) return;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    const std::uint64_t total = counts[i].made();
-    if (counted_) rates_[i] = static_cast<double>(total - made_[i]) / span.value();
-    made_[i] = total;
+    const std::uint64_t total = counts[i].made() - counts[i].lost();
+    if (counted_) rates_[i] = static_cast<double>(total - came_[i]) / span.value();
+    came_[i] = total;
   }
   counted_ = now;
 }

@@ -12,7 +12,8 @@
 
 namespace emberlock::daemon {
 
-/// Turns what devices say of themselves into happenings, each told once. Pure but for what it remembers.
+/// Turns what devices say of themselves into events for the machine, each told once. Pure but for what it
+/// remembers.
 class DeviceWatch {
  public:
   /// The wall clock may differ from the monotonic one by this much more than before.
@@ -22,13 +23,14 @@ class DeviceWatch {
 
   explicit DeviceWatch(std::vector<std::string> camera_ids);
 
-  std::vector<Happening> cameras(const std::vector<v1::CameraStatus::State>& states);
-  std::vector<Happening> strobe(const std::string& id, const Status& answer);
-  std::vector<Happening> clocks(TimePoint monotonic, TimePoint wall);
+  std::vector<MachineEvent> cameras(const std::vector<v1::CameraStatus::State>& states);
+  std::vector<MachineEvent> strobe(const std::string& id, const Status& answer);
+  std::vector<MachineEvent> clocks(TimePoint monotonic, TimePoint wall);
   void frames(const std::vector<drivers::FrameCounts>& counts, TimePoint now);
 
   [[nodiscard]] bool all_film() const;
-  /// Frames a second that the camera made lately; 0 while that isn't known.
+  /// Frames a second that came from the camera lately, without those that were lost; 0 while that isn't
+  /// known.
   [[nodiscard]] double rate(std::size_t camera) const { return rates_[camera]; }
 
  private:
@@ -38,7 +40,7 @@ class DeviceWatch {
   std::optional<std::string> strobe_trouble_;  ///< as it was told last
   std::optional<Seconds> wall_ahead_;
   std::vector<double> rates_;
-  std::vector<std::uint64_t> made_;
+  std::vector<std::uint64_t> came_;
   std::optional<TimePoint> counted_;
 };
 

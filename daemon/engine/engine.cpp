@@ -2,16 +2,17 @@
 #include "daemon/engine/engine.h"
 
 #include <chrono>
+#include <future>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/clock.h"
-#include "base/priority.h"
+#include "daemon/engine/device_message.h"
 #include "rig/devices/device_list.h"
 #include "session/export.h"
 #include "session/files.h"
-#include "session/job_json.h"
+#include "session/job_messages.h"
 #include "session/verify.h"
 
 namespace emberlock::daemon {
@@ -20,6 +21,7 @@ namespace {
 constexpr auto kPause = std::chrono::milliseconds(4);     ///< between two looks for frames
 constexpr Seconds kShown{0.1};                            ///< between two statuses
 constexpr Seconds kLongestSilence{10};                    ///< of the thread or of a camera that says it films
+constexpr Seconds kHangs{600};                            ///< a job that tells nothing for so long
 constexpr auto kLongestFinish = std::chrono::minutes(5);  ///< of queues that drain to a slow disk
 
 ReconstructionOptions reconstruction_options(const rig::DaemonConfig& config) {
@@ -37,29 +39,6 @@ ReconstructionOptions reconstruction_options(const rig::DaemonConfig& config) {
   options.silence = config.reconstruction.silence;
   options.niceness = config.reconstruction.niceness;
   return options;
-}
-
-/// Runs a job to its end, beside a recording if need be; the last that `observer` is told is what came of it.
-template <class Job, class Good>
-Status run_job(const JobObserver& observer, const Job& job, const Good& good) {
-  const Observer told([&](double fraction, std::string_view doing) {
-    v1::JobProgress progress;
-    progress.set_fraction(fraction);
-    progress.set_doing(std::string(doing));
-    return observer(progress);
-  });
-  auto outcome = std::async(std::launch::async, [&] {
-                   give_way();
-                   return job(told);
-                 }).get();
-  if (!outcome.ok()) return outcome.error();
-  v1::JobProgress last;
-  last.set_fraction(1);
-  last.set_done(true);
-  last.set_ok(good(*outcome));
-  last.set_report(session::to_line(to_json(*outcome)));
-  observer(last);
-  return {};
 }
 
 }  // namespace
@@ -93,18 +72,18 @@ Engine::Engine(const rig::DaemonConfig& config, Board& board, session::SessionSt
       store_(std::move(store)),
       rig_(std::move(rig)),
       geometry_(std::move(geometry)),
-      reconstruction_(reconstruction_options(config), board),
+      reconstruction_(reconstruction_options(config), board, jobs_),
       thread_([this] { run(); }) {}
 
-void Engine::take_up_work() { take_up(store_, work_, config_.recording.transcode, told()); }
+void Engine::take_up_work() { take_up(store_, jobs_, config_.recording.transcode, told()); }
 
 UpkeepTold Engine::told() {
   UpkeepTold told;
-  told.salvaged = [this](const std::string& session, const Result<session::SalvageReport>& outcome) {
-    post([session, outcome](Conductor& c) { c.salvaged(session, outcome); });
+  told.salvaged = [this](const std::string& session, const JobResult& result) {
+    post([session, result](Conductor& c) { c.salvaged(session, result); });
   };
-  told.compressed = [this](const std::string& session, const Status& outcome) {
-    post([session, outcome](Conductor& c) { c.transcoded(session, outcome); });
+  told.compressed = [this](const std::string& session, const JobResult& result) {
+    post([session, result](Conductor& c) { c.transcoded(session, result); });
   };
   return told;
 }
@@ -116,6 +95,8 @@ Engine::~Engine() {
 
 void Engine::end() {
   ending_ = true;
+  jobs_.end();
+  reconstruction_.end();
   asked_.notify_all();
 }
 
@@ -128,7 +109,7 @@ void Engine::run() {
   const auto went_round = [this] { went_round_ns_ = SteadyClock().now().ns; };
   went_round();  // cameras that hang take seconds each to start
   Conductor conductor(
-      {*rig_, geometry_, config_, store_, reconstruction_, work_, board_, told()},
+      {*rig_, geometry_, config_, store_, reconstruction_, jobs_, board_, told()},
       [this, went_round] {
         went_round();
         return urgent_ > 0 || ending_;
@@ -161,7 +142,6 @@ void Engine::run() {
   while (!conductor.is_done()) {
     conductor.work();
     went_round();
-    finishing_ = conductor.finishing_progress();
     if (SteadyClock().now() - shown < kShown) continue;
     shown = SteadyClock().now();
     show(conductor);
@@ -181,7 +161,9 @@ void Engine::refuse_calls() {
 }
 
 void Engine::show(const Conductor& conductor) {
-  board_.show(conductor.status());
+  const v1::DaemonStatus status = conductor.status();
+  phase_ = status.phase();
+  board_.show(status);
   shown_.notify_all();
 }
 
@@ -216,14 +198,16 @@ Answer Engine::on_thread(Urgency urgency, std::function<Answer(Conductor&)> call
 bool Engine::alive() const {
   const TimePoint now = SteadyClock().now();
   if (now - TimePoint{went_round_ns_.load()} > kLongestSilence) return false;
+  for (const v1::Job& job : jobs_.hanging(kHangs))
+    if (!tolerates_hanging(phase_, job.kind())) return false;
   if (rig_->pace() != rig::Rig::Pace::real_time) return true;
   const std::lock_guard lock(progress_mutex_);
   progress_.resize(rig_->size());
   bool all = true;
   for (std::size_t i = 0; i < rig_->size(); ++i) {
     const std::uint64_t frames = rig_->counts(i).made();
-    if (rig_->state(i) != drivers::CameraThread::State::filming || frames != progress_[i].frames ||
-        progress_[i].at == TimePoint{})
+    if (rig_->state(i) != drivers::CameraThread::State::filming || rig_->overworked(i) ||
+        frames != progress_[i].frames || progress_[i].at == TimePoint{})
       progress_[i] = {frames, now};
     all &= now - progress_[i].at <= kLongestSilence;
   }
@@ -234,11 +218,7 @@ Status Engine::acknowledge(const v1::AcknowledgeRequest& request) {
   return on_thread<Status>(Urgency::waits, [request](Conductor& c) { return c.acknowledge(request); });
 }
 
-Result<v1::ListDevicesResponse> Engine::list_devices() {
-  v1::ListDevicesResponse response;
-  response.set_json(rig::device_json(rig::list_devices()));
-  return response;
-}
+Result<v1::ListDevicesResponse> Engine::list_devices() { return to_proto(rig::list_devices()); }
 
 Result<v1::StrobeState> Engine::strobe() {
   return on_thread<Result<v1::StrobeState>>(Urgency::waits, [](Conductor& c) { return c.strobe(); });
@@ -287,38 +267,51 @@ Result<v1::Manifest> Engine::session(const v1::SessionRequest& request) {
   return session::read_manifest(folder);
 }
 
+std::optional<v1::Job> Engine::finishing() const {
+  for (v1::Job& job : jobs_.list())
+    if (job.kind() == v1::Job::FINISH) return std::move(job);
+  return std::nullopt;
+}
+
 Result<std::filesystem::path> Engine::path_of(const std::string& session) const {
-  EMBERLOCK_RETURN_IF_ERROR(check_not_salvaged(work_, session));
+  EMBERLOCK_RETURN_IF_ERROR(check_not_salvaged(jobs_, session));
   return store_.path_of(session);
 }
 
-Status Engine::verify_session(const v1::SessionRequest& request, const JobObserver& observer) {
+Result<std::shared_ptr<JobHandle>> Engine::verify_session(const v1::SessionRequest& request) {
   EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, path_of(request.session()));
-  return run_job(
-      observer, [&](const Observer& seen) { return session::verify_session(folder, seen); },
-      [](const session::SessionCheck& check) { return check.whole(); });
+  return jobs_.add({v1::Job::VERIFY, request.session(), [folder](const Observer& observer) -> JobResult {
+                      EMBERLOCK_ASSIGN_OR_RETURN(const auto check, session::verify_session(folder, observer));
+                      return session::to_outcome(check);
+                    }});
 }
 
-Status Engine::repair_session(const v1::SessionRequest& request, const JobObserver& observer) {
+Result<std::shared_ptr<JobHandle>> Engine::repair_session(const v1::SessionRequest& request) {
   EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, path_of(request.session()));
-  return run_job(
-      observer, [&](const Observer& seen) { return session::repair_session(folder, seen); },
-      [](const session::RepairReport& /*report*/) { return true; });
+  return jobs_.add({v1::Job::REPAIR, request.session(), [folder](const Observer& observer) -> JobResult {
+                      EMBERLOCK_ASSIGN_OR_RETURN(const auto report,
+                                                 session::repair_session(folder, observer));
+                      return session::to_outcome(report);
+                    }});
 }
 
-Status Engine::export_session(const v1::ExportRequest& request, const JobObserver& observer) {
+Result<std::shared_ptr<JobHandle>> Engine::export_session(const v1::ExportRequest& request) {
   EMBERLOCK_ASSIGN_OR_RETURN(const auto folder, path_of(request.session()));
   const bool video = request.format() == v1::ExportRequest::VIDEO;
+  const auto format = video ? session::ExportFormat::video : session::ExportFormat::png;
   EMBERLOCK_ASSIGN_OR_RETURN(const auto target,
                              store_.path_for_export(request.session(), video ? "video" : "png"));
-  return run_job(
-      observer,
-      [&](const Observer& seen) {
-        return session::export_session(
-            folder, target, video ? session::ExportFormat::video : session::ExportFormat::png, seen);
-      },
-      [](const session::ExportReport& /*report*/) { return true; });
+  return jobs_.add(
+      {v1::Job::EXPORT, request.session(), [folder, target, format](const Observer& observer) -> JobResult {
+         EMBERLOCK_ASSIGN_OR_RETURN(const auto report,
+                                    session::export_session(folder, target, format, observer));
+         v1::JobOutcome outcome = session::to_outcome(report);
+         outcome.mutable_export_()->set_folder(target.string());
+         return outcome;
+       }});
 }
+
+Status Engine::cancel_job(const v1::CancelJobRequest& request) { return jobs_.cancel(request.id()); }
 
 Result<v1::ReconstructionStatus> Engine::reconstruct(const v1::ReconstructRequest& request) {
   return on_thread<Result<v1::ReconstructionStatus>>(

@@ -5,7 +5,6 @@
 #include <condition_variable>
 #include <deque>
 #include <functional>
-#include <future>
 #include <memory>
 #include <mutex>
 #include <thread>
@@ -13,6 +12,7 @@
 #include "base/result.h"
 #include "daemon/api.h"
 #include "daemon/engine/conductor.h"
+#include "daemon/work/jobs.h"
 #include "daemon/work/upkeep.h"
 
 namespace emberlock::daemon {
@@ -33,17 +33,17 @@ class Engine final : public Api {
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
 
-  /// Whether the thread went round lately, and every camera either films, or is known not to: what the
-  /// watchdog asks.
+  /// Whether the thread went round lately, every camera either films, or is known not to, and no job hangs
+  /// that isn't tolerated (jobs.h): what the watchdog asks.
   [[nodiscard]] bool alive() const;
 
-  /// It shall end. Returns at once: a recording that runs is finished first, as its frames wait in memory.
-  /// From now on whatever is asked is refused.
+  /// It shall end. Returns at once: a recording that runs is finished first, as its frames wait in memory;
+  /// all other jobs are cancelled. From now on whatever is asked is refused.
   void end();
   /// Whether it has, waiting so long for it at most.
   [[nodiscard]] bool ended(Seconds wait);
-  /// Rises while the recording that is being finished gets on.
-  [[nodiscard]] std::uint64_t finishing_progress() const { return finishing_; }
+  /// The job that finishes a recording, while it runs.
+  [[nodiscard]] std::optional<v1::Job> finishing() const;
 
   [[nodiscard]] Board& board() override { return board_; }
   Status acknowledge(const v1::AcknowledgeRequest& request) override;
@@ -56,9 +56,10 @@ class Engine final : public Api {
   Result<v1::RecordingStatus> stop_recording() override;
   Result<v1::ListSessionsResponse> list_sessions() override;
   Result<v1::Manifest> session(const v1::SessionRequest& request) override;
-  Status verify_session(const v1::SessionRequest& request, const JobObserver& observer) override;
-  Status repair_session(const v1::SessionRequest& request, const JobObserver& observer) override;
-  Status export_session(const v1::ExportRequest& request, const JobObserver& observer) override;
+  Result<std::shared_ptr<JobHandle>> verify_session(const v1::SessionRequest& request) override;
+  Result<std::shared_ptr<JobHandle>> repair_session(const v1::SessionRequest& request) override;
+  Result<std::shared_ptr<JobHandle>> export_session(const v1::ExportRequest& request) override;
+  Status cancel_job(const v1::CancelJobRequest& request) override;
   Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override;
   Result<v1::ReconstructionStatus> cancel_reconstruction() override;
 
@@ -97,7 +98,7 @@ class Engine final : public Api {
   std::atomic<bool> ending_ = false;
   bool refuses_ = false;  ///< what is asked, as it is ending
   bool over_ = false;     ///< the thread has nothing more to do
-  std::atomic<std::uint64_t> finishing_ = 0;
+  std::atomic<v1::Phase> phase_ = v1::PHASE_UNSPECIFIED;
   std::atomic<std::int64_t> went_round_ns_ = 0;
 
   struct CameraProgress {
@@ -106,7 +107,7 @@ class Engine final : public Api {
   };
   mutable std::mutex progress_mutex_;
   mutable std::vector<CameraProgress> progress_;  ///< by camera, as alive() saw it
-  WorkQueue work_;
+  Jobs jobs_;
   std::thread thread_;  ///< last: it uses all of the above
 };
 

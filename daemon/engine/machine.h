@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "daemon/engine/reasons.h"
 #include "emberlock/v1/status.pb.h"
 
 namespace emberlock::daemon {
@@ -32,29 +33,25 @@ enum class Lock { absent, held };
 
 struct MachineState {
   v1::Phase phase = v1::IDLE;
-  std::string reason = "nothing is asked for";
+  Reason reason = Why::nothing_asked;
   bool renews = false;       ///< of ALIGNING: nobody left tolerance, those that would have are being reset
   Lock lock = Lock::absent;  ///< of CAPTURING and FINISHING: whether it began locked
   std::string session;       ///< of CAPTURING and FINISHING
   bool reconstruct_after = false;  ///< the recording is handed on once it is finished
   std::string reconstructing;      ///< the session of the running reconstruction; empty: none runs
-  std::vector<v1::Fault> faults;   ///< by id; those that are over stay until acknowledged
+  std::vector<Fault> faults;       ///< by id; those that are over stay until acknowledged
   std::uint64_t next_fault = 1;
-};
-
-/// Who a fault concerns: by these it is raised once, and mended.
-struct FaultKey {
-  v1::Fault::Kind kind = v1::Fault::KIND_UNSPECIFIED;
-  std::string subject = {};
 };
 
 // What is asked for.
 struct AskAlign {};
-struct AskIdle {};  ///< to end the alignment, or to let go of the lock
+struct AskRenew {};  ///< of the lock, before a take that is longer than it holds
+struct AskIdle {};   ///< to end the alignment, or to let go of the lock
 struct AskRecord {
   std::string session;
-  bool unlocked = false;  ///< even though the cameras aren't locked
+  bool unlocked = false;  ///< even though the cameras aren't locked, or may not be for so long
   bool reconstruct = false;
+  TakeLength length = {};
 };
 struct AskStopRecording {};
 struct AskReconstruct {
@@ -69,18 +66,18 @@ struct AskAcknowledge {
 struct RowTimeMeasured {};
 struct RoundDone {
   v1::AlignmentStatus::Verdict verdict = v1::AlignmentStatus::VERDICT_UNSPECIFIED;
-  std::string reason;
+  Reason reason;
   bool renews = false;   ///< of GO_ON: nobody has left tolerance, those that would are being reset
   bool in_time = false;  ///< of GO_ON: that begins, and without `renews` nobody knows how long it takes
 };
 /// The alignment stopped for a reason that isn't its own: a device. It begins again once `Recovered`.
 struct AlignmentBroken {
-  std::string reason;
+  Why why = Why::camera_away;
 };
 struct Recovered {};
 /// The last check promised the lock until now, and none could be made since.
 struct LockExpired {
-  std::string reason;
+  Why why = Why::may_have_drifted;
 };
 struct RecordingBegun {};
 struct RecordingRefused {
@@ -88,37 +85,33 @@ struct RecordingRefused {
 };
 /// It has to end: the disk, or no camera is left, or its time is over.
 struct RecordingEnds {
-  std::string reason;
+  Reason reason;
 };
 struct RecordingFinished {
-  bool whole = false;  ///< the counts of camera, queue and file agree, and the disk took all
-  std::string verdict;
-  bool nothing = false;  ///< not one frame came from any camera
+  Outcome outcome;
 };
 /// The recording that a camera replays is over.
 struct CameraEnded {
   std::string id;
 };
 struct ReconstructionEnded {
-  bool ok = false;
-  std::string what;
-  std::string remedy = {};
+  bool ok = false;  ///< done, or cancelled
+  Reason reason;
 };
 struct FaultRaised {
   FaultKey key;
   v1::Light light = v1::RED;
-  std::string what = {};
-  std::string remedy = {};
+  Reason reason;
 };
 struct FaultMended {
   FaultKey key;
 };
 
-using Happening =
-    std::variant<AskAlign, AskIdle, AskRecord, AskStopRecording, AskReconstruct, AskCancelReconstruction,
-                 AskAcknowledge, RowTimeMeasured, RoundDone, AlignmentBroken, Recovered, LockExpired,
-                 RecordingBegun, RecordingRefused, RecordingEnds, RecordingFinished, CameraEnded,
-                 ReconstructionEnded, FaultRaised, FaultMended>;
+using MachineEvent =
+    std::variant<AskAlign, AskRenew, AskIdle, AskRecord, AskStopRecording, AskReconstruct,
+                 AskCancelReconstruction, AskAcknowledge, RowTimeMeasured, RoundDone, AlignmentBroken,
+                 Recovered, LockExpired, RecordingBegun, RecordingRefused, RecordingEnds, RecordingFinished,
+                 CameraEnded, ReconstructionEnded, FaultRaised, FaultMended>;
 
 enum class Action {
   begin_alignment,  ///< anew, from the row time on
@@ -130,21 +123,15 @@ enum class Action {
   cancel_reconstruction,
 };
 
-/// A line for the journal.
-struct Remark {
-  v1::Light light = v1::GREEN;
-  std::string text;
-};
-
 struct MachineStep {
   MachineState state;
   std::vector<Action> actions;  ///< in this order
   std::vector<Remark> remarks;
-  std::optional<Error> refusal;  ///< of what was asked for: kind `refused`; nothing has changed then
+  std::optional<MachineRefusal> refusal;  ///< of what was asked for; nothing has changed then
 };
 
 /// `utc` is when it happened (ISO 8601), for faults.
-MachineStep step(const MachineState& state, const Happening& happening, const std::string& utc);
+MachineStep step(const MachineState& state, const MachineEvent& event, const std::string& utc);
 
 /// Of the whole: the worst fault that isn't over, else by phase.
 v1::Light light(const MachineState& state);

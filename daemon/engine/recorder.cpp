@@ -15,8 +15,6 @@ std::uint64_t lost(const v1::Counts& counts) {
 
 namespace {
 
-std::uint64_t handed_on(const drivers::FrameCounts& counts) { return counts.delivered + counts.damaged; }
-
 void add(v1::Counts& sum, const v1::Counts& counts) {
   sum.set_recorded(sum.recorded() + counts.recorded());
   sum.set_camera_gap(sum.camera_gap() + counts.camera_gap());
@@ -27,7 +25,7 @@ void add(v1::Counts& sum, const v1::Counts& counts) {
   sum.set_passed_over(sum.passed_over() + counts.passed_over());
 }
 
-std::string words(const v1::Counts& sum, std::size_t cameras) {
+std::string words(const v1::Counts& sum, std::size_t cameras, bool slow_disk) {
   std::string text = fmt::format("{} frames of {} cameras recorded", sum.recorded(), cameras);
   if (lost(sum) == 0) return text + ", none lost";
   text += fmt::format(", {} lost: ", lost(sum));
@@ -38,7 +36,7 @@ std::string words(const v1::Counts& sum, std::size_t cameras) {
   cause(sum.camera_gap(), "by cameras");
   cause(sum.transport(), "on the way");
   cause(sum.underrun(), "for want of a driver's buffer");
-  cause(sum.queue(), "as the encoder was too slow");
+  cause(sum.queue(), slow_disk ? "as the disk was too slow" : "as the processor was too slow to encode them");
   cause(sum.disk(), "refused by the disk");
   return text;
 }
@@ -56,24 +54,23 @@ Status check_space(const std::filesystem::path& folder, const session::WriterOpt
 
 }  // namespace
 
-Explained explain(const CameraBooks& books) {
-  const drivers::FrameCounts& a = books.before;
-  const drivers::FrameCounts& b = books.after;
+v1::Counts explain(const CameraBooks& books) {
+  const drivers::FrameCounts& driver = books.driver;
   std::uint64_t missing = books.arrivals.missing();
   const auto of = [&](std::uint64_t claimed) {
     const std::uint64_t part = std::min(claimed, missing);
     missing -= part;
     return part;
   };
-  Explained explained;
-  explained.transport = of(b.transport - a.transport + b.resend - a.resend);
-  explained.underrun = of(b.underrun - a.underrun + b.queue - a.queue);
-  explained.passed_over = of(b.passed_over - a.passed_over);
+  v1::Counts explained;
+  explained.set_transport(of(driver.transport + driver.resend));
+  explained.set_underrun(of(driver.underrun + driver.queue));
+  explained.set_passed_over(of(driver.passed_over));
   return explained;
 }
 
 std::string disagreement(const CameraBooks& books, const v1::Counts& file) {
-  const std::uint64_t driver = handed_on(books.after) - handed_on(books.before);
+  const std::uint64_t driver = books.driver.delivered + books.driver.damaged;
   const std::uint64_t taken = books.arrivals.delivered();
   if (driver != taken + books.left_out) {
     return fmt::format("the driver handed on {} frames, {} were taken and {} left out", driver, taken,
@@ -107,10 +104,9 @@ Recorder::Recorder(session::SessionWriter writer, const RecorderOptions& options
       session_(std::move(session)),
       purpose_(std::move(purpose)),
       began_(now),
-      past_end_(before.size(), false) {
-  for (const drivers::FrameCounts& counts : before)
-    books_.push_back({.before = counts, .after = {}, .arrivals = {}});
-}
+      past_end_(before.size(), false),
+      before_(before),
+      books_(before.size()) {}
 
 void Recorder::take(std::size_t camera, Frame frame) {
   CameraBooks& books = books_[camera];
@@ -122,6 +118,12 @@ void Recorder::take(std::size_t camera, Frame frame) {
   }
   books.arrivals.add(frame.stamp.frame_id);
   if (!writer_.push(camera, std::move(frame))) ++books.dropped;
+}
+
+std::uint64_t Recorder::no_room() const {
+  std::uint64_t frames = 0;
+  for (const CameraBooks& books : books_) frames += books.dropped;
+  return frames;
 }
 
 void Recorder::show_progress(v1::RecordingStatus& status) const {
@@ -164,25 +166,18 @@ v1::RecordingStatus Recorder::status(TimePoint now) const {
   return status;
 }
 
-std::uint64_t Recorder::progress() const {
-  std::uint64_t done = 0;
-  for (std::size_t i = 0; i < books_.size(); ++i) {
-    const session::CameraProgress camera = writer_.progress(i);
-    done += camera.bytes + camera.counts.recorded() + camera.counts.disk();
-  }
-  return done;
-}
-
-v1::RecordingStatus Recorder::finish(const std::vector<drivers::FrameCounts>& after, TimePoint now) {
+v1::RecordingStatus Recorder::finish(const std::vector<drivers::FrameCounts>& after, TimePoint now,
+                                     const Progress& progress) {
   v1::RecordingStatus status = this->status(now);
   for (std::size_t i = 0; i < books_.size(); ++i) {
-    books_[i].after = after[i];
-    const Explained explained = explain(books_[i]);
-    writer_.count_lost(i, session::LossCause::transport, explained.transport);
-    writer_.count_lost(i, session::LossCause::underrun, explained.underrun);
-    writer_.count_lost(i, session::LossCause::passed_over, explained.passed_over);
+    books_[i].driver = after[i] - before_[i];
+    const v1::Counts explained = explain(books_[i]);
+    writer_.count_lost(i, session::LossCause::transport, explained.transport());
+    writer_.count_lost(i, session::LossCause::underrun, explained.underrun());
+    writer_.count_lost(i, session::LossCause::passed_over, explained.passed_over());
   }
-  const Result<v1::Manifest> manifest = writer_.finish();
+  const session::WriterLoad load = writer_.load();
+  const Result<v1::Manifest> manifest = writer_.finish(progress);
   status.clear_progress();
   status.clear_queue_fill();
   show_progress(status);  // what is safe by now, whatever came of the rest
@@ -205,7 +200,7 @@ v1::RecordingStatus Recorder::finish(const std::vector<drivers::FrameCounts>& af
   }
   status.set_frames(status.lost().recorded());
   status.set_state(disagreements.empty() ? v1::RecordingStatus::COMPLETE : v1::RecordingStatus::FAILED);
-  status.set_verdict(disagreements.empty() ? words(status.lost(), books_.size())
+  status.set_verdict(disagreements.empty() ? words(status.lost(), books_.size(), load.waits_for_disk())
                                            : "the counts don't agree: " + disagreements);
   return status;
 }

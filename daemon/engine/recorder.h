@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/frame.h"
+#include "base/progress.h"
 #include "base/result.h"
 #include "drivers/camera.h"
 #include "emberlock/v1/status.pb.h"
@@ -19,21 +20,16 @@ namespace emberlock::daemon {
 
 /// What driver and recorder say of one camera's frames in one recording.
 struct CameraBooks {
-  drivers::FrameCounts before;  ///< the driver's, when it began
-  drivers::FrameCounts after;   ///< and when it ended
+  drivers::FrameCounts driver;  ///< from its begin to its end
   std::uint64_t left_out = 0;   ///< delivered in that time, but filmed before it began or after it ended
   session::Arrivals arrivals;   ///< what was handed to the recorder
   std::uint64_t dropped = 0;    ///< of it, for want of room in the queue
 };
 
-/// Of the frame numbers that are missing among the arrivals those that the driver has an explanation for.
-/// What it lost before the first arrival or after the last is none of the recording's.
-struct Explained {
-  std::uint64_t transport = 0;
-  std::uint64_t underrun = 0;
-  std::uint64_t passed_over = 0;
-};
-Explained explain(const CameraBooks& books);
+/// Of the frame numbers that are missing among the arrivals those that the driver has an explanation for:
+/// `transport`, `underrun` and `passed_over`. What it lost before the first arrival or after the last is none
+/// of the recording's.
+v1::Counts explain(const CameraBooks& books);
 
 /// Why driver, queue and file don't agree on a camera's frames, in a sentence; empty if they do.
 std::string disagreement(const CameraBooks& books, const v1::Counts& file);
@@ -68,11 +64,14 @@ class Recorder {
   /// The disk's first refusal: nothing that comes later is sure to be kept.
   [[nodiscard]] std::optional<Error> failure() const { return writer_.failure(); }
   [[nodiscard]] v1::RecordingStatus status(TimePoint now) const;
+  [[nodiscard]] session::WriterLoad load() const { return writer_.load(); }
+  /// Frames for which its queues had no room.
+  [[nodiscard]] std::uint64_t no_room() const;
 
-  /// Rises as frames are written. May be asked by another thread while this one finishes, as status().
-  [[nodiscard]] std::uint64_t progress() const;
-  /// Drains the queues, closes the session and compares the books. The last that changes anything.
-  v1::RecordingStatus finish(const std::vector<drivers::FrameCounts>& after, TimePoint now);
+  /// Drains the queues, closes the session and compares the books. The last that changes anything. Another
+  /// thread may ask for the status meanwhile.
+  v1::RecordingStatus finish(const std::vector<drivers::FrameCounts>& after, TimePoint now,
+                             const Progress& progress = {});
 
  private:
   Recorder(session::SessionWriter writer, const RecorderOptions& options, std::string session,
@@ -84,7 +83,8 @@ class Recorder {
   std::string purpose_;
   TimePoint began_;
   std::optional<TimePoint> ended_;
-  std::vector<bool> past_end_;  ///< by camera
+  std::vector<bool> past_end_;                ///< by camera
+  std::vector<drivers::FrameCounts> before_;  ///< by camera, what the driver had counted when it began
   std::vector<CameraBooks> books_;
 };
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/reconstruction/child.h"
 
-#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -13,7 +12,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <poll.h>
-#include <sys/eventfd.h>
 #include <unistd.h>
 
 #include "base/clock.h"
@@ -84,11 +82,7 @@ class LastWords {
   std::string held_;
 };
 
-/// As poll() takes it; at least 1, at most a minute.
-int milliseconds_until(Steady::time_point deadline) {
-  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Steady::now()).count();
-  return static_cast<int>(std::clamp<std::int64_t>(left, 1, 60'000));
-}
+constexpr int kLook = 100;  // ms, between two looks whether it shall end
 
 enum class ReadEnd { open, closed };
 
@@ -112,38 +106,15 @@ ReadEnd read_all(int fd, const TakeBytes& take) {
 
 }  // namespace
 
-ReconstructionChild::ReconstructionChild(ReconstructionOptions options, Board& board,
-                                         std::function<void()> changed)
-    : options_(std::move(options)),
-      board_(board),
-      changed_(std::move(changed)),
-      wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {}
-
-ReconstructionChild::~ReconstructionChild() {
-  {
-    const std::lock_guard lock(mutex_);
-    asked_ = Asked::kill;
-  }
-  ::eventfd_write(wake_.get(), 1);
-  if (thread_.joinable()) thread_.join();
-}
-
-Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::ReconstructRequest& request) {
-  EMBERLOCK_RETURN_IF_ERROR(session::check_session_name(request.session()));
-  EMBERLOCK_RETURN_IF_ERROR(check_request(request));
-  const fs::path session = fs::absolute(options_.sessions / request.session());
-  std::error_code ec;
-  if (!fs::is_regular_file(session::manifest_path(session), ec)) {
-    return Error{ErrorKind::bad_input, "there is no such session", request.session(),
-                 "Look at `emberlock sessions list`"};
-  }
+std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructRequest& request) const {
   const v1::ReconstructRequest& unasked = options_.unasked;
   const std::string& device = !request.device().empty() ? request.device() : unasked.device();
   const double budget = request.budget_s() > 0 ? request.budget_s() : unasked.budget_s();
   const std::uint32_t voxels = request.voxels() > 0 ? request.voxels() : unasked.voxels();
   const auto& hold_out = request.hold_out().empty() ? unasked.hold_out() : request.hold_out();
   const std::string frame = request.has_frame() ? fmt::format("frame-{}", request.frame()) : "middle-frame";
-  std::vector<std::string> command = {options_.program.string(), "reconstruct", session.string()};
+  std::vector<std::string> command = {options_.program.string(), "reconstruct",
+                                      fs::absolute(options_.sessions / request.session()).string()};
   const auto option = [&](const char* name, std::string value) {
     command.insert(command.end(), {name, std::move(value)});
   };
@@ -155,70 +126,106 @@ Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::Reconstruc
   if (voxels > 0) option("--voxels", std::to_string(voxels));
   if (!hold_out.empty()) option("--hold-out", fmt::format("{}", fmt::join(hold_out, ",")));
   if (options_.threads > 0) option("--threads", std::to_string(options_.threads));
+  return command;
+}
 
-  const std::lock_guard starting(starting_);
+Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::ReconstructRequest& request) {
+  EMBERLOCK_RETURN_IF_ERROR(session::check_session_name(request.session()));
+  EMBERLOCK_RETURN_IF_ERROR(check_request(request));
+  std::error_code ec;
+  if (!fs::is_regular_file(session::manifest_path(options_.sessions / request.session()), ec)) {
+    return Error{ErrorKind::bad_input, "there is no such session", request.session(),
+                 "Look at `emberlock sessions list`"};
+  }
   {
     const std::lock_guard lock(mutex_);
-    if (running_) {
+    if (runs()) {
       return Error{ErrorKind::refused, "one runs already, of session " + state_->status().session(),
                    "reconstruction", "Wait for it, or cancel it"};
     }
-  }
-  if (thread_.joinable()) thread_.join();
-  {
-    const std::lock_guard lock(mutex_);
+    EMBERLOCK_ASSIGN_OR_RETURN(job_,
+                               jobs_.add({v1::Job::RECONSTRUCT, request.session(),
+                                          [this, command = command_for(request)](const Observer& observer) {
+                                            return supervise(command, observer);
+                                          }}));
     v1::ReconstructionStatus begun;
     begun.set_id(fmt::format("{} {}", request.session(), utc_now()));
     begun.set_session(request.session());
-    begun.set_device(device);
+    begun.set_device(!request.device().empty() ? request.device() : options_.unasked.device());
     state_.emplace(std::move(begun));
     begun_ns_ = now_ns();
-    asked_ = Asked::nothing;
+    cancelling_ = false;
     running_ = true;
   }
-  // The child dies with the thread that started it, as the kernel counts parents: it is the one that watches
-  // it.
-  thread_ = std::thread([this, words = std::move(command)] { supervise(words); });
   return *status();
 }
 
 Result<v1::ReconstructionStatus> ReconstructionChild::cancel() {
   {
     const std::lock_guard lock(mutex_);
-    if (!running_) {
+    if (!runs()) {
       return Error{ErrorKind::refused, "none runs", "reconstruction", "There is nothing to cancel"};
     }
-    asked_ = Asked::cancel;
+    cancelling_ = true;
+    job_->cancel();
   }
-  ::eventfd_write(wake_.get(), 1);
   return *status();
+}
+
+void ReconstructionChild::end() {
+  ending_ = true;
+  const std::lock_guard lock(mutex_);
+  if (job_) job_->cancel();
 }
 
 std::optional<v1::ReconstructionStatus> ReconstructionChild::status() const {
   const std::lock_guard lock(mutex_);
   if (!state_) return std::nullopt;
   v1::ReconstructionStatus status = state_->status();
-  if (running_ && asked_ != Asked::nothing) status.set_doing("being cancelled");
-  status.set_seconds(running_ ? static_cast<double>(now_ns() - begun_ns_) * 1e-9 : seconds_);
+  if (running_ && !runs()) {  // cancelled before it began
+    ReconstructionState cancelled = *state_;
+    cancelled.end({.why = ChildEnd::Why::cancelled}, {});
+    status = cancelled.status();
+  }
+  if (runs() && cancelling_) status.set_doing("being cancelled");
+  status.set_seconds(runs() ? static_cast<double>(now_ns() - begun_ns_) * 1e-9 : seconds_);
   return status;
 }
 
-void ReconstructionChild::supervise(const std::vector<std::string>& command) {
+JobResult ReconstructionChild::supervise(const std::vector<std::string>& command, const Observer& observer) {
   LastWords last_words;
   ChildEnd end;
+  // The child dies with the thread that started it, as the kernel counts parents: this one, which watches it.
   if (auto process = ChildProcess::spawn(command, options_.niceness); process.ok()) {
-    end = watch(*process, [&](std::string_view bytes) { last_words.add(bytes); });
+    end = watch(
+        *process, [&](std::string_view bytes) { last_words.add(bytes); }, observer);
   } else {
     end.why = ChildEnd::Why::not_started;
     end.words = process.error().message();
   }
+  const std::lock_guard lock(mutex_);
+  state_->end(end, last_words.text());
+  seconds_ = static_cast<double>(now_ns() - begun_ns_) * 1e-9;
+  running_ = false;
+  const v1::ReconstructionStatus& status = state_->status();
+  if (status.state() == v1::ReconstructionStatus::CANCELLED)
+    return Error{ErrorKind::refused, "ended early, as asked", status.session()};
+  if (status.state() != v1::ReconstructionStatus::DONE)
+    return Error{ErrorKind::device, status.error(), status.session()};
+  v1::JobOutcome outcome;
+  outcome.set_ok(true);
+  return outcome;
+}
+
+bool ReconstructionChild::tell(const Observer& observer) {
+  double fraction = 0;
+  std::string doing;
   {
     const std::lock_guard lock(mutex_);
-    state_->end(end, last_words.text());
-    seconds_ = static_cast<double>(now_ns() - begun_ns_) * 1e-9;
-    running_ = false;
+    fraction = state_->status().fraction();
+    doing = state_->status().doing();
   }
-  if (changed_) changed_();
+  return observer(fraction, doing);
 }
 
 void ReconstructionChild::take(v1::ChildMessage&& message) {
@@ -228,10 +235,10 @@ void ReconstructionChild::take(v1::ChildMessage&& message) {
     preview = state_->take(std::move(message));
   }
   if (preview) board_.show(std::make_shared<const v1::IterationPreview>(std::move(*preview)));
-  if (changed_) changed_();
 }
 
-ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take_words) {
+ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take_words,
+                                    const Observer& observer) {
   ChildEnd end;
   session::ChildMessageParser parser;
   Steady::time_point heard = Steady::now();
@@ -241,12 +248,11 @@ ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take
     end.words = std::move(words);
     process.signal(SIGKILL);
   };
-  pollfd polled[] = {{wake_.get(), POLLIN, 0},
-                     {process.exited(), POLLIN, 0},
-                     {process.messages(), POLLIN, 0},
-                     {process.errors(), POLLIN, 0}};
-  pollfd& messages = polled[2];
-  pollfd& errors = polled[3];
+  pollfd polled[] = {
+      {process.exited(), POLLIN, 0}, {process.messages(), POLLIN, 0}, {process.errors(), POLLIN, 0}};
+  const pollfd& exited = polled[0];
+  pollfd& messages = polled[1];
+  pollfd& errors = polled[2];
   const auto read_messages = [&] {
     Status parsed;
     const ReadEnd at = read_all(messages.fd, [&](std::string_view bytes) {
@@ -265,20 +271,15 @@ ChildEnd ReconstructionChild::watch(ChildProcess& process, const TakeBytes& take
     if (read_all(errors.fd, take_words) == ReadEnd::closed) errors.fd = -1;
   };
 
-  while (polled[1].revents == 0) {
-    const bool condemned = end.why != ChildEnd::Why::by_itself;
-    const auto silent_at = condemned ? Steady::time_point::max() : heard + duration(options_.silence);
-    ::poll(polled, std::size(polled), milliseconds_until(kill_at.value_or(silent_at)));
-    if (polled[0].revents != 0) {
-      eventfd_t count = 0;
-      ::eventfd_read(wake_.get(), &count);
+  while (exited.revents == 0) {
+    ::poll(polled, std::size(polled), kLook);
+    if (ending_) condemn(ChildEnd::Why::cancelled, {});
+    if (!tell(observer) && end.why == ChildEnd::Why::by_itself) {
+      end.why = ChildEnd::Why::cancelled;
+      process.signal(SIGTERM);
+      kill_at = Steady::now() + duration(options_.grace);
       const std::lock_guard lock(mutex_);
-      if (asked_ == Asked::kill) condemn(ChildEnd::Why::cancelled, {});
-      if (asked_ == Asked::cancel && end.why == ChildEnd::Why::by_itself) {
-        end.why = ChildEnd::Why::cancelled;
-        process.signal(SIGTERM);
-        kill_at = Steady::now() + duration(options_.grace);
-      }
+      cancelling_ = true;
     }
     if (messages.fd >= 0 && messages.revents != 0) read_messages();
     if (errors.fd >= 0 && errors.revents != 0) read_errors();

@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
+#include <utility>
 #include <vector>
 
 #include "base/quantity.h"
 #include "base/result.h"
-#include "base/unique_fd.h"
 #include "daemon/board.h"
 #include "daemon/reconstruction/state.h"
+#include "daemon/work/jobs.h"
 #include "emberlock/v1/services.pb.h"
 
 namespace emberlock::daemon {
@@ -35,14 +37,12 @@ struct ReconstructionOptions {
 };
 
 /// Reconstructs recordings in a child process, one at a time, so that neither a GPU's fault nor memory that
-/// runs out costs the daemon a frame. The child dies with the daemon. Thread-safe.
+/// runs out costs the daemon a frame. Each is a job; the child dies with the daemon. Thread-safe.
 class ReconstructionChild {
  public:
-  /// Every iteration goes to `board`, which must outlive this. `changed` is called after each change of
-  /// status(), from a thread of this class: it must return at once.
-  ReconstructionChild(ReconstructionOptions options, Board& board, std::function<void()> changed = {});
-  /// Kills what still runs.
-  ~ReconstructionChild();
+  /// Every iteration goes to `board`, which must outlive the jobs, as this must.
+  ReconstructionChild(ReconstructionOptions options, Board& board, Jobs& jobs)
+      : options_(std::move(options)), board_(board), jobs_(jobs) {}
   ReconstructionChild(const ReconstructionChild&) = delete;
   ReconstructionChild& operator=(const ReconstructionChild&) = delete;
 
@@ -51,30 +51,35 @@ class ReconstructionChild {
   Result<v1::ReconstructionStatus> start(const v1::ReconstructRequest& request);
   /// SIGTERM, and SIGKILL after the grace; returns at once. `refused` when none runs.
   Result<v1::ReconstructionStatus> cancel();
+  /// Kills the one that runs, and lets none begin any more; returns at once.
+  void end();
   /// Of the one that runs, else of the last; nothing before the first.
   [[nodiscard]] std::optional<v1::ReconstructionStatus> status() const;
 
  private:
-  enum class Asked { nothing, cancel, kill };
   using TakeBytes = std::function<void(std::string_view)>;
 
-  void supervise(const std::vector<std::string>& command);
-  ChildEnd watch(ChildProcess& process, const TakeBytes& take_words);
+  [[nodiscard]] std::vector<std::string> command_for(const v1::ReconstructRequest& request) const;
+  /// With mutex_ held.
+  [[nodiscard]] bool runs() const { return running_ && !job_->result(); }
+  JobResult supervise(const std::vector<std::string>& command, const Observer& observer);
+  ChildEnd watch(ChildProcess& process, const TakeBytes& take_words, const Observer& observer);
   void take(v1::ChildMessage&& message);
+  /// Tells the job's observer how far it is. False: it shall end.
+  bool tell(const Observer& observer);
 
   const ReconstructionOptions options_;
   Board& board_;
-  const std::function<void()> changed_;
-  UniqueFd wake_;  ///< an eventfd: something was asked
+  Jobs& jobs_;
+  std::atomic<bool> ending_ = false;
 
-  std::mutex starting_;  ///< one start() at a time
-  std::thread thread_;
   mutable std::mutex mutex_;  ///< of what follows
+  std::shared_ptr<JobHandle> job_;
   std::optional<ReconstructionState> state_;
   std::int64_t begun_ns_ = 0;
   double seconds_ = 0;  ///< that the last one took
   bool running_ = false;
-  Asked asked_ = Asked::nothing;
+  bool cancelling_ = false;
 };
 
 }  // namespace emberlock::daemon

@@ -44,10 +44,11 @@ std::optional<v1::IterationPreview> ReconstructionState::take(v1::ChildMessage&&
     if (preview.has_volume() && !is_sound(preview.volume())) preview.clear_volume();
     auto& iterations = *status_.mutable_iterations();
     if (iterations.size() == kIterations) iterations.DeleteSubrange(0, 1);
-    // The last picture of a solve comes once more, with the numbers that are known.
-    const bool known = !iterations.empty() &&
-                       iterations.rbegin()->iteration() == preview.iteration().iteration() &&
-                       iterations.rbegin()->seconds() == preview.iteration().seconds();
+    // The picture of the iteration that was kept comes once more, with numbers that are known.
+    const bool known = std::any_of(iterations.begin(), iterations.end(), [&](const v1::Iteration& earlier) {
+      return earlier.iteration() == preview.iteration().iteration() &&
+             earlier.seconds() == preview.iteration().seconds();
+    });
     if (!known) *iterations.Add() = preview.iteration();
     return std::move(preview);
   } else if (message.has_done()) {

@@ -23,7 +23,7 @@ constexpr std::array<Words, kRefusals> kWords{{
     {Refusal::foreign_origin, "foreign_origin", "asks from another site's page"},
 }};
 
-/// Whether it was tried whether a secret is right.
+/// Whether a wrong secret was presented.
 bool is_guess(Refusal refusal) {
   return refusal == Refusal::wrong_token || refusal == Refusal::wrong_link ||
          refusal == Refusal::unknown_session;
@@ -49,7 +49,7 @@ AuthFailures::Outcome AuthFailures::note(std::string_view way, const std::string
                                          TimePoint now) {
   const std::lock_guard lock(mutex_);
   ++counts_[std::string(way)][static_cast<std::size_t>(refusal)];
-  // A browser that was never let in, or a monitor that asks whether the port is open, is no news.
+  // A browser that was never let in, or a monitor that tests the port, isn't logged.
   if (refusal == Refusal::nothing_shown) return {};
   Source& source = source_of(name, now);
   Outcome outcome;

@@ -15,41 +15,41 @@
 
 namespace emberlock::daemon {
 
-/// Why a request was turned away.
+/// Why a request was refused.
 enum class Refusal {
   nothing_shown,  ///< neither token nor cookie
   wrong_token,
-  wrong_link,       ///< none of ours, followed already, or too old
-  unknown_session,  ///< a cookie that opens nothing, or nothing more
-  foreign_host,     ///< a foreign name was made to lead here (DNS rebinding)
-  foreign_origin,   ///< another site's page asks
+  wrong_link,       ///< unknown, already used, or expired
+  unknown_session,  ///< an unknown or expired session's cookie
+  foreign_host,     ///< a foreign host name that leads here (DNS rebinding)
+  foreign_origin,   ///< from another site's page
 };
 inline constexpr std::size_t kRefusals = 6;
 /// "wrong_token"
 std::string_view name_of(Refusal refusal);
 
-/// What was refused to whom: counts it, slows those who guess, and says it in the log, at most so often as
-/// leaves the log readable. Only answers to what is wrong are slowed: who shows what is right waits for
-/// nobody, wherever he comes from. Times are on the host's monotonic clock. Thread-safe.
+/// Counts refused requests, slows down guessing, and limits the number of log lines. Only refusals are
+/// delayed: a client with the right secret never waits, whatever its address. Times are on the host's
+/// monotonic clock. Thread-safe.
 class AuthFailures {
  public:
-  static constexpr int kFree = 3;             ///< wrong guesses of a source that aren't slowed
-  static constexpr Seconds kFirstDelay{0.1};  ///< then this, doubled by each
+  static constexpr int kFree = 3;             ///< wrong guesses of a source that aren't delayed
+  static constexpr Seconds kFirstDelay{0.1};  ///< then this delay, doubled at each guess
   static constexpr Seconds kLongestDelay{2};
-  static constexpr Seconds kForget{60};  ///< without a guess, a source begins anew
+  static constexpr Seconds kForget{60};  ///< time without a guess after which a source is forgotten
   static constexpr std::size_t kMostSources =
-      256;                                 ///< known at a time; beyond it the one silent longest goes
-  static constexpr Seconds kLogApart{60};  ///< between two lines about one source
-  static constexpr int kMostLines = 10;    ///< in so much time, about all of them
+      256;  ///< maximum number of sources; beyond it the one silent for longest is forgotten
+  static constexpr Seconds kLogApart{60};  ///< minimum time between two lines about one source
+  static constexpr int kMostLines = 10;    ///< maximum number of lines per kLogApart about all sources
 
   struct Outcome {
-    Seconds delay{0};                   ///< before the answer
-    std::optional<std::string> line{};  ///< for the log
+    Seconds delay{0};                   ///< of the answer
+    std::optional<std::string> line{};  ///< to be logged
   };
-  /// `way`: "http" or "grpc". `source`: who asks, as far as that is known: "user 1000", "192.168.0.7".
+  /// `way`: "http" or "grpc". `source`: the client, as far as it is known: "user 1000", "192.168.0.7".
   Outcome note(std::string_view way, const std::string& source, Refusal refusal, TimePoint now);
 
-  /// Since the start, by way and refusal.
+  /// Refusals since the start, by way and reason.
   [[nodiscard]] std::map<std::string, std::array<std::uint64_t, kRefusals>> counts() const;
 
  private:

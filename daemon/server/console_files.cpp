@@ -60,7 +60,7 @@ Result<ConsoleFiles> ConsoleFiles::read(const fs::path& folder) {
       return Error{ErrorKind::bad_input, "more than a console holds", folder.string(),
                    "name the folder that the console was built into"};
     const std::string name = "/" + fs::relative(entry->path(), folder).generic_string();
-    // The build puts a hash of their content into the names of what lies there.
+    // The build includes a hash of their content in these file names.
     const bool hashed = name.starts_with("/assets/");
     File file{.content = std::move(content),
               .type = type_of(entry->path().extension().string()),

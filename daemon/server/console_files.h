@@ -10,22 +10,23 @@
 
 namespace emberlock::daemon {
 
-/// The console as it was built, read once: a request only looks up a name, so no path leads anywhere else.
+/// The files of the built console, read once. A request only looks up a name, so no path can leave the
+/// folder.
 class ConsoleFiles {
  public:
   struct File {
     std::string content;
     std::string_view type;     ///< for Content-Type
-    std::string tag;           ///< for ETag: of the content
+    std::string tag;           ///< for ETag: a hash of the content
     std::string_view caching;  ///< for Cache-Control
   };
-  static constexpr std::size_t kLargest = std::size_t{64} << 20;  ///< bytes, all together
+  static constexpr std::size_t kLargest = std::size_t{64} << 20;  ///< total bytes
 
   ConsoleFiles() = default;
-  /// Only files that are there, no links. A folder that isn't there is an error that says so.
+  /// Reads existing regular files, without links. Error: the folder doesn't exist.
   static Result<ConsoleFiles> read(const std::filesystem::path& folder);
 
-  /// By the path of a URL, "/" being "/index.html"; null: there is none.
+  /// The file for a URL's path; "/" is "/index.html". Null if there is none.
   [[nodiscard]] const File* find(std::string_view path) const;
 
  private:

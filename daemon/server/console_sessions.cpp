@@ -10,7 +10,7 @@
 
 namespace emberlock::daemon {
 
-// Secrets are looked up by their digest: how long that takes tells nothing of the secret.
+// Secrets are looked up by their digest, so that the duration of the search reveals nothing.
 ConsoleSessions::Digest ConsoleSessions::digest_of(std::string_view secret) {
   Digest digest{};
   SHA256(reinterpret_cast<const unsigned char*>(secret.data()), secret.size(), digest.data());

@@ -68,7 +68,7 @@ Next<v1::Picture> PictureFeed::next(TimePoint now) {
     }
   }
   if (!next.message) return next;
-  // The rate holds on average, but nothing is made up for after a pause.
+  // The average rate is kept, but pictures missed in a pause aren't made up for.
   last_[next.message->camera_id()] = {next.message, std::max(due + apart_, now + (1 - kEarly) * apart_)};
   next.again.reset();
   return next;

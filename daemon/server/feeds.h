@@ -11,9 +11,9 @@
 #include "base/time_point.h"
 #include "daemon/board.h"
 
-// What one watcher still has to be told, of each kind of thing on the board. A feed holds nothing but how far
-// its watcher is: the board is the mailbox, with one slot for the status and one for each camera, so a slow
-// watcher costs no memory and misses what was overtaken. The watcher asks when it can take one more message.
+// What one watcher still has to receive of each kind of data on the board. A feed stores only the watcher's
+// position: the board is a mailbox with one slot for the status and one for each camera, so a slow watcher
+// uses no memory and misses what was replaced meanwhile. The watcher asks when it can accept another message.
 // Not thread-safe; times are on the host's monotonic clock.
 namespace emberlock::daemon {
 
@@ -21,20 +21,21 @@ template <class Message>
 struct Next {
   std::shared_ptr<const Message> message = {};  ///< null: nothing now
   std::optional<TimePoint> again =
-      {};  ///< of no message: when there will be one without a change of the board
+      {};  ///< without a message: when there will be one even if the board doesn't change
 };
 
-/// What watchers are told ten times a second: without what is long and seldom changes, the rounds' history.
+/// The part of the status that watchers get ten times a second: without the rounds' history, which is long
+/// and seldom changes.
 v1::DaemonStatus without_history(const v1::DaemonStatus& status);
 
-/// A status whose history changed, whenever that did.
+/// The status, whenever its history has changed.
 class HistoryFeed {
  public:
   explicit HistoryFeed(const Board& board) : board_(board) {}
   Next<v1::DaemonStatus> next(TimePoint now);
 
  private:
-  /// Tells histories apart: each alignment begins its own, and a round is added at their end alone.
+  /// Identifies a history: each alignment starts a new one, and rounds are only appended.
   struct Last {
     int rounds = 0;
     std::uint32_t round = 0;
@@ -45,7 +46,7 @@ class HistoryFeed {
   Last told_;
 };
 
-/// The status when it changed, ten times a second at most.
+/// The status when it has changed, at most ten times a second.
 class StatusFeed {
  public:
   static constexpr Seconds kApart{0.1};
@@ -58,7 +59,7 @@ class StatusFeed {
   TimePoint at_;
 };
 
-/// Every notice after `after`, in order.
+/// All notices after `after`, in order.
 class NoticeFeed {
  public:
   NoticeFeed(const Board& board, std::uint64_t after) : board_(board), after_(after) {}
@@ -67,15 +68,15 @@ class NoticeFeed {
  private:
   const Board& board_;
   std::uint64_t after_;
-  std::deque<v1::Notice> read_;  ///< at most what the board keeps
+  std::deque<v1::Notice> read_;  ///< at most as many as the board keeps
 };
 
-/// The newest picture of each camera, no older than the one before; the camera served longest ago first.
-/// While it lives, pictures are made.
+/// The newest picture of each camera, never older than the previous one; cameras take turns. Pictures are
+/// made only while such a feed exists.
 class PictureFeed {
  public:
   static constexpr double kRateHz = 12;
-  static constexpr double kEarly = 0.2;  ///< periods before it is due that a picture is taken: cameras jitter
+  static constexpr double kEarly = 0.2;  ///< periods by which a picture may be early, because cameras jitter
 
   PictureFeed(Board& board, const v1::WatchPicturesRequest& request);
   Next<v1::Picture> next(TimePoint now);
@@ -83,7 +84,7 @@ class PictureFeed {
  private:
   struct Last {
     std::shared_ptr<const v1::Picture> picture;
-    TimePoint due;  ///< of the next one
+    TimePoint due;  ///< of the next picture
   };
   Board& board_;
   std::set<std::string> cameras_;  ///< empty: all
@@ -92,7 +93,7 @@ class PictureFeed {
   Subscription wanted_;
 };
 
-/// The iterations of the running or last reconstruction from its first one on, and then of the next.
+/// All iterations of the running or last reconstruction, then of the next one.
 class IterationFeed {
  public:
   explicit IterationFeed(const Board& board) : board_(board) {}

@@ -19,7 +19,7 @@
 namespace emberlock::daemon {
 namespace {
 
-/// What gRPC says of itself goes where everything goes.
+/// Redirects gRPC's own messages to our log.
 void log_grpc(gpr_log_func_args* args) {
   spdlog::logger& logger = log(LogCategory::daemon);
   switch (args->severity) {
@@ -35,9 +35,9 @@ void log_grpc(gpr_log_func_args* args) {
   }
 }
 
-/// Lets in who shows the token, in metadata "authorization: Bearer TOKEN". gRPC asks on threads of its own,
-/// not on those that carry others' calls, so that who guesses can be kept waiting; it doesn't tell who asks,
-/// so all guesses by gRPC count as one source's.
+/// Lets in clients with the token, in metadata "authorization: Bearer TOKEN". gRPC calls this on separate
+/// threads, not on those of other clients' calls, so guesses can be delayed. The client is unknown here, so
+/// all guesses by gRPC count as one source.
 class TokenCheck final : public grpc::AuthMetadataProcessor {
  public:
   TokenCheck(rig::Token token, std::shared_ptr<AuthFailures> failures)
@@ -60,7 +60,7 @@ class TokenCheck final : public grpc::AuthMetadataProcessor {
   }
 
  private:
-  static constexpr int kMostWaiting = 16;  ///< threads; who guesses beyond them is answered at once
+  static constexpr int kMostWaiting = 16;  ///< threads; further guesses are answered at once
 
   void refuse(Refusal refusal) {
     const AuthFailures::Outcome outcome =
@@ -93,12 +93,12 @@ Status check(const GrpcServerOptions& options) {
 void set_limits(grpc::ServerBuilder& builder, const GrpcServerOptions& options) {
   const int keepalive_ms = static_cast<int>(in_milliseconds(options.keepalive));
   builder.SetMaxReceiveMessageSize(options.largest_request);
-  // Who says nothing in TLS's handshake keeps a file descriptor no longer than that.
+  // A client that is silent in the TLS handshake keeps its descriptor for at most this time.
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, keepalive_ms);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONCURRENT_STREAMS, options.streams_a_connection);
   builder.AddChannelArgument(GRPC_ARG_ALLOW_REUSEPORT,
-                             0);  // else two daemons share a port, and neither knows
-  // A write to a client that has vanished may never complete (gRPC's issue 41492): pings find out.
+                             0);  // otherwise two daemons could share a port unnoticed
+  // A write to a client that has vanished may never complete (gRPC issue 41492): pings detect that.
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIME_MS, keepalive_ms);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_TIMEOUT_MS, keepalive_ms / 2);
   builder.AddChannelArgument(GRPC_ARG_KEEPALIVE_PERMIT_WITHOUT_CALLS, 1);
@@ -123,17 +123,15 @@ std::shared_ptr<grpc::ServerCredentials> network_credentials(const GrpcServerOpt
 struct GrpcServer::Parts {
   Parts(Api& api, const GrpcServerOptions& options)
       : workers(options.workers, options.waiting),
-        jobs(options.jobs, options.waiting_jobs),
         pump(options.watchers),
         sessions(options.sessions),
-        services({api, workers, jobs, pump, *sessions}) {}
+        services({api, workers, pump, *sessions}) {}
 
   Status listen(const GrpcServerOptions& options);
   void follow(Board& board);
 
-  // The server goes first; while it does, the rest still serves.
+  // The server is destroyed first, while the rest still works.
   Workers workers;
-  Workers jobs;
   StreamPump pump;
   std::shared_ptr<ConsoleSessions> sessions;
   GrpcServices services;
@@ -163,7 +161,7 @@ Status GrpcServer::Parts::listen(const GrpcServerOptions& options) {
     return Error{ErrorKind::io, "nothing can listen there",
                  fmt::format("{} {}", options.socket.string(), options.tcp_address),
                  "the log says why; is the port taken, the address another machine's?"};
-  // Its folder says who may connect.
+  // Access is controlled by the socket's folder.
   if (!options.socket.empty()) ::chmod(options.socket.c_str(), S_IRUSR | S_IWUSR | S_IRGRP | S_IWGRP);
   return {};
 }

@@ -25,7 +25,7 @@ grpc::Status put(Result<Response> result, Response* response) {
   return grpc::Status::OK;
 }
 
-/// Asks on a worker's thread. gRPC keeps request and response until the answer is given.
+/// Runs the call on a worker thread. gRPC keeps request and response until the call is finished.
 template <class Response, class Ask>
 grpc::ServerUnaryReactor* answer(const GrpcBackend& backend, Context* context, Response* response, Ask ask) {
   grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
@@ -37,28 +37,26 @@ grpc::ServerUnaryReactor* answer(const GrpcBackend& backend, Context* context, R
 
 template <class Message, class Feed>
 grpc::ServerWriteReactor<Message>* watch(const GrpcBackend& backend, Feed feed) {
-  auto* stream =
-      new WatchStream<Message, Feed>(backend.pump, std::move(feed));  // deletes itself when it is done
+  auto* stream = new WatchStream<Message, Feed>(backend.pump, std::move(feed));  // deletes itself when done
   if (!backend.pump.add(stream)) stream->Finish(too_many("too many watchers"));
   return stream;
 }
 
 template <class Request>
-grpc::ServerWriteReactor<v1::JobProgress>* start_job(const GrpcBackend& backend, const Request& request,
-                                                     Status (Api::*ask)(const Request&, const JobObserver&)) {
-  const auto job = std::make_shared<Job>([&pump = backend.pump] { pump.wake(); });
+grpc::ServerWriteReactor<v1::Job>* start_job(const GrpcBackend& backend, const Request& request,
+                                             Result<std::shared_ptr<JobHandle>> (Api::*ask)(const Request&)) {
+  const auto job = std::make_shared<JobWatch>([&pump = backend.pump] { pump.wake(); });
   auto* stream = new JobStream(backend.pump, job);  // deletes itself when it is done
-  const bool queued = backend.jobs.run([job, request, ask, &api = backend.api] {
-    job->run([&](const JobObserver& observer) { return (api.*ask)(request, observer); });
-  });
+  const bool queued =
+      backend.workers.run([job, request, ask, &api = backend.api] { job->begin((api.*ask)(request)); });
   if (!queued)
-    stream->Finish(too_many("too many jobs are waiting"));
+    stream->Finish(too_many("too many calls are waiting"));
   else if (!backend.pump.add(stream))
     stream->Finish(too_many("too many watchers"));
   return stream;
 }
 
-/// Who wants the history asks for the status.
+/// Skips the history: a client that wants it asks for the status.
 class BriefStatusFeed {
  public:
   explicit BriefStatusFeed(const Board& board) : whole_(board) {}
@@ -95,7 +93,7 @@ class DaemonService final : public v1::Daemon::CallbackService {
     return answer(backend_, context, response,
                   [this, request] { return backend_.api.acknowledge(*request); });
   }
-  /// A link lets in whoever follows it, so it is for those alone whom the socket's folder lets in.
+  /// Only over the socket, with its folder's access control, because anyone can use a link.
   grpc::ServerUnaryReactor* OpenConsole(Context* context, const v1::Empty* /*request*/,
                                         v1::ConsoleLink* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
@@ -194,17 +192,28 @@ class SessionsService final : public v1::Sessions::CallbackService {
                                 v1::Manifest* response) override {
     return answer(backend_, context, response, [this, request] { return backend_.api.session(*request); });
   }
-  grpc::ServerWriteReactor<v1::JobProgress>* Verify(Context* /*context*/,
-                                                    const v1::SessionRequest* request) override {
+  grpc::ServerWriteReactor<v1::Job>* Verify(Context* /*context*/,
+                                            const v1::SessionRequest* request) override {
     return start_job(backend_, *request, &Api::verify_session);
   }
-  grpc::ServerWriteReactor<v1::JobProgress>* Repair(Context* /*context*/,
-                                                    const v1::SessionRequest* request) override {
+  grpc::ServerWriteReactor<v1::Job>* Repair(Context* /*context*/,
+                                            const v1::SessionRequest* request) override {
     return start_job(backend_, *request, &Api::repair_session);
   }
-  grpc::ServerWriteReactor<v1::JobProgress>* Export(Context* /*context*/,
-                                                    const v1::ExportRequest* request) override {
+  grpc::ServerWriteReactor<v1::Job>* Export(Context* /*context*/, const v1::ExportRequest* request) override {
     return start_job(backend_, *request, &Api::export_session);
+  }
+
+ private:
+  GrpcBackend backend_;
+};
+
+class JobsService final : public v1::Jobs::CallbackService {
+ public:
+  explicit JobsService(GrpcBackend backend) : backend_(backend) {}
+  grpc::ServerUnaryReactor* Cancel(Context* context, const v1::CancelJobRequest* request,
+                                   v1::Empty* response) override {
+    return answer(backend_, context, response, [this, request] { return backend_.api.cancel_job(*request); });
   }
 
  private:
@@ -236,13 +245,14 @@ class ReconstructService final : public v1::Reconstruct::CallbackService {
 
 struct GrpcServices::All {
   explicit All(GrpcBackend b)
-      : daemon(b), devices(b), strobe(b), sync(b), capture(b), sessions(b), reconstruct(b) {}
+      : daemon(b), devices(b), strobe(b), sync(b), capture(b), sessions(b), jobs(b), reconstruct(b) {}
   DaemonService daemon;
   DevicesService devices;
   StrobeService strobe;
   SyncService sync;
   CaptureService capture;
   SessionsService sessions;
+  JobsService jobs;
   ReconstructService reconstruct;
 };
 
@@ -250,8 +260,8 @@ GrpcServices::GrpcServices(GrpcBackend backend) : all_(std::make_unique<All>(bac
 GrpcServices::~GrpcServices() = default;
 
 void GrpcServices::add_to(grpc::ServerBuilder& builder) {
-  grpc::Service* const services[] = {&all_->daemon,  &all_->devices,  &all_->strobe,     &all_->sync,
-                                     &all_->capture, &all_->sessions, &all_->reconstruct};
+  grpc::Service* const services[] = {&all_->daemon,  &all_->devices,  &all_->strobe, &all_->sync,
+                                     &all_->capture, &all_->sessions, &all_->jobs,   &all_->reconstruct};
   for (grpc::Service* service : services) builder.RegisterService(service);
 }
 

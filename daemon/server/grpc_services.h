@@ -9,20 +9,19 @@
 #include "daemon/api.h"
 #include "daemon/server/console_sessions.h"
 #include "daemon/server/grpc_streams.h"
-#include "daemon/server/workers.h"
+#include "daemon/work/workers.h"
 
 namespace emberlock::daemon {
 
-/// What the services of services.proto share.
+/// Shared by the services of services.proto.
 struct GrpcBackend {
   Api& api;
   Workers& workers;  ///< for calls
-  Workers& jobs;     ///< for what may take minutes
   StreamPump& pump;
   ConsoleSessions& sessions;
 };
 
-/// All of services.proto, over an Api. What it refers to outlives the server that has them.
+/// All services of services.proto, for an Api. The objects that it refers to must outlive the server.
 class GrpcServices {
  public:
   explicit GrpcServices(GrpcBackend backend);

@@ -15,22 +15,22 @@
 #include "base/clock.h"
 #include "daemon/server/errors.h"
 #include "daemon/server/feeds.h"
-#include "daemon/server/job.h"
+#include "daemon/server/job_watch.h"
 
-// gRPC's streams to clients. All that gRPC tells a stream, and all that changes on the board, only wakes the
-// pump; its thread alone asks feeds, writes and finishes. So no stream needs a lock, and no writer of the
-// board ever runs gRPC's code.
+// gRPC's streams to clients. All gRPC events of a stream and all changes of the board only wake the pump;
+// only its thread asks feeds, writes and finishes. So no stream needs a lock, and no thread that writes to
+// the board runs gRPC's code.
 namespace emberlock::daemon {
 
-/// What the pump drives. Deletes itself when gRPC is done with it.
+/// A stream driven by the pump. Deletes itself when gRPC has finished with it.
 class PumpedStream {
  public:
   virtual ~PumpedStream() = default;
-  /// Writes if it can and must. Returns when it wants to be asked again without being woken, if so.
+  /// Writes if possible and needed. Returns when it must be called again without a wake-up, if at all.
   virtual std::optional<TimePoint> write(TimePoint now) = 0;
-  /// Nothing is in flight, and the client has gone or has got all.
+  /// Nothing is being written, and the client has gone or has received everything.
   [[nodiscard]] virtual bool over() const = 0;
-  /// The last call: it may be deleted before this returns.
+  /// The last call: the object may be deleted before it returns.
   virtual void finish() = 0;
 };
 
@@ -39,12 +39,12 @@ class StreamPump {
   explicit StreamPump(std::size_t most);
   StreamPump(const StreamPump&) = delete;
   StreamPump& operator=(const StreamPump&) = delete;
-  /// All streams have finished.
+  /// All streams must have finished.
   ~StreamPump();
 
   /// False when there are too many.
   [[nodiscard]] bool add(PumpedStream* stream);
-  /// Something changed. Returns at once; from any thread.
+  /// Something changed. Returns at once; any thread.
   void wake();
   [[nodiscard]] std::size_t streams() const;
 
@@ -61,7 +61,7 @@ class StreamPump {
   std::thread thread_;
 };
 
-/// A stream of what a feed has: one write in flight, the newest alone.
+/// A stream of a feed's messages: one write at a time, always the newest.
 template <class Message>
 class FeedStream : public grpc::ServerWriteReactor<Message>, public PumpedStream {
  public:
@@ -113,29 +113,29 @@ class WatchStream final : public FeedStream<Message> {
   Feed feed_;
 };
 
-class JobStream final : public FeedStream<v1::JobProgress> {
+class JobStream final : public FeedStream<v1::Job> {
  public:
-  JobStream(StreamPump& pump, std::shared_ptr<Job> job) : FeedStream(pump), job_(std::move(job)) {}
-  ~JobStream() override { job_->cancel(); }
+  JobStream(StreamPump& pump, std::shared_ptr<JobWatch> job) : FeedStream(pump), job_(std::move(job)) {}
+  ~JobStream() override { job_->leave(); }
   JobStream(const JobStream&) = delete;
   JobStream& operator=(const JobStream&) = delete;
 
   void OnCancel() override {
-    job_->cancel();
+    job_->leave();
     FeedStream::OnCancel();
   }
 
  private:
-  Next<v1::JobProgress> next(TimePoint /*now*/) override {
-    auto progress = job_->take();
-    if (!progress) return {};
-    return {.message = std::make_shared<const v1::JobProgress>(*std::move(progress))};
+  Next<v1::Job> next(TimePoint /*now*/) override {
+    auto state = job_->take();
+    if (!state) return {};
+    return {.message = std::make_shared<const v1::Job>(*std::move(state))};
   }
   [[nodiscard]] std::optional<grpc::Status> ended() const override {
     const auto ended = job_->ended();
     return ended ? std::optional(grpc_status(*ended)) : std::nullopt;
   }
-  std::shared_ptr<Job> job_;
+  std::shared_ptr<JobWatch> job_;
 };
 
 }  // namespace emberlock::daemon

@@ -19,7 +19,7 @@
 #include "daemon/server/errors.h"
 #include "daemon/server/metrics.h"
 #include "daemon/server/peer.h"
-#include "daemon/server/stranger_page.h"
+#include "daemon/server/sign_in_page.h"
 #include "daemon/server/viewer.h"
 
 namespace emberlock::daemon {
@@ -40,7 +40,7 @@ constexpr const char* kPolicy =
 
 constexpr std::string_view kOpenPath = "/open";
 constexpr std::uint64_t kLargestForm = 1024;  // bytes
-constexpr std::chrono::seconds kGoodbye{1};   // for the other side to say it too
+constexpr std::chrono::seconds kGoodbye{1};   // for the other side to close too
 constexpr std::string_view kSpeakTls =
     "HTTP/1.1 400 Bad Request\r\nContent-Type: text/plain\r\nContent-Length: 50\r\nConnection: close\r\n\r\n"
     "TLS is spoken here: the address begins https://.\r\n";
@@ -108,7 +108,7 @@ void HttpConnection::read_header() {
   http::async_read_header(
       stream_, buffer_, *parser_,
       [self = shared_from_this()](beast::error_code error, std::size_t /*bytes*/) {
-        if (!error) return self->judge();
+        if (!error) return self->authorize();
         if (error == http::error::header_limit)
           return self->respond_error(431, "INVALID_ARGUMENT", "the head is too long", Next::end);
         if (error == http::error::body_limit)
@@ -120,37 +120,37 @@ void HttpConnection::read_header() {
       });
 }
 
-void HttpConnection::judge() {
+void HttpConnection::authorize() {
   const auto& request = parser_->get();
   auto target = parse_target(view(request.target()));
   if (!target) return respond_error(400, "INVALID_ARGUMENT", "no such address", Next::end);
   target_ = *std::move(target);
-  if (target_.path == "/healthz") {  // anybody's, so nothing is read for it
+  if (target_.path == "/healthz") {  // for everybody; nothing else is read for it
     const bool has_body = parser_->chunked() || parser_->content_length().value_or(0) > 0;
     return has_body ? respond_error(413, "INVALID_ARGUMENT", "this takes no body", Next::end) : read_body();
   }
-  // To ask for the head of a link isn't to follow it.
+  // A HEAD request doesn't use up a link.
   if (request.method() != http::verb::get) target_.link.clear();
   const HttpHead head{.host = view(request[http::field::host]),
                       .origin = view(request[http::field::origin]),
                       .authorization = view(request[http::field::authorization]),
                       .cookie = view(request[http::field::cookie])};
-  HttpJudgement judgement = context_.gate.judge(head, target_, SteadyClock().now());
-  switch (judgement.verdict) {
-    case HttpVerdict::welcome:
-      standing_ = Standing::known;
+  HttpAccess access = context_.gate.authorize(head, target_, SteadyClock().now());
+  switch (access.verdict) {
+    case HttpVerdict::granted:
+      standing_ = Standing::authenticated;
       since_ = context_.next_turn();
-      who_ = std::move(judgement.who);
-      cookie_ = std::move(judgement.cookie);
+      who_ = std::move(access.who);
+      cookie_ = std::move(access.cookie);
       if (target_.path == kOpenPath && request.method() == http::verb::get) return let_in({});
       return read_body();
     case HttpVerdict::give_cookie:
-      return let_in(judgement.cookie);
+      return let_in(access.cookie);
     case HttpVerdict::refused: {
       const bool by_form =
-          judgement.refusal == Refusal::nothing_shown || judgement.refusal == Refusal::unknown_session;
+          access.refusal == Refusal::nothing_shown || access.refusal == Refusal::unknown_session;
       if (by_form && target_.path == kOpenPath && request.method() == http::verb::post) return read_form();
-      return refuse(judgement.refusal);
+      return refuse(access.refusal);
     }
   }
 }
@@ -178,9 +178,9 @@ void HttpConnection::read_form() {
                    });
 }
 
-/// Who guesses waits for the answer, he alone.
+/// Delays the answer to a guess; other connections aren't affected.
 void HttpConnection::refuse(Refusal refusal) {
-  standing_ = Standing::stranger;
+  standing_ = Standing::unauthenticated;
   const AuthFailures::Outcome outcome =
       context_.options.failures->note("http", peer_, refusal, SteadyClock().now());
   if (outcome.line) log(LogCategory::daemon).warn("{}", *outcome.line);
@@ -202,7 +202,7 @@ void HttpConnection::answer_refusal(Refusal refusal, Answered answered) {
   const bool by_browser = path == "/" || path == "/index.html" || path == kOpenPath;
   const TokenField field = context_.gate.has_token() ? TokenField::shown : TokenField::none;
   Response refused =
-      by_browser ? response(401, "text/html; charset=utf-8", stranger_page(refusal, field))
+      by_browser ? response(401, "text/html; charset=utf-8", sign_in_page(refusal, field))
                  : response(401, kJson,
                             error_json("UNAUTHENTICATED",
                                        "this daemon doesn't know who asks: `emberlock console` prints a link "
@@ -211,10 +211,11 @@ void HttpConnection::answer_refusal(Refusal refusal, Answered answered) {
                                 '\n');
   refused.set(http::field::www_authenticate, "Bearer realm=\"emberlock\"");
   if (by_browser) {
-    refused.set("Content-Security-Policy", kStrangerPolicy);
-    refused.set("Referrer-Policy", "same-origin");  // else a form's browser doesn't tell whence it asks
+    refused.set("Content-Security-Policy", kSignInPolicy);
+    refused.set("Referrer-Policy",
+                "same-origin");  // otherwise a browser omits the origin when it sends the form
   }
-  // Late, the browser may have a new one by now.
+  // After a delay the browser may have a new cookie.
   if (refusal == Refusal::unknown_session && by_browser && answered == Answered::at_once)
     refused.set(http::field::set_cookie, HttpGate::no_cookie(view(parser_->get()[http::field::host])));
   respond(std::move(refused), Next::end);
@@ -280,7 +281,7 @@ void HttpConnection::answer_api(std::string_view name) {
 }
 
 void HttpConnection::call(const JsonMethod& method) {
-  // The connection is let go of on the server's thread, where alone it may end.
+  // The connection must be released on the server's thread, the only one that may destroy it.
   standing_ = Standing::working;
   const bool queued = context_.workers.run([self = shared_from_this(), &method]() mutable {
     auto result = method.call(self->context_.api, self->parser_->get().body());
@@ -300,33 +301,33 @@ void HttpConnection::watch() {
   std::make_shared<Viewer>(context_, who_, std::move(stream_))->run(parser_->release());
 }
 
-// ---- jobs: one JSON object a line, the newest progress alone; the last is done, or an error
+// ---- jobs: one JSON object per line with the newest progress; the last line is `done` or an error
 
 void HttpConnection::start_job(const JsonMethod& method) {
   if (parser_->get().version() < 11)
     return respond_error(505, "INVALID_ARGUMENT", "jobs are told in chunks: HTTP/1.1", Next::end);
-  auto run = method.job(context_.api, parser_->get().body());
-  if (!run) return respond_error(run.error());
-  job_ = std::make_shared<Job>([weak = weak_from_this(), &loop = context_.loop] {
+  auto begin = method.job(context_.api, parser_->get().body());
+  if (!begin) return respond_error(begin.error());
+  job_ = std::make_shared<JobWatch>([weak = weak_from_this(), &loop = context_.loop] {
     asio::post(loop, [weak] {
       if (const auto self = weak.lock()) self->write_progress();
     });
   });
-  if (!context_.job_workers.run([job = job_, run = std::move(*run)] { job->run(run); })) {
+  if (!context_.workers.run([job = job_, begin = std::move(*begin)] { job->begin(begin()); })) {
     job_.reset();
-    return respond_error(429, "RESOURCE_EXHAUSTED",
-                         "too many jobs are waiting: try again when one has ended");
+    return respond_error(429, "RESOURCE_EXHAUSTED", "too many calls are waiting: try again in a moment");
   }
   standing_ = Standing::working;
   context_.jobs.insert(job_);
   notice_end();
 }
 
-/// Keeps the connection while its job runs, and ends the job when the client goes.
+/// Keeps the connection while its job runs, and cancels the job when the client disconnects.
 void HttpConnection::notice_end() {
   stream_.next_layer().socket().async_wait(asio::ip::tcp::socket::wait_read,
                                            [self = shared_from_this()](beast::error_code error) {
-                                             if (error || !self->job_) return;  // the next request, then
+                                             if (error || !self->job_)
+                                               return;  // the bytes belong to the next request
                                              self->end_job();
                                              self->close();
                                            });
@@ -334,7 +335,7 @@ void HttpConnection::notice_end() {
 
 void HttpConnection::end_job() {
   if (!job_) return;
-  job_->cancel();
+  job_->leave();
   context_.jobs.erase(job_);
   job_.reset();
 }
@@ -351,7 +352,7 @@ void HttpConnection::write_progress() {
   write_line(error_json(code_name(error.kind), error.message()) + '\n');
 }
 
-/// Of a job's stream: nothing comes any more.
+/// Ends the stream of a job.
 void HttpConnection::write_end() {
   stream_.next_layer().expires_after(context_.patience());
   asio::async_write(
@@ -377,7 +378,7 @@ void HttpConnection::write_line(const std::string& json) {
                         self->end_job();
                         return self->close();
                       }
-                      if (!self->job_) return self->write_end();  // it was the error's
+                      if (!self->job_) return self->write_end();  // the line was an error
                       self->stream_.next_layer().expires_never();
                       self->write_progress();
                     });
@@ -403,7 +404,7 @@ void HttpConnection::respond(Response response, Next next) {
   response.content_length(response.body().size());
   if (only_head) response.body().clear();
   answer_ = std::make_shared<const Response>(std::move(response));
-  if (standing_ == Standing::working) standing_ = Standing::known;
+  if (standing_ == Standing::working) standing_ = Standing::authenticated;
   stream_.next_layer().expires_after(context_.patience());
   http::async_write(stream_, *answer_,
                     [self = shared_from_this(), ends](beast::error_code error, std::size_t /*bytes*/) {

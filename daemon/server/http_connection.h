@@ -22,15 +22,15 @@
 
 namespace emberlock::daemon {
 
-/// One connection: requests one after another, each with a deadline, until it becomes a viewer or ends. On
-/// the server's thread.
+/// One connection: consecutive requests, each with a deadline, until it becomes a viewer or ends. Runs on the
+/// server's thread.
 class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
-  /// Whether it makes room for others, those first who stand first here.
+  /// Whether it can be evicted; the first ones in this list are evicted first.
   enum class Standing {
-    stranger,  ///< has shown nothing that is right: in TLS's handshake, in its first head, refused
-    known,     ///< was let in, and sends or takes bytes, or is silent
-    working,   ///< waits for an answer to its call: it makes no room
+    unauthenticated,  ///< no valid secret yet: in the TLS handshake, in its first request, or refused
+    authenticated,    ///< let in; sending, receiving or idle
+    working,          ///< waits for the answer to its call: can't be evicted
   };
 
   HttpConnection(HttpContext& context, boost::asio::ip::tcp::socket socket);
@@ -39,12 +39,12 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   ~HttpConnection();
 
   void run();
-  /// Ends it, as it makes room.
+  /// Closes the connection, because it was evicted.
   void close();
   [[nodiscard]] Standing standing() const { return standing_; }
-  /// Who asks, as far as the kernel knows.
+  /// The client, as far as the kernel knows it.
   [[nodiscard]] const std::string& peer() const { return peer_; }
-  /// Since when it is, or was asked last: larger is later.
+  /// Order of its last request (or its start): larger is later.
   [[nodiscard]] std::uint64_t since() const { return since_; }
 
  private:
@@ -52,16 +52,16 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   using Response = boost::beast::http::response<Body>;
   enum class Next { go_on, end };
 
-  /// Who spoke plain HTTP hears, in plain HTTP, that TLS is spoken.
+  /// Answers plain HTTP on a TLS port, in plain HTTP, that TLS is required.
   void point_to_tls();
   void read_header();
-  /// Refuses by the head alone, before a body is read.
-  void judge();
+  /// Refuses a request from its head, before a body is read.
+  void authorize();
   void refuse(Refusal refusal);
   enum class Answered { at_once, late };
   void answer_refusal(Refusal refusal, Answered answered);
   void let_in(const std::string& cookie);
-  /// A token that the strangers' page's form sent.
+  /// Reads a token from the sign-in page's form.
   void read_form();
   void read_body();
   void answer();
@@ -82,24 +82,24 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void respond_error(unsigned status, std::string_view code, std::string_view message,
                      Next next = Next::go_on);
   void respond_error(const Error& error);
-  /// Says so to the other side first.
+  /// Closes the connection in both directions.
   void end();
 
   HttpContext& context_;
   const std::string peer_;
-  Standing standing_ = Standing::stranger;
+  Standing standing_ = Standing::unauthenticated;
   std::uint64_t since_;
-  std::string cookie_;               ///< that the console's page sets again
-  std::string who_;                  ///< that was let in
-  boost::asio::steady_timer delay_;  ///< of an answer to who guesses
+  std::string cookie_;               ///< set again with the console's page
+  std::string who_;                  ///< the authenticated client
+  boost::asio::steady_timer delay_;  ///< of the answer to a guess
   HttpStream stream_;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<Body>> parser_;
   HttpTarget target_;
-  std::shared_ptr<const Response> answer_;  ///< that is being sent
+  std::shared_ptr<const Response> answer_;  ///< being sent
 
-  std::shared_ptr<Job> job_;
-  std::shared_ptr<const std::string> line_;  ///< that is being sent
+  std::shared_ptr<JobWatch> job_;
+  std::shared_ptr<const std::string> line_;  ///< being sent
   bool head_sent_ = false;
 };
 

@@ -8,7 +8,7 @@
 #include <boost/asio/post.hpp>
 
 #include "base/clock.h"
-#include "daemon/server/crowd.h"
+#include "daemon/server/eviction.h"
 #include "daemon/server/http_connection.h"
 #include "daemon/server/viewer.h"
 
@@ -19,8 +19,7 @@ HttpContext::HttpContext(Api& daemon, HttpServerOptions wanted, HttpGate who, Co
       options(std::move(wanted)),
       gate(std::move(who)),
       console(std::move(files)),
-      workers(options.workers, options.waiting),
-      job_workers(options.jobs, options.waiting_jobs) {}
+      workers(options.workers, options.waiting) {}
 
 std::chrono::nanoseconds HttpContext::patience() const {
   return std::chrono::nanoseconds(static_cast<std::int64_t>(options.patience.value() * 1e9));
@@ -29,13 +28,13 @@ std::chrono::nanoseconds HttpContext::patience() const {
 bool HttpContext::make_room_for_a_connection() {
   if (connections.size() < options.connections) return true;
   std::vector<HttpConnection*> those;
-  std::vector<Guest> guests;
+  std::vector<Occupant> occupants;
   for (HttpConnection* one : connections) {
     if (one->standing() == HttpConnection::Standing::working) continue;
     those.push_back(one);
-    guests.push_back({one->peer(), static_cast<int>(one->standing()), one->since()});
+    occupants.push_back({one->peer(), static_cast<int>(one->standing()), one->since()});
   }
-  const auto leaves = who_leaves(guests);
+  const auto leaves = choose_evicted(occupants);
   if (leaves) those[*leaves]->close();
   return leaves.has_value();
 }
@@ -43,10 +42,10 @@ bool HttpContext::make_room_for_a_connection() {
 void HttpContext::make_room_for_a_viewer() {
   if (viewers.size() < options.viewers) return;
   const std::vector<Viewer*> those(viewers.begin(), viewers.end());
-  std::vector<Guest> guests;
-  guests.reserve(those.size());
-  for (const Viewer* one : those) guests.push_back({one->who(), one->spoke() ? 1 : 0, one->since()});
-  if (const auto leaves = who_leaves(guests)) those[*leaves]->make_room();
+  std::vector<Occupant> occupants;
+  occupants.reserve(those.size());
+  for (const Viewer* one : those) occupants.push_back({one->who(), one->spoke() ? 1 : 0, one->since()});
+  if (const auto leaves = choose_evicted(occupants)) those[*leaves]->make_room();
 }
 
 void HttpContext::wake() {
@@ -71,7 +70,7 @@ void HttpContext::tick_at(TimePoint at) {
   tick_due_ = at;
   tick_.expires_after(std::chrono::nanoseconds(std::max<std::int64_t>(0, at.ns - now.ns)));
   tick_.async_wait([this](boost::system::error_code error) {
-    if (error) return;  // an earlier one took its place
+    if (error) return;  // replaced by an earlier tick
     tick_due_.reset();
     serve_all();
   });

@@ -16,30 +16,30 @@
 #include "daemon/server/console_files.h"
 #include "daemon/server/http_request.h"
 #include "daemon/server/http_server.h"
-#include "daemon/server/job.h"
+#include "daemon/server/job_watch.h"
 #include "daemon/server/viewer_messages.h"
-#include "daemon/server/workers.h"
+#include "daemon/work/workers.h"
 
 namespace emberlock::daemon {
 
 class HttpConnection;
 class Viewer;
 
-/// What all connections share, and the loop that they run on. On the loop's thread alone, where not said
-/// otherwise.
+/// State shared by all connections, and the event loop that they run on. Only on the loop's thread, unless
+/// stated otherwise.
 struct HttpContext {
   HttpContext(Api& daemon, HttpServerOptions wanted, HttpGate who, ConsoleFiles files);
 
-  /// Something on the board changed. From any thread; returns at once.
+  /// Something on the board changed. Any thread; returns at once.
   void wake();
   /// Writes to a viewer what is new for it.
   void serve(Viewer& viewer);
   [[nodiscard]] std::chrono::nanoseconds patience() const;
-  /// Larger each time: who came, or was heard, when.
+  /// A rising counter that orders connections by their last activity.
   [[nodiscard]] std::uint64_t next_turn() { return ++turns_; }
-  /// Lets one connection go where there are as many as may be: crowd.h. False: each waits for its answer.
+  /// Closes a connection if the limit is reached: eviction.h. False: all of them wait for answers.
   [[nodiscard]] bool make_room_for_a_connection();
-  /// Likewise of viewers.
+  /// The same for viewers.
   void make_room_for_a_viewer();
 
   Api& api;
@@ -47,16 +47,15 @@ struct HttpContext {
   const HttpGate gate;
   const ConsoleFiles console;
   std::shared_ptr<boost::asio::ssl::context> tls;  ///< null: plain
-  ViewerMessages messages;                         ///< what viewers have in common is made once
+  ViewerMessages messages;                         ///< shared messages are made once for all viewers
   std::set<Viewer*> viewers;
   std::set<HttpConnection*> connections;
-  std::set<std::shared_ptr<Job>> jobs;  ///< that run
+  std::set<std::shared_ptr<JobWatch>> jobs;  ///< running jobs
   std::atomic<std::size_t> viewer_count = 0;
 
-  // In this order they may go: workers call the loop, the loop's connections all of the above.
+  // Destroyed in reverse order: workers use the loop, and its connections use all members above.
   boost::asio::io_context loop{1};
   Workers workers;
-  Workers job_workers;
 
  private:
   void serve_all();

@@ -36,7 +36,8 @@ std::optional<std::string> unescape(std::string_view text) {
   return plain;
 }
 
-/// The part before `separator`, which goes from `text` with it; all of it where there is none.
+/// The part before `separator`, which is removed from `text` together with it; all of `text` if there is
+/// none.
 std::string_view next_part(std::string_view& text, char separator) {
   const std::size_t end = std::min(text.find(separator), text.size());
   const std::string_view part = text.substr(0, end);
@@ -52,7 +53,7 @@ std::string_view without_port(std::string_view host) {
              : host;
 }
 
-/// Whether no foreign name can lead here by it: "localhost", or an address in numbers.
+/// Whether the host can't be a foreign name that leads here: "localhost", or a numeric address.
 bool needs_no_resolver(std::string_view host) {
   std::string name(without_port(host));
   if (name == "localhost") return true;
@@ -62,14 +63,14 @@ bool needs_no_resolver(std::string_view host) {
   return ::inet_pton(AF_INET, name.c_str(), &address) == 1;
 }
 
-/// Of the one scheme that is spoken here: a page that came by http:// from an address where TLS is spoken is
-/// somebody else's.
+/// Whether the page is our own. The scheme must match too: a page from http:// at an address that speaks TLS
+/// is foreign.
 bool own_page(std::string_view origin, std::string_view host, std::string_view scheme) {
   return origin.starts_with(scheme) && origin.substr(scheme.size()) == host;
 }
 
-/// Browsers send a host's cookies to each of its ports: daemons behind several ports of one name, or of
-/// tunnels, need a name each.
+/// Browsers send a host's cookies to all its ports, so daemons on several ports of one host (or of tunnels)
+/// need different names.
 std::string cookie_name(std::string_view host) {
   const std::string_view name = without_port(host);
   return name.size() == host.size() ? "emberlock_session"
@@ -85,25 +86,25 @@ std::string_view cookie_value(std::string_view cookies, std::string_view name) {
   return {};
 }
 
-HttpJudgement refused(Refusal refusal) {
-  HttpJudgement judgement;
-  judgement.refusal = refusal;
-  return judgement;
+HttpAccess refused(Refusal refusal) {
+  HttpAccess access;
+  access.refusal = refusal;
+  return access;
 }
 
-HttpJudgement welcome(std::string who, std::string cookie = {}) {
-  HttpJudgement judgement;
-  judgement.verdict = HttpVerdict::welcome;
-  judgement.who = std::move(who);
-  judgement.cookie = std::move(cookie);
-  return judgement;
+HttpAccess granted(std::string who, std::string cookie = {}) {
+  HttpAccess access;
+  access.verdict = HttpVerdict::granted;
+  access.who = std::move(who);
+  access.cookie = std::move(cookie);
+  return access;
 }
 
-HttpJudgement give_cookie(std::string cookie) {
-  HttpJudgement judgement;
-  judgement.verdict = HttpVerdict::give_cookie;
-  judgement.cookie = std::move(cookie);
-  return judgement;
+HttpAccess give_cookie(std::string cookie) {
+  HttpAccess access;
+  access.verdict = HttpVerdict::give_cookie;
+  access.cookie = std::move(cookie);
+  return access;
 }
 
 }  // namespace
@@ -128,20 +129,20 @@ std::string token_of_form(std::string_view body) {
   return parsed ? parsed->token : std::string();
 }
 
-HttpJudgement HttpGate::judge(const HttpHead& head, const HttpTarget& target, TimePoint now) const {
+HttpAccess HttpGate::authorize(const HttpHead& head, const HttpTarget& target, TimePoint now) const {
   const std::string_view scheme = transport_ == Transport::tls ? "https://" : "http://";
   if (!head.origin.empty() && !own_page(head.origin, head.host, scheme))
     return refused(Refusal::foreign_origin);
-  // Beyond this machine a foreign name gains nothing: it is sent no cookie.
+  // With TLS a foreign name is harmless: browsers send it no cookie.
   if (transport_ == Transport::plain && !needs_no_resolver(head.host)) return refused(Refusal::foreign_host);
   if (head.authorization.starts_with(kBearer)) {
     const bool right = token_ && token_->matches(head.authorization.substr(kBearer.size()));
-    return right ? welcome("token") : refused(Refusal::wrong_token);
+    return right ? granted("token") : refused(Refusal::wrong_token);
   }
-  // A link that a browser of ours follows again, by its "back", does no harm.
+  // If a browser with a session opens its link again (with its Back button), that is harmless.
   const std::string_view cookie = cookie_value(head.cookie, cookie_name(head.host));
   if (const auto session = sessions_->find(cookie, now))
-    return welcome(fmt::format("session {}", *session), cookie_of(cookie, head.host));
+    return granted(fmt::format("session {}", *session), cookie_of(cookie, head.host));
   if (!target.token.empty()) {
     auto given = cookie_for_token(target.token, head.host, now);
     return given ? give_cookie(std::move(*given)) : refused(Refusal::wrong_token);

@@ -11,21 +11,21 @@
 #include "daemon/server/console_sessions.h"
 #include "rig/access.h"
 
-// What is decided of an HTTP request by its head alone.
+// Decisions about an HTTP request that need only its head.
 namespace emberlock::daemon {
 
-/// Of a request for "/path?token=T" or "/open?link=L".
+/// The target of a request for "/path?token=T" or "/open?link=L".
 struct HttpTarget {
-  std::string path;   ///< begins with a slash; as sent, as no name of ours needs escapes
-  std::string token;  ///< of the query; empty: none
+  std::string path;   ///< begins with a slash; not decoded, because none of our names needs escapes
+  std::string token;  ///< from the query; empty: none
   std::string link;   ///< likewise
 };
-/// Absent: no such request is answered (absolute URLs, spaces and control characters, escapes that are none).
+/// nullopt for targets that aren't answered (absolute URLs, spaces and control characters, invalid escapes).
 std::optional<HttpTarget> parse_target(std::string_view target);
-/// What a form of ours sends as its body: "token=T". Empty: nothing that is a token.
+/// The token in the body of our form: "token=T". Empty if there is none.
 std::string token_of_form(std::string_view body);
 
-/// The headers that say which page a request comes from, and who sends it. Empty: not sent.
+/// The headers that identify the page and the client of a request. Empty: not sent.
 struct HttpHead {
   std::string_view host;
   std::string_view origin;
@@ -34,41 +34,41 @@ struct HttpHead {
 };
 
 enum class HttpVerdict {
-  welcome,
-  give_cookie,  ///< the address holds what is right: from now on a cookie says so, and addresses hold no
+  granted,
+  give_cookie,  ///< the URL contains a valid secret: it is replaced by a cookie, so that the URL holds no
                 ///< secret
   refused,
 };
-struct HttpJudgement {
+struct HttpAccess {
   HttpVerdict verdict = HttpVerdict::refused;
-  Refusal refusal = Refusal::nothing_shown;  ///< of refused
-  std::string who = {};                      ///< of welcome: "token", or "session 3"
-  /// The value of Set-Cookie: of give_cookie; of a welcome by a session, to be set again on the console's
-  /// page.
+  Refusal refusal = Refusal::nothing_shown;  ///< valid if refused
+  std::string who = {};                      ///< valid if granted: "token", or "session 3"
+  /// The value of Set-Cookie: for give_cookie; for a session that was granted access, to be renewed with the
+  /// console's page.
   std::string cookie = {};
 };
 
-/// Who may ask: who shows the token, as "Authorization: Bearer T" or once as ?token=T, and whose browser
-/// followed a link (console_sessions.h); browsers then show the cookie of their session.
+/// Decides who gets access: clients with the token, as "Authorization: Bearer T" or once as ?token=T, and
+/// browsers that opened a link (console_sessions.h), which then send the cookie of their session.
 class HttpGate {
  public:
   enum class Transport {
-    plain,  ///< of this machine alone: by its numbers or "localhost", no other name
+    plain,  ///< local only: by numeric address or "localhost", no other name
     tls,
   };
-  /// `token` absent: there is none that lets in. `sessions` is never null.
+  /// `token` absent: no token gives access. `sessions` must not be null.
   HttpGate(std::optional<rig::Token> token, std::shared_ptr<ConsoleSessions> sessions,
            Transport transport = Transport::plain)
       : token_(std::move(token)), sessions_(std::move(sessions)), transport_(transport) {}
 
-  /// A link that is right is followed by it: it opens nothing a second time.
-  [[nodiscard]] HttpJudgement judge(const HttpHead& head, const HttpTarget& target, TimePoint now) const;
-  /// The value of Set-Cookie for a token that is right; absent: it isn't.
+  /// A valid link is used up: it isn't accepted a second time.
+  [[nodiscard]] HttpAccess authorize(const HttpHead& head, const HttpTarget& target, TimePoint now) const;
+  /// The value of Set-Cookie for a valid token; nullopt for a wrong one.
   [[nodiscard]] std::optional<std::string> cookie_for_token(std::string_view shown, std::string_view host,
                                                             TimePoint now) const;
-  /// The value of Set-Cookie by which a browser forgets a session that ended.
+  /// The value of Set-Cookie that deletes the cookie of an ended session.
   [[nodiscard]] static std::string no_cookie(std::string_view host);
-  /// Whether there is a token that lets in.
+  /// Whether there is a token.
   [[nodiscard]] bool has_token() const { return token_.has_value(); }
 
  private:

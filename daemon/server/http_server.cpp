@@ -48,7 +48,7 @@ Status listen_at(tcp::acceptor& acceptor, const tcp::endpoint& endpoint) {
                "choose another port, or stop who has it"};
 }
 
-/// Where a browser finds it: a server that listens everywhere, by this machine's name.
+/// The address for a browser; a server that listens on all addresses is reached by this machine's name.
 std::string browser_url(const asio::ip::address& address, int port, std::string_view scheme) {
   boost::system::error_code unknown;
   std::string host = address.is_unspecified() ? asio::ip::host_name(unknown) : address.to_string();
@@ -85,7 +85,7 @@ void HttpServer::Parts::accept() {
   acceptor.async_accept([this](boost::system::error_code error, tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
     if (error) {
-      // No file descriptor is free: one will be.
+      // No file descriptor is free: try again later.
       pause.expires_after(std::chrono::milliseconds(100));
       return pause.async_wait([this](boost::system::error_code ended) {
         if (!ended) accept();
@@ -135,7 +135,7 @@ HttpServer::~HttpServer() {
   parts_->subscription = {};
   parts_->context.loop.stop();
   parts_->thread.join();
-  for (const auto& job : parts_->context.jobs) job->cancel();
+  for (const auto& job : parts_->context.jobs) job->leave();
 }
 
 int HttpServer::port() const { return parts_->port; }

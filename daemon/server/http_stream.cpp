@@ -18,7 +18,7 @@ Result<std::shared_ptr<asio::ssl::context>> make_tls_context(const rig::ServerTl
   if (!error && !tls.clients.empty()) {
     context->add_certificate_authority(asio::buffer(tls.clients), error);
     context->set_verify_mode(asio::ssl::verify_peer | asio::ssl::verify_fail_if_no_peer_cert);
-    // Else OpenSSL takes up no session again of a client that it has verified.
+    // Required: otherwise OpenSSL doesn't resume sessions of clients with certificates.
     constexpr unsigned char kName[] = "emberlock";
     SSL_CTX_set_session_id_context(native, kName, sizeof kName);
   }

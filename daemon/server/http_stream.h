@@ -19,11 +19,11 @@
 
 namespace emberlock::daemon {
 
-/// How `tls` is spoken, from TLS 1.2 on. Error bad_input: OpenSSL won't have it.
+/// The OpenSSL settings for `tls`, TLS 1.2 or later. Error bad_input: OpenSSL refuses them.
 Result<std::shared_ptr<boost::asio::ssl::context>> make_tls_context(const rig::ServerTls& tls);
 
-/// A connection of the console's, in plain or over TLS: a stream as Boost.Asio and Beast want one, so that
-/// what stands on it needn't know. Its next layer is the TCP stream, which has the deadlines.
+/// A TCP or TLS connection behind one type that satisfies Boost.Asio's and Beast's stream concepts, so that
+/// its users are independent of TLS. Its next layer is the TCP stream, which has the deadlines.
 class HttpStream {
  public:
   using Tcp = boost::beast::tcp_stream;
@@ -31,7 +31,7 @@ class HttpStream {
   using executor_type = Tcp::executor_type;
   using next_layer_type = Tcp;
 
-  /// `tls` null: plain. It must outlive the stream.
+  /// `tls` null: plain TCP. It must outlive the stream.
   HttpStream(boost::asio::ip::tcp::socket socket, boost::asio::ssl::context* tls)
       : stream_(tls == nullptr ? Either(std::in_place_type<Tcp>, std::move(socket))
                                : Either(std::in_place_type<Tls>, Tcp(std::move(socket)), *tls)) {}
@@ -56,13 +56,13 @@ class HttpStream {
         stream_);
   }
 
-  /// Begins as the server. Of TLS alone.
+  /// The server's TLS handshake. Only with TLS.
   template <class Handler>
   void async_handshake(Handler&& handler) {
     std::get<Tls>(stream_).async_handshake(boost::asio::ssl::stream_base::server,
                                            std::forward<Handler>(handler));
   }
-  /// Tells the other side that no more comes, and hears the same of it.
+  /// Closes the stream in both directions.
   template <class Handler>
   void async_shutdown(Handler&& handler) {
     if (Tls* const tls = std::get_if<Tls>(&stream_))
@@ -73,7 +73,7 @@ class HttpStream {
                       [handler = std::forward<Handler>(handler), error]() mutable { handler(error); });
   }
 
-  /// As a WebSocket ends.
+  /// Required by WebSocket.
   friend void teardown(boost::beast::role_type role, HttpStream& stream, boost::beast::error_code& error) {
     std::visit(
         [&](auto& inner) {

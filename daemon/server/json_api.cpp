@@ -45,15 +45,12 @@ Result<std::string> get_status(Api& api, const std::string& body) {
   return to_json(*api.board().status());
 }
 template <auto ask, class Request>
-Result<std::function<Status(const JobObserver&)>> job_with(Api& api, const std::string& body) {
+Result<BeginJob> job_with(Api& api, const std::string& body) {
   EMBERLOCK_ASSIGN_OR_RETURN(Request request, parse<Request>(body));
-  return std::function<Status(const JobObserver&)>(
-      [&api, request = std::move(request)](const JobObserver& observer) {
-        return (api.*ask)(request, observer);
-      });
+  return BeginJob([&api, request = std::move(request)] { return (api.*ask)(request); });
 }
 
-constexpr std::array<JsonMethod, 16> kMethods{{
+constexpr std::array<JsonMethod, 17> kMethods{{
     {"Daemon/GetStatus", get_status, nullptr},
     {"Daemon/Acknowledge", call_with<&Api::acknowledge, v1::AcknowledgeRequest>, nullptr},
     {"Devices/List", call_plain<&Api::list_devices>, nullptr},
@@ -68,6 +65,7 @@ constexpr std::array<JsonMethod, 16> kMethods{{
     {"Sessions/Verify", nullptr, job_with<&Api::verify_session, v1::SessionRequest>},
     {"Sessions/Repair", nullptr, job_with<&Api::repair_session, v1::SessionRequest>},
     {"Sessions/Export", nullptr, job_with<&Api::export_session, v1::ExportRequest>},
+    {"Jobs/Cancel", call_with<&Api::cancel_job, v1::CancelJobRequest>, nullptr},
     {"Reconstruct/Start", call_with<&Api::reconstruct, v1::ReconstructRequest>, nullptr},
     {"Reconstruct/Cancel", call_plain<&Api::cancel_reconstruction>, nullptr},
 }};
@@ -85,7 +83,7 @@ std::string to_json(const google::protobuf::Message& message) {
   google::protobuf::util::JsonPrintOptions options;
   options.preserve_proto_field_names = true;
   std::string json;
-  // Fails only for types that hold others unseen (Any), which none of ours does.
+  // Fails only for types with opaque content (Any), of which we have none.
   (void)google::protobuf::util::MessageToJsonString(message, &json, options);
   return json;
 }

@@ -22,7 +22,7 @@
 namespace emberlock::daemon {
 namespace {
 
-/// Labels as they stand between braces: camera="CAM 1",fate="delivered".
+/// Labels as written between braces: camera="CAM 1",fate="delivered".
 using Labels = std::vector<std::pair<std::string_view, std::string>>;
 
 std::string escaped(std::string_view value) {
@@ -37,7 +37,7 @@ std::string escaped(std::string_view value) {
   return text;
 }
 
-/// Families in the order in which they were begun, each with its words once.
+/// Metric families in the order of their first sample, each with its help text once.
 class Exposition {
  public:
   void family(std::string_view name, std::string_view type, std::string_view help) {
@@ -60,7 +60,7 @@ class Exposition {
     family(name, type, help);
     sample(value);
   }
-  /// Of an enumeration one sample a value, 1 for the one that holds.
+  /// One sample for each value of an enumeration; 1 for the current one.
   template <class Enum>
   void states(Enum current, const Labels& labels = {}) {
     const google::protobuf::EnumDescriptor* all = google::protobuf::GetEnumDescriptor<Enum>();
@@ -219,7 +219,7 @@ void show_process(Exposition& out, const ProcessUsage& process) {
 }
 
 double start_time(const std::vector<std::string>& stat_fields) {
-  constexpr std::size_t kStartField = 19;  // of /proc/self/stat, counted from the state on
+  constexpr std::size_t kStartField = 19;  // of /proc/self/stat, counted from the state field
   if (stat_fields.size() <= kStartField) return 0;
   std::ifstream stat("/proc/stat");
   for (std::string word; stat >> word;) {
@@ -248,7 +248,7 @@ ProcessUsage process_usage() {
   std::string line;
   std::ifstream stat("/proc/self/stat");
   std::getline(stat, line);
-  // The name of the program stands in brackets, and may hold anything.
+  // The program's name is in parentheses and may contain any characters.
   std::istringstream rest(line.substr(std::min(line.rfind(')') + 2, line.size())));
   std::vector<std::string> fields;
   for (std::string field; rest >> field;) fields.push_back(field);

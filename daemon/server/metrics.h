@@ -12,24 +12,24 @@
 
 namespace emberlock::daemon {
 
-/// What the operating system counts of this process.
+/// Resource usage of this process, by the operating system.
 struct ProcessUsage {
   double cpu_s = 0;
   std::uint64_t resident_bytes = 0;
   std::size_t open_files = 0;
   double start_s = 0;  ///< since 1970-01-01 UTC
 };
-/// What can't be read is 0.
+/// Values that can't be read are 0.
 ProcessUsage process_usage();
 
-/// Of those who ask.
+/// Counts of the clients.
 struct ClientCounts {
   std::size_t viewers = 0;                                                   ///< consoles
   std::size_t other_watchers = 0;                                            ///< gRPC's streams
-  std::map<std::string, std::array<std::uint64_t, kRefusals>> refused = {};  ///< as AuthFailures::counts
+  std::map<std::string, std::array<std::uint64_t, kRefusals>> refused = {};  ///< see AuthFailures::counts
 };
 
-/// All of it in Prometheus' text format, version 0.0.4.
+/// All metrics in Prometheus' text format, version 0.0.4.
 std::string metrics_text(const v1::DaemonStatus& status, const ProcessUsage& process,
                          const ClientCounts& clients);
 

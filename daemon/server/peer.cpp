@@ -38,8 +38,8 @@ void write_end(__be16& port, __be32 (&address)[4], const tcp::endpoint& end) {
   }
 }
 
-/// The user of the socket from `local` to `remote`, both on this machine, as sock_diag(7) tells it. Absent:
-/// there is none, or the kernel doesn't say.
+/// The user who owns the socket from `local` to `remote`, both on this machine, by sock_diag(7). nullopt:
+/// there is no such socket, or the kernel doesn't report it.
 std::optional<uid_t> user_of(const tcp::endpoint& local, const tcp::endpoint& remote) {
   const UniqueFd netlink(::socket(AF_NETLINK, SOCK_RAW | SOCK_CLOEXEC, NETLINK_SOCK_DIAG));
   if (!netlink) return std::nullopt;
@@ -54,19 +54,19 @@ std::optional<uid_t> user_of(const tcp::endpoint& local, const tcp::endpoint& re
   id.idiag_cookie[0] = id.idiag_cookie[1] = INET_DIAG_NOCOOKIE;
   if (::send(netlink.get(), &question, sizeof question, 0) != sizeof question) return std::nullopt;
   alignas(nlmsghdr) char answer[4096];
-  // The kernel has answered when send() returns.
+  // The kernel has answered by the time send() returns.
   const ssize_t got = ::recv(netlink.get(), answer, sizeof answer, MSG_DONTWAIT);
   nlmsghdr head{};
   inet_diag_msg told{};
   if (got < static_cast<ssize_t>(NLMSG_LENGTH(sizeof told))) return std::nullopt;
   std::memcpy(&head, answer, sizeof head);
   std::memcpy(&told, answer + NLMSG_HDRLEN, sizeof told);
-  // A socket that its program closed has no user any more, and would count as root's.
+  // A closed socket has no user any more, and would be taken for root's.
   if (head.nlmsg_type != SOCK_DIAG_BY_FAMILY || told.idiag_inode == 0) return std::nullopt;
   return told.idiag_uid;
 }
 
-/// IPv4 as itself, however it was accepted.
+/// Converts mapped IPv4 addresses to plain ones.
 tcp::endpoint plain(const tcp::endpoint& end) {
   if (!end.address().is_v6() || !end.address().to_v6().is_v4_mapped()) return end;
   return {asio::ip::make_address_v4(asio::ip::v4_mapped, end.address().to_v6()), end.port()};

@@ -15,9 +15,9 @@
 namespace emberlock::daemon {
 namespace {
 
-constexpr double kEarly = 0.2;  // periods before it is due that a frame is taken: cameras jitter
+constexpr double kEarly = 0.2;  // periods by which a frame may be early, because cameras jitter
 
-/// Each 2 x 2 of a mosaic becomes a pixel: half the size, and no colour that isn't there.
+/// Each 2 x 2 cell of a mosaic becomes a pixel: half the size, without interpolated colours.
 template <class Sample>
 cv::Mat half_of_mosaic(const ImageView& mosaic) {
   cv::Mat colour(mosaic.height() / 2, mosaic.width() / 2, CV_MAKETYPE(cv::DataType<Sample>::depth, 3));
@@ -38,7 +38,7 @@ cv::Mat pixels_of(const ImageView& image) {
   const bool deep = bytes_per_sample(image.layout.format) == 2;
   if (is_bayer(image.layout.format))
     return deep ? half_of_mosaic<std::uint16_t>(image) : half_of_mosaic<std::uint8_t>(image);
-  // OpenCV only reads through it.
+  // OpenCV doesn't write to it.
   auto* const bytes = const_cast<std::byte*>(image.data);  // NOLINT(cppcoreguidelines-pro-type-const-cast)
   return {image.height(), image.width(), CV_MAKETYPE(deep ? CV_16U : CV_8U, channels(image.layout.format)),
           bytes, image.stride};
@@ -108,7 +108,7 @@ void Pictures::offer(const std::string& camera_id, const Frame& frame) {
   changed_.notify_one();
 }
 
-/// The camera whose picture is due longest; null: none has a new frame.
+/// The camera whose picture has been due for longest; null if none has a new frame.
 Pictures::Camera* Pictures::next(TimePoint now, std::string& id) {
   Camera* longest = nullptr;
   for (auto& [camera_id, camera] : cameras_) {

@@ -16,14 +16,14 @@
 namespace emberlock::daemon {
 
 struct PicturesOptions {
-  int width = 480;   ///< pixels at most; height follows
-  Hertz rate{12};    ///< of each camera at most, up to 15
-  int quality = 75;  ///< JPEG's, 1..100
+  int width = 480;   ///< maximum in pixels; the height follows
+  Hertz rate{12};    ///< maximum per camera, up to 15
+  int quality = 75;  ///< JPEG quality, 1..100
 };
 
-/// Small JPEGs of what cameras film, on the board while anybody wants them. Each frame is made into one at
-/// most, for all watchers, by one thread that takes the newest of each camera in turn: if it can't keep up,
-/// pictures come less often.
+/// Small JPEGs of the cameras' frames, put on the board while anyone wants them. Each frame is encoded at
+/// most once for all watchers, by one thread that takes the newest frame of each camera in turn; if it is too
+/// slow, pictures come less often.
 class Pictures {
  public:
   static constexpr Hertz kFastest{15};
@@ -33,12 +33,12 @@ class Pictures {
   Pictures& operator=(const Pictures&) = delete;
   ~Pictures();
 
-  /// The camera's newest frame. From any thread; returns at once, and holds on to the frame's pixels a while.
+  /// The camera's newest frame. Any thread; returns at once, and keeps the frame's pixels for a while.
   void offer(const std::string& camera_id, const Frame& frame);
 
  private:
   struct Camera {
-    Frame newest;   ///< without an image: none since the last
+    Frame newest;   ///< without an image if there is no new frame
     TimePoint due;  ///< of the next picture
   };
   void make();
@@ -54,7 +54,7 @@ class Pictures {
   std::thread thread_;
 };
 
-/// A frame as a JPEG of at most `width` pixels a row: grey as grey, Bayer mosaics and RGB in colour, deep
+/// Encodes a frame as a JPEG of at most `width` columns: grey as grey, Bayer mosaics and RGB in colour, deep
 /// samples by their upper eight bits. Error bad_input: an image without pixels.
 Result<v1::Picture> make_picture(const std::string& camera_id, const Frame& frame,
                                  const PicturesOptions& options);

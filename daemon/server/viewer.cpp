@@ -18,13 +18,13 @@ namespace {
 namespace beast = boost::beast;
 namespace websocket = beast::websocket;
 
-/// What the kernel takes for a viewer before it takes no more: little, so that a slow line shows what is new
-/// rather than what has queued.
+/// Limit of the kernel's send buffer for a viewer. Small, so that a slow connection shows new data rather
+/// than queued data.
 constexpr int kKernelBytes = 256 << 10;
 constexpr int kUnsentBytes = 64 << 10;
 
-constexpr std::uint16_t kMadeRoom = 4001;  // a WebSocket's reason to close, of those that programs may choose
-constexpr std::chrono::seconds kFarewell{1};  // for the other side to say it too
+constexpr std::uint16_t kMadeRoom = 4001;     // a WebSocket close code from the range for applications
+constexpr std::chrono::seconds kFarewell{1};  // for the other side to close too
 
 void keep_kernel_queue_short(int socket) {
   (void)::setsockopt(socket, SOL_SOCKET, SO_SNDBUF, &kKernelBytes, sizeof(kKernelBytes));
@@ -57,7 +57,7 @@ void Viewer::leave() {
 }
 
 void Viewer::run(Request request) {
-  beast::get_lowest_layer(socket_).expires_never();  // it has deadlines of its own
+  beast::get_lowest_layer(socket_).expires_never();  // the WebSocket has deadlines of its own
   websocket::stream_base::timeout deadlines{};
   deadlines.handshake_timeout = context_.patience();
   deadlines.idle_timeout = context_.patience();
@@ -84,7 +84,7 @@ void Viewer::make_room() {
   leave();
   open_ = false;
   pictures_.reset();
-  // One that takes nothing hears no farewell either.
+  // A client that doesn't read won't get a close message either.
   if (in_flight_ || request_) return beast::get_lowest_layer(socket_).close();
   farewell_.expires_after(kFarewell);
   farewell_.async_wait([self = shared_from_this()](beast::error_code /*error*/) { self->close(); });
@@ -103,7 +103,7 @@ void Viewer::hear(std::size_t bytes) {
   const std::string_view text(static_cast<const char*>(heard_.data().data()), bytes);
   const auto wish = parse_wish(text);
   heard_.consume(heard_.size());
-  if (!counted_) return read();  // it makes room, and waits for the other side's farewell
+  if (!counted_) return read();  // evicted; waits for the other side's close message
   if (!wish || !socket_.got_text()) {
     open_ = false;
     return socket_.async_close({websocket::close_code::policy_error, "no such message"},
@@ -111,7 +111,7 @@ void Viewer::hear(std::size_t bytes) {
   }
   spoke_ = true;
   since_ = context_.next_turn();
-  // The new feed is there before the old one goes, so that pictures go on being made.
+  // The new feed is created before the old one is destroyed, so that pictures continue to be made.
   pictures_ = *wish ? std::make_unique<PictureFeed>(context_.api.board(), **wish) : nullptr;
   context_.serve(*this);
   read();

@@ -18,28 +18,28 @@
 
 namespace emberlock::daemon {
 
-/// One console's WebSocket: one write in flight, and for the next the newest of what it hasn't seen. A
-/// console that doesn't read stands still alone, and is gone when it gives no sign of life. On the server's
+/// The WebSocket of a console: one write at a time, always the newest data that it hasn't seen. A console
+/// that doesn't read delays only itself, and is disconnected when it shows no sign of life. On the server's
 /// thread.
 class Viewer : public std::enable_shared_from_this<Viewer> {
  public:
   using Request = boost::beast::http::request<boost::beast::http::string_body>;
 
-  /// `who` was let in.
+  /// `who` is the authenticated client.
   Viewer(HttpContext& context, std::string who, HttpStream stream);
   Viewer(const Viewer&) = delete;
   Viewer& operator=(const Viewer&) = delete;
   ~Viewer();
 
-  /// Answers the request for it and serves until the console goes.
+  /// Accepts the WebSocket request and serves until the console disconnects.
   void run(Request request);
-  /// Something may be new. Returns when it wants to be asked again without that, if so.
+  /// Something may be new. Returns when it must be called again without a change, if at all.
   std::optional<TimePoint> write(TimePoint now);
   void close();
-  /// Ends it for another, and says so: a console then doesn't come back by itself.
+  /// Closes it because it was evicted, and says so: the console then doesn't reconnect by itself.
   void make_room();
   [[nodiscard]] const std::string& who() const { return who_; }
-  /// Whether it ever said what it wants to see, as each console does, and which came when: larger is later.
+  /// Whether it has sent its wishes, as each console does; and its order of arrival: larger is later.
   [[nodiscard]] bool spoke() const { return spoke_; }
   [[nodiscard]] std::uint64_t since() const { return since_; }
 
@@ -59,15 +59,15 @@ class Viewer : public std::enable_shared_from_this<Viewer> {
   boost::beast::websocket::stream<HttpStream> socket_;
   boost::beast::flat_buffer heard_;
   std::shared_ptr<const Request> request_;
-  ViewerMessages::Shared in_flight_;  ///< null: none
+  ViewerMessages::Shared in_flight_;  ///< null: nothing is being sent
   bool open_ = false;
 
   HistoryFeed history_;
   StatusFeed status_;
   NoticeFeed notices_;
   IterationFeed iterations_;
-  std::unique_ptr<PictureFeed> pictures_;              ///< null: none are wanted
-  std::deque<ViewerMessages::Shared> iteration_rest_;  ///< of the iteration that is being sent
+  std::unique_ptr<PictureFeed> pictures_;              ///< null: no pictures are wanted
+  std::deque<ViewerMessages::Shared> iteration_rest_;  ///< remaining messages of the current iteration
 };
 
 }  // namespace emberlock::daemon

@@ -10,7 +10,7 @@
 
 namespace emberlock::daemon {
 
-/// The messages of what was shown last, made once for all viewers. Not thread-safe.
+/// The latest messages, made once for all viewers. Not thread-safe.
 class ViewerMessages {
  public:
   using Shared = std::shared_ptr<const WatchMessage>;
@@ -19,7 +19,7 @@ class ViewerMessages {
   Shared history_of(const std::shared_ptr<const v1::DaemonStatus>& status);
   Shared of(const std::shared_ptr<const v1::Picture>& picture);
   std::vector<Shared> of(const std::shared_ptr<const v1::IterationPreview>& preview);
-  /// Nobody watches: nothing is kept.
+  /// Call it when nobody watches, to free the memory.
   void forget() { *this = {}; }
 
  private:

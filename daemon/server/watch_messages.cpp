@@ -81,7 +81,8 @@ std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview) {
 Result<std::optional<v1::WatchPicturesRequest>> parse_wish(std::string_view text) {
   const Error unknown{ErrorKind::bad_input, "no such message", "WebSocket",
                       R"(send {"watch": {"camera_ids": [...], "rate_hz": 12}} or {"watch": null})"};
-  EMBERLOCK_RETURN_IF_ERROR(check_json_nesting(text, "WebSocket"));  // it is written out again below
+  EMBERLOCK_RETURN_IF_ERROR(
+      check_json_nesting(text, "WebSocket"));  // because it is written to JSON again below
   const auto json = nlohmann::json::parse(text, nullptr, false);
   if (!json.is_object() || json.size() != 1 || !json.contains("watch")) return unknown;
   const nlohmann::json& watch = json["watch"];

@@ -11,13 +11,11 @@
 #include "emberlock/v1/services.pb.h"
 #include "emberlock/v1/status.pb.h"
 
-// What goes over the console's WebSocket. From the daemon, as text: {"rounds": AlignmentStatus with its
-// history alone} at the beginning and when that changed, {"status": DaemonStatus without it}, {"notice":
-// Notice},
-// {"iteration": IterationPreview without bytes}; as binary, what has bytes: the length of a header (u32,
-// little-endian), the header, which is JSON with a "kind", then the bytes. From the console, as text:
-// {"watch": WatchPicturesRequest}, or
-// {"watch": null} for no pictures.
+// Messages of the console's WebSocket. From the daemon, as text: {"rounds": AlignmentStatus with only its
+// history} at the beginning and when that changed, {"status": DaemonStatus without it}, {"notice": Notice},
+// {"iteration": IterationPreview without bytes}. Binary messages carry bytes: the length of a header (u32,
+// little-endian), the header (JSON with a "kind"), then the bytes. From the console, as text: {"watch":
+// WatchPicturesRequest}, or {"watch": null} for no pictures.
 namespace emberlock::daemon {
 
 struct WatchMessage {
@@ -31,12 +29,12 @@ WatchMessage history_message(const v1::DaemonStatus& status);
 WatchMessage watch_message(const v1::Notice& notice);
 /// {"kind": "picture", "camera_id", "frame_id", "monotonic_ns", "width", "height"} and the JPEG.
 WatchMessage watch_message(const v1::Picture& picture);
-/// The numbers, then what it has of {"kind": "captured" | "rendered", "reconstruction", "iteration",
-/// "camera_id"} with a JPEG, and {"kind": "volume", "reconstruction", "iteration", "nx", "ny", "nz", "box",
-/// "brightest"} with the voxels.
+/// The numbers; then those that exist of {"kind": "captured"
+/// "rendered", "reconstruction", "iteration", "camera_id"} with a JPEG, and {"kind": "volume",
+/// "reconstruction", "iteration", "nx", "ny", "nz", "box", "brightest"} with the voxels.
 std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview);
 
-/// What a console's message wants: which pictures, or none. Error bad_input: it is no such message.
+/// The pictures that a console's message asks for, or none. Error bad_input: not such a message.
 Result<std::optional<v1::WatchPicturesRequest>> parse_wish(std::string_view text);
 
 }  // namespace emberlock::daemon

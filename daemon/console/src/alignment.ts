@@ -3,7 +3,7 @@
 import type {AlignmentCost, AlignmentOffer, AlignmentStatus, DaemonStatus} from './api.gen';
 import {act, TwoStep} from './act';
 import {el, set, setText, show} from './dom';
-import {count, fixed, known, plural, short, span} from './format';
+import {count, fixed, known, plural, short, span, tolerance as toleranceWords} from './format';
 import {Plot} from './plot';
 import {call} from './wire';
 
@@ -18,9 +18,12 @@ export function costWords(cost: AlignmentCost): string {
 export class Alignment {
   private readonly tolerance = el('input', {id: 'tolerance', name: 'tolerance', size: 9, placeholder: 'default', spellcheck: false, autocomplete: 'off',
                                             'aria-describedby': 'tolerance-help'});
+  private readonly speed = el('input', {name: 'flame_speed', type: 'number', min: 0.001, step: 'any', inputmode: 'decimal', placeholder: 'm/s'});
+  private readonly detail = el('input', {name: 'detail', type: 'number', min: 0.001, step: 'any', inputmode: 'decimal', placeholder: 'mm'});
+  private readonly flame = el('p', {class: 'note flame'});
   private readonly policy = el('select', {id: 'policy', name: 'policy'}, ...policies.map(name => el('option', {value: name}, name || 'default')));
   private readonly start = el('button', {class: 'primary', type: 'submit'}, 'Align');
-  private readonly stop = el('button', {class: 'quiet', type: 'button', onclick: () => this.stopping.press()}, 'Stop');
+  readonly stop = el('button', {class: 'quiet stop', type: 'button', onclick: () => this.stopping.press()}, 'Stop');
   private readonly stopping = new TwoStep(this.stop, armed => (armed ? 'Press again to stop' : 'Stop'), () => void act(call('Sync/Stop')));
   private readonly verdict = el('p', {class: 'verdict', role: 'status'});
   private readonly numbers = el('dl', {class: 'numbers'});
@@ -34,7 +37,9 @@ export class Alignment {
   constructor() {
     const form = el('form', {class: 'orders', onsubmit: (event: Event) => { event.preventDefault(); this.align({}); }},
       el('label', {}, el('span', {}, 'Tolerance'), this.tolerance), el('label', {}, el('span', {}, 'Policy'), this.policy), this.start, this.stop,
-      el('span', {id: 'tolerance-help', class: 'hidden'}, 'For example 100rows or 5.4ms'));
+      el('span', {id: 'tolerance-help', class: 'hidden'}, 'For example 0.5ms or 10rows; empty: as configured, else as the flame needs it'),
+      el('details', {}, el('summary', {}, 'The flame'),
+        el('div', {class: 'options'}, el('label', {}, el('span', {}, 'Fastest motion, m/s'), this.speed), el('label', {}, el('span', {}, 'Smallest detail, mm'), this.detail)), this.flame));
     this.root = el('section', {id: 'alignment', class: 'panel', 'aria-labelledby': 'alignment-title'},
       el('h2', {id: 'alignment-title'}, 'Alignment'), form, this.verdict, this.offers, this.numbers, this.plot.root, this.cost);
     show(this.plot.root, false);
@@ -54,6 +59,12 @@ export class Alignment {
     }
     set(this.verdict, 'data-verdict', a.verdict);
     setText(this.verdict, [verdicts[a.verdict] && `${verdicts[a.verdict][0]!.toUpperCase()}${verdicts[a.verdict].slice(1)}.`, a.reason].filter(Boolean).join(' '));
+    this.tolerance.placeholder = a.flame_speed_m_s > 0 ? `${fixed(a.tolerance_s * 1e3, 2)} ms` : '';
+    if (a.flame_speed_m_s > 0) {
+      this.speed.placeholder = `${a.flame_speed_m_s}`;
+      this.detail.placeholder = `${1000 * a.detail_m}`;
+    }
+    setText(this.flame, a.flame_speed_m_s > 0 ? `At ${a.flame_speed_m_s} m/s, two cameras ${short(2 * a.tolerance_s)} apart see ${fixed(1000 * a.detail_m, 1)} mm displaced by half.` : '');
     this.showNumbers(a);
     this.showOffers(a, this.start.disabled);
     setText(this.cost, a.cost ? `Foretold: ${costWords(a.cost)}` : '');
@@ -69,15 +80,16 @@ export class Alignment {
   private align(request: {tolerance?: string; policy?: string; anyway?: boolean}): void {
     const tolerance = this.tolerance.value.trim();
     void act(call('Sync/Align', {
-      tolerance: request.tolerance ?? (/^\d+(\.\d+)?$/.test(tolerance) ? `${tolerance}rows` : tolerance.replaceAll(' ', '')),
+      tolerance: request.tolerance ?? (/^\d+(\.\d+)?$/.test(tolerance) ? `${tolerance}ms` : tolerance.replaceAll(' ', '')),
       policy: request.policy ?? this.policy.value,
       anyway: request.anyway ?? false,
+      ...(request.tolerance || tolerance ? {} : {flame_speed_m_s: this.speed.valueAsNumber || 0, detail_m: (this.detail.valueAsNumber || 0) / 1000}),
     }));
   }
 
   private showNumbers(a: AlignmentStatus): void {
     const list: [string, string][] = [
-      ['± rows', fixed(a.tolerance_rows, 0)],
+      ['tolerance ±', toleranceWords(a.tolerance_s, a.tolerance_rows)],
       ['policy', a.policy || '–'],
       ['round', count(a.round)],
       ['resets', count(a.resets)],
@@ -85,6 +97,7 @@ export class Alignment {
       ['checks', count(a.checks)],
       ['next check in', span(a.next_check_s)],
       ['time left', span(a.time_left_s)],
+      ['most likely', span(a.likely_left_s)],
     ];
     while (this.numbers.children.length < list.length) this.numbers.append(el('div', {}, el('dt'), el('dd')));
     list.forEach(([name, value], place) => {
@@ -108,7 +121,7 @@ export class Alignment {
   private offer(offer: AlignmentOffer, disabled: boolean): HTMLElement {
     return el('button', {type: 'button', class: 'offer', disabled,
                          onclick: () => this.align({tolerance: `${offer.tolerance_rows}rows`, policy: offer.policy})},
-      el('strong', {}, `± ${fixed(offer.tolerance_rows, 0)} rows, ${offer.policy}`), el('span', {}, offer.cost ? costWords(offer.cost) : ''));
+      el('strong', {}, `± ${toleranceWords(offer.tolerance_s, offer.tolerance_rows)}, ${offer.policy}`), el('span', {}, offer.cost ? costWords(offer.cost) : ''));
   }
 
   private showHistory(a: AlignmentStatus, cameras: string[]): void {

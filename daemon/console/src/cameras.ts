@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The grid of all cameras, and one of them enlarged.
 import type {DaemonStatus} from './api.gen';
+import {arrange, wordsBelow, wordsBeside} from './arrange';
 import {el, Keyed, set, setText, show} from './dom';
 import {Enlarged} from './enlarged';
 import {plural} from './format';
@@ -9,23 +10,6 @@ import type {Picture} from './wire';
 
 const kTileRate = 12;      // pictures a second of each camera in the grid
 const kEnlargedRate = 24;  // of one that is enlarged
-
-/** So many columns that `cells` tiles, whose pictures have this aspect, get the largest pictures in width x height. */
-export function bestColumns(cells: number, width: number, height: number, aspect: number, words = 96, gap = 8): number {
-  let best = 1;
-  let largest = -1;
-  for (let columns = 1; columns <= cells; ++columns) {
-    const rows = Math.ceil(cells / columns);
-    const w = (width - gap * (columns - 1)) / columns;
-    const h = (height - gap * (rows - 1)) / rows - words;
-    const size = Math.min(w, h * aspect);
-    if (size > largest) {
-      largest = size;
-      best = columns;
-    }
-  }
-  return best;
-}
 
 export class Cameras {
   private readonly grid = el('div', {class: 'grid'});
@@ -106,10 +90,13 @@ export class Cameras {
     const {width, height} = this.grid.getBoundingClientRect();
     const first = cameras[0]!;
     const aspect = first.width > 0 && first.height > 0 ? first.width / first.height : 4 / 3;
+    const fills = getComputedStyle(this.grid).getPropertyValue('--fills') === '1';
     // One cell more: the camera to be reset next takes two.
-    const tall = getComputedStyle(this.grid).getPropertyValue('--fills') === '1';
-    const columns = tall ? bestColumns(cameras.length + 1, width, height, aspect) : Math.max(2, Math.floor(width / 260));
-    set(this.grid, 'data-columns', Math.min(columns, 8));
+    const {columns, beside} = fills ? arrange(cameras.length + 1, width, height, aspect) : {columns: Math.max(2, Math.min(8, Math.floor(width / 260))), beside: false};
+    set(this.grid, 'data-columns', columns);
+    set(this.grid, 'data-beside', beside);
+    this.grid.style.setProperty('--words-below', `${wordsBelow(width / columns)}px`);
+    this.grid.style.setProperty('--words-beside', `${wordsBeside(height / Math.ceil((cameras.length + 1) / columns))}px`);
   }
 
   // Arrow keys go from tile to tile.

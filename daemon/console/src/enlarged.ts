@@ -2,7 +2,9 @@
 // One camera over the whole page, with every number known of it.
 import type {CameraStatus, DaemonStatus} from './api.gen';
 import {el, setText} from './dom';
+import {Exposure} from './exposure';
 import {count, fixed, known, micros, ppm, rows, short, span} from './format';
+import {lampAdvice, lampMissing} from './lamp';
 import {cameraWord, showSign, Sign} from './light';
 import {Gauge, Overlay} from './overlay';
 import {LivePicture} from './picture';
@@ -15,7 +17,7 @@ export function facts(c: CameraStatus, tolerance: number | undefined): [string, 
   const list: [string, string][] = [
     ['error', known(c.error_rows) ? `${rows(c.error_rows)} = ${micros(c.error_s)}` : '–'],
     ['known to', known(c.sigma_rows) ? `± ${fixed(c.sigma_rows, 1)} rows` : '–'],
-    ['tolerance', known(tolerance) ? `± ${short(tolerance)}` : '–'],
+    ['tolerance', known(tolerance) ? `± ${short(tolerance)}${known(c.row_time_s) ? ` (${fixed(tolerance / c.row_time_s, 1)} rows)` : ''}` : '–'],
     ['drift', ppm(c.drift_ppm)],
     ['time left', span(c.time_left_s)],
     ['trials (resets)', count(c.resets)],
@@ -48,6 +50,8 @@ export class Enlarged {
   private readonly word = el('span', {class: 'word'});
   private readonly title = el('h2');
   private readonly reason = el('p', {class: 'reason'});
+  private readonly exposure = new Exposure(this.picture.canvas);
+  private readonly lamp = el('p', {class: 'lamp-advice'});
   private readonly list = el('dl', {class: 'facts'});
   private readonly error = el('p', {class: 'error-rows'});
   readonly root: HTMLDialogElement;
@@ -55,15 +59,16 @@ export class Enlarged {
 
   constructor(private readonly changed: () => void) {
     this.root = el('dialog', {class: 'enlarged', 'aria-label': 'Camera'},
-      el('div', {class: 'picture'}, this.picture.canvas, this.overlay.root),
+      el('div', {class: 'picture'}, this.picture.canvas, this.exposure.marks, this.overlay.root),
       el('div', {class: 'side'},
         el('header', {}, this.sign.root, this.title, this.word,
           el('button', {class: 'close', 'aria-label': 'Close', onclick: () => this.root.close()}, '✕')),
-        this.error, this.gauge.root, this.reason, this.list,
+        this.error, this.gauge.root, this.reason, this.lamp, this.exposure.root, this.list,
         el('p', {class: 'legend'}, el('span', {class: 'key lamp'}, '○ lamp'), el('span', {class: 'key dot'}, '◇ dot'),
           el('span', {class: 'key target'}, '┄ target row'), el('span', {class: 'key band'}, '▒ tolerance')),
         el('p', {class: 'note'}, '← → other cameras, Esc back')));
     this.root.addEventListener('close', () => {
+      this.exposure.stop();
       const tile = document.querySelector<HTMLElement>(`.tile[data-camera="${CSS.escape(this.id ?? '')}"]`);
       this.id = undefined;
       tile?.focus();
@@ -87,6 +92,7 @@ export class Enlarged {
     }
     if (this.status) this.show(this.status);
     if (!this.root.open) this.root.showModal();
+    this.exposure.start();
     this.changed();
   }
 
@@ -104,6 +110,8 @@ export class Enlarged {
     setText(this.error, known(camera.error_rows) ? `${rows(camera.error_rows)} · ${micros(camera.error_s)}` : short(undefined));
     this.gauge.show(camera.error_s, tolerance);
     setText(this.reason, camera.reason);
+    this.exposure.lampMissing = lampMissing(camera, status.faults);
+    setText(this.lamp, this.exposure.lampMissing ? lampAdvice(camera) : '');
     this.overlay.show(camera);
     const all = facts(camera, tolerance);
     while (this.list.children.length > all.length) this.list.lastElementChild!.remove();

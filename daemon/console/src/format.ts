@@ -38,6 +38,11 @@ export function short(seconds: number | undefined): string {
   return `${signed(value, unit === 'µs' ? 0 : digits(value)).replace('+', '')} ${unit}`;
 }
 
+/** A tolerance as flames and as people see it: "0.50 ms (9.3 rows)". */
+export function tolerance(seconds: number, inRows: number): string {
+  return `${short(seconds)} (${fixed(inRows, inRows < 99.5 ? 1 : 0)} rows)`;
+}
+
 /** A length of time that one waits for: "48 s", "3 min 20 s", "2 h 05 min". */
 export function span(seconds: number | undefined): string {
   if (!known(seconds)) return kNone;

@@ -8,11 +8,12 @@ import {lightWords, Sign} from './light';
 const kLines = 300;
 
 export class Journal {
-  private readonly list = el('ol', {class: 'journal', role: 'log', 'aria-live': 'off', tabindex: 0});
+  private readonly list = el('ol');
   private readonly note = el('p', {class: 'note'}, 'Nothing yet.');
   private newest = 0;
   readonly root = el('section', {id: 'journal', class: 'panel', 'aria-labelledby': 'journal-title'},
-    el('header', {}, el('h2', {id: 'journal-title'}, 'Journal'), this.note), this.list);
+    el('header', {}, el('h2', {id: 'journal-title'}, 'Journal'), this.note),
+    el('div', {class: 'journal', role: 'log', 'aria-live': 'off', 'aria-label': 'Lines of the journal', tabindex: 0}, this.list));
 
   add(notice: Notice): void {
     if (notice.id <= this.newest) return;

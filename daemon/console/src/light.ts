@@ -56,10 +56,10 @@ export function cameraWord(camera: CameraStatus, tolerance: number | undefined):
   return camera.light === 'RED' ? 'act' : camera.light === 'AMBER' ? 'look' : 'filming';
 }
 
-/** Frames of a camera that are gone, whatever the cause. */
+/** Frames of a camera that were lost in the last seconds, whatever the cause: while there are any its light isn't green. All since the start are
+ *  among the facts of the enlarged picture. */
 export function lostFrames(camera: CameraStatus): number {
-  const c = camera.counts;
-  return c ? c.damaged + c.camera_gap + c.transport + c.resend + c.underrun + c.queue : 0;
+  return camera.lost_lately;
 }
 
 export function showSign(sign: Sign, label: Element, light: Light, word: string): void {

@@ -2,11 +2,12 @@
 // The page: one part for each thing the operator minds, all shown from the daemon's status as it comes.
 import './style.css';
 
-import {toastArea} from './act';
 import {Alignment} from './alignment';
+import {Bar} from './bar';
 import {Cameras} from './cameras';
+import {complaints, connected, heard} from './complaints';
 import {diagnostics} from './diagnostics';
-import {el, setText} from './dom';
+import {el, set, setText} from './dom';
 import {fixed} from './format';
 import {Header} from './header';
 import {Journal} from './journal';
@@ -28,6 +29,7 @@ const sessions = new Sessions();
 const journal = new Journal();
 const token = new Token(word => link.unlock(word));
 const figures = el('span', {id: 'diagnostics'});
+const bar = new Bar([record.hint, record.button, alignment.stop]);
 const goTo = (id: string) => () => document.getElementById(id)?.scrollIntoView();
 const keys = new Keys([
   {key: 'n', words: 'to the camera that is to be reset', run: () => cameras.focusNext()},
@@ -40,12 +42,12 @@ const keys = new Keys([
 ]);
 
 document.body.append(
-  header.root,
+  header.root, bar.root,
   el('main', {},
     el('div', {class: 'rig-view'}, cameras.root, el('aside', {}, record.root, alignment.root, strobe.root)),
     reconstruction.root, sessions.root, journal.root),
   el('footer', {}, figures, el('button', {class: 'quiet', type: 'button', onclick: () => keys.help.showModal()}, 'Keys: ?')),
-  cameras.enlarged.root, keys.help, token.root, toastArea);
+  cameras.enlarged.root, keys.help, token.root, complaints);
 
 // What scrolls stops below the header, however many faults that names.
 new ResizeObserver(() => document.documentElement.style.setProperty('--header', `${header.root.offsetHeight}px`)).observe(header.root);
@@ -53,16 +55,21 @@ new ResizeObserver(() => document.documentElement.style.setProperty('--header', 
 const link: Link = new Link({
   connection(state) {
     header.connection(state);
+    bar.connection(state);
     if (state === 'token') token.ask();
     if (state !== 'open') return;
     token.close();
+    connected();
     diagnostics.forget();
     cameras.restart();
     journal.clear();
   },
   status(status) {
     diagnostics.heard(status.now_ns);
-    for (const part of [header, cameras, record, alignment, strobe, reconstruction, sessions]) part.show(status);
+    heard(status);
+    const {phase, recording} = status;
+    set(document.documentElement, 'data-filmed', phase === 'CAPTURING' || phase === 'FINISHING' ? recording?.purpose : undefined);
+    for (const part of [header, bar, cameras, record, alignment, strobe, reconstruction, sessions]) part.show(status);
   },
   notice: notice => journal.add(notice),
   iteration: preview => reconstruction.preview(preview),

@@ -4,6 +4,8 @@ import {diagnostics} from './diagnostics';
 import {el} from './dom';
 import type {Picture} from './wire';
 
+const kColourless = 8;  // grey levels between two colours that rounding leaves
+
 export async function bitmapOf(jpeg: Uint8Array): Promise<ImageBitmap> {
   return createImageBitmap(new Blob([jpeg as BlobPart], {type: 'image/jpeg'}));
 }
@@ -15,6 +17,15 @@ export function paint(canvas: HTMLCanvasElement, bitmap: ImageBitmap): void {
   }
   canvas.getContext('2d', {alpha: false})!.drawImage(bitmap, 0, 0);
   bitmap.close();
+}
+
+/** Whether a picture has no colours: a grey camera's. */
+export function isGrey(canvas: HTMLCanvasElement): boolean {
+  const {data} = canvas.getContext('2d', {alpha: false})!.getImageData(0, 0, canvas.width, canvas.height);
+  for (let at = 0; at < data.length; at += 4) {
+    if (Math.max(data[at]!, data[at + 1]!, data[at + 2]!) - Math.min(data[at]!, data[at + 1]!, data[at + 2]!) > kColourless) return false;
+  }
+  return true;
 }
 
 export class LivePicture {

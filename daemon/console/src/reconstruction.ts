@@ -5,7 +5,7 @@ import {act, TwoStep} from './act';
 import {el, set, setText, show} from './dom';
 import {fixed, known, percent, span} from './format';
 import {showSign, Sign} from './light';
-import {bitmapOf, paint} from './picture';
+import {bitmapOf, isGrey, paint} from './picture';
 import {Plot} from './plot';
 import type {View, Volume} from './wire';
 import {call} from './wire';
@@ -44,6 +44,10 @@ export class Reconstruction {
   private next?: [Volume, Uint8Array];
   private iterations: Iteration[] = [];
   private id = '';
+  private viewsAsked = 0;
+  private readonly newest = {captured: 0, rendered: 0};
+  private grey = false;
+  private voxels = '';
   readonly root: HTMLElement;
 
   constructor() {
@@ -94,7 +98,24 @@ export class Reconstruction {
   }
 
   async view(header: View, jpeg: Uint8Array): Promise<void> {
-    paint(this.views[header.kind], await bitmapOf(jpeg));
+    const order = ++this.viewsAsked;
+    const bitmap = await bitmapOf(jpeg);
+    if (order < this.newest[header.kind]) return bitmap.close();  // a later one was quicker
+    this.newest[header.kind] = order;
+    paint(this.views[header.kind], bitmap);
+    if (header.kind !== 'captured') return this.caption(header);
+    this.grey = isGrey(this.views.captured);
+    void this.volume?.then(view => this.colour(view));
+    this.caption(header);
+  }
+
+  /** Grey cameras' flame is grey; of others the volume has the brightness alone. */
+  private colour(view: VolumeView): void {
+    view.colour(this.grey);
+    if (this.voxels) setText(this.volumeNote, `${this.voxels}, ${this.grey ? 'grey as its cameras see it' : 'brightness in false colours'}. Drag to turn, wheel to zoom.`);
+  }
+
+  private caption(header: View): void {
     setText(this.captions[header.kind], `${header.kind === 'captured' ? 'Captured by' : 'Rendered as'} ${header.camera_id}, iteration ${header.iteration}`);
     set(this.views[header.kind], 'data-iteration', header.iteration);
   }
@@ -109,7 +130,8 @@ export class Reconstruction {
       this.next = undefined;
       view.show(...newest);
       set(this.place, 'data-voxels', newest[0].nx * newest[0].ny * newest[0].nz);
-      setText(this.volumeNote, `${newest[0].nx} × ${newest[0].ny} × ${newest[0].nz} voxels shown. Drag to turn, wheel to zoom.`);
+      this.voxels = `${newest[0].nx} × ${newest[0].ny} × ${newest[0].nz} voxels shown`;
+      this.colour(view);
     } catch (error) {
       setText(this.volumeNote, `The volume can't be shown: ${String(error)}. It needs WebGL 2.`);
     }

@@ -3,11 +3,11 @@
 import type {Counts, DaemonStatus, RecordingStatus} from './api.gen';
 import {act, TwoStep} from './act';
 import {el, set, setText, show} from './dom';
-import {bytes, clock, count, fixed, percent, short} from './format';
+import {bytes, clock, count, fixed, known, percent, short, span} from './format';
 import {call} from './wire';
 
 const causes: [keyof Counts, string][] = [
-  ['camera_gap', 'never arrived'], ['transport', 'lost on the bus'], ['underrun', 'no buffer'], ['queue', 'encoder too slow'], ['disk', 'disk refused'],
+  ['camera_gap', 'never arrived'], ['transport', 'lost on the bus'], ['underrun', 'no buffer'], ['queue', 'found the queue full'], ['disk', 'disk refused'],
 ];
 
 /** Frames of a recording that are gone, by cause, most first; empty: none. */
@@ -21,9 +21,19 @@ export function atRisk(r: RecordingStatus): string {
   return frames > 0 ? `${count(frames)}, ${fixed(r.progress?.at_risk_s ?? 0, 1)} s` : 'none';
 }
 
+/** How long a take may be that begins now, or for how long one that runs is sure: "A take may be 42 s long, most likely 3 min 20 s." */
+export function takeWords(status: DaemonStatus): string {
+  const a = status.alignment;
+  if (a?.verdict !== 'ALIGNED' || !known(a.time_left_s)) return '';
+  const running = status.phase === 'CAPTURING';
+  if (a.time_left_s <= 0) return running ? `${a.leaves_first} may have left tolerance.` : 'The lock is being checked.';
+  const likely = known(a.likely_left_s) && a.likely_left_s > 1.1 * a.time_left_s ? `, most likely ${span(a.likely_left_s)}` : '';
+  return running ? `The lock holds for another ${span(a.time_left_s)}${likely}.` : `A take may be ${span(a.time_left_s)} long${likely}.`;
+}
+
 export class Record {
-  private readonly button = el('button', {class: 'record', type: 'button', 'aria-keyshortcuts': 'R'});
-  private readonly hint = el('p', {class: 'note hint', role: 'status'});
+  readonly button = el('button', {class: 'record', type: 'button', 'aria-keyshortcuts': 'R'});
+  readonly hint = el('p', {class: 'note hint', role: 'status'});
   private readonly time = el('output', {class: 'clock'}, '0:00.0');
   private readonly session = el('p', {class: 'session'});
   private readonly numbers = el('dl', {class: 'numbers'});
@@ -33,13 +43,15 @@ export class Record {
   private readonly disk = el('p', {class: 'disk'});
   private readonly verdict = el('p', {class: 'verdict', role: 'status'});
   private readonly name = el('input', {name: 'name', maxlength: 80, placeholder: 'by time', autocomplete: 'off', spellcheck: false,
-                                       pattern: '([A-Za-z0-9_:][A-Za-z0-9 ._:\\-]*)?', title: 'Letters, digits, space and . _ : -, a letter or digit in front'});
+                                       dir: 'auto', pattern: '([\\p{L}\\p{N}_:][\\p{L}\\p{M}\\p{N} ._:\\u200c\\u200d\\-]*)?',
+                                       title: 'Letters of any script, digits, space and . _ : -, a letter or digit in front'});
   private readonly purpose = el('select', {name: 'purpose'}, el('option', {value: 'flame'}, 'flame'), el('option', {value: 'alignment'}, 'alignment'));
   private readonly seconds = el('input', {name: 'seconds', type: 'number', min: 0, step: 'any', placeholder: 'until stopped', inputmode: 'decimal'});
   private readonly reconstruct = el('input', {name: 'reconstruct', type: 'checkbox'});
   private readonly step = new TwoStep(this.button, armed => this.words(armed), () => this.go());
   private status?: DaemonStatus;
   private waiting = false;
+  private renewed = 0;  // seconds for which the lock was renewed: the next press records
   readonly root: HTMLElement;
 
   constructor() {
@@ -93,7 +105,8 @@ export class Record {
     const phase = this.status?.phase;
     setText(this.hint, this.step.armed ? (phase === 'IDLE' ? 'The cameras are not locked: their frames will not be of the same instants.' : 'Within 5 seconds, or nothing happens.')
             : phase === 'IDLE' ? 'Not locked: recording needs a second press.'
-            : phase === 'ALIGNING' || phase === 'CALIBRATING' ? 'After the alignment, or when it is stopped.' : '');
+            : phase === 'ALIGNING' || phase === 'CALIBRATING' ? 'After the alignment, or when it is stopped.'
+            : this.status && (phase === 'LOCKED' || phase === 'CAPTURING') ? [this.renewed > 0 && `The lock was to end within ${span(this.renewed)} and is renewed: press again.`, takeWords(this.status)].filter(Boolean).join(' ') : '');
   }
 
   private showDisk(status: DaemonStatus): void {
@@ -137,10 +150,21 @@ export class Record {
     this.waiting = true;
     this.button.disabled = true;
     this.step.show();
+    const seconds = this.seconds.valueAsNumber || 0;
+    const left = this.status?.alignment?.time_left_s;
+    if (!stop && this.status?.phase === 'LOCKED' && known(left) && seconds > left && this.renewed !== seconds) {
+      void act<unknown>(call('Sync/Align', {renew: true, hold_s: seconds})).then(answer => {
+        this.waiting = false;
+        this.renewed = answer ? seconds : 0;
+        if (this.status) this.show(this.status);
+      });
+      return;
+    }
+    this.renewed = 0;
     void act<unknown>(stop ? call('Capture/Stop') : call('Capture/Record', {
       name: this.name.value.trim(),
       purpose: this.purpose.value,
-      seconds: this.seconds.valueAsNumber || 0,
+      seconds,
       unlocked: this.status?.phase !== 'LOCKED',
       reconstruct: this.reconstruct.checked,
     })).then(answer => {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The recorded sessions, and what is done with them.
-import type {BackgroundJob, DaemonStatus, ExportRequest_Format, JobProgress, ListSessionsResponse_Entry as Entry, Light} from './api.gen';
+import type {DaemonStatus, ExportRequest_Format, Job, Job_Kind, JobOutcome, ListSessionsResponse_Entry as Entry, Light} from './api.gen';
 import {act} from './act';
 import {el, Keyed, set, setText, show} from './dom';
 import {bytes, count, dateAndTime, percent, plural} from './format';
+import {FrameChoice} from './frame_choice';
 import {Sign} from './light';
 import {call, follow} from './wire';
 
@@ -14,23 +15,70 @@ export function sessionState(entry: Entry): [Light, string] {
   return entry.state === 'RECORDING' ? ['AMBER', 'open'] : ['LIGHT_UNSPECIFIED', 'unknown'];
 }
 
-/** What is done to a session in the background: "being salvaged, 34 %". */
-export function jobWords(job: BackgroundJob): string {
-  const salvages = job.kind === 'SALVAGE';
-  if (job.state === 'PAUSED') return `${salvages ? 'salvage' : 'compression'} stands still while something is recorded`;
-  if (job.state === 'RUNNING') return `${salvages ? 'being salvaged' : 'being compressed'}, ${percent(job.fraction)}`;
-  return `waits to be ${salvages ? 'salvaged' : 'compressed'}`;
+const kinds: Record<Job_Kind, [string, string, string]> = {
+  KIND_UNSPECIFIED: ['work', 'in work', 'done'],
+  SALVAGE: ['salvage', 'being salvaged', 'salvaged'],
+  COMPRESS: ['compression', 'being compressed', 'compressed'],
+  FINISH: ['end', 'being finished', 'finished'],
+  VERIFY: ['verification', 'being verified', 'verified'],
+  REPAIR: ['repair', 'being repaired', 'repaired'],
+  EXPORT: ['export', 'being exported', 'exported'],
+  RECONSTRUCT: ['reconstruction', 'being reconstructed', 'reconstructed'],
+};
+
+/** What is done to a session: "being salvaged, 34 %". */
+export function jobWords(job: Job): string {
+  const [work, under, done] = kinds[job.kind];
+  if (job.state === 'PAUSED') return `${work} stands still while something is recorded`;
+  if (job.state !== 'RUNNING') return `waits to be ${done}`;
+  return `${under}, ${percent(job.fraction)}${job.silent_s < 30 ? '' : `, nothing new for ${Math.round(job.silent_s)} s`}`;
 }
 
-/** A job's report (JSON) in lines: "frames: 14400". What is nested is left to the file. */
-export function reportLines(report: string): string[] {
-  try {
-    const json = JSON.parse(report) as unknown;
-    if (json === null || typeof json !== 'object') return [String(json)];
-    return Object.entries(json).filter(([, value]) => typeof value !== 'object' || value === null || (Array.isArray(value) && value.every(item => typeof item !== 'object')))
-      .map(([name, value]) => `${name.replaceAll('_', ' ')}: ${Array.isArray(value) ? value.join(', ') || 'none' : String(value)}`);
-  } catch {
-    return report === '' ? [] : [report];
+/** What a job reports, in lines: "frames: 14400". */
+export function reportLines(outcome: JobOutcome | undefined): string[] {
+  if (!outcome) return [];
+  const sum = <T>(cameras: T[], count: (camera: T) => number) => cameras.reduce((all, camera) => all + count(camera), 0);
+  const frames = (words: string, number: number) => number > 0 ? [`${count(number)} ${words}`] : [];
+  const {verify, repair, export: exported} = outcome;
+  if (verify) {
+    return [
+      `${count(sum(verify.cameras, camera => camera.good))} of ${count(sum(verify.cameras, camera => camera.recorded))} frames are good`,
+      ...frames('can\'t be read back', sum(verify.cameras, camera => camera.bad)),
+      ...frames('are missing from the index', sum(verify.cameras, camera => camera.missing)),
+      ...frames('are not in the index, but on the disk', sum(verify.cameras, camera => camera.unindexed)),
+      ...verify.cameras.flatMap(camera => camera.problems.map(problem => `${camera.camera_id}: ${problem}`)), ...verify.problems,
+      ...(verify.to_do ? [`${verify.to_do}.`] : []),
+    ];
+  }
+  if (repair) {
+    return [`${count(sum(repair.cameras, camera => camera.kept))} frames kept, ${count(sum(repair.cameras, camera => camera.lost))} lost`,
+      repair.changed ? 'It was mended.' : 'There was nothing to mend.'];
+  }
+  if (exported) {
+    return [`${count(sum(exported.cameras, camera => camera.frames))} frames in ${exported.folder}`,
+      ...frames('could not be read back, and are left out', sum(exported.cameras, camera => camera.unreadable))];
+  }
+  return [];
+}
+
+/** A job of a session: what it does, and a button that ends it. */
+class JobLine {
+  private readonly words = el('span', {class: 'words'});
+  private readonly cancel: HTMLButtonElement;
+  private job?: Job;
+  readonly root: HTMLElement;
+
+  constructor(id: string, session: string) {
+    this.cancel = el('button', {class: 'quiet', type: 'button', 'aria-label': `Cancel job ${id} on ${session}`, onclick: () => {
+      if (this.job) void act(call('Jobs/Cancel', {id: this.job.id}));
+    }}, 'Cancel');
+    this.root = el('span', {}, this.words, this.cancel);
+  }
+
+  show(job: Job): void {
+    this.job = job;
+    setText(this.words, jobWords(job));
+    show(this.cancel, job.kind !== 'FINISH');
   }
 }
 
@@ -44,7 +92,9 @@ class Row {
   private readonly job = el('div', {class: 'job', hidden: true}, this.progress, this.doing, this.report);
   private readonly buttons: HTMLButtonElement[];
   private readonly reconstruct: HTMLButtonElement;
+  private readonly frame: FrameChoice;
   private readonly background = el('span', {class: 'background', role: 'status', hidden: true});
+  private readonly jobs = new Keyed<Job, JobLine>(this.background, id => new JobLine(id, this.session), (line, job) => line.show(job));
   private entry?: Entry;
   private busy = false;
   private salvaged = false;
@@ -53,9 +103,14 @@ class Row {
   constructor(readonly session: string, private readonly changed: () => void) {
     const button = (words: string, run: () => void) => el('button', {type: 'button', 'aria-label': `${words} ${session}`, onclick: run}, words);
     const exporting = (format: ExportRequest_Format) => () => this.run(tell => follow('Sessions/Export', {session, format}, tell));
-    this.reconstruct = button('Reconstruct', () => void act(call('Reconstruct/Start', {session})).then(answer => {
-      if (answer) document.getElementById('reconstruction')?.scrollIntoView();
-    }));
+    this.frame = new FrameChoice(session);
+    this.reconstruct = button('Reconstruct', () => {
+      const frame = this.frame.request();
+      if (!frame) return;
+      void act(call('Reconstruct/Start', {session, ...frame})).then(answer => {
+        if (answer) document.getElementById('reconstruction')?.scrollIntoView();
+      });
+    });
     this.buttons = [
       button('Verify', () => this.run(tell => follow('Sessions/Verify', {session}, tell))),
       button('Repair', () => this.run(tell => follow('Sessions/Repair', {session}, tell))),
@@ -65,8 +120,8 @@ class Row {
     const names = ['When', 'Of', 'Cameras', 'Frames', 'Lost', 'Size'];
     this.cells.forEach((cell, place) => set(cell, 'data-name', names[place]));
     this.root = el('tr', {'data-session': session},
-      el('th', {scope: 'row'}, session, el('span', {class: 'state'}, this.sign.root, this.state), this.background), ...this.cells,
-      el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.reconstruct), this.job));
+      el('th', {scope: 'row'}, el('bdi', {}, session), el('span', {class: 'state'}, this.sign.root, this.state), this.background), ...this.cells,
+      el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.reconstruct, this.frame.root), this.job));
   }
 
   show(entry: Entry): void {
@@ -80,11 +135,11 @@ class Row {
     this.enable();
   }
 
-  /** What is done to it in the background; nothing else is while it is salvaged. */
-  showJob(job: BackgroundJob | undefined): void {
-    show(this.background, job !== undefined);
-    setText(this.background, job ? jobWords(job) : '');
-    if (this.salvaged === (job?.kind === 'SALVAGE')) return;
+  /** What is done to it; nothing else is while it is salvaged. */
+  showJobs(jobs: Job[]): void {
+    this.jobs.show(jobs, job => String(job.id));
+    show(this.background, jobs.length > 0);
+    if (this.salvaged === jobs.some(job => job.kind === 'SALVAGE')) return;
     this.salvaged = !this.salvaged;
     this.enable();
   }
@@ -92,24 +147,26 @@ class Row {
   private enable(): void {
     for (const button of this.buttons) button.disabled = this.busy || this.salvaged;
     this.reconstruct.disabled = this.busy || this.salvaged || !this.entry?.calibrated;
+    if (this.entry) this.frame.show(this.entry, this.reconstruct.disabled);
     set(this.reconstruct, 'title', this.entry?.calibrated ? undefined : 'Its cameras are not calibrated, or the volume is not known.');
   }
 
-  private run(job: (tell: (progress: JobProgress) => void) => Promise<JobProgress>): void {
+  private run(job: (tell: (state: Job) => void) => Promise<Job>): void {
     this.busy = true;
     this.enable();
     show(this.job, true);
     this.report.replaceChildren();
     set(this.job, 'data-ok', undefined);
-    void act(job(progress => {
-      this.progress.value = progress.fraction;
-      setText(this.doing, `${progress.doing} ${percent(progress.fraction)}`);
+    void act(job(state => {
+      this.progress.value = state.fraction;
+      setText(this.doing, `${state.doing} ${percent(state.fraction)}`);
     })).then(last => {
       this.busy = false;
       this.enable();
-      set(this.job, 'data-ok', String(last?.ok ?? false));
-      setText(this.doing, !last ? 'It failed.' : last.ok ? `Done: ${last.doing || 'all is well'}` : `Failed: ${last.doing}`);
-      this.report.replaceChildren(...reportLines(last?.report ?? '').map(line => el('li', {}, line)));
+      const ok = last?.outcome?.ok ?? false;
+      set(this.job, 'data-ok', String(ok));
+      setText(this.doing, !last ? 'It failed.' : ok ? 'Done: all is well' : 'Done: not all is well');
+      this.report.replaceChildren(...reportLines(last?.outcome).map(line => el('li', {}, line)));
       this.changed();
     });
   }
@@ -120,7 +177,7 @@ export class Sessions {
   private readonly note = el('p', {class: 'note'}, 'None yet.');
   private readonly rows = new Keyed<Entry, Row>(this.body, session => new Row(session, () => void this.refresh()), (row, entry) => row.show(entry));
   private shown = '';
-  private jobs: BackgroundJob[] = [];
+  private jobs: Job[] = [];
   readonly root: HTMLElement;
 
   constructor() {
@@ -151,6 +208,6 @@ export class Sessions {
   }
 
   private showJobs(): void {
-    for (const [session, row] of this.rows.views) row.showJob(this.jobs.find(job => job.session === session));
+    for (const [session, row] of this.rows.views) row.showJobs(this.jobs.filter(job => job.session === session));
   }
 }

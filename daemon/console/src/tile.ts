@@ -22,11 +22,13 @@ export class Tile {
   private readonly lost = el('dd');
   private readonly reason = el('p', {class: 'reason'});
   private readonly nextMark = el('span', {class: 'next-mark', hidden: true});
+  private readonly frame = el('div', {class: 'picture'}, this.picture.canvas, this.overlay.root, this.nextMark);
   readonly root: HTMLElement;
 
   constructor(readonly id: string, open: (id: string) => void) {
-    this.root = el('article', {class: 'tile', tabindex: 0, role: 'button', 'data-camera': id, onclick: () => open(id)},
-      el('div', {class: 'picture'}, this.picture.canvas, this.overlay.root, this.nextMark),
+    // Its words and numbers are its name.
+    this.root = el('div', {class: 'tile', tabindex: 0, role: 'button', 'data-camera': id, onclick: () => open(id)},
+      this.frame,
       el('div', {class: 'facts'},
         el('header', {}, this.sign.root, el('h3', {}, id), this.word),
         this.reason,
@@ -55,6 +57,7 @@ export class Tile {
     show(this.nextMark, camera.reset_next);
     setText(this.nextMark, next ? 'Reset this camera now' : camera.reset === 'BY_HAND' ? 'Reset after that' : 'Being reset');
     this.overlay.show(camera);
+    this.frame.style.setProperty('--aspect', camera.width > 0 && camera.height > 0 ? String(camera.width / camera.height) : '4 / 3');
     this.gauge.show(camera.error_s, tolerance);
     setText(this.error, known(camera.error_rows) ? rows(camera.error_rows) : '– rows');
     setText(this.time, known(camera.error_s) ? micros(camera.error_s) : '');
@@ -65,6 +68,5 @@ export class Tile {
     setText(this.lost, count(lost));
     set(this.lost.parentElement!, 'data-bad', lost > 0);
     setText(this.reason, camera.reason);
-    set(this.root, 'aria-label', `Camera ${camera.id}: ${word}${next ? ', to be reset now' : ''}. ${camera.reason}`);
   }
 }

@@ -12,24 +12,26 @@ import vtkGenericRenderWindow from '@kitware/vtk.js/Rendering/Misc/GenericRender
 
 import type {Volume} from './wire';
 
+type Colour = readonly [number, number, number, number];  // brightness of a voxel; red, green, blue
+const kGlow: readonly Colour[] = [[0, 0, 0, 0], [40, 0.35, 0.02, 0.02], [110, 0.9, 0.3, 0.02], [190, 1, 0.75, 0.2], [255, 1, 1, 0.85]];
+const kGrey: readonly Colour[] = [[0, 0, 0, 0], [255, 1, 1, 1]];
+
 export class VolumeView {
   private readonly window = vtkGenericRenderWindow.newInstance({background: [0.03, 0.04, 0.05]});
   private readonly mapper = vtkVolumeMapper.newInstance();
   private readonly actor = vtkVolume.newInstance();
+  private readonly colours = vtkColorTransferFunction.newInstance();
   private size = '';
+  private grey?: boolean;
 
   constructor(container: HTMLElement) {
     this.window.setContainer(container);
     this.actor.setMapper(this.mapper);
     const property = this.actor.getProperty();
-    const colour = vtkColorTransferFunction.newInstance();
     const opacity = vtkPiecewiseFunction.newInstance();
-    // As a flame glows: through red and orange to nearly white.
-    for (const [at, r, g, b] of [[0, 0, 0, 0], [40, 0.35, 0.02, 0.02], [110, 0.9, 0.3, 0.02], [190, 1, 0.75, 0.2], [255, 1, 1, 0.85]] as const) {
-      colour.addRGBPoint(at, r, g, b);
-    }
     for (const [at, value] of [[0, 0], [8, 0], [60, 0.05], [140, 0.22], [255, 0.6]] as const) opacity.addPoint(at, value);
-    property.setRGBTransferFunction(0, colour);
+    property.setRGBTransferFunction(0, this.colours);
+    this.colour(false);
     property.setScalarOpacity(0, opacity);
     property.setInterpolationTypeToLinear();
     this.window.getRenderer().addVolume(this.actor);
@@ -58,6 +60,15 @@ export class VolumeView {
       this.size = key;
       this.reset();
     }
+    this.window.getRenderWindow().render();
+  }
+
+  /** Grey, or as a flame glows: through red and orange to nearly white. */
+  colour(grey: boolean): void {
+    if (grey === this.grey) return;
+    this.grey = grey;
+    this.colours.removeAllPoints();
+    for (const [at, ...rgb] of grey ? kGrey : kGlow) this.colours.addRGBPoint(at, ...rgb);
     this.window.getRenderWindow().render();
   }
 

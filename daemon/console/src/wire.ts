@@ -1,12 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // What goes over the wire: protobuf's JSON with its defaults filled in, calls, streams of jobs, and the WebSocket's messages.
-import {type Calls, fields, type JobProgress, responses, type Streams} from './api.gen';
+import {type Calls, fields, type Job, responses, type Streams} from './api.gen';
 
 /** Why a call failed: the daemon's code ("FAILED_PRECONDITION", ...) and its sentence. */
 export class ApiError extends Error {
-  constructor(readonly status: number, readonly code: string, message: string) {
+  constructor(readonly status: number, readonly code: string, message: string, readonly order = '') {
     super(message);
   }
+}
+
+/** Told of each order that was carried out. */
+export const answered = new Set<(order: string) => void>();
+
+/** Names an order: its method, and the session that it is about. */
+function orderOf(method: string, request: unknown): string {
+  const {session} = request as {session?: string};
+  return session ? `${method} ${session}` : method;
+}
+
+function tellAnswered(method: string, request: unknown): void {
+  for (const tell of answered) tell(orderOf(method, request));
 }
 
 /** Reads a message of this type: what protobuf leaves out gets its default, 64-bit numbers and "NaN" become numbers. */
@@ -38,35 +51,40 @@ async function post(path: string, request: unknown, signal?: AbortSignal): Promi
   });
   if (response.ok) return response;
   const error = (await response.json().catch(() => ({}))) as {code?: string; message?: string};
-  throw new ApiError(response.status, error.code ?? '', error.message ?? `${path}: answered ${response.status} ${response.statusText}`);
+  throw new ApiError(response.status, error.code ?? '', error.message ?? `${path}: answered ${response.status} ${response.statusText}`, orderOf(path, request));
 }
 
 export async function call<M extends keyof Calls>(method: M, request: Calls[M][0] = {}, signal?: AbortSignal): Promise<Calls[M][1]> {
   const response = await post(method, request, signal);
-  return decode(responses[method], await response.json()) as Calls[M][1];
+  const answer = decode(responses[method], await response.json()) as Calls[M][1];
+  tellAnswered(method, request);
+  return answer;
 }
 
 /** Methods that tell how far they are, and what came of them. */
-export type Jobs = {[M in keyof Streams as Streams[M][1] extends JobProgress ? M : never]: Streams[M]};
+export type Jobs = {[M in keyof Streams as Streams[M][1] extends Job ? M : never]: Streams[M]};
 
-/** Of a job: tells each message, and returns the last, which is done. An error's line and a stream that ends before it is done are
+/** Of a job: tells each state, and returns the last, which is DONE. An error's line and a stream that ends before it is done are
  *  thrown. */
-export async function follow<M extends keyof Jobs>(method: M, request: Jobs[M][0], tell: (message: JobProgress) => void): Promise<JobProgress> {
+export async function follow<M extends keyof Jobs>(method: M, request: Jobs[M][0], tell: (message: Job) => void): Promise<Job> {
   const reader = (await post(method, request)).body!.pipeThrough(new TextDecoderStream()).getReader();
   let rest = '';
-  let last: JobProgress | undefined;
+  let last: Job | undefined;
   for (;;) {
     const {done, value} = await reader.read().catch(() => ({done: true, value: ''}));
     const lines = (rest + (value ?? '')).split('\n');
     rest = lines.pop()!;  // a line that is cut short is none
     for (const line of lines.filter(text => text.trim() !== '')) {
       const json = JSON.parse(line) as {code?: string; message?: string};
-      if (json.code !== undefined && json.message !== undefined) throw new ApiError(500, json.code, json.message);
-      tell((last = decode(responses[method], json) as JobProgress));
+      if (json.code !== undefined && json.message !== undefined) throw new ApiError(500, json.code, json.message, orderOf(method, request));
+      tell((last = decode(responses[method], json) as Job));
     }
     if (!done) continue;
-    if (last?.done) return last;
-    throw new ApiError(502, '', 'The connection broke off before it was done. See what the journal says, and ask again.');
+    if (last?.state === 'DONE') {
+      tellAnswered(method, request);
+      return last;
+    }
+    throw new ApiError(502, '', 'The connection broke off before it was done. See what the journal says, and ask again.', orderOf(method, request));
   }
 }
 

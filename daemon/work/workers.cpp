@@ -1,12 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/server/workers.h"
+#include "daemon/work/workers.h"
 
 #include <utility>
 
+#include "base/priority.h"
+
 namespace emberlock::daemon {
 
-Workers::Workers(std::size_t threads, std::size_t waiting) : waiting_(waiting), idle_(threads) {
-  for (std::size_t i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+Workers::Workers(std::size_t threads, std::size_t waiting, Priority priority)
+    : waiting_(waiting), idle_(threads) {
+  for (std::size_t i = 0; i < threads; ++i) {
+    threads_.emplace_back([this, priority] {
+      if (priority == Priority::lowest) give_way();
+      work();
+    });
+  }
 }
 
 Workers::~Workers() {

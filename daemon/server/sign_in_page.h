@@ -9,11 +9,11 @@ namespace emberlock::daemon {
 
 enum class TokenField { none, shown };
 
-/// What a browser is shown that isn't let in: what to do, without scripts; and where there is a token, a form
-/// for it, which POSTs token=... to /open.
-std::string stranger_page(Refusal refusal, TokenField field);
-/// The Content-Security-Policy that it goes with.
-inline constexpr const char* kStrangerPolicy =
+/// The page for a browser that isn't let in: says what to do, without scripts. If there is a token, it has a
+/// form for it, which POSTs token=... to /open.
+std::string sign_in_page(Refusal refusal, TokenField field);
+/// The page's Content-Security-Policy.
+inline constexpr const char* kSignInPolicy =
     "default-src 'none'; style-src 'unsafe-inline'; form-action 'self'; base-uri 'none'; frame-ancestors "
     "'none'";
 

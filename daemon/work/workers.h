@@ -11,17 +11,22 @@
 
 namespace emberlock::daemon {
 
-/// A few threads for calls that take long, and a queue with a bound. Thread-safe.
+/// A few threads for long calls, and a bounded queue. Thread-safe.
 class Workers {
  public:
-  /// `waiting` calls at most queue behind the `threads` that run.
-  Workers(std::size_t threads, std::size_t waiting);
+  enum class Priority {
+    normal,
+    lowest,  ///< background priority, for processor and disk
+  };
+
+  /// At most `waiting` calls are queued while `threads` run.
+  Workers(std::size_t threads, std::size_t waiting, Priority priority = Priority::normal);
   Workers(const Workers&) = delete;
   Workers& operator=(const Workers&) = delete;
-  /// Runs what is queued to its end.
+  /// Completes the queued calls.
   ~Workers();
 
-  /// False when the queue is full: nothing will run.
+  /// False when the queue is full; the call isn't run then.
   [[nodiscard]] bool run(std::function<void()> call);
 
  private:

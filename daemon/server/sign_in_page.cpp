@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/server/stranger_page.h"
+#include "daemon/server/sign_in_page.h"
 
 #include <string_view>
 
@@ -57,7 +57,7 @@ std::string_view alert_for(Refusal refusal) {
 
 }  // namespace
 
-std::string stranger_page(Refusal refusal, TokenField field) {
+std::string sign_in_page(Refusal refusal, TokenField field) {
   return fmt::format(kPage, alert_for(refusal), field == TokenField::shown ? kForm : "");
 }
 

@@ -10,6 +10,7 @@
 
 #include "base/file.h"
 #include "cli/align_daemon.h"
+#include "cli/align_rounds.h"
 #include "cli/commands.h"
 #include "cli/interrupt.h"
 #include "cli/strobe_choice.h"
@@ -18,20 +19,25 @@
 #include "rig/align/json.h"
 #include "rig/align/record.h"
 #include "rig/align/run.h"
+#include "smear_sync/align/align.h"
 
 namespace emberlock::cli {
 namespace {
 
-/// Of virtual cameras: an order waits for the frame after next.
+/// For virtual cameras: a trim takes effect at the frame after next.
 constexpr Seconds kTrimLatency = milliseconds(80);
 
 struct AlignArguments {
   std::string rig;
   std::string strobe = "virtual";
-  std::string tolerance = "100rows";
-  std::string policy = "densest";
+  std::string tolerance;
+  double flame_speed = smear::FlameMotion{}.speed.value();
+  double detail_mm = 1e3 * smear::FlameMotion{}.detail.value();
+  double shortest_take = 10;
+  std::string policy = "timed";
   std::uint64_t seed = 1;
   bool json = false;
+  AlignDetail detail = AlignDetail::changes;
   double latency_jitter_ms = 0.2;
   int max_rounds = 500;
   int max_resets = 1000;
@@ -48,73 +54,48 @@ struct AlignArguments {
   bool anyway = false;
 };
 
-void print_table(const rig::AlignRoundReport& report) {
-  const SecondsPerRow row = report.options.row_time;
-  std::printf("round %d: %s; %d resets so far", report.decision.round, report.decision.reason.c_str(),
-              report.decision.resets_so_far);
-  if (report.decision.worst_pair) {
-    std::printf("; worst pair %.1f rows (%.3f ms)", (*report.decision.worst_pair / row).value(),
-                in_milliseconds(*report.decision.worst_pair));
+/// Prints the rounds: JSON lines or words on stdout.
+rig::AlignObserver printer(const AlignArguments& arguments) {
+  if (arguments.json) {
+    return [](const rig::AlignRoundReport& report) {
+      std::printf("%s\n", rig::round_json(report).dump().c_str());
+      std::fflush(stdout);
+    };
   }
-  std::printf("\n");
-  if (const auto& dial = report.decision.dial; dial && dial->ready && !dial->act)
-    std::printf("    %s\n", dial->words.c_str());
-  const bool mixed = std::any_of(report.sensors.begin(), report.sensors.end(),
-                                 [](SensorKind kind) { return kind != SensorKind::ccd; });
-  for (std::size_t i = 0; i < report.cameras.size(); ++i) {
-    const smear::CameraDecision& camera = report.decision.cameras[i];
-    const char mark = camera.reset ? '*' : camera.trim ? '~' : report.decision.reference == i ? '=' : ' ';
-    std::printf("  %c %-12s ", mark, report.cameras[i].id.c_str());
-    if (mixed) std::printf("%-8s", std::string(name(report.sensors[i])).c_str());
-    if (camera.error) {
-      std::printf("%+8.1f rows %+8.3f ms", (*camera.error / row).value(), in_milliseconds(*camera.error));
-    } else {
-      std::printf("%25s", std::string(name(camera.state)).c_str());
-    }
-    std::printf("  %s\n", camera.reason.c_str());
-  }
-  std::fflush(stdout);
-}
-
-/// What flashes told of a sensor other than a CCD.
-void print_sensor(const drivers::CameraInfo& camera, const std::optional<smear::RowClock>& clock,
-                  const std::optional<Seconds>& exposure) {
-  if (camera.sensor == SensorKind::ccd) return;
-  std::string text = fmt::format("  {}, {} shutter:", camera.id, name(camera.sensor));
-  if (exposure) text += fmt::format(" exposes about {:.1f} ms", in_milliseconds(*exposure));
-  if (clock)
-    text +=
-        fmt::format(", t_row {:.3f} +- {:.3f} us", clock->row_time.value() * 1e6, clock->sigma.value() * 1e6);
-  std::printf("%s\n", (exposure || clock ? text : text + " nothing could be told of it").c_str());
-}
-
-void print_summary(const rig::AlignRunResult& result) {
-  const smear::AlignDecision& last = result.last;
-  const SecondsPerRow row = result.options.row_time;
-  std::printf("%s after %d rounds and %d resets (policy %s, tolerance %.1f rows, t_row %.4f us): %s\n",
-              last.verdict == smear::AlignVerdict::aligned   ? "aligned"
-              : last.verdict == smear::AlignVerdict::refused ? "REFUSED"
-                                                             : "NOT aligned",
-              last.round, result.resets, std::string(name(result.options.policy)).c_str(),
-              result.options.tolerance.in_rows(row).value(), row.value() * 1e6, last.reason.c_str());
-  if (result.checks > 0) std::printf("  held by %d checks\n", result.checks);
-  for (std::size_t i = 0; i < result.cameras.size(); ++i)
-    print_sensor(result.cameras[i], result.row_clocks[i], result.exposures[i]);
-}
-
-/// Where the rounds go: JSON lines or tables on stdout.
-rig::AlignObserver printer(bool json) {
-  return [json](const rig::AlignRoundReport& report) {
-    if (!json) return print_table(report);
-    std::printf("%s\n", rig::round_json(report).dump().c_str());
+  const auto rounds = std::make_shared<AlignRounds>(arguments.detail);
+  return [rounds](const rig::AlignRoundReport& report) {
+    std::printf("%s", rounds->take(report).c_str());
     std::fflush(stdout);
   };
+}
+
+/// What an alignment that was stopped leaves behind.
+void say_kept(const AlignArguments& arguments, const rig::AlignRunResult& result) {
+  std::FILE* const out = arguments.json ? stderr : stdout;
+  std::fprintf(out, "stopped after round %d, as asked; the cameras stay as they are\n", result.last.round);
+  if (!arguments.record.empty()) {
+    std::fprintf(out, "kept: %d rounds in %s; `emberlock align --replay %s` shows them\n", result.last.round,
+                 arguments.record.c_str(), arguments.record.c_str());
+  }
+  if (!arguments.delays.empty()) {
+    const auto known = std::count_if(result.delays.begin(), result.delays.end(),
+                                     [](const auto& delay) { return delay.has_value(); });
+    std::fprintf(out, "kept: the reset delays of %d cameras in %s\n", static_cast<int>(known),
+                 arguments.delays.c_str());
+  }
+  if (arguments.record.empty() && arguments.delays.empty())
+    std::fprintf(out, "nothing is kept: --record DIR and --delays FILE would have\n");
 }
 
 Result<rig::AlignRunOptions> options_from(const AlignArguments& arguments) {
   rig::AlignRunOptions options;
   EMBERLOCK_ASSIGN_OR_RETURN(options.align.policy, smear::parse_align_policy(arguments.policy));
-  EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, smear::parse_tolerance(arguments.tolerance));
+  options.align.tolerance = smear::tolerance_for(
+      {smear::MetersPerSecond(arguments.flame_speed), Meters(1e-3 * arguments.detail_mm)});
+  if (!arguments.tolerance.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.align.tolerance, smear::parse_tolerance(arguments.tolerance));
+  }
+  options.align.shortest_take = Seconds(arguments.shortest_take);
   options.align.max_rounds = arguments.max_rounds;
   options.align.delay_jitter = std::max(milliseconds(arguments.latency_jitter_ms), microseconds(1));
   options.align.reset_time = Seconds(arguments.reset_seconds);
@@ -139,7 +120,7 @@ Result<rig::AlignRunResult> align_live(const AlignArguments& arguments, const ri
       camera.trim = FrameRateTrim{PartsPerMillion(arguments.trim_range_ppm),
                                   PartsPerMillion(arguments.trim_step_ppm), kTrimLatency};
     }
-    // What a data sheet says of the model: the direction, the rows and the shifts. t_row is measured.
+    // From the model's data sheet: direction, rows and shifts. t_row is measured.
     options.timing.push_back(
         {.rows = camera.timing.rows, .shifts = camera.timing.shifts, .direction = camera.timing.direction});
   }
@@ -163,34 +144,36 @@ Result<rig::AlignRunResult> align_live(const AlignArguments& arguments, const ri
   return result;
 }
 
-/// Whether the daemon is asked: no rig was named, and nothing is to be run again.
+/// Whether to use the daemon: no rig was given, and nothing is replayed.
 bool asks_daemon(const AlignArguments& arguments) {
   return arguments.rig.empty() && arguments.replay.empty();
 }
 
 void align(const AlignArguments& arguments) {
-  const rig::AlignObserver observer = printer(arguments.json);
+  const rig::AlignObserver observer = printer(arguments);
   std::uint64_t seed = arguments.seed;
+  bool stopped = false;
   const auto result = [&]() -> Result<rig::AlignRunResult> {
-    if (arguments.replay.empty()) {
-      std::optional<Interrupt> interrupt;  // a run that isn't to be held ends by itself
-      if (arguments.hold_minutes) interrupt.emplace();
-      return align_live(arguments, observer);
-    }
-    return rig::replay_align(arguments.replay, observer, progress_bar("replay"), &seed);
+    if (!arguments.replay.empty())
+      return rig::replay_align(arguments.replay, observer, progress_bar("replay"), &seed);
+    const Interrupt interrupt;
+    Result<rig::AlignRunResult> live = align_live(arguments, observer);
+    stopped = Interrupt::asked();
+    return live;
   }();
   if (!result.ok()) fail(result.error());
-  if (arguments.json) {
-    std::printf("%s\n", rig::summary_json(*result, seed).dump().c_str());
-  } else {
-    print_summary(*result);
-  }
+  const std::string summary =
+      arguments.json ? rig::summary_json(*result, seed).dump() + "\n" : align_summary(*result);
+  std::printf("%s", summary.c_str());
+  if (stopped) say_kept(arguments, *result);
   if (result->last.verdict != smear::AlignVerdict::aligned) throw CLI::RuntimeError(1);
 }
 
-/// What the daemon can be asked for; the rest is its configuration's.
+/// The options that the daemon accepts; the others are in its configuration.
 DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App& verb) {
-  static const std::set<std::string> kAskable = {"--tolerance", "--policy", "--anyway", "--stop", "--json"};
+  static const std::set<std::string> kAskable = {"--tolerance", "--flame-speed", "--detail",
+                                                 "--policy",    "--anyway",      "--renew",
+                                                 "--stop",      "--json",        "--verbose"};
   for (const CLI::Option* option : verb.get_options()) {
     if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
       fail({ErrorKind::bad_input, "works only together with --rig", option->get_name(),
@@ -199,29 +182,56 @@ DaemonAlignment asked_of_daemon(const AlignArguments& arguments, const CLI::App&
   }
   DaemonAlignment wanted = arguments.by_daemon;
   wanted.json = arguments.json;
+  wanted.detail = arguments.detail;
   if (verb.count("--tolerance") > 0) wanted.request.set_tolerance(arguments.tolerance);
+  if (verb.count("--flame-speed") > 0) wanted.request.set_flame_speed_m_s(arguments.flame_speed);
+  if (verb.count("--detail") > 0) wanted.request.set_detail_m(1e-3 * arguments.detail_mm);
   if (verb.count("--policy") > 0) wanted.request.set_policy(arguments.policy);
   wanted.request.set_anyway(arguments.anyway);
+  wanted.request.set_renew(wanted.renew_for.has_value());
+  wanted.request.set_hold_s(wanted.renew_for.value_or(0));
   return wanted;
 }
 
-/// What an alignment may cost.
+/// Adds the options that say how near and for how long.
+void add_tolerance(CLI::App* verb, AlignArguments& a) {
+  auto* tolerance = verb->add_option(
+      "--tolerance", a.tolerance,
+      "largest distance of a camera from the common target, to either side: 0.5ms, 500us or 10rows [the time "
+      "in which the flame moves by a quarter of --detail]");
+  verb->add_option("--flame-speed", a.flame_speed, "speed of what moves fastest in the flame, m/s")
+      ->check(CLI::Range(0.001, 10000.0))
+      ->excludes(tolerance)
+      ->capture_default_str();
+  verb->add_option("--detail", a.detail_mm, "size of the smallest detail that shall be resolved, mm")
+      ->check(CLI::Range(0.001, 10000.0))
+      ->excludes(tolerance)
+      ->capture_default_str();
+  verb->add_option(
+          "--shortest-take", a.shortest_take,
+          "aligned means: surely for so many seconds, as far as measured drifts and resets can make it")
+      ->check(CLI::Range(0.0, 3600.0))
+      ->capture_default_str();
+}
+
+/// Adds the options that limit an alignment.
 void add_limits(CLI::App* verb, AlignArguments& a) {
-  verb->add_option("--max-rounds", a.max_rounds, "give up after so many")
+  verb->add_option("--max-rounds", a.max_rounds, "give up after so many rounds")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   verb->add_option("--max-resets", a.max_resets,
-                   "refuse a tolerance that would take more, and say what could be met")
+                   "refuse a tolerance that would take more resets, and say which one can be met")
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
-  verb->add_option("--max-minutes", a.max_minutes, "refuse what would take longer")
+  verb->add_option("--max-minutes", a.max_minutes, "refuse a tolerance that would take longer")
       ->check(CLI::Range(0.01, 1e6))
       ->capture_default_str();
-  verb->add_option("--probability", a.probability, "with which the limits must suffice")
+  verb->add_option("--probability", a.probability,
+                   "probability with which the alignment must stay within these limits")
       ->check(CLI::Range(0.01, 1.0))
       ->capture_default_str();
   verb->add_option("--reset-seconds", a.reset_seconds,
-                   "of one reset, where an operator does it: what is foretold counts them")
+                   "time that an operator needs for one reset by hand; the forecast uses it")
       ->check(CLI::Range(0.0, 3600.0))
       ->capture_default_str();
 }
@@ -230,47 +240,47 @@ void add_limits(CLI::App* verb, AlignArguments& a) {
 
 void add_align(CLI::App& app) {
   auto arguments = std::make_shared<AlignArguments>();
-  CLI::App* verb = app.add_subcommand("align",
-                                      "Films the strobe and resets the cameras' shutters until all read "
-                                      "within a tolerance of one another: by the "
-                                      "daemon, or here with --rig.");
+  CLI::App* verb =
+      app.add_subcommand("align",
+                         "Films the strobe and resets the cameras' shutters until all are within a tolerance "
+                         "of one another. The daemon does it; with --rig this program does.");
   CLI::Option* rig =
       verb->add_option("--rig", arguments->rig,
                        "cameras and strobe: virtual:N, or virtual:4ccd+3rolling+2global [the daemon's]");
   verb->add_option(
           "--strobe", arguments->strobe,
-          "of the rig: virtual (it is told what to do), manual or manual:step=1 (somebody sets it by a "
-          "dial, with steps of so many flashes a minute: says what to set, reads from the frames what "
-          "was set, and says which way to turn it), or virtual-dial:error=300,at=1510.5 (a simulated "
-          "dial, so many ppm off, that stands there at first, and somebody who turns it as told)")
+          "the rig's strobe. virtual: simulated, set by the program. manual or manual:step=1: somebody sets "
+          "it with a dial in such steps, flashes per minute; the program says what to set, measures from the "
+          "frames what was set, and says which way to turn. virtual-dial:error=300,at=1510.5: a simulated "
+          "dial, wrong by so many ppm, first set to `at`, and turned as the program says")
       ->needs(rig)
       ->capture_default_str();
-  verb->add_option("--tolerance", arguments->tolerance,
-                   "to the common target, to either side: 100rows, 5.4ms or 500us")
-      ->capture_default_str();
+  add_tolerance(verb, *arguments);
   verb->add_option("--policy", arguments->policy, "fixed-reference (the paper's), densest, timed or trimmed")
       ->capture_default_str();
-  verb->add_option("--seed", arguments->seed, "of the virtual rig and of the moments of untimed resets")
+  verb->add_option("--seed", arguments->seed, "seed of the virtual rig and of the moments of untimed resets")
       ->capture_default_str();
-  verb->add_flag("--json", arguments->json, "one JSON object a round on stdout, and one at the end");
-  verb->add_option("--latency-jitter", arguments->latency_jitter_ms, "RMS of a reset's latency, ms")
+  verb->add_flag("--json", arguments->json, "one JSON object per round on stdout, and one at the end");
+  verb->add_flag_callback(
+      "--verbose", [arguments] { arguments->detail = AlignDetail::all; },
+      "print every camera of every round, not what changes alone");
+  verb->add_option("--latency-jitter", arguments->latency_jitter_ms, "RMS jitter of a reset's latency, ms")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
   add_limits(verb, *arguments);
   verb->add_option("--trim-range", arguments->trim_range_ppm,
-                   "by how much virtual cameras can trim their frame rates, ppm; 0: not at all")
+                   "how far virtual cameras can trim their frame rates, ppm; 0: they can't")
       ->check(CLI::Range(0.0, 1000.0))
       ->capture_default_str();
-  verb->add_option("--trim-step", arguments->trim_step_ppm, "of these trims, ppm")
+  verb->add_option("--trim-step", arguments->trim_step_ppm, "step of these trims, ppm")
       ->check(CLI::Range(0.001, 1000.0))
       ->capture_default_str();
   verb->add_option(
       "--delays", arguments->delays,
-      "file of what is known of the cameras' reset delays: read if it exists, written at the end");
-  verb->add_option(
-          "--hold", arguments->hold_minutes,
-          "once aligned: film again by each next check and reset what left, for so many minutes or until "
-          "Ctrl-C")
+      "file with the measured reset delays of the cameras: read if it exists, written at the end");
+  verb->add_option("--hold", arguments->hold_minutes,
+                   "once aligned: check again whenever it is due and reset cameras that drifted out, for so "
+                   "many minutes or until Ctrl-C")
       ->expected(0, 1)
       ->default_str("1e9")
       ->type_name("MINUTES")
@@ -282,9 +292,14 @@ void add_align(CLI::App& app) {
       ->excludes(record);
   add_daemon_options(*verb, arguments->by_daemon.daemon);
   verb->add_flag("--anyway", arguments->anyway,
-                 "of the daemon: even where the configured limits of time and resets won't hold")
+                 "daemon only: align even if the configured limits of time and resets can't be met")
       ->excludes(rig);
-  verb->add_flag("--stop", arguments->by_daemon.stop, "of the daemon: stop aligning, or let the lock go")
+  verb->add_option("--renew", arguments->by_daemon.renew_for,
+                   "daemon only: go on from the lock, and reset cameras so that it holds for so many seconds")
+      ->type_name("SECONDS")
+      ->check(CLI::PositiveNumber)
+      ->excludes(rig);
+  verb->add_flag("--stop", arguments->by_daemon.stop, "daemon only: stop aligning, or release the lock")
       ->excludes(rig);
   verb->callback([arguments, verb] {
     if (!asks_daemon(*arguments)) return align(*arguments);

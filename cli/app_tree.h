@@ -7,14 +7,17 @@
 
 #include <CLI/CLI.hpp>
 
-// What --help shows of a program, walked.
+// Visits everything that --help shows of a program.
 namespace emberlock::cli {
 
 std::vector<const CLI::App*> verbs_of(const CLI::App& app);
 std::vector<const CLI::Option*> options_of(const CLI::App& app);
 bool takes_value(const CLI::Option& option);
 
-/// `path`: the words that lead to a verb, "emberlock devices probe"; the program itself comes first.
+/// The first clause of a description, because lists have little space.
+std::string first_clause(const std::string& text);
+
+/// `path`: the words of a verb, "emberlock devices probe"; the program itself comes first.
 void visit(const CLI::App& app, const std::string& path,
            const std::function<void(const CLI::App& verb, const std::string& path)>& each);
 

@@ -37,7 +37,7 @@ struct CamerasArguments {
   bool json = false;
 };
 
-/// The colour that an earlier calibration in the same folder knew stays.
+/// Keeps the colour of an earlier calibration in the same folder.
 void keep_colour(v1::Rig& rig, const fs::path& earlier) {
   std::error_code ec;
   if (!fs::exists(earlier, ec)) return;
@@ -156,16 +156,15 @@ void add_cameras(CLI::App& parent) {
   auto arguments = std::make_shared<CamerasArguments>();
   CLI::App* verb = parent.add_subcommand("cameras",
                                          "Lenses and poses of all cameras from pictures or films of a board; "
-                                         "1 if one of them couldn't be placed");
+                                         "exit code 1 if a camera's pose couldn't be found");
   CamerasArguments& a = *arguments;
   add_board_options(*verb, a.boards, recon::FilmSearchOptions{}.instants);
   verb->get_option("--board")->required();
   verb->add_option("--out", a.out, "Folder for rig.json, index.html, transforms.json, opencv/ and colmap/")
       ->required();
-  verb->add_option(
-      "--world", a.world,
-      "Instant whose board is the world: origin at its first corner, x along a row, z out of it [the first "
-      "that most cameras see]");
+  verb->add_option("--world", a.world,
+                   "Instant whose board sets the world frame: origin at its first corner, x along a row, z "
+                   "out of the board [the first instant that most cameras see]");
   verb->add_option(
       "--box", a.box,
       "cx,cy,cz,sx,sy,sz: the flame's volume in that world, metres [the largest cube that all cameras see]");
@@ -180,10 +179,10 @@ void add_convert(CLI::App& parent) {
   };
   auto arguments = std::make_shared<Arguments>();
   CLI::App* verb = parent.add_subcommand(
-      "convert", "Another program's calibration as rig.json, and rig.json for other programs");
+      "convert", "Converts another program's calibration to rig.json, and rig.json for other programs");
   verb->add_option("rig", arguments->rig,
                    "rig.json, transforms.json, OpenCV's YAML or XML (a file, or a folder of them), or a "
-                   "folder of COLMAP's text")
+                   "folder of COLMAP's text files")
       ->required();
   verb->add_option("--out", arguments->out, "Folder for rig.json, transforms.json, opencv/ and colmap/")
       ->required();
@@ -200,8 +199,8 @@ void add_convert(CLI::App& parent) {
 }  // namespace
 
 void add_calibrate(CLI::App& app) {
-  CLI::App* verb = app.add_subcommand(
-      "calibrate", "Where the cameras stand, how their lenses draw, and whether that changed");
+  CLI::App* verb =
+      app.add_subcommand("calibrate", "Poses, lenses and colours of the cameras, and whether a camera moved");
   verb->require_subcommand(1);
   add_cameras(*verb);
   add_calibrate_check(*verb);

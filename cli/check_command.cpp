@@ -17,7 +17,7 @@ namespace emberlock::cli {
 namespace {
 
 constexpr double kDegreesOfTurn = 180 / M_PI;
-constexpr std::size_t kCheckInstants = 20;  // a check asks for less than a calibration
+constexpr std::size_t kCheckInstants = 20;  // a check needs fewer than a calibration
 
 const char* words_of(recon::DriftVerdict verdict) {
   switch (verdict) {
@@ -123,14 +123,14 @@ void add_calibrate_check(CLI::App& parent) {
   auto arguments = std::make_shared<CheckArguments>();
   CLI::App* verb = parent.add_subcommand("check",
                                          "Whether a camera moved since the calibration, from later pictures "
-                                         "of the board or a lamp; 1 if one did");
+                                         "of the board or a lamp; exit code 1 if one did");
   verb->add_option("rig", arguments->rig, "rig.json, or another calibration that `calibrate convert` reads")
       ->required();
   add_board_options(*verb, arguments->boards, kCheckInstants);
-  CLI::Option* lamp = verb->add_flag("--lamp", arguments->lamp,
-                                     "The pictures show one small bright lamp, such as the strobe's, at one "
-                                     "place each instant; three places "
-                                     "tell all, one or two only a camera's turn");
+  CLI::Option* lamp =
+      verb->add_flag("--lamp", arguments->lamp,
+                     "The pictures show one small bright lamp, such as the strobe's, at a new place at each "
+                     "instant. Three places show all movements, one or two only rotations");
   verb->get_option("--board")->excludes(lamp);
   verb->add_flag("--json", arguments->json, "One JSON object on stdout");
   verb->callback([arguments] {

@@ -30,22 +30,21 @@ namespace emberlock::cli {
 namespace {
 
 constexpr std::chrono::seconds kConnect{5};
-constexpr std::chrono::seconds kCall{15};     // what answers at once, devices included
-constexpr std::chrono::seconds kQueues{310};  // what waits for queues to reach the disk
+constexpr std::chrono::seconds kCall{15};     // for calls that answer at once, devices included
+constexpr std::chrono::seconds kQueues{310};  // for calls that wait until queues are on the disk
 constexpr std::chrono::milliseconds kAskStop{50};
 constexpr int kLargestAnswer = 64 << 20;  // bytes
 constexpr int kKeepaliveMs = 20'000;
 
 const char* const kRemedy =
-    "Is it running? `systemctl status emberlockd` says, `sudo systemctl start emberlockd` starts it; "
-    "--daemon names "
-    "another";
+    "Is it running? `systemctl status emberlockd` says, `sudo systemctl start emberlockd` starts it, and "
+    "`emberlockd --config FILE` one of your own; --daemon names another";
 
 Error unreachable(const std::string& where, const std::string& what, const std::string& remedy = kRemedy) {
   return {ErrorKind::io, "the daemon can't be reached: " + what, where, remedy};
 }
 
-/// Asks the kernel, whose words are clearer than gRPC's.
+/// Tests the socket directly, because the kernel's errors are clearer than gRPC's.
 Status try_socket(const std::string& path) {
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
@@ -117,7 +116,7 @@ ErrorKind kind_of(grpc::StatusCode code) {
   }
 }
 
-/// Asks `stop` while a stream waits, and cancels it.
+/// Polls `stop` while a stream waits, and cancels the stream.
 class Stopper {
  public:
   Stopper(grpc::ClientContext& context, Client::Stop stop)
@@ -157,15 +156,16 @@ struct Client::Parts {
         sync(channel),
         capture(channel),
         sessions(channel),
+        jobs(channel),
         reconstruct(channel) {}
 
   Error error(const grpc::Status& status) {
-    // A daemon that is there says UNAVAILABLE of a device, and the channel stays.
+    // A running daemon also returns UNAVAILABLE for a device; the channel is then still connected.
     lost = status.error_code() == grpc::StatusCode::CANCELLED ||
            (status.error_code() == grpc::StatusCode::UNAVAILABLE &&
             channel->GetState(false) != GRPC_CHANNEL_READY);
     if (lost) return unreachable(where, "it went away", "`journalctl -u emberlockd` says why");
-    // The same code with words of the daemon's own is a device's that didn't answer it.
+    // The same code with the daemon's own text is for a device that didn't answer the daemon.
     if (status.error_code() == grpc::StatusCode::DEADLINE_EXCEEDED &&
         status.error_message() == "Deadline Exceeded")
       return {ErrorKind::timed_out, "the daemon didn't answer in time", where,
@@ -193,7 +193,7 @@ struct Client::Parts {
                 Stub& stub, const Request& request, const Take<Response>& take, const Stop& stop) {
     grpc::ClientContext context;
     const auto reader = (stub.*method)(&context, request);
-    std::atomic<bool> ours = false;  // it was ended from here, by `take` or by `stop`
+    std::atomic<bool> ours = false;  // it was ended on this side, by `take` or by `stop`
     {
       const Stopper stopper(context, [&] {
         if (stop && stop()) ours = true;
@@ -217,6 +217,7 @@ struct Client::Parts {
   v1::Sync::Stub sync;
   v1::Capture::Stub capture;
   v1::Sessions::Stub sessions;
+  v1::Jobs::Stub jobs;
   v1::Reconstruct::Stub reconstruct;
   std::atomic<bool> lost = false;
 };
@@ -290,17 +291,17 @@ Result<v1::RecordingStatus> Client::stop_recording() {
 Result<v1::ListSessionsResponse> Client::list_sessions() {
   return parts_->call(&v1::Sessions::Stub::List, parts_->sessions, v1::Empty());
 }
-Status Client::verify(const v1::SessionRequest& request, const Take<v1::JobProgress>& take,
-                      const Stop& stop) {
+Status Client::verify(const v1::SessionRequest& request, const Take<v1::Job>& take, const Stop& stop) {
   return parts_->stream(&v1::Sessions::Stub::Verify, parts_->sessions, request, take, stop);
 }
-Status Client::repair(const v1::SessionRequest& request, const Take<v1::JobProgress>& take,
-                      const Stop& stop) {
+Status Client::repair(const v1::SessionRequest& request, const Take<v1::Job>& take, const Stop& stop) {
   return parts_->stream(&v1::Sessions::Stub::Repair, parts_->sessions, request, take, stop);
 }
-Status Client::export_to(const v1::ExportRequest& request, const Take<v1::JobProgress>& take,
-                         const Stop& stop) {
+Status Client::export_to(const v1::ExportRequest& request, const Take<v1::Job>& take, const Stop& stop) {
   return parts_->stream(&v1::Sessions::Stub::Export, parts_->sessions, request, take, stop);
+}
+Status Client::cancel_job(const v1::CancelJobRequest& request) {
+  return as_status(parts_->call(&v1::Jobs::Stub::Cancel, parts_->jobs, request));
 }
 Result<v1::ReconstructionStatus> Client::reconstruct(const v1::ReconstructRequest& request) {
   return parts_->call(&v1::Reconstruct::Stub::Start, parts_->reconstruct, request);

@@ -15,35 +15,35 @@ namespace emberlock::cli {
 
 inline constexpr int kUnreachable = 3;  ///< exit code: the daemon can't be reached
 
-/// EMBERLOCK_DAEMON in the environment, else unix:/run/emberlock/emberlockd.sock.
+/// EMBERLOCK_DAEMON in the environment, else unix: and usual_socket() (base/daemon_folders.h).
 std::string usual_daemon();
 
-/// Where the daemon is, and what it wants to see.
+/// The daemon's address and the client's credentials.
 struct DaemonAddress {
-  std::string address = usual_daemon();  ///< "unix:PATH", or "HOST:PORT" elsewhere
-  // Of HOST:PORT, in PEM:
-  std::filesystem::path tls_ca;                    ///< who vouches for the daemon
-  std::filesystem::path tls_certificate, tls_key;  ///< of this client, where the daemon wants one; or empty
-  std::filesystem::path token_file;                ///< of HOST:PORT: holds the daemon's token alone
+  std::string address = usual_daemon();  ///< "unix:PATH", or "HOST:PORT"
+  // For HOST:PORT, in PEM:
+  std::filesystem::path tls_ca;                    ///< authority that signed the daemon's certificate
+  std::filesystem::path tls_certificate, tls_key;  ///< of this client, if the daemon requires one; else empty
+  std::filesystem::path token_file;                ///< for HOST:PORT: contains only the daemon's token
 };
 
-/// --daemon (which it returns), --tls-ca, --tls-certificate, --tls-key and --token-file.
+/// Adds --daemon (which it returns), --tls-ca, --tls-certificate, --tls-key and --token-file.
 CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address);
-/// Whether it is one of these.
+/// Whether an option is one of these.
 bool is_daemon_option(const CLI::Option& option);
 
-/// emberlockd, as a verb asks it. Every call has a deadline; streams last until the daemon ends them, `take`
-/// returns false, or `stop`, asked some times a second, returns true: both are ends without an error. Errors
-/// carry the daemon's own words. Thread-safe.
+/// The client of emberlockd. Every call has a deadline. A stream lasts until the daemon ends it, `take`
+/// returns false, or `stop`, polled several times a second, returns true; the last two aren't errors. Errors
+/// contain the daemon's own text. Thread-safe.
 class Client {
  public:
-  /// Also waits, for a few seconds at most, until the daemon answers.
+  /// Waits up to a few seconds for the daemon to answer.
   static Result<Client> connect(const DaemonAddress& address);
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
   ~Client();
 
-  /// Whether the last error was that the daemon is gone.
+  /// Whether the last error was the loss of the daemon.
   [[nodiscard]] bool lost() const;
 
   template <class T>
@@ -63,9 +63,10 @@ class Client {
   Result<v1::RecordingStatus> record(const v1::RecordRequest& request);
   Result<v1::RecordingStatus> stop_recording();
   Result<v1::ListSessionsResponse> list_sessions();
-  Status verify(const v1::SessionRequest& request, const Take<v1::JobProgress>& take, const Stop& stop);
-  Status repair(const v1::SessionRequest& request, const Take<v1::JobProgress>& take, const Stop& stop);
-  Status export_to(const v1::ExportRequest& request, const Take<v1::JobProgress>& take, const Stop& stop);
+  Status verify(const v1::SessionRequest& request, const Take<v1::Job>& take, const Stop& stop);
+  Status repair(const v1::SessionRequest& request, const Take<v1::Job>& take, const Stop& stop);
+  Status export_to(const v1::ExportRequest& request, const Take<v1::Job>& take, const Stop& stop);
+  Status cancel_job(const v1::CancelJobRequest& request);
   Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request);
   Result<v1::ReconstructionStatus> cancel_reconstruction();
   Status watch_iterations(const Take<v1::IterationPreview>& take, const Stop& stop);
@@ -76,9 +77,9 @@ class Client {
   std::unique_ptr<Parts> parts_;
 };
 
-/// Client::connect, or leaves with kUnreachable (2 for an address that is none).
+/// Client::connect; on failure exits with kUnreachable (2 for an invalid address).
 Client connect_or_leave(const DaemonAddress& address);
-/// Prints the error and leaves: kUnreachable where the daemon went away, else as fail().
+/// Prints the error and exits: with kUnreachable if the daemon is gone, else like fail().
 [[noreturn]] void leave(const Client& client, const Error& error);
 template <class T>
 T or_leave(const Client& client, Result<T> result) {

@@ -11,7 +11,7 @@
 
 namespace emberlock::cli {
 
-/// How clips of a strobe are to be read, as typed.
+/// How to read clips of a strobe, as typed.
 struct ClipArguments {
   double flash_rate = 0;
   double row_time_us = 0;
@@ -24,13 +24,13 @@ struct ClipArguments {
   double flash_width_us = 20;
 };
 
-/// Adds their options to a verb and returns --flash-rate, which a verb may require.
+/// Adds the options to a verb and returns --flash-rate, which the verb may require.
 CLI::Option* add_clip_options(CLI::App& verb, ClipArguments& arguments);
 
-/// All but the row time.
+/// All options except the row time.
 smear::ClipOptions clip_options_of(const ClipArguments& arguments);
 
-/// As given by hand.
+/// As given by the user.
 std::optional<SecondsPerRow> row_time_of(const ClipArguments& arguments);
 
 }  // namespace emberlock::cli

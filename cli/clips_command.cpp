@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emberlock devices clips`: what a camera has filmed onto its card comes to the disk, for `emberlock
-// import`.
+// `emberlock devices clips`: downloads what a camera has filmed onto its card, for `emberlock import`.
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -24,7 +23,7 @@ struct ClipsArguments {
   std::string out;
 };
 
-/// One that is there already and still whole isn't loaded again.
+/// A clip that was already downloaded and is intact isn't downloaded again.
 Status fetch_clip(drivers::PtpSession& session, const drivers::Clip& clip, const fs::path& target) {
   std::error_code ec;
   const bool there = fs::exists(target, ec);
@@ -58,11 +57,11 @@ void add_clips(CLI::App& devices) {
   auto a = std::make_shared<ClipsArguments>();
   CLI::App* verb =
       devices.add_subcommand("clips",
-                             "Downloads the movies on a USB camera's card, with their checksums; what is "
-                             "there already stays. The card is "
-                             "only read. `emberlock import OUT` makes a session of several cameras' movies.");
+                             "Downloads the movies on a USB camera's card, with their checksums. Movies that "
+                             "were downloaded before are skipped. The card is only read. `emberlock import "
+                             "OUT` makes a session of several cameras' movies.");
   verb->add_option("ID", a->id, "The camera, as `emberlock devices` names it")->required();
-  verb->add_option("--out", a->out, "The folder that gets a folder a camera")->required();
+  verb->add_option("--out", a->out, "Folder for the movies, in a subfolder per camera")->required();
   verb->callback([a] {
     if (const Status done = fetch_clips(*a); !done) fail(done.error());
   });

@@ -27,7 +27,7 @@ struct ColourArguments {
   std::optional<double> gamma;
 };
 
-/// Puts the colours into the rig's cameras; cameras that it lacks are added with their colour alone.
+/// Stores the colours in the rig's cameras; missing cameras are added with only their colour.
 Status put_colours(v1::Rig& rig, const recon::ColourReadings& readings,
                    const recon::ColourCalibration& calibration) {
   for (std::size_t i = 0; i < calibration.cameras.size(); ++i) {
@@ -104,13 +104,14 @@ void add_calibrate_colour(CLI::App& parent) {
   ColourArguments& a = *arguments;
   verb->add_option(
           "folder", a.folder,
-          "Holds colour.json (where the patches are) and a folder for each camera with its target[_LIGHT]"
-          "[_SECONDSs], flat and dark pictures, or a session whose frames colour.json names so")
+          "Folder with colour.json (where the patches are) and a subfolder per camera with its pictures "
+          "target[_LIGHT][_SECONDSs], flat and dark; or with a session, whose frames colour.json names so")
       ->required();
   verb->add_option("--out", a.out, "Folder for rig.json and colour.html, the report")->required();
-  verb->add_option("--rig", a.rig, "A rig.json whose cameras get the colours [a new one with colours alone]");
-  verb->add_option("--gamma", a.gamma,
-                   "The cameras' response is this power law [found from exposures or radiances]")
+  verb->add_option("--rig", a.rig, "A rig.json to add the colours to [a new one with the colours only]");
+  verb->add_option(
+          "--gamma", a.gamma,
+          "Exponent of the power law that is the cameras' response [found from exposures or radiances]")
       ->check(CLI::Range(0.3, 5.0));
   verb->callback([arguments] { or_fail(calibrate_folder(*arguments)); });
 }

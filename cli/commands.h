@@ -8,13 +8,14 @@
 
 namespace emberlock::cli {
 
-// Each function adds one verb; its callback does the work and ends in fail() or normally.
+// Each function adds a verb; its callback does the work and returns normally or ends in fail().
 void add_devices(CLI::App& app);
 void add_clips(CLI::App& devices);
 void add_smear(CLI::App& app);
 void add_align(CLI::App& app);
 void add_reconstruct(CLI::App& app);
 void add_verify(CLI::App& app);
+void add_view(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 /// `tradeoff sync`; `parent` is the verb tradeoff.
 void add_tradeoff_sync(CLI::App& parent);
@@ -26,16 +27,23 @@ void add_calibrate_check(CLI::App& parent);
 void add_calibrate_colour(CLI::App& parent);
 void add_import(CLI::App& app);
 void add_demo(CLI::App& app);
+void add_sample(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_sessions(CLI::App& app);
+/// status, jobs, console, watch, record and strobe: those that only ask the daemon.
+void add_client(CLI::App& app);
 void add_status(CLI::App& app);
+void add_jobs(CLI::App& app);
 void add_console(CLI::App& app);
 void add_watch(CLI::App& app);
 void add_record(CLI::App& app);
 void add_strobe(CLI::App& app);
 
-/// Prints "emberlock: <message>" on stderr and leaves with exit code 2 for bad input, else 1 (as
-/// CLI::RuntimeError).
+/// Does what the command line asks for; the exit code.
+int run(CLI::App& app, int argc, char** argv);
+
+/// Prints "emberlock: <message>" on stderr and exits (by CLI::RuntimeError) with code 2 for bad input, else
+/// 1.
 [[noreturn]] void fail(const Error& error);
 
 /// The value, or fail().
@@ -48,8 +56,8 @@ inline void or_fail(const Status& status) {
   if (!status) fail(status.error());
 }
 
-/// A progress bar on stderr, redrawn in place on a terminal, a line every tenth otherwise; silent below two
-/// seconds.
+/// A progress bar on stderr: redrawn in place on a terminal, else a line per tenth and at most one a second,
+/// of all bars together; silent in the first two seconds.
 Progress progress_bar(const std::string& title);
 
 }  // namespace emberlock::cli

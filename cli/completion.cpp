@@ -12,24 +12,18 @@ namespace emberlock::cli {
 namespace {
 
 struct Word {
-  enum class Kind { verb, flag, option };  ///< a value stands behind an option
+  enum class Kind { verb, flag, option };  ///< an option is followed by a value
   Kind kind = Kind::verb;
   std::string text;  ///< without dashes
   std::string what;
   [[nodiscard]] std::string typed() const { return (kind == Kind::verb ? "" : "--") + text; }
 };
 
-/// What may follow the words of `path`.
+/// The possible continuations of the words `path`.
 struct Place {
   std::string path;
   std::vector<Word> words;
 };
-
-/// Of a description the first clause: a line in a list has no room for more.
-std::string first_clause(const std::string& text) {
-  return text.substr(
-      0, std::min({text.find(". "), text.find("; "), text.find(": "), text.find('\n'), text.size()}));
-}
 
 std::vector<Place> places_of(const CLI::App& app) {
   std::vector<Place> places;
@@ -52,7 +46,7 @@ std::string in_quotes(const std::string& text) {
   return quoted + "'";
 }
 
-/// 'emberlock devices' | 'emberlock align' ...: the words that lead on.
+/// 'emberlock devices' | 'emberlock align' ...: words that have continuations.
 std::string verbs_among(const std::vector<Place>& places, const char* between) {
   std::vector<std::string> verbs;
   for (const Place& place : places)
@@ -60,7 +54,7 @@ std::string verbs_among(const std::vector<Place>& places, const char* between) {
   return fmt::format("{}", fmt::join(verbs, between));
 }
 
-/// 'emberlock align --delays' | ...: those that a value follows.
+/// 'emberlock align --delays' | ...: options followed by a value.
 std::string valued_among(const std::vector<Place>& places) {
   std::vector<std::string> valued;
   for (const Place& place : places)

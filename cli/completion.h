@@ -7,9 +7,9 @@
 
 namespace emberlock::cli {
 
-// Scripts that make a shell complete verbs and options, and files where an option takes a value.
+// Shell scripts that complete verbs and options, and file names for values of options.
 std::string bash_completion(const CLI::App& app);
-std::string zsh_completion(const CLI::App& app);  ///< for a folder of its fpath, as _emberlock
+std::string zsh_completion(const CLI::App& app);  ///< to be stored as _emberlock in a folder of fpath
 std::string fish_completion(const CLI::App& app);
 
 }  // namespace emberlock::cli

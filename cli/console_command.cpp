@@ -22,7 +22,7 @@ void print_link(const ConsoleArguments& arguments) {
     return;
   }
   std::printf("%s\n", link.url().c_str());
-  // Whoever passes the link on hands over the rig; stdout is the link alone, for programs that open it.
+  // The link gives full control of the rig. stdout is only the link, for programs that open it.
   std::fprintf(stderr,
                "Opens the console in one browser, once, within %.0f s; then that browser is let in.\n",
                link.valid_s());
@@ -33,8 +33,7 @@ void print_link(const ConsoleArguments& arguments) {
 void add_console(CLI::App& app) {
   auto arguments = std::make_shared<ConsoleArguments>();
   CLI::App* verb = app.add_subcommand(
-      "console",
-      "Prints a link that opens the console in a browser: it asks the daemon over its Unix socket");
+      "console", "Prints a link that opens the console in a browser. The daemon must be on this machine");
   add_daemon_options(*verb, arguments->daemon);
   verb->add_flag("--json", arguments->json,
                  "ConsoleLink of emberlock/v1/services.proto, as JSON on one line");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdlib>
 
+#include "base/daemon_folders.h"
 #include "cli/client.h"
 
 namespace emberlock::cli {
@@ -12,7 +13,7 @@ const char* const kDaemonGroup = "The daemon";
 
 std::string usual_daemon() {
   const char* const named = std::getenv("EMBERLOCK_DAEMON");
-  return named == nullptr || *named == '\0' ? "unix:/run/emberlock/emberlockd.sock" : named;
+  return named == nullptr || *named == '\0' ? "unix:" + usual_socket().string() : named;
 }
 
 CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address) {
@@ -21,16 +22,19 @@ CLI::Option* add_daemon_options(CLI::App& verb, DaemonAddress& address) {
     verb.add_option(name, path, words)->envname(environment)->type_name("FILE")->group(kDaemonGroup);
   };
   CLI::Option* where =
-      verb.add_option("--daemon", address.address,
-                      "Where emberlockd is: unix:PATH or HOST:PORT; EMBERLOCK_DAEMON names another")
-          ->capture_default_str()
+      verb.add_option(
+              "--daemon", address.address,
+              "Address of emberlockd: unix:PATH or HOST:PORT [EMBERLOCK_DAEMON, else your own daemon's "
+              "socket, else unix:/run/emberlock/emberlockd.sock]")
           ->group(kDaemonGroup);
-  file("--tls-ca", address.tls_ca, "Of HOST:PORT: PEM of who vouches for the daemon", "EMBERLOCK_TLS_CA");
-  file("--token-file", address.token_file, "Of HOST:PORT: holds the daemon's token", "EMBERLOCK_TOKEN_FILE");
+  file("--tls-ca", address.tls_ca,
+       "HOST:PORT only: PEM of the authority that signed the daemon's certificate", "EMBERLOCK_TLS_CA");
+  file("--token-file", address.token_file, "HOST:PORT only: file with the daemon's token",
+       "EMBERLOCK_TOKEN_FILE");
   file("--tls-certificate", address.tls_certificate,
-       "Of HOST:PORT: PEM of this client, where the daemon wants one (tls_clients)",
+       "HOST:PORT only: PEM of this client's certificate, if the daemon wants one (tls_clients)",
        "EMBERLOCK_TLS_CERTIFICATE");
-  file("--tls-key", address.tls_key, "Of HOST:PORT: PEM of its key", "EMBERLOCK_TLS_KEY");
+  file("--tls-key", address.tls_key, "HOST:PORT only: PEM of its private key", "EMBERLOCK_TLS_KEY");
   return where;
 }
 

@@ -16,11 +16,12 @@
 namespace emberlock::cli {
 namespace {
 
-/// How a line of a camera says where it reads: "+3.2 rows +-0.4", or the phase's state.
+/// A camera's phase in a line of the table: "+3.2 rows +-0.4", or the phase's state.
 std::string sight(const v1::CameraStatus& camera) {
   if (!camera.has_error_rows()) return camera.sight();
   std::string text = fmt::format("{:+.1f} rows", camera.error_rows());
   if (camera.has_sigma_rows()) text += fmt::format(" +-{:.1f}", camera.sigma_rows());
+  if (camera.has_error_s()) text += fmt::format(" ({:+.3f} ms)", 1e3 * camera.error_s());
   return text;
 }
 
@@ -34,7 +35,7 @@ std::string camera_line(const v1::CameraStatus& camera) {
       fmt::format("  {}{:<14} {:<6} {:<11}", camera.reset_next() ? '*' : ' ', camera.id(),
                   in_words(camera.light()), in_words(v1::CameraStatus::State_Name(camera.state())));
   line += fmt::format(" {:>7}", filming ? fmt::format("{:.1f} Hz", camera.measured_rate_hz()) : "");
-  line += fmt::format("  {:<20}", sight(camera));
+  line += fmt::format("  {:<32}", sight(camera));
   if (camera.has_drift_ppm()) line += fmt::format(" {:+.2f} ppm", camera.drift_ppm());
   if (camera.has_time_left_s()) line += fmt::format(", {} left", seconds_in_words(camera.time_left_s()));
   if (!camera.reason().empty()) line += fmt::format("  {}", camera.reason());
@@ -77,17 +78,26 @@ std::string reconstruction_line(const v1::ReconstructionStatus& reconstruction) 
   }
 }
 
-/// "salvage of take 1: 34 % done"; "compression of take 2: waits".
-std::string job_line(const v1::BackgroundJob& job) {
-  const bool salvages = job.kind() == v1::BackgroundJob::SALVAGE;
-  const std::string text = fmt::format("{} of {}: ", salvages ? "salvage" : "compression", job.session());
-  switch (job.state()) {
-    case v1::BackgroundJob::RUNNING:
-      return text + fmt::format("{:.0f} % done", 100 * job.fraction());
-    case v1::BackgroundJob::PAUSED:
-      return text + "stands still while something is recorded";
+constexpr double kSilent = 30;  // s: of a job that tells nothing so long somebody should know
+
+const char* name_of(v1::Job::Kind kind) {
+  switch (kind) {
+    case v1::Job::SALVAGE:
+      return "salvage";
+    case v1::Job::COMPRESS:
+      return "compression";
+    case v1::Job::FINISH:
+      return "end";
+    case v1::Job::VERIFY:
+      return "verification";
+    case v1::Job::REPAIR:
+      return "repair";
+    case v1::Job::EXPORT:
+      return "export";
+    case v1::Job::RECONSTRUCT:
+      return "reconstruction";
     default:
-      return text + "waits";
+      return "work";
   }
 }
 
@@ -103,6 +113,14 @@ std::string fault_lines(const v1::Fault& fault) {
       fault.subject().empty() ? "" : " " + fault.subject(), fault.what(), fault.over() ? " (over)" : "");
   if (!fault.remedy().empty()) text += fmt::format("         {}\n", fault.remedy());
   return text;
+}
+
+std::string round_head(const v1::AlignmentStatus& alignment) {
+  std::string text =
+      fmt::format("round {}: {} {} resets so far", alignment.round(), alignment.reason(), alignment.resets());
+  if (alignment.has_worst_pair_s())
+    text += fmt::format("; worst pair {:.3f} ms", alignment.worst_pair_s() * 1e3);
+  return text + "\n";
 }
 
 }  // namespace
@@ -131,6 +149,28 @@ std::string seconds_in_words(double seconds) {
   return fmt::format("{} h {} min", whole / 3600, whole / 60 % 60);
 }
 
+std::string tolerance_in_words(double seconds, double rows) {
+  const double ms = 1e3 * seconds;
+  return fmt::format("{:.{}f} ms ({:.{}f} rows)", ms,
+                     ms < 0.1 ? 4
+                     : ms < 1 ? 3
+                              : 2,
+                     rows, rows < 100 ? 1 : 0);
+}
+
+std::string lock_in_words(const v1::AlignmentStatus& alignment) {
+  if (alignment.verdict() != v1::AlignmentStatus::ALIGNED) return "";
+  if (!alignment.has_time_left_s()) return "no end in sight";
+  std::string text = fmt::format("a take may be {} long", seconds_in_words(alignment.time_left_s()));
+  if (alignment.has_likely_left_s() && alignment.likely_left_s() > 1.1 * alignment.time_left_s())
+    text += fmt::format(", most likely {}", seconds_in_words(alignment.likely_left_s()));
+  if (!alignment.leaves_first().empty())
+    text += fmt::format(", then {} leaves tolerance", alignment.leaves_first());
+  if (alignment.has_renewed_left_s() && alignment.renewed_left_s() > 1.1 * alignment.time_left_s())
+    text += fmt::format("; {} if renewed", seconds_in_words(alignment.renewed_left_s()));
+  return text;
+}
+
 std::string losses(const v1::Counts& counts) {
   std::vector<std::string> parts;
   const auto add = [&](std::uint64_t n, const char* cause) {
@@ -149,7 +189,7 @@ std::string recording_line(const v1::RecordingStatus& recording) {
   std::string line = fmt::format("{}: {}, {}, {} frames recorded", recording.session(),
                                  in_words(v1::RecordingStatus::State_Name(recording.state())),
                                  seconds_in_words(recording.seconds()), recording.frames());
-  // Of those that are neither recorded nor lost: where they are, while there are any.
+  // Frames that are neither recorded nor lost yet, by stage.
   const v1::FrameProgress& progress = recording.progress();
   if (progress.arrived() > recording.frames() && progress.queued() + progress.written() > progress.safe())
     line += fmt::format(" of {} that came ({} in memory, {} not yet synced, the oldest {} old)",
@@ -168,13 +208,15 @@ std::string iteration_line(const v1::Iteration& iteration) {
   return text + " grey levels";
 }
 
+std::string round_line(const v1::DaemonStatus& status) {
+  std::string text = round_head(status.alignment());
+  for (const v1::CameraStatus& camera : status.cameras())
+    if (camera.reset_next() || camera.state() != v1::CameraStatus::FILMING) text += camera_line(camera);
+  return text;
+}
+
 std::string round_table(const v1::DaemonStatus& status) {
-  const v1::AlignmentStatus& alignment = status.alignment();
-  std::string text =
-      fmt::format("round {}: {} {} resets so far", alignment.round(), alignment.reason(), alignment.resets());
-  if (alignment.has_worst_pair_s())
-    text += fmt::format("; worst pair {:.3f} ms", alignment.worst_pair_s() * 1e3);
-  text += "\n";
+  std::string text = round_head(status.alignment());
   for (const v1::CameraStatus& camera : status.cameras()) text += camera_line(camera);
   return text;
 }
@@ -188,10 +230,12 @@ std::string status_screen(const v1::DaemonStatus& status) {
            fmt::format("{}, {}{}{}", in_words(v1::Phase_Name(status.phase())), in_words(status.light()),
                        status.reason().empty() ? "" : ": ", status.reason()));
   add_line(text, "next", status.next_step());
-  if (status.has_alignment() && status.alignment().has_time_left_s())
-    add_line(text, "lock",
-             fmt::format("{} rows allowed, {} left", status.alignment().tolerance_rows(),
-                         seconds_in_words(status.alignment().time_left_s())));
+  if (status.has_alignment()) {
+    const v1::AlignmentStatus& alignment = status.alignment();
+    if (alignment.tolerance_s() > 0)
+      add_line(text, "tolerance", tolerance_in_words(alignment.tolerance_s(), alignment.tolerance_rows()));
+    add_line(text, "lock", lock_in_words(alignment));
+  }
   add_line(text, "strobe", strobe_line(status.strobe()));
   if (status.has_storage()) add_line(text, "disk", storage_line(status.storage()));
   if (status.has_recording()) {
@@ -199,12 +243,25 @@ std::string status_screen(const v1::DaemonStatus& status) {
     add_line(text, "", status.recording().verdict());
   }
   if (status.has_reconstruction()) add_line(text, "volume", reconstruction_line(status.reconstruction()));
-  for (const v1::BackgroundJob& job : status.jobs()) add_line(text, "job", job_line(job));
+  for (const v1::Job& job : status.jobs()) add_line(text, "job", job_line(job));
   if (!status.faults().empty()) text += "faults\n";
   for (const v1::Fault& fault : status.faults()) text += fault_lines(fault);
   if (!status.cameras().empty()) text += "cameras\n";
   for (const v1::CameraStatus& camera : status.cameras()) text += camera_line(camera);
   return text;
+}
+
+std::string job_line(const v1::Job& job) {
+  const std::string text = fmt::format("{} of {}: ", name_of(job.kind()), job.session());
+  switch (job.state()) {
+    case v1::Job::RUNNING:
+      return text + fmt::format("{:.0f} % done", 100 * job.fraction()) +
+             (job.silent_s() < kSilent ? "" : ", nothing new for " + seconds_in_words(job.silent_s()));
+    case v1::Job::PAUSED:
+      return text + "stands still while something is recorded";
+    default:
+      return text + "waits";
+  }
 }
 
 std::string json_line(const google::protobuf::Message& message) {

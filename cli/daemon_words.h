@@ -6,10 +6,10 @@
 
 #include "emberlock/v1/status.pb.h"
 
-// What the daemon shows, as people read it in a terminal.
+// The daemon's data as text for a terminal.
 namespace emberlock::cli {
 
-/// On one line, fields named as in the .proto: what --json prints.
+/// A message on one line of JSON with the field names of the .proto, for --json.
 std::string json_line(const google::protobuf::Message& message);
 /// "LOCKED" as "locked", "BY_HAND" as "by hand".
 std::string in_words(std::string enum_name);
@@ -19,15 +19,25 @@ std::string bytes_in_words(double bytes);
 /// "0.4 s", "12 s", "5 min 20 s", "3 h 10 min".
 std::string seconds_in_words(double seconds);
 
+/// "0.54 ms (10.0 rows)".
+std::string tolerance_in_words(double seconds, double rows);
+/// "a take may be 42 s long, most likely 3 min 0 s, then left leaves tolerance"; empty where nothing is
+/// locked.
+std::string lock_in_words(const v1::AlignmentStatus& alignment);
+
 /// One screen of `emberlock status`.
 std::string status_screen(const v1::DaemonStatus& status);
 /// "candle: 12 s, 3168 frames, none lost, 1.2 GB, 86.1 MB/s, queue 3 %".
 std::string recording_line(const v1::RecordingStatus& recording);
+/// "salvage of take 1: 34 % done"; "compression of take 2: waits".
+std::string job_line(const v1::Job& job);
 /// Frames that a recording lost, by cause: "12 queue, 3 transport"; "none".
 std::string losses(const v1::Counts& counts);
 /// "iteration 3: 2.1 s, input error 5.31, held-out error 6.20 grey levels".
 std::string iteration_line(const v1::Iteration& iteration);
-/// What a round of alignment showed: a line, and one for each camera.
+/// A round of alignment: one line, and one for each camera that is to be reset or isn't well.
+std::string round_line(const v1::DaemonStatus& status);
+/// The same with a line for every camera.
 std::string round_table(const v1::DaemonStatus& status);
 
 }  // namespace emberlock::cli

@@ -1,10 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
+#include <filesystem>
 #include <memory>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <utility>
 
 #include "cli/commands.h"
+#include "cli/image_size.h"
+#include "cli/interrupt.h"
 #include "cli/outputs.h"
-#include "recon/preprocess/flame_mask.h"
+#include "recon/adjust/picture_error.h"
 #include "report/demo_report.h"
 #include "rig/demo.h"
 
@@ -16,16 +23,6 @@ struct DemoArguments {
   std::string out;
   std::string image = "1280x720";
 };
-
-ImageSize parse_size(const std::string& text) {
-  ImageSize size;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%dx%d%c", &size.width, &size.height, &rest) != 2) {  // NOLINT(cert-err34-c)
-    fail({ErrorKind::bad_input, "\"" + text + "\" is not WIDTHxHEIGHT", "--image",
-          "Give for example 1280x720"});
-  }
-  return size;
-}
 
 void print_summary(const rig::DemoResult& r, const std::string& out) {
   const recon::Report& report = r.outcome.report;
@@ -40,10 +37,39 @@ void print_summary(const rig::DemoResult& r, const std::string& out) {
   std::printf("look at          %s/report.html\n", out.c_str());
 }
 
+/// A step's progress, which says once what Ctrl-C does.
+Progress stoppable(const std::string& title) {
+  return [bar = progress_bar(title), said = false](double fraction, std::string_view what) mutable {
+    if (Interrupt::asked() && !std::exchange(said, true))
+      std::fprintf(stderr, "\nstops after this step, and keeps what is done; Ctrl-C again ends it at once\n");
+    bar(fraction, what);
+  };
+}
+
+/// Keeps what a stopped demonstration has made, unless an earlier one's result is in its place.
+[[noreturn]] void stop_early(const rig::DemoResult& result, OutputFolder& folder, const std::string& out) {
+  std::error_code none;
+  const bool earlier = std::filesystem::exists(std::filesystem::path(out) / "report.html", none);
+  std::printf("stopped, as asked, before the report was made\n");
+  if (earlier) {
+    std::printf("kept             %s, the earlier result\n", out.c_str());
+  } else if (result.kept.empty()) {
+    std::printf("kept             nothing: the cameras weren't aligned yet\n");
+  } else {
+    or_fail(folder.commit());
+    for (const std::string& line : result.kept)
+      std::printf("kept             %s/%s\n", out.c_str(), line.c_str());
+  }
+  throw CLI::RuntimeError(1);
+}
+
 void demo_command(DemoArguments arguments) {
-  arguments.demo.image = parse_size(arguments.image);
+  arguments.demo.image = or_fail(parse_image_size(arguments.image));
   OutputFolder folder = or_fail(OutputFolder::create({arguments.out, kDemo}));
-  const rig::DemoResult result = or_fail(rig::run_demo(arguments.demo, folder.path(), progress_bar));
+  const Interrupt interrupt;
+  const rig::DemoResult result =
+      or_fail(rig::run_demo(arguments.demo, folder.path(), stoppable, Interrupt::asked));
+  if (!result.whole) stop_early(result, folder, arguments.out);
   or_fail(report::write_demo_report(result, folder.path()));
   or_fail(folder.commit());
   print_summary(result, arguments.out);
@@ -54,21 +80,20 @@ void demo_command(DemoArguments arguments) {
 void add_demo(CLI::App& app) {
   auto arguments = std::make_shared<DemoArguments>();
   CLI::App* verb = app.add_subcommand(
-      "demo",
-      "From strobe to volume on simulated cameras: align, record, reconstruct, and a report to look at");
+      "demo", "The whole workflow on simulated cameras: aligns, records, reconstructs, and writes a report");
   DemoArguments& a = *arguments;
   verb->add_option("--out", a.out, "Folder for report.html, summary.png, the sessions and the reconstruction")
       ->required();
-  verb->add_option("--cameras", a.demo.cameras, "How many; the middle one is held out")
+  verb->add_option("--cameras", a.demo.cameras, "Number of cameras; the middle one is held out")
       ->capture_default_str();
-  verb->add_option("--image", a.image, "Size of their pictures")->capture_default_str();
-  verb->add_option("--frames", a.demo.flame_frames, "Of the flame, recorded by each camera")
+  verb->add_option("--image", a.image, "Size of the pictures")->capture_default_str();
+  verb->add_option("--frames", a.demo.flame_frames, "Frames of the flame that each camera records")
       ->capture_default_str();
-  verb->add_option("--voxels", a.demo.voxels, "Along the volume's edge")->capture_default_str();
-  verb->add_option("--threads", a.demo.threads, "CPU threads, 0 takes every core")
+  verb->add_option("--voxels", a.demo.voxels, "Voxels along the volume's edge")->capture_default_str();
+  verb->add_option("--threads", a.demo.threads, "CPU threads of the reconstruction; 0: one per core")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
-  verb->add_option("--seed", a.demo.seed, "Of everything random")->capture_default_str();
+  verb->add_option("--seed", a.demo.seed, "Seed of all random numbers")->capture_default_str();
   verb->callback([arguments] { demo_command(*arguments); });
 }
 

@@ -13,6 +13,7 @@
 
 #include "base/clock.h"
 #include "cli/commands.h"
+#include "cli/image_size.h"
 #include "cli/interrupt.h"
 #include "drivers/camera_thread.h"
 #include "drivers/hotplug.h"
@@ -60,13 +61,15 @@ void list(const ListArguments& arguments) {
     std::printf(
         "No camera was found. Is it switched on and plugged in? Are the rules of udev/ installed, and are "
         "you in the "
-        "group emberlock?\n");
+        "group emberlock? `emberlock doctor` tells. Without any: virtual:11 is a rig of eleven simulated "
+        "ones, as "
+        "in `emberlock align --rig virtual:11` or `emberlock devices probe virtual-00 --rig virtual:11`.\n");
   }
 }
 
-/// Devices that come and go, as they do, until Ctrl-C.
+/// Prints devices that are connected or disconnected, until Ctrl-C.
 void watch() {
-  constexpr Seconds kLook{2};  // network cameras say nothing when they come
+  constexpr Seconds kLook{2};  // interval of searches: network cameras don't announce themselves
   const Interrupt interrupt;
   auto hotplug = drivers::HotplugMonitor::open({"video4linux", "usb", "tty"});
   if (!hotplug) std::fprintf(stderr, "emberlock: %s\n", hotplug.error().message().c_str());
@@ -114,13 +117,7 @@ Result<drivers::CameraRequest> request_from(const ProbeArguments& arguments) {
     request.controls[control.substr(0, equals)] = control.substr(equals + 1);
   }
   if (arguments.size.empty()) return request;
-  ImageSize size;
-  int used = 0;
-  if (std::sscanf(arguments.size.c_str(), "%dx%d%n", &size.width, &size.height, &used) != 2 ||
-      used != static_cast<int>(arguments.size.size())) {
-    return Error{ErrorKind::bad_input, "not a size: \"" + arguments.size + "\"", "--size", "say 1280x720"};
-  }
-  request.size = size;
+  EMBERLOCK_ASSIGN_OR_RETURN(request.size, parse_image_size(arguments.size, "--size"));
   return request;
 }
 
@@ -139,7 +136,7 @@ Result<Probed> probe_virtual(const ProbeArguments& arguments, const drivers::Pro
     if (rig->camera(i).info().id != arguments.id) continue;
     EMBERLOCK_ASSIGN_OR_RETURN(drivers::ProbeFilm film,
                                drivers::film_probe(rig->camera(i), options, *clock, progress_bar("probe")));
-    drivers::ProbeVerdict verdict = drivers::judge(film, {});
+    drivers::ProbeVerdict verdict = drivers::assess(film, {});
     return Probed{arguments.rig, std::move(film), std::move(verdict)};
   }
   return Error{ErrorKind::bad_input, "there is no such camera in " + arguments.rig, arguments.id,
@@ -158,7 +155,7 @@ Result<Probed> probe_real(const ProbeArguments& arguments, const drivers::ProbeO
   SteadyClock clock;
   EMBERLOCK_ASSIGN_OR_RETURN(drivers::ProbeFilm film,
                              drivers::film_probe(camera, options, clock, progress_bar("probe")));
-  drivers::ProbeVerdict verdict = drivers::judge(film, listed.found.link_megabits);
+  drivers::ProbeVerdict verdict = drivers::assess(film, listed.found.link_megabits);
   return Probed{listed.found.address, std::move(film), std::move(verdict)};
 }
 
@@ -211,7 +208,7 @@ void print_json(const nlohmann::ordered_json& json) {
   std::printf("%s\n", json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
 }
 
-/// Whether a serial port leads to a strobe, and to which.
+/// Reports whether a strobe is connected to a serial port, and which.
 void probe_port(const ProbeArguments& arguments, const drivers::StrobeFound& port) {
   const drivers::StrobeIdentity strobe = or_fail(drivers::identify_strobe(port.id));
   const std::string dialect(drivers::name_of(strobe.dialect));
@@ -240,23 +237,23 @@ void probe(const ProbeArguments& arguments) {
 
 void add_probe(CLI::App& devices) {
   auto a = std::make_shared<ProbeArguments>();
-  CLI::App* verb = devices.add_subcommand("probe",
-                                          "Films for some seconds with one camera and judges: rate, losses "
-                                          "by cause, arrival, bandwidth. Asks a serial "
-                                          "port whether it leads to a strobe, and which.");
+  CLI::App* verb = devices.add_subcommand(
+      "probe",
+      "Films for some seconds with one camera and assesses rate, losses by cause, arrival times and "
+      "bandwidth. Of a serial port it finds out whether a strobe is connected, and which.");
   verb->add_option("ID", a->id, "The camera or port, as `emberlock devices` names it")->required();
   verb->add_option("--seconds", a->seconds, "How long to film")
       ->check(CLI::Range(0.5, 3600.0))
       ->capture_default_str();
-  verb->add_option("--resets", a->resets, "Then time as many resets of its shutter")
+  verb->add_option("--resets", a->resets, "Then measure the delay of so many resets of its shutter")
       ->check(CLI::Range(0, 1000));
-  verb->add_option("--size", a->size, "WIDTHxHEIGHT; the largest if not said");
-  verb->add_option("--rate", a->rate, "Frames a second; the fastest if not said")->check(CLI::PositiveNumber);
-  verb->add_option("--format", a->format, "Pixels as they are handed on; what keeps most if not said")
+  verb->add_option("--size", a->size, "WIDTHxHEIGHT [the largest]");
+  verb->add_option("--rate", a->rate, "Frames per second [the fastest]")->check(CLI::PositiveNumber);
+  verb->add_option("--format", a->format, "Pixel format [the one that keeps most]")
       ->check(CLI::IsMember(kFormats));
-  verb->add_option("--exposure-ms", a->exposure_ms, "As the camera is set if not said")
+  verb->add_option("--exposure-ms", a->exposure_ms, "Exposure time, ms [the camera's own setting]")
       ->check(CLI::PositiveNumber);
-  verb->add_option("--control", a->controls, "NAME=VALUE by the camera's own names, as often as needed");
+  verb->add_option("--control", a->controls, "NAME=VALUE, by the camera's own names; may be repeated");
   verb->add_option("--rig", a->rig, "A virtual rig instead of what is plugged in: virtual:11");
   verb->add_flag("--json", a->json, "One JSON object");
   verb->callback([a] { probe(*a); });
@@ -268,16 +265,17 @@ void add_devices(CLI::App& app) {
   auto a = std::make_shared<ListArguments>();
   CLI::App* verb = app.add_subcommand(
       "devices",
-      "Lists the cameras and serial ports that are there, what they can do, and which process holds them.");
+      "Lists the connected cameras and serial ports, what they can do, and which process holds them.");
   verb->require_subcommand(0, 1);
-  verb->add_flag("--modes", a->all_modes, "With every way in which each camera can film");
+  verb->add_flag("--modes", a->all_modes, "List every mode of each camera");
   verb->add_flag("--json", a->json, "One JSON object");
   verb->callback([a, verb] {
     if (verb->get_subcommands().empty()) list(*a);
   });
   add_probe(*verb);
   add_clips(*verb);
-  verb->add_subcommand("watch", "Lists devices as they come and go, until Ctrl-C.")->callback(watch);
+  verb->add_subcommand("watch", "Reports devices that are connected or disconnected, until Ctrl-C.")
+      ->callback(watch);
 }
 
 }  // namespace emberlock::cli

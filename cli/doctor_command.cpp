@@ -2,11 +2,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
 #include "cli/commands.h"
 #include "rig/doctor/doctor.h"
+#include "rig/doctor/words.h"
 
 namespace emberlock::cli {
 namespace {
@@ -16,36 +19,39 @@ struct DoctorArguments {
   bool json = false;
 };
 
-void print_json(const std::vector<rig::doctor::Check>& checks) {
+void print_json(const std::vector<rig::doctor::Finding>& findings, const rig::doctor::Facts& facts) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const rig::doctor::Check& check : checks) {
-    list.push_back({{"what", check.what},
-                    {"health", rig::doctor::name(check.health)},
-                    {"found", check.found},
-                    {"remedy", check.remedy}});
+  for (const rig::doctor::Finding& finding : findings) {
+    const rig::doctor::FindingWords said = words(finding, facts);
+    list.push_back({{"what", said.what},
+                    {"health", name(finding.health)},
+                    {"found", said.found},
+                    {"remedy", said.remedy}});
   }
   std::printf("%s\n", nlohmann::ordered_json{{"checks", list}}
                           .dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace)
                           .c_str());
 }
 
-void print_lines(const std::vector<rig::doctor::Check>& checks) {
-  for (const rig::doctor::Check& check : checks) {
-    std::printf("%-4s  %-13s  %s\n", std::string(rig::doctor::name(check.health)).c_str(), check.what.c_str(),
-                check.found.c_str());
-    if (!check.remedy.empty()) std::printf("%19s  -> %s\n", "", check.remedy.c_str());
+void print_lines(const std::vector<rig::doctor::Finding>& findings, const rig::doctor::Facts& facts) {
+  for (const rig::doctor::Finding& finding : findings) {
+    const rig::doctor::FindingWords said = words(finding, facts);
+    std::printf("%-4s  %-13s  %s\n", std::string(name(finding.health)).c_str(), said.what.c_str(),
+                said.found.c_str());
+    if (!said.remedy.empty()) std::printf("%19s  -> %s\n", "", said.remedy.c_str());
   }
 }
 
 void examine(const DoctorArguments& arguments) {
-  const std::vector<rig::doctor::Check> checks = rig::doctor::judge(rig::doctor::collect(arguments.options));
+  const rig::doctor::Facts facts = rig::doctor::collect(arguments.options);
+  const std::vector<rig::doctor::Finding> findings = rig::doctor::diagnose(facts);
   if (arguments.json) {
-    print_json(checks);
+    print_json(findings, facts);
   } else {
-    print_lines(checks);
+    print_lines(findings, facts);
   }
-  if (std::any_of(checks.begin(), checks.end(), [](const rig::doctor::Check& check) {
-        return check.health == rig::doctor::Health::fail;
+  if (std::any_of(findings.begin(), findings.end(), [](const rig::doctor::Finding& finding) {
+        return finding.health == rig::doctor::Health::fail;
       })) {
     throw CLI::RuntimeError(1);
   }

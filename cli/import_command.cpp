@@ -81,7 +81,7 @@ Result<films::ImportOptions> options_from(const ImportArguments& a) {
   EMBERLOCK_ASSIGN_OR_RETURN(options.strobe, part_from("--strobe", a.strobe));
   EMBERLOCK_ASSIGN_OR_RETURN(options.flame, part_from("--flame", a.flame));
   options.rig = a.rig;
-  options.films.joins = a.joined ? films::Joins::as_told : films::Joins::proven;
+  options.films.continuity = a.joined ? films::Continuity::as_told : films::Continuity::proven;
   options.faults = a.partial ? films::Faults::partial : films::Faults::refuse;
   options.colours = a.grey ? session::Colours::brightness : session::Colours::keep;
   options.encoding = a.encoding == "ffv1" ? session::Encoding::ffv1 : session::Encoding::huffman_nut;
@@ -129,8 +129,7 @@ void add_import(CLI::App& app) {
   CLI::App* verb = app.add_subcommand(
       "import",
       "Makes a session of the cameras' video files, folders of numbered pictures, or a transforms.json. "
-      "Frames "
-      "are put together by the strobe that all films show; each frame's true time is kept in times.json.");
+      "Frames are matched by the strobe that all films show; times.json has each frame's true time.");
   verb->add_option("folder", a->folder,
                    "a video file or a subfolder for each camera, whose id is the file's or subfolder's name")
       ->required();
@@ -145,21 +144,19 @@ void add_import(CLI::App& app) {
       "ID=N, without a strobe: frame i + N of this camera belongs to frame i of the others; may be "
       "repeated");
   flash_rate->excludes(unsynchronised)->excludes(verb->get_option("--offset"));
-  verb->add_option("--strobe", a->strobe,
-                   "FROM-TO, seconds of each film: where the strobe is; else it is found");
-  verb->add_option(
-      "--flame", a->flame,
-      "FROM-TO, seconds of the first camera's film: what is imported; else the longest part in which no "
-      "film shows the strobe");
-  verb->add_option("--rig", a->rig, "rig.json: the calibration that the cameras get, by their ids");
+  verb->add_option("--strobe", a->strobe, "FROM-TO, seconds of each film that show the strobe [found]");
+  verb->add_option("--flame", a->flame,
+                   "FROM-TO, seconds of the first camera's film to import [the longest part in which no film "
+                   "shows the strobe]");
+  verb->add_option("--rig", a->rig, "rig.json: calibration of the cameras, by their ids");
   verb->add_flag("--joined", a->joined,
                  "the files of a camera are one film, even if nothing in them says so");
   verb->add_flag(
       "--partial", a->partial,
-      "import what is good: leave films out that can't be used, end where one is damaged; each is named");
-  verb->add_flag("--grey", a->grey, "brightness alone");
+      "import what is good: leave out films that can't be used, end where one is damaged, and report each");
+  verb->add_flag("--grey", a->grey, "store brightness only");
   verb->add_option("--encoding", a->encoding,
-                   "quick: six times as fast and a sixth larger; ffv1: as recordings are")
+                   "ffv1: as in recordings; quick: six times as fast, files a sixth larger")
       ->check(CLI::IsMember({"quick", "ffv1"}))
       ->capture_default_str();
   verb->add_flag("--json", a->json, "the session's import.json on stdout");

@@ -5,8 +5,8 @@
 
 namespace emberlock::cli {
 
-/// While it lives the first Ctrl-C only asks to stop, so that a run ends well; the second one kills. One at a
-/// time.
+/// While it exists, the first Ctrl-C only sets a flag, so that a run can end properly; the second one kills.
+/// Only one at a time.
 class Interrupt {
  public:
   Interrupt() {
@@ -23,7 +23,7 @@ class Interrupt {
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
-  /// False while there is none.
+  /// Also false when no Interrupt exists.
   [[nodiscard]] static bool asked() { return asked_ != 0; }
 
  private:

@@ -1,48 +1,54 @@
 // SPDX-License-Identifier: Apache-2.0
+// bin/emberlock. What needs cameras, films or volumes loads some two hundred libraries, so it is a program of
+// its own (verbs.cpp), which takes this one's place: the version, and what only asks the daemon, don't wait
+// for them.
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <system_error>
+
+#include <unistd.h>
+
+#include "base/version.h"
 #include "cli/commands.h"
-#include "cli/manual.h"
+#include "cli/help.h"
+
+namespace emberlock::cli {
+namespace {
+namespace fs = std::filesystem;
+
+/// Returns only where there is no such program.
+int hand_on(char** argv) {
+  std::error_code error;
+  const fs::path itself = fs::read_symlink("/proc/self/exe", error);
+  const fs::path verbs = itself.parent_path().parent_path() / "libexec/emberlock/emberlock";
+  if (!error) {
+    ::execv(verbs.c_str(), argv);
+    error = {errno, std::system_category()};
+  }
+  const Error gone{ErrorKind::io, "can't be started: " + error.message(), verbs.string(),
+                   "bin/emberlock needs it: install both"};
+  std::fprintf(stderr, "emberlock: %s\n", gone.message().c_str());
+  return 1;
+}
+
+}  // namespace
+}  // namespace emberlock::cli
 
 int main(int argc, char** argv) {
-  CLI::App app{
-      "Emberlock: locks cameras without trigger hardware, films flames with them, reconstructs the volume.",
-      "emberlock"};
-  app.require_subcommand(1);
-  app.set_version_flag("--version", "emberlock " EMBERLOCK_VERSION);
-#if EMBERLOCK_WITH_DRIVERS
-  emberlock::cli::add_devices(app);
-#endif
-  emberlock::cli::add_smear(app);
-#if EMBERLOCK_WITH_DRIVERS
-  emberlock::cli::add_align(app);
-#endif
-  emberlock::cli::add_import(app);
-  emberlock::cli::add_calibrate(app);
-  emberlock::cli::add_reconstruct(app);
-  emberlock::cli::add_verify(app);
-  emberlock::cli::add_tradeoff(app);
-#if EMBERLOCK_WITH_DRIVERS
-  emberlock::cli::add_demo(app);
-#endif
-  emberlock::cli::add_sessions(app);
-#if EMBERLOCK_WITH_DRIVERS
-  emberlock::cli::add_doctor(app);
-#endif
-#if EMBERLOCK_WITH_DAEMON
-  emberlock::cli::add_status(app);
-  emberlock::cli::add_console(app);
-  emberlock::cli::add_watch(app);
-  emberlock::cli::add_record(app);
-  emberlock::cli::add_strobe(app);
-#endif
-  emberlock::cli::add_manual(app, EMBERLOCK_VERSION);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::Success& e) {
-    return app.exit(e);
-  } catch (const CLI::RuntimeError& e) {
-    return e.get_exit_code();
-  } catch (const CLI::ParseError& e) {
-    app.exit(e);
-    return 2;
+  const std::string first = argc > 1 ? argv[1] : "";
+  if (argc == 2 && first == "--version") {
+    std::printf("emberlock %s\n", emberlock::version().c_str());
+    return 0;
   }
+#if EMBERLOCK_WITH_DAEMON
+  CLI::App app{"", "emberlock"};
+  app.require_subcommand(1);
+  emberlock::cli::style_help(app);
+  emberlock::cli::add_client(app);
+  if (!app.get_subcommands([&](const CLI::App* verb) { return verb->check_name(first); }).empty())
+    return emberlock::cli::run(app, argc, argv);
+#endif
+  return emberlock::cli::hand_on(argv);
 }

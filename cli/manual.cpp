@@ -63,18 +63,17 @@ std::string manual_page(const CLI::App& app, std::string_view version) {
 }
 
 void add_manual(CLI::App& app, const std::string& version) {
-  const auto hidden = [&app](const char* name, const char* what) {
-    return app.add_subcommand(name, what)->group("");
-  };
   static const std::map<std::string, std::string (*)(const CLI::App&)> kShells{
       {"bash", bash_completion}, {"zsh", zsh_completion}, {"fish", fish_completion}};
   auto shell = std::make_shared<std::string>();
-  CLI::App* completion = hidden("completion", "Prints what makes a shell complete verbs and options.");
+  CLI::App* completion = app.add_subcommand(
+      "completion",
+      "Prints a shell's completion of verbs and options: `source <(emberlock completion bash)`");
   completion->add_option("SHELL", *shell, "bash, zsh or fish")->required()->check(CLI::IsMember(kShells));
   completion->callback([shell, &app] { std::printf("%s", kShells.at(*shell)(app).c_str()); });
 
   auto page = std::make_shared<std::string>();
-  CLI::App* man = hidden("man", "Prints a manual page, in roff.");
+  CLI::App* man = app.add_subcommand("man", "Prints a manual page, in roff.")->group("");
   man->add_option("PAGE", *page, "emberlock or emberlockd.toml")
       ->required()
 #if EMBERLOCK_WITH_DRIVERS

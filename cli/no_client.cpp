@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What stands in for the daemon's client where EMBERLOCK_DAEMON is off.
+// Replaces the daemon's client if EMBERLOCK_DAEMON is off.
 #include <string>
 #include <utility>
 
@@ -23,8 +23,9 @@ constexpr const char* kFolder = "Name a folder (./NAME for one here), or use a b
 }  // namespace
 
 void reconstruct_by_daemon(const DaemonReconstruction&) { no_client(kFolder); }
+bool daemon_has(const DaemonAddress&, const std::string&) { return false; }
 v1::ListSessionsResponse sessions_of_daemon(const DaemonAddress&) { no_client(kFolder); }
-void job_by_daemon(const DaemonAddress&, SessionJob, const std::string&, bool) { no_client(kFolder); }
+v1::JobOutcome job_by_daemon(const DaemonAddress&, SessionJob, const std::string&) { no_client(kFolder); }
 void align_by_daemon(const DaemonAlignment&) { no_client("Give --rig, or use a build with it"); }
 
 }  // namespace emberlock::cli

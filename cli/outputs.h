@@ -8,14 +8,15 @@
 
 namespace emberlock::cli {
 
-// Who makes folders, beside `reconstruct` (recon/pipeline/reconstruct.h) and `sessions export`
-// (session/export.h). New sessions (import, align --record) are made where nothing is: check_new_folder().
+// The verbs that write output folders, besides `reconstruct` (recon/pipeline/reconstruct.h) and `sessions
+// export` (session/export.h). New sessions (import, align --record) need a new folder: check_new_folder().
 
 inline constexpr OutputVerb kPlan{"reconstruct --plan"};
 inline constexpr OutputVerb kTradeoffRecon{"tradeoff recon"};
 inline constexpr OutputVerb kTradeoffSync{"tradeoff sync"};
 inline constexpr OutputVerb kVerify{"verify"};
 inline constexpr OutputVerb kDemo{"demo"};
+inline constexpr OutputVerb kSample{"sample"};
 
 inline constexpr std::array<std::string_view, 1> kBesideCameras{"calibrate colour"};
 inline constexpr OutputVerb kCalibrateCameras{"calibrate cameras", kBesideCameras};

@@ -4,15 +4,16 @@
 #include <algorithm>
 #include <csignal>
 #include <string>
+#include <utility>
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/prctl.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/export/picture.h"
 #include "recon/export/preview.h"
 #include "recon/pipeline/advice.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/radiance.h"
 #include "recon/render/render.h"
 #include "session/child_messages.h"
@@ -21,10 +22,10 @@
 namespace emberlock::cli {
 namespace {
 
-constexpr int kWidest = 480;  // of a picture, pixels
+constexpr int kWidest = 480;  // width of a picture in pixels
 constexpr int kBlocks = 64;   // of a volume, along its longest edge
 constexpr auto kRarely = std::chrono::milliseconds(200);
-constexpr int kShare = 20;  // pictures take one part in so many of the time
+constexpr int kShare = 20;  // pictures take at most one part in this many of the time
 
 v1::Iteration numbers(const recon::TracePoint& point, bool judged) {
   v1::Iteration iteration;
@@ -35,7 +36,7 @@ v1::Iteration numbers(const recon::TracePoint& point, bool judged) {
   return iteration;
 }
 
-/// The view to show: one that the solver doesn't know, if there is one.
+/// The view to show: a held-out one, if there is any.
 std::size_t shown_view(const recon::Scene& scene) {
   const auto held_out = std::find_if(scene.views.begin(), scene.views.end(), [](const recon::View& view) {
     return view.role == recon::ViewRole::held_out;
@@ -55,7 +56,7 @@ std::string jpeg(const recon::RadianceImage& image) {
 void add_pictures(v1::IterationPreview& message, const recon::View& view,
                   const recon::RadianceImage& rendered) {
   message.set_camera_id(view.name);
-  message.set_captured_jpeg(jpeg(recon::shrunk(view.image, rendered.size)));
+  message.set_captured_jpeg(jpeg(recon::shrunk(*view.image, rendered.size)));
   message.set_rendered_jpeg(jpeg(rendered));
 }
 
@@ -71,13 +72,13 @@ void add_volume(v1::IterationPreview& message, const recon::Volume& volume) {
   preview.set_voxels(coarse.voxels.data(), coarse.voxels.size());
 }
 
-/// A view of a solve's volume, as it is so far.
+/// A view of the volume in its present state.
 recon::RadianceImage rendered_small(const recon::Volume& volume, const recon::Preview& preview,
                                     const recon::View& view, const recon::ComputeOptions& compute) {
-  const ImageSize size = recon::preview_size(view.image.size, kWidest);
+  const ImageSize size = recon::preview_size(view.image->size, kWidest);
   recon::Effects effects = preview.effects;
   effects.scattering = {};
-  effects.refraction = {};  // moves things by less than one of these pixels
+  effects.refraction = {};  // shifts objects by less than one of these pixels
   recon::RenderOptions options{.compute = compute};
   recon::RadianceImage behind;
   if (view.background) {
@@ -142,7 +143,7 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
   const recon::Report& report = outcome.report;
   if (!report.trace.empty()) *shown.mutable_iteration() = numbers(report.trace.back(), is_judged(scene));
   const std::size_t v = shown_view(scene);
-  const ImageSize size = recon::preview_size(scene.views[v].image.size, kWidest);
+  const ImageSize size = recon::preview_size(scene.views[v].image->size, kWidest);
   add_pictures(shown, scene.views[v], recon::shrunk(outcome.renders[v], size));
   add_volume(shown, outcome.reconstruction.volume);
   send(last);
@@ -152,6 +153,7 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
   for (const recon::EffectReport& effect : report.effects)
     done.add_effects(fmt::format("{} {}: {}", effect.name, effect.on ? "on" : "off", effect.reason));
   for (const std::string& words : report.voxel_choice.words) done.add_advice(words);
+  if (std::string kept = recon::what_was_kept(report); !kept.empty()) done.add_advice(std::move(kept));
   for (const std::string& advice : recon::next_steps(report)) done.add_advice(advice);
   for (const std::string& warning : report.warnings) done.add_warnings(warning);
   done.set_result(folder);

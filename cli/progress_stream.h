@@ -10,18 +10,18 @@
 
 namespace emberlock::cli {
 
-/// Tells another program, by v1::ChildMessages on a descriptor, what a reconstruction does. When nobody reads
-/// any more it falls silent, and the work goes on.
+/// Reports the progress of a reconstruction to another program, as v1::ChildMessages on a descriptor. When
+/// nobody reads any more, reports are dropped and the work continues.
 class ProgressStream {
  public:
-  /// `fd` stays open, and somebody else's. This process dies with its parent from here on, and no longer of
-  /// SIGPIPE.
+  /// `fd` stays open and belongs to the caller. From here on this process is killed when its parent dies, and
+  /// ignores SIGPIPE.
   static Result<ProgressStream> open(int fd);
 
   void loading(recon::Device device);
   void progress(double fraction, std::string_view doing);
-  /// The numbers at once; pictures only where they are due, so that they take at most a twentieth of the
-  /// solve's time.
+  /// Sends the numbers at once, and pictures only when they are due, so that they take at most a twentieth of
+  /// the solve's time.
   void iteration(const recon::Preview& preview, const recon::Scene& scene,
                  const recon::ComputeOptions& compute);
   void done(const recon::Outcome& outcome, const recon::Scene& scene, const std::string& folder);

@@ -4,33 +4,34 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <string>
 #include <vector>
 
-#include <fmt/format.h>
-#include <fmt/ranges.h>
-
 #include "base/clock.h"
 #include "cli/commands.h"
+#include "cli/interrupt.h"
 #include "cli/outputs.h"
 #include "cli/progress_stream.h"
 #include "cli/reconstruct_daemon.h"
+#include "cli/reconstruct_summary.h"
 #include "cli/scene_options.h"
-#include "recon/pipeline/advice.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/pipeline/scene.h"
-#include "recon/pipeline/settled_run.h"
-#include "recon/pipeline/sweep.h"
+#include "recon/pipeline/single_run.h"
 #include "recon/pipeline/work_precision.h"
+#include "recon/preprocess/check_scene.h"
 #include "report/box_pictures.h"
+#include "report/reconstruct_report.h"
 
 namespace emberlock::cli {
 namespace {
 
-/// The command line as typed, before its words mean anything.
+/// The command line as typed, not yet interpreted.
 struct ReconstructArguments {
   std::string input;
   std::string out;
@@ -84,7 +85,7 @@ Result<recon::Box> parse_box(const std::string& text) {
 
 namespace {
 
-/// A number of voxels, or "paper"; nothing leaves the choice to the program.
+/// A number of voxels, or "paper"; empty: the program chooses.
 Status parse_voxels(const std::string& text, recon::ReconstructOptions& options) {
   if (text.empty()) return {};
   if (text == "paper") {
@@ -103,7 +104,7 @@ Status parse_voxels(const std::string& text, recon::ReconstructOptions& options)
   return {};
 }
 
-/// Like parse_box: the words' meaning, or the first that has none.
+/// Interprets the options; or the first error, as in parse_box.
 Result<recon::ReconstructOptions> options_of(const ReconstructArguments& arguments) {
   recon::ReconstructOptions options;
   EMBERLOCK_RETURN_IF_ERROR(parse_voxels(arguments.voxels, options));
@@ -128,7 +129,7 @@ Result<recon::ReconstructOptions> options_of(const ReconstructArguments& argumen
   return options;
 }
 
-/// with_views(), or the reason why not.
+/// with_views(); or why the views can't be used.
 Result<recon::Scene> choose_views(const recon::Scene& scene, int views) {
   const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
                                     [](const recon::View& v) { return v.role == recon::ViewRole::input; });
@@ -139,47 +140,14 @@ Result<recon::Scene> choose_views(const recon::Scene& scene, int views) {
   return recon::with_views(scene, views);
 }
 
-void print_rgb(const char* label, const recon::ChannelRmse& rmse) {
-  std::printf("%-16s %6.2f %6.2f %6.2f  grey levels of 255 (R G B, RMS over the flame)\n", label, rmse[0],
-              rmse[1], rmse[2]);
-}
-
-void print_summary(const recon::Report& report, const std::string& out) {
-  if (report.heldout_rmse) print_rgb("held-out error", *report.heldout_rmse);
-  print_rgb("input error", report.input_rmse);
-  std::printf("%-16s %d x %d x %d voxels of %.2f mm, %zu in the hull\n", "volume", report.voxels[0],
-              report.voxels[1], report.voxels[2], report.voxel_edge.value() * 1e3, report.hull_voxels);
-  std::printf("%-16s %.2f s: effects %.2f, hull %.2f, solve %.2f (%d iterations, solver %s, %s)\n", "time",
-              report.total_time.value(), report.effects_time.value(), report.hull_time.value(),
-              report.solve_time.value(), report.iterations, report.solver.c_str(), report.device.c_str());
-  for (const recon::EffectReport& effect : report.effects) {
-    std::printf("%-16s %s: %s\n", effect.name.c_str(), effect.on ? "on" : "off", effect.reason.c_str());
-  }
-  for (const recon::PreprocessStep& step : report.preprocessing) {
-    if (step.on) std::printf("%-16s %s\n", step.name.c_str(), step.reason.c_str());
-  }
-  for (const std::string& warning : report.warnings) std::printf("%-16s %s\n", "warning", warning.c_str());
-  if (!report.deviations.empty())
-    std::printf("%-16s %s\n", "not the paper's",
-                fmt::format("{}", fmt::join(report.deviations, "; ")).c_str());
-  for (const std::string& words : report.voxel_choice.words)
-    std::printf("%-16s %s\n", "voxels", words.c_str());
-  if (report.plan) {
-    for (const std::string& words : report.plan->words) std::printf("%-16s %s\n", "plan", words.c_str());
-  }
-  for (const std::string& advice : recon::next_steps(report)) {
-    std::printf("%-16s %s\n", "next step", advice.c_str());
-  }
-  std::printf("%-16s %s\n", "written to", out.c_str());
-}
-
-/// Who watches: the terminal, or another program.
+/// The receivers of progress: the terminal, or another program.
 struct Watchers {
   Progress progress;
+  std::function<bool()> stop = {};  ///< true: end with the best so far
   ProgressStream* stream = nullptr;
 };
 
-/// The views that are asked for, of the frame that is, with roles.
+/// The requested views of the requested frame, with their roles.
 Result<recon::Scene> load(const ReconstructArguments& arguments, const Progress& progress) {
   recon::SceneOptions options;
   options.frame = arguments.frame;
@@ -196,48 +164,62 @@ Result<recon::Scene> load(const ReconstructArguments& arguments, const Progress&
   return choose_views(scene, arguments.views);
 }
 
-/// What is read, and must stay out of what is written.
+/// The files that are read; they must not lie in the output folder.
 std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& arguments) {
   recon::SceneOptions options;
   if (!arguments.rig.empty()) options.rig = arguments.rig;
   return recon::files_of(arguments.input, options);
 }
 
-Result<recon::Outcome> reconstruct_files(const ReconstructArguments& arguments, const Watchers& watchers) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::ReconstructOptions options, options_of(arguments));
+Result<Written> reconstruct_files(const ReconstructArguments& arguments, const Watchers& watchers) {
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::ReconstructOptions options, options_of(arguments));
+  options.solve.stop = watchers.stop;
   const std::vector<std::filesystem::path> inputs = inputs_of(arguments);
   EMBERLOCK_RETURN_IF_ERROR(recon::check_output(arguments.out, inputs));
   if (watchers.stream != nullptr) {
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::Device device, recon::resolve(options.solve.compute.device));
     watchers.stream->loading(device);
   }
+  SteadyClock clock;
+  const TimePoint begin = clock.now();
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load(arguments, watchers.progress));
+  const Seconds loading = clock.now() - begin;
+  if (recon::is_stopped(options.solve))
+    return Error{ErrorKind::refused, "ended early, as asked, before there was a volume to keep",
+                 arguments.input};
   std::function<void(const recon::Preview&)> preview;
   if (watchers.stream != nullptr) {
     preview = [&](const recon::Preview& state) {
       watchers.stream->iteration(state, scene, options.solve.compute);
     };
   }
-  SteadyClock clock;
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome,
                              recon::reconstruct(scene, options, clock, watchers.progress, preview));
   outcome.report.input = arguments.input;
-  EMBERLOCK_RETURN_IF_ERROR(recon::write_outcome(outcome, arguments.out, inputs));
+  const TimePoint done = clock.now();
+  EMBERLOCK_RETURN_IF_ERROR(
+      recon::write_outcome(outcome, arguments.out, inputs, report::reconstruct_html(scene, outcome)));
+  const Seconds writing = clock.now() - done;
   if (watchers.stream != nullptr) watchers.stream->done(outcome, scene, arguments.out);
-  return outcome;
+  return Written{std::move(outcome), loading, writing};
 }
 
-/// The box on the pictures, and what a run would take by the shipped front, from a coarse one.
+/// Draws the box on the pictures, and estimates from the reference front what a run would take.
 Status plan_files(const ReconstructArguments& arguments) {
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::ReconstructOptions options, options_of(arguments));
   const OutputRequest where{arguments.plan, kPlan, inputs_of(arguments)};
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(where));
+  const SteadyClock clock;
+  const TimePoint begin = clock.now();
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load(arguments, progress_bar("plan")));
+  const Seconds loading = clock.now() - begin;
   EMBERLOCK_RETURN_IF_ERROR(recon::check_scene(scene));
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::VoxelChoice choice,
-                             recon::plan_voxels(scene, options, SteadyClock(), progress_bar("plan")));
+                             recon::plan_voxels(scene, options, clock, progress_bar("plan")));
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Grid grid, recon::choose_grid(scene, choice.voxels));
+  const TimePoint chosen = clock.now();
   EMBERLOCK_RETURN_IF_ERROR(report::write_plan(scene, grid, where));
+  const Seconds writing = clock.now() - chosen;  // as many pictures as a result has
   const auto& c = scene.box.center;
   const auto& s = scene.box.size;
   std::printf("%-16s --box %.4g,%.4g,%.4g,%.4g,%.4g,%.4g\n", "box", c.x(), c.y(), c.z(), s.x(), s.y(), s.z());
@@ -246,12 +228,15 @@ Status plan_files(const ReconstructArguments& arguments) {
               choice.by_the_paper);
   for (const std::string& words : choice.words) std::printf("%-16s %s\n", "voxels", words.c_str());
   if (choice.expected_time.value() > 0)
-    std::printf("%-16s about %.2g s, by the shipped front\n", "time", choice.expected_time.value());
+    std::printf(
+        "%-16s about %.2g s, by the reference front: loading %.2g, reconstruction %.2g, writing %.2g\n",
+        "time", (loading + choice.expected_time + writing).value(), loading.value(),
+        choice.expected_time.value(), writing.value());
   std::printf("%-16s %s\n", "look at", (std::filesystem::path(arguments.plan) / "index.html").c_str());
   return {};
 }
 
-/// What the daemon can be asked for; the rest is its configuration's.
+/// The options that the daemon accepts; the others are in its configuration.
 DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, const CLI::App& verb) {
   static const std::set<std::string> kAskable = {"input",    "--cancel", "--json",     "--frame",
                                                  "--budget", "--voxels", "--hold-out", "--device"};
@@ -283,68 +268,69 @@ void reconstruct_command(const ReconstructArguments& arguments) {
   if (!arguments.plan.empty()) return or_fail(plan_files(arguments));
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
   if (!arguments.progress_fd) {
-    const recon::Outcome outcome = or_fail(reconstruct_files(arguments, {progress_bar("reconstruct")}));
-    return print_summary(outcome.report, arguments.out);
+    const Interrupt interrupt;
+    return conclude(or_fail(reconstruct_files(arguments, {progress_bar("reconstruct"), Interrupt::asked})),
+                    or_fail(options_of(arguments)).solve,
+                    {arguments.input, arguments.out, arguments.by_daemon.json});
   }
   ProgressStream stream = or_fail(ProgressStream::open(*arguments.progress_fd));
   const auto outcome = reconstruct_files(
       arguments,
-      {[&](double fraction, std::string_view doing) { stream.progress(fraction, doing); }, &stream});
+      {[&](double fraction, std::string_view doing) { stream.progress(fraction, doing); }, {}, &stream});
   if (outcome) return;
   stream.failed(outcome.error());
   fail(outcome.error());
 }
 
-/// How the volume is found.
+/// Adds the options for solving.
 void add_solve_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option("--solver", a.solver, "default, or paper (equations 10 and 11 of the paper)")
       ->capture_default_str();
-  verb->add_option("--hold-out", a.held_out, "Views, counted from 0, kept for judging the result: i,j,...")
+  verb->add_option("--hold-out", a.held_out,
+                   "Views, counted from 0, that aren't used; the result is scored on them: i,j,...")
       ->delimiter(',');
   verb->add_option("--effects", a.effects, "auto, none, or a list such as extinction=32.8 (1/m) [auto]");
-  verb->add_option("--iterations", a.iterations, "At most so many [the solver's own rule]")
+  verb->add_option("--iterations", a.iterations, "Most iterations [the solver's own rule]")
       ->check(CLI::Range(1, 1000000));
   verb->add_option("--views", a.views, "Use so many of the input views, spread as far as possible [all]")
       ->check(CLI::Range(1, 64));
   verb->add_flag("--keep-poses", a.keep_poses,
-                 "Take the cameras' poses as they are told, even where the flame's outlines don't meet");
+                 "Use the given poses of the cameras, even if the flame's outlines don't meet");
   verb->add_option("--step", a.step, "Longest step along a ray, in voxel edges")
       ->check(CLI::Range(0.05, 4.0))
       ->capture_default_str();
   verb->add_option("--precision", a.precision, "float32 or float64")->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads, 0 takes every core; the result doesn't depend on it")
+  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core. The result doesn't depend on them")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
   verb->add_option("--device", a.device, "auto, cpu or cuda")->capture_default_str();
   verb->add_option("--budget", a.budget,
-                   "Be done within so many seconds, loading and writing aside; chooses what is left open")
+                   "Time limit in seconds, without loading and writing; sets the options that aren't given")
       ->check(CLI::PositiveNumber);
   verb->add_option("--target-rmse", a.target_rmse,
-                   "Bring the held-out error to this many grey levels; chooses what is left open")
+                   "Held-out error to reach, grey levels; sets the options that aren't given")
       ->check(CLI::PositiveNumber);
 }
 
-/// How a session's frames become pictures of light.
+/// Adds the options for converting a session's frames to radiance.
 void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option(
           "--threshold", a.threshold,
           "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
       ->check(CLI::Range(0.0, 255.0));
   verb->add_option("--frame", a.frame,
-                   "Of a session: the frame of its first camera [the middle one that all cameras have]")
+                   "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
       ->check(CLI::NonNegativeNumber);
-  verb->add_option(
-          "--background", a.background,
-          "Of a session: auto (each camera's first or last frames, where they are without flame), level (of "
-          "the picture's darker half), or such frames: FIRST-LAST")
+  verb->add_option("--background", a.background,
+                   "Sessions only: auto (each camera's first or last frames, if they show no flame), level "
+                   "(of the picture's darker half), or frames without flame: FIRST-LAST")
       ->capture_default_str();
-  verb->add_option(
-          "--smear", a.smear,
-          "Of a session's CCDs: auto (where rows without flame show it), off, or the share of every row's "
-          "light, with :above or :below for rows on one side")
+  verb->add_option("--smear", a.smear,
+                   "CCDs of sessions only: auto (measured from rows without flame), off, or the share of "
+                   "every row's light, with :above or :below for rows on one side")
       ->capture_default_str();
   verb->add_option("--demosaic", a.demosaic,
-                   "bilinear, the least noise and error on flames; gradient for pictures with sharp edges")
+                   "bilinear: least noise and error on flames; gradient: for pictures with sharp edges")
       ->check(CLI::IsMember({"bilinear", "gradient"}))
       ->capture_default_str();
 }
@@ -353,20 +339,20 @@ void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
 
 void add_reconstruct(CLI::App& app) {
   auto arguments = std::make_shared<ReconstructArguments>();
-  CLI::App* verb = app.add_subcommand("reconstruct",
-                                      "Reconstruct the flame's volume from calibrated pictures or a session");
+  CLI::App* verb = app.add_subcommand(
+      "reconstruct", "Reconstructs the flame's volume from calibrated pictures or a session");
   ReconstructArguments& a = *arguments;
   verb->add_option(
       "input", a.input,
       "transforms.json (NeRF / instant-ngp convention), or a recorded session's folder; with --daemon a "
       "session's name");
-  verb->add_option("--out", a.out, "Folder for volume.vdb, views/ and report.json");
+  verb->add_option("--out", a.out, "Folder for volume.vdb, views/, report.json and the page report.html");
   verb->add_option(
       "--rig", a.rig,
-      "Of a session: the rig.json of `calibrate cameras`, which stands before its own calibration");
-  verb->add_option(
-      "--plan", a.plan,
-      "Only show the box and the voxels on the pictures, in this folder, and what a run would take");
+      "Sessions only: rig.json of `calibrate cameras`, used instead of the session's calibration");
+  verb->add_option("--plan", a.plan,
+                   "Reconstruct nothing; draw the box and the voxels on the pictures, in this folder, and "
+                   "estimate the time of a run");
   verb->add_option("--box", a.box,
                    "cx,cy,cz,sx,sy,sz: the volume's centre and size in metres [the input's, or found]");
   verb->add_option(
@@ -376,21 +362,24 @@ void add_reconstruct(CLI::App& app) {
       "256]");
   add_solve_options(verb, a);
   add_picture_options(verb, a);
-  verb->add_option("--seed", a.seed, "Of the random numbers in the paper's solver")
+  verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   verb->add_option("--progress-fd", a.progress_fd,
-                   "For programs: tell progress, every iteration and the result on this descriptor "
-                   "(emberlock/v1/child.proto), nothing on stdout; die with the parent")
+                   "For programs: write progress, every iteration and the result to this descriptor "
+                   "(emberlock/v1/child.proto), nothing to stdout; end when the parent ends")
       ->check(CLI::NonNegativeNumber);
   CLI::Option* by_daemon = add_daemon_options(*verb, a.by_daemon.daemon);
-  by_daemon->description("Let emberlockd do it, behind the session's name: unix:PATH or HOST:PORT")
+  by_daemon->description("Let emberlockd reconstruct its session of this name: unix:PATH or HOST:PORT")
       ->expected(0, 1)
       ->default_str(a.by_daemon.daemon.address);
-  verb->add_flag("--cancel", a.by_daemon.cancel, "Of the daemon: cancel the one that runs")->needs(by_daemon);
-  verb->add_flag("--json", a.by_daemon.json,
-                 "Of the daemon: Iteration a line, then ReconstructionStatus (emberlock/v1/status.proto)")
+  verb->add_flag("--cancel", a.by_daemon.cancel, "With --daemon: cancel the running reconstruction")
       ->needs(by_daemon);
+  verb->add_flag("--json", a.by_daemon.json,
+                 "report.json on stdout; with --daemon an Iteration per line, then ReconstructionStatus "
+                 "(emberlock/v1/status.proto)")
+      ->excludes("--plan")
+      ->excludes("--progress-fd");
   verb->callback([arguments, verb, by_daemon] {
     if (by_daemon->count() == 0) return reconstruct_command(*arguments);
     reconstruct_by_daemon(asked_of_daemon(*arguments, *verb));

@@ -47,7 +47,7 @@ void reconstruct_by_daemon(const DaemonReconstruction& wanted) {
   const Interrupt interrupt;
   const Progress progress = wanted.json ? Progress() : progress_bar(begun.session());
   v1::ReconstructionStatus last = begun;
-  double shown = 0;  // the newest iteration on the screen; their numbers may begin anew, their times don't
+  double shown = 0;  // time of the newest iteration shown; numbers may restart, times don't
   or_leave(client, client.watch_status(
                        [&](const v1::DaemonStatus& status) {
                          if (status.reconstruction().id() != begun.id()) return true;

@@ -5,16 +5,16 @@
 
 namespace emberlock::cli {
 
-/// `emberlock reconstruct SESSION --daemon`.
+/// Options of `emberlock reconstruct SESSION --daemon`.
 struct DaemonReconstruction {
   DaemonAddress daemon;
   v1::ReconstructRequest request;
-  bool cancel = false;  ///< instead: the one that runs
-  bool json = false;    ///< Iteration, a line each, and ReconstructionStatus at the end
+  bool cancel = false;  ///< instead of reconstructing: cancels the running one
+  bool json = false;    ///< one Iteration per line, and ReconstructionStatus at the end
 };
 
-/// Starts it and shows each iteration until it has ended. Leaves with exit code 1 where it failed or was
-/// cancelled, kUnreachable without a daemon; Ctrl-C leaves the daemon reconstructing.
+/// Starts a reconstruction and shows each iteration until it ends. Exits with code 1 if it failed or was
+/// cancelled, kUnreachable without a daemon. After Ctrl-C the daemon continues.
 void reconstruct_by_daemon(const DaemonReconstruction& wanted);
 
 }  // namespace emberlock::cli

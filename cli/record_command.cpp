@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <string>
@@ -17,7 +18,7 @@ struct RecordArguments {
   DaemonAddress daemon;
   std::string name, purpose = "flame";
   double seconds = 0;
-  bool unlocked = false, reconstruct = false, stop = false, json = false;
+  bool unlocked = false, reconstruct = false, no_renewal = false, stop = false, json = false;
 };
 
 bool is_over(const v1::RecordingStatus& recording) {
@@ -25,12 +26,26 @@ bool is_over(const v1::RecordingStatus& recording) {
          recording.state() == v1::RecordingStatus::FAILED;
 }
 
-/// Shows a recording as it goes: redrawn in place on a terminal, a line each time otherwise.
+/// Shows a recording's progress: redrawn in place on a terminal, else a line a second; as JSON every state.
 class Progressing {
  public:
   explicit Progressing(bool json) : json_(json) {}
 
-  void show(const v1::RecordingStatus& recording) const {
+  void show(const v1::RecordingStatus& recording) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!json_ && !terminal_ && now < next_line_) return;
+    next_line_ = now + std::chrono::seconds(1);
+    print(recording);
+  }
+  /// Exits with code 1 if the counts don't add up.
+  void conclude(const v1::RecordingStatus& recording) const {
+    print(recording);
+    if (!json_) std::printf("%s%s\n", terminal_ ? "\n" : "", recording.verdict().c_str());
+    if (recording.state() == v1::RecordingStatus::FAILED) throw CLI::RuntimeError(1);
+  }
+
+ private:
+  void print(const v1::RecordingStatus& recording) const {
     if (json_) {
       std::printf("%s\n", json_line(recording).c_str());
     } else if (terminal_) {
@@ -40,26 +55,20 @@ class Progressing {
     }
     std::fflush(stdout);
   }
-  /// Leaves with exit code 1 where the counts don't add up.
-  void conclude(const v1::RecordingStatus& recording) const {
-    show(recording);
-    if (!json_) std::printf("%s%s\n", terminal_ ? "\n" : "", recording.verdict().c_str());
-    if (recording.state() == v1::RecordingStatus::FAILED) throw CLI::RuntimeError(1);
-  }
 
- private:
   bool json_;
   bool terminal_ = ::isatty(STDOUT_FILENO) != 0;
+  std::chrono::steady_clock::time_point next_line_;
 };
 
-/// Follows it to its end; Ctrl-C ends it, and waits until it is finished.
-v1::RecordingStatus follow(Client& client, const std::string& session, const Progressing& progressing) {
+/// Follows the recording to its end; Ctrl-C stops it and waits until it is finished.
+v1::RecordingStatus follow(Client& client, const std::string& session, Progressing& progressing) {
   const Interrupt interrupt;
   v1::RecordingStatus last;
   const Status watched = client.watch_status(
       [&](const v1::DaemonStatus& status) {
         const v1::RecordingStatus& recording = status.recording();
-        if (recording.session() != session) return true;  // the one before
+        if (recording.session() != session) return true;  // the previous one
         last = recording;
         if (is_over(recording)) return false;
         progressing.show(recording);
@@ -69,15 +78,43 @@ v1::RecordingStatus follow(Client& client, const std::string& session, const Pro
   or_leave(client, watched);
   if (is_over(last)) return last;
   auto stopped = client.stop_recording();
-  if (!stopped && stopped.error().kind == ErrorKind::refused) {  // it ended by itself just now
+  if (!stopped && stopped.error().kind == ErrorKind::refused) {  // it has just ended by itself
     return or_leave(client, client.status()).recording();
   }
   return or_leave(client, std::move(stopped));
 }
 
+/// A take that is longer than the lock surely holds: the lock is renewed first, which takes some seconds.
+/// Whether it then holds for long enough the daemon says.
+void renew_for(Client& client, double seconds) {
+  const v1::DaemonStatus before = or_leave(client, client.status());
+  const v1::AlignmentStatus& lock = before.alignment();
+  constexpr double kUntilItBegins = 1;
+  if (before.phase() != v1::LOCKED || !lock.has_time_left_s() ||
+      lock.time_left_s() > seconds + kUntilItBegins)
+    return;
+  if (!lock.has_renewed_left_s() || lock.renewed_left_s() < seconds) return;  // that would be for nothing
+  std::fprintf(stderr, "The lock surely holds for %s, and %s are asked for: renewing it first.\n",
+               seconds_in_words(lock.time_left_s()).c_str(), seconds_in_words(seconds).c_str());
+  v1::AlignRequest request;
+  request.set_renew(true);
+  request.set_hold_s(seconds);
+  or_leave(client, client.align(request));
+  const Interrupt interrupt;
+  v1::DaemonStatus now;
+  const auto renewed = [&](const v1::DaemonStatus& status) {
+    now = status;
+    return status.revision() <= before.revision() || status.phase() == v1::ALIGNING;
+  };
+  or_leave(client, client.watch_status(renewed, Interrupt::asked));
+  if (Interrupt::asked()) throw CLI::RuntimeError(1);
+  if (now.phase() == v1::LOCKED)
+    std::fprintf(stderr, "Renewed: %s.\n", lock_in_words(now.alignment()).c_str());
+}
+
 void record(const RecordArguments& arguments) {
   Client client = connect_or_leave(arguments.daemon);
-  const Progressing progressing(arguments.json);
+  Progressing progressing(arguments.json);
   if (arguments.stop) return progressing.conclude(or_leave(client, client.stop_recording()));
   v1::RecordRequest request;
   request.set_name(arguments.name);
@@ -85,6 +122,8 @@ void record(const RecordArguments& arguments) {
   request.set_seconds(arguments.seconds);
   request.set_unlocked(arguments.unlocked);
   request.set_reconstruct(arguments.reconstruct);
+  if (arguments.seconds > 0 && !arguments.unlocked && !arguments.no_renewal)
+    renew_for(client, arguments.seconds);
   const v1::RecordingStatus begun = or_leave(client, client.record(request));
   progressing.conclude(follow(client, begun.session(), progressing));
 }
@@ -97,18 +136,25 @@ void add_record(CLI::App& app) {
       "record", "Records all cameras until Ctrl-C or --stop, and says whether every frame is accounted for");
   RecordArguments& a = *arguments;
   add_daemon_options(*verb, a.daemon);
-  verb->add_option("name", a.name, "Of the session [by the time]");
-  auto* seconds = verb->add_option("--seconds", a.seconds, "End by itself")->check(CLI::PositiveNumber);
-  auto* unlocked = verb->add_flag("--unlocked", a.unlocked, "Even though the cameras aren't locked");
+  verb->add_option("name", a.name, "Name of the session [the time]");
+  auto* seconds =
+      verb->add_option("--seconds", a.seconds, "End after so many seconds")->check(CLI::PositiveNumber);
+  auto* unlocked = verb->add_flag("--unlocked", a.unlocked,
+                                  "Record even if the cameras aren't locked, or may not be for so long");
+  verb->add_flag("--no-renewal", a.no_renewal,
+                 "Refuse --seconds for which the lock isn't sure to hold, instead of renewing it first")
+      ->needs(seconds);
   auto* reconstruct =
-      verb->add_flag("--reconstruct", a.reconstruct, "Hand it on to reconstruction when it is finished");
-  auto* purpose = verb->add_option("--purpose", a.purpose, "What it is for")->capture_default_str();
-  verb->add_flag("--stop", a.stop, "End the recording that runs")
+      verb->add_flag("--reconstruct", a.reconstruct, "Reconstruct the session when it is finished");
+  auto* purpose = verb->add_option("--purpose", a.purpose,
+                                   "Purpose of the recording; \"alignment\": of the flashing strobe")
+                      ->capture_default_str();
+  verb->add_flag("--stop", a.stop, "End the running recording")
       ->excludes(seconds)
       ->excludes(unlocked)
       ->excludes(reconstruct)
       ->excludes(purpose);
-  verb->add_flag("--json", a.json, "RecordingStatus of emberlock/v1/status.proto, a line each time");
+  verb->add_flag("--json", a.json, "RecordingStatus of emberlock/v1/status.proto, a line per change");
   verb->callback([arguments] { record(*arguments); });
 }
 

@@ -13,6 +13,8 @@
 #include "cli/sessions_daemon.h"
 #include "session/export.h"
 #include "session/job_json.h"
+#include "session/job_messages.h"
+#include "session/reader.h"
 #include "session/store.h"
 #include "session/verify.h"
 
@@ -29,7 +31,7 @@ struct SessionsArguments {
   DaemonAddress daemon;
 };
 
-/// A progress bar that Ctrl-C ends the step of.
+/// A progress bar whose step Ctrl-C cancels.
 Observer until_interrupted(const std::string& title) {
   return [bar = progress_bar(title)](double fraction, std::string_view what) {
     bar(fraction, what);
@@ -41,16 +43,25 @@ std::string size_of(std::uint64_t bytes) {
   return fmt::format("{:.1f} MB", static_cast<double>(bytes) / 1e6);
 }
 
+/// Counts characters, not bytes.
+std::string padded(std::string name) {
+  constexpr std::size_t kColumn = 24;
+  const auto characters = static_cast<std::size_t>(std::count_if(
+      name.begin(), name.end(), [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+  if (characters < kColumn) name.append(kColumn - characters, ' ');
+  return name;
+}
+
 void print_table(const v1::ListSessionsResponse& sessions) {
   if (sessions.sessions().empty()) std::printf("No sessions.\n");
   for (const auto& s : sessions.sessions()) {
     if (!s.error().empty()) {
-      std::printf("%-24s unreadable: %s\n", s.session().c_str(), s.error().c_str());
+      std::printf("%s unreadable: %s\n", padded(s.session()).c_str(), s.error().c_str());
       continue;
     }
-    std::printf("%-24s %-9s %-10s %-24s %2u cameras %8llu frames %6llu lost %12s%s\n", s.session().c_str(),
-                v1::Manifest::State_Name(s.state()).c_str(), s.purpose().c_str(), s.created_utc().c_str(),
-                s.cameras(), static_cast<unsigned long long>(s.frames()),
+    std::printf("%s %-9s %-10s %-24s %2u cameras %8llu frames %6llu lost %12s%s\n",
+                padded(s.session()).c_str(), v1::Manifest::State_Name(s.state()).c_str(), s.purpose().c_str(),
+                s.created_utc().c_str(), s.cameras(), static_cast<unsigned long long>(s.frames()),
                 static_cast<unsigned long long>(s.lost()), size_of(s.bytes()).c_str(),
                 s.calibrated() ? "  calibrated" : "");
   }
@@ -70,10 +81,26 @@ void list(const SessionsArguments& a) {
   std::printf("%s\n", json_line(sessions).c_str());
 }
 
-void verify(const SessionsArguments& a) {
-  if (is_daemons(a.folder)) return job_by_daemon(a.daemon, SessionJob::verify, a.folder, a.json);
+/// A name that the daemon doesn't know, or that nobody answers for, may be a folder here.
+SessionsArguments meant(SessionsArguments a) {
+  if (!is_daemons(a.folder) || !session::SessionReader::is_session(a.folder) ||
+      daemon_has(a.daemon, a.folder))
+    return a;
+  a.folder = "./" + a.folder;
+  std::fprintf(stderr, "emberlock: %s is taken: the daemon has no such session, or none answers\n",
+               a.folder.c_str());
+  return a;
+}
+
+session::SessionCheck check_of(const SessionsArguments& a) {
+  if (is_daemons(a.folder))
+    return session::from_proto(job_by_daemon(a.daemon, SessionJob::verify, a.folder).verify());
   const Interrupt interrupt;
-  const session::SessionCheck check = or_fail(session::verify_session(a.folder, until_interrupted("verify")));
+  return or_fail(session::verify_session(a.folder, until_interrupted("verify")));
+}
+
+void verify(const SessionsArguments& a) {
+  const session::SessionCheck check = check_of(a);
   if (a.json) {
     std::printf("%s\n", session::to_line(session::to_json(check)).c_str());
   } else {
@@ -92,11 +119,15 @@ void verify(const SessionsArguments& a) {
   if (!check.whole()) throw CLI::RuntimeError(1);
 }
 
-void repair(const SessionsArguments& a) {
-  if (is_daemons(a.folder)) return job_by_daemon(a.daemon, SessionJob::repair, a.folder, a.json);
+session::RepairReport repair_report_of(const SessionsArguments& a) {
+  if (is_daemons(a.folder))
+    return session::from_proto(job_by_daemon(a.daemon, SessionJob::repair, a.folder).repair());
   const Interrupt interrupt;
-  const session::RepairReport report =
-      or_fail(session::repair_session(a.folder, until_interrupted("repair")));
+  return or_fail(session::repair_session(a.folder, until_interrupted("repair")));
+}
+
+void repair(const SessionsArguments& a) {
+  const session::RepairReport report = repair_report_of(a);
   if (a.json) {
     std::printf("%s\n", session::to_line(session::to_json(report)).c_str());
     return;
@@ -115,43 +146,59 @@ void repair(const SessionsArguments& a) {
                                        : "Nothing to mend.");
 }
 
-void export_frames(const SessionsArguments& a) {
+/// An export, and the folder that it went to.
+struct Exported {
+  fs::path folder;
+  session::ExportReport report;
+};
+
+Exported export_of(const SessionsArguments& a) {
   const bool png = a.format == "png";
   if (is_daemons(a.folder)) {
     if (!a.out.empty())
       fail({ErrorKind::bad_input, "the daemon chooses where", "--out",
             "Leave it away, or name a folder: ./" + a.folder});
-    return job_by_daemon(a.daemon, png ? SessionJob::export_png : SessionJob::export_video, a.folder, a.json);
+    const v1::JobOutcome outcome =
+        job_by_daemon(a.daemon, png ? SessionJob::export_png : SessionJob::export_video, a.folder);
+    return {outcome.export_().folder(), session::from_proto(outcome.export_())};
   }
   if (a.out.empty()) throw CLI::RequiredError("--out");
   const Interrupt interrupt;
   const session::ExportFormat format = png ? session::ExportFormat::png : session::ExportFormat::video;
-  const session::ExportReport report =
-      or_fail(session::export_session(a.folder, a.out, format, until_interrupted("export")));
+  return {a.out, or_fail(session::export_session(a.folder, a.out, format, until_interrupted("export")))};
+}
+
+void export_frames(const SessionsArguments& a) {
+  const auto [folder, report] = export_of(a);
   if (a.json) {
     std::printf("%s\n", session::to_line(session::to_json(report)).c_str());
     return;
   }
   for (const session::ExportedCamera& c : report.cameras) {
-    std::printf("%s: %s frames", (fs::path(a.out) / c.file).c_str(), std::to_string(c.frames).c_str());
-    if (format == session::ExportFormat::video)
+    std::printf("%s: %s frames", fs::absolute(folder / c.file).lexically_normal().c_str(),
+                std::to_string(c.frames).c_str());
+    if (!report.codec.empty())
       std::printf(" at %.3f a second, %s", c.frame_rate.value(), report.codec.c_str());
     if (c.gaps > 0) std::printf(", %s gaps", std::to_string(c.gaps).c_str());
-    if (c.repeated > 0) std::printf(" filled with %s repeated frames", std::to_string(c.repeated).c_str());
+    if (c.repeated > 0)
+      std::printf(" filled with %s repeated frames, marked by a hatched bar",
+                  std::to_string(c.repeated).c_str());
     if (c.unreadable > 0) std::printf(", %s unreadable ones left out", std::to_string(c.unreadable).c_str());
     std::printf("\n");
   }
 }
 
-/// `sessions NAME`, of one session's folder.
+/// Adds a verb of `sessions` that takes one session's folder.
 CLI::App* add_verb(CLI::App& sessions, const char* name, const char* words,
                    const std::shared_ptr<SessionsArguments>& a, void (*run)(const SessionsArguments&)) {
   CLI::App* verb = sessions.add_subcommand(name, words);
-  verb->add_option("SESSION", a->folder, "The session's folder, or the name of one of the daemon's")
+  verb->add_option(
+          "SESSION", a->folder,
+          "The session's folder, or the name of one of the daemon's; of a folder here if it has none")
       ->required();
   add_daemon_options(*verb, a->daemon);
   verb->add_flag("--json", a->json, "One JSON object");
-  verb->callback([a, run] { run(*a); });
+  verb->callback([a, run] { run(meant(*a)); });
   return verb;
 }
 
@@ -160,24 +207,25 @@ CLI::App* add_verb(CLI::App& sessions, const char* name, const char* words,
 void add_sessions(CLI::App& app) {
   auto a = std::make_shared<SessionsArguments>();
   CLI::App* sessions = app.add_subcommand(
-      "sessions", "Lists, verifies, mends and exports recordings: the daemon's by name, others by path.");
+      "sessions", "Lists, verifies, repairs and exports recordings: the daemon's by name, others by path.");
   sessions->require_subcommand(1);
-  CLI::App* all = sessions->add_subcommand("list", "The sessions in a folder, the newest first.");
-  all->add_option("FOLDER", a->folder, "In which sessions lie [the daemon's]");
+  CLI::App* all = sessions->add_subcommand("list", "Lists the sessions in a folder, the newest first.");
+  all->add_option("FOLDER", a->folder, "Folder of sessions [the daemon's]");
   add_daemon_options(*all, a->daemon);
   all->add_flag("--json", a->json, "One JSON object");
   all->callback([a] { list(*a); });
-  add_verb(*sessions, "verify",
-           "Reads every frame back and compares it with what was recorded. Exit code 1: not all there.", a,
-           verify);
+  add_verb(
+      *sessions, "verify",
+      "Reads every frame back and compares it with its checksum. Exit code 1: frames are missing or differ.",
+      a, verify);
   add_verb(*sessions, "repair",
-           "Salvages a session whose recorder was killed; of a damaged one keeps what is good and says what "
-           "is lost.",
+           "Repairs a session whose recorder was killed. Of a damaged session it keeps what is good and says "
+           "what is lost.",
            a, repair);
   CLI::App* out =
       add_verb(*sessions, "export", "Writes frames as files that other programs read.", a, export_frames);
-  out->add_option("--out", a->out, "The folder to make; the daemon chooses its own");
-  out->add_option("--format", a->format, "png: images, sample for sample; video: H.264, to look at")
+  out->add_option("--out", a->out, "Folder to make; for the daemon's sessions the daemon chooses it");
+  out->add_option("--format", a->format, "png: images without loss; video: H.264, to look at")
       ->check(CLI::IsMember({"png", "video"}))
       ->capture_default_str();
 }

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/sessions_daemon.h"
 
-#include <cstdio>
-
-#include <nlohmann/json.hpp>
+#include <algorithm>
 
 #include "cli/commands.h"
 #include "cli/daemon_words.h"
@@ -12,8 +10,7 @@
 namespace emberlock::cli {
 namespace {
 
-Status run(Client& client, SessionJob job, const std::string& session,
-           const Client::Take<v1::JobProgress>& take) {
+Status run(Client& client, SessionJob job, const std::string& session, const Client::Take<v1::Job>& take) {
   v1::SessionRequest request;
   request.set_session(session);
   v1::ExportRequest exporting;
@@ -35,30 +32,32 @@ Status run(Client& client, SessionJob job, const std::string& session,
 
 }  // namespace
 
+bool daemon_has(const DaemonAddress& address, const std::string& name) {
+  auto client = Client::connect(address);
+  if (!client) return false;
+  const auto listed = client->list_sessions();
+  return listed && std::any_of(listed->sessions().begin(), listed->sessions().end(),
+                               [&](const auto& entry) { return entry.session() == name; });
+}
+
 v1::ListSessionsResponse sessions_of_daemon(const DaemonAddress& address) {
   Client client = connect_or_leave(address);
   return or_leave(client, client.list_sessions());
 }
 
-void job_by_daemon(const DaemonAddress& address, SessionJob job, const std::string& session, bool json) {
+v1::JobOutcome job_by_daemon(const DaemonAddress& address, SessionJob job, const std::string& session) {
   Client client = connect_or_leave(address);
   const Interrupt interrupt;
   const Progress progress = progress_bar(session);
-  v1::JobProgress last;
-  or_leave(client, run(client, job, session, [&](const v1::JobProgress& told) {
+  v1::Job last;
+  or_leave(client, run(client, job, session, [&](const v1::Job& told) {
              last = told;
              tell(progress, told.fraction(), told.doing());
              return true;
            }));
-  if (!last.done()) leave(client, {ErrorKind::io, "it was ended before it was done", session});
-  const auto told = nlohmann::json::parse(last.report(), nullptr, false);
-  if (json) {
-    std::printf("%s\n", last.report().c_str());
-  } else {
-    if (!told.is_discarded()) std::printf("%s\n", told.dump(2).c_str());
-    std::printf("%s: %s\n", session.c_str(), last.ok() ? "all good" : "damaged, see above");
-  }
-  if (!last.ok()) throw CLI::RuntimeError(1);
+  if (last.state() != v1::Job::DONE)
+    leave(client, {ErrorKind::io, "it was ended before it was done", session});
+  return last.outcome();
 }
 
 }  // namespace emberlock::cli

@@ -20,7 +20,7 @@ struct SmearArguments {
   bool json = false;
 };
 
-/// NaN and infinity have no JSON; rounding to a millionth keeps lines readable.
+/// JSON has no NaN and infinity; rounding to a millionth keeps lines readable.
 double rounded(double v) { return std::isfinite(v) ? std::round(v * 1e6) / 1e6 : 0; }
 
 std::string reading_line(const std::string& file, int frame, const smear::SmearReading& reading) {
@@ -38,7 +38,7 @@ std::string reading_line(const std::string& file, int frame, const smear::SmearR
                             {"side", name(dot.side)}});
   }
   line["reason"] = reading.reason;
-  // A file name need not be UTF-8.
+  // File names may not be UTF-8.
   return line.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
@@ -53,7 +53,7 @@ std::string text_line(const std::string& file, int frame, const smear::SmearRead
   return line + ": " + reading.reason;
 }
 
-/// Reads all frames of a file; the error that ended it unless that was its end.
+/// Reads all frames of a file; an error if it ended before its end.
 Status read_frames(const std::string& path, bool json) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::unique_ptr<session::FrameFile> file, session::FrameFile::open(path));
   for (int frame = 0;; ++frame) {
@@ -69,8 +69,8 @@ Status read_frames(const std::string& path, bool json) {
   }
 }
 
-/// A broken file doesn't hide the good ones: all are read, every error is told, then the exit code says that
-/// one was.
+/// A broken file doesn't prevent reading the others: all are read and every error is printed; then the exit
+/// code reports it.
 void run_smear(const SmearArguments& arguments) {
   bool failed = false;
   for (const std::string& path : arguments.files) {
@@ -89,9 +89,9 @@ void add_smear(CLI::App& app) {
       app.add_subcommand("smear", "Finds the lamp and its smear dots in images and videos of a strobe.");
   auto arguments = std::make_shared<SmearArguments>();
   verb->add_option("files", arguments->files, "images (PGM, PNG, TIFF, JPEG, FITS) or videos")->required();
-  verb->add_flag(
-      "--json", arguments->json,
-      "one JSON object a line and frame; rows and columns count from 0 at the centre of the top left pixel");
+  verb->add_flag("--json", arguments->json,
+                 "one JSON object per frame, each on a line; rows and columns count from 0 at the centre of "
+                 "the top left pixel");
   verb->callback([arguments] { run_smear(*arguments); });
 }
 

@@ -29,9 +29,9 @@ void add_status(CLI::App& app) {
   auto arguments = std::make_shared<StatusArguments>();
   CLI::App* verb = app.add_subcommand(
       "status",
-      "Says what the rig is doing, what is wrong and what to do about it; exit code 1 where it is red");
+      "Says what the rig is doing, what is wrong and what to do about it; exit code 1 if the state is red");
   add_daemon_options(*verb, arguments->daemon);
-  verb->add_flag("--acknowledge", arguments->acknowledge, "Take faults that are over off the list");
+  verb->add_flag("--acknowledge", arguments->acknowledge, "Remove faults that are over from the list");
   verb->add_flag("--json", arguments->json, "DaemonStatus of emberlock/v1/status.proto, as JSON on one line");
   verb->callback([arguments] { show_status(*arguments); });
 }

@@ -11,19 +11,19 @@
 
 namespace emberlock::cli {
 
-/// What a virtual rig's strobe is: one that is told what to do, or one with a dial and somebody who turns it
-/// as he is told.
+/// The strobe of a virtual rig: one with an interface, or one with a dial and a simulated operator who turns
+/// it as requested.
 struct StrobeChoice {
   std::optional<drivers::VirtualDialOptions> dial;
-  std::optional<Hertz> at;  ///< where the dial is set at first; else where it is asked to be
+  std::optional<Hertz> at;  ///< initial setting of the dial; default: the requested one
 };
 
-/// From "virtual", or "manual" and "virtual-dial" with options: "manual:step=1",
+/// Parses "virtual", or "manual" and "virtual-dial" with options: "manual:step=1",
 /// "virtual-dial:error=300,at=1510.5". Error bad_input otherwise.
 Result<StrobeChoice> parse_strobe(const std::string& text);
 
-/// Plays whoever turns the dial: sets what is asked for at first, or `at`, then turns by as much as is said;
-/// `observer` sees each round before. Just `observer` without a dial.
+/// Simulates the operator: first sets the dial to the requested rate, or to `at`, then turns it by the
+/// requested amounts. `observer` gets each round before that. Without a dial, returns `observer`.
 rig::AlignObserver operated(drivers::VirtualDial* dial, std::optional<Hertz> at, rig::AlignObserver observer);
 
 }  // namespace emberlock::cli

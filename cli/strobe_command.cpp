@@ -1,15 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "base/file.h"
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "cli/daemon_words.h"
+#include "cli/frame_code_signal.h"
+#include "smear_sync/clocks/frame_code.h"
 
 namespace emberlock::cli {
 namespace {
@@ -20,9 +26,18 @@ struct StrobeArguments {
   std::optional<double> rate_hz, phase_ms, width_us;
   std::optional<std::string> code;
   bool json = false;
+  bool frame_code = false;
+  bool play = false;
+  smear::FrameCode words{};
+  std::string csv, wav;
+  double wav_rate_hz = 48000;
 };
 
-/// Whether anything was to be changed.
+constexpr double kUsualRate = 24.2;          // Hz: about 1 % beside cameras of 23.976
+constexpr double kUsualWidth = 20;           // us
+constexpr std::size_t kLongestPrinted = 64;  // flashes of a code
+
+/// Applies the arguments; returns whether there are any changes.
 bool change(v1::StrobeState& state, const StrobeArguments& arguments) {
   if (arguments.output) state.set_output(*arguments.output);
   if (arguments.rate_hz) state.set_rate_hz(*arguments.rate_hz);
@@ -42,10 +57,38 @@ void print_state(const v1::StrobeState& state) {
   std::printf("%-8s %.6g us\n", "width", state.width_s() * 1e6);
   std::string code;
   for (const bool flash : state.code()) code += flash ? '1' : '0';
+  if (code.size() > kLongestPrinted)
+    code = fmt::format("{}... ({} flashes, {} of them skipped)", code.substr(0, kLongestPrinted), code.size(),
+                       std::count(code.begin(), code.end(), '0'));
   if (!code.empty()) std::printf("%-8s %s\n", "code", code.c_str());
 }
 
-void strobe(const StrobeArguments& arguments) {
+/// The code for people and signal generators, without a daemon.
+void print_frame_code(const StrobeArguments& arguments, const std::vector<bool>& pattern) {
+  const Hertz rate(arguments.rate_hz.value_or(kUsualRate));
+  const Seconds width = microseconds(arguments.width_us.value_or(kUsualWidth));
+  if (!arguments.csv.empty()) or_fail(write_file_atomically(arguments.csv, code_csv(pattern, rate, width)));
+  if (!arguments.wav.empty()) {
+    const std::string wave = or_fail(code_wav(pattern, rate, width, Hertz(arguments.wav_rate_hz)));
+    or_fail(write_file_atomically(arguments.wav, wave));
+  }
+  std::printf("%s", code_text(pattern, arguments.words.spacing).c_str());
+  std::fprintf(stderr,
+               "emberlock: %zu flashes, then again from the start; 1 gives a flash, 0 skips it. At %.9g Hz a "
+               "cycle lasts %.1f s\n",
+               pattern.size(), rate.value(), static_cast<double>(pattern.size()) / rate.value());
+}
+
+void strobe(StrobeArguments arguments) {
+  if (arguments.frame_code) {
+    const std::vector<bool> pattern = or_fail(smear::flash_pattern(arguments.words));
+    if (arguments.json && !arguments.play)
+      fail({ErrorKind::bad_input, "the code is no JSON", "--json", "Leave it out, or add --play"});
+    if (!arguments.play) return print_frame_code(arguments, pattern);
+    arguments.code = code_text(pattern, static_cast<int>(pattern.size()));
+    arguments.code->pop_back();  // the end of the line
+    arguments.output = v1::StrobeState::FLASHING;
+  }
   Client client = connect_or_leave(arguments.daemon);
   v1::StrobeState state = or_leave(client, client.strobe());
   if (change(state, arguments)) state = or_leave(client, client.apply_strobe(state));
@@ -56,12 +99,43 @@ void strobe(const StrobeArguments& arguments) {
   }
 }
 
+/// The code by which verify and import know frames.
+void add_frame_code_options(CLI::App& verb, StrobeArguments& a) {
+  auto* frame_code = verb.add_flag(
+      "--frame-code", a.frame_code,
+      "Prints the code of skipped flashes by which verify and import tell which frames belong together");
+  auto* play =
+      verb.add_flag("--play", a.play, "Lets the daemon's strobe flash with it, at --rate [as it is set]")
+          ->needs(frame_code);
+  verb.add_option("--csv", a.csv, "Writes it for a signal generator, a line for each flash, at --rate [24.2]")
+      ->needs(frame_code)
+      ->excludes(play);
+  auto* wav = verb.add_option("--wav", a.wav, "Writes one cycle as a sound file, full level during a flash")
+                  ->needs(frame_code)
+                  ->excludes(play);
+  verb.add_option("--wav-rate", a.wav_rate_hz, "Samples per second of the sound file")
+      ->check(CLI::Range(1.0, 1e7))
+      ->capture_default_str()
+      ->needs(wav);
+  verb.add_option("--code-words", a.words.words, "Words of the code, as for verify")
+      ->check(CLI::Range(1, 31))
+      ->capture_default_str()
+      ->needs(frame_code);
+  verb.add_option("--code-spacing", a.words.spacing, "Flashes from one word to the next, as for verify")
+      ->check(CLI::Range(32, 100000))
+      ->capture_default_str()
+      ->needs(frame_code);
+  frame_code->excludes(verb.get_option("--code"))->excludes(verb.get_option("--output"));
+}
+
 }  // namespace
 
 void add_strobe(CLI::App& app) {
   auto arguments = std::make_shared<StrobeArguments>();
   CLI::App* verb = app.add_subcommand(
-      "strobe", "Says how the strobe is set; with options sets it, and says what it read back");
+      "strobe",
+      "Prints the strobe's settings; with options sets them, and prints what was read back. With "
+      "--frame-code prints the strobe's code, without a daemon");
   StrobeArguments& a = *arguments;
   add_daemon_options(*verb, a.daemon);
   const std::map<std::string, v1::StrobeState::Output> outputs = {{"off", v1::StrobeState::OFF},
@@ -69,14 +143,16 @@ void add_strobe(CLI::App& app) {
                                                                   {"steady", v1::StrobeState::STEADY}};
   verb->add_option("--output", a.output, "off, flashing or steady")
       ->transform(CLI::CheckedTransformer(outputs));
-  verb->add_option("--rate", a.rate_hz, "Flashes a second, Hz")->check(CLI::PositiveNumber);
-  verb->add_option("--phase", a.phase_ms, "Of the flashes, ms");
-  verb->add_option("--width", a.width_us, "Of a flash, us")->check(CLI::PositiveNumber);
-  verb->add_option("--code", a.code, "Which flashes come, over and over: 1101; empty: all")
+  verb->add_option("--rate", a.rate_hz, "Flashes per second, Hz")->check(CLI::PositiveNumber);
+  verb->add_option("--phase", a.phase_ms, "Phase of the flashes, ms");
+  verb->add_option("--width", a.width_us, "Duration of a flash, us")->check(CLI::PositiveNumber);
+  verb->add_option("--code", a.code,
+                   "Cyclic pattern of flashes, 0 skips one: 1101; empty: no flash is skipped")
       ->check([](const std::string& text) {
         return text.find_first_not_of("01") == std::string::npos ? std::string()
                                                                  : "only 0 and 1 can stand in a code";
       });
+  add_frame_code_options(*verb, a);
   verb->add_flag("--json", a.json, "StrobeState of emberlock/v1/session.proto, as JSON on one line");
   verb->callback([arguments] { strobe(*arguments); });
 }

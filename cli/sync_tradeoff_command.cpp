@@ -70,8 +70,9 @@ void tradeoff_sync(const SyncArguments& arguments) {
 
 void add_tradeoff_sync(CLI::App& parent) {
   auto arguments = std::make_shared<SyncArguments>();
-  CLI::App* verb = parent.add_subcommand(
-      "sync", "Resets and minutes against the cameras' tolerance, and what it does to a rising flame");
+  CLI::App* verb = parent.add_subcommand("sync",
+                                         "Resets and minutes that each tolerance of the cameras costs, and "
+                                         "the error that it adds for a rising flame");
   SyncArguments& a = *arguments;
   evaluate::SyncTradeoffOptions& o = a.options;
   verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html")->required();
@@ -79,32 +80,36 @@ void add_tradeoff_sync(CLI::App& parent) {
   verb->add_option("--tolerances", a.tolerances, "Rows to either side: i,j,... [1,2,5,10,20,50,100,200]")
       ->delimiter(',');
   verb->add_option("--policies", a.policies, "[fixed-reference,densest,timed,trimmed]")->delimiter(',');
-  verb->add_option("--frame-rate", a.frame_rate, "Frames a second")->capture_default_str();
+  verb->add_option("--frame-rate", a.frame_rate, "Frames per second")->capture_default_str();
   verb->add_option("--row-time-us", a.row_time_us, "Time to shift one row")->capture_default_str();
-  verb->add_option("--latency-jitter", a.latency_jitter_ms, "RMS of one reset's latency on command, ms")
+  verb->add_option("--latency-jitter", a.latency_jitter_ms, "RMS jitter of a commanded reset's latency, ms")
       ->capture_default_str();
   verb->add_option("--latency-spread", a.latency_spread_ms,
-                   "RMS of the cameras' mean latencies, which are learnt from scratch, ms")
+                   "RMS spread of the cameras' mean latencies, ms; they are unknown at first")
       ->capture_default_str();
-  verb->add_option("--crystal-spread", a.crystal_spread_ppm, "RMS of the cameras' frame rates, ppm")
+  verb->add_option("--crystal-spread", a.crystal_spread_ppm, "RMS spread of the cameras' frame rates, ppm")
       ->capture_default_str();
   verb->add_option("--reset-seconds", a.reset_seconds,
-                   "Of a reset by hand: fixed-reference and densest take those")
+                   "Time of a reset by hand, for fixed-reference and densest")
       ->capture_default_str();
-  verb->add_option("--round-seconds", a.round_seconds, "Of filming between resets")->capture_default_str();
-  verb->add_option("--trim-range", a.trim_range_ppm, "By how much trimmed changes frame rates, ppm")
+  verb->add_option("--round-seconds", a.round_seconds, "Time of filming between resets")
       ->capture_default_str();
-  verb->add_option("--trim-step", a.trim_step_ppm, "Of these, ppm")->capture_default_str();
-  verb->add_option("--rigs", o.rigs, "Simulated for a point")->capture_default_str();
-  verb->add_option("--seed", o.seed, "Of rigs, flame and draws")->capture_default_str();
-  verb->add_option("--flame-speed", o.flame_speed, "Upwards, m/s; 0 leaves the flame out")
+  verb->add_option("--trim-range", a.trim_range_ppm, "How far the policy trimmed can change frame rates, ppm")
       ->capture_default_str();
-  verb->add_option("--voxels", o.voxels, "Of its reconstruction, along an edge")->capture_default_str();
-  verb->add_option("--draws", o.draws, "Of the cameras' times within each tolerance")->capture_default_str();
-  verb->add_option("--added-error", o.added_error,
-                   "Percent that the recommended tolerance may add to the error in perfect step")
+  verb->add_option("--trim-step", a.trim_step_ppm, "Step of these trims, ppm")->capture_default_str();
+  verb->add_option("--rigs", o.rigs, "Rigs that are simulated for each point")->capture_default_str();
+  verb->add_option("--seed", o.seed, "Seed of rigs, flame and draws")->capture_default_str();
+  verb->add_option("--flame-speed", o.flame_speed, "Upward speed of the flame, m/s; 0: no flame")
       ->capture_default_str();
-  verb->add_option("--threads", o.threads, "CPU threads, 0 takes every core")
+  verb->add_option("--voxels", o.voxels, "Voxels along an edge of the flame's reconstruction")
+      ->capture_default_str();
+  verb->add_option("--draws", o.draws, "Random draws of the cameras' times within each tolerance")
+      ->capture_default_str();
+  verb->add_option(
+          "--added-error", o.added_error,
+          "Percent that the recommended tolerance may add to the error of perfectly synchronized cameras")
+      ->capture_default_str();
+  verb->add_option("--threads", o.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
   verb->add_flag("--json", a.json, "All points as one JSON object on stdout");

@@ -2,13 +2,36 @@
 #include <chrono>
 #include <cstdio>
 #include <memory>
+#include <mutex>
+#include <optional>
 #include <string>
 
 #include <unistd.h>
 
 #include "cli/commands.h"
+#include "cli/help.h"
+#include "cli/progress_lines.h"
 
 namespace emberlock::cli {
+
+int run(CLI::App& app, int argc, char** argv) {
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::RuntimeError& e) {
+    return e.get_exit_code();
+  } catch (const CLI::ParseError& e) {
+    const std::string wrong = usage_error(app, e);
+    if (wrong.empty()) {
+      std::printf("%s", help_of_missing_verb(app).c_str());
+    } else {
+      std::fprintf(stderr, "emberlock: %s\n", wrong.c_str());
+    }
+    return 2;
+  }
+  return 0;
+}
 
 void fail(const Error& error) {
   std::fprintf(stderr, "emberlock: %s\n", error.message().c_str());
@@ -19,7 +42,7 @@ Progress progress_bar(const std::string& title) {
   using Clock = std::chrono::steady_clock;
   struct State {
     Clock::time_point start = Clock::now();
-    int tenths_shown = -1;
+    ProgressLines lines;
     bool drawn = false;
   };
   const bool terminal = ::isatty(STDERR_FILENO) != 0;
@@ -36,9 +59,13 @@ Progress progress_bar(const std::string& title) {
                               std::string(static_cast<std::size_t>(kWidth - filled), '.');
       std::fprintf(stderr, "\r\033[K%s [%s] %3.0f %% %s%s", title.c_str(), bar.c_str(), 100 * fraction,
                    words.c_str(), done ? "\n" : "");
-    } else if (const int tenths = static_cast<int>(fraction * 10); tenths != state->tenths_shown) {
-      state->tenths_shown = tenths;
-      std::fprintf(stderr, "%s %3.0f %% %s\n", title.c_str(), 100 * fraction, words.c_str());
+    } else {
+      static std::mutex mutex;
+      static std::optional<double> last_line;
+      const std::lock_guard lock(mutex);
+      const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+      if (state->lines.due(fraction, now, last_line))
+        std::fprintf(stderr, "%s %3.0f %% %s\n", title.c_str(), 100 * fraction, words.c_str());
     }
     std::fflush(stderr);
   };

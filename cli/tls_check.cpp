@@ -26,7 +26,7 @@ namespace beast = boost::beast;
 using asio::ip::tcp;
 
 constexpr std::chrono::seconds kPatience{5};
-/// As gRPC asks: over HTTP/2.
+/// ALPN for HTTP/2, as in gRPC.
 constexpr std::array<unsigned char, 3> kHttp2{2, 'h', '2'};
 
 struct HostPort {
@@ -41,7 +41,7 @@ std::optional<HostPort> split(const std::string& address) {
   return parts;
 }
 
-/// OpenSSL copies it into each connection, so it must be whole before one begins.
+/// OpenSSL copies the context into each connection, so it must be complete before.
 asio::ssl::context context_of(const ClientTls& tls, beast::error_code& error) {
   asio::ssl::context context(asio::ssl::context::tls_client);
   context.set_verify_mode(asio::ssl::verify_peer);
@@ -74,7 +74,7 @@ class Handshake {
       if (!error) shake_hands();
     });
     loop_.run();
-    return judge();
+    return diagnose();
   }
 
  private:
@@ -87,7 +87,7 @@ class Handshake {
   void shake_hands() {
     stream_.async_handshake(asio::ssl::stream_base::client, [this](beast::error_code error) {
       ended(Step::shaking_hands, error);
-      // Since TLS 1.3 a server judges the client's certificate last: its first word says how.
+      // With TLS 1.3 a server verifies the client's certificate last: its first message shows the result.
       if (!error && speaks_http2()) {
         stream_.async_read_some(asio::buffer(heard_), [this](beast::error_code failed, std::size_t) {
           ended(Step::hearing, failed);
@@ -103,12 +103,12 @@ class Handshake {
     return length > 0;
   }
 
-  Status judge() {
+  Status diagnose() {
     if (error_ == beast::error::timeout) return unreachable("it doesn't answer", kIsItThere);
     if (step_ == Step::connecting && error_) return unreachable(error_.message(), kIsItThere);
     const SSL* const ssl = stream_.native_handle();
     if (const long verdict = SSL_get_verify_result(ssl); verdict != X509_V_OK) return distrusted(verdict);
-    // gRPC hangs up without a word on whose certificate it doesn't like.
+    // gRPC closes the connection without a message if it rejects the certificate.
     const STACK_OF(X509_NAME)* const asked_of = SSL_get0_peer_CA_list(ssl);
     if (error_ && asked_of != nullptr && sk_X509_NAME_num(asked_of) > 0) return refused();
     if (step_ == Step::shaking_hands && error_)

@@ -8,15 +8,15 @@
 
 namespace emberlock::cli {
 
-/// What a client believes and shows, as PEM.
+/// A client's trusted authority and its own identity, as PEM.
 struct ClientTls {
-  std::string ca;               ///< who vouches for the daemon
-  rig::TlsIdentity identity{};  ///< empty: none is shown
+  std::string ca;               ///< authority that signed the daemon's certificate
+  rig::TlsIdentity identity{};  ///< empty: none is sent
 };
 
-/// Shakes hands with the daemon at HOST:PORT, and hangs up. Errors are clearer than gRPC's, and say which
-/// side refused which certificate and why: bad_input where an option is wrong, io where nobody answers in
-/// time.
+/// Makes a TLS handshake with the daemon at HOST:PORT and disconnects. Its errors are clearer than gRPC's and
+/// say which side rejected which certificate, and why: bad_input for a wrong option, io where nobody answers
+/// in time.
 Status check_tls(const std::string& address, const ClientTls& tls);
 
 }  // namespace emberlock::cli

@@ -16,15 +16,16 @@
 #include "cli/commands.h"
 #include "cli/outputs.h"
 #include "cli/scene_options.h"
+#include "evaluate/measure_front.h"
+#include "evaluate/recon_sweep.h"
+#include "evaluate/work_points.h"
 #include "recon/pipeline/scene.h"
-#include "recon/pipeline/shipped_front.h"
-#include "recon/pipeline/sweep.h"
 #include "report/tradeoff_report.h"
 
 namespace emberlock::cli {
 namespace {
 
-/// The command line as typed, before its words mean anything.
+/// The command line as typed, not yet interpreted.
 struct SweepArguments {
   std::string input;
   std::string out;
@@ -44,7 +45,7 @@ struct SweepArguments {
   std::vector<std::string> solvers;
 };
 
-/// "auto" and "none" stand for themselves; a word's other parts are one list of effects.
+/// "auto" and "none" are kept alone; the other parts of a word form one list of effects.
 std::vector<std::string> split_effects(const std::vector<std::string>& words) {
   std::vector<std::string> result;
   for (const std::string& word : words) {
@@ -64,8 +65,8 @@ std::vector<std::string> split_effects(const std::vector<std::string>& words) {
   return result;
 }
 
-Result<recon::SweepOptions> options_of(const SweepArguments& arguments) {
-  recon::SweepOptions options;
+Result<evaluate::SweepOptions> options_of(const SweepArguments& arguments) {
+  evaluate::SweepOptions options;
   options.voxels = arguments.voxels;
   options.views = arguments.views;
   options.iterations = arguments.iterations;
@@ -85,7 +86,7 @@ Result<recon::SweepOptions> options_of(const SweepArguments& arguments) {
   return options;
 }
 
-/// What every point's command has in common.
+/// The part that all points' commands have in common.
 std::string common_options(const SweepArguments& arguments) {
   std::string words = "--hold-out ";
   for (std::size_t i = 0; i < arguments.held_out.size(); ++i)
@@ -97,7 +98,7 @@ std::string common_options(const SweepArguments& arguments) {
   return words;
 }
 
-/// The processor and how many threads run on it.
+/// The processor and the number of threads.
 std::string machine(const SweepArguments& arguments) {
   std::ifstream in("/proc/cpuinfo");
   std::string model = "this machine";
@@ -114,35 +115,36 @@ std::string machine(const SweepArguments& arguments) {
 
 void print_summary(const report::Tradeoff& tradeoff, const std::string& out) {
   std::printf("%s\n", report::what_a_second_buys(tradeoff.sweep.points).c_str());
-  for (const recon::WorkPoint& p : recon::pareto_front(tradeoff.sweep.points)) {
+  for (const recon::WorkPoint& p : evaluate::pareto_front(tradeoff.sweep.points)) {
     std::printf("%8.3f s  %6.2f grey levels  %s\n", p.seconds, p.error,
-                recon::command_options(p.settings).c_str());
+                evaluate::command_options(p.settings).c_str());
   }
   for (const std::string& skipped : tradeoff.sweep.skipped) std::printf("left out  %s\n", skipped.c_str());
   std::printf("written to %s\n", (std::filesystem::path(out) / "index.html").c_str());
 }
 
-/// Before minutes are measured: what would be replaced is nothing, or a front that was shipped before.
-void check_shipped_file(const std::string& path) {
+/// Checks, before measuring for minutes, that the file doesn't exist or is an earlier front.
+void check_front_file(const std::string& path) {
   constexpr std::string_view kFirstWords = "// Remade by `emberlock tradeoff recon --ship";
   std::error_code unknown;
   if (!std::filesystem::exists(path, unknown) && !unknown) return;
   const Result<std::string> old = read_file(path);
   if (old.ok() && old->starts_with(kFirstWords)) return;
-  fail({ErrorKind::bad_input, "is there already and is no shipped front", path,
+  fail({ErrorKind::bad_input, "is there already and is no reference front", path,
         "Name another file, or move it away"});
 }
 
 void ship(const SweepArguments& arguments, const recon::ComputeOptions& compute) {
-  check_shipped_file(arguments.ship);
+  check_front_file(arguments.ship);
   SteadyClock clock;
-  const std::string source = or_fail(recon::measure_shipped_source(compute, clock, progress_bar("tradeoff")));
+  const std::string source =
+      or_fail(evaluate::reference_front_source(compute, clock, progress_bar("tradeoff")));
   or_fail(write_file_atomically(arguments.ship, source));
   std::printf("written to %s; build again to ship it\n", arguments.ship.c_str());
 }
 
 void tradeoff_recon(const SweepArguments& arguments) {
-  const recon::SweepOptions options = or_fail(options_of(arguments));
+  const evaluate::SweepOptions options = or_fail(options_of(arguments));
   if (!arguments.ship.empty()) {
     ship(arguments, options.compute);
     return;
@@ -160,7 +162,7 @@ void tradeoff_recon(const SweepArguments& arguments) {
   or_fail(recon::hold_out(scene, arguments.held_out));
   SteadyClock clock;
   report::Tradeoff tradeoff{arguments.input, common_options(arguments), machine(arguments), {}};
-  tradeoff.sweep = or_fail(recon::sweep(scene, options, clock, progress_bar("tradeoff")));
+  tradeoff.sweep = or_fail(evaluate::sweep(scene, options, clock, progress_bar("tradeoff")));
   or_fail(report::write_tradeoff(tradeoff, where));
   print_summary(tradeoff, arguments.out);
 }
@@ -168,21 +170,21 @@ void tradeoff_recon(const SweepArguments& arguments) {
 void add_recon(CLI::App& parent) {
   auto arguments = std::make_shared<SweepArguments>();
   CLI::App* verb = parent.add_subcommand(
-      "recon", "Held-out error against seconds over settings of `reconstruct`, with the Pareto front");
+      "recon", "Held-out error against seconds for many settings of `reconstruct`, with the Pareto front");
   SweepArguments& a = *arguments;
   verb->add_option("input", a.input, "transforms.json, or a recorded session's folder");
   verb->add_option("--out", a.out, "Folder for points.csv, diagram.svg and index.html");
-  verb->add_option("--hold-out", a.held_out, "Views, counted from 0, that judge every point: i,j,...")
+  verb->add_option("--hold-out", a.held_out, "Views, counted from 0, that every point is scored on: i,j,...")
       ->delimiter(',');
   verb->add_option("--voxels", a.voxels,
-                   "Of each list the first value is the base [eighths of what the pictures can show: "
-                   "4,1,2,3,6,8]")
+                   "Voxels along the longest edge. The first value of each list is the base [eighths of what "
+                   "the pictures can show: 4,1,2,3,6,8]")
       ->delimiter(',');
   verb->add_option("--views", a.views, "Numbers of input views, 0 for all [0, half, three quarters]")
       ->delimiter(',');
   verb->add_option("--iterations", a.iterations,
-                   "Points of each run; the largest is as far as it goes, eight times so far for the paper's "
-                   "solver [1,2,3,4,6,8,12]")
+                   "Iterations after which each run is scored; it ends at the largest. The paper's solver: "
+                   "eight times as many [1,2,3,4,6,8,12]")
       ->delimiter(',');
   verb->add_option("--step", a.steps, "Longest steps along a ray, in voxel edges [1,0.5,2]")->delimiter(',');
   verb->add_option("--precision", a.precisions, "[float32,float64]")->delimiter(',');
@@ -191,25 +193,25 @@ void add_recon(CLI::App& parent) {
                    "another list [auto,none]")
       ->allow_extra_args(false);
   verb->add_option("--solver", a.solvers, "[default,paper]")->delimiter(',');
-  verb->add_option("--budget", a.budget, "Stop the sweep after so many seconds, with what there is")
+  verb->add_option("--budget", a.budget, "Stop the sweep after so many seconds, and report the points so far")
       ->check(CLI::PositiveNumber);
   verb->add_option("--box", a.box, "As in `reconstruct`");
   verb->add_option("--frame", a.frame, "As in `reconstruct`")->check(CLI::NonNegativeNumber);
   verb->add_option("--device", a.device, "auto, cpu or cuda")->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads, 0 takes every core")
+  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
   verb->add_option(
       "--ship", a.ship,
       "Instead: measure the front that --budget and --target-rmse of `reconstruct` choose by, on "
-      "simulated flames, and write it to this file (recon/pipeline/shipped_front.inc)");
+      "simulated flames, and write it to this file (recon/pipeline/reference_front.inc)");
   verb->callback([arguments] { tradeoff_recon(*arguments); });
 }
 
 }  // namespace
 
 void add_tradeoff(CLI::App& app) {
-  CLI::App* verb = app.add_subcommand("tradeoff", "What accuracy costs: work-precision diagrams");
+  CLI::App* verb = app.add_subcommand("tradeoff", "Work-precision diagrams: what accuracy costs");
   verb->require_subcommand(1);
   add_recon(*verb);
   add_tradeoff_sync(*verb);

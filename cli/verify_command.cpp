@@ -64,7 +64,7 @@ void print_table(const films::VerifyRunResult& run) {
   for (const std::string& line : result.to_do) std::printf("- %s\n", line.c_str());
 }
 
-/// What the JSON has no room for.
+/// Prints what isn't in the JSON.
 void print_notes(const films::VerifyRunResult& run) {
   for (const std::string& note : run.notes) std::fprintf(stderr, "emberlock: %s\n", note.c_str());
   for (const smear::CameraVerdict& c : run.result.cameras) {
@@ -75,7 +75,7 @@ void print_notes(const films::VerifyRunResult& run) {
   }
 }
 
-/// Where the report goes, and what was read for it.
+/// The output folder of the report, and its inputs.
 OutputRequest where_to(const VerifyArguments& a) {
   OutputRequest where{a.out, kVerify, {a.clips.begin(), a.clips.end()}};
   if (!a.clip.comb.empty()) where.inputs.emplace_back(a.clip.comb);
@@ -107,13 +107,13 @@ void verify(const VerifyArguments& arguments) {
 
 void add_verify(CLI::App& app) {
   auto a = std::make_shared<VerifyArguments>();
-  CLI::App* verb = app.add_subcommand(
-      "verify",
-      "Judges video files of cameras that filmed one strobe: in sync, by how much, which frames belong "
-      "together.");
-  verb->add_option("clips", a->clips, "one video a camera, the reference first")->required();
+  CLI::App* verb = app.add_subcommand("verify",
+                                      "Verifies video files of cameras that filmed one strobe: whether they "
+                                      "are in sync, by how much, and which frames belong together.");
+  verb->add_option("clips", a->clips, "one video per camera, the reference first")->required();
   add_clip_options(*verb, a->clip)->required();
-  verb->add_option("--tolerance", a->tolerance, "to the reference, to either side: 100rows, 5.4ms or 500us")
+  verb->add_option("--tolerance", a->tolerance,
+                   "largest distance from the reference, to either side: 100rows, 5.4ms or 500us")
       ->capture_default_str();
   verb->add_flag("--json", a->json, "the verdict as JSON on stdout");
   verb->add_option("--out", a->out, "write report.html, with frames, fits and residuals, to this folder");

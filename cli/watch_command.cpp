@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <atomic>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <regex>
 #include <string>
 #include <thread>
 #include <utility>
@@ -27,23 +29,38 @@ struct WatchArguments {
   std::optional<double> seconds;
 };
 
-/// What the three streams bring, line by line on stdout.
+/// A countdown isn't news.
+std::string without_times(const std::string& line) {
+  static const std::regex time(R"([0-9.]+ (ms|s|min|h)\b)");
+  return std::regex_replace(line, time, "");
+}
+
+/// Prints the messages of the three streams, line by line on stdout: the present state first, and then what
+/// is newer than that.
 class Lines {
  public:
-  explicit Lines(bool json) : json_(json) {}
+  Lines(bool json, const v1::DaemonStatus& now)
+      : json_(json), begin_utc_(now.now_utc()), begun_(now.reconstruction()) {
+    show(now);
+  }
 
   void show(const v1::DaemonStatus& status) {
+    if (revision_ == status.revision()) return;
+    revision_ = status.revision();
     if (json_) return print("status", status);
     std::string line = fmt::format("{}, {}: {}", in_words(v1::Phase_Name(status.phase())),
                                    in_words(status.light()), status.reason());
     if (!status.next_step().empty()) line += " " + status.next_step();
-    if (std::exchange(last_, line) != line) print(status.now_utc() + " " + line);
+    std::string words = without_times(line);
+    if (std::exchange(last_, words) != words) print(status.now_utc() + " " + line);
   }
   void show(const v1::Notice& notice) {
+    if (notice.utc() < begin_utc_) return;
     if (json_) return print("notice", notice);
     print(fmt::format("{} {}: {}", notice.utc(), in_words(notice.light()), notice.text()));
   }
   void show(v1::IterationPreview preview) {
+    if (is_old(preview)) return;
     if (!json_) return print(preview.reconstruction() + " " + iteration_line(preview.iteration()));
     preview.clear_captured_jpeg();
     preview.clear_rendered_jpeg();
@@ -61,8 +78,19 @@ class Lines {
     std::fflush(stdout);
   }
 
+  /// Whether the reconstruction had come so far, or was over, when this began.
+  [[nodiscard]] bool is_old(const v1::IterationPreview& preview) const {
+    if (begun_.state() == v1::ReconstructionStatus::STATE_UNSPECIFIED) return false;
+    if (preview.reconstruction() != begun_.id()) return false;
+    const auto& known = begun_.iterations();
+    return !known.empty() && preview.iteration().iteration() <= known.rbegin()->iteration();
+  }
+
   const bool json_;
-  std::string last_;  ///< of the status; one thread's
+  const std::string begin_utc_;
+  const v1::ReconstructionStatus begun_;
+  std::optional<std::uint64_t> revision_;  ///< of the last status; used by one thread, as is last_
+  std::string last_;                       ///< its line, without its times
   std::mutex mutex_;
 };
 
@@ -72,9 +100,9 @@ void watch(const WatchArguments& arguments) {
   const auto end = arguments.seconds
                        ? Steady::now() + std::chrono::duration<double>(*arguments.seconds)
                        : std::optional<std::chrono::time_point<Steady, std::chrono::duration<double>>>();
-  std::atomic<bool> over = false;  // one stream ended: so do the others
+  std::atomic<bool> over = false;  // one stream has ended: end the others too
   const auto stop = [&] { return over || Interrupt::asked() || (end && Steady::now() >= *end); };
-  Lines lines(arguments.json);
+  Lines lines(arguments.json, or_leave(client, client.status()));
   const auto show = [&](const auto& message) {
     lines.show(message);
     return true;
@@ -100,13 +128,13 @@ void watch(const WatchArguments& arguments) {
 
 void add_watch(CLI::App& app) {
   auto arguments = std::make_shared<WatchArguments>();
-  CLI::App* verb = app.add_subcommand(
-      "watch",
-      "Follows the daemon: its states, its journal, every iteration of a reconstruction; until Ctrl-C");
+  CLI::App* verb = app.add_subcommand("watch",
+                                      "Follows the daemon from now until Ctrl-C: its states, its journal, "
+                                      "every iteration of a reconstruction");
   add_daemon_options(*verb, arguments->daemon);
-  verb->add_option("--seconds", arguments->seconds, "For so long")->check(CLI::PositiveNumber);
+  verb->add_option("--seconds", arguments->seconds, "End after so many seconds")->check(CLI::PositiveNumber);
   verb->add_flag("--json", arguments->json,
-                 "One object a line: {\"status\": ...}, {\"notice\": ...} or {\"iteration\": ...}");
+                 "One object per line: {\"status\": ...}, {\"notice\": ...} or {\"iteration\": ...}");
   verb->callback([arguments] { watch(*arguments); });
 }
 

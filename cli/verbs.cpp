@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+// libexec/emberlock/emberlock: every verb. bin/emberlock (main.cpp) hands on to it.
+#include "base/version.h"
+#include "cli/commands.h"
+#include "cli/help.h"
+#include "cli/manual.h"
+
+int main(int argc, char** argv) {
+  CLI::App app{
+      "Emberlock: locks cameras without trigger hardware, films flames with them, reconstructs the volume.",
+      "emberlock"};
+  app.require_subcommand(1);
+  emberlock::cli::style_help(app);
+  app.set_version_flag("--version", "emberlock " + emberlock::version());
+#if EMBERLOCK_WITH_DRIVERS
+  emberlock::cli::add_devices(app);
+#endif
+  emberlock::cli::add_smear(app);
+#if EMBERLOCK_WITH_DRIVERS
+  emberlock::cli::add_align(app);
+#endif
+  emberlock::cli::add_import(app);
+  emberlock::cli::add_calibrate(app);
+  emberlock::cli::add_reconstruct(app);
+  emberlock::cli::add_view(app);
+  emberlock::cli::add_verify(app);
+  emberlock::cli::add_tradeoff(app);
+#if EMBERLOCK_WITH_DRIVERS
+  emberlock::cli::add_demo(app);
+  emberlock::cli::add_sample(app);
+#endif
+  emberlock::cli::add_sessions(app);
+#if EMBERLOCK_WITH_DRIVERS
+  emberlock::cli::add_doctor(app);
+#endif
+#if EMBERLOCK_WITH_DAEMON
+  emberlock::cli::add_client(app);
+#endif
+  emberlock::cli::add_help(app);
+  emberlock::cli::add_manual(app, emberlock::version());
+  return emberlock::cli::run(app, argc, argv);
+}

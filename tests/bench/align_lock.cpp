@@ -47,7 +47,7 @@ int cold(int seeds) {
       const auto result = rig::run_align(bench.align, bench.options);
       if (!result || result->last.verdict != smear::AlignVerdict::aligned) {
         std::printf("seed %d: %s\n", seed,
-                    result ? result->last.reason.c_str() : result.error().message().c_str());
+                    result ? result->words.reason.c_str() : result.error().message().c_str());
         continue;
       }
       seconds.push_back((bench.align.clock->now() - began).value());
@@ -125,7 +125,7 @@ bool hold_hour(rig::Alignment& alignment, const test::SmallBench& bench, double 
     if ((locked || renewed) && !holds && !alignment.last().renews) {
       ++held.losses;
       std::printf("         lock given up at %.1f s: %s\n", (clock.now() - TimePoint{}).value(),
-                  alignment.last().reason.c_str());
+                  alignment.words().reason.c_str());
     }
     look();
   }

@@ -134,7 +134,7 @@ recon::Scene circle_scene(int views) {
         "camera " + std::to_string(i),
         recon::look_at({{640, 480}, focal, focal, 320, 240, {}}, 0.3 * at, Eigen::Vector3d::Zero()),
         {}};
-    view.image = recon::render_view(truth.volume, truth.medium, truth.effects, view.camera);
+    view.image = recon::share(recon::render_view(truth.volume, truth.medium, truth.effects, view.camera));
     scene.views.push_back(std::move(view));
   }
   return scene;
@@ -179,8 +179,9 @@ const recon::Problem& problem_of(const Setup& setup) {
   const recon::Scene& scene = scene_of(setup.views);
   const recon::Grid grid = recon::grid_over(scene.box, setup.voxels);
   recon::Pool pool(0);
-  kept.emplace(setup, recon::pose(inputs(scene),
-                                  setup.cube ? recon::whole_grid(grid) : carved(scene, grid, 0), {}, pool));
+  kept.emplace(
+      setup, recon::make_problem(inputs(scene), setup.cube ? recon::whole_grid(grid) : carved(scene, grid, 0),
+                                 {}, pool));
   return kept->second;
 }
 
@@ -311,7 +312,7 @@ void hull_and_rays(benchmark::State& state) {
   std::size_t rays = 0;
   repeat(state, [&] {
     const recon::Hull medium = recon::carve(scene, flames, grid, on_cpu(threads)).value();
-    rays = recon::pose(inputs(scene), medium, {}, pool).list.rays.size();
+    rays = recon::make_problem(inputs(scene), medium, {}, pool).list.rays.size();
   });
   state.counters["rays"] = static_cast<double>(rays);
 }

@@ -14,10 +14,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
 #include "recon/calibrate/pose.h"
 #include "recon/export/picture.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/radiance.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
@@ -48,7 +48,8 @@ recon::Scene twelve_views() {
                      recon::look_at({kPicture, focal, focal, 0.5 * kPicture.width, 0.5 * kPicture.height, {}},
                                     0.3 * at, Eigen::Vector3d::Zero()),
                      {}};
-    view.image = recon::render_view(truth.volume, truth.medium, truth.effects, view.camera, finer);
+    view.image =
+        recon::share(recon::render_view(truth.volume, truth.medium, truth.effects, view.camera, finer));
     scene.views.push_back(std::move(view));
   }
   return scene;
@@ -66,7 +67,7 @@ int write(const fs::path& folder) {
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     const recon::View& view = scene.views[i];
     const std::string name = "view" + std::to_string(i) + ".png";
-    if (!recon::write_png(recon::to_rgb8(view.image).view(), folder / name).ok()) return 1;
+    if (!recon::write_png(recon::to_rgb8(*view.image).view(), folder / name).ok()) return 1;
     const Eigen::Matrix4d m = recon::opengl_world_from_camera(view.camera.camera_from_world);
     nlohmann::json matrix = nlohmann::json::array();
     for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});

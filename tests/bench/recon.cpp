@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "recon/adjust/choose_effects.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
 #include "recon/synthetic/flame.h"
 

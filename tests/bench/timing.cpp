@@ -9,6 +9,7 @@
 
 #include "base/random.h"
 #include "recon/adjust/choose_effects.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
 #include "recon/synthetic/flame.h"
 

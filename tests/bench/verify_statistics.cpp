@@ -21,8 +21,8 @@ struct Worst {
   int offsets_wrong = 0, unknown = 0, cameras = 0;
 };
 
-void judge(std::uint64_t seed, int frames, const drivers::VirtualRigDraw& model,
-           const std::filesystem::path& folder, Worst& all) {
+void run_rig(std::uint64_t seed, int frames, const drivers::VirtualRigDraw& model,
+             const std::filesystem::path& folder, Worst& all) {
   RandomStream random(seed, 7);
   const int cameras = 3 + static_cast<int>(random.uniform(0, 2));
   test::StrobeFilm film = test::random_film(seed, cameras, model);
@@ -95,7 +95,7 @@ int main(int argc, char** argv) {
       "                          (/s)    off by      off by              off by     wrong\n");
   emberlock::Worst all;
   for (int rig = 0; rig < rigs; ++rig) {
-    judge(seed + static_cast<std::uint64_t>(rig), frames, model, folder, all);
+    run_rig(seed + static_cast<std::uint64_t>(rig), frames, model, folder, all);
     std::filesystem::remove_all(folder);
   }
   std::printf(

@@ -31,7 +31,7 @@ daemon::HttpGate gate(std::optional<rig::Token> token, daemon::HttpGate::Transpo
 }
 
 /// Whatever a head says: nobody is let in who didn't show the token, and no foreign name leads here.
-void judge(std::string_view text) {
+void check(std::string_view text) {
   const auto target = daemon::parse_target(next_line(text));
   if (!target) return;
   if (!target->path.starts_with('/') || target->path.find_first_of(" ?\r\n") != std::string::npos)
@@ -41,16 +41,18 @@ void judge(std::string_view text) {
   const daemon::HttpHead head{
       .host = lines[0], .origin = lines[1], .authorization = lines[2], .cookie = lines[3]};
   const bool shown = target->token == kSecret || lines[2].ends_with(kSecret);
-  const daemon::HttpVerdict guarded =
-      gate(*rig::Token::parse(kSecret), daemon::HttpGate::Transport::tls).judge(head, *target, {}).verdict;
+  const daemon::HttpVerdict guarded = gate(*rig::Token::parse(kSecret), daemon::HttpGate::Transport::tls)
+                                          .authorize(head, *target, {})
+                                          .verdict;
   if (guarded != daemon::HttpVerdict::refused && !shown) std::abort();
   // Without a token, and no session open, nobody is let in; by a foreign name nobody whatever he shows.
-  if (gate(std::nullopt, daemon::HttpGate::Transport::plain).judge(head, *target, {}).verdict !=
+  if (gate(std::nullopt, daemon::HttpGate::Transport::plain).authorize(head, *target, {}).verdict !=
       daemon::HttpVerdict::refused)
     std::abort();
   const bool by_name = lines[0].find("evil.example") != std::string_view::npos;
-  const daemon::HttpVerdict local =
-      gate(*rig::Token::parse(kSecret), daemon::HttpGate::Transport::plain).judge(head, *target, {}).verdict;
+  const daemon::HttpVerdict local = gate(*rig::Token::parse(kSecret), daemon::HttpGate::Transport::plain)
+                                        .authorize(head, *target, {})
+                                        .verdict;
   if (by_name && local != daemon::HttpVerdict::refused) std::abort();
 }
 
@@ -84,7 +86,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string_view text(reinterpret_cast<const char*>(data) + 1, size - 1);
   switch (data[0]) {
     case 'h':
-      judge(text);
+      check(text);
       break;
     case 'c':
       ask(text);

@@ -13,7 +13,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace emberlock;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   const std::size_t cut = bytes.find('\f');
-  const auto judge = [](const Result<v1::Rig>& rig) {
+  const auto check_rig = [](const Result<v1::Rig>& rig) {
     if (!rig) {
       if (rig.error().where.empty()) std::abort();
       return;
@@ -25,10 +25,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
   };
   if (cut == std::string_view::npos) {
-    judge(session::parse_rig(bytes, "fuzz/rig.json"));
+    check_rig(session::parse_rig(bytes, "fuzz/rig.json"));
     (void)recon::parse_board(bytes);
   } else {
-    judge(recon::parse_colmap(bytes.substr(0, cut), bytes.substr(cut + 1), "fuzz"));
+    check_rig(recon::parse_colmap(bytes.substr(0, cut), bytes.substr(cut + 1), "fuzz"));
   }
   return 0;
 }

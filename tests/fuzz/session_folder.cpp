@@ -10,6 +10,8 @@
 
 #include <unistd.h>
 
+#include "rig/align/old_record.h"
+#include "rig/align/settings_proto.h"
 #include "session/reader.h"
 #include "session/salvage.h"
 #include "session/verify.h"
@@ -17,7 +19,8 @@
 // A whole session, damaged: everything that reads one says what is good or why it can't, and agrees. The
 // input is the five files of a session one after the other, each behind its length as three bytes,
 // little-endian; what is left of the input belongs to the last. Frames that come are compared with their
-// hashes by the reader itself; what repair leaves must be whole.
+// hashes by the reader itself; what repair leaves must be whole. Of an alignment's settings among the events
+// those that are taken say the same when they are written and read again.
 namespace {
 
 namespace fs = std::filesystem;
@@ -62,6 +65,19 @@ void expect(bool holds) {
   if (!holds) std::abort();
 }
 
+void expect_settings_come_back(const v1::Event& event) {
+  const v1::AlignmentSettings first = [&]() -> v1::AlignmentSettings {
+    if (event.has_settings()) return event.settings();
+    const auto noted = rig::options_in_note(event.note());
+    return noted.ok() && *noted ? rig::to_proto(**noted) : v1::AlignmentSettings();
+  }();
+  const auto options = rig::align_options(first);
+  if (!options.ok()) return;
+  const v1::AlignmentSettings written = rig::to_proto(*options);
+  const auto again = rig::align_options(written);
+  expect(again.ok() && rig::to_proto(*again).SerializeAsString() == written.SerializeAsString());
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
@@ -71,6 +87,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   if (check && check->whole()) expect(reader.ok());
   if (reader.ok()) {
     expect(check.ok());
+    for (const v1::Event& event : reader->events()) expect_settings_come_back(event);
     for (std::size_t c = 0; c < reader->camera_count(); ++c) {
       std::uint64_t good = 0;
       for (std::size_t i = 0; i < reader->stamps(c).size(); ++i) good += reader->read(c, i).ok() ? 1 : 0;

@@ -19,7 +19,7 @@ constexpr Rows kReadingError{1};
 inline void expect_aligned_in_truth(SmallBench& bench) {
   const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok()) << result.error().message();
-  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->last.reason;
+  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->words.reason;
   const SecondsPerRow row = result->options.row_time;
   EXPECT_LT(bench.true_error(row), result->options.tolerance.in_rows(row) + kReadingError);
 }

@@ -38,8 +38,9 @@ inline recon::Scene ball_scene(const BallOptions& o) {
     recon::View view{"camera " + std::to_string(v),
                      recon::look_at({o.image, focal, focal, o.image.width / 2.0, o.image.height / 2.0, {}},
                                     middle + from, middle),
-                     recon::RadianceImage(o.image),
+                     {},
                      held_out ? recon::ViewRole::held_out : recon::ViewRole::input};
+    recon::RadianceImage image(o.image);
     for (int y = 0; y < o.image.height; ++y)
       for (int x = 0; x < o.image.width; ++x) {
         const Eigen::Vector3d along = view.camera.ray({x + 0.5, y + 0.5}).direction.normalized();
@@ -52,10 +53,11 @@ inline recon::Scene ball_scene(const BallOptions& o) {
               o.noise > 0 ? random_bits(o.seed, static_cast<std::uint64_t>(v), at + c) : 0;
           for (int word = 0; word < 4; ++word) sum += static_cast<double>(bits >> (16 * word) & 0xffff);
           const double noise = o.noise > 0 ? 2.55 * o.noise * (sum - 131070) / 37837.2 : 0;
-          view.image.rgb[at + c] =
+          image.rgb[at + c] =
               static_cast<float>(std::max(0.0, (1 - 0.2 * static_cast<double>(c)) * light + noise));
         }
       }
+    view.image = recon::share(std::move(image));
     scene.views.push_back(std::move(view));
   }
   return scene;

@@ -10,12 +10,11 @@
 
 #include "base/random.h"
 #include "recon/calibrate/calibrate_rig.h"
+#include "recon/synthetic/carried_board.h"
 
 namespace emberlock::test {
 
-/// Cameras on the ring of paper_scene() (recon/synthetic/flame.h) that watch a board being carried around: 30
-/// cm from the origin, 36 degrees apart, alternately above and below, the eleventh between two of them; their
-/// lenses differ and distort.
+/// Cameras on a ring (recon::ring_cameras()) that watch a board being carried around.
 struct BoardRigOptions {
   int cameras = 11;
   int instants = 80;
@@ -36,66 +35,6 @@ inline recon::Rigid3 chain(const recon::Rigid3& outer, const recon::Rigid3& inne
   return {outer.rotation * inner.rotation, outer * inner.translation};
 }
 
-inline Eigen::Vector3d on_ring(double radius, double azimuth, double elevation) {
-  return radius * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
-                                  std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
-}
-
-inline std::vector<recon::CameraModel> ring_cameras(const BoardRigOptions& options, RandomStream& random) {
-  std::vector<recon::CameraModel> cameras;
-  const double focal = 0.5 * options.image.width / std::tan(M_PI / 6);
-  for (int i = 0; i < options.cameras; ++i) {
-    const bool eleventh = i == 10;
-    const double azimuth = eleventh ? 90 : 36.0 * i;
-    const double elevation = eleventh ? 0 : i % 2 == 0 ? 10 : -10;
-    recon::Intrinsics lens{options.image,
-                           focal * random.uniform(0.97, 1.03),
-                           0,
-                           0.5 * options.image.width + random.uniform(-8, 8),
-                           0.5 * options.image.height + random.uniform(-8, 8),
-                           {random.uniform(-0.15, -0.05), random.uniform(0, 0.05),
-                            random.uniform(-1e-3, 1e-3), random.uniform(-1e-3, 1e-3), 0}};
-    lens.fy = lens.fx * random.uniform(0.995, 1.005);
-    cameras.push_back(recon::look_at(lens, on_ring(0.3, azimuth * M_PI / 180, elevation * M_PI / 180),
-                                     Eigen::Vector3d(random.uniform(-0.01, 0.01), random.uniform(-0.01, 0.01),
-                                                     random.uniform(-0.01, 0.01))));
-  }
-  return cameras;
-}
-
-/// The board somewhere near the origin, its face towards `azimuth` (radians), tilted by up to 45 degrees.
-inline recon::Rigid3 carried_board(const recon::Board& board, double azimuth, RandomStream& random) {
-  const Eigen::Vector3d out = on_ring(1, azimuth + random.uniform(-0.3, 0.3), random.uniform(-0.8, 0.8));
-  const Eigen::Vector3d right = Eigen::Vector3d::UnitZ().cross(out).normalized();
-  Eigen::Matrix3d rotation;
-  rotation << right, out.cross(right), out;
-  rotation = rotation * Eigen::AngleAxisd(random.uniform(-0.6, 0.6), Eigen::Vector3d::UnitZ());
-  const Eigen::Vector3d middle(random.uniform(-0.06, 0.06), random.uniform(-0.06, 0.06),
-                               random.uniform(-0.06, 0.06));
-  return {rotation, middle - rotation * (0.5 * (board.point(0) + board.point(board.corners() - 1)))};
-}
-
-/// The corners that a camera sees of a board; none unless all are in the picture and the board turns its face
-/// to it.
-inline std::vector<recon::BoardCorner> seen_corners(const recon::CameraModel& camera,
-                                                    const recon::Board& board,
-                                                    const recon::Rigid3& world_from_board) {
-  const Eigen::Vector3d middle =
-      world_from_board * (0.5 * (board.point(0) + board.point(board.corners() - 1)));
-  const double facing = world_from_board.rotation.col(2).dot((camera.center() - middle).normalized());
-  if (facing < 0.5) return {};
-  std::vector<recon::BoardCorner> corners;
-  const ImageSize size = camera.intrinsics.size;
-  for (int id = 0; id < board.corners(); ++id) {
-    const Eigen::Vector3d world = world_from_board * board.point(id);
-    if ((camera.camera_from_world * world).z() < 0.02) return {};
-    const Eigen::Vector2d pixel = camera.project(world);
-    if (pixel.minCoeff() < 2 || pixel.x() > size.width - 2 || pixel.y() > size.height - 2) return {};
-    corners.push_back({id, pixel});
-  }
-  return corners;
-}
-
 inline void disturb(std::vector<recon::BoardCorner>& corners, const BoardRigOptions& options,
                     RandomStream& random) {
   for (recon::BoardCorner& corner : corners) {
@@ -109,7 +48,7 @@ inline void disturb(std::vector<recon::BoardCorner>& corners, const BoardRigOpti
 inline BoardRig board_rig(const BoardRigOptions& options) {
   RandomStream random(options.seed, 77);
   BoardRig rig;
-  rig.cameras = ring_cameras(options, random);
+  rig.cameras = recon::ring_cameras(options.cameras, options.image, random);
   rig.sightings.board = options.board;
   for (int c = 0; c < options.cameras; ++c)
     rig.sightings.cameras.push_back(
@@ -117,10 +56,10 @@ inline BoardRig board_rig(const BoardRigOptions& options) {
   for (int i = 0;
        static_cast<int>(rig.world_from_board.size()) < options.instants && i < 100 * options.instants; ++i) {
     const double azimuth = 2.399963 * i;  // the golden angle: all sides alike
-    const recon::Rigid3 pose = carried_board(options.board, azimuth, random);
+    const recon::Rigid3 pose = recon::carried_board(options.board, azimuth, random);
     std::vector<recon::BoardSightings::Sighting> seen;
     for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-      auto corners = seen_corners(rig.cameras[c], options.board, pose);
+      auto corners = recon::seen_corners(rig.cameras[c], options.board, pose);
       if (!corners.empty()) seen.push_back({c, rig.world_from_board.size(), "", std::move(corners)});
     }
     if (seen.size() < 2 || seen.size() > 4) continue;

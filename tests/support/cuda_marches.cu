@@ -46,19 +46,20 @@ class CudaMarches final : public Marches<Real> {
     if (absorb == recon::Absorb::constant) return spread(residual, recon::ConstantExtinction<Real>{sigma});
     return spread(residual, recon::NoExtinction<Real>{});
   }
-  [[nodiscard]] Field field_forward(const Values& volume, const recon::Judge<Real>& judge) const override {
-    const Copy<const recon::Rgba> seen(judge.seen, rays());
-    const Copy<const recon::Rgba> background(judge.background, rays());
-    const Copy<const recon::Rgba> offset(judge.offset, rays());
+  [[nodiscard]] Field field_forward(const Values& volume,
+                                    const recon::PixelResidual<Real>& pixel) const override {
+    const Copy<const recon::Rgba> seen(pixel.seen, rays());
+    const Copy<const recon::Rgba> background(pixel.background, rays());
+    const Copy<const recon::Rgba> offset(pixel.offset, rays());
     const recon::CudaBuffer<recon::Quad<Real>> light(volume);
     const recon::CudaBuffer<recon::Quad<Real>> residual(rays());
     const recon::CudaBuffer<recon::Quad<Real>> samples(samples_);
     using March = recon::FieldForward<Real, Path>;
-    using Keep = recon::JudgeAndKeep<Real>;
+    using Keep = recon::KeepResidual<Real>;
     recon::launch(rays(),
-                  recon::MarchJudged<March, Keep>{
+                  recon::MarchByResidual<March, Keep>{
                       {rays_.table(), light.data(), samples.data(), 0},
-                      {{seen.data(), background.data(), offset.data(), judge.white}, residual.data()}},
+                      {{seen.data(), background.data(), offset.data(), pixel.white}, residual.data()}},
                   "marching");
     return {residual.download(), samples.download()};
   }

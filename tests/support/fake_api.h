@@ -4,13 +4,16 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <type_traits>
 #include <vector>
 
 #include "daemon/api.h"
+#include "daemon/work/jobs.h"
 
 namespace emberlock::test {
 
@@ -38,14 +41,18 @@ class FakeApi : public daemon::Api {
   Result<v1::Manifest> session(const v1::SessionRequest& request) override {
     return ask("session", request, on_session);
   }
-  Status verify_session(const v1::SessionRequest& request, const daemon::JobObserver& observer) override {
-    return job("verify_session", request, observer);
+  Result<std::shared_ptr<daemon::JobHandle>> verify_session(const v1::SessionRequest& request) override {
+    return job("verify_session", v1::Job::VERIFY, request);
   }
-  Status repair_session(const v1::SessionRequest& request, const daemon::JobObserver& observer) override {
-    return job("repair_session", request, observer);
+  Result<std::shared_ptr<daemon::JobHandle>> repair_session(const v1::SessionRequest& request) override {
+    return job("repair_session", v1::Job::REPAIR, request);
   }
-  Status export_session(const v1::ExportRequest& request, const daemon::JobObserver& observer) override {
-    return job("export_session", request, observer);
+  Result<std::shared_ptr<daemon::JobHandle>> export_session(const v1::ExportRequest& request) override {
+    return job("export_session", v1::Job::EXPORT, request);
+  }
+  Status cancel_job(const v1::CancelJobRequest& request) override {
+    remember("cancel_job " + request.ShortDebugString());
+    return jobs_.cancel(request.id());
   }
   Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override {
     return ask("reconstruct", request, on_reconstruct);
@@ -73,8 +80,12 @@ class FakeApi : public daemon::Api {
   std::function<Result<v1::Manifest>(const v1::SessionRequest&)> on_session;
   std::function<Result<v1::ReconstructionStatus>(const v1::ReconstructRequest&)> on_reconstruct;
   std::function<Result<v1::ReconstructionStatus>()> on_cancel_reconstruction;
-  /// What verify, repair and export do; unset: one progress, done and ok.
-  std::function<Status(const daemon::JobObserver&)> on_job;
+  /// What verify, repair and export do; unset: they are done, and all is well.
+  std::function<daemon::JobResult(const Observer&)> on_job;
+  /// Why none of them can begin.
+  std::optional<Error> on_begin;
+
+  [[nodiscard]] const daemon::Jobs& jobs() const { return jobs_; }
 
  private:
   void remember(std::string call) {
@@ -94,15 +105,16 @@ class FakeApi : public daemon::Api {
     return answer ? answer(request) : empty<Answer>();
   }
   template <class Request>
-  Status job(const std::string& name, const Request& request, const daemon::JobObserver& observer) {
+  Result<std::shared_ptr<daemon::JobHandle>> job(const std::string& name, v1::Job::Kind kind,
+                                                 const Request& request) {
     remember(name + " " + request.ShortDebugString());
-    if (on_job) return on_job(observer);
-    v1::JobProgress whole;
-    whole.set_fraction(1);
-    whole.set_done(true);
-    whole.set_ok(true);
-    observer(whole);
-    return {};
+    if (on_begin) return *on_begin;
+    return jobs_.add({kind, request.session(), [this](const Observer& observer) -> daemon::JobResult {
+                        if (on_job) return on_job(observer);
+                        v1::JobOutcome well;
+                        well.set_ok(true);
+                        return well;
+                      }});
   }
   template <class Answer>
   static Answer empty() {
@@ -115,17 +127,14 @@ class FakeApi : public daemon::Api {
   daemon::Board board_;
   mutable std::mutex mutex_;
   std::vector<std::string> calls_;
+  daemon::Jobs jobs_;  ///< last: its threads use all of the above
 };
 
-/// Jobs, for on_job. This one tells its progress as often as that, and then that it is done.
-inline std::function<Status(const daemon::JobObserver&)> job_that_tells(int times) {
-  return [times](const daemon::JobObserver& observer) {
-    v1::JobProgress progress;
-    for (int i = 0; i < times; ++i) observer(progress);
-    progress.set_done(true);
-    progress.set_report("{}");
-    observer(progress);
-    return Status();
+/// Jobs, for on_job. This one tells how far it is as often as that, and is done.
+inline std::function<daemon::JobResult(const Observer&)> job_that_tells(int times) {
+  return [times](const Observer& observer) {
+    for (int i = 0; i < times; ++i) observer(0, {});
+    return v1::JobOutcome();
   };
 }
 
@@ -134,11 +143,11 @@ class EndlessJob {
  public:
   [[nodiscard]] bool begun() const { return begun_; }
   [[nodiscard]] bool ended() const { return ended_; }
-  Status operator()(const daemon::JobObserver& observer) {
+  daemon::JobResult operator()(const Observer& observer) {
     begun_ = true;
-    while (observer({})) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (observer(0, {})) std::this_thread::sleep_for(std::chrono::milliseconds(1));
     ended_ = true;
-    return {};
+    return Error{ErrorKind::refused, "ended early, as asked"};
   }
 
  private:

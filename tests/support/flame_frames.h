@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/random.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/preprocess/dark_part.h"
 #include "recon/preprocess/develop.h"
 #include "recon/preprocess/hot_pixels.h"
@@ -25,7 +26,7 @@ inline recon::RadianceImage flame_picture(std::uint64_t seed, ImageSize size = {
   options.flame.seed = seed;
   options.image = size;
   options.truth_voxels = size.width < 400 ? 64 : 192;
-  return std::move(recon::paper_scene(options).views.back().image);
+  return *recon::paper_scene(options).views.back().image;
 }
 
 struct FilmOptions {

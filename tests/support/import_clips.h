@@ -13,10 +13,7 @@
 
 #include <fmt/format.h>
 
-#include "base/in_parallel.h"
-#include "base/random.h"
-#include "drivers/virtual/virtual_clock.h"
-#include "drivers/virtual/virtual_rig.h"
+#include "rig/sample/hand_film.h"
 #include "tests/support/strobe_clips.h"
 #include "tests/support/video_writer.h"
 
@@ -63,41 +60,27 @@ struct FlameClip {
 
 /// Films all cameras, `folder`/camera-N.mp4.
 inline std::vector<FlameClip> film_flame(const FlameFilm& film, const std::filesystem::path& folder) {
-  drivers::VirtualRigOptions options = film.strobe.rig;
-  options.queue_frames = 4096;
-  const auto clock = std::make_shared<drivers::VirtualClock>();
-  const auto rig = drivers::VirtualRig::create(options, clock).value();
-  if (!rig->strobe().apply(film.strobe.strobe).ok()) throw std::runtime_error("the strobe refuses");
-  std::multimap<double, int> order;
-  for (int c = 0; c < rig->size(); ++c)
-    order.emplace(c < static_cast<int>(film.strobe.starts.size()) ? film.strobe.starts[c] : 0, c);
-  for (const auto& [start, camera] : order) {
-    clock->sleep_until(TimePoint{} + Seconds(start));
-    if (!rig->camera(camera).start().ok()) throw std::runtime_error("a camera doesn't start");
-  }
-  clock->sleep_until(TimePoint{} + film.strobe_off);
-  if (!rig->strobe().apply({.output = drivers::StrobeOutput::off}).ok())
-    throw std::runtime_error("the strobe refuses");
-
+  rig::HandFilm hand = by_hand(film.strobe);
+  hand.strobe_off = film.strobe_off;
   std::filesystem::create_directories(folder);
-  std::vector<FlameClip> clips(rig->size());
-  const auto film_one = [&](std::size_t c, const Observer&) {
+  std::vector<FlameClip> clips(hand.rig.cameras.size());
+  std::vector<std::unique_ptr<VideoWriter>> writers;
+  for (std::size_t c = 0; c < clips.size(); ++c) {
     clips[c].file = (folder / fmt::format("camera-{}{}", c, film.strobe.suffix)).string();
-    VideoWriter writer(clips[c].file, options.cameras[c].layout.size, film.strobe.format);
-    while (static_cast<int>(clips[c].read_starts.size()) < film.strobe.frames) {
-      const int camera = static_cast<int>(c);
-      const Frame frame = rig->camera(camera).next_frame(Seconds(10)).value();
-      const TimePoint read = rig->read_start(camera, frame.stamp.frame_id);
-      Image image = *frame.image;
-      // The flame is lit a second later.
-      if (read > TimePoint{} + film.strobe_off + Seconds(1)) film.flame(image, c, read - TimePoint{});
-      clips[c].read_starts.push_back(read);
-      writer.write(image);
-    }
-    writer.close();
-    return Status{};
+    writers.push_back(
+        std::make_unique<VideoWriter>(clips[c].file, hand.rig.cameras[c].layout.size, film.strobe.format));
+  }
+  const auto take = [&](std::size_t c, const Frame& frame, TimePoint read) -> Result<double> {
+    Image image = *frame.image;
+    // The flame is lit a second later.
+    if (read > TimePoint{} + film.strobe_off + Seconds(1)) film.flame(image, c, read - TimePoint{});
+    clips[c].read_starts.push_back(read);
+    writers[c]->write(image);
+    return static_cast<double>(clips[c].read_starts.size()) / film.strobe.frames;
   };
-  if (!in_parallel(clips.size(), {}, film_one).ok()) throw std::runtime_error("a camera fails");
+  if (const Status filmed = rig::film_by_hand(hand, take); !filmed.ok())
+    throw std::runtime_error(filmed.error().message());
+  for (const auto& writer : writers) writer->close();
   return clips;
 }
 

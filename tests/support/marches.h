@@ -16,7 +16,7 @@ class Marches {
  public:
   using Values = std::vector<recon::Quad<Real>>;
   struct Field {
-    Values residual;  ///< as judged, one a ray
+    Values residual;  ///< against what was seen, one a ray
     Values samples;   ///< what FieldForward leaves
   };
 
@@ -32,8 +32,9 @@ class Marches {
   }
   /// A^T residual at the key points, under no or constant extinction.
   [[nodiscard]] virtual Values adjoint(recon::Absorb absorb, const Values& residual, Real sigma) const = 0;
-  /// What the judge points to lies in the CPU's memory, one a ray.
-  [[nodiscard]] virtual Field field_forward(const Values& volume, const recon::Judge<Real>& judge) const = 0;
+  /// What `pixel` points to lies in the CPU's memory, one a ray.
+  [[nodiscard]] virtual Field field_forward(const Values& volume,
+                                            const recon::PixelResidual<Real>& pixel) const = 0;
   /// Of 1/2 |residual|^2 by emission (lanes 0..2) and extinction (lane 3).
   [[nodiscard]] virtual Values field_adjoint(const Field& field) const = 0;
 };
@@ -65,12 +66,13 @@ class Marcher final : public Marches<Real> {
     work.residual = seen.data();
     return scatter(absorb, work);
   }
-  [[nodiscard]] Field field_forward(const Values& volume, const recon::Judge<Real>& judge) const override {
+  [[nodiscard]] Field field_forward(const Values& volume,
+                                    const recon::PixelResidual<Real>& pixel) const override {
     Field field{Values(list_.rays.size()), Values(list_.first_sample(list_.rays.size()))};
     recon::MarchWork<Real> work = work_on(volume, 0);
     work.residual = field.residual.data();
     work.samples = field.samples.data();
-    table_.field_forward[static_cast<int>(travel_)](work, judge, 0, list_.rays.size());
+    table_.field_forward[static_cast<int>(travel_)](work, pixel, 0, list_.rays.size());
     return field;
   }
   [[nodiscard]] Values field_adjoint(const Field& field) const override {

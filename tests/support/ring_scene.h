@@ -35,7 +35,7 @@ inline recon::Scene ring_scene(const RingOptions& options = {}) {
                                     Eigen::Vector3d::Zero()),
                      {},
                      held_out ? recon::ViewRole::held_out : recon::ViewRole::input};
-    view.image = recon::render_view(truth.volume, truth.medium, truth.effects, view.camera);
+    view.image = recon::share(recon::render_view(truth.volume, truth.medium, truth.effects, view.camera));
     scene.views.push_back(view);
   }
   return scene;

@@ -79,7 +79,7 @@ class SensorRounds {
  public:
   SensorRounds(ScriptedShutter& shutter, smear::PhaseSensor& sensor) : shutter_(shutter), sensor_(sensor) {}
 
-  ToldRound film(const smear::Beat& own, Seconds wanted = microseconds(10)) {
+  ToldRound film(const smear::PeriodOffset& own, Seconds wanted = microseconds(10)) {
     ToldRound told;
     sensor_.begin_round(own);
     for (int asked = 0; asked < 40; ++asked) {
@@ -124,7 +124,7 @@ class SensorRounds {
   TimePoint now_;
 };
 
-inline const smear::Beat kStill{PartsPerMillion(0), PartsPerMillion(1)};
+inline const smear::PeriodOffset kStill{PartsPerMillion(0), PartsPerMillion(1)};
 
 /// What is said of an exposure that is too short, and of one that is too long; then it is as it was.
 inline void expect_exposures_advised(ScriptedShutter& shutter, SensorRounds& rounds,

@@ -26,7 +26,7 @@ inline rig::DaemonConfig small_config(const std::filesystem::path& folder) {
   config.rig.strobe.source = rig::StrobeSource::virtual_;
   config.recording.folder = folder / "sessions";
   config.recording.writer = small_disk_options(session::Encoding::raw_nut);
-  config.alignment.run.align.tolerance.amount = Rows(30);
+  config.alignment.tolerance = smear::Tolerance{Rows(30)};
   config.alignment.run.comb_frames = 12;
   return config;
 }
@@ -38,9 +38,9 @@ struct SmallDaemon {
         store(session::SessionStore::open(config.recording.folder, {.min_free_bytes = 0}).value()),
         rig(rig::Rig::open(config.rig, std::move(options)).value()),
         geometry(rig::Geometry::of(config.rig, *rig).value()),
-        reconstruction({}, board),
+        reconstruction({}, board, jobs),
         conductor(std::in_place,
-                  daemon::ConductorParts{*rig, geometry, config, store, reconstruction, work, board},
+                  daemon::ConductorParts{*rig, geometry, config, store, reconstruction, jobs, board},
                   std::move(stop)) {}
 
   /// Works until `done`, or for so many slices.
@@ -64,7 +64,7 @@ struct SmallDaemon {
   std::unique_ptr<rig::Rig> rig;
   rig::Geometry geometry;
   daemon::ReconstructionChild reconstruction;
-  daemon::WorkQueue work;
+  daemon::Jobs jobs;
   std::optional<daemon::Conductor> conductor;
   v1::DaemonStatus status;
 };

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "recon/adjust/choose_effects.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
 #include "tests/support/ball_scene.h"
 
@@ -92,10 +93,9 @@ inline SweepOutcome solve_case(const SweepCase& c, recon::Device device) {
   options.precision = c.precision;
   if (c.solver == recon::Solver::paper) options.iterations = 30;
   recon::Effects effects;
-  const recon::View& last = scene.views.back();
-  const double black =
-      recon::all_channels(recon::rmse(recon::RadianceImage(last.image.size), last.image,
-                                      recon::flame_mask(last.image, recon::noise_threshold(last.image)).box));
+  const recon::RadianceImage& last = *scene.views.back().image;
+  const double black = recon::all_channels(recon::rmse(
+      recon::RadianceImage(last.size), last, recon::flame_mask(last, recon::noise_threshold(last)).box));
   if (c.solver == recon::Solver::paper) {
     if (c.effects != "none")
       effects = recon::absorbing(recon::extinction_of_opacity(0.05, Meters(static_cast<double>(grid.edge))));

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <memory>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,8 +14,7 @@
 #include <fmt/format.h>
 
 #include "base/random.h"
-#include "drivers/virtual/virtual_clock.h"
-#include "drivers/virtual/virtual_rig.h"
+#include "rig/sample/hand_film.h"
 #include "smear_sync/clocks/frame_code.h"
 #include "tests/support/light_patterns.h"
 #include "tests/support/video_writer.h"
@@ -49,42 +50,42 @@ inline int nearest_offset(const ClipTruth& reference, const ClipTruth& clip) {
          static_cast<int>(middle);
 }
 
+/// Film and cameras as the product's simulation takes them.
+inline rig::HandFilm by_hand(const StrobeFilm& film) {
+  rig::HandFilm hand{film.rig, film.strobe};
+  for (const double start : film.starts) hand.starts.emplace_back(start);
+  return hand;
+}
+
 /// Films all cameras of a rig, `folder`/camera-N.mp4.
 inline std::vector<ClipTruth> film_strobe(const StrobeFilm& film, const std::filesystem::path& folder) {
-  drivers::VirtualRigOptions options = film.rig;
-  options.queue_frames = 4096;
-  const auto clock = std::make_shared<drivers::VirtualClock>();
-  const auto rig = drivers::VirtualRig::create(options, clock).value();
-  if (!rig->strobe().apply(film.strobe).ok()) throw std::runtime_error("the strobe refuses");
-  std::multimap<double, int> order;
-  for (int c = 0; c < rig->size(); ++c)
-    order.emplace(c < static_cast<int>(film.starts.size()) ? film.starts[c] : 0, c);
-  for (const auto& [start, camera] : order) {
-    clock->sleep_until(TimePoint{} + Seconds(start));
-    if (!rig->camera(camera).start().ok()) throw std::runtime_error("a camera doesn't start");
-  }
-
-  std::vector<std::vector<TimePoint>> starts(rig->size());  // of the read phases, by place in the file
-  std::vector<ClipTruth> truths(rig->size());
-  for (int c = 0; c < rig->size(); ++c) {
+  const drivers::VirtualRigOptions& options = film.rig;
+  const int cameras = static_cast<int>(options.cameras.size());
+  std::vector<std::vector<TimePoint>> starts(cameras);  // of the read phases, by place in the file
+  std::vector<ClipTruth> truths(cameras);
+  std::vector<std::unique_ptr<VideoWriter>> writers;
+  for (int c = 0; c < cameras; ++c) {
     truths[c].file = (folder / fmt::format("camera-{}{}", c, film.suffix)).string();
-    VideoWriter writer(truths[c].file, options.cameras[c].layout.size, film.format);
-    const auto lost = film.drops.find(c);
-    while (static_cast<int>(starts[c].size()) < film.frames) {
-      const Frame frame = rig->camera(c).next_frame(Seconds(10)).value();
-      const int id = static_cast<int>(frame.stamp.frame_id);
-      if (lost != film.drops.end() &&
-          std::find(lost->second.begin(), lost->second.end(), id) != lost->second.end())
-        continue;
-      starts[c].push_back(rig->read_start(c, frame.stamp.frame_id));
-      writer.write(*frame.image);
-    }
-    writer.close();
+    writers.push_back(
+        std::make_unique<VideoWriter>(truths[c].file, options.cameras[c].layout.size, film.format));
   }
+  const auto take = [&](std::size_t c, const Frame& frame, TimePoint read) -> Result<double> {
+    const auto lost = film.drops.find(static_cast<int>(c));
+    const int id = static_cast<int>(frame.stamp.frame_id);
+    if (lost == film.drops.end() ||
+        std::find(lost->second.begin(), lost->second.end(), id) == lost->second.end()) {
+      starts[c].push_back(read);
+      writers[c]->write(*frame.image);
+    }
+    return static_cast<double>(starts[c].size()) / film.frames;
+  };
+  if (const Status filmed = rig::film_by_hand(by_hand(film), take); !filmed.ok())
+    throw std::runtime_error(filmed.error().message());
+  for (const auto& writer : writers) writer->close();
   const int middle = film.frames / 2;
   const TimePoint reference = starts[0][middle];
   const Seconds period = options.cameras[0].timing.frame_period;
-  for (int c = 0; c < rig->size(); ++c) {
+  for (int c = 0; c < cameras; ++c) {
     const Seconds own = options.cameras[c].timing.frame_period;
     // Beyond the file's own frames the camera went on as before.
     const double beyond = (reference - starts[c].back()) / own;

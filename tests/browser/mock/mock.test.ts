@@ -19,6 +19,7 @@ const kPhone = {width: 360, height: 800};
 let browser: Browser;
 let lamp: Uint8Array[];
 let flame: Uint8Array[];
+let greyFlame: Uint8Array[];
 let mock: Mock;
 const opened: Watched[] = [];
 
@@ -26,6 +27,7 @@ beforeAll(async () => {
   browser = await startChromium();
   lamp = await lampPictures(browser, 6);
   flame = await flamePictures(browser, 12);
+  greyFlame = await flamePictures(browser, 1, 'grayscale(1)');
 }, 60_000);
 afterAll(() => browser.close());
 
@@ -49,6 +51,17 @@ async function open(size = kScreen): Promise<Page> {
 }
 const text = (page: Page, selector: string) => page.locator(selector).first().innerText();
 const overflows = (page: Page) => page.evaluate(() => document.documentElement.scrollWidth - document.documentElement.clientWidth);
+/** Whether any pixel of this part of the page, as it is seen, has a colour. */
+async function colourful(page: Page, selector: string): Promise<boolean> {
+  const png = (await page.locator(selector).first().screenshot()).toString('base64');
+  return page.evaluate(async data => {
+    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), letter => letter.charCodeAt(0))]));
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d')!;
+    context.drawImage(bitmap, 0, 0);
+    const bytes = context.getImageData(0, 0, bitmap.width, bitmap.height).data;
+    return bytes.some((red, at) => at % 4 === 0 && Math.max(red, bytes[at + 1]!, bytes[at + 2]!) - Math.min(red, bytes[at + 1]!, bytes[at + 2]!) > 24);
+  }, png);
+}
 
 describe('what is shown', () => {
   test('eleven cameras, orders and the header stand on one screen of 1920 x 1080, and of 1280 x 800', async () => {
@@ -78,7 +91,7 @@ describe('what is shown', () => {
     expect(first!.width).toBeGreaterThan(1.9 * second!.width);
     expect(await text(page, '.tile[data-next] .next-mark')).toBe('Reset this camera now');
     expect(await text(page, '.next .title')).toBe('Reset virtual-04');
-    expect(await text(page, '.next .next-step')).toBe('Press the shutter of virtual-04. It is 412 rows late; 100 are allowed.');
+    expect(await text(page, '.next .next-step')).toBe('Press the shutter of virtual-04. It is 412 rows (22.2 ms) late; 100 (5.40 ms) are allowed.');
     await page.keyboard.press('n');
     expect(await page.evaluate(() => (document.activeElement as HTMLElement).dataset.camera)).toBe('virtual-04');
   });
@@ -98,7 +111,7 @@ describe('what is shown', () => {
 
   test('a tile tells error in rows and time, drift, time left, trials and losses', async () => {
     mock.status = {...locked(), cameras: [seen(0, 30, false, {
-      error_rows: -21.44, error_s: -1.158e-3, drift_ppm: 2.31, time_left_s: 412, resets: 3,
+      error_rows: -21.44, error_s: -1.158e-3, drift_ppm: 2.31, time_left_s: 412, resets: 3, lost_lately: 5,
       counts: {delivered: 900, damaged: 1, camera_gap: 0, transport: 4, resend: 0, underrun: 0, queue: 0, passed_over: 100},
     })]};
     const page = await open();
@@ -288,11 +301,11 @@ describe('orders', () => {
     mock.status = idle();
     mock.show({light: 'RED', reason: 'Refused: 10 rows can’t be met by hand within 60 resets.', alignment: alignment(0, {
       verdict: 'REFUSED', tolerance_rows: 10, reason: '10 rows would take about 400 resets; 60 are allowed.', offers: [
-        {policy: 'densest', tolerance_rows: 120, cost: {resets: 22, resets_p95: 40, time_s: 90, time_p95_s: 160}},
-        {policy: 'timed', tolerance_rows: 60.5, cost: {resets: 12, resets_p95: 19, time_s: 40, time_p95_s: 75}}]})});
+        {policy: 'densest', tolerance_rows: 120, tolerance_s: 6.48e-3, cost: {resets: 22, resets_p95: 40, time_s: 90, time_p95_s: 160}},
+        {policy: 'timed', tolerance_rows: 60.5, tolerance_s: 3.267e-3, cost: {resets: 12, resets_p95: 19, time_s: 40, time_p95_s: 75}}]})});
     const page = await open();
     expect(await page.locator('.offer').allInnerTexts()).toEqual([
-      '± 120 rows, densest\n22 resets in 90 s (95 %: 40 in 2 min 40 s)', expect.stringContaining('12 resets')]);
+      '± 6.48 ms (120 rows), densest\n22 resets in 90 s (95 %: 40 in 2 min 40 s)', expect.stringContaining('12 resets')]);
     await screenshot(page, 'refused-1920');
     await page.locator('.offer').nth(1).click();
     await page.getByRole('button', {name: 'Try it anyway'}).click();
@@ -310,7 +323,7 @@ describe('orders', () => {
     await page.getByRole('button', {name: 'Align', exact: true}).click();
     await page.waitForSelector('.toast');
     expect(await text(page, '.toast p')).toBe('align: no camera films. Start them first.');
-    expect(mock.calls.find(({method}) => method === 'Sync/Align')!.request).toMatchObject({tolerance: '100rows'});
+    expect(mock.calls.find(({method}) => method === 'Sync/Align')!.request).toMatchObject({tolerance: '100ms'});
     await page.getByRole('button', {name: 'Dismiss'}).click();
     expect(await page.locator('.toast').count()).toBe(0);
   });
@@ -327,7 +340,7 @@ describe('orders', () => {
     expect(records()[0]!.request).toMatchObject({unlocked: false, purpose: 'flame', seconds: 0});
     mock.show(capturing(7.35, {lost: {recorded: 1900, camera_gap: 0, transport: 3, underrun: 0, queue: 9, disk: 0, passed_over: 0}, queue_fill: 0.83}));
     await until(() => text(page, '.clock'), words => words === '0:07.3', 'the clock runs');
-    expect(await text(page, '.drops')).toBe('Lost: 9 encoder too slow, 3 lost on the bus');
+    expect(await text(page, '.drops')).toBe('Lost: 9 found the queue full, 3 lost on the bus');
     expect(await text(page, '#record .numbers')).toContain('81.1 MB/s');
     await screenshot(page, 'recording-1920');
     await page.locator('button.record').click();
@@ -336,6 +349,23 @@ describe('orders', () => {
     await page.locator('button.record').click();
     await until(() => text(page, '#record .verdict'), words => words === '2112 frames, all accounted for.', 'the verdict is shown');
     expect(records()).toHaveLength(2);
+  });
+
+  test('how long a take may be is said, and a longer one renews the lock first', async () => {
+    mock.status = locked();
+    mock.answers['Sync/Align'] = () => ({});
+    mock.answers['Capture/Record'] = () => { mock.show(capturing(0.1)); return {}; };
+    const page = await open();
+    await until(() => text(page, '.hint'), words => words === 'A take may be 6 min 40 s long, most likely 15 min 00 s.', 'it is said');
+    await page.locator('#record summary').click();
+    await page.fill('input[name=seconds]', '900');
+    await page.locator('button.record').click();
+    await until(() => mock.calls.filter(({method}) => method === 'Sync/Align').length, many => many === 1, 'the lock is renewed');
+    expect(mock.calls.find(({method}) => method === 'Sync/Align')!.request).toEqual({renew: true, hold_s: 900});
+    expect(records()).toHaveLength(0);
+    await until(() => text(page, '.hint'), words => words.includes('press again'), 'the next press records');
+    await page.locator('button.record').click();
+    await until(() => records().length, many => many === 1, 'it records');
   });
 
   test('not locked, a second press is needed and says why; by key always', async () => {
@@ -429,9 +459,10 @@ describe('what was recorded', () => {
     mock.jobs['Sessions/Verify'] = async function* () {
       yield {fraction: 0.4, doing: 'reads virtual-03'};
       await new Promise<void>(resolve => { go = resolve; });
-      yield {fraction: 1, doing: 'all frames are as recorded', done: true, ok: true, report: '{"frames": 15840, "damaged": 0}'};
+      const cameras = [{camera_id: 'virtual-01', recorded: 15840, good: 15838, missing: 2, problems: ['000000.mkv: ends early']}];
+      yield {state: 'DONE', fraction: 1, outcome: {ok: true, verify: {cameras, to_do: 'Nothing'}}};
     };
-    mock.jobs['Sessions/Export'] = async function* () { yield {fraction: 1, doing: 'disk full', done: true, ok: false, report: ''}; };
+    mock.jobs['Sessions/Export'] = async function* () { yield {state: 'DONE', fraction: 1, outcome: {ok: false}}; };
     const page = await open();
     const row = page.locator('tr[data-session="candle 1"]');
     expect(await row.locator('td').allInnerTexts()).toEqual(expect.arrayContaining(['flame', '11', '15 840', '0', '14.6 GB']));
@@ -440,8 +471,8 @@ describe('what was recorded', () => {
     await page.getByRole('button', {name: 'Verify candle 1'}).click();
     await until(() => row.locator('.job > span').innerText(), words => words === 'reads virtual-03 40 %', 'progress');
     go();
-    await until(() => row.locator('.job > span').innerText(), words => words === 'Done: all frames are as recorded', 'done');
-    expect(await row.locator('.report').innerText()).toBe('frames: 15840\ndamaged: 0');
+    await until(() => row.locator('.job > span').innerText(), words => words === 'Done: all is well', 'done');
+    expect(await row.locator('.report').innerText()).toBe('15 838 of 15 840 frames are good\n2 are missing from the index\nvirtual-01: 000000.mkv: ends early\nNothing.');
     await page.getByRole('button', {name: 'Export videos candle 1'}).click();
     await until(() => row.locator('.job').getAttribute('data-ok'), ok => ok === 'false', 'failed');
     expect(mock.calls.find(({method}) => method === 'Sessions/Export')!.request).toEqual({session: 'candle 1', format: 'VIDEO'});
@@ -472,13 +503,18 @@ describe('what was recorded', () => {
     mock.answers['Sessions/List'] = () => ({sessions: [{...entry, state: 'RECORDING' as const}, {...entry, session: 'other'}]});
     const page = await open();
     await page.waitForSelector('tr[data-session]');
-    mock.show({jobs: [{kind: 'SALVAGE', session: 'candle 1', state: 'RUNNING', fraction: 0.34, doing: 'salvaging'}]});
+    const job = {id: 7, kind: 'SALVAGE' as const, session: 'candle 1', state: 'RUNNING' as const, fraction: 0.34, doing: 'salvaging', seconds: 50, silent_s: 0};
+    mock.show({jobs: [job]});
     const row = page.locator('tr[data-session="candle 1"]');
-    await until(() => row.locator('.background').innerText(), words => words === 'being salvaged, 34 %', 'how far');
+    await until(() => row.locator('.background .words').innerText(), words => words === 'being salvaged, 34 %', 'how far');
     for (const words of ['Verify', 'Export images', 'Reconstruct']) {
       expect(await page.getByRole('button', {name: `${words} candle 1`}).isDisabled()).toBe(true);
       expect(await page.getByRole('button', {name: `${words} other`}).isDisabled()).toBe(false);
     }
+    mock.show({jobs: [{...job, silent_s: 41}]});
+    await until(() => row.locator('.background .words').innerText(), words => words === 'being salvaged, 34 %, nothing new for 41 s', 'silent');
+    await page.getByRole('button', {name: /^Cancel job .* on candle 1$/}).click();
+    await until(() => mock.calls.some(({method, request}) => method === 'Jobs/Cancel' && request.id === 7), Boolean, 'cancelled');
     mock.show({jobs: []});
     await until(() => page.getByRole('button', {name: 'Export images candle 1'}).isDisabled(), disabled => !disabled, 'free again');
     expect(await row.locator('.background').isVisible()).toBe(false);
@@ -513,6 +549,13 @@ describe('what was recorded', () => {
     await page.keyboard.press('2');
     await page.waitForTimeout(400);
     await screenshot(page, 'reconstruction-1920');
+    // Of grey cameras all is grey.
+    expect(await text(page, '.turn .note')).toContain('brightness in false colours');
+    expect(await colourful(page, '.volume')).toBe(true);
+    mock.tellBytes({kind: 'captured', iteration: 6, camera_id: 'virtual-03'}, greyFlame[0]!);
+    await until(() => text(page, '.turn .note'), words => words.includes('grey as its cameras see it'), 'the volume is grey');
+    expect(await colourful(page, '.volume')).toBe(false);
+    expect(await colourful(page, '.pair canvas')).toBe(false);
     await page.getByRole('button', {name: 'Cancel'}).click();
     await page.getByRole('button', {name: 'Press again to cancel'}).click();
     await until(() => mock.calls.some(({method}) => method === 'Reconstruct/Cancel'), Boolean, 'cancelled');

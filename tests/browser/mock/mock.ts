@@ -7,7 +7,7 @@ import {extname, join, normalize} from 'node:path';
 
 import {WebSocket, WebSocketServer} from 'ws';
 
-import type {Calls, DaemonStatus, JobProgress, Light} from '../../../daemon/console/src/api.gen';
+import type {Calls, DaemonStatus, Light} from '../../../daemon/console/src/api.gen';
 
 const kTypes: Record<string, string> = {'.html': 'text/html; charset=utf-8', '.js': 'text/javascript', '.css': 'text/css', '.svg': 'image/svg+xml'};
 const kPolicy = "default-src 'self'; img-src 'self' data: blob:; object-src 'none'; base-uri 'none'; frame-ancestors 'none'";
@@ -20,7 +20,7 @@ export class Refusal extends Error {
 }
 
 type Answers = {[M in keyof Calls]?: (request: Calls[M][0]) => Partial<Calls[M][1]> | Promise<Partial<Calls[M][1]>>};
-type Jobs = Partial<Record<string, (request: Record<string, unknown>) => AsyncIterable<Partial<JobProgress>>>>;
+type Jobs = Partial<Record<string, (request: Record<string, unknown>) => AsyncIterable<object>>>;
 
 interface Watcher {
   socket: WebSocket;

@@ -24,7 +24,8 @@ export async function lampPictures(browser: Browser, count: number): Promise<Uin
   });
 }
 
-export async function flamePictures(browser: Browser, count: number): Promise<Uint8Array[]> {
+/** `filter` is the canvas's: "grayscale(1)" for a grey camera's. */
+export async function flamePictures(browser: Browser, count: number, filter = 'none'): Promise<Uint8Array[]> {
   return paint(browser, count, (context, at) => {
     context.fillStyle = '#020203';
     context.fillRect(0, 0, 640, 480);
@@ -39,12 +40,12 @@ export async function flamePictures(browser: Browser, count: number): Promise<Ui
       context.fillStyle = glow;
       context.fillRect(0, 0, 640, 480);
     }
-  });
+  }, filter);
 }
 
-async function paint(browser: Browser, count: number, picture: (context: CanvasRenderingContext2D, at: number) => void): Promise<Uint8Array[]> {
+export async function paint(browser: Browser, count: number, picture: (context: CanvasRenderingContext2D, at: number) => void, filter = 'none'): Promise<Uint8Array[]> {
   const page = await browser.newPage();
-  const urls = await page.evaluate(([source, many]) => {
+  const urls = await page.evaluate(([source, many, by]) => {
     const draw = new Function(`return (${source})`)() as (context: CanvasRenderingContext2D, at: number) => void;
     const canvas = document.createElement('canvas');
     canvas.width = 640;
@@ -52,10 +53,11 @@ async function paint(browser: Browser, count: number, picture: (context: CanvasR
     const context = canvas.getContext('2d')!;
     return Array.from({length: many}, (_, at) => {
       context.globalCompositeOperation = 'source-over';
+      context.filter = by;
       draw(context, at);
       return canvas.toDataURL('image/jpeg', 0.8);
     });
-  }, [picture.toString(), count] as const);
+  }, [picture.toString(), count, filter] as const);
   await page.close();
   return urls.map(url => Buffer.from(url.slice(url.indexOf(',') + 1), 'base64'));
 }

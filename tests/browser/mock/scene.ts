@@ -20,7 +20,7 @@ export function errorAfter(index: number, round: number): number {
 export function camera(index: number, change: Wire<CameraStatus> = {}): CameraStatus {
   return {
     id: cameraId(index), model: 'virtual CCD', driver: 'virtual', state: 'FILMING', light: 'GREEN', reason: 'Films.', width: 640, height: 480,
-    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [],
+    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [], lost_lately: 0,
     counts: {delivered: 7321, damaged: 0, camera_gap: 0, transport: 0, resend: 0, underrun: 0, queue: 0, passed_over: 240},
     ...change,
   };
@@ -60,7 +60,8 @@ export function idle(): Wire<DaemonStatus> {
 
 export function alignment(round: number, change: Wire<AlignmentStatus> = {}): AlignmentStatus {
   return {policy: 'densest', tolerance_rows: kTolerance, tolerance_s: kTolerance * kRowTime, row_time_s: kRowTime, period_s: 1 / 24, round, resets: Math.floor(round / 2),
-          checks: 0, verdict: 'GO_ON', reason: '', cost: {resets: 24.2, resets_p95: 41, time_s: 96, time_p95_s: 164}, offers: [], reset_next: '', history: history(round), ...change};
+          checks: 0, verdict: 'GO_ON', reason: '', cost: {resets: 24.2, resets_p95: 41, time_s: 96, time_p95_s: 164}, offers: [], reset_next: '', history: history(round),
+          leaves_first: '', shortest_take_s: 10, flame_speed_m_s: 2, detail_m: 0.004, ...change};
 }
 
 export function aligning(round: number): Wire<DaemonStatus> {
@@ -74,7 +75,7 @@ export function aligning(round: number): Wire<DaemonStatus> {
 export function locked(): Wire<DaemonStatus> {
   return {...base, phase: 'LOCKED', light: 'GREEN', reason: 'All 11 cameras are within 100 rows; the widest pair is 41 rows apart.', next_step: 'Record, or let it hold the lock.',
           strobe: flashing, cameras: Array.from({length: kCameras}, (_, index) => seen(index, 30, false)),
-          alignment: alignment(24, {verdict: 'ALIGNED', reason: 'All cameras are in tolerance.', worst_pair_s: 2.215e-3, next_check_s: 124, time_left_s: 400, checks: 2})};
+          alignment: alignment(24, {verdict: 'ALIGNED', reason: 'All cameras are in tolerance.', worst_pair_s: 2.215e-3, next_check_s: 124, time_left_s: 400, likely_left_s: 900, leaves_first: 'virtual-03', checks: 2})};
 }
 
 export function capturing(seconds: number, change: Wire<RecordingStatus> = {}): Wire<DaemonStatus> {

@@ -1,13 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 import {expect, test} from 'vitest';
 
-import {bytes, clock, count, micros, percent, ppm, rows, sentence, short, span} from '../../../daemon/console/src/format';
+import {bytes, clock, count, micros, percent, ppm, rows, sentence, short, span, tolerance} from '../../../daemon/console/src/format';
 
 test('errors carry their sign and no more digits than matter', () => {
   expect([12.34, -0.26, 0, -0.04, 841.4, -99.46, 99.6].map(rows)).toEqual(['+12.3 rows', '−0.3 rows', '0.0 rows', '0.0 rows', '+841 rows', '−99.5 rows', '+100 rows']);
   expect([664e-6, -5.4e-3, 0.0412, 1.5, 0, 999.6e-6].map(short)).toEqual(['664 µs', '−5.40 ms', '41.2 ms', '1.50 s', '0 µs', '1.00 ms']);
   expect([664e-6, -13.8344e-3, 0, -0.4e-6].map(micros)).toEqual(['+664 µs', '−13 834 µs', '0 µs', '0 µs']);
   expect(ppm(-2.34)).toBe('−2.3 ppm');
+});
+
+test('a tolerance is told in time and in rows', () => {
+  expect(tolerance(0.5e-3, 9.26)).toBe('500 µs (9.3 rows)');
+  expect(tolerance(5.4e-3, 100)).toBe('5.40 ms (100 rows)');
 });
 
 test('lengths of time read as one says them', () => {

@@ -1,24 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
 import {expect, test} from 'vitest';
 
-import {bestColumns} from '../../../daemon/console/src/cameras';
+import {arrange, pictureIn} from '../../../daemon/console/src/arrange';
 import {gaugePlace} from '../../../daemon/console/src/overlay';
 
-test('the number of columns that leaves the largest pictures', () => {
-  expect(bestColumns(12, 1490, 940, 4 / 3)).toBe(4);
-  expect(bestColumns(12, 1490, 940, 16 / 9)).toBe(4);
-  expect(bestColumns(2, 1490, 940, 16 / 9)).toBe(2);
-  expect(bestColumns(2, 700, 1400, 16 / 9)).toBe(1);
-  expect(bestColumns(1, 100, 100, 1)).toBe(1);
+test('columns, and words below or beside, that leave the largest pictures', () => {
+  expect(arrange(12, 1490, 940, 4 / 3)).toEqual({columns: 3, beside: true});
+  expect(arrange(1, 700, 700, 4 / 3)).toEqual({columns: 1, beside: false});
+  expect(arrange(2, 1490, 500, 16 / 9)).toEqual({columns: 2, beside: false});
+  expect(arrange(2, 700, 1400, 16 / 9)).toEqual({columns: 1, beside: false});
+  expect(arrange(1, 100, 100, 1)).toEqual({columns: 1, beside: false});
 });
 
-test('no other number of columns leaves larger ones', () => {
-  const picture = (columns: number, cells: number, width: number, height: number, aspect: number) =>
-    Math.min((width - 8 * (columns - 1)) / columns, ((height - 8 * (Math.ceil(cells / columns) - 1)) / Math.ceil(cells / columns) - 96) * aspect);
-  for (const cells of [1, 3, 5, 8, 12, 17]) {
-    for (const [width, height] of [[1490, 940], [900, 690], [2400, 1300]] as const) {
-      const chosen = picture(bestColumns(cells, width, height, 16 / 9), cells, width, height, 16 / 9);
-      for (let columns = 1; columns <= cells; ++columns) expect(chosen).toBeGreaterThanOrEqual(picture(columns, cells, width, height, 16 / 9));
+test('no other arrangement leaves pictures a third wider, and the chosen one fills its tile', () => {
+  for (const cells of [1, 3, 5, 8, 12]) {
+    for (const [width, height] of [[1490, 940], [1180, 640], [930, 510], [2400, 1300]] as const) {
+      const inTile = (columns: number, beside: boolean) => {
+        const rows = Math.ceil(cells / columns);
+        return pictureIn((width - 8 * (columns - 1)) / columns, (height - 8 * (rows - 1)) / rows, 4 / 3, beside);
+      };
+      const {columns, beside} = arrange(cells, width, height, 4 / 3);
+      const chosen = inTile(columns, beside);
+      expect(chosen.fills, `${cells} in ${width} x ${height}`).toBeGreaterThan(0.65);
+      for (let other = 1; other <= 8; ++other) for (const way of [false, true]) expect(1.34 * chosen.width).toBeGreaterThanOrEqual(inTile(other, way).width);
     }
   }
 });

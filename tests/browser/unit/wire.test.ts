@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import {afterEach, expect, test, vi} from 'vitest';
 
-import type {DaemonStatus} from '../../../daemon/console/src/api.gen';
+import type {DaemonStatus, ListDevicesResponse} from '../../../daemon/console/src/api.gen';
 import {decode, follow, unpack} from '../../../daemon/console/src/wire';
 import {pack} from '../mock/mock';
 
@@ -17,6 +17,14 @@ test('64-bit numbers that come as strings, and NaN, become numbers', () => {
   const status = decode('DaemonStatus', {now_ns: '9007199254740991', alignment: {history: [{error_rows: [1.5, 'NaN', '-Infinity']}]}}) as DaemonStatus;
   expect(status.now_ns).toBe(9007199254740991);
   expect(status.alignment!.history[0]!.error_rows).toEqual([1.5, NaN, -Infinity]);
+});
+
+test('devices come as messages: what nobody knows of one is absent, what it has none of is empty', () => {
+  const list = decode('ListDevicesResponse', {cameras: [{id: 'a', reset: 'ON_COMMAND', modes: [{width: 1280, format: 'RGB8'}]}, {id: 'b', held_by: {pid: 7, program: 'cheese'}}]}) as ListDevicesResponse;
+  expect(list).toMatchObject({serial_ports: [], failures: []});
+  expect(list.cameras[0]).toMatchObject({id: 'a', reset: 'ON_COMMAND', external_trigger: false, notes: [], modes: [{width: 1280, height: 0, format: 'RGB8'}]});
+  expect(list.cameras[0]).not.toHaveProperty('held_by');
+  expect(list.cameras[1]!.held_by).toEqual({pid: 7, program: 'cheese'});
 });
 
 test('fields that a newer daemon adds are passed over', () => {
@@ -50,9 +58,9 @@ const verified = (told: string[] = []) => follow('Sessions/Verify', {session: 's
 afterEach(() => vi.unstubAllGlobals());
 
 test('a job is told line by line, however its bytes come, and its last line is what came of it', async () => {
-  answerWith(['{"doing": "rea', 'ds"}\n{"doing": "checks"}\n', '{"done": true, "ok": true, "report": "{}"}\n']);
+  answerWith(['{"doing": "rea', 'ds"}\n{"doing": "checks"}\n', '{"state": "DONE", "outcome": {"ok": true, "salvage": {"events_kept": "3"}}}\n']);
   const told: string[] = [];
-  expect(await verified(told)).toMatchObject({done: true, ok: true});
+  expect(await verified(told)).toMatchObject({state: 'DONE', outcome: {ok: true, salvage: {events_kept: 3}}});
   expect(told).toEqual(['reads', 'checks', '']);
 });
 
@@ -62,7 +70,7 @@ test('a job that fails on its way is an error, in the daemon\u2019s words', asyn
 });
 
 test('a stream that ends without its last line is an error, wherever it is cut', async () => {
-  const lines = '{"doing": "reads"}\n{"done": true, "ok": true}\n';
+  const lines = '{"doing": "reads"}\n{"state": "DONE"}\n';
   for (let length = 0; length < lines.length; ++length) {
     answerWith([lines.slice(0, length)], length % 2 === 0 ? 'ends' : 'breaks');
     await expect(verified(), `${length} bytes`).rejects.toThrow('broke off');

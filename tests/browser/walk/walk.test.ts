@@ -123,7 +123,7 @@ test('the strobe does what it is told, and says so', async () => {
 });
 
 test('aligning: who is being reset is the same everywhere', async () => {
-  await page.fill('#tolerance', String(kTolerance));
+  await page.fill('#tolerance', `${kTolerance}rows`);
   await page.locator('#alignment button[type=submit]').click();
   await until(() => text('h1'), words => words === 'Aligning', 'it aligns', 60);
   // Read in one go: it changes from round to round.
@@ -166,8 +166,8 @@ test('locked: every camera green, its offset in rows and microseconds, its dot i
   expect(dots.filter(({inside}) => !inside)).toEqual([]);
   await agrees('the sums of the alignment', async () => {
     const shown = await facts(page.locator('#alignment .numbers'));
-    return [number(shown['± rows']!), shown.policy, number(shown.resets!), number(shown.checks!)];
-  }, ({alignment}) => [kTolerance, alignment!.policy, alignment!.resets, alignment!.checks]);
+    return [shown['tolerance ±']!.split('(')[1], shown.policy, number(shown.resets!), number(shown.checks!)];
+  }, ({alignment}) => [`${kTolerance.toFixed(kTolerance < 99.5 ? 1 : 0)} rows)`, alignment!.policy, alignment!.resets, alignment!.checks]);
   await follows('time left in tolerance', async () => seconds((await facts(page.locator('#alignment .numbers')))['time left']!), status => status.alignment!.time_left_s ?? 0, 1);
   await screenshot(page, 'locked');
 }, 400_000);

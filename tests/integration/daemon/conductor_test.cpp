@@ -262,5 +262,173 @@ TEST_F(Daemon, StoppedInMidAlignmentItIsIdleAtOnce) {
   EXPECT_EQ(daemon.conductor->strobe()->output(), v1::StrobeState::OFF);
 }
 
+TEST_F(Daemon, TheLockHoldsAsLongAsItIsSaidTo) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    rig::DaemonConfig config = small_config(temp_ / std::to_string(seed));
+    config.rig.virtual_rig.draw.seed = seed;
+    SmallDaemon daemon(std::move(config));
+    ASSERT_TRUE(daemon.conductor->align({}).ok());
+    ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+    const v1::DaemonStatus status = daemon.conductor->status();
+    const double sure = status.alignment().time_left_s();
+    EXPECT_GE(sure, 10) << "a lock is called good when it holds for a take";
+    EXPECT_GE(status.alignment().likely_left_s(), sure);
+    EXPECT_THAT(status.next_step(), HasSubstr("Record: a take may be "));
+    v1::RecordRequest request;
+    request.set_seconds(sure - 1);
+    ASSERT_TRUE(daemon.conductor->record(request).ok());
+    ASSERT_TRUE(daemon.reach(v1::LOCKED, 100'000));
+    EXPECT_EQ(daemon.fault(v1::Fault::LOCK_LOST), nullptr) << seed;
+  }
+}
+
+TEST_F(Daemon, ATakeThatIsLongerThanTheLockIsRefusedUntilTheLockIsRenewedForIt) {
+  rig::DaemonConfig config = small_config(temp_.path());
+  config.rig.virtual_rig.draw.crystal_spread = PartsPerMillion(60);
+  SmallDaemon daemon(std::move(config));
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  // Until the drifts have used up most of it.
+  ASSERT_TRUE(daemon.work_until([&] {
+    const v1::DaemonStatus status = daemon.conductor->status();
+    return status.phase() == v1::LOCKED && status.alignment().has_renewed_left_s() &&
+           status.alignment().time_left_s() < 0.4 * status.alignment().renewed_left_s();
+  }));
+  const v1::AlignmentStatus lock = daemon.conductor->status().alignment();
+  v1::RecordRequest request;
+  request.set_seconds(0.6 * lock.renewed_left_s());
+  const Status refused = daemon.conductor->record(request);
+  ASSERT_FALSE(refused.ok());
+  EXPECT_EQ(refused.error().kind, ErrorKind::refused);
+  EXPECT_THAT(refused.error().message(), HasSubstr("the lock surely holds for"));
+  EXPECT_THAT(refused.error().message(), HasSubstr("enew the lock first"));
+  EXPECT_EQ(daemon.conductor->phase(), v1::LOCKED);
+  v1::AlignRequest renew;
+  renew.set_renew(true);
+  renew.set_hold_s(request.seconds());
+  ASSERT_TRUE(daemon.conductor->align(renew).ok());
+  EXPECT_EQ(daemon.conductor->phase(), v1::ALIGNING);
+  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  EXPECT_GE(daemon.conductor->status().alignment().time_left_s(), request.seconds());
+  EXPECT_TRUE(daemon.conductor->record(request).ok());
+  EXPECT_EQ(daemon.fault(v1::Fault::LOCK_LOST), nullptr);
+  ASSERT_TRUE(daemon.conductor->stop_recording().ok());
+}
+
+TEST_F(Daemon, TheToleranceFollowsFromTheFlameAndIsRememberedWhenItIsTold) {
+  rig::DaemonConfig config = small_config(temp_.path());
+  config.alignment.tolerance.reset();
+  SmallDaemon daemon(std::move(config));
+  v1::AlignRequest request;
+  ASSERT_TRUE(daemon.conductor->align(request).ok());
+  v1::AlignmentStatus status = daemon.conductor->status().alignment();
+  EXPECT_NEAR(status.tolerance_s(), 0.5e-3, 1e-9);
+  EXPECT_EQ(status.flame_speed_m_s(), 2);
+  request.set_flame_speed_m_s(0.5);
+  ASSERT_TRUE(daemon.conductor->align(request).ok());
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  status = daemon.conductor->status().alignment();
+  EXPECT_NEAR(status.tolerance_s(), 2e-3, 1e-9);
+  EXPECT_NEAR(status.tolerance_rows(), 2e-3 / status.row_time_s(), 1e-6);
+  request.Clear();
+  request.set_tolerance("30rows");
+  ASSERT_TRUE(daemon.conductor->align(request).ok());
+  status = daemon.conductor->status().alignment();
+  EXPECT_EQ(status.tolerance_rows(), 30);
+  EXPECT_EQ(status.flame_speed_m_s(), 0);
+  request.set_tolerance("");
+  request.set_detail_m(-1);
+  EXPECT_EQ(daemon.conductor->align(request).error().kind, ErrorKind::bad_input);
+}
+
+/// A flame that is simulated, and a strobe.
+class DaemonAtTheFlame : public Daemon {
+ protected:
+  rig::DaemonConfig config() {
+    rig::DaemonConfig config = small_config(temp_.path());
+    config.rig.virtual_rig.scene = rig::VirtualConfig::Scene::flame;
+    return config;
+  }
+  /// Pixels of a camera's next frame that are bright, and saturated.
+  struct Light {
+    int bright = 0, saturated = 0;
+  };
+  static Light seen(const Image& image) {
+    Light light;
+    for (const std::byte pixel : image.bytes()) {
+      light.bright += std::to_integer<int>(pixel) > 60 ? 1 : 0;
+      light.saturated += std::to_integer<int>(pixel) == 255 ? 1 : 0;
+    }
+    return light;
+  }
+  Light recorded(const std::string& name) {
+    auto session = session::SessionReader::open(temp_.path() / "sessions" / name).value();
+    return seen(*session.read(0, session.stamps(0).size() / 2)->image);
+  }
+  void record(SmallDaemon& daemon, const std::string& name, const std::string& purpose) {
+    v1::RecordRequest request;
+    request.set_name(name);
+    request.set_purpose(purpose);
+    request.set_seconds(0.5);
+    request.set_unlocked(true);
+    const v1::Phase before = daemon.conductor->phase();
+    ASSERT_TRUE(daemon.conductor->record(request).ok());
+    ASSERT_TRUE(daemon.reach(before));
+  }
+};
+
+TEST_F(DaemonAtTheFlame, ItBurnsWhileNothingIsAlignedSoThatCamerasCanBeExposedForIt) {
+  SmallDaemon daemon(config());
+  drivers::Camera& camera = daemon.rig->camera(0);
+  static_cast<void>(camera.next_frame(Seconds(1)));
+  EXPECT_GT(seen(*camera.next_frame(Seconds(1))->image).bright, 500);
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  EXPECT_LT(seen(*camera.next_frame(Seconds(1))->image).bright, 500);
+}
+
+TEST_F(DaemonAtTheFlame, LongerExposuresAreBrighter) {
+  const auto bright = [&](double ms) {
+    rig::DaemonConfig longer = config();
+    longer.rig.cameras[0].request.exposure = milliseconds(ms);
+    SmallDaemon daemon(std::move(longer));
+    static_cast<void>(daemon.rig->camera(0).next_frame(Seconds(1)));
+    return seen(*daemon.rig->camera(0).next_frame(Seconds(1))->image);
+  };
+  EXPECT_GT(bright(4).saturated, 2 * bright(1).saturated + 50);
+  EXPECT_LT(bright(0.1).bright, bright(1).bright / 2);
+}
+
+TEST_F(DaemonAtTheFlame, AStrobeThatFlashesBesideItIsSeen) {
+  SmallDaemon daemon(config());
+  drivers::Camera& camera = daemon.rig->camera(0);
+  static_cast<void>(camera.next_frame(Seconds(1)));
+  const int without = seen(*camera.next_frame(Seconds(1))->image).saturated;
+  v1::StrobeState steady;
+  steady.set_output(v1::StrobeState::STEADY);
+  steady.set_rate_hz(24);
+  steady.set_width_s(20e-6);
+  ASSERT_TRUE(daemon.conductor->apply_strobe(steady).ok());
+  for (int i = 0; i < 2; ++i) static_cast<void>(camera.next_frame(Seconds(1)));
+  EXPECT_GT(seen(*camera.next_frame(Seconds(1))->image).saturated, without + 20);
+}
+
+TEST_F(DaemonAtTheFlame, RecordingsForAlignmentShowTheStrobeAndOthersTheFlame) {
+  SmallDaemon daemon(config());
+  record(daemon, "flame", "flame");
+  record(daemon, "strobe", "alignment");
+  EXPECT_GT(recorded("flame").bright, 500);
+  const Light idle = recorded("strobe");
+  EXPECT_LT(idle.bright, 500);
+  EXPECT_GT(idle.saturated, 20) << "the lamp";
+  EXPECT_EQ(daemon.conductor->strobe()->output(), v1::StrobeState::OFF) << "it flashed for that alone";
+  ASSERT_TRUE(daemon.conductor->align({}).ok());
+  ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+  record(daemon, "locked strobe", "alignment");
+  EXPECT_GT(recorded("locked strobe").saturated, 20);
+  record(daemon, "locked flame", "flame");
+  EXPECT_GT(recorded("locked flame").bright, 500);
+}
+
 }  // namespace
 }  // namespace emberlock

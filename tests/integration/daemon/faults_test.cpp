@@ -2,6 +2,7 @@
 // What goes wrong in a lab: each time the operator is told what happened and what to do, and what was
 // recorded stays.
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <filesystem>
 #include <thread>
@@ -283,6 +284,69 @@ TEST_F(Faults, WhileADiskTakesNothingARecordingIsFinishedBesideAllElse) {
       daemon, [&] { return daemon.conductor->phase() == v1::IDLE; }, Seconds(20)));
   EXPECT_TRUE(daemon.conductor->is_done());
   EXPECT_TRUE(record(daemon).error().kind == ErrorKind::bad_input);  // its name is taken
+}
+
+/// Simulated cameras of 100 frames a second in real time.
+class Overload : public Faults {
+ protected:
+  rig::DaemonConfig config() {
+    rig::DaemonConfig config = test::small_config(temp_.path());
+    config.rig.cameras[0].request.size = ImageSize{64, 48};
+    config.rig.cameras[0].request.frame_rate = Hertz(100);
+    config.rig.virtual_rig.time = rig::VirtualConfig::Time::real;
+    return config;
+  }
+  static const v1::Fault* overload(SmallDaemon& daemon, const std::string& cause) {
+    daemon.status = daemon.conductor->status();
+    for (const v1::Fault& fault : daemon.status.faults())
+      if (fault.kind() == v1::Fault::OVERLOADED && fault.subject() == cause) return &fault;
+    return nullptr;
+  }
+};
+
+TEST_F(Overload, ASlowProcessorIsOneFaultOfItsOwnAndNoCameraIsBlamed) {
+  std::atomic<bool> slow = true;
+  rig::RigOptions rig = options();
+  rig.on_frame = [&slow](std::size_t,
+                         const Frame&) {  // as much work for a frame as four of them give time for
+    const TimePoint until = SteadyClock().now() + milliseconds(40);
+    while (slow && SteadyClock().now() < until) {
+    }
+  };
+  SmallDaemon daemon(config(), rig);
+  ASSERT_TRUE(soon(
+      daemon, [&] { return overload(daemon, "processor") != nullptr; }, Seconds(20)));
+  EXPECT_EQ(daemon.fault(v1::Fault::CAMERA_HANGS), nullptr);
+  EXPECT_EQ(daemon.status.light(), v1::AMBER);
+  EXPECT_THAT(overload(daemon, "processor")->what(), HasSubstr("the processor can't keep up"));
+  EXPECT_THAT(overload(daemon, "processor")->remedy(), HasSubstr("the cameras are well"));
+  const TimePoint from = SteadyClock().now();
+  ASSERT_TRUE(soon(daemon, [&] { return SteadyClock().now() - from > Seconds(1.5); }));
+  const v1::DaemonStatus status = daemon.conductor->status();
+  for (const v1::CameraStatus& camera : status.cameras()) {
+    if (camera.lost_lately() == 0) continue;
+    EXPECT_EQ(camera.light(), v1::AMBER) << "what loses frames isn't well";
+    EXPECT_THAT(camera.reason(), HasSubstr("frames were lost within 10 s"));
+  }
+  EXPECT_THAT(daemon.board.notices(0), SizeIs(1)) << "one line for the cause, not one a camera a second";
+  slow = false;
+}
+
+TEST_F(Overload, ASlowDiskIsToldAsSuch) {
+  SmallDaemon daemon(config(), options());
+  ASSERT_TRUE(soon(daemon, [&] { return all_film(daemon); }));
+  ASSERT_TRUE(record(daemon).ok());
+  const std::filesystem::path folder = temp_.path() / "sessions" / "take";
+  StuckFile stuck(folder / "virtual-00" / "000000.nut");
+  ASSERT_TRUE(soon(
+      daemon, [&] { return overload(daemon, "disk") != nullptr; }, Seconds(20)));
+  EXPECT_THAT(overload(daemon, "disk")->remedy(), HasSubstr("faster disk"));
+  EXPECT_EQ(daemon.status.cameras(0).state(), v1::CameraStatus::FILMING);
+  ASSERT_TRUE(daemon.conductor->stop_recording().ok());
+  stuck.let_go();
+  ASSERT_TRUE(soon(
+      daemon, [&] { return daemon.conductor->phase() == v1::IDLE; }, Seconds(20)));
+  EXPECT_THAT(daemon.conductor->status().recording().verdict(), HasSubstr("as the disk was too slow"));
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 // The programs as an operator runs them: emberlockd, killed and started again, and `emberlock` as its client.
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
@@ -13,6 +14,8 @@
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
+#include "session/files.h"
+#include "session/index.h"
 #include "session/reader.h"
 #include "session/verify.h"
 #include "tests/support/daemon_program.h"
@@ -23,6 +26,7 @@
 namespace emberlock {
 namespace {
 
+namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 
 /// The one that was built.
@@ -39,6 +43,21 @@ class DaemonProgram : public test::DaemonTest {
         << "[rig.strobe]\ndriver = \"virtual\"\n[recording]\nfolder = \"" << sessions().string()
         << "\"\nfree_space_floor_mib = 0\nencoding = \"raw\"\ntranscode = \"never\"\n[server]\nsocket = \""
         << (temp_ / "run" / "d.sock").string() << "\"\nhttp_listen = \"\"\n";
+  }
+  /// Of the session that is being recorded; waits for two minutes, as the machine may be busy. One that ends
+  /// before isn't whole.
+  [[nodiscard]] bool every_camera_has_frames(const std::string& session) const {
+    const auto end = std::chrono::steady_clock::now() + std::chrono::minutes(2);
+    for (int camera = 0; camera < 4; ++camera) {
+      const auto index = session::index_path(sessions() / session, "virtual-0" + std::to_string(camera));
+      std::error_code none_yet;
+      while (!fs::exists(index, none_yet) ||
+             fs::file_size(index, none_yet) < 2 * session::kIndexRecordBytes) {
+        if (std::chrono::steady_clock::now() > end) return false;
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+      }
+    }
+    return true;
   }
 };
 
@@ -83,12 +102,13 @@ TEST_F(DaemonProgram, AskedToEndItFinishesItsRecording) {
   ASSERT_TRUE(answers("status", "filming"));
   std::thread recording([&] { static_cast<void>(client("record ended --unlocked")); });
   ASSERT_TRUE(answers("status", "recording  ended"));
+  ASSERT_TRUE(every_camera_has_frames("ended"));
   EXPECT_EQ(daemon.end(SIGTERM), 0);
   recording.join();
   const auto check = session::verify_session(sessions() / "ended");
   ASSERT_TRUE(check.ok()) << check.error().message();
   EXPECT_EQ(check->state, v1::Manifest::COMPLETE);
-  EXPECT_TRUE(check->whole());
+  EXPECT_TRUE(check->whole()) << check->to_do;
 }
 
 TEST_F(DaemonProgram, FromColdToALockedRecordingByTheCommandLine) {

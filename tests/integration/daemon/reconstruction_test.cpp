@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A recorded session, reconstructed by the program itself as the daemon's child.
-#include <condition_variable>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <memory>
-#include <mutex>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
@@ -14,6 +14,7 @@
 #include "recon/preprocess/radiance.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/recording.h"
+#include "tests/support/wait.h"
 
 namespace emberlock {
 namespace {
@@ -23,7 +24,7 @@ using State = v1::ReconstructionStatus;
 
 v1::Manifest manifest_of(const recon::Scene& scene) {
   v1::Manifest manifest = test::manifest_of(
-      std::vector<ImageLayout>(scene.views.size(), {scene.views.front().image.size, PixelFormat::rgb8, 8}));
+      std::vector<ImageLayout>(scene.views.size(), {scene.views.front().image->size, PixelFormat::rgb8, 8}));
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
     const recon::CameraModel& camera = scene.views[i].camera;
     v1::Calibration& calibration = *manifest.mutable_cameras(static_cast<int>(i))->mutable_calibration();
@@ -55,7 +56,7 @@ void record_flame(const fs::path& folder) {
   check(writer);
   for (std::size_t camera = 0; camera < scene.views.size(); ++camera) {
     Frame frame;
-    frame.image = std::make_shared<const Image>(recon::to_rgb8(scene.views[camera].image));
+    frame.image = std::make_shared<const Image>(recon::to_rgb8(*scene.views[camera].image));
     check(writer->write(camera, frame));
   }
   check(writer->finish());
@@ -72,16 +73,12 @@ class DaemonReconstruction : public testing::Test {
     options.unasked.set_device("cpu");
     options.unasked.set_voxels(24);
     options.unasked.add_hold_out(10);
-    child_ = std::make_unique<daemon::ReconstructionChild>(options, board_, [this] {
-      const std::lock_guard lock(mutex_);
-      changed_.notify_all();
-    });
+    child_ = std::make_unique<daemon::ReconstructionChild>(options, board_, jobs_.emplace());
   }
   [[nodiscard]] bool running() const { return child_->status()->state() == State::RUNNING; }
   /// Waits while it runs and the condition doesn't hold.
   void wait_for(const std::function<bool()>& condition) {
-    std::unique_lock lock(mutex_);
-    while (running() && !condition()) changed_.wait_for(lock, std::chrono::seconds(1));
+    test::wait_until([&] { return !running() || condition(); }, std::chrono::minutes(10));
   }
   static v1::ReconstructRequest candle() {
     v1::ReconstructRequest request;
@@ -91,9 +88,8 @@ class DaemonReconstruction : public testing::Test {
 
   test::TempFolder folder_;
   daemon::Board board_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
   std::unique_ptr<daemon::ReconstructionChild> child_;
+  std::optional<daemon::Jobs> jobs_;
 };
 
 TEST_F(DaemonReconstruction, ARecordedFlameBecomesAVolumeThatIsSeenGrowing) {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/effects/sensor.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/devices.h"
@@ -182,7 +183,7 @@ TEST_P(PredictEffects, AnEvenBackgroundIsFoundAtTheBordersAndItsChangePredicted)
   Filmed filmed = sooty();
   const Pictures lit = filmed.full("background=8/5/3");
   const double full = filmed.change_over_boxes(lit, filmed.full("none"));
-  for (std::size_t v = 0; v < lit.size(); ++v) filmed.scene.views[v].image = lit[v];
+  for (std::size_t v = 0; v < lit.size(); ++v) filmed.scene.views[v].image = recon::share(lit[v]);
   filmed.masks = recon::flame_masks(filmed.scene);
   const recon::EffectChoice choice = filmed.predict("auto:albedo=0");
   EXPECT_EQ(names_of_those_on(choice), "background");
@@ -195,15 +196,16 @@ TEST_P(PredictEffects, AnEvenBackgroundIsFoundAtTheBordersAndItsChangePredicted)
 TEST_P(PredictEffects, ViewsWithBackgroundPicturesUseThem) {
   Filmed filmed = sooty();
   for (recon::View& view : filmed.scene.views) {
-    view.background = recon::RadianceImage(view.image.size);
-    for (std::size_t p = 0; p < view.background->rgb.size(); ++p)
-      view.background->rgb[p] = p / 3 % 160 < 80 ? 20 : 0;  // the left half is lit
+    recon::RadianceImage background(view.image->size);
+    for (std::size_t p = 0; p < background.rgb.size(); ++p)
+      background.rgb[p] = p / 3 % 160 < 80 ? 20 : 0;  // the left half is lit
+    view.background = recon::share(std::move(background));
   }
   const recon::EffectChoice choice = filmed.predict("auto:albedo=0");
   EXPECT_EQ(names_of_those_on(choice), "background");
   EXPECT_EQ(choice.effects.background.kind, recon::Background::Kind::image);
   EXPECT_GT(report_of(choice, "background").predicted_change, 3);
-  filmed.scene.views[2].background = recon::RadianceImage(ImageSize{10, 10});
+  filmed.scene.views[2].background = recon::share(recon::RadianceImage(ImageSize{10, 10}));
   const auto refused =
       recon::predict_effects({filmed.scene, filmed.masks, filmed.coarse.volume, filmed.coarse.medium},
                              filmed.coarse.effects, {}, on_threads(1));
@@ -224,10 +226,12 @@ double overexpose(Filmed& filmed, float gain, float white) {
   Pictures before;
   Pictures after;
   for (recon::View& view : filmed.scene.views) {
-    for (float& value : view.image.rgb) value *= gain;
-    before.push_back(view.image);
-    for (float& value : view.image.rgb) value = std::min(value, white);
-    after.push_back(view.image);
+    recon::RadianceImage image = *view.image;
+    for (float& value : image.rgb) value *= gain;
+    before.push_back(image);
+    for (float& value : image.rgb) value = std::min(value, white);
+    after.push_back(image);
+    view.image = recon::share(std::move(image));
   }
   double sum = 0;
   for (std::size_t v = 0; v < before.size(); ++v)

@@ -34,7 +34,7 @@ class Installed : public ::testing::Test {
 
 TEST_F(Installed, NothingIsMissing) {
   for (const char* file :
-       {"bin/emberlock", "sbin/emberlockd", "etc/emberlock/emberlockd.toml",
+       {"bin/emberlock", "libexec/emberlock/emberlock", "sbin/emberlockd", "etc/emberlock/emberlockd.toml",
         "lib/systemd/system/emberlockd.service", "lib/sysusers.d/emberlock.conf",
         "lib/udev/rules.d/72-emberlock.rules", "share/man/man1/emberlock.1.gz",
         "share/man/man5/emberlockd.toml.5.gz", "share/man/man8/emberlockd.8.gz",
@@ -85,6 +85,14 @@ TEST_F(Installed, BashCompletesTheProgramsVerbs) {
           "COMP_CWORD=1; _emberlock; "
           "echo \"${COMPREPLY[@]}\"'");
   EXPECT_EQ(offered.output, "align\n");
+}
+
+TEST(Package, HoldsTheProgramsAndNothingForDevelopers) {
+  const Shell listed = shell("dpkg --contents " EMBERLOCK_BUILD_DIR "/emberlock_*.deb");
+  EXPECT_THAT(listed.output, HasSubstr("./usr/bin/emberlock\n"));
+  EXPECT_THAT(listed.output, HasSubstr("./usr/libexec/emberlock/emberlock\n"));
+  for (const char* path : {"/usr/include", "/cmake/", ".a\n"})
+    EXPECT_THAT(listed.output, ::testing::Not(HasSubstr(path)));
 }
 
 TEST(Package, LintianFindsNoError) {

@@ -104,11 +104,11 @@ TEST_F(AlignByHand, WhoPressesWhatIsAskedForGetsThere) {
     for (const smear::CameraDecision& camera : last.cameras)
       EXPECT_FALSE(camera.reset) << "nobody is told to";
     if (pressed || !last.reset_next) return;
-    EXPECT_THAT(last.cameras[*last.reset_next].reason, HasSubstr("reset its shutter by hand"));
+    EXPECT_THAT(alignment->words().cameras[*last.reset_next], HasSubstr("reset its shutter by hand"));
     press(*last.reset_next);
     ++presses;
   });
-  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
+  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->words().reason;
   EXPECT_GT(presses, 0);
   EXPECT_EQ(noticed, presses);
   EXPECT_EQ(alignment->resets(), presses);
@@ -127,7 +127,7 @@ TEST_F(AlignByHand, AWrongCameraIsNoticedAsWell) {
         ++wrong;
       },
       600);
-  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
+  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->words().reason;
   EXPECT_GE(noticed, 3);
   EXPECT_LE(unseen, 1);
   EXPECT_LT(longest, kSeenWithin);
@@ -145,7 +145,7 @@ TEST_F(AlignByHand, WhoNeverPressesIsWaitedFor) {
       },
       40);
   EXPECT_TRUE(asked);
-  EXPECT_EQ(alignment->last().verdict, smear::AlignVerdict::go_on) << alignment->last().reason;
+  EXPECT_EQ(alignment->last().verdict, smear::AlignVerdict::go_on) << alignment->words().reason;
   EXPECT_EQ(alignment->resets(), 0);
 }
 
@@ -162,7 +162,7 @@ TEST_F(AlignByHand, PressesTwiceAndTooEarlyDoNoHarm) {
         ++presses;
       },
       600);
-  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
+  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->words().reason;
   EXPECT_LT(bench.true_error(alignment->options().row_time), Rows(31));
 }
 
@@ -193,13 +193,13 @@ TEST_F(AlignByHand, ACameraThatIsSwitchedOffIsWaitedForAndDrawnAnew) {
     }
     if (alignment->state().cameras[2].away) {
       ++away;
-      EXPECT_THAT(last.cameras[2].reason, HasSubstr("sends no frames"));
+      EXPECT_THAT(alignment->words().cameras[2], HasSubstr("sends no frames"));
       return;
     }
     if (!pressed && last.reset_next) press(*last.reset_next);
   });
   EXPECT_GT(away, 5) << "the others are filmed meanwhile";
-  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
+  ASSERT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->words().reason;
   EXPECT_LT(bench.true_error(alignment->options().row_time), Rows(31));
 }
 

@@ -99,7 +99,7 @@ TEST(AlignHold, TheLimitOfRoundsCountsFromTheLastTimeAllWereIn) {
   bench.options.align.max_rounds = 12;
   const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok());
-  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->last.reason;
+  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->words.reason;
   EXPECT_GT(result->last.round, 12);
 }
 

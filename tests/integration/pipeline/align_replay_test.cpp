@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <functional>
+#include <string>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,6 +12,8 @@
 #include "rig/align/json.h"
 #include "rig/align/record.h"
 #include "session/reader.h"
+#include "tests/support/dial_bench.h"
+#include "tests/support/old_alignment.h"
 #include "tests/support/small_rig.h"
 
 namespace emberlock::cli {
@@ -43,16 +48,25 @@ class AlignReplay : public testing::Test {
     };
   }
 
-  /// Changes the recorded events, whose length must stay.
-  void edit_events(const std::function<void(std::string&)>& edit) const {
-    const fs::path events = folder_ / "events.binpb";
-    std::string bytes;
-    {
-      std::ifstream in(events, std::ios::binary);
-      bytes.assign(std::istreambuf_iterator<char>(in), {});
-    }
-    edit(bytes);
-    std::ofstream(events, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  /// Records a run. Returns its rounds, as `emberlock align --json` prints them.
+  std::vector<nlohmann::ordered_json> record(SmallBench& bench) const {
+    std::vector<nlohmann::ordered_json> rounds;
+    const auto recorded = rig::record_align(
+        folder_, bench.align, bench.options,
+        [&](const rig::AlignRoundReport& report) { rounds.push_back(rig::round_json(report)); });
+    EXPECT_TRUE(recorded.ok());
+    EXPECT_FALSE(rounds.empty());
+    return rounds;
+  }
+  static std::vector<std::string> lines_of(const std::vector<nlohmann::ordered_json>& rounds) {
+    std::vector<std::string> lines;
+    for (const nlohmann::ordered_json& round : rounds) lines.push_back(round.dump());
+    return lines;
+  }
+  void expect_differs_in_round_1() const {
+    const auto replayed = rig::replay_align(folder_);
+    ASSERT_FALSE(replayed.ok());
+    EXPECT_THAT(replayed.error().message(), HasSubstr("round 1"));
   }
 
   fs::path folder_;
@@ -96,23 +110,64 @@ TEST_F(AlignReplay, GivesTheSameReadingsAndDecisionsToTheBit) {
             rig::summary_json(*replayed, seed).dump());
 }
 
+TEST_F(AlignReplay, RecordingsWhoseSettingsAndDecisionsAreJsonReplayWhateverTheirSentences) {
+  SmallBench bench(small_rig(4));
+  bench.options.align.policy = smear::AlignPolicy::timed;
+  bench.options.align.limits = smear::AlignLimits{};
+  std::vector<nlohmann::ordered_json> rounds = record(bench);
+  const std::vector<std::string> live = lines_of(rounds);
+  for (nlohmann::ordered_json& round : rounds) {
+    round["reason"] = "as it was worded once";
+    for (nlohmann::ordered_json& camera : round["cameras"]) camera["reason"] = "another sentence";
+  }
+  test::write_as_before(folder_, test::old_settings(bench.options), lines_of(rounds));
+  std::vector<std::string> again;
+  const auto replayed = rig::replay_align(
+      folder_, [&](const rig::AlignRoundReport& report) { again.push_back(rig::round_json(report).dump()); });
+  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
+  EXPECT_EQ(live, again);
+
+  rounds.front()["beat_ppm"] = rounds.front()["beat_ppm"].get<double>() + 1e-9;
+  test::write_as_before(folder_, {}, lines_of(rounds));
+  expect_differs_in_round_1();
+}
+
+TEST_F(AlignReplay, RecordingsWhoseDialHasAdviceInWordsReplay) {
+  test::DialBench bench(small_rig(4, 2));
+  int rounds_left = 3;
+  std::vector<std::string> lines;
+  ASSERT_TRUE(rig::record_align(
+                  folder_, bench.align, bench.options,
+                  [&](const rig::AlignRoundReport& report) {
+                    nlohmann::ordered_json round = rig::round_json(report);
+                    EXPECT_FALSE(round["dial"]["words"].get<std::string>().empty());
+                    round["dial"]["words"] = "turn it somewhere";
+                    lines.push_back(round.dump());
+                    --rounds_left;
+                  },
+                  {}, [&] { return rounds_left <= 0; })
+                  .ok());
+  EXPECT_TRUE(rig::replay_align(folder_).ok());
+  test::write_as_before(folder_, test::old_settings(bench.options), lines);
+  const auto replayed = rig::replay_align(folder_);
+  EXPECT_TRUE(replayed.ok()) << replayed.error().message();
+}
+
 // From before the strobe was moved and before runs were held: the settings have neither.
 TEST_F(AlignReplay, TheFirstRecordingsReplay) {
   SmallBench bench(small_rig(4));
   bench.options.align.strobe_step = Seconds(0);
   std::vector<std::string> live;
-  ASSERT_TRUE(rig::record_align(folder_, bench.align, bench.options, into(live)).ok());
-  edit_events([](std::string& bytes) {
-    for (const std::string setting : {R"("strobe_step_s":0.0,)", R"("hold_s":null,)"}) {
-      const auto at = bytes.find(setting);
-      ASSERT_NE(at, std::string::npos) << setting;
-      bytes.replace(at, setting.size(), setting.size(), ' ');
-    }
-  });
-  std::vector<std::string> again;
-  const auto replayed = rig::replay_align(folder_, into(again));
-  ASSERT_TRUE(replayed.ok()) << replayed.error().message();
-  EXPECT_EQ(live, again);
+  for (nlohmann::ordered_json round : record(bench)) {
+    round.erase("sensor");
+    for (nlohmann::ordered_json& camera : round["cameras"]) camera.erase("servo");
+    live.push_back(round.dump());
+  }
+  nlohmann::ordered_json settings = test::old_settings(bench.options);
+  for (const char* key : {"strobe_step_s", "hold_s", "reset_by"}) settings.erase(key);
+  test::write_as_before(folder_, settings, live);
+  const auto replayed = rig::replay_align(folder_);
+  EXPECT_TRUE(replayed.ok()) << replayed.error().message();
 }
 
 TEST_F(AlignReplay, EveryFrameOfTheRunIsInTheRecording) {
@@ -129,16 +184,26 @@ TEST_F(AlignReplay, EveryFrameOfTheRunIsInTheRecording) {
 TEST_F(AlignReplay, ADecisionThatDiffersFromTheRecordedOneIsAnError) {
   SmallBench bench(small_rig(4));
   ASSERT_TRUE(rig::record_align(folder_, bench.align, bench.options).ok());
-  // One digit of a recorded decision, changed in place.
-  edit_events([](std::string& bytes) {
-    const auto at = bytes.find("\"beat_ppm\":");
-    ASSERT_NE(at, std::string::npos);
-    char& digit = bytes[at + 13];
-    digit = digit == '3' ? '4' : '3';
+  const std::vector<v1::Event> events = test::events_of(folder_);
+  const auto edit_first = [&](const std::function<void(v1::DecisionEvent&)>& edit) {
+    std::vector<v1::Event> edited = events;
+    const auto first = std::find_if(edited.begin(), edited.end(),
+                                    [](const v1::Event& event) { return event.has_decision(); });
+    ASSERT_NE(first, edited.end());
+    EXPECT_TRUE(first->decision().json().empty());
+    edit(*first->mutable_decision());
+    test::write_events(folder_, edited);
+  };
+  edit_first([](v1::DecisionEvent& decision) {
+    decision.set_period_offset_ppm(std::nextafter(decision.period_offset_ppm(), 1e9));
   });
-  const auto replayed = rig::replay_align(folder_);
-  ASSERT_FALSE(replayed.ok());
-  EXPECT_THAT(replayed.error().message(), HasSubstr("round 1"));
+  expect_differs_in_round_1();
+  edit_first([](v1::DecisionEvent& decision) {
+    decision.mutable_cameras(1)->mutable_reason()->set_cause(v1::DecisionEvent::CameraReason::AWAY);
+  });
+  expect_differs_in_round_1();
+  edit_first([](v1::DecisionEvent&) {});
+  EXPECT_TRUE(rig::replay_align(folder_).ok());
 }
 
 TEST_F(AlignReplay, ASessionOfAnythingElseIsRefused) {

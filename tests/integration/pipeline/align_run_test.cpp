@@ -46,7 +46,7 @@ TEST(AlignRun, TrimsBringVirtualCamerasWithinARowInTruth) {
   bench.options.frames_per_round = 8;
   const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok()) << result.error().message();
-  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->last.reason;
+  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->words.reason;
   EXPECT_LT(bench.true_error(result->options.row_time), Rows(1) + kReadingError);
   ASSERT_TRUE(result->last.next_check);
 }
@@ -60,7 +60,7 @@ TEST(AlignRun, WhatTheLimitsDontAllowIsRefusedBeforeAnythingIsReset) {
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->last.verdict, smear::AlignVerdict::refused);
   EXPECT_EQ(result->resets, 0);
-  EXPECT_THAT(result->last.reason, HasSubstr("What could be met"));
+  EXPECT_THAT(result->words.reason, HasSubstr("What could be met"));
 }
 
 // One second of a comb at the size of the paper's videos.
@@ -125,7 +125,7 @@ TEST(AlignRun, ALampOutOfViewIsNamedNotAligned) {
   const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->last.verdict, smear::AlignVerdict::given_up);
-  EXPECT_THAT(result->last.reason, HasSubstr("virtual-02"));
+  EXPECT_THAT(result->words.reason, HasSubstr("virtual-02"));
   EXPECT_EQ(result->resets, 0);
 }
 
@@ -177,19 +177,19 @@ TEST(AlignRun, AReflectionThatLooksLikeADotIsFoundByMovingTheStrobe) {
   believing.options.align.strobe_step = Seconds(0);
   const auto taken_in = rig::run_align(believing.align, believing.options);
   ASSERT_TRUE(taken_in.ok()) << taken_in.error().message();
-  ASSERT_EQ(taken_in->last.verdict, smear::AlignVerdict::aligned) << taken_in->last.reason;
+  ASSERT_EQ(taken_in->last.verdict, smear::AlignVerdict::aligned) << taken_in->words.reason;
   ASSERT_GT(believing.true_error(taken_in->options.row_time), Rows(50)) << "a dot that is believed misleads";
 
   SmallBench bench = bench_with_a_reflection();
   std::vector<std::string> said;
   const auto result = rig::run_align(bench.align, bench.options, [&](const rig::AlignRoundReport& report) {
-    said.push_back(report.decision.cameras[3].reason);
+    said.push_back(report.words.cameras[3]);
     for (std::size_t i = 0; i < 3; ++i)
-      EXPECT_THAT(report.decision.cameras[i].reason, testing::Not(HasSubstr("reflection"))) << i;
+      EXPECT_THAT(report.words.cameras[i], testing::Not(HasSubstr("reflection"))) << i;
   });
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_EQ(result->last.verdict, smear::AlignVerdict::given_up);
-  EXPECT_THAT(result->last.reason, HasSubstr("virtual-03"));
+  EXPECT_THAT(result->words.reason, HasSubstr("virtual-03"));
   EXPECT_EQ(result->resets, 0);
   ASSERT_GE(said.size(), 2U);
   EXPECT_THAT(said[1], HasSubstr("stood still when the strobe's flashes were moved by 2.00 ms"));

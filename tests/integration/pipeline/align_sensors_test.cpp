@@ -77,7 +77,7 @@ TEST(AlignSensors, TheTimeThatIsForetoldCountsTheSweepsOfShuttersThatAreReset) {
     used = r.options;
   });
   ASSERT_TRUE(result.ok()) << result.error().message();
-  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->last.reason;
+  ASSERT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->words.reason;
   ASSERT_GT(rounds[0], 0);
   ASSERT_GT(rounds[1], 0);
   const double foretold_quiet = used.round_time.value() * rounds[0];
@@ -116,13 +116,13 @@ std::string said_of(SensorKind kind, Seconds exposure, Seconds flash_width = mic
   bench.options.flash_width = flash_width;
   std::string said;  // in the first round: later ones sweep anew, and a drift may lead a flash into view
   const auto result = rig::run_align(bench.align, bench.options, [&](const rig::AlignRoundReport& r) {
-    if (said.empty()) said = r.decision.cameras[1].reason;
+    if (said.empty()) said = r.words.cameras[1];
   });
   EXPECT_TRUE(result.ok()) << result.error().message();
   if (!result.ok()) return result.error().message();
   EXPECT_EQ(result->last.verdict, smear::AlignVerdict::given_up);
   EXPECT_EQ(result->resets, 0);
-  EXPECT_THAT(result->last.reason, HasSubstr("virtual-01"));
+  EXPECT_THAT(result->words.reason, HasSubstr("virtual-01"));
   return said;
 }
 
@@ -150,7 +150,7 @@ TEST(AlignSensors, AWrongReadDirectionOfARollingShutterIsNoticed) {
   const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok());
   EXPECT_EQ(result->last.verdict, smear::AlignVerdict::given_up);
-  EXPECT_THAT(result->last.cameras[1].reason, HasSubstr("other read direction"));
+  EXPECT_THAT(result->words.cameras[1], HasSubstr("other read direction"));
 }
 
 TEST(AlignSensors, FlashesThatLightNothingInViewAreSaid) {
@@ -162,8 +162,8 @@ TEST(AlignSensors, FlashesThatLightNothingInViewAreSaid) {
   const auto result = rig::run_align(bench.align, bench.options);
   ASSERT_TRUE(result.ok());
   EXPECT_EQ(result->last.verdict, smear::AlignVerdict::given_up);
-  EXPECT_THAT(result->last.cameras[1].reason, HasSubstr("let the strobe light"));
-  EXPECT_THAT(result->last.cameras[2].reason, HasSubstr("bring the strobe into view"));
+  EXPECT_THAT(result->words.cameras[1], HasSubstr("let the strobe light"));
+  EXPECT_THAT(result->words.cameras[2], HasSubstr("bring the strobe into view"));
 }
 
 TEST(AlignSensors, ARecordingOfThemReplaysToTheBit) {

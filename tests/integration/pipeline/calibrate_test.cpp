@@ -17,10 +17,10 @@
 #include "cli/commands.h"
 #include "recon/calibrate/board_pictures.h"
 #include "recon/calibrate/rig_formats.h"
+#include "recon/synthetic/carried_board.h"
 #include "session/writer.h"
 #include "tests/support/board_rig.h"
 #include "tests/support/recording.h"
-#include "tests/support/rendered_board.h"
 #include "tests/support/smear_frames.h"
 #include "tests/support/verb.h"
 
@@ -64,7 +64,7 @@ TEST_F(CalibrateVerb, RenderedPicturesOfABoardBecomeARig) {
   const test::BoardRigOptions options = two_cameras();
   const test::BoardRig rig = test::board_rig(options);
   for (const auto& sighting : rig.sightings.sightings) {
-    save(test::rendered_board(rig.cameras[sighting.camera], options.board,
+    save(recon::board_picture(rig.cameras[sighting.camera], options.board,
                               rig.world_from_board[sighting.instant]),
          folder_ / "pictures" / rig.sightings.cameras[sighting.camera].id /
              ("board_" + std::to_string(sighting.instant) + ".png"));
@@ -79,6 +79,7 @@ TEST_F(CalibrateVerb, RenderedPicturesOfABoardBecomeARig) {
   EXPECT_LT(told["rms_pixels"], 0.25);
   for (const char* file : {"index.html", "transforms.json", "colmap/cameras.txt", "opencv/cam00.yml"})
     EXPECT_TRUE(fs::exists(out / file)) << file;
+  EXPECT_THAT(test::bytes_of(out / "index.html"), HasSubstr("Where the cameras stand"));
   const auto written = session::read_rig(out / "rig.json");
   ASSERT_TRUE(written.ok()) << written.error().message();
   for (int c = 0; c < 2; ++c) {
@@ -111,7 +112,7 @@ TEST_F(CalibrateVerb, AFilmOfABoardThatRestsInEachPoseBecomesARig) {
   for (std::size_t c = 0; c < 2; ++c) {
     for (std::size_t i = 0; i < rig.world_from_board.size(); ++i) {
       const auto picture = std::make_shared<const Image>(
-          test::rendered_board(rig.cameras[c], options.board, rig.world_from_board[i]));
+          recon::board_picture(rig.cameras[c], options.board, rig.world_from_board[i]));
       for (std::size_t n = 0; n < kRest; ++n) {
         Frame frame = test::noise_frame({{2, 2}, PixelFormat::gray8, 8}, kRest * i + n);
         frame.image = picture;

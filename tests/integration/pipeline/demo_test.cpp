@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "base/file.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/preprocess/flame_mask.h"
 #include "report/demo_report.h"
 #include "rig/align/record.h"
@@ -91,9 +92,9 @@ TEST_F(DemoTest, TheUnseenViewIsPredictedBetterThanByThePapersSolver) {
   ASSERT_TRUE(held_out.has_value());
   EXPECT_LT(recon::all_channels(*held_out), recon::all_channels(*result().paper.report.heldout_rmse));
   const recon::View& view = result().scene.views[static_cast<std::size_t>(result().held_out)];
-  const recon::PixelBox box = recon::noise_mask(view.image).box;
+  const recon::PixelBox box = recon::noise_mask(*view.image).box;
   EXPECT_LT(recon::all_channels(*held_out),
-            0.5 * recon::all_channels(recon::rmse(view.image, recon::RadianceImage(view.image.size), box)))
+            0.5 * recon::all_channels(recon::rmse(*view.image, recon::RadianceImage(view.image->size), box)))
       << "less than half the error of a black picture";
 }
 
@@ -117,6 +118,48 @@ TEST(Demo, OptionsOutOfRangeAreNamed) {
   ASSERT_FALSE(r.ok());
   EXPECT_EQ(r.error().kind, ErrorKind::bad_input);
   EXPECT_THAT(r.error().message(), HasSubstr("--cameras"));
+}
+
+TEST(DemoStopped, KeepsTheStepsThatAreDoneAndNamesThem) {
+  const fs::path folder =
+      fs::temp_directory_path() / ("emberlock_demo_stopped." + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  rig::DemoOptions options;
+  options.cameras = 4;
+  options.image = {320, 240};
+  options.voxels = options.truth_voxels = 40;
+  // Stopped as soon as the flame is filmed: what is filmed by then is a session.
+  bool filming = false;
+  const auto result = rig::run_demo(
+      options, folder,
+      [&](const std::string& title) {
+        filming = filming || title == "record the flame";
+        return Progress{};
+      },
+      [&] { return filming; });
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_FALSE(result->whole);
+  ASSERT_EQ(result->kept.size(), 2U);
+  EXPECT_THAT(result->kept[0], HasSubstr("alignment/: "));
+  EXPECT_THAT(result->kept[1], HasSubstr("flame/: 0 frames of 4 cameras"));
+  EXPECT_TRUE(rig::replay_align(folder / "alignment").ok());
+  EXPECT_TRUE(session::SessionReader::open(folder / "flame").ok());
+  fs::remove_all(folder);
+}
+
+TEST(DemoStopped, BeforeTheFirstStepIsDoneThereIsNothing) {
+  const fs::path folder =
+      fs::temp_directory_path() / ("emberlock_demo_stopped." + std::to_string(::getpid()));
+  fs::create_directories(folder);
+  rig::DemoOptions options;
+  options.cameras = 3;
+  options.image = {320, 240};
+  const auto result = rig::run_demo(
+      options, folder, [](const std::string&) { return Progress{}; }, [] { return true; });
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_FALSE(result->whole);
+  EXPECT_TRUE(result->kept.empty());
+  fs::remove_all(folder);
 }
 
 }  // namespace

@@ -13,6 +13,7 @@
 #include "recon/pipeline/scene.h"
 #include "recon/synthetic/flame.h"
 #include "report/import_report.h"
+#include "tests/support/edit_view.h"
 #include "tests/support/import_clips.h"
 #include "tests/support/recording.h"
 
@@ -42,8 +43,10 @@ std::vector<recon::Scene> two_flames() {
     for (const std::size_t view : kFilmed) {
       scene.views.push_back(all.views[view]);
       // As a film of brightness alone shows it.
-      std::vector<float>& rgb = scene.views.back().image.rgb;
-      for (std::size_t i = 0; i < rgb.size(); i += 3) rgb[i] = rgb[i + 2] = rgb[i + 1];
+      edit(scene.views.back().image, [](recon::RadianceImage& image) {
+        for (std::size_t i = 0; i < image.rgb.size(); i += 3)
+          image.rgb[i] = image.rgb[i + 2] = image.rgb[i + 1];
+      });
     }
   }
   return scenes;
@@ -81,7 +84,7 @@ test::FlameFilm film_of(const std::vector<recon::Scene>& scenes) {
   }
   film.flame = [&scenes](Image& image, std::size_t camera, Seconds at) {
     const auto instant = static_cast<std::size_t>(std::llround((at - kFirstRead) / kFrame));
-    const recon::RadianceImage& picture = scenes[instant % 2].views[camera].image;
+    const recon::RadianceImage& picture = *scenes[instant % 2].views[camera].image;
     auto* row = image.row_as<std::uint8_t>(0);
     for (std::size_t i = 0; i < image.bytes().size(); ++i)
       row[i] = static_cast<std::uint8_t>(
@@ -93,8 +96,8 @@ test::FlameFilm film_of(const std::vector<recon::Scene>& scenes) {
 /// Which of the flames a scene's first picture shows.
 const recon::Scene& nearer_to(const recon::Scene& seen, const std::vector<recon::Scene>& scenes) {
   const auto distance = [&](const recon::Scene& scene) {
-    const std::vector<float>& a = seen.views[0].image.rgb;
-    const std::vector<float>& b = scene.views[0].image.rgb;
+    const std::vector<float>& a = seen.views[0].image->rgb;
+    const std::vector<float>& b = scene.views[0].image->rgb;
     double sum = 0;
     for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(static_cast<double>(a[i] - b[i]));
     return sum;

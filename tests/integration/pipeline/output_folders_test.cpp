@@ -21,10 +21,10 @@
 #include "recon/calibrate/rig_formats.h"
 #include "recon/export/picture.h"
 #include "recon/preprocess/radiance.h"
+#include "recon/synthetic/carried_board.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/board_rig.h"
 #include "tests/support/recording.h"
-#include "tests/support/rendered_board.h"
 #include "tests/support/strobe_clips.h"
 #include "tests/support/verb.h"
 
@@ -39,7 +39,7 @@ using Words = std::vector<std::string>;
 /// A verb with all that it needs but the folder that it writes.
 struct Writer {
   const char* verb;    ///< as its results name it
-  const char* option;  ///< before the folder
+  const char* option;  ///< before the folder; empty where it stands alone
   void (*add)(CLI::App&);
   Words words;
   fs::path input;  ///< one file that it reads; none where it reads none
@@ -72,7 +72,7 @@ fs::path make_transforms(const fs::path& folder) {
   nlohmann::json frames = nlohmann::json::array();
   for (const recon::View& view : scene.views) {
     const std::string name = fmt::format("view{}.png", frames.size());
-    EXPECT_TRUE(recon::write_png(recon::to_rgb8(view.image).view(), folder / name).ok());
+    EXPECT_TRUE(recon::write_png(recon::to_rgb8(*view.image).view(), folder / name).ok());
     const Eigen::Matrix4d m = recon::opengl_world_from_camera(view.camera.camera_from_world);
     nlohmann::json matrix = nlohmann::json::array();
     for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
@@ -109,7 +109,7 @@ fs::path make_boards(const fs::path& folder) {
     const fs::path file =
         folder / rig.sightings.cameras[sighting.camera].id / fmt::format("board_{}.png", sighting.instant);
     fs::create_directories(file.parent_path());
-    const Image picture = test::rendered_board(rig.cameras[sighting.camera], options.board,
+    const Image picture = recon::board_picture(rig.cameras[sighting.camera], options.board,
                                                rig.world_from_board[sighting.instant]);
     EXPECT_TRUE(recon::write_png(picture.view(), file).ok());
   }
@@ -223,6 +223,12 @@ class OutputFolders : public testing::Test {
          {"demo", "--cameras", "3", "--image", "160x160", "--frames", "1", "--voxels", "8"},
          {},
          {"report.html", "summary.png", "flame/manifest.json", "reconstruction/volume.vdb"}},
+        {"sample",
+         "",
+         add_sample,
+         {"sample", "--cameras", "3", "--image", "160x120", "--frames", "2"},
+         {},
+         {"films/camera-2.mp4", "comb/camera-0.mp4", "board/camera-1/00.png", "truth.json"}},
         {"sessions export",
          "--out",
          add_sessions,
@@ -244,14 +250,15 @@ class OutputFolders : public testing::Test {
         {"align",
          "--record",
          add_align,
-         {"align", "--rig", "virtual:3"},
+         {"align", "--rig", "virtual:3", "--tolerance", "100rows", "--shortest-take", "0"},
          {},
          {"manifest.json", "events.binpb"}},
     };
   }
   static test::VerbRun run(const Writer& writer, const fs::path& out) {
     Words words = writer.words;
-    words.insert(words.end(), {writer.option, out.string()});
+    if (*writer.option != '\0') words.emplace_back(writer.option);
+    words.push_back(out.string());
     return test::run_verb(writer.add, words);
   }
   static void expect_made(const Writer& writer, const fs::path& out) {
@@ -274,14 +281,15 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
   std::set<std::string> listed{"emberlock devices clips --out"};  // needs a camera: tests/vm/ptp
   for (const std::vector<Writer>& writers : {replacing(), founding()}) {
     for (const Writer& writer : writers) {
+      if (*writer.option == '\0') continue;
       const bool plan = std::string_view(writer.option) == "--plan";
       listed.insert(std::string("emberlock ") + (plan ? "reconstruct" : writer.verb) + " " + writer.option);
     }
   }
   CLI::App app{"", "emberlock"};
-  for (const auto add :
-       {add_devices, add_smear, add_align, add_reconstruct, add_verify, add_tradeoff, add_calibrate,
-        add_import, add_demo, add_doctor, add_sessions, add_status, add_watch, add_record, add_strobe})
+  for (const auto add : {add_devices, add_smear, add_align, add_reconstruct, add_verify, add_tradeoff,
+                         add_calibrate, add_import, add_demo, add_sample, add_doctor, add_sessions,
+                         add_status, add_jobs, add_watch, add_record, add_strobe})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/hull/hull.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/pipeline/scene.h"
@@ -32,11 +33,11 @@ void shrink(recon::View& view) {
     for (int x = 0; x < kShrink * lens.size.width; ++x) {
       for (int c = 0; c < 3; ++c) {
         small.rgb[3 * (y / kShrink * lens.size.width + x / kShrink) + c] +=
-            view.image.rgb[3 * (y * view.image.size.width + x) + c] / (kShrink * kShrink);
+            view.image->rgb[3 * (y * view.image->size.width + x) + c] / (kShrink * kShrink);
       }
     }
   }
-  view.image = std::move(small);
+  view.image = recon::share(std::move(small));
 }
 
 class ScalarFlowTest : public testing::Test {

@@ -57,8 +57,8 @@ class Plume {
       view.camera.intrinsics = recon::intrinsics_of(transforms_.frames[v], image.layout().size).value();
       view.camera.camera_from_world = transforms_.frames[v].camera_from_world;
       recon::Intrinsics& lens = view.camera.intrinsics;
-      view.image = halved(recon::to_radiance(image.view()));
-      lens.size = view.image.size;
+      view.image = recon::share(halved(recon::to_radiance(image.view())));
+      lens.size = view.image->size;
       for (double* length : {&lens.fx, &lens.fy, &lens.cx, &lens.cy}) *length /= 2;
       view.role = v == kHeldOut ? recon::ViewRole::held_out : recon::ViewRole::input;
       scene.views.push_back(std::move(view));
@@ -85,7 +85,7 @@ Shown reconstructed(const recon::Scene& scene, const char* effects, bool correct
   EXPECT_TRUE(outcome.ok()) << outcome.error().message();
   if (!outcome.ok()) return {};
   const recon::RadianceImage& shown = outcome->renders[kHeldOut];
-  const recon::RadianceImage& truth = scene.views[kHeldOut].image;
+  const recon::RadianceImage& truth = *scene.views[kHeldOut].image;
   double sum = 0;
   for (std::size_t i = 0; i < truth.rgb.size(); ++i) {
     EXPECT_TRUE(std::isfinite(shown.rgb[i]));

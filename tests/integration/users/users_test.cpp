@@ -338,6 +338,41 @@ TEST_F(Users, AKeyThatEverybodyReadsIsRefusedAtTheStart) {
               testing::AllOf(HasSubstr("everybody may read or write the key"), HasSubstr("chmod o=")));
 }
 
+// What README.md says to do first: nothing is edited (but for the console's port, so that tests run side by
+// side).
+TEST_F(Users, AnOrdinaryUserStartsADaemonOfTheirOwnWithThePrintedConfiguration) {
+  const test::TempFolder folder;
+  const fs::path home = folder / "home";
+  const fs::path runtime = folder / "run";
+  ::chmod(folder.path().c_str(), 0755);
+  for (const fs::path& own : {home, runtime}) {
+    fs::create_directory(own);
+    ASSERT_EQ(::chown(own.c_str(), kOther.user, kOther.group), 0);
+    ::chmod(own.c_str(), 0700);
+  }
+  const std::string script = fmt::format(R"(
+unset RUNTIME_DIRECTORY STATE_DIRECTORY XDG_DATA_HOME EMBERLOCK_DAEMON
+export HOME={} XDG_RUNTIME_DIR={}
+cd $HOME
+{} --print-config | sed 's/^#\(http_listen = "127.0.0.1:\)7140/\10/' > rig.toml
+{} --config rig.toml 2> log & daemon=$!
+for i in $(seq 100); do {} status --json > status 2> error && break; sleep 0.1; done
+{} console >> status 2>> error
+kill $daemon; wait $daemon; echo "ended $?" >> status
+cat status error log; find . $XDG_RUNTIME_DIR -printf '%M %p\n'
+)",
+                                         home.string(), runtime.string(), Programs::open_to_all().daemon,
+                                         Programs::open_to_all().daemon, Programs::open_to_all().client,
+                                         Programs::open_to_all().client);
+  const std::string said = as(kOther, [&] { return shell(script).output; });
+  EXPECT_THAT(said, HasSubstr("\"phase\""));
+  EXPECT_THAT(said, HasSubstr("/open?link="));
+  EXPECT_THAT(said, HasSubstr("ended 0"));
+  EXPECT_THAT(said, HasSubstr("drwx------ " + (runtime / "emberlock").string() + "\n"));
+  EXPECT_THAT(said, HasSubstr("./.local/share/emberlock/sessions\n"));
+  EXPECT_THAT(said, testing::Not(HasSubstr("[error]")));
+}
+
 // Another user opens as many connections as there are places, again and again, each stopping in its head. An
 // operator who is in the middle of his own first request gets his answer: the kernel tells them apart.
 TEST_F(Users, AnotherUsersHalfOpenRequestsShutNobodyOut) {

@@ -48,17 +48,18 @@ TEST_P(FieldLaw, GradientIsThatOfCentralDifferences) {
     const double thick = magnitude(1e-4, 10);  // a voxel edge
     const auto seen = random_quads<float>(rays, 1, 2);
     const auto background = random_quads<float>(rays, 2, 2);
-    const Judge<double> judge{seen.data(), *rc::gen::arbitrary<bool>() ? background.data() : nullptr, nullptr,
-                              *rc::gen::element(0.0, 0.8)};
+    const PixelResidual<double> residual_of{seen.data(),
+                                            *rc::gen::arbitrary<bool>() ? background.data() : nullptr,
+                                            nullptr, *rc::gen::element(0.0, 0.8)};
     const auto march = marches_on<double>(device_here(), c.list);
     const Values x = random_quads<double>(c.list.grid.size(), 3, 0.5, thick);
     Values d = random_quads<double>(c.list.grid.size(), 4, 1, 1);
     for (Rgba64& v : d) v = v - Rgba64{{0.5, 0.5, 0.5, 0.5}};
     const auto cost = [&](const Values& at) {
-      const Values residual = march->field_forward(at, judge).residual;
+      const Values residual = march->field_forward(at, residual_of).residual;
       return 0.5 * dot(residual, residual);
     };
-    const Values gradient = march->field_adjoint(march->field_forward(x, judge));
+    const Values gradient = march->field_adjoint(march->field_forward(x, residual_of));
     const double expected = dot(gradient, d, 4);
     constexpr double kStep = 1e-5;  // balances the cube's remainder and rounding
     const double slope = (cost(moved(x, kStep, d)) - cost(moved(x, -kStep, d))) / (2 * kStep);

@@ -138,7 +138,7 @@ TEST(AlignLaws, OnlyCamerasOutOfToleranceAreReset) {
     for (const CameraDecision& camera : decision.cameras) {
       any_reset |= camera.reset;
       if (camera.reset) RC_ASSERT(abs(*camera.error) > options.tolerance.in_time(options.row_time));
-      RC_ASSERT(!camera.reason.empty());
+      RC_ASSERT(camera.reason.cause != CameraCause::none);
     }
     RC_ASSERT(any_reset == (decision.verdict == AlignVerdict::go_on));
     // The target lies within tolerance of a camera.

@@ -70,7 +70,8 @@ class Completion : public ::testing::Test {
 };
 
 TEST_F(Completion, BashOffersVerbsTheirVerbsAndTheirOptions) {
-  EXPECT_THAT(bash_offers("emberlock "), ElementsAre("devices", "align", "--help", "--version"));
+  EXPECT_THAT(bash_offers("emberlock "),
+              ElementsAre("devices", "align", "completion", "--help", "--version"));
   EXPECT_THAT(bash_offers("emberlock al"), ElementsAre("align"));
   EXPECT_THAT(bash_offers("emberlock devices "),
               ElementsAre("probe", "clips", "watch", "--help", "--modes", "--json"));
@@ -83,7 +84,7 @@ TEST_F(Completion, BashOffersFilesBehindAnOptionThatTakesAValue) {
 }
 
 TEST_F(Completion, ZshOffersVerbsTheirVerbsAndTheirOptions) {
-  EXPECT_THAT(zsh_offers("emberlock "), ElementsAre("devices", "align", "--help", "--version"));
+  EXPECT_THAT(zsh_offers("emberlock "), ElementsAre("devices", "align", "completion", "--help", "--version"));
   EXPECT_THAT(zsh_offers("emberlock devices "),
               ElementsAre("probe", "clips", "watch", "--help", "--modes", "--json"));
   EXPECT_THAT(zsh_offers("emberlock devices probe "), Contains("--resets"));

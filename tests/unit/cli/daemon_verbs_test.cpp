@@ -13,6 +13,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "base/clock.h"
 #include "cli/client.h"
 #include "cli/commands.h"
 #include "daemon/server/grpc_server.h"
@@ -125,26 +126,65 @@ TEST_F(DaemonVerbs, StatusIsAScreenForPeopleAndJsonForPrograms) {
   camera.set_id("cam1");
   camera.set_state(v1::CameraStatus::FILMING);
   camera.set_error_rows(-3.25);
-  v1::BackgroundJob& salvage = *status.add_jobs();
-  salvage.set_kind(v1::BackgroundJob::SALVAGE);
+  camera.set_error_s(-175.2e-6);
+  v1::AlignmentStatus& lock = *status.mutable_alignment();
+  lock.set_verdict(v1::AlignmentStatus::ALIGNED);
+  lock.set_tolerance_s(0.5e-3);
+  lock.set_tolerance_rows(9.26);
+  lock.set_time_left_s(42);
+  lock.set_likely_left_s(200);
+  lock.set_renewed_left_s(95);
+  lock.set_leaves_first("cam1");
+  v1::Job& salvage = *status.add_jobs();
+  salvage.set_kind(v1::Job::SALVAGE);
   salvage.set_session("candle");
-  salvage.set_state(v1::BackgroundJob::RUNNING);
+  salvage.set_state(v1::Job::RUNNING);
   salvage.set_fraction(.34);
-  v1::BackgroundJob& waits = *status.add_jobs();
-  waits.set_kind(v1::BackgroundJob::COMPRESS);
+  v1::Job& waits = *status.add_jobs();
+  waits.set_kind(v1::Job::COMPRESS);
   waits.set_session("torch");
-  waits.set_state(v1::BackgroundJob::WAITING);
+  waits.set_state(v1::Job::WAITING);
   api_.board().show(status);
   const test::VerbRun screen = run(add_status, {"status"});
   EXPECT_EQ(screen.exit_code, 0) << screen.err;
   for (const char* words :
        {"bench", "locked, amber: cam1 drifts", "Look at cam1.", "camera lost cam2", "Plug it in.", "cam1",
-        "-3.2 rows", "salvage of candle: 34 % done", "compression of torch: waits"}) {
+        "-3.2 rows (-0.175 ms)", "tolerance  0.500 ms (9.3 rows)",
+        "a take may be 42 s long, most likely 3 min 20 s, then cam1 leaves tolerance; 95 s if renewed",
+        "salvage of candle: 34 % done", "compression of torch: waits"}) {
     EXPECT_THAT(screen.out, HasSubstr(words));
   }
   const json printed = json::parse(run(add_status, {"status", "--json"}).out);
   EXPECT_EQ(printed["faults"][0]["remedy"], "Plug it in.");
   EXPECT_EQ(printed["next_step"], "Look at cam1.") << "named as in the .proto";
+}
+
+TEST_F(DaemonVerbs, JobsAreListedWithTheNumbersThatCancelThem) {
+  EXPECT_EQ(run(add_jobs, {"jobs"}).out, "No jobs.\n");
+  api_.on_job = [](const Observer& observer) -> daemon::JobResult {
+    while (observer(.5, "reads")) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return Error{ErrorKind::refused, "ended early, as asked"};
+  };
+  v1::SessionRequest candle;
+  candle.set_session("candle");
+  const auto job = api_.verify_session(candle);
+  ASSERT_TRUE(job.ok());
+  v1::DaemonStatus status = status_in(v1::IDLE, v1::GREEN, "");
+  v1::Job& shown = *status.add_jobs();
+  shown = (*job)->state();
+  shown.set_state(v1::Job::RUNNING);
+  shown.set_fraction(.5);
+  shown.set_silent_s(41);
+  api_.board().show(status);
+  EXPECT_EQ(run(add_jobs, {"jobs"}).out, "   1  verification of candle: 50 % done, nothing new for 41 s\n");
+  EXPECT_EQ(json::parse(run(add_jobs, {"jobs", "--json"}).out)["jobs"][0]["session"], "candle");
+  const test::VerbRun none = run(add_jobs, {"jobs", "cancel", "7"});
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.err, HasSubstr("job 7: there is none"));
+  EXPECT_EQ(run(add_jobs, {"jobs", "cancel", "1"}).exit_code, 0);
+  const auto result = (*job)->wait(std::chrono::seconds(20));
+  ASSERT_TRUE(result.has_value());
+  EXPECT_EQ(result->error().kind, ErrorKind::refused);
 }
 
 TEST_F(DaemonVerbs, StatusSaysWhatToSetAStrobeWithADialToAndWhatItDoes) {
@@ -213,6 +253,7 @@ TEST_F(DaemonVerbs, AnAlignmentThatIsRefusedSaysWhatCouldBeMet) {
   v1::AlignmentOffer& offer = *refused.mutable_alignment()->add_offers();
   offer.set_policy("timed");
   offer.set_tolerance_rows(200);
+  offer.set_tolerance_s(10.8e-3);
   api_.on_align = [&](const v1::AlignRequest&) {
     show_soon({status_in(v1::ALIGNING), refused});
     return Status();
@@ -220,7 +261,7 @@ TEST_F(DaemonVerbs, AnAlignmentThatIsRefusedSaysWhatCouldBeMet) {
   const test::VerbRun result = run(add_align, {"align"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.out, HasSubstr("900 resets"));
-  EXPECT_THAT(result.out, HasSubstr("200 rows with policy timed"));
+  EXPECT_THAT(result.out, HasSubstr("10.80 ms (200 rows) with policy timed"));
 }
 
 TEST_F(DaemonVerbs, AlignStopLetsTheLockGo) {
@@ -309,6 +350,28 @@ TEST_F(DaemonVerbs, WatchFollowsStatusJournalAndIterations) {
   for (std::string line; std::getline(lines, line);) EXPECT_TRUE(json::accept(line)) << line;
 }
 
+TEST_F(DaemonVerbs, WatchBeginsWithNowAndNotWithWhatIsOver) {
+  api_.board().notice(v1::AMBER, "cam1 was slow yesterday");
+  v1::IterationPreview old;
+  old.set_reconstruction("candle 1");
+  old.mutable_iteration()->set_iteration(7);
+  api_.board().show(std::make_shared<const v1::IterationPreview>(old));
+  std::this_thread::sleep_for(std::chrono::milliseconds(3));
+  v1::DaemonStatus now = status_in(v1::LOCKED, v1::GREEN, "All in tolerance.");
+  now.set_now_utc(utc_now());
+  now.mutable_reconstruction()->set_id("candle 1");
+  now.mutable_reconstruction()->set_state(v1::ReconstructionStatus::DONE);
+  now.mutable_reconstruction()->add_iterations()->set_iteration(7);
+  api_.board().show(now);
+  soon({[&] { api_.board().notice(v1::AMBER, "cam2 is slow today"); }});
+  const test::VerbRun result = run(add_watch, {"watch", "--seconds", "1"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out.substr(0, result.out.find('\n')), HasSubstr("locked, green: All in tolerance."));
+  EXPECT_THAT(result.out, HasSubstr("cam2 is slow today"));
+  EXPECT_THAT(result.out, Not(HasSubstr("yesterday")));
+  EXPECT_THAT(result.out, Not(HasSubstr("candle 1")));
+}
+
 TEST_F(DaemonVerbs, ADaemonThatGoesAwayWhileItIsWatchedIsToldApart) {
   soon({[&] { server_.reset(); }});
   const test::VerbRun result = run(add_watch, {"watch", "--seconds", "20"});
@@ -344,6 +407,10 @@ TEST_F(DaemonVerbs, StrobeChangesWhatItIsToldAlone) {
   EXPECT_EQ(applied["rate_hz"], 24);
   EXPECT_EQ(applied["code"], (json{true, true, false, true}));
   EXPECT_EQ(run(add_strobe, {"strobe", "--code", "12"}).exit_code, 2);
+  const auto played =
+      run(add_strobe, {"strobe", "--frame-code", "--play", "--rate", "24.2", "--code-words", "2"});
+  EXPECT_THAT(played.out,
+              testing::AllOf(HasSubstr("flashing"), HasSubstr("24.2 Hz"), HasSubstr("... (240 flashes, ")));
 }
 
 v1::DaemonStatus reconstructing(v1::ReconstructionStatus::State state, int iterations) {
@@ -389,6 +456,51 @@ TEST_F(DaemonVerbs, AReconstructionThatFailedSaysWhy) {
   const test::VerbRun result = run(add_reconstruct, {"reconstruct", "candle", "--json"});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("SIGSEGV"));
+}
+
+TEST_F(DaemonVerbs, ATakeThatIsLongerThanTheLockRenewsItFirstAndSaysSo) {
+  const auto locked = [](double left, v1::Phase phase = v1::LOCKED) {
+    v1::DaemonStatus status = status_in(phase);
+    status.mutable_alignment()->set_verdict(v1::AlignmentStatus::ALIGNED);
+    status.mutable_alignment()->set_time_left_s(left);
+    if (left < 20) status.mutable_alignment()->set_renewed_left_s(95);
+    return status;
+  };
+  api_.board().show(locked(8.6));
+  api_.on_align = [&](const v1::AlignRequest&) {
+    api_.board().show(locked(8.5, v1::ALIGNING));
+    show_soon({locked(95)});
+    return Status();
+  };
+  api_.on_record = [&](const v1::RecordRequest&) {
+    show_soon({recording(v1::RecordingStatus::COMPLETE, 48)});
+    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
+  };
+  const test::VerbRun result = run(add_record, {"record", "candle", "--seconds", "20"});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(api_.calls(),
+              ElementsAre("align renew: true hold_s: 20", HasSubstr("record name: \"candle\"")));
+  EXPECT_THAT(result.err,
+              HasSubstr("The lock surely holds for 8.6 s, and 20 s are asked for: renewing it first."));
+  EXPECT_THAT(result.err, HasSubstr("Renewed: a take may be 95 s long."));
+}
+
+TEST_F(DaemonVerbs, NoLockIsRenewedForATakeThatItHoldsForOrThatIsAskedForAsItIs) {
+  v1::DaemonStatus status = status_in(v1::LOCKED);
+  status.mutable_alignment()->set_verdict(v1::AlignmentStatus::ALIGNED);
+  status.mutable_alignment()->set_time_left_s(30);
+  api_.board().show(status);
+  api_.on_record = [&](const v1::RecordRequest&) {
+    show_soon({recording(v1::RecordingStatus::COMPLETE, 48)});
+    return Result<v1::RecordingStatus>(recording(v1::RecordingStatus::RECORDING, 0).recording());
+  };
+  for (const auto& words :
+       std::vector<std::vector<std::string>>{{"record", "candle", "--seconds", "20"},
+                                             {"record", "candle", "--seconds", "40"},
+                                             {"record", "candle", "--seconds", "40", "--unlocked"},
+                                             {"record", "candle", "--seconds", "40", "--no-renewal"}})
+    run(add_record, words);
+  for (const std::string& call : api_.calls()) EXPECT_THAT(call, HasSubstr("record"));
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST(DevicesVerb, WhatCannotBeProbedIsSaid) {
   EXPECT_EQ(run_verb(add_devices, {"devices", "probe"}).exit_code, 2);
   const auto size = run_verb(add_devices, {"devices", "probe", "nobody", "--size", "big"});
   EXPECT_EQ(size.exit_code, 2);
-  EXPECT_THAT(size.err, HasSubstr("Say 1280x720"));
+  EXPECT_THAT(size.err, HasSubstr("Give for example 1280x720"));
 }
 
 }  // namespace

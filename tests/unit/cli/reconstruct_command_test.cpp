@@ -106,6 +106,40 @@ TEST_F(ReconstructCommandTest, WritesVolumeViewsAndReport) {
   EXPECT_THAT(result.out, HasSubstr("only 3 input views"));
 }
 
+TEST_F(ReconstructCommandTest, WritesAPageThatStandsAlone) {
+  const Run result = run({"--voxels", "16", "--hold-out", "1", "--device", "cpu", "--effects", "none"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr((root_ / "out" / "report.html").string()));
+  const std::string page = read_file(root_ / "out" / "report.html").value();
+  EXPECT_THAT(page, HasSubstr("captured (held out)"));
+  EXPECT_THAT(page, HasSubstr("data-volume="));
+  EXPECT_THAT(page, testing::Not(HasSubstr("http")));
+  EXPECT_LT(page.size(), 8U << 20);
+}
+
+TEST_F(ReconstructCommandTest, JsonIsTheReportAndNothingElse) {
+  const Run result = run({"--voxels", "12", "--device", "cpu", "--effects", "none", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(json::parse(result.out), report());
+  EXPECT_EQ(report()["kept"]["iteration"], report()["iterations"]);
+}
+
+TEST_F(ReconstructCommandTest, AMissedTargetIsWrittenAndExitsWithOne) {
+  const Run missed = run(
+      {"--voxels", "12", "--hold-out", "1", "--device", "cpu", "--effects", "none", "--target-rmse", "0.01"});
+  EXPECT_EQ(missed.exit_code, 1);
+  EXPECT_THAT(missed.err,
+              HasSubstr("above the target of 0.01; the result is in " + (root_ / "out").string()));
+  EXPECT_THAT(missed.err, HasSubstr("would"));
+  EXPECT_GT(report()["plan"]["missed_by"], 0.0);
+  const Run reached = run(
+      {"--voxels", "12", "--hold-out", "1", "--device", "cpu", "--effects", "none", "--target-rmse", "200"});
+  EXPECT_EQ(reached.exit_code, 0) << reached.err;
+  const Run late = run({"--voxels", "12", "--device", "cpu", "--effects", "none", "--budget", "1e-5"});
+  EXPECT_EQ(late.exit_code, 1);
+  EXPECT_THAT(late.err, HasSubstr("more than the budget"));
+}
+
 TEST_F(ReconstructCommandTest, WithoutVoxelsItTakesTheKneeAndSaysHowToAskForMore) {
   const Run result = run({"--hold-out", "1", "--device", "cpu", "--effects", "none"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
@@ -173,13 +207,17 @@ TEST_F(ReconstructCommandTest, AnotherProgramIsToldEveryIterationAndTheResult) {
   }
   EXPECT_EQ(device, "cpu");
   const json watched = report();
-  ASSERT_EQ(iterations.size(), watched["trace"].size() + 1)
-      << "each, and the last once more with its pictures";
+  const std::size_t kept = watched["trace"].size();
+  ASSERT_EQ(iterations.size(), kept + watched["discarded"].size() + 1)
+      << "each, and the one that was kept once more with its pictures";
+  EXPECT_EQ(iterations.back().iteration().iteration(), watched["kept"]["iteration"]);
   for (std::size_t i = 0; i + 1 < iterations.size(); ++i) {
     EXPECT_EQ(iterations[i].iteration().iteration(), i + 1);
     EXPECT_TRUE(iterations[i].iteration().has_heldout_rmse());
-    EXPECT_EQ(watched["trace"][i]["input_rmse"], unwatched["trace"][i]["input_rmse"])
-        << "watching changes nothing";
+    const auto input_rmse = [&](const json& r) {
+      return i < kept ? r["trace"][i]["input_rmse"] : r["discarded"][i - kept]["input_rmse"];
+    };
+    EXPECT_EQ(input_rmse(watched), input_rmse(unwatched)) << "watching changes nothing";
   }
   for (const v1::IterationPreview& shown : {iterations.front(), iterations.back()}) {
     EXPECT_EQ(shown.camera_id(), "view1.png") << "the one that the solver doesn't know";

@@ -41,6 +41,21 @@ TEST(SessionsVerb, ListsWhatLiesInAFolder) {
   EXPECT_FALSE(std::filesystem::exists(temp / "absent"));
 }
 
+TEST(SessionsVerb, ANameThatNoDaemonAnswersForIsAFolderHere) {
+  const TempFolder temp;
+  record(temp / "flame", kLayout, 5, small_disk_options());
+  const auto before = std::filesystem::current_path();
+  std::filesystem::current_path(temp.path());
+  const auto nobody = "unix:" + (temp / "nobody").string();
+  const auto there = run_verb(add_sessions, {"sessions", "verify", "flame", "--daemon", nobody});
+  const auto absent = run_verb(add_sessions, {"sessions", "verify", "candle", "--daemon", nobody});
+  std::filesystem::current_path(before);
+  EXPECT_EQ(there.exit_code, 0) << there.err;
+  EXPECT_THAT(there.out, HasSubstr("All there."));
+  EXPECT_THAT(there.err, HasSubstr("./flame is taken"));
+  EXPECT_EQ(absent.exit_code, 3);
+}
+
 TEST(SessionsVerb, VerifiesRepairsAndVerifiesAgain) {
   const TempFolder temp;
   record(temp / "s", kLayout, 5, small_disk_options());

@@ -86,23 +86,18 @@ TEST_F(EngineThread, WhatManyAskAtOnceIsDoneAndTheRecordingIsWhole) {
   EXPECT_TRUE(session::verify_session(sessions() / "take")->whole());
 }
 
-TEST_F(EngineThread, AJobLeavesTheProcessorToOthersAndItsLastWordIsWhatCameOfIt) {
+TEST_F(EngineThread, AJobTellsWhatCameOfIt) {
   left_by_another("old", session::Encoding::ffv1);
   start();
-  const auto niceness = [] { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); };
-  const int before = niceness();
   v1::SessionRequest request;
   request.set_session("old");
-  v1::JobProgress last;
-  const Status done = engine_->verify_session(request, [&](const v1::JobProgress& progress) {
-    EXPECT_EQ(niceness(), progress.done() ? before : 19);
-    last = progress;
-    return true;
-  });
-  ASSERT_TRUE(done.ok()) << done.error().message();
-  EXPECT_TRUE(last.done());
-  EXPECT_TRUE(last.ok()) << last.report();
-  EXPECT_EQ(niceness(), before);
+  const auto job = engine_->verify_session(request);
+  ASSERT_TRUE(job.ok()) << job.error().message();
+  const auto result = (*job)->wait(std::chrono::seconds(30));
+  ASSERT_TRUE(result && result->ok());
+  EXPECT_TRUE((*result)->ok());
+  EXPECT_EQ((*result)->verify().cameras(0).recorded(), (*result)->verify().cameras(0).good());
+  EXPECT_EQ((*job)->state().state(), v1::Job::DONE);
 }
 
 TEST_F(EngineThread, EndedInMidRecordingItFinishesIt) {
@@ -154,10 +149,9 @@ TEST_F(EngineThread, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecording
   ASSERT_EQ(::mkfifo(index.c_str(), 0600), 0);
   start();
   ASSERT_TRUE(wait_until([&] {
-    return board_.status()->jobs_size() == 1 &&
-           board_.status()->jobs(0).state() == v1::BackgroundJob::RUNNING;
+    return board_.status()->jobs_size() == 1 && board_.status()->jobs(0).state() == v1::Job::RUNNING;
   }));
-  EXPECT_EQ(board_.status()->jobs(0).kind(), v1::BackgroundJob::SALVAGE);
+  EXPECT_EQ(board_.status()->jobs(0).kind(), v1::Job::SALVAGE);
   EXPECT_EQ(board_.status()->jobs(0).session(), "killed");
   v1::SessionRequest session;
   session.set_session("killed");
@@ -165,17 +159,17 @@ TEST_F(EngineThread, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecording
   exporting.set_session("killed");
   v1::ReconstructRequest reconstruction;
   reconstruction.set_session("killed");
-  const JobObserver nobody = [](const v1::JobProgress&) { return true; };
   for (const Status& refused :
-       {engine_->verify_session(session, nobody), engine_->repair_session(session, nobody),
-        engine_->export_session(exporting, nobody), Status(engine_->reconstruct(reconstruction).error())}) {
+       {Status(engine_->verify_session(session).error()), Status(engine_->repair_session(session).error()),
+        Status(engine_->export_session(exporting).error()),
+        Status(engine_->reconstruct(reconstruction).error())}) {
     ASSERT_FALSE(refused.ok());
     EXPECT_EQ(refused.error().kind, ErrorKind::refused);
     EXPECT_THAT(refused.error().message(), HasSubstr("salvaged"));
     EXPECT_FALSE(refused.error().remedy.empty());
   }
   ASSERT_TRUE(engine_->record(take()).ok());
-  EXPECT_EQ(board_.status()->jobs(0).state(), v1::BackgroundJob::PAUSED);
+  EXPECT_EQ(board_.status()->jobs(0).state(), v1::Job::PAUSED);
   EXPECT_EQ(engine_->stop_recording()->state(), v1::RecordingStatus::COMPLETE);
   ASSERT_TRUE(wait_until(
       [&] { return UniqueFd(::open(index.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC)).get() >= 0; }));
@@ -185,7 +179,9 @@ TEST_F(EngineThread, ASessionInSalvageIsShownAndRefusedForAllElseWhileARecording
   EXPECT_EQ(board_.status()->faults(0).subject(), "killed");
   EXPECT_FALSE(board_.status()->faults(0).remedy().empty());
   std::filesystem::remove(index);
-  EXPECT_TRUE(engine_->verify_session(session, nobody).ok());
+  const auto verification = engine_->verify_session(session);
+  ASSERT_TRUE(verification.ok());
+  EXPECT_TRUE((*verification)->wait(std::chrono::seconds(20))->ok());
 }
 
 TEST_F(EngineThread, EndedItRefusesWhatIsAskedAndStillFinishesItsRecording) {

@@ -4,29 +4,31 @@
 #include <algorithm>
 #include <random>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "daemon/engine/words.h"
+
 namespace emberlock::daemon {
 namespace {
 
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
 constexpr const char* kUtc = "2026-01-02T03:04:05.678Z";
 
-/// A machine that has gone through some happenings.
+/// A machine that has gone through some events.
 class Walk {
  public:
-  explicit Walk(const std::vector<Happening>& happenings = {}) {
-    for (const Happening& happening : happenings) go(happening);
+  explicit Walk(const std::vector<MachineEvent>& events = {}) {
+    for (const MachineEvent& event : events) go(event);
   }
-  const MachineStep& go(const Happening& happening) {
-    last_ = step(state(), happening, kUtc);
+  const MachineStep& go(const MachineEvent& event) {
+    last_ = step(state(), event, kUtc);
     return last_;
   }
   [[nodiscard]] const MachineState& state() const { return last_.state; }
@@ -36,10 +38,15 @@ class Walk {
   MachineStep last_;
 };
 
-RoundDone round(v1::AlignmentStatus::Verdict verdict) { return {verdict, "because"}; }
-const Happening kAligned = round(v1::AlignmentStatus::ALIGNED);
-const Happening kCameraOut = round(v1::AlignmentStatus::GO_ON);
-const std::vector<Happening> kToLocked{AskAlign{}, RowTimeMeasured{}, kAligned};
+const Outcome kWhole{Outcome::Code::whole, "all there"};
+const Outcome kIncomplete{Outcome::Code::incomplete, "2 are missing"};
+const Outcome kNothing{Outcome::Code::nothing, {}, {{"a", v1::CameraStatus::LOST}}};
+
+RoundDone round(v1::AlignmentStatus::Verdict verdict) { return {verdict, AlignmentSays{"because"}}; }
+const AlignmentSays kLeaving{"b would leave before long"};
+const MachineEvent kAligned = round(v1::AlignmentStatus::ALIGNED);
+const MachineEvent kCameraOut = round(v1::AlignmentStatus::GO_ON);
+const std::vector<MachineEvent> kToLocked{AskAlign{}, RowTimeMeasured{}, kAligned};
 
 TEST(Machine, AlignsByWayOfTheRowTime) {
   Walk run;
@@ -53,31 +60,59 @@ TEST(Machine, AlignsByWayOfTheRowTime) {
 
 TEST(Machine, CamerasThatAreResetBeforeTheyLeaveLoseNoLockButARecordingWaits) {
   Walk run(kToLocked);
-  run.go(RoundDone{v1::AlignmentStatus::GO_ON, "b would leave before long", true});
+  run.go(RoundDone{v1::AlignmentStatus::GO_ON, kLeaving, true});
   EXPECT_EQ(run.state().phase, v1::ALIGNING) << "it isn't locked for that moment";
-  EXPECT_EQ(run.state().reason, "b would leave before long");
+  EXPECT_EQ(std::get<AlignmentSays>(run.state().reason).text, kLeaving.text);
   EXPECT_EQ(light(run.state()), v1::AMBER);
   EXPECT_THAT(run.state().faults, IsEmpty());
   for (const bool unlocked : {false, true}) {
     const MachineStep asked = run.go(AskRecord{"flame", unlocked, false});
     ASSERT_TRUE(asked.refusal);
-    EXPECT_THAT(asked.refusal->message(), HasSubstr("Ask again"));
+    EXPECT_EQ(asked.refusal->code, MachineRefusal::Code::renewing_lock);
   }
   run.go(kAligned);
   EXPECT_EQ(light(run.state()), v1::GREEN);
   EXPECT_FALSE(run.go(AskRecord{"flame", false, false}).refusal);
 }
 
+TEST(Machine, ATakeThatIsLongerThanTheLockHoldsIsRefusedAndTheLockCanBeRenewedForIt) {
+  using Refused = MachineRefusal::Code;
+  EXPECT_EQ(Walk().go(AskRenew{}).refusal->code, Refused::not_locked);
+  Walk run(kToLocked);
+  const AskRecord ask{"flame", false, false, {Seconds(20), Seconds(8.6), Seconds(95)}};
+  const MachineStep refused = run.go(ask);
+  ASSERT_TRUE(refused.refusal);
+  EXPECT_EQ(refused.refusal->code, Refused::take_too_long);
+  EXPECT_EQ(refused.refusal->take.sure, Seconds(8.6));
+  EXPECT_EQ(refused.refusal->take.asked, Seconds(20));
+  EXPECT_EQ(run.state().phase, v1::LOCKED);
+  EXPECT_THAT(run.go(AskRenew{}).actions, ElementsAre(Action::check_lock));
+  EXPECT_EQ(run.state().phase, v1::ALIGNING);
+  EXPECT_TRUE(run.state().renews);
+  EXPECT_EQ(run.go(AskRenew{}).refusal->code, Refused::renewing_lock);
+  run.go(kAligned);
+  EXPECT_THAT(run.last().remarks, IsEmpty()) << "it was never lost";
+  EXPECT_FALSE(run.go(AskRecord{"flame", false, false, {Seconds(20), Seconds(95), Seconds(95)}}).refusal);
+  EXPECT_EQ(run.go(AskRenew{}).refusal->code, Refused::recording_runs);
+}
+
+TEST(Machine, OfATakeWithoutALengthTheLockHasOnlyToHold) {
+  EXPECT_FALSE(Walk(kToLocked).go(AskRecord{"flame", false, false, {{}, Seconds(8.6), {}}}).refusal);
+  EXPECT_FALSE(Walk(kToLocked).go(AskRecord{"flame", false, false, {Seconds(900), {}, {}}}).refusal);
+  EXPECT_FALSE(Walk(kToLocked).go(AskRecord{"flame", true, false, {Seconds(20), Seconds(8.6), {}}}).refusal);
+  EXPECT_TRUE(Walk(kToLocked).go(AskRecord{"flame", false, false, {{}, Seconds(0), {}}}).refusal);
+}
+
 TEST(Machine, ALockThatIsGivenUpInTimeIsNoFault) {
   Walk run(kToLocked);
-  const MachineStep given_up =
-      run.go(RoundDone{v1::AlignmentStatus::GO_ON, "b would leave before long", false, true});
+  const MachineStep given_up = run.go(RoundDone{v1::AlignmentStatus::GO_ON, kLeaving, false, true});
   EXPECT_EQ(run.state().phase, v1::ALIGNING);
   EXPECT_EQ(light(run.state()), v1::AMBER);
   EXPECT_THAT(run.state().faults, IsEmpty());
   ASSERT_THAT(given_up.remarks, SizeIs(1));
-  EXPECT_THAT(given_up.remarks[0].text, HasSubstr("before the lock is lost: b would leave"));
-  EXPECT_THAT(run.go(AskRecord{"flame", true, false}).refusal->message(), HasSubstr("being aligned"));
+  EXPECT_EQ(given_up.remarks[0].code, Remark::Code::aligning_in_time);
+  EXPECT_EQ(std::get<AlignmentSays>(given_up.remarks[0].reason).text, kLeaving.text);
+  EXPECT_EQ(run.go(AskRecord{"flame", true, false}).refusal->code, MachineRefusal::Code::aligning);
   run.go(kCameraOut);  // b's shutter, drawn anew
   EXPECT_THAT(run.state().faults, IsEmpty());
   run.go(kAligned);
@@ -86,11 +121,11 @@ TEST(Machine, ALockThatIsGivenUpInTimeIsNoFault) {
 
 TEST(Machine, ARenewalThatLosesACameraIsALostLock) {
   Walk run(kToLocked);
-  run.go(RoundDone{v1::AlignmentStatus::GO_ON, "b would leave before long", true});
+  run.go(RoundDone{v1::AlignmentStatus::GO_ON, kLeaving, true});
   run.go(kCameraOut);
   EXPECT_EQ(run.state().phase, v1::ALIGNING);
   ASSERT_EQ(run.state().faults.size(), 1);
-  EXPECT_EQ(run.state().faults[0].kind(), v1::Fault::LOCK_LOST);
+  EXPECT_EQ(run.state().faults[0].key.kind, v1::Fault::LOCK_LOST);
 }
 
 TEST(Machine, ACheckThatFindsACameraOutSaysSoAndAlignsAgain) {
@@ -98,10 +133,10 @@ TEST(Machine, ACheckThatFindsACameraOutSaysSoAndAlignsAgain) {
   run.go(kCameraOut);
   EXPECT_EQ(run.state().phase, v1::ALIGNING);
   ASSERT_EQ(run.state().faults.size(), 1);
-  EXPECT_EQ(run.state().faults[0].kind(), v1::Fault::LOCK_LOST);
-  EXPECT_EQ(run.state().faults[0].since_utc(), kUtc);
+  EXPECT_EQ(run.state().faults[0].key.kind, v1::Fault::LOCK_LOST);
+  EXPECT_EQ(run.state().faults[0].since_utc, kUtc);
   run.go(kAligned);
-  EXPECT_TRUE(run.state().faults[0].over());
+  EXPECT_TRUE(run.state().faults[0].over);
   EXPECT_EQ(light(run.state()), v1::GREEN);
   run.go(AskAcknowledge{});
   EXPECT_THAT(run.state().faults, IsEmpty());
@@ -125,7 +160,7 @@ TEST(Machine, RecordsWhenLockedAndChecksTheLockAfterwards) {
   run.go(RecordingBegun{});
   EXPECT_THAT(run.go(AskStopRecording{}).actions, ElementsAre(Action::finish_recording));
   EXPECT_EQ(run.state().phase, v1::FINISHING);
-  EXPECT_THAT(run.go(RecordingFinished{true, "all there"}).actions, ElementsAre(Action::check_lock));
+  EXPECT_THAT(run.go(RecordingFinished{kWhole}).actions, ElementsAre(Action::check_lock));
   EXPECT_EQ(run.state().phase, v1::LOCKED);
 }
 
@@ -133,34 +168,31 @@ TEST(Machine, UnlockedItRecordsOnlyWhenThatIsAskedFor) {
   Walk run;
   const MachineStep& refused = run.go(AskRecord{"take"});
   ASSERT_TRUE(refused.refusal);
-  EXPECT_EQ(refused.refusal->kind, ErrorKind::refused);
-  EXPECT_THAT(refused.refusal->message(), HasSubstr("aren't locked"));
+  EXPECT_EQ(refused.refusal->code, MachineRefusal::Code::not_locked);
   EXPECT_FALSE(run.go(AskRecord{"take", true}).refusal);
   run.go(AskStopRecording{});
-  EXPECT_THAT(run.go(RecordingFinished{true, "all there"}).actions, IsEmpty());
+  EXPECT_THAT(run.go(RecordingFinished{kWhole}).actions, IsEmpty());
   EXPECT_EQ(run.state().phase, v1::IDLE);
 }
 
 TEST(Machine, CountsThatDoNotAgreeAreRedUntilSomebodyKnows) {
-  Walk run({AskRecord{"take", true}, RecordingBegun{}, AskStopRecording{},
-            RecordingFinished{false, "2 are missing"}});
+  Walk run({AskRecord{"take", true}, RecordingBegun{}, AskStopRecording{}, RecordingFinished{kIncomplete}});
   EXPECT_EQ(light(run.state()), v1::RED);
   ASSERT_EQ(run.state().faults.size(), 1);
-  EXPECT_EQ(run.state().faults[0].subject(), "take");
-  run.go(AskAcknowledge{run.state().faults[0].id()});
+  EXPECT_EQ(run.state().faults[0].key.subject, "take");
+  run.go(AskAcknowledge{run.state().faults[0].id});
   EXPECT_EQ(light(run.state()), v1::GREEN);
 }
 
 TEST(Machine, ARecordingWithoutAFrameIsRedAndHandedOnToNobody) {
-  Walk run({AskRecord{"take", true, true}, RecordingBegun{}, RecordingEnds{"no frame has come"}});
-  EXPECT_THAT(run.go(RecordingFinished{false, "not one frame came from any camera", true}).actions,
-              IsEmpty());
+  Walk run({AskRecord{"take", true, true}, RecordingBegun{}, RecordingEnds{NoFrames{Seconds(10), {}}}});
+  EXPECT_THAT(run.go(RecordingFinished{kNothing}).actions, IsEmpty());
   EXPECT_EQ(run.state().phase, v1::IDLE);
   EXPECT_EQ(light(run.state()), v1::RED);
   ASSERT_EQ(run.state().faults.size(), 1);
-  EXPECT_EQ(run.state().faults[0].kind(), v1::Fault::NOTHING_RECORDED);
-  EXPECT_FALSE(run.state().faults[0].remedy().empty());
-  run.go(AskAcknowledge{run.state().faults[0].id()});
+  EXPECT_EQ(run.state().faults[0].key.kind, v1::Fault::NOTHING_RECORDED);
+  EXPECT_EQ(std::get<Outcome>(run.state().faults[0].reason).cameras.size(), 1);
+  run.go(AskAcknowledge{run.state().faults[0].id});
   EXPECT_EQ(light(run.state()), v1::GREEN);
 }
 
@@ -170,25 +202,25 @@ TEST(Machine, ADiskThatRefusesARecordingLeavesTheRigAsItWas) {
   run.go(RecordingRefused{{ErrorKind::io, "no space", "/data", "free some"}});
   EXPECT_EQ(run.state().phase, v1::LOCKED);
   EXPECT_EQ(light(run.state()), v1::RED);
+  EXPECT_EQ(std::get<Error>(run.state().faults.at(0).reason).what, "no space");
 }
 
 TEST(Machine, AFinishedRecordingIsHandedOn) {
   Walk run({AskRecord{"take", true, true}, RecordingBegun{}, AskStopRecording{}});
-  EXPECT_THAT(run.go(RecordingFinished{true, "all there"}).actions,
-              ElementsAre(Action::begin_reconstruction));
+  EXPECT_THAT(run.go(RecordingFinished{kWhole}).actions, ElementsAre(Action::begin_reconstruction));
   EXPECT_EQ(run.state().reconstructing, "take");
   EXPECT_TRUE(run.go(AskReconstruct{"other"}).refusal);
   run.go(AskRecord{"next", true});
   EXPECT_EQ(run.state().phase, v1::CAPTURING);  // beside it
-  run.go(ReconstructionEnded{false, "the child was killed by SIGSEGV", "try the CPU"});
+  run.go(ReconstructionEnded{false, ReconstructionFailed{"the child was killed by SIGSEGV"}});
   EXPECT_EQ(run.state().phase, v1::CAPTURING);
   EXPECT_EQ(light(run.state()), v1::AMBER);
 }
 
 TEST(Machine, ALostCameraEndsTheLockAndItsReturnAlignsAnew) {
   Walk run(kToLocked);
-  run.go(FaultRaised{{v1::Fault::CAMERA_LOST, "cam3"}, v1::RED, "was unplugged", "plug it in"});
-  run.go(AlignmentBroken{"cam3 was unplugged"});
+  run.go(FaultRaised{{v1::Fault::CAMERA_LOST, "cam3"}, v1::RED, Why::camera_lost});
+  run.go(AlignmentBroken{Why::camera_away});
   EXPECT_EQ(run.state().phase, v1::CALIBRATING);
   EXPECT_THAT(run.last().actions, IsEmpty());  // it waits
   run.go(FaultMended{{v1::Fault::CAMERA_LOST, "cam3"}});
@@ -200,8 +232,8 @@ TEST(Machine, ALostCameraEndsTheLockAndItsReturnAlignsAnew) {
 
 TEST(Machine, ACameraLostInARecordingDoesNotEndIt) {
   Walk run({AskRecord{"take", true}, RecordingBegun{}});
-  run.go(FaultRaised{{v1::Fault::CAMERA_LOST, "cam3"}, v1::RED, "was unplugged", "plug it in"});
-  run.go(AlignmentBroken{"cam3 was unplugged"});
+  run.go(FaultRaised{{v1::Fault::CAMERA_LOST, "cam3"}, v1::RED, Why::camera_lost});
+  run.go(AlignmentBroken{Why::camera_away});
   EXPECT_EQ(run.state().phase, v1::CAPTURING);
   EXPECT_EQ(light(run.state()), v1::RED);
 }
@@ -209,10 +241,10 @@ TEST(Machine, ACameraLostInARecordingDoesNotEndIt) {
 TEST(Machine, AFaultIsRaisedOnceAndAcknowledgedOnlyWhenItIsOver) {
   Walk run;
   const FaultRaised silent{
-      {v1::Fault::STROBE_SILENT, "nova"}, v1::RED, "doesn't answer", "look at its cable"};
+      {v1::Fault::STROBE_SILENT, "nova"}, v1::RED, Error{ErrorKind::timed_out, "doesn't answer"}};
   EXPECT_EQ(run.go(silent).remarks.size(), 1);
   EXPECT_THAT(run.go(silent).remarks, IsEmpty());
-  const std::uint64_t id = run.state().faults.at(0).id();
+  const std::uint64_t id = run.state().faults.at(0).id;
   run.go(AskAcknowledge{id});
   EXPECT_EQ(run.state().faults.size(), 1);
   run.go(FaultMended{silent.key});
@@ -221,10 +253,12 @@ TEST(Machine, AFaultIsRaisedOnceAndAcknowledgedOnlyWhenItIsOver) {
   EXPECT_TRUE(run.go(AskAcknowledge{id}).refusal);
 }
 
-std::vector<Happening> everything() {
+std::vector<MachineEvent> everything() {
   return {AskAlign{},
+          AskRenew{},
           AskIdle{},
           AskRecord{"a"},
+          AskRecord{"b", false, false, {Seconds(20), Seconds(8)}},
           AskRecord{"b", true, true},
           AskStopRecording{},
           AskReconstruct{"c"},
@@ -235,47 +269,48 @@ std::vector<Happening> everything() {
           kAligned,
           kCameraOut,
           round(v1::AlignmentStatus::REFUSED),
-          AlignmentBroken{"x"},
+          AlignmentBroken{Why::camera_away},
           Recovered{},
-          LockExpired{"x"},
+          LockExpired{Why::may_have_drifted},
           RecordingBegun{},
           RecordingRefused{{ErrorKind::io, "x"}},
-          RecordingEnds{"x"},
-          RecordingFinished{true, "x"},
-          RecordingFinished{false, "x"},
-          RecordingFinished{false, "x", true},
+          RecordingEnds{TimeOver{Seconds(5)}},
+          RecordingFinished{kWhole},
+          RecordingFinished{kIncomplete},
+          RecordingFinished{kNothing},
           CameraEnded{"k"},
-          ReconstructionEnded{true, "x"},
-          ReconstructionEnded{false, "x"},
-          FaultRaised{{v1::Fault::CAMERA_LOST, "k"}, v1::RED, "x", "y"},
+          ReconstructionEnded{true, ReconstructionDone{"x"}},
+          ReconstructionEnded{false, ReconstructionFailed{"x"}},
+          FaultRaised{{v1::Fault::CAMERA_LOST, "k"}, v1::RED, Why::camera_lost},
           FaultMended{{v1::Fault::CAMERA_LOST, "k"}}};
 }
 
-bool asks(const Happening& happening) { return happening.index() <= 6; }
+bool asks(const MachineEvent& event) { return event.index() <= 7; }
 
 /// What must hold whatever happens, in any order.
-TEST(Machine, NoOrderOfHappeningsLeadsAstray) {
-  const std::vector<Happening> all = everything();
+TEST(Machine, NoOrderOfEventsLeadsAstray) {
+  const std::vector<MachineEvent> all = everything();
   std::mt19937 random(20261122);
   for (int walk = 0; walk < 3000; ++walk) {
     MachineState state;
     bool writer_open = false;
     bool child_runs = false;
     for (int i = 0; i < 40; ++i) {
-      const Happening& happening = all[random() % all.size()];
-      const MachineStep next = step(state, happening, kUtc);
+      const MachineEvent& event = all[random() % all.size()];
+      const MachineStep next = step(state, event, kUtc);
       if (next.refusal) {
-        ASSERT_TRUE(asks(happening));
+        ASSERT_TRUE(asks(event));
         ASSERT_EQ(next.state.phase, state.phase);
         ASSERT_THAT(next.actions, IsEmpty());
-        ASSERT_FALSE(next.refusal->remedy.empty());
+        ASSERT_FALSE(words(*next.refusal).what.empty());
+        ASSERT_FALSE(words(*next.refusal).remedy.empty());
       }
       // A conductor carries actions out in order, and tells the end of what it began.
-      if (std::holds_alternative<RecordingRefused>(happening) && state.phase == v1::CAPTURING)
+      if (std::holds_alternative<RecordingRefused>(event) && state.phase == v1::CAPTURING)
         writer_open = false;
-      if (std::holds_alternative<RecordingFinished>(happening) && state.phase == v1::FINISHING)
+      if (std::holds_alternative<RecordingFinished>(event) && state.phase == v1::FINISHING)
         writer_open = false;
-      if (std::holds_alternative<ReconstructionEnded>(happening)) child_runs = false;
+      if (std::holds_alternative<ReconstructionEnded>(event)) child_runs = false;
       for (const Action action : next.actions) {
         if (action == Action::begin_recording) {
           ASSERT_FALSE(writer_open);
@@ -293,16 +328,22 @@ TEST(Machine, NoOrderOfHappeningsLeadsAstray) {
         }
       }
       if (next.state.phase == v1::LOCKED && state.phase != v1::LOCKED) {
-        ASSERT_TRUE(std::holds_alternative<RoundDone>(happening) || state.lock == Lock::held);
+        ASSERT_TRUE(std::holds_alternative<RoundDone>(event) || state.lock == Lock::held);
       }
       state = next.state;
       const bool records = state.phase == v1::CAPTURING || state.phase == v1::FINISHING;
       ASSERT_EQ(records, writer_open);
       ASSERT_EQ(records, !state.session.empty());
       ASSERT_EQ(child_runs, !state.reconstructing.empty());
-      ASSERT_FALSE(state.reason.empty());
+      ASSERT_FALSE(words(state.reason).empty());
+      for (const Remark& remark : next.remarks) ASSERT_FALSE(words(remark).empty());
+      for (const Fault& fault : state.faults) {
+        ASSERT_FALSE(words(fault.key.kind, fault.reason).empty());
+        ASSERT_FALSE(remedy(fault.key.kind, fault.reason).empty() &&
+                     !std::holds_alternative<Error>(fault.reason));
+      }
       ASSERT_TRUE(std::is_sorted(state.faults.begin(), state.faults.end(),
-                                 [](const v1::Fault& a, const v1::Fault& b) { return a.id() < b.id(); }));
+                                 [](const Fault& a, const Fault& b) { return a.id < b.id; }));
     }
   }
 }

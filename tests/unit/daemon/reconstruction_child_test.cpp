@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <chrono>
-#include <condition_variable>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <memory>
-#include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 
@@ -16,6 +15,7 @@
 #include "daemon/reconstruction/child.h"
 #include "session/child_messages.h"
 #include "tests/support/recording.h"
+#include "tests/support/wait.h"
 
 namespace emberlock::daemon {
 namespace {
@@ -40,10 +40,7 @@ class ReconstructionChildTest : public testing::Test {
     std::ofstream(root_ / "program") << "#!/bin/sh\nROOT='" << root_.path().string() << "'\n"
                                      << script << "\n";
     fs::permissions(root_ / "program", fs::perms::owner_all);
-    child_ = std::make_unique<ReconstructionChild>(options_, board_, [this] {
-      const std::lock_guard lock(mutex_);
-      changed_.notify_all();
-    });
+    child_ = std::make_unique<ReconstructionChild>(options_, board_, jobs_.emplace());
     return *child_;
   }
   void message(const std::string& name, const v1::ChildMessage& message) const {
@@ -61,9 +58,7 @@ class ReconstructionChildTest : public testing::Test {
   }
   /// Waits until it runs no more.
   v1::ReconstructionStatus end() {
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, std::chrono::seconds(20),
-                      [&] { return child_->status()->state() != State::RUNNING; });
+    test::wait_until([&] { return child_->status()->state() != State::RUNNING; });
     return *child_->status();
   }
   v1::ReconstructionStatus end_of(const std::string& script) {
@@ -98,9 +93,8 @@ class ReconstructionChildTest : public testing::Test {
   test::TempFolder root_;
   Board board_;
   ReconstructionOptions options_;
-  std::mutex mutex_;
-  std::condition_variable changed_;
   std::unique_ptr<ReconstructionChild> child_;
+  std::optional<Jobs> jobs_;
 };
 
 TEST_F(ReconstructionChildTest, ShowsEveryIterationAndEndsWithTheResult) {
@@ -223,11 +217,21 @@ TEST_F(ReconstructionChildTest, OneThatIgnoresTheCancelIsKilledAfterTheGrace) {
   EXPECT_TRUE(goes_away(pid));
 }
 
-TEST_F(ReconstructionChildTest, ItGoesWithItsOwner) {
+TEST_F(ReconstructionChildTest, ItIsAJobThatAnybodyMayCancel) {
+  ASSERT_TRUE(with_script("echo x > $ROOT/begun; exec sleep 100").start(request()).ok());
+  wait_for_line("begun");
+  const auto job = jobs_->find(v1::Job::RECONSTRUCT, "candle");
+  ASSERT_TRUE(job);
+  EXPECT_TRUE(jobs_->cancel(job->id()).ok());
+  EXPECT_EQ(end().state(), State::CANCELLED);
+}
+
+TEST_F(ReconstructionChildTest, EndKillsTheOneThatRuns) {
   ASSERT_TRUE(with_script("echo $$ > $ROOT/pid; exec sleep 100").start(request()).ok());
   const std::string pid = wait_for_line("pid");
-  child_.reset();
+  child_->end();
   EXPECT_TRUE(goes_away(pid));
+  EXPECT_EQ(end().state(), State::CANCELLED);
 }
 
 TEST_F(ReconstructionChildTest, ItHoldsNoneOfOurFilesAndLetsOthersGoFirst) {

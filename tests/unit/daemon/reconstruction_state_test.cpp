@@ -88,6 +88,7 @@ TEST(ReconstructionState, IterationsBearItsIdAndThePictureAtTheEndIsNoFurtherOne
   EXPECT_EQ(state.take(iteration(1))->reconstruction(), "candle 1");
   state.take(iteration(2));
   EXPECT_TRUE(state.take(iteration(2)).has_value()) << "the board shows its picture";
+  EXPECT_TRUE(state.take(iteration(1)).has_value()) << "or that of an earlier one, which was kept";
   EXPECT_EQ(state.status().iterations_size(), 2);
 }
 

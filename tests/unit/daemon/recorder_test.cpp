@@ -29,21 +29,23 @@ session::Arrivals arrivals(const std::vector<std::uint64_t>& ids) {
 TEST(Recorder, WhatTheDriverLostExplainsMissingNumbersAndNoMore) {
   CameraBooks books;
   books.arrivals = arrivals({1, 2, 5, 6, 9});  // 3, 4, 7, 8
-  books.before.transport = 100;
-  books.after.transport = 101;
-  books.after.resend = 1;
-  books.after.underrun = 1;
-  books.after.passed_over = 9;
-  const Explained explained = explain(books);
-  EXPECT_EQ(explained.transport, 2);
-  EXPECT_EQ(explained.underrun, 1);
-  EXPECT_EQ(explained.passed_over, 1);
+  drivers::FrameCounts before;
+  before.transport = 100;
+  drivers::FrameCounts after;
+  after.transport = 101;
+  after.resend = 1;
+  after.underrun = 1;
+  after.passed_over = 9;
+  books.driver = after - before;
+  const v1::Counts explained = explain(books);
+  EXPECT_EQ(explained.transport(), 2);
+  EXPECT_EQ(explained.underrun(), 1);
+  EXPECT_EQ(explained.passed_over(), 1);
 }
 
 TEST(Recorder, BooksThatDoNotAgreeAreNamed) {
   CameraBooks books;
-  books.before.delivered = 10;
-  books.after.delivered = 15;
+  books.driver.delivered = 5;
   books.left_out = 2;
   books.arrivals = arrivals({1, 2, 3});
   v1::Counts file;
@@ -54,7 +56,7 @@ TEST(Recorder, BooksThatDoNotAgreeAreNamed) {
   EXPECT_THAT(disagreement(books, file), IsEmpty());
   file.set_recorded(1);
   EXPECT_THAT(disagreement(books, file), HasSubstr("3 frames were taken, 2 are written"));
-  books.after.delivered = 16;
+  books.driver.delivered = 6;
   EXPECT_THAT(disagreement(books, file), HasSubstr("the driver handed on 6 frames"));
 }
 

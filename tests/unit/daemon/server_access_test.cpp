@@ -122,8 +122,8 @@ TEST(ServerAccess, WhatIsWrongWithCertificateOrKeyIsSaidOfTheFile) {
 struct Gate {
   explicit Gate(std::optional<rig::Token> secret, HttpGate::Transport transport = HttpGate::Transport::plain)
       : gate(std::move(secret), sessions, transport) {}
-  HttpJudgement judge(const HttpHead& head, const HttpTarget& target = {"/", {}, {}}) const {
-    return gate.judge(head, target, TimePoint{1});
+  HttpAccess authorize(const HttpHead& head, const HttpTarget& target = {"/", {}, {}}) const {
+    return gate.authorize(head, target, TimePoint{1});
   }
   std::shared_ptr<ConsoleSessions> sessions = std::make_shared<ConsoleSessions>();
   HttpGate gate;
@@ -134,8 +134,9 @@ TEST(ServerAccess, OnThisMachineAForeignNameOrSiteIsTurnedAwayWhateverItShows) {
   const Gate gate(token());
   const std::string shown = "Bearer " + kSecret;
   const auto refusal = [&](std::string_view host, std::string_view origin) -> std::optional<Refusal> {
-    const auto judgement = gate.judge({.host = host, .origin = origin, .authorization = shown, .cookie = {}});
-    if (judgement.verdict == HttpVerdict::refused) return judgement.refusal;
+    const auto access =
+        gate.authorize({.host = host, .origin = origin, .authorization = shown, .cookie = {}});
+    if (access.verdict == HttpVerdict::refused) return access.refusal;
     return std::nullopt;
   };
   for (const char* own : {"localhost", "localhost:7140", "127.0.0.1:7140", "[::1]", "[::1]:7140"}) {
@@ -152,14 +153,15 @@ TEST(ServerAccess, OnThisMachineAForeignNameOrSiteIsTurnedAwayWhateverItShows) {
 TEST(ServerAccess, OnThisMachineNobodyIsLetInWhoShowsNothing) {
   for (const std::optional<rig::Token>& secret : {std::optional<rig::Token>(), std::optional(token())}) {
     const Gate gate(secret);
-    const auto judgement = gate.judge({.host = "localhost", .origin = {}, .authorization = {}, .cookie = {}});
-    EXPECT_EQ(judgement.verdict, HttpVerdict::refused);
-    EXPECT_EQ(judgement.refusal, Refusal::nothing_shown);
+    const auto access =
+        gate.authorize({.host = "localhost", .origin = {}, .authorization = {}, .cookie = {}});
+    EXPECT_EQ(access.verdict, HttpVerdict::refused);
+    EXPECT_EQ(access.refusal, Refusal::nothing_shown);
   }
   // Where there is no token none is right, the empty one neither.
   for (const char* shown : {"Bearer ", "Bearer 0123456789abcdef"}) {
     EXPECT_EQ(Gate(std::nullopt)
-                  .judge({.host = "localhost", .origin = {}, .authorization = shown, .cookie = {}})
+                  .authorize({.host = "localhost", .origin = {}, .authorization = shown, .cookie = {}})
                   .refusal,
               Refusal::wrong_token);
   }
@@ -171,40 +173,42 @@ TEST(ServerAccess, ALinkOpensOnceAndItsCookieFromThenOnByTheSamePortAlone) {
   const std::string url = gate.sessions->make_link(TimePoint{1}).value();
   const HttpTarget link = *parse_target(url.substr(std::string("http://127.0.0.1:7140").size()));
   const HttpHead bare{.host = "127.0.0.1:7140", .origin = {}, .authorization = {}, .cookie = {}};
-  const HttpJudgement first = gate.judge(bare, link);
+  const HttpAccess first = gate.authorize(bare, link);
   ASSERT_EQ(first.verdict, HttpVerdict::give_cookie);
-  EXPECT_EQ(gate.judge(bare, link).refusal, Refusal::wrong_link) << "somebody else follows it";
+  EXPECT_EQ(gate.authorize(bare, link).refusal, Refusal::wrong_link) << "somebody else follows it";
   HttpHead known = bare;
   const std::string cookie = "a=b; " + first.cookie.substr(0, first.cookie.find(';')) + "; c=d";
   known.cookie = cookie;
-  EXPECT_EQ(gate.judge(known).verdict, HttpVerdict::welcome);
-  EXPECT_EQ(gate.judge(known, link).verdict, HttpVerdict::welcome) << "the browser's way back";
+  EXPECT_EQ(gate.authorize(known).verdict, HttpVerdict::granted);
+  EXPECT_EQ(gate.authorize(known, link).verdict, HttpVerdict::granted) << "the browser's way back";
   known.host = "127.0.0.1:8000";
-  EXPECT_EQ(gate.judge(known).refusal, Refusal::nothing_shown) << "another daemon's port";
+  EXPECT_EQ(gate.authorize(known).refusal, Refusal::nothing_shown) << "another daemon's port";
 }
 
 TEST(ServerAccess, BeyondThisMachineWhoShowsTheTokenIsWelcomeByWhateverName) {
   const Gate gate(token(), kTls);
-  const auto judge = [&](std::string_view authorization, std::string_view cookie, const std::string& query) {
-    return gate.judge({.host = "lab", .origin = {}, .authorization = authorization, .cookie = cookie},
-                      {.path = "/", .token = query, .link = {}});
+  const auto authorize = [&](std::string_view authorization, std::string_view cookie,
+                             const std::string& query) {
+    return gate.authorize({.host = "lab", .origin = {}, .authorization = authorization, .cookie = cookie},
+                          {.path = "/", .token = query, .link = {}});
   };
-  EXPECT_EQ(judge("Bearer " + kSecret, "", "").verdict, HttpVerdict::welcome);
-  EXPECT_EQ(judge("", "", kSecret).verdict, HttpVerdict::give_cookie);
+  EXPECT_EQ(authorize("Bearer " + kSecret, "", "").verdict, HttpVerdict::granted);
+  EXPECT_EQ(authorize("", "", kSecret).verdict, HttpVerdict::give_cookie);
   for (const std::string& wrong : {kSecret + "0", "Basic " + kSecret, "bearer" + kSecret, kSecret}) {
-    EXPECT_EQ(judge(wrong, "", "").verdict, HttpVerdict::refused) << wrong;
-    EXPECT_EQ(judge("", "emberlock_session=" + wrong, "").refusal, Refusal::unknown_session) << wrong;
+    EXPECT_EQ(authorize(wrong, "", "").verdict, HttpVerdict::refused) << wrong;
+    EXPECT_EQ(authorize("", "emberlock_session=" + wrong, "").refusal, Refusal::unknown_session) << wrong;
   }
-  EXPECT_EQ(judge("", "", kSecret + "0").refusal, Refusal::wrong_token);
+  EXPECT_EQ(authorize("", "", kSecret + "0").refusal, Refusal::wrong_token);
   // Another site's page has the cookie sent along in no browser of today; it is turned away all the same.
-  EXPECT_EQ(gate.judge({.host = "lab",
-                        .origin = "https://evil.example",
-                        .authorization = "Bearer " + kSecret,
-                        .cookie = {}})
+  EXPECT_EQ(gate.authorize({.host = "lab",
+                            .origin = "https://evil.example",
+                            .authorization = "Bearer " + kSecret,
+                            .cookie = {}})
                 .refusal,
             Refusal::foreign_origin);
   EXPECT_EQ(
-      gate.judge({.host = "lab", .origin = "http://lab", .authorization = "Bearer " + kSecret, .cookie = {}})
+      gate.authorize(
+              {.host = "lab", .origin = "http://lab", .authorization = "Bearer " + kSecret, .cookie = {}})
           .refusal,
       Refusal::foreign_origin)
       << "whoever is on the way can serve that page";

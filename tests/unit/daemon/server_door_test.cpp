@@ -253,6 +253,7 @@ TEST_F(ServerDoor, ACallThatRunsIsNotCutOffByTheNext) {
   EXPECT_EQ(ask(port, "GET", "/healthz", "", kBare).status, 0) << "there is no place";
   EXPECT_FALSE(job.ended());
   server.reset();
+  EXPECT_TRUE(wait_until([&] { return job.ended(); }));
 }
 
 // 64 of another session's that say nothing, and more: the operator's console opens, and stays.

@@ -99,19 +99,19 @@ TEST_F(ServerGrpcCalls, AJobsLastProgressArrivesWhateverItOvertook) {
   serve();
   grpc::ClientContext context;
   const auto reader = v1::Sessions::NewStub(channel())->Verify(&context, {});
-  v1::JobProgress progress;
-  while (reader->Read(&progress)) continue;
-  EXPECT_TRUE(progress.done());
+  v1::Job job;
+  while (reader->Read(&job)) continue;
+  EXPECT_EQ(job.state(), v1::Job::DONE);
   EXPECT_TRUE(reader->Finish().ok());
 }
 
 TEST_F(ServerGrpcCalls, AJobThatCannotBeginSaysWhy) {
-  api.on_job = [](const JobObserver&) { return Error{ErrorKind::bad_input, "no such session", "x"}; };
+  api.on_begin = Error{ErrorKind::bad_input, "no such session", "x"};
   serve();
   grpc::ClientContext context;
   const auto reader = v1::Sessions::NewStub(channel())->Export(&context, {});
-  v1::JobProgress progress;
-  EXPECT_FALSE(reader->Read(&progress));
+  v1::Job job;
+  EXPECT_FALSE(reader->Read(&job));
   EXPECT_EQ(reader->Finish().error_code(), grpc::INVALID_ARGUMENT);
 }
 
@@ -122,8 +122,9 @@ TEST_F(ServerGrpcCalls, AJobEndsWhenItsClientGoesInMidStream) {
   {
     grpc::ClientContext context;
     const auto reader = v1::Sessions::NewStub(channel())->Repair(&context, {});
-    v1::JobProgress progress;
-    ASSERT_TRUE(reader->Read(&progress));
+    v1::Job job;
+    ASSERT_TRUE(reader->Read(&job));
+    ASSERT_TRUE(wait_until([&] { return endless.begun(); }));
     context.TryCancel();
   }
   EXPECT_TRUE(wait_until([&] { return endless.ended(); }));

@@ -160,12 +160,14 @@ TEST_F(ServerGrpcWatch, TheServerGoesWhileClientsWatchAndJobsRun) {
   ASSERT_TRUE(watcher->Read(&status));
   grpc::ClientContext repairing;
   const auto job = v1::Sessions::NewStub(channel())->Repair(&repairing, {});
-  v1::JobProgress progress;
+  v1::Job progress;
   ASSERT_TRUE(job->Read(&progress));
+  ASSERT_TRUE(wait_until([&] { return endless.begun(); }));
   server.reset();
   EXPECT_FALSE(watcher->Read(&status));
   while (job->Read(&progress)) continue;
   EXPECT_FALSE(std::filesystem::exists(socket));
+  EXPECT_TRUE(wait_until([&] { return endless.ended(); }));
 }
 
 TEST_F(ServerGrpcWatch, AWatcherThatNeverReadsHoldsNobodyUp) {

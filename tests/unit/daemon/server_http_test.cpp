@@ -227,11 +227,12 @@ TEST_F(ServerHttpTest, AJobTellsALineForEachProgressAndItsLast) {
   const HttpAnswer answer = ask(port, "POST", "/api/v1/Sessions/Verify", R"({"session": "s"})");
   EXPECT_EQ(answer.status, 200);
   EXPECT_THAT(answer.head, HasSubstr("application/x-ndjson"));
-  EXPECT_THAT(answer.body, HasSubstr("{\"done\":true,\"report\":\"{}\"}\n\r\n0\r\n\r\n"));
+  EXPECT_THAT(answer.body, HasSubstr("\"state\":\"DONE\""));
+  EXPECT_THAT(answer.body, HasSubstr("\"outcome\":{}}\n\r\n0\r\n\r\n"));
 }
 
 TEST_F(ServerHttpTest, AJobThatCannotBeginIsAnError) {
-  api.on_job = [](const JobObserver&) { return Error{ErrorKind::bad_input, "no such session", "x"}; };
+  api.on_begin = Error{ErrorKind::bad_input, "no such session", "x"};
   serve();
   EXPECT_EQ(ask(port, "POST", "/api/v1/Sessions/Repair", R"({"session": "x"})").status, 400);
   EXPECT_EQ(ask(port, "POST", "/api/v1/Sessions/Repair", "x").status, 400);
@@ -239,10 +240,8 @@ TEST_F(ServerHttpTest, AJobThatCannotBeginIsAnError) {
 
 TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
   std::atomic<bool> seen = false;
-  api.on_job = [&](const JobObserver& observer) -> Status {
-    v1::JobProgress progress;
-    progress.set_doing("writes");
-    observer(progress);
+  api.on_job = [&](const Observer& observer) -> JobResult {
+    observer(0, "writes");
     wait_until([&] { return seen.load(); });
     return Error{ErrorKind::io, "no space left on device", "exports/flame", "Free space"};
   };
@@ -264,14 +263,16 @@ TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
   }
 }
 
-TEST_F(ServerHttpTest, AJobThatEndsWithoutSayingWhatCameOfItIsAnError) {
-  api.on_job = [](const JobObserver& observer) {
-    observer({});
-    return Status();
-  };
+TEST_F(ServerHttpTest, AJobIsCancelledByItsNumberAndSaysSo) {
+  test::EndlessJob endless;
   serve();
-  const HttpAnswer answer = ask(port, "POST", "/api/v1/Sessions/Verify", R"({"session": "s"})");
-  EXPECT_THAT(answer.body, HasSubstr(R"("code":"INTERNAL")"));
+  const UniqueFd client = begin(endless);
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Jobs/Cancel", R"({"id": 77})").status, 409);
+  EXPECT_EQ(ask(port, "POST", "/api/v1/Jobs/Cancel", R"({"id": 1})").status, 200);
+  std::string answer;
+  for (char c = 0; ::read(client.get(), &c, 1) == 1;) answer += c;
+  EXPECT_THAT(answer, HasSubstr("ended early, as asked"));
+  EXPECT_TRUE(endless.ended());
 }
 
 TEST_F(ServerHttpTest, AJobEndsWhenItsClientGoesInMidStream) {
@@ -286,7 +287,7 @@ TEST_F(ServerHttpTest, TheServerGoesWhileJobsRun) {
   serve();
   const UniqueFd client = begin(endless);
   server.reset();
-  EXPECT_TRUE(endless.ended());
+  EXPECT_TRUE(wait_until([&] { return endless.ended(); }));
 }
 
 TEST_F(ServerHttpTest, HealthAndMetricsFollowTheEngine) {

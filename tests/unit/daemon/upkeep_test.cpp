@@ -27,9 +27,16 @@ void record_raw(const std::filesystem::path& folder) {
   record(folder, kUpkeptLayout, kUpkeptFrames, small_disk_options(session::Encoding::raw_nut));
 }
 
-bool in_work(const WorkQueue& queue) {
-  const auto jobs = queue.progress();
-  return !jobs.empty() && jobs.front().state() == v1::BackgroundJob::RUNNING;
+bool in_work(const Jobs& jobs) {
+  const auto list = jobs.list();
+  return !list.empty() && list.front().state() == v1::Job::RUNNING;
+}
+
+/// Tells whether each was compressed.
+UpkeepTold compressed_into(std::map<std::string, std::string>& outcomes) {
+  return {.compressed = [&](const std::string& session, const JobResult& result) {
+    outcomes[session] = result.ok() ? "" : result.error().message();
+  }};
 }
 
 TEST(Upkeep, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
@@ -37,13 +44,12 @@ TEST(Upkeep, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
   record_raw(temp / "a");
   record_raw(temp / "b");
   record(temp / "compressed already", kUpkeptLayout, 3, small_disk_options());
-  std::map<std::string, bool> outcomes;
-  WorkQueue queue;
-  for (const std::string name : {"a", "b", "a", "compressed already"})
-    queue.add(
-        compression_of(temp / name, [&, name](const Status& outcome) { outcomes[name] = outcome.ok(); }));
-  queue.drain();
-  EXPECT_EQ(outcomes, (std::map<std::string, bool>{{"a", true}, {"b", true}}));
+  std::map<std::string, std::string> outcomes;
+  Jobs jobs;
+  for (const char* name : {"a", "b", "a", "compressed already"})
+    compress_later(temp / name, jobs, compressed_into(outcomes));
+  jobs.drain();
+  EXPECT_EQ(outcomes, (std::map<std::string, std::string>{{"a", ""}, {"b", ""}}));
   for (const char* name : {"a", "b"}) {
     EXPECT_FALSE(is_uncompressed(temp / name));
     const auto check = session::verify_session(temp / name);
@@ -51,23 +57,23 @@ TEST(Upkeep, CompressesWhatIsAddedAndTellsOfEachThatNeededIt) {
     EXPECT_TRUE(check->whole());
     EXPECT_EQ(check->cameras.at(0).good, kUpkeptFrames);
   }
-  EXPECT_TRUE(queue.progress().empty());
+  EXPECT_TRUE(jobs.list().empty());
 }
 
 TEST(Upkeep, CompressionEndedInTheMidstIsTakenUpByTheNext) {
   const TempFolder temp;
   record_raw(temp / "a");
   {
-    WorkQueue queue;
-    queue.add(compression_of(temp / "a"));
-    while (is_uncompressed(temp / "a") && !in_work(queue)) std::this_thread::yield();
+    Jobs jobs;
+    compress_later(temp / "a", jobs, {});
+    while (is_uncompressed(temp / "a") && !in_work(jobs)) std::this_thread::yield();
   }
   auto check = session::verify_session(temp / "a");
   ASSERT_TRUE(check) << check.error().message();
   EXPECT_TRUE(check->whole());
-  WorkQueue queue;
-  queue.add(compression_of(temp / "a"));
-  queue.drain();
+  Jobs jobs;
+  compress_later(temp / "a", jobs, {});
+  jobs.drain();
   EXPECT_FALSE(is_uncompressed(temp / "a"));
   check = session::verify_session(temp / "a");
   ASSERT_TRUE(check) << check.error().message();
@@ -83,13 +89,9 @@ TEST(Upkeep, AFailureIsToldAndKeepsWhatCanBeRead) {
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
   test::put_bytes(segment, bytes);
   std::map<std::string, std::string> outcomes;
-  WorkQueue queue;
-  for (const std::string name : {"damaged", "next"}) {
-    queue.add(compression_of(temp / name, [&, name](const Status& outcome) {
-      outcomes[name] = outcome.ok() ? "" : outcome.error().message();
-    }));
-  }
-  queue.drain();
+  Jobs jobs;
+  for (const char* name : {"damaged", "next"}) compress_later(temp / name, jobs, compressed_into(outcomes));
+  jobs.drain();
   EXPECT_NE(outcomes["damaged"].find("000000.nut"), std::string::npos) << outcomes["damaged"];
   EXPECT_EQ(outcomes["next"], "");
   const auto check = session::verify_session(temp / "damaged");
@@ -109,11 +111,11 @@ void leave_killed_session(const std::filesystem::path& folder,
 struct Told {
   UpkeepTold told() {
     return {.salvaged =
-                [this](const std::string& session, const Result<session::SalvageReport>& outcome) {
+                [this](const std::string& session, const JobResult& outcome) {
                   lines.push_back("salvaged " + session + (outcome.ok() ? "" : ": it failed"));
                 },
             .compressed =
-                [this](const std::string& session, const Status& outcome) {
+                [this](const std::string& session, const JobResult& outcome) {
                   lines.push_back("compressed " + session + (outcome.ok() ? "" : ": it failed"));
                 }};
   }
@@ -130,11 +132,11 @@ TEST(Upkeep, WhatAnEarlierDaemonLeftIsSalvagedFirstAndThenCompressed) {
   test::put_bytes(store.folder() / "a file", "");
   Told told;
   {
-    WorkQueue queue;
-    take_up(store, queue, rig::RecordingConfig::Transcode::when_idle, told.told());
-    EXPECT_TRUE(check_not_salvaged(queue, "b finished").ok());
-    queue.drain();
-    EXPECT_TRUE(check_not_salvaged(queue, "c killed").ok());
+    Jobs jobs;
+    take_up(store, jobs, rig::RecordingConfig::Transcode::when_idle, told.told());
+    EXPECT_TRUE(check_not_salvaged(jobs, "b finished").ok());
+    jobs.drain();
+    EXPECT_TRUE(check_not_salvaged(jobs, "c killed").ok());
   }
   EXPECT_THAT(told.lines, testing::ElementsAre("salvaged c killed", "salvaged d killed raw",
                                                "compressed d killed raw", "compressed a raw"));
@@ -148,18 +150,18 @@ TEST(Upkeep, ASessionThatWaitsForSalvageIsRefusedForAllElseAndSaysSo) {
   const TempFolder temp;
   const session::SessionStore store = session::SessionStore::open(temp / "store").value();
   leave_killed_session(store.folder() / "killed");
-  WorkQueue queue;
-  queue.pause();
-  take_up(store, queue, rig::RecordingConfig::Transcode::never, {});
-  const Status refused = check_not_salvaged(queue, "killed");
+  Jobs jobs;
+  jobs.pause();
+  take_up(store, jobs, rig::RecordingConfig::Transcode::never, {});
+  const Status refused = check_not_salvaged(jobs, "killed");
   ASSERT_FALSE(refused.ok());
   EXPECT_EQ(refused.error().kind, ErrorKind::refused);
   EXPECT_THAT(refused.error().message(), testing::HasSubstr("waits to be salvaged"));
-  ASSERT_EQ(queue.progress().size(), 1U);
-  EXPECT_EQ(queue.progress()[0].state(), v1::BackgroundJob::PAUSED);
-  queue.resume();
-  queue.drain();
-  EXPECT_TRUE(check_not_salvaged(queue, "killed").ok());
+  ASSERT_EQ(jobs.list().size(), 1U);
+  EXPECT_EQ(jobs.list()[0].state(), v1::Job::PAUSED);
+  jobs.resume();
+  jobs.drain();
+  EXPECT_TRUE(check_not_salvaged(jobs, "killed").ok());
   EXPECT_TRUE(session::SessionReader::open(store.folder() / "killed").ok());
 }
 
@@ -170,9 +172,9 @@ TEST(Upkeep, ASessionThatSomebodyStillRecordsStaysAsItIs) {
                                               test::manifest_of({kUpkeptLayout}), small_disk_options());
   ASSERT_TRUE(alive);
   Told told;
-  WorkQueue queue;
-  take_up(store, queue, rig::RecordingConfig::Transcode::never, told.told());
-  queue.drain();
+  Jobs jobs;
+  take_up(store, jobs, rig::RecordingConfig::Transcode::never, told.told());
+  jobs.drain();
   EXPECT_THAT(told.lines, testing::ElementsAre("salvaged recorded now: it failed"));
   EXPECT_EQ(session::read_manifest(store.folder() / "recorded now")->state(), v1::Manifest::RECORDING);
 }
@@ -182,16 +184,16 @@ TEST(Upkeep, EndedInMidSalvageTheNextStartGoesOnAndLosesNothing) {
   const session::SessionStore store = session::SessionStore::open(temp / "store").value();
   leave_killed_session(store.folder() / "killed");
   {
-    WorkQueue queue;
-    take_up(store, queue, rig::RecordingConfig::Transcode::never, {});
-    while (!in_work(queue) &&
+    Jobs jobs;
+    take_up(store, jobs, rig::RecordingConfig::Transcode::never, {});
+    while (!in_work(jobs) &&
            session::read_manifest(store.folder() / "killed")->state() == v1::Manifest::RECORDING)
       std::this_thread::yield();
   }
   Told told;
-  WorkQueue queue;
-  take_up(store, queue, rig::RecordingConfig::Transcode::never, told.told());
-  queue.drain();
+  Jobs jobs;
+  take_up(store, jobs, rig::RecordingConfig::Transcode::never, told.told());
+  jobs.drain();
   EXPECT_LE(told.lines.size(), 1U);
   const auto check = session::verify_session(store.folder() / "killed");
   ASSERT_TRUE(check) << check.error().message();

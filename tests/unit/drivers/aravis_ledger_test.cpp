@@ -8,8 +8,8 @@
 namespace emberlock::drivers::aravis {
 namespace {
 
-std::uint64_t number(FrameLedger& ledger, std::uint64_t id, Fate fate = Fate::delivered) {
-  return ledger.record(id, fate);
+std::uint64_t number(FrameLedger& ledger, std::uint64_t id, FrameOutcome outcome = FrameOutcome::delivered) {
+  return ledger.record(id, outcome);
 }
 
 std::uint64_t all_of(const FrameCounts& c) { return c.delivered + c.damaged + c.lost() + c.passed_over; }
@@ -51,8 +51,8 @@ TEST(FrameLedger, ACountThatBeginsAnewAddsNoGap) {
 TEST(FrameLedger, FramesWithoutANumberExplainTheGapTheyLieIn) {
   FrameLedger ledger;
   number(ledger, 10);
-  ledger.unnumbered(Fate::transport);
-  ledger.unnumbered(Fate::resend);
+  ledger.unnumbered(FrameOutcome::transport);
+  ledger.unnumbered(FrameOutcome::resend);
   EXPECT_EQ(number(ledger, 14), 4U);  // 11 .. 13: one more than was heard of
   EXPECT_EQ(ledger.counts(), (FrameCounts{.delivered = 2, .camera_gap = 1, .transport = 1, .resend = 1}));
 }
@@ -60,25 +60,25 @@ TEST(FrameLedger, FramesWithoutANumberExplainTheGapTheyLieIn) {
 TEST(FrameLedger, APieceAtTheEdgeOfAnUnderrunIsOfTheUnderrun) {
   FrameLedger ledger;
   number(ledger, 10);
-  ledger.unnumbered(Fate::transport);
-  EXPECT_EQ(ledger.record(14, Fate::delivered, Fate::underrun), 4U);
+  ledger.unnumbered(FrameOutcome::transport);
+  EXPECT_EQ(ledger.record(14, FrameOutcome::delivered, FrameOutcome::underrun), 4U);
   EXPECT_EQ(ledger.counts(), (FrameCounts{.delivered = 2, .underrun = 3}));
 }
 
 TEST(FrameLedger, TwoPiecesOfOneFrameAreOneFrame) {
   FrameLedger ledger;
   number(ledger, 10);
-  ledger.unnumbered(Fate::transport);
-  ledger.unnumbered(Fate::transport);
+  ledger.unnumbered(FrameOutcome::transport);
+  ledger.unnumbered(FrameOutcome::transport);
   EXPECT_EQ(number(ledger, 12), 2U);
   EXPECT_EQ(ledger.counts(), (FrameCounts{.delivered = 2, .transport = 1}));
 }
 
 TEST(FrameLedger, FramesWithoutANumberBeforeTheFirstAndAfterTheLastCountToo) {
   FrameLedger ledger;
-  ledger.unnumbered(Fate::transport);
+  ledger.unnumbered(FrameOutcome::transport);
   EXPECT_EQ(number(ledger, 3), 1U);
-  ledger.unnumbered(Fate::transport);
+  ledger.unnumbered(FrameOutcome::transport);
   ledger.begin_anew();
   EXPECT_EQ(ledger.counts(), (FrameCounts{.delivered = 1, .transport = 2}));
 }
@@ -88,8 +88,9 @@ TEST(FrameLedger, TheNextNumberIsTheSumOfAllCounts) {
   std::uint64_t id = 65000;
   for (int i = 0; i < 2000; ++i) {
     id = (id + static_cast<std::uint64_t>(i % 4 == 0 ? 2 : 1) - 1) % 65535 + 1;
-    ledger.record(id, static_cast<Fate>(i % 7), i % 3 == 0 ? Fate::underrun : Fate::camera_gap);
-    if (i % 11 == 0) ledger.unnumbered(Fate::resend);
+    ledger.record(id, static_cast<FrameOutcome>(i % 7),
+                  i % 3 == 0 ? FrameOutcome::underrun : FrameOutcome::camera_gap);
+    if (i % 11 == 0) ledger.unnumbered(FrameOutcome::resend);
     if (i % 501 == 0) ledger.begin_anew();
     EXPECT_EQ(ledger.next_number(), all_of(ledger.counts()));
   }

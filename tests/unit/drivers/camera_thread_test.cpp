@@ -49,6 +49,7 @@ class Desk {
     if (taken_ == made_) return {};
     return taken_++;
   }
+  std::atomic<bool> computes{false};  ///< next_frame doesn't come to an end for want of a faster processor
   void hang() { set(true); }
   void go_on() { set(false); }
   void pass_hang() {
@@ -95,6 +96,8 @@ class DeskCamera final : public Camera {
   }
   Result<Frame> next_frame(Seconds deadline) override {
     desk_->pass_hang();
+    while (desk_->computes) {
+    }
     if (!filming_) return Error{ErrorKind::device, "it does not film", "camera c7", {}};
     if (!desk_->plugged) {
       filming_ = false;
@@ -220,6 +223,19 @@ TEST_F(CameraThreadTest, OneThatHangsIsQuarantinedUntilItGoesOn) {
   desk->make_frames(1);
   desk->go_on();
   until([&] { return camera->state() == State::filming; });
+  EXPECT_TRUE(camera->next_frame(kSoon).ok());
+}
+
+TEST_F(CameraThreadTest, OneThatComputesForTooLongDoesNotHang) {
+  ASSERT_TRUE(camera->start().ok());
+  desk->computes = true;
+  until([&] { return camera->overworked(); });
+  EXPECT_EQ(camera->state(), State::filming);
+  EXPECT_FALSE(camera->trouble());
+  EXPECT_EQ(camera->next_frame(milliseconds(30)).error().kind, ErrorKind::timed_out);
+  desk->computes = false;
+  until([&] { return !camera->overworked(); });
+  desk->make_frames(1);
   EXPECT_TRUE(camera->next_frame(kSoon).ok());
 }
 

@@ -40,7 +40,7 @@ ProbeFilm even_film(const std::vector<std::uint64_t>& lost = {}) {
 }
 
 TEST(Probe, AnEvenCameraIsGoodAndItsRateExact) {
-  const ProbeVerdict verdict = judge(even_film(), {});
+  const ProbeVerdict verdict = assess(even_film(), {});
   EXPECT_EQ(verdict.fitness, Fitness::good);
   EXPECT_NEAR(verdict.rate.value(), 25, 1e-9);
   EXPECT_NEAR(*verdict.megabits, 640 * 480 * 8e-6 * 25, 1e-6);
@@ -48,18 +48,18 @@ TEST(Probe, AnEvenCameraIsGoodAndItsRateExact) {
 }
 
 TEST(Probe, LostFramesAreSaidByCauseAndDoNotBendTheRate) {
-  const ProbeVerdict few = judge(even_film({50}), {});
+  const ProbeVerdict few = assess(even_film({50}), {});
   EXPECT_NEAR(few.rate.value(), 25, 1e-9);
   EXPECT_EQ(few.fitness, Fitness::poor);
   EXPECT_THAT(finding(few, "frames").measured, HasSubstr("1 lost on the way"));
   EXPECT_THAT(finding(few, "frames").remedy, HasSubstr("cable"));
-  EXPECT_EQ(judge(even_film({10, 11, 12, 13}), {}).fitness, Fitness::unfit);
+  EXPECT_EQ(assess(even_film({10, 11, 12, 13}), {}).fitness, Fitness::unfit);
 }
 
 TEST(Probe, ACameraThatKeepsAnotherRateThanItSaysIsPoor) {
   ProbeFilm film = even_film();
   film.info.frame_rate = Hertz(30);
-  const ProbeVerdict verdict = judge(film, {});
+  const ProbeVerdict verdict = assess(film, {});
   EXPECT_EQ(finding(verdict, "rate").fitness, Fitness::poor);
   EXPECT_THAT(finding(verdict, "rate").measured, HasSubstr("25.0000 frames/s"));
 }
@@ -69,10 +69,10 @@ TEST(Probe, UnevenArrivalCountsWhereFramesCouldBeMistaken) {
   for (std::size_t i = 0; i < film.stamps.size(); i += 2) {
     film.stamps[i].monotonic_time = film.stamps[i].monotonic_time + milliseconds(3);
   }
-  EXPECT_NEAR(in_milliseconds(judge(film, {}).arrival_jitter), 1.5, .01);
-  EXPECT_EQ(judge(film, {}).fitness, Fitness::good);
+  EXPECT_NEAR(in_milliseconds(assess(film, {}).arrival_jitter), 1.5, .01);
+  EXPECT_EQ(assess(film, {}).fitness, Fitness::good);
   film.stamps[40].monotonic_time = film.stamps[40].monotonic_time + milliseconds(15);
-  EXPECT_EQ(finding(judge(film, {}), "arrival").fitness, Fitness::poor);
+  EXPECT_EQ(finding(assess(film, {}), "arrival").fitness, Fitness::poor);
 }
 
 TEST(Probe, TheCamerasOwnClockIsBelievedWhereItSaysWhatItMarks) {
@@ -81,21 +81,21 @@ TEST(Probe, TheCamerasOwnClockIsBelievedWhereItSaysWhatItMarks) {
   for (FrameStamp& stamp : film.stamps) {
     stamp.device_time = TimePoint{} + milliseconds(39.999) * static_cast<double>(stamp.frame_id);
   }
-  EXPECT_NEAR(judge(film, {}).rate.value(), 1000 / 39.999, 1e-6);
+  EXPECT_NEAR(assess(film, {}).rate.value(), 1000 / 39.999, 1e-6);
 }
 
 TEST(Probe, AFullLinkIsPoor) {
-  EXPECT_EQ(finding(judge(even_film(), 480.), "bandwidth").fitness, Fitness::good);
-  EXPECT_THAT(finding(judge(even_film(), 480.), "bandwidth").measured, HasSubstr("87 % left"));
-  EXPECT_EQ(finding(judge(even_film(), 65.), "bandwidth").fitness, Fitness::poor);
+  EXPECT_EQ(finding(assess(even_film(), 480.), "bandwidth").fitness, Fitness::good);
+  EXPECT_THAT(finding(assess(even_film(), 480.), "bandwidth").measured, HasSubstr("87 % left"));
+  EXPECT_EQ(finding(assess(even_film(), 65.), "bandwidth").fitness, Fitness::poor);
 }
 
 TEST(Probe, ACameraThatFailsMeanwhileIsUnfitAndItsErrorIsSaid) {
   ProbeFilm film = even_film();
   film.failed = Error{ErrorKind::device, "it was unplugged", "camera c7", "plug it in"};
-  EXPECT_EQ(judge(film, {}).fitness, Fitness::unfit);
-  EXPECT_THAT(finding(judge(film, {}), "ended").measured, HasSubstr("unplugged"));
-  EXPECT_EQ(judge({}, {}).fitness, Fitness::unfit);
+  EXPECT_EQ(assess(film, {}).fitness, Fitness::unfit);
+  EXPECT_THAT(finding(assess(film, {}), "ended").measured, HasSubstr("unplugged"));
+  EXPECT_EQ(assess({}, {}).fitness, Fitness::unfit);
 }
 
 TEST(Probe, AVirtualCameraShowsItsTrueRateAndResetDelay) {
@@ -106,7 +106,7 @@ TEST(Probe, AVirtualCameraShowsItsTrueRateAndResetDelay) {
   const auto rig = testing_support::small_rig({camera}, {});
   const ProbeFilm film =
       film_probe(rig->camera(0), {.film = Seconds(20), .resets = 100}, rig->clock(), {}).value();
-  const ProbeVerdict verdict = judge(film, {});
+  const ProbeVerdict verdict = assess(film, {});
   EXPECT_EQ(verdict.fitness, Fitness::good);
   EXPECT_NEAR(verdict.rate.value(), 24 * (1 + 150e-6), 1e-6);
   EXPECT_EQ(film.counts.lost(), 0);

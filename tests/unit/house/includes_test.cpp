@@ -6,6 +6,7 @@
 #include <map>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -118,6 +119,38 @@ TEST(House, TheListOfInnerFoldersIsTheirs) {
   for (const auto& [house, order] : kInnerOrder)
     for (const std::string& inner : order)
       EXPECT_TRUE(fs::is_directory(kRoot / house / inner)) << house << '/' << inner;
+}
+
+/// The room that a library of CMake's belongs to: "emberlock::drivers_v4l2", or "emberlock_drivers_v4l2".
+std::string room_of(std::string library) {
+  library = library.substr(library.starts_with("emberlock::") ? 11 : 10);
+  if (library == "ccd_model") return "smear_sync";
+  if (library == "grpc") return "proto";
+  if (library == "version") return "base";
+  const std::string first = library.substr(0, library.find('_'));  // drivers_v4l2, cli_client
+  return library == "smear_sync" ? library : first;
+}
+
+/// links.txt is what CMake was told to link.
+TEST(House, ARoomLinksOnlyWhatStandsAboveIt) {
+  std::ifstream file(fs::path(EMBERLOCK_BUILD_DIR) / "links.txt");
+  std::set<std::string> rooms;
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string library;
+    words >> library;
+    if (!library.starts_with("emberlock_") || !kMayInclude.contains(room_of(library))) continue;  // programs
+    const std::string room = room_of(library);
+    rooms.insert(room);
+    for (std::string link; words >> link;) {
+      if (!link.starts_with("emberlock::")) continue;
+      const bool of_virtual = library == "emberlock_drivers_virtual" && link == "emberlock::ccd_model";
+      EXPECT_TRUE(room_of(link) == room || kMayInclude.at(room).contains(room_of(link)) || of_virtual)
+          << library << " links " << link << ", which " << room << "/ may not";
+    }
+  }
+  for (const char* room : {"base", "smear_sync", "session", "recon", "films", "evaluate", "report", "cli"})
+    EXPECT_TRUE(rooms.contains(room)) << room << " is not in links.txt";
 }
 
 /// Headers that include each other are one in two files.

@@ -5,6 +5,7 @@
 #include <map>
 #include <regex>
 #include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -101,6 +102,35 @@ TEST(House, EverySourceNamesItsLicence) {
 
 TEST(House, NoSourceIsLongerThan450Lines) {
   for (const Source& source : ship_sources()) EXPECT_LE(source.lines.size(), 450U) << source.path;
+}
+
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+/// CONTRIBUTING.md shows code of examples that are built and run, as it stands there.
+TEST(House, WhatContributingQuotesIsBuilt) {
+  std::string built;
+  for (const char* folder : {"tests/unit/examples", "tests/integration/library/program"})
+    for (const auto& entry : fs::directory_iterator(kSources / folder)) built += text_of(entry.path());
+  std::istringstream page(text_of(kSources / "CONTRIBUTING.md"));
+  int quotations = 0;
+  std::string quoted;
+  bool inside = false;
+  for (std::string line; std::getline(page, line);) {
+    if (!line.starts_with("```")) {
+      if (inside) quoted += line + "\n";
+      continue;
+    }
+    if (inside) {
+      ++quotations;
+      EXPECT_NE(built.find(quoted), std::string::npos) << quoted;
+    }
+    inside = !inside;
+    quoted.clear();
+  }
+  EXPECT_GE(quotations, 6);
 }
 
 /// As clang-format lays them out: from the line that opens it to the brace under its first letter.

@@ -25,10 +25,11 @@ void expect_transpose(const RayList& list, double sigma, const std::vector<Rgba>
   const auto x = random_quads<Real>(list.grid.size(), 5);
   const auto y = random_quads<Real>(list.rays.size(), 6);
   const std::vector<Rgba> black(list.rays.size());
-  const Judge<Real> judge{black.data(), background.empty() ? nullptr : background.data(), nullptr, 0};
+  const PixelResidual<Real> residual_of{black.data(), background.empty() ? nullptr : background.data(),
+                                        nullptr, 0};
   const auto judged = [&](const std::vector<Quad<Real>>& volume) {
     auto residual = march->forward(absorb, volume, static_cast<Real>(sigma));
-    for (std::size_t r = 0; r < residual.size(); ++r) residual[r] = judge(r, residual[r]);
+    for (std::size_t r = 0; r < residual.size(); ++r) residual[r] = residual_of(r, residual[r]);
     return residual;
   };
   const double left = dot(judged(x), y) - dot(judged(std::vector<Quad<Real>>(x.size())), y);
@@ -44,10 +45,11 @@ void expect_transpose_of_field(const RayList& list, double sigma, const std::vec
   const auto x = random_quads<Real>(list.grid.size(), 5, 1, 2 * sigma);
   const auto dark = random_quads<Real>(list.grid.size(), 5, 0, 2 * sigma);
   const std::vector<Rgba> black(list.rays.size());
-  const Judge<Real> judge{black.data(), background.empty() ? nullptr : background.data(), nullptr, 0};
-  auto field = march->field_forward(x, judge);
+  const PixelResidual<Real> residual_of{black.data(), background.empty() ? nullptr : background.data(),
+                                        nullptr, 0};
+  auto field = march->field_forward(x, residual_of);
   const auto y = random_quads<Real>(list.rays.size(), 6);
-  const double left = dot(field.residual, y) - dot(march->field_forward(dark, judge).residual, y);
+  const double left = dot(field.residual, y) - dot(march->field_forward(dark, residual_of).residual, y);
   field.residual = y;
   const double right = dot(x, march->field_adjoint(field));
   ASSERT_GT(left, 10);
@@ -74,13 +76,13 @@ TEST_P(Adjoint, OfCurvedRaysIsTheTransposeInDoublePrecision) { expect_transposes
 /// Two views of a medium with holes, through even gas or a lens of it.
 Problem problem_of(const RefractiveIndex* gas, Pool& pool) {
   const MarchCase c = march_case();
-  const View a{"a", c.cameras[0], RadianceImage(c.cameras[0].intrinsics.size)};
-  const View b{"b", c.cameras[1], RadianceImage(c.cameras[1].intrinsics.size)};
+  const View a{"a", c.cameras[0], share(RadianceImage(c.cameras[0].intrinsics.size))};
+  const View b{"b", c.cameras[1], share(RadianceImage(c.cameras[1].intrinsics.size))};
   ProblemOptions options;
   options.gas = gas;
   options.subsets = 3;
   options.subset_of = [](std::size_t view, int x, int y) { return (x + y + static_cast<int>(view)) % 4 - 1; };
-  return pose({&a, &b}, c.medium, options, pool);
+  return make_problem({&a, &b}, c.medium, options, pool);
 }
 
 /// <A x, A x> = <x, A^T A x>, over every subset, of what the engine itself gives back.

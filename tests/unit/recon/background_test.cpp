@@ -147,7 +147,7 @@ TEST_P(BackgroundTest, EveryRayFindsItsOwnPixelInItsOwnViewsPicture) {
   const Holes holes;
   View with;
   with.camera = holes.camera;
-  with.background = noise({24, 20});
+  with.background = share(noise({24, 20}));
   View without;
   without.camera = camera_at({0, 0.3, 0.1}, {24, 20}, 18);
   Pool pool(1, device_here());
@@ -175,9 +175,9 @@ TEST(Background, PictureOfAnotherSizeIsRefusedByItsViewsName) {
   view.name = "left";
   view.camera = camera_at({0.5, 0, 0}, {3, 3}, 300);
   EXPECT_TRUE(check(Background{Background::Kind::image, {}}, view).ok());
-  view.background = RadianceImage({3, 3});
+  view.background = share(RadianceImage({3, 3}));
   EXPECT_TRUE(check(Background{Background::Kind::image, {}}, view).ok());
-  view.background = RadianceImage({3, 4});
+  view.background = share(RadianceImage({3, 4}));
   EXPECT_TRUE(check(Background{}, view).ok());
   const Status status = check(Background{Background::Kind::image, {}}, view);
   ASSERT_FALSE(status.ok());

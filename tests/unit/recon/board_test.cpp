@@ -6,7 +6,7 @@
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
 
-#include "tests/support/rendered_board.h"
+#include "recon/synthetic/carried_board.h"
 
 namespace emberlock::recon {
 namespace {
@@ -61,7 +61,7 @@ TEST(Board, AChessboardsCornersAreFoundToAFractionOfAPixelFromAnySide) {
   const Board board = *parse_board("chessboard:9x6:18mm");
   for (const double angle : {0.0, 0.3, M_PI, M_PI / 2}) {
     const Rigid3 pose = turned_board(board, angle);
-    const auto corners = find_board(test::rendered_board(watcher(), board, pose).view(), board);
+    const auto corners = find_board(board_picture(watcher(), board, pose).view(), board);
     ASSERT_EQ(corners.size(), 54U) << angle;
     EXPECT_LT(worst_corner(corners, board, watcher(), pose), 0.35)
         << "wrong ids are tens of pixels off: " << angle;
@@ -108,7 +108,7 @@ TEST(Board, PartOfACharucoBoardHasItsNumbers) {
   const std::vector<int> visible = corners_with_markers(board, camera, pose);
   EXPECT_GE(visible.size(), 12U);
   EXPECT_LE(visible.size(), 36U) << "of 48";
-  const auto corners = find_board(test::rendered_board(camera, board, pose).view(), board);
+  const auto corners = find_board(board_picture(camera, board, pose).view(), board);
   std::vector<int> found;
   found.reserve(corners.size());
   for (const BoardCorner& corner : corners) found.push_back(corner.id);

@@ -12,9 +12,11 @@
 #include "recon/adjust/find_motion.h"
 #include "recon/adjust/find_pointing.h"
 #include "recon/adjust/left_out_views.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/render/render.h"
 #include "tests/support/ball_scene.h"
 #include "tests/support/devices.h"
+#include "tests/support/edit_view.h"
 
 namespace emberlock::recon {
 namespace {
@@ -31,9 +33,9 @@ struct Posed {
     for (const View& view : scene.views) {
       if (view.role != ViewRole::input) continue;
       setup.views.push_back(&view);
-      setup.boxes.push_back({0, 0, view.image.size.width, view.image.size.height});
+      setup.boxes.push_back({0, 0, view.image->size.width, view.image->size.height});
     }
-    level = pose_level(setup, hull, 1, most_subsets);
+    level = make_level(setup, hull, 1, most_subsets);
   }
   [[nodiscard]] std::vector<Rgba> dark() const { return std::vector<Rgba>(level.problem.active.size()); }
 
@@ -113,6 +115,24 @@ TEST_P(DescentOn, WhatTheLastPassDidIsJudgedBeforeAnybodyTakesIt) {
     for (int c = 0; c < 4; ++c) ASSERT_EQ(x[p].c[c], settled[p].c[c]);
 }
 
+TEST_P(DescentOn, WhatWasKeptIsTakenWhereItShowsNoMoreError) {
+  const Posed posed(ball_of(64), 12, 1);
+  Descent wild = wild_one(posed, 64);
+  wild.pass();
+  const double dark = wild.kept_error();
+  const double overshot = wild.judge();
+  ASSERT_GT(overshot, dark);
+  EXPECT_TRUE(wild.take_kept(overshot));
+  EXPECT_EQ(wild.fit_error(), dark);
+
+  Descent sound(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, posed.dark());
+  after_passes(sound, 5);
+  const double last = sound.judge();
+  EXPECT_LT(last, sound.kept_error());
+  EXPECT_FALSE(sound.take_kept(last));
+  EXPECT_EQ(sound.fit_error(), last);
+}
+
 TEST_P(DescentOn, StepsStayHalvedAndCountedThoughTheLightIsScatteredAnew) {
   const Posed posed(ball_of(64), 12, 1);
   Descent wild = wild_one(posed, 64);
@@ -152,12 +172,12 @@ TEST_P(DescentOn, OneIterationsErrorIsThatOfWhatItMade) {
   int views = 0;
   for (const View& view : scene.views) {
     if (view.role != ViewRole::input) continue;
-    const PixelBox box = flame_mask(view.image, noise_threshold(view.image)).box;
+    const PixelBox box = flame_mask(*view.image, noise_threshold(*view.image)).box;
     const auto squared = [&](const RadianceImage& image) {
-      const double error = all_channels(rmse(image, view.image, box));
+      const double error = all_channels(rmse(image, *view.image, box));
       return error * error;
     };
-    black += squared(RadianceImage(view.image.size));
+    black += squared(RadianceImage(view.image->size));
     shown += squared(render_view(r->volume, r->hull, {}, view.camera));
     ++views;
   }
@@ -169,8 +189,8 @@ TEST_P(DescentOn, OneIterationsErrorIsThatOfWhatItMade) {
 /// A picture that no steps can fit.
 Scene with_an_infinite_pixel() {
   Scene scene = ball_of(64);
-  View& view = scene.views[1];
-  view.image.rgb[3 * static_cast<std::size_t>(24 * 64 + 32)] = INFINITY;
+  edit(scene.views[1].image,
+       [](RadianceImage& image) { image.rgb[3 * static_cast<std::size_t>(24 * 64 + 32)] = INFINITY; });
   return scene;
 }
 
@@ -238,7 +258,7 @@ Scene ball_before_a_wall(const Effects& effects, double light, double extinction
         for (std::size_t c = 0; c < 3; ++c) truth.emission[3 * p + c] = static_cast<float>(light * share);
         truth.extinction[p] = static_cast<float>(extinction * share);
       }
-  for (View& view : scene.views) view.image = render_view(truth, medium, effects, view.camera);
+  for (View& view : scene.views) view.image = share(render_view(truth, medium, effects, view.camera));
   return scene;
 }
 

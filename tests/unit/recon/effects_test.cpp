@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "recon/adjust/choose_effects.h"
+#include "recon/adjust/picture_error.h"
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "recon/pipeline/grid_choice.h"
+#include "tests/support/edit_view.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -49,10 +50,11 @@ TEST(FindBoxTest, HoldsTheFlameAndLittleMore) {
 TEST(FindBoxTest, ASpeckThatOneViewAloneShowsChangesNothing) {
   Scene scene = small_flame_scene();
   const auto before = find_box(scene, flame_masks(scene));
-  for (int y = 2; y < 6; ++y)
-    for (int x = 150; x < 155; ++x)
-      for (std::size_t c = 0; c < 3; ++c)
-        scene.views[3].image.rgb[3 * static_cast<std::size_t>(160 * y + x) + c] = 200;
+  edit(scene.views[3].image, [](RadianceImage& image) {
+    for (int y = 2; y < 6; ++y)
+      for (int x = 150; x < 155; ++x)
+        for (std::size_t c = 0; c < 3; ++c) image.rgb[3 * static_cast<std::size_t>(160 * y + x) + c] = 200;
+  });
   const auto after = find_box(scene, flame_masks(scene));
   ASSERT_TRUE(before.ok() && after.ok());
   EXPECT_LT((before->center - after->center).norm(), 5e-3);
@@ -70,7 +72,7 @@ TEST(FindBoxTest, ASmallerBoxTakesFewerVoxels) {
 
 TEST(FindBoxTest, ADarkViewIsNamed) {
   Scene scene = small_flame_scene();
-  std::fill(scene.views[4].image.rgb.begin(), scene.views[4].image.rgb.end(), 0.F);
+  scene.views[4].image = share(RadianceImage({160, 120}));
   const auto box = find_box(scene, flame_masks(scene));
   ASSERT_FALSE(box.ok());
   EXPECT_THAT(box.error().message(), HasSubstr("camera 4"));

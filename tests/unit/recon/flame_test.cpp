@@ -61,7 +61,7 @@ TEST(PaperScene, IsTheTenPlusOneViewsOfThePaper) {
             1);
   for (const View& view : scene.views) {
     EXPECT_NEAR(view.camera.center().norm(), 0.3, 1e-9);
-    const float brightest = *std::max_element(view.image.rgb.begin(), view.image.rgb.end());
+    const float brightest = *std::max_element(view.image->rgb.begin(), view.image->rgb.end());
     EXPECT_GT(brightest, 120);
     EXPECT_LT(brightest, 256);
   }

@@ -33,8 +33,8 @@ class MarchHardCase : public OnEachDevice {
   /// The same emission everywhere, 1 a voxel edge, and extinction a voxel edge.
   [[nodiscard]] Seen march(const Hull& medium, const CameraModel& camera, float sigma = 0,
                            Absorb absorb = Absorb::nothing) {
-    View view{"camera", camera, RadianceImage(camera.intrinsics.size)};
-    const Problem problem = pose({&view}, medium, {}, pool_);
+    View view{"camera", camera, share(RadianceImage(camera.intrinsics.size))};
+    const Problem problem = make_problem({&view}, medium, {}, pool_);
     const auto engine = make_engine(problem, {absorb, sigma, 0, {}}, Precision::float32, pool_);
     engine->set(std::vector<Rgba>(problem.grid().size(), Rgba{{1, 1, 1, sigma}}));
     Seen seen;

@@ -5,8 +5,10 @@
 
 #include <gtest/gtest.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
 #include "tests/support/devices.h"
+#include "tests/support/edit_view.h"
 #include "tests/support/ring_scene.h"
 
 namespace emberlock::recon {
@@ -88,7 +90,9 @@ TEST_P(HardScene, ExtinctionFromNearlyNoneToAMillionAMetre) {
 TEST_P(HardScene, SaturatedViews) {
   Scene scene = scene_of(10);
   for (View& view : scene.views)
-    for (float& v : view.image.rgb) v = std::min(255.F, 20 * v);
+    edit(view.image, [](RadianceImage& image) {
+      for (float& v : image.rgb) v = std::min(255.F, 20 * v);
+    });
   expect_stable(solve_on(scene, 16));
 }
 
@@ -130,7 +134,7 @@ TEST_P(HardScene, AThresholdAboveEverythingIsAnErrorThatNamesAView) {
 
 TEST_P(HardScene, ABlackViewIsAnErrorThatNamesIt) {
   Scene scene = scene_of(10);
-  std::fill(scene.views[3].image.rgb.begin(), scene.views[3].image.rgb.end(), 0.F);
+  scene.views[3].image = share(RadianceImage(scene.views[3].image->size));
   const auto r = solve_on(scene, 16);
   ASSERT_FALSE(r.ok());
   EXPECT_EQ(r.error().where, "camera 3");
@@ -144,14 +148,17 @@ TEST_P(HardScene, NanAndInfiniteInputIsAnErrorThatNamesItsView) {
     return !r.ok() && r.error().kind == ErrorKind::bad_input && r.error().where == "camera 4";
   };
   const float nan = std::nanf("");
-  EXPECT_TRUE(refused([&](View& v) { v.image.rgb[100] = nan; }));
-  EXPECT_TRUE(refused([](View& v) { v.image.rgb.back() = -INFINITY; }));
+  const auto with_nan = [&](RadianceImage& image) { image.rgb[100] = nan; };
+  EXPECT_TRUE(refused([&](View& v) { edit(v.image, with_nan); }));
+  EXPECT_TRUE(
+      refused([](View& v) { edit(v.image, [](RadianceImage& image) { image.rgb.back() = -INFINITY; }); }));
   EXPECT_TRUE(refused([&](View& v) {
-    v.background = RadianceImage(v.image.size);
-    v.background->rgb[7] = nan;
+    v.background = v.image;
+    edit(v.background, with_nan);
   }));
-  EXPECT_TRUE(refused([](View& v) { v.background = RadianceImage({8, 6}); })) << "of another size";
-  EXPECT_TRUE(refused([](View& v) { v.average = RadianceImage({8, 6}); })) << "of another size";
+  EXPECT_TRUE(refused([](View& v) { v.image.reset(); })) << "no picture at all";
+  EXPECT_TRUE(refused([](View& v) { v.background = share(RadianceImage({8, 6})); })) << "of another size";
+  EXPECT_TRUE(refused([](View& v) { v.average = share(RadianceImage({8, 6})); })) << "of another size";
   EXPECT_TRUE(refused([](View& v) { v.camera.camera_from_world.translation.x() = INFINITY; }));
   EXPECT_TRUE(refused([](View& v) { v.camera.camera_from_world.rotation(2, 2) = NAN; }));
   EXPECT_TRUE(refused([](View& v) { v.camera.intrinsics.fy = NAN; }));

@@ -6,8 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "recon/adjust/descent.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/tracker.h"
 #include "tests/support/devices.h"
+#include "tests/support/edit_view.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -70,14 +72,15 @@ TEST_P(HeldOutTrace, ATargetIsReachedByAllPixelsNotByTheSample) {
       static_cast<double>(before.trace_sample.of) / static_cast<double>(before.trace_sample.pixels))));
   ASSERT_GT(stride, 1);
   const double reached = all_channels(*before.heldout_rmse);
-  RadianceImage& image = scene.views.back().image;
-  for (int y = 0; y < image.size.height; ++y)
-    for (int x = 0; x < image.size.width; ++x)
-      if (x % stride != 0 || y % stride != 0)
-        for (int c = 0; c < 3; ++c) {
-          float& value = image.rgb[static_cast<std::size_t>(3 * (y * image.size.width + x) + c)];
-          if (value > 20) value += 25;
-        }
+  edit(scene.views.back().image, [&](RadianceImage& image) {
+    for (int y = 0; y < image.size.height; ++y)
+      for (int x = 0; x < image.size.width; ++x)
+        if (x % stride != 0 || y % stride != 0)
+          for (int c = 0; c < 3; ++c) {
+            float& value = image.rgb[static_cast<std::size_t>(3 * (y * image.size.width + x) + c)];
+            if (value > 20) value += 25;
+          }
+  });
   SolveOptions options = at_most_iterations(4);
   options.target_rmse = 1.5 * reached;
   const Reconstruction r = solved_here(scene, options);
@@ -91,20 +94,20 @@ TEST_P(HeldOutTrace, AnEngineJudgesAnothersVolumeWhereItLies) {
   Pool pool(2, device_here());
   SolveOptions options;
   const SolverSetup setup{{&scene.views[0]}, {{0, 0, 320, 240}}, hull, kHeldOutMedium, options, pool};
-  const Problem problem = pose({&scene.views[3]}, hull, setup.problem_options(), pool);
+  const Problem problem = make_problem({&scene.views[3]}, hull, setup.problem_options(), pool);
   const Optics optics = setup.optics(problem.grid());
   const auto solver = make_engine(problem, optics, Precision::float32, pool);
-  const auto judge = make_engine(problem, optics, Precision::float32, pool, EngineRole::judge);
+  const auto judging = make_residual_engine(problem, optics, Precision::float32, pool);
   solver->set(std::vector<Rgba>(problem.grid().size(), Rgba{{3, 2, 1, 0}}));
   solver->residual(0);
-  judge->residual_of(*solver, 0);
+  judging->residual_of(*solver, 0);
   const auto same = [](const std::vector<Rgba>& a, const std::vector<Rgba>& b) {
     return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Rgba& p, const Rgba& q) {
       return p.c[0] == q.c[0] && p.c[1] == q.c[1] && p.c[2] == q.c[2];
     });
   };
-  EXPECT_TRUE(same(solver->residuals(), judge->residuals()));
-  EXPECT_TRUE(same(solver->residuals(0), judge->residuals(0)));
+  EXPECT_TRUE(same(solver->residuals(), judging->residuals()));
+  EXPECT_TRUE(same(solver->residuals(0), judging->residuals(0)));
   EXPECT_GT(problem.list.rays.size(), 1000U);
 }
 
@@ -115,7 +118,7 @@ TEST_P(HeldOutTrace, TakesATwentiethOfTheFittedPixelsHoweverManyViewsAreHeldOut)
   std::size_t fitted = 0;
   for (const View& view : scene.views) {
     if (view.role == ViewRole::held_out) continue;
-    const PixelBox box = flame_mask(view.image, noise_threshold(view.image)).box;
+    const PixelBox box = flame_mask(*view.image, noise_threshold(*view.image)).box;
     fitted += static_cast<std::size_t>((box.x1 - box.x0) * (box.y1 - box.y0));
   }
   for (const Solver solver : {Solver::standard, Solver::paper}) {

@@ -6,8 +6,10 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "recon/preprocess/check_scene.h"
 #include "recon/preprocess/radiance.h"
 #include "tests/support/devices.h"
+#include "tests/support/edit_view.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -79,7 +81,7 @@ TEST_P(HullTest, ThresholdAboveEverythingIsAnErrorThatNamesViewAndThreshold) {
 
 TEST_P(HullTest, ABlackViewIsNamed) {
   Scene scene = small_flame_scene();
-  std::fill(scene.views[3].image.rgb.begin(), scene.views[3].image.rgb.end(), 0.F);
+  scene.views[3].image = share(RadianceImage({160, 120}));
   const auto hull = carve(scene, flame_masks(scene), grid_over(scene.box, 32), {});
   ASSERT_FALSE(hull.ok());
   EXPECT_EQ(hull.error().where, "camera 3");
@@ -89,7 +91,7 @@ TEST_P(HullTest, HeldOutViewsDoNotCarve) {
   Scene scene = small_flame_scene();
   const Grid grid = grid_over(scene.box, 32);
   const auto before = carve(scene, flame_masks(scene), grid, {});
-  std::fill(scene.views[10].image.rgb.begin(), scene.views[10].image.rgb.end(), 0.F);
+  scene.views[10].image = share(RadianceImage({160, 120}));
   const auto after = carve(scene, flame_masks(scene), grid, {});
   ASSERT_TRUE(before.ok() && after.ok());
   EXPECT_EQ(before->inside, after->inside);
@@ -117,9 +119,9 @@ TEST(FlameMask, ThresholdComesFromTheNoise) {
   PaperSceneOptions options;
   options.image = {160, 120};
   options.truth_voxels = 48;
-  EXPECT_DOUBLE_EQ(noise_threshold(paper_scene(options).views[0].image), 1);
+  EXPECT_DOUBLE_EQ(noise_threshold(*paper_scene(options).views[0].image), 1);
   options.noise = 2;
-  const double threshold = noise_threshold(paper_scene(options).views[0].image);
+  const double threshold = noise_threshold(*paper_scene(options).views[0].image);
   EXPECT_GT(threshold, 4);
   EXPECT_LT(threshold, 14);
 }
@@ -153,10 +155,11 @@ TEST(FlameMask, HotPixelsAreNoFlame) {
 
 TEST(FlameMask, NanAndInfiniteInputIsRefusedByName) {
   Scene scene = small_flame_scene();
-  scene.views[2].image.rgb[3 * (5 * 160 + 7) + 1] = std::nanf("");
+  const SharedImage whole = scene.views[2].image;
+  edit(scene.views[2].image, [](RadianceImage& image) { image.rgb[3 * (5 * 160 + 7) + 1] = std::nanf(""); });
   EXPECT_EQ(check_scene(scene).error().where, "camera 2");
   EXPECT_NE(check_scene(scene).error().what.find("(7, 5)"), std::string::npos);
-  scene.views[2].image.rgb[3 * (5 * 160 + 7) + 1] = 0;
+  scene.views[2].image = whole;
   scene.views[4].camera.camera_from_world.translation.x() = INFINITY;
   EXPECT_EQ(check_scene(scene).error().where, "camera 4");
 }

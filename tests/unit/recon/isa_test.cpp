@@ -33,14 +33,14 @@ void expect_same_marches(const MarchTable<Real>& table, bool curved) {
   const auto x = random_quads<Real>(c.list.grid.size(), 1, 1, 0.5);
   const auto y = random_quads<Real>(c.list.rays.size(), 2);
   const auto seen = random_quads<float>(c.list.rays.size(), 3);
-  const Judge<Real> judge{seen.data(), seen.data(), nullptr, 0};
+  const PixelResidual<Real> residual_of{seen.data(), seen.data(), nullptr, 0};
   constexpr auto kSigma = static_cast<Real>(0.1);
   for (const Absorb absorb : {Absorb::nothing, Absorb::constant, Absorb::field})
     expect_same(level.forward(absorb, x, kSigma), baseline.forward(absorb, x, kSigma), "forward");
   for (const Absorb absorb : {Absorb::nothing, Absorb::constant})
     expect_same(level.adjoint(absorb, y, kSigma), baseline.adjoint(absorb, y, kSigma), "adjoint");
-  const auto field = level.field_forward(x, judge);
-  const auto truth = baseline.field_forward(x, judge);
+  const auto field = level.field_forward(x, residual_of);
+  const auto truth = baseline.field_forward(x, residual_of);
   expect_same(field.residual, truth.residual, "field residual");
   expect_same(level.field_adjoint(field), baseline.field_adjoint(truth), "field gradient");
 }

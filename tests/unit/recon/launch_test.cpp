@@ -79,7 +79,7 @@ void expect_gathered(const RayList& list) {
 
   const std::vector<Rgba> black(list.rays.size());
   const auto field = march.field_forward(random_quads<float>(list.grid.size(), 5, 1, 0.2),
-                                         Judge<float>{black.data(), nullptr, nullptr, 0});
+                                         PixelResidual<float>{black.data(), nullptr, nullptr, 0});
   launch(list.runs.size(), FieldAdjoint<float, Path, LayAside<float>>{list.table(), field.residual.data(),
                                                                       field.samples.data(), 0, aside});
   gather(Trilinear{});

@@ -5,6 +5,7 @@
 
 #include "base/random.h"
 #include "recon/adjust/choose_effects.h"
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/prepared_scene.h"
 #include "recon/adjust/solver.h"
 #include "recon/synthetic/flame.h"
@@ -112,7 +113,8 @@ TEST(MotionTest, AFlameThatStandsStillAndOneFilmedAtOnceAreLeftAlone) {
   EXPECT_EQ(choice.reports.back().seconds, Seconds(0));
   Effects asked;
   asked.motion = rising(1);
-  EXPECT_EQ(&PreparedScene(at_once, asked).scene(), &at_once) << "nothing is copied where no view is late";
+  EXPECT_EQ(PreparedScene::create(at_once, asked)->scene().views[0].image, at_once.views[0].image)
+      << "nothing is copied where no view is late";
 }
 
 TEST(MotionTest, TimesThatAreAsUncertainAsTheyDifferAreNotUsed) {
@@ -143,13 +145,15 @@ TEST(MotionTest, TheSteadyPartGoesBackIntoARenderOfALateView) {
   const Scene& scene = rising_scene();
   Effects effects;
   effects.motion = rising(1);
-  const PreparedScene prepared(scene, effects);
-  RadianceImage render = prepared.scene().views[0].image;
-  at_own_instant(render, scene, 0, effects);
+  const auto prepared = PreparedScene::create(scene, effects);
+  ASSERT_TRUE(prepared.ok());
+  const RadianceImage& at_instant = *prepared->scene().views[0].image;
+  RadianceImage render = at_instant;
+  prepared->at_own_instant(render, 0);
   double worst = 0;
   for (std::size_t i = 0; i < render.rgb.size(); ++i)
-    if (prepared.scene().views[0].image.rgb[i] > 0)  // elsewhere black has clipped it
-      worst = std::max(worst, static_cast<double>(std::abs(render.rgb[i] - scene.views[0].image.rgb[i])));
+    if (at_instant.rgb[i] > 0)  // elsewhere black has clipped it
+      worst = std::max(worst, static_cast<double>(std::abs(render.rgb[i] - scene.views[0].image->rgb[i])));
   EXPECT_LT(worst, 1e-3);
 }
 

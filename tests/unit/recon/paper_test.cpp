@@ -6,10 +6,11 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/pipeline/reconstruct.h"
-#include "recon/preprocess/flame_mask.h"
 #include "tests/support/counting_clock.h"
 #include "tests/support/devices.h"
+#include "tests/support/edit_view.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -48,8 +49,9 @@ TEST_P(PapersSolver, RefusesWhatItWouldIgnore) {
       {"saturated", [](Effects& e, Scene&) { e.sensor.clipping = Sensor::Clipping::at_white; }},
       {"saturated",
        [](Effects&, Scene& scene) {
-         scene.views[2].bounds.assign(160 * 120, 0);
-         scene.views[2].bounds[60 * 160 + 80] = 1;
+         std::vector<std::uint8_t> bounds(160 * 120);
+         bounds[60 * 160 + 80] = 1;
+         scene.views[2].bounds = share(std::move(bounds));
        }},
       {"scatters evenly",
        [](Effects& e, Scene&) {
@@ -77,7 +79,9 @@ TEST_P(PapersSolver, KeepsWhatPassesAroundItHandle) {
                 e.sensor.gamma = 2.2;
               }).ok());
   EXPECT_TRUE(solved_under([](Effects& e, Scene&) { e.motion = {Motion::Carry::uniform, {0, 0, 1}}; }).ok());
-  EXPECT_TRUE(solved_under([](Effects&, Scene& scene) { scene.views[2].bounds.assign(160 * 120, 0); }).ok())
+  EXPECT_TRUE(solved_under([](Effects&, Scene& scene) {
+                scene.views[2].bounds = share(std::vector<std::uint8_t>(160 * 120));
+              }).ok())
       << "bounds that no pixel has";
 }
 
@@ -89,7 +93,9 @@ TEST_P(PapersSolver, FindsTheFlameBeforeABackground) {
   for (const float level : {20.F, 60.F}) {
     Scene lit = black;
     for (View& view : lit.views)
-      for (float& value : view.image.rgb) value += level;
+      edit(view.image, [&](RadianceImage& image) {
+        for (float& value : image.rgb) value += level;
+      });
     Effects effects;
     effects.background = {
         Background::Kind::constant,

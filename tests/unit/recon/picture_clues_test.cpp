@@ -14,12 +14,13 @@ const PixelBox kWhole{0, 0, kSize.width, kSize.height};
 
 template <class Light>
 View view_of(const Light& light) {
-  View view;
-  view.image = RadianceImage(kSize);
-  float* to = view.image.rgb.data();
+  RadianceImage image(kSize);
+  float* to = image.rgb.data();
   for (int y = 0; y < kSize.height; ++y)
     for (int x = 0; x < kSize.width; ++x)
       for (int c = 0; c < 3; ++c) *to++ = static_cast<float>(light(x, y, c));
+  View view;
+  view.image = share(std::move(image));
   return view;
 }
 
@@ -32,7 +33,7 @@ double flame_on_the_floor(int x, int y, int c) {
 TEST(PictureClues, BorderLevelIsWhatTheFlameLeavesFree) {
   Scene scene;
   scene.views = {view_of(flame_on_the_floor)};
-  const auto border = border_level(scene, {flame_mask(scene.views[0].image, 50)});
+  const auto border = border_level(scene, {flame_mask(*scene.views[0].image, 50)});
   ASSERT_TRUE(border);
   EXPECT_EQ(border->level, (std::array<double, 3>{6, 7, 8}));
   EXPECT_EQ(border->unevenness, 0);
@@ -43,7 +44,7 @@ TEST(PictureClues, BorderLevelSaysHowUnevenItIs) {
   scene.views = {view_of([](int x, int, int) { return x < 16 ? 12 : 4; }),
                  view_of([](int, int, int) { return 4; })};
   const auto border =
-      border_level(scene, {flame_mask(scene.views[0].image, 50), flame_mask(scene.views[1].image, 50)});
+      border_level(scene, {flame_mask(*scene.views[0].image, 50), flame_mask(*scene.views[1].image, 50)});
   ASSERT_TRUE(border);
   EXPECT_EQ(border->level[0], 5);  // one of eight sides has 12
   EXPECT_EQ(border->unevenness, 7);
@@ -54,7 +55,7 @@ TEST(PictureClues, HeldOutViewsAndBordersFullOfFlameTellNothing) {
   scene.views = {view_of([](int, int, int) { return 100; }), view_of([](int, int, int) { return 9; })};
   scene.views[1].role = ViewRole::held_out;
   EXPECT_FALSE(
-      border_level(scene, {flame_mask(scene.views[0].image, 50), flame_mask(scene.views[1].image, 50)}));
+      border_level(scene, {flame_mask(*scene.views[0].image, 50), flame_mask(*scene.views[1].image, 50)}));
 }
 
 /// A paraboloid of `top`, above its surroundings by 200 at most.

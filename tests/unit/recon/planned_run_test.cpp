@@ -7,9 +7,9 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/pipeline/advice.h"
 #include "recon/pipeline/grid_choice.h"
-#include "recon/preprocess/flame_mask.h"
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
@@ -149,6 +149,7 @@ TEST_P(Target, MissedItSaysByHowMuchAndWhatWouldBeNeeded) {
   EXPECT_NEAR(plan.missed_by, all_channels(outcome.report.trace.back().heldout_rmse) - 0.01, 1e-9);
   EXPECT_THAT(plan.words.back(), HasSubstr("was missed by"));
   EXPECT_THAT(plan.words.back(), HasSubstr("would be needed"));
+  EXPECT_THAT(plan.remedy, HasSubstr("would be needed"));
   EXPECT_LE(plan.attempts, 3);
 }
 
@@ -171,6 +172,14 @@ TEST_P(Target, WithABudgetTheBudgetStaysHard) {
   EXPECT_GT(outcome.report.plan->missed_by, 0);
 }
 
+TEST_P(Target, ToldToStopItTriesNoFurther) {
+  ReconstructOptions options = with_target(0.01);
+  options.solve.stop = [] { return true; };
+  const Outcome outcome = run(options);
+  EXPECT_EQ(outcome.report.plan->attempts, 0);
+  EXPECT_THAT(outcome.report.plan->words, Contains(HasSubstr("stopped after the reference run")));
+}
+
 TEST_P(Target, NeedsAHeldOutView) {
   Scene scene = flame();
   scene.views.resize(10);
@@ -182,6 +191,8 @@ TEST_P(Plan, StandsInTheReport) {
   EXPECT_EQ(json["plan"]["budget"], 0.02);
   EXPECT_TRUE(json["plan"]["target_rmse"].is_null());
   EXPECT_FALSE(json["plan"]["words"].empty());
+  EXPECT_GE(json["plan"]["predicted_rmse_without"], json["plan"]["predicted_rmse"])
+      << "where effects change little";
   EXPECT_TRUE(nlohmann::json::parse(to_json(Report{}))["plan"].is_null());
 }
 
@@ -196,7 +207,10 @@ TEST_P(Advice, SaysWhatTheLastIterationsBoughtAndWhatVoxelsWouldBring) {
   EXPECT_THAT(steps[1], HasSubstr("24 voxels instead of 16"));
   Report finest = report;
   finest.finest_voxels = 16;
-  EXPECT_THAT(more_voxels(finest), HasSubstr("more voxels bring little"));
+  finest.voxel_choice.by_the_paper = 16;
+  EXPECT_THAT(more_voxels(finest), HasSubstr("16 are what the pictures can show"));
+  finest.voxel_choice.by_the_paper = 32;
+  EXPECT_THAT(more_voxels(finest), HasSubstr("16 are the most that are taken unasked, 3.0 pixels a voxel"));
   finest.heldout_rmse.reset();
   EXPECT_EQ(more_voxels(finest), "");
 }

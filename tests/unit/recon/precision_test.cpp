@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
 #include "tests/support/devices.h"
 #include "tests/support/march_case.h"

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/preprocess/develop.h"
 #include "session/media/frame_file.h"
 #include "tests/support/flame_frames.h"

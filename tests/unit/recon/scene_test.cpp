@@ -12,6 +12,8 @@
 #include "session/reader.h"
 #include "session/shutter_times.h"
 #include "session/writer.h"
+#include "tests/support/count_allocations.h"
+#include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
 namespace {
@@ -59,9 +61,9 @@ TEST_F(SceneTest, PicturesOfEveryDepthBecomeRadiance) {
   EXPECT_EQ(scene->views[1].name, "b.pgm") << "the extension was found";
   for (const View& view : scene->views) {
     EXPECT_EQ(view.role, ViewRole::input);
-    EXPECT_EQ(view.image.size, (ImageSize{4, 2}));
-    for (std::size_t i = 0; i < 21; ++i) EXPECT_EQ(view.image.rgb[i], 0);
-    for (std::size_t i = 21; i < 24; ++i) EXPECT_FLOAT_EQ(view.image.rgb[i], 255);
+    EXPECT_EQ(view.image->size, (ImageSize{4, 2}));
+    for (std::size_t i = 0; i < 21; ++i) EXPECT_EQ(view.image->rgb[i], 0);
+    for (std::size_t i = 21; i < 24; ++i) EXPECT_FLOAT_EQ(view.image->rgb[i], 255);
   }
 }
 
@@ -112,6 +114,27 @@ TEST_F(SceneTest, HoldingOutChangesRoles) {
   EXPECT_THAT(hold_out(*scene, {2}).error().message(), HasSubstr("--hold-out 2"));
   EXPECT_FALSE(hold_out(*scene, {-1}).ok());
   EXPECT_THAT(hold_out(*scene, {0}).error().message(), HasSubstr("every view"));
+}
+
+TEST(SceneViews, FewerAreSpreadAndTheHeldOutOnesStay) {
+  Scene scene = small_flame_scene();
+  scene.linearised = true;
+  scene.preprocessing.push_back({"white balance", true, "told"});
+  const Scene fewer = with_views(scene, 5);
+  ASSERT_EQ(fewer.views.size(), 6);
+  EXPECT_TRUE(fewer.linearised);
+  EXPECT_EQ(fewer.preprocessing.size(), 1);
+  double closest = 0;  // the paper's cameras stand 36 degrees apart and opposite each other
+  for (const View& a : fewer.views) {
+    for (const View& b : fewer.views) {
+      if (&a == &b || a.role != ViewRole::input || b.role != ViewRole::input) continue;
+      closest =
+          std::max(closest, std::abs(a.camera.center().normalized().dot(b.camera.center().normalized())));
+    }
+  }
+  EXPECT_LT(closest, std::cos(30 * M_PI / 180));
+  EXPECT_EQ(with_views(scene, 0).views.size(), 11);
+  EXPECT_EQ(with_views(scene, 99).views.size(), 11);
 }
 
 /// Three cameras of a session: grey, mosaic and colour, 8 and 12 bits, five frames 10 ms apart; the second
@@ -185,19 +208,21 @@ class SessionSceneTest : public SceneTest {
   }
 };
 
-/// 24 frames: a lamp of 30 levels in the last column above a level of 4, and from the twelfth on 80 levels of
-/// flame in the upper three rows.
+/// 24 frames of the manifest's size: a lamp of 30 levels in the last column above a level of 4, and from the
+/// twelfth on 80 levels of flame in the upper three eighths.
 fs::path SessionSceneTest::record_long(const v1::Manifest& m) const {
   fs::path folder = root_ / "long";
   auto writer = session::SessionWriter::create(folder, m, {.min_free_bytes = 0});
   EXPECT_TRUE(writer.ok()) << writer.error().message();
+  const ImageSize size{static_cast<int>(m.cameras(0).width()), static_cast<int>(m.cameras(0).height())};
   for (std::size_t camera = 0; camera < 3; ++camera) {
     for (std::uint64_t f = 0; f < 24; ++f) {
-      auto image = std::make_shared<Image>(ImageLayout{{16, 8}, kFormats[camera], camera == 0 ? 12 : 8});
+      auto image = std::make_shared<Image>(ImageLayout{size, kFormats[camera], camera == 0 ? 12 : 8});
       const int channels = emberlock::channels(kFormats[camera]);
-      for (int y = 0; y < 8; ++y) {
-        for (int i = 0; i < 16 * channels; ++i) {
-          const int level = 4 + (i / channels == 15 ? 30 : 0) + (f >= 12 && y < 3 ? 80 : 0);
+      for (int y = 0; y < size.height; ++y) {
+        for (int i = 0; i < size.width * channels; ++i) {
+          const int level =
+              4 + (i / channels == size.width - 1 ? 30 : 0) + (f >= 12 && 8 * y < 3 * size.height ? 80 : 0);
           if (camera == 0)
             image->row_as<std::uint16_t>(y)[i] = static_cast<std::uint16_t>(level * 4095 / 255);
           else
@@ -221,8 +246,8 @@ TEST_F(SessionSceneTest, TheFramesOfOneInstantBecomeViews) {
   ASSERT_EQ(scene->views.size(), 3U);
   EXPECT_EQ(scene->box.size, Eigen::Vector3d(0.2, 0.2, 0.4));
   for (const View& view : scene->views) {
-    for (std::size_t i = 0; i < 3 * 16; ++i) EXPECT_NEAR(view.image.rgb[i], 11 - 4, 0.1) << view.name;
-    EXPECT_NEAR(view.image.rgb.back(), 0, 0.1) << "the black level is taken out";
+    for (std::size_t i = 0; i < 3 * 16; ++i) EXPECT_NEAR(view.image->rgb[i], 11 - 4, 0.1) << view.name;
+    EXPECT_NEAR(view.image->rgb.back(), 0, 0.1) << "the black level is taken out";
     EXPECT_EQ(view.camera.intrinsics.fy, 21);
   }
   EXPECT_EQ(scene->views[2].camera.camera_from_world.translation, Eigen::Vector3d(0.2, 0, 2));
@@ -235,7 +260,7 @@ TEST_F(SessionSceneTest, AManifestsColourMakesCamerasAlike) {
   for (int c = 0; c < 3; ++c) colour->add_gain(2);
   const auto scene = load_scene(record(m), {.box = {}, .frame = 1});
   ASSERT_TRUE(scene.ok()) << scene.error().message();
-  EXPECT_NEAR(scene->views[2].image.rgb[0], 11 - 4, 0.1);
+  EXPECT_NEAR(scene->views[2].image->rgb[0], 11 - 4, 0.1);
   EXPECT_TRUE(scene->linearised);
   ASSERT_FALSE(scene->preprocessing.empty());
   EXPECT_EQ(scene->preprocessing[0].name, "linearise");
@@ -250,9 +275,9 @@ TEST_F(SessionSceneTest, FramesWithoutFlameTellTheBackground) {
   const auto scene = load_scene(folder, {.box = {}, .frame = 20});
   ASSERT_TRUE(scene.ok()) << scene.error().message();
   for (const View& view : scene->views) {
-    EXPECT_NEAR(view.image.rgb[0], 80, 0.1) << view.name;
-    EXPECT_NEAR(view.image.rgb[3 * 15], 80, 0.1) << "a lamp stands there";
-    EXPECT_NEAR(view.image.rgb.back(), 0, 0.1);
+    EXPECT_NEAR(view.image->rgb[0], 80, 0.1) << view.name;
+    EXPECT_NEAR(view.image->rgb[3 * 15], 80, 0.1) << "a lamp stands there";
+    EXPECT_NEAR(view.image->rgb.back(), 0, 0.1);
   }
   const auto background = std::find_if(scene->preprocessing.begin(), scene->preprocessing.end(),
                                        [](const PreprocessStep& step) { return step.name == "background"; });
@@ -263,11 +288,30 @@ TEST_F(SessionSceneTest, FramesWithoutFlameTellTheBackground) {
   SceneOptions level;
   level.frame = 20;
   ASSERT_TRUE(parse_background("level", level.frames).ok());
-  EXPECT_NEAR(load_scene(folder, level)->views[0].image.rgb[3 * 15], 110, 0.2) << "the lamp is left in";
+  EXPECT_NEAR(load_scene(folder, level)->views[0].image->rgb[3 * 15], 110, 0.2) << "the lamp is left in";
   ASSERT_TRUE(parse_background("0-4", level.frames).ok());
-  EXPECT_NEAR(load_scene(folder, level)->views[0].image.rgb[3 * 15], 80, 0.1);
+  EXPECT_NEAR(load_scene(folder, level)->views[0].image->rgb[3 * 15], 80, 0.1);
   ASSERT_TRUE(parse_background("30-40", level.frames).ok());
   EXPECT_THAT(load_scene(folder, level).error().message(), HasSubstr("camera cam0: has no frame 40"));
+}
+
+TEST_F(SessionSceneTest, NoFrameIsDecodedTwiceForTheBackground) {
+  v1::Manifest m = manifest();
+  for (auto& camera : *m.mutable_cameras()) {
+    camera.set_width(78);
+    camera.set_height(58);
+  }
+  const fs::path folder = record_long(m);
+  SceneOptions options;
+  options.frame = 20;
+  const auto decoding = [&] {  // of the colour camera
+    return allocations_of(std::size_t{78} * 58 * 3, [&] { EXPECT_TRUE(load_scene(folder, options).ok()); });
+  };
+  const int flame_and_dark = decoding();
+  options.frames.background = FrameOptions::Background::level;
+  const int flame = decoding();
+  EXPECT_GE(flame, 1);
+  EXPECT_EQ(flame_and_dark, 9 * flame) << "the flame's and eight without flame";
 }
 
 TEST(FrameOptions, WordsThatMeanNothingAreRefused) {
@@ -284,7 +328,7 @@ TEST(FrameOptions, WordsThatMeanNothingAreRefused) {
 TEST_F(SessionSceneTest, ALostFramesNeighbourStandsInWithinOnePeriod) {
   const auto scene = load_scene(record(manifest()), {.box = {}, .frame = 3});
   ASSERT_TRUE(scene.ok()) << scene.error().message();
-  EXPECT_NEAR(scene->views[1].image.rgb[0], 12 - 4, 0.1) << "frame 2, 9 ms before";
+  EXPECT_NEAR(scene->views[1].image->rgb[0], 12 - 4, 0.1) << "frame 2, 9 ms before";
 }
 
 TEST_F(SessionSceneTest, ACameraThatIsAMillisecondTooSlowIsNamed) {
@@ -298,7 +342,7 @@ TEST_F(SessionSceneTest, ACameraThatIsAMillisecondTooSlowIsNamed) {
 TEST_F(SessionSceneTest, WithoutAFrameTheMiddleOneIsTaken) {
   const auto scene = load_scene(record(manifest()));
   ASSERT_TRUE(scene.ok()) << scene.error().message();
-  EXPECT_NEAR(scene->views[0].image.rgb[0], 12 - 4, 0.1);
+  EXPECT_NEAR(scene->views[0].image->rgb[0], 12 - 4, 0.1);
 }
 
 TEST_F(SessionSceneTest, WhereACameraLostTheMiddleTheNearestInstantThatAllHaveIsTaken) {
@@ -306,7 +350,7 @@ TEST_F(SessionSceneTest, WhereACameraLostTheMiddleTheNearestInstantThatAllHaveIs
   m.mutable_cameras(1)->set_frame_rate_hz(120);  // a period of 8.3 ms: a neighbour 9 ms off is too far
   const auto scene = load_scene(record(m, 2));
   ASSERT_TRUE(scene.ok()) << scene.error().message();
-  for (const View& view : scene->views) EXPECT_NEAR(view.image.rgb[0], 13 - 4, 0.1) << view.name;
+  for (const View& view : scene->views) EXPECT_NEAR(view.image->rgb[0], 13 - 4, 0.1) << view.name;
 }
 
 TEST_F(SessionSceneTest, ACameraWithoutCalibrationIsNamed) {

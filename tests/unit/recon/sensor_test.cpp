@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "recon/kernels/judge.h"
+#include "recon/kernels/residual.h"
 
 namespace emberlock::recon {
 namespace {
@@ -91,11 +91,11 @@ TEST(Sensor, ImpossibleOnesAreRefused) {
 TEST(Sensor, SaturatedPixelIsABoundAndTheOthersAreValues) {
   const Rgba seen{{200, 200, 199, 0}};
   const Rgba rendered{{150, 250, 250, 0.4F}};
-  Judge<float> judge;
-  judge.seen = &seen;
-  EXPECT_EQ(judge(0, rendered).c[1], 50.F);
-  judge.white = 200;
-  const Rgba r = judge(0, rendered);
+  PixelResidual<float> residual_of;
+  residual_of.seen = &seen;
+  EXPECT_EQ(residual_of(0, rendered).c[1], 50.F);
+  residual_of.white = 200;
+  const Rgba r = residual_of(0, rendered);
   EXPECT_EQ(r.c[0], -50.F);  // saturated, and rendered darker
   EXPECT_EQ(r.c[1], 0.F);    // saturated, and rendered brighter
   EXPECT_EQ(r.c[2], 51.F);   // a value
@@ -105,11 +105,11 @@ TEST(Sensor, SaturatedPixelIsABoundAndTheOthersAreValues) {
 TEST(Sensor, AViewsOwnMarksMakeItsValuesBounds) {
   const Rgba seen{{90, 200, 199, 5}};  // red and blue are marked, whatever their value
   const Rgba rendered{{150, 250, 150, 0.4F}};
-  Judge<float> judge;
-  judge.seen = &seen;
-  EXPECT_EQ(judge(0, rendered).c[0], 60.F) << "nobody looks at the marks where nothing is bounded";
-  judge.white = std::numeric_limits<float>::infinity();
-  const Rgba r = judge(0, rendered);
+  PixelResidual<float> residual_of;
+  residual_of.seen = &seen;
+  EXPECT_EQ(residual_of(0, rendered).c[0], 60.F) << "nobody looks at the marks where nothing is bounded";
+  residual_of.white = std::numeric_limits<float>::infinity();
+  const Rgba r = residual_of(0, rendered);
   EXPECT_EQ(r.c[0], 0.F);    // a bound, and rendered brighter
   EXPECT_EQ(r.c[1], 50.F);   // a value
   EXPECT_EQ(r.c[2], -49.F);  // a bound, and rendered darker
@@ -126,10 +126,10 @@ TEST(Sensor, DescentOnTheBoundFindsWhatTheClippedPixelsHide) {
     for (const float g : gain) {
       const float seen = std::min(g * truth, 200.F);
       const Rgba pixel{{seen, 0, 0, 0}};
-      Judge<float> judge;
-      judge.seen = &pixel;
-      judge.white = 200;
-      slope += g * judge(0, Rgba{{g * x, 0, 0, 0}}).c[0];
+      PixelResidual<float> residual_of;
+      residual_of.seen = &pixel;
+      residual_of.white = 200;
+      slope += g * residual_of(0, Rgba{{g * x, 0, 0, 0}}).c[0];
     }
     x -= slope / 5.25F;
   }

@@ -15,8 +15,9 @@ Scene scene_of_one_view() {
   scene.box = {{0, 0, 0}, {1, 1, 1}};
   View view;
   view.camera.intrinsics.size = {4, 4};
-  view.image = RadianceImage({4, 4});
-  for (float& v : view.image.rgb) v = 100;
+  RadianceImage image({4, 4});
+  for (float& v : image.rgb) v = 100;
+  view.image = share(std::move(image));
   scene.views.push_back(view);
   return scene;
 }
@@ -29,20 +30,21 @@ std::vector<FlameMask> mask_of_all() {
 
 TEST(SmallScene, AMeanOverASaturatedPixelIsALowerBound) {
   Scene scene = scene_of_one_view();
-  scene.views[0].bounds.assign(16, 0);
-  scene.views[0].bounds[0] = 1;   // red, top left
-  scene.views[0].bounds[5] = 4;   // blue, in the same four pixels
-  scene.views[0].bounds[14] = 2;  // green, bottom right
+  std::vector<std::uint8_t> bounds(16);
+  bounds[0] = 1;   // red, top left
+  bounds[5] = 4;   // blue, in the same four pixels
+  bounds[14] = 2;  // green, bottom right
+  scene.views[0].bounds = share(bounds);
   const std::vector<FlameMask> masks = mask_of_all();
   const Scene small = small_scene(scene, masks, 4);
-  ASSERT_EQ(small.views[0].image.size.width, 2);
-  EXPECT_THAT(small.views[0].bounds, ElementsAre(5, 0, 0, 2));
-  EXPECT_EQ(small_scene(scene, masks, 16).views[0].bounds, scene.views[0].bounds) << "not shrunk";
+  ASSERT_EQ(small.views[0].image->size.width, 2);
+  EXPECT_THAT(*small.views[0].bounds, ElementsAre(5, 0, 0, 2));
+  EXPECT_EQ(*small_scene(scene, masks, 16).views[0].bounds, bounds) << "not shrunk";
 }
 
 TEST(SmallScene, WithoutSaturatedPixelsThereAreNoBounds) {
   const std::vector<FlameMask> masks = mask_of_all();
-  EXPECT_TRUE(small_scene(scene_of_one_view(), masks, 4).views[0].bounds.empty());
+  EXPECT_FALSE(small_scene(scene_of_one_view(), masks, 4).views[0].bounds);
 }
 
 }  // namespace

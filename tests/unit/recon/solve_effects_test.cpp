@@ -5,10 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/devices.h"
+#include "tests/support/edit_view.h"
 
 namespace emberlock::recon {
 namespace {
@@ -18,7 +20,7 @@ ON_EACH_DEVICE(SolveEffects);
 constexpr PerMeter kExtinction{32.8};
 
 /// The paper's set-up, small, filmed under `effects`; extinction is the flame's.
-Scene filmed(Effects effects, const std::optional<RadianceImage>& background = std::nullopt) {
+Scene filmed(Effects effects, const SharedImage& background = nullptr) {
   PaperSceneOptions options;
   options.image = {160, 120};
   options.truth_voxels = 64;
@@ -29,8 +31,8 @@ Scene filmed(Effects effects, const std::optional<RadianceImage>& background = s
   for (View& view : scene.views) {
     view.background = background;
     RenderOptions render;
-    render.background = background ? &*background : nullptr;
-    view.image = render_view(truth.volume, truth.medium, effects, view.camera, render);
+    render.background = background.get();
+    view.image = share(render_view(truth.volume, truth.medium, effects, view.camera, render));
   }
   return scene;
 }
@@ -63,7 +65,7 @@ TEST_P(SolveEffects, APictureOfTheBackgroundIsSeenThroughTheFlame) {
   for (std::size_t i = 0; i < wall.rgb.size(); ++i) wall.rgb[i] = 20 + 0.4F * static_cast<float>(i / 3 % 160);
   Effects effects;
   effects.background.kind = Background::Kind::image;
-  const Scene scene = filmed(effects, wall);
+  const Scene scene = filmed(effects, share(wall));
   const double known = heldout(scene, effects);
   EXPECT_LT(known, 1.25 * undisturbed());
   EXPECT_GT(heldout(scene, {}), 2 * known);
@@ -96,15 +98,18 @@ TEST_P(SolveEffects, EachViewsOwnSaturatedPixelsBoundTheLight) {
   for (std::size_t v = 0; v + 1 < scene.views.size(); ++v) {
     View& view = scene.views[v];
     const auto white = static_cast<float>(100 + 15 * v);
-    view.bounds.resize(view.image.rgb.size() / 3);
-    for (std::size_t i = 0; i < view.image.rgb.size(); ++i) {
-      if (view.image.rgb[i] < white) continue;
-      view.image.rgb[i] = white;
-      view.bounds[i / 3] = static_cast<std::uint8_t>(view.bounds[i / 3] | 1U << i % 3);
-    }
+    std::vector<std::uint8_t> bounds(view.image->rgb.size() / 3);
+    edit(view.image, [&](RadianceImage& image) {
+      for (std::size_t i = 0; i < image.rgb.size(); ++i) {
+        if (image.rgb[i] < white) continue;
+        image.rgb[i] = white;
+        bounds[i / 3] = static_cast<std::uint8_t>(bounds[i / 3] | 1U << i % 3);
+      }
+    });
+    view.bounds = share(std::move(bounds));
   }
   const double as_bounds = heldout(scene, {});
-  for (View& view : scene.views) view.bounds.clear();
+  for (View& view : scene.views) view.bounds.reset();
   EXPECT_LT(as_bounds, 0.8 * heldout(scene, {}));
 }
 
@@ -123,9 +128,10 @@ TEST_P(SolveEffects, ARisingFlameIsSharpenedAgain) {
   ASSERT_TRUE(r.ok());
   Effects at_once;
   at_once.extinction = effects.extinction;
-  const View& judge = instant.views.back();
-  const double sharp = all_channels(rmse(judge.image, render_view(r->volume, r->hull, at_once, judge.camera),
-                                         flame_mask(judge.image, 1).box));
+  const View& unseen = instant.views.back();
+  const double sharp =
+      all_channels(rmse(*unseen.image, render_view(r->volume, r->hull, at_once, unseen.camera),
+                        flame_mask(*unseen.image, 1).box));
   EXPECT_LT(sharp, 0.95 * blurred);
 }
 
@@ -149,15 +155,15 @@ TEST_P(SolveEffects, LightThatTheMediumScattersIsTakenOutOfTheEmission) {
   const double error = all_channels(r->trace.back().heldout_rmse);
   EXPECT_LT(error, 1.2 * undisturbed());
   // The volume emits, scatters, and shows what was seen; with its scattering left out it is darker.
-  const View& judge = scene.views.back();
-  const PixelBox box = flame_mask(judge.image, 1).box;
+  const View& unseen = scene.views.back();
+  const PixelBox box = flame_mask(*unseen.image, 1).box;
   const double again =
-      all_channels(rmse(judge.image, render_view(r->volume, r->hull, effects, judge.camera), box));
+      all_channels(rmse(*unseen.image, render_view(r->volume, r->hull, effects, unseen.camera), box));
   EXPECT_LT(again, 1.5 * error);  // the emission has no negative places where more is scattered than shines
   Effects dark = effects;
   dark.scattering = {};
   const double without =
-      all_channels(rmse(judge.image, render_view(r->volume, r->hull, dark, judge.camera), box));
+      all_channels(rmse(*unseen.image, render_view(r->volume, r->hull, dark, unseen.camera), box));
   EXPECT_GT(without, 2 * again);
 }
 

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "recon/adjust/guard.h"
+#include "recon/adjust/picture_error.h"
 #include "tests/support/devices.h"
 
 namespace emberlock::recon {

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "recon/adjust/picture_error.h"
 #include "recon/compute/pool.h"
 #include "recon/render/render.h"
 #include "tests/support/devices.h"
@@ -99,8 +100,8 @@ TEST_P(SolverTest, TracedErrorsAreThoseOfTheRenderedVolume) {
   ASSERT_TRUE(r.ok());
   const View& test = scene.views[10];
   const RadianceImage image = render_view(r->volume, r->hull, r->effects, test.camera);
-  const PixelBox box = flame_mask(test.image, noise_threshold(test.image)).box;
-  EXPECT_NEAR(all_channels(rmse(image, test.image, box)), all_channels(r->trace.back().heldout_rmse), 1e-2);
+  const PixelBox box = flame_mask(*test.image, noise_threshold(*test.image)).box;
+  EXPECT_NEAR(all_channels(rmse(image, *test.image, box)), all_channels(r->trace.back().heldout_rmse), 1e-2);
 }
 
 TEST_P(SolverTest, FewOrBadlyPlacedViewsStillFitWhatTheySee) {

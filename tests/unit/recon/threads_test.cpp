@@ -46,12 +46,12 @@ TEST_P(Threads, DescendTheSameBitsByEmissionAndExtinction) {
   const Hull hull = *carve(scene, flame_masks(scene), grid_over(scene.box, 40), {});
   std::vector<const View*> views;
   for (const View& v : scene.views) views.push_back(&v);
-  ProblemOptions posing;
-  posing.subsets = 2;
-  posing.subset_of = [](std::size_t, int x, int y) { return (x + y) % 2; };
+  ProblemOptions problem_options;
+  problem_options.subsets = 2;
+  problem_options.subset_of = [](std::size_t, int x, int y) { return (x + y) % 2; };
   expect_same_bits<Rgba>([&](int threads) {
     Pool pool(threads, device_here());
-    const Problem problem = pose(views, hull, posing, pool);
+    const Problem problem = make_problem(views, hull, problem_options, pool);
     Optics optics;
     optics.absorb = Absorb::field;
     const auto engine = make_engine(problem, optics, Precision::float32, pool);

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "recon/pipeline/grid_choice.h"
-#include "recon/pipeline/settled_run.h"
-#include "recon/pipeline/shipped_front.h"
+#include "recon/pipeline/reference_front.h"
+#include "recon/pipeline/single_run.h"
 #include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
@@ -56,10 +56,10 @@ TEST(Knee, WhatTakesLongerAndIsWorseIsNeverTaken) {
 }
 
 TEST(ShippedFront, HoldsWhatTheKneeNeeds) {
-  EXPECT_EQ(shipped_calibration().front().seconds, 1);
+  EXPECT_EQ(reference_calibration().front().seconds, 1);
   for (const char* effects : {"auto", "none"}) {
     double before = 0;
-    for (const WorkPoint& p : shipped_ends()) {
+    for (const WorkPoint& p : reference_ends()) {
       if (p.settings.effects != effects) continue;
       EXPECT_EQ(p.settings.iterations, 0);
       EXPECT_GT(p.seconds, before) << p.settings.voxels;
@@ -115,7 +115,7 @@ TEST_P(VoxelChoiceTest, ASlowOrBusyMachineTakesFewerVoxelsAndSaysSo) {
   EXPECT_THAT(choice.words, Contains(HasSubstr("--voxels paper")));
 }
 
-/// Time and error of one and the same point of the shipped front.
+/// Time and error of one and the same point of the reference front.
 TEST_P(VoxelChoiceTest, FewerIterationsTakeTheTimeOfThoseIterations) {
   Calibration as_shipped;
   as_shipped.unit = Seconds(1);
@@ -136,7 +136,8 @@ TEST_P(VoxelChoiceTest, AMachineTenTimesAsSlowIsMeasuredAsTenTimesAsSlow) {
   const auto unit = [&](double tick) {
     const SlowClock clock(tick);
     const TimePoint start = clock.now();
-    const Task task{pictures(), device_here(), [&] { return clock.now() - start; }, nobody};
+    const Task task{*PreparedScene::create(pictures(), {}), device_here(),
+                    [&] { return clock.now() - start; }, nobody};
     const auto measured = calibrate(task, unlimited());
     EXPECT_TRUE(measured.ok());
     return measured.ok() ? measured->unit.value() : 0;

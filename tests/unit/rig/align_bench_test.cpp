@@ -25,8 +25,18 @@ class AlignBenchTest : public testing::Test {
   Seconds period = emberlock::period(devices.align.cameras[0]->info().frame_rate);
   drivers::StrobeSettings flashes{
       .output = drivers::StrobeOutput::flashing, .rate = rate(period), .width = microseconds(20)};
-  AlignBench bench{devices.align, devices.options, period};
+  AlignRunOptions options = at_period(devices.options, period);
+  AlignBench bench{devices.align, options};
 };
+
+TEST(AlignPeriod, IsToldToWhoeverAsksForItByOneOption) {
+  AlignRunOptions options;
+  options.timing.resize(3);
+  options.timing[1].frame_period = milliseconds(20);
+  const AlignRunOptions at = at_period(options, milliseconds(40));
+  EXPECT_EQ(at.align.period, milliseconds(40));
+  for (const smear::CcdTiming& timing : at.timing) EXPECT_EQ(timing.frame_period, at.align.period);
+}
 
 TEST_F(AlignBenchTest, CamerasAreKnownByTheirSensors) {
   EXPECT_THAT(bench.cameras_with(SensorKind::ccd), ElementsAre(0U));
@@ -58,7 +68,8 @@ TEST(AlignBench, FramesInFlightShowWhatWasBeforeAndArePassedOver) {
   test::SmallBench devices(setup);
   for (drivers::Camera* camera : devices.align.cameras) ASSERT_TRUE(camera->start().ok());
   const Seconds period = emberlock::period(devices.align.cameras[0]->info().frame_rate);
-  AlignBench bench{devices.align, devices.options, period};
+  const AlignRunOptions options = at_period(devices.options, period);
+  AlignBench bench{devices.align, options};
   ASSERT_TRUE(bench.film_all(1).ok());
   drivers::StrobeSettings settings{
       .output = drivers::StrobeOutput::flashing, .rate = rate(period), .width = microseconds(20)};

@@ -4,7 +4,10 @@
 
 #include "base/file.h"
 #include "rig/align/json.h"
+#include "rig/align/old_record.h"
 #include "rig/align/record.h"
+#include "rig/align/settings_proto.h"
+#include "tests/support/old_alignment.h"
 #include "tests/support/small_rig.h"
 
 namespace emberlock::rig {
@@ -24,54 +27,69 @@ AlignRunOptions some_options() {
   return options;
 }
 
-TEST(AlignJson, OptionsComeBackAsTheyWere) {
-  const auto json = options_json(some_options());
-  const auto back = options_from_json(nlohmann::json::parse(json.dump()));
+/// Settings as a note of an old recording had them, read.
+Result<AlignRunOptions> from_old(const nlohmann::ordered_json& settings) {
+  const auto options = options_in_note(nlohmann::ordered_json{{"align", settings}}.dump());
+  if (!options.ok()) return options.error();
+  EXPECT_TRUE(*options);
+  return (*options).value_or(AlignRunOptions{});
+}
+
+TEST(OldAlignSettings, ComeBackAsTheyWere) {
+  const auto back = from_old(test::old_settings(some_options()));
   ASSERT_TRUE(back.ok()) << back.error().message();
-  EXPECT_EQ(options_json(*back).dump(), json.dump());
+  EXPECT_EQ(to_proto(*back).SerializeAsString(), to_proto(some_options()).SerializeAsString());
   EXPECT_EQ(back->timing[0].direction, smear::ReadDirection::bottom_first);
   EXPECT_EQ(back->delays[1]->mean, milliseconds(12.3));
   EXPECT_EQ(back->seed, 18446744073709551615u);
   EXPECT_EQ(back->align.limits->resets, 60);
 }
 
-TEST(AlignJson, TheDialOfAStrobeThatIsSetByHandComesBack) {
+TEST(OldAlignSettings, TheDialOfAStrobeThatIsSetByHandComesBack) {
   AlignRunOptions options = some_options();
-  EXPECT_FALSE(options_json(options).contains("dial")) << "of other strobes recordings are as they were";
   options.align.dial = StrobeDial{.step = Hertz(1.0 / 60)};
-  const auto back = options_from_json(nlohmann::json::parse(options_json(options).dump()));
+  auto settings = test::old_settings(options);
+  const auto back = from_old(settings);
   ASSERT_TRUE(back.ok()) << back.error().message();
   EXPECT_EQ(back->align.dial, options.align.dial);
-  auto impossible = nlohmann::json::parse(options_json(options).dump());
-  impossible["dial"]["step_hz"] = 0;
-  EXPECT_FALSE(options_from_json(impossible).ok());
+  settings["dial"]["step_hz"] = 0;
+  EXPECT_FALSE(from_old(settings).ok());
 }
 
-TEST(AlignJson, EveryMissingOrMistypedFieldIsAnErrorNotACrash) {
-  const auto whole = nlohmann::json::parse(options_json(some_options()).dump());
+TEST(OldAlignSettings, EveryMissingOrMistypedFieldIsAnErrorNotACrash) {
+  const auto whole = test::old_settings(some_options());
   for (const auto& [key, value] : whole.items()) {
     auto missing = whole;
     missing.erase(key);
     // Than the first recordings.
     const bool newer = key == "strobe_step_s" || key == "hold_s" || key == "reset_by";
-    EXPECT_EQ(options_from_json(missing).ok(), newer) << key;
+    EXPECT_EQ(from_old(missing).ok(), newer) << key;
     auto mistyped = whole;
     mistyped[key] = nlohmann::json::object();
-    EXPECT_FALSE(options_from_json(mistyped).ok()) << key;
+    EXPECT_FALSE(from_old(mistyped).ok()) << key;
   }
-  EXPECT_FALSE(options_from_json(nullptr).ok());
+  EXPECT_FALSE(from_old(nullptr).ok());
 }
 
-TEST(AlignJson, SettingsFromBeforeTheStrobeWasMovedAndRunsWereHeldAreRead) {
-  auto first = nlohmann::json::parse(options_json(some_options()).dump());
+TEST(OldAlignSettings, OtherNotesHoldNone) {
+  for (const char* note : {"", "late frame: 3 0.5 a", "{\"aligned\": 1}", "[\"align\"]"}) {
+    const auto options = options_in_note(note);
+    ASSERT_TRUE(options.ok()) << note;
+    EXPECT_FALSE(*options) << note;
+  }
+  EXPECT_FALSE(*options_in_note(std::string(100'000, '[')));
+}
+
+TEST(OldAlignSettings, ThoseFromBeforeTheStrobeWasMovedAndRunsWereHeldAreRead) {
+  auto first = test::old_settings(some_options());
   first.erase("strobe_step_s");
   first.erase("hold_s");
-  const auto unmoved = options_from_json(first);
+  const auto unmoved = from_old(first);
   ASSERT_TRUE(unmoved.ok()) << unmoved.error().message();
   EXPECT_EQ(unmoved->align.strobe_step, Seconds(0));
   EXPECT_FALSE(unmoved->hold);
   first["nod_s"] = 0.001;  // as the step was called at first
-  EXPECT_EQ(options_from_json(first)->align.strobe_step, milliseconds(1));
+  EXPECT_EQ(from_old(first)->align.strobe_step, milliseconds(1));
 }
 
 TEST(AlignJson, WhatIsNotKnownIsNull) {
@@ -81,7 +99,8 @@ TEST(AlignJson, WhatIsNotKnownIsNull) {
   const smear::AlignOptions options;
   const auto step = smear::align_step({}, round, cameras, options);
   const std::vector<SensorKind> sensors(cameras.size(), SensorKind::rolling_shutter);
-  const auto json = round_json({round, step.decision, cameras, sensors, options, {}, {}, {}});
+  const auto words = smear::words(step.decision, round, cameras, options);
+  const auto json = round_json({round, step.decision, words, cameras, sensors, options, {}, {}, {}});
   EXPECT_TRUE(json["reference"].is_null());
   EXPECT_TRUE(json["worst_pair_rows"].is_null());
   EXPECT_TRUE(json["cameras"][0]["tau_ms"].is_null());

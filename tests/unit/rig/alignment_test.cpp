@@ -44,7 +44,7 @@ class AlignmentTest : public testing::Test {
     }
     do {
       ASSERT_TRUE(alignment->round().ok());
-      ASSERT_LT(alignment->last().round, 100) << alignment->last().reason;
+      ASSERT_LT(alignment->last().round, 100) << alignment->words().reason;
     } while (alignment->last().verdict != smear::AlignVerdict::aligned);
   }
 
@@ -127,7 +127,7 @@ TEST_F(AlignmentTest, CamerasAreResetBeforeTheyLeaveAndTheLockIsMissedForSeconds
       renewals += alignment->last().renews && alignment->state().renewal == 1 ? 1 : 0;
       if (!alignment->locked(bench.align.clock->now())) unlocked += bench.align.clock->now() - now;
       ASSERT_TRUE(alignment->last().renews || alignment->last().verdict == smear::AlignVerdict::aligned)
-          << alignment->last().reason;
+          << alignment->words().reason;
     }
     if (!alignment->locked(bench.align.clock->now())) continue;
     EXPECT_LE(bench.true_error(row), alignment->options().tolerance.in_rows(row));
@@ -189,7 +189,7 @@ TEST_F(AlignmentTest, AFlameIsFilmedInTheDarkBetweenTwoChecks) {
     for (const Frame& frame : camera) EXPECT_GT(frame.stamp.monotonic_time, last);
   }
   EXPECT_EQ(alignment->last().round, before + 1) << "the row time isn't measured again";
-  EXPECT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->last().reason;
+  EXPECT_EQ(alignment->last().verdict, smear::AlignVerdict::aligned) << alignment->words().reason;
 }
 
 TEST_F(AlignmentTest, AStopEndsCalibrationRoundAndWaitSoonAndTheyCanBeMadeAgain) {

@@ -7,6 +7,8 @@
 
 #include <gmock/gmock.h>
 
+#include "tests/support/recording.h"
+
 namespace emberlock::rig {
 namespace {
 using ::testing::HasSubstr;
@@ -36,9 +38,34 @@ TEST(Config, TheCommentedFileSaysWhatTheEmptyOneSaysButForASimulatedRig) {
   EXPECT_EQ(commented.rig.strobe.source, StrobeSource::virtual_);
   commented.rig = {};
   EXPECT_EQ(print_config(commented), nothing);
-  EXPECT_THAT(nothing, HasSubstr("tolerance = \"100rows\"\n"));
+  EXPECT_THAT(nothing, HasSubstr("policy = \"timed\"\n"));
   EXPECT_THAT(nothing, HasSubstr("flash_width_us = 20\n"));
-  EXPECT_THAT(nothing, HasSubstr("folder = \"/var/lib/emberlock/sessions\"\n"));
+  EXPECT_THAT(nothing, HasSubstr("picture_width = 480\n"));
+}
+
+TEST(Config, WhatTheFileLeavesToTheMachineIsFilledIn) {
+  const test::TempFolder prefix;
+  for (const char* folder : {"bin", "sbin"}) std::filesystem::create_directory(prefix / folder);
+  DaemonConfig config = parsed("");
+  fill_in(config, {"/run/user/7/emberlock", "/home/ada/data"}, prefix / "sbin/emberlockd");
+  EXPECT_EQ(config.server.socket, "/run/user/7/emberlock/emberlockd.sock");
+  EXPECT_EQ(config.recording.folder, "/home/ada/data/sessions");
+  EXPECT_EQ(config.server.console, prefix / "share/emberlock/console");
+  EXPECT_EQ(config.reconstruction.program, "emberlock") << "none is beside it: the one in PATH";
+  std::ofstream(prefix / "bin/emberlock") << "#!/bin/sh\n";
+  std::filesystem::permissions(prefix / "bin/emberlock", std::filesystem::perms::owner_all);
+  for (const char* daemon : {"sbin/emberlockd", "bin/emberlockd"}) {
+    DaemonConfig found = parsed("");
+    fill_in(found, {}, prefix / daemon);
+    EXPECT_EQ(found.reconstruction.program, prefix / "bin/emberlock") << daemon;
+  }
+  DaemonConfig said = parsed(
+      "[server]\nsocket = \"/a/b.sock\"\n[recording]\nfolder = \"/c\"\n[reconstruction]\n"
+      "program = \"emberlock\"\n");
+  fill_in(said, {"/run/user/7/emberlock", "/home/ada/data"}, prefix / "bin/emberlockd");
+  EXPECT_EQ(said.server.socket, "/a/b.sock");
+  EXPECT_EQ(said.recording.folder, "/c");
+  EXPECT_EQ(said.reconstruction.program, "emberlock");
 }
 
 TEST(Config, WhatIsPrintedIsReadAgain) {
@@ -55,7 +82,8 @@ TEST(Config, TheCommentedFileExplainsEveryKeyWithRangeAndDefault) {
   const std::string text = commented_config();
   EXPECT_THAT(
       text,
-      HasSubstr("# How long the strobe's flashes are. A number from 0.1 to 10000.\n#flash_width_us = 20\n"));
+      HasSubstr(
+          "# Duration of one flash of the strobe. A number from 0.1 to 10000.\n#flash_width_us = 20\n"));
   EXPECT_THAT(text, HasSubstr("\"virtual\", \"v4l2\", \"aravis\", \"ptp\" or \"replay\""));
 }
 
@@ -129,7 +157,7 @@ free_space_floor_mib = 3
 budget_s = 60
 hold_out = [3, 7]
 )");
-  EXPECT_DOUBLE_EQ(std::get<Seconds>(config.alignment.run.align.tolerance.amount).value(), 5.4e-3);
+  EXPECT_DOUBLE_EQ(std::get<Seconds>(config.alignment.tolerance.value().amount).value(), 5.4e-3);
   EXPECT_EQ(config.alignment.run.align.limits->time, Seconds(120));
   EXPECT_DOUBLE_EQ(in_microseconds(config.alignment.run.flash_width), 50);
   EXPECT_EQ(config.recording.writer.min_free_bytes, 3u << 20);

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rig/doctor/doctor.h"
 
-#include <algorithm>
 #include <filesystem>
+#include <variant>
+#include <vector>
 
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "rig/doctor/words.h"
 
 namespace emberlock::rig::doctor {
 namespace {
-using ::testing::HasSubstr;
 
 /// A machine on which everything is as it should be.
 Facts healthy() {
@@ -33,115 +35,114 @@ Facts healthy() {
   return f;
 }
 
-Check of(const Facts& facts, const std::string& what) {
-  for (Check& check : judge(facts)) {
-    if (check.what == what) return check;
+/// What is found of the matter that `Code` is of.
+template <class Code>
+Finding of(const Facts& facts) {
+  for (const Finding& finding : diagnose(facts)) {
+    if (std::holds_alternative<Code>(finding.code)) return finding;
   }
-  ADD_FAILURE() << "no check " << what;
+  ADD_FAILURE() << "nothing is found of one matter";
   return {};
+}
+template <class Code>
+Code code(const Facts& facts) {
+  return std::get<Code>(of<Code>(facts).code);
+}
+template <class Code>
+Health health(const Facts& facts) {
+  return of<Code>(facts).health;
 }
 
 TEST(Doctor, AHealthyMachineHasNothingToMend) {
-  for (const Check& check : judge(healthy())) {
-    EXPECT_EQ(check.health, Health::ok) << check.what << ": " << check.found;
-    EXPECT_FALSE(check.found.empty()) << check.what;
-    EXPECT_EQ(check.remedy, "") << check.what;
+  const Facts facts = healthy();
+  const std::vector<Finding> findings = diagnose(facts);
+  ASSERT_EQ(findings.size(), std::variant_size_v<FindingCode>);
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    EXPECT_EQ(findings[i].code.index(), i) << "the order is the list's";
+    EXPECT_EQ(findings[i].health, Health::ok) << words(findings[i], facts).found;
   }
-}
-
-TEST(Doctor, AStrobeThatIsSetByHandIsToldWhatToBeSetTo) {
-  Facts f = healthy();
-  f.strobe = StrobeSource::manual;
-  f.frame_rate = Hertz(24000.0 / 1001);
-  const Check check = of(f, "strobe");
-  EXPECT_EQ(check.health, Health::ok);
-  EXPECT_THAT(check.found, HasSubstr("set by hand: to 1438.6 flashes a minute (23.977 Hz)"));
-  EXPECT_THAT(check.found, HasSubstr("row_time_us"));
-  f.frame_rate = Hertz(0);
-  EXPECT_THAT(of(f, "strobe").found, HasSubstr("emberlock status says what to"));
-  EXPECT_THAT(of(healthy(), "strobe").found, HasSubstr("none is configured"));
-}
-
-TEST(Doctor, WhatIsWrongComesWithWhatToDo) {
-  Facts nothing;  // an empty machine: no group, no rules, no cameras, no disk, no daemon
-  nothing.folder_error = "ada can't write to /var/lib: Permission denied";
-  int wrong = 0;
-  for (const Check& check : judge(nothing)) {
-    if (check.health == Health::ok) continue;
-    ++wrong;
-    EXPECT_NE(check.remedy, "") << check.what;
-  }
-  EXPECT_GE(wrong, 6);
 }
 
 TEST(Doctor, WhoIsNotInTheGroupIsToldToJoinAndWhoJoinedLaterToLogInAnew) {
   Facts f = healthy();
   f.in_group = false;
-  EXPECT_EQ(of(f, "groups").health, Health::fail);
-  EXPECT_THAT(of(f, "groups").remedy, HasSubstr("usermod --append --groups emberlock ada"));
+  EXPECT_EQ(health<GroupFinding>(f), Health::fail);
+  EXPECT_EQ(code<GroupFinding>(f), GroupFinding::outsider);
   f.joined_later = true;
-  EXPECT_THAT(of(f, "groups").remedy, HasSubstr("log in anew"));
+  EXPECT_EQ(code<GroupFinding>(f), GroupFinding::joined_later);
   f.root = true;
-  EXPECT_EQ(of(f, "groups").health, Health::ok);
+  EXPECT_EQ(health<GroupFinding>(f), Health::ok);
+}
+
+TEST(Doctor, WithoutTheGroupNodesThatAreLockedFail) {
+  Facts f = healthy();
+  f.group_exists = f.in_group = false;
+  EXPECT_EQ(code<GroupFinding>(f), GroupFinding::no_group);
+  EXPECT_EQ(health<GroupFinding>(f), Health::warn);
+  f.locked = {"/dev/video0"};
+  EXPECT_EQ(health<GroupFinding>(f), Health::fail);
 }
 
 TEST(Doctor, CamerasThatCannotBeOpenedOrAreHeldByOthersFail) {
   Facts f = healthy();
   f.locked = {"/dev/video0", "/dev/video2"};
-  EXPECT_EQ(of(f, "cameras").health, Health::fail);
-  EXPECT_THAT(of(f, "cameras").found, HasSubstr("/dev/video0"));
+  EXPECT_EQ(health<CameraFinding>(f), Health::fail);
+  EXPECT_EQ(code<CameraFinding>(f), CameraFinding::locked);
   f = healthy();
-  f.held = {{"cam", {42, "cheese"}}};
-  EXPECT_EQ(of(f, "holders").health, Health::fail);
-  EXPECT_EQ(of(f, "holders").found, "cheese (process 42) has cam");
-  f.held = {{"cam", {42, "emberlockd"}}};
-  EXPECT_EQ(of(f, "holders").health, Health::ok);
+  f.held = {{"own", {41, "emberlockd"}}, {"cam", {42, "cheese"}}};
+  EXPECT_EQ(health<HolderFinding>(f), Health::fail);
+  EXPECT_EQ(of<HolderFinding>(f).which, 1);
+  f.held.pop_back();
+  EXPECT_EQ(code<HolderFinding>(f), HolderFinding::ours);
 }
 
 TEST(Doctor, MeddlersMatterOnlyWithoutTheRules) {
   Facts f = healthy();
   f.meddlers = {{"ModemManager", 7}};
-  EXPECT_EQ(of(f, "meddlers").health, Health::ok);
+  EXPECT_EQ(code<MeddlerFinding>(f), MeddlerFinding::kept_off);
   f.rules.reset();
-  EXPECT_EQ(of(f, "udev rules").health, Health::warn);
-  EXPECT_EQ(of(f, "meddlers").health, Health::warn);
+  EXPECT_EQ(health<RulesFinding>(f), Health::warn);
+  EXPECT_EQ(health<MeddlerFinding>(f), Health::warn);
 }
 
 TEST(Doctor, UsbMemoryMustHoldTheFramesOfItsCameras) {
   Facts f = healthy();
   f.usb3_cameras = 2;
-  EXPECT_EQ(of(f, "usb memory").health, Health::fail);
-  EXPECT_THAT(of(f, "usb memory").remedy, HasSubstr("echo 400 | sudo tee"));
+  EXPECT_EQ(health<UsbFinding>(f), Health::fail);
+  EXPECT_EQ(of<UsbFinding>(f).megabytes, 400);
   f.usbfs_megabytes = 0;  // no limit
-  EXPECT_EQ(of(f, "usb memory").health, Health::ok);
+  EXPECT_EQ(health<UsbFinding>(f), Health::ok);
 }
 
 TEST(Doctor, GigECamerasWantLargePacketsAndSocketBuffers) {
   Facts f = healthy();
   f.socket_buffer = 212992;
-  EXPECT_EQ(of(f, "socket buffer").health, Health::ok);  // nobody needs it
-  f.links = {{"enp3s0", 1500, 4}};
-  EXPECT_EQ(of(f, "socket buffer").health, Health::warn);
-  EXPECT_EQ(of(f, "network").health, Health::warn);
-  EXPECT_THAT(of(f, "network").remedy, HasSubstr("ip link set dev enp3s0 mtu 9000"));
-  f.links.front().mtu = 9000;
-  EXPECT_EQ(of(f, "network").health, Health::ok);
+  EXPECT_EQ(health<BufferFinding>(f), Health::ok);  // nobody needs it
+  f.links = {{"enp2s0", 9000, 1}, {"enp3s0", 1500, 4}};
+  EXPECT_EQ(health<BufferFinding>(f), Health::warn);
+  EXPECT_EQ(code<NetworkFinding>(f), NetworkFinding::small_packets);
+  EXPECT_EQ(health<NetworkFinding>(f), Health::warn);
+  EXPECT_EQ(of<NetworkFinding>(f).which, 1);
+  f.links.back().mtu = 9000;
+  EXPECT_EQ(health<NetworkFinding>(f), Health::ok);
 }
 
 TEST(Doctor, TheDiskMustHoldAndTakeWhatTheCamerasSend) {
   Facts f = healthy();
   f.write_bytes_per_s = 300e6;
-  EXPECT_EQ(of(f, "disk speed").health, Health::warn);
+  EXPECT_EQ(code<SpeedFinding>(f), SpeedFinding::little_to_spare);
+  EXPECT_EQ(health<SpeedFinding>(f), Health::warn);
   f.write_bytes_per_s = 200e6;
-  EXPECT_EQ(of(f, "disk speed").health, Health::fail);
-  EXPECT_EQ(of(f, "disk speed").found, "200 MB/s, the cameras send 243 MB/s");
+  EXPECT_EQ(health<SpeedFinding>(f), Health::fail);
   f.free_bytes = std::uint64_t{20} << 30;
-  EXPECT_EQ(of(f, "disk").health, Health::warn);
+  EXPECT_EQ(health<SpaceFinding>(f), Health::warn);
+  EXPECT_NEAR(of<SpaceFinding>(f).recording.value(), (19.0 * (1 << 30)) / 243e6, 1e-9);
   f.free_bytes = std::uint64_t{1} << 29;
-  EXPECT_EQ(of(f, "disk").health, Health::fail);
+  EXPECT_EQ(code<SpaceFinding>(f), SpaceFinding::below_floor);
+  EXPECT_EQ(health<SpaceFinding>(f), Health::fail);
 }
 
-TEST(Doctor, TheRestIsJudgedOneByOne) {
+TEST(Doctor, TheRestIsFoundOneByOne) {
   Facts f = healthy();
   f.clock_synchronized = false;
   f.governor = "powersave";
@@ -149,15 +150,15 @@ TEST(Doctor, TheRestIsJudgedOneByOne) {
   f.config_problems = {Error{ErrorKind::bad_input, "x is 3", "lab.toml:1:1", "give 2"}};
   f.daemon = Reach::nobody_there;
   f.cuda_built = true;
-  EXPECT_EQ(of(f, "clock").health, Health::warn);
-  EXPECT_EQ(of(f, "processor").health, Health::warn);
-  EXPECT_EQ(of(f, "limits").health, Health::warn);
-  EXPECT_EQ(of(f, "configuration").health, Health::fail);
-  EXPECT_THAT(of(f, "configuration").found, HasSubstr("lab.toml:1:1: x is 3"));
-  EXPECT_EQ(of(f, "daemon").health, Health::warn);
-  EXPECT_EQ(of(f, "cuda").health, Health::warn);
+  EXPECT_EQ(health<ClockFinding>(f), Health::warn);
+  EXPECT_EQ(health<GovernorFinding>(f), Health::warn);
+  EXPECT_EQ(health<LimitFinding>(f), Health::warn);
+  EXPECT_EQ(of<LimitFinding>(f).files, 65536);
+  EXPECT_EQ(health<ConfigFinding>(f), Health::fail);
+  EXPECT_EQ(health<DaemonFinding>(f), Health::warn);
+  EXPECT_EQ(health<CudaFinding>(f), Health::warn);
   f.daemon = Reach::refused;
-  EXPECT_EQ(of(f, "daemon").health, Health::fail);
+  EXPECT_EQ(health<DaemonFinding>(f), Health::fail);
 }
 
 TEST(Doctor, WhatCamerasSendIsCountedFromTheConfiguration) {

@@ -50,14 +50,14 @@ TEST(Rig, FastVirtualCamerasAlignOnTheirOwnClock) {
   EXPECT_EQ((*rig)->state(0), Thread::idle);
   AlignmentConfig alignment;
   alignment.run.hold.reset();
-  alignment.run.align.tolerance.amount = Rows(30);
+  alignment.tolerance = smear::Tolerance{Rows(30)};
   alignment.reference = "virtual-02";
   const auto options = (*rig)->align_options(alignment);
   ASSERT_TRUE(options.ok()) << options.error().message();
   EXPECT_EQ(options->align.reference, 2U);
   const auto result = run_align((*rig)->devices(), *options);
   ASSERT_TRUE(result.ok()) << result.error().message();
-  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->last.reason;
+  EXPECT_EQ(result->last.verdict, smear::AlignVerdict::aligned) << result->words.reason;
   EXPECT_EQ((*rig)->state(0), Thread::filming);
   EXPECT_GT((*rig)->clock().now().ns, 0);
 }

@@ -92,6 +92,61 @@ TEST(Export, AVideosTimeRunsOnThroughGapsAndWhatWasFilledIsSaid) {
   EXPECT_FALSE((*video)->next());
 }
 
+/// The difference of the brightest and the darkest pixel of a picture's last rows.
+double contrast_below(const Image& image) {
+  double low = 255;
+  double high = 0;
+  for (int x = 0; x < image.layout().size.width; ++x) {
+    low = std::min<double>(low, image.view().sample(x, image.layout().size.height - 1));
+    high = std::max<double>(high, image.view().sample(x, image.layout().size.height - 1));
+  }
+  return high - low;
+}
+
+// A machine that lags stamps frames late; the camera's own clock, and its numbers, know better.
+TEST(Export, AVideoHasTheCamerasOwnRateAndMarksWhatItRepeats) {
+  const TempFolder temp;
+  const ImageLayout layout{{96, 64}, PixelFormat::gray8, 8};
+  v1::Manifest manifest = manifest_of({layout});
+  manifest.mutable_cameras(0)->set_frame_rate_hz(23.976);
+  auto writer = SessionWriter::create(temp / "s", manifest, small_disk_options());
+  ASSERT_TRUE(writer);
+  for (const std::int64_t id : {0, 1, 2, 5, 6, 7}) {
+    Frame frame = flat_frame(layout, static_cast<std::uint64_t>(id), .4);
+    frame.stamp.device_time.ns = 77 + id * 41'708'000;        // 23.9762 Hz
+    frame.stamp.monotonic_time.ns = 1'000 + id * 48'300'000;  // 20.7 Hz
+    ASSERT_TRUE(writer->write(0, frame));
+  }
+  ASSERT_TRUE(writer->finish());
+  const auto report = export_session(temp / "s", temp / "out", ExportFormat::video);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_NEAR(report->cameras.at(0).frame_rate.value(), 23.976, 1e-9);
+  EXPECT_EQ(report->cameras.at(0).repeated, 2U);
+  const auto video = FrameFile::open(temp / "out/cam0.mp4", Colours::brightness);
+  ASSERT_TRUE(video);
+  EXPECT_NEAR((*video)->claims().frame_rate->value(), 23.976, 1e-3);
+  for (std::uint64_t i = 0; i < 8; ++i) {
+    const auto image = (*video)->next();
+    ASSERT_TRUE(image) << i;
+    EXPECT_EQ(contrast_below(*image) > 100, i == 3 || i == 4) << i;
+    EXPECT_NEAR(image->view().sample(30, 20) / 255.0, .4, .02) << i;
+  }
+}
+
+TEST(Export, ACameraThatClaimsAnotherRateThanItHasIsShownAtItsOwn) {
+  const TempFolder temp;
+  const ImageLayout layout{{64, 48}, PixelFormat::gray8, 8};
+  v1::Manifest manifest = manifest_of({layout});
+  manifest.mutable_cameras(0)->set_frame_rate_hz(30);
+  auto writer = SessionWriter::create(temp / "s", manifest, small_disk_options());
+  ASSERT_TRUE(writer);
+  for (std::uint64_t id = 0; id < 4; ++id) ASSERT_TRUE(writer->write(0, flat_frame(layout, id, .4)));
+  ASSERT_TRUE(writer->finish());
+  const auto report = export_session(temp / "s", temp / "out", ExportFormat::video);
+  ASSERT_TRUE(report) << report.error().message();
+  EXPECT_NEAR(report->cameras.at(0).frame_rate.value(), 100, 1e-6);
+}
+
 TEST(Export, WhatCannotBeReadIsLeftOutAndCounted) {
   const TempFolder temp;
   const ImageLayout layout{{64, 48}, PixelFormat::gray8, 8};

@@ -54,6 +54,30 @@ TEST(SessionStore, ExportsGoBesideItAndFollowNoLink) {
   EXPECT_FALSE(store.path_for_export("take 1", "video"));
 }
 
+TEST(SessionStore, NamesOfAnyScriptAreStoredListedAndFound) {
+  const TempFolder temp;
+  const SessionStore store = store_in(temp);
+  for (const std::string name : {"\u03c6\u03bb\u03cc\u03b3\u03b1", "\u706b\u7130 1", "\u0644\u0647\u0628"}) {
+    const auto path = store.path_for_new(name, kNow);
+    ASSERT_TRUE(path) << path.error().message();
+    record(*path, kStoredLayout, 2, small_disk_options());
+    EXPECT_EQ(store.path_of(name).value(), temp / "store" / name);
+  }
+  EXPECT_EQ(store.list().sessions_size(), 3);
+}
+
+TEST(SessionStore, ANameThatLooksLikeAnOldOneIsTaken) {
+  const TempFolder temp;
+  const SessionStore store = store_in(temp);
+  const auto path = store.path_for_new("e\u0301te\u0301", kNow);
+  ASSERT_TRUE(path);
+  EXPECT_EQ(path->filename(), "\u00e9t\u00e9");
+  std::filesystem::create_directories(temp /
+                                      "store/e\u0301te\u0301");  // copied from a file system that parts marks
+  EXPECT_FALSE(store.path_for_new("\u00e9t\u00e9", kNow));
+  EXPECT_TRUE(store.path_for_new("ete", kNow));
+}
+
 /// A session as a killed recorder leaves it.
 void leave_unfinished(const std::filesystem::path& folder) {
   auto writer = SessionWriter::create(folder, manifest_of({kStoredLayout}), small_disk_options());

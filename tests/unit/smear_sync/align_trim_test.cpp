@@ -99,7 +99,7 @@ TEST(AlignTrim, ACameraWithoutTrimsIsNamed) {
   sim.trim.reset();
   const AlignOutcome o = simulate(sim, 1);
   EXPECT_EQ(o.decision.verdict, AlignVerdict::refused);
-  EXPECT_THAT(o.decision.reason, HasSubstr("cam0 can't be trimmed"));
+  EXPECT_THAT(o.words.reason, HasSubstr("cam0 can't be trimmed"));
 }
 
 /// Cameras known to be alike, of which so many rows are asked for within 60 resets and ten minutes.
@@ -122,7 +122,7 @@ TEST(AlignLimits, ATolerancePastTheLimitsIsRefusedWithWhatCouldBeMet) {
   EXPECT_EQ(o.decision.offers[1].policy, AlignPolicy::densest);
   EXPECT_GT(o.decision.offers[1].tolerance.in_rows(sim.options.row_time), Rows(20));
   for (const AlignOffer& offer : o.decision.offers) EXPECT_GE(offer.effort.within, 0.9);
-  EXPECT_THAT(o.decision.reason, HasSubstr("What could be met: 3.0 rows by timed"));
+  EXPECT_THAT(o.words.reason, HasSubstr("What could be met: 0.162 ms (3.0 rows) by timed"));
 }
 
 TEST(AlignLimits, AnOfferKeepsItsPromise) {
@@ -162,7 +162,7 @@ TEST(AlignLimits, AToleranceBelowTheNoiseIsRefused) {
   const AlignSimulation sim = limited(AlignPolicy::timed, Rows(0.2));
   const AlignOutcome o = simulate(sim, 1);
   EXPECT_EQ(o.decision.verdict, AlignVerdict::refused);
-  EXPECT_THAT(o.decision.reason, HasSubstr("can't be told: phases are known to 0.3 rows"));
+  EXPECT_THAT(o.words.reason, HasSubstr("can't be told: phases are known to 0.3 rows"));
 }
 
 TEST(AlignSchedule, TheNextCheckComesBeforeTheDriftLeavesTheTolerance) {

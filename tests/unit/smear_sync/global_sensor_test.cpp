@@ -19,7 +19,7 @@ constexpr int kFewLooks = 12;
 class GlobalSensor : public testing::Test {
  protected:
   /// A round whose phase is right.
-  ToldRound expect_true(const Beat& own = kStill) {
+  ToldRound expect_true(const PeriodOffset& own = kStill) {
     const ToldRound told = rounds.film(own);
     EXPECT_EQ(told.phase.state, PhaseState::known) << told.phase.reason;
     EXPECT_LT(rounds.off(told), 4 * told.phase.sigma);
@@ -44,7 +44,7 @@ TEST_F(GlobalSensor, AWholeSweepFirstThenAFewLooksARound) {
 
 TEST_F(GlobalSensor, AnEdgeThatDriftsIsFollowedForHours) {
   shutter.rate = PartsPerMillion(22);
-  const Beat roughly{PartsPerMillion(20), PartsPerMillion(3)};
+  const PeriodOffset roughly{PartsPerMillion(20), PartsPerMillion(3)};
   expect_true(roughly);
   for (int i = 0; i < 150; ++i) {  // more looks than are kept
     rounds.wait(Seconds(20));
@@ -55,7 +55,7 @@ TEST_F(GlobalSensor, AnEdgeThatDriftsIsFollowedForHours) {
 // Ten minutes at +-20 ppm: the edge may be anywhere within 36 ms.
 TEST_F(GlobalSensor, LooksThatTellNothingAnyMoreAreForgotten) {
   shutter.rate = PartsPerMillion(15);
-  const Beat unknown{PartsPerMillion(0), PartsPerMillion(20)};
+  const PeriodOffset unknown{PartsPerMillion(0), PartsPerMillion(20)};
   const auto film = [&] {
     const ToldRound told = rounds.film(unknown);
     ASSERT_EQ(told.phase.state, PhaseState::known) << told.phase.reason;

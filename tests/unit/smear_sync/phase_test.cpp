@@ -103,8 +103,9 @@ TEST(Phase, ShortFlashesCarryNoSubRowPhaseAndLongOnesDo) {
 }
 
 TEST(Phase, ExpectedBeatOfThePapersStrobe) {
-  const Beat beat = expected_beat(Hertz(23.98), period(Hertz(23.976)), PartsPerMillion(1));
-  EXPECT_NEAR(beat.rate.value(), -166.8, 0.1);
+  const PeriodOffset period_offset =
+      expected_period_offset(Hertz(23.98), period(Hertz(23.976)), PartsPerMillion(1));
+  EXPECT_NEAR(period_offset.rate.value(), -166.8, 0.1);
 }
 
 std::vector<PhaseSample> samples_at(std::initializer_list<double> rows, double sigma_rows = 0.3) {
@@ -193,15 +194,15 @@ TEST(Refer, CamerasReadOneAfterTheOtherUnderABeat) {
       rig[camera].push_back({TimePoint{} + Seconds(t), {PhaseState::known, tau, Rows(0.3) * row, {}}});
     }
   }
-  CircleOptions options{.period = T, .beat = {PartsPerMillion(-160), PartsPerMillion(20)}};
+  CircleOptions options{.period = T, .period_offset = {PartsPerMillion(-160), PartsPerMillion(20)}};
   const CommonPhases common = refer(rig, options);
-  EXPECT_NEAR(common.beat.rate.value(), -167, 3 * common.beat.sigma.value());
-  EXPECT_LT(common.beat.sigma, PartsPerMillion(20));
+  EXPECT_NEAR(common.period_offset.rate.value(), -167, 3 * common.period_offset.sigma.value());
+  EXPECT_LT(common.period_offset.sigma, PartsPerMillion(20));
   for (const Phase& phase : common.phases) {
     EXPECT_NEAR((phase_error(phase, common.phases.front(), T) / row).value(), 0, 3.0);
   }
   // Left alone, the beat would pull the first and the last apart by 30 rows.
-  options.beat = {};
+  options.period_offset = {};
   const CommonPhases pulled = refer(rig, options);
   EXPECT_GT(std::abs((phase_error(pulled.phases.back(), pulled.phases.front(), T) / row).value()), 25);
 }
@@ -209,8 +210,8 @@ TEST(Refer, CamerasReadOneAfterTheOtherUnderABeat) {
 TEST(Refer, WithoutAnyDotKeepsTheBeatThatWasPromised) {
   std::vector<std::vector<PhaseSample>> rig(2);
   rig[0].push_back({TimePoint{5}, {PhaseState::blind, {}, {}, "no dot"}});
-  const CommonPhases common = refer(rig, {.beat = {PartsPerMillion(7), PartsPerMillion(3)}});
-  EXPECT_NEAR(common.beat.rate.value(), 7, 1e-12);
+  const CommonPhases common = refer(rig, {.period_offset = {PartsPerMillion(7), PartsPerMillion(3)}});
+  EXPECT_NEAR(common.period_offset.rate.value(), 7, 1e-12);
   EXPECT_EQ(common.phases[0].state, PhaseState::blind);
   EXPECT_EQ(common.phases[1].state, PhaseState::unusable);
 }

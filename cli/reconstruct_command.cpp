@@ -229,7 +229,9 @@ Status plan_files(const ReconstructArguments& arguments) {
   for (const std::string& words : choice.words) std::printf("%-16s %s\n", "voxels", words.c_str());
   if (choice.expected_time.value() > 0)
     std::printf(
-        "%-16s about %.2g s, by the reference front: loading %.2g, reconstruction %.2g, writing %.2g\n",
+        "%-16s about %.2g s, as a run on a grid half as fine tells: loading %.2g, reconstruction %.2g, "
+        "writing "
+        "%.2g\n",
         "time", (loading + choice.expected_time + writing).value(), loading.value(),
         choice.expected_time.value(), writing.value());
   std::printf("%-16s %s\n", "look at", (std::filesystem::path(arguments.plan) / "index.html").c_str());

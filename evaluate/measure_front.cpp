@@ -34,11 +34,11 @@ Result<recon::Reference> time_reference(const recon::Scene& scene, int voxels,
   return best;
 }
 
-/// Runs to the solver's own end.
-Result<std::vector<recon::WorkPoint>> measure_ends(const recon::Scene& scene, const std::vector<int>& voxels,
-                                                   const recon::ComputeOptions& compute, const Clock& clock,
-                                                   const Progress& progress) {
-  std::vector<recon::WorkPoint> ends;
+/// Fills `ends` and `solves`.
+Status measure_ends(const recon::Scene& scene, const std::vector<int>& voxels,
+                    const recon::ComputeOptions& compute, const Clock& clock, const Progress& progress,
+                    MeasuredFront& measured) {
+  std::vector<recon::WorkPoint>& ends = measured.ends;
   for (const char* effects : {"auto", "none"})
     for (const int v : voxels) {
       recon::ReconstructOptions options;
@@ -52,8 +52,10 @@ Result<std::vector<recon::WorkPoint>> measure_ends(const recon::Scene& scene, co
       ends.push_back({{.voxels = v, .iterations = 0, .effects = effects},
                       done.total_time.value(),
                       recon::all_channels(done.heldout_rmse.value())});
+      measured.solves.push_back(ends.back());
+      measured.solves.back().seconds -= done.effects_time.value();
     }
-  return ends;
+  return {};
 }
 
 /// The geometric mean of two flames' points, as source; those that one of them lacks are left out.
@@ -95,10 +97,10 @@ Result<MeasuredFront> measure_front(const recon::Scene& scene, const recon::Comp
   };
   EMBERLOCK_ASSIGN_OR_RETURN(Sweep result, sweep(scene, options, clock, half(0)));
   measured.points = std::move(result.points);
-  EMBERLOCK_ASSIGN_OR_RETURN(measured.ends, measure_ends(scene, options.voxels, compute, clock, half(0.5)));
+  EMBERLOCK_RETURN_IF_ERROR(measure_ends(scene, options.voxels, compute, clock, half(0.5), measured));
   const double seconds = std::max(reference.seconds.value(), 1e-9);
   for (recon::CalibrationRun& run : measured.calibration) run.seconds /= seconds;
-  for (auto* points : {&measured.points, &measured.ends})
+  for (auto* points : {&measured.points, &measured.ends, &measured.solves})
     for (recon::WorkPoint& p : *points) {
       p.seconds /= seconds;
       p.error /= std::max(reference.error, 1e-9);
@@ -130,9 +132,11 @@ Result<std::string> reference_front_source(const recon::ComputeOptions& compute,
       "// voxels, iterations, effects, seconds, error\n"
       "constexpr Row kRows[] = {{\n{}}};\n"
       "constexpr Row kEnds[] = {{\n{}}};\n"
+      "constexpr Row kSolves[] = {{\n{}}};\n"
       "// voxels, seconds\n"
       "constexpr CalibrationRun kCalibration[] = {{\n",
-      finest, rows_of(fronts[0].points, fronts[1].points), rows_of(fronts[0].ends, fronts[1].ends));
+      finest, rows_of(fronts[0].points, fronts[1].points), rows_of(fronts[0].ends, fronts[1].ends),
+      rows_of(fronts[0].solves, fronts[1].solves));
   for (std::size_t i = 0; i < fronts[0].calibration.size(); ++i) {
     const recon::CalibrationRun& run = fronts[0].calibration[i];
     source += fmt::format("    {{{}, {:.4g}}},\n", run.voxels,

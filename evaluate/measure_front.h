@@ -15,7 +15,8 @@ namespace emberlock::evaluate {
 /// One flame's measurement, in multiples of its reference.
 struct MeasuredFront {
   std::vector<recon::WorkPoint> points;  ///< as reference_front()
-  std::vector<recon::WorkPoint> ends;
+  std::vector<recon::WorkPoint> ends;    ///< as reference_ends()
+  std::vector<recon::WorkPoint> solves;  ///< as reference_solves()
   std::vector<recon::CalibrationRun> calibration;
 };
 Result<MeasuredFront> measure_front(const recon::Scene& scene, const recon::ComputeOptions& compute,

@@ -48,7 +48,9 @@ struct VoxelChoice {
   int voxels = 0;               ///< along the longest edge
   int by_the_paper = 0;         ///< voxels_by_the_paper()
   Seconds calibration_time{0};  ///< duration of measuring this machine; 0 if it wasn't needed
-  Seconds expected_time{0};     ///< in all, with measuring, by the reference front; 0 if nothing was measured
+  /// In all, with measuring. Of a plan (plan_voxels()) measured; of a run by the reference front, whose
+  /// flames take light: the most. 0 if nothing was measured.
+  Seconds expected_time{0};
   struct Option {
     int voxels = 0;
     Seconds time{0};

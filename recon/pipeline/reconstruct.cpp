@@ -15,6 +15,7 @@
 #include "recon/export/picture.h"
 #include "recon/export/volume_file.h"
 #include "recon/pipeline/planned_run.h"
+#include "recon/pipeline/planned_time.h"
 #include "recon/pipeline/voxel_choice.h"
 #include "recon/preprocess/radiance.h"
 
@@ -104,15 +105,16 @@ Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& op
     choice.expected_time = Seconds(0);
   }
   // The reference front tells of the default solver's own end alone.
-  if (choice.rule == "knee" || has_goal(options) || options.solve.solver != Solver::standard) return choice;
+  if (has_goal(options) || options.solve.solver != Solver::standard) return choice;
+  const Seconds spent = elapsed();
   ReconstructOptions chosen = options;
   chosen.voxels = choice.voxels;
-  EMBERLOCK_ASSIGN_OR_RETURN(const Calibration measured, calibrate(task, chosen));
-  choice.calibration_time = measured.took;
-  const std::vector<WorkPoint> expected = expected_runs(scene, chosen, measured);
-  if (!expected.empty()) choice.expected_time = elapsed() + Seconds(expected.front().seconds);
+  EMBERLOCK_ASSIGN_OR_RETURN(const PlannedTime planned, plan_time(task, chosen, progress));
+  choice.expected_time = spent + planned.total();
   return choice;
 } catch (const DeviceError& e) {
+  return e.error();
+} catch (const Diverged& e) {
   return e.error();
 } catch (const std::bad_alloc&) {
   return Error{ErrorKind::bad_input, "not enough memory", "--voxels", "Give fewer voxels, or a smaller box"};

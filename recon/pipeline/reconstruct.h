@@ -58,8 +58,8 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
                             const Progress& progress = {},
                             const std::function<void(const Preview&)>& preview = {});
 
-/// What reconstruct() would take, without doing it: the number of voxels and how long that is thought to
-/// last.
+/// What reconstruct() would take, without doing it: the number of voxels, and how long that lasts by what the
+/// search for effects and a run on a grid half as fine take (planned_time.h).
 Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
                                 const Progress& progress = {});
 

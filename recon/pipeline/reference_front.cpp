@@ -41,6 +41,11 @@ const std::vector<WorkPoint>& reference_ends() {
   return ends;
 }
 
+const std::vector<WorkPoint>& reference_solves() {
+  static const std::vector<WorkPoint> solves = points_of(std::begin(kSolves), std::end(kSolves));
+  return solves;
+}
+
 const std::vector<CalibrationRun>& reference_calibration() {
   static const std::vector<CalibrationRun> runs(std::begin(kCalibration), std::end(kCalibration));
   return runs;
@@ -55,6 +60,12 @@ std::vector<WorkPoint> scaled(std::vector<WorkPoint> front, int finest, double r
     p.error *= reference_error;
   }
   return front;
+}
+
+double seconds_at(const std::vector<WorkPoint>& runs, std::string_view effects, int finest, int voxels) {
+  std::vector<WorkPoint> kept = scaled(runs, finest, 1, 1);
+  std::erase_if(kept, [&](const WorkPoint& p) { return p.settings.effects != effects; });
+  return at_voxels(kept, voxels).front().seconds;
 }
 
 }  // namespace emberlock::recon

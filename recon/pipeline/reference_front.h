@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string_view>
 #include <vector>
 
 #include "recon/pipeline/work_precision.h"
@@ -19,6 +20,9 @@ int reference_finest();
 /// reconstruction takes and reaches where nobody limits it. The same units.
 const std::vector<WorkPoint>& reference_ends();
 
+/// The same runs without their search for effects: hull, solve and rendering.
+const std::vector<WorkPoint>& reference_solves();
+
 /// What a reference run takes on finer grids than the reference's own, in its seconds: the first is 1.
 struct CalibrationRun {
   int voxels = 0;
@@ -30,5 +34,9 @@ const std::vector<CalibrationRun>& reference_calibration();
 /// by its reference run.
 std::vector<WorkPoint> scaled(std::vector<WorkPoint> front, int finest, double reference_seconds,
                               double reference_error);
+
+/// Of reference_ends() or reference_solves(), those with these effects: the seconds at so many voxels of a
+/// scene whose pictures call for `finest`, in their own unit.
+double seconds_at(const std::vector<WorkPoint>& runs, std::string_view effects, int finest, int voxels);
 
 }  // namespace emberlock::recon

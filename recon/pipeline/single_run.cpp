@@ -7,7 +7,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "recon/adjust/choose_effects.h"
 #include "recon/adjust/paper.h"
 #include "recon/adjust/picture_error.h"
 #include "recon/pipeline/coverage.h"
@@ -29,23 +28,6 @@ constexpr std::size_t bytes_per_key_point(Precision precision) {
   const std::size_t number = precision == Precision::float64 ? sizeof(double) : sizeof(float);
   const std::size_t level = (8 * 4 + 4) * number + 2 * sizeof(Rgba);
   return level + level / 8;
-}
-
-Result<EffectChoice> decide_effects(const Task& task, const Grid& grid, const ReconstructOptions& options) {
-  EffectRequest request = options.effects.value_or(EffectRequest{});
-  const bool as_published = !options.effects && options.solve.solver == Solver::paper;
-  if (as_published) {
-    request.fixed = absorbing(extinction_of_opacity(kPaperOpacity, Meters(static_cast<double>(grid.edge))));
-  }
-  const PreparedScene known = request.fixed ? task.prepared.under(*request.fixed) : task.prepared;
-  EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
-                             choose_effects(known, grid, request, options.solve, task.elapsed));
-  if (as_published) {
-    for (EffectReport& report : choice.reports) {
-      if (report.name == "extinction") report.reason = "the paper's constant opacity of 0.05 a step";
-    }
-  }
-  return choice;
 }
 
 /// Root of the mean over the views of the squared error, one role at a time; nothing without such a view.
@@ -115,6 +97,23 @@ Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels, P
                                                  : "Give fewer voxels, or a smaller box"};
   }
   return grid;
+}
+
+Result<EffectChoice> decide_effects(const Task& task, const Grid& grid, const ReconstructOptions& options) {
+  EffectRequest request = options.effects.value_or(EffectRequest{});
+  const bool as_published = !options.effects && options.solve.solver == Solver::paper;
+  if (as_published) {
+    request.fixed = absorbing(extinction_of_opacity(kPaperOpacity, Meters(static_cast<double>(grid.edge))));
+  }
+  const PreparedScene known = request.fixed ? task.prepared.under(*request.fixed) : task.prepared;
+  EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
+                             choose_effects(known, grid, request, options.solve, task.elapsed));
+  if (as_published) {
+    for (EffectReport& report : choice.reports) {
+      if (report.name == "extinction") report.reason = "the paper's constant opacity of 0.05 a step";
+    }
+  }
+  return choice;
 }
 
 Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions& options,

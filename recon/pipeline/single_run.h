@@ -3,6 +3,7 @@
 
 #include <functional>
 
+#include "recon/adjust/choose_effects.h"
 #include "recon/adjust/prepared_scene.h"
 #include "recon/pipeline/reconstruct.h"
 
@@ -24,6 +25,9 @@ double physical_memory();
 /// larger than `memory`.
 Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels,
                          Precision precision = Precision::float32, double memory = physical_memory());
+
+/// Those that are asked for, and of the others those that the scene calls for.
+Result<EffectChoice> decide_effects(const Task& task, const Grid& grid, const ReconstructOptions& options);
 
 /// Effects, hull, solve and rendering, at settings that stay as they are.
 Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, const Progress& progress);

@@ -31,14 +31,26 @@ const WorkPoint* next_better(const std::vector<WorkPoint>& points, const WorkPoi
   return next;
 }
 
-/// `spent`: seconds that have passed already.
+/// Of a chosen run where the search for effects finds that the flame takes no light.
+double seconds_without_effects(const Scene& scene, int voxels, Seconds unit) {
+  const auto seconds = [&](const std::vector<WorkPoint>& runs, const char* effects) {
+    return unit.value() * seconds_at(runs, effects, finest_voxels(scene), voxels);
+  };
+  return seconds(reference_ends(), "auto") - seconds(reference_solves(), "auto") +
+         seconds(reference_solves(), "none");
+}
+
+/// `spent`: seconds that have passed already. `least`: what it takes where an effect is not called for.
 std::string why(const std::vector<WorkPoint>& points, const WorkPoint& chosen, const Calibration& measured,
-                double spent) {
-  std::string words = fmt::format(
-      "{} voxels along the longest edge: about {:.2g} s from the loaded pictures on, on this machine as it "
-      "is "
-      "now (measured in {:.2g} s)",
-      chosen.settings.voxels, spent + chosen.seconds, measured.took.value());
+                double spent, double least) {
+  const double most = spent + chosen.seconds;
+  std::string words = fmt::format("{} voxels along the longest edge: about ", chosen.settings.voxels);
+  words += least < chosen.seconds
+               ? fmt::format("{:.2g} s, or {:.2g} where the flame takes none of its own light,", most,
+                             spent + least)
+               : fmt::format("{:.2g} s", most);
+  words += fmt::format(" from the loaded pictures on, on this machine as it is now (measured in {:.2g} s)",
+                       measured.took.value());
   Patience unhurried;
   unhurried.most_seconds = INFINITY;
   const WorkPoint& wanted = *knee(points, unhurried);
@@ -174,8 +186,12 @@ Result<VoxelChoice> choose_voxels(const Task& task, const ReconstructOptions& op
   const WorkPoint* chosen = knee(points);
   if (chosen == nullptr) return told(scene, "finest", finest_voxels(scene), "");  // choose_grid() says why
   const Seconds spent = task.elapsed();
+  const bool searches = !options.effects || !options.effects->fixed;
+  const double least = searches && options.solve.iterations == 0
+                           ? seconds_without_effects(scene, chosen->settings.voxels, measured.unit)
+                           : chosen->seconds;
   VoxelChoice choice =
-      told(scene, "knee", chosen->settings.voxels, why(points, *chosen, measured, spent.value()));
+      told(scene, "knee", chosen->settings.voxels, why(points, *chosen, measured, spent.value(), least));
   choice.calibration_time = measured.took;
   choice.expected_time = spent + Seconds(chosen->seconds);
   for (const WorkPoint& p : points) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "recon/pipeline/grid_choice.h"
+#include "recon/pipeline/planned_time.h"
 #include "recon/pipeline/reference_front.h"
 #include "recon/pipeline/single_run.h"
 #include "tests/support/devices.h"
@@ -59,7 +60,7 @@ TEST(ShippedFront, HoldsWhatTheKneeNeeds) {
   EXPECT_EQ(reference_calibration().front().seconds, 1);
   for (const char* effects : {"auto", "none"}) {
     double before = 0;
-    for (const WorkPoint& p : reference_ends()) {
+    for (const WorkPoint& p : reference_solves()) {
       if (p.settings.effects != effects) continue;
       EXPECT_EQ(p.settings.iterations, 0);
       EXPECT_GT(p.seconds, before) << p.settings.voxels;
@@ -145,6 +146,41 @@ TEST_P(VoxelChoiceTest, AMachineTenTimesAsSlowIsMeasuredAsTenTimesAsSlow) {
   const double slow = unit(0.2);  // so slow that there is time for the first solve alone
   EXPECT_GT(slow, 1);
   EXPECT_NEAR(unit(2) / slow, 10, 1e-6) << "no solve is cut short";
+}
+
+TEST_P(VoxelChoiceTest, APlanSearchesForTheEffectsAsTheRunDoesAndScalesWithTheMachine) {
+  const std::function<void(const Preview&)> nobody;
+  ReconstructOptions options;
+  options.solve.compute = {device_here(), 2};
+  options.voxels = 24;
+  const auto planned_on = [&](double tick) {
+    const SlowClock clock(tick);
+    const TimePoint start = clock.now();
+    const Task task{*PreparedScene::create(pictures(), {}), device_here(),
+                    [&] { return clock.now() - start; }, nobody};
+    auto planned = plan_time(task, options, {});
+    EXPECT_TRUE(planned.ok());
+    return *planned;
+  };
+  const PlannedTime planned = planned_on(1e-3);
+  const auto run = reconstruct(pictures(), options, SlowClock(1e-3));
+  ASSERT_TRUE(run.ok()) << run.error().message();
+  ASSERT_EQ(planned.effects.reports.size(), run->report.effects.size());
+  for (std::size_t i = 0; i < planned.effects.reports.size(); ++i) {
+    EXPECT_EQ(planned.effects.reports[i].on, run->report.effects[i].on) << run->report.effects[i].name;
+    EXPECT_EQ(planned.effects.reports[i].predicted_change, run->report.effects[i].predicted_change);
+  }
+  EXPECT_EQ(planned.searching, run->report.effects_time);
+  EXPECT_GT(planned.solving.value(), 0);
+  EXPECT_NEAR(planned_on(1e-2).total() / planned.total(), 10, 1e-6);
+}
+
+TEST(PlannedTime, OfVoxelsThatDoNotFitIsAnError) {
+  const std::function<void(const Preview&)> nobody;
+  const Task task{*PreparedScene::create(pictures(), {}), Device::cpu, [] { return Seconds(0); }, nobody};
+  ReconstructOptions options;
+  options.voxels = kLargestVoxels + 1;
+  EXPECT_FALSE(plan_time(task, options, {}).ok());
 }
 
 TEST_P(VoxelChoiceTest, DoublePrecisionNeedsTheMemoryOfAboutTwiceAsManyPoints) {

@@ -20,7 +20,7 @@ namespace {
 struct VerifyArguments {
   std::vector<std::string> clips;
   ClipArguments clip;
-  std::string tolerance = "100rows";
+  std::string tolerance;
   bool json = false;
   std::string out;
 };
@@ -31,7 +31,8 @@ films::VerifyRunOptions options_from(const VerifyArguments& a) {
   options.comb = a.clip.comb;
   options.comb_rate = Hertz(a.clip.comb_rate);
   options.row_time = row_time_of(a.clip);
-  options.verify.tolerance = or_fail(smear::parse_tolerance(a.tolerance));
+  options.verify.tolerance =
+      a.tolerance.empty() ? smear::tolerance_for({}) : or_fail(smear::parse_tolerance(a.tolerance));
   options.verify.clip = clip_options_of(a.clip);
   return options;
 }
@@ -113,8 +114,8 @@ void add_verify(CLI::App& app) {
   verb->add_option("clips", a->clips, "one video per camera, the reference first")->required();
   add_clip_options(*verb, a->clip)->required();
   verb->add_option("--tolerance", a->tolerance,
-                   "largest distance from the reference, to either side: 100rows, 5.4ms or 500us")
-      ->capture_default_str();
+                   "largest distance from the reference, to either side: 100rows, 5.4ms or 500us [0.5ms, as "
+                   "`align` takes it for a flame of 2 m/s]");
   verb->add_flag("--json", a->json, "the verdict as JSON on stdout");
   verb->add_option("--out", a->out, "write report.html, with frames, fits and residuals, to this folder");
   verb->callback([a] { verify(*a); });

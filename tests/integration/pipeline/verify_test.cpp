@@ -124,7 +124,7 @@ TEST_F(VerifyClips, GiveTheJsonOfTheManualAndAReportThatStandsAlone) {
   with.suffix = ".mp4";
   with.frames = 90;
   with.rig.cameras[0].first_phase = with.rig.cameras[1].first_phase = Seconds(0);
-  with.starts = {0.5, 0.5 + 0.001};
+  with.starts = {0.5, 0.5 + 0.0002};
   std::vector<std::string> arguments = film(with);
   for (const char* a : {"--json", "--out"}) arguments.emplace_back(a);
   arguments.push_back((folder_ / "report").string());
@@ -154,6 +154,20 @@ TEST_F(VerifyClips, GiveTheJsonOfTheManualAndAReportThatStandsAlone) {
     EXPECT_NE(report.find(evidence), std::string::npos) << evidence;
   for (const char* wrong : {"http://", "https://", "<script", "\"nan", "Lnan", "Mnan", "{}"})
     EXPECT_EQ(report.find(wrong), std::string::npos) << wrong;
+}
+
+/// A flame of 2 m/s needs half a millisecond.
+TEST_F(VerifyClips, AMillisecondApartIsOutOfToleranceUnlessMoreIsAllowed) {
+  test::StrobeFilm with = test::random_film(44, 2, small_model(), kShortCode);
+  with.format = {};
+  with.suffix = ".mp4";
+  with.frames = 90;
+  with.rig.cameras[0].first_phase = with.rig.cameras[1].first_phase = Seconds(0);
+  with.starts = {0.5, 0.5 + 0.001};
+  std::vector<std::string> arguments = film(with);
+  EXPECT_EQ(run(arguments).exit_code, 1);
+  for (const char* a : {"--tolerance", "1.5ms"}) arguments.emplace_back(a);
+  EXPECT_EQ(run(arguments).exit_code, 0);
 }
 
 TEST_F(VerifyClips, ALostFrameIsToldAndTheOthersStayPaired) {

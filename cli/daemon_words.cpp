@@ -61,18 +61,29 @@ std::string strobe_line(const v1::StrobeStatus& strobe) {
   return strobe.reason().empty() ? text : text + ". " + strobe.reason();
 }
 
+/// ", 2 frames failed" of a sequence; else nothing.
+std::string failed_in_words(const v1::ReconstructionStatus& reconstruction) {
+  const auto failed = std::count_if(
+      reconstruction.frames().begin(), reconstruction.frames().end(),
+      [](const v1::SequenceFrame& frame) { return frame.state() == v1::ReconstructionStatus::FAILED; });
+  return failed == 0 ? "" : fmt::format(", {} frame{} failed", failed, failed == 1 ? "" : "s");
+}
+
 std::string reconstruction_line(const v1::ReconstructionStatus& reconstruction) {
   std::string text = fmt::format("{}: {}", reconstruction.session(),
                                  in_words(v1::ReconstructionStatus::State_Name(reconstruction.state())));
   switch (reconstruction.state()) {
     case v1::ReconstructionStatus::RUNNING:
-      return text + fmt::format(", {:.0f} %, {}, {}", 100 * reconstruction.fraction(), reconstruction.doing(),
-                                seconds_in_words(reconstruction.seconds()));
+      return text + fmt::format(", {:.0f} %, {}, {}{}", 100 * reconstruction.fraction(),
+                                reconstruction.doing(), seconds_in_words(reconstruction.seconds()),
+                                failed_in_words(reconstruction));
     case v1::ReconstructionStatus::DONE:
       return text + fmt::format(" after {}, in {}", seconds_in_words(reconstruction.seconds()),
                                 reconstruction.result());
     case v1::ReconstructionStatus::FAILED:
       return text + ". " + reconstruction.error();
+    case v1::ReconstructionStatus::CANCELLED:
+      return fmt::format("{}: {}", reconstruction.session(), reconstruction.doing());
     default:
       return text;
   }
@@ -205,6 +216,16 @@ std::string iteration_line(const v1::Iteration& iteration) {
                                  iteration.seconds(), iteration.input_rmse());
   if (iteration.has_heldout_rmse())
     text += fmt::format(", held-out error about {:.2f}", iteration.heldout_rmse());
+  return text + " grey levels";
+}
+
+std::string frame_line(const v1::SequenceFrame& frame) {
+  std::string text = fmt::format("frame {}: {}", frame.frame(),
+                                 in_words(v1::ReconstructionStatus::State_Name(frame.state())));
+  if (frame.state() != v1::ReconstructionStatus::DONE)
+    return frame.error().empty() ? text : text + ". " + frame.error();
+  text += fmt::format(", input error {:.2f}", frame.input_rmse());
+  if (frame.has_heldout_rmse()) text += fmt::format(", held-out error about {:.2f}", frame.heldout_rmse());
   return text + " grey levels";
 }
 

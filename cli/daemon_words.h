@@ -35,6 +35,8 @@ std::string job_line(const v1::Job& job);
 std::string losses(const v1::Counts& counts);
 /// "iteration 3: 2.1 s, input error 5.31, held-out error 6.20 grey levels".
 std::string iteration_line(const v1::Iteration& iteration);
+/// A frame of a sequence: "frame 12: done, input error 5.31, held-out error about 6.20 grey levels".
+std::string frame_line(const v1::SequenceFrame& frame);
 /// A round of alignment: one line, and one for each camera that is to be reset or isn't well.
 std::string round_line(const v1::DaemonStatus& status);
 /// The same with a line for every camera.

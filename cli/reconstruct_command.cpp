@@ -17,6 +17,7 @@
 #include "cli/outputs.h"
 #include "cli/progress_stream.h"
 #include "cli/reconstruct_daemon.h"
+#include "cli/reconstruct_sequence.h"
 #include "cli/reconstruct_summary.h"
 #include "cli/scene_options.h"
 #include "recon/pipeline/grid_choice.h"
@@ -27,6 +28,8 @@
 #include "recon/preprocess/check_scene.h"
 #include "report/box_pictures.h"
 #include "report/reconstruct_report.h"
+#include "session/frame_range.h"
+#include "session/reader.h"
 
 namespace emberlock::cli {
 namespace {
@@ -50,7 +53,8 @@ struct ReconstructArguments {
   int views = 0;
   double step = 1;
   std::string voxels;
-  std::optional<std::size_t> frame;
+  std::optional<std::size_t> frame, last_frame;
+  std::uint32_t every = 1;
   std::optional<double> budget;
   std::optional<double> target_rmse;
   std::optional<double> threshold;
@@ -240,8 +244,9 @@ Status plan_files(const ReconstructArguments& arguments) {
 
 /// The options that the daemon accepts; the others are in its configuration.
 DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, const CLI::App& verb) {
-  static const std::set<std::string> kAskable = {"input",    "--cancel", "--json",     "--frame",
-                                                 "--budget", "--voxels", "--hold-out", "--device"};
+  static const std::set<std::string> kAskable = {"input",        "--cancel", "--json",   "--frame",
+                                                 "--last-frame", "--every",  "--budget", "--voxels",
+                                                 "--hold-out",   "--device"};
   for (const CLI::Option* option : verb.get_options()) {
     if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
       fail({ErrorKind::bad_input, "can't be used with --daemon", option->get_name(),
@@ -253,6 +258,10 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
   v1::ReconstructRequest& request = wanted.request;
   request.set_session(arguments.input);
   if (arguments.frame) request.set_frame(*arguments.frame);
+  if (arguments.last_frame) {
+    request.set_last_frame(*arguments.last_frame);
+    request.set_every(arguments.every);
+  }
   request.set_budget_s(arguments.budget.value_or(0));
   const std::optional<int> voxels = or_fail(options_of(arguments)).voxels;
   if (!voxels && !arguments.voxels.empty()) {
@@ -265,15 +274,36 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
   return wanted;
 }
 
+/// To be interrupted by Ctrl-C.
+Status reconstruct_and_tell(const ReconstructArguments& arguments) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const Written written,
+                             reconstruct_files(arguments, {progress_bar("reconstruct"), Interrupt::asked}));
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::ReconstructOptions options, options_of(arguments));
+  return conclude(written, options.solve, {arguments.input, arguments.out, arguments.by_daemon.json});
+}
+
+/// The frames from --frame to --last-frame.
+void reconstruct_range(const ReconstructArguments& arguments) {
+  const session::FrameRange range{arguments.frame.value_or(0), *arguments.last_frame, arguments.every};
+  const auto session = or_fail(session::SessionReader::open(arguments.input));
+  const std::uint64_t recorded = session.camera_count() == 0 ? 0 : session.stamps(0).size();
+  reconstruct_sequence(or_fail(session::frames_of(range, recorded, "--last-frame")), arguments.out,
+                       [&](std::uint64_t frame, const std::filesystem::path& out) {
+                         ReconstructArguments one = arguments;
+                         one.frame = frame;
+                         one.out = out.string();
+                         return reconstruct_and_tell(one);
+                       });
+}
+
 void reconstruct_command(const ReconstructArguments& arguments) {
   if (arguments.input.empty()) throw CLI::RequiredError("input");
   if (!arguments.plan.empty()) return or_fail(plan_files(arguments));
   if (arguments.out.empty()) throw CLI::RequiredError("--out");
   if (!arguments.progress_fd) {
     const Interrupt interrupt;
-    return conclude(or_fail(reconstruct_files(arguments, {progress_bar("reconstruct"), Interrupt::asked})),
-                    or_fail(options_of(arguments)).solve,
-                    {arguments.input, arguments.out, arguments.by_daemon.json});
+    if (arguments.last_frame) return reconstruct_range(arguments);
+    return or_fail(reconstruct_and_tell(arguments));
   }
   ProgressStream stream = or_fail(ProgressStream::open(*arguments.progress_fd));
   const auto outcome = reconstruct_files(
@@ -323,6 +353,15 @@ void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option("--frame", a.frame,
                    "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
       ->check(CLI::NonNegativeNumber);
+  CLI::Option* last = verb->add_option("--last-frame", a.last_frame,
+                                       "Sessions only: reconstructs one frame after the other, from --frame "
+                                       "to this one, each into OUT/frame-N")
+                          ->check(CLI::NonNegativeNumber)
+                          ->needs("--frame");
+  verb->add_option("--every", a.every, "With --last-frame: each frame of so many")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str()
+      ->needs(last);
   verb->add_option("--background", a.background,
                    "Sessions only: auto (each camera's first or last frames, if they show no flame), level "
                    "(of the picture's darker half), or frames without flame: FIRST-LAST")
@@ -378,10 +417,11 @@ void add_reconstruct(CLI::App& app) {
   verb->add_flag("--cancel", a.by_daemon.cancel, "With --daemon: cancel the running reconstruction")
       ->needs(by_daemon);
   verb->add_flag("--json", a.by_daemon.json,
-                 "report.json on stdout; with --daemon an Iteration per line, then ReconstructionStatus "
-                 "(emberlock/v1/status.proto)")
+                 "report.json on stdout; with --daemon an Iteration (of several frames, a SequenceFrame) per "
+                 "line, then ReconstructionStatus (emberlock/v1/status.proto)")
       ->excludes("--plan")
       ->excludes("--progress-fd");
+  verb->get_option("--last-frame")->excludes("--plan")->excludes("--progress-fd");
   verb->callback([arguments, verb, by_daemon] {
     if (by_daemon->count() == 0) return reconstruct_command(*arguments);
     reconstruct_by_daemon(asked_of_daemon(*arguments, *verb));

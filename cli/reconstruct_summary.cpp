@@ -56,7 +56,7 @@ void print_summary(const Written& written, const std::string& out) {
 
 }  // namespace
 
-void conclude(const Written& written, const recon::SolveOptions& asked, const WrittenTo& where) {
+Status conclude(const Written& written, const recon::SolveOptions& asked, const WrittenTo& where) {
   const recon::Report& report = written.outcome.report;
   if (where.json) {
     std::printf("%s", recon::to_json(report).c_str());
@@ -65,16 +65,17 @@ void conclude(const Written& written, const recon::SolveOptions& asked, const Wr
   }
   std::fflush(stdout);
   if (report.stopped) {
-    fail({ErrorKind::refused,
-          fmt::format("ended early, as asked: the volume after iteration {} is kept, in {}",
-                      report.kept.iteration, where.out),
-          where.input});
+    return Error{ErrorKind::refused,
+                 fmt::format("ended early, as asked: the volume after iteration {} is kept, in {}",
+                             report.kept.iteration, where.out),
+                 where.input};
   }
   if (const Status met = recon::goals_met(asked, report); !met.ok()) {
     Error missed = met.error();
     missed.what += fmt::format("; the result is in {}", where.out);
-    fail(missed);
+    return missed;
   }
+  return {};
 }
 
 }  // namespace emberlock::cli

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "base/quantity.h"
+#include "base/result.h"
 #include "recon/adjust/solver.h"
 #include "recon/pipeline/reconstruct.h"
 
@@ -21,8 +22,7 @@ struct WrittenTo {
   bool json = false;
 };
 
-/// Prints what came out, or report.json; exits with code 1 where that isn't what was asked for, though it is
-/// written.
-void conclude(const Written& written, const recon::SolveOptions& asked, const WrittenTo& where);
+/// Prints what came out, or report.json. Error: that isn't what was asked for, though it is written.
+Status conclude(const Written& written, const recon::SolveOptions& asked, const WrittenTo& where);
 
 }  // namespace emberlock::cli

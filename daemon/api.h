@@ -36,6 +36,9 @@ class Api {
   virtual Status cancel_job(const v1::CancelJobRequest& request) = 0;
   virtual Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) = 0;
   virtual Result<v1::ReconstructionStatus> cancel_reconstruction() = 0;
+  /// Null: the frame isn't done, or no longer held.
+  virtual std::shared_ptr<const v1::IterationPreview> reconstructed_frame(
+      const v1::FrameRequest& request) = 0;
 };
 
 }  // namespace emberlock::daemon

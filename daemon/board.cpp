@@ -15,6 +15,10 @@ bool has_pictures(const v1::IterationPreview& preview) {
   return preview.has_volume() || !preview.captured_jpeg().empty() || !preview.rendered_jpeg().empty();
 }
 
+bool is_of_same(const v1::IterationPreview& a, const v1::IterationPreview& b) {
+  return a.reconstruction() == b.reconstruction() && a.frame() == b.frame();
+}
+
 /// What is told inside is clauses, that others build on; what people are shown begins and ends as a sentence.
 /// A first word that isn't one, as "virtual-02" and "raw:", stays as it is.
 std::string sentence(std::string text) {
@@ -38,7 +42,10 @@ void write_sentences(v1::DaemonStatus& status) {
   if (status.has_strobe()) mend(status.mutable_strobe()->mutable_reason());
   if (status.has_alignment()) mend(status.mutable_alignment()->mutable_reason());
   if (status.has_recording()) mend(status.mutable_recording()->mutable_verdict());
-  if (status.has_reconstruction()) mend(status.mutable_reconstruction()->mutable_error());
+  if (!status.has_reconstruction()) return;
+  mend(status.mutable_reconstruction()->mutable_error());
+  for (v1::SequenceFrame& frame : *status.mutable_reconstruction()->mutable_frames())
+    mend(frame.mutable_error());
 }
 
 }  // namespace
@@ -97,7 +104,7 @@ void Board::show(std::shared_ptr<const v1::IterationPreview> preview) {
   {
     const std::lock_guard lock(mutex_);
     if (!iterations_.empty()) {
-      if (iterations_.back()->reconstruction() != preview->reconstruction()) {
+      if (!is_of_same(*iterations_.back(), *preview)) {
         iterations_.clear();
       } else if (has_pictures(*preview)) {
         for (auto& earlier : iterations_) {

@@ -55,10 +55,10 @@ class Board {
   /// The newest of each camera, by camera id.
   [[nodiscard]] std::map<std::string, std::shared_ptr<const v1::Picture>> pictures() const;
 
-  /// Forgets those of another reconstruction.
+  /// Forgets those of another reconstruction, and of another frame of a sequence.
   void show(std::shared_ptr<const v1::IterationPreview> preview);
-  /// Of the running or last reconstruction those from the `from`th on (counted from 0), in order; only the
-  /// newest that came with pictures and volume still has them.
+  /// Of the running or last reconstruction (of a sequence its frame at hand) those from the `from`th on
+  /// (counted from 0), in order; only the newest that came with pictures and volume still has them.
   [[nodiscard]] std::vector<std::shared_ptr<const v1::IterationPreview>> iterations(std::size_t from) const;
 
   /// `changed` is called after each change, from whichever thread makes it: it must return at once, and call

@@ -65,6 +65,7 @@ Conductor::~Conductor() {
 Status Conductor::reconstruct(const v1::ReconstructRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(parts_.store.path_of(request.session()));
   EMBERLOCK_RETURN_IF_ERROR(check_not_salvaged(parts_.jobs, request.session()));
+  EMBERLOCK_RETURN_IF_ERROR(parts_.reconstruction.check(request));
   reconstruct_request_ = request;
   return happen(AskReconstruct{request.session()});
 }

@@ -329,4 +329,8 @@ Result<v1::ReconstructionStatus> Engine::cancel_reconstruction() {
                                                      });
 }
 
+std::shared_ptr<const v1::IterationPreview> Engine::reconstructed_frame(const v1::FrameRequest& request) {
+  return reconstruction_.frame(request);
+}
+
 }  // namespace emberlock::daemon

@@ -62,6 +62,7 @@ class Engine final : public Api {
   Status cancel_job(const v1::CancelJobRequest& request) override;
   Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override;
   Result<v1::ReconstructionStatus> cancel_reconstruction() override;
+  std::shared_ptr<const v1::IterationPreview> reconstructed_frame(const v1::FrameRequest& request) override;
 
  private:
   enum class Urgency {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/reconstruction/child.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <csignal>
+#include <limits>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -19,6 +21,7 @@
 #include "recon/compute/device.h"
 #include "session/child_messages.h"
 #include "session/files.h"
+#include "session/frame_range.h"
 #include "session/name.h"
 
 namespace emberlock::daemon {
@@ -27,6 +30,7 @@ namespace {
 
 using Steady = std::chrono::steady_clock;
 
+constexpr auto kUnknown = std::numeric_limits<std::uint64_t>::max();  // a number of frames
 constexpr std::uint32_t kLargestVoxels = 1024;  // as `emberlock reconstruct --voxels` takes them
 
 Steady::duration duration(Seconds seconds) {
@@ -106,6 +110,31 @@ ReadEnd read_all(int fd, const TakeBytes& take) {
 
 }  // namespace
 
+Status ReconstructionChild::check(const v1::ReconstructRequest& request) const {
+  EMBERLOCK_RETURN_IF_ERROR(check_request(request));
+  const auto frames = frames_of(request);
+  return frames.ok() ? Status() : frames.error();
+}
+
+Result<std::vector<std::uint64_t>> ReconstructionChild::frames_of(
+    const v1::ReconstructRequest& request) const {
+  if (!request.has_last_frame()) {
+    if (request.every() != 0)
+      return refuse_field("every", "is for sequences", "Give last_frame too, or leave it away");
+    return std::vector<std::uint64_t>();
+  }
+  if (!request.has_frame())
+    return refuse_field("last_frame", "a sequence has a first frame too", "Give frame, or leave it away");
+  EMBERLOCK_ASSIGN_OR_RETURN(const v1::Manifest manifest,
+                             session::read_manifest(options_.sessions / request.session()));
+  std::uint64_t recorded = manifest.cameras().empty() ? 0 : manifest.cameras(0).counts().recorded();
+  // Not counted before it is finished; the child says what to do about it.
+  if (manifest.state() == v1::Manifest::RECORDING) recorded = kUnknown;
+  const session::FrameRange range{request.frame(), request.last_frame(),
+                                  std::max<std::uint64_t>(1, request.every())};
+  return session::frames_of(range, recorded, "last_frame");
+}
+
 std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructRequest& request) const {
   const v1::ReconstructRequest& unasked = options_.unasked;
   const std::string& device = !request.device().empty() ? request.device() : unasked.device();
@@ -131,28 +160,29 @@ std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructR
 
 Result<v1::ReconstructionStatus> ReconstructionChild::start(const v1::ReconstructRequest& request) {
   EMBERLOCK_RETURN_IF_ERROR(session::check_session_name(request.session()));
-  EMBERLOCK_RETURN_IF_ERROR(check_request(request));
   std::error_code ec;
   if (!fs::is_regular_file(session::manifest_path(options_.sessions / request.session()), ec)) {
     return Error{ErrorKind::bad_input, "there is no such session", request.session(),
                  "Look at `emberlock sessions list`"};
   }
+  EMBERLOCK_RETURN_IF_ERROR(check_request(request));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::uint64_t> frames, frames_of(request));
   {
     const std::lock_guard lock(mutex_);
     if (runs()) {
       return Error{ErrorKind::refused, "one runs already, of session " + state_->status().session(),
                    "reconstruction", "Wait for it, or cancel it"};
     }
-    EMBERLOCK_ASSIGN_OR_RETURN(job_,
-                               jobs_.add({v1::Job::RECONSTRUCT, request.session(),
-                                          [this, command = command_for(request)](const Observer& observer) {
-                                            return supervise(command, observer);
-                                          }}));
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        job_, jobs_.add({v1::Job::RECONSTRUCT, request.session(), [this, request](const Observer& observer) {
+                           return supervise(request, observer);
+                         }}));
     v1::ReconstructionStatus begun;
     begun.set_id(fmt::format("{} {}", request.session(), utc_now()));
     begun.set_session(request.session());
     begun.set_device(!request.device().empty() ? request.device() : options_.unasked.device());
-    state_.emplace(std::move(begun));
+    kept_.begin(begun.id());
+    state_.emplace(std::move(begun), frames, fs::absolute(options_.results / request.session()).string());
     begun_ns_ = now_ns();
     cancelling_ = false;
     running_ = true;
@@ -183,7 +213,7 @@ std::optional<v1::ReconstructionStatus> ReconstructionChild::status() const {
   if (!state_) return std::nullopt;
   v1::ReconstructionStatus status = state_->status();
   if (running_ && !runs()) {  // cancelled before it began
-    ReconstructionState cancelled = *state_;
+    SequenceState cancelled = *state_;
     cancelled.end({.why = ChildEnd::Why::cancelled}, {});
     status = cancelled.status();
   }
@@ -192,22 +222,24 @@ std::optional<v1::ReconstructionStatus> ReconstructionChild::status() const {
   return status;
 }
 
-JobResult ReconstructionChild::supervise(const std::vector<std::string>& command, const Observer& observer) {
-  LastWords last_words;
-  ChildEnd end;
-  // The child dies with the thread that started it, as the kernel counts parents: this one, which watches it.
-  if (auto process = ChildProcess::spawn(command, options_.niceness); process.ok()) {
-    end = watch(
-        *process, [&](std::string_view bytes) { last_words.add(bytes); }, observer);
-  } else {
-    end.why = ChildEnd::Why::not_started;
-    end.words = process.error().message();
-  }
+std::shared_ptr<const v1::IterationPreview> ReconstructionChild::frame(
+    const v1::FrameRequest& request) const {
   const std::lock_guard lock(mutex_);
-  state_->end(end, last_words.text());
+  return kept_.find(request);
+}
+
+JobResult ReconstructionChild::supervise(v1::ReconstructRequest request, const Observer& observer) {
+  const auto next = [&] {
+    const std::lock_guard lock(mutex_);
+    if (!state_->next()) return false;
+    if (const auto frame = state_->frame()) request.set_frame(*frame);
+    return true;
+  };
+  while (next()) reconstruct(request, observer);
+  const std::lock_guard lock(mutex_);
   seconds_ = static_cast<double>(now_ns() - begun_ns_) * 1e-9;
   running_ = false;
-  const v1::ReconstructionStatus& status = state_->status();
+  const v1::ReconstructionStatus status = state_->status();
   if (status.state() == v1::ReconstructionStatus::CANCELLED)
     return Error{ErrorKind::refused, "ended early, as asked", status.session()};
   if (status.state() != v1::ReconstructionStatus::DONE)
@@ -217,13 +249,30 @@ JobResult ReconstructionChild::supervise(const std::vector<std::string>& command
   return outcome;
 }
 
+void ReconstructionChild::reconstruct(const v1::ReconstructRequest& request, const Observer& observer) {
+  LastWords last_words;
+  ChildEnd end;
+  // The child dies with the thread that started it, as the kernel counts parents: this one, which watches it.
+  if (auto process = ChildProcess::spawn(command_for(request), options_.niceness); process.ok()) {
+    end = watch(
+        *process, [&](std::string_view bytes) { last_words.add(bytes); }, observer);
+  } else {
+    end.why = ChildEnd::Why::not_started;
+    end.words = process.error().message();
+  }
+  const std::lock_guard lock(mutex_);
+  state_->end(end, last_words.text());
+  const auto volume = std::exchange(newest_volume_, std::nullopt);
+  if (volume && state_->has_result()) kept_.keep(*volume);
+}
+
 bool ReconstructionChild::tell(const Observer& observer) {
   double fraction = 0;
   std::string doing;
   {
     const std::lock_guard lock(mutex_);
-    fraction = state_->status().fraction();
-    doing = state_->status().doing();
+    fraction = state_->fraction();
+    doing = state_->doing();
   }
   return observer(fraction, doing);
 }
@@ -233,6 +282,7 @@ void ReconstructionChild::take(v1::ChildMessage&& message) {
   {
     const std::lock_guard lock(mutex_);
     preview = state_->take(std::move(message));
+    if (preview && preview->has_frame() && preview->has_volume()) newest_volume_ = preview;
   }
   if (preview) board_.show(std::make_shared<const v1::IterationPreview>(std::move(*preview)));
 }

@@ -16,6 +16,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "daemon/board.h"
+#include "daemon/reconstruction/kept_frames.h"
 #include "daemon/reconstruction/state.h"
 #include "daemon/work/jobs.h"
 #include "emberlock/v1/services.pb.h"
@@ -36,8 +37,9 @@ struct ReconstructionOptions {
   int niceness = 10;     ///< 0..19: frames go first
 };
 
-/// Reconstructs recordings in a child process, one at a time, so that neither a GPU's fault nor memory that
-/// runs out costs the daemon a frame. Each is a job; the child dies with the daemon. Thread-safe.
+/// Reconstructs recordings in child processes, one at a time, so that neither a GPU's fault nor memory that
+/// runs out costs the daemon a frame. Each is a job, and so is a sequence of frames; the child dies with the
+/// daemon. Thread-safe.
 class ReconstructionChild {
  public:
   /// Every iteration goes to `board`, which must outlive the jobs, as this must.
@@ -46,8 +48,10 @@ class ReconstructionChild {
   ReconstructionChild(const ReconstructionChild&) = delete;
   ReconstructionChild& operator=(const ReconstructionChild&) = delete;
 
-  /// Errors: one runs already (`refused`), a session that isn't there or whose name is none, values out of
-  /// range.
+  /// Whether such a request could be started: no value is out of range, and the session has these frames.
+  [[nodiscard]] Status check(const v1::ReconstructRequest& request) const;
+  /// Errors: one runs already (`refused`), a session that isn't there or whose name is none, those of
+  /// check().
   Result<v1::ReconstructionStatus> start(const v1::ReconstructRequest& request);
   /// SIGTERM, and SIGKILL after the grace; returns at once. `refused` when none runs.
   Result<v1::ReconstructionStatus> cancel();
@@ -55,14 +59,20 @@ class ReconstructionChild {
   void end();
   /// Of the one that runs, else of the last; nothing before the first.
   [[nodiscard]] std::optional<v1::ReconstructionStatus> status() const;
+  /// A frame of the newest sequence, as it was kept. Null: it isn't done, or no longer held.
+  [[nodiscard]] std::shared_ptr<const v1::IterationPreview> frame(const v1::FrameRequest& request) const;
 
  private:
   using TakeBytes = std::function<void(std::string_view)>;
 
+  /// A sequence's frames; none of a request that isn't of one.
+  [[nodiscard]] Result<std::vector<std::uint64_t>> frames_of(const v1::ReconstructRequest& request) const;
   [[nodiscard]] std::vector<std::string> command_for(const v1::ReconstructRequest& request) const;
   /// With mutex_ held.
   [[nodiscard]] bool runs() const { return running_ && !job_->result(); }
-  JobResult supervise(const std::vector<std::string>& command, const Observer& observer);
+  JobResult supervise(v1::ReconstructRequest request, const Observer& observer);
+  /// One child, from its start to its end.
+  void reconstruct(const v1::ReconstructRequest& request, const Observer& observer);
   ChildEnd watch(ChildProcess& process, const TakeBytes& take_words, const Observer& observer);
   void take(v1::ChildMessage&& message);
   /// Tells the job's observer how far it is. False: it shall end.
@@ -75,7 +85,9 @@ class ReconstructionChild {
 
   mutable std::mutex mutex_;  ///< of what follows
   std::shared_ptr<JobHandle> job_;
-  std::optional<ReconstructionState> state_;
+  std::optional<SequenceState> state_;
+  std::optional<v1::IterationPreview> newest_volume_;  ///< of the sequence's frame at hand
+  KeptFrames kept_;
   std::int64_t begun_ns_ = 0;
   double seconds_ = 0;  ///< that the last one took
   bool running_ = false;

@@ -77,8 +77,9 @@ Next<v1::Picture> PictureFeed::next(TimePoint now) {
 Next<v1::IterationPreview> IterationFeed::next(TimePoint /*now*/) {
   const auto all = board_.iterations(0);
   if (all.empty()) return {};
-  if (all.back()->reconstruction() != reconstruction_) {
+  if (all.back()->reconstruction() != reconstruction_ || all.back()->frame() != frame_) {
     reconstruction_ = all.back()->reconstruction();
+    frame_ = all.back()->frame();
     seen_ = 0;
   }
   if (seen_ >= all.size()) return {};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <deque>
 #include <map>
 #include <memory>
@@ -102,6 +103,7 @@ class IterationFeed {
  private:
   const Board& board_;
   std::string reconstruction_;
+  std::uint64_t frame_ = 0;  ///< of a sequence
   std::size_t seen_ = 0;
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "daemon/server/grpc_services.h"
 
+#include <memory>
 #include <type_traits>
 #include <utility>
 
@@ -22,6 +23,13 @@ template <class Response>
 grpc::Status put(Result<Response> result, Response* response) {
   if (!result) return grpc_status(result.error());
   *response = std::move(*result);
+  return grpc::Status::OK;
+}
+
+template <class Response>
+grpc::Status put(const std::shared_ptr<const Response>& found, Response* response) {
+  if (!found) return {grpc::StatusCode::NOT_FOUND, kNotFound};
+  *response = *found;
   return grpc::Status::OK;
 }
 
@@ -231,6 +239,11 @@ class ReconstructService final : public v1::Reconstruct::CallbackService {
   grpc::ServerUnaryReactor* Cancel(Context* context, const v1::Empty* /*request*/,
                                    v1::ReconstructionStatus* response) override {
     return answer(backend_, context, response, [this] { return backend_.api.cancel_reconstruction(); });
+  }
+  grpc::ServerUnaryReactor* Frame(Context* context, const v1::FrameRequest* request,
+                                  v1::IterationPreview* response) override {
+    return answer(backend_, context, response,
+                  [this, request] { return backend_.api.reconstructed_frame(*request); });
   }
   grpc::ServerWriteReactor<v1::IterationPreview>* Watch(Context* /*context*/,
                                                         const v1::Empty* /*request*/) override {

@@ -288,6 +288,7 @@ void HttpConnection::call(const JsonMethod& method) {
     auto& loop = self->context_.loop;
     asio::post(loop, [self = std::move(self), result = std::move(result)]() mutable {
       if (!result) return self->respond_error(result.error());
+      if (result->empty()) return self->respond_error(404, "NOT_FOUND", kNotFound);
       self->respond(self->response(200, kJson, std::move(*result)));
     });
   });

@@ -29,6 +29,11 @@ Result<std::string> answer(const Result<Message>& message) {
   if (!message) return message.error();
   return to_json(*message);
 }
+/// Nothing where there is none.
+template <class Message>
+Result<std::string> answer(const std::shared_ptr<const Message>& message) {
+  return message ? to_json(*message) : std::string();
+}
 
 template <auto ask, class Request>
 Result<std::string> call_with(Api& api, const std::string& body) {
@@ -50,7 +55,7 @@ Result<BeginJob> job_with(Api& api, const std::string& body) {
   return BeginJob([&api, request = std::move(request)] { return (api.*ask)(request); });
 }
 
-constexpr std::array<JsonMethod, 17> kMethods{{
+constexpr std::array<JsonMethod, 18> kMethods{{
     {"Daemon/GetStatus", get_status, nullptr},
     {"Daemon/Acknowledge", call_with<&Api::acknowledge, v1::AcknowledgeRequest>, nullptr},
     {"Devices/List", call_plain<&Api::list_devices>, nullptr},
@@ -68,6 +73,7 @@ constexpr std::array<JsonMethod, 17> kMethods{{
     {"Jobs/Cancel", call_with<&Api::cancel_job, v1::CancelJobRequest>, nullptr},
     {"Reconstruct/Start", call_with<&Api::reconstruct, v1::ReconstructRequest>, nullptr},
     {"Reconstruct/Cancel", call_plain<&Api::cancel_reconstruction>, nullptr},
+    {"Reconstruct/Frame", call_with<&Api::reconstructed_frame, v1::FrameRequest>, nullptr},
 }};
 
 }  // namespace

@@ -19,7 +19,7 @@ using BeginJob = std::function<Result<std::shared_ptr<JobHandle>>()>;
 struct JsonMethod {
   std::string_view name;  ///< "Sync/Align"
   /// Exactly one is set. An empty `body` is the empty request. A body that isn't JSON of the request's type
-  /// is a bad_input.
+  /// is a bad_input. An empty answer: what is asked for isn't there (NOT_FOUND).
   Result<std::string> (*call)(Api& api, const std::string& body);
   /// Parses the request; the returned function begins the job.
   Result<BeginJob> (*job)(Api& api, const std::string& body);

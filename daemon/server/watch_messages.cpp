@@ -52,6 +52,7 @@ std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview) {
   v1::IterationPreview numbers;
   numbers.set_reconstruction(preview.reconstruction());
   numbers.set_camera_id(preview.camera_id());
+  if (preview.has_frame()) numbers.set_frame(preview.frame());
   *numbers.mutable_iteration() = preview.iteration();
   std::vector<WatchMessage> messages{text_of("iteration", numbers)};
   const auto header = [&](const char* kind) {

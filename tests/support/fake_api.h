@@ -60,6 +60,10 @@ class FakeApi : public daemon::Api {
   Result<v1::ReconstructionStatus> cancel_reconstruction() override {
     return ask("cancel_reconstruction", on_cancel_reconstruction);
   }
+  std::shared_ptr<const v1::IterationPreview> reconstructed_frame(const v1::FrameRequest& request) override {
+    remember("reconstructed_frame " + request.ShortDebugString());
+    return on_reconstructed_frame ? on_reconstructed_frame(request) : nullptr;
+  }
 
   /// Each call's name, with its request as one line: "align tolerance: \"100rows\"".
   [[nodiscard]] std::vector<std::string> calls() const {
@@ -80,6 +84,7 @@ class FakeApi : public daemon::Api {
   std::function<Result<v1::Manifest>(const v1::SessionRequest&)> on_session;
   std::function<Result<v1::ReconstructionStatus>(const v1::ReconstructRequest&)> on_reconstruct;
   std::function<Result<v1::ReconstructionStatus>()> on_cancel_reconstruction;
+  std::function<std::shared_ptr<const v1::IterationPreview>(const v1::FrameRequest&)> on_reconstructed_frame;
   /// What verify, repair and export do; unset: they are done, and all is well.
   std::function<daemon::JobResult(const Observer&)> on_job;
   /// Why none of them can begin.

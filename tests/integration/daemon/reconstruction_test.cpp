@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "daemon/reconstruction/child.h"
@@ -43,7 +44,7 @@ v1::Manifest manifest_of(const recon::Scene& scene) {
   return manifest;
 }
 
-/// One frame of the paper's eleven cameras, at 64 x 48.
+/// Three frames of the paper's eleven cameras, at 64 x 48.
 void record_flame(const fs::path& folder) {
   recon::PaperSceneOptions options;
   options.image = {64, 48};
@@ -55,9 +56,13 @@ void record_flame(const fs::path& folder) {
   auto writer = session::SessionWriter::create(folder, manifest_of(scene), test::small_disk_options());
   check(writer);
   for (std::size_t camera = 0; camera < scene.views.size(); ++camera) {
-    Frame frame;
-    frame.image = std::make_shared<const Image>(recon::to_rgb8(*scene.views[camera].image));
-    check(writer->write(camera, frame));
+    const auto image = std::make_shared<const Image>(recon::to_rgb8(*scene.views[camera].image));
+    for (std::uint64_t i = 0; i < 3; ++i) {
+      Frame frame;
+      frame.stamp = test::noise_frame({{2, 2}, PixelFormat::gray8, 8}, i).stamp;
+      frame.image = image;
+      check(writer->write(camera, frame));
+    }
   }
   check(writer->finish());
 }
@@ -106,6 +111,33 @@ TEST_F(DaemonReconstruction, ARecordedFlameBecomesAVolumeThatIsSeenGrowing) {
   EXPECT_EQ(shown.back()->camera_id(), "cam10");
   EXPECT_EQ(shown.back()->volume().voxels().size(), 25U * 25U * 25U);
   EXPECT_FALSE(shown.back()->rendered_jpeg().empty());
+}
+
+TEST_F(DaemonReconstruction, ASequenceBecomesAVolumeForEachFrameThatCanBeFetched) {
+  v1::ReconstructRequest request = candle();
+  request.set_frame(0);
+  request.set_last_frame(2);
+  request.set_every(2);
+  request.set_voxels(12);
+  ASSERT_TRUE(child_->start(request).ok());
+  wait_for([] { return false; });
+  const v1::ReconstructionStatus status = *child_->status();
+  ASSERT_EQ(status.state(), State::DONE) << status.error();
+  EXPECT_EQ(status.result(), folder_ / "results/candle");
+  ASSERT_EQ(status.frames_size(), 2);
+  for (const v1::SequenceFrame& frame : status.frames()) {
+    EXPECT_EQ(frame.state(), State::DONE);
+    EXPECT_GT(frame.input_rmse(), 0);
+    EXPECT_TRUE(frame.has_heldout_rmse());
+    EXPECT_TRUE(fs::exists(folder_ / fmt::format("results/candle/frame-{}/volume.vdb", frame.frame())));
+    v1::FrameRequest wanted;
+    wanted.set_reconstruction(status.id());
+    wanted.set_frame(frame.frame());
+    const auto kept = child_->frame(wanted);
+    ASSERT_TRUE(kept);
+    EXPECT_EQ(kept->volume().voxels().size(), 13U * 13U * 13U);
+    EXPECT_EQ(kept->iteration().input_rmse(), frame.input_rmse());
+  }
 }
 
 TEST_F(DaemonReconstruction, OneThatIsCancelledLeavesNoHalfResult) {

@@ -447,6 +447,36 @@ TEST_F(DaemonVerbs, ReconstructShowsEveryIterationAndTheResult) {
               ElementsAre("reconstruct session: \"candle\" voxels: 64 hold_out: 1 hold_out: 3"));
 }
 
+TEST_F(DaemonVerbs, ASequenceIsToldFrameByFrame) {
+  using State = v1::ReconstructionStatus;
+  const auto at = [](State::State whole, std::initializer_list<State::State> frames) {
+    v1::DaemonStatus status = reconstructing(whole, 2);
+    std::uint64_t number = 10;
+    for (const State::State state : frames) {
+      v1::SequenceFrame& frame = *status.mutable_reconstruction()->add_frames();
+      frame.set_frame(number += 2);
+      frame.set_state(state);
+      frame.set_input_rmse(4.5);
+      if (state == State::FAILED) frame.set_error("No light.");
+    }
+    return status;
+  };
+  api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
+    show_soon({at(State::RUNNING, {State::DONE, State::RUNNING, State::STATE_UNSPECIFIED}),
+               at(State::FAILED, {State::DONE, State::FAILED, State::DONE})});
+    return Result<v1::ReconstructionStatus>(at(State::RUNNING, {}).reconstruction());
+  };
+  const test::VerbRun result =
+      run(add_reconstruct, {"reconstruct", "candle", "--frame", "12", "--last-frame", "16", "--every", "2"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.out,
+            "1 of 3: frame 12: done, input error 4.50 grey levels\n"
+            "2 of 3: frame 14: failed. No light.\n"
+            "3 of 3: frame 16: done, input error 4.50 grey levels\n");
+  EXPECT_THAT(api_.calls(), ElementsAre("reconstruct session: \"candle\" frame: 12 last_frame: 16 every: 2"));
+  EXPECT_THAT(run(add_status, {"status"}).out, HasSubstr("candle: failed"));
+}
+
 TEST_F(DaemonVerbs, AReconstructionThatFailedSaysWhy) {
   api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
     show_soon({reconstructing(v1::ReconstructionStatus::FAILED, 1)});

@@ -99,6 +99,10 @@ TEST(Board, OnlyTheNewestIterationHasPicturesAndAnotherReconstructionBeginsAnew)
   EXPECT_THAT(board.iterations(1), SizeIs(1));
   board.show(iteration_of("two", 1));
   EXPECT_THAT(board.iterations(0), SizeIs(1));
+  auto next_frame = std::make_shared<v1::IterationPreview>(*iteration_of("two", 1));
+  next_frame->set_frame(7);
+  board.show(std::shared_ptr<const v1::IterationPreview>(next_frame));
+  EXPECT_THAT(board.iterations(0), SizeIs(1)) << "of the frame at hand";
 }
 
 TEST(Board, IterationsWithoutPicturesLeaveTheNewestPicturesStanding) {

@@ -7,6 +7,8 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
@@ -14,6 +16,7 @@
 #include "base/unique_fd.h"
 #include "daemon/reconstruction/child.h"
 #include "session/child_messages.h"
+#include "session/files.h"
 #include "tests/support/recording.h"
 #include "tests/support/wait.h"
 
@@ -29,7 +32,11 @@ class ReconstructionChildTest : public testing::Test {
  protected:
   ReconstructionChildTest() {
     fs::create_directories(root_ / "sessions/candle");
-    std::ofstream(root_ / "sessions/candle/manifest.json") << "{}";
+    v1::Manifest manifest = test::manifest_of({{{4, 4}, PixelFormat::gray8, 8}});
+    manifest.mutable_cameras(0)->mutable_counts()->set_recorded(40);
+    manifest.set_state(v1::Manifest::COMPLETE);
+    manifest.set_format_version(session::kSessionFormatVersion);
+    if (!session::write_manifest(root_ / "sessions/candle", manifest).ok()) ADD_FAILURE() << "no manifest";
     options_.program = root_ / "program";
     options_.sessions = root_ / "sessions";
     options_.results = root_ / "results";
@@ -269,6 +276,88 @@ TEST_F(ReconstructionChildTest, SessionsOutsideTheFolderAndValuesOutOfRangeAreRe
   wrong = request();
   wrong.set_budget_s(-1);
   EXPECT_THAT(child.start(wrong).error().message(), HasSubstr("budget_s"));
+  EXPECT_FALSE(child.status().has_value());
+  EXPECT_FALSE(fs::exists(root_ / "begun"));
+}
+
+v1::ReconstructRequest range(std::uint64_t first, std::uint64_t last, std::uint32_t every = 0) {
+  v1::ReconstructRequest request;
+  request.set_session("candle");
+  request.set_frame(first);
+  request.set_last_frame(last);
+  request.set_every(every);
+  return request;
+}
+
+TEST_F(ReconstructionChildTest, ASequenceIsOneJobOfAChildForEachFrame) {
+  done_message();
+  v1::ChildMessage kept;
+  v1::VolumePreview& volume = *kept.mutable_iteration()->mutable_volume();
+  volume.set_nx(1);
+  volume.set_ny(1);
+  volume.set_nz(1);
+  for (int i = 0; i < 3; ++i) {
+    volume.mutable_box()->add_center(0);
+    volume.mutable_box()->add_size(1);
+  }
+  volume.set_voxels("v");
+  kept.mutable_iteration()->mutable_iteration()->set_input_rmse(4.5);
+  message("kept", kept);
+  // Frame 9 fails.
+  ASSERT_TRUE(with_script("echo \"$@\" >> $ROOT/words; case \"$*\" in *'--frame 9'*) kill -SEGV $$;; esac; "
+                          "cat $ROOT/kept $ROOT/done >&3")
+                  .start(range(7, 12, 2))
+                  .ok());
+  const auto status = end();
+  EXPECT_EQ(status.state(), State::FAILED);
+  EXPECT_THAT(status.error(), HasSubstr("1 of 3 frames failed: 9. The others are in"));
+  EXPECT_THAT(status.error(), HasSubstr("SIGSEGV"));
+  EXPECT_EQ(status.result(), root_ / "results/candle");
+  ASSERT_EQ(status.frames_size(), 3);
+  EXPECT_EQ(status.frames(2).state(), State::DONE);
+  EXPECT_EQ(status.frames(2).input_rmse(), 4.5);
+  const std::string words = test::bytes_of(root_ / "words");
+  for (const char* frame : {"frame-7 --progress-fd 3 --frame 7", "frame-9 ", "frame-11 "})
+    EXPECT_THAT(words, HasSubstr(frame));
+  v1::FrameRequest wanted;
+  wanted.set_reconstruction(status.id());
+  wanted.set_frame(11);
+  ASSERT_TRUE(child_->frame(wanted));
+  EXPECT_EQ(child_->frame(wanted)->volume().voxels(), "v");
+  wanted.set_frame(9);
+  EXPECT_FALSE(child_->frame(wanted)) << "it failed";
+  EXPECT_TRUE(jobs_->list().empty());
+}
+
+TEST_F(ReconstructionChildTest, ASequenceThatIsCancelledKeepsWhatIsDone) {
+  done_message();
+  ReconstructionChild& child = with_script(
+      "case \"$*\" in *'--frame 1'*) echo x > $ROOT/begun; exec sleep 100;; esac; cat $ROOT/done >&3");
+  ASSERT_TRUE(child.start(range(0, 3)).ok());
+  wait_for_line("begun");
+  EXPECT_EQ(child.status()->doing(), "frame 1 (2 of 4): starting");
+  EXPECT_EQ(child.status()->fraction(), 0.25);
+  EXPECT_TRUE(child.cancel().ok());
+  const auto status = end();
+  EXPECT_EQ(status.state(), State::CANCELLED);
+  EXPECT_EQ(status.doing(), "cancelled, with 1 of 4 frames done");
+  EXPECT_EQ(status.frames(2).state(), State::STATE_UNSPECIFIED);
+}
+
+TEST_F(ReconstructionChildTest, ASequenceThatHasNoSuchFramesIsRefused) {
+  ReconstructionChild& child = with_script("echo x > $ROOT/begun");
+  v1::ReconstructRequest without_first = range(0, 3);
+  without_first.clear_frame();
+  v1::ReconstructRequest every_alone = range(3, 3, 2);
+  every_alone.clear_last_frame();
+  for (const auto& [wanted, words] : std::vector<std::pair<v1::ReconstructRequest, std::string>>{
+           {without_first, "last_frame: a sequence has a first frame too. Give frame"},
+           {every_alone, "every: is for sequences. Give last_frame too"},
+           {range(3, 2), "last_frame: 2 lies before the first frame, 3"},
+           {range(3, 40), "last_frame: there is no frame 40: the session has 40. Give at most 39"}}) {
+    EXPECT_THAT(child.check(wanted).error().message(), HasSubstr(words));
+    EXPECT_THAT(child.start(wanted).error().message(), HasSubstr(words));
+  }
   EXPECT_FALSE(child.status().has_value());
   EXPECT_FALSE(fs::exists(root_ / "begun"));
 }

@@ -144,5 +144,129 @@ TEST(ReconstructionState, AnEndWithoutAResultIsAFailure) {
               HasSubstr("600 s"));
 }
 
+SequenceState sequence(const std::vector<std::uint64_t>& frames) {
+  v1::ReconstructionStatus status;
+  status.set_id("candle 1");
+  status.set_session("candle");
+  return {status, frames, "/results/candle"};
+}
+
+/// Its next frame, reconstructed.
+void succeed(SequenceState& state, double error = 2) {
+  ASSERT_TRUE(state.next());
+  v1::ChildMessage kept = iteration(9);
+  kept.mutable_iteration()->mutable_iteration()->set_input_rmse(error);
+  state.take(std::move(kept));
+  state.take(done());
+  state.end({}, "");
+}
+void fail(SequenceState& state, const ChildEnd& end = {.code = 2}) {
+  ASSERT_TRUE(state.next());
+  state.end(end, "no light");
+}
+
+TEST(SequenceState, WithoutFramesItIsTheReconstructionOfOne) {
+  SequenceState state = sequence({});
+  ASSERT_TRUE(state.next());
+  EXPECT_FALSE(state.frame());
+  EXPECT_FALSE(state.take(iteration(1))->has_frame());
+  state.take(at_work(0.5, "carving the hull"));
+  EXPECT_EQ(state.fraction(), 0.5);
+  EXPECT_EQ(state.doing(), "carving the hull");
+  state.take(done());
+  state.end({}, "");
+  EXPECT_FALSE(state.next());
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::DONE);
+  EXPECT_EQ(state.status().result(), "/results/candle");
+  EXPECT_EQ(state.status().frames_size(), 0);
+}
+
+TEST(SequenceState, TellsTheFrameAtHandAndHowFarTheWholeIs) {
+  SequenceState state = sequence({10, 12, 14, 16});
+  EXPECT_EQ(state.doing(), "starting");
+  succeed(state, 3.5);
+  ASSERT_TRUE(state.next());
+  EXPECT_EQ(state.take(iteration(1))->frame(), 12U);
+  state.take(at_work(0.5, "iterating"));
+  const v1::ReconstructionStatus status = state.status();
+  EXPECT_EQ(status.state(), v1::ReconstructionStatus::RUNNING);
+  EXPECT_EQ(status.doing(), "frame 12 (2 of 4): iterating");
+  EXPECT_EQ(status.fraction(), 1.5 / 4);
+  EXPECT_EQ(status.iterations_size(), 1) << "of the frame at hand";
+  EXPECT_EQ(status.result(), "/results/candle");
+  ASSERT_EQ(status.frames_size(), 4);
+  EXPECT_EQ(status.frames(0).state(), v1::ReconstructionStatus::DONE);
+  EXPECT_EQ(status.frames(0).input_rmse(), 3.5);
+  EXPECT_EQ(status.frames(1).state(), v1::ReconstructionStatus::RUNNING);
+  EXPECT_EQ(status.frames(2).state(), v1::ReconstructionStatus::STATE_UNSPECIFIED);
+  EXPECT_EQ(status.frames(3).frame(), 16U);
+}
+
+TEST(SequenceState, AllDoneIsDone) {
+  SequenceState state = sequence({1, 2});
+  succeed(state);
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::RUNNING) << "between two children";
+  succeed(state);
+  EXPECT_FALSE(state.next());
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::DONE);
+  EXPECT_EQ(state.status().fraction(), 1);
+  EXPECT_EQ(state.status().doing(), "done");
+}
+
+TEST(SequenceState, AFrameThatFailsIsMarkedAndTheOthersGoOn) {
+  SequenceState state = sequence({1, 2, 3});
+  succeed(state);
+  fail(state);
+  succeed(state);
+  const v1::ReconstructionStatus status = state.status();
+  EXPECT_EQ(status.state(), v1::ReconstructionStatus::FAILED);
+  EXPECT_EQ(status.frames(1).state(), v1::ReconstructionStatus::FAILED);
+  EXPECT_THAT(status.frames(1).error(), HasSubstr("exit code 2"));
+  EXPECT_THAT(status.error(),
+              HasSubstr("1 of 3 frames failed: 2. The others are in /results/candle. Frame 2: "));
+  EXPECT_THAT(status.error(), HasSubstr("no light"));
+  EXPECT_EQ(status.fraction(), 1);
+}
+
+TEST(SequenceState, WhereTheFirstThreeFailTheOthersAreNotTried) {
+  SequenceState state = sequence({0, 1, 2, 3, 4});
+  for (int i = 0; i < 3; ++i) fail(state);
+  EXPECT_FALSE(state.next());
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::FAILED);
+  EXPECT_THAT(state.status().error(), HasSubstr("3 of 5 frames failed: 0, 1, 2. The other 2 were not tried"));
+  EXPECT_EQ(state.status().result(), "");
+}
+
+TEST(SequenceState, LaterOnFramesMayFailInARow) {
+  SequenceState state = sequence({0, 1, 2, 3, 4});
+  succeed(state);
+  for (int i = 0; i < 4; ++i) fail(state);
+  EXPECT_FALSE(state.next());
+  EXPECT_THAT(state.status().error(), HasSubstr("4 of 5 frames failed: 1, 2, 3, 4"));
+}
+
+TEST(SequenceState, AChildThatCannotBeStartedEndsIt) {
+  SequenceState state = sequence({0, 1, 2});
+  succeed(state);
+  fail(state, {.why = ChildEnd::Why::not_started, .words = "/usr/bin/emberlock: isn't there"});
+  EXPECT_FALSE(state.next());
+  EXPECT_THAT(state.status().error(), HasSubstr("/usr/bin/emberlock: isn't there"));
+}
+
+TEST(SequenceState, CancelledItKeepsWhatIsDone) {
+  SequenceState state = sequence({0, 1, 2});
+  succeed(state);
+  fail(state, {.why = ChildEnd::Why::cancelled});
+  EXPECT_FALSE(state.next());
+  const v1::ReconstructionStatus status = state.status();
+  EXPECT_EQ(status.state(), v1::ReconstructionStatus::CANCELLED);
+  EXPECT_EQ(status.doing(), "cancelled, with 1 of 3 frames done");
+  EXPECT_EQ(status.frames(1).state(), v1::ReconstructionStatus::CANCELLED);
+  EXPECT_EQ(status.result(), "/results/candle");
+  SequenceState waiting = sequence({0, 1});
+  waiting.end({.why = ChildEnd::Why::cancelled}, "");
+  EXPECT_EQ(waiting.status().state(), v1::ReconstructionStatus::CANCELLED) << "before it began";
+}
+
 }  // namespace
 }  // namespace emberlock::daemon

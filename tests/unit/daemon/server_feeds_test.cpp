@@ -23,9 +23,11 @@ void show_picture(Board& board, const std::string& camera, std::uint64_t frame) 
   board.show(std::shared_ptr<const v1::Picture>(picture));
 }
 
-void show_iteration(Board& board, const std::string& reconstruction, std::uint32_t iteration) {
+void show_iteration(Board& board, const std::string& reconstruction, std::uint32_t iteration,
+                    std::uint64_t frame = 0) {
   auto preview = std::make_shared<v1::IterationPreview>();
   preview->set_reconstruction(reconstruction);
+  preview->set_frame(frame);
   preview->mutable_iteration()->set_iteration(iteration);
   board.show(std::shared_ptr<const v1::IterationPreview>(preview));
 }
@@ -125,6 +127,9 @@ TEST(ServerFeeds, IterationsAreToldFromTheFirstOnAndThenThoseOfTheNextReconstruc
   EXPECT_FALSE(feed.next(kStart).message);
   show_iteration(board, "second", 1);
   EXPECT_EQ(feed.next(kStart).message->reconstruction(), "second");
+  EXPECT_FALSE(feed.next(kStart).message);
+  show_iteration(board, "second", 1, 7);
+  EXPECT_EQ(feed.next(kStart).message->frame(), 7U) << "the sequence's next frame";
   EXPECT_FALSE(feed.next(kStart).message);
 }
 

@@ -61,6 +61,27 @@ TEST_F(ServerGrpcCalls, EachKindOfErrorHasItsCodeAndTheWholeMessage) {
   }
 }
 
+TEST_F(ServerGrpcCalls, AFrameThatIsNotHeldIsNotFound) {
+  api.on_reconstructed_frame = [](const v1::FrameRequest& request) {
+    if (request.frame() != 12) return std::shared_ptr<const v1::IterationPreview>();
+    auto kept = std::make_shared<v1::IterationPreview>();
+    kept->mutable_volume()->set_voxels("voxels");
+    return std::shared_ptr<const v1::IterationPreview>(kept);
+  };
+  serve();
+  const auto reconstruct = v1::Reconstruct::NewStub(channel());
+  const auto ask = [&](std::uint64_t frame, v1::IterationPreview& answer) {
+    v1::FrameRequest request;
+    request.set_frame(frame);
+    grpc::ClientContext context;
+    return reconstruct->Frame(&context, request, &answer).error_code();
+  };
+  v1::IterationPreview answer;
+  EXPECT_EQ(ask(12, answer), grpc::OK);
+  EXPECT_EQ(answer.volume().voxels(), "voxels");
+  EXPECT_EQ(ask(13, answer), grpc::NOT_FOUND);
+}
+
 TEST_F(ServerGrpcCalls, BeyondTheQueueCallsAreRefusedAndStatusIsStillAnswered) {
   std::promise<void> go;
   const std::shared_future<void> gone = go.get_future().share();

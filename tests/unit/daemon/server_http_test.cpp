@@ -263,6 +263,22 @@ TEST_F(ServerHttpTest, AJobThatFailsOnItsWayEndsItsStreamWithTheError) {
   }
 }
 
+TEST_F(ServerHttpTest, AFrameThatIsNotHeldIsNotFound) {
+  api.on_reconstructed_frame = [](const v1::FrameRequest& request) {
+    if (request.frame() != 12) return std::shared_ptr<const v1::IterationPreview>();
+    auto kept = std::make_shared<v1::IterationPreview>();
+    kept->mutable_volume()->set_voxels("voxels");
+    return std::shared_ptr<const v1::IterationPreview>(kept);
+  };
+  serve();
+  const auto found =
+      ask(port, "POST", "/api/v1/Reconstruct/Frame", R"({"reconstruction": "r", "frame": 12})");
+  EXPECT_EQ(json::parse(found.body)["volume"]["voxels"], "dm94ZWxz");
+  const auto absent = ask(port, "POST", "/api/v1/Reconstruct/Frame", R"({"frame": "13"})");
+  EXPECT_EQ(absent.status, 404);
+  EXPECT_EQ(json::parse(absent.body)["code"], "NOT_FOUND");
+}
+
 TEST_F(ServerHttpTest, AJobIsCancelledByItsNumberAndSaysSo) {
   test::EndlessJob endless;
   serve();

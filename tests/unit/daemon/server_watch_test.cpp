@@ -140,6 +140,7 @@ TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
   auto preview = std::make_shared<v1::IterationPreview>();
   preview->set_reconstruction("r");
   preview->mutable_iteration()->set_iteration(3);
+  preview->set_frame(12);
   preview->set_camera_id("CAM 1");
   preview->set_captured_jpeg("captured");
   preview->set_rendered_jpeg("rendered");
@@ -152,7 +153,8 @@ TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
   while (!numbers.contains("iteration")) numbers = text(console);
   EXPECT_EQ(
       numbers,
-      json::parse(R"({"iteration":{"reconstruction":"r","iteration":{"iteration":3},"camera_id":"CAM 1"}})"));
+      json::parse(
+          R"({"iteration":{"reconstruction":"r","iteration":{"iteration":3},"camera_id":"CAM 1","frame":"12"}})"));
   const Binary captured = binary(console);
   EXPECT_EQ(captured.header["kind"], "captured");
   EXPECT_EQ(captured.header["camera_id"], "CAM 1");

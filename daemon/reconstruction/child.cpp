@@ -222,10 +222,9 @@ std::optional<v1::ReconstructionStatus> ReconstructionChild::status() const {
   return status;
 }
 
-std::shared_ptr<const v1::IterationPreview> ReconstructionChild::frame(
-    const v1::FrameRequest& request) const {
+std::shared_ptr<const v1::IterationPreview> ReconstructionChild::frame(const v1::FrameRequest& one) const {
   const std::lock_guard lock(mutex_);
-  return kept_.find(request);
+  return kept_.find(one);
 }
 
 JobResult ReconstructionChild::supervise(v1::ReconstructRequest request, const Observer& observer) {

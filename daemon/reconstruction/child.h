@@ -60,7 +60,7 @@ class ReconstructionChild {
   /// Of the one that runs, else of the last; nothing before the first.
   [[nodiscard]] std::optional<v1::ReconstructionStatus> status() const;
   /// A frame of the newest sequence, as it was kept. Null: it isn't done, or no longer held.
-  [[nodiscard]] std::shared_ptr<const v1::IterationPreview> frame(const v1::FrameRequest& request) const;
+  [[nodiscard]] std::shared_ptr<const v1::IterationPreview> frame(const v1::FrameRequest& one) const;
 
  private:
   using TakeBytes = std::function<void(std::string_view)>;

@@ -75,7 +75,7 @@ const link: Link = new Link({
   iteration: preview => reconstruction.preview(preview),
   bytes(head, bytes) {
     if (head.kind === 'picture') cameras.offer(head, bytes);
-    else if (head.kind === 'volume') void reconstruction.showVolume(head, bytes);
+    else if (head.kind === 'volume') reconstruction.showVolume(head, bytes);
     else void reconstruction.view(head, bytes);
   },
 });

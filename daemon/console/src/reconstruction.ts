@@ -6,7 +6,9 @@ import {el, set, setText, show} from './dom';
 import {fixed, known, percent, span} from './format';
 import {showSign, Sign} from './light';
 import {bitmapOf, isGrey, paint} from './picture';
+import {Player} from './player';
 import {Plot} from './plot';
+import {frameAtHand, Sequence} from './sequence';
 import type {View, Volume} from './wire';
 import {call} from './wire';
 import type {VolumeView} from './volume';
@@ -33,6 +35,8 @@ export class Reconstruction {
   private readonly latest = el('p', {class: 'latest'});
   private readonly place = el('div', {class: 'volume', tabindex: 0, role: 'img', 'aria-label': 'The reconstructed volume: drag to turn it, arrow keys turn it too'});
   private readonly volumeNote = el('p', {class: 'note'}, 'The volume comes with the first iteration.');
+  private readonly sequence = new Sequence();
+  private readonly player = new Player((volume, voxels) => void this.draw(volume, voxels), () => { if (this.live) void this.draw(...this.live); });
   private readonly effects = el('ul', {class: 'reasons'});
   private readonly advice = el('ul', {class: 'reasons'});
   private readonly result = el('p', {class: 'result'});
@@ -42,8 +46,9 @@ export class Reconstruction {
   private readonly chosen = el('div', {}, el('h3', {}, 'Effects'), this.effects);
   private volume?: Promise<VolumeView>;
   private next?: [Volume, Uint8Array];
+  private live?: [Volume, Uint8Array];
   private iterations: Iteration[] = [];
-  private id = '';
+  private shown = '';  // id, and of a sequence the frame at hand
   private viewsAsked = 0;
   private readonly newest = {captured: 0, rendered: 0};
   private grey = false;
@@ -53,8 +58,8 @@ export class Reconstruction {
   constructor() {
     this.content = el('div', {class: 'reconstruction', hidden: true},
       el('div', {class: 'pair'}, el('figure', {}, this.views.captured, this.captions.captured), el('figure', {}, this.views.rendered, this.captions.rendered)),
-      el('div', {class: 'progress'}, this.latest, this.plot.root, this.chosen, this.advised, this.result),
-      el('div', {class: 'turn'}, this.place, this.volumeNote));
+      el('div', {class: 'progress'}, this.sequence.root, this.latest, this.plot.root, this.chosen, this.advised, this.result),
+      el('div', {class: 'turn'}, this.place, this.player.root, this.volumeNote));
     this.place.addEventListener('keydown', event => {
       const by = {ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, 10], ArrowDown: [0, -10]}[event.key];
       if (by === undefined || !this.volume) return;
@@ -72,8 +77,9 @@ export class Reconstruction {
     show(this.content, r !== undefined);
     for (const part of [this.bar, this.cancel, this.sign.root]) show(part, r !== undefined);
     if (!r) return;
-    if (r.id !== this.id) this.begin(r.id);
-    const [light, word] = states[r.state];
+    this.begin(r.id, frameAtHand(r));
+    const part = r.state === 'FAILED' && r.frames.some(({state}) => state === 'DONE');
+    const [light, word] = part ? ['AMBER', 'done in part'] as const : states[r.state];
     showSign(this.sign, this.word, light, word);
     this.bar.value = r.fraction;
     show(this.bar, r.state === 'RUNNING');
@@ -88,11 +94,13 @@ export class Reconstruction {
         list.replaceChildren(...lines.map(line => el('li', {}, line)));
       }
     }
+    this.sequence.show(r.frames);
+    this.player.show(r);
     setText(this.result, r.result ? `Written to ${r.result}` : '');
   }
 
   preview(preview: IterationPreview): void {
-    if (preview.reconstruction !== this.id) this.begin(preview.reconstruction);
+    this.begin(preview.reconstruction, preview.frame);
     const {iteration} = preview;
     if (iteration && iteration.iteration > (this.iterations.at(-1)?.iteration ?? -1)) this.showIterations([...this.iterations, iteration]);
   }
@@ -120,7 +128,12 @@ export class Reconstruction {
     set(this.views[header.kind], 'data-iteration', header.iteration);
   }
 
-  async showVolume(header: Volume, voxels: Uint8Array): Promise<void> {
+  showVolume(header: Volume, voxels: Uint8Array): void {
+    this.live = [header, voxels];
+    if (this.player.follows) void this.draw(header, voxels);
+  }
+
+  private async draw(header: Volume, voxels: Uint8Array): Promise<void> {
     this.next = [header, voxels];
     try {
       this.volume ??= import('./volume').then(module => new module.VolumeView(this.place));
@@ -137,8 +150,10 @@ export class Reconstruction {
     }
   }
 
-  private begin(id: string): void {
-    this.id = id;
+  private begin(id: string, frame: number | undefined): void {
+    const now = `${id} ${frame ?? ''}`;
+    if (now === this.shown) return;
+    this.shown = now;
     this.showIterations([]);
   }
 

@@ -54,8 +54,8 @@ export class VolumeView {
     this.mapper.setSampleDistance(step);
     this.actor.getProperty().setScalarOpacityUnitDistance(0, 3 * step);
     this.mapper.setInputData(image);
-    // The operator's view stays from iteration to iteration.
-    const key = JSON.stringify([nx, ny, nz, size, center]);
+    // The operator's view stays from iteration to iteration, and from frame to frame.
+    const key = JSON.stringify([size, center]);
     if (key !== this.size) {
       this.size = key;
       this.reset();

@@ -10,7 +10,7 @@ import type {AlignmentStatus} from '../../../daemon/console/src/api.gen';
 import {bench, drawn, kPhone, kSizes} from './bench';
 import {faultyAligning, faultyCapturing, noLamp} from './faulty';
 import {Refusal} from './mock';
-import {alignment, capturing, idle, locked, reconstruction} from './scene';
+import {alignment, capturing, idle, locked, reconstruction, sequence} from './scene';
 import {until} from '../support/chromium';
 
 const kAxe = readFileSync(fileURLToPath(new URL('../../../daemon/console/node_modules/axe-core/axe.min.js', import.meta.url)), 'utf8');
@@ -44,9 +44,10 @@ describe.each([kSizes[0], kPhone])('axe at $width x $height', size => {
       'faults that are over': {...over, faults: over.faults!.map(fault => ({...fault, over: true})), jobs: []},
       recording: {...faultyCapturing(7.3), reconstruction: reconstruction(3)},
       locked: {...locked(), faults: [], recording: {...capturing(8).recording!, state: 'COMPLETE' as const, verdict: '2112 frames, all accounted for.'}},
+      'a sequence': {...locked(), reconstruction: sequence('dfdr--')},
       refused: {...noLamp(), alignment: alignment(0, {verdict: 'REFUSED', reason: '10 rows would take about 400 resets; 60 are allowed.', offers})},
     };
-    for (const [words, status] of Object.entries(states).filter(([words]) => size !== kPhone || words === 'recording' || words === 'refused')) {
+    for (const [words, status] of Object.entries(states).filter(([words]) => size !== kPhone || ['recording', 'refused', 'a sequence'].includes(words))) {
       rig.mock.show(status);
       rig.mock.notice('AMBER', words);
       await page.waitForFunction(last => document.querySelector('.journal li')?.textContent?.endsWith(last), words);

@@ -20,7 +20,7 @@ export function errorAfter(index: number, round: number): number {
 export function camera(index: number, change: Wire<CameraStatus> = {}): CameraStatus {
   return {
     id: cameraId(index), model: 'virtual CCD', driver: 'virtual', state: 'FILMING', light: 'GREEN', reason: 'Films.', width: 640, height: 480,
-    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [], lost_lately: 0,
+    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [], lost_lately: 0, lamp_hidden: false,
     counts: {delivered: 7321, damaged: 0, camera_gap: 0, transport: 0, resend: 0, underrun: 0, queue: 0, passed_over: 240},
     ...change,
   };
@@ -89,7 +89,15 @@ export function capturing(seconds: number, change: Wire<RecordingStatus> = {}): 
 export function reconstruction(iterations: number, change: Wire<ReconstructionStatus> = {}): ReconstructionStatus {
   return {id: 'r1', session: '2026-11-22_031500', state: 'RUNNING', fraction: iterations / 12, doing: 'adjusts the volume', device: 'CPU, 2 threads', seconds: 4 * iterations,
           iterations: Array.from({length: iterations}, (_, at) => iteration(at + 1)), result: '', effects: ['emission: the flame glows', 'no scattering: nothing in the scene calls for it'],
-          advice: ['12 more iterations: 48 s, about 0.3 grey levels'], error: '', ...change};
+          advice: ['12 more iterations: 48 s, about 0.3 grey levels'], error: '', frames: [], ...change};
+}
+
+/** A sequence of these frames: 'd' is done, 'f' failed, 'r' runs, '-' waits. */
+export function sequence(states: string, change: Wire<ReconstructionStatus> = {}): ReconstructionStatus {
+  const names = {d: 'DONE', f: 'FAILED', r: 'RUNNING', '-': 'STATE_UNSPECIFIED'} as const;
+  const frames = [...states].map((state, at) => ({frame: 10 + 2 * at, state: names[state as keyof typeof names], input_rmse: state === 'd' ? 2 + at / 10 : 0, error: state === 'f' ? 'It crashed by SIGSEGV. Try device cpu.' : ''}));
+  return reconstruction(2, {id: 's1', frames, fraction: [...states].filter(state => state === 'd' || state === 'f').length / states.length,
+                            doing: `frame ${10 + 2 * states.indexOf('r')} (${states.indexOf('r') + 1} of ${states.length}): iterating`, ...change});
 }
 
 export const iteration = (at: number) => ({iteration: at, seconds: 4 * at, input_rmse: 2.1 + 14 * Math.exp(-at / 3), heldout_rmse: 2.9 + 14 * Math.exp(-at / 3.3)});

@@ -322,6 +322,20 @@ test('the volume is seen, and turns by mouse and by key', async () => {
   await turned('by key');
 }, 120_000);
 
+test('two frames, one after the other, are played', async () => {
+  const {cameras, frames} = (decode('ListSessionsResponse', await daemon.call('Sessions/List')) as ListSessionsResponse).sessions.find(({session}) => session === 'walk')!;
+  const first = Math.floor(frames / cameras / 2);
+  await page.getByLabel('Frame of walk to reconstruct', {exact: true}).fill(String(first));
+  await page.getByLabel('Last frame of walk to reconstruct, of several').fill(String(first + 1));
+  await page.getByRole('button', {name: 'Reconstruct walk'}).click();
+  await page.locator('.sequence .tally').waitFor();
+  await until(() => text('.sequence .tally'), words => words === 'Frames: 2 of 2 done', 'both are done', 600);
+  await until(() => text('.player .label'), words => words.startsWith(`frame ${first + 1}, 2 of 2: error `), 'the last one is shown');
+  await page.getByRole('slider', {name: 'Frame of the sequence'}).press('Home');
+  await until(() => text('.player .label'), words => words.startsWith(`frame ${first}, 1 of 2: error `), 'the first one is shown');
+  expect(await page.locator('.toast').count()).toBe(0);
+}, 700_000);
+
 test('the daemon gone is told', async () => {
   expect(watched.complaints).toEqual([]);
   daemon.kill();

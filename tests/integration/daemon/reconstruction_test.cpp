@@ -15,6 +15,7 @@
 #include "recon/preprocess/radiance.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/recording.h"
+#include "tests/support/shell.h"
 #include "tests/support/wait.h"
 
 namespace emberlock {
@@ -138,6 +139,25 @@ TEST_F(DaemonReconstruction, ASequenceBecomesAVolumeForEachFrameThatCanBeFetched
     EXPECT_EQ(kept->volume().voxels().size(), 13U * 13U * 13U);
     EXPECT_EQ(kept->iteration().input_rmse(), frame.input_rmse());
   }
+}
+
+TEST_F(DaemonReconstruction, WithoutTheDaemonTheProgramReconstructsASequenceToo) {
+  const std::string command =
+      fmt::format("{} reconstruct {} --device cpu --voxels 12 --frame 0 --out {} ", EMBERLOCK_PROGRAM,
+                  (folder_ / "sessions/candle").string(), (folder_ / "out").string());
+  const Shell run = shell(command + "--last-frame 2 --every 2");
+  EXPECT_EQ(run.status, 0) << run.output;
+  EXPECT_THAT(run.output, HasSubstr("frame 2 (2 of 2)"));
+  for (const char* frame : {"frame-0", "frame-2"})
+    EXPECT_TRUE(fs::exists(folder_ / fmt::format("out/{}/volume.vdb", frame))) << frame;
+  EXPECT_FALSE(fs::exists(folder_ / "out/frame-1"));
+  const Shell beyond = shell(command + "--last-frame 3");
+  EXPECT_EQ(beyond.status, 2);
+  EXPECT_THAT(beyond.output,
+              HasSubstr("--last-frame: there is no frame 3: the session has 3. Give at most 2"));
+  const Shell hopeless = shell(command + "--last-frame 2 --hold-out 30");
+  EXPECT_EQ(hopeless.status, 1);
+  EXPECT_THAT(hopeless.output, HasSubstr("of 3 frames 3 failed and 0 were not tried"));
 }
 
 TEST_F(DaemonReconstruction, OneThatIsCancelledLeavesNoHalfResult) {

@@ -187,7 +187,7 @@ std::string SequenceState::doing() const {
     case v1::ReconstructionStatus::DONE:
       return "done";
     default:
-      return "failed";
+      return fmt::format("{} of {} frames failed", count(v1::ReconstructionStatus::FAILED), frames_.size());
   }
 }
 

@@ -220,6 +220,7 @@ TEST(SequenceState, AFrameThatFailsIsMarkedAndTheOthersGoOn) {
   succeed(state);
   const v1::ReconstructionStatus status = state.status();
   EXPECT_EQ(status.state(), v1::ReconstructionStatus::FAILED);
+  EXPECT_EQ(status.doing(), "1 of 3 frames failed");
   EXPECT_EQ(status.frames(1).state(), v1::ReconstructionStatus::FAILED);
   EXPECT_THAT(status.frames(1).error(), HasSubstr("exit code 2"));
   EXPECT_THAT(status.error(),

@@ -26,7 +26,7 @@ export class FrameChoice {
     this.last = number(0, 'alone', `Last frame of ${session} to reconstruct, of several`);
     this.every = number(1, '1', `Of ${session}, each frame of so many`);
     const word = (text: string) => el('span', {'aria-hidden': 'true'}, text);
-    this.root = el('span', {class: 'frame-choice'}, word('frame'), this.first, word('to'), this.last, word('each of'), this.every);
+    this.root = el('span', {class: 'frame-choice'}, word('frame'), this.first, word('to'), this.last, word('every'), this.every);
   }
 
   show(entry: Entry, disabled: boolean): void {

@@ -167,10 +167,15 @@ describe('played', () => {
   test.each(kSizes)('fits at $width x $height, with controls to touch', async size => {
     serveFrames();
     rig.mock.status = {...locked(), reconstruction: sequence('ddfdr'.padEnd(400, '-'))};
+    rig.mock.answers['Sessions/List'] = () => ({sessions: [entry]});
     const page = await rig.open(size);
     await page.waitForSelector('.player');
+    await page.waitForSelector('.frame-choice');
     expect(await overflows(page)).toBe(0);
+    await page.locator('#sessions').scrollIntoViewIfNeeded();
+    await screenshot(page, `sequence-choice-${size.width}`);
     if (size !== kPhone) return;
+    for (const input of await page.locator('.frame-choice input').all()) expect((await input.boundingBox())!.height).toBeGreaterThanOrEqual(44);
     await page.getByRole('slider').press('Home');
     for (const control of ['.player .play', '.player input', '.player .quiet']) {
       expect((await page.locator(control).boundingBox())!.height, control).toBeGreaterThanOrEqual(44);

@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "drivers/virtual/virtual_dial.h"
+#include "drivers/virtual/virtual_rig.h"
 #include "session/reader.h"
 #include "tests/support/small_daemon.h"
 
@@ -280,6 +282,37 @@ TEST_F(Daemon, TheLockHoldsAsLongAsItIsSaidTo) {
     ASSERT_TRUE(daemon.reach(v1::LOCKED, 100'000));
     EXPECT_EQ(daemon.fault(v1::Fault::LOCK_LOST), nullptr) << seed;
   }
+}
+
+TEST_F(Daemon, NoCamerasTrulyLieFartherApartBeforeThePromiseIsOverAndTwiceThatWouldBeTooLong) {
+  int too_long_if_doubled = 0;
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    rig::DaemonConfig config = small_config(temp_ / std::to_string(seed));
+    config.rig.virtual_rig.draw.seed = seed;
+    config.rig.virtual_rig.draw.crystal_spread = PartsPerMillion(60);
+    SmallDaemon daemon(std::move(config));
+    ASSERT_TRUE(daemon.conductor->align({}).ok());
+    ASSERT_TRUE(daemon.reach(v1::LOCKED)) << daemon.conductor->status().reason();
+    const v1::AlignmentStatus lock = daemon.conductor->status().alignment();
+    drivers::VirtualRig& rig = *daemon.rig->virtual_rig();
+    const TimePoint locked = rig.clock().now();
+    // Nothing is reset during a recording.
+    v1::RecordRequest request;
+    request.set_seconds(2 * lock.time_left_s());
+    request.set_unlocked(true);
+    ASSERT_TRUE(daemon.conductor->record(request).ok());
+    std::optional<Seconds> left;
+    ASSERT_TRUE(daemon.work_until(
+        [&] {
+          if (!left && true_spread(rig).value() > 2 * lock.tolerance_s()) left = rig.clock().now() - locked;
+          return daemon.conductor->phase() != v1::CAPTURING;
+        },
+        100'000));
+    if (!left) continue;
+    EXPECT_GE(left->value(), lock.time_left_s()) << seed;
+    ++too_long_if_doubled;
+  }
+  EXPECT_GT(too_long_if_doubled, 0) << "this finds nothing";
 }
 
 TEST_F(Daemon, ATakeThatIsLongerThanTheLockIsRefusedUntilTheLockIsRenewedForIt) {

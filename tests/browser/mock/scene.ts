@@ -20,7 +20,7 @@ export function errorAfter(index: number, round: number): number {
 export function camera(index: number, change: Wire<CameraStatus> = {}): CameraStatus {
   return {
     id: cameraId(index), model: 'virtual CCD', driver: 'virtual', state: 'FILMING', light: 'GREEN', reason: 'Films.', width: 640, height: 480,
-    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [], lost_lately: 0, lamp_hidden: false,
+    frame_rate_hz: 24, measured_rate_hz: 24.0003, reset: 'BY_HAND', sensor: 'CCD', sight: '', resets: 0, reset_next: false, dots: [], band: [], lost_lately: 0,
     counts: {delivered: 7321, damaged: 0, camera_gap: 0, transport: 0, resend: 0, underrun: 0, queue: 0, passed_over: 240},
     ...change,
   };

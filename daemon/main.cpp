@@ -162,6 +162,7 @@ Status serve(const rig::DaemonConfig& config) {
   if (!config.server.http_listen.empty()) {
     HttpServerOptions options = http_options(config.server, access);
     options.other_watchers = [&grpc_server] { return grpc_server->watchers(); };
+    options.export_folder = [&engine](std::string_view session) { return engine->video_folder(session); };
     EMBERLOCK_ASSIGN_OR_RETURN(http_server, HttpServer::start(*engine, std::move(options)));
     log(LogCategory::daemon)
         .info("the console is at {}: `emberlock console` prints a link that opens it", http_server->url());

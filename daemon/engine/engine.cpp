@@ -18,6 +18,7 @@
 namespace emberlock::daemon {
 namespace {
 
+constexpr const char* kVideoFolder = "video";
 constexpr auto kPause = std::chrono::milliseconds(4);     ///< between two looks for frames
 constexpr Seconds kShown{0.1};                            ///< between two statuses
 constexpr Seconds kLongestSilence{10};                    ///< of the thread or of a camera that says it films
@@ -300,7 +301,7 @@ Result<std::shared_ptr<JobHandle>> Engine::export_session(const v1::ExportReques
   const bool video = request.format() == v1::ExportRequest::VIDEO;
   const auto format = video ? session::ExportFormat::video : session::ExportFormat::png;
   EMBERLOCK_ASSIGN_OR_RETURN(const auto target,
-                             store_.path_for_export(request.session(), video ? "video" : "png"));
+                             store_.path_for_export(request.session(), video ? kVideoFolder : "png"));
   return jobs_.add(
       {v1::Job::EXPORT, request.session(), [folder, target, format](const Observer& observer) -> JobResult {
          EMBERLOCK_ASSIGN_OR_RETURN(const auto report,
@@ -309,6 +310,10 @@ Result<std::shared_ptr<JobHandle>> Engine::export_session(const v1::ExportReques
          outcome.mutable_export_()->set_folder(target.string());
          return outcome;
        }});
+}
+
+Result<std::filesystem::path> Engine::video_folder(std::string_view session) const {
+  return store_.path_for_export(session, kVideoFolder);
 }
 
 Status Engine::cancel_job(const v1::CancelJobRequest& request) { return jobs_.cancel(request.id()); }

@@ -4,9 +4,11 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <string_view>
 #include <thread>
 
 #include "base/result.h"
@@ -59,6 +61,9 @@ class Engine final : public Api {
   Result<std::shared_ptr<JobHandle>> verify_session(const v1::SessionRequest& request) override;
   Result<std::shared_ptr<JobHandle>> repair_session(const v1::SessionRequest& request) override;
   Result<std::shared_ptr<JobHandle>> export_session(const v1::ExportRequest& request) override;
+  /// Where a session's exported videos lie, if it was exported. Any thread. Error bad_input: an invalid name,
+  /// or a symbolic link in the path.
+  [[nodiscard]] Result<std::filesystem::path> video_folder(std::string_view session) const;
   Status cancel_job(const v1::CancelJobRequest& request) override;
   Result<v1::ReconstructionStatus> reconstruct(const v1::ReconstructRequest& request) override;
   Result<v1::ReconstructionStatus> cancel_reconstruction() override;

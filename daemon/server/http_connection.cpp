@@ -38,6 +38,7 @@ constexpr const char* kPolicy =
     "worker-src 'self' "
     "blob:; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
+constexpr std::string_view kExportsPath = "/exports/";
 constexpr std::string_view kOpenPath = "/open";
 constexpr std::uint64_t kLargestForm = 1024;  // bytes
 constexpr std::chrono::seconds kGoodbye{1};   // for the other side to close too
@@ -255,6 +256,7 @@ void HttpConnection::answer() {
                                           .other_watchers = others,
                                           .refused = context_.options.failures->counts()})));
   }
+  if (path.starts_with(kExportsPath)) return answer_export();
   answer_file();
 }
 

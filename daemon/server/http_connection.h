@@ -17,6 +17,7 @@
 #include <boost/beast/http/string_body.hpp>
 
 #include "daemon/server/http_context.h"
+#include "daemon/server/http_download.h"
 #include "daemon/server/http_stream.h"
 #include "daemon/server/json_api.h"
 
@@ -67,6 +68,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void answer();
   void answer_api(std::string_view method);
   void answer_file();
+  void answer_export();
+  void write_download();
   void call(const JsonMethod& method);
   void watch();
 
@@ -97,6 +100,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   std::optional<boost::beast::http::request_parser<Body>> parser_;
   HttpTarget target_;
   std::shared_ptr<const Response> answer_;  ///< being sent
+  std::shared_ptr<HttpDownload> download_;  ///< being sent
 
   std::shared_ptr<JobWatch> job_;
   std::shared_ptr<const std::string> line_;  ///< being sent

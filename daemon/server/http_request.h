@@ -16,12 +16,14 @@ namespace emberlock::daemon {
 
 /// The target of a request for "/path?token=T" or "/open?link=L".
 struct HttpTarget {
-  std::string path;   ///< begins with a slash; not decoded, because none of our names needs escapes
+  std::string path;   ///< begins with a slash; not decoded; unescape() is for the parts that may need it
   std::string token;  ///< from the query; empty: none
   std::string link;   ///< likewise
 };
 /// nullopt for targets that aren't answered (absolute URLs, spaces and control characters, invalid escapes).
 std::optional<HttpTarget> parse_target(std::string_view target);
+/// Text of a URL without its escapes (%2F), undone once. nullopt: one is invalid.
+std::optional<std::string> unescape(std::string_view text);
 /// The token in the body of our form: "token=T". Empty if there is none.
 std::string token_of_form(std::string_view body);
 

@@ -13,6 +13,7 @@
 #include "daemon/api.h"
 #include "daemon/server/auth_failures.h"
 #include "daemon/server/console_sessions.h"
+#include "daemon/server/exported_file.h"
 #include "rig/access.h"
 
 namespace emberlock::daemon {
@@ -36,7 +37,8 @@ struct HttpServerOptions {
   Seconds patience{15};  ///< for the TLS handshake, a complete header or body, a client to accept an answer,
                          ///< a viewer's sign of life
   std::function<std::size_t()> other_watchers =
-      {};  ///< for /metrics: the watchers outside this server (gRPC's)
+      {};                           ///< for /metrics: the watchers outside this server (gRPC's)
+  ExportFolder export_folder = {};  ///< if unset, no exported files are served
 };
 
 /// The console and the API over HTTP/1.1, with TLS if not local, on one thread, for authenticated clients
@@ -45,6 +47,7 @@ struct HttpServerOptions {
 ///   GET /open?link=L, POST /open  a session's cookie, for a link or for a form's token
 ///   POST /api/v1/<Service>/<Method>  json_api.h; jobs answer with one JSON object per line while they run
 ///   GET /api/v1/watch            WebSocket: watch_messages.h
+///   GET /exports/SESSION/video/FILE  an exported video: exported_file.h
 ///   GET /metrics                 for Prometheus;  GET /healthz: 200 once the engine runs, for everybody
 /// Serves while it exists; the Api must outlive it.
 class HttpServer {

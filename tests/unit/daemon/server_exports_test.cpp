@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// Exported videos, fetched from the console's server.
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/server/exported_file.h"
+#include "daemon/server/http_server.h"
+#include "session/store.h"
+#include "tests/support/fake_api.h"
+#include "tests/support/http_client.h"
+#include "tests/support/recording.h"
+
+namespace emberlock::daemon {
+namespace {
+
+namespace fs = std::filesystem;
+using test::ask;
+using test::HttpAnswer;
+using testing::AnyOf;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+class ServerExportsTest : public testing::Test {
+ protected:
+  ServerExportsTest() {
+    fs::create_directories(videos / "folder.mp4");
+    write(videos / "cam 1.mp4", "film");
+    write(folder / "secret", "secret");
+    write(videos / ".hidden", "secret");
+    write(folder / "exports/take 1/above.mp4", "secret");
+    fs::create_symlink(folder / "secret", videos / "link.mp4");
+    fs::create_directories(folder / "elsewhere");
+    write(folder / "elsewhere/cam.mp4", "secret");
+    fs::create_directories(folder / "exports/linked");
+    fs::create_directory_symlink(folder / "elsewhere", folder / "exports/linked/video");
+    HttpServerOptions options{.listen = "127.0.0.1:0"};
+    options.token = *rig::Token::parse(test::kHttpToken);
+    options.export_folder = [this](std::string_view session) {
+      return store.path_for_export(session, "video");
+    };
+    server = HttpServer::start(api, std::move(options)).value();
+    port = server->port();
+  }
+  static void write(const fs::path& path, const std::string& content) {
+    std::ofstream(path, std::ios::binary) << content;
+  }
+
+  test::TempFolder folder;
+  fs::path videos = folder / "exports/take 1/video";
+  session::SessionStore store = session::SessionStore::open(folder / "sessions").value();
+  test::FakeApi api;
+  std::unique_ptr<HttpServer> server;
+  int port = 0;
+};
+
+TEST_F(ServerExportsTest, AVideoIsSentToBeSaved) {
+  const HttpAnswer answer = ask(port, "GET", "/exports/take%201/video/cam%201.mp4");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_EQ(answer.body, "film");
+  EXPECT_THAT(answer.head, HasSubstr("Content-Type: video/mp4"));
+  EXPECT_THAT(answer.head, HasSubstr("Content-Length: 4"));
+  EXPECT_THAT(answer.head, HasSubstr("X-Content-Type-Options: nosniff"));
+  EXPECT_THAT(answer.head, HasSubstr("Cache-Control: no-store"));
+  EXPECT_THAT(answer.head, HasSubstr("Content-Disposition: attachment; filename=\"cam 1.mp4\"; "
+                                     "filename*=UTF-8''cam%201.mp4"));
+}
+
+TEST_F(ServerExportsTest, OfAHeadRequestOnlyTheHeadIsSent) {
+  const HttpAnswer answer = ask(port, "HEAD", "/exports/take%201/video/cam%201.mp4");
+  EXPECT_EQ(answer.status, 200);
+  EXPECT_THAT(answer.head, HasSubstr("Content-Length: 4"));
+  EXPECT_THAT(answer.body, IsEmpty());
+}
+
+TEST_F(ServerExportsTest, AConnectionGoesOnAfterAVideo) {
+  const std::string target = " /exports/take%201/video/cam%201.mp4 HTTP/1.1\r\n" + test::kLetIn;
+  const HttpAnswer answers = test::ask_raw(
+      port, "HEAD" + target + "\r\nGET" + target + "\r\nGET" + target + "Connection: close\r\n\r\n");
+  EXPECT_EQ(answers.status, 200);
+  const std::size_t second = answers.body.find("\r\n\r\nfilmHTTP/1.1 200");
+  EXPECT_NE(second, std::string::npos);
+  EXPECT_TRUE(answers.body.ends_with("\r\n\r\nfilm"));
+}
+
+TEST_F(ServerExportsTest, NamesAreInAnyScript) {
+  const fs::path there = folder / "exports/пламя/video";
+  fs::create_directories(there);
+  write(there / "камера.mp4", "film");
+  const HttpAnswer answer = ask(port, "GET",
+                                "/exports/%D0%BF%D0%BB%D0%B0%D0%BC%D1%8F/video/"
+                                "%D0%BA%D0%B0%D0%BC%D0%B5%D1%80%D0%B0.mp4");
+  EXPECT_EQ(answer.body, "film");
+  EXPECT_THAT(answer.head, HasSubstr("filename*=UTF-8''%D0%BA%D0%B0%D0%BC%D0%B5%D1%80%D0%B0.mp4"));
+  EXPECT_EQ(attachment("a\"\r\n.mp4"), "attachment; filename=\"a___.mp4\"; filename*=UTF-8''a%22%0D%0A.mp4");
+}
+
+TEST_F(ServerExportsTest, OnlyFilesOfAnExportAreSent) {
+  for (const char* path : {"/exports/",
+                           "/exports/take%201",
+                           "/exports/take%201/video/",
+                           "/exports/take%201/video/none.mp4",
+                           "/exports/none/video/cam%201.mp4",
+                           "/exports/take%201/video/folder.mp4",
+                           "/exports/take%201/video/link.mp4",
+                           "/exports/linked/video/cam.mp4",
+                           "/exports/take%201/video/.hidden",
+                           "/exports/take%201/video/..",
+                           "/exports/take%201/video/../above.mp4",
+                           "/exports/take%201/video/%2e%2e/above.mp4",
+                           "/exports/take%201/video/..%2fabove.mp4",
+                           "/exports/take%201/video/%252e%252e%252fabove.mp4",
+                           "/exports/../video/cam.mp4",
+                           "/exports/%2e%2e/video/cam.mp4",
+                           "/exports/%2e%2e%2felsewhere/video/cam.mp4",
+                           "/exports/take%201/video//etc/passwd",
+                           "/exports/take%201/video/%2fetc%2fpasswd",
+                           "/exports/%2fetc/video/passwd",
+                           "/exports/take%201/video/cam%201.mp4%00.txt",
+                           "/exports/take%201/video/cam%25201.mp4",
+                           "/exports/take%201/video/cam%201.mp4%2",
+                           "/exports/take%201/png/cam%201.mp4",
+                           "/exports/take%201/above.mp4"}) {
+    const HttpAnswer answer = ask(port, "GET", path);
+    EXPECT_EQ(answer.status, 404) << path;
+    EXPECT_THAT(answer.body, Not(AnyOf("secret", "film"))) << path;
+  }
+  EXPECT_EQ(ask(port, "POST", "/exports/take%201/video/cam%201.mp4").status, 405);
+}
+
+TEST_F(ServerExportsTest, WithoutTheTokenNothingIsSent) {
+  const std::string target = "/exports/take%201/video/cam%201.mp4";
+  EXPECT_EQ(ask(port, "GET", target, "", "Host: localhost\r\n").status, 401);
+  EXPECT_EQ(ask(port, "HEAD", target, "", "Host: localhost\r\n").status, 401);
+  EXPECT_EQ(ask(port, "GET", target, "", test::kLetIn + "Origin: http://evil.example\r\n").status, 403);
+}
+
+/// The client reads the first bytes of a file that the disk doesn't even hold, then leaves.
+TEST_F(ServerExportsTest, ALargeFileIsSentPieceByPiece) {
+  write(videos / "large.mp4", "begin");
+  fs::resize_file(videos / "large.mp4", std::uintmax_t{1} << 40);
+  {
+    const UniqueFd client = test::connect_to(port);
+    test::send_all(client, "GET /exports/take%201/video/large.mp4 HTTP/1.1\r\n" + test::kLetIn + "\r\n");
+    std::string answer;
+    for (char c = 0; !answer.ends_with("\r\n\r\nbegin") && ::read(client.get(), &c, 1) == 1;) answer += c;
+    EXPECT_THAT(answer, HasSubstr("Content-Length: 1099511627776"));
+    EXPECT_EQ(ask(port, "GET", "/exports/take%201/video/cam%201.mp4").body, "film") << "others are served";
+  }
+  std::string bytes(std::size_t{8} << 20, '\0');
+  for (std::size_t i = 0; i < bytes.size(); ++i) bytes[i] = static_cast<char>(i * 2654435761U >> 13);
+  write(videos / "whole.mp4", bytes);
+  EXPECT_TRUE(ask(port, "GET", "/exports/take%201/video/whole.mp4").body == bytes);
+}
+
+}  // namespace
+}  // namespace emberlock::daemon

@@ -55,10 +55,18 @@ export function reportLines(outcome: JobOutcome | undefined): string[] {
       repair.changed ? 'It was mended.' : 'There was nothing to mend.'];
   }
   if (exported) {
-    return [`${count(sum(exported.cameras, camera => camera.frames))} frames in ${exported.folder}`,
+    return [`${count(sum(exported.cameras, camera => camera.frames))} frames in ${exported.folder}${exported.codec ? '' : ', one file a frame'}`,
       ...frames('could not be read back, and are left out', sum(exported.cameras, camera => camera.unreadable))];
   }
   return [];
+}
+
+/** Links to the videos that a job exported, one for each camera; none for images. */
+function exportLinks(session: string, outcome: JobOutcome | undefined): HTMLElement[] {
+  const exported = outcome?.export;
+  if (!exported?.codec) return [];
+  return exported.cameras.map(({file}) => el('li', {},
+    el('a', {href: `/exports/${encodeURIComponent(session)}/video/${encodeURIComponent(file)}`, download: file}, file)));
 }
 
 /** A job of a session: what it does, and a button that ends it. */
@@ -166,7 +174,7 @@ class Row {
       const ok = last?.outcome?.ok ?? false;
       set(this.job, 'data-ok', String(ok));
       setText(this.doing, !last ? 'It failed.' : ok ? 'Done: all is well' : 'Done: not all is well');
-      this.report.replaceChildren(...reportLines(last?.outcome).map(line => el('li', {}, line)));
+      this.report.replaceChildren(...reportLines(last?.outcome).map(line => el('li', {}, line)), ...exportLinks(this.session, last?.outcome));
       this.changed();
     });
   }

@@ -480,6 +480,26 @@ describe('what was recorded', () => {
     await until(() => mock.calls.some(({method, request}) => method === 'Reconstruct/Start' && request.session === 'candle 1'), Boolean, 'started');
   });
 
+  test('exported videos can be downloaded; of images the folder is told', async () => {
+    mock.status = idle();
+    mock.answers['Sessions/List'] = () => ({sessions: [{...entry, session: 'пламя: 1'}]});
+    mock.jobs['Sessions/Export'] = async function* ({format}) {
+      const video = format === 'VIDEO';
+      const cameras = ['north', 'south:2'].map(camera_id => ({camera_id, file: video ? `${camera_id}.mp4` : camera_id, frames: 10}));
+      yield {state: 'DONE', fraction: 1, outcome: {ok: true, export: {cameras, codec: video ? 'libx264' : '', folder: video ? '/data/exports/video' : '/data/exports/png'}}};
+    };
+    const page = await open();
+    const report = page.locator('tr[data-session="пламя: 1"] .report');
+    await page.getByRole('button', {name: 'Export videos пламя: 1'}).click();
+    await until(() => report.innerText(), words => words === '20 frames in /data/exports/video\nnorth.mp4\nsouth:2.mp4', 'videos');
+    const folder = '/exports/%D0%BF%D0%BB%D0%B0%D0%BC%D1%8F%3A%201/video';
+    expect(await report.locator('a').evaluateAll(links => links.map(link => [link.getAttribute('href'), link.getAttribute('download')])))
+      .toEqual([[`${folder}/north.mp4`, 'north.mp4'], [`${folder}/south%3A2.mp4`, 'south:2.mp4']]);
+    await page.getByRole('button', {name: 'Export images пламя: 1'}).click();
+    await until(() => report.innerText(), words => words.includes('png, one file a frame'), 'images');
+    expect(await report.locator('a').count()).toBe(0);
+  });
+
   test('a job that fails on its way, or breaks off, is told, and looks so', async () => {
     mock.status = idle();
     mock.answers['Sessions/List'] = () => ({sessions: [entry]});

@@ -76,21 +76,25 @@ struct CurvedPath {
   }
 };
 
-/// Number of samples located at once: on the CPU the loop over them is vectorized.
+/// Number of samples located at once, and how many are held before they are taken: on the CPU the loop over
+/// the former is vectorized, and the latter spans the short runs of a ray.
 #ifdef __CUDA_ARCH__
 inline constexpr int kBatch = 1;
+inline constexpr int kHeld = 1;
 #else
-inline constexpr int kBatch = 16;
+inline constexpr int kBatch = 8;
+inline constexpr int kHeld = 64;
 #endif
 
-/// The voxels of consecutive samples: the index of each one's lowest key point, and the position within the
-/// voxel.
+/// The voxels of consecutive samples: the index of each one's lowest key point, the position within the
+/// voxel, and the weight.
 template <class Real>
 struct Batch {
-  alignas(64) Real fx[kBatch];
-  alignas(64) Real fy[kBatch];
-  alignas(64) Real fz[kBatch];
-  alignas(64) std::int32_t base[kBatch];
+  alignas(64) Real fx[kHeld + kBatch];
+  alignas(64) Real fy[kHeld + kBatch];
+  alignas(64) Real fz[kHeld + kBatch];
+  alignas(64) Real weight[kHeld + kBatch];
+  alignas(64) std::int32_t base[kHeld + kBatch];
 };
 
 /// Returns `low` for NaN.
@@ -104,12 +108,12 @@ HOST_DEVICE inline int clamp_cell(float p, int key_points) {
   return clamp_to(static_cast<int>(p), 0, key_points - 2);
 }
 
-/// Samples `first` .. first + kBatch - 1 of a run; those beyond its end are nearby places that aren't used. A
-/// sample that rounding puts across the border of its run's slab is treated as in the slab, by the march and
-/// by its transpose.
+/// Puts samples `first` .. first + kBatch - 1 of a run at `at`; those beyond its end are nearby places that
+/// aren't used. A sample that rounding puts across the border of its run's slab is treated as in the slab, by
+/// the march and by its transpose.
 template <class Real>
 HOST_DEVICE inline void locate(const RayTable& table, const Line<Real>& line, const Run& run, int first,
-                               Batch<Real>& batch) {
+                               Batch<Real>& batch, int at = 0) {
   const Real ox = line.origin[0], oy = line.origin[1], oz = line.origin[2];
   const Real dx = line.direction[0], dy = line.direction[1], dz = line.direction[2];
   const Real start = Real(run.start), step = Real(run.step);
@@ -126,20 +130,27 @@ HOST_DEVICE inline void locate(const RayTable& table, const Line<Real>& line, co
     const int ix = static_cast<int>(clamp_to(x, Real(0), last_x));
     const int iy = static_cast<int>(clamp_to(y, Real(0), last_y));
     const int iz = static_cast<int>(clamp_to(z, low_z, last_z));
-    batch.base[i] = ix + row * iy + plane * iz;
-    batch.fx[i] = x - Real(ix);
-    batch.fy[i] = y - Real(iy);
-    batch.fz[i] = z - Real(iz);
+    batch.base[at + i] = ix + row * iy + plane * iz;
+    batch.fx[at + i] = x - Real(ix);
+    batch.fy[at + i] = y - Real(iy);
+    batch.fz[at + i] = z - Real(iz);
   }
+}
+
+/// The two values at the voxel's faces across x (p is its lowest key point).
+template <class Real>
+HOST_DEVICE inline Pair<Real> bilinear(const Quad<Real>* p, std::size_t row, std::size_t plane,
+                                       std::type_identity_t<Real> fy, std::type_identity_t<Real> fz) {
+  const Pair<Real> near = mix(fy, load_pair(p), load_pair(p + row));
+  const Pair<Real> far = mix(fy, load_pair(p + plane), load_pair(p + plane + row));
+  return mix(fz, near, far);
 }
 
 template <class Real>
 HOST_DEVICE inline Quad<Real> trilinear(const Quad<Real>* p, std::size_t row, std::size_t plane,
                                         std::type_identity_t<Real> fx, std::type_identity_t<Real> fy,
                                         std::type_identity_t<Real> fz) {
-  const Pair<Real> near = mix(fy, load_pair(p), load_pair(p + row));
-  const Pair<Real> far = mix(fy, load_pair(p + plane), load_pair(p + plane + row));
-  const Pair<Real> both = mix(fz, near, far);
+  const Pair<Real> both = bilinear(p, row, plane, fy, fz);
   return mix(fx, low(both), high(both));
 }
 
@@ -147,9 +158,9 @@ HOST_DEVICE inline Quad<Real> trilinear(const Quad<Real>* p, std::size_t row, st
 template <class Real, class Act>
 HOST_DEVICE inline void each_sample(const RayTable& table, const Line<Real>& line, const Run& run, Act& act) {
   Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
-  for (int first = 0; first < run.count; first += kBatch) {
-    locate(table, line, run, first, batch);
-    const int here = run.count - first < kBatch ? run.count - first : kBatch;
+  for (int first = 0; first < run.count; first += kHeld) {
+    const int here = run.count - first < kHeld ? run.count - first : kHeld;
+    for (int at = 0; at < here; at += kBatch) locate(table, line, run, first + at, batch, at);
     for (int i = 0; i < here; ++i) act(first + i, batch.base[i], batch.fx[i], batch.fy[i], batch.fz[i]);
   }
 }
@@ -194,6 +205,18 @@ struct IntoKeyPoints {
   }
 };
 
+/// Powers of the transmittance of a step: to(i) for 0 <= i <= kBatch. Without a chain of products over the
+/// samples, so that the loop over them is vectorized.
+template <class Real>
+struct Powers {
+  Real one, two, four, eight;
+  HOST_DEVICE explicit Powers(Real p) : one(p), two(p * p), four(two * two), eight(four * four) {}
+  [[nodiscard]] HOST_DEVICE Real to(int i) const {
+    return ((i & 1) != 0 ? one : Real(1)) * ((i & 2) != 0 ? two : Real(1)) * ((i & 4) != 0 ? four : Real(1)) *
+           ((i & 8) != 0 ? eight : Real(1));
+  }
+};
+
 /// Radiance of one ray in lanes 0..2, its transmittance to the far end in lane 3:
 ///   L += T S ds phi(sigma ds), T *= exp(-sigma ds)
 /// Lengths are in voxel edges, so S is per voxel edge here.
@@ -208,52 +231,66 @@ struct Forward {
     const std::size_t row = static_cast<std::size_t>(table.nx);
     const std::size_t plane = row * static_cast<std::size_t>(table.ny);
     Quad<Real> radiance;
+    if constexpr (Extinction::kField)
+      radiance = through_field(r, row, plane);
+    else
+      radiance = through_constant(r, row, plane);
+    return radiance;
+  }
+
+ private:
+  HOST_DEVICE Quad<Real> through_field(const MarchRay& r, std::size_t row, std::size_t plane) const {
+    Quad<Real> radiance;
     Real transmittance = 1;
-    Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
     for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
       const Run run = table.runs[n];
-      const Line<Real> line = Path::template line<Real>(table, n);
-      if constexpr (!Extinction::kField) transmittance = extinction.at(Real(run.before));
-      const Real pass = extinction_over(run);
-      Real weight = extinction_weight(run, transmittance);
-      for (int first = 0; first < run.count; first += kBatch) {
-        locate(table, line, run, first, batch);
-        const int here = run.count - first < kBatch ? run.count - first : kBatch;
-        for (int i = 0; i < here; ++i) {
-          const Quad<Real> value =
-              trilinear(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i]);
-          if constexpr (Extinction::kField) {
-            const Real x = value.c[3] * Real(run.step);
-            const Real mean = phi(x);
-            radiance = radiance + (transmittance * Real(run.step) * mean) * value;
-            transmittance *= 1 - x * mean;
-          } else {
-            radiance = radiance + weight * value;
-            weight *= pass;
-          }
-        }
-      }
-    }
-    if constexpr (!Extinction::kField) {
-      const Run& last = table.runs[r.first_run + r.runs - 1];
-      transmittance = extinction.at(Real(last.before) + Real(last.step) * Real(last.count));
+      const auto act = [&](int, std::int32_t base, Real fx, Real fy, Real fz) {
+        const Quad<Real> value = trilinear(volume + base, row, plane, fx, fy, fz);
+        const Real x = value.c[3] * Real(run.step);
+        const Real mean = phi(x);
+        radiance = radiance + (transmittance * Real(run.step) * mean) * value;
+        transmittance *= 1 - x * mean;
+      };
+      each_sample(table, Path::template line<Real>(table, n), run, act);
     }
     radiance.c[3] = transmittance;
     return radiance;
   }
 
- private:
-  HOST_DEVICE Real extinction_over(const Run& run) const {
-    if constexpr (Extinction::kField)
-      return 1;
-    else
-      return extinction.over(Real(run.step));
+  /// The samples of several runs are held and then taken at once: most runs are short.
+  HOST_DEVICE Quad<Real> through_constant(const MarchRay& r, std::size_t row, std::size_t plane) const {
+    Batch<Real> batch;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
+    Pair<Real> sum = {};
+    int held = 0;
+    for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
+      const Run run = table.runs[n];
+      const Line<Real> line = Path::template line<Real>(table, n);
+      const Powers<Real> pass(extinction.over(Real(run.step)));
+      Real weight = extinction.at(Real(run.before)) * extinction.weight(Real(run.step));
+      for (int first = 0; first < run.count; first += kBatch) {
+        if (held >= kHeld) {
+          take(batch, held, row, plane, sum);
+          held = 0;
+        }
+        locate(table, line, run, first, batch, held);
+        for (int i = 0; i < kBatch; ++i) batch.weight[held + i] = weight * pass.to(i);
+        weight *= pass.to(kBatch);
+        held += run.count - first < kBatch ? run.count - first : kBatch;
+      }
+    }
+    take(batch, held, row, plane, sum);
+    Quad<Real> radiance = low(sum) + high(sum);
+    const Run& last = table.runs[r.first_run + r.runs - 1];
+    radiance.c[3] = extinction.at(Real(last.before) + Real(last.step) * Real(last.count));
+    return radiance;
   }
-  HOST_DEVICE Real extinction_weight(const Run& run, Real transmittance) const {
-    if constexpr (Extinction::kField)
-      return 1;
-    else
-      return transmittance * extinction.weight(Real(run.step));
+  HOST_DEVICE void take(const Batch<Real>& batch, int held, std::size_t row, std::size_t plane,
+                        Pair<Real>& sum) const {
+    for (int i = 0; i < held; ++i) {
+      const Pair<Real> both = bilinear(volume + batch.base[i], row, plane, batch.fy[i], batch.fz[i]);
+      const Real high = batch.weight[i] * batch.fx[i];
+      sum = add_weighted(sum, batch.weight[i] - high, high, both);
+    }
   }
 };
 

@@ -61,6 +61,12 @@ template <class Real>
 HOST_DEVICE inline Pair<Real> mix(std::type_identity_t<Real> t, const Pair<Real>& a, const Pair<Real>& b) {
   return {a.low + t * (b.low - a.low), a.high + t * (b.high - a.high)};
 }
+/// a + (low b.low, high b.high)
+template <class Real>
+HOST_DEVICE inline Pair<Real> add_weighted(const Pair<Real>& a, std::type_identity_t<Real> low,
+                                           std::type_identity_t<Real> high, const Pair<Real>& b) {
+  return {a.low + low * b.low, a.high + high * b.high};
+}
 
 #else
 
@@ -125,6 +131,13 @@ HOST_DEVICE inline Quad<Real> high(const Pair<Real>& a) {
 template <class Real>
 HOST_DEVICE inline Pair<Real> mix(std::type_identity_t<Real> t, const Pair<Real>& a, const Pair<Real>& b) {
   return {a.c + t * (b.c - a.c)};
+}
+/// a + (low b.low, high b.high)
+template <class Real>
+HOST_DEVICE inline Pair<Real> add_weighted(const Pair<Real>& a, std::type_identity_t<Real> low,
+                                           std::type_identity_t<Real> high, const Pair<Real>& b) {
+  const typename detail::Lanes<Real>::Eight weights = {low, low, low, low, high, high, high, high};
+  return {a.c + weights * b.c};
 }
 
 #endif

@@ -281,6 +281,8 @@ void run_stage(benchmark::State& state, const Case& c) {
     return;
   }
   state.counters["samples"] = n.samples;
+  state.counters["runs"] = static_cast<double>(problem.list.runs.size());
+  state.counters["rays"] = static_cast<double>(problem.list.rays.size());
   state.counters["samples/s"] = n.samples / least.wall;
   state.counters["samples/s/core"] = n.samples / least.core;
   state.counters["near_B/s"] = bytes.near / least.core;

@@ -16,23 +16,39 @@ struct ForwardByHand {
     const recon::MarchRay& r = table.rays[ray];
     const std::size_t row = static_cast<std::size_t>(table.nx);
     const std::size_t plane = row * static_cast<std::size_t>(table.ny);
-    recon::Rgba radiance;
     recon::Batch<float> batch;
+    recon::Pair<float> sum = {};
+    int held = 0;
     for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
       const recon::Run run = table.runs[n];
       const recon::Line<float> line(table.origins + 3 * static_cast<std::size_t>(table.rays[run.ray].view),
                                     table.rays[run.ray].direction);
       const float step = run.step;
       for (int first = 0; first < run.count; first += recon::kBatch) {
-        recon::locate(table, line, run, first, batch);
-        const int here = run.count - first < recon::kBatch ? run.count - first : recon::kBatch;
-        for (int i = 0; i < here; ++i)
-          radiance = radiance + step * recon::trilinear(volume + batch.base[i], row, plane, batch.fx[i],
-                                                        batch.fy[i], batch.fz[i]);
+        if (held >= recon::kHeld) {
+          take(batch, held, row, plane, sum);
+          held = 0;
+        }
+        recon::locate(table, line, run, first, batch, held);
+        for (int i = 0; i < recon::kBatch; ++i) batch.weight[held + i] = step;
+        held += run.count - first < recon::kBatch ? run.count - first : recon::kBatch;
       }
     }
+    take(batch, held, row, plane, sum);
+    recon::Rgba radiance = recon::low(sum) + recon::high(sum);
     radiance.c[3] = 1;
     return radiance;
+  }
+
+ private:
+  HOST_DEVICE void take(const recon::Batch<float>& batch, int held, std::size_t row, std::size_t plane,
+                        recon::Pair<float>& sum) const {
+    for (int i = 0; i < held; ++i) {
+      const recon::Pair<float> both =
+          recon::bilinear(volume + batch.base[i], row, plane, batch.fy[i], batch.fz[i]);
+      const float high = batch.weight[i] * batch.fx[i];
+      sum = recon::add_weighted(sum, batch.weight[i] - high, high, both);
+    }
   }
 };
 
@@ -48,9 +64,9 @@ struct AdjointByHand {
                                   table.rays[run.ray].direction);
     const recon::Rgba w = run.step * residual[run.ray];
     recon::Batch<float> batch;
-    for (int first = 0; first < run.count; first += recon::kBatch) {
-      recon::locate(table, line, run, first, batch);
-      const int here = run.count - first < recon::kBatch ? run.count - first : recon::kBatch;
+    for (int first = 0; first < run.count; first += recon::kHeld) {
+      const int here = run.count - first < recon::kHeld ? run.count - first : recon::kHeld;
+      for (int at = 0; at < here; at += recon::kBatch) recon::locate(table, line, run, first + at, batch, at);
       for (int i = 0; i < here; ++i)
         put(run.first_sample + static_cast<std::size_t>(first + i), batch.base[i], batch.fx[i], batch.fy[i],
             batch.fz[i], w);

@@ -19,6 +19,8 @@ void add_view(CLI::App& app);
 void add_tradeoff(CLI::App& app);
 /// `tradeoff sync`; `parent` is the verb tradeoff.
 void add_tradeoff_sync(CLI::App& parent);
+/// `tradeoff rig`; `parent` is the verb tradeoff.
+void add_tradeoff_rig(CLI::App& parent);
 /// `calibrate cameras`, `check`, `convert` and `colour`.
 void add_calibrate(CLI::App& app);
 /// `calibrate check`; `parent` is the verb calibrate.

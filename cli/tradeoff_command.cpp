@@ -215,6 +215,7 @@ void add_tradeoff(CLI::App& app) {
   verb->require_subcommand(1);
   add_recon(*verb);
   add_tradeoff_sync(*verb);
+  add_tradeoff_rig(*verb);
 }
 
 }  // namespace emberlock::cli

@@ -8,6 +8,7 @@
 
 #include "base/clock.h"
 #include "base/random.h"
+#include "evaluate/option_range.h"
 #include "recon/compute/pool.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/synthetic/flame.h"
@@ -23,12 +24,6 @@ constexpr smear::AlignPolicy kPolicies[] = {smear::AlignPolicy::fixed_reference,
                                             smear::AlignPolicy::timed, smear::AlignPolicy::trimmed};
 
 bool by_hand(smear::AlignPolicy policy) { return policy < smear::AlignPolicy::timed; }
-
-Status in_range(const char* option, double value, double low, double high) {
-  if (value >= low && value <= high) return {};
-  return Error{ErrorKind::bad_input, fmt::format("{:g} is out of range", value), option,
-               fmt::format("give {:g} to {:g}", low, high)};
-}
 
 Status check(const SyncTradeoffOptions& o) {
   const double half = 0.5 / o.frame_rate.value() / o.row_time.value();

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
-#include <optional>
+#include <set>
 
 #include "base/random.h"
 #include "recon/compute/pool.h"
@@ -177,6 +177,43 @@ void add_noise(RadianceImage& image, double sigma, std::uint64_t seed, std::uint
     image.rgb[i] = std::max(0.F, image.rgb[i] + static_cast<float>(sigma * random_normal(seed, view, i)));
 }
 
+void add_part(RadianceImage& sum, const RadianceImage& image, float part) {
+  for (std::size_t i = 0; i < sum.rgb.size(); ++i) sum.rgb[i] += part * image.rgb[i];
+}
+
+/// Number of instants that an exposure is made of: between them the flame rises by about a voxel of the
+/// truth.
+int instants_of(const PaperSceneOptions& options) {
+  const double rise = std::abs(options.flame.rise_speed) * options.exposure.value();
+  const double voxel = 0.2 / options.truth_voxels;
+  return std::clamp(static_cast<int>(std::ceil(rise / voxel)), 1, 32);
+}
+
+/// Each view sees the mean of its exposure's instants. Views of one lateness share the truth.
+void film(const Flame& flame, const PaperSceneOptions& options, Scene& scene) {
+  const Grid grid = grid_over(scene.box, options.truth_voxels);
+  RenderOptions march;
+  march.step = options.truth_step;
+  std::set<Seconds> delays;
+  for (const View& view : scene.views) delays.insert(view.lateness);
+  std::vector<RadianceImage> images(scene.views.size(), RadianceImage(options.image));
+  const int instants = instants_of(options);
+  for (const Seconds late : delays)
+    for (int i = 0; i < instants; ++i) {
+      const Seconds time = options.time + late + options.exposure * ((i + 0.5) / instants - 0.5);
+      const FlameTruth truth = flame.at(time, grid);
+      for (std::size_t v = 0; v < images.size(); ++v)
+        if (scene.views[v].lateness == late)
+          add_part(images[v],
+                   render_view(truth.volume, truth.medium, truth.effects, scene.views[v].camera, march),
+                   1 / static_cast<float>(instants));
+    }
+  for (std::size_t v = 0; v < images.size(); ++v) {
+    if (options.noise > 0) add_noise(images[v], options.noise, options.flame.seed, v);
+    scene.views[v].image = share(std::move(images[v]));
+  }
+}
+
 /// Long before and long after `time` the flame is another one of its kind.
 void film_average(const Flame& flame, const PaperSceneOptions& options, Scene& scene) {
   constexpr double kRate = 24;
@@ -190,9 +227,8 @@ void film_average(const Flame& flame, const PaperSceneOptions& options, Scene& s
     const Seconds time = options.time + Seconds((frame - before) / kRate);
     const FlameTruth truth = flame.at(time, grid);
     for (std::size_t v = 0; v < averages.size(); ++v) {
-      const RadianceImage image =
-          render_view(truth.volume, truth.medium, truth.effects, scene.views[v].camera);
-      for (std::size_t p = 0; p < image.rgb.size(); ++p) averages[v].rgb[p] += part * image.rgb[p];
+      add_part(averages[v], render_view(truth.volume, truth.medium, truth.effects, scene.views[v].camera),
+               part);
     }
   }
   for (std::size_t v = 0; v < averages.size(); ++v) scene.views[v].average = share(std::move(averages[v]));
@@ -277,29 +313,21 @@ FlameTruth Flame::at(Seconds time, const Grid& grid) const {
 Scene paper_scene(const PaperSceneOptions& options) {
   Scene scene;
   scene.box = {Eigen::Vector3d::Zero(), Eigen::Vector3d::Constant(0.2)};
-  const Flame flame(options.flame);
-  const Grid grid = grid_over(scene.box, options.truth_voxels);
-  const FlameTruth in_time = flame.at(options.time, grid);
   const Intrinsics intrinsics = pinhole(options.image, 60);
-  RenderOptions finer;
-  finer.step = options.truth_step;
-  const auto film = [&](const std::string& name, double azimuth, double elevation, ViewRole role) {
+  const auto place = [&](const std::string& name, double azimuth, double elevation, ViewRole role) {
     View view{
         name, look_at(intrinsics, on_sphere(0.3, azimuth, elevation), Eigen::Vector3d::Zero()), {}, role};
     const std::size_t i = scene.views.size();
-    const Seconds late = i < options.lateness.size() ? options.lateness[i] : Seconds(0);
-    view.lateness = late;
-    std::optional<FlameTruth> moved;
-    if (late != Seconds(0)) moved = flame.at(options.time + late, grid);
-    const FlameTruth& truth = moved ? *moved : in_time;
-    RadianceImage image = render_view(truth.volume, truth.medium, truth.effects, view.camera, finer);
-    if (options.noise > 0) add_noise(image, options.noise, options.flame.seed, scene.views.size());
-    view.image = share(std::move(image));
+    view.lateness = i < options.lateness.size() ? options.lateness[i] : Seconds(0);
     scene.views.push_back(std::move(view));
   };
-  for (int i = 0; i < 10; ++i)
-    film("camera " + std::to_string(i), 36.0 * i, i % 2 == 0 ? 10 : -10, ViewRole::input);
-  film("test view", 90, 0, ViewRole::held_out);
+  const double step = 360.0 / options.cameras;
+  const double first = 90 - (std::round(options.cameras / 4.0) - 0.5) * step;
+  for (int i = 0; i < options.cameras; ++i)
+    place("camera " + std::to_string(i), first + step * i, i % 2 == 0 ? 10 : -10, ViewRole::input);
+  place("test view", 90, 0, ViewRole::held_out);
+  const Flame flame(options.flame);
+  film(flame, options, scene);
   if (options.averaged_frames > 0) film_average(flame, options, scene);
   return scene;
 }

@@ -71,11 +71,14 @@ struct PaperSceneOptions {
   double truth_step = 0.5;  ///< of the march that films it, in its voxel edges
   double noise = 0;         ///< standard deviation of the pixels, grey levels
   int averaged_frames = 0;  ///< number of frames, 24 per second around `time`, for View::average; 0: unknown
+  int cameras = 10;         ///< number of input views
+  Seconds exposure{0};      ///< of every view, around its instant
 };
 
 /// The paper's set-up: ten input views every 36 degrees, 30 cm from the origin, alternately slightly above
 /// and below the plane, with a field of view of 60 degrees, around a volume of 20 cm. The eleventh view,
-/// between two of them, is held out. The views contain their delays.
+/// between two of them, is held out. The views contain their delays. Other numbers of cameras stand evenly
+/// around, so that the held-out view is the same.
 Scene paper_scene(const PaperSceneOptions& options = {});
 
 }  // namespace emberlock::recon

@@ -67,5 +67,46 @@ TEST(PaperScene, IsTheTenPlusOneViewsOfThePaper) {
   }
 }
 
+TEST(PaperScene, AnyNumberOfCamerasStandsEvenlyAroundTheSameHeldOutView) {
+  PaperSceneOptions options;
+  options.image = {32, 24};
+  options.truth_voxels = 16;
+  const Scene ten = paper_scene(options);
+  for (const int cameras : {3, 4, 7, 16}) {
+    options.cameras = cameras;
+    const Scene scene = paper_scene(options);
+    ASSERT_EQ(scene.views.size(), static_cast<std::size_t>(cameras) + 1);
+    EXPECT_EQ(scene.views.back().image->rgb, ten.views.back().image->rgb);
+    const auto azimuth = [&](int i) {
+      const Eigen::Vector3d c = scene.views[static_cast<std::size_t>(i)].camera.center();
+      return std::atan2(c.y(), c.x());
+    };
+    for (int i = 0; i < cameras; ++i) {
+      const double step = std::remainder(azimuth((i + 1) % cameras) - azimuth(i), 2 * M_PI);
+      EXPECT_NEAR(step, 2 * M_PI / cameras, 1e-9);
+      EXPECT_GT(std::abs(std::remainder(azimuth(i) - M_PI / 2, 2 * M_PI)), 0.4 * step) << "beside the judge";
+    }
+  }
+}
+
+TEST(PaperScene, AnExposureIsTheMeanOfItsInstants) {
+  PaperSceneOptions options;
+  options.image = {32, 24};
+  options.truth_voxels = 16;
+  const auto at = [&](double ms) {
+    PaperSceneOptions o = options;
+    o.time = milliseconds(ms);
+    return paper_scene(o).views[0].image->rgb;
+  };
+  options.flame.rise_speed = 1;
+  options.exposure = milliseconds(25);  // two voxels of 12.5 mm
+  const std::vector<float> exposed = paper_scene(options).views[0].image->rgb;
+  options.exposure = Seconds(0);
+  const std::vector<float> before = at(-6.25);
+  const std::vector<float> after = at(6.25);
+  for (std::size_t i = 0; i < exposed.size(); ++i)
+    ASSERT_NEAR(exposed[i], 0.5F * (before[i] + after[i]), 1e-3);
+}
+
 }  // namespace
 }  // namespace emberlock::recon

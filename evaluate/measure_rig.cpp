@@ -290,8 +290,10 @@ std::string choice_text(const RigTradeoffOptions& o, RigAxis axis, std::size_t i
 
 std::string setup_text(const RigTradeoffOptions& o, const RigSetup& setup) {
   std::string words;
-  for (const RigAxis axis : kAllRigAxes)
+  for (const RigAxis axis : kAllRigAxes) {
+    if (axis == RigAxis::device && o.devices.size() == 1) continue;
     words += (words.empty() ? "" : ", ") + choice_text(o, axis, setup.at(axis));
+  }
   return words;
 }
 

@@ -66,7 +66,7 @@ Result<RigTradeoff> measure_rig_tradeoff(const RigTradeoffOptions& options, cons
 
 /// "12 cameras", "320x240", "within 0.5 ms"
 std::string choice_text(const RigTradeoffOptions& options, RigAxis axis, std::size_t choice);
-/// All of a set-up's choices, separated by commas.
+/// All of a set-up's choices, separated by commas; of the device only where there are several.
 std::string setup_text(const RigTradeoffOptions& options, const RigSetup& setup);
 
 }  // namespace emberlock::evaluate

@@ -155,7 +155,7 @@ void checks_table(HtmlPage& page, const RigTradeoff& t) {
   for (const evaluate::RigCheck& c : t.checks)
     rows.push_back({setup_text(t.options, c.setup), fmt::format("{:.2f}", c.predicted.error),
                     fmt::format("{:.2f}", c.simulated.error),
-                    fmt::format("{:+.0f} %", 100 * (c.predicted.error / c.simulated.error - 1)),
+                    fmt::format("{:+.0f}\u00a0%", 100 * (c.predicted.error / c.simulated.error - 1)),
                     fmt::format("{:.2f}", c.predicted.seconds()),
                     fmt::format("{:.2f}", c.simulated.seconds())});
   if (!rows.empty())
@@ -172,7 +172,7 @@ void axes_table(HtmlPage& page, const RigTradeoff& t) {
     const evaluate::RigFrame& frame = t.frames.at(setup);
     rows.push_back({setup == t.grid.base ? "the base" : choice_text(t.options, *axis, setup.at(*axis)),
                     fmt::format("{:.2f}", frame.error),
-                    fmt::format("{:+.0f} %", 100 * (frame.error / base.error - 1)),
+                    fmt::format("{:+.0f}\u00a0%", 100 * (frame.error / base.error - 1)),
                     fmt::format("{:.2f}", frame.seconds())});
   }
   page.table({"one choice changed", "error", "", "s a frame"}, rows);

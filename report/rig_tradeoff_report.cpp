@@ -125,6 +125,14 @@ std::string plot(const RigTradeoff& t) {
   return svg_plot_for_any_width(series, options);
 }
 
+/// For narrow pages: breaks after commas alone.
+std::string setup_cell(const RigTradeoff& t, const RigSetup& setup) {
+  std::string cell;
+  for (const char c : setup_text(t.options, setup))
+    cell += c == ' ' && !cell.ends_with(',') ? "\u00a0" : std::string(1, c);
+  return cell;
+}
+
 void steps_table(HtmlPage& page, const RigTradeoff& t) {
   if (t.steps.empty()) {
     page.paragraph("No single step from there lowers the error.");
@@ -142,7 +150,7 @@ void front_table(HtmlPage& page, const RigTradeoff& t) {
   std::vector<std::vector<std::string>> rows;
   for (const std::size_t i : t.front) {
     const RigPoint& p = t.points[i];
-    rows.push_back({setup_text(t.options, p.setup) + (t.chosen == i ? "  \u2190 chosen" : ""),
+    rows.push_back({setup_cell(t, p.setup) + (t.chosen == i ? "  \u2190 chosen" : ""),
                     fmt::format("{:.2f}", p.frame.error), minutes_text(p.minutes),
                     minutes_text(align_minutes(t, p.setup)), fmt::format("{:.2f}", p.frame.seconds()),
                     fmt::format("{:g}", p.euros), source(p)});
@@ -153,7 +161,7 @@ void front_table(HtmlPage& page, const RigTradeoff& t) {
 void checks_table(HtmlPage& page, const RigTradeoff& t) {
   std::vector<std::vector<std::string>> rows;
   for (const evaluate::RigCheck& c : t.checks)
-    rows.push_back({setup_text(t.options, c.setup), fmt::format("{:.2f}", c.predicted.error),
+    rows.push_back({setup_cell(t, c.setup), fmt::format("{:.2f}", c.predicted.error),
                     fmt::format("{:.2f}", c.simulated.error),
                     fmt::format("{:+.0f}\u00a0%", 100 * (c.predicted.error / c.simulated.error - 1)),
                     fmt::format("{:.2f}", c.predicted.seconds()),

@@ -14,25 +14,24 @@ namespace emberlock::recon {
 /// The effect of a batch of samples on the light, from their optical depths.
 template <class Real>
 struct Steps {  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before it is read
-  alignas(64) Real depth[kHeld];
-  alignas(64) Real mean[kHeld];   ///< phi(depth)
-  alignas(64) Real slope[kHeld];  ///< phi'(depth)
-  bool thin = false;              ///< the series are accurate for all of them
+  Real depth[kBatch];
+  Real mean[kBatch];   ///< phi(depth)
+  Real slope[kBatch];  ///< phi'(depth)
+  bool thin = false;   ///< the series are accurate for all of them
 
   /// Sets the depths of the samples, with the extinction in lane 3 of `values`; the rest of the batch, from
   /// `here` on, gets 0.
   HOST_DEVICE void take(const Quad<Real>* values, int here, Real step) {
     for (int i = 0; i < here; ++i) depth[i] = values[i].c[3] * step;
-    const int all = (here + kBatch - 1) / kBatch * kBatch;
-    for (int i = here; i < all; ++i) depth[i] = 0;  // the following samples may belong to another thread
-    int deep =
-        0;  // a flag for all of them, as a largest value isn't vectorized where NaN must keep its rules
+    for (int i = here; i < kBatch; ++i) depth[i] = 0;  // the following samples may belong to another thread
+    // Flags instead of the largest depth, which isn't vectorized where NaN must keep its rules.
+    int deep = 0;
     VECTOR_LOOP
-    for (int i = 0; i < all; ++i) deep |= depth[i] < series_limit<Real>() ? 0 : 1;
+    for (int i = 0; i < kBatch; ++i) deep |= depth[i] < series_limit<Real>() ? 0 : 1;
     thin = deep == 0;
     if (thin) {
       VECTOR_LOOP
-      for (int i = 0; i < all; ++i) mean[i] = phi_series(depth[i]);
+      for (int i = 0; i < kBatch; ++i) mean[i] = phi_series(depth[i]);
     } else {
       for (int i = 0; i < here; ++i) mean[i] = phi(depth[i]);
     }
@@ -40,9 +39,8 @@ struct Steps {  // NOLINT(cppcoreguidelines-pro-type-member-init): filled before
   /// After take().
   HOST_DEVICE void take_slopes(int here) {
     if (thin) {
-      const int all = (here + kBatch - 1) / kBatch * kBatch;
       VECTOR_LOOP
-      for (int i = 0; i < all; ++i) slope[i] = phi_slope_series(depth[i]);
+      for (int i = 0; i < kBatch; ++i) slope[i] = phi_slope_series(depth[i]);
     } else {
       for (int i = 0; i < here; ++i) slope[i] = phi_slope(depth[i]);
     }
@@ -76,9 +74,9 @@ struct FieldForward {
       const Run run = table.runs[n];
       const Line<Real> line = Path::template line<Real>(table, n);
       const Real step = Real(run.step);
-      for (int first = 0; first < run.count; first += kHeld) {
-        const int here = run.count - first < kHeld ? run.count - first : kHeld;
-        for (int at = 0; at < here; at += kBatch) locate(table, line, run, first + at, batch, at);
+      for (int first = 0; first < run.count; first += kBatch) {
+        locate(table, line, run, first, batch);
+        const int here = run.count - first < kBatch ? run.count - first : kBatch;
         for (int i = 0; i < here; ++i)
           values[i] = trilinear(volume + batch.base[i], row, plane, batch.fx[i], batch.fy[i], batch.fz[i]);
         steps.take(values, here, step);
@@ -94,25 +92,23 @@ struct FieldForward {
     // `behind` is R . (L - A): lane 3 carries what the medium's far end passes on, weighed by the caller.
     Real behind = residual.c[0] * radiance.c[0] + residual.c[1] * radiance.c[1] +
                   residual.c[2] * radiance.c[2] + residual.c[3] * transmittance;
-    alignas(64) Real along[kHeld];
     transmittance = 1;
     values = samples + (table.runs[r.first_run].first_sample - first_sample);
     for (std::size_t n = r.first_run; n < r.first_run + r.runs; ++n) {
       const int count = table.runs[n].count;
       const Real step = Real(table.runs[n].step);
-      for (int first = 0; first < count; first += kHeld) {
-        const int here = count - first < kHeld ? count - first : kHeld;
+      for (int first = 0; first < count; first += kBatch) {
+        const int here = count - first < kBatch ? count - first : kBatch;
         steps.take(values, here, step);
         steps.take_slopes(here);
-        for (int i = 0; i < here; ++i)
-          along[i] = residual.c[0] * values[i].c[0] + residual.c[1] * values[i].c[1] +
-                     residual.c[2] * values[i].c[2];
         for (int i = 0; i < here; ++i) {
-          const Real seen = transmittance * step;
-          const Real weight = seen * steps.mean[i];
-          behind -= weight * along[i];
+          const Quad<Real> value = values[i];
+          const Real weight = transmittance * step * steps.mean[i];
+          const Real along =
+              residual.c[0] * value.c[0] + residual.c[1] * value.c[1] + residual.c[2] * value.c[2];
+          behind -= weight * along;
           values[i].c[0] = weight;
-          values[i].c[1] = step * (seen * step * steps.slope[i] * along[i] - behind);
+          values[i].c[1] = step * (transmittance * step * steps.slope[i] * along - behind);
           transmittance *= 1 - steps.depth[i] * steps.mean[i];
         }
         values += here;

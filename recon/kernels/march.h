@@ -268,14 +268,14 @@ struct Forward {
       const Powers<Real> pass(extinction.over(Real(run.step)));
       Real weight = extinction.at(Real(run.before)) * extinction.weight(Real(run.step));
       for (int first = 0; first < run.count; first += kBatch) {
+        locate(table, line, run, first, batch, held);
+        for (int i = 0; i < kBatch; ++i) batch.weight[held + i] = weight * pass.to(i);
+        weight *= pass.to(kBatch);
+        held += kBatch == 1 || run.count - first > kBatch ? kBatch : run.count - first;
         if (held >= kHeld) {
           take(batch, held, row, plane, sum);
           held = 0;
         }
-        locate(table, line, run, first, batch, held);
-        for (int i = 0; i < kBatch; ++i) batch.weight[held + i] = weight * pass.to(i);
-        weight *= pass.to(kBatch);
-        held += run.count - first < kBatch ? run.count - first : kBatch;
       }
     }
     take(batch, held, row, plane, sum);

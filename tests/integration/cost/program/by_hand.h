@@ -25,13 +25,13 @@ struct ForwardByHand {
                                     table.rays[run.ray].direction);
       const float step = run.step;
       for (int first = 0; first < run.count; first += recon::kBatch) {
+        recon::locate(table, line, run, first, batch, held);
+        for (int i = 0; i < recon::kBatch; ++i) batch.weight[held + i] = step;
+        held += recon::kBatch == 1 || run.count - first > recon::kBatch ? recon::kBatch : run.count - first;
         if (held >= recon::kHeld) {
           take(batch, held, row, plane, sum);
           held = 0;
         }
-        recon::locate(table, line, run, first, batch, held);
-        for (int i = 0; i < recon::kBatch; ++i) batch.weight[held + i] = step;
-        held += run.count - first < recon::kBatch ? run.count - first : recon::kBatch;
       }
     }
     take(batch, held, row, plane, sum);

@@ -37,17 +37,18 @@ recon::View averaged(const recon::View& fine, int n, double noise, std::uint64_t
   lens.size = {lens.size.width / n, lens.size.height / n};
   for (double* value : {&lens.fx, &lens.fy, &lens.cx, &lens.cy}) *value /= n;
   recon::RadianceImage image(lens.size);
-  const auto row = static_cast<std::size_t>(3 * fine.image->size.width);
+  const auto side = static_cast<std::size_t>(n);
+  const std::size_t row = 3 * static_cast<std::size_t>(fine.image->size.width);
+  const std::size_t averaged_row = 3 * static_cast<std::size_t>(lens.size.width);
   for (std::size_t i = 0; i < image.rgb.size(); ++i) {
-    const std::size_t across = i % static_cast<std::size_t>(3 * lens.size.width);
-    const std::size_t x = across / 3 * static_cast<std::size_t>(n);
-    const std::size_t y = i / static_cast<std::size_t>(3 * lens.size.width) * static_cast<std::size_t>(n);
+    const std::size_t across = i % averaged_row;
+    const std::size_t x = across / 3 * side;
+    const std::size_t y = i / averaged_row * side;
     float sum = 0;
-    for (std::size_t k = 0; k < static_cast<std::size_t>(n * n); ++k) {
-      const auto side = static_cast<std::size_t>(n);
+    for (std::size_t k = 0; k < side * side; ++k) {
       sum += fine.image->rgb[(y + k / side) * row + 3 * (x + k % side) + across % 3];
     }
-    sum /= static_cast<float>(n * n);
+    sum /= static_cast<float>(side * side);
     image.rgb[i] = std::max(0.F, sum + static_cast<float>(noise * random_normal(seed, stream, i)));
   }
   view.image = recon::share(std::move(image));

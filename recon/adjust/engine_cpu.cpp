@@ -223,9 +223,7 @@ class CpuEngine final : public Engine {
     const PaperAdjust<Extinction> adjustment{table,
                                              residual_.data(),
                                              extinction,
-                                             step.gain,
-                                             step.deviation,
-                                             step.stream,
+                                             {step.gain, step.deviation, step.stream},
                                              {table, x_.data(), {step.decay}}};
     each_slab(subset, [&](const std::uint32_t* runs, std::size_t count) {
       for (std::size_t n = 0; n < count; ++n) adjustment(runs[n]);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The engine's launches on a GPU, of the functors that the CPU runs. Sums into key points are gathered, so
-// results have the same bits on every run.
+// The engine's launches on a GPU, of the functors that the CPU runs, except for sums into key points: these
+// are gathered (gather.h), so results have the same bits on every run.
+#include <algorithm>
 #include <optional>
 #include <stdexcept>
 
@@ -13,7 +14,6 @@
 #include "recon/kernels/exposure.h"
 #include "recon/kernels/field.h"
 #include "recon/kernels/gather.h"
-#include "recon/kernels/paper.h"
 #include "recon/kernels/update.h"
 
 namespace emberlock::recon {
@@ -73,20 +73,13 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
         weight_(x_.size()),
         stiffness_(x_.size()),
         residual_(problem.list.rays.size()),
-        samples_(CudaBuffer<Quad<Real>>::unfilled(Extinction::kField ? problem.most_samples() : 0)),
-        deposits_(
-            CudaBuffer<Deposit<Real>>::unfilled(memory == EngineMemory::steps ? problem.most_samples() : 0)) {
+        samples_(CudaBuffer<Quad<Real>>::unfilled(Extinction::kField ? problem.most_samples() : 0)) {
     const ExposureBlur blur(optics.exposure, problem.grid());
     if (!blur.identity()) {
       blur_.emplace(blur, problem.grid());
       exposed_gradient_ = CudaBuffer<Quad<Real>>(x_.size());
     }
-    if (memory == EngineMemory::residuals) return;
-    for (int s = 0; s < problem.list.subsets(); ++s) {
-      const auto voxels = CudaBuffer<std::uint32_t>::unfilled(first_sample(s + 1) - first_sample(s));
-      each_run(s, NameVoxels<Real, Path>{lists_.table(), voxels.data(), first_sample(s)}, "naming voxels");
-      by_voxel_.push_back(sort_by_voxel(voxels, size()));
-    }
+    if (memory == EngineMemory::steps) prepare_sums();
   }
 
   [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_.download()); }
@@ -161,21 +154,14 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   }
 
   void spread(int subset) override {
-    const LayAside<Real> aside{deposits_.data(), first_sample(subset)};
     if constexpr (Extinction::kField) {
-      each_run(subset,
-               FieldAdjoint<Real, Path, LayAside<Real>>{lists_.table(), residual_.data(), samples_.data(),
-                                                        first_sample(subset), aside},
-               "weighing samples");
+      lay_aside(subset, FieldWeight<Real>{residual_.data(), samples_.data(), first_sample(subset)});
     } else {
-      each_run(subset,
-               Adjoint<Real, Extinction, Path, LayAside<Real>>{lists_.table(), residual_.data(), extinction_,
-                                                               aside},
-               "weighing samples");
+      lay_aside(subset, AdjointWeight<Real, Extinction>{residual_.data(), extinction_});
     }
-    if (!blur_) return gather(subset, gradient_, Trilinear{});
+    if (!blur_) return add_up(subset, gradient_, Trilinear{});
     exposed_gradient_.clear();
-    gather(subset, exposed_gradient_, Trilinear{});
+    add_up(subset, exposed_gradient_, Trilinear{});
     launch(size(), AddAt<Real>{blur_->adjoint(exposed_gradient_), gradient_.data()}, "adding up");
   }
 
@@ -214,16 +200,9 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
 
   void step_paper([[maybe_unused]] int subset, [[maybe_unused]] const PaperStep& step) override {
     if constexpr (kPaperSteps) {
-      each_run(subset,
-               PaperAdjust<Extinction, LayAside<float>>{lists_.table(),
-                                                        residual_.data(),
-                                                        extinction_,
-                                                        step.gain,
-                                                        step.deviation,
-                                                        step.stream,
-                                                        {deposits_.data(), first_sample(subset)}},
-               "weighing samples");
-      gather(subset, x_, Fade{step.decay});
+      lay_aside(subset, PaperWeight<Extinction>{
+                            residual_.data(), extinction_, {step.gain, step.deviation, step.stream}});
+      add_up(subset, x_, Fade{step.decay});
       y_.copy_from(x_);
     }
   }
@@ -267,21 +246,39 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   void each_ray(int subset, const Act& act) {
     launch(first_ray(subset), first_ray(subset + 1), act, "marching");
   }
-  template <class Act>
-  void each_run(int subset, const Act& act, const char* what) {
-    launch(problem_.list.first_run(first_ray(subset)), problem_.list.first_run(first_ray(subset + 1)), act,
-           what);
+
+  /// Which samples' contributions each voxel sums, and space for contributions and sums.
+  void prepare_sums() {
+    std::size_t most_voxels = 0;
+    for (int s = 0; s < problem_.list.subsets(); ++s) {
+      const std::size_t count = first_sample(s + 1) - first_sample(s);
+      const auto voxels = CudaBuffer<std::uint32_t>::unfilled(count);
+      run_of_sample_.push_back(CudaBuffer<std::uint32_t>::unfilled(count));
+      launch(problem_.list.first_run(first_ray(s)), problem_.list.first_run(first_ray(s + 1)),
+             NameVoxels<Real, Path>{samples_of(s), voxels.data()}, "naming voxels");
+      by_voxel_.push_back(sort_by_voxel(voxels, size()));
+      most_voxels = std::max(most_voxels, by_voxel_.back().voxels());
+    }
+    deposits_ = CudaBuffer<Deposit<Real>>::unfilled(problem_.most_samples());
+    corner_sums_ = CudaBuffer<Quad<Real>>::unfilled(8 * most_voxels);
+  }
+  [[nodiscard]] SubsetSamples samples_of(int subset) const {
+    return {lists_.table(), first_sample(subset), run_of_sample_[static_cast<std::size_t>(subset)].data()};
+  }
+  template <class Weight>
+  void lay_aside(int subset, const Weight& weight) {
+    launch(first_sample(subset), first_sample(subset + 1),
+           LayAside<Real, Path, Weight>{samples_of(subset), weight, deposits_.data()}, "weighing samples");
   }
   template <class Spread>
-  void gather(int subset, const CudaBuffer<Quad<Real>>& target, const Spread& spread) {
+  void add_up(int subset, const CudaBuffer<Quad<Real>>& target, const Spread& spread) {
     const Grid& g = problem_.grid();
-    const SortedSamples& sorted = by_voxel_[static_cast<std::size_t>(subset)];
-    if (sorted.order.size() == 0) return;
-    launch(
-        size(),
-        GatherDeposits<Real, Spread>{
-            g.nx, g.ny, {sorted.order.data(), sorted.begin.data()}, deposits_.data(), target.data(), spread},
-        "gathering");
+    const SamplesByVoxel by_voxel = by_voxel_[static_cast<std::size_t>(subset)].view();
+    if (by_voxel.voxels == 0) return;
+    launch(by_voxel.voxels, SumCorners<Real, Spread>{by_voxel, deposits_.data(), corner_sums_.data(), spread},
+           "summing samples");
+    launch(size(), AddCorners<Real>{g.nx, g.ny, by_voxel, corner_sums_.data(), target.data()},
+           "adding up voxels");
   }
 
   const Problem& problem_;
@@ -294,10 +291,12 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   CudaBuffer<Quad<Real>> y_, next_y_, gradient_, marked_, kept_, saved_;
   const CudaBuffer<Quad<Real>>* shown_ = &y_;  // what is marched
   CudaBuffer<Real> weight_, stiffness_, field_weight_, reference_;
-  CudaBuffer<Quad<Real>> residual_, samples_;  // samples of one subset
-  CudaBuffer<Deposit<Real>> deposits_;         // of one subset
-  std::vector<SortedSamples> by_voxel_;        // one a subset
-  std::optional<DeviceBlur<Real>> blur_;       // where the exposure is long enough to matter
+  CudaBuffer<Quad<Real>> residual_, samples_;             // samples of one subset
+  std::vector<CudaBuffer<std::uint32_t>> run_of_sample_;  // one a subset
+  std::vector<SortedSamples> by_voxel_;                   // one a subset
+  CudaBuffer<Deposit<Real>> deposits_;                    // of one subset
+  CudaBuffer<Quad<Real>> corner_sums_;                    // of one subset
+  std::optional<DeviceBlur<Real>> blur_;                  // where the exposure is long enough to matter
   CudaBuffer<Quad<Real>> exposed_gradient_;
   std::optional<CudaSnapshot<Quad<Real>>> snapshot_;
 };

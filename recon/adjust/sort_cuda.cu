@@ -2,34 +2,53 @@
 #include <bit>
 
 #include <cub/device/device_radix_sort.cuh>
+#include <cub/device/device_scan.cuh>
 
 #include "recon/adjust/sort_cuda.h"
 #include "recon/compute/cuda_launch.h"
-#include "recon/kernels/gather.h"
 
 namespace emberlock::recon {
+namespace {
+
+/// Calls one of CUB's functions twice: for the size of its working space, and with it.
+template <class Call>
+void with_space(const Call& call, const char* what) {
+  std::size_t bytes = 0;
+  check_cuda(call(nullptr, bytes), what);
+  const auto space = CudaBuffer<std::uint8_t>::unfilled(bytes);
+  check_cuda(call(space.data(), bytes), what);
+}
+
+}  // namespace
 
 SortedSamples sort_by_voxel(const CudaBuffer<std::uint32_t>& voxels, std::size_t key_points) {
   const std::size_t count = voxels.size();
-  SortedSamples sorted{CudaBuffer<std::uint32_t>::unfilled(count),
-                       CudaBuffer<std::uint32_t>::unfilled(key_points + 1)};
+  SortedSamples sorted{
+      CudaBuffer<std::uint32_t>::unfilled(count), {}, CudaBuffer<std::uint32_t>(key_points + 1)};
   const auto sorted_voxels = CudaBuffer<std::uint32_t>::unfilled(count);
   if (count > 0) {
     const auto numbers = CudaBuffer<std::uint32_t>::unfilled(count);
     launch(count, Number{numbers.data()}, "numbering samples");
-    std::size_t bytes = 0;
-    const auto sort = [&](void* space) {
-      check_cuda(
-          cub::DeviceRadixSort::SortPairs(space, bytes, voxels.data(), sorted_voxels.data(), numbers.data(),
-                                          sorted.order.data(), count, 0, std::bit_width(key_points)),
-          "sorting samples");
-    };
-    sort(nullptr);
-    sort(CudaBuffer<std::uint8_t>::unfilled(bytes).data());
+    with_space(
+        [&](void* space, std::size_t& bytes) {
+          return cub::DeviceRadixSort::SortPairs(space, bytes, voxels.data(), sorted_voxels.data(),
+                                                 numbers.data(), sorted.order.data(), count, 0,
+                                                 std::bit_width(key_points));
+        },
+        "sorting samples");
   }
-  launch(key_points + 1,
-         FindBegin{sorted_voxels.data(), static_cast<std::uint32_t>(count), sorted.begin.data()},
+  const auto begin = CudaBuffer<std::uint32_t>::unfilled(key_points + 1);
+  launch(key_points + 1, FindBegin{sorted_voxels.data(), static_cast<std::uint32_t>(count), begin.data()},
          "finding voxels");
+  launch(key_points, HasSamples{begin.data(), sorted.place.data()}, "finding voxels");
+  with_space(
+      [&](void* space, std::size_t& bytes) {
+        return cub::DeviceScan::ExclusiveSum(space, bytes, sorted.place.data(), key_points + 1);
+      },
+      "counting voxels");
+  sorted.begin = CudaBuffer<std::uint32_t>::unfilled(sorted.place.download_one(key_points) + std::size_t{1});
+  launch(key_points + 1, ListBegin{begin.data(), sorted.place.data(), key_points, sorted.begin.data()},
+         "listing voxels");
   return sorted;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
 #include <math.h>
 
 #include "base/host_device.h"
@@ -55,6 +57,7 @@ struct NoExtinction {
   static constexpr bool kField = false;
   [[nodiscard]] HOST_DEVICE Real at(Real /*length*/) const { return 1; }
   [[nodiscard]] HOST_DEVICE Real over(Real /*step*/) const { return 1; }
+  [[nodiscard]] HOST_DEVICE Real over(Real /*step*/, std::uint32_t /*steps*/) const { return 1; }
   [[nodiscard]] HOST_DEVICE Real weight(Real step) const { return step; }
 };
 
@@ -65,6 +68,14 @@ struct ConstantExtinction {
   Real sigma = 0;
   [[nodiscard]] HOST_DEVICE Real at(Real length) const { return exp_of(-sigma * length); }
   [[nodiscard]] HOST_DEVICE Real over(Real step) const { return 1 - sigma * step * phi(sigma * step); }
+  /// The product over several steps, as the march makes it: exp(-sigma ds steps) differs where steps are
+  /// thick.
+  [[nodiscard]] HOST_DEVICE Real over(Real step, std::uint32_t steps) const {
+    Real product = 1;
+    for (Real power = over(step); steps > 0; steps >>= 1, power *= power)
+      if ((steps & 1) != 0) product *= power;
+    return product;
+  }
   /// ds * phi(sigma ds)
   [[nodiscard]] HOST_DEVICE Real weight(Real step) const { return step * phi(sigma * step); }
 };

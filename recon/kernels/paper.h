@@ -56,23 +56,32 @@ struct Fade {
   }
 };
 
-/// The paper's equations (10) and (11) for one run: every sample contributes G(s) alpha_l dL T(s, s_e), with
-/// T of (12), to its eight key points; `put` multiplies it by exp(-alpha_d D(j, s)), with D in voxel edges
-/// (Fade).
-template <class Extinction, class Put = IntoKeyPoints<float, Fade>>
+/// The paper's equation (10) for one sample: G(s) alpha_l dL T(s, s_e).
+struct PaperChange {
+  float gain = 0.001F;       ///< alpha_l, times the factor from the paper's colour intensity to emission
+  float deviation = 0.05F;   ///< of G(s)
+  std::uint64_t stream = 0;  ///< hash of seed and iteration
+
+  /// `residual`: rendered - captured.
+  HOST_DEVICE Rgba operator()(std::uint64_t sample, float transmittance, const Rgba& residual) const {
+    return (transmittance * gaussian_weight(mix64(stream ^ sample), deviation)) * (-gain * residual);
+  }
+};
+
+/// The paper's equations (10) and (11) for one run: every sample contributes its change, with T of (12), to
+/// its eight key points, times exp(-alpha_d D(j, s)), with D in voxel edges.
+template <class Extinction>
 struct PaperAdjust {
   RayTable table;
   const Rgba* residual = nullptr;  ///< rendered - captured, one per ray
   Extinction extinction;
-  float gain = 0.001F;       ///< alpha_l, times the factor from the paper's colour intensity to emission
-  float deviation = 0.05F;   ///< of G(s)
-  std::uint64_t stream = 0;  ///< hash of seed and iteration
-  Put put;
+  PaperChange change;
+  IntoKeyPoints<float, Fade> put;
 
   HOST_DEVICE void operator()(std::size_t n) const {
     const Run run = table.runs[n];
     Weigh weigh{*this, run.first_sample, extinction.over(run.step), extinction.at(run.before),
-                -gain * residual[run.ray]};
+                residual[run.ray]};
     each_sample(table, StraightPath::line<float>(table, n), run, weigh);
   }
 
@@ -82,11 +91,10 @@ struct PaperAdjust {
     std::uint32_t first_sample = 0;
     float pass = 0;
     float transmittance = 0;
-    Rgba change;
+    Rgba seen;
     HOST_DEVICE void operator()(int i, std::int32_t base, float fx, float fy, float fz) {
       const std::uint64_t sample = first_sample + static_cast<std::uint32_t>(i);
-      by.put(sample, base, fx, fy, fz,
-             (transmittance * gaussian_weight(mix64(by.stream ^ sample), by.deviation)) * change);
+      by.put(sample, base, fx, fy, fz, by.change(sample, transmittance, seen));
       transmittance *= pass;
     }
   };

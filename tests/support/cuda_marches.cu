@@ -30,10 +30,12 @@ class CudaMarches final : public Marches<Real> {
   using Field = typename Marches<Real>::Field;
 
   explicit CudaMarches(const recon::RayList& list)
-      : list_(list), rays_(list), samples_(list.first_sample(rays())) {
+      : list_(list),
+        rays_(list),
+        samples_(list.first_sample(rays())),
+        run_of_sample_(recon::CudaBuffer<std::uint32_t>::unfilled(samples_)) {
     const auto voxels = recon::CudaBuffer<std::uint32_t>::unfilled(samples_);
-    recon::launch(list.runs.size(), recon::NameVoxels<Real, Path>{rays_.table(), voxels.data(), 0},
-                  "naming voxels");
+    recon::launch(list.runs.size(), recon::NameVoxels<Real, Path>{all(), voxels.data()}, "naming voxels");
     by_voxel_ = recon::sort_by_voxel(voxels, list.grid.size());
   }
 
@@ -66,16 +68,12 @@ class CudaMarches final : public Marches<Real> {
   [[nodiscard]] Values field_adjoint(const Field& field) const override {
     const recon::CudaBuffer<recon::Quad<Real>> residual(field.residual);
     const recon::CudaBuffer<recon::Quad<Real>> samples(field.samples);
-    return gathered([&](const recon::LayAside<Real>& aside) {
-      recon::launch(list_.runs.size(),
-                    recon::FieldAdjoint<Real, Path, recon::LayAside<Real>>{rays_.table(), residual.data(),
-                                                                           samples.data(), 0, aside},
-                    "weighing samples");
-    });
+    return gathered(recon::FieldWeight<Real>{residual.data(), samples.data(), 0});
   }
 
  private:
   [[nodiscard]] std::size_t rays() const { return list_.rays.size(); }
+  [[nodiscard]] recon::SubsetSamples all() const { return {rays_.table(), 0, run_of_sample_.data()}; }
 
   template <class Extinction>
   [[nodiscard]] Values marched(const Values& volume, const Extinction& extinction) const {
@@ -91,28 +89,28 @@ class CudaMarches final : public Marches<Real> {
   template <class Extinction>
   [[nodiscard]] Values spread(const Values& residual, const Extinction& extinction) const {
     const recon::CudaBuffer<recon::Quad<Real>> of_rays(residual);
-    return gathered([&](const recon::LayAside<Real>& aside) {
-      recon::launch(list_.runs.size(),
-                    recon::Adjoint<Real, Extinction, Path, recon::LayAside<Real>>{
-                        rays_.table(), of_rays.data(), extinction, aside},
-                    "weighing samples");
-    });
+    return gathered(recon::AdjointWeight<Real, Extinction>{of_rays.data(), extinction});
   }
-  template <class LayAll>
-  [[nodiscard]] Values gathered(const LayAll& lay_all) const {
+  template <class Weight>
+  [[nodiscard]] Values gathered(const Weight& weight) const {
     const auto deposits = recon::CudaBuffer<recon::Deposit<Real>>::unfilled(samples_);
-    const recon::CudaBuffer<recon::Quad<Real>> gradient(list_.grid.size());
-    lay_all(recon::LayAside<Real>{deposits.data(), 0});
+    recon::launch(samples_, recon::LayAside<Real, Path, Weight>{all(), weight, deposits.data()},
+                  "weighing samples");
+    const recon::SamplesByVoxel by_voxel = by_voxel_.view();
+    const auto sums = recon::CudaBuffer<recon::Quad<Real>>::unfilled(8 * by_voxel.voxels);
+    recon::launch(by_voxel.voxels, recon::SumCorners<Real>{by_voxel, deposits.data(), sums.data()},
+                  "summing samples");
     const recon::Grid& g = list_.grid;
-    const recon::SamplesByVoxel sorted{by_voxel_.order.data(), by_voxel_.begin.data()};
-    recon::launch(g.size(), recon::GatherDeposits<Real>{g.nx, g.ny, sorted, deposits.data(), gradient.data()},
-                  "gathering");
+    const recon::CudaBuffer<recon::Quad<Real>> gradient(g.size());
+    recon::launch(g.size(), recon::AddCorners<Real>{g.nx, g.ny, by_voxel, sums.data(), gradient.data()},
+                  "adding up voxels");
     return gradient.download();
   }
 
   const recon::RayList& list_;
   recon::DeviceRayList rays_;
   std::size_t samples_;
+  recon::CudaBuffer<std::uint32_t> run_of_sample_;
   recon::SortedSamples by_voxel_;
 };
 

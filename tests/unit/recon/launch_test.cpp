@@ -2,7 +2,10 @@
 // What a GPU runs one thread for each call, called here one after the other and backwards: every call has its
 // own place to write to, and together they do what the CPU's own way does.
 #include <algorithm>
+#include <iterator>
+#include <numeric>
 #include <tuple>
+#include <type_traits>
 
 #include <gtest/gtest.h>
 
@@ -24,78 +27,141 @@ void launch(std::size_t count, const Act& act) {
   for (std::size_t i = count; i-- > 0;) act(i);
 }
 
-/// What sort_by_voxel() makes on the GPU.
+/// What sort_by_voxel() makes on the GPU, of the samples from `first_ray` to `last_ray`.
 struct Sorted {
-  std::vector<std::uint32_t> order, begin;
-  [[nodiscard]] SamplesByVoxel view() const { return {order.data(), begin.data()}; }
+  std::size_t first = 0;
+  std::vector<std::uint32_t> run, order, begin, place;
+  [[nodiscard]] SamplesByVoxel view() const {
+    return {order.data(), begin.data(), place.data(), begin.size() - 1};
+  }
 };
 
-template <class Path>
-Sorted sort_samples(const RayList& list) {
-  std::vector<std::uint32_t> voxels(list.first_sample(list.rays.size()));
-  launch(list.runs.size(), NameVoxels<float, Path>{list.table(), voxels.data(), 0});
-  Sorted sorted{std::vector<std::uint32_t>(voxels.size()), std::vector<std::uint32_t>(list.grid.size() + 1)};
-  launch(voxels.size(), Number{sorted.order.data()});
+template <class Real, class Path>
+Sorted sort_samples(const RayList& list, std::size_t first_ray, std::size_t last_ray) {
+  const std::size_t first = list.first_sample(first_ray);
+  const std::size_t count = list.first_sample(last_ray) - first;
+  const std::size_t key_points = list.grid.size();
+  Sorted sorted{first,
+                std::vector<std::uint32_t>(count),
+                std::vector<std::uint32_t>(count),
+                {},
+                std::vector<std::uint32_t>(key_points + 1)};
+  std::vector<std::uint32_t> voxels(count);
+  const NameVoxels<Real, Path> name{{list.table(), first, sorted.run.data()}, voxels.data()};
+  for (std::size_t n = list.first_run(last_ray); n-- > list.first_run(first_ray);) name(n);
+  launch(count, Number{sorted.order.data()});
   std::stable_sort(sorted.order.begin(), sorted.order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return voxels[a] < voxels[b]; });
-  std::vector<std::uint32_t> in_order(voxels.size());
-  for (std::size_t i = 0; i < in_order.size(); ++i) in_order[i] = voxels[sorted.order[i]];
-  launch(sorted.begin.size(),
-         FindBegin{in_order.data(), static_cast<std::uint32_t>(in_order.size()), sorted.begin.data()});
+  std::vector<std::uint32_t> in_order(count);
+  for (std::size_t i = 0; i < count; ++i) in_order[i] = voxels[sorted.order[i]];
+  std::vector<std::uint32_t> begin(key_points + 1);
+  launch(begin.size(), FindBegin{in_order.data(), static_cast<std::uint32_t>(count), begin.data()});
+  launch(key_points, HasSamples{begin.data(), sorted.place.data()});
+  std::exclusive_scan(sorted.place.begin(), sorted.place.end(), sorted.place.begin(), 0U);
+  sorted.begin.resize(sorted.place.back() + std::size_t{1});
+  launch(begin.size(), ListBegin{begin.data(), sorted.place.data(), key_points, sorted.begin.data()});
+  EXPECT_EQ(sorted.begin.back(), count);
+  std::sort(voxels.begin(), voxels.end());
+  voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
+  EXPECT_EQ(sorted.view().voxels, voxels.size());
   return sorted;
 }
 
+template <class Real, class Path, class Weight, class Spread = Trilinear>
+std::vector<Quad<Real>> gathered(const RayList& list, const Sorted& sorted, const Weight& weight,
+                                 const Spread& spread = {}) {
+  std::vector<std::uint32_t> run = sorted.run;
+  std::vector<Deposit<Real>> deposits(run.size());
+  const LayAside<Real, Path, Weight> aside{{list.table(), sorted.first, run.data()}, weight, deposits.data()};
+  for (std::size_t s = sorted.first + run.size(); s-- > sorted.first;) aside(s);
+  const SamplesByVoxel samples = sorted.view();
+  std::vector<Quad<Real>> sums(8 * samples.voxels);
+  launch(samples.voxels, SumCorners<Real, Spread>{samples, deposits.data(), sums.data(), spread});
+  std::vector<Quad<Real>> target(list.grid.size());
+  launch(target.size(), AddCorners<Real>{list.grid.nx, list.grid.ny, samples, sums.data(), target.data()});
+  return target;
+}
+
 /// Sums in another order, so up to rounding.
-void expect_near(const std::vector<Rgba>& found, const std::vector<Rgba>& expected) {
-  float most = 0;
-  for (const Rgba& v : expected)
+template <class Real>
+void expect_near(const std::vector<Quad<Real>>& found, const std::vector<Quad<Real>>& expected) {
+  Real most = 0;
+  for (const Quad<Real>& v : expected)
     for (int c = 0; c < 4; ++c) most = std::max(most, std::abs(v.c[c]));
   ASSERT_GT(most, 0);
   ASSERT_EQ(found.size(), expected.size());
+  const Real rounding = std::is_same_v<Real, float> ? Real(5e-6) : Real(1e-12);
   for (std::size_t p = 0; p < found.size(); ++p)
-    for (int c = 0; c < 4; ++c) ASSERT_NEAR(found[p].c[c], expected[p].c[c], 2e-6F * most) << p << ", " << c;
+    for (int c = 0; c < 4; ++c)
+      ASSERT_NEAR(found[p].c[c], expected[p].c[c], rounding * most) << p << ", " << c;
 }
 
-template <class Path>
+template <class Real, class Path>
 void expect_gathered(const RayList& list) {
-  const Sorted sorted = sort_samples<Path>(list);
-  const auto residual = random_quads<float>(list.rays.size(), 6);
-  std::vector<Deposit<float>> deposits(sorted.order.size());
-  const LayAside<float> aside{deposits.data(), 0};
-  std::vector<Rgba> gradient(list.grid.size());
-  const auto gather = [&](const auto& spread) {
-    using Spread = std::decay_t<decltype(spread)>;
-    std::fill(gradient.begin(), gradient.end(), Rgba{});
-    launch(gradient.size(), GatherDeposits<float, Spread>{list.grid.nx, list.grid.ny, sorted.view(),
-                                                          deposits.data(), gradient.data(), spread});
-  };
-
-  const Marcher<float> march(list);
-  const ConstantExtinction<float> extinction{0.1F};
-  launch(list.runs.size(), emberlock::recon::Adjoint<float, ConstantExtinction<float>, Path, LayAside<float>>{
-                               list.table(), residual.data(), extinction, aside});
-  gather(Trilinear{});
-  expect_near(gradient, march.adjoint(Absorb::constant, residual, 0.1F));
+  const Sorted sorted = sort_samples<Real, Path>(list, 0, list.rays.size());
+  const auto residual = random_quads<Real>(list.rays.size(), 6);
+  const Marcher<Real> march(list);
+  const ConstantExtinction<Real> thick{Real(1.7)};  // a step of 1.7: not that of exp(-sigma ds)
+  expect_near(gathered<Real, Path>(list, sorted,
+                                   AdjointWeight<Real, ConstantExtinction<Real>>{residual.data(), thick}),
+              march.adjoint(Absorb::constant, residual, thick.sigma));
+  expect_near(
+      gathered<Real, Path>(list, sorted, AdjointWeight<Real, NoExtinction<Real>>{residual.data(), {}}),
+      march.adjoint(Absorb::nothing, residual, 0));
 
   const std::vector<Rgba> black(list.rays.size());
-  const auto field = march.field_forward(random_quads<float>(list.grid.size(), 5, 1, 0.2),
-                                         PixelResidual<float>{black.data(), nullptr, nullptr, 0});
-  launch(list.runs.size(), FieldAdjoint<float, Path, LayAside<float>>{list.table(), field.residual.data(),
-                                                                      field.samples.data(), 0, aside});
-  gather(Trilinear{});
-  expect_near(gradient, march.field_adjoint(field));
-
-  launch(list.runs.size(), PaperAdjust<ConstantExtinction<float>, LayAside<float>>{
-                               list.table(), residual.data(), extinction, 0.001F, 0.05F, 7, aside});
-  gather(Fade{1.5F});
-  std::vector<Rgba> adjusted(list.grid.size());
-  const PaperAdjust<ConstantExtinction<float>> adjust{
-      list.table(), residual.data(), extinction, 0.001F, 0.05F, 7, {list.table(), adjusted.data(), {1.5F}}};
-  launch(list.runs.size(), adjust);
-  expect_near(gradient, adjusted);
+  const auto field = march.field_forward(random_quads<Real>(list.grid.size(), 5, 1, 0.2),
+                                         PixelResidual<Real>{black.data(), nullptr, nullptr, 0});
+  expect_near(
+      gathered<Real, Path>(list, sorted, FieldWeight<Real>{field.residual.data(), field.samples.data(), 0}),
+      march.field_adjoint(field));
 }
 
-TEST(Launch, KeyPointsGatherWhatSamplesWouldAdd) { expect_gathered<StraightPath>(march_case().list); }
+template <class Real>
+void expect_gathered_everywhere() {
+  expect_gathered<Real, StraightPath>(march_case().list);
+  expect_gathered<Real, StraightPath>(march_case({.step = 0.3F, .seed = 2}).list);
+  expect_gathered<Real, StraightPath>(march_case({.size = {0.2, 0.01, 0.01}, .filled = 1}).list);
+  expect_gathered<Real, StraightPath>(march_case({.size = {0.01, 0.2, 0.01}, .filled = 1}).list);
+  expect_gathered<Real, StraightPath>(march_case({.size = {0.01, 0.01, 0.2}, .filled = 1}).list);
+  expect_gathered<Real, CurvedPath>(march_case({.curved = true}).list);
+}
+
+TEST(Launch, KeyPointsAddUpWhatSamplesWouldAdd) {
+  expect_gathered_everywhere<float>();
+  expect_gathered_everywhere<double>();
+}
+
+TEST(Launch, ThePapersKeyPointsAddUpWhatSamplesWouldAdd) {
+  const RayList list = march_case().list;
+  const auto residual = random_quads<float>(list.rays.size(), 6);
+  const ConstantExtinction<float> extinction{0.1F};
+  const PaperChange change{0.001F, 0.05F, 7};
+  const Fade fade{1.5F};
+  std::vector<Rgba> adjusted(list.grid.size());
+  launch(list.runs.size(),
+         PaperAdjust<ConstantExtinction<float>>{
+             list.table(), residual.data(), extinction, change, {list.table(), adjusted.data(), fade}});
+  expect_near(gathered<float, StraightPath>(
+                  list, sort_samples<float, StraightPath>(list, 0, list.rays.size()),
+                  PaperWeight<ConstantExtinction<float>>{residual.data(), extinction, change}, fade),
+              adjusted);
+}
+
+/// Subsets have their own samples, and one may have none.
+TEST(Launch, PartsOfTheRaysAddUpToAll) {
+  const RayList list = march_case().list;
+  const auto residual = random_quads<double>(list.rays.size(), 6);
+  const AdjointWeight<double, NoExtinction<double>> weight{residual.data(), {}};
+  std::vector<Rgba64> sum(list.grid.size());
+  const std::size_t cuts[] = {0, 1, 1, list.rays.size() / 3, list.rays.size()};
+  for (std::size_t n = 0; n + 1 < std::size(cuts); ++n) {
+    const Sorted sorted = sort_samples<double, StraightPath>(list, cuts[n], cuts[n + 1]);
+    const auto part = gathered<double, StraightPath>(list, sorted, weight);
+    for (std::size_t p = 0; p < sum.size(); ++p) sum[p] = sum[p] + part[p];
+  }
+  expect_near(sum, Marcher<double>(list).adjoint(Absorb::nothing, residual, 0));
+}
 
 TEST(Launch, VoxelsCarvedOneByOneAreTheHull) {
   const Scene scene = ring_scene();

@@ -31,6 +31,7 @@ void add_import(CLI::App& app);
 void add_demo(CLI::App& app);
 void add_sample(CLI::App& app);
 void add_doctor(CLI::App& app);
+void add_bench(CLI::App& app);
 void add_sessions(CLI::App& app);
 /// status, jobs, console, watch, record and strobe: those that only ask the daemon.
 void add_client(CLI::App& app);

@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
   emberlock::cli::add_sessions(app);
 #if EMBERLOCK_WITH_DRIVERS
   emberlock::cli::add_doctor(app);
+  emberlock::cli::add_bench(app);
 #endif
 #if EMBERLOCK_WITH_DAEMON
   emberlock::cli::add_client(app);

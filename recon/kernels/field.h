@@ -119,31 +119,30 @@ struct FieldForward {
 
 /// The transpose for one run: puts at its samples' places the residual times the emission's weight, and the
 /// derivative by extinction in lane 3.
-template <class Real, class Path, class Put = IntoKeyPoints<Real>>
+template <class Real, class Path>
 struct FieldAdjoint {
   RayTable table;
   const Quad<Real>* residual = nullptr;  ///< one per ray
   const Quad<Real>* samples = nullptr;   ///< the output of FieldForward
   std::size_t first_sample = 0;
-  Put put;
+  IntoKeyPoints<Real> put;
 
   HOST_DEVICE void operator()(std::size_t n) const {
     const Run run = table.runs[n];
-    Weigh weigh{put, samples + (run.first_sample - first_sample), run.first_sample, residual[run.ray]};
+    const Weigh weigh{put, samples + (run.first_sample - first_sample), residual[run.ray]};
     each_sample(table, Path::template line<Real>(table, n), run, weigh);
   }
 
  private:
   struct Weigh {
-    const Put& put;
+    const IntoKeyPoints<Real>& put;
     const Quad<Real>* samples;
-    std::size_t first_sample;
     Quad<Real> seen;
     HOST_DEVICE void operator()(int sample, std::int32_t base, Real fx, Real fy, Real fz) const {
       const Quad<Real>& left = samples[sample];
       Quad<Real> w = left.c[0] * seen;
       w.c[3] = left.c[1];
-      put(first_sample + static_cast<std::size_t>(sample), base, fx, fy, fz, w);
+      put(base, fx, fy, fz, w);
     }
   };
 };

@@ -199,8 +199,7 @@ struct IntoKeyPoints {
         row(static_cast<std::size_t>(table.nx)),
         plane(row * static_cast<std::size_t>(table.ny)),
         spread(by) {}
-  HOST_DEVICE void operator()(std::size_t /*sample*/, std::int32_t base, Real fx, Real fy, Real fz,
-                              const Quad<Real>& w) const {
+  HOST_DEVICE void operator()(std::int32_t base, Real fx, Real fy, Real fz, const Quad<Real>& w) const {
     spread(target + base, row, plane, fx, fy, fz, w);
   }
 };
@@ -296,29 +295,28 @@ struct Forward {
 
 /// The exact transpose of Forward's lanes 0..2 without extinction or with constant extinction, for one run:
 /// puts its ray's residual at its samples' places, with Forward's weights.
-template <class Real, class Extinction, class Path, class Put = IntoKeyPoints<Real>>
+template <class Real, class Extinction, class Path>
 struct Adjoint {
   RayTable table;
   const Quad<Real>* residual = nullptr;  ///< one per ray
   Extinction extinction;
-  Put put;
+  IntoKeyPoints<Real> put;
 
   HOST_DEVICE void operator()(std::size_t n) const {
     const Run run = table.runs[n];
     const Quad<Real> w =
         (extinction.at(Real(run.before)) * extinction.weight(Real(run.step))) * residual[run.ray];
-    Weigh weigh{put, run.first_sample, extinction.over(Real(run.step)), w};
+    Weigh weigh{put, extinction.over(Real(run.step)), w};
     each_sample(table, Path::template line<Real>(table, n), run, weigh);
   }
 
  private:
   struct Weigh {
-    const Put& put;
-    std::size_t first_sample;
+    const IntoKeyPoints<Real>& put;
     Real pass;
     Quad<Real> w;
-    HOST_DEVICE void operator()(int sample, std::int32_t base, Real fx, Real fy, Real fz) {
-      put(first_sample + static_cast<std::size_t>(sample), base, fx, fy, fz, w);
+    HOST_DEVICE void operator()(int /*sample*/, std::int32_t base, Real fx, Real fy, Real fz) {
+      put(base, fx, fy, fz, w);
       w = pass * w;
     }
   };

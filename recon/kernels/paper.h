@@ -94,7 +94,7 @@ struct PaperAdjust {
     Rgba seen;
     HOST_DEVICE void operator()(int i, std::int32_t base, float fx, float fy, float fz) {
       const std::uint64_t sample = first_sample + static_cast<std::uint32_t>(i);
-      by.put(sample, base, fx, fy, fz, by.change(sample, transmittance, seen));
+      by.put(base, fx, fy, fz, by.change(sample, transmittance, seen));
       transmittance *= pass;
     }
   };

@@ -38,7 +38,7 @@ template <class Path>
 Values transposed(const RayList& list, const Values& residual) {
   const RayTable table = list.table();
   Values gradient(list.grid.size());
-  const Adjoint<double, ConstantExtinction<double>, Path, IntoKeyPoints<double>> adjoint{
+  const Adjoint<double, ConstantExtinction<double>, Path> adjoint{
       table, residual.data(), {0.05}, {table, gradient.data()}};
   for (std::size_t run = 0; run < list.runs.size(); ++run) adjoint(run);
   return gradient;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "recon/kernels/gather.h"
 #include "recon/kernels/march.h"
 
 namespace emberlock {
@@ -52,11 +53,10 @@ struct ForwardByHand {
   }
 };
 
-template <class Put = recon::IntoKeyPoints<float>>
 struct AdjointByHand {
   recon::RayTable table;
   const recon::Rgba* residual = nullptr;
-  Put put;
+  recon::IntoKeyPoints<float> put;
 
   HOST_DEVICE void operator()(std::size_t n) const {
     const recon::Run run = table.runs[n];
@@ -67,10 +67,29 @@ struct AdjointByHand {
     for (int first = 0; first < run.count; first += recon::kHeld) {
       const int here = run.count - first < recon::kHeld ? run.count - first : recon::kHeld;
       for (int at = 0; at < here; at += recon::kBatch) recon::locate(table, line, run, first + at, batch, at);
-      for (int i = 0; i < here; ++i)
-        put(run.first_sample + static_cast<std::size_t>(first + i), batch.base[i], batch.fx[i], batch.fy[i],
-            batch.fz[i], w);
+      for (int i = 0; i < here; ++i) put(batch.base[i], batch.fx[i], batch.fy[i], batch.fz[i], w);
     }
+  }
+};
+
+/// Of one sample, as the GPU's transposes begin.
+struct LayAsideByHand {
+  recon::SubsetSamples samples;
+  const recon::Rgba* residual = nullptr;
+  recon::Deposit<float>* deposits = nullptr;
+
+  HOST_DEVICE void operator()(std::size_t sample) const {
+    const recon::RayTable& table = samples.table;
+    const recon::Run run = table.runs[samples.run_of(sample)];
+    const recon::Line<float> line(table.origins + 3 * static_cast<std::size_t>(table.rays[run.ray].view),
+                                  table.rays[run.ray].direction);
+    recon::Batch<float> batch;
+    recon::locate(table, line, run, static_cast<int>(sample - run.first_sample), batch);
+    recon::Deposit<float>& to = deposits[sample - samples.first];
+    to.w = run.step * residual[run.ray];
+    to.fx = batch.fx[0];
+    to.fy = batch.fy[0];
+    to.fz = batch.fz[0];
   }
 };
 

@@ -22,7 +22,7 @@ __attribute__((noinline)) void forward_by_hand(const recon::MarchWork<float>& w,
 }
 __attribute__((noinline)) void adjoint_by_hand(const recon::MarchWork<float>& w, const std::uint32_t* runs,
                                                std::size_t count) {
-  const AdjointByHand<> march{w.rays, w.residual, {w.rays, w.gradient}};
+  const AdjointByHand march{w.rays, w.residual, {w.rays, w.gradient}};
   for (std::size_t n = 0; n < count; ++n) march(runs[n]);
 }
 

@@ -9,11 +9,13 @@ __device__ void each_ray(const March& march, recon::Rgba* radiance, std::size_t 
   const std::size_t ray = blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
   if (ray < rays) radiance[ray] = march(ray);
 }
-template <class March>
-__device__ void each_run(const March& march, std::size_t runs) {
-  const std::size_t run = blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
-  if (run < runs) march(run);
+template <class Act>
+__device__ void each_sample(const Act& act, std::size_t samples) {
+  const std::size_t sample = blockIdx.x * std::size_t{blockDim.x} + threadIdx.x;
+  if (sample < samples) act(sample);
 }
+template <class Extinction>
+using LayAsideUnder = recon::LayAside<float, recon::StraightPath, recon::AdjointWeight<float, Extinction>>;
 
 extern "C" {
 
@@ -29,14 +31,12 @@ __global__ void forward_constant(
     std::size_t rays) {
   each_ray(march, radiance, rays);
 }
-__global__ void adjoint_none(recon::Adjoint<float, recon::NoExtinction<float>, recon::StraightPath> march,
-                             std::size_t runs) {
-  each_run(march, runs);
+__global__ void adjoint_none(LayAsideUnder<recon::NoExtinction<float>> act, std::size_t samples) {
+  each_sample(act, samples);
 }
-__global__ void adjoint_by_hand(AdjointByHand<> march, std::size_t runs) { each_run(march, runs); }
-__global__ void adjoint_constant(
-    recon::Adjoint<float, recon::ConstantExtinction<float>, recon::StraightPath> march, std::size_t runs) {
-  each_run(march, runs);
+__global__ void adjoint_by_hand(LayAsideByHand act, std::size_t samples) { each_sample(act, samples); }
+__global__ void adjoint_constant(LayAsideUnder<recon::ConstantExtinction<float>> act, std::size_t samples) {
+  each_sample(act, samples);
 }
 
 }  // extern "C"

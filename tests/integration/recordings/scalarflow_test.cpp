@@ -47,13 +47,14 @@ class ScalarFlowTest : public testing::Test {
     ASSERT_TRUE(scene.ok()) << scene.error().message();
     scene_ = std::move(scene).value();
   }
-  [[nodiscard]] recon::Report without_view(std::size_t held_out, recon::Solver solver,
-                                           int iterations = 0) const {
+  [[nodiscard]] recon::Report without_view(std::size_t held_out, recon::Solver solver, int iterations = 0,
+                                           const char* effects = "auto") const {
     recon::Scene scene = scene_;
     for (recon::View& view : scene.views) shrink(view);
     scene.views[held_out].role = recon::ViewRole::held_out;
     recon::ReconstructOptions options;
     options.voxels = kVoxels;
+    if (solver == recon::Solver::standard) options.effects = recon::parse_effects(effects).value();
     options.solve.solver = solver;
     options.solve.iterations = iterations;
     options.solve.flame_threshold = kThreshold;
@@ -130,6 +131,18 @@ TEST_F(ScalarFlowTest, EachViewHeldOutInTurnIsPredicted) {
                 recon::all_channels(report.input_rmse), report.iterations);
     EXPECT_LT(error, 1.1 * kMeasured[view]) << "view " << view;
     EXPECT_LT(recon::all_channels(report.input_rmse), error) << "view " << view;
+  }
+}
+
+TEST_F(ScalarFlowTest, EffectsThatAreFoundAreNeverWorseThanNone) {
+  for (std::size_t view = 0; view < 5; ++view) {
+    const recon::Report found = without_view(view, recon::Solver::standard);
+    const recon::Report none = without_view(view, recon::Solver::standard, 0, "none");
+    ASSERT_TRUE(found.heldout_rmse && none.heldout_rmse);
+    std::printf("view %zu held out: error %.2f, without effects %.2f\n", view,
+                recon::all_channels(*found.heldout_rmse), recon::all_channels(*none.heldout_rmse));
+    EXPECT_LE(recon::all_channels(*found.heldout_rmse), 1.001 * recon::all_channels(*none.heldout_rmse))
+        << "view " << view;
   }
 }
 

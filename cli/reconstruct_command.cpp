@@ -20,6 +20,7 @@
 #include "cli/reconstruct_sequence.h"
 #include "cli/reconstruct_summary.h"
 #include "cli/scene_options.h"
+#include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/pipeline/reconstruct.h"
 #include "recon/pipeline/scene.h"
@@ -175,6 +176,12 @@ std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& argumen
   return recon::files_of(arguments.input, options);
 }
 
+/// Before the work starts: more voxels than the pictures tell apart cost much and bring nothing.
+void warn_if_too_fine(const recon::Scene& scene, const recon::ReconstructOptions& options, std::FILE* to) {
+  const std::string warning = recon::too_fine_warning(scene, options.voxels.value_or(0));
+  if (!warning.empty()) std::fprintf(to, "%-16s %s\n", "warning", warning.c_str());
+}
+
 Result<Written> reconstruct_files(const ReconstructArguments& arguments, const Watchers& watchers) {
   EMBERLOCK_ASSIGN_OR_RETURN(recon::ReconstructOptions options, options_of(arguments));
   options.solve.stop = watchers.stop;
@@ -188,6 +195,7 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
   const TimePoint begin = clock.now();
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load(arguments, watchers.progress));
   const Seconds loading = clock.now() - begin;
+  warn_if_too_fine(scene, options, stderr);
   if (recon::is_stopped(options.solve))
     return Error{ErrorKind::refused, "ended early, as asked, before there was a volume to keep",
                  arguments.input};
@@ -238,6 +246,7 @@ Status plan_files(const ReconstructArguments& arguments) {
         "%.2g\n",
         "time", (loading + choice.expected_time + writing).value(), loading.value(),
         choice.expected_time.value(), writing.value());
+  warn_if_too_fine(scene, options, stdout);
   std::printf("%-16s %s\n", "look at", (std::filesystem::path(arguments.plan) / "index.html").c_str());
   return {};
 }

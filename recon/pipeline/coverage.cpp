@@ -7,6 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "recon/pipeline/grid_choice.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -50,6 +52,16 @@ std::vector<std::string> coverage_warnings(const Scene& scene) {
         "judging)");
   }
   return warnings;
+}
+
+std::string too_fine_warning(const Scene& scene, int voxels) {
+  const int most = voxels_by_the_paper(scene);
+  if (voxels <= most) return {};
+  return fmt::format(
+      "{} voxels along the longest edge are finer than the pictures resolve: {:.2g} pixels a voxel, where {} "
+      "voxels have 1.5. {:.3g} times as many unknowns take so much more memory and time, and may show other "
+      "views worse. Give --voxels {} or fewer",
+      voxels, 1.5 * most / voxels, most, std::pow(static_cast<double>(voxels) / most, 3), most);
 }
 
 }  // namespace emberlock::recon

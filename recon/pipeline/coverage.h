@@ -13,4 +13,8 @@ namespace emberlock::recon {
 /// because they see the same silhouette), and whether a view is held out.
 std::vector<std::string> coverage_warnings(const Scene& scene);
 
+/// Where so many voxels along the longest edge are more than voxels_by_the_paper(): that they are finer than
+/// the input views resolve, and what to ask for instead. Otherwise empty.
+std::string too_fine_warning(const Scene& scene, int voxels);
+
 }  // namespace emberlock::recon

@@ -122,7 +122,7 @@ TEST_F(ScalarFlowTest, TheHullHoldsEveryVoxelThatShinesInAllViews) {
 }
 
 TEST_F(ScalarFlowTest, EachViewHeldOutInTurnIsPredicted) {
-  constexpr double kMeasured[] = {10.7, 11.9, 10.8, 9.4, 12.6};
+  constexpr double kMeasured[] = {11.4, 9.5, 10.7, 9.3, 9.9};
   for (std::size_t view = 0; view < 5; ++view) {
     const recon::Report report = without_view(view, recon::Solver::standard);
     ASSERT_TRUE(report.heldout_rmse);

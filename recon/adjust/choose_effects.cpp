@@ -134,8 +134,10 @@ Status check_gamma(const Scene& scene, const EffectRequest& request) {
 }
 
 /// The sensor, with the level at which it clips where enough of the flame is clipped.
-Sensor clipping_sensor(const Scene& filmed, Sensor sensor, double tolerance) {
-  const std::vector<PixelBox> boxes = flame_boxes(filmed, flame_masks(filmed));
+Sensor clipping_sensor(const PreparedScene& told, Sensor sensor, double tolerance,
+                       const ComputeOptions& compute) {
+  const Scene& filmed = told.scene();
+  const std::vector<PixelBox> boxes = flame_boxes(filmed, *told.masks(std::nullopt, compute));
   const double white = clip_level(filmed, boxes, sensor.white);
   if (white > 0 && clipped_pixels(filmed, boxes, white).excess >= tolerance) {
     sensor.clipping = Sensor::Clipping::at_white;
@@ -145,26 +147,28 @@ Sensor clipping_sensor(const Scene& filmed, Sensor sensor, double tolerance) {
 }
 
 /// In linear grey levels: what the pictures of the background show, else the level along the borders.
-Background known_background(const Scene& linear, double tolerance) {
+Background known_background(const PreparedScene& prepared, double tolerance, const ComputeOptions& compute) {
+  const Scene& linear = prepared.scene();
   const bool pictured = std::any_of(linear.views.begin(), linear.views.end(), [](const View& view) {
     return view.role == ViewRole::input && view.background;
   });
   if (pictured) return {Background::Kind::image, {}};
-  const std::optional<BorderLevel> border = border_level(linear, flame_masks(linear));
+  const std::optional<BorderLevel> border = border_level(linear, *prepared.masks(std::nullopt, compute));
   if (!border || *std::max_element(border->level.begin(), border->level.end()) < tolerance) return {};
   return {Background::Kind::constant, border->level};
 }
 
 }  // namespace
 
-PreparedScene under_known_effects(const PreparedScene& filmed, const EffectRequest& request) {
+PreparedScene under_known_effects(const PreparedScene& filmed, const EffectRequest& request,
+                                  const ComputeOptions& compute) {
   if (request.fixed) return filmed.under(*request.fixed);
   Effects known;
   known.sensor = request.assumed.sensor;
   if (known.sensor.gamma != 1) known.sensor.response = Sensor::Response::gamma;
-  known.sensor = clipping_sensor(filmed.told(), known.sensor, request.tolerance);
+  known.sensor = clipping_sensor(filmed.under({}), known.sensor, request.tolerance, compute);
   const PreparedScene linear = filmed.under(known);
-  known.background = known_background(linear.scene(), request.tolerance);
+  known.background = known_background(linear, request.tolerance, compute);
   return linear.under(known);
 }
 
@@ -180,7 +184,8 @@ Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid
   const Seconds start = elapsed ? elapsed() : Seconds(0);
   const PreparedScene prepared = scene.under(known);
   const Scene& linear = prepared.scene();
-  const std::vector<FlameMask> masks = masks_before(linear, known.background, options.flame_threshold);
+  const SharedMasks shared_masks = prepared.masks(options.flame_threshold, options.compute);
+  const std::vector<FlameMask>& masks = *shared_masks;
   EMBERLOCK_ASSIGN_OR_RETURN(const Hull hull, carve(linear, masks, grid, options.compute));
   SolverSetup setup{{}, {}, hull, known, options, pool};
   const std::vector<PixelBox> boxes = flame_boxes(linear, masks);
@@ -238,7 +243,7 @@ Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
                                     const SolveOptions& options, const Elapsed& elapsed) {
   EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
-  return choose_effects(under_known_effects(told, request), grid, request, options, elapsed);
+  return choose_effects(under_known_effects(told, request, options.compute), grid, request, options, elapsed);
 }
 
 }  // namespace emberlock::recon

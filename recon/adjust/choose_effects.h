@@ -9,7 +9,8 @@ namespace emberlock::recon {
 
 /// A scene under what must be known before the flame can be looked at: what is set by hand, else response,
 /// clipped pixels and background, as far as the pictures tell them.
-PreparedScene under_known_effects(const PreparedScene& filmed, const EffectRequest& request);
+PreparedScene under_known_effects(const PreparedScene& filmed, const EffectRequest& request,
+                                  const ComputeOptions& compute = {});
 
 /// Decides which effects the pictures of a scene that is under_known_effects() call for. With `request.fixed`
 /// it takes those and only predicts their change. Otherwise the extinction is found by a global search: cold

@@ -41,10 +41,10 @@ double rms(const Scene& scene, Seconds View::*of) {
 class MotionProbe {
  public:
   explicit MotionProbe(const MotionSearch& search)
-      : small_(
-            small_scene(search.scene,
-                        masks_before(search.scene, search.effects.background, search.options.flame_threshold),
-                        kMotionPixels)),
+      : small_(small_scene(search.scene,
+                           masks_before(search.scene, search.effects.background,
+                                        search.options.flame_threshold, search.options.compute),
+                           kMotionPixels)),
         grid_(
             grid_over(search.scene.box,
                       std::min(kCoarseGrid, std::max({search.grid.nx, search.grid.ny, search.grid.nz}) - 1))),
@@ -55,7 +55,8 @@ class MotionProbe {
     effects_.background = search.effects.background;
     effects_.sensor.clipping = search.effects.sensor.clipping;
     effects_.sensor.white = search.effects.sensor.white;
-    boxes_ = flame_boxes(small_, masks_before(small_, effects_.background, options_.flame_threshold));
+    boxes_ = flame_boxes(
+        small_, masks_before(small_, effects_.background, options_.flame_threshold, options_.compute));
   }
 
   [[nodiscard]] const Scene& scene() const { return small_; }
@@ -66,8 +67,9 @@ class MotionProbe {
     const Sensor& sensor = effects_.sensor;
     const double white = sensor.clipping == Sensor::Clipping::at_white ? sensor.white : 0;
     const Scene scene = at_one_instant(small_, carried(velocity), white);
-    const auto hull = carve(scene, masks_before(scene, effects_.background, options_.flame_threshold), grid_,
-                            options_.compute);
+    const auto hull =
+        carve(scene, masks_before(scene, effects_.background, options_.flame_threshold, options_.compute),
+              grid_, options_.compute);
     if (!hull) return std::numeric_limits<double>::infinity();
     SolverSetup setup{{}, boxes_, *hull, effects_, options_, pool_};
     for (const View& view : scene.views) setup.views.push_back(&view);

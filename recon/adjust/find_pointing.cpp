@@ -86,9 +86,11 @@ class PointingProbe {
     effects_.background = effects.background;
     effects_.sensor.clipping = effects.sensor.clipping;
     effects_.sensor.white = effects.sensor.white;
-    small_ =
-        small_scene(scene, masks_before(scene, effects.background, options.flame_threshold), kPointingPixels);
-    masks_ = masks_before(small_, effects.background, options.flame_threshold);
+    const auto masks_of = [&](const Scene& of) {
+      return masks_before(of, effects.background, options.flame_threshold, options.compute);
+    };
+    small_ = small_scene(scene, masks_of(scene), kPointingPixels);
+    masks_ = masks_of(small_);
     boxes_ = flame_boxes(small_, masks_);
     grid_ = grid_over(scene.box, kPointingGrid);
   }

@@ -52,7 +52,10 @@ PreparedScene PreparedScene::under(const Effects& effects) const {
   other.effects_ = effects;
   const bool same_sensor = effects.sensor == effects_.sensor;
   if (!same_sensor) other.make_linear();
-  if (!same_sensor || effects.motion != effects_.motion) other.bring_together();
+  const bool same_pictures = same_sensor && effects.motion == effects_.motion;
+  if (!same_pictures) other.bring_together();
+  if (!same_pictures || effects.background != effects_.background)
+    other.noise_masks_ = std::make_shared<NoiseMasks>();
   return other;
 }
 
@@ -61,7 +64,18 @@ PreparedScene PreparedScene::through(const std::vector<CameraModel>& cameras) co
   for (std::size_t v = 0; v < cameras.size(); ++v)
     other.told_.views[v].camera = other.linear_.views[v].camera = cameras[v];
   other.bring_together();
+  other.noise_masks_ = std::make_shared<NoiseMasks>();
   return other;
+}
+
+SharedMasks PreparedScene::masks(std::optional<double> threshold, const ComputeOptions& compute) const {
+  const auto find = [&] {
+    return std::make_shared<const std::vector<FlameMask>>(
+        masks_before(prepared_, effects_.background, threshold, compute));
+  };
+  if (threshold) return find();
+  std::call_once(noise_masks_->once, [&] { noise_masks_->found = find(); });
+  return noise_masks_->found;
 }
 
 void PreparedScene::at_own_instant(RadianceImage& render, std::size_t i) const {
@@ -84,15 +98,11 @@ SharedImage before_background(const View& view, const Background& background) {
 }
 
 std::vector<FlameMask> masks_before(const Scene& scene, const Background& background,
-                                    std::optional<double> threshold) {
-  if (background.kind == Background::Kind::black) return flame_masks(scene, threshold);
-  std::vector<FlameMask> masks;
-  masks.reserve(scene.views.size());
-  for (const View& view : scene.views) {
-    const SharedImage flame = before_background(view, background);
-    masks.push_back(threshold ? flame_mask(*flame, *threshold) : noise_mask(*flame));
-  }
-  return masks;
+                                    std::optional<double> threshold, const ComputeOptions& compute) {
+  if (background.kind == Background::Kind::black) return flame_masks(scene, threshold, compute);
+  Scene in_front = scene;
+  for (View& view : in_front.views) view.image = before_background(view, background);
+  return flame_masks(in_front, threshold, compute);
 }
 
 }  // namespace emberlock::recon

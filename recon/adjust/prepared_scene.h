@@ -2,15 +2,20 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
 #include "base/result.h"
+#include "recon/compute/device.h"
 #include "recon/effects/effects.h"
 #include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
+
+using SharedMasks = std::shared_ptr<const std::vector<FlameMask>>;
 
 /// A scene that has passed check_scene(), and its views as a solver works on them under some effects: linear
 /// in light, and all of the scene's instant. Pictures that come out as they were are shared with the scene as
@@ -28,6 +33,9 @@ class PreparedScene {
   /// Pictures as filmed, cameras as put right by through().
   [[nodiscard]] const Scene& told() const { return told_; }
   [[nodiscard]] const Effects& effects() const { return effects_; }
+  /// Of scene(), in front of the background. Noise masks are found when they are first asked for, once for
+  /// all scenes of the same pictures and background.
+  [[nodiscard]] SharedMasks masks(std::optional<double> threshold, const ComputeOptions& compute) const;
   /// Makes of a render by scene()'s camera of view `i` what the view itself shows: at its own instant.
   void at_own_instant(RadianceImage& render, std::size_t i) const;
 
@@ -36,17 +44,23 @@ class PreparedScene {
   void make_linear();
   void bring_together();
 
+  struct NoiseMasks {
+    std::once_flag once;
+    SharedMasks found;
+  };
+
   Scene told_;
   Effects effects_;
   Scene linear_;    // as filmed, linear in light
   Scene prepared_;  // and of one instant
+  std::shared_ptr<NoiseMasks> noise_masks_ = std::make_shared<NoiseMasks>();
 };
 
 /// What stands out from the background, brighter or darker; the picture itself where that is black.
 SharedImage before_background(const View& view, const Background& background);
 
-/// flame_masks() of what stands out from the background.
+/// flame_masks() of what stands out from the background; without a threshold each view's own noise_mask.
 std::vector<FlameMask> masks_before(const Scene& scene, const Background& background,
-                                    std::optional<double> threshold = std::nullopt);
+                                    std::optional<double> threshold, const ComputeOptions& compute);
 
 }  // namespace emberlock::recon

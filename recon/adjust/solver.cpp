@@ -101,13 +101,13 @@ Result<Reconstruction> solve(const PreparedScene& scene, const Grid& grid, const
   const bool paper = options.solver == Solver::paper;
   const Scene& linear = scene.scene();
   // Errors are counted over these boxes, whatever the threshold.
-  const std::vector<FlameMask> own = masks_before(linear, effects.background);
+  const SharedMasks own = scene.masks(std::nullopt, options.compute);
   std::optional<double> threshold = options.flame_threshold;
   if (paper && !threshold) threshold = kPaperFlameThreshold;
-  const std::vector<FlameMask> chosen = threshold ? masks_before(linear, effects.background, threshold) : own;
+  const SharedMasks chosen = scene.masks(threshold, options.compute);
   Reconstruction result;
   result.effects = effects;
-  EMBERLOCK_ASSIGN_OR_RETURN(result.hull, carve(linear, chosen, grid, options.compute));
+  EMBERLOCK_ASSIGN_OR_RETURN(result.hull, carve(linear, *chosen, grid, options.compute));
   result.hull_time = now() - start;
 
   Pool pool(options.compute.threads, device);
@@ -119,7 +119,7 @@ Result<Reconstruction> solve(const PreparedScene& scene, const Grid& grid, const
     (input ? setup.views : held_out).push_back(&linear.views[v]);
     const ImageSize size = linear.views[v].image->size;
     (input ? setup.boxes : held_out_boxes)
-        .push_back(own[v].box.empty() ? PixelBox{0, 0, size.width, size.height} : own[v].box);
+        .push_back((*own)[v].box.empty() ? PixelBox{0, 0, size.width, size.height} : (*own)[v].box);
   }
   std::optional<RefractiveIndex> index;
   if (effects.refraction.rays == Refraction::Rays::curved) {

@@ -54,6 +54,7 @@ struct Background {
   enum class Kind { black, constant, image };
   Kind kind = Kind::black;
   std::array<double, 3> radiance = {};  ///< of `constant`, grey levels
+  friend bool operator==(const Background&, const Background&) = default;
 };
 
 /// How long the shutter is open on a flame that rises meanwhile.

@@ -47,7 +47,8 @@ struct PutRight {
 
 PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOptions& options, Device device,
                                 const Elapsed& elapsed, const Progress& progress) {
-  PutRight result{under_known_effects(told, options.effects.value_or(EffectRequest{})), {}};
+  PutRight result{under_known_effects(told, options.effects.value_or(EffectRequest{}), options.solve.compute),
+                  {}};
   if (!may_correct_pointing(told.told(), options)) return result;
   Pool pool(options.solve.compute.threads, device);
   result.pointing =

@@ -135,8 +135,7 @@ Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions
   outcome.report = describe(scene, done.hull.grid, options, task.device);
   Report& result = outcome.report;
   result.hull_voxels = done.hull.count;
-  result.views =
-      errors_of_views(scene, masks_before(solved.scene(), done.effects.background), outcome.renders);
+  result.views = errors_of_views(scene, *solved.masks(std::nullopt, options.compute), outcome.renders);
   result.input_rmse = over_views(result.views, ViewRole::input).value_or(ChannelRmse{});
   result.heldout_rmse = over_views(result.views, ViewRole::held_out);
   result.hull_time = done.hull_time;

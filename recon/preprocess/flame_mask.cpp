@@ -5,10 +5,23 @@
 #include <cmath>
 #include <limits>
 
+#include "recon/compute/pool.h"
+
 namespace emberlock::recon {
 namespace {
 
-float brightness(const float* rgb) { return std::max({rgb[0], rgb[1], rgb[2]}); }
+/// The brightest channel of each pixel.
+std::vector<float> brightness(const RadianceImage& image) {
+  std::vector<float> brightest(image.rgb.size() / 3);
+  const float* rgb = image.rgb.data();
+  for (std::size_t p = 0; p < brightest.size(); ++p)
+    brightest[p] = std::max({rgb[3 * p], rgb[3 * p + 1], rgb[3 * p + 2]});
+  return brightest;
+}
+
+std::size_t row_begin(ImageSize size, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width);
+}
 
 template <class Values>
 double median(Values& values) {
@@ -18,85 +31,130 @@ double median(Values& values) {
   return *middle;
 }
 
-}  // namespace
-
-double noise_threshold(const RadianceImage& image) {
-  constexpr int kBlocks = 12;  // along the shorter side, where pixels allow
-  const int edge = std::clamp(std::min(image.size.width, image.size.height) / kBlocks, 4, 16);
+struct Blocks {
   std::vector<double> means;
-  std::vector<double> peaks;
-  for (int y = 0; y + edge <= image.size.height; y += edge) {
-    for (int x = 0; x + edge <= image.size.width; x += edge) {
-      double sum = 0;
-      double peak = -std::numeric_limits<double>::infinity();
-      for (int i = 0; i < edge * edge; ++i) {
-        const std::size_t p =
-            static_cast<std::size_t>(y + i / edge) * static_cast<std::size_t>(image.size.width) +
-            static_cast<std::size_t>(x + i % edge);
-        const auto v = static_cast<double>(brightness(&image.rgb[3 * p]));
-        sum += v;
-        peak = std::max(peak, v);
+  std::vector<float> peaks;
+};
+
+/// Of the square blocks that lie wholly in the picture.
+Blocks blocks_of(const std::vector<float>& bright, ImageSize size, int edge) {
+  Blocks blocks;
+  const int across = size.width / edge;
+  for (int y = 0; y + edge <= size.height; y += edge) {
+    const std::size_t first = blocks.means.size();
+    blocks.means.resize(first + static_cast<std::size_t>(across), 0);
+    blocks.peaks.resize(first + static_cast<std::size_t>(across), -std::numeric_limits<float>::infinity());
+    for (int dy = 0; dy < edge; ++dy) {
+      const float* pixel = bright.data() + row_begin(size, y + dy);
+      for (std::size_t b = first; b < blocks.means.size(); ++b) {
+        double sum = blocks.means[b];
+        float peak = blocks.peaks[b];
+        for (int dx = 0; dx < edge; ++dx, ++pixel) {
+          sum += static_cast<double>(*pixel);
+          peak = std::max(peak, *pixel);
+        }
+        blocks.means[b] = sum;
+        blocks.peaks[b] = peak;
       }
-      means.push_back(sum / (edge * edge));
-      peaks.push_back(peak);
     }
   }
-  if (means.empty()) return 1;
-  // The brightest of n normal pixels lies about sqrt(2 ln n) - 1/2 sigma above their mean. Looking at the
-  // brightest ones needs no model of what clipping at black, quantisation and demosaicing do to the rest.
-  const double background = median(means);
-  const double above = std::sqrt(2 * std::log(edge * edge)) - 0.5;
-  return background + std::max(1.0, 6 / above * (median(peaks) - background));
+  for (double& mean : blocks.means) mean /= edge * edge;
+  return blocks;
 }
 
-FlameMask flame_mask(const RadianceImage& image, double threshold) {
-  FlameMask mask;
-  mask.size = image.size;
-  mask.threshold = threshold;
-  mask.flame.resize(image.rgb.size() / 3);
-  PixelBox box{image.size.width, image.size.height, 0, 0};
-  for (int y = 0; y < image.size.height; ++y) {
-    const std::size_t row = static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width);
-    for (int x = 0; x < image.size.width; ++x) {
-      const std::size_t p = row + static_cast<std::size_t>(x);
-      if (!(brightness(&image.rgb[3 * p]) > threshold)) continue;
-      mask.flame[p] = 1;
-      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
+double noise_threshold(const std::vector<float>& bright, ImageSize size) {
+  constexpr int kBlocks = 12;  // along the shorter side, where pixels allow
+  const int edge = std::clamp(std::min(size.width, size.height) / kBlocks, 4, 16);
+  Blocks blocks = blocks_of(bright, size, edge);
+  if (blocks.means.empty()) return 1;
+  // The brightest of n normal pixels lies about sqrt(2 ln n) - 1/2 sigma above their mean. Looking at the
+  // brightest ones needs no model of what clipping at black, quantisation and demosaicing do to the rest.
+  const double background = median(blocks.means);
+  const double above = std::sqrt(2 * std::log(edge * edge)) - 0.5;
+  return background + std::max(1.0, 6 / above * (median(blocks.peaks) - background));
+}
+
+/// The smallest box that holds every pixel of 1.
+PixelBox box_of(const std::vector<std::uint8_t>& flame, ImageSize size) {
+  const auto width = static_cast<std::size_t>(size.width);
+  std::vector<std::uint8_t> column(width);  // 1 where any row has one
+  int y0 = size.height;
+  int y1 = 0;
+  for (int y = 0; y < size.height; ++y) {
+    const std::uint8_t* row = flame.data() + row_begin(size, y);
+    unsigned any = 0;
+    for (std::size_t x = 0; x < width; ++x) {
+      column[x] |= row[x];
+      any |= row[x];
     }
+    if (any == 0) continue;
+    y0 = std::min(y0, y);
+    y1 = y + 1;
   }
-  mask.box = box.empty() ? PixelBox{} : box;
+  if (y1 == 0) return {};
+  const auto x0 = std::find(column.begin(), column.end(), 1) - column.begin();
+  const auto x1 = column.rend() - std::find(column.rbegin(), column.rend(), 1);
+  return {static_cast<int>(x0), y0, static_cast<int>(x1), y1};
+}
+
+/// The largest float that isn't above a double: a float is above the one exactly where it is above the other.
+float not_above(double value) {
+  const auto nearest = static_cast<float>(value);
+  return static_cast<double>(nearest) > value ? std::nextafter(nearest, -INFINITY) : nearest;
+}
+
+FlameMask mask_above(const std::vector<float>& bright, ImageSize size, double threshold) {
+  FlameMask mask{size, threshold, std::vector<std::uint8_t>(bright.size()), {}};
+  const float least = not_above(threshold);
+  for (std::size_t p = 0; p < bright.size(); ++p) mask.flame[p] = bright[p] > least ? 1 : 0;
+  mask.box = box_of(mask.flame, size);
   return mask;
+}
+
+/// Leaves the flame pixels that have at least three others among their eight neighbours.
+void take_out_specks(FlameMask& mask) {
+  constexpr int kNeighbours = 3;
+  const auto width = static_cast<std::size_t>(mask.size.width);
+  const std::vector<std::uint8_t> raw = mask.flame;
+  const std::vector<std::uint8_t> none(width);
+  std::vector<std::uint8_t> column(width + 2);  // sums of three rows, between two of nothing
+  for (int y = mask.box.y0; y < mask.box.y1; ++y) {
+    const std::uint8_t* middle = raw.data() + row_begin(mask.size, y);
+    const std::uint8_t* above = y > 0 ? middle - width : none.data();
+    const std::uint8_t* below = y + 1 < mask.size.height ? middle + width : none.data();
+    std::uint8_t* left = mask.flame.data() + row_begin(mask.size, y);
+    for (std::size_t x = 0; x < width; ++x)
+      column[x + 1] = static_cast<std::uint8_t>(above[x] + middle[x] + below[x]);
+    for (std::size_t x = 0; x < width; ++x)
+      left[x] = column[x] + column[x + 1] + column[x + 2] > kNeighbours ? middle[x] : std::uint8_t{0};
+  }
+  mask.box = box_of(mask.flame, mask.size);
+}
+
+}  // namespace
+
+double noise_threshold(const RadianceImage& image) { return noise_threshold(brightness(image), image.size); }
+
+FlameMask flame_mask(const RadianceImage& image, double threshold) {
+  return mask_above(brightness(image), image.size, threshold);
 }
 
 FlameMask noise_mask(const RadianceImage& image) {
-  const FlameMask raw = flame_mask(image, noise_threshold(image));
-  constexpr int kNeighbours = 3;
-  const auto lit = [&](int x, int y) {
-    return x >= 0 && y >= 0 && x < raw.size.width && y < raw.size.height && raw.at(x, y);
-  };
-  FlameMask mask{raw.size, raw.threshold, std::vector<std::uint8_t>(raw.flame.size()), {}};
-  PixelBox box{raw.size.width, raw.size.height, 0, 0};
-  for (int y = raw.box.y0; y < raw.box.y1; ++y) {
-    for (int x = raw.box.x0; x < raw.box.x1; ++x) {
-      if (!raw.at(x, y)) continue;
-      int around = -1;
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dx = -1; dx <= 1; ++dx) around += lit(x + dx, y + dy) ? 1 : 0;
-      if (around < kNeighbours) continue;
-      mask.flame[static_cast<std::size_t>(y) * static_cast<std::size_t>(raw.size.width) +
-                 static_cast<std::size_t>(x)] = 1;
-      box = {std::min(box.x0, x), std::min(box.y0, y), std::max(box.x1, x + 1), std::max(box.y1, y + 1)};
-    }
-  }
-  mask.box = box.empty() ? PixelBox{} : box;
+  const std::vector<float> bright = brightness(image);
+  FlameMask mask = mask_above(bright, image.size, noise_threshold(bright, image.size));
+  take_out_specks(mask);
   return mask;
 }
 
-std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold) {
-  std::vector<FlameMask> masks;
-  masks.reserve(scene.views.size());
-  for (const View& view : scene.views)
-    masks.push_back(threshold ? flame_mask(*view.image, *threshold) : noise_mask(*view.image));
+std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold,
+                                   const ComputeOptions& compute) {
+  std::vector<FlameMask> masks(scene.views.size());
+  Pool pool(compute.threads);
+  pool.run(static_cast<int>(masks.size()), [&](int v) {
+    const auto i = static_cast<std::size_t>(v);
+    const RadianceImage& image = *scene.views[i].image;
+    masks[i] = threshold ? flame_mask(image, *threshold) : noise_mask(image);
+  });
   return masks;
 }
 

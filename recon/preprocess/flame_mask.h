@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "recon/compute/device.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
@@ -42,6 +43,7 @@ FlameMask flame_mask(const RadianceImage& image, double threshold);
 FlameMask noise_mask(const RadianceImage& image);
 
 /// Masks of all views, in order; without a threshold each view's own noise_mask.
-std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold = std::nullopt);
+std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold = std::nullopt,
+                                   const ComputeOptions& compute = {});
 
 }  // namespace emberlock::recon

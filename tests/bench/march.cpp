@@ -292,9 +292,9 @@ void run_stage(benchmark::State& state, const Case& c) {
 
 // --- hull, pictures, whole frames
 
-void masks(benchmark::State& state) {
+void masks(benchmark::State& state, int threads) {
   const recon::Scene& scene = scene_of(10);
-  repeat(state, [&] { benchmark::DoNotOptimize(recon::flame_masks(scene)); });
+  repeat(state, [&] { benchmark::DoNotOptimize(recon::flame_masks(scene, {}, on_cpu(threads))); });
 }
 
 void hull(benchmark::State& state) {
@@ -400,7 +400,7 @@ int main(int argc, char** argv) {
   add("triad", 1, bandwidth)->ArgName("threads")->Arg(1)->Arg(2);
   for (const int threads : {1, 2}) add_paper_setup(threads);
   add("solve/told/voxels:256/threads:2", 1, frame, true, 256, 2);
-  add("masks", 4, masks);
+  for (const int threads : {1, 2}) add("masks/threads:" + std::to_string(threads), 4, masks, threads);
   for (const recon::Absorb absorb : {recon::Absorb::nothing, recon::Absorb::constant})
     for (const Stage stage : {Stage::forward, Stage::adjoint})
       add_stage("cube/", {stage, absorb, {128, 10, true}, 1}, 3);

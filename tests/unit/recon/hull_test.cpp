@@ -5,9 +5,7 @@
 
 #include <gtest/gtest.h>
 
-#include "base/random.h"
 #include "recon/preprocess/check_scene.h"
-#include "recon/preprocess/radiance.h"
 #include "tests/support/devices.h"
 #include "tests/support/edit_view.h"
 #include "tests/support/small_flame.h"
@@ -115,45 +113,7 @@ TEST_P(HullTest, SixtyFiveViewsAreRefused) {
   EXPECT_TRUE(carve(scene, flame_masks(scene), grid_over(scene.box, 8), {}).ok());
 }
 
-TEST(FlameMask, ThresholdComesFromTheNoise) {
-  PaperSceneOptions options;
-  options.image = {160, 120};
-  options.truth_voxels = 48;
-  EXPECT_DOUBLE_EQ(noise_threshold(*paper_scene(options).views[0].image), 1);
-  options.noise = 2;
-  const double threshold = noise_threshold(*paper_scene(options).views[0].image);
-  EXPECT_GT(threshold, 4);
-  EXPECT_LT(threshold, 14);
-}
-
-TEST(FlameMask, ThresholdOfADemosaicedPictureLiesAboveItsNoise) {
-  // Interpolated samples share their neighbours' noise: differences of neighbours would see half of it.
-  Image mosaic({{320, 240}, PixelFormat::bayer_rggb8, 8});
-  for (int y = 0; y < 240; ++y)
-    for (int x = 0; x < 320; ++x) {
-      const int pixel = y * 320 + x;
-      mosaic.row_as<std::uint8_t>(y)[x] = static_cast<std::uint8_t>(
-          std::lround(20 + 2 * random_normal(1, 0, static_cast<std::uint64_t>(pixel))));
-    }
-  const RadianceImage image = to_radiance(mosaic.view());
-  EXPECT_GT(noise_threshold(image), 20 + 4 * 2);
-  EXPECT_TRUE(noise_mask(image).box.empty());
-}
-
-TEST(FlameMask, HotPixelsAreNoFlame) {
-  RadianceImage image({40, 30});
-  const auto light = [&](int x, int y) { image.rgb[3 * static_cast<std::size_t>(y * 40 + x)] = 200; };
-  light(3, 4);
-  light(30, 20);
-  light(31, 20);
-  EXPECT_TRUE(noise_mask(image).box.empty());
-  light(30, 21);
-  light(31, 21);
-  EXPECT_EQ(noise_mask(image).box.x0, 30);
-  EXPECT_EQ(noise_mask(image).box.y1, 22);
-}
-
-TEST(FlameMask, NanAndInfiniteInputIsRefusedByName) {
+TEST(CheckScene, NanAndInfiniteInputIsRefusedByName) {
   Scene scene = small_flame_scene();
   const SharedImage whole = scene.views[2].image;
   edit(scene.views[2].image, [](RadianceImage& image) { image.rgb[3 * (5 * 160 + 7) + 1] = std::nanf(""); });

@@ -84,6 +84,21 @@ TEST(PreparedSceneTest, AGreyBackgroundBehindAGammaIsKnownInLinearLevels) {
   for (const double level : found.radiance) EXPECT_NEAR(level, 12, 0.5);
 }
 
+TEST(PreparedSceneTest, MasksAreFoundOnceForTheSamePicturesAndBackground) {
+  const auto prepared = PreparedScene::create(scene_of_a_ball(), {});
+  ASSERT_TRUE(prepared.ok());
+  const SharedMasks masks = prepared->masks({}, {});
+  Effects other;
+  other.extinction = constant_extinction(PerMeter(30));
+  EXPECT_EQ(prepared->under(other).masks({}, {}), masks);
+  other.background = {Background::Kind::constant, {9, 9, 9}};
+  EXPECT_NE(prepared->under(other).masks({}, {}), masks);
+  EXPECT_NE(prepared->under(a_gamma()).masks({}, {}), masks);
+  const SharedMasks at_threshold = prepared->masks(50, {});
+  EXPECT_EQ((*at_threshold)[0].threshold, 50);
+  EXPECT_EQ(prepared->masks({}, {}), masks);
+}
+
 TEST(PreparedSceneTest, WhatDoesNotChangeAPictureSharesIt) {
   const Scene told = scene_of_a_ball();
   const auto prepared = PreparedScene::create(told, a_gamma());

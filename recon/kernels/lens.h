@@ -28,8 +28,9 @@ struct Distortion {
   HOST_DEVICE inline void distort(double x, double y, double& to_x, double& to_y) const {
     brown_conrady(k1, k2, p1, p2, k3, x, y, to_x, to_y);
   }
-  /// By fixed-point iteration.
+  /// By Newton's method; where the lens folds the picture over, by steps of the difference itself.
   HOST_DEVICE inline void undistort(double& x, double& y) const {
+    constexpr double kFold = 0.05;  // of the determinant
     const double from_x = x;
     const double from_y = y;
     for (int i = 0; i < 50; ++i) {
@@ -38,9 +39,18 @@ struct Distortion {
       distort(x, y, dx, dy);
       dx -= from_x;
       dy -= from_y;
-      x -= dx;
-      y -= dy;
-      if (dx * dx + dy * dy < 1e-24) break;
+      const double r2 = x * x + y * y;
+      const double radial = 1 + r2 * (k1 + r2 * (k2 + r2 * k3));
+      const double slope = 2 * (k1 + r2 * (2 * k2 + r2 * 3 * k3));  // of radial by r2, twice
+      const double xx = radial + x * x * slope + 2 * p1 * y + 6 * p2 * x;
+      const double xy = x * y * slope + 2 * (p1 * x + p2 * y);
+      const double yy = radial + y * y * slope + 6 * p1 * y + 2 * p2 * x;
+      const double determinant = xx * yy - xy * xy;
+      const bool folds = !(determinant > kFold);
+      x -= folds ? dx : (yy * dx - xy * dy) / determinant;
+      y -= folds ? dy : (xx * dy - xy * dx) / determinant;
+      // A step of Newton's leaves about the square of what it took away.
+      if (dx * dx + dy * dy < (folds ? 1e-24 : 1e-16)) break;
     }
   }
 };

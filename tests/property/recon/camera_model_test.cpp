@@ -44,7 +44,7 @@ TEST(CameraModelLaws, ARayProjectsBackOntoItsPixel) {
     const Ray ray = c.ray(pixel);
     RC_ASSERT(std::abs(ray.direction.norm() - 1) < 1e-12);
     const Eigen::Vector2d back = c.project(ray.origin + real(0.01, 100) * ray.direction);
-    RC_ASSERT((back - pixel).norm() < 1e-3);
+    RC_ASSERT((back - pixel).norm() < 1e-9);
   });
 }
 

@@ -80,17 +80,17 @@ Bench measure(const BenchArguments& a) {
   const Result<recon::Device> cuda =
       asked == recon::Device::cpu
           ? Result<recon::Device>(Error{ErrorKind::refused, "not asked for", "--device cpu", ""})
-          : recon::resolve(recon::Device::cuda);
+          : recon::resolve(asked == recon::Device::cuda ? asked : recon::Device::cuda);
   if (!cuda) b.no_cuda = cuda.error().what;
   if (!cuda && asked == recon::Device::cuda) fail(cuda.error());
   b.machine.disk = or_fail(rig::doctor::write_speed(a.folder, std::uint64_t{256} << 20, Seconds(2)));
   b.devices = rig::list_devices();
   b.machine.cpu = timed(usual, recon::Device::cpu, a, "CPU");
-  if (cuda) b.machine.cuda = timed(usual, recon::Device::cuda, a, "GPU");
+  if (cuda) b.machine.cuda = timed(usual, *cuda, a, "GPU");
   b.on_cuda = b.machine.cuda && b.machine.cuda->found < b.machine.cpu.found;
   b.frame = b.on_cuda ? *b.machine.cuda : b.machine.cpu;
   if (a.rig.cameras != usual.cameras || a.rig.size != usual.size || a.rig.voxels != usual.voxels)
-    b.frame = timed(a.rig, b.on_cuda ? recon::Device::cuda : recon::Device::cpu, a, "your rig");
+    b.frame = timed(a.rig, b.on_cuda ? *cuda : recon::Device::cpu, a, "your rig");
   b.expected = or_fail(evaluate::expectation(a.rig, b.machine.disk, b.frame));
   return b;
 }
@@ -179,7 +179,8 @@ void add_bench(CLI::App& app) {
   verb->add_option("--voxels", a.rig.voxels, "Along the longest edge")->capture_default_str();
   verb->add_option("--disk", a.folder, "A place on the recordings' disk; what is written there is removed")
       ->capture_default_str();
-  verb->add_option("--device", a.device, "auto, cpu or cuda")->capture_default_str();
+  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
+      ->capture_default_str();
   verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();

@@ -107,7 +107,7 @@ void ProgressStream::send(const v1::ChildMessage& message) {
 void ProgressStream::loading(recon::Device device) {
   v1::ChildMessage message;
   message.mutable_progress()->set_doing("loading the pictures");
-  message.mutable_progress()->set_device(device == recon::Device::cuda ? "cuda" : "cpu");
+  message.mutable_progress()->set_device(name(device));
   send(message);
 }
 

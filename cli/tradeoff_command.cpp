@@ -197,7 +197,8 @@ void add_recon(CLI::App& parent) {
       ->check(CLI::PositiveNumber);
   verb->add_option("--box", a.box, "As in `reconstruct`");
   verb->add_option("--frame", a.frame, "As in `reconstruct`")->check(CLI::NonNegativeNumber);
-  verb->add_option("--device", a.device, "auto, cpu or cuda")->capture_default_str();
+  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
+      ->capture_default_str();
   verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();

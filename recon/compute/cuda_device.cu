@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdint>
 #include <cstdio>
+#include <map>
+#include <mutex>
 #include <string>
 
 #include <cuda_runtime.h>
@@ -11,18 +13,20 @@
 namespace emberlock::recon {
 namespace {
 
-/// Why the first GPU isn't usable; empty if it is.
-std::string missing() {
+/// Why a GPU isn't usable; empty if it is.
+std::string missing(int gpu) {
   int devices = 0;
   const cudaError_t code = cudaGetDeviceCount(&devices);
   if (code != cudaSuccess) return cudaGetErrorString(code);
   if (devices == 0) return "no GPU was found";
+  if (gpu >= devices)
+    return "there is no GPU " + std::to_string(gpu) + ", the last is " + std::to_string(devices - 1);
   int major = 0;
   int minor = 0;
   int pools = 0;
-  if (cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, 0) != cudaSuccess ||
-      cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, 0) != cudaSuccess ||
-      cudaDeviceGetAttribute(&pools, cudaDevAttrMemoryPoolsSupported, 0) != cudaSuccess)
+  if (cudaDeviceGetAttribute(&major, cudaDevAttrComputeCapabilityMajor, gpu) != cudaSuccess ||
+      cudaDeviceGetAttribute(&minor, cudaDevAttrComputeCapabilityMinor, gpu) != cudaSuccess ||
+      cudaDeviceGetAttribute(&pools, cudaDevAttrMemoryPoolsSupported, gpu) != cudaSuccess)
     return "the GPU doesn't answer";
   constexpr int kOldest = 75;  // the oldest architecture for which the build compiles
   if (10 * major + minor < kOldest)
@@ -32,29 +36,35 @@ std::string missing() {
   return {};
 }
 
-Status ask_cuda() {
-  const std::string why = missing();
+Status ask_cuda(int gpu) {
+  const std::string why = missing(gpu);
   if (why.empty()) return {};
   return Error{
-      ErrorKind::device, "CUDA can't run here: " + why, "device cuda",
+      ErrorKind::device, "CUDA can't run here: " + why, "device " + name(Device(Device::cuda, gpu)),
       "Install an NVIDIA GPU of compute capability 7.5 or later and its driver, or use --device cpu"};
 }
 
 /// Keeps freed memory for the next allocation, instead of returning it to the driver at every wait.
-void keep_freed_memory() {
-  int device = 0;
+void keep_freed_memory(int gpu) {
   cudaMemPool_t pool = nullptr;
-  check_cuda(cudaGetDevice(&device), "asking for the device");
-  check_cuda(cudaDeviceGetDefaultMemPool(&pool, device), "asking for its memory");
+  check_cuda(cudaDeviceGetDefaultMemPool(&pool, gpu), "asking for its memory");
   std::uint64_t all = ~std::uint64_t{0};
   check_cuda(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &all), "setting up its memory");
 }
 
 }  // namespace
 
-Status cuda_status() {
-  static const Status status = ask_cuda();
-  return status;
+Status cuda_status(int gpu) {
+  static std::mutex mutex;
+  static std::map<int, Status> asked;
+  const std::lock_guard lock(mutex);
+  const auto known = asked.find(gpu);
+  return known != asked.end() ? known->second : asked.emplace(gpu, ask_cuda(gpu)).first->second;
+}
+
+void use_gpu(int gpu) {
+  check_cuda(cudaSetDevice(gpu), "choosing the GPU");
+  keep_freed_memory(gpu);
 }
 
 void check_cuda(cudaError_t code, const char* what) {
@@ -65,8 +75,6 @@ void check_cuda(cudaError_t code, const char* what) {
 }
 
 void* cuda_allocate(std::size_t bytes) {
-  static const bool kept = (keep_freed_memory(), true);
-  (void)kept;
   void* data = nullptr;
   const cudaError_t code = cudaMallocAsync(&data, bytes, nullptr);
   if (code != cudaErrorMemoryAllocation) {

@@ -5,7 +5,10 @@
 
 namespace emberlock::recon {
 
-/// Ok if the CUDA backend was built and a GPU answers; otherwise the Error says which is missing.
-Status cuda_status();
+/// Ok if the CUDA backend was built and this GPU answers; otherwise the Error says which is missing.
+Status cuda_status(int gpu = 0);
+
+/// The GPU of all that the calling thread does from here on. Throws a DeviceError.
+void use_gpu(int gpu);
 
 }  // namespace emberlock::recon

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/compute/device.h"
 
+#include <charconv>
 #include <cstdlib>
 #include <string>
 
@@ -17,12 +18,25 @@ Result<Precision> parse_precision(std::string_view name) {
 
 std::string_view name(Precision precision) { return precision == Precision::float32 ? "float32" : "float64"; }
 
+std::string name(Device device) {
+  if (device == Device::automatic) return "auto";
+  if (device == Device::cpu) return "cpu";
+  return device.gpu == 0 ? "cuda" : "cuda:" + std::to_string(device.gpu);
+}
+
 Result<Device> parse_device(std::string_view name) {
-  if (name == "auto") return Device::automatic;
-  if (name == "cpu") return Device::cpu;
-  if (name == "cuda") return Device::cuda;
+  if (name == "auto") return Device(Device::automatic);
+  if (name == "cpu") return Device(Device::cpu);
+  if (name == "cuda") return Device(Device::cuda);
+  constexpr std::string_view kNumbered = "cuda:";
+  if (name.substr(0, kNumbered.size()) == kNumbered) {
+    int gpu = -1;
+    const char* end = name.data() + name.size();
+    const auto [last, error] = std::from_chars(name.data() + kNumbered.size(), end, gpu);
+    if (error == std::errc() && last == end && gpu >= 0) return Device(Device::cuda, gpu);
+  }
   return Error{ErrorKind::bad_input, "unknown device '" + std::string(name) + "'", "device",
-               "Use auto, cpu or cuda"};
+               "Use auto, cpu, cuda, or cuda:N for the GPU of this number"};
 }
 
 Result<Device> resolve(Device choice) {
@@ -30,18 +44,19 @@ Result<Device> resolve(Device choice) {
   if (named != nullptr) {
     EMBERLOCK_ASSIGN_OR_RETURN(choice, parse_device(named));
   }
-  if (choice == Device::cpu) return Device::cpu;
-  const Status cuda = cuda_status();
-  if (cuda.ok()) return Device::cuda;
-  if (choice == Device::automatic) return Device::cpu;
+  if (choice == Device::cpu) return choice;
+  const Status cuda = cuda_status(choice.gpu);
+  if (cuda.ok()) return Device(Device::cuda, choice.gpu);
+  if (choice == Device::automatic) return Device(Device::cpu);
   return cuda.error();
 }
 
 #ifndef EMBERLOCK_HAVE_CUDA
-Status cuda_status() {
+Status cuda_status(int /*gpu*/) {
   return Error{ErrorKind::device, "this build has no CUDA backend", "device cuda",
                "Build where nvcc is on PATH, or use --device cpu"};
 }
+void use_gpu(int /*gpu*/) {}
 #endif
 
 }  // namespace emberlock::recon

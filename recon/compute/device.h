@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <compare>
 #include <exception>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -9,11 +11,23 @@
 
 namespace emberlock::recon {
 
-enum class Device {
-  automatic,  ///< CUDA if it was built and a GPU answers, else the CPU
-  cpu,
-  cuda,
+/// Where the heavy passes run.
+struct Device {
+  enum Kind {
+    automatic,  ///< CUDA if it was built and a GPU answers, else the CPU
+    cpu,
+    cuda,
+  };
+  // NOLINTNEXTLINE(google-explicit-constructor): a kind is a device, the first of its kind
+  constexpr Device(Kind of = automatic, int number = 0) : kind(of), gpu(number) {}
+  Kind kind;
+  int gpu;  ///< of `cuda`: which GPU, as the driver counts them from 0
+  friend auto operator<=>(const Device&, const Device&) = default;
+  friend bool operator==(const Device&, const Device&) = default;
+  friend bool operator==(const Device& device, Kind kind) { return device.kind == kind; }
 };
+/// "auto", "cpu", "cuda" (the first GPU), "cuda:1", ...
+std::string name(Device device);
 
 /// Whether this build can launch on a GPU. If not, no Pool has Device::cuda.
 #ifdef EMBERLOCK_HAVE_CUDA
@@ -47,12 +61,12 @@ class DeviceError : public std::exception {
   Error error_;
 };
 
-/// "auto", "cpu" or "cuda"; otherwise the Error lists these.
+/// The device of this name(); otherwise the Error lists what there is.
 Result<Device> parse_device(std::string_view name);
 
 /// The device selected on this machine: cpu or cuda, never automatic. An Error of kind `device` says why CUDA
-/// isn't usable (not built, no driver, no GPU). EMBERLOCK_DEVICE=cpu|cuda in the environment overrides
-/// automatic, for tests and comparisons.
+/// isn't usable (not built, no driver, no such GPU). EMBERLOCK_DEVICE=cpu|cuda|cuda:N in the environment
+/// overrides automatic, for tests and comparisons.
 Result<Device> resolve(Device choice);
 
 }  // namespace emberlock::recon

@@ -8,6 +8,8 @@
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
 
+#include "recon/compute/cuda_device.h"
+
 #ifdef EMBERLOCK_THREAD_SANITIZER
 #include <sanitizer/tsan_interface.h>
 #endif
@@ -43,15 +45,18 @@ Device resolved(Device choice) {
 
 struct Pool::Arena {
   explicit Arena(std::size_t threads)
-      : limit(tbb::global_control::max_allowed_parallelism, threads), arena(static_cast<int>(threads)) {}
-  tbb::global_control limit;
+      : limit(tbb::global_control::max_allowed_parallelism, std::max(threads, thread_count(0))),
+        arena(static_cast<int>(threads)) {}
+  tbb::global_control limit;  // of the process: several pools may be at work at once
   tbb::task_arena arena;
   char started = 0;  // addresses for publish and observe
   char ended = 0;
 };
 
 Pool::Pool(int threads, Device device)
-    : arena_(std::make_unique<Arena>(thread_count(threads))), device_(device) {}
+    : arena_(std::make_unique<Arena>(thread_count(threads))), device_(device) {
+  if (device == Device::cuda) use_gpu(device.gpu);
+}
 Pool::Pool(const ComputeOptions& compute) : Pool(compute.threads, resolved(compute.device)) {}
 Pool::~Pool() = default;
 

@@ -13,7 +13,8 @@ namespace emberlock::recon {
 /// in the order of the tasks, are bit-identical for any number of threads. One caller at a time.
 class Pool {
  public:
-  /// 0 threads: all cores. The device must be resolved: cpu, or cuda if resolve() returned it.
+  /// 0 threads: all cores. The device must be resolved: cpu, or cuda if resolve() returned it; its GPU
+  /// becomes that of the calling thread.
   explicit Pool(int threads, Device device = Device::cpu);
   /// Throws a DeviceError if resolve() fails.
   explicit Pool(const ComputeOptions& compute);

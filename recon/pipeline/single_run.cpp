@@ -58,7 +58,7 @@ Report describe(const Scene& scene, const Grid& grid, const SolveOptions& option
   Report report;
   report.solver = name(options.solver);
   if (options.solver == Solver::paper) report.deviations = paper_deviations();
-  report.device = device == Device::cuda ? "cuda" : "cpu";
+  report.device = name(device);
   report.threads = options.compute.threads;
   report.seed = options.seed;
   report.step = options.step;

@@ -181,5 +181,22 @@ TEST(Device, CudaRunsOrSaysWhyNot) {
   }
 }
 
+TEST(Device, IsNamedByItsKindAndNumber) {
+  for (const char* text : {"auto", "cpu", "cuda", "cuda:1", "cuda:12"})
+    EXPECT_EQ(name(*parse_device(text)), text);
+  EXPECT_EQ(*parse_device("cuda:0"), *parse_device("cuda"));
+  EXPECT_EQ(parse_device("cuda:3")->gpu, 3);
+  EXPECT_FALSE(*parse_device("cuda:3") == Device(Device::cuda));
+  EXPECT_TRUE(*parse_device("cuda:3") == Device::cuda);
+  for (const char* text : {"", "gpu", "cuda:", "cuda:-1", "cuda:1x", "cuda: 1", "cuda:99999999999"})
+    EXPECT_FALSE(parse_device(text).ok()) << text;
+}
+
+TEST(Device, AGpuThatIsNotThereIsAnError) {
+  const auto none = resolve(Device(Device::cuda, 1000));
+  ASSERT_FALSE(none.ok());
+  EXPECT_EQ(none.error().kind, ErrorKind::device);
+}
+
 }  // namespace
 }  // namespace emberlock::recon

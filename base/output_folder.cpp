@@ -194,20 +194,6 @@ bool lies_in(const fs::path& path, const fs::path& folder) {
   }
 }
 
-/// Creates a folder and its missing parents; `made` receives those that were created.
-Status make_folders(const fs::path& folder, std::vector<fs::path>& made) {
-  std::vector<fs::path> absent;
-  for (fs::path at = folder; !is_there(at); at = at.parent_path()) absent.push_back(at);
-  for (auto next = absent.rbegin(); next != absent.rend(); ++next) {
-    if (::mkdir(next->c_str(), 0777) == 0) {
-      made.push_back(*next);
-    } else if (errno != EEXIST) {
-      return refused_by_system(*next, "cannot create the folder", "Check that its parent is writable");
-    }
-  }
-  return {};
-}
-
 /// A mount point can't be replaced by another folder.
 Status check_not_mounted(const fs::path& target) {
   struct statx info {};
@@ -280,6 +266,29 @@ bool remove_ours(const fs::path& folder,
   return all;
 }
 
+Result<MadeFolders> MadeFolders::create(const fs::path& folder) {
+  MadeFolders made;
+  std::vector<fs::path> absent;
+  for (fs::path at = folder; !is_there(at); at = at.parent_path()) absent.push_back(at);
+  for (auto next = absent.rbegin(); next != absent.rend(); ++next) {
+    if (::mkdir(next->c_str(), 0777) == 0) {
+      made.made_.push_back(*next);
+    } else if (errno != EEXIST) {
+      return refused_by_system(*next, "cannot create the folder", "Check that its parent is writable");
+    }
+  }
+  return made;
+}
+
+MadeFolders& MadeFolders::operator=(MadeFolders&& o) noexcept {
+  std::swap(made_, o.made_);
+  return *this;
+}
+
+MadeFolders::~MadeFolders() {
+  for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) ::rmdir(folder->c_str());
+}
+
 Status OutputFolder::check(const OutputRequest& request) {
   // Creating the hidden folder and removing it again makes exactly the checks of a real run.
   const auto probe = create(request);
@@ -292,7 +301,7 @@ Result<OutputFolder> OutputFolder::create(const OutputRequest& asked) {
   const fs::path& target = request.target;
   EMBERLOCK_RETURN_IF_ERROR(check_apart(target, request.inputs));
   OutputFolder folder(request);
-  EMBERLOCK_RETURN_IF_ERROR(make_folders(target.parent_path(), folder.made_));
+  EMBERLOCK_ASSIGN_OR_RETURN(folder.parents_, MadeFolders::create(target.parent_path()));
   EMBERLOCK_RETURN_IF_ERROR(check_not_mounted(target));
   EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd parent, lock_folder(target.parent_path()));
   EMBERLOCK_RETURN_IF_ERROR(clean_up(target));
@@ -319,13 +328,12 @@ Result<OutputFolder> OutputFolder::create(const OutputRequest& asked) {
 OutputFolder::OutputFolder(OutputFolder&& o) noexcept
     : request_(std::move(o.request_)),
       staging_(std::exchange(o.staging_, {})),
-      made_(std::exchange(o.made_, {})),
+      parents_(std::move(o.parents_)),
       lock_(std::move(o.lock_)) {}
 
 OutputFolder::~OutputFolder() {
   std::error_code ec;
   if (!staging_.empty()) fs::remove_all(staging_, ec);
-  for (auto parent = made_.rbegin(); parent != made_.rend(); ++parent) ::rmdir(parent->c_str());
 }
 
 Status OutputFolder::commit() {
@@ -341,7 +349,7 @@ Status OutputFolder::commit() {
   lock_ = UniqueFd();  // on the old list, which is replaced now: over NFS an open handle would keep that file
                        // alive
   // The result is complete and on the disk. From here on no failure loses it.
-  made_.clear();
+  parents_.keep();
   if (const Status listed = write_list(staging_, list); !listed.ok()) moves = listed;
   if (moves.ok()) moves = flush_folders(staging_);
   fs::path old;

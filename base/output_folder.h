@@ -61,6 +61,22 @@ Status check_new_folder(const std::filesystem::path& folder);
 bool remove_ours(const std::filesystem::path& folder,
                  const std::function<bool(const std::string& path, const struct stat& info)>& ours);
 
+/// A folder and its parents, as far as they were missing. When it is destroyed, those that it created and
+/// that nothing was put in are removed again.
+class MadeFolders {
+ public:
+  MadeFolders() = default;
+  /// Error (io): one of them can't be created.
+  static Result<MadeFolders> create(const std::filesystem::path& folder);
+  MadeFolders(MadeFolders&&) noexcept = default;
+  MadeFolders& operator=(MadeFolders&& o) noexcept;
+  ~MadeFolders();
+  void keep() { made_.clear(); }
+
+ private:
+  std::vector<std::filesystem::path> made_;  // outermost first
+};
+
 /// The output folder of a verb. It is filled as a hidden folder beside the target (`path()`) and renamed to
 /// the target only when it is complete and on the disk (`commit()`). When it is destroyed without commit(),
 /// it removes what was written.
@@ -98,8 +114,8 @@ class OutputFolder {
 
   OutputRequest request_;  // its target is resolved
   std::filesystem::path staging_;
-  std::vector<std::filesystem::path> made_;  // created parents; removed again if nothing was put in them
-  UniqueFd lock_;                            // on the list, held while the result isn't finished
+  MadeFolders parents_;
+  UniqueFd lock_;  // on the list, held while the result isn't finished
 };
 
 }  // namespace emberlock

@@ -1,13 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
 #include <optional>
 #include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -16,6 +13,7 @@
 #include "cli/interrupt.h"
 #include "cli/outputs.h"
 #include "cli/progress_stream.h"
+#include "cli/reconstruct_arguments.h"
 #include "cli/reconstruct_daemon.h"
 #include "cli/reconstruct_sequence.h"
 #include "cli/reconstruct_summary.h"
@@ -35,146 +33,12 @@
 namespace emberlock::cli {
 namespace {
 
-/// The command line as typed, not yet interpreted.
-struct ReconstructArguments {
-  std::string input;
-  std::string out;
-  std::string rig;
-  std::string background = "auto";
-  std::string smear = "auto";
-  std::string demosaic = "bilinear";
-  std::string plan;
-  std::string box;
-  std::string solver = "default";
-  std::string effects;
-  std::string device = "auto";
-  std::string precision = "float32";
-  bool keep_poses = false;
-  std::vector<int> held_out;
-  int views = 0;
-  double step = 1;
-  std::string voxels;
-  std::optional<std::size_t> frame, last_frame;
-  std::uint32_t every = 1;
-  std::optional<double> budget;
-  std::optional<double> target_rmse;
-  std::optional<double> threshold;
-  int iterations = 0;
-  int threads = 0;
-  std::uint64_t seed = 1;
-  std::optional<int> progress_fd;
-  DaemonReconstruction by_daemon;
-};
-
-}  // namespace
-
-Result<recon::Box> parse_box(const std::string& text) {
-  std::vector<double> numbers;
-  std::istringstream words(text);
-  for (std::string word; std::getline(words, word, ',');) {
-    char* end = nullptr;
-    numbers.push_back(std::strtod(word.c_str(), &end));
-    if (word.empty() || *end != '\0' || !std::isfinite(numbers.back())) numbers.clear();
-    if (numbers.empty()) break;
-  }
-  if (numbers.size() != 6 || text.back() == ',') {
-    return Error{ErrorKind::bad_input, "\"" + text + "\" is not six numbers", "--box",
-                 "Give cx,cy,cz,sx,sy,sz: centre and size in metres"};
-  }
-  const recon::Box box{{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5]}};
-  if (box.size.minCoeff() <= 0) {
-    return Error{ErrorKind::bad_input, "an edge is 0 or less", "--box", "Give sizes above 0 m"};
-  }
-  return box;
-}
-
-namespace {
-
-/// A number of voxels, or "paper"; empty: the program chooses.
-Status parse_voxels(const std::string& text, recon::ReconstructOptions& options) {
-  if (text.empty()) return {};
-  if (text == "paper") {
-    options.rule = recon::VoxelRule::paper;
-    return {};
-  }
-  int voxels = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), voxels);
-  if (error != std::errc() || end != text.data() + text.size() || voxels < 1 ||
-      voxels > recon::kLargestVoxels) {
-    return Error{ErrorKind::bad_input, "\"" + text + "\" is no number of voxels", "--voxels",
-                 "Give 1 to " + std::to_string(recon::kLargestVoxels) +
-                     ", or paper for the paper's rule, or leave it away for the knee of time against error"};
-  }
-  options.voxels = voxels;
-  return {};
-}
-
-/// Interprets the options; or the first error, as in parse_box.
-Result<recon::ReconstructOptions> options_of(const ReconstructArguments& arguments) {
-  recon::ReconstructOptions options;
-  EMBERLOCK_RETURN_IF_ERROR(parse_voxels(arguments.voxels, options));
-  if (!arguments.effects.empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(options.effects, recon::parse_effects(arguments.effects));
-  }
-  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.solver, recon::parse_solver(arguments.solver));
-  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.compute.device, recon::parse_device(arguments.device));
-  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.precision, recon::parse_precision(arguments.precision));
-  options.correct_pointing = !arguments.keep_poses;
-  options.solve.step = arguments.step;
-  options.solve.compute.threads = arguments.threads;
-  options.solve.iterations = arguments.iterations;
-  if (arguments.budget) options.solve.budget = Seconds(*arguments.budget);
-  options.solve.target_rmse = arguments.target_rmse;
-  options.solve.flame_threshold = arguments.threshold;
-  options.solve.seed = arguments.seed;
-  if (options.solve.target_rmse && arguments.held_out.empty()) {
-    return Error{ErrorKind::bad_input, "is judged on held-out views, and none is held out", "--target-rmse",
-                 "Hold a view out with --hold-out i"};
-  }
-  return options;
-}
-
-/// with_views(); or why the views can't be used.
-Result<recon::Scene> choose_views(const recon::Scene& scene, int views) {
-  const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
-                                    [](const recon::View& v) { return v.role == recon::ViewRole::input; });
-  if (views > inputs) {
-    return Error{ErrorKind::bad_input, "there are " + std::to_string(inputs) + " input views", "--views",
-                 "Give at most so many"};
-  }
-  return recon::with_views(scene, views);
-}
-
 /// The receivers of progress: the terminal, or another program.
 struct Watchers {
   Progress progress;
   std::function<bool()> stop = {};  ///< true: end with the best so far
   ProgressStream* stream = nullptr;
 };
-
-/// The requested views of the requested frame, with their roles.
-Result<recon::Scene> load(const ReconstructArguments& arguments, const Progress& progress) {
-  recon::SceneOptions options;
-  options.frame = arguments.frame;
-  options.progress = progress;
-  if (!arguments.box.empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(options.box, parse_box(arguments.box));
-  }
-  if (!arguments.rig.empty()) options.rig = arguments.rig;
-  EMBERLOCK_RETURN_IF_ERROR(recon::parse_background(arguments.background, options.frames));
-  EMBERLOCK_RETURN_IF_ERROR(recon::parse_smear(arguments.smear, options.frames));
-  if (arguments.demosaic == "gradient") options.frames.develop.demosaicing = recon::Demosaicing::gradient;
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::Scene scene, recon::load_scene(arguments.input, options));
-  EMBERLOCK_RETURN_IF_ERROR(recon::hold_out(scene, arguments.held_out));
-  return choose_views(scene, arguments.views);
-}
-
-/// The files that are read; they must not lie in the output folder.
-std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& arguments) {
-  recon::SceneOptions options;
-  if (!arguments.rig.empty()) options.rig = arguments.rig;
-  return recon::files_of(arguments.input, options);
-}
 
 /// Before the work starts: more voxels than the pictures tell apart cost much and bring nothing.
 void warn_if_too_fine(const recon::Scene& scene, const recon::ReconstructOptions& options, std::FILE* to) {
@@ -193,7 +57,7 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
   }
   SteadyClock clock;
   const TimePoint begin = clock.now();
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load(arguments, watchers.progress));
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(arguments, watchers.progress));
   const Seconds loading = clock.now() - begin;
   warn_if_too_fine(scene, options, stderr);
   if (recon::is_stopped(options.solve))
@@ -223,7 +87,7 @@ Status plan_files(const ReconstructArguments& arguments) {
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(where));
   const SteadyClock clock;
   const TimePoint begin = clock.now();
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load(arguments, progress_bar("plan")));
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(arguments, progress_bar("plan")));
   const Seconds loading = clock.now() - begin;
   EMBERLOCK_RETURN_IF_ERROR(recon::check_scene(scene));
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::VoxelChoice choice,
@@ -283,12 +147,16 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
   return wanted;
 }
 
+Status print_outcome(const ReconstructArguments& arguments, const Written& written, const std::string& out) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::ReconstructOptions options, options_of(arguments));
+  return conclude(written, options.solve, {arguments.input, out, arguments.by_daemon.json});
+}
+
 /// To be interrupted by Ctrl-C.
 Status reconstruct_and_tell(const ReconstructArguments& arguments) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Written written,
                              reconstruct_files(arguments, {progress_bar("reconstruct"), Interrupt::asked}));
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::ReconstructOptions options, options_of(arguments));
-  return conclude(written, options.solve, {arguments.input, arguments.out, arguments.by_daemon.json});
+  return print_outcome(arguments, written, arguments.out);
 }
 
 /// The frames from --frame to --last-frame.
@@ -296,13 +164,22 @@ void reconstruct_range(const ReconstructArguments& arguments) {
   const session::FrameRange range{arguments.frame.value_or(0), *arguments.last_frame, arguments.every};
   const auto session = or_fail(session::SessionReader::open(arguments.input));
   const std::uint64_t recorded = session.camera_count() == 0 ? 0 : session.stamps(0).size();
-  reconstruct_sequence(or_fail(session::frames_of(range, recorded, "--last-frame")), arguments.out,
-                       [&](std::uint64_t frame, const std::filesystem::path& out) {
-                         ReconstructArguments one = arguments;
-                         one.frame = frame;
-                         one.out = out.string();
-                         return reconstruct_and_tell(one);
-                       });
+  const std::vector<std::uint64_t> frames = or_fail(session::frames_of(range, recorded, "--last-frame"));
+  const int at_once = std::min(arguments.at_once, static_cast<int>(frames.size()));
+  const auto averages = std::make_shared<recon::SharedAverages>();
+  const auto reconstruct = [&](std::uint64_t frame, const std::filesystem::path& out,
+                               const Progress& progress) {
+    ReconstructArguments one = arguments;
+    one.averages = averages;
+    one.frame = frame;
+    one.out = out.string();
+    one.threads = threads_of_each(arguments.threads, at_once);
+    return reconstruct_files(one, {progress, Interrupt::asked});
+  };
+  reconstruct_sequence(frames, arguments.out, at_once,
+                       {reconstruct, [&](const Written& written, const std::filesystem::path& out) {
+                          return print_outcome(arguments, written, out.string());
+                        }});
 }
 
 void reconstruct_command(const ReconstructArguments& arguments) {
@@ -321,68 +198,6 @@ void reconstruct_command(const ReconstructArguments& arguments) {
   if (outcome) return;
   stream.failed(outcome.error());
   fail(outcome.error());
-}
-
-/// Adds the options for solving.
-void add_solve_options(CLI::App* verb, ReconstructArguments& a) {
-  verb->add_option("--solver", a.solver, "default, or paper (equations 10 and 11 of the paper)")
-      ->capture_default_str();
-  verb->add_option("--hold-out", a.held_out,
-                   "Views, counted from 0, that aren't used; the result is scored on them: i,j,...")
-      ->delimiter(',');
-  verb->add_option("--effects", a.effects, "auto, none, or a list such as extinction=32.8 (1/m) [auto]");
-  verb->add_option("--iterations", a.iterations, "Most iterations [the solver's own rule]")
-      ->check(CLI::Range(1, 1000000));
-  verb->add_option("--views", a.views, "Use so many of the input views, spread as far as possible [all]")
-      ->check(CLI::Range(1, 64));
-  verb->add_flag("--keep-poses", a.keep_poses,
-                 "Use the given poses of the cameras, even if the flame's outlines don't meet");
-  verb->add_option("--step", a.step, "Longest step along a ray, in voxel edges")
-      ->check(CLI::Range(0.05, 4.0))
-      ->capture_default_str();
-  verb->add_option("--precision", a.precision, "float32 or float64")->capture_default_str();
-  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core. The result doesn't depend on them")
-      ->check(CLI::Range(0, 256))
-      ->capture_default_str();
-  verb->add_option("--device", a.device, "auto, cpu or cuda")->capture_default_str();
-  verb->add_option("--budget", a.budget,
-                   "Time limit in seconds, without loading and writing; sets the options that aren't given")
-      ->check(CLI::PositiveNumber);
-  verb->add_option("--target-rmse", a.target_rmse,
-                   "Held-out error to reach, grey levels; sets the options that aren't given")
-      ->check(CLI::PositiveNumber);
-}
-
-/// Adds the options for converting a session's frames to radiance.
-void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
-  verb->add_option(
-          "--threshold", a.threshold,
-          "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
-      ->check(CLI::Range(0.0, 255.0));
-  verb->add_option("--frame", a.frame,
-                   "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
-      ->check(CLI::NonNegativeNumber);
-  CLI::Option* last = verb->add_option("--last-frame", a.last_frame,
-                                       "Sessions only: reconstructs one frame after the other, from --frame "
-                                       "to this one, each into OUT/frame-N")
-                          ->check(CLI::NonNegativeNumber)
-                          ->needs("--frame");
-  verb->add_option("--every", a.every, "With --last-frame: each frame of so many")
-      ->check(CLI::Range(1, 1000000))
-      ->capture_default_str()
-      ->needs(last);
-  verb->add_option("--background", a.background,
-                   "Sessions only: auto (each camera's first or last frames, if they show no flame), level "
-                   "(of the picture's darker half), or frames without flame: FIRST-LAST")
-      ->capture_default_str();
-  verb->add_option("--smear", a.smear,
-                   "CCDs of sessions only: auto (measured from rows without flame), off, or the share of "
-                   "every row's light, with :above or :below for rows on one side")
-      ->capture_default_str();
-  verb->add_option("--demosaic", a.demosaic,
-                   "bilinear: least noise and error on flames; gradient: for pictures with sharp edges")
-      ->check(CLI::IsMember({"bilinear", "gradient"}))
-      ->capture_default_str();
 }
 
 }  // namespace

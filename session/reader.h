@@ -39,7 +39,8 @@ class SessionReader {
 
   /// Frame `i` of stamps(camera). Any order works; ascending order is fastest. The pixels are exactly those
   /// recorded: a missing segment, or pixels that don't match their hash, are an Error (bad_input) that names
-  /// file and frame; other frames stay readable. Past the end: out_of_data.
+  /// file and frame; other frames stay readable. Past the end: out_of_data. Different cameras can be read
+  /// from different threads.
   Result<Frame> read(std::size_t camera, std::size_t i);
 
  private:

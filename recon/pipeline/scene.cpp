@@ -8,6 +8,7 @@
 
 #include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
+#include "recon/compute/pool.h"
 #include "recon/hull/find_box.h"
 #include "recon/pipeline/session_picture.h"
 #include "recon/preprocess/flame_mask.h"
@@ -46,7 +47,8 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
   if (options.box || transforms.box) {
     scene.box = options.box ? *options.box : *transforms.box;
   } else {
-    EMBERLOCK_ASSIGN_OR_RETURN(scene.box, find_box(scene, flame_masks(scene)));
+    EMBERLOCK_ASSIGN_OR_RETURN(scene.box,
+                               find_box(scene, flame_masks(scene, {}, {Device::cpu, options.threads})));
   }
   return scene;
 }
@@ -121,43 +123,49 @@ void tell_lateness(const session::SessionReader& reader, std::size_t camera, std
   view.lateness_sigma = Seconds(times.sigma_s());
 }
 
-/// A session and what it takes to develop each camera's frames.
-struct SessionPictures {
-  session::SessionReader reader;
-  std::vector<FrameDeveloper> developers = {};
-};
-
 /// Calls act(view, picture, taken) for `count` complete frames of each camera, spread evenly over the
-/// recording; `taken` of them where there are fewer.
+/// recording; `taken` of them where there are fewer. One call at a time for each view, several views at once.
 template <class Act>
-Status each_of_some_frames(SessionPictures& session, std::size_t count, const Progress& progress,
-                           const char* doing, const Act& act) {
-  session::SessionReader& reader = session.reader;
-  for (std::size_t i = 0; i < reader.camera_count(); ++i) {
+Status each_of_some_frames(session::SessionReader& reader, const std::vector<FrameDeveloper>& developers,
+                           std::size_t count, const SceneOptions& options, const char* doing,
+                           const Act& act) {
+  const std::size_t cameras = reader.camera_count();
+  std::mutex mutex;
+  std::size_t developed = 0;
+  const auto one_more = [&] {
+    const std::lock_guard lock(mutex);
+    tell(options.progress, static_cast<double>(++developed) / static_cast<double>(cameras * count), doing);
+  };
+  const auto frames_of = [&](std::size_t i) -> Status {
     std::vector<std::size_t> complete;
     for (std::size_t f = 0; f < reader.stamps(i).size(); ++f)
       if (reader.stamps(i)[f].status == FrameStatus::complete) complete.push_back(f);
     const std::size_t taken = std::min(count, complete.size());
     for (std::size_t n = 0; n < taken; ++n) {
-      tell(progress,
-           (static_cast<double>(i) + static_cast<double>(n) / static_cast<double>(taken)) /
-               static_cast<double>(reader.camera_count()),
-           doing);
       // The middle of each of `taken` equal parts: the recording's own middle where it is one.
       EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame,
                                  reader.read(i, complete[(2 * n + 1) * complete.size() / (2 * taken)]));
-      act(i, session.developers[i].develop(frame).image, taken);
+      act(i, developers[i].develop(frame).image, taken);
+      one_more();
     }
-  }
+    return {};
+  };
+  std::vector<Status> done(cameras);
+  Pool(options.threads).run(static_cast<int>(cameras), [&](int camera) {
+    const auto i = static_cast<std::size_t>(camera);
+    done[i] = frames_of(i);
+  });
+  for (const Status& status : done) EMBERLOCK_RETURN_IF_ERROR(status);
   return {};
 }
 
 /// A box that holds the flame of some instants over the recording: each camera's masks are joined.
-Status find_box_of_session(SessionPictures& session, const Progress& progress, Scene& scene) {
+Status find_box_of_session(session::SessionReader& reader, const std::vector<FrameDeveloper>& developers,
+                           const SceneOptions& options, Scene& scene) {
   constexpr std::size_t kInstants = 5;
-  std::vector<FlameMask> masks = flame_masks(scene);
+  std::vector<FlameMask> masks = flame_masks(scene, {}, {Device::cpu, options.threads});
   EMBERLOCK_RETURN_IF_ERROR(each_of_some_frames(
-      session, kInstants, progress, "looking for the flame",
+      reader, developers, kInstants, options, "looking for the flame",
       [&](std::size_t i, const RadianceImage& image, auto) {
         const FlameMask other = noise_mask(image);
         FlameMask& mask = masks[i];
@@ -172,26 +180,54 @@ Status find_box_of_session(SessionPictures& session, const Progress& progress, S
   return {};
 }
 
-/// What each camera shows on average over frames of the whole recording.
-Status average(SessionPictures& session, const Progress& progress, Scene& scene) {
+/// How each camera's frames are developed: as the one nearest to an instant is.
+Result<std::vector<FrameDeveloper>> developers_at(session::SessionReader& reader,
+                                                  const v1::Manifest& manifest, TimePoint instant,
+                                                  const FrameOptions& options) {
+  std::vector<FrameDeveloper> developers;
+  for (std::size_t i = 0; i < reader.camera_count(); ++i) {
+    const std::size_t nearest = nearest_complete(reader.stamps(i), instant).value_or(0);
+    EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame, reader.read(i, nearest));
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        FrameDeveloper developer,
+        FrameDeveloper::create(reader, i, manifest.cameras(static_cast<int>(i)), frame, nearest, options));
+    developers.push_back(std::move(developer));
+  }
+  return developers;
+}
+
+/// What each camera shows on average over frames of the whole recording, developed as the middle one is.
+Result<std::vector<SharedImage>> averages_of(session::SessionReader& reader, const v1::Manifest& manifest,
+                                             const SceneOptions& options) {
   constexpr std::size_t kFrames = 32;  // leave a sixth of what changes in the average
+  const TimePoint middle = reader.stamps(0)[middle_frame(reader)].monotonic_time;
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<FrameDeveloper> developers,
+                             developers_at(reader, manifest, middle, options.frames));
   std::vector<RadianceImage> averages;
-  for (const View& view : scene.views) averages.emplace_back(view.image->size);
+  for (std::size_t i = 0; i < reader.camera_count(); ++i) averages.emplace_back(reader.layout(i).size);
   EMBERLOCK_RETURN_IF_ERROR(
-      each_of_some_frames(session, kFrames, progress, "averaging the recording",
+      each_of_some_frames(reader, developers, kFrames, options, "averaging the recording",
                           [&](std::size_t i, const RadianceImage& image, std::size_t taken) {
                             std::vector<float>& sum = averages[i].rgb;
                             const auto part = 1 / static_cast<float>(taken);
                             for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += part * image.rgb[p];
                           }));
-  for (std::size_t i = 0; i < averages.size(); ++i) scene.views[i].average = share(std::move(averages[i]));
+  std::vector<SharedImage> shared;
+  for (RadianceImage& average : averages) shared.push_back(share(std::move(average)));
+  return shared;
+}
+
+Status add_averages(session::SessionReader& reader, const v1::Manifest& manifest, const SceneOptions& options,
+                    Scene& scene) {
+  const auto averages = options.averages ? options.averages : std::make_shared<SharedAverages>();
+  std::call_once(averages->once, [&] { averages->found = averages_of(reader, manifest, options); });
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<SharedImage> found, *averages->found);
+  for (std::size_t i = 0; i < found.size(); ++i) scene.views[i].average = found[i];
   return {};
 }
 
 Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
-  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader opened, session::SessionReader::open(folder));
-  SessionPictures session{std::move(opened)};
-  session::SessionReader& reader = session.reader;
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader reader, session::SessionReader::open(folder));
   v1::Manifest manifest = reader.manifest();
   const std::string manifest_name = (folder / "manifest.json").string();
   if (options.rig) {
@@ -219,6 +255,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
   }
   const TimePoint instant = first[frame].monotonic_time;
   std::vector<std::pair<std::string, std::vector<PreprocessStep>>> steps;
+  std::vector<FrameDeveloper> developers;
   for (std::size_t i = 0; i < reader.camera_count(); ++i) {
     const v1::CameraStream& stream = manifest.cameras(static_cast<int>(i));
     View view;
@@ -239,7 +276,7 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
                                FrameDeveloper::create(reader, i, stream, shown, *nearest, options.frames));
     DevelopedPicture picture = developer.develop(shown);
     scene.linearised = scene.linearised || developer.linearises();
-    session.developers.push_back(std::move(developer));
+    developers.push_back(std::move(developer));
     view.image = share(std::move(picture.image));
     if (!picture.bounds.empty()) view.bounds = share(std::move(picture.bounds));
     steps.emplace_back(view.name, std::move(picture.steps));
@@ -249,10 +286,10 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
   if (options.box || own_box)
     scene.box = options.box ? *options.box : *own_box;
   else
-    EMBERLOCK_RETURN_IF_ERROR(find_box_of_session(session, options.progress, scene));
+    EMBERLOCK_RETURN_IF_ERROR(find_box_of_session(reader, developers, options, scene));
   const bool late = std::any_of(scene.views.begin(), scene.views.end(),
                                 [](const View& v) { return abs(v.lateness) > v.lateness_sigma; });
-  if (late) EMBERLOCK_RETURN_IF_ERROR(average(session, options.progress, scene));
+  if (late) EMBERLOCK_RETURN_IF_ERROR(add_averages(reader, manifest, options, scene));
   return scene;
 }
 

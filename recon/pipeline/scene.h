@@ -3,6 +3,8 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <vector>
 
@@ -13,6 +15,12 @@
 
 namespace emberlock::recon {
 
+/// What a session's cameras show on average: found by the first of the scenes that share it.
+struct SharedAverages {
+  std::once_flag once;
+  std::optional<Result<std::vector<SharedImage>>> found;
+};
+
 struct SceneOptions {
   std::optional<Box> box;  ///< stands before the input's own; without either it is found from the pictures
   std::optional<std::size_t> frame;  ///< of a session: frame of its first camera; else the one nearest to the
@@ -20,7 +28,10 @@ struct SceneOptions {
   std::optional<std::filesystem::path> rig =
       {};                    ///< of a session: a rig.json that stands before its calibration
   FrameOptions frames = {};  ///< of a session: how its frames become pictures
+  int threads = 0;           ///< CPU threads, as in ComputeOptions; the result doesn't depend on them
   Progress progress = {};    ///< of a session: reading its other frames, where they are needed
+  /// For several frames of one session that are read with the same rig and FrameOptions.
+  std::shared_ptr<SharedAverages> averages = {};
 };
 
 /// A transforms.json (a file) or a recorded session (a folder with a manifest): views in the order of the
@@ -31,7 +42,7 @@ struct SceneOptions {
 ///
 /// A box is found (find_box()) so that it holds the flame of several instants over a session. Where a
 /// session's times.json says that cameras were late, views bring their lateness, and what each camera shows
-/// on average over frames of the whole recording.
+/// on average over frames of the whole recording, the same whatever frame is asked for.
 Result<Scene> load_scene(const std::filesystem::path& input, const SceneOptions& options = {});
 
 /// What load_scene() reads, as far as it is there: the input, a transforms.json's pictures, the rig.

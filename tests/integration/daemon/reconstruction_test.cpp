@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include "base/file.h"
 #include "daemon/reconstruction/child.h"
 #include "recon/preprocess/radiance.h"
 #include "recon/synthetic/flame.h"
@@ -156,6 +157,32 @@ TEST_F(DaemonReconstruction, WithoutTheDaemonTheProgramReconstructsASequenceToo)
   EXPECT_THAT(beyond.output,
               HasSubstr("--last-frame: there is no frame 3: the session has 3. Give at most 2"));
   const Shell hopeless = shell(command + "--last-frame 2 --hold-out 30");
+  EXPECT_EQ(hopeless.status, 1);
+  EXPECT_THAT(hopeless.output, HasSubstr("of 3 frames 3 failed and 0 were not tried"));
+}
+
+TEST_F(DaemonReconstruction, FramesThatAreAtWorkAtOnceBecomeWhatTheyBecomeAlone) {
+  const auto run = [&](const char* at_once, const char* out) {
+    return shell(fmt::format(
+        "{} reconstruct {} --device cpu --voxels 12 --frame 0 --last-frame 2 {} --out {}", EMBERLOCK_PROGRAM,
+        (folder_ / "sessions/candle").string(), at_once, (folder_ / out).string()));
+  };
+  const Shell alone = run("", "alone");
+  EXPECT_EQ(alone.status, 0) << alone.output;
+  const Shell together = run("--at-once 2 --threads 3", "together");
+  EXPECT_EQ(together.status, 0) << together.output;
+  EXPECT_THAT(together.output, HasSubstr("3 frames in "));
+  for (const char* frame : {"frame-0", "frame-1", "frame-2"}) {
+    EXPECT_THAT(together.output, HasSubstr(fmt::format("together/{}", frame)));
+    for (const char* view : {"0000.png", "0010.png"}) {
+      const fs::path picture = fs::path(frame) / "views" / view;
+      const auto expected = read_file(folder_ / "alone" / picture);
+      const auto got = read_file(folder_ / "together" / picture);
+      ASSERT_TRUE(expected.ok() && got.ok()) << picture;
+      EXPECT_EQ(*got, *expected) << picture;
+    }
+  }
+  const Shell hopeless = run("--at-once 2 --hold-out 30", "hopeless");
   EXPECT_EQ(hopeless.status, 1);
   EXPECT_THAT(hopeless.output, HasSubstr("of 3 frames 3 failed and 0 were not tried"));
 }

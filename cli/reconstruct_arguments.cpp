@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/reconstruct_arguments.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "cli/scene_options.h"
+#include "recon/pipeline/grid_choice.h"
+
+namespace emberlock::cli {
+namespace {
+
+/// A number of voxels, or "paper"; empty: the program chooses.
+Status parse_voxels(const std::string& text, recon::ReconstructOptions& options) {
+  if (text.empty()) return {};
+  if (text == "paper") {
+    options.rule = recon::VoxelRule::paper;
+    return {};
+  }
+  int voxels = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), voxels);
+  if (error != std::errc() || end != text.data() + text.size() || voxels < 1 ||
+      voxels > recon::kLargestVoxels) {
+    return Error{ErrorKind::bad_input, "\"" + text + "\" is no number of voxels", "--voxels",
+                 "Give 1 to " + std::to_string(recon::kLargestVoxels) +
+                     ", or paper for the paper's rule, or leave it away for the knee of time against error"};
+  }
+  options.voxels = voxels;
+  return {};
+}
+
+/// with_views(); or why the views can't be used.
+Result<recon::Scene> choose_views(const recon::Scene& scene, int views) {
+  const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
+                                    [](const recon::View& v) { return v.role == recon::ViewRole::input; });
+  if (views > inputs) {
+    return Error{ErrorKind::bad_input, "there are " + std::to_string(inputs) + " input views", "--views",
+                 "Give at most so many"};
+  }
+  return recon::with_views(scene, views);
+}
+
+}  // namespace
+
+Result<recon::Box> parse_box(const std::string& text) {
+  std::vector<double> numbers;
+  std::istringstream words(text);
+  for (std::string word; std::getline(words, word, ',');) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(word.c_str(), &end));
+    if (word.empty() || *end != '\0' || !std::isfinite(numbers.back())) numbers.clear();
+    if (numbers.empty()) break;
+  }
+  if (numbers.size() != 6 || text.back() == ',') {
+    return Error{ErrorKind::bad_input, "\"" + text + "\" is not six numbers", "--box",
+                 "Give cx,cy,cz,sx,sy,sz: centre and size in metres"};
+  }
+  const recon::Box box{{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5]}};
+  if (box.size.minCoeff() <= 0) {
+    return Error{ErrorKind::bad_input, "an edge is 0 or less", "--box", "Give sizes above 0 m"};
+  }
+  return box;
+}
+
+Result<recon::ReconstructOptions> options_of(const ReconstructArguments& arguments) {
+  recon::ReconstructOptions options;
+  EMBERLOCK_RETURN_IF_ERROR(parse_voxels(arguments.voxels, options));
+  if (!arguments.effects.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.effects, recon::parse_effects(arguments.effects));
+  }
+  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.solver, recon::parse_solver(arguments.solver));
+  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.compute.device, recon::parse_device(arguments.device));
+  EMBERLOCK_ASSIGN_OR_RETURN(options.solve.precision, recon::parse_precision(arguments.precision));
+  options.correct_pointing = !arguments.keep_poses;
+  options.solve.step = arguments.step;
+  options.solve.compute.threads = arguments.threads;
+  options.solve.iterations = arguments.iterations;
+  if (arguments.budget) options.solve.budget = Seconds(*arguments.budget);
+  options.solve.target_rmse = arguments.target_rmse;
+  options.solve.flame_threshold = arguments.threshold;
+  options.solve.seed = arguments.seed;
+  if (options.solve.target_rmse && arguments.held_out.empty()) {
+    return Error{ErrorKind::bad_input, "is judged on held-out views, and none is held out", "--target-rmse",
+                 "Hold a view out with --hold-out i"};
+  }
+  return options;
+}
+
+Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Progress& progress) {
+  recon::SceneOptions options;
+  options.frame = arguments.frame;
+  options.progress = progress;
+  options.threads = arguments.threads;
+  options.averages = arguments.averages;
+  if (!arguments.box.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(options.box, parse_box(arguments.box));
+  }
+  if (!arguments.rig.empty()) options.rig = arguments.rig;
+  EMBERLOCK_RETURN_IF_ERROR(recon::parse_background(arguments.background, options.frames));
+  EMBERLOCK_RETURN_IF_ERROR(recon::parse_smear(arguments.smear, options.frames));
+  if (arguments.demosaic == "gradient") options.frames.develop.demosaicing = recon::Demosaicing::gradient;
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::Scene scene, recon::load_scene(arguments.input, options));
+  EMBERLOCK_RETURN_IF_ERROR(recon::hold_out(scene, arguments.held_out));
+  return choose_views(scene, arguments.views);
+}
+
+std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& arguments) {
+  recon::SceneOptions options;
+  if (!arguments.rig.empty()) options.rig = arguments.rig;
+  return recon::files_of(arguments.input, options);
+}
+
+void add_solve_options(CLI::App* verb, ReconstructArguments& a) {
+  verb->add_option("--solver", a.solver, "default, or paper (equations 10 and 11 of the paper)")
+      ->capture_default_str();
+  verb->add_option("--hold-out", a.held_out,
+                   "Views, counted from 0, that aren't used; the result is scored on them: i,j,...")
+      ->delimiter(',');
+  verb->add_option("--effects", a.effects, "auto, none, or a list such as extinction=32.8 (1/m) [auto]");
+  verb->add_option("--iterations", a.iterations, "Most iterations [the solver's own rule]")
+      ->check(CLI::Range(1, 1000000));
+  verb->add_option("--views", a.views, "Use so many of the input views, spread as far as possible [all]")
+      ->check(CLI::Range(1, 64));
+  verb->add_flag("--keep-poses", a.keep_poses,
+                 "Use the given poses of the cameras, even if the flame's outlines don't meet");
+  verb->add_option("--step", a.step, "Longest step along a ray, in voxel edges")
+      ->check(CLI::Range(0.05, 4.0))
+      ->capture_default_str();
+  verb->add_option("--precision", a.precision, "float32 or float64")->capture_default_str();
+  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core. The result doesn't depend on them")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
+      ->capture_default_str();
+  verb->add_option("--budget", a.budget,
+                   "Time limit in seconds, without loading and writing; sets the options that aren't given")
+      ->check(CLI::PositiveNumber);
+  verb->add_option("--target-rmse", a.target_rmse,
+                   "Held-out error to reach, grey levels; sets the options that aren't given")
+      ->check(CLI::PositiveNumber);
+}
+
+void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
+  verb->add_option(
+          "--threshold", a.threshold,
+          "Grey level above which a pixel shows flame [each picture's noise; the paper's solver: 30]")
+      ->check(CLI::Range(0.0, 255.0));
+  verb->add_option("--frame", a.frame,
+                   "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
+      ->check(CLI::NonNegativeNumber);
+  CLI::Option* last = verb->add_option("--last-frame", a.last_frame,
+                                       "Sessions only: reconstructs one frame after the other, from --frame "
+                                       "to this one, each into OUT/frame-N")
+                          ->check(CLI::NonNegativeNumber)
+                          ->needs("--frame");
+  verb->add_option("--every", a.every, "With --last-frame: each frame of so many")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str()
+      ->needs(last);
+  verb->add_option(
+          "--at-once", a.at_once,
+          "With --last-frame: so many frames at work, each with its share of --threads and memory of "
+          "its own. The results don't depend on it; more finish sooner on many cores and on a GPU")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str()
+      ->needs(last);
+  verb->add_option("--background", a.background,
+                   "Sessions only: auto (each camera's first or last frames, if they show no flame), level "
+                   "(of the picture's darker half), or frames without flame: FIRST-LAST")
+      ->capture_default_str();
+  verb->add_option("--smear", a.smear,
+                   "CCDs of sessions only: auto (measured from rows without flame), off, or the share of "
+                   "every row's light, with :above or :below for rows on one side")
+      ->capture_default_str();
+  verb->add_option("--demosaic", a.demosaic,
+                   "bilinear: least noise and error on flames; gradient: for pictures with sharp edges")
+      ->check(CLI::IsMember({"bilinear", "gradient"}))
+      ->capture_default_str();
+}
+
+}  // namespace emberlock::cli

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/progress.h"
+#include "cli/commands.h"
+#include "cli/reconstruct_daemon.h"
+#include "recon/pipeline/reconstruct.h"
+#include "recon/pipeline/scene.h"
+
+namespace emberlock::cli {
+
+/// The command line as typed, not yet interpreted.
+struct ReconstructArguments {
+  std::string input;
+  std::string out;
+  std::string rig;
+  std::string background = "auto";
+  std::string smear = "auto";
+  std::string demosaic = "bilinear";
+  std::string plan;
+  std::string box;
+  std::string solver = "default";
+  std::string effects;
+  std::string device = "auto";
+  std::string precision = "float32";
+  bool keep_poses = false;
+  std::vector<int> held_out;
+  int views = 0;
+  double step = 1;
+  std::string voxels;
+  std::optional<std::size_t> frame, last_frame;
+  std::uint32_t every = 1;
+  int at_once = 1;
+  std::optional<double> budget;
+  std::optional<double> target_rmse;
+  std::optional<double> threshold;
+  int iterations = 0;
+  int threads = 0;
+  std::uint64_t seed = 1;
+  std::optional<int> progress_fd;
+  DaemonReconstruction by_daemon;
+  std::shared_ptr<recon::SharedAverages> averages = {};  ///< of a sequence's frames
+};
+
+/// Interprets the options; or the first error, as in parse_box.
+Result<recon::ReconstructOptions> options_of(const ReconstructArguments& arguments);
+/// The requested views of the requested frame, with their roles.
+Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Progress& progress);
+/// The files that are read; they must not lie in the output folder.
+std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& arguments);
+
+/// Adds the options for solving.
+void add_solve_options(CLI::App* verb, ReconstructArguments& a);
+/// Adds the options for choosing a session's frames and converting them to radiance.
+void add_picture_options(CLI::App* verb, ReconstructArguments& a);
+
+}  // namespace emberlock::cli

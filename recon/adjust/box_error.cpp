@@ -17,9 +17,9 @@ int first_of(int x, int stride) { return (x + stride - 1) / stride * stride; }
 }  // namespace
 
 ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std::vector<PixelBox>& boxes,
-                               const Problem& problem, const Background& background, int stride,
-                               std::optional<std::size_t> rays)
-    : weight_(rays.value_or(problem.list.rays.size())) {
+                               const Problem& problem, const Background& background, ResidualEngine& engine,
+                               int stride, std::optional<std::size_t> rays)
+    : engine_(engine) {
   std::vector<RadianceImage> behind;
   std::vector<double> pixels(views.size());
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -42,29 +42,27 @@ ErrorOverBoxes::ErrorOverBoxes(const std::vector<const View*>& views, const std:
       unreached_[c] += sum[c] / (std::max(1.0, pixels[v]) * static_cast<double>(views.size()));
   }
   black_ = unreached_;
-  for (std::size_t r = 0; r < weight_.size(); ++r) {
+  std::vector<float> weight(rays.value_or(problem.list.rays.size()));
+  for (std::size_t r = 0; r < weight.size(); ++r) {
     const std::size_t v = problem.list.rays[r].view;
     const PixelBox& box = boxes[v];
     const int width = views[v]->image->size.width;
     const int x = static_cast<int>(problem.list.pixels[r]) % width;
     const int y = static_cast<int>(problem.list.pixels[r]) / width;
     if (x < box.x0 || x >= box.x1 || y < box.y0 || y >= box.y1) continue;
-    weight_[r] = static_cast<float>(1 / (std::max(1.0, pixels[v]) * static_cast<double>(views.size())));
+    weight[r] = static_cast<float>(1 / (std::max(1.0, pixels[v]) * static_cast<double>(views.size())));
     const std::size_t at = 3 * static_cast<std::size_t>(problem.list.pixels[r]);
     for (std::size_t c = 0; c < 3; ++c) {
       const double b = static_cast<double>(views[v]->image->rgb[at + c] - value(behind[v], at + c));
-      unreached_[c] -= static_cast<double>(weight_[r]) * b * b;
+      unreached_[c] -= static_cast<double>(weight[r]) * b * b;
     }
   }
+  weights_ = engine.keep_weights(weight);
 }
 
-std::array<double, 3> ErrorOverBoxes::operator()(const std::vector<Rgba>& residual) const {
-  std::array<double, 3> sum = unreached_;
-  for (std::size_t r = 0; r < weight_.size(); ++r)
-    for (std::size_t c = 0; c < 3; ++c)
-      sum[c] += static_cast<double>(weight_[r]) * static_cast<double>(residual[r].c[c]) *
-                static_cast<double>(residual[r].c[c]);
-  for (double& s : sum) s = std::sqrt(std::max(0.0, s));
+std::array<double, 3> ErrorOverBoxes::operator()() const {
+  std::array<double, 3> sum = engine_.weighted_squares(weights_);
+  for (std::size_t c = 0; c < 3; ++c) sum[c] = std::sqrt(std::max(0.0, sum[c] + unreached_[c]));
   return sum;
 }
 

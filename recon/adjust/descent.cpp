@@ -220,14 +220,12 @@ void Descent::settle() {
   if (guard_.halvings() > 0 || !guard_.allows(last)) take_kept(last);
 }
 
-double Descent::fit_error() const {
-  const std::vector<Rgba> r = engine_->residuals();
-  double sum = 0;
-  for (std::size_t i = 0; i < fitted_; ++i)
-    for (std::size_t c = 0; c < 3; ++c)
-      sum += static_cast<double>(r[i].c[c]) * static_cast<double>(r[i].c[c]);
-  return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(fitted_))));
+double Descent::rms_of_residuals(std::size_t first_ray, std::size_t last_ray) const {
+  const ResidualEngine::Squares s = engine_->squares(first_ray, last_ray);
+  return std::sqrt((s[0] + s[1] + s[2]) / (3 * std::max(1.0, static_cast<double>(last_ray - first_ray))));
 }
+
+double Descent::fit_error() const { return rms_of_residuals(0, fitted_); }
 
 /// Of no light at all, behind which the whole background shines.
 double Descent::black_error() const {
@@ -245,13 +243,8 @@ double Descent::black_error() const {
 double Descent::validation_error() {
   const int subset = rays_of(level_.subsets) > 0 ? level_.subsets : 0;
   engine_->residual(subset);
-  const std::vector<Rgba> r = engine_->residuals();
   const std::size_t first = level_.problem.list.subset_begin[static_cast<std::size_t>(subset)];
-  double sum = 0;
-  for (std::size_t i = first; i < first + rays_of(subset); ++i)
-    for (std::size_t c = 0; c < 3; ++c)
-      sum += static_cast<double>(r[i].c[c]) * static_cast<double>(r[i].c[c]);
-  return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(rays_of(subset)))));
+  return rms_of_residuals(first, first + rays_of(subset));
 }
 
 /// Light that is seen over what an even medium of 1 would show.

@@ -76,6 +76,7 @@ class Descent {
   /// judge(), and where steps went too far, now or before, take_kept(). For who ends here.
   void settle();
   /// RMS over the fitted rays, each as its subset's step found it; grey levels.
+  [[nodiscard]] double rms_of_residuals(std::size_t first_ray, std::size_t last_ray) const;
   [[nodiscard]] double fit_error() const;
   /// RMS over the held-out pixels, or over the first subset where there are none; grey levels.
   [[nodiscard]] double validation_error();

@@ -17,7 +17,22 @@ void note_marched(std::vector<int>& marched, int subset) {
   marched.push_back(subset);
 }
 
+ResidualEngine::Squares add_up(const std::vector<Quad<double>>& chunks) {
+  ResidualEngine::Squares sum = {};
+  for (const Quad<double>& chunk : chunks)
+    for (std::size_t c = 0; c < 3; ++c) sum[c] += chunk.c[c];
+  return sum;
+}
+
 }  // namespace
+
+ResidualEngine::Squares ResidualEngine::squares(std::size_t first_ray, std::size_t last_ray) const {
+  return first_ray < last_ray ? add_up(chunks_of_squares(first_ray, last_ray)) : Squares{};
+}
+
+ResidualEngine::Squares ResidualEngine::weighted_squares(std::size_t number) const {
+  return add_up(chunks_of_squares(number));
+}
 
 void ResidualEngine::set(const std::vector<Rgba>& x) {
   marched_.clear();

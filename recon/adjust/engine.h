@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <type_traits>
@@ -29,14 +31,23 @@ class ResidualEngine {
   /// here on.
   virtual void set_offset(const std::vector<Rgba>& offset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> residuals() const = 0;
-  /// Those of one subset's rays alone.
-  [[nodiscard]] virtual std::vector<Rgba> residuals(int subset) const = 0;
+  /// Sums of the squared residuals for R, G and B, of a range of the rays. They are made where the residuals
+  /// lie, in an order that no thread count changes.
+  using Squares = std::array<double, 3>;
+  [[nodiscard]] Squares squares(std::size_t first_ray, std::size_t last_ray) const;
+  /// Keeps weights of the first so many rays where the residuals lie; returns their number.
+  virtual std::size_t keep_weights(const std::vector<float>& of_rays) = 0;
+  /// The same of the rays that have weights of this number, each with its weight.
+  [[nodiscard]] Squares weighted_squares(std::size_t number) const;
 
  protected:
   /// The subsets whose residuals are those of y as it is now, the last one last.
   std::vector<int> marched_;
 
  private:
+  [[nodiscard]] virtual std::vector<Quad<double>> chunks_of_squares(std::size_t first_ray,
+                                                                    std::size_t last_ray) const = 0;
+  [[nodiscard]] virtual std::vector<Quad<double>> chunks_of_squares(std::size_t weights) const = 0;
   virtual void put(const std::vector<Rgba>& x) = 0;
   virtual void march_other(const ResidualEngine& other, int subset) = 0;
   [[nodiscard]] virtual std::size_t grid_points() const = 0;

@@ -33,12 +33,9 @@ class CpuEngine final : public Engine {
   [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_); }
   [[nodiscard]] std::vector<Rgba> recent() override { return get(); }
   [[nodiscard]] std::vector<Rgba> residuals() const override { return converted<float>(residual_); }
-  [[nodiscard]] std::vector<Rgba> residuals(int subset) const override {
-    const auto begin = [&](int s) {
-      return residual_.begin() +
-             static_cast<std::ptrdiff_t>(problem_.list.subset_begin[static_cast<std::size_t>(s)]);
-    };
-    return converted<float>(std::vector<Quad<Real>>(begin(subset), begin(subset + 1)));
+  std::size_t keep_weights(const std::vector<float>& of_rays) override {
+    ray_weights_.push_back(of_rays);
+    return ray_weights_.size() - 1;
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
@@ -56,6 +53,25 @@ class CpuEngine final : public Engine {
   }
 
  private:
+  [[nodiscard]] std::vector<Quad<double>> chunks_of_squares(std::size_t first_ray,
+                                                            std::size_t last_ray) const override {
+    return sum_chunks({residual_.data(), nullptr, first_ray, last_ray, nullptr});
+  }
+  [[nodiscard]] std::vector<Quad<double>> chunks_of_squares(std::size_t weights) const override {
+    const std::vector<float>& of_rays = ray_weights_.at(weights);
+    return sum_chunks({residual_.data(), of_rays.data(), 0, of_rays.size(), nullptr});
+  }
+  [[nodiscard]] std::vector<Quad<double>> sum_chunks(SumSquares<Real> act) const {
+    std::vector<Quad<double>> sums(act.chunks());
+    act.sums = sums.data();
+    constexpr int kTasks = 64;
+    pool_.run(kTasks, [&](int task) {
+      const Slice mine = slice(sums.size(), kTasks, task);
+      for (std::size_t chunk = mine.begin; chunk < mine.end; ++chunk) act(chunk);
+    });
+    return sums;
+  }
+
   void put(const std::vector<Rgba>& x) override {
     x_ = converted<Real>(x);
     if (memory_ == EngineMemory::steps) y_ = next_y_ = x_;
@@ -243,6 +259,7 @@ class CpuEngine final : public Engine {
   std::vector<Quad<Real>> residual_;
   std::vector<Quad<Real>> samples_;  // of one subset
   std::vector<Rgba> offset_;
+  std::vector<std::vector<float>> ray_weights_;
   std::optional<ExposureBlur> blur_;  // where the exposure is long enough to matter
   std::vector<Quad<Real>> blurred_;   // B y
 };

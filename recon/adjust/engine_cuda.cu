@@ -94,8 +94,9 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   [[nodiscard]] std::vector<Rgba> residuals() const override {
     return converted<float>(residual_.download());
   }
-  [[nodiscard]] std::vector<Rgba> residuals(int subset) const override {
-    return converted<float>(residual_.download(first_ray(subset), first_ray(subset + 1) - first_ray(subset)));
+  std::size_t keep_weights(const std::vector<float>& of_rays) override {
+    ray_weights_.emplace_back(of_rays);
+    return ray_weights_.size() - 1;
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_.download()); }
 
@@ -117,6 +118,21 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
 
  private:
   using Radiance = Forward<Real, Extinction, Path>;
+
+  [[nodiscard]] std::vector<Quad<double>> chunks_of_squares(std::size_t first_ray,
+                                                            std::size_t last_ray) const override {
+    return sum_chunks({residual_.data(), nullptr, first_ray, last_ray, nullptr});
+  }
+  [[nodiscard]] std::vector<Quad<double>> chunks_of_squares(std::size_t weights) const override {
+    const CudaBuffer<float>& of_rays = ray_weights_.at(weights);
+    return sum_chunks({residual_.data(), of_rays.data(), 0, of_rays.size(), nullptr});
+  }
+  [[nodiscard]] static std::vector<Quad<double>> sum_chunks(SumSquares<Real> act) {
+    const auto sums = CudaBuffer<Quad<double>>::unfilled(act.chunks());
+    act.sums = sums.data();
+    launch(sums.size(), act, "summing squares");
+    return sums.download();
+  }
 
   void put(const std::vector<Rgba>& x) override {
     x_.upload(converted<Real>(x));
@@ -287,6 +303,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   Extinction extinction_;
   DeviceRayList lists_;
   CudaBuffer<Rgba> seen_, background_, offset_, target_;  // null where there is none
+  std::vector<CudaBuffer<float>> ray_weights_;
   using CudaVolume<Real>::x_;
   CudaBuffer<Quad<Real>> y_, next_y_, gradient_, marked_, kept_, saved_;
   const CudaBuffer<Quad<Real>>* shown_ = &y_;  // what is marched

@@ -77,8 +77,8 @@ class MotionProbe {
     Descent descent(level, setup.optics(hull->grid), setup, std::vector<Rgba>(level.problem.active.size()));
     for (int p = 0; p < kMotionPasses; ++p) descent.pass();
     descent.settle();
-    const ErrorOverBoxes error(setup.views, boxes_, level.problem, effects_.background);
-    return all_channels(error(descent.engine().residuals()));
+    const ErrorOverBoxes error(setup.views, boxes_, level.problem, effects_.background, descent.engine());
+    return all_channels(error());
   } catch (const Diverged&) {
     return std::numeric_limits<double>::infinity();
   }

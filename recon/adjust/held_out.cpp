@@ -58,9 +58,9 @@ HeldOut::HeldOut(const SolverSetup& setup, std::vector<const View*> views, const
       problem_(sampled_problem(setup, views_, boxes, stride_)),
       engine_(
           make_residual_engine(problem_, setup.optics(problem_.grid()), setup.options.precision, setup.pool)),
-      sample_error_(views_, boxes, problem_, setup.effects.background, stride_,
+      sample_error_(views_, boxes, problem_, setup.effects.background, *engine_, stride_,
                     problem_.list.subset_begin[1]),
-      error_(views_, boxes, problem_, setup.effects.background) {
+      error_(views_, boxes, problem_, setup.effects.background, *engine_) {
   for (const PixelBox& box : boxes) {
     sample_.pixels += pixels_on(box, stride_);
     sample_.of += pixels_on(box, 1);
@@ -69,12 +69,12 @@ HeldOut::HeldOut(const SolverSetup& setup, std::vector<const View*> views, const
 
 std::array<double, 3> HeldOut::sampled(const ResidualEngine& solution) {
   engine_->residual_of(solution, 0);
-  return sample_error_(engine_->residuals(0));
+  return sample_error_();
 }
 
 std::array<double, 3> HeldOut::all(const ResidualEngine& solution) {
   for (int subset = 0; subset < 2; ++subset) engine_->residual_of(solution, subset);
-  return error_(engine_->residuals());
+  return error_();
 }
 
 HeldOut::Both HeldOut::both(const std::vector<Rgba>& x) {

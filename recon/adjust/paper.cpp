@@ -119,7 +119,7 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
   const float sigma = setup.sigma(problem.grid());
   const auto engine = make_engine(problem, absorbing_optics(sigma), Precision::float32, setup.pool);
   engine->set(std::vector<Rgba>(problem.grid().size()));
-  const ErrorOverBoxes error(setup.views, setup.boxes, problem, setup.effects.background);
+  const ErrorOverBoxes error(setup.views, setup.boxes, problem, setup.effects.background, *engine);
 
   // The paper's volume holds colour intensity V with L += T tau V; here L += T S (1 - exp(-sigma)) / sigma a
   // voxel edge, so S = V sigma, and without extinction S = V tau.
@@ -134,7 +134,7 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
   const auto find_error = [&] {
     engine->residual(0);
     engine->residual(1);
-    return error(engine->residuals());
+    return error();
   };
   while (solution.iterations < most) {
     const std::array<double, 3> before = find_error();

@@ -45,7 +45,7 @@ struct Ending {
 template <class Shine>
 Ending end_with_the_best(Descent& descent, const Tracker& tracker, const ErrorOverBoxes& error, int lowest_at,
                          const Shine& shine) {
-  const auto input_rmse = [&] { return error(descent.engine().residuals()); };
+  const auto input_rmse = [&] { return error(); };
   if (const std::optional<int> better = tracker.better_before()) {
     descent.engine().go_back();
     shine();
@@ -88,7 +88,7 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
   const bool uneven =
       setup.effects.scattering.order != Scattering::Order::none && setup.effects.scattering.asymmetry != 0;
   const ErrorOverBoxes error(setup.views, setup.boxes, level->problem, setup.effects.background,
-                             stride_for(setup, setup.hull.grid));
+                             descent->engine(), stride_for(setup, setup.hull.grid));
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;
   double last = std::numeric_limits<double>::infinity();
   int iteration = 0;
@@ -111,8 +111,7 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
     if (finding == Guard::Finding::best) lowest_at = iteration;
     ++iteration;
     const double validation = descent->validation_error();
-    if (tracker.record(iteration, error(descent->engine().residuals()), descent->engine(), level->problem))
-      break;
+    if (tracker.record(iteration, error(), descent->engine(), level->problem)) break;
     if (iteration * level->subsets % kRound != 0) continue;
     if (setup.options.iterations == 0 && validation > (1 - kLeastGain) * last) break;
     last = validation;

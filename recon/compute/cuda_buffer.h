@@ -64,14 +64,6 @@ class CudaBuffer {
     check_cuda(cudaMemcpy(&to, data_ + at, sizeof(T), cudaMemcpyDeviceToHost), "copying from the GPU");
     return to;
   }
-  /// Downloads `count` elements from index `first` on.
-  [[nodiscard]] std::vector<T> download(std::size_t first, std::size_t count) const {
-    std::vector<T> to(count);
-    if (count > 0)
-      check_cuda(cudaMemcpy(to.data(), data_ + first, count * sizeof(T), cudaMemcpyDeviceToHost),
-                 "copying from the GPU");
-    return to;
-  }
   [[nodiscard]] std::vector<T> download() const {
     std::vector<T> to(size_);
     download(to.data());

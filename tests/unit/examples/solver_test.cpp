@@ -25,7 +25,7 @@ Solution solve_by_steps(const SolverSetup& setup, Tracker& tracker) {
   Solution solution;
   const Problem problem = make_problem(setup.views, setup.hull, setup.problem_options(), setup.pool);
   const auto engine = make_engine(problem, setup.optics(problem.grid()), Precision::float32, setup.pool);
-  const ErrorOverBoxes error(setup.views, setup.boxes, problem, setup.effects.background);
+  const ErrorOverBoxes error(setup.views, setup.boxes, problem, setup.effects.background, *engine);
 
   std::vector<Rgba> ones(problem.active.size());
   for (std::size_t p = 0; p < ones.size(); ++p)
@@ -43,7 +43,7 @@ Solution solve_by_steps(const SolverSetup& setup, Tracker& tracker) {
   Engine::Step step{.scale = 1, .momentum = 0};
   while (solution.iterations < setup.options.iterations) {
     engine->residual(0);
-    const std::array<double, 3> before = error(engine->residuals());
+    const std::array<double, 3> before = error();
     const Guard::Finding finding = guard.look(all_channels(before));  // throws where halving doesn't help
     if (finding == Guard::Finding::diverged) {
       engine->restore();
@@ -60,7 +60,7 @@ Solution solve_by_steps(const SolverSetup& setup, Tracker& tracker) {
     if (tracker.record(solution.iterations, before, *engine, problem)) break;
   }
   engine->residual(0);
-  solution.input_rmse = error(engine->residuals());
+  solution.input_rmse = error();
   solution.x = engine->get();
   solution.volume = to_volume(solution.x, problem, setup.hull, setup.effects);
   solution.halvings = guard.halvings();

@@ -24,7 +24,7 @@ struct Device {
   int gpu;  ///< of `cuda`: which GPU, as the driver counts them from 0
   friend auto operator<=>(const Device&, const Device&) = default;
   friend bool operator==(const Device&, const Device&) = default;
-  friend bool operator==(const Device& device, Kind kind) { return device.kind == kind; }
+  friend bool operator==(const Device& device, Kind of) { return device.kind == of; }
 };
 /// "auto", "cpu", "cuda" (the first GPU), "cuda:1", ...
 std::string name(Device device);

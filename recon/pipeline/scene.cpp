@@ -213,6 +213,7 @@ Result<std::vector<SharedImage>> averages_of(session::SessionReader& reader, con
                             for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += part * image.rgb[p];
                           }));
   std::vector<SharedImage> shared;
+  shared.reserve(averages.size());
   for (RadianceImage& average : averages) shared.push_back(share(std::move(average)));
   return shared;
 }

@@ -151,7 +151,7 @@ void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
                    "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
       ->check(CLI::NonNegativeNumber);
   CLI::Option* last = verb->add_option("--last-frame", a.last_frame,
-                                       "Sessions only: reconstructs one frame after the other, from --frame "
+                                       "Sessions only: reconstructs each frame, from --frame "
                                        "to this one, each into OUT/frame-N")
                           ->check(CLI::NonNegativeNumber)
                           ->needs("--frame");

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <exception>
 #include <mutex>
 #include <new>
 #include <numeric>
@@ -63,6 +64,8 @@ class SequenceOfFrames {
   } catch (const std::bad_alloc&) {
     return Error{ErrorKind::refused, "not enough memory", folder.string(),
                  "Give a smaller --at-once, or fewer --voxels"};
+  } catch (const std::exception& e) {  // one frame's failure ends neither the others nor the program
+    return Error{ErrorKind::refused, e.what(), folder.string()};
   }
 
   std::optional<std::size_t> take() {

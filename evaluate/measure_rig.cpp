@@ -283,7 +283,7 @@ std::string choice_text(const RigTradeoffOptions& o, RigAxis axis, std::size_t i
     case RigAxis::tolerance:
       return fmt::format("within {:g} ms", in_milliseconds(o.tolerances[i]));
     case RigAxis::device:
-      return o.devices[i] == recon::Device::cuda ? "cuda" : "cpu";
+      return recon::name(o.devices[i]);
   }
   return {};
 }

@@ -65,7 +65,7 @@ struct Report {
   std::string input;                    ///< as the user typed it
   std::string solver;                   ///< "default" or "paper"
   std::vector<std::string> deviations;  ///< of the paper's solver from the paper (paper.h)
-  std::string device;                   ///< "cpu" or "cuda"
+  std::string device;                   ///< name(Device): "cpu", "cuda", "cuda:1", ...
   int threads = 0;                      ///< 0: all cores
   std::uint64_t seed = 0;
   double step = 1;  ///< voxel edges

@@ -114,7 +114,7 @@ struct RecordingConfig {
 
 struct ReconstructionConfig {
   std::filesystem::path program;  ///< searched in PATH unless it contains a slash; empty: fill_in() names it
-  std::string device = "auto";    ///< auto, cpu, cuda or cuda:N
+  std::string device = "auto";    ///< auto, cpu or cuda
   std::optional<Seconds> budget{};  ///< default: the reconstruction's own rules
   std::optional<int> voxels{};      ///< along the longest edge; default: the reconstruction's own rules
   std::vector<int> hold_out{};      ///< views held out to assess the result, counted from 0

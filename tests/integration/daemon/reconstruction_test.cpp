@@ -184,6 +184,7 @@ TEST_F(DaemonReconstruction, FramesThatAreAtWorkAtOnceBecomeWhatTheyBecomeAlone)
   }
   const Shell hopeless = run("--at-once 2 --hold-out 30", "hopeless");
   EXPECT_EQ(hopeless.status, 1);
+  EXPECT_FALSE(fs::exists(folder_ / "hopeless")) << "nothing was put in it";
   EXPECT_THAT(hopeless.output, HasSubstr("of 3 frames 3 failed and 0 were not tried"));
 }
 

@@ -33,7 +33,7 @@ SortedSamples sort_by_voxel(const CudaBuffer<std::uint32_t>& voxels, std::size_t
         [&](void* space, std::size_t& bytes) {
           return cub::DeviceRadixSort::SortPairs(space, bytes, voxels.data(), sorted_voxels.data(),
                                                  numbers.data(), sorted.order.data(), count, 0,
-                                                 std::bit_width(key_points));
+                                                 static_cast<int>(std::bit_width(key_points)));
         },
         "sorting samples");
   }

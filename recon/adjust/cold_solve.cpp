@@ -3,8 +3,7 @@
 
 #include <cmath>
 #include <limits>
-
-#include "recon/adjust/extinction_field.h"
+#include <optional>
 
 namespace emberlock::recon {
 namespace {
@@ -17,31 +16,31 @@ ColdSolve finish(Descent& descent, int passes) {
   for (int p = 0; p < passes; ++p) descent.pass();
   const double error = descent.validation_error();
   if (!std::isfinite(error)) throw Diverged(error, error);
-  return {error, descent.engine().get()};
+  return {error, descent.take_engine()};
 }
 
 ColdSolve solve_level(const SolverSetup& setup, const Level& level, const Extinction& extinction) {
   const Problem& problem = level.problem;
   Optics optics = setup.optics(problem.grid());
-  std::vector<Rgba> x(problem.active.size());
   if (extinction.model == Extinction::Model::none) {
     optics.absorb = Absorb::nothing;
-    Descent descent(level, optics, setup, x);
+    Descent descent(level, optics, setup);
     return finish(descent, kEmissionPasses + kJointPasses);
   }
   if (extinction.model == Extinction::Model::constant) {
     SolverSetup even = setup;
     even.effects.extinction = extinction;
-    Descent descent(level, even.optics(problem.grid()), even, x);
+    Descent descent(level, even.optics(problem.grid()), even);
     return finish(descent, kEmissionPasses + kJointPasses);
   }
   optics.absorb = Absorb::field;
+  std::optional<Descent> even;
   if (extinction.soot.value() > 0) {  // is spread by the light that there is
-    Descent even(level, optics, setup, with_extinction(x, expected_extinction(problem, extinction, x)));
-    for (int p = 0; p < kEmissionPasses; ++p) even.pass();
-    x = even.engine().get();
+    even.emplace(level, optics, setup, DescentStart{nullptr, &extinction});
+    for (int p = 0; p < kEmissionPasses; ++p) even->pass();
   }
-  Descent descent(level, optics, setup, with_extinction(x, expected_extinction(problem, extinction, x)));
+  Descent descent(level, optics, setup, {even ? &even->engine() : nullptr, &extinction});
+  even.reset();
   for (int p = 0; p < kEmissionPasses; ++p) descent.pass();
   descent.release_extinction();
   return finish(descent, kJointPasses);
@@ -52,7 +51,7 @@ ColdSolve solve_level(const SolverSetup& setup, const Level& level, const Extinc
 ColdSolve cold_solve(const SolverSetup& setup, const Level& level, const Extinction& extinction) try {
   return solve_level(setup, level, extinction);
 } catch (const Diverged&) {
-  return {std::numeric_limits<double>::infinity(), std::vector<Rgba>(level.problem.active.size())};
+  return {std::numeric_limits<double>::infinity(), nullptr};
 }
 
 }  // namespace emberlock::recon

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <vector>
+#include <memory>
 
 #include "recon/adjust/descent.h"
 
@@ -9,8 +9,8 @@ namespace emberlock::recon {
 
 /// The result of a few passes on a level, starting from darkness, for comparing candidates.
 struct ColdSolve {
-  double error = 0;     ///< RMS over the level's held-out pixels, grey levels; infinite if it diverged
-  std::vector<Rgba> x;  ///< as from Engine::get()
+  double error = 0;  ///< RMS over the level's held-out pixels, grey levels; infinite if it diverged
+  std::shared_ptr<const Engine> engine;  ///< holds the solution; null if it diverged
 };
 
 /// `extinction`: none, constant, or the initial value of a field.

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/random.h"
-
 namespace emberlock::recon {
 namespace {
 
@@ -28,29 +26,7 @@ constexpr float kLeastCurvature = 0.05F;  // by the extinction
 constexpr float kJoint = 2;
 constexpr float kMostExtinction = 0.3F;       // a voxel edge, unless more is expected
 constexpr float kFaintestExtinction = 1e-4F;  // a voxel edge: the scale of a medium thought to take nothing
-constexpr int kHoldOutOneIn = 32;             // pixels kept from the fit
 constexpr std::size_t kFewestRays = 256;      // of a subset
-
-/// Of those that any ray comes to.
-float mean(const std::vector<float>& weights) {
-  double sum = 0;
-  std::size_t count = 0;
-  for (const float w : weights) {
-    sum += static_cast<double>(w);
-    count += w > 0 ? 1 : 0;
-  }
-  return count > 0 ? static_cast<float>(sum / static_cast<double>(count)) : 0;
-}
-
-/// Pixel subsets whose successive ones lie as far apart as can be: Bayer's order (1973).
-int bayer(int x, int y) {
-  static constexpr int kOrder[4][4] = {{0, 8, 2, 10}, {12, 4, 14, 6}, {3, 11, 1, 9}, {15, 7, 13, 5}};
-  return kOrder[y & 3][x & 3];
-}
-
-bool held_out(int x, int y) {
-  return random_bits(0, static_cast<std::uint64_t>(x), static_cast<std::uint64_t>(y)) % kHoldOutOneIn == 0;
-}
 
 /// Pixels across a voxel in the middle of the grid, in the view that shows it smallest.
 double pixels_per_voxel(const SolverSetup& setup, const Grid& g) {
@@ -76,6 +52,10 @@ int subsets_for(float sigma, double rays_per_voxel, std::size_t pixels, int most
     subsets /= 4;
   }
   return subsets;
+}
+
+double rms_of(const ResidualEngine::Squares& s, std::size_t rays) {
+  return std::sqrt((s[0] + s[1] + s[2]) / (3 * std::max(1.0, static_cast<double>(rays))));
 }
 
 std::size_t flame_pixels(const SolverSetup& setup, int stride) {
@@ -111,25 +91,25 @@ Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
                               flame_pixels(setup, stride), most_subsets);
   ProblemOptions options = setup.problem_options();
   options.subsets = level.subsets + 1;
-  options.subset_of = [subsets = level.subsets, stride, left_out](std::size_t view, int x, int y) {
-    if (x % stride != 0 || y % stride != 0) return -1;
-    if (left_out ? view == *left_out : held_out(x, y)) return subsets;
-    return bayer(x / stride, y / stride) * subsets / 16;
-  };
+  options.rule = {stride, -1, level.subsets, level.subsets, left_out ? static_cast<int>(*left_out) : -1};
   level.problem = make_problem(setup.views, hull, options, setup.pool);
   return level;
 }
 
-Descent::Descent(const Level& level, const Optics& optics, const SolverSetup& setup,
-                 const std::vector<Rgba>& x)
+Descent::Descent(const Level& level, const Optics& optics, const SolverSetup& setup, const DescentStart& start)
     : level_(level),
       engine_(make_engine(level.problem, optics, setup.options.precision, setup.pool)),
       fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]),
       guard_(black_error()) {
-  find_weights(x);
+  if (start.from != nullptr) engine_->start_from(*start.from);
+  if (start.expected != nullptr) {
+    const auto edge = static_cast<double>(level.problem.grid().edge);
+    engine_->expect_extinction(static_cast<float>(start.expected->value.value() * edge),
+                               static_cast<float>(start.expected->soot.value() * edge));
+  }
+  find_weights();
   stiffness_ *=
       static_cast<float>(setup.smoothness.value_or(setup.options.smoothness.value_or(kLeastSmoothness)));
-  engine_->set(x);
   guard_ = Guard(start_error());
   engine_->mark();
   engine_->keep();
@@ -153,7 +133,7 @@ void Descent::each_subset(const Act& act) {
 
 double Descent::start_error() {
   const double black = black_error();
-  if (level_.problem.background.empty()) return black;
+  if (!level_.problem.is_before_background) return black;
   each_subset([&](int s) { engine_->residual(s); });  // a medium darkens it, light or not
   return std::max(black, fit_error());
 }
@@ -221,24 +201,13 @@ void Descent::settle() {
 }
 
 double Descent::rms_of_residuals(std::size_t first_ray, std::size_t last_ray) const {
-  const ResidualEngine::Squares s = engine_->squares(first_ray, last_ray);
-  return std::sqrt((s[0] + s[1] + s[2]) / (3 * std::max(1.0, static_cast<double>(last_ray - first_ray))));
+  return rms_of(engine_->squares(first_ray, last_ray), last_ray - first_ray);
 }
 
 double Descent::fit_error() const { return rms_of_residuals(0, fitted_); }
 
 /// Of no light at all, behind which the whole background shines.
-double Descent::black_error() const {
-  const Problem& problem = level_.problem;
-  double sum = 0;
-  for (std::size_t r = 0; r < fitted_; ++r)
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto behind = problem.background.empty() ? 0. : static_cast<double>(problem.background[r].c[c]);
-      const double left = static_cast<double>(problem.seen[r].c[c]) - behind;
-      sum += left * left;
-    }
-  return std::sqrt(sum / (3 * std::max(1.0, static_cast<double>(fitted_))));
-}
+double Descent::black_error() const { return rms_of(engine_->black_squares(0, fitted_), fitted_); }
 
 double Descent::validation_error() {
   const int subset = rays_of(level_.subsets) > 0 ? level_.subsets : 0;
@@ -247,92 +216,41 @@ double Descent::validation_error() {
   return rms_of_residuals(first, first + rays_of(subset));
 }
 
-/// Light that is seen over what an even medium of 1 would show.
-float Descent::mean_emission(const std::vector<Rgba>& of_one) const {
-  const Problem& problem = level_.problem;
-  double seen = 0;
-  double even = 0;
-  for (std::size_t r = 0; r < fitted_; ++r) {
-    even += static_cast<double>(of_one[r].c[0]);
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float behind = problem.background.empty() ? 0.F : problem.background[r].c[c];
-      seen += static_cast<double>(problem.seen[r].c[c] - behind) / 3;
-    }
-  }
-  return even > 0 ? static_cast<float>(std::max(0.0, seen) / even) : 0;
-}
-
 /// The largest of all subsets' N / N_s A_s^T A_s 1; 1 only at the hull's key points. A field's extinction is
 /// lane 3 of x, thinned.
-void Descent::find_weights(const std::vector<Rgba>& x) {
-  const std::vector<std::uint8_t>& active = level_.problem.active;
-  std::vector<Rgba> ones(active.size());
-  for (std::size_t p = 0; p < ones.size(); ++p)
-    if (active[p] != 0) ones[p] = Rgba{{1, 1, 1, kThinned * x[p].c[3]}};
-  engine_->set(ones);
-  engine_->set_weights(std::vector<float>(active.size()));
-  const std::vector<Rgba> dark(level_.problem.list.rays.size());
+void Descent::find_weights() {
+  engine_->light_evenly(kThinned);
   each_subset([&](int s) {
-    engine_->residual_against(dark, s, Engine::Behind::nothing);
+    engine_->residual_against_aim(s, Engine::Behind::nothing);
     engine_->backproject(s);
     engine_->raise_weights(share(s));
   });
-  soft_ = kSoftLight * mean_emission(engine_->residuals());
-  std::vector<float> weights = engine_->weights();
-  const float middle = mean(weights);
-  for (std::size_t p = 0; p < weights.size(); ++p)
-    weights[p] = active[p] != 0 && weights[p] > 0 ? weights[p] + kLeastWeight * middle : 0;
-  stiffness_ = middle;
-  engine_->set_weights(weights);
+  soft_ = kSoftLight * engine_->seen_over_shown(fitted_);
+  stiffness_ = engine_->settle_weights(kLeastWeight, 1);
+  engine_->rest();
 }
 
 /// kJoint J^T J 1 of the subset that has most, J being the derivative by the extinction of what the rays
 /// show, the background that comes through included: all of its entries have one sign, because extinction
 /// only takes light away, so this majorises J^T J. J 1 is a difference along (0, 0, 0, 1).
 void Descent::release_extinction() {
-  const std::vector<std::uint8_t>& active = level_.problem.active;
-  const std::vector<Rgba> x = engine_->get();
-  reference_.assign(x.size(), 0);
-  std::vector<Rgba> denser = x;
-  double sum = 0;
-  for (std::size_t p = 0; p < x.size(); ++p)
-    if (active[p] != 0) sum += static_cast<double>(reference_[p] = x[p].c[3]);
-  const auto points = static_cast<double>(std::count(active.begin(), active.end(), 1));
-  const float scale = std::max(static_cast<float>(sum / std::max(1.0, points)), kFaintestExtinction);
-  const float difference = 0.02F * scale;
-  const auto radiance = [&](const std::vector<Rgba>& volume) {
-    engine_->set(volume);
-    each_subset([&](int s) { engine_->project(s); });
-    return engine_->residuals();
-  };
-  for (std::size_t p = 0; p < x.size(); ++p)
-    if (active[p] != 0) denser[p].c[3] += difference;
-  const std::vector<Rgba> after = radiance(denser);
-  const std::vector<Rgba> before = radiance(x);
-  std::vector<Rgba> target(before.size());  // so that the residual is J 1
-  const std::vector<Rgba>& behind = level_.problem.background;
-  for (std::size_t r = 0; r < target.size(); ++r) {
-    Rgba shown = before[r];
-    Rgba change = after[r] - before[r];
-    for (std::size_t c = 0; c < 3 && !behind.empty(); ++c) {
-      shown.c[c] += before[r].c[3] * behind[r].c[c];
-      change.c[c] += change.c[3] * behind[r].c[c];
-    }
-    target[r] = shown - (1 / difference) * change;
-  }
-  engine_->set_field(std::vector<float>(x.size()), reference_);
+  engine_->rest();
+  const float scale = std::max(engine_->take_reference(), kFaintestExtinction);
+  const float rise = 0.02F * scale;
+  const auto project = [&] { each_subset([&](int s) { engine_->project(s); }); };
+  engine_->thicken(rise);
+  project();
+  engine_->aim_at_residuals();
+  engine_->rest();
+  project();
+  engine_->aim_at_slope(rise);
   each_subset([&](int s) {
-    engine_->residual_against(target, s, Engine::Behind::background);
+    engine_->residual_against_aim(s, Engine::Behind::background);
     engine_->backproject(s);
     engine_->raise_field_weights(share(s));
   });
-  std::vector<float> weights = engine_->field_weights();
-  const float middle = mean(weights);
-  for (std::size_t p = 0; p < weights.size(); ++p)
-    weights[p] = active[p] != 0 && weights[p] > 0 ? kJoint * (weights[p] + kLeastCurvature * middle) : 0;
-  engine_->set_field(weights, reference_);
-  engine_->set(x);
-  field_ = {{}, kVariation * scale * middle, kSoft * scale, std::max(kMostExtinction, 4 * scale)};
+  const float curvature = engine_->settle_field_weights(kLeastCurvature, kJoint);
+  field_ = {{}, kVariation * scale * curvature, kSoft * scale, std::max(kMostExtinction, 4 * scale)};
   momentum_time_ = 1;
 }
 

@@ -3,7 +3,7 @@
 
 #include <memory>
 #include <optional>
-#include <vector>
+#include <utility>
 
 #include "recon/adjust/engine.h"
 #include "recon/adjust/guard.h"
@@ -36,6 +36,13 @@ Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
 /// How firmly two neighbours are tied at least, over the mean of A^T A 1.
 constexpr double kLeastSmoothness = 0.04;
 
+/// Whose light a descent starts from, of the same grid or one half as fine, and what extinction is expected under that,
+/// where the optics take a field. From darkness where there is none.
+struct DescentStart {
+  const Engine* from = nullptr;
+  const Extinction* expected = nullptr;
+};
+
 /// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Huber total variation
 /// over x >= 0, by preconditioned ordered-subset steps with Nesterov's momentum.
 ///
@@ -52,9 +59,8 @@ constexpr double kLeastSmoothness = 0.04;
 /// an extinction that moves along, whose problem isn't convex. A Guard looks after all of it.
 class Descent {
  public:
-  /// The level and the pool must outlive it. Starts from x: emission, and in lane 3 extinction where the
-  /// optics take a field.
-  Descent(const Level& level, const Optics& optics, const SolverSetup& setup, const std::vector<Rgba>& x);
+  /// The level and the pool must outlive it.
+  Descent(const Level& level, const Optics& optics, const SolverSetup& setup, const DescentStart& start = {});
 
   /// From here on the extinction moves too, held to what it is now by the total variation of their
   /// difference. Absorb::field alone.
@@ -81,6 +87,8 @@ class Descent {
   /// RMS over the held-out pixels, or over the first subset where there are none; grey levels.
   [[nodiscard]] double validation_error();
   [[nodiscard]] Engine& engine() { return *engine_; }
+  /// For who ends here.
+  [[nodiscard]] std::unique_ptr<Engine> take_engine() { return std::move(engine_); }
   [[nodiscard]] int halvings() const { return guard_.halvings(); }
 
  private:
@@ -89,10 +97,9 @@ class Descent {
   [[nodiscard]] float share(int subset) const;
   template <class Act>
   void each_subset(const Act& act);
-  [[nodiscard]] float mean_emission(const std::vector<Rgba>& of_one) const;
   [[nodiscard]] double black_error() const;
   [[nodiscard]] double start_error();
-  void find_weights(const std::vector<Rgba>& x);
+  void find_weights();
 
   const Level& level_;
   std::unique_ptr<Engine> engine_;
@@ -104,7 +111,6 @@ class Descent {
   double momentum_time_ = 1;
   double last_error_ = 0;                   // of the pass before; infinite before the first
   std::optional<Engine::FieldStep> field_;  // once the extinction is released
-  std::vector<float> reference_;            // what it is held to, a voxel edge
 };
 
 }  // namespace emberlock::recon

@@ -17,22 +17,13 @@ void note_marched(std::vector<int>& marched, int subset) {
   marched.push_back(subset);
 }
 
-ResidualEngine::Squares add_up(const std::vector<Quad<double>>& chunks) {
-  ResidualEngine::Squares sum = {};
-  for (const Quad<double>& chunk : chunks)
-    for (std::size_t c = 0; c < 3; ++c) sum[c] += chunk.c[c];
-  return sum;
-}
-
 }  // namespace
 
 ResidualEngine::Squares ResidualEngine::squares(std::size_t first_ray, std::size_t last_ray) const {
-  return first_ray < last_ray ? add_up(chunks_of_squares(first_ray, last_ray)) : Squares{};
+  return first_ray < last_ray ? sum_squares(first_ray, last_ray) : Squares{};
 }
 
-ResidualEngine::Squares ResidualEngine::weighted_squares(std::size_t number) const {
-  return add_up(chunks_of_squares(number));
-}
+ResidualEngine::Squares ResidualEngine::weighted_squares(std::size_t number) const { return sum_squares(number); }
 
 void ResidualEngine::set(const std::vector<Rgba>& x) {
   marched_.clear();
@@ -54,6 +45,43 @@ void Engine::residual(int subset) {
 void Engine::residual_against(const std::vector<Rgba>& target, int subset, Behind behind) {
   march_against(target, subset, behind);
   note_marched(marched_, subset);
+}
+
+void Engine::residual_against_aim(int subset, Behind behind) {
+  march_against_aim(subset, behind);
+  note_marched(marched_, subset);
+}
+
+void Engine::start_from(const Engine& other) {
+  marched_.clear();
+  copy_solution(other);
+}
+
+void Engine::expect_extinction(float even, float soot) {
+  demand(takes_a_field(), "expect_extinction() where the optics take none: make the engine with Absorb::field");
+  marched_.clear();
+  put_expected_extinction(even, soot);
+}
+
+void Engine::light_evenly(float thinned) {
+  marched_.clear();
+  put_even_light(thinned);
+}
+
+void Engine::thicken(float by) {
+  marched_.clear();
+  put_thicker(by);
+}
+
+float Engine::take_reference() {
+  demand(takes_a_field(), "take_reference() where the optics take none: make the engine with Absorb::field");
+  has_field_ = true;
+  return put_reference();
+}
+
+float Engine::settle_field_weights(float share, float factor) {
+  demand(has_field_, "settle_field_weights() without a field: set_field() or take_reference() first");
+  return settle_curvature(share, factor);
 }
 
 void Engine::project(int subset) {

@@ -31,13 +31,21 @@ class ResidualEngine {
   /// here on.
   virtual void set_offset(const std::vector<Rgba>& offset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> residuals() const = 0;
-  /// Sums of the squared residuals for R, G and B, of a range of the rays. They are made where the residuals
+  /// Sums of the squared residuals for R, G and B, of a range of the rays. All sums are made where their terms
   /// lie, in an order that no thread count changes.
   using Squares = std::array<double, 3>;
   [[nodiscard]] Squares squares(std::size_t first_ray, std::size_t last_ray) const;
-  /// Keeps weights of the first so many rays where the residuals lie; returns their number.
-  virtual std::size_t keep_weights(const std::vector<float>& of_rays) = 0;
-  /// The same of the rays that have weights of this number, each with its weight.
+  /// The same of no light at all, behind which the whole background shines.
+  [[nodiscard]] virtual Squares black_squares(std::size_t first_ray, std::size_t last_ray) const = 0;
+  /// Boxes of the views, one each, that errors are taken over: what a ray counts by its pixel, of the first so many rays,
+  /// and over all pixels whose coordinates are multiples of a stride what no light at all leaves.
+  struct Weighed {
+    std::size_t number = 0;    ///< for weighted_squares()
+    Squares black_of_rays{};   ///< of the pixels that rays see
+    Squares black_of_boxes{};  ///< of all pixels
+  };
+  [[nodiscard]] virtual Weighed weigh(const std::vector<WeighedBox>& boxes, std::size_t rays, int stride) = 0;
+  /// squares() of the rays that were weighed, each by what it counts.
   [[nodiscard]] Squares weighted_squares(std::size_t number) const;
 
  protected:
@@ -45,9 +53,8 @@ class ResidualEngine {
   std::vector<int> marched_;
 
  private:
-  [[nodiscard]] virtual std::vector<Quad<double>> chunks_of_squares(std::size_t first_ray,
-                                                                    std::size_t last_ray) const = 0;
-  [[nodiscard]] virtual std::vector<Quad<double>> chunks_of_squares(std::size_t weights) const = 0;
+  [[nodiscard]] virtual Squares sum_squares(std::size_t first_ray, std::size_t last_ray) const = 0;
+  [[nodiscard]] virtual Squares sum_squares(std::size_t weights) const = 0;
   virtual void put(const std::vector<Rgba>& x) = 0;
   virtual void march_other(const ResidualEngine& other, int subset) = 0;
   [[nodiscard]] virtual std::size_t grid_points() const = 0;
@@ -79,6 +86,8 @@ class Engine : public ResidualEngine {
   /// residual = A y - target, for targets other than what was seen. With Behind::background A y includes the
   /// background's light that the medium lets through.
   void residual_against(const std::vector<Rgba>& target, int subset, Behind behind);
+  /// The same for a target that lies with the residuals: at first nothing at all, see aim_at_slope().
+  void residual_against_aim(int subset, Behind behind);
   /// residual = A y.
   void project(int subset);
   /// gradient += A^T residual; under Absorb::field lane 3 is the slope by extinction. The subset's residual()
@@ -97,6 +106,31 @@ class Engine : public ResidualEngine {
   void go_back();
   /// y = x: the look-ahead is forgotten.
   void rest();
+  // How a level begins. What follows changes y alone where it says so; rest() brings it back to x.
+
+  /// x and y become those of an engine of the same grid, or of one half as fine; both of one precision and device.
+  void start_from(const Engine& other);
+  /// Lane 3 of x and y becomes what is expected a voxel edge: ExpectExtinction.
+  void expect_extinction(float even, float soot);
+  /// y = 1 in the medium, thinned.
+  void light_evenly(float thinned);
+  /// The mean light that is seen beside the background over the mean that the residuals show, 0 where that is none.
+  [[nodiscard]] virtual float seen_over_shown(std::size_t last_ray) const = 0;
+  /// weights = factor * (weights + share * mean) where any ray comes; the mean, as it was, of those above 0.
+  virtual float settle_weights(float share, float factor) = 0;
+  /// After set_field() or take_reference(): the same of the curvature by the extinction.
+  float settle_field_weights(float share, float factor);
+  /// What the extinction is thought to be from here on is what x says; clears its weights, and the gradient. The mean over
+  /// the medium.
+  float take_reference();
+  /// y = x with more extinction in the medium.
+  void thicken(float by);
+  /// What the residuals, from project(), hold is what residual_against_aim() aims at.
+  virtual void aim_at_residuals() = 0;
+  /// From there and what project() shows now: a residual against the aim, before the background, is the slope of what the
+  /// rays show by the extinction, which rose by so much in between.
+  virtual void aim_at_slope(float rise) = 0;
+
   /// The weights of descend(): one a key point, 0 for those that take no part, as all are before. Clears the
   /// gradient.
   virtual void set_weights(const std::vector<float>& weights) = 0;
@@ -130,7 +164,14 @@ class Engine : public ResidualEngine {
  private:
   virtual void march_residual(int subset) = 0;
   virtual void march_against(const std::vector<Rgba>& target, int subset, Behind behind) = 0;
+  virtual void march_against_aim(int subset, Behind behind) = 0;
   virtual void march_radiance(int subset) = 0;
+  virtual void copy_solution(const Engine& other) = 0;
+  virtual void put_expected_extinction(float even, float soot) = 0;
+  virtual void put_even_light(float thinned) = 0;
+  virtual void put_thicker(float by) = 0;
+  virtual float settle_curvature(float share, float factor) = 0;
+  virtual float put_reference() = 0;
   virtual void spread(int subset) = 0;  ///< the gradient's sum
   virtual void copy_to_mark() = 0;
   virtual void swap_mark_and_kept() = 0;

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include "recon/adjust/engine.h"
+#include "recon/adjust/engine_parts.h"
 #include "recon/effects/exposure.h"
 #include "recon/kernels/paper.h"
 
@@ -15,7 +16,7 @@ class CpuEngine final : public Engine {
   CpuEngine(const Problem& problem, const Optics& optics, Pool& pool, EngineMemory memory)
       : problem_(problem),
         optics_(optics),
-        travel_(problem.list.bends.empty() ? Travel::straight : Travel::curved),
+        travel_(problem.list.curved ? Travel::curved : Travel::straight),
         memory_(memory),
         pool_(pool),
         x_(memory == EngineMemory::steps ? problem.grid().size() : 0),
@@ -24,7 +25,7 @@ class CpuEngine final : public Engine {
         gradient_(x_.size()),
         weight_(x_.size()),
         stiffness_(x_.size()),
-        residual_(problem.list.rays.size()) {
+        residual_(problem.rays()) {
     const ExposureBlur blur(optics.exposure, problem.grid());
     if (!blur.identity()) blur_ = blur;
     if (optics.absorb == Absorb::field) samples_.resize(problem.most_samples());
@@ -33,9 +34,19 @@ class CpuEngine final : public Engine {
   [[nodiscard]] std::vector<Rgba> get() const override { return converted<float>(x_); }
   [[nodiscard]] std::vector<Rgba> recent() override { return get(); }
   [[nodiscard]] std::vector<Rgba> residuals() const override { return converted<float>(residual_); }
-  std::size_t keep_weights(const std::vector<float>& of_rays) override {
-    ray_weights_.push_back(of_rays);
-    return ray_weights_.size() - 1;
+  [[nodiscard]] Squares black_squares(std::size_t first_ray, std::size_t last_ray) const override {
+    return squares_of(sum(BlackTerm{problem_.seen.data(), background()}, first_ray, last_ray));
+  }
+  [[nodiscard]] Weighed weigh(const std::vector<WeighedBox>& boxes, std::size_t rays, int stride) override {
+    const std::vector<ViewPixels> views = problem_.view_pixels();
+    const RayList& list = problem_.list;
+    std::vector<float>& weights = ray_weights_.emplace_back(rays);
+    const WeighRays act{views.data(), boxes.data(), list.rays.data(), list.pixels.data(), weights.data()};
+    each_of(rays, act);
+    const std::size_t rows = most_rows(boxes);
+    return {ray_weights_.size() - 1,
+            squares_of(sum(BlackOfRay{views.data(), list.rays.data(), list.pixels.data(), weights.data()}, 0, rays)),
+            squares_of(sum(BlackOfRow{views.data(), boxes.data(), rows, stride}, 0, rows * boxes.size()))};
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
@@ -53,23 +64,33 @@ class CpuEngine final : public Engine {
   }
 
  private:
-  [[nodiscard]] std::vector<Quad<double>> chunks_of_squares(std::size_t first_ray,
-                                                            std::size_t last_ray) const override {
-    return sum_chunks({residual_.data(), nullptr, first_ray, last_ray, nullptr});
+  [[nodiscard]] Squares sum_squares(std::size_t first_ray, std::size_t last_ray) const override {
+    return squares_of(sum(SquareTerm<Real>{residual_.data(), nullptr}, first_ray, last_ray));
   }
-  [[nodiscard]] std::vector<Quad<double>> chunks_of_squares(std::size_t weights) const override {
+  [[nodiscard]] Squares sum_squares(std::size_t weights) const override {
     const std::vector<float>& of_rays = ray_weights_.at(weights);
-    return sum_chunks({residual_.data(), of_rays.data(), 0, of_rays.size(), nullptr});
+    return squares_of(sum(SquareTerm<Real>{residual_.data(), of_rays.data()}, 0, of_rays.size()));
   }
-  [[nodiscard]] std::vector<Quad<double>> sum_chunks(SumSquares<Real> act) const {
+  template <class Term>
+  [[nodiscard]] Quad<double> sum(const Term& term, std::size_t first, std::size_t last) const {
+    SumChunk<Term> act{term, first, last, nullptr};
     std::vector<Quad<double>> sums(act.chunks());
     act.sums = sums.data();
+    each_of(sums.size(), act);
+    Quad<double> all;
+    for (const Quad<double>& chunk : sums) all = all + chunk;
+    return all;
+  }
+  template <class Act>
+  void each_of(std::size_t count, const Act& act) const {
     constexpr int kTasks = 64;
     pool_.run(kTasks, [&](int task) {
-      const Slice mine = slice(sums.size(), kTasks, task);
-      for (std::size_t chunk = mine.begin; chunk < mine.end; ++chunk) act(chunk);
+      const Slice mine = slice(count, kTasks, task);
+      for (std::size_t i = mine.begin; i < mine.end; ++i) act(i);
     });
-    return sums;
+  }
+  [[nodiscard]] const Rgba* background() const {
+    return problem_.background.empty() ? nullptr : problem_.background.data();
   }
 
   void put(const std::vector<Rgba>& x) override {
@@ -87,9 +108,12 @@ class CpuEngine final : public Engine {
     residual(subset, problem_.pixel_residual<Real>(offset_, optics_.white));
   }
   void march_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
-    const bool lit = behind == Behind::background && !problem_.background.empty();
-    residual(subset,
-             PixelResidual<Real>{target.data(), lit ? problem_.background.data() : nullptr, nullptr, 0});
+    residual(subset, PixelResidual<Real>{target.data(), behind == Behind::background ? background() : nullptr,
+                                         nullptr, 0});
+  }
+  void march_against_aim(int subset, Behind behind) override {
+    aim_.resize(residual_.size());
+    march_against(aim_, subset, behind);
   }
   void residual(int subset, const PixelResidual<Real>& pixel) {
     expose();
@@ -123,6 +147,54 @@ class CpuEngine final : public Engine {
     if (!blur_) return;
     gradient_ = converted<Real>(blur_->adjoint(converted<float>(gradient_), pool_));
     for (std::size_t p = 0; p < before.size(); ++p) gradient_[p] = gradient_[p] + before[p];
+  }
+
+  void copy_solution(const Engine& other) override {
+    const auto& from = dynamic_cast<const CpuEngine&>(other);
+    if (from.problem_.grid().edge == problem_.grid().edge) {
+      x_ = from.x_;
+    } else {
+      const RefineLight<Real> refine = refinement<Real>(from.problem_, problem_, problem_.share.data(), from.x_.data(), x_.data());
+      std::fill(x_.begin(), x_.end(), Quad<Real>{});
+      each_row([&](int i, int j, int k) { refine(i, j, k); });
+    }
+    y_ = next_y_ = x_;
+  }
+  void put_expected_extinction(float even, float soot) override {
+    const float mean = soot > 0 ? mean_of(sum(LuminanceTerm<Real>{problem_.share.data(), x_.data()}, 0, x_.size())) : 0;
+    each_of(x_.size(), ExpectExtinction<Real>{problem_.share.data(), x_.data(), even, soot, mean});
+    y_ = next_y_ = x_;
+  }
+  void put_even_light(float thinned) override {
+    each_of(x_.size(), LightEvenly<Real>{problem_.share.data(), x_.data(), y_.data(), thinned});
+  }
+  void put_thicker(float by) override {
+    each_of(x_.size(), Thicken<Real>{problem_.share.data(), x_.data(), y_.data(), by});
+  }
+  [[nodiscard]] float seen_over_shown(std::size_t last_ray) const override {
+    return ratio(sum(SeenTerm<Real>{problem_.seen.data(), background(), residual_.data()}, 0, last_ray));
+  }
+  float settle_weights(float share, float factor) override { return settle(weight_, share, factor); }
+  float settle_curvature(float share, float factor) override { return settle(field_weight_, share, factor); }
+  float settle(std::vector<Real>& weights, float share, float factor) {
+    const float mean = mean_of(sum(WeightTerm<Real>{weights.data()}, 0, weights.size()));
+    each_of(weights.size(), SettleWeight<Real>{problem_.share.data(), weights.data(), Real(share * mean), Real(factor)});
+    clear_gradient();
+    return mean;
+  }
+  float put_reference() override {
+    reference_.resize(x_.size());
+    field_weight_.assign(x_.size(), 0);
+    clear_gradient();
+    each_of(x_.size(), TakeReference<Real>{problem_.share.data(), x_.data(), reference_.data()});
+    return mean_of(sum(ExtinctionTerm<Real>{problem_.share.data(), x_.data()}, 0, x_.size()));
+  }
+  void aim_at_residuals() override {
+    aim_.resize(residual_.size());
+    each_of(aim_.size(), Convert<Real, float>{residual_.data(), aim_.data()});
+  }
+  void aim_at_slope(float rise) override {
+    each_of(aim_.size(), AimAtSlope<Real>{residual_.data(), background(), rise, aim_.data()});
   }
 
   void copy_to_mark() override { marked_ = x_; }
@@ -186,18 +258,27 @@ class CpuEngine final : public Engine {
   }
   template <class Entry, class Act>
   void each_row(Entry entry, const Act& act) {
+    each_span([&](int begin, int end, int j, int k) { entry(act, begin, end, j, k); });
+  }
+  template <class Act>
+  void each_row(const Act& act) {
+    each_span([&](int begin, int end, int j, int k) {
+      for (int i = begin; i < end; ++i) act(i, j, k);
+    });
+  }
+  template <class Act>
+  void each_span(const Act& act) {
     const Grid& g = problem_.grid();
     pool_.run(g.nz, [&](int k) {
       for (int j = 0; j < g.ny; ++j) {
         const Slice span = problem_.row_span[static_cast<std::size_t>(j) +
                                              static_cast<std::size_t>(g.ny) * static_cast<std::size_t>(k)];
-        entry(act, static_cast<int>(span.begin), static_cast<int>(span.end), j, k);
+        act(static_cast<int>(span.begin), static_cast<int>(span.end), j, k);
       }
     });
   }
   [[nodiscard]] MarchWork<Real> work(int subset) {
-    const std::size_t first =
-        problem_.list.first_sample(problem_.list.subset_begin[static_cast<std::size_t>(subset)]);
+    const std::size_t first = problem_.list.before[static_cast<std::size_t>(subset)].samples;
     return {problem_.list.table(),
             blur_ ? blurred_.data() : shown_->data(),
             Real(optics_.sigma),
@@ -258,7 +339,7 @@ class CpuEngine final : public Engine {
   std::vector<Real> weight_, stiffness_, field_weight_, reference_;
   std::vector<Quad<Real>> residual_;
   std::vector<Quad<Real>> samples_;  // of one subset
-  std::vector<Rgba> offset_;
+  std::vector<Rgba> offset_, aim_;
   std::vector<std::vector<float>> ray_weights_;
   std::optional<ExposureBlur> blur_;  // where the exposure is long enough to matter
   std::vector<Quad<Real>> blurred_;   // B y

@@ -6,11 +6,12 @@
 #include <stdexcept>
 
 #include "recon/adjust/engine.h"
+#include "recon/adjust/engine_parts.h"
+#include "recon/adjust/gpu_problem.h"
 #include "recon/adjust/sort_cuda.h"
 #include "recon/compute/cuda_launch.h"
 #include "recon/compute/cuda_snapshot.h"
 #include "recon/effects/exposure.h"
-#include "recon/hull/device_ray_list.h"
 #include "recon/kernels/exposure.h"
 #include "recon/kernels/field.h"
 #include "recon/kernels/gather.h"
@@ -64,15 +65,13 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
         memory_(memory),
         optics_(optics),
         extinction_(extinction),
-        lists_(problem.list),
-        seen_(problem.seen),
-        background_(problem.background),
+        on_gpu_(GpuProblem::of(problem)),
         y_(x_.size()),
         next_y_(x_.size()),
         gradient_(x_.size()),
         weight_(x_.size()),
         stiffness_(x_.size()),
-        residual_(problem.list.rays.size()),
+        residual_(problem.rays()),
         samples_(CudaBuffer<Quad<Real>>::unfilled(Extinction::kField ? problem.most_samples() : 0)) {
     const ExposureBlur blur(optics.exposure, problem.grid());
     if (!blur.identity()) {
@@ -94,9 +93,19 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   [[nodiscard]] std::vector<Rgba> residuals() const override {
     return converted<float>(residual_.download());
   }
-  std::size_t keep_weights(const std::vector<float>& of_rays) override {
-    ray_weights_.emplace_back(of_rays);
-    return ray_weights_.size() - 1;
+  [[nodiscard]] Squares black_squares(std::size_t first_ray, std::size_t last_ray) const override {
+    return squares_of(sum(BlackTerm{on_gpu_->seen.data(), on_gpu_->background.data()}, first_ray, last_ray));
+  }
+  [[nodiscard]] Weighed weigh(const std::vector<WeighedBox>& boxes, std::size_t rays, int stride) override {
+    const CudaBuffer<WeighedBox> on_gpu_boxes(boxes);
+    const ViewPixels* views = on_gpu_->views.data();
+    const MarchRay* of_rays = on_gpu_->rays->rays.data();
+    const std::uint32_t* pixels = on_gpu_->rays->pixels.data();
+    const CudaBuffer<float>& weights = ray_weights_.emplace_back(CudaBuffer<float>::unfilled(rays));
+    launch(rays, WeighRays{views, on_gpu_boxes.data(), of_rays, pixels, weights.data()}, "weighing rays");
+    const std::size_t rows = most_rows(boxes);
+    return {ray_weights_.size() - 1, squares_of(sum(BlackOfRay{views, of_rays, pixels, weights.data()}, 0, rays)),
+            squares_of(sum(BlackOfRow{views, on_gpu_boxes.data(), rows, stride}, 0, rows * boxes.size()))};
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_.download()); }
 
@@ -119,19 +128,30 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
  private:
   using Radiance = Forward<Real, Extinction, Path>;
 
-  [[nodiscard]] std::vector<Quad<double>> chunks_of_squares(std::size_t first_ray,
-                                                            std::size_t last_ray) const override {
-    return sum_chunks({residual_.data(), nullptr, first_ray, last_ray, nullptr});
+  [[nodiscard]] Squares sum_squares(std::size_t first_ray, std::size_t last_ray) const override {
+    return squares_of(sum(SquareTerm<Real>{residual_.data(), nullptr}, first_ray, last_ray));
   }
-  [[nodiscard]] std::vector<Quad<double>> chunks_of_squares(std::size_t weights) const override {
+  [[nodiscard]] Squares sum_squares(std::size_t weights) const override {
     const CudaBuffer<float>& of_rays = ray_weights_.at(weights);
-    return sum_chunks({residual_.data(), of_rays.data(), 0, of_rays.size(), nullptr});
+    return squares_of(sum(SquareTerm<Real>{residual_.data(), of_rays.data()}, 0, of_rays.size()));
   }
-  [[nodiscard]] static std::vector<Quad<double>> sum_chunks(SumSquares<Real> act) {
-    const auto sums = CudaBuffer<Quad<double>>::unfilled(act.chunks());
+  template <class Term>
+  [[nodiscard]] static Quad<double> sum(const Term& term, std::size_t first, std::size_t last) {
+    if (first >= last) return {};
+    SumChunk<Term> act{term, first, last, nullptr};
+    auto sums = CudaBuffer<Quad<double>>::unfilled(act.chunks());
     act.sums = sums.data();
-    launch(sums.size(), act, "summing squares");
-    return sums.download();
+    launch(sums.size(), act, "summing");
+    while (sums.size() > SumChunk<Summed>::kElements) {
+      SumChunk<Summed> again{{sums.data()}, 0, sums.size(), nullptr};
+      auto fewer = CudaBuffer<Quad<double>>::unfilled(again.chunks());
+      again.sums = fewer.data();
+      launch(fewer.size(), again, "summing");
+      sums = std::move(fewer);
+    }
+    Quad<double> all;
+    for (const Quad<double>& chunk : sums.download()) all = all + chunk;
+    return all;
   }
 
   void put(const std::vector<Rgba>& x) override {
@@ -149,17 +169,22 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   }
   void march_residual(int subset) override {
     residual(subset,
-             PixelResidual<Real>{seen_.data(), background_.data(), offset_.data(), Real(optics_.white)});
+             PixelResidual<Real>{on_gpu_->seen.data(), on_gpu_->background.data(), offset_.data(),
+                                 Real(optics_.white)});
   }
   void march_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
-    target_.upload(target);
-    const Rgba* background = behind == Behind::background ? background_.data() : nullptr;
-    residual(subset, PixelResidual<Real>{target_.data(), background, nullptr, 0});
+    aim_.upload(target);
+    march_against_aim(subset, behind);
+  }
+  void march_against_aim(int subset, Behind behind) override {
+    if (aim_.size() != residual_.size()) aim_ = CudaBuffer<Rgba>(residual_.size());
+    const Rgba* background = behind == Behind::background ? on_gpu_->background.data() : nullptr;
+    residual(subset, PixelResidual<Real>{aim_.data(), background, nullptr, 0});
   }
   void residual(int subset, const PixelResidual<Real>& pixel) {
     const KeepResidual<Real> keep{pixel, residual_.data()};
     if constexpr (Extinction::kField) {
-      const FieldForward<Real, Path> march{lists_.table(), exposed(), samples_.data(), first_sample(subset)};
+      const FieldForward<Real, Path> march{on_gpu_->rays->table(), exposed(), samples_.data(), first_sample(subset)};
       each_ray(subset, MarchByResidual<FieldForward<Real, Path>, KeepResidual<Real>>{march, keep});
     } else {
       each_ray(subset, MarchAndKeep<Radiance, KeepResidual<Real>>{radiance(), keep});
@@ -181,6 +206,56 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     launch(size(), AddAt<Real>{blur_->adjoint(exposed_gradient_), gradient_.data()}, "adding up");
   }
 
+  void copy_solution(const Engine& other) override {
+    const auto& from = dynamic_cast<const CudaEngine&>(other);
+    if (from.problem_.grid().edge == problem_.grid().edge)
+      x_.copy_from(from.x_);
+    else
+      each_key_point(refinement<Real>(from.problem_, problem_, share(), from.x_.data(), x_.data()), "refining");
+    look_from_x();
+  }
+  void put_expected_extinction(float even, float soot) override {
+    const float mean = soot > 0 ? mean_of(sum(LuminanceTerm<Real>{share(), x_.data()}, 0, size())) : 0;
+    launch(size(), ExpectExtinction<Real>{share(), x_.data(), even, soot, mean}, "expecting extinction");
+    look_from_x();
+  }
+  void put_even_light(float thinned) override {
+    launch(size(), LightEvenly<Real>{share(), x_.data(), y_.data(), thinned}, "lighting evenly");
+  }
+  void put_thicker(float by) override {
+    launch(size(), Thicken<Real>{share(), x_.data(), y_.data(), by}, "thickening");
+  }
+  [[nodiscard]] float seen_over_shown(std::size_t last_ray) const override {
+    return ratio(
+        sum(SeenTerm<Real>{on_gpu_->seen.data(), on_gpu_->background.data(), residual_.data()}, 0, last_ray));
+  }
+  float settle_weights(float share, float factor) override { return settle(weight_, share, factor); }
+  float settle_curvature(float share, float factor) override { return settle(field_weight_, share, factor); }
+  float settle(CudaBuffer<Real>& weights, float least, float factor) {
+    const float mean = mean_of(sum(WeightTerm<Real>{weights.data()}, 0, size()));
+    launch(size(), SettleWeight<Real>{share(), weights.data(), Real(least * mean), Real(factor)}, "settling weights");
+    gradient_.clear();
+    return mean;
+  }
+  float put_reference() override {
+    reference_ = CudaBuffer<Real>::unfilled(size());
+    field_weight_ = CudaBuffer<Real>(size());
+    gradient_.clear();
+    launch(size(), TakeReference<Real>{share(), x_.data(), reference_.data()}, "taking the extinction");
+    return mean_of(sum(ExtinctionTerm<Real>{share(), x_.data()}, 0, size()));
+  }
+  void aim_at_residuals() override {
+    if (aim_.size() != residual_.size()) aim_ = CudaBuffer<Rgba>::unfilled(residual_.size());
+    launch(aim_.size(), Convert<Real, float>{residual_.data(), aim_.data()}, "aiming");
+  }
+  void aim_at_slope(float rise) override {
+    launch(aim_.size(), AimAtSlope<Real>{residual_.data(), on_gpu_->background.data(), rise, aim_.data()}, "aiming");
+  }
+  void look_from_x() {
+    forget_look_ahead();
+    next_y_.copy_from(x_);
+  }
+
   void copy_to_mark() override {
     if (marked_.size() != size()) marked_ = CudaBuffer<Quad<Real>>::unfilled(size());
     marked_.copy_from(x_);
@@ -194,8 +269,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   void copy_from_saved() override { return_to(saved_); }
   void return_to(const CudaBuffer<Quad<Real>>& earlier) {
     x_.copy_from(earlier);
-    forget_look_ahead();
-    next_y_.copy_from(x_);
+    look_from_x();
   }
   void forget_look_ahead() override { y_.copy_from(x_); }
 
@@ -229,7 +303,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   [[nodiscard]] std::size_t size() const { return problem_.grid().size(); }
   /// y, or B y where the exposure is long enough to matter.
   [[nodiscard]] const Quad<Real>* exposed() { return blur_ ? blur_->forward(*shown_) : shown_->data(); }
-  [[nodiscard]] Radiance radiance() { return {lists_.table(), exposed(), extinction_}; }
+  [[nodiscard]] Radiance radiance() { return {on_gpu_->rays->table(), exposed(), extinction_}; }
   [[nodiscard]] Descend<Real> emission_step(const Step& step) {
     return {problem_.grid(),  weight_.data(),    x_.data(),        y_.data(),           next_y_.data(),
             gradient_.data(), stiffness_.data(), Real(step.scale), Real(step.momentum), Real(step.length)};
@@ -251,16 +325,15 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     launch(size(), ActAt<Act>{act, problem_.grid()}, what);
   }
 
-  /// The first ray or sample of a subset.
-  [[nodiscard]] std::size_t first_ray(int subset) const {
-    return problem_.list.subset_begin[static_cast<std::size_t>(subset)];
+  [[nodiscard]] const float* share() const { return on_gpu_->share.data(); }
+  /// What comes before a subset.
+  [[nodiscard]] const RayCounts& before(int subset) const {
+    return problem_.list.before[static_cast<std::size_t>(subset)];
   }
-  [[nodiscard]] std::size_t first_sample(int subset) const {
-    return problem_.list.first_sample(first_ray(subset));
-  }
+  [[nodiscard]] std::size_t first_sample(int subset) const { return before(subset).samples; }
   template <class Act>
   void each_ray(int subset, const Act& act) {
-    launch(first_ray(subset), first_ray(subset + 1), act, "marching");
+    launch(before(subset).rays, before(subset + 1).rays, act, "marching");
   }
 
   /// Which samples' contributions each voxel sums, and space for contributions and sums.
@@ -270,8 +343,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
       const std::size_t count = first_sample(s + 1) - first_sample(s);
       const auto voxels = CudaBuffer<std::uint32_t>::unfilled(count);
       run_of_sample_.push_back(CudaBuffer<std::uint32_t>::unfilled(count));
-      launch(problem_.list.first_run(first_ray(s)), problem_.list.first_run(first_ray(s + 1)),
-             NameVoxels<Real, Path>{samples_of(s), voxels.data()}, "naming voxels");
+      launch(before(s).runs, before(s + 1).runs, NameVoxels<Real, Path>{samples_of(s), voxels.data()},
+             "naming voxels");
       by_voxel_.push_back(sort_by_voxel(voxels, size()));
       most_voxels = std::max(most_voxels, by_voxel_.back().voxels());
     }
@@ -279,7 +352,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     corner_sums_ = CudaBuffer<Quad<Real>>::unfilled(8 * most_voxels);
   }
   [[nodiscard]] SubsetSamples samples_of(int subset) const {
-    return {lists_.table(), first_sample(subset), run_of_sample_[static_cast<std::size_t>(subset)].data()};
+    return {on_gpu_->rays->table(), first_sample(subset), run_of_sample_[static_cast<std::size_t>(subset)].data()};
   }
   template <class Weight>
   void lay_aside(int subset, const Weight& weight) {
@@ -301,8 +374,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   EngineMemory memory_;
   Optics optics_;
   Extinction extinction_;
-  DeviceRayList lists_;
-  CudaBuffer<Rgba> seen_, background_, offset_, target_;  // null where there is none
+  std::shared_ptr<const GpuProblem> on_gpu_;
+  CudaBuffer<Rgba> offset_, aim_;  // null where there is none
   std::vector<CudaBuffer<float>> ray_weights_;
   using CudaVolume<Real>::x_;
   CudaBuffer<Quad<Real>> y_, next_y_, gradient_, marked_, kept_, saved_;
@@ -321,7 +394,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
 template <class Real, class Extinction>
 std::unique_ptr<Engine> make_with(const Problem& problem, const Optics& optics, Extinction extinction,
                                   EngineMemory memory) {
-  if (problem.list.bends.empty())
+  if (!problem.list.curved)
     return std::make_unique<CudaEngine<Real, Extinction, StraightPath>>(problem, optics, extinction, memory);
   return std::make_unique<CudaEngine<Real, Extinction, CurvedPath>>(problem, optics, extinction, memory);
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "recon/adjust/cold_solve.h"
 
@@ -16,7 +17,7 @@ constexpr std::size_t kRays = 30000;  // about as many pixels of the flames' box
 struct Candidate {
   Extinction extinction;
   double error = 0;
-  std::vector<Rgba> x;
+  std::shared_ptr<const Engine> engine;
 };
 
 Extinction guess(PerMeter even, PerMeter soot) {
@@ -34,21 +35,20 @@ class Probe {
 
   [[nodiscard]] Candidate solve(const Extinction& extinction) const {
     ColdSolve solved = cold_solve(setup_, level_, extinction);
-    return {extinction, solved.error, std::move(solved.x)};
+    return {extinction, solved.error, std::move(solved.engine)};
   }
 
   /// Mean length of a ray inside the hull.
   [[nodiscard]] Meters mean_chord() const {
-    double sum = 0;
-    for (const Run& run : level_.problem.list.runs) sum += static_cast<double>(run.step) * run.count;
-    const double rays = std::max(1.0, static_cast<double>(level_.problem.list.rays.size()));
-    return Meters(sum / rays * static_cast<double>(hull_.grid.edge));
+    const double rays = std::max(1.0, static_cast<double>(level_.problem.rays()));
+    return Meters(total_length(level_.problem.list, setup_.pool) / rays * static_cast<double>(hull_.grid.edge));
   }
 
   [[nodiscard]] FoundExtinction result(const Candidate& c) const {
     Effects effects;
     effects.extinction = c.extinction;
-    return {c.extinction, c.error, to_volume(c.x, level_.problem, hull_, effects), hull_};
+    const std::vector<Rgba> x = c.engine ? c.engine->get() : std::vector<Rgba>(level_.problem.grid().size());
+    return {c.extinction, c.error, to_volume(x, level_.problem, hull_, effects), hull_};
   }
 
  private:

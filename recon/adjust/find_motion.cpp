@@ -74,10 +74,10 @@ class MotionProbe {
     SolverSetup setup{{}, boxes_, *hull, effects_, options_, pool_};
     for (const View& view : scene.views) setup.views.push_back(&view);
     const Level level = make_level(setup, *hull, 1, 4);
-    Descent descent(level, setup.optics(hull->grid), setup, std::vector<Rgba>(level.problem.active.size()));
+    Descent descent(level, setup.optics(hull->grid), setup);
     for (int p = 0; p < kMotionPasses; ++p) descent.pass();
     descent.settle();
-    const ErrorOverBoxes error(setup.views, boxes_, level.problem, effects_.background, descent.engine());
+    const ErrorOverBoxes error(boxes_, level.problem, descent.engine());
     return all_channels(error());
   } catch (const Diverged&) {
     return std::numeric_limits<double>::infinity();

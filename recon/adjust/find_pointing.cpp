@@ -107,7 +107,9 @@ class PointingProbe {
     if (!hull) return true;
     std::vector<const View*> views;
     for (const View& view : small_.views) views.push_back(&view);
-    const Problem problem = make_problem(views, *hull, {}, pool_);
+    ProblemOptions here;
+    here.home = RayListOptions::Home::cpu;
+    const Problem problem = make_problem(views, *hull, here, pool_);
     std::vector<double> reached(views.size());
     for (std::size_t r = 0; r < problem.seen.size(); ++r)
       if (in_mask(problem.list.rays[r].view, problem.list.pixels[r]))
@@ -135,7 +137,7 @@ class PointingProbe {
         setup.boxes.push_back(boxes_[v]);
       }
     const Level level = make_level(setup, *hull, 1, 4);
-    Descent descent(level, setup.optics(hull->grid), setup, std::vector<Rgba>(level.problem.active.size()));
+    Descent descent(level, setup.optics(hull->grid), setup);
     for (int p = 0; p < kPointingPasses; ++p) descent.pass();
     descent.settle();
     const Volume volume = to_volume(descent.engine().get(), level.problem, *hull, effects_);

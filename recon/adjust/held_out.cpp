@@ -34,11 +34,9 @@ Problem sampled_problem(const SolverSetup& setup, const std::vector<const View*>
   ProblemOptions options = setup.problem_options();
   options.subsets = 2;
   options.adjoint = false;
-  options.subset_of = [&boxes, stride](std::size_t view, int x, int y) {
-    const PixelBox& b = boxes[view];
-    if (x < b.x0 || x >= b.x1 || y < b.y0 || y >= b.y1) return -1;
-    return x % stride == 0 && y % stride == 0 ? 0 : 1;
-  };
+  options.rule.stride = stride;
+  options.rule.others = 1;
+  options.boxes = boxes;
   return make_problem(views, setup.hull, options, setup.pool);
 }
 
@@ -58,9 +56,8 @@ HeldOut::HeldOut(const SolverSetup& setup, std::vector<const View*> views, const
       problem_(sampled_problem(setup, views_, boxes, stride_)),
       engine_(
           make_residual_engine(problem_, setup.optics(problem_.grid()), setup.options.precision, setup.pool)),
-      sample_error_(views_, boxes, problem_, setup.effects.background, *engine_, stride_,
-                    problem_.list.subset_begin[1]),
-      error_(views_, boxes, problem_, setup.effects.background, *engine_) {
+      sample_error_(boxes, problem_, *engine_, stride_, problem_.list.subset_begin[1]),
+      error_(boxes, problem_, *engine_) {
   for (const PixelBox& box : boxes) {
     sample_.pixels += pixels_on(box, stride_);
     sample_.of += pixels_on(box, 1);

@@ -37,7 +37,7 @@ std::vector<SharedImage> flames_before_backgrounds(const SolverSetup& setup) {
 
 /// Rays without flame show the background and nothing else.
 void blacken(Problem& problem) {
-  for (std::size_t r = problem.list.subset_begin[1]; r < problem.seen.size(); ++r)
+  for (std::size_t r = problem.list.before[1].rays; r < problem.seen.size(); ++r)
     problem.seen[r] = problem.background.empty() ? Rgba{} : problem.background[r];
 }
 
@@ -119,7 +119,7 @@ Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker
   const float sigma = setup.sigma(problem.grid());
   const auto engine = make_engine(problem, absorbing_optics(sigma), Precision::float32, setup.pool);
   engine->set(std::vector<Rgba>(problem.grid().size()));
-  const ErrorOverBoxes error(setup.views, setup.boxes, problem, setup.effects.background, *engine);
+  const ErrorOverBoxes error(setup.boxes, problem, *engine);
 
   // The paper's volume holds colour intensity V with L += T tau V; here L += T S (1 - exp(-sigma)) / sigma a
   // voxel edge, so S = V sigma, and without extinction S = V tau.

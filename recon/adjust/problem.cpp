@@ -3,39 +3,60 @@
 
 #include <algorithm>
 
-#include "recon/effects/background.h"
+#include "recon/adjust/problem_cuda.h"
 #include "recon/effects/refraction.h"
-#include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
 namespace {
 
-void find_active(const Hull& hull, std::vector<std::uint8_t>& active, std::vector<Slice>& row_span) {
+/// Scattered from the voxels, most of which are empty.
+void find_shares(const Hull& hull, std::vector<float>& share, std::vector<Slice>& row_span) {
   const Grid& g = hull.grid;
-  active.assign(g.size(), 0);
+  share.assign(g.size(), 0);
   std::size_t voxel = 0;
   for (int k = 0; k < g.nz - 1; ++k)
     for (int j = 0; j < g.ny - 1; ++j)
       for (int i = 0; i < g.nx - 1; ++i)
         if (hull.inside[voxel++] != 0)
-          for (int c = 0; c < 8; ++c) active[g.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2))] = 1;
+          for (int c = 0; c < 8; ++c) share[g.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2))] += 0.125F;
   row_span.assign(static_cast<std::size_t>(g.ny) * static_cast<std::size_t>(g.nz), {0, 0});
   const auto width = static_cast<std::ptrdiff_t>(g.nx);
   for (std::size_t row = 0; row < row_span.size(); ++row) {
-    const auto begin = active.begin() + static_cast<std::ptrdiff_t>(row) * width;
-    const auto first = std::find(begin, begin + width, 1);
+    const auto begin = share.begin() + static_cast<std::ptrdiff_t>(row) * width;
+    const auto first = std::find_if(begin, begin + width, [](float s) { return s > 0; });
     if (first == begin + width) continue;
     auto last = begin + width;
-    while (*(last - 1) == 0) --last;
+    while (!(*(last - 1) > 0)) --last;
     row_span[row] = {static_cast<std::size_t>(first - begin), static_cast<std::size_t>(last - begin)};
   }
+}
+
+ProblemPicture picture_of(const View& view, const Background& background) {
+  ProblemPicture picture{view.image, view.bounds, nullptr, {}};
+  if (background.kind == Background::Kind::image) picture.behind = view.background;
+  if (background.kind == Background::Kind::constant)
+    for (std::size_t c = 0; c < 3; ++c) picture.level[c] = static_cast<float>(background.radiance[c]);
+  return picture;
+}
+
+void read_pixels(Problem& problem, Pool& pool) {
+  const std::vector<ViewPixels> views = problem.view_pixels();
+  problem.seen.resize(problem.rays());
+  if (problem.is_before_background) problem.background.resize(problem.rays());
+  const ReadPixels read{views.data(), problem.list.rays.data(), problem.list.pixels.data(), problem.seen.data(),
+                        problem.is_before_background ? problem.background.data() : nullptr};
+  constexpr int kTasks = 64;
+  pool.run(kTasks, [&](int task) {
+    const Slice mine = slice(problem.rays(), kTasks, task);
+    for (std::size_t r = mine.begin; r < mine.end; ++r) read(r);
+  });
 }
 
 SlabRuns sort_into_slabs(const Problem& problem, int subset) {
   const RayList& list = problem.list;
   const auto s = static_cast<std::size_t>(subset);
-  const std::size_t first = list.first_run(list.subset_begin[s]);
-  const std::size_t last = list.first_run(list.subset_begin[s + 1]);
+  const std::size_t first = list.before[s].runs;
+  const std::size_t last = list.before[s + 1].runs;
   std::vector<std::uint16_t> slab_of(last - first);
   SlabRuns slabs;
   slabs.begin.assign(static_cast<std::size_t>(problem.slab_count()) + 1, 0);
@@ -56,74 +77,60 @@ SlabRuns sort_into_slabs(const Problem& problem, int subset) {
 
 std::size_t Problem::most_samples() const {
   std::size_t most = 0;
-  for (std::size_t s = 0; s + 1 < list.subset_begin.size(); ++s)
-    most =
-        std::max(most, list.first_sample(list.subset_begin[s + 1]) - list.first_sample(list.subset_begin[s]));
+  for (std::size_t s = 0; s + 1 < list.before.size(); ++s)
+    most = std::max(most, std::size_t{list.before[s + 1].samples - list.before[s].samples});
   return most;
+}
+
+std::vector<ViewPixels> Problem::view_pixels() const {
+  std::vector<ViewPixels> views;
+  for (const ProblemPicture& p : pictures) {
+    ViewPixels view{p.image->rgb.data(), p.bounds ? p.bounds->data() : nullptr,
+                    p.behind ? p.behind->rgb.data() : nullptr, {}, p.image->size.width};
+    std::copy(p.level.begin(), p.level.end(), view.level);
+    views.push_back(view);
+  }
+  return views;
 }
 
 Problem make_problem(const std::vector<const View*>& views, const Hull& hull, const ProblemOptions& options,
                      Pool& pool) {
   Problem problem;
   problem.crop = crop_to_medium(hull);
+  problem.is_before_background = options.background.kind != Background::Kind::black;
   std::vector<const CameraModel*> cameras;
   cameras.reserve(views.size());
-  for (const View* view : views) cameras.push_back(&view->camera);
+  for (const View* view : views) {
+    cameras.push_back(&view->camera);
+    problem.pictures.push_back(picture_of(*view, options.background));
+  }
   RayListOptions clip;
   clip.step = static_cast<float>(options.step);
   clip.subsets = options.subsets;
+  clip.rule = options.rule;
   clip.subset_of = options.subset_of;
+  clip.boxes = options.boxes;
+  clip.home = options.subset_of ? RayListOptions::Home::cpu : options.home;
   IndexField gas;
   if (options.gas != nullptr) {
     gas = options.gas->field(problem.crop.hull.grid);
     clip.gas = &gas;
   }
   problem.list = clip_rays(cameras, problem.crop.hull, clip, pool);
-  find_active(problem.crop.hull, problem.active, problem.row_span);
-  problem.seen.resize(problem.list.rays.size());
-  for (std::size_t r = 0; r < problem.seen.size(); ++r) {
-    const View& view = *views[problem.list.rays[r].view];
-    const std::size_t pixel = problem.list.pixels[r];
-    const float* rgb = &view.image->rgb[3 * pixel];
-    const float bounds = view.bounds ? static_cast<float>((*view.bounds)[pixel]) : 0.F;
-    problem.seen[r] = Rgba{{rgb[0], rgb[1], rgb[2], bounds}};
+  if constexpr (kCudaBuilt) {
+    if (pool.device() == Device::cuda && clip.home == RayListOptions::Home::where_it_is_made) {
+      problem.on_gpu = read_on_cuda(problem);
+      return problem;
+    }
   }
-  problem.background = behind_rays(options.background, problem.list, views);
-  if (!options.adjoint) return problem;
+  find_shares(problem.crop.hull, problem.share, problem.row_span);
+  read_pixels(problem, pool);
+  if (!options.adjoint || pool.device() == Device::cuda) return problem;
   problem.slabs.resize(static_cast<std::size_t>(options.subsets));
   pool.run(options.subsets, [&](int subset) {
     problem.slabs[static_cast<std::size_t>(subset)] = sort_into_slabs(problem, subset);
   });
   return problem;
-}
-
-std::vector<Rgba> refine(const std::vector<Rgba>& coarse, const Problem& from, const Problem& to) {
-  const Grid& f = from.grid();
-  const Grid& g = to.grid();
-  std::vector<Rgba> fine(g.size());
-  const auto place = [](int fine_key, int key_points) {
-    const float p = 0.5F * static_cast<float>(fine_key);
-    const int cell = clamp_cell(p, key_points);
-    return std::pair(cell, p - static_cast<float>(cell));
-  };
-  for (int k = 0; k < g.nz; ++k) {
-    const auto [ck, fz] = place(k + to.crop.offset[2] - 2 * from.crop.offset[2], f.nz);
-    for (int j = 0; j < g.ny; ++j) {
-      const auto [cj, fy] = place(j + to.crop.offset[1] - 2 * from.crop.offset[1], f.ny);
-      const Slice span = to.row_span[static_cast<std::size_t>(j) +
-                                     static_cast<std::size_t>(g.ny) * static_cast<std::size_t>(k)];
-      for (std::size_t i = span.begin; i < span.end; ++i) {
-        const std::size_t p = g.index(static_cast<int>(i), j, k);
-        if (to.active[p] == 0) continue;
-        const auto [ci, fx] = place(static_cast<int>(i) + to.crop.offset[0] - 2 * from.crop.offset[0], f.nx);
-        // Emission is kept a voxel edge, and the fine edge is half as long.
-        fine[p] =
-            0.5F * trilinear(coarse.data() + f.index(ci, cj, ck), static_cast<std::size_t>(f.nx),
-                             static_cast<std::size_t>(f.nx) * static_cast<std::size_t>(f.ny), fx, fy, fz);
-      }
-    }
-  }
-  return fine;
 }
 
 }  // namespace emberlock::recon

@@ -6,21 +6,9 @@
 
 #include "recon/adjust/sort_cuda.h"
 #include "recon/compute/cuda_launch.h"
+#include "recon/compute/cuda_space.h"
 
 namespace emberlock::recon {
-namespace {
-
-/// Calls one of CUB's functions twice: for the size of its working space, and with it.
-template <class Call>
-void with_space(const Call& call, const char* what) {
-  std::size_t bytes = 0;
-  check_cuda(call(nullptr, bytes), what);
-  const auto space = CudaBuffer<std::uint8_t>::unfilled(bytes);
-  check_cuda(call(space.data(), bytes), what);
-}
-
-}  // namespace
-
 SortedSamples sort_by_voxel(const CudaBuffer<std::uint32_t>& voxels, std::size_t key_points) {
   const std::size_t count = voxels.size();
   SortedSamples sorted{
@@ -38,7 +26,7 @@ SortedSamples sort_by_voxel(const CudaBuffer<std::uint32_t>& voxels, std::size_t
         "sorting samples");
   }
   const auto begin = CudaBuffer<std::uint32_t>::unfilled(key_points + 1);
-  launch(key_points + 1, FindBegin{sorted_voxels.data(), static_cast<std::uint32_t>(count), begin.data()},
+  launch(key_points + 1, FindBegin<>{sorted_voxels.data(), static_cast<std::uint32_t>(count), begin.data()},
          "finding voxels");
   launch(key_points, HasSamples{begin.data(), sorted.place.data()}, "finding voxels");
   with_space(

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "recon/adjust/descent.h"
-#include "recon/adjust/extinction_field.h"
 #include "recon/adjust/left_out_views.h"
 #include "recon/adjust/picture_error.h"
 #include "recon/adjust/tracker.h"
@@ -28,11 +27,10 @@ constexpr double kLeastGain = 0.02;        // a round that lowers it by a smalle
 int longest(const Grid& g) { return std::max({g.nx, g.ny, g.nz}) - 1; }
 
 /// Starts a level from the coarser one's light; the extinction as it is expected under that light.
-std::unique_ptr<Descent> begin(const Level& level, const SolverSetup& setup, std::vector<Rgba> x) {
-  const Problem& problem = level.problem;
-  if (setup.effects.extinction.model == Extinction::Model::field)
-    x = with_extinction(x, expected_extinction(problem, setup.effects.extinction, x));
-  return std::make_unique<Descent>(level, setup.optics(problem.grid()), setup, x);
+std::unique_ptr<Descent> begin(const Level& level, const SolverSetup& setup, const Engine* from) {
+  const bool field = setup.effects.extinction.model == Extinction::Model::field;
+  return std::make_unique<Descent>(level, setup.optics(level.problem.grid()), setup,
+                                   DescentStart{from, field ? &setup.effects.extinction : nullptr});
 }
 
 /// The best of the finest level's iterations becomes the descent's x: by the held-out views where the
@@ -76,19 +74,15 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
   for (std::size_t l = hulls.size(); l-- > 0;) {
     auto finer = std::make_unique<const Level>(make_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
     if (descent) descent->settle();  // nobody has judged the last pass yet
-    std::vector<Rgba> x = descent ? refine(descent->engine().get(), level->problem, finer->problem)
-                                  : std::vector<Rgba>(finer->problem.active.size());
     if (descent) halvings += descent->halvings();
-    descent = begin(*finer, setup, std::move(x));
+    descent = begin(*finer, setup, descent ? &descent->engine() : nullptr);
     level = std::move(finer);
     for (int s = 0; l > 0 && s < kCoarseSteps && !tracker.out_of_time(); s += level->subsets) descent->pass();
   }
   if (setup.effects.extinction.model == Extinction::Model::field) descent->release_extinction();
 
-  const bool uneven =
-      setup.effects.scattering.order != Scattering::Order::none && setup.effects.scattering.asymmetry != 0;
-  const ErrorOverBoxes error(setup.views, setup.boxes, level->problem, setup.effects.background,
-                             descent->engine(), stride_for(setup, setup.hull.grid));
+  const bool uneven = setup.scatters_unevenly();
+  const ErrorOverBoxes error(setup.boxes, level->problem, descent->engine(), stride_for(setup, setup.hull.grid));
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;
   double last = std::numeric_limits<double>::infinity();
   int iteration = 0;

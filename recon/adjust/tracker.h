@@ -42,12 +42,17 @@ struct SolverSetup {
     optics.exposure = effects.exposure;
     return optics;
   }
+  [[nodiscard]] bool scatters_unevenly() const {
+    return effects.scattering.order != Scattering::Order::none && effects.scattering.asymmetry != 0;
+  }
   /// What every problem of this scene shares.
   [[nodiscard]] ProblemOptions problem_options() const {
     ProblemOptions problem;
     problem.background = effects.background;
     problem.gas = gas;
     problem.step = options.step;
+    // Light that isn't scattered evenly is rendered for each ray (uneven_light.h).
+    if (scatters_unevenly()) problem.home = RayListOptions::Home::cpu;
     return problem;
   }
 };

@@ -22,7 +22,7 @@ std::vector<Rgba> UnevenLight::operator()(const std::vector<const View*>& views,
   options.step = setup_.options.step;
   options.compute = setup_.options.compute;
   options.scattered = &field_;
-  std::vector<Rgba> offset(problem.list.rays.size());
+  std::vector<Rgba> offset(problem.rays());
   std::vector<RadianceImage> difference;
   for (const View* view : views) {
     RadianceImage image = render_view(emission_, setup_.hull, scattering, view->camera, options);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +21,15 @@ void check_cuda(cudaError_t code, const char* what);
 /// process for reuse.
 void* cuda_allocate(std::size_t bytes);
 void cuda_free(void* data) noexcept;
+
+/// For gpu_work().
+struct CountedWork {
+  std::atomic<std::uint64_t> launches = 0, uploads = 0, uploaded = 0, downloads = 0, downloaded = 0;
+};
+CountedWork& counted_work();
+
+/// Copies from and to the CPU's memory wait until they are complete.
+void cuda_copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind);
 
 /// Owns an array in the GPU's memory. Its launches and copies run in the order of the default stream.
 template <class T>
@@ -61,7 +72,7 @@ class CudaBuffer {
   void download(T* to) const { copy(to, data_, cudaMemcpyDeviceToHost); }
   [[nodiscard]] T download_one(std::size_t at) const {
     T to;
-    check_cuda(cudaMemcpy(&to, data_ + at, sizeof(T), cudaMemcpyDeviceToHost), "copying from the GPU");
+    cuda_copy(&to, data_ + at, sizeof(T), cudaMemcpyDeviceToHost);
     return to;
   }
   [[nodiscard]] std::vector<T> download() const {
@@ -76,9 +87,8 @@ class CudaBuffer {
     if (size > 0) data_ = static_cast<T*>(cuda_allocate(bytes()));
   }
 
-  /// Copies from and to the CPU's memory wait until they are complete.
   void copy(T* to, const T* from, cudaMemcpyKind kind) const {
-    if (size_ > 0) check_cuda(cudaMemcpy(to, from, bytes(), kind), "copying memory");
+    if (size_ > 0) cuda_copy(to, from, bytes(), kind);
   }
 
   T* data_ = nullptr;

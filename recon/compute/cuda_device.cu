@@ -74,6 +74,32 @@ void check_cuda(cudaError_t code, const char* what) {
        "device cuda", "Use --device cpu, and look at the driver's log (dmesg) for the GPU's state"});
 }
 
+CountedWork& counted_work() {
+  static CountedWork counted;
+  return counted;
+}
+
+GpuWork gpu_work() {
+  const CountedWork& c = counted_work();
+  GpuWork work{c.launches, c.uploads, c.uploaded, c.downloads, c.downloaded, 0};
+#ifndef __CUDACC__
+  work.software = 1e-9 * static_cast<double>(software_gpu::busy_ns);
+#endif
+  return work;
+}
+
+void cuda_copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) {
+  CountedWork& counted = counted_work();
+  if (kind == cudaMemcpyHostToDevice) {
+    ++counted.uploads;
+    counted.uploaded += bytes;
+  } else if (kind == cudaMemcpyDeviceToHost) {
+    ++counted.downloads;
+    counted.downloaded += bytes;
+  }
+  check_cuda(cudaMemcpy(to, from, bytes, kind), "copying memory");
+}
+
 void* cuda_allocate(std::size_t bytes) {
   void* data = nullptr;
   const cudaError_t code = cudaMallocAsync(&data, bytes, nullptr);

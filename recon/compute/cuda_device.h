@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+
 #include "base/result.h"
 
 namespace emberlock::recon {
@@ -10,5 +12,14 @@ Status cuda_status(int gpu = 0);
 
 /// The GPU of all that the calling thread does from here on. Throws a DeviceError.
 void use_gpu(int gpu);
+
+/// What this process has asked of its GPUs so far. A graph of launches counts as one.
+struct GpuWork {
+  std::uint64_t launches = 0;
+  std::uint64_t uploads = 0, uploaded = 0;      ///< copies to the GPU, and their bytes
+  std::uint64_t downloads = 0, downloaded = 0;  ///< copies to the CPU, which wait, and their bytes
+  double software = 0;  ///< seconds that a GPU in software (tests) was at work; 0 of others
+};
+GpuWork gpu_work();
 
 }  // namespace emberlock::recon

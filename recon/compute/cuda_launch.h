@@ -25,6 +25,7 @@ __global__ void call_each(const Act act, std::size_t first, std::size_t last) {
 template <class Act>
 void launch(std::size_t first, std::size_t last, const Act& act, const char* what) {
   if (first >= last) return;
+  ++counted_work().launches;
 #ifdef __CUDACC__
   const std::size_t blocks = (last - first + kThreadsABlock - 1) / kThreadsABlock;
   call_each<<<static_cast<unsigned>(blocks), kThreadsABlock>>>(act, first, last);

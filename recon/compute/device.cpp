@@ -57,6 +57,7 @@ Status cuda_status(int /*gpu*/) {
                "Build where nvcc is on PATH, or use --device cpu"};
 }
 void use_gpu(int /*gpu*/) {}
+GpuWork gpu_work() { return {}; }
 #endif
 
 }  // namespace emberlock::recon

@@ -29,19 +29,4 @@ RadianceImage backdrop(const Background& background, ImageSize size, const Radia
   return image;
 }
 
-std::vector<Rgba> behind_rays(const Background& background, const RayList& list,
-                              const std::vector<const View*>& views) {
-  if (background.kind == Background::Kind::black) return {};
-  std::vector<RadianceImage> backdrops;
-  backdrops.reserve(views.size());
-  for (const View* view : views)
-    backdrops.push_back(backdrop(background, view->camera.intrinsics.size, view->background.get()));
-  std::vector<Rgba> out(list.rays.size());
-  for (std::size_t r = 0; r < out.size(); ++r) {
-    const float* pixel = &backdrops[list.rays[r].view].rgb[3 * static_cast<std::size_t>(list.pixels[r])];
-    for (int c = 0; c < 3; ++c) out[r].c[c] = pixel[c];
-  }
-  return out;
-}
-
 }  // namespace emberlock::recon

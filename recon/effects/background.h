@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <vector>
-
 #include "recon/effects/effects.h"
-#include "recon/hull/ray_list.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
@@ -18,10 +15,5 @@ Status check(const Background& background, const View& view);
 /// The background for a camera with pictures of `size`, in linear grey levels. `own` is the view's own
 /// picture for Kind::image, or null.
 RadianceImage backdrop(const Background& background, ImageSize size, const RadianceImage* own);
-
-/// The background at the pixel of each ray of a list through `views`, whose pictures must pass `check`; empty
-/// if everything is black.
-std::vector<Rgba> behind_rays(const Background& background, const RayList& list,
-                              const std::vector<const View*>& views);
 
 }  // namespace emberlock::recon

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 #include <Eigen/LU>
 
@@ -49,8 +50,15 @@ PixelBox reach(const CameraModel& camera, const Grid& g) {
           bound(std::ceil(high.x()) + 1, size.width), bound(std::ceil(high.y()) + 1, size.height)};
 }
 
-/// Neighbouring rays read the same key points: the data for the rays of a tile stay in the L1 cache.
-constexpr int kTile = 16;
+/// The part of a picture that may have rays.
+PixelBox part_of(const std::vector<const CameraModel*>& cameras, std::size_t view, const Grid& grid,
+                 const RayListOptions& options) {
+  const PixelBox all = reach(*cameras[view], grid);
+  if (options.boxes.empty()) return all;
+  const PixelBox& box = options.boxes[view];
+  return {std::max(all.x0, box.x0), std::max(all.y0, box.y0), std::min(all.x1, box.x1), std::min(all.y1, box.y1)};
+}
+
 struct PixelTile {
   std::uint32_t view;
   int x0, y0, x1, y1;
@@ -73,7 +81,7 @@ void each_pixel(const PixelTile& tile, const PixelRays& camera, const RayListOpt
                 const Act& act) {
   for (int y = tile.y0; y < tile.y1; ++y)
     for (int x = tile.x0; x < tile.x1; ++x) {
-      const int subset = options.subset_of ? options.subset_of(tile.view, x, y) : 0;
+      const int subset = options.subset_of ? options.subset_of(tile.view, x, y) : options.rule(tile.view, x, y);
       if (subset >= 0)
         act(subset, static_cast<std::uint32_t>(y) * camera.width + static_cast<std::uint32_t>(x));
     }
@@ -163,6 +171,7 @@ TileRays clip_tile(const CutRay& cut, const PixelRays& camera, const float* orig
 void assemble(std::vector<TileRays>& tiles, int subsets, bool curved, RayList& list, Pool& pool) {
   RayCounts next;
   list.subset_begin.push_back(0);
+  list.before.push_back(next);
   for (int s = 0; s < subsets; ++s) {
     for (TileRays& tile : tiles) {
       RayCounts& counts = tile.counts[static_cast<std::size_t>(s)];
@@ -170,6 +179,7 @@ void assemble(std::vector<TileRays>& tiles, int subsets, bool curved, RayList& l
       next = next + counts;
     }
     list.subset_begin.push_back(next.rays);
+    list.before.push_back(next);
   }
   list.rays.resize(next.rays);
   list.pixels.resize(next.rays);
@@ -200,10 +210,11 @@ void assemble(std::vector<TileRays>& tiles, int subsets, bool curved, RayList& l
   });
 }
 
-std::vector<PixelTile> tiles_of(const std::vector<const CameraModel*>& cameras, const Grid& grid) {
+std::vector<PixelTile> tiles_of(const std::vector<const CameraModel*>& cameras, const Grid& grid,
+                                const RayListOptions& options) {
   std::vector<PixelTile> tiles;
   for (std::size_t v = 0; v < cameras.size(); ++v) {
-    const PixelBox box = reach(*cameras[v], grid);
+    const PixelBox box = part_of(cameras, v, grid, options);
     for (int y = box.y0; y < box.y1; y += kTile)
       for (int x = box.x0; x < box.x1; x += kTile)
         tiles.push_back(
@@ -221,11 +232,16 @@ std::vector<PixelRays> rays_of(const std::vector<const CameraModel*>& cameras) {
 
 }  // namespace
 
-std::size_t RayList::first_sample(std::size_t ray) const {
-  if (runs.empty()) return 0;
-  const std::size_t run = first_run(ray);
-  return run < runs.size() ? runs[run].first_sample
-                           : runs.back().first_sample + static_cast<std::size_t>(runs.back().count);
+double total_length(const RayList& list, Pool& pool) {
+  const auto chunks = (std::size_t{list.count().runs} + SumLengths::kRuns - 1) / SumLengths::kRuns;
+  std::vector<double> sums(chunks);
+  if (kCudaBuilt && list.on_gpu) {
+    lengths_on_cuda(*list.on_gpu, sums);
+  } else {
+    const SumLengths act{list.runs.data(), list.runs.size(), sums.data()};
+    pool.run(static_cast<int>(chunks), [&](int chunk) { act(static_cast<std::size_t>(chunk)); });
+  }
+  return std::accumulate(sums.begin(), sums.end(), 0.0);
 }
 
 CroppedHull crop_to_medium(const Hull& hull) {
@@ -289,7 +305,7 @@ Hull coarsen(const Hull& hull) {
 PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, const Grid& grid,
                               const RayListOptions& options, Pool& pool) {
   const auto subsets = static_cast<std::size_t>(options.subsets);
-  const std::vector<PixelTile> tiles = tiles_of(cameras, grid);
+  const std::vector<PixelTile> tiles = tiles_of(cameras, grid, options);
   const std::vector<PixelRays> rays = rays_of(cameras);
   std::vector<std::vector<std::size_t>> place(tiles.size(), std::vector<std::size_t>(subsets));
   const auto each_tile = [&](const auto& act) {
@@ -316,6 +332,25 @@ PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, co
   return out;
 }
 
+namespace {
+
+/// Where all pixels that may have rays are dealt to subsets on the GPU, by the options' rule.
+std::vector<TiledView> tiled_views(const std::vector<const CameraModel*>& cameras, const Grid& grid,
+                                   const RayListOptions& options) {
+  std::vector<TiledView> views;
+  std::uint32_t slot = 0;
+  for (std::size_t v = 0; v < cameras.size(); ++v) {
+    const PixelBox part = part_of(cameras, v, grid, options);
+    TiledView view{part.x0, part.y0, part.x1, part.y1, cameras[v]->intrinsics.size.width, slot};
+    if (part.empty()) view.x1 = view.x0;
+    slot += static_cast<std::uint32_t>(view.tiles_across() * view.tiles_down() * kTile * kTile);
+    views.push_back(view);
+  }
+  return views;
+}
+
+}  // namespace
+
 RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& medium,
                   const RayListOptions& options, Pool& pool) {
   RayList list;
@@ -330,18 +365,22 @@ RayList clip_rays(const std::vector<const CameraModel*>& cameras, const Hull& me
   const Cutter cutter(medium, options);
   if constexpr (kCudaBuilt) {
     if (pool.device() == Device::cuda) {
-      cut_on_cuda(cutter.cut(), rays, pixels_in_order(cameras, medium.grid, options, pool), list);
+      if (options.subset_of)
+        cut_on_cuda(cutter.cut(), rays, pixels_in_order(cameras, medium.grid, options, pool), options, list);
+      else
+        cut_on_cuda(cutter.cut(), rays, tiled_views(cameras, medium.grid, options), options, list);
       return list;
     }
   }
-  const std::vector<PixelTile> tiles = tiles_of(cameras, medium.grid);
+  const std::vector<PixelTile> tiles = tiles_of(cameras, medium.grid, options);
   std::vector<TileRays> found(tiles.size());
   pool.run(static_cast<int>(tiles.size()), [&](int t) {
     const PixelTile& tile = tiles[static_cast<std::size_t>(t)];
     found[static_cast<std::size_t>(t)] = clip_tile(
         cutter.cut(), rays[tile.view], &list.origins[3 * static_cast<std::size_t>(tile.view)], tile, options);
   });
-  assemble(found, options.subsets, options.gas != nullptr, list, pool);
+  list.curved = options.gas != nullptr;
+  assemble(found, options.subsets, list.curved, list, pool);
   return list;
 }
 

@@ -8,6 +8,7 @@
 #include "recon/kernels/clip.h"
 #include "recon/kernels/lens.h"
 #include "recon/kernels/march.h"
+#include "recon/kernels/pixel_rule.h"
 #include "recon/kernels/refract.h"
 
 namespace emberlock::recon {
@@ -96,12 +97,80 @@ struct PixelOfView {
   std::uint32_t pixel = 0;  ///< y * width + x
 };
 
+/// Neighbouring rays read the same key points: a list takes pixels by tiles of kTile * kTile, so that their data
+/// stay in the L1 cache.
+inline constexpr int kTile = 16;
+
+/// The part of a view's picture, [x0, x1) x [y0, y1), that may have rays, and the first of its slots: a tile has one
+/// for each of its pixels, row by row, beyond the part's borders too.
+struct TiledView {
+  int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
+  int width = 0;  ///< of the picture
+  std::uint32_t first_slot = 0;
+
+  [[nodiscard]] HOST_DEVICE inline int tiles_across() const { return (x1 - x0 + kTile - 1) / kTile; }
+  [[nodiscard]] HOST_DEVICE inline int tiles_down() const { return (y1 - y0 + kTile - 1) / kTile; }
+};
+/// The slots of several views.
+struct PixelSlots {
+  const TiledView* views = nullptr;
+  std::uint32_t count = 0;  ///< views
+  PixelRule rule;
+
+  /// Calls act(view, x, y) unless the slot lies beyond the borders.
+  template <class Act>
+  HOST_DEVICE inline void at(std::uint32_t slot, const Act& act) const {
+    std::uint32_t view = 0;
+    while (view + 1 < count && views[view + 1].first_slot <= slot) ++view;
+    const TiledView& part = views[view];
+    const auto in = static_cast<int>(slot - part.first_slot);
+    const int tile = in / (kTile * kTile);
+    const int x = part.x0 + tile % part.tiles_across() * kTile + in % kTile;
+    const int y = part.y0 + tile / part.tiles_across() * kTile + in / kTile % kTile;
+    if (x < part.x1 && y < part.y1) act(view, x, y);
+  }
+};
+/// The subset of each slot; `subsets` of those that are in none.
+struct NameSubsets {
+  PixelSlots slots;
+  std::uint8_t subsets = 1;
+  std::uint8_t* to = nullptr;
+
+  HOST_DEVICE inline void operator()(std::size_t slot) const {
+    int subset = -1;
+    slots.at(static_cast<std::uint32_t>(slot),
+             [&](std::uint32_t view, int x, int y) { subset = slots.rule(view, x, y); });
+    to[slot] = subset < 0 ? subsets : static_cast<std::uint8_t>(subset);
+  }
+};
+/// The pixels of sorted slots.
+struct PlacePixels {
+  PixelSlots slots;
+  const std::uint32_t* sorted = nullptr;
+  PixelOfView* to = nullptr;
+
+  HOST_DEVICE inline void operator()(std::size_t n) const {
+    slots.at(sorted[n], [&](std::uint32_t view, int x, int y) {
+      to[n] = {view, static_cast<std::uint32_t>(y * slots.views[view].width + x)};
+    });
+  }
+};
+
 struct RayCounts {
   std::uint32_t rays = 0, runs = 0, samples = 0;
 
   HOST_DEVICE inline friend RayCounts operator+(const RayCounts& a, const RayCounts& b) {
     return {a.rays + b.rays, a.runs + b.runs, a.samples + b.samples};
   }
+};
+
+/// What comes before the first pixel of each subset.
+struct PickCounts {
+  const RayCounts* before = nullptr;   ///< of each pixel
+  const std::uint32_t* first = nullptr;  ///< of each subset
+  RayCounts* to = nullptr;
+
+  HOST_DEVICE inline void operator()(std::size_t subset) const { to[subset] = before[first[subset]]; }
 };
 
 /// Computes the rays of a list of pixels in two passes, so that each knows its place in the list: first
@@ -157,6 +226,21 @@ struct WritePixelRuns {
     if (ray.runs == 0) return;
     rays[next.rays] = ray;
     pixels[next.rays] = at.pixel;
+  }
+};
+
+/// Adds up the lengths of one chunk of runs, voxel edges.
+struct SumLengths {
+  static constexpr std::size_t kRuns = 1024;
+  const Run* runs = nullptr;
+  std::size_t count = 0;
+  double* sums = nullptr;  ///< one a chunk
+
+  HOST_DEVICE inline void operator()(std::size_t chunk) const {
+    double sum = 0;
+    for (std::size_t n = chunk * kRuns; n < count && n < (chunk + 1) * kRuns; ++n)
+      sum += static_cast<double>(runs[n].step) * runs[n].count;
+    sums[chunk] = sum;
   }
 };
 

@@ -128,9 +128,10 @@ struct Number {
   HOST_DEVICE void operator()(std::size_t i) const { to[i] = static_cast<std::uint32_t>(i); }
 };
 
-/// begin[v]: number of sorted voxels before v.
+/// begin[v]: number of sorted voxels (or other keys) before v.
+template <class Key = std::uint32_t>
 struct FindBegin {
-  const std::uint32_t* sorted = nullptr;
+  const Key* sorted = nullptr;
   std::uint32_t count = 0;
   std::uint32_t* begin = nullptr;
 

@@ -52,27 +52,18 @@ struct KeepResidual {
   }
 };
 
-/// Adds up the squares of one chunk of rays' residuals for R, G and B, each with its ray's weight where there
-/// are any.
+/// Term of a sum (sum.h): a ray's squared residuals for R, G and B, with its weight where there are any.
 template <class Real>
-struct SumSquares {
-  static constexpr std::size_t kRays = 256;
+struct SquareTerm {
   const Quad<Real>* residual = nullptr;  ///< one a ray
   const float* weight = nullptr;         ///< one a ray, or none
-  std::size_t first = 0, last = 0;       ///< of the rays
-  Quad<double>* sums = nullptr;          ///< one a chunk
 
-  [[nodiscard]] HOST_DEVICE std::size_t chunks() const { return (last - first + kRays - 1) / kRays; }
-  HOST_DEVICE void operator()(std::size_t chunk) const {
-    const std::size_t begin = first + chunk * kRays;
-    const std::size_t end = last - begin < kRays ? last : begin + kRays;
+  HOST_DEVICE Quad<double> operator()(std::size_t ray) const {
+    const double w = weight == nullptr ? 1 : static_cast<double>(weight[ray]);
     Quad<double> sum;
-    for (std::size_t r = begin; r < end; ++r) {
-      const double w = weight == nullptr ? 1 : static_cast<double>(weight[r]);
-      for (int c = 0; c < 3; ++c)
-        sum.c[c] += w * static_cast<double>(residual[r].c[c]) * static_cast<double>(residual[r].c[c]);
-    }
-    sums[chunk] = sum;
+    for (int c = 0; c < 3; ++c)
+      sum.c[c] = w * static_cast<double>(residual[ray].c[c]) * static_cast<double>(residual[ray].c[c]);
+    return sum;
   }
 };
 

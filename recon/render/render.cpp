@@ -81,7 +81,7 @@ void march(const RayList& list, const std::vector<Rgba>& source, Absorb absorb, 
   work.volume = source.data();
   work.sigma = sigma;
   work.residual = seen.data();
-  const Travel travel = list.bends.empty() ? Travel::straight : Travel::curved;
+  const Travel travel = list.curved ? Travel::curved : Travel::straight;
   const auto forward = march_table<float>().forward_of(absorb, travel);
   constexpr int kTasks = 128;
   pool.run(kTasks, [&](int task) {

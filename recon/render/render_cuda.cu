@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/compute/cuda_launch.h"
-#include "recon/hull/device_ray_list.h"
+#include "recon/hull/gpu_rays.h"
 #include "recon/render/render_cuda.h"
 
 namespace emberlock::recon {
@@ -9,19 +9,19 @@ namespace {
 template <class Path, class Extinction>
 std::vector<Rgba> march(const RayList& list, const std::vector<Rgba>& source, const Extinction& extinction) {
   using March = Forward<float, Extinction, Path>;
-  const DeviceRayList rays(list);
+  const auto rays = GpuRays::of(list);
   const CudaBuffer<Rgba> volume(source);
   const auto seen = CudaBuffer<Rgba>::unfilled(list.rays.size());
   launch(list.rays.size(),
-         MarchAndKeep<March, KeepRadiance<float>>{{rays.table(), volume.data(), extinction}, {seen.data()}},
+         MarchAndKeep<March, KeepRadiance<float>>{{rays->table(), volume.data(), extinction}, {seen.data()}},
          "marching");
   return seen.download();
 }
 
 template <class Extinction>
 std::vector<Rgba> march(const RayList& list, const std::vector<Rgba>& source, const Extinction& extinction) {
-  return list.bends.empty() ? march<StraightPath>(list, source, extinction)
-                            : march<CurvedPath>(list, source, extinction);
+  return list.curved ? march<CurvedPath>(list, source, extinction)
+                     : march<StraightPath>(list, source, extinction);
 }
 
 }  // namespace

@@ -196,7 +196,7 @@ Counts count(const recon::Problem& problem) {
     counts.samples += run.count;
     counts.crossings += static_cast<double>(static_cast<float>(run.count) * run.step * main_axis);
   }
-  counts.key_points = static_cast<double>(std::count(problem.active.begin(), problem.active.end(), 1));
+  counts.key_points = static_cast<double>(std::count_if(problem.share.begin(), problem.share.end(), [](float s) { return s > 0; }));
   counts.ray_bytes =
       static_cast<double>(problem.list.rays.size() * (sizeof(recon::MarchRay) + sizeof(recon::Rgba)) +
                           problem.list.runs.size() * sizeof(recon::Run));
@@ -245,7 +245,8 @@ std::unique_ptr<recon::Engine> engine_for(const Case& c, const recon::Problem& p
   optics.absorb = c.absorb;
   auto engine = recon::make_engine(problem, optics, recon::Precision::float32, pool);
   engine->set(std::vector<recon::Rgba>(problem.grid().size(), recon::Rgba{{3, 2, 1, sigma}}));
-  const std::vector<float> weights(problem.active.begin(), problem.active.end());
+  std::vector<float> weights(problem.share);
+  for (float& w : weights) w = w > 0 ? 1 : 0;
   engine->set_weights(weights);
   if (c.absorb == recon::Absorb::field)
     engine->set_field(weights, std::vector<float>(problem.grid().size(), sigma));

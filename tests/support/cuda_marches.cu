@@ -2,7 +2,7 @@
 // For tests: single launches of what recon/adjust/engine_cuda.cu strings together, over the CPU's memory.
 #include "recon/adjust/sort_cuda.h"
 #include "recon/compute/cuda_launch.h"
-#include "recon/hull/device_ray_list.h"
+#include "recon/hull/gpu_rays.h"
 #include "recon/kernels/field.h"
 #include "recon/kernels/gather.h"
 #include "tests/support/marches.h"
@@ -31,8 +31,8 @@ class CudaMarches final : public Marches<Real> {
 
   explicit CudaMarches(const recon::RayList& list)
       : list_(list),
-        rays_(list),
-        samples_(list.first_sample(rays())),
+        rays_(recon::GpuRays::of(list)),
+        samples_(list.count().samples),
         run_of_sample_(recon::CudaBuffer<std::uint32_t>::unfilled(samples_)) {
     const auto voxels = recon::CudaBuffer<std::uint32_t>::unfilled(samples_);
     recon::launch(list.runs.size(), recon::NameVoxels<Real, Path>{all(), voxels.data()}, "naming voxels");
@@ -60,7 +60,7 @@ class CudaMarches final : public Marches<Real> {
     using Keep = recon::KeepResidual<Real>;
     recon::launch(rays(),
                   recon::MarchByResidual<March, Keep>{
-                      {rays_.table(), light.data(), samples.data(), 0},
+                      {rays_->table(), light.data(), samples.data(), 0},
                       {{seen.data(), background.data(), offset.data(), pixel.white}, residual.data()}},
                   "marching");
     return {residual.download(), samples.download()};
@@ -73,7 +73,7 @@ class CudaMarches final : public Marches<Real> {
 
  private:
   [[nodiscard]] std::size_t rays() const { return list_.rays.size(); }
-  [[nodiscard]] recon::SubsetSamples all() const { return {rays_.table(), 0, run_of_sample_.data()}; }
+  [[nodiscard]] recon::SubsetSamples all() const { return {rays_->table(), 0, run_of_sample_.data()}; }
 
   template <class Extinction>
   [[nodiscard]] Values marched(const Values& volume, const Extinction& extinction) const {
@@ -82,7 +82,7 @@ class CudaMarches final : public Marches<Real> {
     using March = recon::Forward<Real, Extinction, Path>;
     recon::launch(rays(),
                   recon::MarchAndKeep<March, recon::KeepRadiance<Real>>{
-                      {rays_.table(), light.data(), extinction}, {seen.data()}},
+                      {rays_->table(), light.data(), extinction}, {seen.data()}},
                   "marching");
     return seen.download();
   }
@@ -108,7 +108,7 @@ class CudaMarches final : public Marches<Real> {
   }
 
   const recon::RayList& list_;
-  recon::DeviceRayList rays_;
+  std::shared_ptr<const recon::GpuRays> rays_;
   std::size_t samples_;
   recon::CudaBuffer<std::uint32_t> run_of_sample_;
   recon::SortedSamples by_voxel_;
@@ -146,7 +146,7 @@ void each_key_point(const Step& step) {
 
 template <class Real>
 std::unique_ptr<Marches<Real>> cuda_marches(const recon::RayList& list) {
-  if (list.bends.empty()) return std::make_unique<CudaMarches<Real, recon::StraightPath>>(list);
+  if (!list.curved) return std::make_unique<CudaMarches<Real, recon::StraightPath>>(list);
   return std::make_unique<CudaMarches<Real, recon::CurvedPath>>(list);
 }
 template std::unique_ptr<Marches<float>> cuda_marches(const recon::RayList& list);

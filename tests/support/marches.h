@@ -51,7 +51,7 @@ class Marcher final : public Marches<Real> {
                    const recon::MarchTable<Real>& table = recon::march_table<Real>())
       : list_(list),
         table_(table),
-        travel_(list.bends.empty() ? recon::Travel::straight : recon::Travel::curved) {}
+        travel_(list.curved ? recon::Travel::curved : recon::Travel::straight) {}
 
   [[nodiscard]] Values forward(recon::Absorb absorb, const Values& volume, Real sigma) const override {
     Values seen(list_.rays.size());
@@ -68,7 +68,7 @@ class Marcher final : public Marches<Real> {
   }
   [[nodiscard]] Field field_forward(const Values& volume,
                                     const recon::PixelResidual<Real>& pixel) const override {
-    Field field{Values(list_.rays.size()), Values(list_.first_sample(list_.rays.size()))};
+    Field field{Values(list_.rays.size()), Values(list_.count().samples)};
     recon::MarchWork<Real> work = work_on(volume, 0);
     work.residual = field.residual.data();
     work.samples = field.samples.data();

@@ -11,6 +11,8 @@
 // then take several times as long. It says nothing of speed, of warps, or of what nvcc makes of the code.
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -177,10 +179,17 @@ class Memory {
 inline thread_local std::vector<Work>* recording = nullptr;
 inline thread_local cudaError_t last_error = cudaSuccess;
 
+/// How long launches and copies took so far.
+inline std::atomic<std::int64_t> busy_ns = 0;
+
 inline void enqueue(Work work) {
   if (recording != nullptr) return recording->push_back(std::move(work));
-  const Memory::Open open;
-  work();
+  const auto start = std::chrono::steady_clock::now();
+  {
+    const Memory::Open open;
+    work();
+  }
+  busy_ns += std::chrono::nanoseconds(std::chrono::steady_clock::now() - start).count();
 }
 
 /// Whether any word of what a launch is told is an address of the CPU's memory. GCC alone tells padding, which may
@@ -255,6 +264,10 @@ inline cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr /*which*/, 
   return cudaSuccess;
 }
 inline cudaError_t cudaSetDevice(int /*gpu*/) { return cudaSuccess; }
+inline cudaError_t cudaGetDevice(int* gpu) {
+  *gpu = 0;
+  return cudaSuccess;
+}
 inline cudaError_t cudaDeviceGetDefaultMemPool(cudaMemPool_t* pool, int /*gpu*/) {
   *pool = nullptr;
   return cudaSuccess;

@@ -25,19 +25,13 @@ Solution solve_by_steps(const SolverSetup& setup, Tracker& tracker) {
   Solution solution;
   const Problem problem = make_problem(setup.views, setup.hull, setup.problem_options(), setup.pool);
   const auto engine = make_engine(problem, setup.optics(problem.grid()), Precision::float32, setup.pool);
-  const ErrorOverBoxes error(setup.views, setup.boxes, problem, setup.effects.background, *engine);
+  const ErrorOverBoxes error(setup.boxes, problem, *engine);
 
-  std::vector<Rgba> ones(problem.active.size());
-  for (std::size_t p = 0; p < ones.size(); ++p)
-    if (problem.active[p] != 0) ones[p] = Rgba{{1, 1, 1, 0}};
-  engine->set(ones);
-  engine->set_weights(std::vector<float>(ones.size()));
-  engine->residual_against(std::vector<Rgba>(problem.seen.size()), 0, Engine::Behind::nothing);  // A 1
+  engine->light_evenly(1);
+  engine->residual_against_aim(0, Engine::Behind::nothing);  // A 1
   engine->backproject(0);
   engine->raise_weights(1);
-  engine->set_weights(engine->weights());  // clears the gradient
-
-  engine->set(std::vector<Rgba>(ones.size()));
+  engine->rest();  // the light is that of x again: none
   solution.black_error = all_channels(error.black());
   Guard guard(solution.black_error);
   Engine::Step step{.scale = 1, .momentum = 0};

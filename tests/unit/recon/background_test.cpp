@@ -6,8 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "recon/adjust/problem.h"
 #include "recon/hull/hull.h"
-#include "recon/hull/ray_list.h"
 #include "recon/render/render.h"
 #include "tests/support/devices.h"
 
@@ -150,12 +150,19 @@ TEST_P(BackgroundTest, EveryRayFindsItsOwnPixelInItsOwnViewsPicture) {
   with.background = share(noise({24, 20}));
   View without;
   without.camera = camera_at({0, 0.3, 0.1}, {24, 20}, 18);
+  with.image = without.image = share(noise({24, 20}));
   Pool pool(1, device_here());
-  const RayList list = clip_rays({&without.camera, &with.camera}, holes.medium, {}, pool);
-  const std::vector<const View*> views = {&without, &with};
-  EXPECT_TRUE(behind_rays({}, list, views).empty());
-  const auto image = behind_rays({Background::Kind::image, {}}, list, views);
-  const auto constant = behind_rays({Background::Kind::constant, {10, 60, 200}}, list, views);
+  const auto behind = [&](const Background& background) {
+    ProblemOptions options;
+    options.background = background;
+    options.home = RayListOptions::Home::cpu;
+    return make_problem({&without, &with}, holes.medium, options, pool);
+  };
+  EXPECT_TRUE(behind({}).background.empty());
+  const Problem problem = behind({Background::Kind::image, {}});
+  const RayList& list = problem.list;
+  const std::vector<Rgba>& image = problem.background;
+  const std::vector<Rgba> constant = behind({Background::Kind::constant, {10, 60, 200}}).background;
   int lit = 0;
   for (std::size_t r = 0; r < list.rays.size(); ++r) {
     const bool has = list.rays[r].view == 1;

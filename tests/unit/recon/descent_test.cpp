@@ -8,7 +8,6 @@
 #include <gtest/gtest.h>
 
 #include "recon/adjust/cold_solve.h"
-#include "recon/adjust/extinction_field.h"
 #include "recon/adjust/find_motion.h"
 #include "recon/adjust/find_pointing.h"
 #include "recon/adjust/left_out_views.h"
@@ -37,7 +36,6 @@ struct Posed {
     }
     level = make_level(setup, hull, 1, most_subsets);
   }
-  [[nodiscard]] std::vector<Rgba> dark() const { return std::vector<Rgba>(level.problem.active.size()); }
 
   Scene scene;
   Hull hull;
@@ -61,7 +59,7 @@ double after_passes(Descent& descent, int passes) {
 
 /// Its first step alone goes so far that no later one makes up for it.
 Descent wild_one(const Posed& posed, float times) {
-  Descent wild(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, posed.dark());
+  Descent wild(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
   std::vector<float> weights = wild.engine().weights();
   for (float& w : weights) w /= times;
   wild.engine().set_weights(weights);
@@ -73,7 +71,7 @@ TEST_P(DescentOn, StepsThatAreTooLongAreTakenBackUntilTheyAreShortEnough) {
     SCOPED_TRACE(subsets);
     const Posed posed(ball_of(64), 12, subsets);
     ASSERT_EQ(posed.level.subsets, subsets);
-    Descent sound(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, posed.dark());
+    Descent sound(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
     sound.pass();
     const double black = sound.fit_error();
     after_passes(sound, 40);
@@ -105,7 +103,7 @@ TEST_P(DescentOn, WhatTheLastPassDidIsJudgedBeforeAnybodyTakesIt) {
   EXPECT_GT(brightest, 0);
   for (const Rgba& v : wild.engine().get()) ASSERT_EQ(v.c[0], 0);
 
-  Descent sound(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, posed.dark());
+  Descent sound(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
   const double judged = after_passes(sound, 5);
   const std::vector<Rgba> x = sound.engine().get();
   sound.settle();
@@ -125,7 +123,7 @@ TEST_P(DescentOn, WhatWasKeptIsTakenWhereItShowsNoMoreError) {
   EXPECT_TRUE(wild.take_kept(overshot));
   EXPECT_EQ(wild.fit_error(), dark);
 
-  Descent sound(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, posed.dark());
+  Descent sound(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
   after_passes(sound, 5);
   const double last = sound.judge();
   EXPECT_LT(last, sound.kept_error());
@@ -152,11 +150,11 @@ TEST_P(DescentOn, ColdSolvesTakeAConstantExtinctionForWhatItIs) {
   Effects effects;
   effects.extinction = constant_extinction(PerMeter(20));
   const Posed posed(ball_of(64), 12, 4, effects);
-  Descent descent(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, posed.dark());
+  Descent descent(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
   after_passes(descent, 6);
   const ColdSolve cold = cold_solve(posed.setup, posed.level, effects.extinction);
   EXPECT_EQ(cold.error, descent.validation_error());
-  for (const Rgba& v : cold.x) ASSERT_EQ(v.c[3], 0) << "no field is found";
+  for (const Rgba& v : cold.engine->get()) ASSERT_EQ(v.c[3], 0) << "no field is found";
 }
 
 TEST_P(DescentOn, OneIterationsErrorIsThatOfWhatItMade) {
@@ -267,10 +265,8 @@ TEST_P(DescentOn, ExtinctionBeforeABrightWallNeedsNoShorterSteps) {
   effects.background = {Background::Kind::constant, {200, 200, 200}};
   effects.extinction = {Extinction::Model::field, PerMeter(10), PerMeter(0)};
   const Posed posed(ball_before_a_wall(effects, 600, 10), 16, 16, effects);
-  std::vector<Rgba> x = posed.dark();
-  x = with_extinction(x,
-                      expected_extinction(posed.level.problem, {Extinction::Model::field, PerMeter(1)}, x));
-  Descent descent(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, x);
+  const Extinction thin{Extinction::Model::field, PerMeter(1)};
+  Descent descent(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, {nullptr, &thin});
   for (int p = 0; p < 4; ++p) descent.pass();
   descent.release_extinction();
   const double before = descent.fit_error();

@@ -94,7 +94,9 @@ TEST_P(HeldOutTrace, AnEngineJudgesAnothersVolumeWhereItLies) {
   Pool pool(2, device_here());
   SolveOptions options;
   const SolverSetup setup{{&scene.views[0]}, {{0, 0, 320, 240}}, hull, kHeldOutMedium, options, pool};
-  const Problem problem = make_problem({&scene.views[3]}, hull, setup.problem_options(), pool);
+  ProblemOptions here = setup.problem_options();
+  here.home = RayListOptions::Home::cpu;
+  const Problem problem = make_problem({&scene.views[3]}, hull, here, pool);
   const Optics optics = setup.optics(problem.grid());
   const auto solver = make_engine(problem, optics, Precision::float32, pool);
   const auto judging = make_residual_engine(problem, optics, Precision::float32, pool);
@@ -110,10 +112,17 @@ TEST_P(HeldOutTrace, AnEngineJudgesAnothersVolumeWhereItLies) {
   EXPECT_GT(problem.list.rays.size(), 1000U);
 
   const std::vector<Rgba> rays = solver->residuals();
+  const RadianceImage& image = *scene.views[3].image;
+  const WeighedBox box{100, 60, 230, 180, 0.25F};
+  const auto in_box = [&](std::size_t pixel) {
+    const int x = static_cast<int>(pixel) % image.size.width;
+    const int y = static_cast<int>(pixel) / image.size.width;
+    return x >= box.x0 && x < box.x1 && y >= box.y0 && y < box.y1;
+  };
   std::vector<float> weights(rays.size() - 300);
-  for (std::size_t r = 0; r < weights.size(); ++r) weights[r] = static_cast<float>(r % 7) / 3;
-  const std::size_t kept = solver->keep_weights(weights);
-  const std::size_t other = solver->keep_weights({5.F});
+  for (std::size_t r = 0; r < weights.size(); ++r) weights[r] = in_box(problem.list.pixels[r]) ? box.weight : 0;
+  const Engine::Weighed kept = solver->weigh({box}, weights.size(), 1);
+  const Engine::Weighed other = solver->weigh({{0, 0, image.size.width, image.size.height, 5}}, 1, 3);
   for (std::size_t c = 0; c < 3; ++c) {
     const auto sum = [&](std::size_t first, std::size_t last, const std::vector<float>& weight) {
       double s = 0;
@@ -128,9 +137,25 @@ TEST_P(HeldOutTrace, AnEngineJudgesAnothersVolumeWhereItLies) {
                                       {300, 300},
                                       {129, rays.size() - 1}})
       EXPECT_NEAR(solver->squares(first, last)[c], sum(first, last, {}), 1e-9 * sum(0, rays.size(), {}));
-    EXPECT_NEAR(solver->weighted_squares(kept)[c], sum(0, weights.size(), weights),
+    EXPECT_NEAR(solver->weighted_squares(kept.number)[c], sum(0, weights.size(), weights),
                 1e-9 * sum(0, rays.size(), {}));
-    EXPECT_NEAR(solver->weighted_squares(other)[c], sum(0, 1, {5.F}), 1e-9 * sum(0, rays.size(), {}));
+    EXPECT_NEAR(solver->weighted_squares(other.number)[c], sum(0, 1, {5.F}), 1e-9 * sum(0, rays.size(), {}));
+    double of_rays = 0;
+    double of_box = 0;
+    double of_every_third = 0;
+    for (std::size_t pixel = 0; 3 * pixel < image.rgb.size(); ++pixel) {
+      const double square = std::pow(static_cast<double>(image.rgb[3 * pixel + c]), 2);
+      if (in_box(pixel)) of_box += 0.25 * square;
+      const auto width = static_cast<std::size_t>(image.size.width);
+      if (pixel % width % 3 == 0 && pixel / width % 3 == 0) of_every_third += 5 * square;
+    }
+    for (std::size_t r = 0; r < weights.size(); ++r)
+      of_rays += static_cast<double>(weights[r]) *
+                 std::pow(static_cast<double>(image.rgb[3 * std::size_t{problem.list.pixels[r]} + c]), 2);
+    EXPECT_GT(of_rays, 0);
+    EXPECT_NEAR(kept.black_of_rays[c], of_rays, 1e-9 * of_box);
+    EXPECT_NEAR(kept.black_of_boxes[c], of_box, 1e-9 * of_box);
+    EXPECT_NEAR(other.black_of_boxes[c], of_every_third, 1e-9 * of_every_third);
   }
 }
 

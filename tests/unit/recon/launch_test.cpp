@@ -36,10 +36,18 @@ struct Sorted {
   }
 };
 
+std::size_t first_run(const RayList& list, std::size_t ray) {
+  return ray < list.rays.size() ? list.rays[ray].first_run : list.runs.size();
+}
+std::size_t first_sample(const RayList& list, std::size_t ray) {
+  const std::size_t run = first_run(list, ray);
+  return run < list.runs.size() ? list.runs[run].first_sample : list.count().samples;
+}
+
 template <class Real, class Path>
 Sorted sort_samples(const RayList& list, std::size_t first_ray, std::size_t last_ray) {
-  const std::size_t first = list.first_sample(first_ray);
-  const std::size_t count = list.first_sample(last_ray) - first;
+  const std::size_t first = first_sample(list, first_ray);
+  const std::size_t count = first_sample(list, last_ray) - first;
   const std::size_t key_points = list.grid.size();
   Sorted sorted{first,
                 std::vector<std::uint32_t>(count),
@@ -48,14 +56,14 @@ Sorted sort_samples(const RayList& list, std::size_t first_ray, std::size_t last
                 std::vector<std::uint32_t>(key_points + 1)};
   std::vector<std::uint32_t> voxels(count);
   const NameVoxels<Real, Path> name{{list.table(), first, sorted.run.data()}, voxels.data()};
-  for (std::size_t n = list.first_run(last_ray); n-- > list.first_run(first_ray);) name(n);
+  for (std::size_t n = first_run(list, last_ray); n-- > first_run(list, first_ray);) name(n);
   launch(count, Number{sorted.order.data()});
   std::stable_sort(sorted.order.begin(), sorted.order.end(),
                    [&](std::uint32_t a, std::uint32_t b) { return voxels[a] < voxels[b]; });
   std::vector<std::uint32_t> in_order(count);
   for (std::size_t i = 0; i < count; ++i) in_order[i] = voxels[sorted.order[i]];
   std::vector<std::uint32_t> begin(key_points + 1);
-  launch(begin.size(), FindBegin{in_order.data(), static_cast<std::uint32_t>(count), begin.data()});
+  launch(begin.size(), FindBegin<>{in_order.data(), static_cast<std::uint32_t>(count), begin.data()});
   launch(key_points, HasSamples{begin.data(), sorted.place.data()});
   std::exclusive_scan(sorted.place.begin(), sorted.place.end(), sorted.place.begin(), 0U);
   sorted.begin.resize(sorted.place.back() + std::size_t{1});

@@ -59,7 +59,7 @@ TEST_P(Threads, DescendTheSameBitsByEmissionAndExtinction) {
     std::vector<Rgba> start(points);
     std::vector<float> weights(points);
     for (std::size_t p = 0; p < points; ++p)
-      if (problem.active[p] != 0) {
+      if (problem.share[p] > 0) {
         start[p] = Rgba{{5, 3, 1, 0.1F}};
         weights[p] = 500;
       }

@@ -7,6 +7,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -25,7 +26,7 @@ using test::TempFolder;
 
 const ImageLayout kLayout{{64, 48}, PixelFormat::gray8, 8};
 constexpr std::uint64_t kFrameBytes = 64 * 48;
-constexpr Seconds kEver{1e6};
+constexpr Seconds kEver{1e6};  // for queues that no busy machine shall fill
 
 SessionWriter writer_for(const std::filesystem::path& folder, std::size_t cameras) {
   return SessionWriter::create(folder, manifest_of(std::vector<ImageLayout>(cameras, kLayout)),
@@ -87,7 +88,7 @@ TEST(AsyncWriter, AFullQueueLosesFramesCountedAsTheQueues) {
 
 TEST(AsyncWriter, LossesOfTheDriverAreTakenFromTheCamerasGaps) {
   const TempFolder temp;
-  AsyncWriter writer(writer_for(temp / "s", 1));
+  AsyncWriter writer(writer_for(temp / "s", 1), {.queue_time = kEver});
   for (const std::uint64_t id : {0, 1, 6}) EXPECT_TRUE(writer.push(0, noise_frame(kLayout, id)));
   writer.count_lost(0, LossCause::transport, 1);
   writer.count_lost(0, LossCause::underrun, 2);
@@ -104,7 +105,7 @@ TEST(AsyncWriter, NoSpaceIsToldWhileRecordingAndCountedAsTheDisks) {
   options.min_free_bytes = std::uint64_t{1} << 60;
   auto writer = SessionWriter::create(temp / "s", manifest_of({kLayout}), options);
   ASSERT_TRUE(writer);
-  AsyncWriter async(std::move(writer).value());
+  AsyncWriter async(std::move(writer).value(), {.queue_time = kEver});
   for (std::uint64_t i = 0; i < 5; ++i) EXPECT_TRUE(async.push(0, noise_frame(kLayout, i)));
   const auto manifest = async.finish();
   ASSERT_TRUE(manifest) << manifest.error().message();
@@ -115,7 +116,7 @@ TEST(AsyncWriter, NoSpaceIsToldWhileRecordingAndCountedAsTheDisks) {
 
 TEST(AsyncWriter, AFrameOfAnotherLayoutIsToldAndCounted) {
   const TempFolder temp;
-  AsyncWriter writer(writer_for(temp / "s", 1));
+  AsyncWriter writer(writer_for(temp / "s", 1), {.queue_time = kEver});
   EXPECT_TRUE(writer.push(0, noise_frame({{48, 64}, PixelFormat::gray8, 8}, 0)));
   EXPECT_TRUE(writer.push(0, noise_frame(kLayout, 1)));
   const auto manifest = writer.finish();
@@ -126,7 +127,46 @@ TEST(AsyncWriter, AFrameOfAnotherLayoutIsToldAndCounted) {
 }
 
 /// A segment "file" that takes 64 KiB and then nothing, until somebody reads: a disk that hangs.
-void put_stalled_disk(const std::filesystem::path& segment) { ASSERT_EQ(::mkfifo(segment.c_str(), 0600), 0); }
+class StalledDisk {
+ public:
+  explicit StalledDisk(std::filesystem::path segment) : path_(std::move(segment)) {
+    EXPECT_EQ(::mkfifo(path_.c_str(), 0600), 0);
+    pipe_ = UniqueFd(::open(path_.c_str(), O_RDWR | O_CLOEXEC));
+  }
+  /// Whether all of its pages are in use. The last one may have room for a frame or two still.
+  [[nodiscard]] bool hangs() const {
+    pollfd room{pipe_.get(), POLLOUT, 0};
+    return ::poll(&room, 1, 0) == 0;
+  }
+  /// From now on it takes everything, until nobody writes any more.
+  [[nodiscard]] std::thread come_back() {
+    UniqueFd reader(::open(path_.c_str(), O_RDONLY | O_CLOEXEC));
+    pipe_ = UniqueFd();  // else this is a writer too, and there is no end
+    return std::thread([fd = std::move(reader)] {
+      std::array<char, 4096> bytes{};
+      while (::read(fd.get(), bytes.data(), bytes.size()) > 0) {
+      }
+    });
+  }
+
+ private:
+  std::filesystem::path path_;
+  UniqueFd pipe_;
+};
+
+/// Pushes frames of camera 0, none before the last was taken from the queue, until its disk hangs: then the
+/// encoder stands still, however late it came to run. Returns their number.
+std::uint64_t push_until_it_hangs(AsyncWriter& writer, const StalledDisk& disk) {
+  std::uint64_t pushed = 0;
+  while (!disk.hangs()) {
+    if (writer.progress(0).queue_fill > 0) {
+      std::this_thread::yield();
+    } else {
+      EXPECT_TRUE(writer.push(0, noise_frame(kLayout, pushed++)));
+    }
+  }
+  return pushed;
+}
 
 TEST(AsyncWriter, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
   const TempFolder temp;
@@ -134,37 +174,34 @@ TEST(AsyncWriter, ADiskThatHangsHoldsNobodyUpAndWhatItCostIsCounted) {
                                            small_disk_options(Encoding::raw_nut))
                          .value(),
                      {.queue_bytes = 8 * kFrameBytes, .queue_time = kEver});
-  put_stalled_disk(temp / "s/cam0/000000.nut");
+  StalledDisk disk(temp / "s/cam0/000000.nut");
+  std::uint64_t pushed = push_until_it_hangs(writer, disk);
   std::uint64_t refused = 0;
-  for (std::uint64_t i = 0; i < 200; ++i) {  // 600 KB; were push() to wait, it would wait for ever
-    if (!writer.push(0, noise_frame(kLayout, i))) ++refused;
-    while (!writer.push(1, noise_frame(kLayout, i))) std::this_thread::yield();
-  }
+  CameraProgress stalled;
+  do {  // 600 KB; were push() to wait, it would wait for ever
+    if (!writer.push(0, noise_frame(kLayout, pushed++))) ++refused;
+    while (!writer.push(1, noise_frame(kLayout, pushed))) std::this_thread::yield();
+    stalled = writer.progress(0);
+  } while (pushed < 200 || stalled.queue_fill < 1);
   EXPECT_GT(refused, 100U);
-  const CameraProgress stalled = writer.progress(0);
   EXPECT_EQ(stalled.queue_fill, 1);
   EXPECT_EQ(stalled.counts.queue(), refused);
-  EXPECT_EQ(stalled.arrived, 200U);
-  EXPECT_EQ(stalled.queued + stalled.written + refused, 200U);
+  EXPECT_EQ(stalled.arrived, pushed);
+  EXPECT_EQ(stalled.queued + stalled.written + refused, pushed);
   EXPECT_GE(stalled.queued, 8U);
   EXPECT_EQ(stalled.safe, 0U);
   EXPECT_EQ(stalled.counts.recorded(), 0U) << "what no disk has is called recorded";
   EXPECT_GT(stalled.at_risk.value(), 0);
 
-  std::thread disk([&] {  // it comes back
-    const UniqueFd fd(::open((temp / "s/cam0/000000.nut").c_str(), O_RDONLY | O_CLOEXEC));
-    std::array<char, 4096> bytes{};
-    while (::read(fd.get(), bytes.data(), bytes.size()) > 0) {
-    }
-  });
+  std::thread reading = disk.come_back();
   const auto manifest = writer.finish();
-  disk.join();
+  reading.join();
   ASSERT_TRUE(manifest) << manifest.error().message();
   // A pipe keeps nothing: what went into it is lost to the disk, and said so.
   const v1::Counts& counts = manifest->cameras(0).counts();
   EXPECT_EQ(counts.recorded(), 0U);
   EXPECT_EQ(counts.queue(), refused);
-  EXPECT_EQ(accounted(counts), 200U);
+  EXPECT_EQ(accounted(counts), pushed);
 }
 
 TEST(AsyncWriter, AFrameThatHasWaitedTooLongFillsItsQueueHoweverSmallItIs) {
@@ -173,20 +210,20 @@ TEST(AsyncWriter, AFrameThatHasWaitedTooLongFillsItsQueueHoweverSmallItIs) {
       SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options(Encoding::raw_nut))
           .value(),
       {.queue_time = Seconds(0.05)});
-  put_stalled_disk(temp / "s/cam0/000000.nut");
-  std::uint64_t id = 0;
-  while (writer.push(0, noise_frame(kLayout, id))) ++id;  // were only bytes bounded, 20 000 frames would fit
-  EXPECT_LT(id, 15'000U);
-  EXPECT_EQ(writer.progress(0).queue_fill, 1);
-  EXPECT_EQ(writer.progress(0).counts.queue(), 1U);
-  std::thread disk([&] {
-    const UniqueFd fd(::open((temp / "s/cam0/000000.nut").c_str(), O_RDONLY | O_CLOEXEC));
-    std::array<char, 4096> bytes{};
-    while (::read(fd.get(), bytes.data(), bytes.size()) > 0) {
-    }
-  });
+  StalledDisk disk(temp / "s/cam0/000000.nut");
+  std::uint64_t pushed = push_until_it_hangs(writer, disk);
+  std::uint64_t refused = 0;
+  CameraProgress stalled;
+  do {
+    if (!writer.push(0, noise_frame(kLayout, pushed++))) ++refused;
+    stalled = writer.progress(0);
+  } while (refused == 0 || stalled.queue_fill < 1);
+  EXPECT_LT(pushed, 15'000U) << "were only bytes bounded, 20 000 frames would fit";
+  EXPECT_EQ(stalled.queue_fill, 1);
+  EXPECT_EQ(stalled.counts.queue(), refused);
+  std::thread reading = disk.come_back();
   static_cast<void>(writer.finish());
-  disk.join();
+  reading.join();
 }
 
 TEST(AsyncWriter, ASimulationWaitsForRoomAndLosesNothing) {
@@ -203,7 +240,8 @@ TEST(AsyncWriter, WhatItCallsSafeASalvageOfACopyFinds) {
   for (const Encoding encoding : {Encoding::ffv1, Encoding::raw_nut}) {
     const TempFolder temp;
     AsyncWriter writer(
-        SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options(encoding)).value());
+        SessionWriter::create(temp / "s", manifest_of({kLayout}), small_disk_options(encoding)).value(),
+        {.queue_time = kEver});
     for (std::uint64_t i = 0; i < 7; ++i) ASSERT_TRUE(writer.push(0, noise_frame(kLayout, i)));
     // No frame comes after these, and no segment ends: they become safe nevertheless.
     while (writer.progress(0).safe < 7) std::this_thread::yield();
@@ -248,7 +286,7 @@ TEST(AsyncWriter, PushesAfterTheEndAreRefused) {
 TEST(AsyncWriter, ThrownAwayUnfinishedLeavesASessionToSalvage) {
   const TempFolder temp;
   {
-    AsyncWriter writer(writer_for(temp / "s", 2));
+    AsyncWriter writer(writer_for(temp / "s", 2), {.queue_time = kEver});
     for (std::uint64_t i = 0; i < 10; ++i) EXPECT_TRUE(writer.push(0, noise_frame(kLayout, i)));
   }
   EXPECT_FALSE(SessionReader::open(temp / "s"));

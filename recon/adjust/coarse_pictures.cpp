@@ -86,12 +86,13 @@ CoarsePictures::CoarsePictures(const CoarseFlame& flame, const ComputeOptions& c
 
 std::vector<RadianceImage> CoarsePictures::operator()(const Effects& effects, RenderOptions options) const {
   options.compute = compute_;
-  std::vector<RadianceImage> pictures;
+  std::vector<const CameraModel*> cameras;
+  std::vector<const RadianceImage*> backgrounds;
   for (std::size_t v = 0; v < cameras_.size(); ++v) {
-    options.background = backgrounds_[v].rgb.empty() ? nullptr : &backgrounds_[v];
-    pictures.push_back(render_view(volume_, medium_, effects, cameras_[v], options));
+    cameras.push_back(&cameras_[v]);
+    backgrounds.push_back(backgrounds_[v].rgb.empty() ? nullptr : &backgrounds_[v]);
   }
-  return pictures;
+  return render_views(volume_, medium_, effects, cameras, backgrounds, options);
 }
 
 double change(const std::vector<RadianceImage>& with, const std::vector<RadianceImage>& without) {

@@ -91,7 +91,9 @@ Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
                               flame_pixels(setup, stride), most_subsets);
   ProblemOptions options = setup.problem_options();
   options.subsets = level.subsets + 1;
-  options.rule = {stride, -1, level.subsets, level.subsets, left_out ? static_cast<int>(*left_out) : -1};
+  options.rule.stride = stride;
+  options.rule.dealt = options.rule.held_out = level.subsets;
+  if (left_out) options.rule.left_out = static_cast<int>(*left_out);
   level.problem = make_problem(setup.views, hull, options, setup.pool);
   return level;
 }

@@ -23,13 +23,13 @@ std::vector<Rgba> UnevenLight::operator()(const std::vector<const View*>& views,
   options.compute = setup_.options.compute;
   options.scattered = &field_;
   std::vector<Rgba> offset(problem.rays());
-  std::vector<RadianceImage> difference;
-  for (const View* view : views) {
-    RadianceImage image = render_view(emission_, setup_.hull, scattering, view->camera, options);
-    const RadianceImage plain = render_view(source_, setup_.hull, even, view->camera, options);
-    for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] -= plain.rgb[i];
-    difference.push_back(std::move(image));
-  }
+  std::vector<const CameraModel*> cameras;
+  for (const View* view : views) cameras.push_back(&view->camera);
+  const std::vector<const RadianceImage*> dark(views.size());
+  std::vector<RadianceImage> difference = render_views(emission_, setup_.hull, scattering, cameras, dark, options);
+  const std::vector<RadianceImage> plain = render_views(source_, setup_.hull, even, cameras, dark, options);
+  for (std::size_t v = 0; v < views.size(); ++v)
+    for (std::size_t i = 0; i < plain[v].rgb.size(); ++i) difference[v].rgb[i] -= plain[v].rgb[i];
   for (std::size_t ray = 0; ray < offset.size(); ++ray) {
     const float* rgb =
         &difference[problem.list.rays[ray].view].rgb[3 * static_cast<std::size_t>(problem.list.pixels[ray])];

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/hull/kernel_views.h"
 
+#include <algorithm>
+#include <cstring>
+
 #include "recon/calibrate/camera_model.h"
 
 namespace emberlock::recon {
@@ -52,14 +55,14 @@ Cutter::Cutter(const Hull& medium, const RayListOptions& options) {
   const auto whole_words = [](std::size_t bytes) { return (bytes + 3) / 4 * 4; };  // for clip_bundle()
   inside_.resize(whole_words(voxels.size()));
   occupied_.resize(whole_words(blocks.size()));
-  std::size_t voxel = 0;
+  const auto width = static_cast<std::size_t>(voxels.mx);
+  const std::uint8_t* row = medium.inside.data();
   for (int k = 0; k < voxels.mz; ++k)
-    for (int j = 0; j < voxels.my; ++j)
-      for (int i = 0; i < voxels.mx; ++i)
-        if (medium.inside[voxel++] != 0) {
-          inside_[voxels.index(i, j, k)] = 1;
-          occupied_[blocks.index(i / kBlock, j / kBlock, k / kBlock)] = 1;
-        }
+    for (int j = 0; j < voxels.my; ++j, row += width) {
+      if (std::memchr(row, 1, width) == nullptr) continue;  // as most are
+      std::copy_n(row, width, &inside_[voxels.index(0, j, k)]);
+      for (int i = 0; i < voxels.mx; ++i) occupied_[blocks.index(i / kBlock, j / kBlock, k / kBlock)] |= row[i];
+    }
   voxels.inside = inside_.data();
   blocks.inside = occupied_.data();
   cut_.step = options.step;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <numeric>
 
 #include <Eigen/LU>
@@ -248,19 +249,22 @@ CroppedHull crop_to_medium(const Hull& hull) {
   const Grid& g = hull.grid;
   int low[3] = {g.nx, g.ny, g.nz};
   int high[3] = {-1, -1, -1};
-  std::size_t at = 0;
-  for (int k = 0; k < g.nz - 1; ++k) {
-    for (int j = 0; j < g.ny - 1; ++j) {
-      for (int i = 0; i < g.nx - 1; ++i) {
-        if (hull.inside[at++] == 0) continue;
-        const int voxel[3] = {i, j, k};
-        for (int a = 0; a < 3; ++a) {
-          low[a] = std::min(low[a], voxel[a]);
-          high[a] = std::max(high[a], voxel[a]);
-        }
+  const auto width = static_cast<std::size_t>(g.nx - 1);
+  const std::uint8_t* row = hull.inside.data();
+  for (int k = 0; k < g.nz - 1; ++k)
+    for (int j = 0; j < g.ny - 1; ++j, row += width) {
+      const void* first = std::memchr(row, 1, width);
+      if (first == nullptr) continue;  // as most are
+      const auto begin = static_cast<int>(static_cast<const std::uint8_t*>(first) - row);
+      auto end = static_cast<int>(width);
+      while (row[end - 1] == 0) --end;
+      const int from[3] = {begin, j, k};
+      const int to[3] = {end - 1, j, k};
+      for (int a = 0; a < 3; ++a) {
+        low[a] = std::min(low[a], from[a]);
+        high[a] = std::max(high[a], to[a]);
       }
     }
-  }
   CroppedHull crop;
   if (high[0] < 0) return {whole_grid(g), {0, 0, 0}};
   Grid& c = crop.hull.grid;
@@ -276,9 +280,9 @@ CroppedHull crop_to_medium(const Hull& hull) {
   crop.hull.inside.reserve(voxel_index(c, 0, 0, c.nz - 1));
   for (int k = 0; k < c.nz - 1; ++k) {
     for (int j = 0; j < c.ny - 1; ++j) {
-      const auto row =
+      const auto cropped =
           hull.inside.begin() + static_cast<std::ptrdiff_t>(voxel_index(g, low[0], low[1] + j, low[2] + k));
-      crop.hull.inside.insert(crop.hull.inside.end(), row, row + (c.nx - 1));
+      crop.hull.inside.insert(crop.hull.inside.end(), cropped, cropped + (c.nx - 1));
     }
   }
   return crop;
@@ -293,11 +297,14 @@ Hull coarsen(const Hull& hull) {
   out.grid.ny = g.ny / 2 + 1;
   out.grid.nz = g.nz / 2 + 1;
   out.inside.resize(voxel_index(out.grid, 0, 0, out.grid.nz - 1));
-  std::size_t at = 0;
+  const auto width = static_cast<std::size_t>(g.nx - 1);
+  const std::uint8_t* row = hull.inside.data();
   for (int k = 0; k < g.nz - 1; ++k)
-    for (int j = 0; j < g.ny - 1; ++j)
-      for (int i = 0; i < g.nx - 1; ++i)
-        if (hull.inside[at++] != 0) out.inside[voxel_index(out.grid, i / 2, j / 2, k / 2)] = 1;
+    for (int j = 0; j < g.ny - 1; ++j, row += width) {
+      if (std::memchr(row, 1, width) == nullptr) continue;  // as most are
+      std::uint8_t* to = &out.inside[voxel_index(out.grid, 0, j / 2, k / 2)];
+      for (std::size_t i = 0; i < width; ++i) to[i / 2] |= row[i];
+    }
   out.count = static_cast<std::size_t>(std::count(out.inside.begin(), out.inside.end(), 1));
   return out;
 }

@@ -123,14 +123,22 @@ Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions
   const Scene& scene = task.scene();
   Outcome outcome;
   const Seconds start = task.elapsed();
-  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+  constexpr std::size_t kAtOnce = 10;  // views, between two looks at the progress
+  for (std::size_t first = 0; first < scene.views.size(); first += kAtOnce) {
     tell(progress,
-         kSolveTo + (1 - kSolveTo) * static_cast<double>(i) / static_cast<double>(scene.views.size()),
+         kSolveTo + (1 - kSolveTo) * static_cast<double>(first) / static_cast<double>(scene.views.size()),
          "rendering the views");
-    const View& view = solved.scene().views[i];
-    outcome.renders.push_back(render_view(done.volume, done.hull, done.effects, view.camera,
-                                          {.compute = options.compute, .background = view.background.get()}));
-    solved.at_own_instant(outcome.renders.back(), i);
+    std::vector<const CameraModel*> cameras;
+    std::vector<const RadianceImage*> backgrounds;
+    for (std::size_t v = first; v < std::min(first + kAtOnce, scene.views.size()); ++v) {
+      cameras.push_back(&solved.scene().views[v].camera);
+      backgrounds.push_back(solved.scene().views[v].background.get());
+    }
+    for (RadianceImage& render : render_views(done.volume, done.hull, done.effects, cameras, backgrounds,
+                                              {.compute = options.compute})) {
+      solved.at_own_instant(render, outcome.renders.size());
+      outcome.renders.push_back(std::move(render));
+    }
   }
   outcome.report = describe(scene, done.hull.grid, options, task.device);
   Report& result = outcome.report;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <vector>
+
 #include "recon/compute/device.h"
 #include "recon/effects/effects.h"
 #include "recon/effects/refraction.h"
@@ -42,5 +44,12 @@ struct RenderOptions {
 /// usable.
 RadianceImage render_view(const Volume& volume, const Hull& medium, const Effects& effects,
                           const CameraModel& camera, const RenderOptions& options = {});
+
+/// The same for several cameras, in their order: what the volume takes to be prepared, or brought to a GPU, is taken once.
+/// `backgrounds`, one a camera, stand for the options'.
+std::vector<RadianceImage> render_views(const Volume& volume, const Hull& medium, const Effects& effects,
+                                        const std::vector<const CameraModel*>& cameras,
+                                        const std::vector<const RadianceImage*>& backgrounds,
+                                        const RenderOptions& options = {});
 
 }  // namespace emberlock::recon

@@ -7,27 +7,26 @@ namespace emberlock::recon {
 namespace {
 
 template <class Path, class Extinction>
-std::vector<Rgba> march(const RayList& list, const std::vector<Rgba>& source, const Extinction& extinction) {
+MarchedRays march(const RayList& list, const std::vector<Rgba>& source, const Extinction& extinction) {
   using March = Forward<float, Extinction, Path>;
   const auto rays = GpuRays::of(list);
   const CudaBuffer<Rgba> volume(source);
-  const auto seen = CudaBuffer<Rgba>::unfilled(list.rays.size());
-  launch(list.rays.size(),
+  const auto seen = CudaBuffer<Rgba>::unfilled(list.count().rays);
+  launch(seen.size(),
          MarchAndKeep<March, KeepRadiance<float>>{{rays->table(), volume.data(), extinction}, {seen.data()}},
          "marching");
-  return seen.download();
+  return {seen.download(), rays->pixels.download()};
 }
 
 template <class Extinction>
-std::vector<Rgba> march(const RayList& list, const std::vector<Rgba>& source, const Extinction& extinction) {
+MarchedRays march(const RayList& list, const std::vector<Rgba>& source, const Extinction& extinction) {
   return list.curved ? march<CurvedPath>(list, source, extinction)
                      : march<StraightPath>(list, source, extinction);
 }
 
 }  // namespace
 
-std::vector<Rgba> march_on_cuda(const RayList& list, const std::vector<Rgba>& source, Absorb absorb,
-                                float sigma) {
+MarchedRays march_on_cuda(const RayList& list, const std::vector<Rgba>& source, Absorb absorb, float sigma) {
   switch (absorb) {
     case Absorb::field:
       return march(list, source, FieldExtinction<float>{});

@@ -179,17 +179,24 @@ class Memory {
 inline thread_local std::vector<Work>* recording = nullptr;
 inline thread_local cudaError_t last_error = cudaSuccess;
 
-/// How long launches and copies took so far.
+/// How long launches, copies and the memory took so far.
 inline std::atomic<std::int64_t> busy_ns = 0;
+class Busy {
+ public:
+  Busy() = default;
+  Busy(Busy&&) = delete;
+  Busy& operator=(Busy&&) = delete;
+  ~Busy() { busy_ns += std::chrono::nanoseconds(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
 
 inline void enqueue(Work work) {
   if (recording != nullptr) return recording->push_back(std::move(work));
-  const auto start = std::chrono::steady_clock::now();
-  {
-    const Memory::Open open;
-    work();
-  }
-  busy_ns += std::chrono::nanoseconds(std::chrono::steady_clock::now() - start).count();
+  const Busy busy;
+  const Memory::Open open;
+  work();
 }
 
 /// Whether any word of what a launch is told is an address of the CPU's memory. GCC alone tells padding, which may
@@ -282,11 +289,13 @@ inline cudaError_t cudaMemGetInfo(std::size_t* free, std::size_t* total) {
 }
 inline cudaError_t cudaMallocAsync(void** data, std::size_t bytes, cudaStream_t /*stream*/) {
   if (software_gpu::recording != nullptr) return cudaErrorStreamCaptureUnsupported;
+  const software_gpu::Busy busy;
   *data = software_gpu::Memory::get().allocate(bytes);
   return *data != nullptr ? cudaSuccess : software_gpu::last_error = cudaErrorMemoryAllocation;
 }
 inline cudaError_t cudaFreeAsync(void* data, cudaStream_t /*stream*/) {
   if (software_gpu::recording != nullptr) return cudaErrorStreamCaptureUnsupported;
+  const software_gpu::Busy busy;
   software_gpu::Memory::get().free(data);
   return cudaSuccess;
 }

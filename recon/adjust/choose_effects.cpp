@@ -241,9 +241,11 @@ Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid
 }
 
 Result<EffectChoice> choose_effects(const Scene& scene, const Grid& grid, const EffectRequest& request,
-                                    const SolveOptions& options, const Elapsed& elapsed) {
+                                    const SolveOptions& options, const Elapsed& elapsed) try {
   EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
   return choose_effects(under_known_effects(told, request, options.compute), grid, request, options, elapsed);
+} catch (const DeviceError& e) {
+  return e.error();
 }
 
 }  // namespace emberlock::recon

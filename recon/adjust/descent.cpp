@@ -148,21 +148,15 @@ void Descent::begin_anew() {
 Guard::Finding Descent::pass() {
   engine_->mark();  // what this pass judges: its own steps are judged by the next
   engine_->stiffen(stiffness_, soft_);
+  std::vector<Engine::SubsetStep> steps;
   each_subset([&](int s) {
-    engine_->residual(s);
-    engine_->backproject(s);
     const double next_time = 0.5 * (1 + std::sqrt(1 + 4 * momentum_time_ * momentum_time_));
     const auto momentum = std::min(field_ ? kMostJointMomentum : kMostMomentum,
                                    static_cast<float>((momentum_time_ - 1) / next_time));
     momentum_time_ = next_time;
-    const Engine::Step step{share(s), momentum, length_};
-    if (field_) {
-      field_->emission = step;
-      engine_->descend_field(*field_);
-    } else {
-      engine_->descend(step);
-    }
+    steps.push_back({s, {share(s), momentum, length_}});
   });
+  engine_->sweep(steps, field_ ? &*field_ : nullptr);
   double error = fit_error();
   const Guard::Finding finding = guard_.look(error);
   if (finding == Guard::Finding::best) engine_->keep();

@@ -156,6 +156,25 @@ void Engine::descend_field(const FieldStep& step) {
   step_field(step);
 }
 
+void Engine::sweep(const std::vector<SubsetStep>& steps, const FieldStep* field) {
+  demand(field == nullptr || has_field_, "sweep() of a field without one: set_field() or take_reference() first");
+  marched_.clear();
+  sweep_subsets(steps, field);
+}
+
+void Engine::sweep_subsets(const std::vector<SubsetStep>& steps, const FieldStep* field) {
+  for (const SubsetStep& step : steps) sweep_subset(step, field);
+}
+
+void Engine::sweep_subset(const SubsetStep& step, const FieldStep* field) {
+  march_residual(step.subset);
+  spread(step.subset);
+  if (field == nullptr) return step_emission(step.step);
+  FieldStep both = *field;
+  both.emission = step.step;
+  step_field(both);
+}
+
 void Engine::adjust(int subset, const PaperStep& step) {
   demand(takes_paper_steps(),
          "adjust() but in float32, along straight rays, with none or constant extinction");

@@ -157,6 +157,13 @@ class Engine : public ResidualEngine {
   [[nodiscard]] std::vector<float> field_weights() const;
   /// After set_field(): emission and extinction at once.
   void descend_field(const FieldStep& step);
+  /// For each of these subsets, in their order: residual(), backproject() and descend(), or descend_field() with the same
+  /// emission step where a field is given.
+  struct SubsetStep {
+    int subset;
+    Step step;
+  };
+  void sweep(const std::vector<SubsetStep>& steps, const FieldStep* field = nullptr);
   /// x and y += the paper's adjustment from the subset's residual(), since when y must be as it was. Only in
   /// float32, along straight rays and with none or constant extinction.
   void adjust(int subset, const PaperStep& step);
@@ -186,6 +193,13 @@ class Engine : public ResidualEngine {
   virtual void raise_curvature(float scale) = 0;
   [[nodiscard]] virtual std::vector<float> curvature() const = 0;
   virtual void step_field(const FieldStep& step) = 0;
+  virtual void sweep_subsets(const std::vector<SubsetStep>& steps, const FieldStep* field);
+
+ protected:
+  /// One of a sweep's: what sweep_subsets() does for each.
+  void sweep_subset(const SubsetStep& step, const FieldStep* field);
+
+ private:
   virtual void step_paper(int subset, const PaperStep& step) = 0;
 
   bool is_marked_ = false;

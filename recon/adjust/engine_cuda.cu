@@ -9,6 +9,7 @@
 #include "recon/adjust/engine_parts.h"
 #include "recon/adjust/gpu_problem.h"
 #include "recon/adjust/sort_cuda.h"
+#include "recon/compute/cuda_graph.h"
 #include "recon/compute/cuda_launch.h"
 #include "recon/compute/cuda_snapshot.h"
 #include "recon/effects/exposure.h"
@@ -42,6 +43,27 @@ class DeviceBlur {
   Grid grid_;
   CudaBuffer<float> weights_;
   CudaBuffer<Quad<Real>> blurred_;
+};
+
+template <class Real>
+HOST_DEVICE inline void set_momentum(Descend<Real>& step, float momentum) {
+  step.momentum = Real(momentum);
+}
+template <class Real>
+HOST_DEVICE inline void set_momentum(DescendField<Real>& step, float momentum) {
+  step.emission.momentum = Real(momentum);
+}
+/// A step whose momentum lies on the GPU.
+template <class Update>
+struct WithMomentum {
+  Update step;
+  const float* momentum = nullptr;
+
+  HOST_DEVICE void operator()(int i, int j, int k) const {
+    Update now = step;
+    set_momentum(now, *momentum);
+    now(i, j, k);
+  }
 };
 
 /// The volume of an engine, whatever marches through it.
@@ -238,6 +260,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     return mean;
   }
   float put_reference() override {
+    graphs_.clear();  // they know the memory that goes
     reference_ = CudaBuffer<Real>::unfilled(size());
     field_weight_ = CudaBuffer<Real>(size());
     gradient_.clear();
@@ -274,9 +297,35 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   void forget_look_ahead() override { y_.copy_from(x_); }
 
   void step_emission(const Step& step) override { update(emission_step(step)); }
+  /// A pass is always the same launches but for the momenta, which the launches read from the GPU's memory.
+  void sweep_subsets(const std::vector<SubsetStep>& steps, const FieldStep* field) override {
+    std::vector<float> momenta;
+    for (const SubsetStep& s : steps) momenta.push_back(s.step.momentum);
+    if (momenta_.size() != momenta.size()) graphs_.clear();  // they read from the memory that goes
+    momenta_.upload(momenta);
+    Sweep sweep{y_.data(), offset_.data(), steps, field != nullptr ? std::optional(*field) : std::nullopt};
+    const auto same = [&](const auto& known) { return known.first == sweep; };
+    auto graph = std::find_if(graphs_.begin(), graphs_.end(), same);
+    if (graph == graphs_.end()) {
+      constexpr std::size_t kMost = 4;
+      if (graphs_.size() == kMost) graphs_.erase(graphs_.begin());
+      graphs_.emplace_back(std::move(sweep), CudaGraph([&] {
+                             for (std::size_t n = 0; n < steps.size(); ++n) {
+                               momentum_ = momenta_.data() + n;
+                               sweep_subset(steps[n], field);
+                             }
+                             momentum_ = nullptr;
+                           }));
+      graph = graphs_.end() - 1;
+    } else if (steps.size() % 2 != 0) {
+      y_.swap(next_y_);  // as recording does, step by step
+    }
+    graph->second.launch();
+  }
   [[nodiscard]] bool takes_a_field() const override { return Extinction::kField; }
   [[nodiscard]] bool takes_paper_steps() const override { return kPaperSteps; }
   void put_field(const std::vector<float>& weights, const std::vector<float>& reference) override {
+    graphs_.clear();  // they know the memory that goes
     field_weight_.upload({weights.begin(), weights.end()});
     reference_.upload({reference.begin(), reference.end()});
     gradient_.clear();
@@ -317,7 +366,10 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   }
   template <class Update>
   void update(const Update& step) {
-    each_key_point(step, "stepping");
+    if (momentum_ != nullptr)
+      each_key_point(WithMomentum<Update>{step, momentum_}, "stepping");
+    else
+      each_key_point(step, "stepping");
     y_.swap(next_y_);
   }
   template <class Act>
@@ -370,6 +422,26 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
            "adding up voxels");
   }
 
+  /// What tells one pass' launches from another's.
+  struct Sweep {
+    const void* y;
+    const void* offset;
+    std::vector<SubsetStep> steps;
+    std::optional<FieldStep> field;
+
+    friend bool operator==(const Sweep& a, const Sweep& b) {
+      const auto same_step = [](const SubsetStep& s, const SubsetStep& t) {
+        return s.subset == t.subset && s.step.scale == t.step.scale && s.step.length == t.step.length;
+      };
+      const auto same_field = [](const FieldStep& s, const FieldStep& t) {
+        return s.variation == t.variation && s.soft == t.soft && s.most == t.most;
+      };
+      return a.y == b.y && a.offset == b.offset && a.field.has_value() == b.field.has_value() &&
+             (!a.field || same_field(*a.field, *b.field)) &&
+             std::equal(a.steps.begin(), a.steps.end(), b.steps.begin(), b.steps.end(), same_step);
+    }
+  };
+
   const Problem& problem_;
   EngineMemory memory_;
   Optics optics_;
@@ -389,6 +461,9 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   std::optional<DeviceBlur<Real>> blur_;                  // where the exposure is long enough to matter
   CudaBuffer<Quad<Real>> exposed_gradient_;
   std::optional<CudaSnapshot<Quad<Real>>> snapshot_;
+  CudaBuffer<float> momenta_;          // of a sweep's steps
+  const float* momentum_ = nullptr;    // while one is recorded: of the next step
+  std::vector<std::pair<Sweep, CudaGraph>> graphs_;
 };
 
 template <class Real, class Extinction>

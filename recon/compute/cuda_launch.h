@@ -20,7 +20,8 @@ __global__ void call_each(const Act act, std::size_t first, std::size_t last) {
 }
 #endif
 
-/// Calls act(first) .. act(last - 1) concurrently in any order, on the default stream. `what` names them in
+/// Calls act(first) .. act(last - 1) concurrently in any order, on the calling
+/// thread's stream. `what` names them in
 /// errors.
 template <class Act>
 void launch(std::size_t first, std::size_t last, const Act& act, const char* what) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <utility>
@@ -28,10 +29,16 @@ std::shared_ptr<const CudaBuffer<T>> on_gpu(const std::shared_ptr<const std::vec
   int gpu = 0;
   check_cuda(cudaGetDevice(&gpu), "asking for the GPU");
   const std::lock_guard lock(copies.mutex);
-  std::erase_if(copies.of,
-                [&](const auto& c) { return c.first.first == gpu && c.second.original.expired(); });
+  const auto forgotten = [&](const auto& c) { return c.first.first == gpu && c.second.original.expired(); };
+  if (std::any_of(copies.of.begin(), copies.of.end(), forgotten)) {
+    check_cuda(cudaDeviceSynchronize(), "waiting for those who still read a picture");
+    std::erase_if(copies.of, forgotten);
+  }
   auto& copy = copies.of[{gpu, original.get()}];
-  if (!copy.on_gpu) copy = {original, std::make_shared<const CudaBuffer<T>>(*original)};
+  if (!copy.on_gpu) {
+    copy = {original, std::make_shared<const CudaBuffer<T>>(*original)};
+    check_cuda(cudaStreamSynchronize(cudaStreamPerThread), "copying a picture for the streams of other threads");
+  }
   return copy.on_gpu;
 }
 

@@ -77,10 +77,10 @@ std::size_t voxels(const Grid& g) {
 
 void carve_voxels(const std::vector<Seen>& seen, Hull& hull, Pool& pool) {
   std::vector<Silhouette> views;
-  std::vector<const std::uint8_t*> masks;
+  std::vector<const FlameMask*> masks;
   for (const Seen& s : seen) {
     views.push_back(silhouette(s.view->camera));
-    masks.push_back(s.mask->flame.data());
+    masks.push_back(s.mask);
   }
   if constexpr (kCudaBuilt) {
     if (pool.device() == Device::cuda) return carve_on_cuda(hull.grid, std::move(views), masks, hull.inside);

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <limits>
 
+#include "recon/compute/cuda_device.h"
 #include "recon/compute/pool.h"
+#include "recon/preprocess/flame_mask_cuda.h"
 
 namespace emberlock::recon {
 namespace {
@@ -37,9 +39,10 @@ struct Blocks {
 };
 
 /// Of the square blocks that lie wholly in the picture.
-Blocks blocks_of(const std::vector<float>& bright, ImageSize size, int edge) {
+Blocks blocks_of(const std::vector<float>& bright, ImageSize size, const NoiseBlocks& grid) {
   Blocks blocks;
-  const int across = size.width / edge;
+  const int edge = grid.edge;
+  const int across = grid.across;
   for (int y = 0; y + edge <= size.height; y += edge) {
     const std::size_t first = blocks.means.size();
     blocks.means.resize(first + static_cast<std::size_t>(across), 0);
@@ -62,16 +65,10 @@ Blocks blocks_of(const std::vector<float>& bright, ImageSize size, int edge) {
   return blocks;
 }
 
-double noise_threshold(const std::vector<float>& bright, ImageSize size) {
-  constexpr int kBlocks = 12;  // along the shorter side, where pixels allow
-  const int edge = std::clamp(std::min(size.width, size.height) / kBlocks, 4, 16);
-  Blocks blocks = blocks_of(bright, size, edge);
-  if (blocks.means.empty()) return 1;
-  // The brightest of n normal pixels lies about sqrt(2 ln n) - 1/2 sigma above their mean. Looking at the
-  // brightest ones needs no model of what clipping at black, quantisation and demosaicing do to the rest.
-  const double background = median(blocks.means);
-  const double above = std::sqrt(2 * std::log(edge * edge)) - 0.5;
-  return background + std::max(1.0, 6 / above * (median(blocks.peaks) - background));
+NoiseThreshold noise_threshold(const std::vector<float>& bright, ImageSize size) {
+  const NoiseBlocks grid = noise_blocks(size);
+  Blocks blocks = blocks_of(bright, size, grid);
+  return noise_threshold(grid, blocks.means, blocks.peaks);
 }
 
 /// The smallest box that holds every pixel of 1.
@@ -95,12 +92,6 @@ PixelBox box_of(const std::vector<std::uint8_t>& flame, ImageSize size) {
   const auto x0 = std::find(column.begin(), column.end(), 1) - column.begin();
   const auto x1 = column.rend() - std::find(column.rbegin(), column.rend(), 1);
   return {static_cast<int>(x0), y0, static_cast<int>(x1), y1};
-}
-
-/// The largest float that isn't above a double: a float is above the one exactly where it is above the other.
-float not_above(double value) {
-  const auto nearest = static_cast<float>(value);
-  return static_cast<double>(nearest) > value ? std::nextafter(nearest, -INFINITY) : nearest;
 }
 
 FlameMask mask_above(const std::vector<float>& bright, ImageSize size, double threshold) {
@@ -133,7 +124,30 @@ void take_out_specks(FlameMask& mask) {
 
 }  // namespace
 
-double noise_threshold(const RadianceImage& image) { return noise_threshold(brightness(image), image.size); }
+NoiseBlocks noise_blocks(ImageSize size) {
+  constexpr int kBlocks = 12;  // along the shorter side, where pixels allow
+  const int edge = std::clamp(std::min(size.width, size.height) / kBlocks, 4, 16);
+  return {edge, size.width / edge, size.width / edge * (size.height / edge)};
+}
+
+NoiseThreshold noise_threshold(const NoiseBlocks& blocks, std::vector<double>& means, std::vector<float>& peaks) {
+  if (means.empty()) return {};
+  // The brightest of n normal pixels lies about sqrt(2 ln n) - 1/2 sigma above their mean. Looking at the
+  // brightest ones needs no model of what clipping at black, quantisation and demosaicing do to the rest.
+  const double background = median(means);
+  const double above = std::sqrt(2 * std::log(blocks.edge * blocks.edge)) - 0.5;
+  const double value = background + std::max(1.0, 6 / above * (median(peaks) - background));
+  return {value, not_above(value)};
+}
+
+float not_above(double value) {
+  const auto nearest = static_cast<float>(value);
+  return static_cast<double>(nearest) > value ? std::nextafter(nearest, -INFINITY) : nearest;
+}
+
+double noise_threshold(const RadianceImage& image) {
+  return noise_threshold(brightness(image), image.size).value;
+}
 
 FlameMask flame_mask(const RadianceImage& image, double threshold) {
   return mask_above(brightness(image), image.size, threshold);
@@ -141,13 +155,20 @@ FlameMask flame_mask(const RadianceImage& image, double threshold) {
 
 FlameMask noise_mask(const RadianceImage& image) {
   const std::vector<float> bright = brightness(image);
-  FlameMask mask = mask_above(bright, image.size, noise_threshold(bright, image.size));
+  FlameMask mask = mask_above(bright, image.size, noise_threshold(bright, image.size).value);
   take_out_specks(mask);
   return mask;
 }
 
 std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold,
                                    const ComputeOptions& compute) {
+  if constexpr (kCudaBuilt) {
+    const Result<Device> device = resolve(compute.device);
+    if (device.ok() && *device == Device::cuda) {
+      use_gpu(device->gpu);
+      return masks_on_cuda(scene, threshold);
+    }
+  }
   std::vector<FlameMask> masks(scene.views.size());
   Pool pool(compute.threads);
   pool.run(static_cast<int>(masks.size()), [&](int v) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct FlameMask {
   double threshold = 0;             ///< grey levels
   std::vector<std::uint8_t> flame;  ///< 1 or 0, row-major, width * height
   PixelBox box;                     ///< the smallest that holds every flame pixel; empty without any
+  std::shared_ptr<const std::uint8_t> on_gpu = {};  ///< where it was made on a GPU: `flame` in its memory
   [[nodiscard]] bool at(int x, int y) const {
     return flame[static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width) +
                  static_cast<std::size_t>(x)] != 0;
@@ -42,7 +44,23 @@ FlameMask flame_mask(const RadianceImage& image, double threshold);
 /// among its eight neighbours. A hot pixel or the tail of the noise would stretch the box and grow the hull.
 FlameMask noise_mask(const RadianceImage& image);
 
-/// Masks of all views, in order; without a threshold each view's own noise_mask.
+/// How the noise of a picture of this size is measured: edge of its square blocks, blocks in a row, and in all.
+struct NoiseBlocks {
+  int edge = 1, across = 0, count = 0;
+};
+NoiseBlocks noise_blocks(ImageSize size);
+/// The threshold from the mean and the brightest pixel of each block, which it sorts. `least` is the largest float that isn't
+/// above it.
+struct NoiseThreshold {
+  double value = 1;
+  float least = 1;
+};
+NoiseThreshold noise_threshold(const NoiseBlocks& blocks, std::vector<double>& means, std::vector<float>& peaks);
+/// The largest float that isn't above a double: a float is above the one exactly where it is above the other.
+float not_above(double value);
+
+/// Masks of all views, in order, the same on every device; without a threshold each view's own noise_mask. Throws a
+/// DeviceError where a GPU fails.
 std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold = std::nullopt,
                                    const ComputeOptions& compute = {});
 

@@ -8,12 +8,14 @@ namespace emberlock::recon {
 namespace {
 
 /// The multiples of the stride in [from, to).
-int multiples(int from, int to, int stride) { return (to + stride - 1) / stride - (from + stride - 1) / stride; }
+int multiples(int from, int to, int stride) {
+  return (to + stride - 1) / stride - (from + stride - 1) / stride;
+}
 
 }  // namespace
 
-ErrorOverBoxes::ErrorOverBoxes(const std::vector<PixelBox>& boxes, const Problem& problem, ResidualEngine& engine,
-                               int stride, std::optional<std::size_t> rays)
+ErrorOverBoxes::ErrorOverBoxes(const std::vector<PixelBox>& boxes, const Problem& problem,
+                               ResidualEngine& engine, int stride, std::optional<std::size_t> rays)
     : engine_(engine) {
   std::vector<WeighedBox> weighed;
   for (const PixelBox& b : boxes) {

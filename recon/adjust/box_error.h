@@ -15,8 +15,8 @@ namespace emberlock::recon {
 /// rays (default: all) are every stride-th pixel of the views along both axes. The engine must outlive it.
 class ErrorOverBoxes {
  public:
-  ErrorOverBoxes(const std::vector<PixelBox>& boxes, const Problem& problem, ResidualEngine& engine, int stride = 1,
-                 std::optional<std::size_t> rays = std::nullopt);
+  ErrorOverBoxes(const std::vector<PixelBox>& boxes, const Problem& problem, ResidualEngine& engine,
+                 int stride = 1, std::optional<std::size_t> rays = std::nullopt);
   /// RMSE for R, G, B: the mean square over each view's box, then over the views, of the engine's residuals
   /// as they are now.
   [[nodiscard]] std::array<double, 3> operator()() const;

@@ -36,8 +36,8 @@ Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
 /// How firmly two neighbours are tied at least, over the mean of A^T A 1.
 constexpr double kLeastSmoothness = 0.04;
 
-/// Whose light a descent starts from, of the same grid or one half as fine, and what extinction is expected under that,
-/// where the optics take a field. From darkness where there is none.
+/// Whose light a descent starts from, of the same grid or one half as fine, and what extinction is expected
+/// under that, where the optics take a field. From darkness where there is none.
 struct DescentStart {
   const Engine* from = nullptr;
   const Extinction* expected = nullptr;

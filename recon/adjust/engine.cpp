@@ -23,7 +23,9 @@ ResidualEngine::Squares ResidualEngine::squares(std::size_t first_ray, std::size
   return first_ray < last_ray ? sum_squares(first_ray, last_ray) : Squares{};
 }
 
-ResidualEngine::Squares ResidualEngine::weighted_squares(std::size_t number) const { return sum_squares(number); }
+ResidualEngine::Squares ResidualEngine::weighted_squares(std::size_t number) const {
+  return sum_squares(number);
+}
 
 void ResidualEngine::set(const std::vector<Rgba>& x) {
   marched_.clear();
@@ -58,7 +60,8 @@ void Engine::start_from(const Engine& other) {
 }
 
 void Engine::expect_extinction(float even, float soot) {
-  demand(takes_a_field(), "expect_extinction() where the optics take none: make the engine with Absorb::field");
+  demand(takes_a_field(),
+         "expect_extinction() where the optics take none: make the engine with Absorb::field");
   marched_.clear();
   put_expected_extinction(even, soot);
 }
@@ -157,7 +160,8 @@ void Engine::descend_field(const FieldStep& step) {
 }
 
 void Engine::sweep(const std::vector<SubsetStep>& steps, const FieldStep* field) {
-  demand(field == nullptr || has_field_, "sweep() of a field without one: set_field() or take_reference() first");
+  demand(field == nullptr || has_field_,
+         "sweep() of a field without one: set_field() or take_reference() first");
   marched_.clear();
   sweep_subsets(steps, field);
 }

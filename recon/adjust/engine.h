@@ -31,14 +31,15 @@ class ResidualEngine {
   /// here on.
   virtual void set_offset(const std::vector<Rgba>& offset) = 0;
   [[nodiscard]] virtual std::vector<Rgba> residuals() const = 0;
-  /// Sums of the squared residuals for R, G and B, of a range of the rays. All sums are made where their terms
-  /// lie, in an order that no thread count changes.
+  /// Sums of the squared residuals for R, G and B, of a range of the rays. All sums are made where their
+  /// terms lie, in an order that no thread count changes.
   using Squares = std::array<double, 3>;
   [[nodiscard]] Squares squares(std::size_t first_ray, std::size_t last_ray) const;
   /// The same of no light at all, behind which the whole background shines.
   [[nodiscard]] virtual Squares black_squares(std::size_t first_ray, std::size_t last_ray) const = 0;
-  /// Boxes of the views, one each, that errors are taken over: what a ray counts by its pixel, of the first so many rays,
-  /// and over all pixels whose coordinates are multiples of a stride what no light at all leaves.
+  /// Boxes of the views, one each, that errors are taken over: what a ray counts by its pixel, of the first
+  /// so many rays, and over all pixels whose coordinates are multiples of a stride what no light at all
+  /// leaves.
   struct Weighed {
     std::size_t number = 0;    ///< for weighted_squares()
     Squares black_of_rays{};   ///< of the pixels that rays see
@@ -108,27 +109,29 @@ class Engine : public ResidualEngine {
   void rest();
   // How a level begins. What follows changes y alone where it says so; rest() brings it back to x.
 
-  /// x and y become those of an engine of the same grid, or of one half as fine; both of one precision and device.
+  /// x and y become those of an engine of the same grid, or of one half as fine; both of one precision and
+  /// device.
   void start_from(const Engine& other);
   /// Lane 3 of x and y becomes what is expected a voxel edge: ExpectExtinction.
   void expect_extinction(float even, float soot);
   /// y = 1 in the medium, thinned.
   void light_evenly(float thinned);
-  /// The mean light that is seen beside the background over the mean that the residuals show, 0 where that is none.
+  /// The mean light that is seen beside the background over the mean that the residuals show, 0 where that is
+  /// none.
   [[nodiscard]] virtual float seen_over_shown(std::size_t last_ray) const = 0;
   /// weights = factor * (weights + share * mean) where any ray comes; the mean, as it was, of those above 0.
   virtual float settle_weights(float share, float factor) = 0;
   /// After set_field() or take_reference(): the same of the curvature by the extinction.
   float settle_field_weights(float share, float factor);
-  /// What the extinction is thought to be from here on is what x says; clears its weights, and the gradient. The mean over
-  /// the medium.
+  /// What the extinction is thought to be from here on is what x says; clears its weights, and the gradient.
+  /// The mean over the medium.
   float take_reference();
   /// y = x with more extinction in the medium.
   void thicken(float by);
   /// What the residuals, from project(), hold is what residual_against_aim() aims at.
   virtual void aim_at_residuals() = 0;
-  /// From there and what project() shows now: a residual against the aim, before the background, is the slope of what the
-  /// rays show by the extinction, which rose by so much in between.
+  /// From there and what project() shows now: a residual against the aim, before the background, is the slope
+  /// of what the rays show by the extinction, which rose by so much in between.
   virtual void aim_at_slope(float rise) = 0;
 
   /// The weights of descend(): one a key point, 0 for those that take no part, as all are before. Clears the
@@ -157,8 +160,8 @@ class Engine : public ResidualEngine {
   [[nodiscard]] std::vector<float> field_weights() const;
   /// After set_field(): emission and extinction at once.
   void descend_field(const FieldStep& step);
-  /// For each of these subsets, in their order: residual(), backproject() and descend(), or descend_field() with the same
-  /// emission step where a field is given.
+  /// For each of these subsets, in their order: residual(), backproject() and descend(), or descend_field()
+  /// with the same emission step where a field is given.
   struct SubsetStep {
     int subset;
     Step step;

@@ -45,7 +45,8 @@ class CpuEngine final : public Engine {
     each_of(rays, act);
     const std::size_t rows = most_rows(boxes);
     return {ray_weights_.size() - 1,
-            squares_of(sum(BlackOfRay{views.data(), list.rays.data(), list.pixels.data(), weights.data()}, 0, rays)),
+            squares_of(
+                sum(BlackOfRay{views.data(), list.rays.data(), list.pixels.data(), weights.data()}, 0, rays)),
             squares_of(sum(BlackOfRow{views.data(), boxes.data(), rows, stride}, 0, rows * boxes.size()))};
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
@@ -154,14 +155,16 @@ class CpuEngine final : public Engine {
     if (from.problem_.grid().edge == problem_.grid().edge) {
       x_ = from.x_;
     } else {
-      const RefineLight<Real> refine = refinement<Real>(from.problem_, problem_, problem_.share.data(), from.x_.data(), x_.data());
+      const RefineLight<Real> refine =
+          refinement<Real>(from.problem_, problem_, problem_.share.data(), from.x_.data(), x_.data());
       std::fill(x_.begin(), x_.end(), Quad<Real>{});
       each_row([&](int i, int j, int k) { refine(i, j, k); });
     }
     y_ = next_y_ = x_;
   }
   void put_expected_extinction(float even, float soot) override {
-    const float mean = soot > 0 ? mean_of(sum(LuminanceTerm<Real>{problem_.share.data(), x_.data()}, 0, x_.size())) : 0;
+    const float mean =
+        soot > 0 ? mean_of(sum(LuminanceTerm<Real>{problem_.share.data(), x_.data()}, 0, x_.size())) : 0;
     each_of(x_.size(), ExpectExtinction<Real>{problem_.share.data(), x_.data(), even, soot, mean});
     y_ = next_y_ = x_;
   }
@@ -178,7 +181,8 @@ class CpuEngine final : public Engine {
   float settle_curvature(float share, float factor) override { return settle(field_weight_, share, factor); }
   float settle(std::vector<Real>& weights, float share, float factor) {
     const float mean = mean_of(sum(WeightTerm<Real>{weights.data()}, 0, weights.size()));
-    each_of(weights.size(), SettleWeight<Real>{problem_.share.data(), weights.data(), Real(share * mean), Real(factor)});
+    each_of(weights.size(),
+            SettleWeight<Real>{problem_.share.data(), weights.data(), Real(share * mean), Real(factor)});
     clear_gradient();
     return mean;
   }

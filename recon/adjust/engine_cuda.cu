@@ -126,7 +126,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     const CudaBuffer<float>& weights = ray_weights_.emplace_back(CudaBuffer<float>::unfilled(rays));
     launch(rays, WeighRays{views, on_gpu_boxes.data(), of_rays, pixels, weights.data()}, "weighing rays");
     const std::size_t rows = most_rows(boxes);
-    return {ray_weights_.size() - 1, squares_of(sum(BlackOfRay{views, of_rays, pixels, weights.data()}, 0, rays)),
+    return {ray_weights_.size() - 1,
+            squares_of(sum(BlackOfRay{views, of_rays, pixels, weights.data()}, 0, rays)),
             squares_of(sum(BlackOfRow{views, on_gpu_boxes.data(), rows, stride}, 0, rows * boxes.size()))};
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_.download()); }
@@ -190,9 +191,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     shown_ = &y_;
   }
   void march_residual(int subset) override {
-    residual(subset,
-             PixelResidual<Real>{on_gpu_->seen.data(), on_gpu_->background.data(), offset_.data(),
-                                 Real(optics_.white)});
+    residual(subset, PixelResidual<Real>{on_gpu_->seen.data(), on_gpu_->background.data(), offset_.data(),
+                                         Real(optics_.white)});
   }
   void march_against(const std::vector<Rgba>& target, int subset, Behind behind) override {
     aim_.upload(target);
@@ -206,7 +206,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   void residual(int subset, const PixelResidual<Real>& pixel) {
     const KeepResidual<Real> keep{pixel, residual_.data()};
     if constexpr (Extinction::kField) {
-      const FieldForward<Real, Path> march{on_gpu_->rays->table(), exposed(), samples_.data(), first_sample(subset)};
+      const FieldForward<Real, Path> march{on_gpu_->rays->table(), exposed(), samples_.data(),
+                                           first_sample(subset)};
       each_ray(subset, MarchByResidual<FieldForward<Real, Path>, KeepResidual<Real>>{march, keep});
     } else {
       each_ray(subset, MarchAndKeep<Radiance, KeepResidual<Real>>{radiance(), keep});
@@ -233,7 +234,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     if (from.problem_.grid().edge == problem_.grid().edge)
       x_.copy_from(from.x_);
     else
-      each_key_point(refinement<Real>(from.problem_, problem_, share(), from.x_.data(), x_.data()), "refining");
+      each_key_point(refinement<Real>(from.problem_, problem_, share(), from.x_.data(), x_.data()),
+                     "refining");
     look_from_x();
   }
   void put_expected_extinction(float even, float soot) override {
@@ -255,7 +257,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   float settle_curvature(float share, float factor) override { return settle(field_weight_, share, factor); }
   float settle(CudaBuffer<Real>& weights, float least, float factor) {
     const float mean = mean_of(sum(WeightTerm<Real>{weights.data()}, 0, size()));
-    launch(size(), SettleWeight<Real>{share(), weights.data(), Real(least * mean), Real(factor)}, "settling weights");
+    launch(size(), SettleWeight<Real>{share(), weights.data(), Real(least * mean), Real(factor)},
+           "settling weights");
     gradient_.clear();
     return mean;
   }
@@ -272,7 +275,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     launch(aim_.size(), Convert<Real, float>{residual_.data(), aim_.data()}, "aiming");
   }
   void aim_at_slope(float rise) override {
-    launch(aim_.size(), AimAtSlope<Real>{residual_.data(), on_gpu_->background.data(), rise, aim_.data()}, "aiming");
+    launch(aim_.size(), AimAtSlope<Real>{residual_.data(), on_gpu_->background.data(), rise, aim_.data()},
+           "aiming");
   }
   void look_from_x() {
     forget_look_ahead();
@@ -302,7 +306,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     std::vector<float> momenta;
     for (const SubsetStep& s : steps) momenta.push_back(s.step.momentum);
     if (momenta_.size() != momenta.size()) graphs_.clear();  // they read from the memory that goes
-    momenta_.upload(momenta);
+    if (momenta != uploaded_momenta_) momenta_.upload(momenta);
+    uploaded_momenta_ = std::move(momenta);
     Sweep sweep{y_.data(), offset_.data(), steps, field != nullptr ? std::optional(*field) : std::nullopt};
     const auto same = [&](const auto& known) { return known.first == sweep; };
     auto graph = std::find_if(graphs_.begin(), graphs_.end(), same);
@@ -404,7 +409,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     corner_sums_ = CudaBuffer<Quad<Real>>::unfilled(8 * most_voxels);
   }
   [[nodiscard]] SubsetSamples samples_of(int subset) const {
-    return {on_gpu_->rays->table(), first_sample(subset), run_of_sample_[static_cast<std::size_t>(subset)].data()};
+    return {on_gpu_->rays->table(), first_sample(subset),
+            run_of_sample_[static_cast<std::size_t>(subset)].data()};
   }
   template <class Weight>
   void lay_aside(int subset, const Weight& weight) {
@@ -461,8 +467,9 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   std::optional<DeviceBlur<Real>> blur_;                  // where the exposure is long enough to matter
   CudaBuffer<Quad<Real>> exposed_gradient_;
   std::optional<CudaSnapshot<Quad<Real>>> snapshot_;
-  CudaBuffer<float> momenta_;          // of a sweep's steps
-  const float* momentum_ = nullptr;    // while one is recorded: of the next step
+  CudaBuffer<float> momenta_;  // of a sweep's steps
+  std::vector<float> uploaded_momenta_;
+  const float* momentum_ = nullptr;  // while one is recorded: of the next step
   std::vector<std::pair<Sweep, CudaGraph>> graphs_;
 };
 

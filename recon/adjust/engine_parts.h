@@ -32,8 +32,8 @@ inline std::size_t most_rows(const std::vector<WeighedBox>& boxes) {
 }
 
 template <class Real>
-RefineLight<Real> refinement(const Problem& from, const Problem& to, const float* share, const Quad<Real>* coarse,
-                             Quad<Real>* fine) {
+RefineLight<Real> refinement(const Problem& from, const Problem& to, const float* share,
+                             const Quad<Real>* coarse, Quad<Real>* fine) {
   RefineLight<Real> refine{from.grid(), to.grid(), {}, share, coarse, fine};
   for (int a = 0; a < 3; ++a) refine.shift[a] = to.crop.offset[a] - 2 * from.crop.offset[a];
   return refine;

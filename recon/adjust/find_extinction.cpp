@@ -41,7 +41,8 @@ class Probe {
   /// Mean length of a ray inside the hull.
   [[nodiscard]] Meters mean_chord() const {
     const double rays = std::max(1.0, static_cast<double>(level_.problem.rays()));
-    return Meters(total_length(level_.problem.list, setup_.pool) / rays * static_cast<double>(hull_.grid.edge));
+    return Meters(total_length(level_.problem.list, setup_.pool) / rays *
+                  static_cast<double>(hull_.grid.edge));
   }
 
   [[nodiscard]] FoundExtinction result(const Candidate& c) const {

@@ -5,6 +5,7 @@
 
 #include "recon/adjust/problem_cuda.h"
 #include "recon/effects/refraction.h"
+#include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
 namespace {
@@ -43,7 +44,8 @@ void read_pixels(Problem& problem, Pool& pool) {
   const std::vector<ViewPixels> views = problem.view_pixels();
   problem.seen.resize(problem.rays());
   if (problem.is_before_background) problem.background.resize(problem.rays());
-  const ReadPixels read{views.data(), problem.list.rays.data(), problem.list.pixels.data(), problem.seen.data(),
+  const ReadPixels read{views.data(), problem.list.rays.data(), problem.list.pixels.data(),
+                        problem.seen.data(),
                         problem.is_before_background ? problem.background.data() : nullptr};
   constexpr int kTasks = 64;
   pool.run(kTasks, [&](int task) {
@@ -85,8 +87,11 @@ std::size_t Problem::most_samples() const {
 std::vector<ViewPixels> Problem::view_pixels() const {
   std::vector<ViewPixels> views;
   for (const ProblemPicture& p : pictures) {
-    ViewPixels view{p.image->rgb.data(), p.bounds ? p.bounds->data() : nullptr,
-                    p.behind ? p.behind->rgb.data() : nullptr, {}, p.image->size.width};
+    ViewPixels view{p.image->rgb.data(),
+                    p.bounds ? p.bounds->data() : nullptr,
+                    p.behind ? p.behind->rgb.data() : nullptr,
+                    {},
+                    p.image->size.width};
     std::copy(p.level.begin(), p.level.end(), view.level);
     views.push_back(view);
   }

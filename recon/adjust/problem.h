@@ -12,10 +12,11 @@
 #include "recon/kernels/pictures.h"
 #include "recon/kernels/residual.h"
 #include "recon/kernels/rgba.h"
-#include "recon/preprocess/view.h"
+#include "recon/preprocess/radiance_image.h"
 
 namespace emberlock::recon {
 
+struct View;
 class RefractiveIndex;
 
 /// The runs in each slab of voxels along z. Even slabs share no key point and can be written at the same
@@ -43,9 +44,10 @@ struct Problem {
   std::vector<ProblemPicture> pictures;  ///< one a view
   std::vector<Rgba> seen;                ///< the pixel of each ray, grey levels; lane 3: its View::bounds
   std::vector<Rgba> background;          ///< behind each ray, grey levels; empty where it is black
-  std::vector<float> share;     ///< of each key point's eight voxels, that are inside the hull; 0: it takes no part
-  std::vector<Slice> row_span;  ///< for each row (j, k) of key points: first that takes part, last + 1
-  std::vector<SlabRuns> slabs;  ///< one for each subset
+  std::vector<float>
+      share;  ///< of each key point's eight voxels, that are inside the hull; 0: it takes no part
+  std::vector<Slice> row_span;        ///< for each row (j, k) of key points: first that takes part, last + 1
+  std::vector<SlabRuns> slabs;        ///< one for each subset
   bool is_before_background = false;  ///< one that isn't black
   std::shared_ptr<const GpuProblem> on_gpu;
   [[nodiscard]] const Grid& grid() const { return crop.hull.grid; }
@@ -69,7 +71,8 @@ struct ProblemOptions {
   double step = 1;                       ///< the march's longest, voxel edges
   int subsets = 1;
   bool adjoint = true;  ///< whether residuals will be projected back; Problem::slabs is empty where not
-  // As in RayListOptions. With subset_of, or where the CPU is their home, rays are in the CPU's memory on every device.
+  // As in RayListOptions. With subset_of, or where the CPU is their home, rays are in the CPU's memory on
+  // every device.
   PixelRule rule;
   std::function<int(std::size_t view, int x, int y)> subset_of;
   std::vector<PixelBox> boxes;

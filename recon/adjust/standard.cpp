@@ -82,7 +82,8 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
   if (setup.effects.extinction.model == Extinction::Model::field) descent->release_extinction();
 
   const bool uneven = setup.scatters_unevenly();
-  const ErrorOverBoxes error(setup.boxes, level->problem, descent->engine(), stride_for(setup, setup.hull.grid));
+  const ErrorOverBoxes error(setup.boxes, level->problem, descent->engine(),
+                             stride_for(setup, setup.hull.grid));
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;
   double last = std::numeric_limits<double>::infinity();
   int iteration = 0;

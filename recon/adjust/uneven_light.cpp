@@ -26,7 +26,8 @@ std::vector<Rgba> UnevenLight::operator()(const std::vector<const View*>& views,
   std::vector<const CameraModel*> cameras;
   for (const View* view : views) cameras.push_back(&view->camera);
   const std::vector<const RadianceImage*> dark(views.size());
-  std::vector<RadianceImage> difference = render_views(emission_, setup_.hull, scattering, cameras, dark, options);
+  std::vector<RadianceImage> difference =
+      render_views(emission_, setup_.hull, scattering, cameras, dark, options);
   const std::vector<RadianceImage> plain = render_views(source_, setup_.hull, even, cameras, dark, options);
   for (std::size_t v = 0; v < views.size(); ++v)
     for (std::size_t i = 0; i < plain[v].rgb.size(); ++i) difference[v].rgb[i] -= plain[v].rgb[i];

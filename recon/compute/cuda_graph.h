@@ -12,15 +12,18 @@ namespace emberlock::recon {
 /// Launches, copies and clearings on the GPU that are made once and repeated as one.
 class CudaGraph {
  public:
-  /// Of what `launches` asks of the calling thread's stream, none of which runs yet. It may neither allocate nor wait.
+  /// Of what `launches` asks of the calling thread's stream, none of which runs yet. It may neither allocate
+  /// nor wait.
   template <class Launches>
   explicit CudaGraph(const Launches& launches) {
-    check_cuda(cudaStreamBeginCapture(cudaStreamPerThread, cudaStreamCaptureModeThreadLocal), "recording launches");
+    check_cuda(cudaStreamBeginCapture(cudaStreamPerThread, cudaStreamCaptureModeThreadLocal),
+               "recording launches");
     cudaGraph_t recorded = nullptr;
     try {
       launches();
     } catch (...) {
-      if (cudaStreamEndCapture(cudaStreamPerThread, &recorded) == cudaSuccess) (void)cudaGraphDestroy(recorded);
+      if (cudaStreamEndCapture(cudaStreamPerThread, &recorded) == cudaSuccess)
+        (void)cudaGraphDestroy(recorded);
       (void)cudaGetLastError();
       throw;
     }

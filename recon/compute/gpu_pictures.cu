@@ -37,7 +37,8 @@ std::shared_ptr<const CudaBuffer<T>> on_gpu(const std::shared_ptr<const std::vec
   auto& copy = copies.of[{gpu, original.get()}];
   if (!copy.on_gpu) {
     copy = {original, std::make_shared<const CudaBuffer<T>>(*original)};
-    check_cuda(cudaStreamSynchronize(cudaStreamPerThread), "copying a picture for the streams of other threads");
+    check_cuda(cudaStreamSynchronize(cudaStreamPerThread),
+               "copying a picture for the streams of other threads");
   }
   return copy.on_gpu;
 }

@@ -9,11 +9,13 @@
 
 namespace emberlock::recon {
 
-/// What is shared between views and never changes, in the memory of the calling thread's GPU: copied when it is first
-/// asked for, and freed when nobody holds the original any longer and another is asked for. Null for null.
+/// What is shared between views and never changes, in the memory of the calling thread's GPU: copied when it
+/// is first asked for, and freed when nobody holds the original any longer and another is asked for. Null for
+/// null.
 template <class T>
 std::shared_ptr<const CudaBuffer<T>> on_gpu(const std::shared_ptr<const std::vector<T>>& original);
-extern template std::shared_ptr<const CudaBuffer<float>> on_gpu(const std::shared_ptr<const std::vector<float>>&);
+extern template std::shared_ptr<const CudaBuffer<float>> on_gpu(
+    const std::shared_ptr<const std::vector<float>>&);
 extern template std::shared_ptr<const CudaBuffer<std::uint8_t>> on_gpu(
     const std::shared_ptr<const std::vector<std::uint8_t>>&);
 

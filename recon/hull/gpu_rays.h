@@ -25,7 +25,9 @@ class GpuRays {
     return copied;
   }
 
-  [[nodiscard]] RayTable table() const { return {origins.data(), rays.data(), runs.data(), bends.data(), nx_, ny_, nz_}; }
+  [[nodiscard]] RayTable table() const {
+    return {origins.data(), rays.data(), runs.data(), bends.data(), nx_, ny_, nz_};
+  }
 
   CudaBuffer<float> origins;
   CudaBuffer<MarchRay> rays;

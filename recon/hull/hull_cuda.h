@@ -11,7 +11,7 @@ namespace emberlock::recon {
 
 /// Carves a grid with the views (at most 64, their tables not yet built) on the GPU; `masks` are theirs.
 /// Throws a DeviceError.
-void carve_on_cuda(const Grid& grid, std::vector<Silhouette> views, const std::vector<const FlameMask*>& masks,
-                   std::vector<std::uint8_t>& inside);
+void carve_on_cuda(const Grid& grid, std::vector<Silhouette> views,
+                   const std::vector<const FlameMask*>& masks, std::vector<std::uint8_t>& inside);
 
 }  // namespace emberlock::recon

@@ -61,7 +61,8 @@ Cutter::Cutter(const Hull& medium, const RayListOptions& options) {
     for (int j = 0; j < voxels.my; ++j, row += width) {
       if (std::memchr(row, 1, width) == nullptr) continue;  // as most are
       std::copy_n(row, width, &inside_[voxels.index(0, j, k)]);
-      for (int i = 0; i < voxels.mx; ++i) occupied_[blocks.index(i / kBlock, j / kBlock, k / kBlock)] |= row[i];
+      for (int i = 0; i < voxels.mx; ++i)
+        occupied_[blocks.index(i / kBlock, j / kBlock, k / kBlock)] |= row[i];
     }
   voxels.inside = inside_.data();
   blocks.inside = occupied_.data();

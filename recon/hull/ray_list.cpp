@@ -57,7 +57,8 @@ PixelBox part_of(const std::vector<const CameraModel*>& cameras, std::size_t vie
   const PixelBox all = reach(*cameras[view], grid);
   if (options.boxes.empty()) return all;
   const PixelBox& box = options.boxes[view];
-  return {std::max(all.x0, box.x0), std::max(all.y0, box.y0), std::min(all.x1, box.x1), std::min(all.y1, box.y1)};
+  return {std::max(all.x0, box.x0), std::max(all.y0, box.y0), std::min(all.x1, box.x1),
+          std::min(all.y1, box.y1)};
 }
 
 struct PixelTile {
@@ -82,7 +83,8 @@ void each_pixel(const PixelTile& tile, const PixelRays& camera, const RayListOpt
                 const Act& act) {
   for (int y = tile.y0; y < tile.y1; ++y)
     for (int x = tile.x0; x < tile.x1; ++x) {
-      const int subset = options.subset_of ? options.subset_of(tile.view, x, y) : options.rule(tile.view, x, y);
+      const int subset =
+          options.subset_of ? options.subset_of(tile.view, x, y) : options.rule(tile.view, x, y);
       if (subset >= 0)
         act(subset, static_cast<std::uint32_t>(y) * camera.width + static_cast<std::uint32_t>(x));
     }

@@ -10,8 +10,8 @@
 #include "recon/hull/medium.h"
 #include "recon/kernels/cut.h"
 #include "recon/kernels/march.h"
-#include "recon/preprocess/flame_mask.h"
 #include "recon/kernels/refract.h"
+#include "recon/preprocess/flame_mask.h"
 
 namespace emberlock::recon {
 
@@ -40,8 +40,8 @@ struct RayList {
   std::vector<std::uint32_t> pixels;      ///< pixel of each ray, y * width + x
   std::vector<std::size_t> subset_begin;  ///< subsets + 1 values
   std::vector<RayCounts> before;          ///< rays, runs and samples before each subset, and in all
-  /// Where they were made on a GPU: there they are. If RayListOptions say so, rays, runs, bends and pixels are nowhere
-  /// else.
+  /// Where they were made on a GPU: there they are. If RayListOptions say so, rays, runs, bends and pixels
+  /// are nowhere else.
   std::shared_ptr<const GpuRays> on_gpu;
   [[nodiscard]] RayTable table() const {
     return {origins.data(), rays.data(), runs.data(), bends.empty() ? nullptr : bends.data(),

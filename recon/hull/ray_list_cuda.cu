@@ -22,8 +22,8 @@ CudaBuffer<RayCounts> sums_before(const CudaBuffer<RayCounts>& counts) {
   auto sums = CudaBuffer<RayCounts>::unfilled(counts.size());
   with_space(
       [&](void* space, std::size_t& bytes) {
-        return cub::DeviceScan::ExclusiveScan(space, bytes, counts.data(), sums.data(), SumOfCounts{}, RayCounts{},
-                                              static_cast<int>(counts.size()));
+        return cub::DeviceScan::ExclusiveScan(space, bytes, counts.data(), sums.data(), SumOfCounts{},
+                                              RayCounts{}, static_cast<int>(counts.size()));
       },
       "adding up rays");
   return sums;
@@ -52,8 +52,8 @@ GpuPixels deal(const std::vector<TiledView>& views, const RayListOptions& option
   if (slots > 0)
     with_space(
         [&](void* space, std::size_t& bytes) {
-          return cub::DeviceRadixSort::SortPairs(space, bytes, subset.data(), sorted_subset.data(), slot.data(),
-                                                 sorted_slot.data(), slots, 0,
+          return cub::DeviceRadixSort::SortPairs(space, bytes, subset.data(), sorted_subset.data(),
+                                                 slot.data(), sorted_slot.data(), slots, 0,
                                                  static_cast<int>(std::bit_width(subsets)));
         },
         "sorting pixels");
@@ -86,7 +86,8 @@ void cut(const CutRay& cut, const std::vector<PixelRays>& cameras, const GpuPixe
   launch(pixels.count, CountPixelRuns{of, counts.data()}, "counting runs");
   const CudaBuffer<RayCounts> before = sums_before(counts);
   const auto at_subsets = CudaBuffer<RayCounts>::unfilled(pixels.first.size());
-  launch(at_subsets.size(), PickCounts{before.data(), pixels.first.data(), at_subsets.data()}, "counting runs");
+  launch(at_subsets.size(), PickCounts{before.data(), pixels.first.data(), at_subsets.data()},
+         "counting runs");
   list.before = at_subsets.download();
   for (const RayCounts& counted : list.before) list.subset_begin.push_back(counted.rays);
 
@@ -96,7 +97,8 @@ void cut(const CutRay& cut, const std::vector<PixelRays>& cameras, const GpuPixe
   made->bends = CudaBuffer<Bend>::unfilled(list.curved ? all.runs : 0);
   made->pixels = CudaBuffer<std::uint32_t>::unfilled(all.rays);
   launch(pixels.count,
-         WritePixelRuns{of, before.data(), made->rays.data(), made->runs.data(), made->bends.data(), made->pixels.data()},
+         WritePixelRuns{of, before.data(), made->rays.data(), made->runs.data(), made->bends.data(),
+                        made->pixels.data()},
          "writing runs");
   if (options.home == RayListOptions::Home::cpu) {
     list.rays = made->rays.download();
@@ -112,12 +114,13 @@ void cut(const CutRay& cut, const std::vector<PixelRays>& cameras, const GpuPixe
 void cut_on_cuda(const CutRay& ray, const std::vector<PixelRays>& cameras, const PixelsInOrder& pixels,
                  const RayListOptions& options, RayList& list) {
   const std::vector<std::uint32_t> first(pixels.subset_begin.begin(), pixels.subset_begin.end());
-  cut(ray, cameras, {CudaBuffer<PixelOfView>(pixels.pixels), CudaBuffer<std::uint32_t>(first), pixels.pixels.size()},
+  cut(ray, cameras,
+      {CudaBuffer<PixelOfView>(pixels.pixels), CudaBuffer<std::uint32_t>(first), pixels.pixels.size()},
       options, list);
 }
 
-void cut_on_cuda(const CutRay& ray, const std::vector<PixelRays>& cameras, const std::vector<TiledView>& views,
-                 const RayListOptions& options, RayList& list) {
+void cut_on_cuda(const CutRay& ray, const std::vector<PixelRays>& cameras,
+                 const std::vector<TiledView>& views, const RayListOptions& options, RayList& list) {
   cut(ray, cameras, deal(views, options), options, list);
 }
 

@@ -18,13 +18,13 @@ struct PixelsInOrder {
 PixelsInOrder pixels_in_order(const std::vector<const CameraModel*>& cameras, const Grid& grid,
                               const RayListOptions& options, Pool& pool);
 
-/// Computes the pixels' rays on the GPU, which keeps them; `cut` points to the CPU's memory. `list` must have its grid
-/// and origins, and receives the rest. Throws a DeviceError.
+/// Computes the pixels' rays on the GPU, which keeps them; `cut` points to the CPU's memory. `list` must have
+/// its grid and origins, and receives the rest. Throws a DeviceError.
 void cut_on_cuda(const CutRay& cut, const std::vector<PixelRays>& cameras, const PixelsInOrder& pixels,
                  const RayListOptions& options, RayList& list);
 /// The same of all pixels of the views' parts, by the options' rule.
-void cut_on_cuda(const CutRay& cut, const std::vector<PixelRays>& cameras, const std::vector<TiledView>& views,
-                 const RayListOptions& options, RayList& list);
+void cut_on_cuda(const CutRay& cut, const std::vector<PixelRays>& cameras,
+                 const std::vector<TiledView>& views, const RayListOptions& options, RayList& list);
 /// SumLengths for each chunk.
 void lengths_on_cuda(const GpuRays& rays, std::vector<double>& sums);
 

@@ -97,12 +97,12 @@ struct PixelOfView {
   std::uint32_t pixel = 0;  ///< y * width + x
 };
 
-/// Neighbouring rays read the same key points: a list takes pixels by tiles of kTile * kTile, so that their data
-/// stay in the L1 cache.
+/// Neighbouring rays read the same key points: a list takes pixels by tiles of kTile * kTile, so that their
+/// data stay in the L1 cache.
 inline constexpr int kTile = 16;
 
-/// The part of a view's picture, [x0, x1) x [y0, y1), that may have rays, and the first of its slots: a tile has one
-/// for each of its pixels, row by row, beyond the part's borders too.
+/// The part of a view's picture, [x0, x1) x [y0, y1), that may have rays, and the first of its slots: a tile
+/// has one for each of its pixels, row by row, beyond the part's borders too.
 struct TiledView {
   int x0 = 0, y0 = 0, x1 = 0, y1 = 0;
   int width = 0;  ///< of the picture
@@ -166,7 +166,7 @@ struct RayCounts {
 
 /// What comes before the first pixel of each subset.
 struct PickCounts {
-  const RayCounts* before = nullptr;   ///< of each pixel
+  const RayCounts* before = nullptr;     ///< of each pixel
   const std::uint32_t* first = nullptr;  ///< of each subset
   RayCounts* to = nullptr;
 

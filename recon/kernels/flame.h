@@ -15,11 +15,11 @@ struct FlameView {
   int width = 0, height = 0;
   int edge = 1, across = 0, blocks = 0;  ///< of a block, blocks in a row of them, and in all
   float least = 0;                       ///< brighter pixels are flame
-  bool specks = true;                    ///< whether those without three flame pixels among their neighbours count too
+  bool specks = true;  ///< whether those without three flame pixels among their neighbours count too
 
   [[nodiscard]] HOST_DEVICE inline float brightness(int x, int y) const {
-    const float* p =
-        rgb + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+    const float* p = rgb + 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+                                static_cast<std::size_t>(x));
     const float most = p[0] < p[1] ? p[1] : p[0];
     return most < p[2] ? p[2] : most;
   }
@@ -93,7 +93,8 @@ struct FindRow {
     const auto y = static_cast<int>(at % most);
     RowOfFlame row;
     if (y < view.height) {
-      const std::uint8_t* flame = view.flame + static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width);
+      const std::uint8_t* flame =
+          view.flame + static_cast<std::size_t>(y) * static_cast<std::size_t>(view.width);
       while (row.first < view.width && flame[row.first] == 0) ++row.first;
       row.last = view.width;
       while (row.last > row.first && flame[row.last - 1] == 0) --row.last;

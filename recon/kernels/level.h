@@ -11,8 +11,8 @@
 
 namespace emberlock::recon {
 
-// How a level of resolution begins: from the coarser one's light, with an expected extinction, and with weights for its
-// steps. `share` is Problem::share, one a key point: 0 for those that take no part.
+// How a level of resolution begins: from the coarser one's light, with an expected extinction, and with
+// weights for its steps. `share` is Problem::share, one a key point: 0 for those that take no part.
 
 /// The share of a key point's eight voxels that are inside the hull.
 struct ShareInside {
@@ -29,7 +29,8 @@ struct ShareInside {
       if (x < 0 || y < 0 || z < 0 || x >= grid.nx - 1 || y >= grid.ny - 1 || z >= grid.nz - 1) continue;
       const auto mx = static_cast<std::size_t>(grid.nx - 1);
       const auto my = static_cast<std::size_t>(grid.ny - 1);
-      count += inside[static_cast<std::size_t>(x) + mx * (static_cast<std::size_t>(y) + my * static_cast<std::size_t>(z))];
+      count += inside[static_cast<std::size_t>(x) +
+                      mx * (static_cast<std::size_t>(y) + my * static_cast<std::size_t>(z))];
     }
     share[grid.index(i, j, k)] = 0.125F * static_cast<float>(count);
   }
@@ -71,8 +72,9 @@ HOST_DEVICE inline Real luminance(const Quad<Real>& x) {
   return Real(0.299F) * x.c[0] + Real(0.587F) * x.c[1] + Real(0.114F) * x.c[2];
 }
 
-/// The extinction that is expected a voxel edge, in lane 3: `even` times a key point's share of the medium, and `soot`
-/// distributed like the luminance, whose mean over the medium is `mean`; like the share where it is 0.
+/// The extinction that is expected a voxel edge, in lane 3: `even` times a key point's share of the medium,
+/// and `soot` distributed like the luminance, whose mean over the medium is `mean`; like the share where it
+/// is 0.
 template <class Real>
 struct ExpectExtinction {
   /// Soot is thought to be at most so many times denser than its mean: beyond, brightness tells of heat.
@@ -142,8 +144,9 @@ struct SettleWeight {
   }
 };
 
-/// What a ray must have been seen to show so that its residual is the slope of what it shows by the extinction, from
-/// what it shows (radiance and transmittance, and the background behind) before and after the extinction rose.
+/// What a ray must have been seen to show so that its residual is the slope of what it shows by the
+/// extinction, from what it shows (radiance and transmittance, and the background behind) before and after
+/// the extinction rose.
 template <class Real>
 struct AimAtSlope {
   const Quad<Real>* before = nullptr;
@@ -160,7 +163,8 @@ struct AimAtSlope {
         shown.c[c] += before[ray].c[3] * Real(background[ray].c[c]);
         change.c[c] += change.c[3] * Real(background[ray].c[c]);
       }
-    for (int c = 0; c < 4; ++c) target[ray].c[c] = static_cast<float>(shown.c[c] - (1 / Real(rise)) * change.c[c]);
+    for (int c = 0; c < 4; ++c)
+      target[ray].c[c] = static_cast<float>(shown.c[c] - (1 / Real(rise)) * change.c[c]);
   }
 };
 
@@ -208,7 +212,8 @@ struct LuminanceTerm {
 
 // And of a ray.
 
-/// The light that is seen beside the background, the mean of the channels, in lane 0; what the ray shows in lane 1.
+/// The light that is seen beside the background, the mean of the channels, in lane 0; what the ray shows in
+/// lane 1.
 template <class Real>
 struct SeenTerm {
   const Rgba* seen = nullptr;

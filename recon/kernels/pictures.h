@@ -87,8 +87,8 @@ struct BlackOfRay {
     return static_cast<double>(weights[ray]) * views[rays[ray].view].squares(pixels[ray]);
   }
 };
-/// Of one row of the views' boxes, `rows` for each view: the same over its pixels whose coordinates are multiples of the
-/// stride.
+/// Of one row of the views' boxes, `rows` for each view: the same over its pixels whose coordinates are
+/// multiples of the stride.
 struct BlackOfRow {
   const ViewPixels* views = nullptr;
   const WeighedBox* boxes = nullptr;

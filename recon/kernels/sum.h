@@ -8,8 +8,8 @@
 
 namespace emberlock::recon {
 
-/// Adds up the terms of one chunk of elements, in their order: sums of the same chunks in their order have the same bits
-/// however many threads made them.
+/// Adds up the terms of one chunk of elements, in their order: sums of the same chunks in their order have
+/// the same bits however many threads made them.
 template <class Term>
 struct SumChunk {
   static constexpr std::size_t kElements = 128;

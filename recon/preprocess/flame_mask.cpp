@@ -8,6 +8,7 @@
 #include "recon/compute/cuda_device.h"
 #include "recon/compute/pool.h"
 #include "recon/preprocess/flame_mask_cuda.h"
+#include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
 namespace {
@@ -130,7 +131,8 @@ NoiseBlocks noise_blocks(ImageSize size) {
   return {edge, size.width / edge, size.width / edge * (size.height / edge)};
 }
 
-NoiseThreshold noise_threshold(const NoiseBlocks& blocks, std::vector<double>& means, std::vector<float>& peaks) {
+NoiseThreshold noise_threshold(const NoiseBlocks& blocks, std::vector<double>& means,
+                               std::vector<float>& peaks) {
   if (means.empty()) return {};
   // The brightest of n normal pixels lies about sqrt(2 ln n) - 1/2 sigma above their mean. Looking at the
   // brightest ones needs no model of what clipping at black, quantisation and demosaicing do to the rest.
@@ -166,7 +168,9 @@ std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> thr
     const Result<Device> device = resolve(compute.device);
     if (device.ok() && *device == Device::cuda) {
       use_gpu(device->gpu);
-      return masks_on_cuda(scene, threshold);
+      std::vector<SharedImage> pictures;
+      for (const View& view : scene.views) pictures.push_back(view.image);
+      return masks_on_cuda(pictures, threshold);
     }
   }
   std::vector<FlameMask> masks(scene.views.size());

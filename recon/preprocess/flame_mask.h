@@ -7,9 +7,11 @@
 #include <vector>
 
 #include "recon/compute/device.h"
-#include "recon/preprocess/view.h"
+#include "recon/preprocess/radiance_image.h"
 
 namespace emberlock::recon {
+
+struct Scene;
 
 /// Pixels [x0, x1) x [y0, y1).
 struct PixelBox {
@@ -44,23 +46,25 @@ FlameMask flame_mask(const RadianceImage& image, double threshold);
 /// among its eight neighbours. A hot pixel or the tail of the noise would stretch the box and grow the hull.
 FlameMask noise_mask(const RadianceImage& image);
 
-/// How the noise of a picture of this size is measured: edge of its square blocks, blocks in a row, and in all.
+/// How the noise of a picture of this size is measured: edge of its square blocks, blocks in a row, and in
+/// all.
 struct NoiseBlocks {
   int edge = 1, across = 0, count = 0;
 };
 NoiseBlocks noise_blocks(ImageSize size);
-/// The threshold from the mean and the brightest pixel of each block, which it sorts. `least` is the largest float that isn't
-/// above it.
+/// The threshold from the mean and the brightest pixel of each block, which it sorts. `least` is the largest
+/// float that isn't above it.
 struct NoiseThreshold {
   double value = 1;
   float least = 1;
 };
-NoiseThreshold noise_threshold(const NoiseBlocks& blocks, std::vector<double>& means, std::vector<float>& peaks);
+NoiseThreshold noise_threshold(const NoiseBlocks& blocks, std::vector<double>& means,
+                               std::vector<float>& peaks);
 /// The largest float that isn't above a double: a float is above the one exactly where it is above the other.
 float not_above(double value);
 
-/// Masks of all views, in order, the same on every device; without a threshold each view's own noise_mask. Throws a
-/// DeviceError where a GPU fails.
+/// Masks of all views, in order, the same on every device; without a threshold each view's own noise_mask.
+/// Throws a DeviceError where a GPU fails.
 std::vector<FlameMask> flame_masks(const Scene& scene, std::optional<double> threshold = std::nullopt,
                                    const ComputeOptions& compute = {});
 

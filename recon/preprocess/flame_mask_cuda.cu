@@ -23,8 +23,9 @@ PixelBox box_of(const RowOfFlame* rows, int height) {
 
 }  // namespace
 
-std::vector<FlameMask> masks_on_cuda(const Scene& scene, std::optional<double> threshold) {
-  const std::size_t count = scene.views.size();
+std::vector<FlameMask> masks_on_cuda(const std::vector<SharedImage>& images,
+                                     std::optional<double> threshold) {
+  const std::size_t count = images.size();
   std::vector<FlameMask> masks(count);
   std::vector<FlameView> views(count);
   std::vector<std::shared_ptr<const CudaBuffer<float>>> pictures;
@@ -34,11 +35,11 @@ std::vector<FlameMask> masks_on_cuda(const Scene& scene, std::optional<double> t
   std::size_t most_blocks = 1;
   std::vector<std::size_t> first(count);
   for (std::size_t v = 0; v < count; ++v) {
-    const SharedImage& image = scene.views[v].image;
+    const SharedImage& image = images[v];
     const ImageSize size = image->size;
     const NoiseBlocks blocks = noise_blocks(size);
     pictures.push_back(on_gpu(std::shared_ptr<const std::vector<float>>(image, &image->rgb)));
-    views[v] = {pictures.back()->data(), nullptr,      size.width, size.height, blocks.edge,
+    views[v] = {pictures.back()->data(), nullptr,      size.width, size.height,          blocks.edge,
                 blocks.across,           blocks.count, 0,          threshold.has_value()};
     first[v] = pixels;
     const std::size_t here = image->rgb.size() / 3;
@@ -47,7 +48,8 @@ std::vector<FlameMask> masks_on_cuda(const Scene& scene, std::optional<double> t
     most_rows = std::max(most_rows, static_cast<std::size_t>(size.height));
     most_blocks = std::max(most_blocks, static_cast<std::size_t>(blocks.count));
   }
-  const auto flame = std::make_shared<const CudaBuffer<std::uint8_t>>(CudaBuffer<std::uint8_t>::unfilled(pixels));
+  const auto flame =
+      std::make_shared<const CudaBuffer<std::uint8_t>>(CudaBuffer<std::uint8_t>::unfilled(pixels));
   for (std::size_t v = 0; v < count; ++v) views[v].flame = flame->data() + first[v];
   std::vector<BlockStatistics> measured;
   if (!threshold) {
@@ -61,7 +63,7 @@ std::vector<FlameMask> masks_on_cuda(const Scene& scene, std::optional<double> t
     if (threshold) {
       found = {*threshold, not_above(*threshold)};
     } else {
-      const NoiseBlocks blocks = noise_blocks(scene.views[v].image->size);
+      const NoiseBlocks blocks = noise_blocks(images[v]->size);
       std::vector<double> means;
       std::vector<float> peaks;
       for (std::size_t b = 0; b < static_cast<std::size_t>(blocks.count); ++b) {
@@ -81,9 +83,9 @@ std::vector<FlameMask> masks_on_cuda(const Scene& scene, std::optional<double> t
   const std::vector<std::uint8_t> all = flame->download();
   for (std::size_t v = 0; v < count; ++v) {
     FlameMask& mask = masks[v];
-    mask.size = scene.views[v].image->size;
+    mask.size = images[v]->size;
     const auto begin = all.begin() + static_cast<std::ptrdiff_t>(first[v]);
-    mask.flame.assign(begin, begin + static_cast<std::ptrdiff_t>(scene.views[v].image->rgb.size() / 3));
+    mask.flame.assign(begin, begin + static_cast<std::ptrdiff_t>(images[v]->rgb.size() / 3));
     mask.box = box_of(&found[v * most_rows], mask.size.height);
     mask.on_gpu = std::shared_ptr<const std::uint8_t>(flame, flame->data() + first[v]);
   }

@@ -8,7 +8,7 @@
 
 namespace emberlock::recon {
 
-/// flame_masks() on the calling thread's GPU, which keeps them too. Throws a DeviceError.
-std::vector<FlameMask> masks_on_cuda(const Scene& scene, std::optional<double> threshold);
+/// flame_masks() of these pictures on the calling thread's GPU, which keeps them too. Throws a DeviceError.
+std::vector<FlameMask> masks_on_cuda(const std::vector<SharedImage>& images, std::optional<double> threshold);
 
 }  // namespace emberlock::recon

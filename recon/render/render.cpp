@@ -83,7 +83,8 @@ void march(const RayList& list, const std::vector<Rgba>& source, Absorb absorb, 
     const Slice mine =
         slice(list.before[static_cast<std::size_t>(view) + 1].rays - first, kTasks, task % kTasks);
     forward(work, first + mine.begin, first + mine.end);
-    put_in_front(&seen[first + mine.begin], &list.pixels[first + mine.begin], mine.end - mine.begin, images[view]);
+    put_in_front(&seen[first + mine.begin], &list.pixels[first + mine.begin], mine.end - mine.begin,
+                 images[view]);
   });
 }
 
@@ -100,7 +101,8 @@ class Renderer {
         sigma_(static_cast<float>(effects.extinction.value.value() * static_cast<double>(volume.grid.edge))),
         blur_(effects.exposure, crop_.hull.grid) {
     if (effects.scattering.order == Scattering::Order::none) return;
-    if (options.scattered == nullptr) found_ = find_in_scatter(volume, medium, effects, options.in_scatter, pool);
+    if (options.scattered == nullptr)
+      found_ = find_in_scatter(volume, medium, effects, options.in_scatter, pool);
     scattered_ = options.scattered != nullptr ? options.scattered : &found_;
     if (scattered_->empty()) scattered_ = nullptr;
   }
@@ -113,7 +115,8 @@ class Renderer {
     if (scattered_ == nullptr && blur_.identity()) return march_through(source_, cameras, images);
     std::vector<Rgba> source = source_;
     if (scattered_ != nullptr)
-      add_in_scatter(*scattered_, cameras.front()->center(), crop_.hull.grid, effects_.extinction, pool_, source);
+      add_in_scatter(*scattered_, cameras.front()->center(), crop_.hull.grid, effects_.extinction, pool_,
+                     source);
     if (!blur_.identity()) source = blur_.forward(source, pool_);
     march_through(source, cameras, images);
   }
@@ -128,14 +131,15 @@ class Renderer {
     clip.home = RayListOptions::Home::where_it_is_made;
     IndexField gas;
     if (effects_.refraction.rays == Refraction::Rays::curved) {
-      const RefractiveIndex index(
-          options_.gas != nullptr ? *options_.gas : assume_temperature(crop_.hull, source, effects_.refraction),
-          effects_.refraction.ambient);
+      const RefractiveIndex index(options_.gas != nullptr
+                                      ? *options_.gas
+                                      : assume_temperature(crop_.hull, source, effects_.refraction),
+                                  effects_.refraction.ambient);
       gas = index.field(crop_.hull.grid);
       clip.gas = &gas;
     }
-    march(clip_rays(cameras, crop_.hull, clip, pool_), source, absorb_of(effects_.extinction.model), sigma_, pool_,
-          images);
+    march(clip_rays(cameras, crop_.hull, clip, pool_), source, absorb_of(effects_.extinction.model), sigma_,
+          pool_, images);
   }
 
   const Effects& effects_;

@@ -45,8 +45,8 @@ struct RenderOptions {
 RadianceImage render_view(const Volume& volume, const Hull& medium, const Effects& effects,
                           const CameraModel& camera, const RenderOptions& options = {});
 
-/// The same for several cameras, in their order: what the volume takes to be prepared, or brought to a GPU, is taken once.
-/// `backgrounds`, one a camera, stand for the options'.
+/// The same for several cameras, in their order: what the volume takes to be prepared, or brought to a GPU,
+/// is taken once. `backgrounds`, one a camera, stand for the options'.
 std::vector<RadianceImage> render_views(const Volume& volume, const Hull& medium, const Effects& effects,
                                         const std::vector<const CameraModel*>& cameras,
                                         const std::vector<const RadianceImage*>& backgrounds,

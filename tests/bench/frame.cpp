@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What one frame takes from pictures to volume and rendered views, and on a GPU what crosses the bus: ten views of
-// 640 x 480, 128 voxels, nothing held out.
+// What one frame takes from pictures to volume and rendered views, and on a GPU what crosses the bus: ten
+// views of 640 x 480, 128 voxels, nothing held out.
 //   bench_frame [DEVICE [THREADS [REPEATS]]]
-// On the GPU in software (scripts/build software-gpu bench_frame) the last column is the CPU's own work: what a GPU
-// would have to wait for.
+// On the GPU in software (scripts/build software-gpu bench_frame) the last column is the CPU's own work: what
+// a GPU would have to wait for.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -55,9 +55,11 @@ int main(int argc, char** argv) {
   options.solve.compute.threads = argc > 2 ? std::atoi(argv[2]) : 0;
   const int repeats = argc > 3 ? std::atoi(argv[3]) : 5;
 
-  std::printf("| extinction | ms, least of %d | launches | copies to the GPU | MB | copies to the CPU | MB | CPU's own work, ms |\n"
-              "|---|---|---|---|---|---|---|---|\n",
-              repeats);
+  std::printf(
+      "| extinction | ms, least of %d | launches | copies to the GPU | MB | copies to the CPU | MB | CPU's "
+      "own work, ms |\n"
+      "|---|---|---|---|---|---|---|---|\n",
+      repeats);
   for (const bool told : {true, false}) {
     if (told) {
       recon::Effects effects;
@@ -69,14 +71,15 @@ int main(int argc, char** argv) {
     std::vector<Took> all(static_cast<std::size_t>(repeats));
     for (Took& took : all)
       if (!frame(scene, options, took)) return 1;
-    const auto& [seconds, work] =
-        *std::min_element(all.begin(), all.end(), [](const Took& a, const Took& b) { return a.seconds < b.seconds; });
+    const auto& [seconds, work] = *std::min_element(
+        all.begin(), all.end(), [](const Took& a, const Took& b) { return a.seconds < b.seconds; });
     double own = 1e9;
     for (const Took& took : all) own = std::min(own, took.seconds - took.work.software);
-    std::printf("| %s | %.1f | %llu | %llu | %.1f | %llu | %.1f | %.1f |\n", told ? "told" : "found out", 1e3 * seconds,
-                static_cast<unsigned long long>(work.launches), static_cast<unsigned long long>(work.uploads),
-                1e-6 * static_cast<double>(work.uploaded), static_cast<unsigned long long>(work.downloads),
-                1e-6 * static_cast<double>(work.downloaded), work.software > 0 ? 1e3 * own : 0.0);
+    std::printf("| %s | %.1f | %llu | %llu | %.1f | %llu | %.1f | %.1f |\n", told ? "told" : "found out",
+                1e3 * seconds, static_cast<unsigned long long>(work.launches),
+                static_cast<unsigned long long>(work.uploads), 1e-6 * static_cast<double>(work.uploaded),
+                static_cast<unsigned long long>(work.downloads), 1e-6 * static_cast<double>(work.downloaded),
+                work.software > 0 ? 1e3 * own : 0.0);
   }
   return 0;
 }

@@ -196,7 +196,8 @@ Counts count(const recon::Problem& problem) {
     counts.samples += run.count;
     counts.crossings += static_cast<double>(static_cast<float>(run.count) * run.step * main_axis);
   }
-  counts.key_points = static_cast<double>(std::count_if(problem.share.begin(), problem.share.end(), [](float s) { return s > 0; }));
+  counts.key_points = static_cast<double>(
+      std::count_if(problem.share.begin(), problem.share.end(), [](float s) { return s > 0; }));
   counts.ray_bytes =
       static_cast<double>(problem.list.rays.size() * (sizeof(recon::MarchRay) + sizeof(recon::Rgba)) +
                           problem.list.runs.size() * sizeof(recon::Run));

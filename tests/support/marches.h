@@ -49,9 +49,7 @@ class Marcher final : public Marches<Real> {
 
   explicit Marcher(const recon::RayList& list,
                    const recon::MarchTable<Real>& table = recon::march_table<Real>())
-      : list_(list),
-        table_(table),
-        travel_(list.curved ? recon::Travel::curved : recon::Travel::straight) {}
+      : list_(list), table_(table), travel_(list.curved ? recon::Travel::curved : recon::Travel::straight) {}
 
   [[nodiscard]] Values forward(recon::Absorb absorb, const Values& volume, Real sigma) const override {
     Values seen(list_.rays.size());

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// A GPU in software, for tests (EMBERLOCK_CUDA=SOFTWARE): as much of CUDA's runtime as Emberlock calls, over the CPU's
-// memory. The .cu files compile as C++ and run wherever there is no GPU, so that what they string together is tested
-// there too, and so that sanitizers see each access and each race of a launch.
+// A GPU in software, for tests (EMBERLOCK_CUDA=SOFTWARE): as much of CUDA's runtime as Emberlock calls, over
+// the CPU's memory. The .cu files compile as C++ and run wherever there is no GPU, so that what they string
+// together is tested there too, and so that sanitizers see each access and each race of a launch.
 //
-// It is stricter than a GPU where that shows errors: memory comes filled with a pattern that is no number; a launch
-// runs its calls on two threads, each half in another order; what a launch is told must not point into the CPU's
-// memory. With EMBERLOCK_SOFTWARE_GPU=closed the CPU can't touch the GPU's memory but by launches and copies, which
-// then take several times as long. It says nothing of speed, of warps, or of what nvcc makes of the code.
+// It is stricter than a GPU where that shows errors: memory comes filled with a pattern that is no number; a
+// launch runs its calls on two threads, each half in another order; what a launch is told must not point into
+// the CPU's memory. With EMBERLOCK_SOFTWARE_GPU=closed the CPU can't touch the GPU's memory but by launches
+// and copies, which then take several times as long. It says nothing of speed, of warps, or of what nvcc
+// makes of the code.
 
 #include <algorithm>
 #include <atomic>
@@ -85,7 +86,8 @@ class Memory {
     const std::size_t pages = (bytes + kPage - 1) / kPage * kPage;
     if (used_ + pages > capacity()) return nullptr;
     std::uintptr_t at = 0;
-    const auto free = std::find_if(free_.begin(), free_.end(), [&](const Piece& p) { return p.bytes == pages; });
+    const auto free =
+        std::find_if(free_.begin(), free_.end(), [&](const Piece& p) { return p.bytes == pages; });
     if (free != free_.end()) {
       at = free->at;
       free_.erase(free);
@@ -134,7 +136,8 @@ class Memory {
   /// Whether there is memory of the CPU at this address.
   static bool is_of_the_cpu(std::uintptr_t address) {
     unsigned char in = 0;
-    return address >= kFirstOfTheCpu && ::mincore(reinterpret_cast<void*>(address / kPage * kPage), 1, &in) == 0;
+    return address >= kFirstOfTheCpu &&
+           ::mincore(reinterpret_cast<void*>(address / kPage * kPage), 1, &in) == 0;
   }
 
  private:
@@ -147,8 +150,8 @@ class Memory {
 
   Memory() {
     void* const wanted = reinterpret_cast<void*>(kFirst);
-    if (::mmap(wanted, kSize, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE, -1, 0) !=
-        wanted)
+    if (::mmap(wanted, kSize, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE,
+               -1, 0) != wanted)
       std::abort();
   }
   static void protect(const Piece& piece, bool open) {
@@ -199,8 +202,8 @@ inline void enqueue(Work work) {
   work();
 }
 
-/// Whether any word of what a launch is told is an address of the CPU's memory. GCC alone tells padding, which may
-/// hold anything.
+/// Whether any word of what a launch is told is an address of the CPU's memory. GCC alone tells padding,
+/// which may hold anything.
 template <class Act>
 bool points_to_the_cpu([[maybe_unused]] Act act) {
 #if __has_builtin(__builtin_clear_padding)
@@ -226,8 +229,7 @@ void launch(std::size_t first, std::size_t last, const Act& act) {
       for (std::size_t i = first; i < middle; ++i) act(i);
     };
     std::thread other;
-    if (last - first > kWorthAThread)
-      other = std::thread(upwards);
+    if (last - first > kWorthAThread) other = std::thread(upwards);
     for (std::size_t i = last; i-- > middle;) act(i);
     if (other.joinable())
       other.join();
@@ -279,7 +281,8 @@ inline cudaError_t cudaDeviceGetDefaultMemPool(cudaMemPool_t* pool, int /*gpu*/)
   *pool = nullptr;
   return cudaSuccess;
 }
-inline cudaError_t cudaMemPoolSetAttribute(cudaMemPool_t /*pool*/, cudaMemPoolAttr /*which*/, void* /*value*/) {
+inline cudaError_t cudaMemPoolSetAttribute(cudaMemPool_t /*pool*/, cudaMemPoolAttr /*which*/,
+                                           void* /*value*/) {
   return cudaSuccess;
 }
 inline cudaError_t cudaMemGetInfo(std::size_t* free, std::size_t* total) {
@@ -311,7 +314,8 @@ inline cudaError_t cudaFreeHost(void* data) {
   std::free(data);
   return cudaSuccess;
 }
-inline cudaError_t cudaMemsetAsync(void* data, int value, std::size_t bytes, cudaStream_t /*stream*/ = nullptr) {
+inline cudaError_t cudaMemsetAsync(void* data, int value, std::size_t bytes,
+                                   cudaStream_t /*stream*/ = nullptr) {
   software_gpu::enqueue([=] { std::memset(data, value, bytes); });
   return cudaSuccess;
 }
@@ -321,7 +325,8 @@ inline cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes
     const auto at = reinterpret_cast<std::uintptr_t>(data);
     return at >= software_gpu::kFirst && at < software_gpu::kFirst + software_gpu::kSize;
   };
-  if (of_the_gpu(to) != (kind != cudaMemcpyDeviceToHost) || of_the_gpu(from) != (kind != cudaMemcpyHostToDevice))
+  if (of_the_gpu(to) != (kind != cudaMemcpyDeviceToHost) ||
+      of_the_gpu(from) != (kind != cudaMemcpyHostToDevice))
     return cudaErrorInvalidValue;
   software_gpu::enqueue([=] { std::memcpy(to, from, bytes); });
   return cudaSuccess;
@@ -367,7 +372,8 @@ inline cudaError_t cudaStreamEndCapture(cudaStream_t /*stream*/, cudaGraph_t* gr
   delete std::exchange(software_gpu::recording, nullptr);
   return cudaSuccess;
 }
-inline cudaError_t cudaGraphInstantiate(cudaGraphExec_t* exec, cudaGraph_t graph, unsigned long long /*flags*/) {
+inline cudaError_t cudaGraphInstantiate(cudaGraphExec_t* exec, cudaGraph_t graph,
+                                        unsigned long long /*flags*/) {
   *exec = new SoftwareGraph(*graph);
   return cudaSuccess;
 }

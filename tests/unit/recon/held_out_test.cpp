@@ -120,7 +120,8 @@ TEST_P(HeldOutTrace, AnEngineJudgesAnothersVolumeWhereItLies) {
     return x >= box.x0 && x < box.x1 && y >= box.y0 && y < box.y1;
   };
   std::vector<float> weights(rays.size() - 300);
-  for (std::size_t r = 0; r < weights.size(); ++r) weights[r] = in_box(problem.list.pixels[r]) ? box.weight : 0;
+  for (std::size_t r = 0; r < weights.size(); ++r)
+    weights[r] = in_box(problem.list.pixels[r]) ? box.weight : 0;
   const Engine::Weighed kept = solver->weigh({box}, weights.size(), 1);
   const Engine::Weighed other = solver->weigh({{0, 0, image.size.width, image.size.height, 5}}, 1, 3);
   for (std::size_t c = 0; c < 3; ++c) {

@@ -9,8 +9,9 @@ namespace cub {
 
 struct DeviceRadixSort {
   template <class Key, class Value>
-  static cudaError_t SortPairs(void* space, std::size_t& bytes, const Key* keys, Key* sorted_keys, const Value* values,
-                               Value* sorted_values, std::size_t count, int first_bit, int last_bit) {
+  static cudaError_t SortPairs(void* space, std::size_t& bytes, const Key* keys, Key* sorted_keys,
+                               const Value* values, Value* sorted_values, std::size_t count, int first_bit,
+                               int last_bit) {
     if (space == nullptr) {
       bytes = 1;
       return cudaSuccess;

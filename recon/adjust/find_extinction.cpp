@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <mutex>
+#include <optional>
 
 #include "recon/adjust/cold_solve.h"
 
@@ -69,11 +71,20 @@ double vertex(const std::array<double, 3>& x, const std::array<double, 3>& error
 
 /// Tries places along a line, then the vertex of the parabola around the best.
 template <class Try, class Late>
-Candidate search_line(const std::vector<double>& places, const Try& attempt, const Late& late) {
-  std::vector<Candidate> tried;
-  tried.reserve(places.size());
-  for (const double place : places)
-    if (tried.empty() || !late()) tried.push_back(attempt(place));
+Candidate search_line(const Pool& pool, const std::vector<double>& places, const Try& attempt,
+                      const Late& late) {
+  std::vector<std::optional<Candidate>> attempts(places.size());
+  std::mutex asking;
+  at_once(pool, static_cast<int>(places.size()), [&](int n) {
+    const auto at = static_cast<std::size_t>(n);
+    const auto too_late = [&] {
+      const std::lock_guard lock(asking);  // the caller's clock need not be for several threads
+      return late();
+    };
+    if (at == 0 || !too_late()) attempts[at] = attempt(places[at]);
+  });
+  std::vector<Candidate> tried;  // up to the first that came too late
+  for (std::size_t n = 0; n < attempts.size() && attempts[n]; ++n) tried.push_back(*std::move(attempts[n]));
   const auto better = [](const Candidate& a, const Candidate& b) { return a.error < b.error; };
   const auto best = std::min_element(tried.begin(), tried.end(), better);
   const auto at = static_cast<std::size_t>(best - tried.begin());
@@ -92,13 +103,13 @@ FoundExtinction find_extinction(const SolverSetup& setup, const Elapsed& elapsed
   const Probe probe(setup);
   const double chord = probe.mean_chord().value();
   const Candidate even = search_line(
-      {0.0, 0.3, 0.7, 1.2, 3.0},
+      setup.pool, {0.0, 0.3, 0.7, 1.2, 3.0},
       [&](double depth) { return probe.solve(guess(PerMeter(depth / chord), PerMeter(0))); }, late);
   const double total = even.extinction.value.value();
   if (total <= 0 || late()) return probe.result(even);
   // The same mean, from all even to all like soot.
   const Candidate mixed = search_line(
-      {0.0, 0.5, 1.0},
+      setup.pool, {0.0, 0.5, 1.0},
       [&](double share) {
         return share == 0 ? even : probe.solve(guess(PerMeter((1 - share) * total), PerMeter(share * total)));
       },

@@ -30,11 +30,13 @@ LeftOutViews::LeftOutViews(const SolverSetup& setup, const Hull& fine)
 double LeftOutViews::error(const Extinction& extinction, double smoothness) const {
   SolverSetup setup = setup_;
   setup.smoothness = smoothness;
+  std::vector<double> errors(levels_.size());
+  at_once(setup.pool, static_cast<int>(levels_.size()), [&](int f) {
+    const auto fold = static_cast<std::size_t>(f);
+    errors[fold] = cold_solve(setup, levels_[fold], extinction).error;
+  });
   double sum = 0;
-  for (const Level& level : levels_) {
-    const double e = cold_solve(setup, level, extinction).error;
-    sum += e * e;
-  }
+  for (const double e : errors) sum += e * e;
   return std::sqrt(sum / static_cast<double>(std::max<std::size_t>(1, levels_.size())));
 }
 

@@ -67,6 +67,8 @@ void use_gpu(int gpu) {
   keep_freed_memory(gpu);
 }
 
+void finish_gpu_work() { check_cuda(cudaStreamSynchronize(cudaStreamPerThread), "waiting for its work"); }
+
 void check_cuda(cudaError_t code, const char* what) {
   if (code == cudaSuccess) return;
   throw DeviceError(

@@ -13,6 +13,9 @@ Status cuda_status(int gpu = 0);
 /// The GPU of all that the calling thread does from here on. Throws a DeviceError.
 void use_gpu(int gpu);
 
+/// Waits for all that the calling thread asked of its GPU. Throws a DeviceError.
+void finish_gpu_work();
+
 /// What this process has asked of its GPUs so far. A graph of launches counts as one.
 struct GpuWork {
   std::uint64_t launches = 0;

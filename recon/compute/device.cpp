@@ -44,7 +44,7 @@ Result<Device> resolve(Device choice) {
   if (named != nullptr) {
     EMBERLOCK_ASSIGN_OR_RETURN(choice, parse_device(named));
   }
-  if (choice == Device::cpu) return choice;
+  if (choice == Device::cpu || (choice == Device::automatic && kGpuInSoftware)) return Device(Device::cpu);
   const Status cuda = cuda_status(choice.gpu);
   if (cuda.ok()) return Device(Device::cuda, choice.gpu);
   if (choice == Device::automatic) return Device(Device::cpu);
@@ -57,6 +57,7 @@ Status cuda_status(int /*gpu*/) {
                "Build where nvcc is on PATH, or use --device cpu"};
 }
 void use_gpu(int /*gpu*/) {}
+void finish_gpu_work() {}
 GpuWork gpu_work() { return {}; }
 #endif
 

@@ -36,6 +36,14 @@ inline constexpr bool kCudaBuilt = true;
 inline constexpr bool kCudaBuilt = false;
 #endif
 
+/// Whether its GPU is one in software (EMBERLOCK_CUDA=SOFTWARE), for tests: nobody gets it who doesn't name
+/// it.
+#ifdef EMBERLOCK_GPU_IN_SOFTWARE
+inline constexpr bool kGpuInSoftware = true;
+#else
+inline constexpr bool kGpuInSoftware = false;
+#endif
+
 /// Precision of the march and of all values at key points.
 enum class Precision { float32, float64 };
 

@@ -2,7 +2,9 @@
 #include "recon/compute/pool.h"
 
 #include <algorithm>
+#include <exception>
 #include <thread>
+#include <vector>
 
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
@@ -74,6 +76,29 @@ void Pool::run(int tasks, const std::function<void(int)>& task) {
         tbb::simple_partitioner());
   });
   observe(&a.ended);
+}
+
+void at_once(const Pool& pool, int count, const std::function<void(int)>& act) {
+  if (pool.device() != Device::cuda || count < 2) {
+    for (int i = 0; i < count; ++i) act(i);
+    return;
+  }
+  finish_gpu_work();  // what the others read is there
+  std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(count));
+  std::vector<std::thread> threads;
+  for (int i = 0; i < count; ++i)
+    threads.emplace_back([&, i] {
+      try {
+        use_gpu(pool.device().gpu);
+        act(i);
+        finish_gpu_work();
+      } catch (...) {
+        thrown[static_cast<std::size_t>(i)] = std::current_exception();
+      }
+    });
+  for (std::thread& thread : threads) thread.join();
+  for (const std::exception_ptr& exception : thrown)
+    if (exception) std::rethrow_exception(exception);
 }
 
 }  // namespace emberlock::recon

@@ -33,6 +33,11 @@ class Pool {
   Device device_;
 };
 
+/// Calls act(0) .. act(count - 1), which compute on the pool's device and nowhere else: one after the other
+/// on the CPU, whose threads each of them fills; at once on a GPU, which none of them fills, each by a thread
+/// and in a stream of its own. Throws what the first of them threw.
+void at_once(const Pool& pool, int count, const std::function<void(int)>& act);
+
 /// The range of elements for task `task` of `tasks` nearly equal ones.
 struct Slice {
   std::size_t begin, end;

@@ -8,6 +8,8 @@
 
 #include "base/random.h"
 #include "recon/preprocess/radiance.h"
+#include "recon/preprocess/view.h"
+#include "tests/support/devices.h"
 #include "tests/support/small_flame.h"
 
 namespace emberlock::recon {
@@ -96,6 +98,29 @@ TEST(FlameMask, OfAllViewsAreTheSameOnAnyNumberOfThreads) {
   for (std::size_t v = 0; v < scene.views.size(); ++v) {
     EXPECT_EQ(alone[v].flame, three[v].flame);
     EXPECT_EQ(alone[v].flame, noise_mask(*scene.views[v].image).flame);
+  }
+}
+
+TEST(FlameMask, OfAllViewsAreTheSameOnAnyDevice) {
+  Scene scene = small_flame_scene();
+  for (const ImageSize size :
+       {ImageSize{64, 48}, {37, 29}, {203, 61}, {5, 4}, {4, 7}, {3, 9}, {1, 1}, {2, 40}})
+    scene.views.push_back({"noise", {}, share(noisy_picture(size, static_cast<std::uint64_t>(size.height)))});
+  const std::optional<double> thresholds[] = {{}, 30, 1000, -1};
+  for (const std::optional<double>& threshold : thresholds) {
+    const std::vector<FlameMask> here = flame_masks(scene, threshold, {Device::cpu, 2});
+    for (const Device device : other_devices()) {
+      const std::vector<FlameMask> there = flame_masks(scene, threshold, {device, 2});
+      for (std::size_t v = 0; v < scene.views.size(); ++v) {
+        EXPECT_EQ(there[v].flame, here[v].flame) << "view " << v;
+        EXPECT_EQ(there[v].threshold, here[v].threshold);
+        EXPECT_EQ(there[v].size.width, here[v].size.width);
+        EXPECT_EQ(there[v].box.x0, here[v].box.x0) << "view " << v;
+        EXPECT_EQ(there[v].box.y0, here[v].box.y0);
+        EXPECT_EQ(there[v].box.x1, here[v].box.x1);
+        EXPECT_EQ(there[v].box.y1, here[v].box.y1);
+      }
+    }
   }
 }
 

@@ -5,66 +5,23 @@
 #include <optional>
 #include <stdexcept>
 
+#include "recon/adjust/cuda_sweep.h"
 #include "recon/adjust/engine.h"
 #include "recon/adjust/engine_parts.h"
+#include "recon/adjust/gpu_blur.h"
 #include "recon/adjust/gpu_problem.h"
 #include "recon/adjust/sort_cuda.h"
 #include "recon/compute/cuda_graph.h"
 #include "recon/compute/cuda_launch.h"
 #include "recon/compute/cuda_snapshot.h"
+#include "recon/compute/cuda_sum.h"
 #include "recon/effects/exposure.h"
-#include "recon/kernels/exposure.h"
 #include "recon/kernels/field.h"
 #include "recon/kernels/gather.h"
 #include "recon/kernels/update.h"
 
 namespace emberlock::recon {
 namespace {
-
-/// B and its transpose.
-template <class Real>
-class DeviceBlur {
- public:
-  DeviceBlur(const ExposureBlur& blur, const Grid& grid)
-      : grid_(grid), weights_(blur.weights()), blurred_(CudaBuffer<Quad<Real>>::unfilled(grid.size())) {}
-
-  [[nodiscard]] const Quad<Real>* forward(const CudaBuffer<Quad<Real>>& x) { return average(x, 1); }
-  [[nodiscard]] const Quad<Real>* adjoint(const CudaBuffer<Quad<Real>>& y) { return average(y, -1); }
-
- private:
-  const Quad<Real>* average(const CudaBuffer<Quad<Real>>& in, int direction) {
-    launch(grid_.size(),
-           AverageAlongZ<Real>{in.data(), blurred_.data(), grid_.index(0, 0, 1), grid_.nz, weights_.data(),
-                               static_cast<int>(weights_.size() / 2), direction},
-           "exposing");
-    return blurred_.data();
-  }
-
-  Grid grid_;
-  CudaBuffer<float> weights_;
-  CudaBuffer<Quad<Real>> blurred_;
-};
-
-template <class Real>
-HOST_DEVICE inline void set_momentum(Descend<Real>& step, float momentum) {
-  step.momentum = Real(momentum);
-}
-template <class Real>
-HOST_DEVICE inline void set_momentum(DescendField<Real>& step, float momentum) {
-  step.emission.momentum = Real(momentum);
-}
-/// A step whose momentum lies on the GPU.
-template <class Update>
-struct WithMomentum {
-  Update step;
-  const float* momentum = nullptr;
-
-  HOST_DEVICE void operator()(int i, int j, int k) const {
-    Update now = step;
-    set_momentum(now, *momentum);
-    now(i, j, k);
-  }
-};
 
 /// The volume of an engine, whatever marches through it.
 template <class Real>
@@ -116,7 +73,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     return converted<float>(residual_.download());
   }
   [[nodiscard]] Squares black_squares(std::size_t first_ray, std::size_t last_ray) const override {
-    return squares_of(sum(BlackTerm{on_gpu_->seen.data(), on_gpu_->background.data()}, first_ray, last_ray));
+    return squares_of(
+        sum_on_cuda(BlackTerm{on_gpu_->seen.data(), on_gpu_->background.data()}, first_ray, last_ray));
   }
   [[nodiscard]] Weighed weigh(const std::vector<WeighedBox>& boxes, std::size_t rays, int stride) override {
     const CudaBuffer<WeighedBox> on_gpu_boxes(boxes);
@@ -127,8 +85,9 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     launch(rays, WeighRays{views, on_gpu_boxes.data(), of_rays, pixels, weights.data()}, "weighing rays");
     const std::size_t rows = most_rows(boxes);
     return {ray_weights_.size() - 1,
-            squares_of(sum(BlackOfRay{views, of_rays, pixels, weights.data()}, 0, rays)),
-            squares_of(sum(BlackOfRow{views, on_gpu_boxes.data(), rows, stride}, 0, rows * boxes.size()))};
+            squares_of(sum_on_cuda(BlackOfRay{views, of_rays, pixels, weights.data()}, 0, rays)),
+            squares_of(
+                sum_on_cuda(BlackOfRow{views, on_gpu_boxes.data(), rows, stride}, 0, rows * boxes.size()))};
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_.download()); }
 
@@ -152,31 +111,12 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   using Radiance = Forward<Real, Extinction, Path>;
 
   [[nodiscard]] Squares sum_squares(std::size_t first_ray, std::size_t last_ray) const override {
-    return squares_of(sum(SquareTerm<Real>{residual_.data(), nullptr}, first_ray, last_ray));
+    return squares_of(sum_on_cuda(SquareTerm<Real>{residual_.data(), nullptr}, first_ray, last_ray));
   }
   [[nodiscard]] Squares sum_squares(std::size_t weights) const override {
     const CudaBuffer<float>& of_rays = ray_weights_.at(weights);
-    return squares_of(sum(SquareTerm<Real>{residual_.data(), of_rays.data()}, 0, of_rays.size()));
+    return squares_of(sum_on_cuda(SquareTerm<Real>{residual_.data(), of_rays.data()}, 0, of_rays.size()));
   }
-  template <class Term>
-  [[nodiscard]] static Quad<double> sum(const Term& term, std::size_t first, std::size_t last) {
-    if (first >= last) return {};
-    SumChunk<Term> act{term, first, last, nullptr};
-    auto sums = CudaBuffer<Quad<double>>::unfilled(act.chunks());
-    act.sums = sums.data();
-    launch(sums.size(), act, "summing");
-    while (sums.size() > SumChunk<Summed>::kElements) {
-      SumChunk<Summed> again{{sums.data()}, 0, sums.size(), nullptr};
-      auto fewer = CudaBuffer<Quad<double>>::unfilled(again.chunks());
-      again.sums = fewer.data();
-      launch(fewer.size(), again, "summing");
-      sums = std::move(fewer);
-    }
-    Quad<double> all;
-    for (const Quad<double>& chunk : sums.download()) all = all + chunk;
-    return all;
-  }
-
   void put(const std::vector<Rgba>& x) override {
     x_.upload(converted<Real>(x));
     if (memory_ == EngineMemory::residuals) return;
@@ -239,7 +179,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     look_from_x();
   }
   void put_expected_extinction(float even, float soot) override {
-    const float mean = soot > 0 ? mean_of(sum(LuminanceTerm<Real>{share(), x_.data()}, 0, size())) : 0;
+    const float mean =
+        soot > 0 ? mean_of(sum_on_cuda(LuminanceTerm<Real>{share(), x_.data()}, 0, size())) : 0;
     launch(size(), ExpectExtinction<Real>{share(), x_.data(), even, soot, mean}, "expecting extinction");
     look_from_x();
   }
@@ -250,13 +191,13 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     launch(size(), Thicken<Real>{share(), x_.data(), y_.data(), by}, "thickening");
   }
   [[nodiscard]] float seen_over_shown(std::size_t last_ray) const override {
-    return ratio(
-        sum(SeenTerm<Real>{on_gpu_->seen.data(), on_gpu_->background.data(), residual_.data()}, 0, last_ray));
+    return ratio(sum_on_cuda(
+        SeenTerm<Real>{on_gpu_->seen.data(), on_gpu_->background.data(), residual_.data()}, 0, last_ray));
   }
   float settle_weights(float share, float factor) override { return settle(weight_, share, factor); }
   float settle_curvature(float share, float factor) override { return settle(field_weight_, share, factor); }
   float settle(CudaBuffer<Real>& weights, float least, float factor) {
-    const float mean = mean_of(sum(WeightTerm<Real>{weights.data()}, 0, size()));
+    const float mean = mean_of(sum_on_cuda(WeightTerm<Real>{weights.data()}, 0, size()));
     launch(size(), SettleWeight<Real>{share(), weights.data(), Real(least * mean), Real(factor)},
            "settling weights");
     gradient_.clear();
@@ -268,7 +209,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     field_weight_ = CudaBuffer<Real>(size());
     gradient_.clear();
     launch(size(), TakeReference<Real>{share(), x_.data(), reference_.data()}, "taking the extinction");
-    return mean_of(sum(ExtinctionTerm<Real>{share(), x_.data()}, 0, size()));
+    return mean_of(sum_on_cuda(ExtinctionTerm<Real>{share(), x_.data()}, 0, size()));
   }
   void aim_at_residuals() override {
     if (aim_.size() != residual_.size()) aim_ = CudaBuffer<Rgba>::unfilled(residual_.size());
@@ -428,26 +369,6 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
            "adding up voxels");
   }
 
-  /// What tells one pass' launches from another's.
-  struct Sweep {
-    const void* y;
-    const void* offset;
-    std::vector<SubsetStep> steps;
-    std::optional<FieldStep> field;
-
-    friend bool operator==(const Sweep& a, const Sweep& b) {
-      const auto same_step = [](const SubsetStep& s, const SubsetStep& t) {
-        return s.subset == t.subset && s.step.scale == t.step.scale && s.step.length == t.step.length;
-      };
-      const auto same_field = [](const FieldStep& s, const FieldStep& t) {
-        return s.variation == t.variation && s.soft == t.soft && s.most == t.most;
-      };
-      return a.y == b.y && a.offset == b.offset && a.field.has_value() == b.field.has_value() &&
-             (!a.field || same_field(*a.field, *b.field)) &&
-             std::equal(a.steps.begin(), a.steps.end(), b.steps.begin(), b.steps.end(), same_step);
-    }
-  };
-
   const Problem& problem_;
   EngineMemory memory_;
   Optics optics_;
@@ -464,7 +385,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   std::vector<SortedSamples> by_voxel_;                   // one a subset
   CudaBuffer<Deposit<Real>> deposits_;                    // of one subset
   CudaBuffer<Quad<Real>> corner_sums_;                    // of one subset
-  std::optional<DeviceBlur<Real>> blur_;                  // where the exposure is long enough to matter
+  std::optional<GpuBlur<Real>> blur_;                     // where the exposure is long enough to matter
   CudaBuffer<Quad<Real>> exposed_gradient_;
   std::optional<CudaSnapshot<Quad<Real>>> snapshot_;
   CudaBuffer<float> momenta_;  // of a sweep's steps

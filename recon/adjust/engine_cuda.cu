@@ -245,6 +245,7 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
   /// A pass is always the same launches but for the momenta, which the launches read from the GPU's memory.
   void sweep_subsets(const std::vector<SubsetStep>& steps, const FieldStep* field) override {
     std::vector<float> momenta;
+    momenta.reserve(steps.size());
     for (const SubsetStep& s : steps) momenta.push_back(s.step.momentum);
     if (momenta_.size() != momenta.size()) graphs_.clear();  // they read from the memory that goes
     if (momenta != uploaded_momenta_) momenta_.upload(momenta);

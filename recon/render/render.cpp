@@ -2,6 +2,7 @@
 #include "recon/render/render.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "recon/compute/pool.h"
@@ -129,13 +130,13 @@ class Renderer {
     clip.subsets = static_cast<int>(cameras.size());
     clip.rule.by_view = true;
     clip.home = RayListOptions::Home::where_it_is_made;
+    std::optional<RefractiveIndex> index;  // whose values the gas points to
     IndexField gas;
     if (effects_.refraction.rays == Refraction::Rays::curved) {
-      const RefractiveIndex index(options_.gas != nullptr
-                                      ? *options_.gas
-                                      : assume_temperature(crop_.hull, source, effects_.refraction),
-                                  effects_.refraction.ambient);
-      gas = index.field(crop_.hull.grid);
+      index.emplace(options_.gas != nullptr ? *options_.gas
+                                            : assume_temperature(crop_.hull, source, effects_.refraction),
+                    effects_.refraction.ambient);
+      gas = index->field(crop_.hull.grid);
       clip.gas = &gas;
     }
     march(clip_rays(cameras, crop_.hull, clip, pool_), source, absorb_of(effects_.extinction.model), sigma_,

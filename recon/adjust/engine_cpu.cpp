@@ -47,7 +47,7 @@ class CpuEngine final : public Engine {
     return {ray_weights_.size() - 1,
             squares_of(
                 sum(BlackOfRay{views.data(), list.rays.data(), list.pixels.data(), weights.data()}, 0, rays)),
-            squares_of(sum(BlackOfRow{views.data(), boxes.data(), rows, stride}, 0, rows * boxes.size()))};
+            squares_of(sum<1>(BlackOfRow{views.data(), boxes.data(), rows, stride}, 0, rows * boxes.size()))};
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_); }
 
@@ -72,9 +72,9 @@ class CpuEngine final : public Engine {
     const std::vector<float>& of_rays = ray_weights_.at(weights);
     return squares_of(sum(SquareTerm<Real>{residual_.data(), of_rays.data()}, 0, of_rays.size()));
   }
-  template <class Term>
+  template <std::size_t kElements = 32, class Term>
   [[nodiscard]] Quad<double> sum(const Term& term, std::size_t first, std::size_t last) const {
-    SumChunk<Term> act{term, first, last, nullptr};
+    SumChunk<Term, kElements> act{term, first, last, nullptr};
     std::vector<Quad<double>> sums(act.chunks());
     act.sums = sums.data();
     each_of(sums.size(), act);

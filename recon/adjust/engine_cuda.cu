@@ -86,8 +86,8 @@ class CudaEngine final : public Engine, public CudaVolume<Real> {
     const std::size_t rows = most_rows(boxes);
     return {ray_weights_.size() - 1,
             squares_of(sum_on_cuda(BlackOfRay{views, of_rays, pixels, weights.data()}, 0, rays)),
-            squares_of(
-                sum_on_cuda(BlackOfRow{views, on_gpu_boxes.data(), rows, stride}, 0, rows * boxes.size()))};
+            squares_of(sum_on_cuda<1>(BlackOfRow{views, on_gpu_boxes.data(), rows, stride}, 0,
+                                      rows * boxes.size()))};
   }
   [[nodiscard]] std::vector<Rgba> gradient() const override { return converted<float>(gradient_.download()); }
 

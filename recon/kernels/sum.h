@@ -8,11 +8,10 @@
 
 namespace emberlock::recon {
 
-/// Adds up the terms of one chunk of elements, in their order: sums of the same chunks in their order have
-/// the same bits however many threads made them.
-template <class Term>
+/// Adds up the terms of one chunk of so many elements, in their order: few, where a term is work. Sums of the
+/// same chunks in their order have the same bits however many threads made them.
+template <class Term, std::size_t kElements = 32>
 struct SumChunk {
-  static constexpr std::size_t kElements = 128;
   Term term;
   std::size_t first = 0, last = 0;  ///< elements
   Quad<double>* sums = nullptr;     ///< one a chunk

@@ -64,7 +64,7 @@ void march(const RayList& list, const std::vector<Rgba>& source, Absorb absorb, 
       for (int v = 0; v < list.subsets(); ++v) {
         const std::size_t first = list.before[static_cast<std::size_t>(v)].rays;
         const std::size_t last = list.before[static_cast<std::size_t>(v) + 1].rays;
-        put_in_front(&marched.seen[first], &marched.pixels[first], last - first, images[v]);
+        put_in_front(marched.seen.data() + first, marched.pixels.data() + first, last - first, images[v]);
       }
       return;
     }
@@ -84,8 +84,8 @@ void march(const RayList& list, const std::vector<Rgba>& source, Absorb absorb, 
     const Slice mine =
         slice(list.before[static_cast<std::size_t>(view) + 1].rays - first, kTasks, task % kTasks);
     forward(work, first + mine.begin, first + mine.end);
-    put_in_front(&seen[first + mine.begin], &list.pixels[first + mine.begin], mine.end - mine.begin,
-                 images[view]);
+    put_in_front(seen.data() + first + mine.begin, list.pixels.data() + first + mine.begin,
+                 mine.end - mine.begin, images[view]);
   });
 }
 

@@ -163,8 +163,8 @@ class Engine : public ResidualEngine {
   /// For each of these subsets, in their order: residual(), backproject() and descend(), or descend_field()
   /// with the same emission step where a field is given.
   struct SubsetStep {
-    int subset;
-    Step step;
+    int subset = 0;
+    Step step = {1, 0};
   };
   void sweep(const std::vector<SubsetStep>& steps, const FieldStep* field = nullptr);
   /// x and y += the paper's adjustment from the subset's residual(), since when y must be as it was. Only in

@@ -24,6 +24,7 @@ std::vector<Rgba> UnevenLight::operator()(const std::vector<const View*>& views,
   options.scattered = &field_;
   std::vector<Rgba> offset(problem.rays());
   std::vector<const CameraModel*> cameras;
+  cameras.reserve(views.size());
   for (const View* view : views) cameras.push_back(&view->camera);
   const std::vector<const RadianceImage*> dark(views.size());
   std::vector<RadianceImage> difference =

@@ -86,6 +86,7 @@ void at_once(const Pool& pool, int count, const std::function<void(int)>& act) {
   finish_gpu_work();  // what the others read is there
   std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(count));
   std::vector<std::thread> threads;
+  threads.reserve(thrown.size());
   for (int i = 0; i < count; ++i)
     threads.emplace_back([&, i] {
       try {

@@ -50,22 +50,22 @@ namespace software_gpu {
 
 using Work = std::function<void()>;
 
-/// Addresses far from those of the CPU's memory, and where the sanitizers let programs be.
-#if defined(__SANITIZE_THREAD__)
-#define EMBERLOCK_UNDER_TSAN
-#elif defined(__has_feature)
+/// Addresses far from those of the CPU's memory, but where ThreadSanitizer lets programs be.
+#if defined(__has_feature)
 #if __has_feature(thread_sanitizer)
 #define EMBERLOCK_UNDER_TSAN
 #endif
 #endif
 #ifdef EMBERLOCK_UNDER_TSAN
-inline constexpr std::uintptr_t kFirst = 0x002000000000;
+inline constexpr std::uintptr_t kWanted = 0;
+inline constexpr int kExactly = 0;
 #else
-inline constexpr std::uintptr_t kFirst = 0x200000000000;
+inline constexpr std::uintptr_t kWanted = 0x200000000000;
+inline constexpr int kExactly = MAP_FIXED_NOREPLACE;
 #endif
 /// Programs, libraries, heaps and stacks lie above on x86-64.
 inline constexpr std::uintptr_t kFirstOfTheCpu = 0x500000000000;
-inline constexpr std::size_t kSize = std::size_t{1} << 36;
+inline constexpr std::size_t kSize = std::size_t{1} << 35;
 /// What EMBERLOCK_SOFTWARE_GPU_MB allows, for tests of a memory that is too small.
 inline std::size_t capacity() {
   const char* told = std::getenv("EMBERLOCK_SOFTWARE_GPU_MB");
@@ -92,7 +92,7 @@ class Memory {
       at = free->at;
       free_.erase(free);
     } else {
-      if (next_ + pages + kPage > kFirst + kSize) return nullptr;
+      if (next_ + pages + kPage > first_ + kSize) return nullptr;
       at = next_;
       next_ += pages + kPage;
     }
@@ -116,6 +116,10 @@ class Memory {
     used_ -= piece->bytes;
     free_.push_back(*piece);
     pieces_.erase(piece);
+  }
+  [[nodiscard]] bool holds(const void* data) const {
+    const auto at = reinterpret_cast<std::uintptr_t>(data);
+    return at >= first_ && at < first_ + kSize;
   }
   [[nodiscard]] std::size_t used() {
     const std::lock_guard lock(mutex_);
@@ -149,10 +153,10 @@ class Memory {
   };
 
   Memory() {
-    void* const wanted = reinterpret_cast<void*>(kFirst);
-    if (::mmap(wanted, kSize, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | MAP_FIXED_NOREPLACE,
-               -1, 0) != wanted)
-      std::abort();
+    void* const mapped = ::mmap(reinterpret_cast<void*>(kWanted), kSize, PROT_NONE,
+                                MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE | kExactly, -1, 0);
+    if (mapped == MAP_FAILED) std::abort();
+    first_ = next_ = reinterpret_cast<std::uintptr_t>(mapped);
   }
   static void protect(const Piece& piece, bool open) {
     ::mprotect(reinterpret_cast<void*>(piece.at), piece.bytes, open ? PROT_READ | PROT_WRITE : PROT_NONE);
@@ -172,7 +176,8 @@ class Memory {
 
   const bool closes_ = told_to_close();
   std::mutex mutex_;
-  std::uintptr_t next_ = kFirst;
+  std::uintptr_t first_ = 0;
+  std::uintptr_t next_ = 0;
   std::size_t used_ = 0;
   int open_ = 0;
   std::vector<Piece> pieces_, free_;
@@ -321,12 +326,9 @@ inline cudaError_t cudaMemsetAsync(void* data, int value, std::size_t bytes,
 }
 inline cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind,
                                    cudaStream_t /*stream*/ = nullptr) {
-  const auto of_the_gpu = [](const void* data) {
-    const auto at = reinterpret_cast<std::uintptr_t>(data);
-    return at >= software_gpu::kFirst && at < software_gpu::kFirst + software_gpu::kSize;
-  };
-  if (of_the_gpu(to) != (kind != cudaMemcpyDeviceToHost) ||
-      of_the_gpu(from) != (kind != cudaMemcpyHostToDevice))
+  const software_gpu::Memory& memory = software_gpu::Memory::get();
+  if (memory.holds(to) != (kind != cudaMemcpyDeviceToHost) ||
+      memory.holds(from) != (kind != cudaMemcpyHostToDevice))
     return cudaErrorInvalidValue;
   software_gpu::enqueue([=] { std::memcpy(to, from, bytes); });
   return cudaSuccess;

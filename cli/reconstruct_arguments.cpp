@@ -93,7 +93,7 @@ Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Pro
   options.frame = arguments.frame;
   options.progress = progress;
   options.threads = arguments.threads;
-  options.averages = arguments.averages;
+  options.recording = arguments.recording;
   if (!arguments.box.empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(options.box, parse_box(arguments.box));
   }

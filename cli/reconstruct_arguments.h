@@ -47,7 +47,7 @@ struct ReconstructArguments {
   std::uint64_t seed = 1;
   std::optional<int> progress_fd;
   DaemonReconstruction by_daemon;
-  std::shared_ptr<recon::SharedAverages> averages = {};  ///< of a sequence's frames
+  std::shared_ptr<recon::SharedRecording> recording = {};  ///< of a sequence's frames
 };
 
 /// Interprets the options; or the first error, as in parse_box.

@@ -166,11 +166,11 @@ void reconstruct_range(const ReconstructArguments& arguments) {
   const std::uint64_t recorded = session.camera_count() == 0 ? 0 : session.stamps(0).size();
   const std::vector<std::uint64_t> frames = or_fail(session::frames_of(range, recorded, "--last-frame"));
   const int at_once = std::min(arguments.at_once, static_cast<int>(frames.size()));
-  const auto averages = std::make_shared<recon::SharedAverages>();
+  const auto recording = std::make_shared<recon::SharedRecording>();
   const auto reconstruct = [&](std::uint64_t frame, const std::filesystem::path& out,
                                const Progress& progress) {
     ReconstructArguments one = arguments;
-    one.averages = averages;
+    one.recording = recording;
     one.frame = frame;
     one.out = out.string();
     one.threads = threads_of_each(arguments.threads, at_once);

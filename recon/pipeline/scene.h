@@ -11,14 +11,16 @@
 #include "base/progress.h"
 #include "base/result.h"
 #include "recon/pipeline/session_picture.h"
+#include "recon/preprocess/flame_mask.h"
 #include "recon/preprocess/view.h"
 
 namespace emberlock::recon {
 
-/// What a session's cameras show on average: found by the first of the scenes that share it.
-struct SharedAverages {
-  std::once_flag once;
-  std::optional<Result<std::vector<SharedImage>>> found;
+/// What a session's cameras show over the whole of it: found by the first of the scenes that share it.
+struct SharedRecording {
+  std::once_flag masked, averaged;
+  std::optional<Result<std::vector<FlameMask>>> masks;       ///< where each sees flame at some instants
+  std::optional<Result<std::vector<SharedImage>>> averages;  ///< of each
 };
 
 struct SceneOptions {
@@ -31,7 +33,7 @@ struct SceneOptions {
   int threads = 0;           ///< CPU threads, as in ComputeOptions; the result doesn't depend on them
   Progress progress = {};    ///< of a session: reading its other frames, where they are needed
   /// For several frames of one session that are read with the same rig and FrameOptions.
-  std::shared_ptr<SharedAverages> averages = {};
+  std::shared_ptr<SharedRecording> recording = {};
 };
 
 /// A transforms.json (a file) or a recorded session (a folder with a manifest): views in the order of the

@@ -146,11 +146,17 @@ Result<FrameDeveloper> FrameDeveloper::create(session::SessionReader& reader, st
     EMBERLOCK_ASSIGN_OR_RETURN(developer.colour_, read_colour(stream.colour(), reader.layout(camera).size,
                                                               "camera " + stream.camera_id()));
   }
+  Frames dark;
   if (options.background == FrameOptions::Background::automatic) {
-    EMBERLOCK_ASSIGN_OR_RETURN(developer.dark_, find_dark(reader, camera, number, flame.image->view()));
+    EMBERLOCK_ASSIGN_OR_RETURN(dark, find_dark(reader, camera, number, flame.image->view()));
   } else if (options.background == FrameOptions::Background::frames) {
-    EMBERLOCK_ASSIGN_OR_RETURN(developer.dark_, told_dark(reader, camera, options));
+    EMBERLOCK_ASSIGN_OR_RETURN(dark, told_dark(reader, camera, options));
   }
+  if (dark.empty()) return developer;
+  std::vector<ImageView> views;
+  views.reserve(dark.size());
+  for (const Frame& frame : dark) views.push_back(frame.image->view());
+  developer.dark_ = share(dark_picture_of(views, developer.colour_));
   return developer;
 }
 
@@ -159,7 +165,7 @@ DevelopedPicture FrameDeveloper::develop(const Frame& frame) const {
   from.frame = frame.image->view();
   from.sensor = sensor_;
   from.colour = colour_;
-  for (const Frame& f : dark_) from.dark.push_back(f.image->view());
+  from.dark = dark_;
   return recon::develop(from, options_);
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -55,7 +56,7 @@ class FrameDeveloper {
   FrameDeveloper() = default;
   SensorKind sensor_ = SensorKind::ccd;
   std::optional<Colour> colour_;
-  std::vector<Frame> dark_;
+  std::shared_ptr<const DarkPicture> dark_;
   DevelopOptions options_;
 };
 

@@ -20,20 +20,25 @@ PreprocessStep linearised(const std::optional<Colour>& colour) {
   return {"linearise", true, "by the calibrated response"};
 }
 
-PreprocessStep take_hot_pixels_out(Samples& samples, std::optional<Samples>& dark,
-                                   const std::optional<Colour>& colour) {
-  std::vector<std::uint32_t> hot = dark ? hot_pixels_of_dark(*dark) : hot_pixels_of_picture(samples);
-  const char* by = dark ? "stand out in the frames without flame" : "stand out in the picture";
-  if (colour && !colour->hot_pixels.empty()) {
-    std::vector<std::uint32_t> all;
-    std::set_union(hot.begin(), hot.end(), colour->hot_pixels.begin(), colour->hot_pixels.end(),
-                   std::back_inserter(all));
-    hot.swap(all);
-    by = "are calibrated as hot, or stand out";
-  }
+/// Those that stand out, and the calibrated ones.
+std::vector<std::uint32_t> with_calibrated(std::vector<std::uint32_t> hot,
+                                           const std::optional<Colour>& colour) {
+  if (!colour || colour->hot_pixels.empty()) return hot;
+  std::vector<std::uint32_t> all;
+  std::set_union(hot.begin(), hot.end(), colour->hot_pixels.begin(), colour->hot_pixels.end(),
+                 std::back_inserter(all));
+  return all;
+}
+
+PreprocessStep take_hot_pixels_out(Samples& samples, const CameraFrame& camera) {
+  const DarkPicture* dark = camera.dark.get();
+  const std::vector<std::uint32_t> hot =
+      dark != nullptr ? dark->hot : with_calibrated(hot_pixels_of_picture(samples), camera.colour);
   if (hot.empty()) return {"hot pixels", false, "none stand out"};
   replace_hot_pixels(samples, hot);
-  if (dark) replace_hot_pixels(*dark, hot);
+  const char* by = camera.colour && !camera.colour->hot_pixels.empty() ? "are calibrated as hot, or stand out"
+                   : dark != nullptr ? "stand out in the frames without flame"
+                                     : "stand out in the picture";
   return {"hot pixels", true, fmt::format("{} {}", hot.size(), by)};
 }
 
@@ -79,23 +84,27 @@ std::string counted(std::size_t count, std::size_t all, const std::string& first
 
 }  // namespace
 
+DarkPicture dark_picture_of(const std::vector<ImageView>& dark, const std::optional<Colour>& colour) {
+  std::vector<Samples> frames;
+  frames.reserve(dark.size());
+  for (const ImageView& frame : dark) frames.push_back(samples_of(frame, colour ? &*colour : nullptr));
+  DarkPicture picture{midmean_of(frames), {}, dark.size()};
+  picture.hot = with_calibrated(hot_pixels_of_dark(picture.level), colour);
+  replace_hot_pixels(picture.level, picture.hot);
+  return picture;
+}
+
 DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& options) {
   const Colour* colour = camera.colour ? &*camera.colour : nullptr;
+  const DarkPicture* dark = camera.dark.get();
   DevelopedPicture out;
   Samples samples = samples_of(camera.frame, colour);
-  std::optional<Samples> dark;
-  if (!camera.dark.empty()) {
-    std::vector<Samples> frames;
-    frames.reserve(camera.dark.size());
-    for (const ImageView& frame : camera.dark) frames.push_back(samples_of(frame, colour));
-    dark = midmean_of(frames);
-  }
   out.steps.push_back(linearised(camera.colour));
-  out.steps.push_back(take_hot_pixels_out(samples, dark, camera.colour));
-  if (dark) {
-    subtract(samples, *dark);
+  out.steps.push_back(take_hot_pixels_out(samples, camera));
+  if (dark != nullptr) {
+    subtract(samples, dark->level);
     out.steps.push_back(
-        {"background", true, fmt::format("the midmean of {} frames without flame", camera.dark.size())});
+        {"background", true, fmt::format("the midmean of {} frames without flame", dark->frames)});
   } else {
     out.steps.push_back(
         {"background", false, "no frames without flame: the level of the picture's darker half instead"});
@@ -104,7 +113,7 @@ DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& option
   out.steps.push_back(demosaiced(samples.layout, options.demosaicing));
   out.image = to_picture(samples, &out.bounds, options.demosaicing);
   out.steps.push_back(saturated(out.bounds));
-  if (!dark) subtract_background(out.image);
+  if (dark == nullptr) subtract_background(out.image);
   if (colour != nullptr) equalise(out.image, *colour);
   out.steps.push_back(equalised(camera.colour));
   return out;

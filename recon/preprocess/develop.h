@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <memory>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "base/image.h"
 #include "base/sensor_kind.h"
 #include "recon/preprocess/colour.h"
+#include "recon/preprocess/samples.h"
 #include "recon/preprocess/smear.h"
 #include "recon/preprocess/view.h"
 
@@ -20,11 +25,19 @@ struct DevelopOptions {
   Demosaicing demosaicing = Demosaicing::bilinear;
 };
 
+/// What a camera shows without flame: found once for all of its frames.
+struct DarkPicture {
+  Samples level;                        ///< the frames' midmean, its hot pixels replaced
+  std::vector<std::uint32_t> hot = {};  ///< pixels, ascending, the calibration's own among them
+  std::size_t frames = 0;
+};
+/// `dark`: at least one frame, all of one layout.
+DarkPicture dark_picture_of(const std::vector<ImageView>& dark, const std::optional<Colour>& colour);
+
 /// One camera's frame of the flame, and the known properties of the camera.
 struct CameraFrame {
   ImageView frame;
-  std::vector<ImageView> dark =
-      {};  ///< frames without flame; if empty, the level comes from the picture's own dark half
+  std::shared_ptr<const DarkPicture> dark = {};  ///< null: the level comes from the picture's own dark half
   std::optional<Colour> colour = {};  ///< absent: samples are assumed to be linear, and all cameras equal
   SensorKind sensor = SensorKind::ccd;
 };
@@ -37,7 +50,7 @@ struct DevelopedPicture {
 
 /// Converts samples to radiance: linearise, hot pixels, background, smear, demosaic, level, gain and
 /// vignetting, in this order, so that additive effects of the sensor are removed before anything is
-/// multiplied or interpolated. Each step reports whether it ran and why. Dark frames must have the frame's
+/// multiplied or interpolated. Each step reports whether it ran and why. The background must have the frame's
 /// layout.
 DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& options = {});
 

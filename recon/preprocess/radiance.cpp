@@ -61,7 +61,8 @@ void subtract_background(RadianceImage& image) {
       each_pixel(block->x, block->y, [&](const float* rgb) { values.push_back(rgb[c]); });
     level[c] = midmean(values);
   }
-  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] -= level[i % 3];
+  for (std::size_t i = 0; i < image.rgb.size(); i += 3)
+    for (std::size_t c = 0; c < 3; ++c) image.rgb[i + c] -= level[c];
 }
 
 Image to_rgb8(const RadianceImage& image) {
@@ -71,8 +72,9 @@ Image to_rgb8(const RadianceImage& image) {
     const float* from = image.rgb.data() + static_cast<std::size_t>(y) * row_samples;
     auto* to = out.row_as<std::uint8_t>(y);
     for (std::size_t i = 0; i < row_samples; ++i) {
-      const float value = std::isnan(from[i]) ? 0.0F : std::clamp(from[i], 0.0F, 255.0F);
-      to[i] = static_cast<std::uint8_t>(std::lround(value));
+      // In double, adding a half and cutting rounds as lround() does. Comparisons with NaN are false: 0.
+      const float value = from[i] > 0.0F ? std::min(from[i], 255.0F) : 0.0F;
+      to[i] = static_cast<std::uint8_t>(static_cast<double>(value) + 0.5);
     }
   }
   return out;

@@ -83,6 +83,33 @@ std::uint8_t colours_at(const Samples& s, int x, int y, Demosaicing demosaicing,
   return static_cast<std::uint8_t>(bounds);
 }
 
+bool any_saturated_beside_row(const Samples& s, int y) {
+  if (s.saturated.empty()) return false;
+  const auto first = s.saturated.begin() + static_cast<std::ptrdiff_t>(s.index(0, y - 1));
+  return std::any_of(first, first + std::ptrdiff_t{3} * s.size.width, [](std::uint8_t m) { return m != 0; });
+}
+
+/// What bilinear() gives for a row that isn't at the border, without its first and last pixel. The sums have
+/// the same order, so the bits are the same.
+void bilinear_row(const Samples& s, int y, float* out) {
+  const float* row = &s.value[s.index(0, y)];
+  const float* above = row - s.size.width;
+  const float* below = row + s.size.width;
+  const std::size_t own = (y & 1) == 0 ? 0 : 2;  // the row's colour beside green; the other's is 2 - own
+  for (int x = 1; x + 1 < s.size.width; ++x) {
+    float* rgb = out + 3 * static_cast<std::size_t>(x);
+    if (mosaic_channel(x, y) == 1) {
+      rgb[1] = row[x];
+      rgb[own] = (row[x - 1] + row[x + 1]) / 2;
+      rgb[2 - own] = (above[x] + below[x]) / 2;
+    } else {
+      rgb[own] = row[x];
+      rgb[1] = (above[x] + row[x - 1] + row[x + 1] + below[x]) / 4;
+      rgb[2 - own] = (above[x - 1] + above[x + 1] + below[x - 1] + below[x + 1]) / 4;
+    }
+  }
+}
+
 }  // namespace
 
 Samples samples_of(const ImageView& image, const Colour* colour) {
@@ -127,9 +154,13 @@ RadianceImage to_picture(const Samples& samples, std::vector<std::uint8_t>* boun
   if (bounds != nullptr) bounds->clear();
   if (mark) bounds->resize(pixels);
   if (samples.layout == SampleLayout::mosaic) {
-    std::size_t p = 0;
+    const int width = samples.size.width;
     for (int y = 0; y < samples.size.height; ++y) {
-      for (int x = 0; x < samples.size.width; ++x, ++p) {
+      const bool plain = demosaicing == Demosaicing::bilinear && y > 0 && y + 1 < samples.size.height &&
+                         width > 1 && !any_saturated_beside_row(samples, y);
+      if (plain) bilinear_row(samples, y, &picture.rgb[3 * samples.index(0, y)]);
+      for (int x = 0; x < width; x += plain && x == 0 ? width - 1 : 1) {
+        const std::size_t p = samples.index(x, y);
         const std::uint8_t bits = colours_at(samples, x, y, demosaicing, &picture.rgb[3 * p]);
         if (mark) (*bounds)[p] = bits;
       }

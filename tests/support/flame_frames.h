@@ -220,7 +220,9 @@ inline BackgroundResidual background_residual(const recon::RadianceImage& pictur
   BackgroundResidual out;
   out.filmed = recon::all_channels(recon::rmse(recon::to_radiance(frame.view()), truth, {}));
   out.level = off();
-  for (const Image& d : dark) camera.dark.push_back(d.view());
+  std::vector<ImageView> views;
+  for (const Image& d : dark) views.push_back(d.view());
+  camera.dark = recon::share(recon::dark_picture_of(views, {}));
   out.dark_part = off();
   return out;
 }

@@ -108,6 +108,42 @@ TEST(Demosaicing, BilinearIsTheBetterOneOnFlamesAndGradientOnPicturesWithEdges) 
   EXPECT_LT(gradient, 0.8 * bilinear) << bilinear;
 }
 
+/// (1 2 1) x (1 2 1) over the samples of a channel; the sample itself where it was measured.
+double convolved(const ImageView& mosaic, int x, int y, int channel) {
+  if (mosaic_channel(x, y) == channel) return mosaic.sample(x, y);
+  double sum = 0;
+  double weights = 0;
+  for (int v = std::max(0, y - 1); v <= std::min(mosaic.layout.size.height - 1, y + 1); ++v) {
+    for (int u = std::max(0, x - 1); u <= std::min(mosaic.layout.size.width - 1, x + 1); ++u) {
+      if (mosaic_channel(u, v) != channel) continue;
+      const double weight = (2 - std::abs(u - x)) * (2 - std::abs(v - y));
+      sum += weight * mosaic.sample(u, v);
+      weights += weight;
+    }
+  }
+  return weights > 0 ? sum / weights : 0;
+}
+
+TEST(Demosaicing, BilinearIsTheNormalisedConvolutionWithSaturatedSamplesAndWithout) {
+  for (const ImageSize size : {ImageSize{1, 1}, ImageSize{2, 5}, ImageSize{3, 3}, ImageSize{16, 10}}) {
+    for (const double most : {254.0, 270.0}) {
+      Image image(ImageLayout{size, PixelFormat::bayer_rggb8, 8});
+      RandomStream random(static_cast<std::uint64_t>(size.width), static_cast<std::uint64_t>(most));
+      for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x)
+          image.row_as<std::uint8_t>(y)[x] =
+              static_cast<std::uint8_t>(std::min(255.0, random.uniform(0, most)));
+      const RadianceImage picture = to_picture(samples_of(image.view()));
+      for (int y = 0; y < size.height; ++y)
+        for (int x = 0; x < size.width; ++x)
+          for (int c = 0; c < 3; ++c)
+            ASSERT_NEAR(picture.rgb[3 * (y * size.width + x) + c], convolved(image.view(), x, y, c), 1e-4)
+                << size.width << " x " << size.height << ", most " << most << ": " << x << ' ' << y << ' '
+                << c;
+    }
+  }
+}
+
 TEST(Demosaicing, GradientKeepsSamplesAndRestoresLinearRamps) {
   Image image(ImageLayout{{12, 12}, PixelFormat::bayer_rggb8, 8});
   const auto ramp = [](int x, int y, int c) { return 10 + (c + 1) * 3 * x + (3 - c) * 2 * y; };

@@ -1,0 +1,320 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/pipeline/session_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "recon/calibrate/rig.h"
+#include "recon/compute/pool.h"
+#include "recon/hull/find_box.h"
+#include "recon/pipeline/session_picture.h"
+#include "recon/preprocess/flame_mask.h"
+#include "session/reader.h"
+#include "session/shutter_times.h"
+
+namespace emberlock::recon {
+namespace fs = std::filesystem;
+namespace {
+
+/// The complete frame nearest to `t`; all cameras' monotonic stamps are on one clock.
+std::optional<std::size_t> nearest_complete(const std::vector<FrameStamp>& stamps, TimePoint t) {
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < stamps.size(); ++i) {
+    if (stamps[i].status != FrameStatus::complete) continue;
+    if (!best || abs(stamps[i].monotonic_time - t) < abs(stamps[*best].monotonic_time - t)) best = i;
+  }
+  return best;
+}
+
+/// How far from an instant a camera's frame may be to stand for it: a frame period, anything where that isn't
+/// known.
+Seconds reach_of(const session::SessionReader& reader, std::size_t camera) {
+  const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
+  return Seconds(rate > 0 ? 1 / rate : INFINITY);
+}
+
+/// The complete frame of a camera within its reach of `t`.
+std::optional<std::size_t> frame_at(const session::SessionReader& reader, std::size_t camera, TimePoint t) {
+  const auto nearest = nearest_complete(reader.stamps(camera), t);
+  if (!nearest || abs(reader.stamps(camera)[*nearest].monotonic_time - t) > reach_of(reader, camera))
+    return std::nullopt;
+  return nearest;
+}
+
+/// When a camera's complete frames came, rising.
+std::vector<TimePoint> complete_times(const std::vector<FrameStamp>& stamps) {
+  std::vector<TimePoint> times;
+  for (const FrameStamp& stamp : stamps)
+    if (stamp.status == FrameStatus::complete) times.push_back(stamp.monotonic_time);
+  std::sort(times.begin(), times.end());
+  return times;
+}
+
+bool any_within(const std::vector<TimePoint>& rising, TimePoint t, Seconds reach) {
+  const auto after = std::lower_bound(rising.begin(), rising.end(), t);
+  return (after != rising.end() && abs(*after - t) <= reach) ||
+         (after != rising.begin() && abs(*std::prev(after) - t) <= reach);
+}
+
+/// The first camera's frame nearest to the middle of which all cameras have the instant; the middle one where
+/// there is none.
+std::size_t middle_frame(const session::SessionReader& reader) {
+  std::vector<std::vector<TimePoint>> complete;
+  for (std::size_t i = 0; i < reader.camera_count(); ++i)
+    complete.push_back(complete_times(reader.stamps(i)));
+  const std::vector<FrameStamp>& first = reader.stamps(0);
+  const auto whole = [&](std::size_t frame) {
+    for (std::size_t i = 0; i < complete.size(); ++i)
+      if (!any_within(complete[i], first[frame].monotonic_time, reach_of(reader, i))) return false;
+    return true;
+  };
+  const std::size_t middle = first.size() / 2;
+  for (std::size_t away = 0; away <= middle; ++away) {
+    if (middle + away < first.size() && whole(middle + away)) return middle + away;
+    if (whole(middle - away)) return middle - away;
+  }
+  return middle;
+}
+
+/// How late a frame is. One that stands in for a lost one is late, or early, by whole periods more.
+void tell_lateness(const session::SessionReader& reader, std::size_t camera, std::size_t frame,
+                   TimePoint instant, const v1::ShutterTimes::Camera& times, View& view) {
+  const double rate = reader.manifest().cameras(static_cast<int>(camera)).frame_rate_hz();
+  const Seconds after = reader.stamps(camera)[frame].monotonic_time - instant;
+  const double periods = rate > 0 ? std::round(after.value() * rate) : 0;
+  view.lateness = Seconds(times.late_s(static_cast<int>(frame)) + (rate > 0 ? periods / rate : 0));
+  view.lateness_sigma = Seconds(times.sigma_s());
+}
+
+/// The cameras of a session, of which each can be read by a thread of its own.
+Status each_camera(const session::SessionReader& reader, int threads,
+                   const std::function<Status(std::size_t)>& act) {
+  std::vector<Status> done(reader.camera_count());
+  Pool(threads).run(static_cast<int>(done.size()), [&](int camera) {
+    const auto i = static_cast<std::size_t>(camera);
+    done[i] = act(i);
+  });
+  for (const Status& status : done) EMBERLOCK_RETURN_IF_ERROR(status);
+  return {};
+}
+
+/// A session, and how its cameras' frames are developed where the recording as a whole is looked at: as the
+/// one nearest to its middle is.
+struct Recording {
+  session::SessionReader& reader;
+  const v1::Manifest& manifest;
+  const SceneOptions& options;
+  std::vector<FrameDeveloper> developers;
+};
+
+Status open_middle(Recording& recording) {
+  session::SessionReader& reader = recording.reader;
+  const TimePoint middle = reader.stamps(0)[middle_frame(reader)].monotonic_time;
+  std::vector<std::optional<FrameDeveloper>> developers(reader.camera_count());
+  EMBERLOCK_RETURN_IF_ERROR(each_camera(reader, recording.options.threads, [&](std::size_t i) -> Status {
+    const std::size_t nearest = nearest_complete(reader.stamps(i), middle).value_or(0);
+    EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame, reader.read(i, nearest));
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        developers[i], FrameDeveloper::create(reader, i, recording.manifest.cameras(static_cast<int>(i)),
+                                              frame, nearest, recording.options.frames));
+    return {};
+  }));
+  for (std::optional<FrameDeveloper>& developer : developers)
+    recording.developers.push_back(std::move(*developer));
+  return {};
+}
+
+/// Calls act(view, picture, taken) for `count` complete frames of each camera, spread evenly over the
+/// recording; `taken` of them where there are fewer. One call at a time for each view, several views at once.
+template <class Act>
+Status each_of_some_frames(Recording& recording, std::size_t count, const char* doing, const Act& act) {
+  session::SessionReader& reader = recording.reader;
+  if (recording.developers.empty()) EMBERLOCK_RETURN_IF_ERROR(open_middle(recording));
+  const std::size_t cameras = reader.camera_count();
+  std::mutex mutex;
+  std::size_t developed = 0;
+  const auto one_more = [&] {
+    const std::lock_guard lock(mutex);
+    tell(recording.options.progress, static_cast<double>(++developed) / static_cast<double>(cameras * count),
+         doing);
+  };
+  return each_camera(reader, recording.options.threads, [&](std::size_t i) -> Status {
+    std::vector<std::size_t> complete;
+    for (std::size_t f = 0; f < reader.stamps(i).size(); ++f)
+      if (reader.stamps(i)[f].status == FrameStatus::complete) complete.push_back(f);
+    const std::size_t taken = std::min(count, complete.size());
+    for (std::size_t n = 0; n < taken; ++n) {
+      // The middle of each of `taken` equal parts: the recording's own middle where it is one.
+      EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame,
+                                 reader.read(i, complete[(2 * n + 1) * complete.size() / (2 * taken)]));
+      act(i, recording.developers[i].develop(frame).image, taken);
+      one_more();
+    }
+    return {};
+  });
+}
+
+/// What is flame in either.
+void join(FlameMask& mask, const FlameMask& other) {
+  for (std::size_t p = 0; p < mask.flame.size(); ++p) mask.flame[p] |= other.flame[p];
+  if (other.box.empty()) return;
+  mask.box = mask.box.empty()
+                 ? other.box
+                 : PixelBox{std::min(mask.box.x0, other.box.x0), std::min(mask.box.y0, other.box.y0),
+                            std::max(mask.box.x1, other.box.x1), std::max(mask.box.y1, other.box.y1)};
+}
+
+/// Where each camera sees flame at some instants over the recording.
+Result<std::vector<FlameMask>> masks_of(Recording& recording) {
+  constexpr std::size_t kInstants = 5;
+  std::vector<FlameMask> masks(recording.reader.camera_count());
+  EMBERLOCK_RETURN_IF_ERROR(each_of_some_frames(recording, kInstants, "looking for the flame",
+                                                [&](std::size_t i, const RadianceImage& image, auto) {
+                                                  FlameMask mask = noise_mask(image);
+                                                  if (masks[i].flame.empty())
+                                                    masks[i] = std::move(mask);
+                                                  else
+                                                    join(masks[i], mask);
+                                                }));
+  return masks;
+}
+
+/// What each camera shows on average over frames of the whole recording.
+Result<std::vector<SharedImage>> averages_of(Recording& recording) {
+  constexpr std::size_t kFrames = 32;  // leave a sixth of what changes in the average
+  std::vector<RadianceImage> averages;
+  for (std::size_t i = 0; i < recording.reader.camera_count(); ++i)
+    averages.emplace_back(recording.reader.layout(i).size);
+  EMBERLOCK_RETURN_IF_ERROR(
+      each_of_some_frames(recording, kFrames, "averaging the recording",
+                          [&](std::size_t i, const RadianceImage& image, std::size_t taken) {
+                            std::vector<float>& sum = averages[i].rgb;
+                            const auto part = 1 / static_cast<float>(taken);
+                            for (std::size_t p = 0; p < sum.size(); ++p) sum[p] += part * image.rgb[p];
+                          }));
+  std::vector<SharedImage> shared;
+  shared.reserve(averages.size());
+  for (RadianceImage& average : averages) shared.push_back(share(std::move(average)));
+  return shared;
+}
+
+/// A box that holds the flame at the scene's instant and at some others over the recording.
+Status find_box_of_session(Recording& recording, SharedRecording& shared, Scene& scene) {
+  std::call_once(shared.masked, [&] { shared.masks = masks_of(recording); });
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<FlameMask> over_all, *shared.masks);
+  std::vector<FlameMask> masks = flame_masks(scene, {}, {Device::cpu, recording.options.threads});
+  for (std::size_t i = 0; i < masks.size(); ++i) join(masks[i], over_all[i]);
+  EMBERLOCK_ASSIGN_OR_RETURN(scene.box, find_box(scene, masks));
+  return {};
+}
+
+Status add_averages(Recording& recording, SharedRecording& shared, Scene& scene) {
+  std::call_once(shared.averaged, [&] { shared.averages = averages_of(recording); });
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<SharedImage> found, *shared.averages);
+  for (std::size_t i = 0; i < found.size(); ++i) scene.views[i].average = found[i];
+  return {};
+}
+
+struct Instant {
+  TimePoint time;
+  std::size_t frame = 0;  ///< of the first camera
+};
+
+/// A camera's view of the instant.
+struct Filmed {
+  View view;
+  std::vector<PreprocessStep> steps;
+  std::optional<FrameDeveloper> developer;
+};
+
+Result<Filmed> view_of(session::SessionReader& reader, std::size_t i, const v1::CameraStream& stream,
+                       const Instant& instant, const std::optional<v1::ShutterTimes>& times,
+                       const SceneOptions& options) {
+  Filmed filmed;
+  View& view = filmed.view;
+  view.name = stream.camera_id();
+  const ImageSize size{static_cast<int>(stream.width()), static_cast<int>(stream.height())};
+  EMBERLOCK_ASSIGN_OR_RETURN(view.camera, camera_model_of(stream.calibration(), size, stream.camera_id(),
+                                                          (reader.folder() / "manifest.json").string() +
+                                                              ": cameras[" + std::to_string(i) + "]"));
+  const auto nearest = frame_at(reader, i, instant.time);
+  if (!nearest) {
+    return Error{ErrorKind::bad_input,
+                 "has no complete frame within a frame period of frame " + std::to_string(instant.frame),
+                 reader.folder().string() + ": camera " + stream.camera_id(),
+                 "Choose another --frame; the index tells which frames were lost"};
+  }
+  if (times) tell_lateness(reader, i, *nearest, instant.time, times->cameras(static_cast<int>(i)), view);
+  EMBERLOCK_ASSIGN_OR_RETURN(const Frame shown, reader.read(i, *nearest));
+  EMBERLOCK_ASSIGN_OR_RETURN(filmed.developer,
+                             FrameDeveloper::create(reader, i, stream, shown, *nearest, options.frames));
+  DevelopedPicture picture = filmed.developer->develop(shown);
+  view.image = share(std::move(picture.image));
+  if (!picture.bounds.empty()) view.bounds = share(std::move(picture.bounds));
+  filmed.steps = std::move(picture.steps);
+  return filmed;
+}
+
+}  // namespace
+
+Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) {
+  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionReader reader, session::SessionReader::open(folder));
+  v1::Manifest manifest = reader.manifest();
+  const std::string manifest_name = (folder / "manifest.json").string();
+  if (options.rig) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const v1::Rig rig, session::read_rig(*options.rig));
+    EMBERLOCK_RETURN_IF_ERROR(apply_rig(manifest, rig, options.rig->string()));
+  }
+  std::optional<Box> box;
+  if (manifest.has_box()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(box, box_of(manifest.box(), manifest_name));
+  }
+  if (options.box) box = options.box;
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto times, session::read_shutter_times(reader));
+  if (reader.camera_count() == 0 || reader.camera_count() > kMaxViews) {
+    return Error{ErrorKind::bad_input,
+                 std::to_string(reader.camera_count()) + " cameras, 1 to 64 are possible",
+                 manifest_name + ": cameras", "Record between 1 and 64 cameras"};
+  }
+  const std::vector<FrameStamp>& first = reader.stamps(0);
+  const std::size_t frame = options.frame ? *options.frame : first.empty() ? 0 : middle_frame(reader);
+  if (frame >= first.size()) {
+    return Error{
+        ErrorKind::bad_input,
+        "camera " + manifest.cameras(0).camera_id() + " has " + std::to_string(first.size()) + " frames",
+        folder.string() + ": frame " + std::to_string(frame), "Choose a smaller --frame"};
+  }
+  const Instant instant{first[frame].monotonic_time, frame};
+  std::vector<Filmed> cameras(reader.camera_count());
+  EMBERLOCK_RETURN_IF_ERROR(each_camera(reader, options.threads, [&](std::size_t i) -> Status {
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        cameras[i], view_of(reader, i, manifest.cameras(static_cast<int>(i)), instant, times, options));
+    return {};
+  }));
+  Scene scene;
+  Recording recording{reader, manifest, options, {}};
+  std::vector<std::pair<std::string, std::vector<PreprocessStep>>> steps;
+  steps.reserve(cameras.size());
+  for (Filmed& camera : cameras) {
+    scene.linearised = scene.linearised || camera.developer->linearises();
+    steps.emplace_back(camera.view.name, std::move(camera.steps));
+    scene.views.push_back(std::move(camera.view));
+    if (frame == middle_frame(reader)) recording.developers.push_back(std::move(*camera.developer));
+  }
+  scene.preprocessing = together(steps);
+  const auto shared = options.recording ? options.recording : std::make_shared<SharedRecording>();
+  if (box)
+    scene.box = *box;
+  else
+    EMBERLOCK_RETURN_IF_ERROR(find_box_of_session(recording, *shared, scene));
+  const bool late = std::any_of(scene.views.begin(), scene.views.end(),
+                                [](const View& v) { return abs(v.lateness) > v.lateness_sigma; });
+  if (late) EMBERLOCK_RETURN_IF_ERROR(add_averages(recording, *shared, scene));
+  return scene;
+}
+
+}  // namespace emberlock::recon

@@ -83,11 +83,7 @@ CountedWork& counted_work() {
 
 GpuWork gpu_work() {
   const CountedWork& c = counted_work();
-  GpuWork work{c.launches, c.uploads, c.uploaded, c.downloads, c.downloaded, 0};
-#ifndef __CUDACC__
-  work.software = 1e-9 * static_cast<double>(software_gpu::busy_ns);
-#endif
-  return work;
+  return {c.launches, c.uploads, c.uploaded, c.downloads, c.downloaded};
 }
 
 void cuda_copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) {

@@ -21,7 +21,6 @@ struct GpuWork {
   std::uint64_t launches = 0;
   std::uint64_t uploads = 0, uploaded = 0;      ///< copies to the GPU, and their bytes
   std::uint64_t downloads = 0, downloaded = 0;  ///< copies to the CPU, which wait, and their bytes
-  double software = 0;  ///< seconds that a GPU in software (tests) was at work; 0 of others
 };
 GpuWork gpu_work();
 

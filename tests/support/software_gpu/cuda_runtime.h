@@ -13,7 +13,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
@@ -187,22 +186,8 @@ class Memory {
 inline thread_local std::vector<Work>* recording = nullptr;
 inline thread_local cudaError_t last_error = cudaSuccess;
 
-/// How long launches, copies and the memory took so far.
-inline std::atomic<std::int64_t> busy_ns = 0;
-class Busy {
- public:
-  Busy() = default;
-  Busy(Busy&&) = delete;
-  Busy& operator=(Busy&&) = delete;
-  ~Busy() { busy_ns += std::chrono::nanoseconds(std::chrono::steady_clock::now() - start_).count(); }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
 inline void enqueue(Work work) {
   if (recording != nullptr) return recording->push_back(std::move(work));
-  const Busy busy;
   const Memory::Open open;
   work();
 }
@@ -297,13 +282,11 @@ inline cudaError_t cudaMemGetInfo(std::size_t* free, std::size_t* total) {
 }
 inline cudaError_t cudaMallocAsync(void** data, std::size_t bytes, cudaStream_t /*stream*/) {
   if (software_gpu::recording != nullptr) return cudaErrorStreamCaptureUnsupported;
-  const software_gpu::Busy busy;
   *data = software_gpu::Memory::get().allocate(bytes);
   return *data != nullptr ? cudaSuccess : software_gpu::last_error = cudaErrorMemoryAllocation;
 }
 inline cudaError_t cudaFreeAsync(void* data, cudaStream_t /*stream*/) {
   if (software_gpu::recording != nullptr) return cudaErrorStreamCaptureUnsupported;
-  const software_gpu::Busy busy;
   software_gpu::Memory::get().free(data);
   return cudaSuccess;
 }

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "base/random.h"
+#include "recon/render/render.h"
+#include "recon/synthetic/flame.h"
+#include "recon/temperature/emitter.h"
+
+namespace emberlock::test {
+
+/// A camera with three overlapping lobes.
+inline recon::CameraResponse lobes(double scale = 1, std::array<double, 3> nm = {600, 540, 460},
+                                   std::array<double, 3> sigma = {40, 40, 30}) {
+  recon::CameraResponse response;
+  response.absolute = true;
+  for (double w = 380; w <= 780; w += 5) {
+    response.wavelength_nm.push_back(w);
+    for (std::size_t c = 0; c < 3; ++c)
+      response.level[c].push_back(scale * std::exp(-0.5 * std::pow((w - nm[c]) / sigma[c], 2)));
+  }
+  return response;
+}
+
+/// What glows: temperature in K, absorption at 550 nm in 1/m, at key points.
+struct Glowing {
+  recon::Grid grid;
+  std::vector<float> kelvin, absorption;
+};
+
+struct GlowingFlameOptions {
+  recon::PaperSceneOptions film = {};
+  double coldest = 1450, hottest = 2030;  // K
+  recon::Emitter emitter = recon::Emitter::grey;
+  double noise = 0.25;    // grey levels
+  double levels = 65535;  // of the camera's samples; 0: not rounded
+};
+
+/// A drawn flame whose absorption is its soot's, cooler where there is more of it and further up.
+class GlowingFlame {
+ public:
+  explicit GlowingFlame(const GlowingFlameOptions& options)
+      : options_(options), flame_(with_soot(options.film.flame)), response_(lobes()) {
+    scale();
+  }
+  [[nodiscard]] const recon::CameraResponse& response() const { return response_; }
+  [[nodiscard]] const GlowingFlameOptions& options() const { return options_; }
+
+  [[nodiscard]] Glowing at(const recon::Grid& grid) const {
+    const recon::FlameTruth truth = flame_.at(Seconds(0), grid);
+    Glowing out{grid, {}, truth.volume.extinction};
+    out.kelvin.resize(grid.size());
+    const double height = options_.film.flame.height.value();
+    const double thick = 2.5 * options_.film.flame.extinction.value();
+    for (int k = 0; k < grid.nz; ++k) {
+      const double up = std::clamp(
+          (static_cast<double>(grid.origin[2]) + k * static_cast<double>(grid.edge)) / height + 0.5, 0.0,
+          1.0);
+      for (int j = 0; j < grid.ny; ++j)
+        for (int i = 0; i < grid.nx; ++i) {
+          const std::size_t p = grid.index(i, j, k);
+          const double dense = std::min(1.0, static_cast<double>(out.absorption[p]) / thick);
+          out.kelvin[p] = static_cast<float>(options_.hottest - (options_.hottest - options_.coldest) *
+                                                                    (0.55 * dense + 0.45 * up));
+        }
+    }
+    return out;
+  }
+
+  /// In levels a metre.
+  [[nodiscard]] recon::FlameTruth lit(const recon::Grid& grid) const {
+    recon::FlameTruth truth = flame_.at(Seconds(0), grid);
+    const Glowing glowing = at(grid);
+    const recon::EmitterTable table(response_, options_.emitter, Kelvin(1000), Kelvin(2500));
+    for (std::size_t p = 0; p < grid.size(); ++p) {
+      const recon::EmitterLevels levels = table.at(Kelvin(static_cast<double>(glowing.kelvin[p])));
+      for (std::size_t c = 0; c < 3; ++c)
+        truth.volume.emission[3 * p + c] = static_cast<float>(static_cast<double>(glowing.absorption[p]) *
+                                                              levels.value[c] * std::exp(levels.log_scale));
+    }
+    return truth;
+  }
+
+  /// The paper's set-up; the last view is held out.
+  [[nodiscard]] recon::Scene film() const {
+    recon::PaperSceneOptions film = options_.film;
+    film.truth_voxels = 2;
+    recon::Scene scene = recon::paper_scene(film);
+    const recon::FlameTruth truth = lit(recon::grid_over(scene.box, options_.film.truth_voxels));
+    recon::RenderOptions march;
+    march.step = options_.film.truth_step;
+    for (std::size_t v = 0; v < scene.views.size(); ++v) {
+      recon::RadianceImage image =
+          recon::render_view(truth.volume, truth.medium, truth.effects, scene.views[v].camera, march);
+      for (std::size_t i = 0; i < image.rgb.size(); ++i) {
+        double level = static_cast<double>(image.rgb[i]) +
+                       options_.noise * random_normal(options_.film.flame.seed, v, i);
+        if (options_.levels > 0) level = std::round(level * options_.levels / 255) * 255 / options_.levels;
+        image.rgb[i] = static_cast<float>(std::clamp(level, 0.0, 255.0));
+      }
+      scene.views[v].image = recon::share(std::move(image));
+    }
+    return scene;
+  }
+
+ private:
+  static recon::FlameOptions with_soot(recon::FlameOptions options) {
+    options.absorber = recon::Absorber::soot;
+    return options;
+  }
+  /// So that the brightest pixel from the side is about 230.
+  void scale() {
+    recon::PaperSceneOptions film = options_.film;
+    film.truth_voxels = 2;
+    film.image = {80, 60};
+    const recon::Scene scene = recon::paper_scene(film);
+    const recon::FlameTruth truth = lit(recon::grid_over(scene.box, 64));
+    float most = 0;
+    for (std::size_t v = 0; v < 2; ++v)
+      for (const float level :
+           recon::render_view(truth.volume, truth.medium, truth.effects, scene.views[v].camera).rgb)
+        most = std::max(most, level);
+    response_ = lobes(230 / static_cast<double>(most));
+  }
+
+  GlowingFlameOptions options_;
+  recon::Flame flame_;
+  recon::CameraResponse response_;
+};
+
+}  // namespace emberlock::test

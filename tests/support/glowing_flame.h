@@ -3,12 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "base/random.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
-#include "recon/temperature/emitter.h"
+#include "recon/temperature/temperature.h"
 
 namespace emberlock::test {
 
@@ -130,5 +133,68 @@ class GlowingFlame {
   recon::Flame flame_;
   recon::CameraResponse response_;
 };
+
+/// Errors of a field against the truth, over key points whose true emission is 5 % of the brightest, weighted
+/// by it.
+struct TemperatureScore {
+  double median = 0, most = 0, bias = 0;  // K; `most`: 95 % lie below
+  double within = 0;                      // share within two sigma
+  double told = 0;                        // share of the points
+  double rows = 1;
+  void add(const TemperatureScore& o) {
+    if (rows == 1 && told == 0) rows = 0;
+    median += o.median, most += o.most, bias += o.bias, within += o.within, told += o.told, rows += 1;
+  }
+  [[nodiscard]] TemperatureScore mean() const {
+    return {median / rows, most / rows, bias / rows, within / rows, told / rows};
+  }
+};
+
+inline TemperatureScore score_of(const GlowingFlame& flame, const recon::Reconstruction& done,
+                                 const recon::TemperatureField& field) {
+  const recon::Grid& grid = done.volume.grid;
+  const Glowing truth = flame.at(grid);
+  const std::vector<float> lit = flame.lit(grid).volume.emission;
+  const float brightest = *std::max_element(lit.begin(), lit.end());
+  struct Off {
+    double kelvin, sigma, weight;
+  };
+  std::vector<Off> off;
+  std::size_t emitting = 0;
+  double weights = 0;
+  TemperatureScore score;
+  for (std::size_t p = 0; p < grid.size(); ++p) {
+    const float own = std::max({lit[3 * p], lit[3 * p + 1], lit[3 * p + 2]});
+    if (own < 0.05F * brightest) continue;
+    ++emitting;
+    if (!(field.kelvin[p] > 0)) continue;
+    const double error = static_cast<double>(field.kelvin[p] - truth.kelvin[p]);
+    off.push_back({std::abs(error), static_cast<double>(field.sigma[p]), static_cast<double>(own)});
+    weights += off.back().weight;
+    score.bias += off.back().weight * error;
+    if (off.back().kelvin < 2 * off.back().sigma) score.within += off.back().weight;
+  }
+  if (off.empty()) return score;
+  score.bias /= weights;
+  score.within /= weights;
+  score.told = static_cast<double>(off.size()) / static_cast<double>(emitting);
+  std::sort(off.begin(), off.end(), [](const Off& a, const Off& b) { return a.kelvin < b.kelvin; });
+  double sum = 0;
+  for (const Off& o : off) {
+    sum += o.weight;
+    if (sum <= 0.5 * weights) score.median = o.kelvin;
+    if (sum <= 0.95 * weights) score.most = o.kelvin;
+  }
+  return score;
+}
+
+inline std::string words(const TemperatureScore& score, const recon::TemperatureField& field) {
+  return fmt::format(
+      "median {:.1f} K, 95 % {:.1f}, bias {:+.1f}, within two sigma {:.1f} %, told {:.1f} %; {:.0f} K on "
+      "average, "
+      "sigma {:.1f}, if the other kind {:.0f}; chi-square {:.2f}",
+      score.median, score.most, score.bias, 100 * score.within, 100 * score.told, field.summary.mean,
+      field.summary.sigma, field.summary.if_other, field.summary.chi_square);
+}
 
 }  // namespace emberlock::test

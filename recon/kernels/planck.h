@@ -8,8 +8,8 @@
 namespace emberlock::recon {
 
 /// hc / k and 2 h c^2 (CODATA 2018), for wavelengths in nm: K nm, and W nm^4 / (sr m^2).
-inline constexpr double kSecondRadiation = 1.438776877e7;
-inline constexpr double kFirstRadiance = 1.191042972e20;
+inline constexpr double kSecondRadiation = 1.438776877503933e7;
+inline constexpr double kFirstRadiance = 1.191042972397188e20;
 
 /// Natural logarithm of a black body's spectral radiance, W / (sr m^2 nm), by Planck's law (the paper's
 /// equation (13)). `nm` > 0, `kelvin` > 0. Finite wherever both are, where the radiance itself would

@@ -67,10 +67,10 @@ double relative_absorption(Emitter emitter, double nm) {
 
 EmitterLevels levels_of(const CameraResponse& response, Emitter emitter, Kelvin temperature) {
   EmitterLevels out = integrated(response, emitter, temperature.value());
-  const double most = *std::max_element(out.value.begin(), out.value.end());
-  if (!(most > 0)) return {{}, 0};
-  for (double& v : out.value) v /= most;
-  out.log_scale += std::log(most);
+  const double sum = out.value[0] + out.value[1] + out.value[2];
+  if (!(sum > 0)) return {{}, 0};
+  for (double& v : out.value) v /= sum;
+  out.log_scale += std::log(sum);
   return out;
 }
 
@@ -100,12 +100,15 @@ EmitterLevels EmitterTable::at(Kelvin temperature) const {
 
 std::array<double, 2> chromaticity(Kelvin temperature) {
   const EmitterLevels xyz = levels_of(cie_1931_observer(), Emitter::grey, temperature);
-  const double sum = xyz.value[0] + xyz.value[1] + xyz.value[2];
-  return {xyz.value[0] / sum, xyz.value[1] / sum};
+  return {xyz.value[0], xyz.value[1]};
 }
 
 std::array<double, 3> black_body_colour(Kelvin temperature) {
-  return levels_of(standard_response(), Emitter::grey, temperature).value;
+  std::array<double, 3> rgb = levels_of(standard_response(), Emitter::grey, temperature).value;
+  const double most = *std::max_element(rgb.begin(), rgb.end());
+  if (most > 0)
+    for (double& v : rgb) v /= most;
+  return rgb;
 }
 
 }  // namespace emberlock::recon

@@ -27,8 +27,8 @@ std::string_view name(Emitter emitter);
 double relative_absorption(Emitter emitter, double nm);
 
 /// What an emitter of a temperature shows: level c a metre, for an absorption of 1/m at 550 nm, is value[c]
-/// times exp(log_scale). The largest magnitude among `value` is 1; a channel that would be below 0, outside
-/// the camera's gamut, shows 0.
+/// times exp(log_scale). `value` adds up to 1; a channel that would be below 0, outside the camera's gamut,
+/// shows 0.
 struct EmitterLevels {
   std::array<double, 3> value = {};
   double log_scale = 0;

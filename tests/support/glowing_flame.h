@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "base/random.h"
+#include "recon/kernels/planck.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
 #include "recon/temperature/temperature.h"
@@ -39,7 +40,7 @@ struct GlowingFlameOptions {
   double coldest = 1450, hottest = 2030;  // K
   recon::Emitter emitter = recon::Emitter::grey;
   double noise = 0.25;    // grey levels
-  double levels = 65535;  // of the camera's samples; 0: not rounded
+  double levels = 65535;  // of the camera's samples; 0: neither rounded nor cut at black
 };
 
 /// A drawn flame whose absorption is its soot's, cooler where there is more of it and further up.
@@ -95,18 +96,40 @@ class GlowingFlame {
     const recon::FlameTruth truth = lit(recon::grid_over(scene.box, options_.film.truth_voxels));
     recon::RenderOptions march;
     march.step = options_.film.truth_step;
+    // Soot absorbs each channel's light differently.
+    std::vector<recon::FlameTruth> absorbed(3, truth);
+    for (std::size_t c = 0; c < 3; ++c) {
+      const auto share = static_cast<float>(absorption_of(c));
+      for (float& e : absorbed[c].volume.extinction) e *= share;
+    }
     for (std::size_t v = 0; v < scene.views.size(); ++v) {
-      recon::RadianceImage image =
-          recon::render_view(truth.volume, truth.medium, truth.effects, scene.views[v].camera, march);
+      recon::RadianceImage image(film.image);
+      for (std::size_t c = 0; c < 3; ++c) {
+        const recon::RadianceImage own =
+            recon::render_view(absorbed[c].volume, truth.medium, truth.effects, scene.views[v].camera, march);
+        for (std::size_t i = c; i < image.rgb.size(); i += 3) image.rgb[i] = own.rgb[i];
+      }
       for (std::size_t i = 0; i < image.rgb.size(); ++i) {
         double level = static_cast<double>(image.rgb[i]) +
                        options_.noise * random_normal(options_.film.flame.seed, v, i);
         if (options_.levels > 0) level = std::round(level * options_.levels / 255) * 255 / options_.levels;
-        image.rgb[i] = static_cast<float>(std::clamp(level, 0.0, 255.0));
+        image.rgb[i] =
+            static_cast<float>(std::min(options_.levels > 0 ? std::max(level, 0.0) : level, 255.0));
       }
       scene.views[v].image = recon::share(std::move(image));
     }
     return scene;
+  }
+
+  /// A channel's share of the absorption at 550 nm, at 1800 K.
+  [[nodiscard]] double absorption_of(std::size_t channel) const {
+    const auto light = [](double nm) {
+      return std::exp(recon::log_planck(nm, 1800) - recon::log_planck(600, 1800));
+    };
+    return recon::integral(
+               response_, channel,
+               [&](double nm) { return recon::relative_absorption(options_.emitter, nm) * light(nm); }) /
+           recon::integral(response_, channel, light);
   }
 
  private:

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "base/file.h"
+#include "cli/commands.h"
+#include "recon/export/volume_file.h"
+#include "recon/temperature/radiant.h"
+#include "report/html.h"
+
+namespace emberlock::cli {
+namespace {
+namespace fs = std::filesystem;
+
+struct MeasureArguments {
+  std::vector<std::string> volumes;
+  std::string target;
+  std::string out;
+  std::string up = "z";
+  int threads = 0;
+};
+
+/// A small surface: where it is and where it looks.
+struct Target {
+  Eigen::Vector3d point, normal;
+};
+
+struct Measured {
+  std::string name;
+  recon::HotStatistics statistics;
+  double power = 0, power_error = 0;  // W
+  std::optional<double> flux;         // W / m^2
+};
+
+Result<std::optional<Target>> parse_target(const std::string& text) {
+  if (text.empty()) return std::optional<Target>{};
+  std::array<double, 6> v = {};
+  int end = 0;
+  const int read =
+      std::sscanf(text.c_str(), "%lf,%lf,%lf,%lf,%lf,%lf%n", &v[0], &v[1], &v[2], &v[3], &v[4], &v[5], &end);
+  const bool finite = std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
+  const Eigen::Vector3d normal(v[3], v[4], v[5]);
+  if (read != 6 || end != static_cast<int>(text.size()) || !finite || !(normal.norm() > 0))
+    return Error{ErrorKind::bad_input, "\"" + text + "\" is no target", "--target",
+                 "Give x,y,z,nx,ny,nz: a point in metres and the direction it looks in"};
+  return std::optional<Target>{{{v[0], v[1], v[2]}, normal.normalized()}};
+}
+
+Result<Eigen::Vector3d> parse_up(const std::string& text) {
+  const double sign = text.rfind('-', 0) == 0 ? -1 : 1;
+  const std::string axis = sign < 0 ? text.substr(1) : text;
+  if (axis == "x" || axis == "y" || axis == "z")
+    return Eigen::Vector3d(sign * Eigen::Vector3d::Unit(axis[0] - 'x'));
+  return Error{ErrorKind::bad_input, "\"" + text + "\" is no axis", "--up", "Give x, y, z, -x, -y or -z"};
+}
+
+/// A result's folder stands for its volume.
+fs::path file_of(const std::string& name) {
+  std::error_code ec;
+  return fs::is_directory(name, ec) ? fs::path(name) / "volume.vdb" : fs::path(name);
+}
+
+Result<Measured> measured(const std::string& name, const std::optional<Target>& target,
+                          const Eigen::Vector3d& up, const recon::ComputeOptions& compute) {
+  const fs::path file = file_of(name);
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Volume volume, recon::read_volume(file));
+  const auto kelvin = recon::read_grid(file, "temperature");
+  if (!kelvin)
+    return Error{kelvin.error().kind, kelvin.error().what, file.string(),
+                 "Reconstruct it with --quantity temperature"};
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<float> sigma, recon::read_grid(file, "temperature_sigma"));
+  if (volume.extinction.empty())
+    return Error{ErrorKind::bad_input, "has no extinction, so that what it radiates isn't known",
+                 file.string(), "Reconstruct it with --effects auto or extinction=SIGMA"};
+  recon::HotVolume hot{volume.grid, *kelvin, volume.extinction};
+  Measured out;
+  out.name = name;
+  out.statistics = recon::statistics_of(hot, sigma, up);
+  if (out.statistics.points == 0)
+    return Error{ErrorKind::bad_input, "no voxel tells a temperature", file.string(),
+                 "See what its report.html says of temperatures"};
+  out.power = recon::radiated_power(hot, compute);
+  if (target) out.flux = recon::radiant_flux(hot, target->point, target->normal, compute);
+  // All voxels off alike, as what is off in a response or an emitter is.
+  for (std::size_t p = 0; p < hot.kelvin.size(); ++p) hot.kelvin[p] += sigma[p];
+  out.power_error = recon::radiated_power(hot, compute) - out.power;
+  return out;
+}
+
+std::string csv_of(const std::vector<Measured>& all) {
+  std::string csv =
+      "volume,power_w,power_error_w,flux_w_m2,mean_k,mean_error_k,most_k,most_error_k,height_m,volume_m3\n";
+  for (const Measured& m : all)
+    csv += fmt::format("{},{:.6g},{:.3g},{},{:.1f},{:.1f},{:.1f},{:.1f},{:.5g},{:.5g}\n", m.name, m.power,
+                       m.power_error, m.flux ? fmt::format("{:.6g}", *m.flux) : "", m.statistics.mean,
+                       m.statistics.mean_error, m.statistics.most, m.statistics.most_error,
+                       m.statistics.height, m.statistics.volume);
+  return csv;
+}
+
+void print(const Measured& m) {
+  const recon::HotStatistics& s = m.statistics;
+  std::printf("%-16s %s\n", "volume", m.name.c_str());
+  std::printf("%-16s %.4g W +- %.2g, in all directions\n", "radiates", m.power, m.power_error);
+  if (m.flux) std::printf("%-16s %.4g W / m2\n", "on the target", *m.flux);
+  std::printf("%-16s %.0f K +- %.0f on average, %.0f K +- %.0f at most\n", "temperature", s.mean,
+              s.mean_error, s.most, s.most_error);
+  std::printf("%-16s %.4g m high, %.4g cm3, of the voxels that tell a temperature\n", "flame", s.height,
+              1e6 * s.volume);
+}
+
+/// measures.csv, and of several volumes measures.html.
+Status write_measures(const std::vector<Measured>& all, const fs::path& folder) {
+  std::error_code ec;
+  fs::create_directories(folder, ec);
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "measures.csv", csv_of(all)));
+  if (all.size() < 2) return {};
+  report::HtmlPage page("Emberlock: what the flame radiates");
+  const auto plot = [&](const char* title, const char* unit, const auto& value) {
+    report::Series series{title, {}, {}};
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      series.x.push_back(static_cast<double>(i));
+      series.y.push_back(value(all[i]));
+    }
+    page.heading(title);
+    page.raw(
+        report::svg_plot_for_any_width({series}, {.title = title, .x_label = "volume", .y_label = unit}));
+  };
+  plot("radiated power", "W", [](const Measured& m) { return m.power; });
+  plot("mean temperature", "K", [](const Measured& m) { return m.statistics.mean; });
+  plot("highest temperature", "K", [](const Measured& m) { return m.statistics.most; });
+  plot("height", "m", [](const Measured& m) { return m.statistics.height; });
+  return write_file_atomically(folder / "measures.html", page.str());
+}
+
+void measure(const MeasureArguments& arguments) {
+  const std::optional<Target> target = or_fail(parse_target(arguments.target));
+  const Eigen::Vector3d up = or_fail(parse_up(arguments.up));
+  recon::ComputeOptions compute;
+  compute.threads = arguments.threads;
+  std::vector<Measured> all;
+  all.reserve(arguments.volumes.size());
+  for (const std::string& name : arguments.volumes) {
+    all.push_back(or_fail(measured(name, target, up, compute)));
+    print(all.back());
+  }
+  if (arguments.out.empty()) return;
+  or_fail(write_measures(all, arguments.out));
+  std::printf("%-16s %s\n", "written to", arguments.out.c_str());
+}
+
+}  // namespace
+
+void add_measure(CLI::App& app) {
+  auto arguments = std::make_shared<MeasureArguments>();
+  MeasureArguments& a = *arguments;
+  CLI::App* verb = app.add_subcommand(
+      "measure", "Measures what flames radiate: power, flux on a surface, temperatures, height and volume");
+  verb->add_option(
+          "VOLUMES", a.volumes,
+          "Results of `reconstruct --quantity temperature`: folders or volume.vdb, a sequence's in its order")
+      ->required();
+  verb->add_option(
+      "--target", a.target,
+      "x,y,z,nx,ny,nz: also the flux on a small surface, at a point (m) and the direction it looks in");
+  verb->add_option("--up", a.up, "The world's axis along which height is counted: x, y, z, -x, -y or -z")
+      ->capture_default_str();
+  verb->add_option("--out", a.out,
+                   "Folder for measures.csv, and of several volumes measures.html with plots");
+  verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
+      ->check(CLI::Range(0, 256))
+      ->capture_default_str();
+  verb->callback([arguments] { measure(*arguments); });
+}
+
+}  // namespace emberlock::cli

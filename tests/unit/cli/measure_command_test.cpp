@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "cli/commands.h"
+#include "recon/export/volume_file.h"
+#include "tests/support/verb.h"
+
+namespace emberlock::cli {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// A ball of 5 cm and 1500 K, of optical radius 0.5, as `reconstruct` would write it.
+class MeasureCommandTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    root_ = fs::temp_directory_path() / ("emberlock_measure_test." + std::to_string(::getpid()));
+    fs::create_directories(root_);
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  void write(const std::string& name, bool with_temperature, bool with_extinction = true) const {
+    constexpr int kPoints = 33;
+    recon::Volume volume;
+    volume.grid = {{-0.06F, -0.06F, -0.06F}, 0.12F / (kPoints - 1), kPoints, kPoints, kPoints};
+    volume.emission.assign(3 * volume.grid.size(), 0);
+    volume.extinction.assign(volume.grid.size(), 0);
+    std::vector<float> kelvin(volume.grid.size());
+    std::vector<float> sigma(volume.grid.size());
+    for (int k = 0; k < kPoints; ++k)
+      for (int j = 0; j < kPoints; ++j)
+        for (int i = 0; i < kPoints; ++i) {
+          const double edge = 0.12 / (kPoints - 1);
+          const double r = edge * std::sqrt(std::pow(i - 16, 2) + std::pow(j - 16, 2) + std::pow(k - 16, 2));
+          const double inside = std::clamp((0.05 - r) / edge + 0.5, 0.0, 1.0);
+          const std::size_t p = volume.grid.index(i, j, k);
+          volume.extinction[p] = static_cast<float>(10 * inside);
+          kelvin[p] = inside > 0 ? 1500 : 0;
+          sigma[p] = inside > 0 ? 15 : 0;
+        }
+    if (!with_extinction) volume.extinction.clear();
+    std::vector<recon::NamedGrid> further;
+    if (with_temperature) {
+      further.push_back({"temperature", "K", kelvin});
+      further.push_back({"temperature_sigma", "K", sigma});
+    }
+    ASSERT_TRUE(recon::write_volume(volume, root_ / name, further).ok());
+  }
+  [[nodiscard]] test::VerbRun run(std::vector<std::string> words) const {
+    words.insert(words.begin(), "measure");
+    return test::run_verb(add_measure, std::move(words));
+  }
+  fs::path root_;
+};
+
+TEST_F(MeasureCommandTest, SaysWhatABallRadiates) {
+  write("a.vdb", true);
+  const auto result = run({(root_ / "a.vdb").string(), (root_ / "a.vdb").string(), "--target", "0,0,-1,0,0,1",
+                           "--out", (root_ / "out").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("1500 K +- 15 on average"));
+  std::ifstream in(root_ / "out" / "measures.csv");
+  std::string line;
+  std::getline(in, line);
+  EXPECT_THAT(line, HasSubstr("power_w"));
+  std::getline(in, line, ',');
+  std::string power;
+  std::getline(in, power, ',');
+  const double t = 0.5;
+  const double expected = 4 * 3.14159265 * 0.05 * 0.05 * 5.670374419e-8 * std::pow(1500, 4) *
+                          (1 - (1 - (1 + 2 * t) * std::exp(-2 * t)) / (2 * t * t));
+  EXPECT_NEAR(std::stod(power), expected, 0.02 * expected);
+  std::getline(in, power, ',');
+  EXPECT_NEAR(std::stod(power), 4 * 15 / 1500.0 * expected, 0.005 * expected) << "T^4, all voxels off alike";
+  std::getline(in, power, ',');
+  EXPECT_NEAR(std::stod(power), expected / (4 * 3.14159265), 0.05 * expected / (4 * 3.14159265))
+      << "a metre away";
+  EXPECT_TRUE(fs::exists(root_ / "out" / "measures.html"));
+}
+
+TEST_F(MeasureCommandTest, SaysWhatIsMissing) {
+  write("colour.vdb", false);
+  write("thin.vdb", true, false);
+  const auto expect_refused = [&](const std::vector<std::string>& words, const char* why) {
+    const auto result = run(words);
+    EXPECT_NE(result.exit_code, 0);
+    EXPECT_THAT(result.err, HasSubstr(why));
+  };
+  expect_refused({(root_ / "colour.vdb").string()}, "--quantity temperature");
+  expect_refused({(root_ / "thin.vdb").string()}, "no extinction");
+  expect_refused({(root_ / "none.vdb").string()}, "none.vdb");
+  expect_refused({(root_ / "thin.vdb").string(), "--target", "1,2,3"}, "is no target");
+  expect_refused({(root_ / "thin.vdb").string(), "--target", "1,2,3,0,0,0"}, "is no target");
+  expect_refused({(root_ / "thin.vdb").string(), "--up", "w"}, "is no axis");
+}
+
+}  // namespace
+}  // namespace emberlock::cli

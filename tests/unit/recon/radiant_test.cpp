@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/temperature/radiant.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace emberlock::recon {
+namespace {
+
+constexpr double kSigma = 5.670374419e-8;
+constexpr double kPi = 3.14159265358979;
+
+HotVolume ball(double radius, double kelvin, double absorption, int voxels = 48) {
+  HotVolume v;
+  const double half = 1.1 * radius;
+  const auto edge = static_cast<float>(2 * half / voxels);
+  v.grid = {{static_cast<float>(-half), static_cast<float>(-half), static_cast<float>(-half)},
+            edge,
+            voxels + 1,
+            voxels + 1,
+            voxels + 1};
+  v.kelvin.assign(v.grid.size(), 0);
+  v.absorption.assign(v.grid.size(), 0);
+  for (int k = 0; k <= voxels; ++k)
+    for (int j = 0; j <= voxels; ++j)
+      for (int i = 0; i <= voxels; ++i) {
+        const double c = voxels / 2.0;
+        const double r = static_cast<double>(edge) *
+                         std::sqrt(std::pow(i - c, 2) + std::pow(j - c, 2) + std::pow(k - c, 2));
+        // The border's voxels hold the share that lies inside.
+        const double inside = std::clamp((radius - r) / static_cast<double>(edge) + 0.5, 0.0, 1.0);
+        v.absorption[v.grid.index(i, j, k)] = static_cast<float>(inside * absorption);
+        v.kelvin[v.grid.index(i, j, k)] = inside > 0 ? static_cast<float>(kelvin) : 0;
+      }
+  return v;
+}
+
+TEST(Radiant, AnIsothermalBallRadiatesTheClosedForm) {
+  for (const double radius : {0.01, 0.1, 3.0})
+    for (const double depth : {0.05, 0.5, 2.0}) {
+      const double t = depth;
+      const double share = 1 - (1 - (1 + 2 * t) * std::exp(-2 * t)) / (2 * t * t);
+      const double expected = 4 * kPi * radius * radius * kSigma * std::pow(1500, 4) * share;
+      EXPECT_NEAR(radiated_power(ball(radius, 1500, depth / radius)), expected, 0.02 * expected)
+          << radius << " m, " << depth;
+    }
+}
+
+TEST(Radiant, FluxFarAwayIsThePowerOverTheSphere) {
+  const HotVolume v = ball(0.1, 1200, 5);
+  const double power = radiated_power(v);
+  const double distance = 0.5;
+  const double flux = radiant_flux(v, {0, 0, -distance}, {0, 0, 1});
+  EXPECT_NEAR(flux, power / (4 * kPi * distance * distance), 0.04 * flux);
+  EXPECT_EQ(radiant_flux(v, {0, 0, -distance}, {0, 0, -1}), 0) << "looking away";
+}
+
+TEST(Radiant, InsideAThickBodyTheFluxIsSigmaT4) {
+  EXPECT_NEAR(radiant_flux(ball(0.1, 1000, 1e4), {0, 0, 0}, {1, 0, 0}), kSigma * 1e12, 0.01 * kSigma * 1e12);
+}
+
+TEST(Radiant, StatisticsOfABall) {
+  const HotVolume v = ball(0.1, 1500, 5);
+  const HotStatistics s = statistics_of(v, std::vector<float>(v.grid.size(), 20.0F), {0, 0, 1});
+  EXPECT_NEAR(s.mean, 1500, 1e-6);
+  EXPECT_NEAR(s.mean_error, 20, 1e-9);
+  EXPECT_EQ(s.most, 1500);
+  EXPECT_NEAR(s.height, 0.2, 0.01);
+  EXPECT_NEAR(s.volume, 4.0 / 3 * kPi * 1e-3, 0.08 * 4.2e-3);
+}
+
+TEST(Radiant, NothingRadiatesNothing) {
+  const HotVolume v = ball(0.1, 0, 0);
+  EXPECT_EQ(radiated_power(v), 0);
+  EXPECT_EQ(statistics_of(v, v.kelvin, {0, 0, 1}).points, 0U);
+}
+
+}  // namespace
+}  // namespace emberlock::recon

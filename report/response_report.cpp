@@ -15,16 +15,16 @@ namespace {
 constexpr std::array<const char*, 3> kChannelNames = {"red", "green", "blue"};
 constexpr std::array<std::size_t, 3> kChannelColours = {1, 2, 0};  // of the palette: red, green, blue
 
-double largest(const recon::CameraResponse& response) {
+double largest_level(const recon::CameraResponse& response) {
   double most = 0;
   for (const auto& channel : response.level)
     for (const double v : channel) most = std::max(most, std::abs(v));
   return most;
 }
 
-std::string response_plot(const recon::CameraResponse& response, const recon::CameraResponse& base) {
+std::string spectral_plot(const recon::CameraResponse& response, const recon::CameraResponse& base) {
   std::vector<Series> series;
-  const double scale = largest(response) / largest(base);
+  const double scale = largest_level(response) / largest_level(base);
   for (std::size_t c = 0; c < 3; ++c) {
     series.push_back({kChannelNames[c], response.wavelength_nm, response.level[c]});
     series.back().colour = kChannelColours[c];
@@ -81,7 +81,7 @@ std::string response_report_page(const std::vector<GlowSource>& sources, const r
       fmt::format("From {} picture{} of an emitter of known temperature. Chi-square {:.1f}, {} expected.",
                   sources.size(), sources.size() == 1 ? "" : "s", fit.chi_square, fit.freedom));
   for (const std::string& warning : fit.warnings) page.paragraph("Warning: " + warning);
-  page.raw(response_plot(fit.response, base));
+  page.raw(spectral_plot(fit.response, base));
   std::vector<std::vector<std::string>> rows;
   for (std::size_t c = 0; c < 3; ++c) {
     std::vector<std::string> row = channel_words(fit.channels[c]);

@@ -99,6 +99,12 @@ std::array<double, 3> light_at(const FlatField& flat, double x, double y) {
   return out;
 }
 
+bool changes_nothing(const Colour& colour) {
+  const std::array<double, 3> none = {};
+  return colour.response.empty() && colour.dark == none && colour.gain == std::array<double, 3>{1, 1, 1} &&
+         colour.vignetting == none && colour.flat.light.empty() && colour.hot_pixels.empty();
+}
+
 double exposure_of(const Colour& colour, double sample) {
   if (colour.response.empty()) return sample;
   const double place = std::clamp(sample, 0.0, 1.0) * static_cast<double>(colour.response.size() - 1);

@@ -36,6 +36,9 @@ struct Colour {
   Seconds exposure{0};  ///< at which `spectral` holds; 0: not told
 };
 
+/// Whether pictures stay as they are: nothing but the spectral response is known.
+bool changes_nothing(const Colour& colour);
+
 /// Relative exposure 0..1 of a sample 0..1, linear between the points of the response.
 double exposure_of(const Colour& colour, double sample);
 

@@ -15,22 +15,22 @@ constexpr int kLeastBlocks = 3;           // along a side
 constexpr double kLeastShare = 2e-3;      // of the picture
 constexpr double kSaturatedShare = 2e-3;  // of a region
 
-/// Sums of the three channels, averaged in square blocks.
-struct Blocks {
+/// CellSums of the three channels, averaged in square blocks.
+struct GlowBlocks {
   int side = 1, columns = 0, rows = 0;
   std::vector<double> level;
   double noise = 0;  // of a block
 };
 
-double brightness(const RadianceImage& picture, int x, int y) {
+double light_of_pixel(const RadianceImage& picture, int x, int y) {
   const float* rgb =
       &picture.rgb[3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(picture.size.width) +
                         static_cast<std::size_t>(x))];
   return static_cast<double>(rgb[0]) + static_cast<double>(rgb[1]) + static_cast<double>(rgb[2]);
 }
 
-Blocks blocks_of(const RadianceImage& picture) {
-  Blocks blocks;
+GlowBlocks glow_blocks_of(const RadianceImage& picture) {
+  GlowBlocks blocks;
   blocks.side = std::clamp(std::min(picture.size.width, picture.size.height) / 96, 1, 16);
   blocks.columns = picture.size.width / blocks.side;
   blocks.rows = picture.size.height / blocks.side;
@@ -39,15 +39,15 @@ Blocks blocks_of(const RadianceImage& picture) {
       double sum = 0;
       for (int y = row * blocks.side; y < (row + 1) * blocks.side; ++y)
         for (int x = column * blocks.side; x < (column + 1) * blocks.side; ++x)
-          sum += brightness(picture, x, y);
+          sum += light_of_pixel(picture, x, y);
       blocks.level.push_back(sum / (blocks.side * blocks.side));
     }
   const double half = 0.5 * *std::max_element(blocks.level.begin(), blocks.level.end());
   std::vector<double> differences;
   for (int y = 0; y < picture.size.height; ++y)
     for (int x = 1; x < picture.size.width; ++x) {
-      const double left = brightness(picture, x - 1, y);
-      const double own = brightness(picture, x, y);
+      const double left = light_of_pixel(picture, x - 1, y);
+      const double own = light_of_pixel(picture, x, y);
       if (left > half && own > half) differences.push_back(std::abs(own - left));
     }
   if (differences.empty()) return blocks;
@@ -59,7 +59,7 @@ Blocks blocks_of(const RadianceImage& picture) {
 
 /// The largest rectangle of blocks of a level, by the histogram of each row: every bar is closed by the first
 /// lower one.
-PatchPlace largest_rectangle(const Blocks& blocks, double level, double tolerance) {
+PatchPlace largest_rectangle(const GlowBlocks& blocks, double level, double tolerance) {
   struct Bar {
     int first, height;
   };
@@ -90,8 +90,8 @@ PatchPlace largest_rectangle(const Blocks& blocks, double level, double toleranc
   return best;
 }
 
-/// Sums over a part of a region.
-struct Sums {
+/// CellSums over a part of a region.
+struct CellSums {
   double sum = 0, squares = 0;
   int count = 0;
   [[nodiscard]] double mean() const { return sum / count; }
@@ -102,8 +102,8 @@ void read_channel(const RadianceImage& picture, const std::vector<std::uint8_t>&
                   std::size_t c, GlowPicture& out) {
   const PatchPlace& region = out.region;
   const int parts = std::min(region.width, region.height) >= 8 ? 4 : 1;  // along each side
-  std::vector<Sums> cells(static_cast<std::size_t>(parts * parts));
-  Sums all;
+  std::vector<CellSums> cells(static_cast<std::size_t>(parts * parts));
+  CellSums all;
   int white = 0;
   for (int y = 0; y < region.height; ++y)
     for (int x = 0; x < region.width; ++x) {
@@ -111,9 +111,9 @@ void read_channel(const RadianceImage& picture, const std::vector<std::uint8_t>&
           static_cast<std::size_t>(region.y + y) * static_cast<std::size_t>(picture.size.width) +
           static_cast<std::size_t>(region.x + x);
       const auto v = static_cast<double>(picture.rgb[3 * pixel + c]);
-      Sums& cell =
+      CellSums& cell =
           cells[static_cast<std::size_t>(y * parts / region.height * parts + x * parts / region.width)];
-      for (Sums* sums : {&cell, &all}) {
+      for (CellSums* sums : {&cell, &all}) {
         sums->sum += v;
         sums->squares += v * v;
         ++sums->count;
@@ -122,7 +122,7 @@ void read_channel(const RadianceImage& picture, const std::vector<std::uint8_t>&
     }
   double noise = 0;  // variance of a pixel
   double uneven = 0;
-  for (const Sums& cell : cells) {
+  for (const CellSums& cell : cells) {
     noise += cell.variance() / static_cast<double>(cells.size());
     uneven += std::pow(cell.mean() - all.mean(), 2) / static_cast<double>(cells.size());
   }
@@ -142,18 +142,24 @@ Error bad_glow(const std::string& where, std::string what, std::string remedy) {
 
 std::optional<PatchPlace> find_glow(const RadianceImage& picture) {
   if (picture.rgb.empty()) return std::nullopt;
-  const Blocks blocks = blocks_of(picture);
+  const GlowBlocks blocks = glow_blocks_of(picture);
   const double most = *std::max_element(blocks.level.begin(), blocks.level.end());
   const double least = kLeastShare * static_cast<double>(blocks.level.size());
-  for (double level = most; most > 0 && level > 0.05 * most; level *= 0.98) {
-    PatchPlace found = largest_rectangle(blocks, level, std::max(kEven * level, 4 * blocks.noise));
+  // The first level that has a rectangle lies at the edge of the region's noise: one close below has more.
+  PatchPlace best;
+  double lowest = 0.05 * most;
+  for (double level = most; level > lowest; level *= 0.98) {
+    const double tolerance = std::max(kEven * level, 4 * blocks.noise);
+    const PatchPlace found = largest_rectangle(blocks, level, tolerance);
     if (found.width * found.height < std::max(1.0, least)) continue;
-    if (found.width > 4) found.x += 1, found.width -= 2;
-    if (found.height > 4) found.y += 1, found.height -= 2;
-    return PatchPlace{found.x * blocks.side, found.y * blocks.side, found.width * blocks.side,
-                      found.height * blocks.side};
+    if (best.width == 0) lowest = level - 2 * tolerance;
+    if (found.width * found.height > best.width * best.height) best = found;
   }
-  return std::nullopt;
+  if (best.width == 0) return std::nullopt;
+  if (best.width > 4) best.x += 1, best.width -= 2;
+  if (best.height > 4) best.y += 1, best.height -= 2;
+  return PatchPlace{best.x * blocks.side, best.y * blocks.side, best.width * blocks.side,
+                    best.height * blocks.side};
 }
 
 Result<GlowPicture> read_glow(const ImageView& view, const GlowPictureOptions& options,

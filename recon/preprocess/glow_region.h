@@ -27,10 +27,10 @@ struct GlowPictureOptions {
   const Image* dark = nullptr;  ///< the same camera without light; null: black is the colour's, or 0
 };
 
-/// The largest rectangle of the brightest even part: blocks within 4 % (or their noise) of one level, from
-/// the brightest downwards until a rectangle has at least three by three of them (each a 96th of the
-/// picture's shorter side) and 0.2 % of the picture; without its outermost blocks. Absent where there is
-/// none.
+/// The brightest even part: of blocks (each a 96th of the picture's shorter side) within 4 %, or their noise,
+/// of one level, the largest rectangle, without its outermost blocks. Levels are tried from the brightest
+/// downwards, until a rectangle has at least three by three blocks and 0.2 % of the picture. Absent where
+/// there is none.
 std::optional<PatchPlace> find_glow(const RadianceImage& picture);
 
 /// Errors name `where`: a region that doesn't lie in the picture or has fewer than 4 pixels, none that is

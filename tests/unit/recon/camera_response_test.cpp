@@ -100,6 +100,9 @@ TEST(SpectralColour, AResponseIsReadBackAsItWas) {
   EXPECT_EQ(*back->spectral, small_response());
   EXPECT_EQ(back->exposure, colour.exposure);
   EXPECT_EQ(back->gain, colour.gain);
+  EXPECT_FALSE(changes_nothing(*back));
+  colour.gain = {1, 1, 1};
+  EXPECT_TRUE(changes_nothing(colour));
 
   v1::Manifest manifest;
   v1::CameraStream& stream = *manifest.add_cameras();

@@ -78,10 +78,12 @@ TEST(ResponseFit, FourTemperaturesTellShiftWidthAndScale) {
   ASSERT_TRUE(fit.ok()) << fit.error().message();
   EXPECT_TRUE(fit->response.absolute);
   EXPECT_LT(fit->chi_square, 10);
+  const std::array shift = {8.0, -6.0, 5.0};
+  const std::array width = {1.1, 0.9, 1.05};
   for (std::size_t c = 0; c < 3; ++c) {
     const FittedChannel& channel = fit->channels[c];
-    EXPECT_NEAR(channel.shift.value, std::array{8.0, -6.0, 5.0}[c], 2 * channel.shift.sigma + 0.05);
-    EXPECT_NEAR(channel.width.value, std::array{1.1, 0.9, 1.05}[c], 2 * channel.width.sigma + 0.01);
+    EXPECT_NEAR(channel.shift.value, shift[c], 2 * channel.shift.sigma + 0.05);
+    EXPECT_NEAR(channel.width.value, width[c], 2 * channel.width.sigma + 0.01);
     EXPECT_NEAR(channel.scale.value / 3e-3, 1, 2 * channel.scale.sigma + 0.005);
     EXPECT_GT(channel.shift.by_data, 0.9);
     // What it says of a flame's temperature is what the camera shows.
@@ -140,7 +142,9 @@ TEST(ResponseFit, StatedErrorsHoldForOneTwoAndFourTemperatures) {
     const double share = static_cast<double>(within) / all;
     EXPECT_GT(share, 0.88) << temperatures.size() << " temperatures";
     EXPECT_LT(share, 0.995) << temperatures.size() << " temperatures";
-    if (temperatures.size() == 1) EXPECT_GT(prior / (3 * kRepeats), 0.9) << "one level can't tell a shift";
+    if (temperatures.size() == 1) {
+      EXPECT_GT(prior / (3 * kRepeats), 0.9) << "one level can't tell a shift";
+    }
   }
 }
 
@@ -187,7 +191,7 @@ TEST(ResponseFit, ASaturatedLevelIsABound) {
   EXPECT_LT(fit->chi_square, 1);
   EXPECT_EQ(fit->freedom, 8 - 3);
   for (GlowReading& r : readings) r.saturated[1] = true;
-  EXPECT_THAT(fit_response(readings, fit_camera()).error().message(), HasSubstr("green is at white"));
+  EXPECT_THAT(fit_response(readings, fit_camera()).error().message(), HasSubstr("green: is at white"));
 }
 
 TEST(ResponseFit, WhatTellsNothingIsRefused) {

@@ -98,19 +98,22 @@ struct CellSums {
   [[nodiscard]] double variance() const { return std::max(0.0, squares / count - mean() * mean()); }
 };
 
-void read_channel(const RadianceImage& picture, const std::vector<std::uint8_t>& bounds, double step,
-                  std::size_t c, GlowPicture& out) {
+/// `shown`: before the dark picture was taken off.
+void read_channel(const RadianceImage& picture, const RadianceImage& shown,
+                  const std::vector<std::uint8_t>& bounds, double step, std::size_t c, GlowPicture& out) {
   const PatchPlace& region = out.region;
   const int parts = std::min(region.width, region.height) >= 8 ? 4 : 1;  // along each side
   std::vector<CellSums> cells(static_cast<std::size_t>(parts * parts));
   CellSums all;
   int white = 0;
+  int black = 0;
   for (int y = 0; y < region.height; ++y)
     for (int x = 0; x < region.width; ++x) {
       const auto pixel =
           static_cast<std::size_t>(region.y + y) * static_cast<std::size_t>(picture.size.width) +
           static_cast<std::size_t>(region.x + x);
       const auto v = static_cast<double>(picture.rgb[3 * pixel + c]);
+      black += shown.rgb[3 * pixel + c] <= 0 ? 1 : 0;
       CellSums& cell =
           cells[static_cast<std::size_t>(y * parts / region.height * parts + x * parts / region.width)];
       for (CellSums* sums : {&cell, &all}) {
@@ -129,8 +132,10 @@ void read_channel(const RadianceImage& picture, const std::vector<std::uint8_t>&
   uneven = std::max(0.0, uneven - noise * static_cast<double>(cells.size()) / all.count);
   // Noise of half a step turns rounding into noise; without it all pixels are rounded alike.
   const double rounding = std::sqrt(noise) > 0.4 * step ? 0 : step * step / 12;
+  // Noise that is cut off at black raises the mean: by 0.4 of it where half is.
+  const double cut = noise * std::pow(static_cast<double>(black) / all.count, 2);
   out.level[c] = all.mean();
-  out.sigma[c] = std::sqrt(noise / all.count + uneven + rounding);
+  out.sigma[c] = std::sqrt(noise / all.count + uneven + rounding + cut);
   out.saturated[c] = white > kSaturatedShare * all.count;
 }
 
@@ -172,6 +177,7 @@ Result<GlowPicture> read_glow(const ImageView& view, const GlowPictureOptions& o
     return picture;
   };
   RadianceImage picture = developed(view, &bounds);
+  const RadianceImage shown = picture;
   if (options.dark != nullptr) {
     const RadianceImage dark = developed(options.dark->view(), nullptr);
     if (dark.size != picture.size)
@@ -194,7 +200,7 @@ Result<GlowPicture> read_glow(const ImageView& view, const GlowPictureOptions& o
   out.region = *region;
   for (std::size_t c = 0; c < 3; ++c) {
     const double gain = colour != nullptr ? colour->gain[c] : 1;
-    read_channel(picture, bounds, 255.0 / view.layout.white() * gain, c, out);
+    read_channel(picture, shown, bounds, 255.0 / view.layout.white() * gain, c, out);
   }
   return out;
 }

@@ -17,7 +17,7 @@ namespace emberlock::recon {
 struct GlowPicture {
   PatchPlace region;
   std::array<double, 3> level = {};    ///< mean, 0..255, linear in light, gain and vignetting applied
-  std::array<double, 3> sigma = {};    ///< of noise, rounding, and how uneven the region is
+  std::array<double, 3> sigma = {};    ///< of noise, its cut at black, rounding, and unevenness
   std::array<bool, 3> saturated = {};  ///< white in more than 0.2 % of the region: `level` is a lower bound
 };
 

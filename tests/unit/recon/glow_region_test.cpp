@@ -83,6 +83,15 @@ TEST(GlowRegion, WhiteIsABoundAndDarkIsTakenOff) {
   EXPECT_THAT(read_glow(other.view(), options, "a.png").error().message(), HasSubstr("dark picture"));
 }
 
+TEST(GlowRegion, NoiseThatIsCutAtBlackIsNoLight) {
+  GlowPictureOptions options;
+  options.region = PatchPlace{20, 20, 100, 100};
+  const auto glow = read_glow(glow_picture({{{0, 0, 192, 144}, 0}}).view(), options, "a.png");
+  ASSERT_TRUE(glow.ok()) << glow.error().message();
+  EXPECT_GT(glow->level[0], 0.3);
+  EXPECT_LT(glow->level[0], 3 * glow->sigma[0]);
+}
+
 TEST(GlowRegion, TheColourOfTheCameraIsApplied) {
   GlowPictureOptions options;
   Colour colour;

@@ -83,6 +83,29 @@ recon::Colour power_law(double gamma) {
   return colour;
 }
 
+/// Of each picture, s; nothing where they aren't told.
+Result<std::vector<double>> exposures_of(const BlackBodyArguments& arguments) {
+  if (arguments.exposures.empty()) return std::vector<double>{};
+  constexpr const char* kRemedy =
+      "Give one exposure time in s for all pictures, or one for each: 0.004,0.001";
+  EMBERLOCK_ASSIGN_OR_RETURN(std::vector<double> seconds,
+                             parse_numbers(arguments.exposures, 0, "--exposure", kRemedy));
+  const bool fits = seconds.size() == 1 || seconds.size() == arguments.pictures.size();
+  if (!fits || !std::all_of(seconds.begin(), seconds.end(), [](double s) { return s >= 1e-6 && s <= 3600; }))
+    return Error{ErrorKind::bad_input, "\"" + arguments.exposures + "\" doesn't fit", "--exposure", kRemedy};
+  seconds.resize(arguments.pictures.size(), seconds.front());
+  return seconds;
+}
+
+/// What the picture had shown at an exposure so many times as long.
+recon::GlowReading exposed(recon::GlowReading reading, double times) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    reading.level[c] *= times;
+    reading.sigma[c] *= times;
+  }
+  return reading;
+}
+
 Status read_sources(const BlackBodyArguments& arguments, const v1::RigCamera* camera,
                     std::vector<report::GlowSource>& out) {
   EMBERLOCK_ASSIGN_OR_RETURN(
@@ -92,6 +115,7 @@ Status read_sources(const BlackBodyArguments& arguments, const v1::RigCamera* ca
     return Error{ErrorKind::bad_input,
                  fmt::format("{} temperature(s), {} picture(s)", kelvin.size(), arguments.pictures.size()),
                  "--black-body", "Give one picture for each temperature, in the same order"};
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<double> exposures, exposures_of(arguments));
   recon::GlowPictureOptions options;
   EMBERLOCK_ASSIGN_OR_RETURN(options.region, parse_region(arguments.region));
   if (arguments.gamma) options.colour = power_law(*arguments.gamma);
@@ -118,9 +142,9 @@ Status read_sources(const BlackBodyArguments& arguments, const v1::RigCamera* ca
     }
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::GlowPicture glow,
                                recon::read_glow(picture.view(), options, name));
-    out.push_back({fs::path(name).filename().string(),
-                   glow.region,
-                   {Kelvin(kelvin[i]), glow.level, glow.sigma, glow.saturated}});
+    const recon::GlowReading reading{Kelvin(kelvin[i]), glow.level, glow.sigma, glow.saturated};
+    const double times = exposures.empty() ? 1 : exposures.front() / exposures[i];
+    out.push_back({fs::path(name).filename().string(), glow.region, exposed(reading, times)});
   }
   return {};
 }
@@ -152,7 +176,7 @@ void print_fit(const std::vector<report::GlowSource>& sources, const recon::Resp
 
 /// One response for all cameras, since their pictures are equalised to one radiance.
 void put_response(v1::Rig& rig, v1::RigCamera& camera, const recon::CameraResponse& response,
-                  const std::optional<double>& exposure) {
+                  const std::vector<double>& exposures) {
   for (v1::RigCamera& other : *rig.mutable_cameras()) {
     if (!other.colour().has_spectral()) continue;
     other.mutable_colour()->clear_spectral();
@@ -162,7 +186,7 @@ void put_response(v1::Rig& rig, v1::RigCamera& camera, const recon::CameraRespon
                   other.camera_id().c_str());
   }
   *camera.mutable_colour()->mutable_spectral() = recon::message_of(response);
-  if (exposure) camera.mutable_colour()->set_exposure_s(*exposure);
+  if (!exposures.empty()) camera.mutable_colour()->set_exposure_s(exposures.front());
 }
 
 }  // namespace
@@ -198,7 +222,8 @@ Status calibrate_black_body(const BlackBodyArguments& arguments) {
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "response.html",
                                                   report::response_report_page(sources, fit, base)));
   if (camera != nullptr) {
-    put_response(rig, *camera, fit.response, arguments.exposure);
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<double> exposures, exposures_of(arguments));
+    put_response(rig, *camera, fit.response, exposures);
     EMBERLOCK_RETURN_IF_ERROR(session::write_rig(staging.path() / "rig.json", rig));
   }
   EMBERLOCK_RETURN_IF_ERROR(staging.commit());

@@ -19,9 +19,9 @@ struct BlackBodyArguments {
   std::string region;            ///< x,y,width,height; empty: found
   std::string dark;              ///< a picture; empty: none
   std::string base = "srgb";
-  std::string rig;                      ///< rig.json; empty: none
-  std::string camera;                   ///< of the rig
-  std::optional<double> exposure = {};  ///< s
+  std::string rig;        ///< rig.json; empty: none
+  std::string camera;     ///< of the rig
+  std::string exposures;  ///< s: "0.004", or one a picture: "0.004,0.001"; empty: of one, not told
   std::optional<double> gamma = {};
   std::string out;
 };

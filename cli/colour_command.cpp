@@ -122,7 +122,7 @@ void add_black_body_options(CLI::App& verb, BlackBodyArguments& a) {
   CLI::Option* temperatures = verb.add_option(
       "--black-body", a.temperatures,
       "T[,T2...]: finds the spectral response and its absolute scale instead, from one picture for each of "
-      "these true temperatures in K (500 to 6000), all of one exposure");
+      "these true temperatures in K (500 to 6000)");
   verb.add_option("--emitter", a.emitter,
                   "What glows: furnace (emissivity 1), tungsten (a ribbon), or its emissivity")
       ->capture_default_str()
@@ -145,8 +145,9 @@ void add_black_body_options(CLI::App& verb, BlackBodyArguments& a) {
                   "sensor (the same without negative lobes), or a response.json")
       ->capture_default_str()
       ->needs(temperatures);
-  verb.add_option("--exposure", a.exposure, "Exposure time of the pictures in s, kept in rig.json")
-      ->check(CLI::Range(1e-6, 3600.0))
+  verb.add_option("--exposure", a.exposures,
+                  "Exposure time of the pictures in s, or one for each: S1,S2,... The response holds at the "
+                  "first; rig.json keeps it [all alike]")
       ->needs(temperatures);
   verb.add_option("--camera", a.camera,
                   "With --rig: the camera that took the pictures; its gains and vignetting are applied, and "
@@ -176,7 +177,8 @@ void add_calibrate_colour(CLI::App& parent) {
   verb->add_option("--rig", a.rig, "A rig.json to add the colours to [a new one with the colours only]");
   verb->add_option(
           "--gamma", a.gamma,
-          "Exponent of the power law that is the cameras' response [found from exposures or radiances]")
+          "Exponent of the power law that is the cameras' response [found from exposures or radiances; "
+          "with --black-body linear]")
       ->check(CLI::Range(0.3, 5.0));
   add_black_body_options(*verb, a.black_body);
   verb->callback([arguments] { or_fail(calibrate(*arguments)); });

@@ -101,6 +101,7 @@ std::string response_report_page(const std::vector<GlowSource>& sources, const r
   }
   page.heading("How well a black body's level is known").table({"", "red", "green", "blue"}, rows);
   page.heading("Pictures")
+      .paragraph("Levels as the first picture's exposure would show them.")
       .table({"picture", "temperature", "region", "red", "green", "blue"}, source_rows(sources, fit));
   return page.str();
 }

@@ -364,7 +364,7 @@ Result<ResponseFit> fit_response(const std::vector<GlowReading>& readings, const
     fit.covariance *= fit.chi_square / expected;
     fit.warnings.push_back(fmt::format(
         "the levels deviate from any such response: chi-square {:.1f}, {:.0f} expected. Are the pictures in "
-        "the order of the temperatures, linear in light, and of one exposure?",
+        "the order of the temperatures, linear in light, and of the exposures told?",
         fit.chi_square, expected));
   }
   for (std::size_t c = 0; c < 3; ++c)

@@ -113,6 +113,22 @@ TEST_F(BlackBody, ALampsRibbonNeedsItsEmissivityAndWindow) {
   EXPECT_NEAR(told[1] / furnace_levels(truth, 1800)[1], 1, 0.02);
 }
 
+TEST_F(BlackBody, HotterPicturesMayBeExposedShorter) {
+  const recon::CameraResponse truth = camera();
+  auto hot = furnace_levels(truth, 2600);
+  for (double& level : hot) level *= 0.002 / 0.16;
+  const std::string a = film("a.png", furnace_levels(truth, 1700));
+  const std::string b = film("b.png", hot);
+  const auto run =
+      calibrate({"--black-body", "1700,2600", "--exposure", "0.16,0.002", "--base", "sensor", a, b});
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const auto found = recon::read_camera_response(folder_.path() / "out" / "response.json");
+  EXPECT_NEAR(furnace_levels(*found, 2000)[1] / furnace_levels(truth, 2000)[1], 1, 0.03);
+  for (const char* bad : {"1,2,3", "0", "-1,1", "x"})
+    EXPECT_THAT(calibrate({"--black-body", "1700,2600", "--exposure", bad, a, b}).err,
+                HasSubstr("--exposure"));
+}
+
 TEST_F(BlackBody, TheRigsCameraGetsIt) {
   v1::Rig rig = recon::empty_rig();
   for (const char* id : {"left", "right"}) {

@@ -17,7 +17,6 @@
 namespace emberlock::recon {
 namespace {
 namespace fs = std::filesystem;
-using nlohmann::json;
 using testing::HasSubstr;
 
 CameraResponse small_response(double scale = 1) {
@@ -31,8 +30,8 @@ class CameraResponseFile : public testing::Test {
         write_file_atomically(folder_.path() / "a.pgm", std::string("P5\n4 2\n255\n") + std::string(8, 'x'))
             .ok());
   }
-  [[nodiscard]] fs::path write(const json& response_field) const {
-    json document = json::parse(
+  [[nodiscard]] fs::path write(const nlohmann::json& response_field) const {
+    nlohmann::json document = nlohmann::json::parse(
         R"({"fl_x": 10, "w": 4, "h": 2, "box": {"center": [0, 0, 0], "size": [1, 1, 1]}, "frames": [
       {"file_path": "a.pgm", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,5],[0,0,0,1]]}]})");
     document["camera_response"] = response_field;
@@ -54,7 +53,8 @@ TEST_F(CameraResponseFile, ATransformsNamesItBesideItself) {
 }
 
 TEST_F(CameraResponseFile, WhatCantBeReadNamesFileAndField) {
-  for (const json& value : {json(3), json(""), json(nullptr), json(std::string("a\0b", 3)), json::array()}) {
+  for (const nlohmann::json& value : {nlohmann::json(3), nlohmann::json(""), nlohmann::json(nullptr),
+                                      nlohmann::json(std::string("a\0b", 3)), nlohmann::json::array()}) {
     const auto scene = load_scene(write(value));
     ASSERT_FALSE(scene.ok()) << value.dump();
     EXPECT_THAT(scene.error().where, HasSubstr("transforms.json: camera_response"));

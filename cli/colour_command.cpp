@@ -5,10 +5,12 @@
 #include <memory>
 #include <string>
 #include <system_error>
+#include <vector>
 
 #include <fmt/format.h>
 
 #include "base/file.h"
+#include "cli/black_body.h"
 #include "cli/commands.h"
 #include "cli/outputs.h"
 #include "recon/preprocess/colour_calibration.h"
@@ -21,10 +23,11 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ColourArguments {
-  std::string folder;
+  std::vector<std::string> inputs;  ///< a folder, or pictures of a black body
   std::string out;
   std::string rig;
   std::optional<double> gamma;
+  BlackBodyArguments black_body;
 };
 
 /// Stores the colours in the rig's cameras; missing cameras are added with only their colour.
@@ -47,6 +50,11 @@ Status put_colours(v1::Rig& rig, const recon::ColourReadings& readings,
     into->set_camera_id(from.id);
     into->set_width(static_cast<std::uint32_t>(from.size.width));
     into->set_height(static_cast<std::uint32_t>(from.size.height));
+    if (into->colour().has_spectral())
+      std::printf(
+          "%-16s the spectral response of %s was of its earlier gains and was removed: find it again with "
+          "--black-body\n",
+          "note", from.id.c_str());
     *into->mutable_colour() = recon::to_message(calibration.cameras[i].colour);
   }
   return {};
@@ -71,11 +79,12 @@ void print_summary(const recon::ColourCalibration& calibration) {
 }
 
 Status calibrate_folder(const ColourArguments& arguments) {
-  OutputRequest where{arguments.out, kCalibrateColour, {arguments.folder}};
+  OutputRequest where{arguments.out, kCalibrateColour, {arguments.inputs.front()}};
   if (!arguments.rig.empty()) where.updated.emplace_back(arguments.rig);
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(where));
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::ColourReadings readings,
-                             recon::read_colour_folder(arguments.folder, progress_bar("calibrate colour")));
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      const recon::ColourReadings readings,
+      recon::read_colour_folder(arguments.inputs.front(), progress_bar("calibrate colour")));
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::ColourCalibration calibration,
                              recon::calibrate_colour(readings, {.gamma = arguments.gamma}));
   v1::Rig rig;
@@ -95,25 +104,84 @@ Status calibrate_folder(const ColourArguments& arguments) {
   return {};
 }
 
+Status calibrate(const ColourArguments& arguments) {
+  if (arguments.black_body.temperatures.empty()) {
+    if (arguments.inputs.size() == 1) return calibrate_folder(arguments);
+    return Error{ErrorKind::bad_input, "several folders are named", arguments.inputs[1],
+                 "Name one; pictures of a black body need --black-body"};
+  }
+  BlackBodyArguments black_body = arguments.black_body;
+  black_body.pictures = arguments.inputs;
+  black_body.out = arguments.out;
+  black_body.rig = arguments.rig;
+  black_body.gamma = arguments.gamma;
+  return calibrate_black_body(black_body);
+}
+
+void add_black_body_options(CLI::App& verb, BlackBodyArguments& a) {
+  CLI::Option* temperatures = verb.add_option(
+      "--black-body", a.temperatures,
+      "T[,T2...]: finds the spectral response and its absolute scale instead, from one picture for each of "
+      "these true temperatures in K (500 to 6000)");
+  verb.add_option("--emitter", a.emitter,
+                  "What glows: furnace (emissivity 1), tungsten (a ribbon), or its emissivity")
+      ->capture_default_str()
+      ->needs(temperatures);
+  verb.add_option("--window", a.window,
+                  "Share of the light that a lamp's glass, or other windows, let through")
+      ->check(CLI::Range(0.01, 1.0))
+      ->capture_default_str()
+      ->needs(temperatures);
+  verb.add_option("--temperature-sigma", a.temperature_sigma, "Standard error of each temperature, K")
+      ->check(CLI::Range(0.0, 500.0))
+      ->capture_default_str()
+      ->needs(temperatures);
+  verb.add_option("--region", a.region, "x,y,width,height: where it glows [the brightest even rectangle]")
+      ->needs(temperatures);
+  verb.add_option("--dark", a.dark, "A picture without light, which is subtracted [black is 0]")
+      ->needs(temperatures);
+  verb.add_option("--base", a.base,
+                  "The response that is scaled, shifted and widened: srgb (a camera that shows linear sRGB), "
+                  "sensor (the same without negative lobes), or a response.json")
+      ->capture_default_str()
+      ->needs(temperatures);
+  verb.add_option("--exposure", a.exposures,
+                  "Exposure time of the pictures in s, or one for each: S1,S2,... The response holds at the "
+                  "first; rig.json keeps it [all alike]")
+      ->needs(temperatures);
+  verb.add_option("--camera", a.camera,
+                  "With --rig: the camera that took the pictures; its gains and vignetting are applied, and "
+                  "it gets the response [the only one]")
+      ->needs(temperatures);
+}
+
 }  // namespace
 
 void add_calibrate_colour(CLI::App& parent) {
   auto arguments = std::make_shared<ColourArguments>();
   CLI::App* verb = parent.add_subcommand(
-      "colour", "Responses, gains between cameras, vignetting and dark levels, from pictures of one target");
+      "colour",
+      "Responses, gains between cameras, vignetting and dark levels, from pictures of one target; with "
+      "--black-body a camera's spectral response, from pictures of a furnace or lamp of known temperatures");
   ColourArguments& a = *arguments;
   verb->add_option(
-          "folder", a.folder,
+          "folder", a.inputs,
           "Folder with colour.json (where the patches are) and a subfolder per camera with its pictures "
-          "target[_LIGHT][_SECONDSs], flat and dark; or with a session, whose frames colour.json names so")
+          "target[_LIGHT][_SECONDSs], flat and dark; or with a session, whose frames colour.json names so. "
+          "With --black-body: pictures")
       ->required();
-  verb->add_option("--out", a.out, "Folder for rig.json and colour.html, the report")->required();
+  verb->add_option("--out", a.out,
+                   "Folder for rig.json and colour.html, the report; with --black-body for response.json, "
+                   "response.html and, with --rig, rig.json")
+      ->required();
   verb->add_option("--rig", a.rig, "A rig.json to add the colours to [a new one with the colours only]");
   verb->add_option(
           "--gamma", a.gamma,
-          "Exponent of the power law that is the cameras' response [found from exposures or radiances]")
+          "Exponent of the power law that is the cameras' response [found from exposures or radiances; "
+          "with --black-body linear]")
       ->check(CLI::Range(0.3, 5.0));
-  verb->callback([arguments] { or_fail(calibrate_folder(*arguments)); });
+  add_black_body_options(*verb, a.black_body);
+  verb->callback([arguments] { or_fail(calibrate(*arguments)); });
 }
 
 }  // namespace emberlock::cli

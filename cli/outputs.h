@@ -19,10 +19,15 @@ inline constexpr OutputVerb kVerify{"verify"};
 inline constexpr OutputVerb kDemo{"demo"};
 inline constexpr OutputVerb kSample{"sample"};
 
-inline constexpr std::array<std::string_view, 1> kBesideCameras{"calibrate colour"};
+inline constexpr std::array<std::string_view, 2> kBesideCameras{"calibrate colour",
+                                                                "calibrate colour --black-body"};
 inline constexpr OutputVerb kCalibrateCameras{"calibrate cameras", kBesideCameras};
-inline constexpr std::array<std::string_view, 2> kBesideColour{"calibrate cameras", "calibrate convert"};
+inline constexpr std::array<std::string_view, 3> kBesideColour{"calibrate cameras", "calibrate convert",
+                                                               "calibrate colour --black-body"};
 inline constexpr OutputVerb kCalibrateColour{"calibrate colour", kBesideColour};
+inline constexpr std::array<std::string_view, 3> kBesideResponse{"calibrate cameras", "calibrate convert",
+                                                                 "calibrate colour"};
+inline constexpr OutputVerb kCalibrateResponse{"calibrate colour --black-body", kBesideResponse};
 inline constexpr OutputVerb kCalibrateConvert{"calibrate convert"};
 
 }  // namespace emberlock::cli

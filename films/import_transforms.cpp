@@ -11,6 +11,7 @@
 #include "base/in_parallel.h"
 #include "films/import_parts.h"
 #include "films/small_picture.h"
+#include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
 #include "session/layout.h"
 #include "session/media/import_scan.h"
@@ -85,6 +86,8 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Transforms scene, recon::read_transforms(transforms));
   std::vector<fs::path> inputs{transforms};
   for (const recon::TransformsFrame& frame : scene.frames) inputs.push_back(frame.image);
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto response, recon::response_of(scene));
+  if (scene.camera_response) inputs.push_back(*scene.camera_response);
   EMBERLOCK_ASSIGN_OR_RETURN(const ImportFolder target, ImportFolder::open(options.out, inputs));
   EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<std::string> ids,
                              named(ids_of(scene.frames), options.ids, transforms));
@@ -99,6 +102,7 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
     part.stream.set_camera_id(ids[i]);
     session::set_layout(part.stream, layout);
     put_calibration(lens, frame.camera_from_world, *part.stream.mutable_calibration());
+    if (response) *part.stream.mutable_colour()->mutable_spectral() = recon::message_of(*response);
     part.files = {{frame.image, session::VideoScan{layout.size, {0}, {0}, {}, {}, {}, {}, 1, {}}, 0}};
     part.writer.min_free_bytes = options.min_free_bytes;
     part.places = {0};

@@ -17,8 +17,11 @@ constexpr std::size_t kMaxRigBytes = std::size_t{64} << 20;
 constexpr std::uint32_t kMaxRigSide = 65536;  // pixels
 
 Status check_colour(const v1::Colour& colour, const std::string& where) {
-  for (const auto* list : {&colour.response(), &colour.dark(), &colour.gain(), &colour.vignetting()}) {
-    if (!std::all_of(list->begin(), list->end(), [](double v) { return std::isfinite(v); })) {
+  const v1::SpectralResponse& spectral = colour.spectral();
+  for (const auto* list : {&colour.response(), &colour.dark(), &colour.gain(), &colour.vignetting(),
+                           &spectral.wavelength_nm(), &spectral.r(), &spectral.g(), &spectral.b()}) {
+    if (!std::isfinite(colour.exposure_s()) ||
+        !std::all_of(list->begin(), list->end(), [](double v) { return std::isfinite(v); })) {
       return Error{ErrorKind::bad_input, "a number isn't finite", where + ".colour",
                    "Calibrate the colour again, or remove it"};
     }

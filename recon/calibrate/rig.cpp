@@ -18,6 +18,28 @@ std::string words_of(std::uint32_t width, std::uint32_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
+template <class Cameras>
+Result<std::shared_ptr<const CameraResponse>> response_of_all(const Cameras& cameras,
+                                                              const std::string& where) {
+  std::shared_ptr<const CameraResponse> common;
+  std::string first;
+  for (const auto& camera : cameras) {
+    if (!camera.colour().has_spectral()) continue;
+    const std::string field = where + ": camera " + camera.camera_id() + ".colour.spectral";
+    EMBERLOCK_ASSIGN_OR_RETURN(CameraResponse response,
+                               camera_response_of(camera.colour().spectral(), field));
+    if (!common) {
+      common = std::make_shared<const CameraResponse>(std::move(response));
+      first = camera.camera_id();
+    } else if (response != *common) {
+      return bad_rig(field, "differs from camera " + first + "'s",
+                     "All cameras' pictures are equalised to one radiance, so give one response for all, or "
+                     "leave it to one camera");
+    }
+  }
+  return common;
+}
+
 }  // namespace
 
 Result<CameraModel> camera_model_of(const v1::Calibration& c, ImageSize size, const std::string& camera_id,
@@ -115,6 +137,34 @@ v1::Box message_of(const Box& box) {
     message.add_size(box.size[i]);
   }
   return message;
+}
+
+Result<CameraResponse> camera_response_of(const v1::SpectralResponse& message, const std::string& where) {
+  CameraResponse response;
+  response.absolute = message.absolute();
+  response.wavelength_nm.assign(message.wavelength_nm().begin(), message.wavelength_nm().end());
+  const std::array channels = {&message.r(), &message.g(), &message.b()};
+  for (std::size_t c = 0; c < 3; ++c) response.level[c].assign(channels[c]->begin(), channels[c]->end());
+  EMBERLOCK_RETURN_IF_ERROR(check_camera_response(response, where));
+  return response;
+}
+
+v1::SpectralResponse message_of(const CameraResponse& response) {
+  v1::SpectralResponse message;
+  message.set_absolute(response.absolute);
+  message.mutable_wavelength_nm()->Add(response.wavelength_nm.begin(), response.wavelength_nm.end());
+  const std::array channels = {message.mutable_r(), message.mutable_g(), message.mutable_b()};
+  for (std::size_t c = 0; c < 3; ++c) channels[c]->Add(response.level[c].begin(), response.level[c].end());
+  return message;
+}
+
+Result<std::shared_ptr<const CameraResponse>> common_response(const v1::Manifest& manifest,
+                                                              const std::string& where) {
+  return response_of_all(manifest.cameras(), where);
+}
+
+Result<std::shared_ptr<const CameraResponse>> common_response(const v1::Rig& rig, const std::string& where) {
+  return response_of_all(rig.cameras(), where);
 }
 
 Status apply_rig(v1::Manifest& manifest, const v1::Rig& rig, const std::string& where) {

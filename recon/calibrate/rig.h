@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -8,6 +9,7 @@
 
 #include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
+#include "recon/calibrate/camera_response.h"
 #include "session/reader.h"
 #include "session/rig_file.h"  // read_rig, write_rig
 
@@ -36,5 +38,16 @@ v1::Box message_of(const Box& box);
 /// Other data are unchanged. `where` names the rig. Errors: a camera of the session that isn't in the rig;
 /// pictures of another size than calibrated (names both).
 Status apply_rig(v1::Manifest& manifest, const v1::Rig& rig, const std::string& where);
+
+/// A spectral response as a session's or a rig's Colour holds it. Errors: what makes a CameraResponse
+/// invalid.
+Result<CameraResponse> camera_response_of(const v1::SpectralResponse& message, const std::string& where);
+v1::SpectralResponse message_of(const CameraResponse& response);
+
+/// The spectral response of the cameras' pictures, which are equalised to one radiance: the first camera's
+/// that has one; null if none has. Errors: one that isn't valid, cameras with different ones.
+Result<std::shared_ptr<const CameraResponse>> common_response(const v1::Manifest& manifest,
+                                                              const std::string& where);
+Result<std::shared_ptr<const CameraResponse>> common_response(const v1::Rig& rig, const std::string& where);
 
 }  // namespace emberlock::recon

@@ -17,6 +17,8 @@ namespace {
 constexpr std::size_t kLargestRigText = std::size_t{64} << 20;
 constexpr std::size_t kLargestOpencvText = std::size_t{4} << 20;  // of one camera
 
+constexpr const char* kResponseFile = "response.json";
+
 Error bad_format(std::string where, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), std::move(where), std::move(remedy)};
 }
@@ -57,16 +59,25 @@ Result<v1::Rig> import_folder(const fs::path& folder) {
   return import_opencv(files);
 }
 
+bool has_response(const v1::Rig& rig) {
+  return std::any_of(rig.cameras().begin(), rig.cameras().end(),
+                     [](const v1::RigCamera& c) { return c.colour().has_spectral(); });
+}
+
 }  // namespace
 
 Result<v1::Rig> rig_of_transforms(std::string_view json, const fs::path& source) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Transforms transforms, parse_transforms(json, source));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto response, response_of(transforms));
   v1::Rig rig = empty_rig();
   for (const TransformsFrame& frame : transforms.frames) {
     if (!frame.lens.w || !frame.lens.h)
       return bad_format(frame.where + ".w, h", "the picture's size is missing", "Add w and h, in pixels");
     EMBERLOCK_ASSIGN_OR_RETURN(const Intrinsics lens, intrinsics_of(frame, {*frame.lens.w, *frame.lens.h}));
     *rig.add_cameras() = rig_camera_of(frame.image.stem().string(), {lens, frame.camera_from_world});
+    if (!response) continue;
+    v1::RigCamera& camera = *rig.mutable_cameras(rig.cameras_size() - 1);
+    *camera.mutable_colour()->mutable_spectral() = message_of(*response);
   }
   if (transforms.box) *rig.mutable_box() = message_of(*transforms.box);
   EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, source.string()));
@@ -97,6 +108,7 @@ std::string transforms_json(const v1::Rig& rig) {
                                   {"k3", d.k3},
                                   {"transform_matrix", matrix}});
   }
+  if (has_response(rig)) document["camera_response"] = kResponseFile;
   if (rig.has_box()) {
     const std::vector<double> center(rig.box().center().begin(), rig.box().center().end());
     const std::vector<double> size(rig.box().size().begin(), rig.box().size().end());
@@ -124,6 +136,7 @@ Result<v1::Rig> import_rig(const fs::path& path) {
 
 Status export_rig(const v1::Rig& rig, const fs::path& folder) {
   EMBERLOCK_RETURN_IF_ERROR(session::check_rig(rig, folder.string()));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto response, common_response(rig, folder.string()));
   std::error_code ec;
   fs::create_directories(folder / "opencv", ec);
   fs::create_directories(folder / "colmap", ec);
@@ -132,6 +145,7 @@ Status export_rig(const v1::Rig& rig, const fs::path& folder) {
   }
   EMBERLOCK_RETURN_IF_ERROR(session::write_rig(folder / "rig.json", rig));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "transforms.json", transforms_json(rig)));
+  if (response) EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / kResponseFile, to_json(*response)));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "colmap" / "cameras.txt", colmap_cameras(rig)));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "colmap" / "images.txt", colmap_images(rig)));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "colmap" / "points3D.txt", ""));

@@ -10,7 +10,7 @@
 namespace emberlock::recon {
 
 // Conversion between rig.json and other programs' files. These have no place for colour, uncertainties and
-// (except transforms.json) the box.
+// (except transforms.json) the spectral response and the box.
 
 /// Imports a rig from rig.json, transforms.json (one camera per frame, named after its picture without
 /// extension), OpenCV's YAML or XML (one camera per file, named after the file), a folder of such files, or a
@@ -20,8 +20,8 @@ namespace emberlock::recon {
 Result<v1::Rig> import_rig(const std::filesystem::path& path);
 
 /// Writes rig.json, transforms.json, opencv/<camera>.yml and colmap/{cameras,images,points3D}.txt to
-/// `folder`. In transforms.json and COLMAP's files pictures are named <camera>.png, and only placed cameras
-/// are included.
+/// `folder`, and where a camera's spectral response is known response.json, which transforms.json names. In
+/// transforms.json and COLMAP's files pictures are named <camera>.png, and only placed cameras are included.
 Status export_rig(const v1::Rig& rig, const std::filesystem::path& folder);
 
 /// Parses COLMAP's text files: cam_from_world, pixel centres at +0.5 like ours. `where` names the folder.

@@ -231,6 +231,18 @@ fs::path find_image(const fs::path& folder, const std::string& file_path) {
   return path;
 }
 
+/// A path in the document, not empty.
+Result<std::string> read_path(const json& object, const char* key, const Place& place,
+                              const char* otherwise) {
+  const auto it = object.find(key);
+  if (it == object.end() || !it->is_string() || it->get_ref<const std::string&>().empty())
+    return place.at(key).error(otherwise, "Give its path, relative to the json's folder");
+  const auto& text = it->get_ref<const std::string&>();
+  if (text.find('\0') != std::string::npos)
+    return place.at(key).error("holds a zero byte", "Correct the path");
+  return text;
+}
+
 Result<TransformsFrame> read_frame(const json& object, const Place& place, const fs::path& folder,
                                    const LensFields& shared) {
   if (!object.is_object()) return place.error("is no object", "A frame has file_path and transform_matrix");
@@ -240,14 +252,8 @@ Result<TransformsFrame> read_frame(const json& object, const Place& place, const
   frame.lens = shared;
   EMBERLOCK_RETURN_IF_ERROR(read_lens(object, place, frame.lens));
 
-  const auto file_path = object.find("file_path");
-  if (file_path == object.end() || !file_path->is_string() ||
-      file_path->get_ref<const std::string&>().empty()) {
-    return place.at("file_path").error("no picture is named", "Give its path, relative to the json's folder");
-  }
-  const auto& text = file_path->get_ref<const std::string&>();
-  if (text.find('\0') != std::string::npos)
-    return place.at("file_path").error("holds a zero byte", "Correct the path");
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text,
+                             read_path(object, "file_path", place, "no picture is named"));
   frame.image = find_image(folder, text);
 
   const auto matrix = object.find("transform_matrix");
@@ -280,11 +286,17 @@ Result<Transforms> parse_transforms(std::string_view text, const fs::path& sourc
   const Place top{source.string(), ""};
   EMBERLOCK_ASSIGN_OR_RETURN(const json document, parse(text, top, source.string()));
   if (!document.is_object()) return top.error("is no transforms.json", R"(Give an object with "frames")");
-  EMBERLOCK_RETURN_IF_ERROR(check_keys(document, top, {"frames", "box"}));
+  EMBERLOCK_RETURN_IF_ERROR(check_keys(document, top, {"frames", "box", "camera_response"}));
   LensFields shared;
   EMBERLOCK_RETURN_IF_ERROR(read_lens(document, top, shared));
 
   Transforms transforms;
+  transforms.where = source.string();
+  if (document.contains("camera_response")) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::string response,
+                               read_path(document, "camera_response", top, "no file is named"));
+    transforms.camera_response = source.parent_path() / response;
+  }
   if (const auto box = document.find("box"); box != document.end()) {
     EMBERLOCK_ASSIGN_OR_RETURN(transforms.box, read_box(*box, top.at("box")));
   }
@@ -308,6 +320,16 @@ Result<Transforms> parse_transforms(std::string_view text, const fs::path& sourc
 Result<Transforms> read_transforms(const fs::path& path) {
   EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path, kLargestFile));
   return parse_transforms(text, path);
+}
+
+Result<std::shared_ptr<const CameraResponse>> response_of(const Transforms& transforms) {
+  if (!transforms.camera_response) return std::shared_ptr<const CameraResponse>{};
+  auto response = read_camera_response(*transforms.camera_response);
+  if (!response) {
+    return Error{response.error().kind, response.error().message(), transforms.where + ": camera_response",
+                 "Correct the path or that file; `emberlock calibrate colour --black-body` makes one"};
+  }
+  return std::make_shared<const CameraResponse>(*std::move(response));
 }
 
 Result<Intrinsics> intrinsics_of(const TransformsFrame& frame, ImageSize size) {

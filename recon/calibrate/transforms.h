@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include "base/result.h"
 #include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
+#include "recon/calibrate/camera_response.h"
 
 namespace emberlock::recon {
 
@@ -41,12 +43,20 @@ struct TransformsFrame {
 struct Transforms {
   std::vector<TransformsFrame> frames;  ///< 1..kMaxViews
   std::optional<Box> box;               ///< `"box": {"center": [x, y, z], "size": [x, y, z]}`, our extension
+  /// `"camera_response": "response.json"`, our extension: of all cameras (camera_response.h); relative paths
+  /// start from the folder of the json.
+  std::optional<std::filesystem::path> camera_response = {};
+  std::string where = {};  ///< "path/transforms.json", for messages
 };
 
 /// `json` is the content of the file, `source` its path. Accesses the disk only to complete a `file_path`
 /// without extension. Errors name the file, the field and the remedy.
 Result<Transforms> parse_transforms(std::string_view json, const std::filesystem::path& source);
 Result<Transforms> read_transforms(const std::filesystem::path& path);
+
+/// The cameras' response; null if the file names none. Errors name the file and its field, then those of
+/// read_camera_response().
+Result<std::shared_ptr<const CameraResponse>> response_of(const Transforms& transforms);
 
 /// The frame's intrinsics for a picture of `size`. Errors: size differs from w, h; no focal length; a
 /// distortion that isn't invertible within the picture.

@@ -65,8 +65,9 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
                                                              options.solve, task.elapsed, progress));
   if (!options.temperature) return {};
   const Seconds start = task.elapsed();
-  const CameraResponse& response =
-      options.temperature->response ? *options.temperature->response : standard_response();
+  const CameraResponse* told =
+      options.temperature->response ? options.temperature->response.get() : task.scene().response.get();
+  const CameraResponse& response = told != nullptr ? *told : standard_response();
   tell(progress, kNearlyDone, "reading temperatures");
   outcome.temperature = temperature_of(task.scene(), outcome.reconstruction, *outcome.errors, response,
                                        options.temperature->emitter, options.solve.compute);

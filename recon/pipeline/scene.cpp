@@ -27,6 +27,7 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
   if (options.rig) return bad(path.string(), "holds its own calibration", "Leave --rig out");
   EMBERLOCK_ASSIGN_OR_RETURN(const Transforms transforms, read_transforms(path));
   Scene scene;
+  EMBERLOCK_ASSIGN_OR_RETURN(scene.response, response_of(transforms));
   scene.preprocessing = {{"all", false, "pictures of a transforms.json are taken as they are"}};
   for (const TransformsFrame& frame : transforms.frames) {
     const auto image = session::read_image(frame.image);
@@ -65,8 +66,10 @@ std::vector<fs::path> files_of(const fs::path& input, const SceneOptions& option
   if (options.rig) files.push_back(*options.rig);
   std::error_code ec;
   if (!fs::is_regular_file(input, ec)) return files;
-  if (const auto transforms = read_transforms(input))
+  if (const auto transforms = read_transforms(input)) {
+    if (transforms->camera_response) files.push_back(*transforms->camera_response);
     for (const TransformsFrame& frame : transforms->frames) files.push_back(frame.image);
+  }
   return files;
 }
 

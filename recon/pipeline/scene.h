@@ -40,14 +40,16 @@ struct SceneOptions {
 /// input, all of role input. Errors name file, field and remedy: those of read_transforms(), read_image() and
 /// SessionReader; an input that is neither; no box in the input nor in the options, and none to be found; a
 /// rig that doesn't fit, a camera without calibration, more than 64 of them; a camera of the session that has
-/// no complete frame within one frame period of the chosen instant.
+/// no complete frame within one frame period of the chosen instant; a camera response that can't be read, or
+/// cameras with different ones.
 ///
 /// A box is found (find_box()) so that it holds the flame of several instants over a session. Where a
 /// session's times.json says that cameras were late, views bring their lateness, and what each camera shows
 /// on average over frames of the whole recording, the same whatever frame is asked for.
 Result<Scene> load_scene(const std::filesystem::path& input, const SceneOptions& options = {});
 
-/// What load_scene() reads, as far as it is there: the input, a transforms.json's pictures, the rig.
+/// What load_scene() reads, as far as it is there: the input, a transforms.json's pictures
+/// and camera response, the rig.
 std::vector<std::filesystem::path> files_of(const std::filesystem::path& input,
                                             const SceneOptions& options = {});
 

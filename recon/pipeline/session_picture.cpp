@@ -145,6 +145,7 @@ Result<FrameDeveloper> FrameDeveloper::create(session::SessionReader& reader, st
   if (stream.has_colour()) {
     EMBERLOCK_ASSIGN_OR_RETURN(developer.colour_, read_colour(stream.colour(), reader.layout(camera).size,
                                                               "camera " + stream.camera_id()));
+    if (changes_nothing(*developer.colour_)) developer.colour_.reset();
   }
   Frames dark;
   if (options.background == FrameOptions::Background::automatic) {

@@ -296,6 +296,8 @@ Result<Scene> load_session(const fs::path& folder, const SceneOptions& options) 
     return {};
   }));
   Scene scene;
+  EMBERLOCK_ASSIGN_OR_RETURN(scene.response,
+                             common_response(manifest, options.rig ? options.rig->string() : manifest_name));
   Recording recording{reader, manifest, options, {}};
   std::vector<std::pair<std::string, std::vector<PreprocessStep>>> steps;
   steps.reserve(cameras.size());

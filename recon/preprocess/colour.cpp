@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "recon/calibrate/rig.h"
+
 namespace emberlock::recon {
 namespace {
 
@@ -67,6 +69,18 @@ Status read_flat(const v1::FlatField& message, FlatField& flat, const std::strin
   return {};
 }
 
+Status read_spectral(const v1::Colour& message, Colour& colour, const std::string& where) {
+  constexpr double kLongestExposure = 3600;  // s
+  if (!(message.exposure_s() >= 0 && message.exposure_s() <= kLongestExposure))
+    return bad_field(where, "exposure_s", "isn't within 0 to 3600 s");
+  colour.exposure = Seconds(message.exposure_s());
+  if (!message.has_spectral()) return {};
+  EMBERLOCK_ASSIGN_OR_RETURN(CameraResponse response,
+                             camera_response_of(message.spectral(), where + ".colour.spectral"));
+  colour.spectral = std::make_shared<const CameraResponse>(std::move(response));
+  return {};
+}
+
 }  // namespace
 
 std::array<double, 3> light_at(const FlatField& flat, double x, double y) {
@@ -83,6 +97,12 @@ std::array<double, 3> light_at(const FlatField& flat, double x, double y) {
         std::lerp(cell(across.before, down.after, c), cell(across.after, down.after, c), across.part),
         down.part);
   return out;
+}
+
+bool changes_nothing(const Colour& colour) {
+  const std::array<double, 3> none = {};
+  return colour.response.empty() && colour.dark == none && colour.gain == std::array<double, 3>{1, 1, 1} &&
+         colour.vignetting == none && colour.flat.light.empty() && colour.hot_pixels.empty();
 }
 
 double exposure_of(const Colour& colour, double sample) {
@@ -120,6 +140,7 @@ Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std:
     colour.hot_pixels.push_back(pixel);
   }
   std::sort(colour.hot_pixels.begin(), colour.hot_pixels.end());
+  EMBERLOCK_RETURN_IF_ERROR(read_spectral(message, colour, where));
   return colour;
 }
 
@@ -135,6 +156,8 @@ v1::Colour to_message(const Colour& colour) {
     message.mutable_flat()->set_rows(static_cast<std::uint32_t>(colour.flat.rows));
     message.mutable_flat()->mutable_light()->Assign(colour.flat.light.begin(), colour.flat.light.end());
   }
+  if (colour.spectral) *message.mutable_spectral() = message_of(*colour.spectral);
+  if (colour.exposure.value() != 0) message.set_exposure_s(colour.exposure.value());
   return message;
 }
 

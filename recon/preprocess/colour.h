@@ -3,11 +3,14 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "base/image.h"
+#include "base/quantity.h"
 #include "base/result.h"
+#include "recon/calibrate/camera_response.h"
 #include "session/rig_file.h"  // v1::Colour
 
 namespace emberlock::recon {
@@ -28,7 +31,13 @@ struct Colour {
   std::array<double, 3> vignetting = {};   ///< k2, k4, k6
   FlatField flat = {};
   std::vector<std::uint32_t> hot_pixels = {};  ///< y * width + x, rising
+  /// Of the pictures that all of the above made; null: not known.
+  std::shared_ptr<const CameraResponse> spectral = {};
+  Seconds exposure{0};  ///< at which `spectral` holds; 0: not told
 };
+
+/// Whether pictures stay as they are: nothing but the spectral response is known.
+bool changes_nothing(const Colour& colour);
 
 /// Relative exposure 0..1 of a sample 0..1, linear between the points of the response.
 double exposure_of(const Colour& colour, double sample);
@@ -48,7 +57,8 @@ double radius_squared(ImageSize size, double x, double y);
 /// Converts the message for pictures of `size`. Errors name the field below `where`: numbers that aren't
 /// finite, a response that doesn't rise from 0 to 1, other than three gains or dark levels, gains not above
 /// 0, a vignetting or flat field without light somewhere, a flat field with a wrong number of values, hot
-/// pixels outside the picture.
+/// pixels outside the picture, a spectral response that isn't valid (camera_response.h), an exposure time
+/// below 0 or above an hour.
 Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std::string& where);
 v1::Colour to_message(const Colour& colour);
 

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "base/quantity.h"
 #include "recon/calibrate/box.h"
 #include "recon/calibrate/camera_model.h"
+#include "recon/calibrate/camera_response.h"
 #include "recon/preprocess/radiance_image.h"
 
 namespace emberlock::recon {
@@ -46,6 +48,7 @@ struct Scene {
   std::vector<PreprocessStep> preprocessing = {};  ///< what was done to the pictures, in order
   /// They went through their cameras' calibrated responses: another gamma would bend them twice.
   bool linearised = false;
+  std::shared_ptr<const CameraResponse> response = {};  ///< of all views; null: not known
 };
 
 }  // namespace emberlock::recon

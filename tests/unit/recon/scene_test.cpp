@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
+#include "recon/calibrate/rig.h"
 #include "session/reader.h"
 #include "session/shutter_times.h"
 #include "session/writer.h"
@@ -268,6 +269,23 @@ TEST_F(SessionSceneTest, AManifestsColourMakesCamerasAlike) {
   EXPECT_THAT(scene->preprocessing[0].reason, HasSubstr("1 of 3 cameras, cam2: by the calibrated response"));
   colour->set_response(2, 0.5);
   EXPECT_THAT(load_scene(record(m)).error().message(), HasSubstr("camera cam2.colour.response"));
+}
+
+TEST_F(SessionSceneTest, OneCamerasResponseIsTheScenesAndChangesNoPicture) {
+  v1::Manifest m = manifest();
+  const auto plain = load_scene(record(m));
+  ASSERT_TRUE(plain.ok()) << plain.error().message();
+  EXPECT_EQ(plain->response, nullptr);
+  *m.mutable_cameras(1)->mutable_colour()->mutable_spectral() = message_of(standard_response());
+  const auto scene = load_scene(record(m));
+  ASSERT_TRUE(scene.ok()) << scene.error().message();
+  ASSERT_NE(scene->response, nullptr);
+  EXPECT_EQ(*scene->response, standard_response());
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(scene->views[i].image->rgb, plain->views[i].image->rgb);
+  *m.mutable_cameras(2)->mutable_colour()->mutable_spectral() = message_of(cie_1931_observer());
+  const auto differ = load_scene(record(m));
+  ASSERT_FALSE(differ.ok());
+  EXPECT_THAT(differ.error().message(), testing::AllOf(HasSubstr("cam1"), HasSubstr("cam2")));
 }
 
 TEST_F(SessionSceneTest, FramesWithoutFlameTellTheBackground) {

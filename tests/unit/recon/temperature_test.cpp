@@ -113,14 +113,14 @@ TEST(SelfAbsorption, OfABallsMiddleIsTheClosedForm) {
   volume.emission.assign(3 * volume.grid.size(), 0.0F);
   volume.extinction.assign(volume.grid.size(), 0.0F);
   constexpr double kRadius = 0.08;
-  constexpr double kExtinction = 10;
+  constexpr double kAbsorption = 10;
   for (int k = 0; k < 65; ++k)
     for (int j = 0; j < 65; ++j)
       for (int i = 0; i < 65; ++i) {
         const double r =
             0.2 / 64 * std::sqrt(std::pow(i - 32, 2) + std::pow(j - 32, 2) + std::pow(k - 32, 2));
         if (r > kRadius) continue;
-        volume.extinction[volume.grid.index(i, j, k)] = kExtinction;
+        volume.extinction[volume.grid.index(i, j, k)] = kAbsorption;
         for (std::size_t c = 0; c < 3; ++c) volume.emission[3 * volume.grid.index(i, j, k) + c] = 100;
       }
   PaperSceneOptions film;
@@ -132,7 +132,7 @@ TEST(SelfAbsorption, OfABallsMiddleIsTheClosedForm) {
   EXPECT_GT(own.channel[2], own.channel[0]) << "blue is absorbed more";
   for (std::size_t c = 0; c < 3; ++c)
     EXPECT_NEAR(own.factor[3 * volume.grid.index(32, 32, 32) + c],
-                std::exp((own.channel[c] - 1) * kExtinction * kRadius), 0.02)
+                std::exp((own.channel[c] - 1) * kAbsorption * kRadius), 0.02)
         << c;
   EXPECT_TRUE(self_absorption(scene, done, test::lobes(), Emitter::grey).factor.empty())
       << "grey costs nothing";

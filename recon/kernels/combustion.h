@@ -141,22 +141,4 @@ struct Burn {
   }
 };
 
-/// The floor's flux into the lowest cells, upwind and implicit: state = (state + c inlet) / (1 + c).
-struct FeedBurner {
-  Rgba inlet;
-  const float* speed = nullptr;  ///< m/s, of the floor's faces
-  Rgba* state = nullptr;
-  float* particles = nullptr;  ///< or absent
-  FluidGrid grid;
-  float cells = 0;  ///< dt / edge
-
-  HOST_DEVICE void operator()(int i, int j, int) const {
-    const std::size_t c = grid.index(i, j, 0);
-    const float share = cells * speed[c];
-    if (!(share > 0)) return;
-    state[c] = (1.F / (1.F + share)) * (state[c] + share * inlet);
-    if (particles != nullptr) particles[c] /= 1.F + share;
-  }
-};
-
 }  // namespace emberlock::recon

@@ -37,7 +37,7 @@ struct FlameSimulationOptions {
   double diffusivity = 0;   ///< of momentum, heat and mass, m^2/s, constant; 0: no such pass
   double unevenness = 0.1;  ///< of the burners' speed from face to face, 0..1 of it
   std::uint64_t seed = 1;   ///< of that
-  double cfl = 1;           ///< cells that gas passes in a substep at most, 0.1..4
+  double cfl = 0.9;         ///< cells that gas passes in a substep at most, along all axes together, 0.1..1
   int substeps = 1000;      ///< of a step at most; a longer step is refused
   ComputeOptions compute;
 };
@@ -59,7 +59,7 @@ struct FluidStats {
   double relative_divergence = 0;  ///< rms of (divergence - that of expanding gas): after the projection over
                                    ///< before it; the worst substep's
   double cfl = 0;                  ///< cells passed in a substep, the most
-  double fastest = 0;              ///< m/s, a component of the velocity
+  double fastest = 0;              ///< m/s, the components of a velocity added up
   Kelvin hottest;
   double heat_release = 0;  ///< W, of the last substep
 };
@@ -76,12 +76,12 @@ struct GasState {
 
 /// Buoyant, burning gas on a staggered grid, after Nguyen, Fedkiw and Jensen 2002 ("Physically based modeling
 /// and animation of fire") and Hong, Shinar and Fedkiw 2007 ("Wrinkled flames and cellular patterns"). Unlike
-/// theirs its flames are not a sharp front but burn where fuel and oxygen mix. A substep: MacCormack
-/// advection, diffusion, the burners, combustion with soot and radiation, buoyancy, vorticity confinement,
-/// and a projection with the gas' true density, after which the divergence is that of gas which expands. Gas
-/// flows freely through the sides and the top, beyond which there is still air; the floor is solid and slips.
-/// Pure: no clock and no file, and the same bits for any number of threads. Not thread-safe; on a GPU it
-/// belongs to the thread that made it.
+/// theirs its flames are not a sharp front but burn where fuel and oxygen mix. A substep: XX diffusion, the
+/// burners, combustion with soot and radiation, buoyancy, vorticity confinement, and a projection with the
+/// gas' true density, after which the divergence is that of gas which expands. Gas flows freely through the
+/// sides and the top, beyond which there is still air; the floor is solid and slips. Pure: no clock and no
+/// file, and the same bits for any number of threads. Not thread-safe; on a GPU it belongs to the thread that
+/// made it.
 class FlameSimulation {
  public:
   /// Errors: bad_input for an option out of its range, device for a device that isn't there or full.

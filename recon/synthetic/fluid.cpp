@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <type_traits>
 
 #include "base/random.h"
 
@@ -120,10 +121,10 @@ Status FlameSimulation::Fluid::substep(double seconds, FluidStats& stats) {
   const auto dt = static_cast<float>(seconds);
   const float cells = dt / grid_.edge;
   const float per_kelvin = 1 / options_.gas.air_temperature;
+  transport(cells);
   advect(cells);
   if (options_.diffusivity > 0)
     diffuse(static_cast<float>(options_.diffusivity) * dt / (grid_.edge * grid_.edge));
-  feed(cells);
   if (burns())
     work_.cells(grid_, Burn{options_.gas, gas_.data(), particles_.data(), expansion_.data(), heat_.data(),
                             grid_, dt});
@@ -151,20 +152,33 @@ void FlameSimulation::Fluid::advect_faces(float cells) {
   work_.faces<Axis>(grid_, CorrectTrace<float, Axis>{in, hat, out, faces(), grid_, cells});
 }
 
-void FlameSimulation::Fluid::advect(float cells) {
-  work_.cells(grid_, TraceBack<Rgba, -1>{gas_.data(), gas_scratch_.data(), faces(), grid_, cells});
-  work_.cells(grid_, CorrectTrace<Rgba, -1>{gas_.data(), gas_scratch_.data(), next_gas_.data(), faces(),
-                                            grid_, cells});
+void FlameSimulation::Fluid::transport(float cells) {
+  Rgba inlet;
+  inlet.c[kTemperature] = options_.gas.burner_temperature;
+  inlet.c[kMixture] = burns() ? 1 : 0;
+  inlet.c[kFuel] = inlet.c[kMixture];
+  inlet.c[kSoot] = static_cast<float>(options_.burner_soot);
+  const Rgba* gas = gas_.data();
+  const auto stage = [&](const auto& inflow, const auto* start, const auto* in, auto* out, float keep) {
+    work_.cells(grid_,
+                Transport<std::decay_t<decltype(inflow)>>{start, in, out, gas, faces(), grid_, inflow,
+                                                          options_.gas.burner_temperature, cells, keep});
+  };
+  stage(inlet, gas, gas, gas_scratch_.data(), 0.F);
+  stage(inlet, gas, gas_scratch_.data(), next_gas_.data(), 0.5F);
   if (burns()) {
-    work_.cells(grid_, TraceBack<float, -1>{particles_.data(), scratch_.data(), faces(), grid_, cells});
-    work_.cells(grid_, CorrectTrace<float, -1>{particles_.data(), scratch_.data(), next_particles_.data(),
-                                               faces(), grid_, cells});
+    const float* particles = particles_.data();
+    stage(0.F, particles, particles, scratch_.data(), 0.F);
+    stage(0.F, particles, scratch_.data(), next_particles_.data(), 0.5F);
     particles_.swap(next_particles_);
   }
+  gas_.swap(next_gas_);
+}
+
+void FlameSimulation::Fluid::advect(float cells) {
   advect_faces<0>(cells);
   advect_faces<1>(cells);
   advect_faces<2>(cells);
-  gas_.swap(next_gas_);
   for (int axis = 0; axis < 3; ++axis) velocity_[axis].swap(next_velocity_[axis]);
 }
 
@@ -185,16 +199,6 @@ void FlameSimulation::Fluid::diffuse(float share) {
   diffuse_faces<0>(share);
   diffuse_faces<1>(share);
   diffuse_faces<2>(share);
-}
-
-void FlameSimulation::Fluid::feed(float cells) {
-  Rgba inlet;
-  inlet.c[kTemperature] = options_.gas.burner_temperature;
-  inlet.c[kMixture] = burns() ? 1 : 0;
-  inlet.c[kFuel] = inlet.c[kMixture];
-  inlet.c[kSoot] = static_cast<float>(options_.burner_soot);
-  work_.each({grid_.nx, grid_.ny, 1}, FeedBurner{inlet, velocity_[2].data(), gas_.data(),
-                                                 burns() ? particles_.data() : nullptr, grid_, cells});
 }
 
 void FlameSimulation::Fluid::confine(float dt) {

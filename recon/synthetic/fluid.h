@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "recon/kernels/fluid_forces.h"
+#include "recon/kernels/fluid_transport.h"
 #include "recon/synthetic/flame_simulation.h"
 #include "recon/synthetic/fluid_work.h"
 #include "recon/synthetic/pressure_solver.h"
@@ -29,13 +30,13 @@ class FlameSimulation::Fluid {
   [[nodiscard]] double longest_substep(const FluidStats& stats) const;
   void look(FluidStats& stats);
   Status substep(double dt, FluidStats& stats);
+  void transport(float cells);
   void advect(float cells);
   template <int Axis>
   void advect_faces(float cells);
   void diffuse(float share);
   template <int Axis>
   void diffuse_faces(float share);
-  void feed(float cells);
   void confine(float dt);
   Status project(FluidStats& stats);
   [[nodiscard]] ConstFaceFields faces() const;

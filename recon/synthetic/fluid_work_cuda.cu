@@ -5,6 +5,7 @@
 #include "recon/kernels/combustion.h"
 #include "recon/kernels/fluid_forces.h"
 #include "recon/kernels/fluid_pressure.h"
+#include "recon/kernels/fluid_transport.h"
 
 namespace emberlock::recon {
 namespace {
@@ -43,22 +44,19 @@ void each_on_gpu(const FluidRange& range, const Act& act) {
   launch(range.size(), AtIndices<Act>{act, range}, "a fluid's pass");
 }
 
-template void each_on_gpu(const FluidRange&, const TraceBack<float, -1>&);
+template void each_on_gpu(const FluidRange&, const Transport<float>&);
+template void each_on_gpu(const FluidRange&, const Transport<Rgba>&);
 template void each_on_gpu(const FluidRange&, const TraceBack<float, 0>&);
 template void each_on_gpu(const FluidRange&, const TraceBack<float, 1>&);
 template void each_on_gpu(const FluidRange&, const TraceBack<float, 2>&);
-template void each_on_gpu(const FluidRange&, const TraceBack<Rgba, -1>&);
-template void each_on_gpu(const FluidRange&, const CorrectTrace<float, -1>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 0>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 1>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 2>&);
-template void each_on_gpu(const FluidRange&, const CorrectTrace<Rgba, -1>&);
 template void each_on_gpu(const FluidRange&, const Diffuse<float, -1>&);
 template void each_on_gpu(const FluidRange&, const Diffuse<float, 0>&);
 template void each_on_gpu(const FluidRange&, const Diffuse<float, 1>&);
 template void each_on_gpu(const FluidRange&, const Diffuse<float, 2>&);
 template void each_on_gpu(const FluidRange&, const Diffuse<Rgba, -1>&);
-template void each_on_gpu(const FluidRange&, const FeedBurner&);
 template void each_on_gpu(const FluidRange&, const Burn&);
 template void each_on_gpu(const FluidRange&, const Buoyancy&);
 template void each_on_gpu(const FluidRange&, const Vorticity&);

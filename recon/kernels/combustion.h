@@ -76,7 +76,7 @@ struct Burn {
   GasProperties gas;
   Rgba* state = nullptr;
   float* particles = nullptr;
-  float* expansion = nullptr;  ///< out, 1/s: the divergence that heat asks for
+  float* expansion = nullptr;  ///< 1/s: the divergence that heat asks for is added
   float* heat = nullptr;       ///< out, W/m^3 released by combustion
   FluidGrid grid;
   float dt = 0;
@@ -84,7 +84,6 @@ struct Burn {
   HOST_DEVICE void operator()(int i, int j, int k) const {
     const std::size_t c = grid.index(i, j, k);
     Rgba s = state[c];
-    expansion[c] = 0;
     heat[c] = 0;
     if (s.c[kMixture] < 1e-6F && s.c[kTemperature] < gas.air_temperature + 1) return;  // air
     const float before = s.c[kTemperature];
@@ -107,7 +106,7 @@ struct Burn {
     s.c[kFuel] = fuel;
     s.c[kSoot] = soot;
     state[c] = s;
-    expansion[c] = std::log(t / before) / dt;
+    expansion[c] += std::log(t / before) / dt;
     heat[c] = density * burnt * gas.heat_of_combustion / dt;
   }
 

@@ -108,27 +108,4 @@ struct CorrectTrace {
   }
 };
 
-/// Explicit diffusion: out = in + share * (sum of the six neighbours - 6 in), without flux through the floor.
-/// `Axis` as above.
-template <class Value, int Axis>
-struct Diffuse {
-  const Value* in = nullptr;
-  Value* out = nullptr;
-  FluidGrid grid;
-  float share = 0;  ///< D dt / edge^2, at most 1/6
-
-  HOST_DEVICE void operator()(int i, int j, int k) const {
-    const std::size_t c = grid.index(i, j, k);
-    const std::size_t y = grid.stride_y();
-    const std::size_t z = grid.stride_z();
-    if (Axis == 2 && k == 0) {
-      out[c] = in[c];
-      return;
-    }
-    const Value below = k > 0 ? in[c - z] : in[c];
-    const Value around = (in[c - 1] + in[c + 1]) + (in[c - y] + in[c + y]) + (below + in[c + z]);
-    out[c] = in[c] + share * (around - 6.F * in[c]);
-  }
-};
-
 }  // namespace emberlock::recon

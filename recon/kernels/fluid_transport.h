@@ -50,8 +50,7 @@ struct Transport {
     const float speed = Side < 0 ? velocity.axis[Axis][c] : -velocity.axis[Axis][next];  // inwards
     const bool boundary = Side < 0 ? at == 0 : at == last;
     const float here = gas[c].c[0];
-    if (Axis == 2 && Side < 0 && boundary)
-      return (speed * here / inlet_temperature) * (inlet - in[c]);
+    if (Axis == 2 && Side < 0 && boundary) return (speed * here / inlet_temperature) * (inlet - in[c]);
     // The density at the face over the cell's.
     const float flow = speed * 2 * here / (here + gas[next].c[0]);
     if (speed > 0) {

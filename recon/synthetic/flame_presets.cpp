@@ -22,6 +22,7 @@ void make_candle(FlameSimulationOptions& o) {
   o.gas.burner_temperature = 600;
   o.gas.mixing_time = 0.001F;
   o.diffusivity = 1e-4;
+  o.eddies = 0;
   o.unevenness = 0;
 }
 
@@ -46,6 +47,7 @@ FlameSimulationOptions flame_preset(FlamePreset preset, int cells) {
   FlameSimulationOptions o;
   o.nx = o.ny = cells;
   o.nz = 2 * cells;
+  o.eddies = 0.17;
   double width = 0.6;  // metres
   switch (preset) {
     case FlamePreset::candle:

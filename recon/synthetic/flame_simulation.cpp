@@ -42,6 +42,7 @@ Status check_options(const FlameSimulationOptions& o) {
   if (!in_range(o.burner_soot, 0, 0.5)) return bad_flame("burner_soot", "0 to 0.5");
   if (!in_range(o.confinement, 0, 1)) return bad_flame("confinement", "0 to 1");
   if (!in_range(o.diffusivity, 0, 1e3)) return bad_flame("diffusivity", "0 to 1000 m^2/s");
+  if (!in_range(o.eddies, 0, 0.3)) return bad_flame("eddies", "0 to 0.3");
   if (!in_range(o.unevenness, 0, 1)) return bad_flame("unevenness", "0 to 1");
   if (!in_range(o.cfl, 0.1, 1)) return bad_flame("cfl", "0.1 to 1");
   if (o.substeps < 1) return bad_flame("substeps", "1 or more");

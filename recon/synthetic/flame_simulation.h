@@ -32,9 +32,10 @@ struct FlameSimulationOptions {
   std::vector<Burner> burners = {Burner{}};
   Combustion combustion = Combustion::one_step;
   GasProperties gas;
-  double burner_soot = 0;   ///< mass fraction of soot (or smoke) in what flows out, 0..0.5
-  double confinement = 0;   ///< strength of the vorticity confinement, 0..1; 0: no such pass
-  double diffusivity = 0;   ///< of momentum, heat and mass, m^2/s, constant; 0: no such pass
+  double burner_soot = 0;  ///< mass fraction of soot (or smoke) in what flows out, 0..0.5
+  double confinement = 0;  ///< strength of the vorticity confinement, 0..1; 0: no such pass
+  double diffusivity = 0;  ///< of momentum, heat and mass, m^2/s, constant; 0: no such pass
+  double eddies = 0;       ///< Smagorinsky's constant, 0..0.3: mixing by eddies below a cell; 0: no such pass
   double unevenness = 0.1;  ///< of the burners' speed from face to face, 0..1 of it
   std::uint64_t seed = 1;   ///< of that
   double cfl = 0.9;         ///< cells that gas passes in a substep at most, along all axes together, 0.1..1
@@ -76,12 +77,12 @@ struct GasState {
 
 /// Buoyant, burning gas on a staggered grid, after Nguyen, Fedkiw and Jensen 2002 ("Physically based modeling
 /// and animation of fire") and Hong, Shinar and Fedkiw 2007 ("Wrinkled flames and cellular patterns"). Unlike
-/// theirs its flames are not a sharp front but burn where fuel and oxygen mix. A substep: XX diffusion, the
-/// burners, combustion with soot and radiation, buoyancy, vorticity confinement, and a projection with the
-/// gas' true density, after which the divergence is that of gas which expands. Gas flows freely through the
-/// sides and the top, beyond which there is still air; the floor is solid and slips. Pure: no clock and no
-/// file, and the same bits for any number of threads. Not thread-safe; on a GPU it belongs to the thread that
-/// made it.
+/// theirs its flames are not a sharp front but burn where fuel and oxygen mix. A substep: transport of what
+/// the gas carries, MacCormack advection of its velocity, diffusion, combustion with soot and radiation,
+/// buoyancy, vorticity confinement, and a projection with the gas' true density, after which the divergence
+/// is that of gas which expands. Gas flows freely through the sides and the top, beyond which there is still
+/// air; the floor is solid and slips. Pure: no clock and no file, and the same bits for any number of
+/// threads. Not thread-safe; on a GPU it belongs to the thread that made it.
 class FlameSimulation {
  public:
   /// Errors: bad_input for an option out of its range, device for a device that isn't there or full.

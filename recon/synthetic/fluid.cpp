@@ -46,8 +46,10 @@ FlameSimulation::Fluid::Fluid(const FlameSimulationOptions& options)
     array->fill(still);
   }
   if (burns())
-    for (FluidArray<float>* array : {&particles_, &next_particles_, &scratch_, &expansion_, &heat_})
+    for (FluidArray<float>* array : {&particles_, &next_particles_, &scratch_, &heat_})
       *array = work_.array<float>(size);
+  if (burns() || diffuses()) expansion_ = work_.array<float>(size);
+  if (options.eddies > 0) eddies_ = work_.array<float>(size);
   set_burners();
 }
 
@@ -93,7 +95,7 @@ double FlameSimulation::Fluid::longest_substep(const FluidStats& stats) const {
   const double divisor = speed + std::sqrt(speed * speed + 4 * faster * way);
   double longest = divisor > 0 ? 2 * way / divisor : 1e9;
   if (options_.diffusivity > 0)
-    longest = std::min(longest, options_.edge.value() * options_.edge.value() / (7 * options_.diffusivity));
+    longest = std::min(longest, options_.edge.value() * options_.edge.value() / (12 * options_.diffusivity));
   return longest;
 }
 
@@ -123,8 +125,10 @@ Status FlameSimulation::Fluid::substep(double seconds, FluidStats& stats) {
   const float per_kelvin = 1 / options_.gas.air_temperature;
   transport(cells);
   advect(cells);
-  if (options_.diffusivity > 0)
-    diffuse(static_cast<float>(options_.diffusivity) * dt / (grid_.edge * grid_.edge));
+  if (diffuses())
+    diffuse(dt);
+  else if (burns())
+    work_.cells(grid_, SetZero{expansion_.data(), grid_});
   if (burns())
     work_.cells(grid_, Burn{options_.gas, gas_.data(), particles_.data(), expansion_.data(), heat_.data(),
                             grid_, dt});
@@ -183,22 +187,32 @@ void FlameSimulation::Fluid::advect(float cells) {
 }
 
 template <int Axis>
-void FlameSimulation::Fluid::diffuse_faces(float share) {
-  work_.faces<Axis>(grid_,
-                    Diffuse<float, Axis>{velocity_[Axis].data(), next_velocity_[Axis].data(), grid_, share});
+void FlameSimulation::Fluid::diffuse_faces(float share, const float* eddies) {
+  work_.faces<Axis>(
+      grid_, DiffuseFaces<Axis>{velocity_[Axis].data(), next_velocity_[Axis].data(), eddies, grid_, share});
   velocity_[Axis].swap(next_velocity_[Axis]);
 }
 
-void FlameSimulation::Fluid::diffuse(float share) {
-  work_.cells(grid_, Diffuse<Rgba, -1>{gas_.data(), next_gas_.data(), grid_, share});
-  gas_.swap(next_gas_);
+void FlameSimulation::Fluid::diffuse(float dt) {
+  const float share = static_cast<float>(options_.diffusivity) * dt / (grid_.edge * grid_.edge);
+  const float* eddies = nullptr;
+  if (options_.eddies > 0) {
+    const auto strength = static_cast<float>(options_.eddies);
+    work_.cells(grid_, EddyDiffusion{faces(), eddies_.data(), grid_, strength * strength * dt / grid_.edge});
+    eddies = eddies_.data();
+  }
+  const Rgba* gas = gas_.data();
+  work_.cells(grid_, DiffuseCells<Rgba>{gas, next_gas_.data(), gas, eddies, grid_, share});
   if (burns()) {
-    work_.cells(grid_, Diffuse<float, -1>{particles_.data(), next_particles_.data(), grid_, share});
+    work_.cells(grid_,
+                DiffuseCells<float>{particles_.data(), next_particles_.data(), gas, eddies, grid_, share});
     particles_.swap(next_particles_);
   }
-  diffuse_faces<0>(share);
-  diffuse_faces<1>(share);
-  diffuse_faces<2>(share);
+  work_.cells(grid_, HeatedBy{gas, next_gas_.data(), expansion_.data(), grid_, 1 / dt});
+  gas_.swap(next_gas_);
+  diffuse_faces<0>(share, eddies);
+  diffuse_faces<1>(share, eddies);
+  diffuse_faces<2>(share, eddies);
 }
 
 void FlameSimulation::Fluid::confine(float dt) {
@@ -227,7 +241,8 @@ Status FlameSimulation::Fluid::project(FluidStats& stats) {
   double left = 1;
   for (int pass = 0;; ++pass) {
     float* b = pressure_.b();
-    work_.cells(grid_, DivergenceError{faces(), burns() ? expansion_.data() : nullptr, grid_, b});
+    work_.cells(grid_,
+                DivergenceError{faces(), expansion_.size() > 0 ? expansion_.data() : nullptr, grid_, b});
     const double size = std::sqrt(work_.sum(grid_, TwoProducts{b, b, b}).first);
     if (pass == 0) first = size;
     if (!(first > 0)) return {};

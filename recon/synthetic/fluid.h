@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "recon/kernels/fluid_diffusion.h"
 #include "recon/kernels/fluid_forces.h"
 #include "recon/kernels/fluid_transport.h"
 #include "recon/synthetic/flame_simulation.h"
@@ -34,12 +35,13 @@ class FlameSimulation::Fluid {
   void advect(float cells);
   template <int Axis>
   void advect_faces(float cells);
-  void diffuse(float share);
+  void diffuse(float dt);
   template <int Axis>
-  void diffuse_faces(float share);
+  void diffuse_faces(float share, const float* eddies);
   void confine(float dt);
   Status project(FluidStats& stats);
   [[nodiscard]] ConstFaceFields faces() const;
+  [[nodiscard]] bool diffuses() const { return options_.diffusivity > 0 || options_.eddies > 0; }
   [[nodiscard]] bool burns() const { return options_.combustion == Combustion::one_step; }
 
   FlameSimulationOptions options_;
@@ -49,7 +51,9 @@ class FlameSimulation::Fluid {
   FluidArray<float> velocity_[3], next_velocity_[3];
   FluidArray<float> face_scratch_[3], scratch_;
   FluidArray<Rgba> gas_, next_gas_, gas_scratch_;
-  FluidArray<float> particles_, next_particles_, expansion_, heat_;  // empty if nothing burns
+  FluidArray<float> particles_, next_particles_, heat_;  // empty if nothing burns
+  FluidArray<float> expansion_, eddies_;
+
   PressureSolver pressure_;
   double fastest_burner_ = 0;
 };

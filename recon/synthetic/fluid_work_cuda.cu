@@ -3,6 +3,7 @@
 
 #include "recon/compute/cuda_launch.h"
 #include "recon/kernels/combustion.h"
+#include "recon/kernels/fluid_diffusion.h"
 #include "recon/kernels/fluid_forces.h"
 #include "recon/kernels/fluid_pressure.h"
 #include "recon/kernels/fluid_transport.h"
@@ -52,11 +53,13 @@ template void each_on_gpu(const FluidRange&, const TraceBack<float, 2>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 0>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 1>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 2>&);
-template void each_on_gpu(const FluidRange&, const Diffuse<float, -1>&);
-template void each_on_gpu(const FluidRange&, const Diffuse<float, 0>&);
-template void each_on_gpu(const FluidRange&, const Diffuse<float, 1>&);
-template void each_on_gpu(const FluidRange&, const Diffuse<float, 2>&);
-template void each_on_gpu(const FluidRange&, const Diffuse<Rgba, -1>&);
+template void each_on_gpu(const FluidRange&, const EddyDiffusion&);
+template void each_on_gpu(const FluidRange&, const DiffuseFaces<0>&);
+template void each_on_gpu(const FluidRange&, const DiffuseFaces<1>&);
+template void each_on_gpu(const FluidRange&, const DiffuseFaces<2>&);
+template void each_on_gpu(const FluidRange&, const DiffuseCells<float>&);
+template void each_on_gpu(const FluidRange&, const DiffuseCells<Rgba>&);
+template void each_on_gpu(const FluidRange&, const HeatedBy&);
 template void each_on_gpu(const FluidRange&, const Burn&);
 template void each_on_gpu(const FluidRange&, const Buoyancy&);
 template void each_on_gpu(const FluidRange&, const Vorticity&);

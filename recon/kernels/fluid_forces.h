@@ -15,7 +15,7 @@ struct Buoyancy {
   const Rgba* state = nullptr;
   float* w = nullptr;
   FluidGrid grid;
-  float per_kelvin = 0;  ///< 1 / temperature outside
+  float air = 0;  ///< temperature outside
   float dt = 0;
 
   HOST_DEVICE void operator()(int i, int j, int k) const {
@@ -23,7 +23,7 @@ struct Buoyancy {
     const std::size_t c = grid.index(i, j, k);
     const float below = state[c - grid.stride_z()].c[0];
     const float mean = k == grid.nz ? below : 0.5F * (below + state[c].c[0]);
-    w[c] += dt * kGravity * (mean * per_kelvin - 1);
+    w[c] += dt * kGravity * ((mean - air) / air);
   }
 };
 

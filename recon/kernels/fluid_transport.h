@@ -27,6 +27,10 @@ HOST_DEVICE inline Rgba limited_slope(const Rgba& a, const Rgba& b) {
   return slope;
 }
 
+/// What rounding made negative.
+HOST_DEVICE inline float at_least_zero(float v) { return v > 0 ? v : 0.F; }
+HOST_DEVICE inline Rgba at_least_zero(const Rgba& v) { return non_negative(v); }
+
 /// One stage: out = keep start + (1 - keep) (in + dt change of in), where density * change is the mean over
 /// faces of mass flux * (face's value - cell's).
 template <class Value>
@@ -71,7 +75,7 @@ struct Transport {
     const Value y = through<1, -1>(c, j, grid.ny - 1) + through<1, 1>(c, j, grid.ny - 1);
     const Value z = through<2, -1>(c, k, grid.nz - 1) + through<2, 1>(c, k, grid.nz - 1);
     const Value stepped = in[c] + cells * (x + y + z);
-    out[c] = keep * start[c] + (1 - keep) * stepped;
+    out[c] = at_least_zero(keep * start[c] + (1 - keep) * stepped);
   }
 };
 

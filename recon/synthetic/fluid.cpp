@@ -111,6 +111,7 @@ Result<FluidStats> FlameSimulation::Fluid::step(Seconds time) {
                        std::to_string(options_.substeps) + " substeps",
                    "flame simulation", "Take shorter steps, or allow more substeps"};
     const double dt = left / std::max(1.0, parts);
+    stats.cfl = std::max(stats.cfl, stats.fastest * dt / options_.edge.value());
     EMBERLOCK_RETURN_IF_ERROR(substep(dt, stats));
     left = parts <= 1 ? 0 : left - dt;
     ++stats.substeps;
@@ -122,7 +123,6 @@ Result<FluidStats> FlameSimulation::Fluid::step(Seconds time) {
 Status FlameSimulation::Fluid::substep(double seconds, FluidStats& stats) {
   const auto dt = static_cast<float>(seconds);
   const float cells = dt / grid_.edge;
-  const float per_kelvin = 1 / options_.gas.air_temperature;
   transport(cells);
   advect(cells);
   if (diffuses())
@@ -132,14 +132,13 @@ Status FlameSimulation::Fluid::substep(double seconds, FluidStats& stats) {
   if (burns())
     work_.cells(grid_, Burn{options_.gas, gas_.data(), particles_.data(), expansion_.data(), heat_.data(),
                             grid_, dt});
-  work_.faces<2>(grid_, Buoyancy{gas_.data(), velocity_[2].data(), grid_, per_kelvin, dt});
+  work_.faces<2>(grid_, Buoyancy{gas_.data(), velocity_[2].data(), grid_, options_.gas.air_temperature, dt});
   if (options_.confinement > 0) confine(dt);
   EMBERLOCK_RETURN_IF_ERROR(project(stats));
   look(stats);
   if (!std::isfinite(stats.fastest) || !std::isfinite(stats.hottest.value()))
     return Error{ErrorKind::not_converged, "a number of the gas isn't finite", "flame simulation",
                  "Take smaller steps or a smaller cfl"};
-  stats.cfl = std::max(stats.cfl, stats.fastest * seconds / options_.edge.value());
   if (burns()) {
     const double volume = std::pow(options_.edge.value(), 3);
     stats.heat_release = volume * work_.sum(grid_, SumCells{heat_.data()}).first;

@@ -47,9 +47,11 @@ void each_on_gpu(const FluidRange& range, const Act& act) {
 
 template void each_on_gpu(const FluidRange&, const Transport<float>&);
 template void each_on_gpu(const FluidRange&, const Transport<Rgba>&);
+template void each_on_gpu(const FluidRange&, const TraceBack<float, -1>&);  // of tests
 template void each_on_gpu(const FluidRange&, const TraceBack<float, 0>&);
 template void each_on_gpu(const FluidRange&, const TraceBack<float, 1>&);
 template void each_on_gpu(const FluidRange&, const TraceBack<float, 2>&);
+template void each_on_gpu(const FluidRange&, const CorrectTrace<float, -1>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 0>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 1>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 2>&);

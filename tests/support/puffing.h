@@ -23,14 +23,15 @@ struct PuffingCase {
 };
 
 struct Puffing {
-  double frequency = 0;  ///< Hz, of the strongest line of the spectrum of the heights' mean
-  double expected = 0;   ///< 1.5 / sqrt(D)
+  double frequency = 0;       ///< Hz, of the strongest line of the spectrum of the heights' mean
+  double expected = 0;        ///< 1.5 / sqrt(D)
   std::vector<double> speed;  ///< m/s, upwards on the axis, one diameter above the burner
 };
 
 /// The strongest frequency between `low` and `high`, Hz, of samples `interval` s apart: the peak of their
 /// periodogram without mean, with a Hann window, at frequencies 0.01 Hz apart.
-inline double strongest_frequency(const std::vector<double>& samples, double interval, double low, double high) {
+inline double strongest_frequency(const std::vector<double>& samples, double interval, double low,
+                                  double high) {
   double mean = 0;
   for (const double s : samples) mean += s / static_cast<double>(samples.size());
   double best = 0;
@@ -74,7 +75,8 @@ inline Puffing count_puffs(const PuffingCase& c) {
           gas.velocity[3 * gas.grid.index(o.nx / 2 - a % 2, o.ny / 2 - a / 2, level) + 2]);
     result.speed.push_back(sum / 4);
   }
-  result.frequency = strongest_frequency(result.speed, c.interval, 0.3 * result.expected, 4 * result.expected);
+  result.frequency =
+      strongest_frequency(result.speed, c.interval, 0.3 * result.expected, 4 * result.expected);
   return result;
 }
 

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/synthetic/fluid_work_cuda.h"
-
 #include "recon/compute/cuda_launch.h"
 #include "recon/kernels/combustion.h"
 #include "recon/kernels/fluid_diffusion.h"
 #include "recon/kernels/fluid_forces.h"
 #include "recon/kernels/fluid_pressure.h"
 #include "recon/kernels/fluid_transport.h"
+#include "recon/synthetic/fluid_work_cuda.h"
 
 namespace emberlock::recon {
 namespace {

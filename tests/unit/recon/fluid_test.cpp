@@ -48,14 +48,14 @@ struct TurningBlob {
     for (int k = -1; k <= grid.nz; ++k)
       for (int j = -1; j <= grid.ny; ++j)
         for (int i = -1; i <= grid.nx; ++i) {
-          const double dx = (i + 0.5) / grid.nx - 0.5 - 0.2 * std::cos(angle);
-          const double dy = (j + 0.5) / grid.ny - 0.5 - 0.2 * std::sin(angle);
-          f[grid.index(i, j, k)] = static_cast<float>(std::exp(-(dx * dx + dy * dy) / (2 * 0.1 * 0.1)));
+          const double dx = (i + 0.5) / grid.nx - 0.5 - 0.15 * std::cos(angle);
+          const double dy = (j + 0.5) / grid.ny - 0.5 - 0.15 * std::sin(angle);
+          f[grid.index(i, j, k)] = static_cast<float>(std::exp(-(dx * dx + dy * dy) / (2 * 0.07 * 0.07)));
         }
     return f;
   }
-  /// Mean of |value - truth| over the middle layer's cells, but for the blob's top: both methods give up their
-  /// second order at extremes, so as to make no new ones.
+  /// Mean of |value - truth| over the middle layer's cells, but for the blob's top: both methods give up
+  /// their second order at extremes, so as to make no new ones.
   [[nodiscard]] double error(const std::vector<float>& values, double angle) const {
     const std::vector<float> truth = blob(angle);
     double sum = 0;

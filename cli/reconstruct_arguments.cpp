@@ -64,6 +64,19 @@ Result<recon::Box> parse_box(const std::string& text) {
   return box;
 }
 
+Status parse_quantity(const ReconstructArguments& arguments, recon::ReconstructOptions& options) {
+  options.errors = arguments.errors;
+  recon::TemperatureRequest request;
+  EMBERLOCK_ASSIGN_OR_RETURN(request.emitter, recon::parse_emitter(arguments.emitter));
+  if (!arguments.response.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(recon::CameraResponse response,
+                               recon::read_camera_response(arguments.response));
+    request.response = std::make_shared<const recon::CameraResponse>(std::move(response));
+  }
+  if (arguments.quantity == "temperature") options.temperature = std::move(request);
+  return {};
+}
+
 Result<recon::ReconstructOptions> options_of(const ReconstructArguments& arguments) {
   recon::ReconstructOptions options;
   EMBERLOCK_RETURN_IF_ERROR(parse_voxels(arguments.voxels, options));
@@ -81,6 +94,7 @@ Result<recon::ReconstructOptions> options_of(const ReconstructArguments& argumen
   options.solve.target_rmse = arguments.target_rmse;
   options.solve.flame_threshold = arguments.threshold;
   options.solve.seed = arguments.seed;
+  EMBERLOCK_RETURN_IF_ERROR(parse_quantity(arguments, options));
   if (options.solve.target_rmse && arguments.held_out.empty()) {
     return Error{ErrorKind::bad_input, "is judged on held-out views, and none is held out", "--target-rmse",
                  "Hold a view out with --hold-out i"};
@@ -140,6 +154,27 @@ void add_solve_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option("--target-rmse", a.target_rmse,
                    "Held-out error to reach, grey levels; sets the options that aren't given")
       ->check(CLI::PositiveNumber);
+}
+
+void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
+  CLI::Option* quantity =
+      verb->add_option("--quantity", a.quantity,
+                       "colour, or temperature: also the grids temperature and temperature_sigma, in K")
+          ->check(CLI::IsMember({"colour", "temperature"}))
+          ->capture_default_str();
+  verb->add_option(
+          "--response", a.response,
+          "The camera's spectral response, a response.json of `calibrate colour --black-body` [the input's; "
+          "else that of a camera that shows linear sRGB]")
+      ->needs(quantity);
+  verb->add_option("--emitter", a.emitter,
+                   "What glows: grey, soot (not grey), or paper (green alone, constant opacity)")
+      ->check(CLI::IsMember({"grey", "soot", "paper"}))
+      ->capture_default_str()
+      ->needs(quantity);
+  verb->add_flag(
+      "--errors", a.errors,
+      "Also the grids emission_sigma and density_sigma: solves again without each of up to ten views");
 }
 
 void add_picture_options(CLI::App* verb, ReconstructArguments& a) {

@@ -45,6 +45,10 @@ struct ReconstructArguments {
   int iterations = 0;
   int threads = 0;
   std::uint64_t seed = 1;
+  std::string quantity = "colour";
+  std::string response;
+  std::string emitter = "grey";
+  bool errors = false;
   std::optional<int> progress_fd;
   DaemonReconstruction by_daemon;
   std::shared_ptr<recon::SharedRecording> recording = {};  ///< of a sequence's frames
@@ -59,6 +63,8 @@ std::vector<std::filesystem::path> inputs_of(const ReconstructArguments& argumen
 
 /// Adds the options for solving.
 void add_solve_options(CLI::App* verb, ReconstructArguments& a);
+/// Adds the options for what is measured in the volume.
+void add_quantity_options(CLI::App* verb, ReconstructArguments& a);
 /// Adds the options for choosing a session's frames and converting them to radiance.
 void add_picture_options(CLI::App* verb, ReconstructArguments& a);
 

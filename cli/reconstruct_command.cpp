@@ -227,6 +227,7 @@ void add_reconstruct(CLI::App& app) {
       "256]");
   add_solve_options(verb, a);
   add_picture_options(verb, a);
+  add_quantity_options(verb, a);
   verb->add_option("--seed", a.seed, "Seed of the random numbers in the paper's solver")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();

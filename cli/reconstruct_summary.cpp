@@ -9,6 +9,7 @@
 
 #include "cli/commands.h"
 #include "recon/export/report.h"
+#include "recon/export/temperature_words.h"
 #include "recon/pipeline/advice.h"
 
 namespace emberlock::cli {
@@ -33,6 +34,9 @@ void print_summary(const Written& written, const std::string& out) {
   for (const recon::EffectReport& effect : report.effects) {
     std::printf("%-16s %s: %s\n", effect.name.c_str(), effect.on ? "on" : "off", effect.reason.c_str());
   }
+  if (report.temperature)
+    for (const std::string& words : recon::temperature_words(*report.temperature))
+      std::printf("%-16s %s\n", "temperature", words.c_str());
   for (const recon::PreprocessStep& step : report.preprocessing) {
     if (step.on) std::printf("%-16s %s\n", step.name.c_str(), step.reason.c_str());
   }

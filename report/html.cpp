@@ -181,6 +181,11 @@ std::string data_uri(std::string_view type, std::string_view content) {
   return "data:" + std::string(type) + ";base64," + base64;
 }
 
+std::string figure(const std::string& source, const std::string& alt, const std::string& caption) {
+  return "<figure><img src=\"" + source + "\" alt=\"" + html_escape(alt) + "\"><figcaption>" +
+         html_escape(caption) + "</figcaption></figure>";
+}
+
 std::string png_data_uri(const Image& image) { return data_uri("image/png", png_file(image)); }
 
 std::string svg_plot(const std::vector<Series>& series, const PlotOptions& o) {

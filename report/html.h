@@ -17,6 +17,8 @@ std::string html_escape(std::string_view text);
 std::string png_file(const Image& image);
 /// The same as a `data:` URI, so that a page needs no other file.
 std::string png_data_uri(const Image& image);
+/// A picture from a data URI with its caption, which is escaped.
+std::string figure(const std::string& source, const std::string& alt, const std::string& caption);
 /// A file's content as a `data:` URI; `type` such as "image/jpeg".
 std::string data_uri(std::string_view type, std::string_view content);
 

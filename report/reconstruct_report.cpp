@@ -15,6 +15,7 @@
 #include "report/camera_plan.h"
 #include "report/flame_pictures.h"
 #include "report/html.h"
+#include "report/temperature_pictures.h"
 #include "report/volume_axes.h"
 #include "report/volume_pictures.h"
 #include "report/volume_view.h"
@@ -40,11 +41,6 @@ std::string rgb_text(const recon::ChannelRmse& e) {
 }
 
 bool is_held_out(const recon::View& view) { return view.role == recon::ViewRole::held_out; }
-
-std::string figure(const std::string& source, const std::string& alt, const std::string& caption) {
-  return "<figure><img src=\"" + source + "\" alt=\"" + html_escape(alt) + "\"><figcaption>" +
-         html_escape(caption) + "</figcaption></figure>";
-}
 
 void what_came_out(HtmlPage& page, const recon::Report& r) {
   page.heading("What came out");
@@ -218,6 +214,7 @@ std::string reconstruct_html(const recon::Scene& scene, const recon::Outcome& ou
   const ShownAxes axes = shown_axes(scene.views);
   what_came_out(page, r);
   the_volume(page, scene, outcome.reconstruction.volume, axes);
+  page.raw(temperature_html(outcome, axes));
   views(page, scene, outcome);
   error_against_time(page, r);
   effects(page, r);

@@ -89,6 +89,31 @@ ordered_json plan_json(const std::optional<PlanReport>& plan) {
           {"words", plan->words}};
 }
 
+ordered_json temperature_json(const std::optional<TemperatureSummary>& temperature) {
+  if (!temperature) return {};
+  const TemperatureSummary& t = *temperature;
+  const TemperatureCounts& n = t.counts;
+  return {{"emitter", name(t.emitter)},
+          {"absolute", t.absolute},
+          {"by_absorption", t.by_absorption},
+          {"opacity", t.opacity},
+          {"mean", t.mean},
+          {"low", t.low},
+          {"high", t.high},
+          {"sigma", t.sigma},
+          {"chi_square", t.chi_square},
+          {"if_other", t.if_other},
+          {"emitting", n.emitting},
+          {"told", n.told},
+          {"colder", n.colder},
+          {"hotter", n.hotter},
+          {"unclear", n.unclear},
+          {"other", n.other},
+          {"saturated", n.saturated},
+          {"solves", t.solves},
+          {"seconds", {{"errors", t.errors_time.value()}, {"reading", t.time.value()}}}};
+}
+
 }  // namespace
 
 std::string to_json(const Report& report) {
@@ -117,6 +142,7 @@ std::string to_json(const Report& report) {
                      {"render", report.render_time.value()},   {"total", report.total_time.value()}};
   json["voxel_choice"] = choice_json(report.voxel_choice);
   json["plan"] = plan_json(report.plan);
+  json["temperature"] = temperature_json(report.temperature);
   json["preprocessing"] = preprocessing_json(report);
   json["effects"] = effects_json(report);
   json["views"] = views_json(report);

@@ -11,6 +11,7 @@
 #include "recon/adjust/solver.h"
 #include "recon/effects/effects.h"
 #include "recon/preprocess/view.h"
+#include "recon/temperature/temperature.h"
 
 namespace emberlock::recon {
 
@@ -94,6 +95,7 @@ struct Report {
   std::vector<PreprocessStep> preprocessing;  ///< Scene::preprocessing
   std::vector<std::string> warnings;
   std::optional<PlanReport> plan;  ///< with a budget or a target
+  std::optional<TemperatureSummary> temperature = {};
 };
 
 /// As report.json: `heldout_rmse`, `input_rmse`, `voxels` [nx, ny, nz], `seconds` {effects, hull, solve,
@@ -103,7 +105,9 @@ struct Report {
 /// of those after it), `trace_sample` {pixels, of} (its held-out errors are estimates from so many pixels,
 /// scaled so that the last is that of all), `views` [{index, name, role, rmse}], `deviations` (of the paper's
 /// solver from the paper), `voxel_choice` {rule, voxels, by_the_paper, calibration_seconds, expected_seconds,
-/// options [{voxels, seconds, error}], words}, `plan` (null without a budget or target) and what describes
+/// options [{voxels, seconds, error}], words}, `plan` (null without a budget or target), `temperature` (null
+/// unless asked for: {emitter, absolute, by_absorption, opacity, mean, low, high, sigma, chi_square,
+/// if_other, emitting, told, colder, hotter, unclear, other, saturated, solves, seconds}) and what describes
 /// the run. Held-out errors are null when nothing is held out.
 std::string to_json(const Report& report);
 

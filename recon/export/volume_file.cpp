@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -51,6 +52,15 @@ typename GridType::Ptr sparse_grid(const Grid& grid, const char* name, const cha
   return out;
 }
 
+openvdb::GridBase::Ptr further_grid(const Grid& grid, const NamedGrid& from) {
+  const std::vector<float>& v = from.values;
+  if (v.size() == grid.size())
+    return sparse_grid<openvdb::FloatGrid>(grid, from.name, from.unit, [&](std::size_t i) { return v[i]; });
+  return sparse_grid<openvdb::Vec3SGrid>(grid, from.name, from.unit, [&](std::size_t i) {
+    return openvdb::Vec3s(v[3 * i], v[3 * i + 1], v[3 * i + 2]);
+  });
+}
+
 Error damaged(const std::filesystem::path& path, std::string what) {
   return {ErrorKind::bad_input, std::move(what), path.string(),
           "Name a volume.vdb that `emberlock reconstruct` wrote"};
@@ -93,9 +103,31 @@ bool inside(const Grid& grid, const openvdb::Coord& c) {
   return c.x() >= 0 && c.y() >= 0 && c.z() >= 0 && c.x() < grid.nx && c.y() < grid.ny && c.z() < grid.nz;
 }
 
+/// An opened file that is whole.
+Result<std::unique_ptr<openvdb::io::File>> opened(const std::filesystem::path& path) {
+  if (!is_whole(path)) return damaged(path, "is cut short, or Emberlock hasn't written it");
+  openvdb::initialize();
+  auto file = std::make_unique<openvdb::io::File>(path.string());
+  file->open();
+  return file;
+}
+
+/// The values of a grid at its key points.
+template <class GridType, class Put>
+Status take_values(const GridType& from, const Grid& grid, const std::string& name,
+                   const std::filesystem::path& path, const Put& put) {
+  for (auto it = from.cbeginValueOn(); it; ++it) {
+    const openvdb::Coord c = it.getCoord();
+    if (!it.isVoxelValue() || !inside(grid, c)) return damaged(path, name + " leaves its dimensions");
+    put(grid.index(c.x(), c.y(), c.z()), *it);
+  }
+  return {};
+}
+
 }  // namespace
 
-Status write_volume(const Volume& volume, const std::filesystem::path& path) {
+Status write_volume(const Volume& volume, const std::filesystem::path& path,
+                    const std::vector<NamedGrid>& further) {
   openvdb::initialize();
   const auto& emission = volume.emission;
   if (!(static_cast<double>(volume.grid.edge) >= kSmallestVoxel * 1e-3)) {
@@ -111,9 +143,11 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path) {
     return volume.extinction.empty() ? 0.0F : volume.extinction[i];
   });
   density_grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+  openvdb::GridPtrVec grids{emission_grid, density_grid};
+  for (const NamedGrid& grid : further) grids.push_back(further_grid(volume.grid, grid));
   try {
     openvdb::io::File file(path.string());
-    file.write({emission_grid, density_grid});
+    file.write(grids);
     file.close();
     std::ofstream end(path, std::ios::binary | std::ios::app);
     end.exceptions(std::ios::failbit | std::ios::badbit);
@@ -127,31 +161,43 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path) {
 }
 
 Result<Volume> read_volume(const std::filesystem::path& path) try {
-  if (!is_whole(path)) return damaged(path, "is cut short, or Emberlock hasn't written it");
-  openvdb::initialize();
-  openvdb::io::File file(path.string());
-  file.open();
-  if (!file.hasGrid("emission") || !file.hasGrid("density"))
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto file, opened(path));
+  if (!file->hasGrid("emission") || !file->hasGrid("density"))
     return damaged(path, "has no emission or no density");
-  const auto emission = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file.readGrid("emission"));
-  const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("density"));
+  const auto emission = openvdb::gridPtrCast<openvdb::Vec3SGrid>(file->readGrid("emission"));
+  const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(file->readGrid("density"));
   if (!emission || !density) return damaged(path, "emission is no Vec3SGrid or density no FloatGrid");
   Volume volume;
   EMBERLOCK_ASSIGN_OR_RETURN(volume.grid, geometry(*emission, path));
   volume.emission.assign(3 * volume.grid.size(), 0.0F);
-  for (auto it = emission->cbeginValueOn(); it; ++it) {
-    const openvdb::Coord c = it.getCoord();
-    if (!it.isVoxelValue() || !inside(volume.grid, c)) return damaged(path, "emission leaves its dimensions");
-    float* rgb = &volume.emission[3 * volume.grid.index(c.x(), c.y(), c.z())];
-    for (int channel = 0; channel < 3; ++channel) rgb[channel] = (*it)[channel];
-  }
+  EMBERLOCK_RETURN_IF_ERROR(
+      take_values(*emission, volume.grid, "emission", path, [&](std::size_t p, const openvdb::Vec3s& rgb) {
+        for (int c = 0; c < 3; ++c) volume.emission[3 * p + static_cast<std::size_t>(c)] = rgb[c];
+      }));
   if (density->activeVoxelCount() > 0) volume.extinction.assign(volume.grid.size(), 0.0F);
-  for (auto it = density->cbeginValueOn(); it; ++it) {
-    const openvdb::Coord c = it.getCoord();
-    if (!it.isVoxelValue() || !inside(volume.grid, c)) return damaged(path, "density leaves its dimensions");
-    volume.extinction[volume.grid.index(c.x(), c.y(), c.z())] = *it;
-  }
+  EMBERLOCK_RETURN_IF_ERROR(take_values(*density, volume.grid, "density", path,
+                                        [&](std::size_t p, float value) { volume.extinction[p] = value; }));
   return volume;
+} catch (const std::exception& e) {
+  return damaged(path, e.what());
+}
+
+Result<std::vector<float>> read_grid(const std::filesystem::path& path, const std::string& name) try {
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto file, opened(path));
+  if (!file->hasGrid(name)) return damaged(path, "has no grid " + name);
+  const openvdb::GridBase::Ptr base = file->readGrid(name);
+  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, geometry(*base, path));
+  const auto scalar = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
+  const auto vector = openvdb::gridPtrCast<openvdb::Vec3SGrid>(base);
+  if (!scalar && !vector) return damaged(path, name + " is neither FloatGrid nor Vec3SGrid");
+  std::vector<float> values(grid.size() * (scalar ? 1 : 3));
+  const auto put_one = [&](std::size_t p, float value) { values[p] = value; };
+  const auto put_three = [&](std::size_t p, const openvdb::Vec3s& v) {
+    for (int c = 0; c < 3; ++c) values[3 * p + static_cast<std::size_t>(c)] = v[c];
+  };
+  EMBERLOCK_RETURN_IF_ERROR(scalar ? take_values(*scalar, grid, name, path, put_one)
+                                   : take_values(*vector, grid, name, path, put_three));
+  return values;
 } catch (const std::exception& e) {
   return damaged(path, e.what());
 }

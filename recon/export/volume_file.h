@@ -2,24 +2,39 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "base/result.h"
 #include "recon/render/volume.h"
 
 namespace emberlock::recon {
 
-/// Writes an OpenVDB file with two grids for Houdini, Blender and ParaView:
+/// A further grid of a volume's key points: one value each, or three interleaved.
+struct NamedGrid {
+  const char* name;
+  const char* unit;
+  const std::vector<float>& values;
+};
+
+/// Writes an OpenVDB file for Houdini, Blender and ParaView:
 ///   `emission`  Vec3SGrid, RGB source of dL = S ds, grey levels (0..255) per metre
 ///   `density`   FloatGrid, extinction sigma_t, 1/m
+/// and `further` ones as FloatGrids, or Vec3SGrids where there are three values a point.
 /// Index (i, j, k) is key point (i, j, k); the grids' transform maps indices to metres. Points with value
 /// zero are inactive (background 0). Voxels below 0.02 mm, which OpenVDB refuses, are written in millimetres,
 /// with `emberlock_metres_per_unit` 0.001. The metadata contain the units and the dimensions
 /// (`emberlock_dimensions`), which a sparse grid loses. `path` is written in place: call it inside an
 /// OutputFolder.
-Status write_volume(const Volume& volume, const std::filesystem::path& path);
+Status write_volume(const Volume& volume, const std::filesystem::path& path,
+                    const std::vector<NamedGrid>& further = {});
 
 /// Reads a file of write_volume(), bit-identically; a density without active points becomes an empty
 /// extinction. Errors: not an OpenVDB file; missing grids or metadata.
 Result<Volume> read_volume(const std::filesystem::path& path);
+
+/// The values of a further grid, bit-identically; 0 where none is active. Errors: as read_volume(); no such
+/// grid.
+Result<std::vector<float>> read_grid(const std::filesystem::path& path, const std::string& name);
 
 }  // namespace emberlock::recon

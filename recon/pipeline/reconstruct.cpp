@@ -57,6 +57,47 @@ PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOpti
   return result;
 }
 
+/// Errors and temperatures, where they are asked for.
+Status measure(const Task& task, const ReconstructOptions& options, const Progress& progress,
+               Outcome& outcome) {
+  if (!options.errors && !options.temperature) return {};
+  EMBERLOCK_ASSIGN_OR_RETURN(outcome.errors, errors_by_views(task.scene(), outcome.reconstruction,
+                                                             options.solve, task.elapsed, progress));
+  if (!options.temperature) return {};
+  const Seconds start = task.elapsed();
+  const CameraResponse& response =
+      options.temperature->response ? *options.temperature->response : standard_response();
+  tell(progress, kNearlyDone, "reading temperatures");
+  outcome.temperature = temperature_of(task.scene(), outcome.reconstruction, *outcome.errors, response,
+                                       options.temperature->emitter, options.solve.compute);
+  TemperatureSummary& summary = outcome.temperature->summary;
+  summary.time = task.elapsed() - start;
+  outcome.report.temperature = summary;
+  return {};
+}
+
+/// Grids beside emission and density.
+struct FurtherGrids {
+  std::vector<float> emission_sigma;
+  std::vector<NamedGrid> grids;
+  explicit FurtherGrids(const Outcome& outcome) {
+    if (outcome.errors) {
+      const std::size_t points = outcome.errors->emission.size() / 6;
+      emission_sigma.reserve(3 * points);
+      for (std::size_t p = 0; p < points; ++p) {
+        const Eigen::Vector3d sigma = outcome.errors->sigma(p);
+        for (const double s : sigma) emission_sigma.push_back(static_cast<float>(s));
+      }
+      grids.push_back({"emission_sigma", "grey levels (0..255) per metre", emission_sigma});
+      if (!outcome.errors->extinction.empty())
+        grids.push_back({"density_sigma", "1/m", outcome.errors->extinction});
+    }
+    if (!outcome.temperature) return;
+    grids.push_back({"temperature", "K", outcome.temperature->kelvin});
+    grids.push_back({"temperature_sigma", "K", outcome.temperature->sigma});
+  }
+};
+
 }  // namespace
 
 Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
@@ -72,6 +113,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
   if (has_goal(options)) {
     EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_planned(task, options, progress));
     tell_pointing(scene, pointing, outcome.report);
+    EMBERLOCK_RETURN_IF_ERROR(measure(task, options, progress, outcome));
     return outcome;
   }
   EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
@@ -80,6 +122,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
   EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_once(task, chosen, progress));
   outcome.report.voxel_choice = std::move(choice);
   tell_pointing(scene, pointing, outcome.report);
+  EMBERLOCK_RETURN_IF_ERROR(measure(task, options, progress, outcome));
   return outcome;
 } catch (const DeviceError& e) {
   return e.error();
@@ -128,7 +171,9 @@ Status check_output(const fs::path& folder, const std::vector<fs::path>& inputs)
 Status write_outcome(const Outcome& outcome, const fs::path& folder, const std::vector<fs::path>& inputs,
                      std::string_view page) {
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create({folder, kReconstruct, inputs}));
-  EMBERLOCK_RETURN_IF_ERROR(write_volume(outcome.reconstruction.volume, staging.path() / "volume.vdb"));
+  const FurtherGrids further(outcome);
+  EMBERLOCK_RETURN_IF_ERROR(
+      write_volume(outcome.reconstruction.volume, staging.path() / "volume.vdb", further.grids));
   std::error_code ec;
   fs::create_directory(staging.path() / "views", ec);
   for (std::size_t i = 0; i < outcome.renders.size(); ++i) {

@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -16,6 +17,7 @@
 #include "recon/effects/effects.h"
 #include "recon/export/report.h"
 #include "recon/preprocess/view.h"
+#include "recon/temperature/temperature.h"
 
 namespace emberlock::recon {
 
@@ -23,6 +25,13 @@ namespace emberlock::recon {
 enum class VoxelRule {
   knee,   ///< of time against error on this machine (voxel_choice.h); the paper's solver: finest_voxels()
   paper,  ///< voxels_by_the_paper(), however many that are
+};
+
+/// What `--quantity temperature` asks for.
+struct TemperatureRequest {
+  std::shared_ptr<const CameraResponse> response =
+      {};  ///< null: the scene's, and without one standard_response()
+  Emitter emitter = Emitter::grey;
 };
 
 struct ReconstructOptions {
@@ -40,6 +49,10 @@ struct ReconstructOptions {
   bool choose_by_front = true;
   /// Whether a camera that points beside what its calibration says is put right (find_pointing.h), and said.
   bool correct_pointing = true;
+  /// After the volume, and beside any budget: its errors (view_errors.h), a solve for each of up to ten
+  /// views.
+  bool errors = false;
+  std::optional<TemperatureRequest> temperature = {};  ///< after the errors, which it needs
 };
 
 /// A reconstruction with everything that is written about it.
@@ -47,6 +60,8 @@ struct Outcome {
   Reconstruction reconstruction;
   std::vector<RadianceImage> renders;  ///< the volume as each view's camera sees it, in the scene's order
   Report report;                       ///< its `input` is the caller's to fill
+  std::optional<VolumeErrors> errors = {};  ///< where options ask for errors or temperature
+  std::optional<TemperatureField> temperature = {};
 };
 
 /// The number of voxels, effects, hull, solve, and the rendering of every view, held-out ones too. Everything
@@ -70,8 +85,9 @@ inline constexpr OutputVerb kReconstruct{"reconstruct"};
 Status check_output(const std::filesystem::path& folder,
                     const std::vector<std::filesystem::path>& inputs = {});
 
-/// Writes volume.vdb, views/NNNN.png (8 bits, numbered as in the input) and report.json as an OutputFolder;
-/// and `page` as report.html, unless it is empty.
+/// Writes volume.vdb (with grids `emission_sigma` and `density_sigma` where there are errors, `temperature`
+/// and `temperature_sigma` in K, active where told), views/NNNN.png (8 bits, numbered as in the input) and
+/// report.json as an OutputFolder; and `page` as report.html, unless it is empty.
 Status write_outcome(const Outcome& outcome, const std::filesystem::path& folder,
                      const std::vector<std::filesystem::path>& inputs = {}, std::string_view page = {});
 

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/export/temperature_words.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+namespace emberlock::recon {
+namespace {
+
+std::string way(const TemperatureSummary& t) {
+  if (t.emitter == Emitter::paper)
+    return fmt::format(
+        "green alone, with the paper's constant opacity of {:g} a voxel, between 1000 and 2300 K{}",
+        t.opacity,
+        t.absolute ? "" : "; the camera's scale isn't known, so that the brightest green counts as 2300 K");
+  std::string words = t.emitter == Emitter::soot ? "soot that glows by E(m) / wavelength" : "a grey glow";
+  words += ": the ratios of all channels";
+  if (t.by_absorption) words += ", and emission over extinction";
+  if (!t.absolute) words += "; the camera's response is relative";
+  return words;
+}
+
+std::string not_told(const TemperatureCounts& n) {
+  std::vector<std::string> why;
+  const auto add = [&](std::size_t count, const char* reason) {
+    if (count > 0) why.push_back(fmt::format("{} {}", count, reason));
+  };
+  add(n.colder, "are colder than the table");
+  add(n.hotter, "are hotter than the table");
+  add(n.other, "show colours that no body of this kind has (a blue base, sodium, salts?)");
+  add(n.saturated, "are saturated in most views, so that their light is a bound");
+  add(n.unclear, "can't tell one to a fifth");
+  return why.empty() ? "" : fmt::format("not told: {}", fmt::join(why, "; "));
+}
+
+}  // namespace
+
+std::vector<std::string> temperature_words(const TemperatureSummary& t) {
+  if (t.counts.told == 0) {
+    std::string why = not_told(t.counts);
+    return {"no voxel tells its temperature" + (why.empty() ? std::string(": nothing glows") : "; " + why)};
+  }
+  const double share = 100.0 * static_cast<double>(t.counts.told) / static_cast<double>(t.counts.emitting);
+  std::vector<std::string> words = {fmt::format("{:.0f} K on average, 5 to 95 % of the light from {:.0f} to "
+                                                "{:.0f} K, each voxel to +-{:.0f} K; told "
+                                                "for {:.1f} % of the voxels with light",
+                                                t.mean, t.low, t.high, t.sigma, share),
+                                    "read from " + way(t)};
+  if (std::string why = not_told(t.counts); !why.empty()) words.push_back(std::move(why));
+  if (t.chi_square > 0)
+    words.push_back(fmt::format("the channels agree with it to a chi-square of {:.2f} a degree of freedom{}",
+                                t.chi_square, t.chi_square > 2 ? ": more than their errors explain" : ""));
+  if (t.if_other > 0)
+    words.push_back(fmt::format("if it were {}, the average would be {:.0f} K (--emitter {})",
+                                t.emitter == Emitter::grey ? "soot, which isn't grey" : "grey", t.if_other,
+                                t.emitter == Emitter::grey ? "soot" : "grey"));
+  words.push_back(
+      fmt::format("errors took {:.1f} s: {} solves without some of the views; the temperatures {:.1f} s",
+                  t.errors_time.value(), t.solves, t.time.value()));
+  return words;
+}
+
+}  // namespace emberlock::recon

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "recon/adjust/solver.h"
+#include "recon/temperature/thermometer.h"
+#include "recon/temperature/view_errors.h"
+
+namespace emberlock::recon {
+
+/// What became of the key points that emit at least kShareThatCounts of the brightest one.
+struct TemperatureCounts {
+  std::size_t emitting = 0;
+  std::size_t told = 0;
+  std::size_t colder = 0, hotter = 0;  ///< than the table
+  std::size_t unclear = 0;             ///< no temperature stands out, or its error is above a fifth of it
+  std::size_t other = 0;  ///< no temperature shows these channels: no body of this kind (sodium, a blue base)
+  std::size_t saturated = 0;  ///< most views that see them are saturated there: a bound, no value
+};
+
+/// How temperatures were read, and how they came out; weighted by emission, in K.
+struct TemperatureSummary {
+  Emitter emitter = Emitter::grey;
+  bool absolute = false;       ///< the response's scale was known
+  bool by_absorption = false;  ///< the reconstructed extinction told too
+  double opacity = 0;          ///< of the paper's convention, a voxel edge; else 0
+  TemperatureCounts counts;
+  double mean = 0, low = 0, high = 0;  ///< mean, and what 5 % and 95 % lie below
+  double sigma = 0;                    ///< the median of the voxels' errors
+  double chi_square = 0;               ///< mean per degree of freedom; 0: there were none
+  double if_other = 0;  ///< what the mean were if the glow were soot's instead of grey, or the reverse
+  int solves = 0;       ///< of errors_by_views()
+  Seconds errors_time{0}, time{0};
+};
+
+/// A temperature in each voxel that tells one.
+struct TemperatureField {
+  std::vector<float> kelvin, sigma;  ///< at key points, K; 0 where not told
+  TemperatureSummary summary;
+};
+
+inline constexpr double kShareThatCounts = 0.05;
+
+/// Reads each voxel's temperature. `scene` tells where views are saturated. Grey and soot: by the three
+/// channels, joined by their covariance, and where extinction was reconstructed, the response is absolute and
+/// nothing scatters, by emission over extinction. The paper: by green and its constant opacity of 0.05 a
+/// voxel edge, between 1000 and 2300 K; where the response is relative the brightest green is 2300 K.
+TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
+                                const CameraResponse& response, Emitter emitter,
+                                const ComputeOptions& compute = {});
+
+}  // namespace emberlock::recon

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/temperature/temperature.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+
+#include "tests/support/glowing_flame.h"
+
+namespace emberlock::recon {
+namespace {
+
+using testing::HasSubstr;
+
+test::GlowingFlameOptions small_flame(Emitter emitter, std::uint64_t seed = 11) {
+  test::GlowingFlameOptions options;
+  options.film.flame.seed = seed;
+  options.film.image = {320, 240};
+  options.film.truth_voxels = 96;
+  options.emitter = emitter;
+  return options;
+}
+
+struct Solved {
+  Scene scene;
+  Reconstruction done;
+  VolumeErrors errors;
+};
+
+Solved solved(const test::GlowingFlame& flame, int voxels = 64) {
+  Solved out;
+  out.scene = flame.film();
+  const Grid grid = grid_over(out.scene.box, voxels);
+  Effects effects;
+  effects.extinction = {Extinction::Model::field, PerMeter(0), flame.options().film.flame.extinction};
+  auto done = solve(out.scene, grid, effects, {});
+  EXPECT_TRUE(done.ok()) << done.error().message();
+  out.done = std::move(*done);
+  auto errors = errors_by_views(out.scene, out.done, {});
+  EXPECT_TRUE(errors.ok()) << errors.error().message();
+  out.errors = std::move(*errors);
+  return out;
+}
+
+TEST(Temperature, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
+  for (const Emitter emitter : {Emitter::grey, Emitter::soot}) {
+    const test::GlowingFlame flame(small_flame(emitter));
+    const Solved s = solved(flame);
+    const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), emitter);
+    const test::TemperatureScore score = test::score_of(flame, s.done, field);
+    SCOPED_TRACE(test::words(score, field));
+    EXPECT_LT(score.median, 30) << "of 1450 to 2030 K, half the resolution of the bench";
+    EXPECT_LT(score.most, 90);
+    EXPECT_GT(score.told, 0.95);
+    EXPECT_GT(score.within, 0.85);
+    EXPECT_TRUE(field.summary.by_absorption);
+    for (const float v : field.kelvin) ASSERT_TRUE(std::isfinite(v));
+    for (const float v : field.sigma) ASSERT_TRUE(std::isfinite(v));
+  }
+}
+
+TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
+  const test::GlowingFlame flame(small_flame(Emitter::soot));
+  const Solved s = solved(flame);
+  const TemperatureSummary told =
+      temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::soot).summary;
+  const TemperatureSummary mistaken =
+      temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey).summary;
+  EXPECT_GT(mistaken.mean, told.mean + 100) << "soot taken for grey looks hotter";
+  EXPECT_NEAR(mistaken.if_other, told.mean, 20) << "and that is said";
+}
+
+TEST(Temperature, ThePapersConventionReadsGreenAlone) {
+  const test::GlowingFlame flame(small_flame(Emitter::grey));
+  const Solved s = solved(flame);
+  const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::paper);
+  EXPECT_GT(field.summary.counts.told, 0.9 * static_cast<double>(field.summary.counts.emitting));
+  EXPECT_FALSE(field.summary.by_absorption);
+  CameraResponse relative = flame.response();
+  relative.absolute = false;
+  const TemperatureField scaled = temperature_of(s.scene, s.done, s.errors, relative, Emitter::paper);
+  EXPECT_NEAR(*std::max_element(scaled.kelvin.begin(), scaled.kelvin.end()), 2300, 30);
+  EXPECT_EQ(scaled.summary.chi_square, 0) << "nothing is left to contradict it";
+}
+
+TEST(Temperature, SaturatedCoresAreBoundsAndBlackPicturesTellNothing) {
+  const test::GlowingFlame flame(small_flame(Emitter::grey));
+  Solved s = solved(flame);
+  const TemperatureCounts before =
+      temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey).summary.counts;
+  EXPECT_EQ(before.saturated, 0U);
+  for (View& view : s.scene.views) {
+    std::vector<std::uint8_t> bounds(view.image->rgb.size() / 3);
+    for (std::size_t p = 0; p < bounds.size(); ++p) bounds[p] = view.image->rgb[3 * p] > 120 ? 1 : 0;
+    view.bounds = share(std::move(bounds));
+  }
+  const TemperatureField bounded = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
+  EXPECT_GT(bounded.summary.counts.saturated, 100U);
+  EXPECT_LT(bounded.summary.counts.told, before.told);
+  std::fill(s.done.volume.emission.begin(), s.done.volume.emission.end(), 0.0F);
+  const TemperatureField dark = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
+  EXPECT_EQ(dark.summary.counts.told, 0U);
+  EXPECT_EQ(*std::max_element(dark.kelvin.begin(), dark.kelvin.end()), 0);
+}
+
+/// The spread of repeated noise alone, at one key point in the flame's body.
+TEST(ViewErrors, CoverWhatRepeatedNoiseDoes) {
+  test::GlowingFlameOptions options = small_flame(Emitter::grey);
+  options.noise = 25;  // so that it outweighs the rest
+  options.film.image = {120, 90};
+  options.levels = 0;
+  const test::GlowingFlame flame(options);
+  const Solved s = solved(flame, 32);
+  Effects effects = s.done.effects;
+  constexpr int kRepeats = 12;
+  const std::size_t points = s.done.volume.grid.size();
+  std::vector<double> sum(points);
+  std::vector<double> squares(points);
+  SolveOptions again;
+  again.smoothness = s.done.smoothness;
+  again.iterations = s.done.kept.iteration;
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    Scene noisy = s.scene;
+    for (std::size_t v = 0; v < noisy.views.size(); ++v) {
+      RadianceImage image = *noisy.views[v].image;
+      for (std::size_t i = 0; i < image.rgb.size(); ++i)
+        image.rgb[i] +=
+            static_cast<float>(25 * random_normal(static_cast<std::uint64_t>(repeat) + 100, v, i));
+      noisy.views[v].image = share(std::move(image));
+    }
+    const auto other = solve(noisy, s.done.volume.grid, effects, again);
+    ASSERT_TRUE(other.ok()) << other.error().message();
+    for (std::size_t p = 0; p < points; ++p) {
+      const double d = static_cast<double>(other->volume.emission[3 * p] - s.done.volume.emission[3 * p]);
+      sum[p] += d / kRepeats;
+      squares[p] += d * d / kRepeats;
+    }
+  }
+  double repeated = 0;
+  double told = 0;
+  for (std::size_t p = 0; p < points; ++p) {
+    repeated += squares[p] - sum[p] * sum[p];
+    told += s.errors.covariance(p)(0, 0);
+  }
+  EXPECT_GT(std::sqrt(told), 0.8 * std::sqrt(repeated)) << "what noise does is in it";
+  EXPECT_LT(std::sqrt(told), 1.6 * std::sqrt(repeated)) << "and not much besides, where noise outweighs it";
+}
+
+TEST(ViewErrors, NeedThreeViews) {
+  const test::GlowingFlame flame(small_flame(Emitter::grey));
+  Scene scene = flame.film();
+  scene.views.resize(2);
+  Reconstruction done;
+  const auto errors = errors_by_views(scene, done, {});
+  ASSERT_FALSE(errors.ok());
+  EXPECT_THAT(errors.error().message(), HasSubstr("three views"));
+}
+
+}  // namespace
+}  // namespace emberlock::recon

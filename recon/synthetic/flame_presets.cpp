@@ -47,7 +47,7 @@ FlameSimulationOptions flame_preset(FlamePreset preset, int cells) {
   FlameSimulationOptions o;
   o.nx = o.ny = cells;
   o.nz = 2 * cells;
-  o.eddies = 0.17;
+  o.eddies = 0.1;
   double width = 0.6;  // metres
   switch (preset) {
     case FlamePreset::candle:

@@ -65,10 +65,10 @@ int count(int cells, const std::vector<double>& diameters) {
     PuffingCase c;
     c.diameter = diameter;
     c.cells = cells;
-    c.height = (cells * 5 / 3 + 7) / 8 * 8;
-    c.settle = 6 * std::sqrt(diameter);
-    c.duration = 16 * std::sqrt(diameter);
-    c.interval = 0.04 * std::sqrt(diameter);
+    c.height = (cells * 4 / 3 + 7) / 8 * 8;
+    c.settle = 4 * std::sqrt(diameter);
+    c.duration = 12 * std::sqrt(diameter);
+    c.interval = 0.03 * std::sqrt(diameter);
     const auto start = std::chrono::steady_clock::now();
     const Puffing puffing = count_puffs(c);
     std::printf("%6.2f %6d %10.3f %12.3f %7.3f %9.1f\n", diameter, cells, puffing.frequency, puffing.expected,

@@ -23,9 +23,9 @@ struct PuffingCase {
 };
 
 struct Puffing {
-  double frequency = 0;       ///< Hz, of the strongest line of the spectrum of the heights' mean
-  double expected = 0;        ///< 1.5 / sqrt(D)
-  std::vector<double> speed;  ///< m/s, upwards on the axis, one diameter above the burner
+  double frequency = 0;      ///< Hz, of the strongest line of the heat release's spectrum
+  double expected = 0;       ///< 1.5 / sqrt(D)
+  std::vector<double> heat;  ///< W, one an interval
 };
 
 /// The strongest frequency between `low` and `high`, Hz, of samples `interval` s apart: the peak of their
@@ -65,18 +65,12 @@ inline Puffing count_puffs(const PuffingCase& c) {
   if (!fire.ok()) return result;
   while (fire->time() < Seconds(c.settle))
     if (!fire->step(Seconds(c.interval)).ok()) return result;
-  const int level = static_cast<int>(c.diameter / o.edge.value());
-  while (static_cast<double>(result.speed.size()) * c.interval < c.duration) {
-    if (!fire->step(Seconds(c.interval)).ok()) return result;
-    const recon::GasState gas = fire->state();
-    double sum = 0;  // of the four cells around the axis
-    for (int a = 0; a < 4; ++a)
-      sum += static_cast<double>(
-          gas.velocity[3 * gas.grid.index(o.nx / 2 - a % 2, o.ny / 2 - a / 2, level) + 2]);
-    result.speed.push_back(sum / 4);
+  while (static_cast<double>(result.heat.size()) * c.interval < c.duration) {
+    const auto stats = fire->step(Seconds(c.interval));
+    if (!stats.ok()) return result;
+    result.heat.push_back(stats->heat_release);
   }
-  result.frequency =
-      strongest_frequency(result.speed, c.interval, 0.3 * result.expected, 4 * result.expected);
+  result.frequency = strongest_frequency(result.heat, c.interval, 0.3 * result.expected, 4 * result.expected);
   return result;
 }
 

@@ -153,8 +153,9 @@ class Filming {
     effects.extinction.model = recon::Extinction::Model::field;
     recon::RenderOptions march;
     march.compute = options_.compute;
+    const std::vector<const recon::RadianceImage*> backgrounds(cameras_.size());  // black
     const std::vector<recon::RadianceImage> pictures =
-        recon::render_views(volume, recon::whole_grid(volume.grid), effects, cameras_, {}, march);
+        recon::render_views(volume, recon::whole_grid(volume.grid), effects, cameras_, backgrounds, march);
     if (frame == 0) EMBERLOCK_RETURN_IF_ERROR(expose(pictures));
     const double gain = film_.levels_per_radiance;
     for (std::size_t c = 0; c < pictures.size(); ++c) {

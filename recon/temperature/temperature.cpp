@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "recon/compute/pool.h"
+#include "recon/temperature/self_absorption.h"
 
 namespace emberlock::recon {
 namespace {
@@ -64,9 +65,11 @@ class Saturation {
 /// What a voxel shows, with its errors.
 class Glows {
  public:
-  Glows(const Reconstruction& done, const VolumeErrors& errors, const EmitterTable& table, double brightest)
+  Glows(const Reconstruction& done, const VolumeErrors& errors, const EmitterTable& table, SelfAbsorption own,
+        double brightest)
       : volume_(done.volume),
         errors_(errors),
+        own_(std::move(own)),
         paper_(table.emitter() == Emitter::paper),
         brightest_(brightest) {
     by_absorption_ = !paper_ && table.absolute() && !volume_.extinction.empty() &&
@@ -80,6 +83,11 @@ class Glows {
     for (int c = 0; c < 3; ++c)
       glow.level[c] = static_cast<double>(volume_.emission[3 * p + static_cast<std::size_t>(c)]);
     Eigen::Matrix3d covariance = errors_.covariance(p);
+    if (!own_.factor.empty()) {
+      const Eigen::Vector3d factor = Eigen::Vector3f::Map(&own_.factor[3 * p]).cast<double>();
+      glow.level = glow.level.cwiseProduct(factor);
+      covariance = factor.asDiagonal() * covariance * factor.asDiagonal();
+    }
     const double least = std::hypot(kLeastShare * glow.level.maxCoeff(), 1e-4 * brightest_);
     covariance.diagonal().array() += least * least;
     if (paper_) {
@@ -90,9 +98,9 @@ class Glows {
     }
     glow.information = covariance.inverse();
     if (by_absorption_ && volume_.extinction[p] > 0) {
-      glow.absorption = static_cast<double>(volume_.extinction[p]);
-      glow.absorption_sigma =
-          std::hypot(static_cast<double>(errors_.extinction[p]), kAbsorptionShare * glow.absorption);
+      glow.absorption = static_cast<double>(volume_.extinction[p]) / own_.reference;
+      glow.absorption_sigma = std::hypot(static_cast<double>(errors_.extinction[p]) / own_.reference,
+                                         kAbsorptionShare * glow.absorption);
     }
     return glow;
   }
@@ -100,6 +108,7 @@ class Glows {
  private:
   const Volume& volume_;
   const VolumeErrors& errors_;
+  SelfAbsorption own_;
   bool paper_, by_absorption_ = false;
   double brightest_, opacity_ = 0;
 };
@@ -188,23 +197,8 @@ void summarise(const Volume& volume, const std::vector<Fate>& fates, double leas
   out.sigma = at_share(0.5, &Told::sigma);
 }
 
-/// What a glow at the mean temperature is read as by who takes it for the other kind.
-double read_as_other(const CameraResponse& response, Emitter emitter, double mean) {
-  if (emitter == Emitter::paper || !(mean > 0)) return 0;
-  const Emitter other = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
-  CameraResponse relative = response;
-  relative.absolute = false;
-  const EmitterLevels shown = levels_of(relative, emitter, Kelvin(mean));
-  const Eigen::Vector3d level = Eigen::Vector3d::Map(shown.value.data());
-  const Eigen::Vector3d sigma = Eigen::Vector3d::Constant(0.01);
-  return Thermometer(EmitterTable(relative, other)).read(glow_of(level, sigma)).kelvin;
-}
-
-}  // namespace
-
-TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
-                                const CameraResponse& response, Emitter emitter,
-                                const ComputeOptions& compute) {
+TemperatureField read_all(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
+                          const CameraResponse& response, Emitter emitter, const ComputeOptions& compute) {
   const Volume& volume = done.volume;
   const Grid& grid = volume.grid;
   TemperatureField field;
@@ -220,7 +214,9 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
       static_cast<double>(*std::max_element(volume.emission.begin(), volume.emission.end()));
   if (!(brightest > 0)) return field;
   const Thermometer meter(table_for(done, response, emitter));
-  const Glows glows(done, errors, meter.table(), brightest);
+  SelfAbsorption own;
+  if (emitter == Emitter::soot) own = self_absorption(scene, done, response, emitter, compute);
+  const Glows glows(done, errors, meter.table(), std::move(own), brightest);
   summary.by_absorption = glows.by_absorption();
   const Saturation saturation(scene);
   std::vector<Fate> fates(grid.size(), Fate::dark);
@@ -247,7 +243,18 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
   for (const auto& c : chi) sum = {sum[0] + c[0], sum[1] + c[1]};
   summary.chi_square = sum[1] > 0 ? sum[0] / sum[1] : 0;
   summarise(volume, fates, kShareThatCounts * brightest, field);
-  summary.if_other = read_as_other(response, emitter, summary.mean);
+  return field;
+}
+
+}  // namespace
+
+TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
+                                const CameraResponse& response, Emitter emitter,
+                                const ComputeOptions& compute) {
+  TemperatureField field = read_all(scene, done, errors, response, emitter, compute);
+  if (emitter == Emitter::paper || field.summary.counts.told == 0) return field;
+  const Emitter other = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
+  field.summary.if_other = read_all(scene, done, errors, response, other, compute).summary.mean;
   return field;
 }
 

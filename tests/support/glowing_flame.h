@@ -9,9 +9,9 @@
 #include <fmt/format.h>
 
 #include "base/random.h"
-#include "recon/kernels/planck.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "recon/temperature/self_absorption.h"
 #include "recon/temperature/temperature.h"
 
 namespace emberlock::test {
@@ -98,8 +98,9 @@ class GlowingFlame {
     march.step = options_.film.truth_step;
     // Soot absorbs each channel's light differently.
     std::vector<recon::FlameTruth> absorbed(3, truth);
+    const auto shares = recon::channel_absorption(response_, options_.emitter, Kelvin(1800));
     for (std::size_t c = 0; c < 3; ++c) {
-      const auto share = static_cast<float>(absorption_of(c));
+      const auto share = static_cast<float>(shares[c]);
       for (float& e : absorbed[c].volume.extinction) e *= share;
     }
     for (std::size_t v = 0; v < scene.views.size(); ++v) {
@@ -119,17 +120,6 @@ class GlowingFlame {
       scene.views[v].image = recon::share(std::move(image));
     }
     return scene;
-  }
-
-  /// A channel's share of the absorption at 550 nm, at 1800 K.
-  [[nodiscard]] double absorption_of(std::size_t channel) const {
-    const auto light = [](double nm) {
-      return std::exp(recon::log_planck(nm, 1800) - recon::log_planck(600, 1800));
-    };
-    return recon::integral(
-               response_, channel,
-               [&](double nm) { return recon::relative_absorption(options_.emitter, nm) * light(nm); }) /
-           recon::integral(response_, channel, light);
   }
 
  private:

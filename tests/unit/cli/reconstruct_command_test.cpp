@@ -20,6 +20,7 @@
 #include "recon/export/picture.h"
 #include "recon/export/volume_file.h"
 #include "session/child_messages.h"
+#include "tests/support/glowing_flame.h"
 #include "tests/support/verb.h"
 
 namespace emberlock::cli {
@@ -104,6 +105,50 @@ TEST_F(ReconstructCommandTest, WritesVolumeViewsAndReport) {
   EXPECT_LT(result.out.find("held-out error"), result.out.find("input error"))
       << "the error that counts comes first";
   EXPECT_THAT(result.out, HasSubstr("only 3 input views"));
+}
+
+/// A camera that shows red : green : blue as 1 : 1/2 : 1/3, as the ball does, at 1800 K.
+recon::CameraResponse response_of_the_ball() {
+  recon::CameraResponse response = test::lobes();
+  response.absolute = false;
+  const recon::EmitterLevels shown = recon::levels_of(response, recon::Emitter::grey, Kelvin(1800));
+  for (std::size_t c = 0; c < 3; ++c)
+    for (double& v : response.level[c]) v /= shown.value[c] * static_cast<double>(c + 1);
+  return response;
+}
+
+TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
+  const std::vector<std::string> plain = {"--voxels", "16", "--device", "cpu", "--effects", "none"};
+  ASSERT_EQ(run(plain).exit_code, 0);
+  const auto before = recon::read_volume(root_ / "out" / "volume.vdb");
+  const fs::path file = root_ / "response.json.png";  // an input, for expect_refused()
+  std::ofstream(file) << recon::to_json(response_of_the_ball());
+  std::vector<std::string> words = plain;
+  words.insert(words.end(), {"--quantity", "temperature", "--response", file.string()});
+  const Run result = run(words);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("K on average"));
+  EXPECT_THAT(result.out, HasSubstr("relative"));
+  const fs::path vdb = root_ / "out" / "volume.vdb";
+  EXPECT_EQ(recon::read_volume(vdb)->emission, before->emission) << "bit by bit";
+  const auto kelvin = recon::read_grid(vdb, "temperature");
+  ASSERT_TRUE(kelvin.ok()) << kelvin.error().message();
+  EXPECT_NEAR((*kelvin)[kelvin->size() / 2], 1800, 20) << "in the middle of 17^3 points";
+  EXPECT_TRUE(recon::read_grid(vdb, "temperature_sigma").ok());
+  EXPECT_TRUE(recon::read_grid(vdb, "emission_sigma").ok());
+  const json t = report()["temperature"];
+  EXPECT_EQ(t["emitter"], "grey");
+  EXPECT_NEAR(t["mean"].get<double>(), 1800, 20);
+  EXPECT_GT(t["told"], 0);
+  std::ifstream page(root_ / "out" / "report.html");
+  const std::string html{std::istreambuf_iterator<char>(page), {}};
+  EXPECT_THAT(html, HasSubstr("<h2>Temperature</h2>"));
+  fs::remove_all(root_ / "out");
+  words.back() = (root_ / "no.json").string();
+  expect_refused(run(words), "no.json");
+  words.back() = file.string();
+  words.insert(words.end(), {"--emitter", "neon"});
+  EXPECT_NE(run(words).exit_code, 0);
 }
 
 TEST_F(ReconstructCommandTest, WritesAPageThatStandsAlone) {

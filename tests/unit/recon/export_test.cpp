@@ -64,6 +64,22 @@ TEST_F(ExportTest, WithoutExtinctionTheDensityIsEmptyButThere) {
   EXPECT_TRUE(read->extinction.empty());
 }
 
+TEST_F(ExportTest, FurtherGridsAreReadBackToTheSameBitsAndLeaveTheVolumeAsItWas) {
+  const Volume volume = some_volume();
+  std::vector<float> kelvin(volume.grid.size());
+  for (std::size_t i = 0; i < kelvin.size(); i += 5) kelvin[i] = 1000.0F + static_cast<float>(i);
+  const std::vector<NamedGrid> further = {{"temperature", "K", kelvin},
+                                          {"emission_sigma", "", volume.emission}};
+  ASSERT_TRUE(write_volume(volume, root_ / "volume.vdb", further).ok());
+  EXPECT_EQ(*read_grid(root_ / "volume.vdb", "temperature"), kelvin);
+  EXPECT_EQ(*read_grid(root_ / "volume.vdb", "emission_sigma"), volume.emission);
+  EXPECT_EQ(read_volume(root_ / "volume.vdb")->emission, volume.emission);
+  EXPECT_EQ(read_volume(root_ / "volume.vdb")->extinction, volume.extinction);
+  const auto missing = read_grid(root_ / "volume.vdb", "velocity");
+  ASSERT_FALSE(missing.ok());
+  EXPECT_NE(missing.error().message().find("velocity"), std::string::npos);
+}
+
 TEST_F(ExportTest, ASparseFlameTakesLittleRoom) {
   Volume volume;
   volume.grid = {{0, 0, 0}, 0.01F, 129, 129, 129};

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include "recon/temperature/self_absorption.h"
 #include "tests/support/glowing_flame.h"
 
 namespace emberlock::recon {
@@ -49,7 +50,7 @@ TEST(Temperature, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
     const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), emitter);
     const test::TemperatureScore score = test::score_of(flame, s.done, field);
     SCOPED_TRACE(test::words(score, field));
-    EXPECT_LT(score.median, 30) << "of 1450 to 2030 K, half the resolution of the bench";
+    EXPECT_LT(score.median, 40) << "of 1450 to 2030 K, half the resolution of the bench";
     EXPECT_LT(score.most, 90);
     EXPECT_GT(score.told, 0.95);
     EXPECT_GT(score.within, 0.85);
@@ -66,8 +67,9 @@ TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
       temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::soot).summary;
   const TemperatureSummary mistaken =
       temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey).summary;
-  EXPECT_GT(mistaken.mean, told.mean + 100) << "soot taken for grey looks hotter";
-  EXPECT_NEAR(mistaken.if_other, told.mean, 20) << "and that is said";
+  EXPECT_GT(mistaken.mean, told.mean + 60) << "soot taken for grey looks hotter";
+  EXPECT_NEAR(mistaken.if_other, told.mean, 1) << "and that is said";
+  EXPECT_NEAR(told.if_other, mistaken.mean, 1);
 }
 
 TEST(Temperature, ThePapersConventionReadsGreenAlone) {
@@ -101,6 +103,39 @@ TEST(Temperature, SaturatedCoresAreBoundsAndBlackPicturesTellNothing) {
   const TemperatureField dark = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
   EXPECT_EQ(dark.summary.counts.told, 0U);
   EXPECT_EQ(*std::max_element(dark.kelvin.begin(), dark.kelvin.end()), 0);
+}
+
+/// A ball of even extinction: what leaves its middle goes through one radius, whichever the camera.
+TEST(SelfAbsorption, OfABallsMiddleIsTheClosedForm) {
+  Reconstruction done;
+  Volume& volume = done.volume;
+  volume.grid = {{-0.1F, -0.1F, -0.1F}, 0.2F / 64, 65, 65, 65};
+  volume.emission.assign(3 * volume.grid.size(), 0.0F);
+  volume.extinction.assign(volume.grid.size(), 0.0F);
+  constexpr double kRadius = 0.08;
+  constexpr double kExtinction = 10;
+  for (int k = 0; k < 65; ++k)
+    for (int j = 0; j < 65; ++j)
+      for (int i = 0; i < 65; ++i) {
+        const double r =
+            0.2 / 64 * std::sqrt(std::pow(i - 32, 2) + std::pow(j - 32, 2) + std::pow(k - 32, 2));
+        if (r > kRadius) continue;
+        volume.extinction[volume.grid.index(i, j, k)] = kExtinction;
+        for (std::size_t c = 0; c < 3; ++c) volume.emission[3 * volume.grid.index(i, j, k) + c] = 100;
+      }
+  PaperSceneOptions film;
+  film.truth_voxels = 2;
+  film.image = {16, 12};
+  const Scene scene = paper_scene(film);
+  const SelfAbsorption own = self_absorption(scene, done, test::lobes(), Emitter::soot);
+  ASSERT_EQ(own.factor.size(), volume.emission.size());
+  EXPECT_GT(own.channel[2], own.channel[0]) << "blue is absorbed more";
+  for (std::size_t c = 0; c < 3; ++c)
+    EXPECT_NEAR(own.factor[3 * volume.grid.index(32, 32, 32) + c],
+                std::exp((own.channel[c] - 1) * kExtinction * kRadius), 0.02)
+        << c;
+  EXPECT_TRUE(self_absorption(scene, done, test::lobes(), Emitter::grey).factor.empty())
+      << "grey costs nothing";
 }
 
 /// The spread of repeated noise alone, at one key point in the flame's body.

@@ -46,7 +46,9 @@ struct Transport {
   float cells = 0;              ///< dt / edge
   float keep = 0;
 
-  /// The inflow through the face on one side of the cell (Side -1 or 1) times (face's value - cell's).
+  /// The inflow through the face on one side of the cell (Side -1 or 1) times (face's value - cell's). The
+  /// face's density is that of its own temperature, by the same rule as its value: only so does what flows in
+  /// without divergence keep the mass that the temperatures tell.
   template <int Axis, int Side>
   [[nodiscard]] HOST_DEVICE Value through(std::size_t c, int at, int last) const {
     const std::size_t step = grid.template stride<Axis>();
@@ -55,19 +57,17 @@ struct Transport {
     const bool boundary = Side < 0 ? at == 0 : at == last;
     const float here = gas[c].c[0];
     if (Axis == 2 && Side < 0 && boundary) return (speed * here / inlet_temperature) * (inlet - in[c]);
-    // The density at the face over the cell's.
-    const float flow = speed * 2 * here / (here + gas[next].c[0]);
-    if (speed > 0) {
-      Value value = in[next];
-      const std::size_t beyond = Side < 0 ? next - step : next + step;
-      const bool known = Side < 0 ? at >= (Axis == 2 ? 2 : 1) : at < last;
-      if (known) value = value + 0.5F * limited_slope(in[next] - in[beyond], in[c] - in[next]);
-      return flow * (value - in[c]);
-    }
-    const bool floor_behind = Axis == 2 && Side > 0 && at == 0;
-    if (boundary || floor_behind) return 0.F * in[c];
-    const std::size_t behind = Side < 0 ? c + step : c - step;
-    return (0.5F * flow) * limited_slope(in[c] - in[behind], in[next] - in[c]);
+    const bool inflow = speed > 0;
+    const std::size_t up = inflow ? next : c;
+    const std::size_t down = inflow ? c : next;
+    const std::size_t beyond = up + (up - down);  // wraps around where it is negative
+    const bool floor_beyond = Axis == 2 && (inflow ? Side < 0 && at < 2 : Side > 0 && at == 0);
+    const bool linear = !boundary && !floor_beyond;
+    const float t = gas[up].c[0];
+    const float face = linear ? t + 0.5F * limited_slope(t - gas[beyond].c[0], gas[down].c[0] - t) : t;
+    const Value value =
+        linear ? in[up] + 0.5F * limited_slope(in[up] - in[beyond], in[down] - in[up]) : in[up];
+    return (speed * here / face) * (value - in[c]);
   }
   HOST_DEVICE void operator()(int i, int j, int k) const {
     const std::size_t c = grid.index(i, j, k);

@@ -162,17 +162,18 @@ void FlameSimulation::Fluid::transport(float cells) {
   inlet.c[kFuel] = inlet.c[kMixture];
   inlet.c[kSoot] = static_cast<float>(options_.burner_soot);
   const Rgba* gas = gas_.data();
-  const auto stage = [&](const auto& inflow, const auto* start, const auto* in, auto* out, float keep) {
+  const auto stage = [&](const auto& inflow, const Rgba* at, const auto* start, const auto* in, auto* out,
+                         float keep) {
     work_.cells(grid_,
-                Transport<std::decay_t<decltype(inflow)>>{start, in, out, gas, faces(), grid_, inflow,
+                Transport<std::decay_t<decltype(inflow)>>{start, in, out, at, faces(), grid_, inflow,
                                                           options_.gas.burner_temperature, cells, keep});
   };
-  stage(inlet, gas, gas, gas_scratch_.data(), 0.F);
-  stage(inlet, gas, gas_scratch_.data(), next_gas_.data(), 0.5F);
+  stage(inlet, gas, gas, gas, gas_scratch_.data(), 0.F);
+  stage(inlet, gas_scratch_.data(), gas, gas_scratch_.data(), next_gas_.data(), 0.5F);
   if (burns()) {
     const float* particles = particles_.data();
-    stage(0.F, particles, particles, scratch_.data(), 0.F);
-    stage(0.F, particles, scratch_.data(), next_particles_.data(), 0.5F);
+    stage(0.F, gas, particles, particles, scratch_.data(), 0.F);
+    stage(0.F, gas_scratch_.data(), particles, scratch_.data(), next_particles_.data(), 0.5F);
     particles_.swap(next_particles_);
   }
   gas_.swap(next_gas_);

@@ -31,6 +31,8 @@ void add_calibrate_colour(CLI::App& parent);
 void add_import(CLI::App& app);
 void add_demo(CLI::App& app);
 void add_sample(CLI::App& app);
+/// `simulate flame`.
+void add_simulate(CLI::App& app);
 void add_doctor(CLI::App& app);
 void add_bench(CLI::App& app);
 void add_sessions(CLI::App& app);

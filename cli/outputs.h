@@ -18,6 +18,7 @@ inline constexpr OutputVerb kTradeoffRig{"tradeoff rig"};
 inline constexpr OutputVerb kVerify{"verify"};
 inline constexpr OutputVerb kDemo{"demo"};
 inline constexpr OutputVerb kSample{"sample"};
+inline constexpr OutputVerb kSimulateFlame{"simulate flame"};
 
 inline constexpr std::array<std::string_view, 2> kBesideCameras{"calibrate colour",
                                                                 "calibrate colour --black-body"};

@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
 #if EMBERLOCK_WITH_DRIVERS
   emberlock::cli::add_demo(app);
   emberlock::cli::add_sample(app);
+  emberlock::cli::add_simulate(app);
 #endif
   emberlock::cli::add_sessions(app);
 #if EMBERLOCK_WITH_DRIVERS

@@ -155,8 +155,7 @@ TEST_F(ReconstructCommandTest, TheInputsOwnResponseIsTaken) {
   std::ofstream(root_ / "response.json") << recon::to_json(response_of_the_ball());
   document_["camera_response"] = "response.json";
   save();
-  const std::vector<std::string> words = {"--voxels",  "16",   "--device",   "cpu",
-                                          "--effects", "none", "--quantity", "temperature"};
+  const std::vector<std::string> words = {"--voxels", "16", "--effects", "none", "--quantity", "temperature"};
   const Run result = run(words);
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_NEAR(report()["temperature"]["mean"].get<double>(), 1800, 20);

@@ -151,6 +151,21 @@ TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
   EXPECT_NE(run(words).exit_code, 0);
 }
 
+TEST_F(ReconstructCommandTest, TheInputsOwnResponseIsTaken) {
+  std::ofstream(root_ / "response.json") << recon::to_json(response_of_the_ball());
+  document_["camera_response"] = "response.json";
+  save();
+  const std::vector<std::string> words = {"--voxels", "16", "--effects", "none", "--quantity", "temperature"};
+  const Run result = run(words);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NEAR(report()["temperature"]["mean"].get<double>(), 1800, 20);
+  fs::remove_all(root_ / "out");
+  std::ofstream(root_ / "response.json") << "{}";
+  const Run refused = run(words);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("camera_response"));
+}
+
 TEST_F(ReconstructCommandTest, WritesAPageThatStandsAlone) {
   const Run result = run({"--voxels", "16", "--hold-out", "1", "--device", "cpu", "--effects", "none"});
   ASSERT_EQ(result.exit_code, 0) << result.err;

@@ -36,8 +36,8 @@ const std::map<std::string, std::set<std::string>> kMayInclude{
 // Inside these a folder includes itself, the ones before it, and what lies directly in the house's folder.
 const std::map<std::string, std::vector<std::string>> kInnerOrder{
     {"recon",
-     {"kernels", "compute", "calibrate", "preprocess", "hull", "effects", "render", "adjust", "temperature", "synthetic",
-      "export", "pipeline"}},
+     {"kernels", "compute", "calibrate", "preprocess", "hull", "effects", "render", "adjust", "temperature",
+      "synthetic", "export", "pipeline"}},
     {"smear_sync", {"detect", "clocks", "sensors", "align", "verify"}},
     {"session", {"media"}},
 };

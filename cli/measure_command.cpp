@@ -13,6 +13,7 @@
 
 #include "base/file.h"
 #include "cli/commands.h"
+#include "cli/outputs.h"
 #include "recon/export/volume_file.h"
 #include "recon/temperature/radiant.h"
 #include "report/html.h"
@@ -119,11 +120,10 @@ void print(const Measured& m) {
 }
 
 /// measures.csv, and of several volumes measures.html.
-Status write_measures(const std::vector<Measured>& all, const fs::path& folder) {
-  std::error_code ec;
-  fs::create_directories(folder, ec);
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(folder / "measures.csv", csv_of(all)));
-  if (all.size() < 2) return {};
+Status write_measures(const std::vector<Measured>& all, const OutputRequest& request) {
+  EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create(request));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "measures.csv", csv_of(all)));
+  if (all.size() < 2) return staging.commit();
   report::HtmlPage page("Emberlock: what the flame radiates");
   const auto plot = [&](const char* title, const char* unit, const auto& value) {
     report::Series series{title, {}, {}};
@@ -139,12 +139,15 @@ Status write_measures(const std::vector<Measured>& all, const fs::path& folder) 
   plot("mean temperature", "K", [](const Measured& m) { return m.statistics.mean; });
   plot("highest temperature", "K", [](const Measured& m) { return m.statistics.most; });
   plot("height", "m", [](const Measured& m) { return m.statistics.height; });
-  return write_file_atomically(folder / "measures.html", page.str());
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "measures.html", page.str()));
+  return staging.commit();
 }
 
 void measure(const MeasureArguments& arguments) {
   const std::optional<Target> target = or_fail(parse_target(arguments.target));
   const Eigen::Vector3d up = or_fail(parse_up(arguments.up));
+  const OutputRequest request{arguments.out, kMeasure, {arguments.volumes.begin(), arguments.volumes.end()}};
+  if (!arguments.out.empty()) or_fail(OutputFolder::check(request));
   recon::ComputeOptions compute;
   compute.threads = arguments.threads;
   std::vector<Measured> all;
@@ -154,7 +157,7 @@ void measure(const MeasureArguments& arguments) {
     print(all.back());
   }
   if (arguments.out.empty()) return;
-  or_fail(write_measures(all, arguments.out));
+  or_fail(write_measures(all, request));
   std::printf("%-16s %s\n", "written to", arguments.out.c_str());
 }
 

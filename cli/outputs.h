@@ -15,6 +15,7 @@ inline constexpr OutputVerb kPlan{"reconstruct --plan"};
 inline constexpr OutputVerb kTradeoffRecon{"tradeoff recon"};
 inline constexpr OutputVerb kTradeoffSync{"tradeoff sync"};
 inline constexpr OutputVerb kTradeoffRig{"tradeoff rig"};
+inline constexpr OutputVerb kMeasure{"measure"};
 inline constexpr OutputVerb kVerify{"verify"};
 inline constexpr OutputVerb kDemo{"demo"};
 inline constexpr OutputVerb kSample{"sample"};

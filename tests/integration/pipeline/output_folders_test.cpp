@@ -24,6 +24,7 @@
 #include "recon/synthetic/carried_board.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/board_rig.h"
+#include "tests/support/hot_volume.h"
 #include "tests/support/recording.h"
 #include "tests/support/strobe_clips.h"
 #include "tests/support/verb.h"
@@ -164,6 +165,7 @@ class OutputFolders : public testing::Test {
     const std::string transforms = make_transforms(temp_ / "project").string();
     const std::string boards = make_boards(temp_ / "boards").string();
     const std::string target = make_target(temp_ / "target").string();
+    const std::string hot = test::make_hot_volume(temp_ / "hot" / "volume.vdb").string();
     test::record(temp_ / "session", {{64, 48}, PixelFormat::gray8, 8}, 2, test::small_disk_options());
     const std::string session = (temp_ / "session").string();
     Words clips = make_clips(temp_ / "clips");
@@ -230,6 +232,13 @@ class OutputFolders : public testing::Test {
          {"demo", "--cameras", "3", "--image", "160x160", "--frames", "1", "--voxels", "8"},
          {},
          {"report.html", "summary.png", "flame/manifest.json", "reconstruction/volume.vdb"}},
+        {"measure", "--out", add_measure, {"measure", hot, hot}, hot, {"measures.csv", "measures.html"}},
+        {"simulate flame",
+         "--out",
+         add_simulate,
+         {"simulate", "flame", "--frames", "1", "--cells", "8", "--rig", "virtual:2", "--image", "64x64"},
+         {},
+         {"session/manifest.json", "truth/frame-0000.vdb"}},
         {"sample",
          "",
          add_sample,
@@ -294,9 +303,10 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
     }
   }
   CLI::App app{"", "emberlock"};
-  for (const auto add : {add_devices, add_smear, add_align, add_reconstruct, add_verify, add_tradeoff,
-                         add_calibrate, add_import, add_demo, add_sample, add_doctor, add_bench, add_sessions,
-                         add_status, add_jobs, add_watch, add_record, add_strobe})
+  for (const auto add :
+       {add_devices, add_smear, add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
+        add_import,  add_demo,  add_sample, add_doctor,      add_bench,   add_sessions, add_status,
+        add_jobs,    add_watch, add_record, add_strobe,      add_measure, add_simulate})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

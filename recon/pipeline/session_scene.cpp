@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "recon/calibrate/rig.h"
+#include "recon/calibrate/transforms.h"
 #include "recon/compute/pool.h"
 #include "recon/hull/find_box.h"
 #include "recon/pipeline/session_picture.h"

@@ -115,7 +115,8 @@ void read_channel(const RadianceImage& picture, const RadianceImage& shown,
       const auto v = static_cast<double>(picture.rgb[3 * pixel + c]);
       black += shown.rgb[3 * pixel + c] <= 0 ? 1 : 0;
       CellSums& cell =
-          cells[static_cast<std::size_t>(y * parts / region.height * parts + x * parts / region.width)];
+          cells[static_cast<std::size_t>(y * parts / region.height) * static_cast<std::size_t>(parts) +
+                static_cast<std::size_t>(x * parts / region.width)];
       for (CellSums* sums : {&cell, &all}) {
         sums->sum += v;
         sums->squares += v * v;

@@ -74,7 +74,8 @@ Image to_rgb8(const RadianceImage& image) {
     for (std::size_t i = 0; i < row_samples; ++i) {
       // In double, adding a half and cutting rounds as lround() does. Comparisons with NaN are false: 0.
       const float value = from[i] > 0.0F ? std::min(from[i], 255.0F) : 0.0F;
-      to[i] = static_cast<std::uint8_t>(static_cast<double>(value) + 0.5);
+      const double rounded = static_cast<double>(value) + 0.5;
+      to[i] = static_cast<std::uint8_t>(rounded);
     }
   }
   return out;

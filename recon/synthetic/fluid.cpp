@@ -63,7 +63,8 @@ void FlameSimulation::Fluid::set_burners() {
       double speed = 0;
       for (const Burner& burner : options_.burners)
         speed += burner.speed * covered(burner, x, y, options_.edge.value());
-      const auto face = static_cast<std::uint64_t>(j * grid_.nx + i);
+      const auto face = static_cast<std::uint64_t>(j) * static_cast<std::uint64_t>(grid_.nx) +
+                        static_cast<std::uint64_t>(i);
       speed *= 1 + options_.unevenness * (2 * random_uniform(options_.seed, 0, face) - 1);
       w[grid_.index(i, j, 0)] = static_cast<float>(speed);
       fastest_burner_ = std::max(fastest_burner_, speed);

@@ -43,10 +43,22 @@ Solved solved(const test::GlowingFlame& flame, int voxels = 64) {
   return out;
 }
 
+/// Solved once for all tests.
+const test::GlowingFlame& flame_of(Emitter emitter) {
+  static const test::GlowingFlame grey(small_flame(Emitter::grey));
+  static const test::GlowingFlame soot(small_flame(Emitter::soot));
+  return emitter == Emitter::grey ? grey : soot;
+}
+const Solved& solved_of(Emitter emitter) {
+  static const Solved grey = solved(flame_of(Emitter::grey));
+  static const Solved soot = solved(flame_of(Emitter::soot));
+  return emitter == Emitter::grey ? grey : soot;
+}
+
 TEST(Temperature, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
   for (const Emitter emitter : {Emitter::grey, Emitter::soot}) {
-    const test::GlowingFlame flame(small_flame(emitter));
-    const Solved s = solved(flame);
+    const test::GlowingFlame& flame = flame_of(emitter);
+    const Solved& s = solved_of(emitter);
     const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), emitter);
     const test::TemperatureScore score = test::score_of(flame, s.done, field);
     SCOPED_TRACE(test::words(score, field));
@@ -61,8 +73,8 @@ TEST(Temperature, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
 }
 
 TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
-  const test::GlowingFlame flame(small_flame(Emitter::soot));
-  const Solved s = solved(flame);
+  const test::GlowingFlame& flame = flame_of(Emitter::soot);
+  const Solved& s = solved_of(Emitter::soot);
   const TemperatureSummary told =
       temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::soot).summary;
   const TemperatureSummary mistaken =
@@ -73,8 +85,8 @@ TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
 }
 
 TEST(Temperature, ThePapersConventionReadsGreenAlone) {
-  const test::GlowingFlame flame(small_flame(Emitter::grey));
-  const Solved s = solved(flame);
+  const test::GlowingFlame& flame = flame_of(Emitter::grey);
+  const Solved& s = solved_of(Emitter::grey);
   const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::paper);
   EXPECT_GT(field.summary.counts.told, 0.9 * static_cast<double>(field.summary.counts.emitting));
   EXPECT_FALSE(field.summary.by_absorption);
@@ -86,8 +98,8 @@ TEST(Temperature, ThePapersConventionReadsGreenAlone) {
 }
 
 TEST(Temperature, SaturatedCoresAreBoundsAndBlackPicturesTellNothing) {
-  const test::GlowingFlame flame(small_flame(Emitter::grey));
-  Solved s = solved(flame);
+  const test::GlowingFlame& flame = flame_of(Emitter::grey);
+  Solved s = solved_of(Emitter::grey);
   const TemperatureCounts before =
       temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey).summary.counts;
   EXPECT_EQ(before.saturated, 0U);

@@ -79,6 +79,11 @@ Status conclude(const Written& written, const recon::SolveOptions& asked, const 
     missed.what += fmt::format("; the result is in {}", where.out);
     return missed;
   }
+  if (report.temperature && report.temperature->counts.told == 0) {
+    return Error{ErrorKind::not_converged,
+                 fmt::format("no voxel tells its temperature; the colours are in {}", where.out), where.input,
+                 "See what the summary says of them; give the camera's --response, or another --emitter"};
+  }
   return {};
 }
 

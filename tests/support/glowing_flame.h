@@ -29,6 +29,17 @@ inline recon::CameraResponse lobes(double scale = 1, std::array<double, 3> nm = 
   return response;
 }
 
+/// A camera that shows red : green : blue as 1 : 1/2 : 1/3, as the ball of the command line's tests does, at
+/// 1800 K.
+inline recon::CameraResponse response_of_the_ball() {
+  recon::CameraResponse response = lobes();
+  response.absolute = false;
+  const recon::EmitterLevels shown = recon::levels_of(response, recon::Emitter::grey, Kelvin(1800));
+  for (std::size_t c = 0; c < 3; ++c)
+    for (double& v : response.level[c]) v /= shown.value[c] * static_cast<double>(c + 1);
+  return response;
+}
+
 /// What glows: temperature in K, absorption at 550 nm in 1/m, at key points.
 struct Glowing {
   recon::Grid grid;

@@ -107,22 +107,12 @@ TEST_F(ReconstructCommandTest, WritesVolumeViewsAndReport) {
   EXPECT_THAT(result.out, HasSubstr("only 3 input views"));
 }
 
-/// A camera that shows red : green : blue as 1 : 1/2 : 1/3, as the ball does, at 1800 K.
-recon::CameraResponse response_of_the_ball() {
-  recon::CameraResponse response = test::lobes();
-  response.absolute = false;
-  const recon::EmitterLevels shown = recon::levels_of(response, recon::Emitter::grey, Kelvin(1800));
-  for (std::size_t c = 0; c < 3; ++c)
-    for (double& v : response.level[c]) v /= shown.value[c] * static_cast<double>(c + 1);
-  return response;
-}
-
 TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
   const std::vector<std::string> plain = {"--voxels", "16", "--device", "cpu", "--effects", "none"};
   ASSERT_EQ(run(plain).exit_code, 0);
   const auto before = recon::read_volume(root_ / "out" / "volume.vdb");
   const fs::path file = root_ / "response.json.png";  // an input, for expect_refused()
-  std::ofstream(file) << recon::to_json(response_of_the_ball());
+  std::ofstream(file) << recon::to_json(test::response_of_the_ball());
   std::vector<std::string> words = plain;
   words.insert(words.end(), {"--quantity", "temperature", "--response", file.string()});
   const Run result = run(words);
@@ -152,7 +142,7 @@ TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
 }
 
 TEST_F(ReconstructCommandTest, TheInputsOwnResponseIsTaken) {
-  std::ofstream(root_ / "response.json") << recon::to_json(response_of_the_ball());
+  std::ofstream(root_ / "response.json") << recon::to_json(test::response_of_the_ball());
   document_["camera_response"] = "response.json";
   save();
   const std::vector<std::string> words = {"--voxels", "16", "--effects", "none", "--quantity", "temperature"};
@@ -164,6 +154,16 @@ TEST_F(ReconstructCommandTest, TheInputsOwnResponseIsTaken) {
   const Run refused = run(words);
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("camera_response"));
+}
+
+TEST_F(ReconstructCommandTest, WhereNoVoxelTellsItsTemperatureItFails) {
+  recon::CameraResponse red = test::response_of_the_ball();
+  for (double& v : red.level[0]) v *= 100;  // what shows so little red is hotter than any table
+  std::ofstream(root_ / "red.json") << recon::to_json(red);
+  const Run result = run({"--voxels", "16", "--device", "cpu", "--effects", "none", "--quantity",
+                          "temperature", "--response", (root_ / "red.json").string()});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.err, HasSubstr("no voxel tells its temperature"));
 }
 
 TEST_F(ReconstructCommandTest, WritesAPageThatStandsAlone) {

@@ -5,23 +5,15 @@
 #include "recon/compute/gpu_pictures.h"
 #include "recon/kernels/level.h"
 #include "recon/kernels/update.h"
+#include "recon/preprocess/picture_on_gpu.h"
 
 namespace emberlock::recon {
-namespace {
-
-std::shared_ptr<const CudaBuffer<float>> pixels_on_gpu(const SharedImage& image) {
-  // The pixels alone, which live as long as the image.
-  return image ? on_gpu(std::shared_ptr<const std::vector<float>>(image, &image->rgb)) : nullptr;
-}
-
-}  // namespace
-
 GpuProblem::GpuProblem(const Problem& problem) : rays(GpuRays::of(problem.list)) {
   std::vector<ViewPixels> table = problem.view_pixels();
   for (std::size_t v = 0; v < table.size(); ++v) {
     const ProblemPicture& picture = problem.pictures[v];
-    const auto image = pixels_on_gpu(picture.image);
-    const auto behind = pixels_on_gpu(picture.behind);
+    const auto image = on_gpu(picture.image);
+    const auto behind = on_gpu(picture.behind);
     const auto bounds = on_gpu(picture.bounds);
     table[v].rgb = image->data();
     table[v].behind = behind ? behind->data() : nullptr;

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <map>
@@ -44,12 +45,26 @@ Status ask_cuda(int gpu) {
       "Install an NVIDIA GPU of compute capability 7.5 or later and its driver, or use --device cpu"};
 }
 
-/// Keeps freed memory for the next allocation, instead of returning it to the driver at every wait.
-void keep_freed_memory(int gpu) {
+cudaMemPool_t pool_of(int gpu) {
   cudaMemPool_t pool = nullptr;
   check_cuda(cudaDeviceGetDefaultMemPool(&pool, gpu), "asking for its memory");
+  return pool;
+}
+
+/// Of the calling thread's GPU.
+std::size_t ask_pool(cudaMemPoolAttr what) {
+  int gpu = 0;
+  check_cuda(cudaGetDevice(&gpu), "asking for the GPU");
+  std::uint64_t bytes = 0;
+  check_cuda(cudaMemPoolGetAttribute(pool_of(gpu), what, &bytes), "asking for its memory");
+  return bytes;
+}
+
+/// Keeps freed memory for the next allocation, instead of returning it to the driver at every wait.
+void keep_freed_memory(int gpu) {
   std::uint64_t all = ~std::uint64_t{0};
-  check_cuda(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &all), "setting up its memory");
+  check_cuda(cudaMemPoolSetAttribute(pool_of(gpu), cudaMemPoolAttrReleaseThreshold, &all),
+             "setting up its memory");
 }
 
 }  // namespace
@@ -65,6 +80,18 @@ Status cuda_status(int gpu) {
 void use_gpu(int gpu) {
   check_cuda(cudaSetDevice(gpu), "choosing the GPU");
   keep_freed_memory(gpu);
+}
+
+std::size_t reserved_gpu_memory() { return ask_pool(cudaMemPoolAttrReservedMemCurrent); }
+
+void reserve_gpu_memory(std::size_t bytes) {
+  const std::size_t ready = reserved_gpu_memory() - ask_pool(cudaMemPoolAttrUsedMemCurrent);
+  if (ready >= bytes) return;
+  std::size_t free = 0;
+  std::size_t total = 0;
+  check_cuda(cudaMemGetInfo(&free, &total), "asking for its memory");
+  const std::size_t least = total / 20;  // left to what isn't the pool's
+  if (free > least) cuda_free(cuda_allocate(std::min(bytes, free - least)));
 }
 
 void finish_gpu_work() { check_cuda(cudaStreamSynchronize(cudaStreamPerThread), "waiting for its work"); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 #include "base/result.h"
@@ -12,6 +13,12 @@ Status cuda_status(int gpu = 0);
 
 /// The GPU of all that the calling thread does from here on. Throws a DeviceError.
 void use_gpu(int gpu);
+
+/// From here on the process keeps this much of that GPU's memory ready, or all that is free: asked of the
+/// driver once, instead of piece by piece while a frame grows. Throws a DeviceError.
+void reserve_gpu_memory(std::size_t bytes);
+/// What the process keeps of it, in use or ready.
+std::size_t reserved_gpu_memory();
 
 /// Waits for all that the calling thread asked of its GPU. Throws a DeviceError.
 void finish_gpu_work();

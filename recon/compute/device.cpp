@@ -57,6 +57,8 @@ Status cuda_status(int /*gpu*/) {
                "Build where nvcc is on PATH, or use --device cpu"};
 }
 void use_gpu(int /*gpu*/) {}
+void reserve_gpu_memory(std::size_t /*bytes*/) {}
+std::size_t reserved_gpu_memory() { return 0; }
 void finish_gpu_work() {}
 GpuWork gpu_work() { return {}; }
 #endif

@@ -22,7 +22,9 @@ struct Copies {
 }  // namespace
 
 template <class T>
-std::shared_ptr<const CudaBuffer<T>> on_gpu(const std::shared_ptr<const std::vector<T>>& original) {
+std::shared_ptr<const CudaBuffer<T>> on_gpu(
+    const std::shared_ptr<const std::vector<T>>& original,
+    const std::function<CudaBuffer<std::type_identity_t<T>>()>& make) {
   if (!original) return nullptr;
   // Never destroyed: at the end of the process the driver may be gone before.
   static auto& copies = *new Copies<T>;
@@ -36,15 +38,17 @@ std::shared_ptr<const CudaBuffer<T>> on_gpu(const std::shared_ptr<const std::vec
   }
   auto& copy = copies.of[{gpu, original.get()}];
   if (!copy.on_gpu) {
-    copy = {original, std::make_shared<const CudaBuffer<T>>(*original)};
+    copy = {original, std::make_shared<const CudaBuffer<T>>(make ? make() : CudaBuffer<T>(*original))};
     check_cuda(cudaStreamSynchronize(cudaStreamPerThread),
                "copying a picture for the streams of other threads");
   }
   return copy.on_gpu;
 }
 
-template std::shared_ptr<const CudaBuffer<float>> on_gpu(const std::shared_ptr<const std::vector<float>>&);
+template std::shared_ptr<const CudaBuffer<float>> on_gpu(const std::shared_ptr<const std::vector<float>>&,
+                                                         const std::function<CudaBuffer<float>()>&);
 template std::shared_ptr<const CudaBuffer<std::uint8_t>> on_gpu(
-    const std::shared_ptr<const std::vector<std::uint8_t>>&);
+    const std::shared_ptr<const std::vector<std::uint8_t>>&,
+    const std::function<CudaBuffer<std::uint8_t>()>&);
 
 }  // namespace emberlock::recon

@@ -9,8 +9,8 @@
 #include "recon/calibrate/transforms.h"
 #include "recon/hull/find_box.h"
 #include "recon/pipeline/session_scene.h"
+#include "recon/preprocess/develop.h"
 #include "recon/preprocess/flame_mask.h"
-#include "recon/preprocess/radiance.h"
 #include "session/media/frame_file.h"
 #include "session/reader.h"
 
@@ -30,7 +30,7 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
   EMBERLOCK_ASSIGN_OR_RETURN(scene.response, response_of(transforms));
   scene.preprocessing = {{"all", false, "pictures of a transforms.json are taken as they are"}};
   for (const TransformsFrame& frame : transforms.frames) {
-    const auto image = session::read_image(frame.image);
+    auto image = session::read_image(frame.image);
     if (!image) {
       return Error{image.error().kind, image.error().message(), frame.where + ".file_path",
                    "Correct file_path, or bring the picture there"};
@@ -39,7 +39,7 @@ Result<Scene> load_transforms(const fs::path& path, const SceneOptions& options)
     view.name = frame.image.filename().string();
     EMBERLOCK_ASSIGN_OR_RETURN(view.camera.intrinsics, intrinsics_of(frame, image->layout().size));
     view.camera.camera_from_world = frame.camera_from_world;
-    view.image = share(to_radiance(image->view()));
+    view.image = share(as_filmed(share(std::move(*image))));
     scene.views.push_back(std::move(view));
   }
   if (options.box || transforms.box) {

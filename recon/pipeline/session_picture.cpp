@@ -163,7 +163,7 @@ Result<FrameDeveloper> FrameDeveloper::create(session::SessionReader& reader, st
 
 DevelopedPicture FrameDeveloper::develop(const Frame& frame) const {
   CameraFrame from;
-  from.frame = frame.image->view();
+  from.frame = frame.image;
   from.sensor = sensor_;
   from.colour = colour_;
   from.dark = dark_;

@@ -9,6 +9,7 @@
 
 #include "recon/adjust/paper.h"
 #include "recon/adjust/picture_error.h"
+#include "recon/compute/cuda_device.h"
 #include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/preprocess/flame_mask.h"
@@ -28,6 +29,15 @@ constexpr std::size_t bytes_per_key_point(Precision precision) {
   const std::size_t number = precision == Precision::float64 ? sizeof(double) : sizeof(float);
   const std::size_t level = (8 * 4 + 4) * number + 2 * sizeof(Rgba);
   return level + level / 8;
+}
+
+/// What of a GPU's memory a frame will hold that is known before its hull is: its pictures and bounds, and
+/// what a solve holds a key point.
+std::size_t bytes_on_gpu(const Scene& scene, const Grid& grid, Precision precision) {
+  std::size_t bytes = grid.size() * bytes_per_key_point(precision);
+  for (const View& view : scene.views)
+    bytes += view.image->rgb.size() * sizeof(float) + view.image->rgb.size() / 3;
+  return bytes;
 }
 
 /// Root of the mean over the views of the squared error, one role at a time; nothing without such a view.
@@ -167,6 +177,10 @@ Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, co
   const Seconds start = task.elapsed();
   EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
                              choose_grid(task.scene(), options.voxels, solve_options.precision));
+  if (task.device == Device::cuda) {
+    use_gpu(task.device.gpu);
+    reserve_gpu_memory(bytes_on_gpu(task.scene(), grid, solve_options.precision));
+  }
   tell(progress, 0, "finding out which effects matter");
   EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice, decide_effects(task, grid, options));
   const Seconds effects_time = task.elapsed() - start;

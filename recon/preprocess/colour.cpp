@@ -40,19 +40,6 @@ Status check_response(const std::vector<double>& response, const std::string& wh
   return {};
 }
 
-/// A coordinate between the middles of `cells` cells: the indices before and after it, and the fraction.
-struct BetweenCells {
-  std::size_t before, after;
-  double part;
-};
-
-BetweenCells between_cells(double share, int cells) {
-  const double at = std::clamp(share * cells - 0.5, 0.0, static_cast<double>(cells - 1));
-  const auto before = static_cast<std::size_t>(at);
-  return {before, std::min(before + 1, static_cast<std::size_t>(cells - 1)),
-          at - static_cast<double>(before)};
-}
-
 Status read_flat(const v1::FlatField& message, FlatField& flat, const std::string& where) {
   constexpr std::uint32_t kMostCells = 4096;  // per side
   const std::uint32_t columns = message.columns();
@@ -83,19 +70,13 @@ Status read_spectral(const v1::Colour& message, Colour& colour, const std::strin
 
 }  // namespace
 
+CellsOfLight cells_of(const FlatField& flat) {
+  return {flat.columns, flat.rows, flat.light.empty() ? nullptr : flat.light.data()};
+}
+
 std::array<double, 3> light_at(const FlatField& flat, double x, double y) {
-  std::array<double, 3> out = {1, 1, 1};
-  if (flat.light.empty()) return out;
-  const BetweenCells across = between_cells(x, flat.columns);
-  const BetweenCells down = between_cells(y, flat.rows);
-  const auto cell = [&](std::size_t column, std::size_t row, std::size_t c) {
-    return static_cast<double>(flat.light[3 * (row * static_cast<std::size_t>(flat.columns) + column) + c]);
-  };
-  for (std::size_t c = 0; c < 3; ++c)
-    out[c] = std::lerp(
-        std::lerp(cell(across.before, down.before, c), cell(across.after, down.before, c), across.part),
-        std::lerp(cell(across.before, down.after, c), cell(across.after, down.after, c), across.part),
-        down.part);
+  std::array<double, 3> out = {};
+  cells_of(flat).at(x, y, out.data());
   return out;
 }
 
@@ -114,10 +95,7 @@ double exposure_of(const Colour& colour, double sample) {
 }
 
 double radius_squared(ImageSize size, double x, double y) {
-  const double dx = x - 0.5 * size.width;
-  const double dy = y - 0.5 * size.height;
-  return 4 * (dx * dx + dy * dy) /
-         (static_cast<double>(size.width) * size.width + static_cast<double>(size.height) * size.height);
+  return radius_squared(size.width, size.height, x, y);
 }
 
 Result<Colour> read_colour(const v1::Colour& message, ImageSize size, const std::string& where) {

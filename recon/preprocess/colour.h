@@ -11,6 +11,7 @@
 #include "base/quantity.h"
 #include "base/result.h"
 #include "recon/calibrate/camera_response.h"
+#include "recon/kernels/develop.h"
 #include "session/rig_file.h"  // v1::Colour
 
 namespace emberlock::recon {
@@ -42,11 +43,12 @@ bool changes_nothing(const Colour& colour);
 /// Relative exposure 0..1 of a sample 0..1, linear between the points of the response.
 double exposure_of(const Colour& colour, double sample);
 
-/// The relative light at a pixel, 1 in the middle: 1 + k2 r^2 + k4 r^4 + k6 r^6, with `r_squared` in half
-/// diagonals.
+/// The relative light at a pixel (falloff() of kernels/develop.h).
 inline double falloff(const std::array<double, 3>& k, double r_squared) {
-  return 1 + r_squared * (k[0] + r_squared * (k[1] + r_squared * k[2]));
+  return falloff(k.data(), r_squared);
 }
+/// For kernels.
+CellsOfLight cells_of(const FlatField& flat);
 
 /// A flat field's three values at a place, with x and y in 0..1 of the picture's sides.
 std::array<double, 3> light_at(const FlatField& flat, double x, double y);

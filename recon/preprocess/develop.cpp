@@ -2,7 +2,9 @@
 #include "recon/preprocess/develop.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -20,6 +22,16 @@ PreprocessStep linearised(const std::optional<Colour>& colour) {
   return {"linearise", true, "by the calibrated response"};
 }
 
+/// Without what is found out in the picture.
+RawPicture undeveloped(std::shared_ptr<const Image> frame, const Colour* colour) {
+  const ImageLayout layout = frame->layout();
+  RawPicture raw{std::move(frame), exposures_of(layout, colour), {}};
+  raw.light = light_of_number(layout, colour, raw.exposures.data());
+  raw.equalise = equalising(layout.size, colour != nullptr ? *colour : Colour{});
+  if (colour != nullptr) raw.flat = colour->flat.light;
+  return raw;
+}
+
 /// Those that stand out, and the calibrated ones.
 std::vector<std::uint32_t> with_calibrated(std::vector<std::uint32_t> hot,
                                            const std::optional<Colour>& colour) {
@@ -30,30 +42,35 @@ std::vector<std::uint32_t> with_calibrated(std::vector<std::uint32_t> hot,
   return all;
 }
 
-PreprocessStep take_hot_pixels_out(Samples& samples, const CameraFrame& camera) {
+PreprocessStep take_hot_pixels_out(Samples& samples, const CameraFrame& camera, RawPicture& raw) {
   const DarkPicture* dark = camera.dark.get();
-  const std::vector<std::uint32_t> hot =
-      dark != nullptr ? dark->hot : with_calibrated(hot_pixels_of_picture(samples), camera.colour);
-  if (hot.empty()) return {"hot pixels", false, "none stand out"};
-  replace_hot_pixels(samples, hot);
+  raw.hot = dark != nullptr ? dark->hot : with_calibrated(hot_pixels_of_picture(samples), camera.colour);
+  if (raw.hot.empty()) return {"hot pixels", false, "none stand out"};
+  replace_hot_pixels(samples, raw.hot);
   const char* by = camera.colour && !camera.colour->hot_pixels.empty() ? "are calibrated as hot, or stand out"
                    : dark != nullptr ? "stand out in the frames without flame"
                                      : "stand out in the picture";
-  return {"hot pixels", true, fmt::format("{} {}", hot.size(), by)};
+  return {"hot pixels", true, fmt::format("{} {}", raw.hot.size(), by)};
 }
 
-PreprocessStep take_smear_out(Samples& samples, SensorKind sensor, const DevelopOptions& options) {
+void remove_smear(Samples& samples, const Smear& smear, RawPicture& raw) {
+  raw.smear_of_row = remove_smear(samples, smear);
+  if (smear.path != SmearPath::whole_column) raw.smear_of_other_rows = taking_smear(smear);
+}
+
+PreprocessStep take_smear_out(Samples& samples, SensorKind sensor, const DevelopOptions& options,
+                              RawPicture& raw) {
   PreprocessStep step{"smear", false, {}};
   if (options.smear_removal == DevelopOptions::SmearRemoval::off) {
     step.reason = "switched off";
   } else if (options.smear_removal == DevelopOptions::SmearRemoval::told) {
-    remove_smear(samples, options.smear);
+    remove_smear(samples, options.smear, raw);
     step.on = true;
     step.reason = "as told";
   } else if (sensor != SensorKind::ccd) {
     step.reason = "the sensor is no CCD";
   } else if (const auto smear = find_smear(samples, &step.reason)) {
-    remove_smear(samples, *smear);
+    remove_smear(samples, *smear, raw);
     step.on = true;
   }
   return step;
@@ -97,11 +114,14 @@ DarkPicture dark_picture_of(const std::vector<ImageView>& dark, const std::optio
 DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& options) {
   const Colour* colour = camera.colour ? &*camera.colour : nullptr;
   const DarkPicture* dark = camera.dark.get();
+  auto raw = std::make_shared<RawPicture>(undeveloped(camera.frame, colour));
+  raw->demosaicing = options.demosaicing;
   DevelopedPicture out;
-  Samples samples = samples_of(camera.frame, colour);
+  Samples samples = samples_of(camera.frame->view(), raw->light);
   out.steps.push_back(linearised(camera.colour));
-  out.steps.push_back(take_hot_pixels_out(samples, camera));
+  out.steps.push_back(take_hot_pixels_out(samples, camera, *raw));
   if (dark != nullptr) {
+    raw->dark = std::shared_ptr<const std::vector<float>>(camera.dark, &dark->level.value);
     subtract(samples, dark->level);
     out.steps.push_back(
         {"background", true, fmt::format("the midmean of {} frames without flame", dark->frames)});
@@ -109,14 +129,24 @@ DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& option
     out.steps.push_back(
         {"background", false, "no frames without flame: the level of the picture's darker half instead"});
   }
-  out.steps.push_back(take_smear_out(samples, camera.sensor, options));
+  out.steps.push_back(take_smear_out(samples, camera.sensor, options, *raw));
   out.steps.push_back(demosaiced(samples.layout, options.demosaicing));
   out.image = to_picture(samples, &out.bounds, options.demosaicing);
   out.steps.push_back(saturated(out.bounds));
-  if (dark == nullptr) subtract_background(out.image);
+  if (dark == nullptr) {
+    const std::array<float, 3> level = subtract_background(out.image);
+    std::copy(level.begin(), level.end(), raw->equalise.level);
+  }
   if (colour != nullptr) equalise(out.image, *colour);
   out.steps.push_back(equalised(camera.colour));
+  out.image.origin = Origin(std::move(raw));
   return out;
+}
+
+RadianceImage as_filmed(std::shared_ptr<const Image> frame) {
+  RadianceImage image = to_radiance(frame->view());
+  image.origin = Origin(share(undeveloped(std::move(frame), nullptr)));
+  return image;
 }
 
 std::vector<PreprocessStep> together(

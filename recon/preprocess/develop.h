@@ -11,6 +11,7 @@
 #include "base/image.h"
 #include "base/sensor_kind.h"
 #include "recon/preprocess/colour.h"
+#include "recon/preprocess/raw_picture.h"
 #include "recon/preprocess/samples.h"
 #include "recon/preprocess/smear.h"
 #include "recon/preprocess/view.h"
@@ -36,7 +37,7 @@ DarkPicture dark_picture_of(const std::vector<ImageView>& dark, const std::optio
 
 /// One camera's frame of the flame, and the known properties of the camera.
 struct CameraFrame {
-  ImageView frame;
+  std::shared_ptr<const Image> frame;
   std::shared_ptr<const DarkPicture> dark = {};  ///< null: the level comes from the picture's own dark half
   std::optional<Colour> colour = {};  ///< absent: samples are assumed to be linear, and all cameras equal
   SensorKind sensor = SensorKind::ccd;
@@ -51,8 +52,11 @@ struct DevelopedPicture {
 /// Converts samples to radiance: linearise, hot pixels, background, smear, demosaic, level, gain and
 /// vignetting, in this order, so that additive effects of the sensor are removed before anything is
 /// multiplied or interpolated. Each step reports whether it ran and why. The background must have the frame's
-/// layout.
+/// layout. The picture knows its origin.
 DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& options = {});
+
+/// A picture whose samples are linear in light already, without any of that: to_radiance(), with its origin.
+RadianceImage as_filmed(std::shared_ptr<const Image> frame);
 
 /// Merges the steps of several cameras: a step is on if any camera's is; if they differ, the reason gives
 /// their numbers and the first camera of each kind.

@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "recon/compute/cuda_launch.h"
-#include "recon/compute/gpu_pictures.h"
 #include "recon/kernels/flame.h"
 #include "recon/preprocess/flame_mask_cuda.h"
+#include "recon/preprocess/picture_on_gpu.h"
 
 namespace emberlock::recon {
 namespace {
@@ -38,7 +38,7 @@ std::vector<FlameMask> masks_on_cuda(const std::vector<SharedImage>& images,
     const SharedImage& image = images[v];
     const ImageSize size = image->size;
     const NoiseBlocks blocks = noise_blocks(size);
-    pictures.push_back(on_gpu(std::shared_ptr<const std::vector<float>>(image, &image->rgb)));
+    pictures.push_back(on_gpu(image));
     views[v] = {pictures.back()->data(), nullptr,      size.width, size.height,          blocks.edge,
                 blocks.across,           blocks.count, 0,          threshold.has_value()};
     first[v] = pixels;

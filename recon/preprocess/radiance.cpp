@@ -22,7 +22,7 @@ float midmean(std::vector<float>& values) {
   return static_cast<float>(sum / static_cast<double>(last - first));
 }
 
-void subtract_background(RadianceImage& image) {
+std::array<float, 3> subtract_background(RadianceImage& image) {
   // Block means decide which half is darker, because noise doesn't sort them. The level is the midmean of
   // pixels: unlike the mean it isn't biased by clipping at black, and unlike the median it isn't limited to
   // sample values.
@@ -50,7 +50,7 @@ void subtract_background(RadianceImage& image) {
       blocks.push_back({x, y, std::max({sum[0], sum[1], sum[2]})});
     }
   }
-  if (blocks.empty()) return;
+  if (blocks.empty()) return {};
   const auto half = blocks.begin() + static_cast<std::ptrdiff_t>(blocks.size() / 2);
   std::nth_element(blocks.begin(), half, blocks.end(),
                    [](const Block& a, const Block& b) { return a.brightness < b.brightness; });
@@ -63,6 +63,7 @@ void subtract_background(RadianceImage& image) {
   }
   for (std::size_t i = 0; i < image.rgb.size(); i += 3)
     for (std::size_t c = 0; c < 3; ++c) image.rgb[i + c] -= level[c];
+  return level;
 }
 
 Image to_rgb8(const RadianceImage& image) {

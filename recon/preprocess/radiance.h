@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "base/image.h"
@@ -18,8 +19,8 @@ float midmean(std::vector<float>& values);
 
 /// Subtracts the camera's black level and uniform stray light: each channel's midmean over the darker half of
 /// the picture's blocks of up to 8 x 8 pixels. Noise stays on both sides of 0, so that sums are unbiased. At
-/// least half of the picture must be background.
-void subtract_background(RadianceImage& image);
+/// least half of the picture must be background. Returns the level.
+std::array<float, 3> subtract_background(RadianceImage& image);
 
 /// Converts back to 8 bits per channel: rounded, clamped to 0..255; NaN becomes 0.
 Image to_rgb8(const RadianceImage& image);

@@ -182,7 +182,8 @@ std::vector<double> light_above_level(const Samples& s, const std::vector<double
   return out;
 }
 
-void remove_from_whole_columns(Samples& s, const Smear& smear) {
+/// What is added to each sample of a row.
+std::vector<float> smear_of_columns(const Samples& s, const Smear& smear) {
   const int channels = s.channels();
   double mean_fraction = 0;
   for (int c = 0; c < channels; ++c) mean_fraction += smear.fraction[at(c)] / channels;
@@ -206,25 +207,7 @@ void remove_from_whole_columns(Samples& s, const Smear& smear) {
       column[at(x) * at(channels) + at(c)] = static_cast<float>(add);
     }
   }
-  for (std::size_t i = 0; i < s.value.size(); ++i) s.value[i] -= column[i % column.size()];
-}
-
-/// Row by row in the direction in which light has been picked up: all of it is known by then.
-void remove_from_rows(Samples& s, const Smear& smear) {
-  const int channels = s.channels();
-  const bool from_top = smear.path == SmearPath::rows_above;
-  std::vector<double> light(at(s.size.width));
-  for (int i = 0; i < s.size.height; ++i) {
-    const int y = from_top ? i : s.size.height - 1 - i;
-    for (int x = 0; x < s.size.width; ++x) {
-      const double before = light[at(x)];
-      for (int c = 0; c < channels; ++c) {
-        float& value = s.value[s.index(x, y, c)];
-        value -= static_cast<float>(smear.fraction[at(c)] * before);
-        light[at(x)] += static_cast<double>(value) / channels;
-      }
-    }
-  }
+  return column;
 }
 
 }  // namespace
@@ -267,11 +250,25 @@ std::optional<Smear> find_smear(const Samples& samples, std::string* why) {
   return found;
 }
 
-void remove_smear(Samples& samples, const Smear& smear) {
-  if (smear.path == SmearPath::whole_column)
-    remove_from_whole_columns(samples, smear);
-  else
-    remove_from_rows(samples, smear);
+TakeSmearOfRows taking_smear(const Smear& smear) {
+  TakeSmearOfRows take;
+  take.from_top = smear.path == SmearPath::rows_above;
+  std::copy(smear.fraction.begin(), smear.fraction.end(), take.fraction);
+  return take;
+}
+
+std::vector<float> remove_smear(Samples& samples, const Smear& smear) {
+  if (smear.path == SmearPath::whole_column) {
+    std::vector<float> columns = smear_of_columns(samples, smear);
+    for (auto row = samples.value.begin(); row != samples.value.end();)
+      for (const float more : columns) *row++ -= more;
+    return columns;
+  }
+  TakeSmearOfRows take = taking_smear(smear);
+  take.s = samples.view();
+  take.value = samples.value.data();
+  for (int x = 0; x < samples.size.width; ++x) take(at(x));
+  return {};
 }
 
 }  // namespace emberlock::recon

@@ -39,7 +39,10 @@ struct Smear {
 std::optional<Smear> find_smear(const Samples& samples, std::string* why = nullptr);
 
 /// Removes the smear. A saturated sample is only a lower bound of its column's light; for such columns the
-/// smear in their rows without flame is used if it is larger.
-void remove_smear(Samples& samples, const Smear& smear);
+/// smear in their rows without flame is used if it is larger. Returns what was taken from each sample of
+/// every row; empty where `path` isn't the whole column.
+std::vector<float> remove_smear(Samples& samples, const Smear& smear);
+/// That of the other paths as a functor, which doesn't hold the samples.
+TakeSmearOfRows taking_smear(const Smear& smear);
 
 }  // namespace emberlock::recon

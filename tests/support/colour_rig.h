@@ -228,7 +228,7 @@ inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig,
               noisy_sample(camera, camera.exposure(radiance, channel, x + 0.5, y + 0.5), random));
         }
     recon::CameraFrame from;
-    from.frame = frame.view();
+    from.frame = std::make_shared<const Image>(std::move(frame));
     from.sensor = SensorKind::global_shutter;
     if (calibration != nullptr) from.colour = calibration->cameras[i].colour;
     const recon::DevelopedPicture picture = recon::develop(from);
@@ -246,7 +246,7 @@ inline PatchSpread held_out_spread(const std::vector<ColourTruth>& rig,
         for (std::size_t c = 0; c < 3; ++c) {
           sum[p][c] += static_cast<double>(picture.image.rgb[3 * at + c]);
           bound[p][c] += picture.bounds.empty() ? 0 : picture.bounds[at] >> c & 1;
-          clipped[p][c] += frame.view().sample(x, y, static_cast<int>(c)) == 255 ? 1 : 0;
+          clipped[p][c] += from.frame->view().sample(x, y, static_cast<int>(c)) == 255 ? 1 : 0;
         }
       }
     for (std::size_t p = 0; p < patches.size(); ++p)

@@ -207,18 +207,18 @@ inline BackgroundResidual background_residual(const recon::RadianceImage& pictur
   options.format = PixelFormat::rgb8;
   options.gain = 0.6;
   options.background = lit_wall(picture.size);
-  const Image frame = film(picture, options, seed);
+  const auto frame = std::make_shared<const Image>(film(picture, options, seed));
   std::vector<Image> dark;
   for (std::uint64_t f = 0; f < recon::kDarkFrames; ++f)
     dark.push_back(film(recon::RadianceImage(picture.size), options, 100 + f));
   recon::RadianceImage truth = picture;
   for (float& v : truth.rgb) v *= 0.6F;
   recon::CameraFrame camera;
-  camera.frame = frame.view();
+  camera.frame = frame;
   camera.sensor = SensorKind::global_shutter;
   const auto off = [&] { return recon::all_channels(recon::rmse(recon::develop(camera).image, truth, {})); };
   BackgroundResidual out;
-  out.filmed = recon::all_channels(recon::rmse(recon::to_radiance(frame.view()), truth, {}));
+  out.filmed = recon::all_channels(recon::rmse(recon::to_radiance(frame->view()), truth, {}));
   out.level = off();
   std::vector<ImageView> views;
   for (const Image& d : dark) views.push_back(d.view());

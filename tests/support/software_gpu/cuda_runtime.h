@@ -39,7 +39,11 @@ enum cudaDeviceAttr {
   cudaDevAttrComputeCapabilityMinor,
   cudaDevAttrMemoryPoolsSupported,
 };
-enum cudaMemPoolAttr { cudaMemPoolAttrReleaseThreshold };
+enum cudaMemPoolAttr {
+  cudaMemPoolAttrReleaseThreshold,
+  cudaMemPoolAttrReservedMemCurrent,
+  cudaMemPoolAttrUsedMemCurrent,
+};
 enum cudaStreamCaptureMode { cudaStreamCaptureModeThreadLocal };
 using cudaMemPool_t = int*;
 using cudaStream_t = int*;
@@ -96,6 +100,7 @@ class Memory {
       next_ += pages + kPage;
     }
     used_ += pages;
+    most_ = std::max(most_, used_);
     // Ends as close to the page that nobody may touch as the largest elements' alignment allows.
     const std::uintptr_t begin = at + (pages - bytes) / kAlign * kAlign;
     pieces_.push_back({at, pages});
@@ -123,6 +128,11 @@ class Memory {
   [[nodiscard]] std::size_t used() {
     const std::lock_guard lock(mutex_);
     return used_;
+  }
+  /// The most that was in use at once: what a pool that gives nothing back has from the driver.
+  [[nodiscard]] std::size_t reserved() {
+    const std::lock_guard lock(mutex_);
+    return most_;
   }
   /// The GPU's memory can be touched while any of these lives, if it is closed at all.
   class Open {
@@ -177,7 +187,7 @@ class Memory {
   std::mutex mutex_;
   std::uintptr_t first_ = 0;
   std::uintptr_t next_ = 0;
-  std::size_t used_ = 0;
+  std::size_t used_ = 0, most_ = 0;
   int open_ = 0;
   std::vector<Piece> pieces_, free_;
 };
@@ -273,6 +283,13 @@ inline cudaError_t cudaDeviceGetDefaultMemPool(cudaMemPool_t* pool, int /*gpu*/)
 }
 inline cudaError_t cudaMemPoolSetAttribute(cudaMemPool_t /*pool*/, cudaMemPoolAttr /*which*/,
                                            void* /*value*/) {
+  return cudaSuccess;
+}
+inline cudaError_t cudaMemPoolGetAttribute(cudaMemPool_t /*pool*/, cudaMemPoolAttr which, void* value) {
+  if (which == cudaMemPoolAttrReleaseThreshold) return cudaErrorInvalidValue;
+  auto& memory = software_gpu::Memory::get();
+  *static_cast<std::uint64_t*>(value) =
+      which == cudaMemPoolAttrReservedMemCurrent ? memory.reserved() : memory.used();
   return cudaSuccess;
 }
 inline cudaError_t cudaMemGetInfo(std::size_t* free, std::size_t* total) {

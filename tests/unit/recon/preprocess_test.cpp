@@ -250,9 +250,8 @@ TEST(DarkPart, TakesAWallsLightOutWhichALevelDoesNot) {
 TEST(Develop, SaysWhatRanAndWhy) {
   test::FilmOptions film;
   film.gain = 2;
-  const Image frame = test::film(small_flame_picture(), film, 1);
   CameraFrame camera;
-  camera.frame = frame.view();
+  camera.frame = share(test::film(small_flame_picture(), film, 1));
   camera.sensor = SensorKind::rolling_shutter;
   const DevelopedPicture plain = develop(camera);
   std::vector<std::string> on;

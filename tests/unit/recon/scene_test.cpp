@@ -250,6 +250,7 @@ TEST_F(SessionSceneTest, TheFramesOfOneInstantBecomeViews) {
     for (std::size_t i = 0; i < 3 * 16; ++i) EXPECT_NEAR(view.image->rgb[i], 11 - 4, 0.1) << view.name;
     EXPECT_NEAR(view.image->rgb.back(), 0, 0.1) << "the black level is taken out";
     EXPECT_EQ(view.camera.intrinsics.fy, 21);
+    EXPECT_TRUE(view.image->origin.raw()) << "a GPU develops it itself";
   }
   EXPECT_EQ(scene->views[2].camera.camera_from_world.translation, Eigen::Vector3d(0.2, 0, 2));
 }

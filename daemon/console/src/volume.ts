@@ -10,25 +10,22 @@ import vtkVolume from '@kitware/vtk.js/Rendering/Core/Volume';
 import vtkVolumeMapper from '@kitware/vtk.js/Rendering/Core/VolumeMapper';
 import vtkGenericRenderWindow from '@kitware/vtk.js/Rendering/Misc/GenericRenderWindow';
 
-import {kHeat, spread} from './layers';
+import {heat, spread} from './layers';
 import type {Volume} from './wire';
 
 type Colour = readonly [number, number, number, number];  // brightness of a voxel; red, green, blue
 const kGlow: readonly Colour[] = [[0, 0, 0, 0], [40, 0.35, 0.02, 0.02], [110, 0.9, 0.3, 0.02], [190, 1, 0.75, 0.2], [255, 1, 1, 0.85]];
 const kGrey: readonly Colour[] = [[0, 0, 0, 0], [255, 1, 1, 1]];
-const kMeasured: readonly Colour[] = kHeat.map(([red, green, blue], at) => [255 * at / (kHeat.length - 1), red / 255, green / 255, blue / 255]);
 // Opacity of a voxel's brightness. What is measured shows the colours of what lies in front rather than all light along a ray.
 const kClear = [[0, 0], [8, 0], [60, 0.05], [140, 0.22], [255, 0.6]] as const;
 const kDense = [[0, 0], [6, 0], [16, 0.35], [80, 0.7], [255, 0.9]] as const;
 
-/** One of each in turn. */
-function paired(first: Uint8Array, second: Uint8Array): Uint8Array {
-  const both = new Uint8Array(2 * first.length);
-  for (let at = 0; at < first.length; ++at) {
-    both[2 * at] = first[at]!;
-    both[2 * at + 1] = second[at]!;
-  }
-  return both;
+/** Red, green, blue and brightness of each voxel; nothing where nothing is told. */
+function coloured(header: Volume, measured: Uint8Array, brightness: Uint8Array): Uint8Array {
+  const colours = Array.from({length: 256}, (_, value) => heat(value));
+  const out = new Uint8Array(4 * measured.length);
+  spread(header, measured).forEach((value, at) => out.set([...colours[value]!, measured[at] ? brightness[at]! : 0], 4 * at));
+  return out;
 }
 
 export class VolumeView {
@@ -38,7 +35,7 @@ export class VolumeView {
   private readonly colours = vtkColorTransferFunction.newInstance();
   private readonly opacity = vtkPiecewiseFunction.newInstance();
   private size = '';
-  private shown?: readonly Colour[];
+  private shown: readonly unknown[] = [];
 
   constructor(container: HTMLElement) {
     this.window.setContainer(container);
@@ -46,7 +43,7 @@ export class VolumeView {
     const property = this.actor.getProperty();
     property.setRGBTransferFunction(0, this.colours);
     property.setScalarOpacity(0, this.opacity);
-    property.setIndependentComponents(false);  // the second one is what the opacity goes by
+    property.setIndependentComponents(false);  // of four: a colour, and what the opacity goes by
     property.setInterpolationTypeToLinear();
     this.window.getRenderer().addVolume(this.actor);
     this.mapper.setMaximumSamplesPerRay(400);
@@ -59,7 +56,7 @@ export class VolumeView {
     const many = nx * ny * nz;
     if (bytes.length !== many * (1 + (header.layers ?? []).length)) throw new Error(`a volume of ${nx} x ${ny} x ${nz} voxels with ${bytes.length} bytes`);
     const brightness = bytes.subarray(0, many);
-    this.colour(measured ? kMeasured : grey ? kGrey : kGlow);
+    this.colour(grey ? kGrey : kGlow, measured ? kDense : kClear);
     const size = header.box?.size ?? [1, 1, 1];
     const center = header.box?.center ?? [0, 0, 0];
     const spacing = [size[0]! / nx, size[1]! / ny, size[2]! / nz];
@@ -68,7 +65,7 @@ export class VolumeView {
     image.setSpacing([spacing[0]!, spacing[1]!, spacing[2]!]);
     image.setOrigin([0, 1, 2].map(axis => center[axis]! - size[axis]! / 2 + spacing[axis]! / 2) as [number, number, number]);
     image.getPointData().setScalars(vtkDataArray.newInstance(measured
-      ? {name: 'measured', numberOfComponents: 2, values: paired(spread(header, measured), brightness.map((light, at) => (measured[at] ? light : 0)))}
+      ? {name: 'measured', numberOfComponents: 4, values: coloured(header, measured, brightness)}
       : {name: 'brightness', numberOfComponents: 1, values: brightness}));
     const step = Math.min(...spacing);
     this.mapper.setSampleDistance(step);
@@ -83,13 +80,13 @@ export class VolumeView {
     this.window.getRenderWindow().render();
   }
 
-  private colour(colours: readonly Colour[]): void {
-    if (colours === this.shown) return;
-    this.shown = colours;
+  private colour(colours: readonly Colour[], opacity: typeof kClear | typeof kDense): void {
+    if (colours === this.shown[0] && opacity === this.shown[1]) return;
+    this.shown = [colours, opacity];
     this.colours.removeAllPoints();
     for (const [at, ...rgb] of colours) this.colours.addRGBPoint(at, ...rgb);
     this.opacity.removeAllPoints();
-    for (const [at, value] of colours === kMeasured ? kDense : kClear) this.opacity.addPoint(at, value);
+    for (const [at, value] of opacity) this.opacity.addPoint(at, value);
   }
 
   /** From the side, upright. */

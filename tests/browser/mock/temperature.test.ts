@@ -20,6 +20,24 @@ function tell({header, bytes}: {header: object; bytes: Uint8Array}): void {
 const sliceAt = (page: Page, x: number, y: number) => page.locator('canvas.slice').evaluate((canvas: HTMLCanvasElement, [right, down]) =>
   [...canvas.getContext('2d')!.getImageData(Math.floor(right! * canvas.width), Math.floor(down! * canvas.height), 1, 1).data.slice(0, 3)], [x, y]);
 
+/** How many pixels of the volume, as it is seen, are orange or yellow, and how many violet. */
+async function colours(page: Page): Promise<{warm: number; violet: number}> {
+  const png = (await page.locator('.volume').screenshot()).toString('base64');
+  return page.evaluate(async data => {
+    const bitmap = await createImageBitmap(new Blob([Uint8Array.from(atob(data), letter => letter.charCodeAt(0))]));
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext('2d')!;
+    context.drawImage(bitmap, 0, 0);
+    const {data: bytes} = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    const seen = {warm: 0, violet: 0};
+    for (let at = 0; at < bytes.length; at += 4) {
+      const [red, green, blue] = [bytes[at]!, bytes[at + 1]!, bytes[at + 2]!];
+      if (red > blue + 60 && red > 120) ++seen.warm;
+      if (red > green + 20 && blue > green + 20) ++seen.violet;
+    }
+    return seen;
+  }, png);
+}
+
 describe('asked for', () => {
   const asked = () => rig.mock.calls.filter(({method}) => method === 'Reconstruct/Start').map(({request}) => request);
   const quantity = 'What of candle 1 to reconstruct';
@@ -72,13 +90,16 @@ describe('shown', () => {
     expect(light(below)).toBeGreaterThan(light(above) + 60);
     expect(light(above)).toBeGreaterThan(0);
     expect(outside).toEqual([0, 0, 0]);
-    await screenshot(page, 'temperature-mock', true);
+    // Only what is measured has the bar's colours: violet is none of a glow's.
+    await until(() => colours(page), ({warm, violet}) => warm > 20 && violet > 20, 'the volume has them too', 20);
+    await page.locator('.turn').scrollIntoViewIfNeeded();
+    await screenshot(page, 'temperature-mock');
     rig.mock.show({reconstruction: reconstruction(12, {state: 'DONE', temperature: ['1650 K on average', 'read from a grey glow']})});
     tell(hotFlameVolume(false));
     await page.locator('.layers[data-shown=TEMPERATURE]:not([data-quick])').waitFor();
     expect(await text(page, '.layers .note')).not.toContain('looked up');
     expect(await page.locator('.progress').innerText()).toContain('1650 K on average');
-  });
+  }, 90_000);
 
   test('what somebody chose stays from iteration to iteration, and the next reconstruction begins anew', async () => {
     rig.mock.status = {...locked(), reconstruction: reconstruction(3)};

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "recon/export/preview.h"
 #include "recon/export/temperature_words.h"
 #include "report/html.h"
 #include "report/value_slices.h"
@@ -17,14 +18,6 @@ namespace {
 
 /// A key point that shows less light than this share of the brightest has errors that nobody looks for.
 constexpr double kLeastLight = 0.005;
-
-/// The largest of what is told, to two digits, so that a bar's end reads well.
-double round_end(const std::vector<float>& values) {
-  const double most = static_cast<double>(*std::max_element(values.begin(), values.end()));
-  if (!(most > 0)) return 1;
-  const double unit = std::pow(10.0, std::floor(std::log10(most)) - 1);
-  return unit * std::ceil(most / unit);
-}
 
 std::string paragraph(std::string_view clause) { return "<p>" + html_escape(sentence(clause)) + "</p>"; }
 
@@ -68,7 +61,7 @@ std::string errors_html(const recon::Outcome& outcome, const ShownAxes& axes) {
       "took {:.1f} s: it holds the pictures' noise, and what a view more or less would change",
       errors.solves, errors.time.value()));
   const auto add = [&](const std::vector<float>& values, const char* unit, const char* what) {
-    html += value_slices_html(volume.grid, values, axes, {0, round_end(values), unit}, what);
+    html += value_slices_html(volume.grid, values, axes, {0, recon::end_of_bar(values), unit}, what);
   };
   add(emission, "grey levels a centimetre", "error of the light, mean of R, G and B,");
   if (!extinction.empty()) add(extinction, "1/m", "error of the extinction");

@@ -39,16 +39,19 @@ struct Blocks {
   }
 };
 
+constexpr double kBeyond = 0.02;  // so large a share of what is told may lie beyond an end of a bar
+
+std::vector<float> told_of(const std::vector<float>& values) {
+  std::vector<float> told;
+  std::copy_if(values.begin(), values.end(), std::back_inserter(told), [](float v) { return v > 0; });
+  return told;
+}
+
 /// The value below which so large a share of them lies.
-double percentile(std::vector<float> values, double share) {
+double percentile(std::vector<float>& values, double share) {
   const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + at, values.end());
   return static_cast<double>(values[static_cast<std::size_t>(at)]);
-}
-
-double up_to_two_digits(double value) {
-  const double unit = std::pow(10.0, std::floor(std::log10(value)) - 1);
-  return unit * std::ceil(value / unit - 1e-9);
 }
 
 }  // namespace
@@ -134,21 +137,27 @@ std::vector<float> coarse_emission(const Volume& volume, int longest) {
   return sum;
 }
 
+double end_of_bar(const std::vector<float>& errors) {
+  std::vector<float> told = told_of(errors);
+  if (told.empty()) return 1;
+  constexpr double kRounding = 1e-5;  // of a float
+  const double most = percentile(told, 1 - kBeyond);
+  const double unit = std::pow(10.0, std::floor(std::log10(most)) - 1);
+  return unit * std::ceil(most / unit - kRounding);
+}
+
 CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks) {
-  constexpr double kShare = 0.02;
   constexpr double kKelvin = 50;
   CoarseLayer layer;
   layer.kind = kind;
   layer.voxels.resize(blocks.size());
-  std::vector<float> told;
-  std::copy_if(blocks.begin(), blocks.end(), std::back_inserter(told), [](float v) { return v > 0; });
+  std::vector<float> told = told_of(blocks);
   if (told.empty()) return layer;
-  layer.high = percentile(told, 1 - kShare);
   if (kind == CoarseLayer::Kind::temperature) {
-    layer.low = kKelvin * std::floor(percentile(std::move(told), kShare) / kKelvin);
-    layer.high = std::max(layer.low + kKelvin, kKelvin * std::ceil(layer.high / kKelvin));
+    layer.low = kKelvin * std::floor(percentile(told, kBeyond) / kKelvin);
+    layer.high = std::max(layer.low + kKelvin, kKelvin * std::ceil(percentile(told, 1 - kBeyond) / kKelvin));
   } else {
-    layer.high = up_to_two_digits(layer.high);
+    layer.high = end_of_bar(blocks);
   }
   std::transform(blocks.begin(), blocks.end(), layer.voxels.begin(), [&](float value) {
     const double share = (static_cast<double>(value) - layer.low) / (layer.high - layer.low);

@@ -53,8 +53,12 @@ struct CoarseLayer {
   std::vector<std::uint8_t> voxels;  ///< nx ny nz; 0: not told
 };
 
+/// Where a colour bar of errors that begins at 0 ends: the 98th percentile of those above 0, up to two
+/// digits; 1 where there are none.
+double end_of_bar(const std::vector<float>& errors);
+
 /// Of a value a block; what isn't above 0 is not told. Temperatures from the 2nd to the 98th percentile of
-/// those told, to 50 K; errors from 0 to the 98th, to two digits.
+/// those told, to 50 K; errors from 0 to end_of_bar().
 CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks);
 /// Of a value a key point of the grid: a block's is the mean over those that are told.
 CoarseLayer coarse_layer(CoarseLayer::Kind kind, const Grid& grid, int longest,

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <csignal>
+#include <cstddef>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -13,6 +15,7 @@
 #include "recon/adjust/picture_error.h"
 #include "recon/export/picture.h"
 #include "recon/export/preview.h"
+#include "recon/export/temperature_words.h"
 #include "recon/pipeline/advice.h"
 #include "recon/preprocess/radiance.h"
 #include "recon/render/render.h"
@@ -70,6 +73,45 @@ void add_volume(v1::IterationPreview& message, const recon::Volume& volume) {
   for (const double value : coarse.box.size) preview.mutable_box()->add_size(value);
   preview.set_brightest(coarse.brightest);
   preview.set_voxels(coarse.voxels.data(), coarse.voxels.size());
+}
+
+v1::VolumeLayer& add_layer(v1::IterationPreview& message, const recon::CoarseLayer& layer) {
+  using Kind = recon::CoarseLayer::Kind;
+  v1::VolumeLayer& added = *message.mutable_volume()->add_layers();
+  added.set_kind(layer.kind == Kind::temperature         ? v1::VolumeLayer::TEMPERATURE
+                 : layer.kind == Kind::temperature_sigma ? v1::VolumeLayer::TEMPERATURE_SIGMA
+                 : layer.kind == Kind::emission_sigma    ? v1::VolumeLayer::EMISSION_SIGMA
+                                                         : v1::VolumeLayer::EXTINCTION_SIGMA);
+  added.set_low(layer.low);
+  added.set_high(layer.high);
+  added.set_voxels(layer.voxels.data(), layer.voxels.size());
+  return added;
+}
+
+void add_looked_up(v1::IterationPreview& message, const recon::Volume& volume,
+                   const recon::TemperatureLookUp& temperatures) {
+  const Meters edge(static_cast<double>(volume.grid.edge));
+  const std::vector<float> kelvin = temperatures.read(recon::coarse_emission(volume, kBlocks), edge);
+  add_layer(message, recon::layer_of(recon::CoarseLayer::Kind::temperature, kelvin)).set_quick(true);
+}
+
+/// What was measured in the finished volume.
+void add_measured(v1::IterationPreview& message, const recon::Outcome& outcome) {
+  using Kind = recon::CoarseLayer::Kind;
+  const recon::Grid& grid = outcome.reconstruction.volume.grid;
+  const auto add = [&](Kind kind, const std::vector<float>& values) {
+    if (!values.empty())
+      add_layer(message, recon::coarse_layer(kind, grid, kBlocks, [&](std::size_t p) { return values[p]; }));
+  };
+  if (outcome.temperature) {
+    add(Kind::temperature, outcome.temperature->kelvin);
+    add(Kind::temperature_sigma, outcome.temperature->sigma);
+  }
+  if (!outcome.errors) return;
+  add_layer(message, recon::coarse_layer(Kind::emission_sigma, grid, kBlocks, [&](std::size_t p) {
+              return static_cast<float>(outcome.errors->sigma(p).mean());
+            }));
+  add(Kind::extinction_sigma, outcome.errors->extinction);
 }
 
 /// A view of the volume in its present state.
@@ -130,6 +172,7 @@ void ProgressStream::iteration(const recon::Preview& preview, const recon::Scene
       const recon::View& view = scene.views[shown_view(scene)];
       add_pictures(shown, view, rendered_small(*volume, preview, view, compute));
       add_volume(shown, *volume);
+      if (temperatures_) add_looked_up(shown, *volume, *temperatures_);
       pictures_due_ = begin + std::max<Clock::duration>(kRarely, kShare * (Clock::now() - begin));
     }
   }
@@ -146,6 +189,7 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
   const ImageSize size = recon::preview_size(scene.views[v].image->size, kWidest);
   add_pictures(shown, scene.views[v], recon::shrunk(outcome.renders[v], size));
   add_volume(shown, outcome.reconstruction.volume);
+  add_measured(shown, outcome);
   send(last);
 
   v1::ChildMessage message;
@@ -156,6 +200,9 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
   if (std::string kept = recon::what_was_kept(report); !kept.empty()) done.add_advice(std::move(kept));
   for (const std::string& advice : recon::next_steps(report)) done.add_advice(advice);
   for (const std::string& warning : report.warnings) done.add_warnings(warning);
+  if (report.temperature)
+    for (const std::string& words : recon::temperature_words(*report.temperature))
+      done.add_temperature(words);
   done.set_result(folder);
   send(message);
 }

@@ -2,10 +2,14 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
+#include <string>
 #include <string_view>
+#include <utility>
 
 #include "base/result.h"
 #include "emberlock/v1/child.pb.h"
+#include "recon/export/temperature_look_up.h"
 #include "recon/pipeline/reconstruct.h"
 
 namespace emberlock::cli {
@@ -19,11 +23,14 @@ class ProgressStream {
   static Result<ProgressStream> open(int fd);
 
   void loading(recon::Device device);
+  /// Every volume from here on comes with temperatures, looked up by its colours.
+  void look_up(recon::TemperatureLookUp temperatures) { temperatures_ = std::move(temperatures); }
   void progress(double fraction, std::string_view doing);
   /// Sends the numbers at once, and pictures only when they are due, so that they take at most a twentieth of
   /// the solve's time.
   void iteration(const recon::Preview& preview, const recon::Scene& scene,
                  const recon::ComputeOptions& compute);
+  /// With temperatures and errors as far as the outcome has them.
   void done(const recon::Outcome& outcome, const recon::Scene& scene, const std::string& folder);
   void failed(const Error& error);
 
@@ -35,6 +42,7 @@ class ProgressStream {
 
   int fd_;
   bool broken_ = false;
+  std::optional<recon::TemperatureLookUp> temperatures_;
   Clock::time_point pictures_due_;
 };
 

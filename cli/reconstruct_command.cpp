@@ -18,6 +18,8 @@
 #include "cli/reconstruct_sequence.h"
 #include "cli/reconstruct_summary.h"
 #include "cli/scene_options.h"
+#include "recon/calibrate/rig.h"
+#include "recon/export/temperature_look_up.h"
 #include "recon/pipeline/coverage.h"
 #include "recon/pipeline/grid_choice.h"
 #include "recon/pipeline/reconstruct.h"
@@ -65,6 +67,9 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
                  arguments.input};
   std::function<void(const recon::Preview&)> preview;
   if (watchers.stream != nullptr) {
+    if (options.temperature)
+      watchers.stream->look_up(recon::TemperatureLookUp(recon::response_for(*options.temperature, scene),
+                                                        options.temperature->emitter));
     preview = [&](const recon::Preview& state) {
       watchers.stream->iteration(state, scene, options.solve.compute);
     };
@@ -92,7 +97,7 @@ Status plan_files(const ReconstructArguments& arguments) {
   EMBERLOCK_RETURN_IF_ERROR(recon::check_scene(scene));
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::VoxelChoice choice,
                              recon::plan_voxels(scene, options, clock, progress_bar("plan")));
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Grid grid, recon::choose_grid(scene, choice.voxels));
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Grid grid, recon::choose_grid(scene, options, choice.voxels));
   const TimePoint chosen = clock.now();
   EMBERLOCK_RETURN_IF_ERROR(report::write_plan(scene, grid, where));
   const Seconds writing = clock.now() - chosen;  // as many pictures as a result has
@@ -117,9 +122,9 @@ Status plan_files(const ReconstructArguments& arguments) {
 
 /// The options that the daemon accepts; the others are in its configuration.
 DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, const CLI::App& verb) {
-  static const std::set<std::string> kAskable = {"input",        "--cancel", "--json",   "--frame",
-                                                 "--last-frame", "--every",  "--budget", "--voxels",
-                                                 "--hold-out",   "--device"};
+  static const std::set<std::string> kAskable = {
+      "input",    "--cancel",   "--json",   "--frame",    "--last-frame", "--every",   "--budget",
+      "--voxels", "--hold-out", "--device", "--quantity", "--response",   "--emitter", "--errors"};
   for (const CLI::Option* option : verb.get_options()) {
     if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
       fail({ErrorKind::bad_input, "can't be used with --daemon", option->get_name(),
@@ -136,7 +141,8 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
     request.set_every(arguments.every);
   }
   request.set_budget_s(arguments.budget.value_or(0));
-  const std::optional<int> voxels = or_fail(options_of(arguments)).voxels;
+  const recon::ReconstructOptions options = or_fail(options_of(arguments));
+  const std::optional<int> voxels = options.voxels;
   if (!voxels && !arguments.voxels.empty()) {
     fail({ErrorKind::bad_input, "\"" + arguments.voxels + "\" can't be used with --daemon", "--voxels",
           "Give a number, or reconstruct here, without --daemon"});
@@ -144,6 +150,11 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
   request.set_voxels(static_cast<std::uint32_t>(voxels.value_or(0)));
   for (const int view : arguments.held_out) request.add_hold_out(static_cast<std::uint32_t>(view));
   if (verb.count("--device") > 0) request.set_device(arguments.device);
+  if (verb.count("--quantity") > 0) request.set_quantity(arguments.quantity);
+  if (verb.count("--emitter") > 0) request.set_emitter(arguments.emitter);
+  if (options.temperature && options.temperature->response)
+    *request.mutable_response() = recon::message_of(*options.temperature->response);
+  request.set_errors(arguments.errors);
   return wanted;
 }
 

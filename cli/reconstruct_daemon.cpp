@@ -41,6 +41,8 @@ void print_frames(const v1::ReconstructionStatus& status, int& told, bool json) 
 
 void print_advice(const v1::ReconstructionStatus& status) {
   for (const std::string& effect : status.effects()) std::printf("%-10s %s\n", "effect", effect.c_str());
+  for (const std::string& found : status.temperature())
+    std::printf("%-10s %s\n", "temperature", found.c_str());
   for (const std::string& advice : status.advice()) std::printf("%-10s %s\n", "next step", advice.c_str());
 }
 

@@ -38,6 +38,17 @@ Image scaled(const Image& image, int width) {
   return result;
 }
 
+Image scaled_into(const Image& image, ImageSize most) {
+  const ImageSize from = image.layout().size;
+  return scaled(image, std::clamp(from.width * most.height / from.height, 1, most.width));
+}
+
+Image enlarged(const Image& image, ImageSize most) {
+  const ImageSize from = image.layout().size;
+  const int times = std::min(most.width / from.width, most.height / from.height);
+  return scaled(image, std::max(1, times) * from.width);
+}
+
 Image side_by_side(const std::vector<Image>& pictures, int gap) {
   int width = 0;
   int height = 0;

@@ -18,6 +18,10 @@ recon::RadianceImage difference(const recon::RadianceImage& a, const recon::Radi
 /// The picture resized to another width with the same aspect ratio; each pixel is the mean of those that it
 /// covers.
 Image scaled(const Image& image, int width);
+/// The same, as large as fits.
+Image scaled_into(const Image& image, ImageSize most);
+/// The picture enlarged so many whole times as fit, at least once: its pixels stay square.
+Image enlarged(const Image& image, ImageSize most);
 
 /// Pictures of equal height from left to right, `gap` black columns between them.
 Image side_by_side(const std::vector<Image>& pictures, int gap = 8);

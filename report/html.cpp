@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -179,6 +180,12 @@ std::string data_uri(std::string_view type, std::string_view content) {
     for (std::size_t k = 0; k < 4; ++k) base64 += k <= n ? kDigits[block >> (18 - 6 * k) & 63U] : '=';
   }
   return "data:" + std::string(type) + ";base64," + base64;
+}
+
+std::string sentence(std::string_view clause) {
+  std::string text(clause);
+  if (!text.empty()) text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  return text + ".";
 }
 
 std::string figure(const std::string& source, const std::string& alt, const std::string& caption) {

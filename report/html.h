@@ -13,6 +13,9 @@ namespace emberlock::report {
 /// Escapes text for use between tags and in attributes.
 std::string html_escape(std::string_view text);
 
+/// A clause as a sentence: it begins with an upper-case letter and ends with a full stop.
+std::string sentence(std::string_view clause);
+
 /// An image as a PNG file; gray8 or rgb8.
 std::string png_file(const Image& image);
 /// The same as a `data:` URI, so that a page needs no other file.

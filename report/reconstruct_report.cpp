@@ -15,7 +15,7 @@
 #include "report/camera_plan.h"
 #include "report/flame_pictures.h"
 #include "report/html.h"
-#include "report/temperature_pictures.h"
+#include "report/measured_pictures.h"
 #include "report/volume_axes.h"
 #include "report/volume_pictures.h"
 #include "report/volume_view.h"
@@ -24,12 +24,14 @@ namespace emberlock::report {
 namespace {
 
 constexpr double kDifferenceGainShown = 4;
-constexpr int kViewWidth = 300;   // pixels
-constexpr int kSliceWidth = 256;  // at least
+// At most so large, in pixels: what is tall would make a long page.
+constexpr ImageSize kViewSize{300, 400};
+constexpr ImageSize kVolumeSize{256, 400};
 
 constexpr const char* kPageStyle = R"(<style>
 .three { display: grid; grid-template-columns: repeat(3, minmax(0, 1fr)); gap: .4rem; max-width: 58rem;
-  margin: .2rem 0 1.2rem; } .three img { width: 100%; display: block; } .three figcaption { width: auto; }
+  margin: .2rem 0 1.2rem; } .three img { width: 100%; display: block;
+  max-height: 26rem; object-fit: contain; object-position: left bottom; } .three figcaption { width: auto; }
 .words td:last-child { text-align: left; min-width: 14rem; } .words td { vertical-align: top; }
 @media (max-width: 700px) { .words, .words tbody { display: block; } .words tr { display: flex; flex-wrap: wrap; }
   .words th, .words td { flex: 1 0 3rem; } .words th:last-child { display: none; } .words td:last-child {
@@ -86,7 +88,7 @@ void views(HtmlPage& page, const recon::Scene& scene, const recon::Outcome& outc
     const recon::View& view = scene.views[i];
     const recon::PixelBox box = with_margin(recon::noise_mask(*view.image).box, 12, view.image->size);
     const auto panel = [&](const recon::RadianceImage& image) {
-      return jpeg_uri(scaled(crop(recon::to_rgb8(image), box), kViewWidth));
+      return jpeg_uri(scaled_into(crop(recon::to_rgb8(image), box), kViewSize));
     };
     const std::string name = fmt::format("{}: {}", i, view.name);
     page.raw("<div class=\"three\">" +
@@ -101,8 +103,7 @@ void views(HtmlPage& page, const recon::Scene& scene, const recon::Outcome& outc
 
 /// As large as its pixels allow, which stay square.
 std::string volume_figure(const Image& picture, const std::string& caption) {
-  const int times = std::max(1, kSliceWidth / picture.layout().size.width);
-  return figure(png_data_uri(scaled(picture, times * picture.layout().size.width)), caption, caption);
+  return figure(png_data_uri(enlarged(picture, kVolumeSize)), caption, caption);
 }
 
 void the_volume(HtmlPage& page, const recon::Scene& scene, const recon::Volume& volume,
@@ -215,6 +216,7 @@ std::string reconstruct_html(const recon::Scene& scene, const recon::Outcome& ou
   what_came_out(page, r);
   the_volume(page, scene, outcome.reconstruction.volume, axes);
   page.raw(temperature_html(outcome, axes));
+  page.raw(errors_html(outcome, axes));
   views(page, scene, outcome);
   error_against_time(page, r);
   effects(page, r);

@@ -11,7 +11,8 @@
 
 namespace emberlock::session {
 
-/// The largest accepted message of a child process. Two pictures and 64^3 voxels take a tenth of it.
+/// The largest accepted message of a child process. Two pictures and 64^3 voxels with four layers take a
+/// third of it.
 inline constexpr std::size_t kLargestChildMessage = std::size_t{4} << 20;
 
 /// The message, preceded by its length as a varint.

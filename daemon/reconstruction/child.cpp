@@ -18,7 +18,10 @@
 
 #include "base/clock.h"
 #include "daemon/reconstruction/process.h"
+#include "recon/calibrate/camera_response.h"
+#include "recon/calibrate/rig.h"
 #include "recon/compute/device.h"
+#include "recon/temperature/emitter.h"
 #include "session/child_messages.h"
 #include "session/files.h"
 #include "session/frame_range.h"
@@ -45,6 +48,22 @@ Error refuse_field(const char* field, std::string what, std::string remedy) {
   return {ErrorKind::bad_input, std::move(what), field, std::move(remedy)};
 }
 
+Status check_quantity(const v1::ReconstructRequest& request) {
+  const bool temperature = request.quantity() == "temperature";
+  if (!temperature && !request.quantity().empty() && request.quantity() != "colour")
+    return refuse_field("quantity", fmt::format("\"{}\" is none", request.quantity()),
+                        "Give colour or temperature");
+  if (!request.emitter().empty()) {
+    if (const auto emitter = recon::parse_emitter(request.emitter()); !emitter)
+      return refuse_field("emitter", emitter.error().what, emitter.error().remedy);
+    if (!temperature) return refuse_field("emitter", "is for temperatures", "Give quantity temperature too");
+  }
+  if (!request.has_response()) return {};
+  if (!temperature) return refuse_field("response", "is for temperatures", "Give quantity temperature too");
+  const auto response = recon::camera_response_of(request.response(), "response");
+  return response.ok() ? Status() : response.error();
+}
+
 Status check_request(const v1::ReconstructRequest& request) {
   if (!std::isfinite(request.budget_s()) || request.budget_s() < 0)
     return refuse_field("budget_s", "is no length of time", "Give seconds above 0, or 0 for none");
@@ -52,10 +71,18 @@ Status check_request(const v1::ReconstructRequest& request) {
     return refuse_field(
         "voxels", fmt::format("{} are too many", request.voxels()),
         fmt::format("Give at most {}, or 0 for the knee of time against error", kLargestVoxels));
+  EMBERLOCK_RETURN_IF_ERROR(check_quantity(request));
   if (!request.device().empty()) {
     if (const auto device = recon::parse_device(request.device()); !device) return device.error();
   }
   return {};
+}
+
+/// What the child reads on its stdin: its --response.
+std::string input_for(const v1::ReconstructRequest& request) {
+  if (!request.has_response()) return {};
+  const auto response = recon::camera_response_of(request.response(), "response");
+  return response ? recon::to_json(*response) : std::string();
 }
 
 /// What a child wrote to stderr, as far as a sentence can hold it.
@@ -154,6 +181,10 @@ std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructR
   if (budget > 0) option("--budget", fmt::format("{}", budget));
   if (voxels > 0) option("--voxels", std::to_string(voxels));
   if (!hold_out.empty()) option("--hold-out", fmt::format("{}", fmt::join(hold_out, ",")));
+  if (!request.quantity().empty()) option("--quantity", request.quantity());
+  if (!request.emitter().empty()) option("--emitter", request.emitter());
+  if (request.has_response()) option("--response", "/dev/stdin");
+  if (request.errors()) command.emplace_back("--errors");
   if (options_.threads > 0) option("--threads", std::to_string(options_.threads));
   return command;
 }
@@ -252,7 +283,8 @@ void ReconstructionChild::reconstruct(const v1::ReconstructRequest& request, con
   LastWords last_words;
   ChildEnd end;
   // The child dies with the thread that started it, as the kernel counts parents: this one, which watches it.
-  if (auto process = ChildProcess::spawn(command_for(request), options_.niceness); process.ok()) {
+  if (auto process = ChildProcess::spawn(command_for(request), options_.niceness, input_for(request));
+      process.ok()) {
     end = watch(
         *process, [&](std::string_view bytes) { last_words.add(bytes); }, observer);
   } else {

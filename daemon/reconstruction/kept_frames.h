@@ -14,7 +14,8 @@ namespace emberlock::daemon {
 /// The volumes of a sequence's frames, without pictures: as many as fit into so many bytes, the newest.
 class KeptFrames {
  public:
-  static constexpr std::size_t kMostBytes = std::size_t{256} << 20;  ///< about 970 volumes of 64^3 voxels
+  static constexpr std::size_t kMostBytes = std::size_t{256}
+                                            << 20;  ///< 64^3 voxels: about 970 volumes, 200 with all layers
 
   explicit KeptFrames(std::size_t most_bytes = kMostBytes) : most_bytes_(most_bytes) {}
 

@@ -3,10 +3,12 @@
 
 #include <cerrno>
 #include <csignal>
+#include <cstddef>
 #include <system_error>
 
 #include <fcntl.h>
 #include <spawn.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -33,15 +35,29 @@ Result<Pipe> make_pipe(const std::string& program) {
   return pipe;
 }
 
+/// A file in memory that holds these bytes.
+Result<UniqueFd> make_input(std::string_view bytes, const std::string& program) {
+  UniqueFd file(::memfd_create("input", MFD_CLOEXEC));
+  if (!file) return system_error(errno, "cannot be given its input", program);
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(file.get(), bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return system_error(errno, "cannot be given its input", program);
+    bytes.remove_prefix(static_cast<std::size_t>(n));
+  }
+  ::lseek(file.get(), 0, SEEK_SET);
+  return file;
+}
+
 /// glibc 2.36 declares its own for C alone.
 int pidfd_open(pid_t pid) { return static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)); }
 
 /// posix_spawn's two parameters, destroyed as they must be.
 class SpawnSettings {
  public:
-  SpawnSettings(const Pipe& messages, const Pipe& errors) {
+  SpawnSettings(const UniqueFd& input, const Pipe& messages, const Pipe& errors) {
     ::posix_spawn_file_actions_init(&actions);
-    ::posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+    ::posix_spawn_file_actions_adddup2(&actions, input.get(), STDIN_FILENO);
     ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
     ::posix_spawn_file_actions_adddup2(&actions, errors.write.get(), STDERR_FILENO);
     ::posix_spawn_file_actions_adddup2(&actions, messages.write.get(), ChildProcess::kMessagesFd);
@@ -70,14 +86,16 @@ class SpawnSettings {
 
 }  // namespace
 
-Result<ChildProcess> ChildProcess::spawn(const std::vector<std::string>& command, int niceness) {
+Result<ChildProcess> ChildProcess::spawn(const std::vector<std::string>& command, int niceness,
+                                         std::string_view input) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const UniqueFd held, make_input(input, command[0]));
   EMBERLOCK_ASSIGN_OR_RETURN(Pipe messages, make_pipe(command[0]));
   EMBERLOCK_ASSIGN_OR_RETURN(Pipe errors, make_pipe(command[0]));
   std::vector<char*> words;
   words.reserve(command.size() + 1);
   for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
   words.push_back(nullptr);
-  const SpawnSettings settings(messages, errors);
+  const SpawnSettings settings(held, messages, errors);
   pid_t pid = -1;
   const int code =
       ::posix_spawnp(&pid, words[0], &settings.actions, &settings.attributes, words.data(), environ);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -12,8 +13,8 @@
 
 namespace emberlock::daemon {
 
-/// A program in a process group of its own: stdin and stdout are /dev/null, descriptor 3 is its messages'
-/// pipe, it has no other of ours. Destroyed, it is killed with all that it started, and reaped.
+/// A program in a process group of its own: stdin is what it is given, stdout /dev/null, descriptor 3 its
+/// messages' pipe; it has no other of ours. Destroyed, it is killed with all that it started, and reaped.
 class ChildProcess {
  public:
   static constexpr int kMessagesFd = 3;  ///< in the child
@@ -23,9 +24,10 @@ class ChildProcess {
     int signal = 0;  ///< not 0: it died by it
   };
 
-  /// `command[0]` is the program, looked for on PATH where it has no slash; `niceness` 0..19. Errors name the
-  /// program.
-  static Result<ChildProcess> spawn(const std::vector<std::string>& command, int niceness);
+  /// `command[0]` is the program, looked for on PATH where it has no slash; `niceness` 0..19; it reads
+  /// `input`, from a file in memory, on its stdin. Errors name the program.
+  static Result<ChildProcess> spawn(const std::vector<std::string>& command, int niceness,
+                                    std::string_view input = {});
   ChildProcess(ChildProcess&& other) noexcept
       : pid_(std::exchange(other.pid_, -1)),
         exited_(std::move(other.exited_)),

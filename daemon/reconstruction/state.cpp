@@ -18,9 +18,13 @@ namespace {
 /// Whether what is shown of an iteration holds together: it comes from another process.
 bool is_sound(const v1::VolumePreview& volume) {
   constexpr std::uint32_t kMost = 256;  // along an edge
+  const std::size_t size = volume.voxels().size();
   return volume.nx() <= kMost && volume.ny() <= kMost && volume.nz() <= kMost &&
-         volume.voxels().size() == std::size_t{volume.nx()} * volume.ny() * volume.nz() &&
-         volume.box().center_size() == 3 && volume.box().size_size() == 3;
+         size == std::size_t{volume.nx()} * volume.ny() * volume.nz() && volume.box().center_size() == 3 &&
+         volume.box().size_size() == 3 &&
+         std::all_of(volume.layers().begin(), volume.layers().end(), [&](const v1::VolumeLayer& layer) {
+           return layer.voxels().size() == size && std::isfinite(layer.low()) && std::isfinite(layer.high());
+         });
 }
 
 std::string signal_name(int signal) {
@@ -59,6 +63,7 @@ std::optional<v1::IterationPreview> ReconstructionState::take(v1::ChildMessage&&
     *status_.mutable_effects() = std::move(*done.mutable_effects());
     *status_.mutable_advice() = std::move(*done.mutable_advice());
     status_.mutable_advice()->MergeFrom(done.warnings());
+    *status_.mutable_temperature() = std::move(*done.mutable_temperature());
     status_.set_result(std::move(*done.mutable_result()));
     done_ = true;
   } else if (message.has_failure()) {

@@ -73,8 +73,17 @@ std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview) {
                           {"ny", volume.ny()},
                           {"nz", volume.nz()},
                           {"box", nlohmann::json::parse(to_json(volume.box()), nullptr, false)},
-                          {"brightest", volume.brightest()}});
-    messages.push_back(binary_of(volume_header, volume.voxels()));
+                          {"brightest", volume.brightest()},
+                          {"layers", nlohmann::json::array()}});
+    std::string voxels = volume.voxels();
+    for (const v1::VolumeLayer& layer : volume.layers()) {
+      volume_header["layers"].push_back({{"kind", v1::VolumeLayer::Kind_Name(layer.kind())},
+                                         {"low", layer.low()},
+                                         {"high", layer.high()},
+                                         {"quick", layer.quick()}});
+      voxels += layer.voxels();
+    }
+    messages.push_back(binary_of(volume_header, voxels));
   }
   return messages;
 }

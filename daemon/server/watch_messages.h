@@ -31,7 +31,8 @@ WatchMessage watch_message(const v1::Notice& notice);
 WatchMessage watch_message(const v1::Picture& picture);
 /// The numbers; then those that exist of {"kind": "captured"
 /// "rendered", "reconstruction", "iteration", "camera_id"} with a JPEG, and {"kind": "volume",
-/// "reconstruction", "iteration", "nx", "ny", "nz", "box", "brightest"} with the voxels.
+/// "reconstruction", "iteration", "nx", "ny", "nz", "box", "brightest", "layers"} with the voxels and behind
+/// them those of each layer, {"kind", "low", "high", "quick"} (VolumeLayer).
 std::vector<WatchMessage> watch_messages(const v1::IterationPreview& preview);
 
 /// The pictures that a console's message asks for, or none. Error bad_input: not such a message.

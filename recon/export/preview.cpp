@@ -3,10 +3,58 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
 
 #include <opencv2/imgproc.hpp>
 
 namespace emberlock::recon {
+namespace {
+
+/// Cubic blocks of key points, as few as hold the grid with at most so many along its longest edge.
+struct Blocks {
+  int edge = 1;  ///< key points
+  int nx = 0, ny = 0, nz = 0;
+
+  Blocks(const Grid& grid, int longest)
+      : edge((std::max({grid.nx, grid.ny, grid.nz}) + longest - 1) / longest),
+        nx((grid.nx + edge - 1) / edge),
+        ny((grid.ny + edge - 1) / edge),
+        nz((grid.nz + edge - 1) / edge) {}
+  [[nodiscard]] std::size_t size() const {
+    return static_cast<std::size_t>(nx) * static_cast<std::size_t>(ny) * static_cast<std::size_t>(nz);
+  }
+  /// Calls take(block, point) for each key point of the grid, in its order.
+  template <class Take>
+  void each(const Grid& grid, const Take& take) const {
+    const auto n = static_cast<std::size_t>(nx);
+    for (int k = 0; k < grid.nz; ++k)
+      for (int j = 0; j < grid.ny; ++j) {
+        const std::size_t row = n * (static_cast<std::size_t>(j / edge) +
+                                     static_cast<std::size_t>(ny) * static_cast<std::size_t>(k / edge));
+        const std::size_t first = grid.index(0, j, k);
+        for (int i = 0; i < grid.nx; ++i)
+          take(row + static_cast<std::size_t>(i / edge), first + static_cast<std::size_t>(i));
+      }
+  }
+};
+
+constexpr double kBeyond = 0.02;  // so large a share of what is told may lie beyond an end of a bar
+
+std::vector<float> told_of(const std::vector<float>& values) {
+  std::vector<float> told;
+  std::copy_if(values.begin(), values.end(), std::back_inserter(told), [](float v) { return v > 0; });
+  return told;
+}
+
+/// The value below which so large a share of them lies.
+double percentile(std::vector<float>& values, double share) {
+  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + at, values.end());
+  return static_cast<double>(values[static_cast<std::size_t>(at)]);
+}
+
+}  // namespace
 
 ImageSize preview_size(ImageSize full, int widest) {
   if (full.width <= widest) return full;
@@ -37,31 +85,26 @@ RadianceImage shrunk(const RadianceImage& image, ImageSize size) {
 
 CoarseBrightness coarse_brightness(const Volume& volume, int longest) {
   const Grid& grid = volume.grid;
-  const int block = (std::max({grid.nx, grid.ny, grid.nz}) + longest - 1) / longest;
+  const Blocks blocks(grid, longest);
   CoarseBrightness coarse;
-  coarse.nx = (grid.nx + block - 1) / block;
-  coarse.ny = (grid.ny + block - 1) / block;
-  coarse.nz = (grid.nz + block - 1) / block;
-  const auto nx = static_cast<std::size_t>(coarse.nx);
-  const auto ny = static_cast<std::size_t>(coarse.ny);
-  std::vector<float> sum(nx * ny * static_cast<std::size_t>(coarse.nz));
-  for (int k = 0; k < grid.nz; ++k)
-    for (int j = 0; j < grid.ny; ++j) {
-      const float* light = &volume.emission[3 * grid.index(0, j, k)];
-      float* row =
-          &sum[nx * (static_cast<std::size_t>(j / block) + ny * static_cast<std::size_t>(k / block))];
-      for (int i = 0; i < grid.nx; ++i, light += 3) row[i / block] += light[0] + light[1] + light[2];
-    }
+  coarse.nx = blocks.nx;
+  coarse.ny = blocks.ny;
+  coarse.nz = blocks.nz;
+  std::vector<float> sum(blocks.size());
+  blocks.each(grid, [&](std::size_t block, std::size_t point) {
+    const float* light = &volume.emission[3 * point];
+    sum[block] += light[0] + light[1] + light[2];
+  });
 
   // The last blocks may hold fewer points.
-  const auto points = [block](int n, std::size_t at) {
-    return std::min(block, n - static_cast<int>(at) * block);
+  const auto points = [&](int n, int at) {
+    return static_cast<float>(std::min(blocks.edge, n - at * blocks.edge));
   };
-  for (std::size_t k = 0, v = 0; k < static_cast<std::size_t>(coarse.nz); ++k)
-    for (std::size_t j = 0; j < ny; ++j)
-      for (std::size_t i = 0; i < nx; ++i, ++v)
-        sum[v] /= 3.0F * static_cast<float>(points(grid.nx, i)) * static_cast<float>(points(grid.ny, j)) *
-                  static_cast<float>(points(grid.nz, k));
+  std::size_t v = 0;
+  for (int k = 0; k < blocks.nz; ++k)
+    for (int j = 0; j < blocks.ny; ++j)
+      for (int i = 0; i < blocks.nx; ++i, ++v)
+        sum[v] /= 3.0F * points(grid.nx, i) * points(grid.ny, j) * points(grid.nz, k);
 
   const float brightest = std::max(0.0F, *std::max_element(sum.begin(), sum.end()));
   coarse.brightest = static_cast<double>(brightest);
@@ -71,15 +114,72 @@ CoarseBrightness coarse_brightness(const Volume& volume, int longest) {
       return static_cast<std::uint8_t>(std::lround(255 * std::max(0.0F, value) / brightest));
     });
   }
-  const std::array<int, 3> blocks = {coarse.nx, coarse.ny, coarse.nz};
+  const std::array<int, 3> number = {blocks.nx, blocks.ny, blocks.nz};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double edge = static_cast<double>(grid.edge);
-    const double size = edge * block * blocks[axis];
+    const double size = edge * blocks.edge * number[axis];
     coarse.box.size[static_cast<Eigen::Index>(axis)] = size;
     coarse.box.center[static_cast<Eigen::Index>(axis)] =
         static_cast<double>(grid.origin[axis]) - edge / 2 + size / 2;
   }
   return coarse;
+}
+
+std::vector<float> coarse_emission(const Volume& volume, int longest) {
+  const Blocks blocks(volume.grid, longest);
+  std::vector<float> sum(3 * blocks.size());
+  std::vector<float> points(blocks.size());
+  blocks.each(volume.grid, [&](std::size_t block, std::size_t point) {
+    for (std::size_t c = 0; c < 3; ++c) sum[3 * block + c] += volume.emission[3 * point + c];
+    ++points[block];
+  });
+  for (std::size_t i = 0; i < sum.size(); ++i) sum[i] /= points[i / 3];
+  return sum;
+}
+
+double end_of_bar(const std::vector<float>& errors) {
+  std::vector<float> told = told_of(errors);
+  if (told.empty()) return 1;
+  constexpr double kRounding = 1e-5;  // of a float
+  const double most = percentile(told, 1 - kBeyond);
+  const double unit = std::pow(10.0, std::floor(std::log10(most)) - 1);
+  return unit * std::ceil(most / unit - kRounding);
+}
+
+CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks) {
+  constexpr double kKelvin = 50;
+  CoarseLayer layer;
+  layer.kind = kind;
+  layer.voxels.resize(blocks.size());
+  std::vector<float> told = told_of(blocks);
+  if (told.empty()) return layer;
+  if (kind == CoarseLayer::Kind::temperature) {
+    layer.low = kKelvin * std::floor(percentile(told, kBeyond) / kKelvin);
+    layer.high = std::max(layer.low + kKelvin, kKelvin * std::ceil(percentile(told, 1 - kBeyond) / kKelvin));
+  } else {
+    layer.high = end_of_bar(blocks);
+  }
+  std::transform(blocks.begin(), blocks.end(), layer.voxels.begin(), [&](float value) {
+    const double share = (static_cast<double>(value) - layer.low) / (layer.high - layer.low);
+    return static_cast<std::uint8_t>(value > 0 ? 1 + std::lround(254 * std::clamp(share, 0.0, 1.0)) : 0);
+  });
+  return layer;
+}
+
+CoarseLayer coarse_layer(CoarseLayer::Kind kind, const Grid& grid, int longest,
+                         const std::function<float(std::size_t point)>& value) {
+  const Blocks blocks(grid, longest);
+  std::vector<float> sum(blocks.size());
+  std::vector<float> told(blocks.size());
+  blocks.each(grid, [&](std::size_t block, std::size_t point) {
+    const float v = value(point);
+    if (!(v > 0)) return;
+    sum[block] += v;
+    ++told[block];
+  });
+  for (std::size_t i = 0; i < sum.size(); ++i)
+    if (told[i] > 0) sum[i] /= told[i];
+  return layer_of(kind, sum);
 }
 
 }  // namespace emberlock::recon

@@ -2,10 +2,13 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "recon/calibrate/box.h"
+#include "recon/kernels/grid.h"
 #include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
 
@@ -33,5 +36,32 @@ struct CoarseBrightness {
 /// The mean over cubic blocks, as small as possible with at most `longest` (>= 1) blocks along the longest
 /// edge.
 CoarseBrightness coarse_brightness(const Volume& volume, int longest);
+
+/// The mean of R, G and B over the same blocks, levels a metre; 3 nx ny nz.
+std::vector<float> coarse_emission(const Volume& volume, int longest);
+
+/// A quantity on the same blocks.
+struct CoarseLayer {
+  enum class Kind {
+    temperature,        ///< K
+    temperature_sigma,  ///< K; a standard error, as those below
+    emission_sigma,     ///< levels per metre, mean of R, G, B
+    extinction_sigma,   ///< 1/m
+  };
+  Kind kind = Kind::temperature;
+  double low = 0, high = 0;          ///< of values 1 and 255; what lies beyond is shown as they are
+  std::vector<std::uint8_t> voxels;  ///< nx ny nz; 0: not told
+};
+
+/// Where a colour bar of errors that begins at 0 ends: the 98th percentile of those above 0, up to two
+/// digits; 1 where there are none.
+double end_of_bar(const std::vector<float>& errors);
+
+/// Of a value a block; what isn't above 0 is not told. Temperatures from the 2nd to the 98th percentile of
+/// those told, to 50 K; errors from 0 to end_of_bar().
+CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks);
+/// Of a value a key point of the grid: a block's is the mean over those that are told.
+CoarseLayer coarse_layer(CoarseLayer::Kind kind, const Grid& grid, int longest,
+                         const std::function<float(std::size_t point)>& value);
 
 }  // namespace emberlock::recon

@@ -32,9 +32,8 @@ class Choices {
       : all_(scaled(reference_front(), finest_voxels(scene), std::max(1e-9, reference.seconds.value()),
                     std::max(1e-9, reference.error))),
         whole_(all_) {
-    std::erase_if(all_, [&](const WorkPoint& p) {
-      return !choose_grid(scene, p.settings.voxels, asked.solve.precision).ok();
-    });
+    std::erase_if(all_,
+                  [&](const WorkPoint& p) { return !choose_grid(scene, asked, p.settings.voxels).ok(); });
     if (asked.effects) {
       const char* kept = asked.effects->fixed ? "none" : "auto";
       std::erase_if(all_, [&](const WorkPoint& p) { return p.settings.effects != kept; });
@@ -161,10 +160,11 @@ class PlannedRun {
     plan_.target_rmse = asked_.solve.target_rmse;
     tell(progress_, 0, "measuring this machine on a coarse grid");
     if (asked_.voxels)
-      EMBERLOCK_RETURN_IF_ERROR(as_status(choose_grid(task_.scene(), asked_.voxels, asked_.solve.precision)));
+      EMBERLOCK_RETURN_IF_ERROR(as_status(choose_grid(task_.scene(), asked_, asked_.voxels)));
     const int voxels = reference_voxels(finest_voxels(task_.scene()));
-    EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
-                               choose_grid(task_.scene(), std::min(voxels, asked_.voxels.value_or(voxels))));
+    EMBERLOCK_ASSIGN_OR_RETURN(
+        const Grid grid,
+        choose_grid(task_.scene(), asked_, std::min(voxels, asked_.voxels.value_or(voxels))));
     const PreparedScene scene =
         task_.prepared.under(asked_.effects && asked_.effects->fixed ? *asked_.effects->fixed : Effects{});
     EMBERLOCK_ASSIGN_OR_RETURN(reference_, measure_reference(scene, grid, asked_.solve, task_.elapsed));

@@ -16,8 +16,7 @@ constexpr int kLeastCoarse = 8;  // voxels of the coarse run
 Result<PlannedTime> plan_time(const Task& task, const ReconstructOptions& options, const Progress& progress) {
   const Seconds start = task.elapsed();
   tell(progress, 0, "finding out which effects matter");
-  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
-                             choose_grid(task.scene(), options.voxels, options.solve.precision));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, choose_grid(task.scene(), options, options.voxels));
   PlannedTime planned;
   EMBERLOCK_ASSIGN_OR_RETURN(planned.effects, decide_effects(task, grid, options));
   const Seconds decided = task.elapsed();

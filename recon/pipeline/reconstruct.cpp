@@ -65,11 +65,9 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
                                                              options.solve, task.elapsed, progress));
   if (!options.temperature) return {};
   const Seconds start = task.elapsed();
-  const CameraResponse* told =
-      options.temperature->response ? options.temperature->response.get() : task.scene().response.get();
-  const CameraResponse& response = told != nullptr ? *told : standard_response();
   tell(progress, kNearlyDone, "reading temperatures");
-  outcome.temperature = temperature_of(task.scene(), outcome.reconstruction, *outcome.errors, response,
+  outcome.temperature = temperature_of(task.scene(), outcome.reconstruction, *outcome.errors,
+                                       response_for(*options.temperature, task.scene()),
                                        options.temperature->emitter, options.solve.compute);
   TemperatureSummary& summary = outcome.temperature->summary;
   summary.time = task.elapsed() - start;
@@ -100,6 +98,11 @@ struct FurtherGrids {
 };
 
 }  // namespace
+
+const CameraResponse& response_for(const TemperatureRequest& request, const Scene& scene) {
+  if (request.response) return *request.response;
+  return scene.response ? *scene.response : standard_response();
+}
 
 Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
                             const Progress& progress,
@@ -143,7 +146,7 @@ Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& op
   const Task task{with_cameras_put_right(told, options, device, elapsed, progress).scene, device, elapsed,
                   nobody};
   EMBERLOCK_ASSIGN_OR_RETURN(VoxelChoice choice, choose_voxels(task, options, progress));
-  EMBERLOCK_RETURN_IF_ERROR(choose_grid(scene, choice.voxels, options.solve.precision));
+  EMBERLOCK_RETURN_IF_ERROR(choose_grid(scene, options, choice.voxels));
   if (choice.rule == "knee" && has_goal(options)) {
     choice.words = {"with --budget or --target-rmse a run chooses its voxels itself; without: " +
                     choice.words.front()};

@@ -33,6 +33,8 @@ struct TemperatureRequest {
       {};  ///< null: the scene's, and without one standard_response()
   Emitter emitter = Emitter::grey;
 };
+/// The one to read by; it lives as long as both.
+const CameraResponse& response_for(const TemperatureRequest& request, const Scene& scene);
 
 struct ReconstructOptions {
   std::optional<int> voxels;  ///< along the box's longest edge, 1..kLargestVoxels

@@ -25,16 +25,22 @@ constexpr double kPaperOpacity = 0.05;
 /// weights and reference of the extinction), and the engine of the held-out views one of four; of floats
 /// there are what a level starts from, a copy while weights are found, and the next coarser level, an eighth
 /// of all that.
-constexpr std::size_t bytes_per_key_point(Precision precision) {
+constexpr std::size_t solve_per_key_point(Precision precision) {
   const std::size_t number = precision == Precision::float64 ? sizeof(double) : sizeof(float);
   const std::size_t level = (8 * 4 + 4) * number + 2 * sizeof(Rgba);
   return level + level / 8;
+}
+std::size_t bytes_per_key_point(const ReconstructOptions& options) {
+  const std::size_t solve = solve_per_key_point(options.solve.precision);
+  if (!options.errors && !options.temperature) return solve;
+  // errors_by_views() has, beside a solve, the volume and eleven sums: deviations and their products.
+  return solve + (4 + 11) * sizeof(float);
 }
 
 /// What of a GPU's memory a frame will hold that is known before its hull is: its pictures and bounds, and
 /// what a solve holds a key point.
 std::size_t bytes_on_gpu(const Scene& scene, const Grid& grid, Precision precision) {
-  std::size_t bytes = grid.size() * bytes_per_key_point(precision);
+  std::size_t bytes = grid.size() * solve_per_key_point(precision);
   for (const View& view : scene.views)
     bytes += view.image->rgb.size() * sizeof(float) + view.image->rgb.size() / 3;
   return bytes;
@@ -95,18 +101,19 @@ double physical_memory() {
   return static_cast<double>(::sysconf(_SC_PHYS_PAGES)) * static_cast<double>(::sysconf(_SC_PAGE_SIZE));
 }
 
-Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels, Precision precision,
-                         double memory) {
+Result<Grid> choose_grid(const Scene& scene, const ReconstructOptions& options,
+                         const std::optional<int>& voxels, double memory) {
   if (voxels && (*voxels < 1 || *voxels > kLargestVoxels)) {
     return Error{ErrorKind::bad_input, std::to_string(*voxels) + " voxels are out of range", "--voxels",
                  "Give 1 to " + std::to_string(kLargestVoxels)};
   }
   const Grid grid = grid_over(scene.box, voxels.value_or(finest_voxels(scene)));
-  if (static_cast<double>(grid.size() * bytes_per_key_point(precision)) > memory) {
+  if (static_cast<double>(grid.size() * bytes_per_key_point(options)) > memory) {
     return Error{ErrorKind::bad_input,
                  "a grid of " + std::to_string(grid.size()) + " points exceeds the memory", "--voxels",
-                 precision == Precision::float64 ? "Give fewer voxels, a smaller box or --precision float32"
-                                                 : "Give fewer voxels, or a smaller box"};
+                 options.solve.precision == Precision::float64
+                     ? "Give fewer voxels, a smaller box or --precision float32"
+                     : "Give fewer voxels, or a smaller box"};
   }
   return grid;
 }
@@ -175,8 +182,7 @@ Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions
 Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, const Progress& progress) {
   const SolveOptions& solve_options = options.solve;
   const Seconds start = task.elapsed();
-  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid,
-                             choose_grid(task.scene(), options.voxels, solve_options.precision));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, choose_grid(task.scene(), options, options.voxels));
   if (task.device == Device::cuda) {
     use_gpu(task.device.gpu);
     reserve_gpu_memory(bytes_on_gpu(task.scene(), grid, solve_options.precision));

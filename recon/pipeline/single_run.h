@@ -22,9 +22,9 @@ struct Task {
 double physical_memory();
 
 /// The grid over the scene's box; without voxels the finest that is chosen unasked. Errors: out of range, or
-/// larger than `memory`.
-Result<Grid> choose_grid(const Scene& scene, const std::optional<int>& voxels,
-                         Precision precision = Precision::float32, double memory = physical_memory());
+/// larger than `memory` for what `options` ask for, by precision and errors.
+Result<Grid> choose_grid(const Scene& scene, const ReconstructOptions& options,
+                         const std::optional<int>& voxels, double memory = physical_memory());
 
 /// Those that are asked for, and of the others those that the scene calls for.
 Result<EffectChoice> decide_effects(const Task& task, const Grid& grid, const ReconstructOptions& options);

@@ -149,9 +149,8 @@ std::vector<WorkPoint> expected_runs(const Scene& scene, const ReconstructOption
   }
   expected = scaled(std::move(expected), finest_voxels(scene), std::max(1e-9, calibration.unit.value()), 1);
   if (options.voxels) return at_voxels(expected, *options.voxels);
-  std::erase_if(expected, [&](const WorkPoint& p) {
-    return !choose_grid(scene, p.settings.voxels, options.solve.precision).ok();
-  });
+  std::erase_if(expected,
+                [&](const WorkPoint& p) { return !choose_grid(scene, options, p.settings.voxels).ok(); });
   return expected;
 }
 

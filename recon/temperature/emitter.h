@@ -26,6 +26,9 @@ std::string_view name(Emitter emitter);
 /// 1990, equations 17 and 18); below 0.4 um as at 0.4 um.
 double relative_absorption(Emitter emitter, double nm);
 
+/// The paper's convention: the ends of its table, in K, and what a step of one voxel edge takes of the light.
+inline constexpr double kPaperColdest = 1000, kPaperHottest = 2300, kPaperOpacityOfAStep = 0.05;
+
 /// What an emitter of a temperature shows: level c a metre, for an absorption of 1/m at 550 nm, is value[c]
 /// times exp(log_scale). `value` adds up to 1; a channel that would be below 0, outside the camera's gamut,
 /// shows 0.

@@ -18,7 +18,6 @@ constexpr double kAbsorptionShare = 0.5;    // of the extinction: how well pictu
 constexpr double kMostUncertain = 0.2;      // of a temperature
 constexpr double kNoBody = 16;              // chi-square a freedom: four sigma
 constexpr double kWhite = 254.5;            // levels
-constexpr double kPaperColdest = 1000, kPaperHottest = 2300, kPaperOpacityOfAStep = 0.05;
 
 enum class Fate : std::uint8_t { dark, told, colder, hotter, unclear, other, saturated };
 

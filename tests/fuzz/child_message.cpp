@@ -18,6 +18,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (!shown || !shown->has_volume()) return;
     const v1::VolumePreview& volume = shown->volume();
     if (volume.voxels().size() != std::size_t{volume.nx()} * volume.ny() * volume.nz()) std::abort();
+    for (const v1::VolumeLayer& layer : volume.layers())
+      if (layer.voxels().size() != volume.voxels().size()) std::abort();
   };
   session::ChildMessageParser parser;
   if (parser.add(bytes.substr(0, size / 2), take))

@@ -139,8 +139,9 @@ export class Player {
       complain(error);
     });
     if (!answer?.volume) return undefined;
-    const {voxels, ...header} = answer.volume;
-    const volume: Held = [{kind: 'volume', ...header}, Uint8Array.from(atob(voxels), letter => letter.charCodeAt(0))];
+    const {voxels, layers, ...header} = answer.volume;
+    const bytes = [voxels, ...layers.map(layer => layer.voxels)].map(text => atob(text)).join('');
+    const volume: Held = [{kind: 'volume', ...header, layers}, Uint8Array.from(bytes, letter => letter.charCodeAt(0))];
     cache.set(frame, volume);
     return volume;
   }

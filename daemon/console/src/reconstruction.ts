@@ -4,6 +4,7 @@ import type {DaemonStatus, Iteration, IterationPreview, Light, ReconstructionSta
 import {act, TwoStep} from './act';
 import {el, set, setText, show} from './dom';
 import {fixed, known, percent, span} from './format';
+import {Layers} from './layers';
 import {showSign, Sign} from './light';
 import {bitmapOf, isGrey, paint} from './picture';
 import {Player} from './player';
@@ -35,31 +36,35 @@ export class Reconstruction {
   private readonly latest = el('p', {class: 'latest'});
   private readonly place = el('div', {class: 'volume', tabindex: 0, role: 'img', 'aria-label': 'The reconstructed volume: drag to turn it, arrow keys turn it too'});
   private readonly volumeNote = el('p', {class: 'note'}, 'The volume comes with the first iteration.');
+  private readonly layers = new Layers(() => { if (this.drawn) void this.draw(...this.drawn); });
   private readonly sequence = new Sequence();
   private readonly player = new Player((volume, voxels) => void this.draw(volume, voxels), () => { if (this.live) void this.draw(...this.live); });
+  private readonly temperature = el('ul', {class: 'reasons'});
   private readonly effects = el('ul', {class: 'reasons'});
   private readonly advice = el('ul', {class: 'reasons'});
   private readonly result = el('p', {class: 'result'});
   private readonly content: HTMLElement;
   private readonly none = el('p', {class: 'empty'}, 'Nothing was reconstructed since the start. Sessions below has a button for each that is calibrated.');
   private readonly advised = el('div', {}, el('h3', {}, 'What the next step would cost'), this.advice);
+  private readonly measured = el('div', {}, el('h3', {}, 'Temperature'), this.temperature);
   private readonly chosen = el('div', {}, el('h3', {}, 'Effects'), this.effects);
   private volume?: Promise<VolumeView>;
   private next?: [Volume, Uint8Array];
   private live?: [Volume, Uint8Array];
+  private drawn?: [Volume, Uint8Array];
   private iterations: Iteration[] = [];
   private shown = '';  // id, and of a sequence the frame at hand
+  private id = '';
   private viewsAsked = 0;
   private readonly newest = {captured: 0, rendered: 0};
   private grey = false;
-  private voxels = '';
   readonly root: HTMLElement;
 
   constructor() {
     this.content = el('div', {class: 'reconstruction', hidden: true},
       el('div', {class: 'pair'}, el('figure', {}, this.views.captured, this.captions.captured), el('figure', {}, this.views.rendered, this.captions.rendered)),
-      el('div', {class: 'progress'}, this.sequence.root, this.latest, this.plot.root, this.chosen, this.advised, this.result),
-      el('div', {class: 'turn'}, this.place, this.player.root, this.volumeNote));
+      el('div', {class: 'progress'}, this.sequence.root, this.latest, this.plot.root, this.measured, this.chosen, this.advised, this.result),
+      el('div', {class: 'turn'}, this.place, this.player.root, this.volumeNote, this.layers.root));
     this.place.addEventListener('keydown', event => {
       const by = {ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, 10], ArrowDown: [0, -10]}[event.key];
       if (by === undefined || !this.volume) return;
@@ -88,7 +93,7 @@ export class Reconstruction {
     show(this.error, r.error !== '');
     setText(this.error, r.error);
     if (r.iterations.length >= this.iterations.length) this.showIterations(r.iterations);
-    for (const [list, lines, holder] of [[this.effects, r.effects, this.chosen], [this.advice, r.advice, this.advised]] as const) {
+    for (const [list, lines, holder] of [[this.temperature, r.temperature, this.measured], [this.effects, r.effects, this.chosen], [this.advice, r.advice, this.advised]] as const) {
       show(holder, lines.length > 0);
       if (list.childElementCount !== lines.length || [...list.children].some((item, place) => item.textContent !== lines[place])) {
         list.replaceChildren(...lines.map(line => el('li', {}, line)));
@@ -112,15 +117,11 @@ export class Reconstruction {
     this.newest[header.kind] = order;
     paint(this.views[header.kind], bitmap);
     if (header.kind !== 'captured') return this.caption(header);
-    this.grey = isGrey(this.views.captured);
-    void this.volume?.then(view => this.colour(view));
+    const grey = isGrey(this.views.captured);
+    const changed = grey !== this.grey;
+    this.grey = grey;
+    if (changed && this.drawn) void this.draw(...this.drawn);
     this.caption(header);
-  }
-
-  /** Grey cameras' flame is grey; of others the volume has the brightness alone. */
-  private colour(view: VolumeView): void {
-    view.colour(this.grey);
-    if (this.voxels) setText(this.volumeNote, `${this.voxels}, ${this.grey ? 'grey as its cameras see it' : 'brightness in false colours'}. Drag to turn, wheel to zoom.`);
   }
 
   private caption(header: View): void {
@@ -141,10 +142,14 @@ export class Reconstruction {
       if (!this.next) return;
       const newest = this.next;
       this.next = undefined;
-      view.show(...newest);
-      set(this.place, 'data-voxels', newest[0].nx * newest[0].ny * newest[0].nz);
-      this.voxels = `${newest[0].nx} × ${newest[0].ny} × ${newest[0].nz} voxels shown`;
-      this.colour(view);
+      this.drawn = newest;
+      const [{nx, ny, nz}] = newest;
+      const measured = this.layers.show(...newest);
+      view.show(...newest, this.grey, measured);
+      set(this.place, 'data-voxels', nx * ny * nz);
+      // Grey cameras' flame is grey; of others the volume has the brightness alone.
+      const colours = measured ? 'as opaque as the flame is bright' : this.grey ? 'grey as its cameras see it' : 'brightness in false colours';
+      setText(this.volumeNote, `${nx} × ${ny} × ${nz} voxels shown, ${colours}. Drag to turn, wheel to zoom.`);
     } catch (error) {
       setText(this.volumeNote, `The volume can't be shown: ${String(error)}. It needs WebGL 2.`);
     }
@@ -155,6 +160,9 @@ export class Reconstruction {
     if (now === this.shown) return;
     this.shown = now;
     this.showIterations([]);
+    if (id === this.id) return;
+    this.id = id;
+    this.layers.begin();
   }
 
   private showIterations(list: Iteration[]): void {

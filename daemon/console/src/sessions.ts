@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // The recorded sessions, and what is done with them.
-import type {DaemonStatus, ExportRequest_Format, Job, Job_Kind, JobOutcome, ListSessionsResponse_Entry as Entry, Light} from './api.gen';
+import type {DaemonStatus, ExportRequest_Format, Job, Job_Kind, JobOutcome, ListSessionsResponse_Entry as Entry, Light, ReconstructRequest} from './api.gen';
 import {act} from './act';
 import {el, Keyed, set, setText, show} from './dom';
 import {bytes, count, dateAndTime, percent, plural} from './format';
 import {FrameChoice} from './frame_choice';
 import {Sign} from './light';
+import {QuantityChoice} from './quantity_choice';
 import {call, follow} from './wire';
 
 export function sessionState(entry: Entry): [Light, string] {
@@ -101,6 +102,7 @@ class Row {
   private readonly buttons: HTMLButtonElement[];
   private readonly reconstruct: HTMLButtonElement;
   private readonly frame: FrameChoice;
+  private readonly quantity: QuantityChoice;
   private readonly background = el('span', {class: 'background', role: 'status', hidden: true});
   private readonly jobs = new Keyed<Job, JobLine>(this.background, id => new JobLine(id, this.session), (line, job) => line.show(job));
   private entry?: Entry;
@@ -112,12 +114,10 @@ class Row {
     const button = (words: string, run: () => void) => el('button', {type: 'button', 'aria-label': `${words} ${session}`, onclick: run}, words);
     const exporting = (format: ExportRequest_Format) => () => this.run(tell => follow('Sessions/Export', {session, format}, tell));
     this.frame = new FrameChoice(session);
+    this.quantity = new QuantityChoice(session);
     this.reconstruct = button('Reconstruct', () => {
       const frame = this.frame.request();
-      if (!frame) return;
-      void act(call('Reconstruct/Start', {session, ...frame})).then(answer => {
-        if (answer) document.getElementById('reconstruction')?.scrollIntoView();
-      });
+      if (frame) void this.quantity.request().then(quantity => quantity && this.start({session, ...frame, ...quantity}));
     });
     this.buttons = [
       button('Verify', () => this.run(tell => follow('Sessions/Verify', {session}, tell))),
@@ -129,7 +129,7 @@ class Row {
     this.cells.forEach((cell, place) => set(cell, 'data-name', names[place]));
     this.root = el('tr', {'data-session': session},
       el('th', {scope: 'row'}, el('bdi', {}, session), el('span', {class: 'state'}, this.sign.root, this.state), this.background), ...this.cells,
-      el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.reconstruct, this.frame.root), this.job));
+      el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.reconstruct, this.quantity.root, this.frame.root), this.job));
   }
 
   show(entry: Entry): void {
@@ -156,7 +156,14 @@ class Row {
     for (const button of this.buttons) button.disabled = this.busy || this.salvaged;
     this.reconstruct.disabled = this.busy || this.salvaged || !this.entry?.calibrated;
     if (this.entry) this.frame.show(this.entry, this.reconstruct.disabled);
+    this.quantity.enable(!this.reconstruct.disabled);
     set(this.reconstruct, 'title', this.entry?.calibrated ? undefined : 'Its cameras are not calibrated, or the volume is not known.');
+  }
+
+  private start(request: Partial<ReconstructRequest>): void {
+    void act(call('Reconstruct/Start', request)).then(answer => {
+      if (answer) document.getElementById('reconstruction')?.scrollIntoView();
+    });
   }
 
   private run(job: (tell: (state: Job) => void) => Promise<Job>): void {

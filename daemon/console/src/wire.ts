@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What goes over the wire: protobuf's JSON with its defaults filled in, calls, streams of jobs, and the WebSocket's messages.
-import {type Calls, fields, type Job, responses, type Streams} from './api.gen';
+import {type Calls, fields, type Job, responses, type Streams, type VolumeLayer_Kind} from './api.gen';
 
 /** Why a call failed: the daemon's code ("FAILED_PRECONDITION", ...) and its sentence. */
 export class ApiError extends Error {
@@ -102,6 +102,14 @@ export interface View {
   iteration: number;
   camera_id: string;
 }
+/** A quantity on a volume's voxels: 1..255 from low to high, 0 where it isn't told. */
+export interface Layer {
+  kind: VolumeLayer_Kind;
+  low: number;
+  high: number;
+  quick: boolean;
+}
+/** Its bytes are the voxels of its brightness, and behind them those of each layer. */
 export interface Volume {
   kind: 'volume';
   nx: number;
@@ -109,6 +117,7 @@ export interface Volume {
   nz: number;
   box?: {center?: number[]; size?: number[]};
   brightest: number;
+  layers?: Layer[];
 }
 export type BinaryHeader = Picture | View | Volume;
 

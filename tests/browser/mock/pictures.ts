@@ -77,3 +77,17 @@ export function flameVolume(n = 32): {header: object; bytes: Uint8Array} {
   }
   return {header: {kind: 'volume', nx: n, ny: n, nz: n, box: {center: [0, 0, 0.2], size: [0.3, 0.3, 0.4]}, brightest: 812}, bytes};
 }
+
+/** The same with a temperature: 1400 K above to 1900 K below; and its error, where it is the result. */
+export function hotFlameVolume(quick: boolean, n = 32): {header: object; bytes: Uint8Array} {
+  const {header, bytes} = flameVolume(n);
+  const layers = [{kind: 'TEMPERATURE', low: 1400, high: 1900, quick}, ...(quick ? [] : [{kind: 'TEMPERATURE_SIGMA', low: 0, high: 40, quick}])];
+  const all = new Uint8Array((1 + layers.length) * bytes.length);
+  all.set(bytes);
+  bytes.forEach((light, at) => {
+    if (light < 13) return;
+    all[bytes.length + at] = 255 - Math.floor(254 * Math.floor(at / (n * n)) / n);
+    if (!quick) all[2 * bytes.length + at] = 30 + Math.floor(200 * Math.floor(at / (n * n)) / n);
+  });
+  return {header: {...header, layers}, bytes: all};
+}

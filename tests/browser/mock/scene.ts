@@ -89,7 +89,7 @@ export function capturing(seconds: number, change: Wire<RecordingStatus> = {}): 
 export function reconstruction(iterations: number, change: Wire<ReconstructionStatus> = {}): ReconstructionStatus {
   return {id: 'r1', session: '2026-11-22_031500', state: 'RUNNING', fraction: iterations / 12, doing: 'adjusts the volume', device: 'CPU, 2 threads', seconds: 4 * iterations,
           iterations: Array.from({length: iterations}, (_, at) => iteration(at + 1)), result: '', effects: ['emission: the flame glows', 'no scattering: nothing in the scene calls for it'],
-          advice: ['12 more iterations: 48 s, about 0.3 grey levels'], error: '', frames: [], ...change};
+          advice: ['12 more iterations: 48 s, about 0.3 grey levels'], error: '', frames: [], temperature: [], ...change};
 }
 
 /** A sequence of these frames: 'd' is done, 'f' failed, 'r' runs, '-' waits. */

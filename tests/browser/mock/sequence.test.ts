@@ -19,7 +19,7 @@ const every = 'Of candle 1, each frame of so many';
 function volume(edge: number) {
   const {header, bytes} = flameVolume(edge);
   const {nx, ny, nz, box, brightest} = header as {nx: number; ny: number; nz: number; box: {center: number[]; size: number[]}; brightest: number};
-  return {volume: {nx, ny, nz, box, brightest, voxels: Buffer.from(bytes).toString('base64')}};
+  return {volume: {nx, ny, nz, box, brightest, voxels: Buffer.from(bytes).toString('base64'), layers: []}};
 }
 const edgeOf = (at: number) => 8 + (at - 10) / 2;
 function serveFrames(): void {

@@ -24,6 +24,7 @@
 namespace emberlock::cli {
 namespace {
 using nlohmann::json;
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
@@ -445,6 +446,34 @@ TEST_F(DaemonVerbs, ReconstructShowsEveryIterationAndTheResult) {
     EXPECT_THAT(result.out, HasSubstr(line));
   EXPECT_THAT(api_.calls(),
               ElementsAre("reconstruct session: \"candle\" voxels: 64 hold_out: 1 hold_out: 3"));
+}
+
+TEST_F(DaemonVerbs, ReconstructAsksForTemperaturesWithTheResponseItself) {
+  const test::TempFolder folder;
+  std::ofstream(folder / "response.json")
+      << R"({"unit": "relative", "wavelength_nm": [500, 600], "r": [0, 1], "g": [1, 0], "b": [0, 0]})";
+  api_.on_reconstruct = [&](const v1::ReconstructRequest&) {
+    v1::DaemonStatus done = reconstructing(v1::ReconstructionStatus::DONE, 1);
+    done.mutable_reconstruction()->add_temperature("1650 K on average");
+    show_soon({done});
+    return Result<v1::ReconstructionStatus>(
+        reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
+  };
+  const std::string file = (folder / "response.json").string();
+  const test::VerbRun result = run(add_reconstruct, {"reconstruct", "candle", "--quantity", "temperature",
+                                                     "--emitter", "soot", "--response", file});
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("1650 K on average"));
+  EXPECT_THAT(api_.calls(),
+              ElementsAre(AllOf(HasSubstr("quantity: \"temperature\""), HasSubstr("wavelength_nm: 600"),
+                                HasSubstr("emitter: \"soot\""))));
+  EXPECT_EQ(run(add_reconstruct, {"reconstruct", "candle", "--errors"}).exit_code, 0);
+  EXPECT_THAT(api_.calls().back(), HasSubstr("errors: true"));
+  const test::VerbRun refused = run(add_reconstruct, {"reconstruct", "candle", "--quantity", "temperature",
+                                                      "--response", (folder / "no.json").string()});
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("no.json"));
+  EXPECT_EQ(api_.calls().size(), 2U) << "the daemon isn't asked";
 }
 
 TEST_F(DaemonVerbs, ASequenceIsToldFrameByFrame) {

@@ -292,6 +292,48 @@ TEST_F(ReconstructCommandTest, AnotherProgramIsToldEveryIterationAndTheResult) {
   EXPECT_FALSE(messages.back().done().advice().empty());
 }
 
+TEST_F(ReconstructCommandTest, TemperaturesAreToldAfterEveryIterationAndMeasuredAtTheEnd) {
+  std::ofstream(root_ / "response.json") << recon::to_json(test::response_of_the_ball());
+  std::vector<std::string> words = {"--voxels",  "16",   "--device",     "cpu",
+                                    "--effects", "none", "--iterations", "4"};
+  const auto volumes = [&](const std::vector<std::string>& more) {
+    const UniqueFd file(::open((root_ / "messages").c_str(), O_CREAT | O_TRUNC | O_WRONLY, 0600));
+    std::vector<std::string> all = words;
+    all.insert(all.end(), more.begin(), more.end());
+    all.insert(all.end(), {"--progress-fd", std::to_string(file.get())});
+    const Run result = run(all);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    std::vector<v1::VolumePreview> found;
+    for (const v1::ChildMessage& message : read_messages(root_ / "messages")) {
+      if (message.has_iteration() && message.iteration().has_volume())
+        found.push_back(message.iteration().volume());
+      if (message.has_done()) EXPECT_EQ(message.done().temperature().empty(), more.empty());
+    }
+    return found;
+  };
+  for (const v1::VolumePreview& volume : volumes({}))
+    EXPECT_TRUE(volume.layers().empty()) << "it costs nothing";
+  const auto shown = volumes({"--quantity", "temperature", "--response", (root_ / "response.json").string()});
+  ASSERT_GE(shown.size(), 2U);
+  const auto in_the_middle = [](const v1::VolumeLayer& layer) {
+    const auto value = static_cast<unsigned char>(layer.voxels()[layer.voxels().size() / 2]);
+    return layer.low() + (layer.high() - layer.low()) * (value - 1.0) / 254;
+  };
+  ASSERT_EQ(shown.front().layers_size(), 1);
+  const v1::VolumeLayer& quick = shown.front().layers(0);
+  EXPECT_TRUE(quick.quick());
+  EXPECT_EQ(quick.kind(), v1::VolumeLayer::TEMPERATURE);
+  EXPECT_EQ(quick.voxels().size(), 17U * 17U * 17U);
+  EXPECT_NEAR(in_the_middle(quick), 1800, 100) << "after one iteration";
+  const v1::VolumePreview& last = shown.back();
+  ASSERT_EQ(last.layers_size(), 3);
+  EXPECT_FALSE(last.layers(0).quick());
+  EXPECT_NEAR(in_the_middle(last.layers(0)), 1800, 20);
+  EXPECT_EQ(last.layers(1).kind(), v1::VolumeLayer::TEMPERATURE_SIGMA);
+  EXPECT_EQ(last.layers(2).kind(), v1::VolumeLayer::EMISSION_SIGMA);
+  EXPECT_GT(last.layers(2).high(), 0);
+}
+
 TEST_F(ReconstructCommandTest, WhenNobodyReadsAnyMoreTheWorkGoesOn) {
   int ends[2];
   ASSERT_EQ(::pipe(ends), 0);

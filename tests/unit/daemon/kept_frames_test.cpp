@@ -12,7 +12,8 @@ v1::IterationPreview volume_of(std::uint64_t frame, std::size_t bytes) {
   v1::IterationPreview preview;
   preview.set_frame(frame);
   preview.set_captured_jpeg("captured");
-  preview.mutable_volume()->set_voxels(std::string(bytes, 'v'));
+  preview.mutable_volume()->set_voxels(std::string(bytes / 2, 'v'));
+  preview.mutable_volume()->add_layers()->set_voxels(std::string(bytes / 2, 't'));
   return preview;
 }
 
@@ -28,7 +29,7 @@ TEST(KeptFrames, AreFoundByReconstructionAndFrame) {
   frames.begin("one");
   frames.keep(volume_of(12, 8));
   ASSERT_TRUE(frames.find(request("one", 12)));
-  EXPECT_EQ(frames.find(request("one", 12))->volume().voxels(), "vvvvvvvv");
+  EXPECT_EQ(frames.find(request("one", 12))->volume().voxels(), "vvvv");
   EXPECT_EQ(frames.find(request("one", 12))->captured_jpeg(), "");
   EXPECT_FALSE(frames.find(request("one", 13)));
   EXPECT_FALSE(frames.find(request("two", 12)));

@@ -15,6 +15,8 @@
 
 #include "base/unique_fd.h"
 #include "daemon/reconstruction/child.h"
+#include "recon/calibrate/camera_response.h"
+#include "recon/calibrate/rig.h"
 #include "session/child_messages.h"
 #include "session/files.h"
 #include "tests/support/recording.h"
@@ -139,6 +141,74 @@ TEST_F(ReconstructionChildTest, WhatIsAskedReachesTheProgram) {
   EXPECT_THAT(wait_for_line("words"),
               HasSubstr("/results/candle/frame-7 --progress-fd 3 --device cpu --frame 7 "
                         "--budget 2.5 --voxels 64 --hold-out 1,3 --threads 2"));
+}
+
+v1::SpectralResponse two_wavelengths() {
+  v1::SpectralResponse response;
+  for (const double nm : {500, 600}) {
+    response.add_wavelength_nm(nm);
+    response.add_r(nm / 100);
+    response.add_g(1);
+    response.add_b(0);
+  }
+  return response;
+}
+
+TEST_F(ReconstructionChildTest, TemperaturesAreAskedOfTheProgramWithTheResponseOnItsInput) {
+  done_message();
+  v1::ReconstructRequest asked = request();
+  asked.set_quantity("temperature");
+  asked.set_emitter("soot");
+  *asked.mutable_response() = two_wavelengths();
+  ASSERT_TRUE(with_script("echo \"$@\" > $ROOT/words; cat /dev/stdin > $ROOT/response; cat $ROOT/done >&3")
+                  .start(asked)
+                  .ok());
+  EXPECT_EQ(end().state(), State::DONE);
+  EXPECT_THAT(test::bytes_of(root_ / "words"),
+              HasSubstr("--quantity temperature --emitter soot --response /dev/stdin"));
+  const auto read = recon::read_camera_response(root_ / "response");
+  ASSERT_TRUE(read.ok()) << read.error().message();
+  EXPECT_EQ(recon::message_of(*read).ShortDebugString(), two_wavelengths().ShortDebugString());
+  asked = request();
+  asked.set_errors(true);
+  ASSERT_TRUE(child_->start(asked).ok());
+  EXPECT_EQ(end().state(), State::DONE);
+  EXPECT_THAT(test::bytes_of(root_ / "words"),
+              testing::AllOf(HasSubstr("--errors"), Not(HasSubstr("stdin"))));
+  EXPECT_EQ(test::bytes_of(root_ / "response"), "") << "nothing to read";
+}
+
+TEST_F(ReconstructionChildTest, WhatNoTemperatureCanBeReadByIsRefused) {
+  ReconstructionChild& child = with_script("echo x > $ROOT/begun");
+  const auto refusal = [&](auto change) {
+    v1::ReconstructRequest wrong = request();
+    wrong.set_quantity("temperature");
+    change(wrong);
+    const auto refused = child.start(wrong);
+    EXPECT_FALSE(refused.ok());
+    if (refused) return std::string();
+    EXPECT_EQ(refused.error().kind, ErrorKind::bad_input);
+    return refused.error().message();
+  };
+  using Request = v1::ReconstructRequest;
+  EXPECT_THAT(refusal([](Request& r) { r.set_quantity("pressure"); }), HasSubstr("colour or temperature"));
+  EXPECT_THAT(refusal([](Request& r) { r.set_emitter("neon"); }), HasSubstr("grey, soot or paper"));
+  EXPECT_THAT(refusal([](Request& r) {
+                r.set_quantity("colour");
+                r.set_emitter("grey");
+              }),
+              HasSubstr("Give quantity temperature too"));
+  EXPECT_THAT(refusal([](Request& r) {
+                r.clear_quantity();
+                *r.mutable_response() = two_wavelengths();
+              }),
+              HasSubstr("Give quantity temperature too"));
+  EXPECT_THAT(refusal([](Request& r) {
+                *r.mutable_response() = two_wavelengths();
+                r.mutable_response()->add_r(1);
+              }),
+              HasSubstr("response"));
+  EXPECT_FALSE(fs::exists(root_ / "begun"));
 }
 
 TEST_F(ReconstructionChildTest, ACrashIsNamedWithItsLastWords) {

@@ -112,6 +112,15 @@ TEST(ReconstructionState, AVolumeWhoseBytesAreNotItsSizeIsNotShown) {
   }
   volume.set_voxels("12345678");
   EXPECT_TRUE(state.take(v1::ChildMessage(message))->has_volume());
+  v1::VolumeLayer& layer = *volume.add_layers();
+  layer.set_voxels("12345678");
+  EXPECT_TRUE(state.take(v1::ChildMessage(message))->has_volume());
+  layer.set_high(std::numeric_limits<double>::infinity());
+  EXPECT_FALSE(state.take(v1::ChildMessage(message))->has_volume());
+  layer.set_high(2);
+  layer.set_voxels("123456789");
+  EXPECT_FALSE(state.take(v1::ChildMessage(message))->has_volume());
+  volume.clear_layers();
   volume.set_voxels("1234567");
   EXPECT_FALSE(state.take(v1::ChildMessage(message))->has_volume());
   volume.set_nx(std::numeric_limits<std::uint32_t>::max());

@@ -147,6 +147,12 @@ TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
   preview->mutable_volume()->set_nx(2);
   preview->mutable_volume()->mutable_box()->add_size(0.5);
   preview->mutable_volume()->set_voxels("voxels");
+  v1::VolumeLayer& layer = *preview->mutable_volume()->add_layers();
+  layer.set_kind(v1::VolumeLayer::TEMPERATURE);
+  layer.set_low(1400);
+  layer.set_high(1900);
+  layer.set_quick(true);
+  layer.set_voxels("kelvin");
   api.board().show(preview);
   WatchClient console(server->port());
   json numbers = text(console);
@@ -163,7 +169,9 @@ TEST_F(ServerWatchTest, AnIterationComesAsNumbersThenPicturesThenTheVolume) {
   const Binary volume = binary(console);
   EXPECT_EQ(volume.header["nx"], 2);
   EXPECT_EQ(volume.header["box"]["size"][0], 0.5);
-  EXPECT_EQ(volume.bytes, "voxels");
+  EXPECT_EQ(volume.header["layers"],
+            json::parse(R"([{"kind": "TEMPERATURE", "low": 1400, "high": 1900, "quick": true}])"));
+  EXPECT_EQ(volume.bytes, "voxelskelvin");
 }
 
 TEST_F(ServerWatchTest, WhoTalksNonsenseIsPutOutAndTheOthersStay) {

@@ -72,6 +72,46 @@ TEST(Preview, CoarseBlocksHoldTheMeanOfTheirPointsEvenWhereTheyAreCutOff) {
   EXPECT_NEAR(coarse.brightest, brightest, 1e-4);
 }
 
+TEST(Preview, CoarseLightHasTheColoursOfItsPoints) {
+  Volume volume;
+  volume.grid = {{0, 0, 0}, 1, 5, 2, 2};
+  for (std::size_t i = 0; i < 3 * volume.grid.size(); ++i)
+    volume.emission.push_back(static_cast<float>(i % 3 + 1) * static_cast<float>(1 + i / 3 % 5));
+  const std::vector<float> light = coarse_emission(volume, 3);  // blocks of two points along x
+  ASSERT_EQ(light.size(), 9U);
+  for (std::size_t block = 0; block < 3; ++block)
+    for (std::size_t c = 0; c < 3; ++c)
+      EXPECT_FLOAT_EQ(light[3 * block + c], static_cast<float>(c + 1) * std::array{1.5F, 3.5F, 5.0F}[block]);
+}
+
+TEST(Preview, ALayerIsTheMeanOfWhatIsToldAndZeroWhereNothingIs) {
+  const Grid grid{{0, 0, 0}, 1, 6, 1, 1};
+  const std::vector<float> kelvin = {1500, 0, 0, 0, 1600, 1700};
+  const CoarseLayer layer =
+      coarse_layer(CoarseLayer::Kind::temperature, grid, 3, [&](std::size_t p) { return kelvin[p]; });
+  ASSERT_EQ(layer.voxels.size(), 3U);
+  EXPECT_EQ(layer.low, 1500);
+  EXPECT_EQ(layer.high, 1650);
+  EXPECT_EQ(layer.voxels[0], 1) << "1500 K, though half of its points tell nothing";
+  EXPECT_EQ(layer.voxels[1], 0);
+  EXPECT_EQ(layer.voxels[2], 255);
+}
+
+TEST(Preview, ErrorsAreShownFromZeroAndWhatLiesBeyondTheEndAsTheEnd) {
+  std::vector<float> sigma(200, 2.31F);
+  sigma[0] = 1000;  // one voxel that tells hardly anything
+  sigma[1] = 0;
+  sigma[2] = 1.2F;
+  const CoarseLayer layer = layer_of(CoarseLayer::Kind::extinction_sigma, sigma);
+  EXPECT_EQ(layer.low, 0);
+  EXPECT_NEAR(layer.high, 2.4, 1e-9);
+  EXPECT_EQ(layer.voxels[0], 255);
+  EXPECT_EQ(layer.voxels[1], 0);
+  EXPECT_EQ(layer.voxels[2], 128);
+  const CoarseLayer nothing = layer_of(CoarseLayer::Kind::temperature, std::vector<float>(4));
+  EXPECT_EQ(nothing.voxels, std::vector<std::uint8_t>(4));
+}
+
 TEST(Preview, ADarkVolumeIsDark) {
   Volume volume;
   volume.grid = {{0, 0, 0}, 1, 300, 2, 2};

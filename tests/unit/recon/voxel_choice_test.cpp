@@ -183,17 +183,31 @@ TEST(PlannedTime, OfVoxelsThatDoNotFitIsAnError) {
   EXPECT_FALSE(plan_time(task, options, {}).ok());
 }
 
+/// In 4 GB.
+int largest_that_fits(const ReconstructOptions& options) {
+  int voxels = 4;
+  while (voxels < kLargestVoxels && choose_grid(pictures(), options, voxels + 4, 4e9).ok()) voxels += 4;
+  return voxels;
+}
+
 TEST_P(VoxelChoiceTest, DoublePrecisionNeedsTheMemoryOfAboutTwiceAsManyPoints) {
-  const auto largest = [](Precision precision) {
-    constexpr double kMemory = 4e9;  // bytes
-    int voxels = 16;
-    while (voxels < kLargestVoxels && choose_grid(pictures(), voxels + 16, precision, kMemory).ok())
-      voxels += 16;
-    return voxels;
-  };
-  const int fits = largest(Precision::float32);
+  ReconstructOptions options;
+  const int fits = largest_that_fits(options);
   ASSERT_LT(fits, kLargestVoxels);
-  EXPECT_NEAR(std::pow(static_cast<double>(fits) / largest(Precision::float64), 3), 1.8, 0.3);
+  options.solve.precision = Precision::float64;
+  EXPECT_NEAR(std::pow(static_cast<double>(fits) / largest_that_fits(options), 3), 1.8, 0.3);
+}
+
+TEST_P(VoxelChoiceTest, ErrorsNeedFifteenFloatsAKeyPointMoreThanTheSolve) {
+  ReconstructOptions options;
+  const int fits = largest_that_fits(options);
+  options.errors = true;
+  const int with_errors = largest_that_fits(options);
+  constexpr double kSolve = 9 / 8.0 * (36 + 8);  // floats a key point
+  EXPECT_NEAR(std::pow(static_cast<double>(fits) / with_errors, 3), (kSolve + 15) / kSolve, 0.05);
+  options.errors = false;
+  options.temperature.emplace();
+  EXPECT_EQ(largest_that_fits(options), with_errors) << "temperatures need the errors";
 }
 
 TEST_P(VoxelChoiceTest, SaysWhatTheNextStepWouldBuyAndCost) {

@@ -47,6 +47,15 @@ TEST(FlamePictures, ScalingDownKeepsShapeAndMean) {
   EXPECT_EQ(scaled(recon::to_rgb8(image), 1).view().sample(0, 0, 2), 60);
 }
 
+TEST(FlamePictures, TallOnesAreNoTallerThanThereIsRoom) {
+  const Image tall = recon::to_rgb8(ramp({10, 80}, 0));
+  EXPECT_EQ(scaled_into(tall, {300, 400}).layout().size, (ImageSize{50, 400}));
+  EXPECT_EQ(scaled_into(recon::to_rgb8(ramp({80, 10}, 0)), {300, 400}).layout().size, (ImageSize{300, 37}));
+  EXPECT_EQ(enlarged(tall, {300, 400}).layout().size, (ImageSize{50, 400}));
+  EXPECT_EQ(enlarged(tall, {300, 239}).layout().size, (ImageSize{20, 160})) << "whole times";
+  EXPECT_EQ(enlarged(tall, {300, 20}).layout().size, tall.layout().size) << "never smaller";
+}
+
 TEST(FlamePictures, MarginStaysInsideThePicture) {
   const recon::PixelBox box = with_margin({1, 5, 3, 9}, 4, {10, 10});
   EXPECT_EQ(box.x0, 0);

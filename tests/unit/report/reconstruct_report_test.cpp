@@ -7,6 +7,8 @@
 #include <gmock/gmock.h>
 
 #include "recon/hull/hull.h"
+#include "report/measured_pictures.h"
+#include "report/value_slices.h"
 #include "report/volume_pictures.h"
 #include "report/volume_view.h"
 #include "tests/support/ball_scene.h"
@@ -98,6 +100,65 @@ TEST(VolumeView, CarriesTheVolumeAndSaysSoWhereItCannotBeTurned) {
   EXPECT_THAT(html, HasSubstr("has no WebGL2"));
   EXPECT_THAT(html, HasSubstr("<noscript>"));
   EXPECT_THAT(html, Not(HasSubstr("http")));
+}
+
+/// One that tells 1700 K, and its errors, in the voxel that has light.
+recon::Outcome measured_light() {
+  recon::Outcome outcome;
+  outcome.reconstruction.volume = one_light(16);
+  const recon::Volume& volume = outcome.reconstruction.volume;
+  const std::size_t points = volume.grid.size();
+  const std::size_t lit = volume.grid.index(4, 8, 12);
+  outcome.errors.emplace();
+  outcome.errors->emission.assign(6 * points, 100);
+  for (const std::size_t c : {0U, 3U, 5U}) outcome.errors->emission[6 * lit + c] = 3600;  // sigma 60 a metre
+  outcome.errors->extinction.assign(points, 1);
+  outcome.errors->extinction[lit] = 2.5F;
+  outcome.errors->solves = 7;
+  outcome.temperature.emplace();
+  outcome.temperature->kelvin.assign(points, 0);
+  outcome.temperature->kelvin[lit] = 1700;
+  outcome.temperature->sigma.assign(points, 0);
+  outcome.temperature->sigma[lit] = 12;
+  recon::TemperatureSummary& summary = outcome.temperature->summary;
+  summary.counts = {.emitting = 2, .told = 1, .unclear = 1};
+  summary.mean = summary.low = summary.high = 1700;
+  summary.sigma = 12;
+  return outcome;
+}
+
+TEST(MeasuredPictures, TemperatureIsToldInSentencesAndDrawnWithABarInKelvin) {
+  const std::string html = temperature_html(measured_light(), {});
+  for (const char* part :
+       {"<p>1700 K on average", "<p>Read from a grey glow", "<p>Not told: 1 can", "<span>1700 K</span>",
+        "<span>1750 K</span>", "temperature in the middle, across z", "<p>Grey: not told."})
+    EXPECT_THAT(html, HasSubstr(part));
+  EXPECT_EQ(temperature_html({}, {}), "");
+}
+
+TEST(MeasuredPictures, ErrorsOfLightAndExtinctionAreDrawnWhereThereIsLight) {
+  recon::Outcome outcome = measured_light();
+  const std::string html = errors_html(outcome, {});
+  for (const char* part : {"<h2>Errors</h2>", "by 7 solves", "<span>0.6 grey levels a centimetre</span>",
+                           "<span>2.5 1/m</span>", "error of the extinction in the middle, across x"})
+    EXPECT_THAT(html, HasSubstr(part));
+  outcome.errors->extinction.clear();
+  EXPECT_THAT(errors_html(outcome, {}), Not(HasSubstr("1/m")));
+  EXPECT_EQ(errors_html({}, {}), "");
+}
+
+TEST(ValueSlice, ShowsLowDarkHighBrightAndWhatIsNotToldGrey) {
+  const recon::Grid grid{{0, 0, 0}, 1, 3, 1, 2};
+  const std::vector<float> values = {1500, 0, 2000, 0, 0, 0};
+  const Image slice = value_slice(grid, values, {}, 1, {1500, 2000, "K"});
+  ASSERT_EQ(slice.layout().size, (ImageSize{3, 1})) << "cropped to what is told";
+  const auto light = [&](int x) {
+    const std::uint8_t* rgb = slice.view().row_as<std::uint8_t>(0) + 3 * x;
+    return rgb[0] + rgb[1] + rgb[2];
+  };
+  EXPECT_LT(light(0), 20);
+  EXPECT_EQ(light(1), 3 * 58);
+  EXPECT_GT(light(2), 600);
 }
 
 TEST(ReconstructReport, ShowsEverythingInOnePageThatNeedsNoOther) {

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is reconstructed: colour, colour with its errors, or temperature too, and by which emitter and camera response that is read.
+import type {ReconstructRequest, SpectralResponse} from './api.gen';
+import {el, show} from './dom';
+
+/** A response.json's text as the daemon takes it; undefined: it is none. */
+export function responseOf(text: string): SpectralResponse | undefined {
+  try {
+    const {unit, wavelength_nm, r, g, b} = JSON.parse(text) as Record<string, unknown>;
+    const numbers = (list: unknown): list is number[] => Array.isArray(list) && list.every(value => typeof value === 'number');
+    if (typeof unit !== 'string' || !numbers(wavelength_nm) || !numbers(r) || !numbers(g) || !numbers(b)) return undefined;
+    return {wavelength_nm, r, g, b, absolute: unit !== 'relative'};
+  } catch {
+    return undefined;
+  }
+}
+
+function choice(label: string, options: Record<string, string>, onchange?: () => void): HTMLSelectElement {
+  return el('select', {'aria-label': label, onchange}, ...Object.entries(options).map(([value, words]) => el('option', {value}, words)));
+}
+
+export class QuantityChoice {
+  private readonly quantity: HTMLSelectElement;
+  private readonly emitter: HTMLSelectElement;
+  private readonly response: HTMLInputElement;
+  private readonly temperature: HTMLElement;
+  readonly root: HTMLElement;
+
+  constructor(session: string) {
+    this.quantity = choice(`What of ${session} to reconstruct`, {colour: 'colour', errors: 'colour and its errors', temperature: 'temperature'},
+                           () => show(this.temperature, this.quantity.value === 'temperature'));
+    this.emitter = choice(`What glows in ${session}`, {grey: 'grey', soot: 'soot', paper: 'as in the paper'});
+    this.response = el('input', {type: 'file', accept: '.json,application/json', 'aria-label': `Camera response of ${session}`,
+                                 title: 'A response.json of "calibrate colour --black-body"; without one the session’s is taken, else that of a camera that shows linear sRGB.',
+                                 onchange: () => this.response.setCustomValidity('')});
+    const word = (text: string) => el('span', {'aria-hidden': 'true'}, text);
+    this.temperature = el('span', {class: 'of-temperature', hidden: true}, word('of'), this.emitter, word('response'), this.response);
+    this.root = el('span', {class: 'quantity-choice'}, this.quantity, this.temperature);
+  }
+
+  enable(enabled: boolean): void {
+    for (const input of [this.quantity, this.emitter, this.response]) input.disabled = !enabled;
+  }
+
+  /** The request's part; undefined where the file is no response, which the browser says. */
+  async request(): Promise<Partial<ReconstructRequest> | undefined> {
+    if (this.quantity.value === 'errors') return {errors: true};
+    if (this.quantity.value !== 'temperature') return {};
+    const file = this.response.files?.[0];
+    const response = file && responseOf(await file.text());
+    if (file && !response) {
+      this.response.setCustomValidity('This is no camera response: choose a response.json of "calibrate colour --black-body".');
+      this.response.reportValidity();
+      return undefined;
+    }
+    return {quantity: 'temperature', emitter: this.emitter.value, ...(response && {response})};
+  }
+}

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report/measured_pictures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "recon/export/preview.h"
+#include "recon/export/temperature_words.h"
+#include "report/html.h"
+#include "report/value_slices.h"
+
+namespace emberlock::report {
+namespace {
+
+/// A key point that shows less light than this share of the brightest has errors that nobody looks for.
+constexpr double kLeastLight = 0.005;
+
+std::string paragraph(std::string_view clause) { return "<p>" + html_escape(sentence(clause)) + "</p>"; }
+
+}  // namespace
+
+std::string temperature_html(const recon::Outcome& outcome, const ShownAxes& axes) {
+  if (!outcome.temperature) return {};
+  const recon::TemperatureField& field = *outcome.temperature;
+  const recon::TemperatureSummary& summary = field.summary;
+  std::string html = "<h2>Temperature</h2>";
+  for (const std::string& words : recon::temperature_words(summary)) html += paragraph(words);
+  if (summary.counts.told == 0) return html;
+  constexpr double kRound = 50;
+  const double low = kRound * std::floor(summary.low / kRound);
+  const double high = std::max(low + kRound, kRound * std::ceil(summary.high / kRound));
+  const recon::Grid& grid = outcome.reconstruction.volume.grid;
+  html += value_slices_html(grid, field.kelvin, axes, {low, high, "K"}, "temperature");
+  const double most_sigma = std::max(10.0, 10 * std::ceil(0.4 * summary.sigma));
+  html += value_slices_html(grid, field.sigma, axes, {0, most_sigma, "K"}, "its error (one sigma)");
+  return html + paragraph("grey: not told. The grids temperature and temperature_sigma are in volume.vdb");
+}
+
+std::string errors_html(const recon::Outcome& outcome, const ShownAxes& axes) {
+  if (!outcome.errors) return {};
+  const recon::VolumeErrors& errors = *outcome.errors;
+  const recon::Volume& volume = outcome.reconstruction.volume;
+  const double brightest =
+      static_cast<double>(*std::max_element(volume.emission.begin(), volume.emission.end()));
+  std::vector<float> emission(volume.grid.size());
+  std::vector<float> extinction(errors.extinction.empty() ? 0 : emission.size());
+  for (std::size_t p = 0; p < emission.size(); ++p) {
+    const auto light = static_cast<double>(
+        std::max({volume.emission[3 * p], volume.emission[3 * p + 1], volume.emission[3 * p + 2]}));
+    if (!(light > kLeastLight * brightest)) continue;
+    emission[p] = static_cast<float>(errors.sigma(p).mean() / 100);
+    if (!extinction.empty()) extinction[p] = errors.extinction[p];
+  }
+  std::string html = "<h2>Errors</h2>";
+  html += paragraph(fmt::format(
+      "how far each voxel may be off (one standard error), by {} solves without some of the views, which "
+      "took {:.1f} s: it holds the pictures' noise, and what a view more or less would change",
+      errors.solves, errors.time.value()));
+  const auto add = [&](const std::vector<float>& values, const char* unit, const char* what) {
+    html += value_slices_html(volume.grid, values, axes, {0, recon::end_of_bar(values), unit}, what);
+  };
+  add(emission, "grey levels a centimetre", "error of the light, mean of R, G and B,");
+  if (!extinction.empty()) add(extinction, "1/m", "error of the extinction");
+  return html + paragraph(
+                    "grey: hardly any light. The grids emission_sigma and, where extinction was "
+                    "reconstructed, density_sigma are in volume.vdb");
+}
+
+}  // namespace emberlock::report

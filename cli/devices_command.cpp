@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -15,6 +14,7 @@
 #include "cli/commands.h"
 #include "cli/image_size.h"
 #include "cli/interrupt.h"
+#include "cli/pixel_formats.h"
 #include "drivers/camera_thread.h"
 #include "drivers/hotplug.h"
 #include "drivers/probe.h"
@@ -95,20 +95,11 @@ void watch() {
   }
 }
 
-const std::map<std::string, PixelFormat> kFormats = [] {
-  std::map<std::string, PixelFormat> formats;
-  for (const PixelFormat f : {PixelFormat::gray8, PixelFormat::gray16, PixelFormat::bayer_rggb8,
-                              PixelFormat::bayer_rggb16, PixelFormat::rgb8, PixelFormat::rgb16}) {
-    formats.emplace(name(f), f);
-  }
-  return formats;
-}();
-
 Result<drivers::CameraRequest> request_from(const ProbeArguments& arguments) {
   drivers::CameraRequest request;
   if (arguments.rate > 0) request.frame_rate = Hertz(arguments.rate);
   if (arguments.exposure_ms > 0) request.exposure = milliseconds(arguments.exposure_ms);
-  if (!arguments.format.empty()) request.format = kFormats.at(arguments.format);
+  if (!arguments.format.empty()) request.format = pixel_formats().at(arguments.format);
   for (const std::string& control : arguments.controls) {
     const auto equals = control.find('=');
     if (equals == 0 || equals == std::string::npos) {
@@ -250,7 +241,7 @@ void add_probe(CLI::App& devices) {
   verb->add_option("--size", a->size, "WIDTHxHEIGHT [the largest]");
   verb->add_option("--rate", a->rate, "Frames per second [the fastest]")->check(CLI::PositiveNumber);
   verb->add_option("--format", a->format, "Pixel format [the one that keeps most]")
-      ->check(CLI::IsMember(kFormats));
+      ->check(CLI::IsMember(pixel_formats()));
   verb->add_option("--exposure-ms", a->exposure_ms, "Exposure time, ms [the camera's own setting]")
       ->check(CLI::PositiveNumber);
   verb->add_option("--control", a->controls, "NAME=VALUE, by the camera's own names; may be repeated");

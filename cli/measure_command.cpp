@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -25,14 +26,20 @@ namespace fs = std::filesystem;
 struct MeasureArguments {
   std::vector<std::string> volumes;
   std::string target;
+  std::string sphere;
   std::string out;
   std::string up = "z";
   int threads = 0;
 };
 
 /// A small surface: where it is and where it looks.
-struct Target {
+struct Surface {
   Eigen::Vector3d point, normal;
+};
+
+struct Targets {
+  std::optional<Surface> surface;
+  std::optional<recon::TargetSphere> sphere;
 };
 
 struct Measured {
@@ -40,20 +47,43 @@ struct Measured {
   recon::HotStatistics statistics;
   double power = 0, power_error = 0;  // W
   std::optional<double> flux;         // W / m^2
+  std::optional<recon::SphereFlux> sphere;
 };
 
-Result<std::optional<Target>> parse_target(const std::string& text) {
-  if (text.empty()) return std::optional<Target>{};
-  std::array<double, 6> v = {};
-  int end = 0;
-  const int read =
-      std::sscanf(text.c_str(), "%lf,%lf,%lf,%lf,%lf,%lf%n", &v[0], &v[1], &v[2], &v[3], &v[4], &v[5], &end);
-  const bool finite = std::all_of(v.begin(), v.end(), [](double x) { return std::isfinite(x); });
-  const Eigen::Vector3d normal(v[3], v[4], v[5]);
-  if (read != 6 || end != static_cast<int>(text.size()) || !finite || !(normal.norm() > 0))
-    return Error{ErrorKind::bad_input, "\"" + text + "\" is no target", "--target",
-                 "Give x,y,z,nx,ny,nz: a point in metres and the direction it looks in"};
-  return std::optional<Target>{{{v[0], v[1], v[2]}, normal.normalized()}};
+/// N finite numbers between commas.
+template <std::size_t N>
+std::optional<std::array<double, N>> parse_numbers(const std::string& text) {
+  std::array<double, N> numbers = {};
+  const char* at = text.data();
+  const char* end = at + text.size();
+  for (std::size_t i = 0; i < N; ++i) {
+    if (i > 0 && (at == end || *at++ != ',')) return {};
+    const auto read = std::from_chars(at, end, numbers[i]);
+    if (read.ec != std::errc() || !std::isfinite(numbers[i])) return {};
+    at = read.ptr;
+  }
+  if (at != end) return {};
+  return numbers;
+}
+
+Result<Targets> parse_targets(const MeasureArguments& arguments) {
+  Targets targets;
+  if (!arguments.target.empty()) {
+    const auto v = parse_numbers<6>(arguments.target);
+    const Eigen::Vector3d normal = v ? Eigen::Vector3d((*v)[3], (*v)[4], (*v)[5]) : Eigen::Vector3d::Zero();
+    if (!(normal.norm() > 0))
+      return Error{ErrorKind::bad_input, "\"" + arguments.target + "\" is no target", "--target",
+                   "Give x,y,z,nx,ny,nz: a point in metres and the direction it looks in"};
+    targets.surface = Surface{{(*v)[0], (*v)[1], (*v)[2]}, normal.normalized()};
+  }
+  if (!arguments.sphere.empty()) {
+    const auto v = parse_numbers<4>(arguments.sphere);
+    if (!v || !((*v)[3] > 0))
+      return Error{ErrorKind::bad_input, "\"" + arguments.sphere + "\" is no sphere", "--target-sphere",
+                   "Give x,y,z,radius in metres"};
+    targets.sphere = recon::TargetSphere{{(*v)[0], (*v)[1], (*v)[2]}, (*v)[3]};
+  }
+  return targets;
 }
 
 Result<Eigen::Vector3d> parse_up(const std::string& text) {
@@ -70,8 +100,8 @@ fs::path file_of(const std::string& name) {
   return fs::is_directory(name, ec) ? fs::path(name) / "volume.vdb" : fs::path(name);
 }
 
-Result<Measured> measured(const std::string& name, const std::optional<Target>& target,
-                          const Eigen::Vector3d& up, const recon::ComputeOptions& compute) {
+Result<Measured> measured(const std::string& name, const Targets& targets, const Eigen::Vector3d& up,
+                          const recon::ComputeOptions& compute) {
   const fs::path file = file_of(name);
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Volume volume, recon::read_volume(file));
   const auto kelvin = recon::read_grid(file, "temperature");
@@ -90,7 +120,9 @@ Result<Measured> measured(const std::string& name, const std::optional<Target>& 
     return Error{ErrorKind::bad_input, "no voxel tells a temperature", file.string(),
                  "See what its report.html says of temperatures"};
   out.power = recon::radiated_power(hot, compute);
-  if (target) out.flux = recon::radiant_flux(hot, target->point, target->normal, compute);
+  if (targets.surface)
+    out.flux = recon::radiant_flux(hot, targets.surface->point, targets.surface->normal, compute);
+  if (targets.sphere) out.sphere = recon::radiant_flux(hot, *targets.sphere, compute);
   // All voxels off alike, as what is off in a response or an emitter is.
   for (std::size_t p = 0; p < hot.kelvin.size(); ++p) hot.kelvin[p] += sigma[p];
   out.power_error = recon::radiated_power(hot, compute) - out.power;
@@ -99,12 +131,16 @@ Result<Measured> measured(const std::string& name, const std::optional<Target>& 
 
 std::string csv_of(const std::vector<Measured>& all) {
   std::string csv =
-      "volume,power_w,power_error_w,flux_w_m2,mean_k,mean_error_k,most_k,most_error_k,height_m,volume_m3\n";
+      "volume,power_w,power_error_w,flux_w_m2,sphere_mean_w_m2,sphere_most_w_m2,sphere_power_w,mean_k,mean_"
+      "error_k,most_k,most_error_k,height_m,volume_m3\n";
   for (const Measured& m : all)
-    csv += fmt::format("{},{:.6g},{:.3g},{},{:.1f},{:.1f},{:.1f},{:.1f},{:.5g},{:.5g}\n", m.name, m.power,
-                       m.power_error, m.flux ? fmt::format("{:.6g}", *m.flux) : "", m.statistics.mean,
-                       m.statistics.mean_error, m.statistics.most, m.statistics.most_error,
-                       m.statistics.height, m.statistics.volume);
+    csv += fmt::format(
+        "{},{:.6g},{:.3g},{},{},{:.1f},{:.1f},{:.1f},{:.1f},{:.5g},{:.5g}\n", m.name, m.power, m.power_error,
+        m.flux ? fmt::format("{:.6g}", *m.flux) : "",
+        m.sphere ? fmt::format("{:.6g},{:.6g},{:.6g}", m.sphere->mean, m.sphere->most, m.sphere->power)
+                 : ",,",
+        m.statistics.mean, m.statistics.mean_error, m.statistics.most, m.statistics.most_error,
+        m.statistics.height, m.statistics.volume);
   return csv;
 }
 
@@ -113,6 +149,9 @@ void print(const Measured& m) {
   std::printf("%-16s %s\n", "volume", m.name.c_str());
   std::printf("%-16s %.4g W +- %.2g, in all directions\n", "radiates", m.power, m.power_error);
   if (m.flux) std::printf("%-16s %.4g W / m2\n", "on the target", *m.flux);
+  if (m.sphere)
+    std::printf("%-16s %.4g W / m2 on average, %.4g W / m2 at most, %.4g W in all\n", "on the sphere",
+                m.sphere->mean, m.sphere->most, m.sphere->power);
   std::printf("%-16s %.0f K +- %.0f on average, %.0f K +- %.0f at most\n", "temperature", s.mean,
               s.mean_error, s.most, s.most_error);
   std::printf("%-16s %.4g m high, %.4g cm3, of the voxels that tell a temperature\n", "flame", s.height,
@@ -136,6 +175,12 @@ Status write_measures(const std::vector<Measured>& all, const OutputRequest& req
         report::svg_plot_for_any_width({series}, {.title = title, .x_label = "volume", .y_label = unit}));
   };
   plot("radiated power", "W", [](const Measured& m) { return m.power; });
+  if (all.front().flux) plot("flux on the target", "W / m2", [](const Measured& m) { return *m.flux; });
+  if (all.front().sphere) {
+    plot("mean flux on the sphere", "W / m2", [](const Measured& m) { return m.sphere->mean; });
+    plot("highest flux on the sphere", "W / m2", [](const Measured& m) { return m.sphere->most; });
+    plot("power that the sphere catches", "W", [](const Measured& m) { return m.sphere->power; });
+  }
   plot("mean temperature", "K", [](const Measured& m) { return m.statistics.mean; });
   plot("highest temperature", "K", [](const Measured& m) { return m.statistics.most; });
   plot("height", "m", [](const Measured& m) { return m.statistics.height; });
@@ -144,7 +189,7 @@ Status write_measures(const std::vector<Measured>& all, const OutputRequest& req
 }
 
 void measure(const MeasureArguments& arguments) {
-  const std::optional<Target> target = or_fail(parse_target(arguments.target));
+  const Targets targets = or_fail(parse_targets(arguments));
   const Eigen::Vector3d up = or_fail(parse_up(arguments.up));
   const OutputRequest request{arguments.out, kMeasure, {arguments.volumes.begin(), arguments.volumes.end()}};
   if (!arguments.out.empty()) or_fail(OutputFolder::check(request));
@@ -153,7 +198,7 @@ void measure(const MeasureArguments& arguments) {
   std::vector<Measured> all;
   all.reserve(arguments.volumes.size());
   for (const std::string& name : arguments.volumes) {
-    all.push_back(or_fail(measured(name, target, up, compute)));
+    all.push_back(or_fail(measured(name, targets, up, compute)));
     print(all.back());
   }
   if (arguments.out.empty()) return;
@@ -175,6 +220,10 @@ void add_measure(CLI::App& app) {
   verb->add_option(
       "--target", a.target,
       "x,y,z,nx,ny,nz: also the flux on a small surface, at a point (m) and the direction it looks in");
+  verb->add_option("--target-sphere", a.sphere,
+                   "x,y,z,radius (m): also the flux on a black sphere, mean and highest, and the power that "
+                   "it catches; one around the flame catches on its inner side")
+      ->type_name("TEXT");
   verb->add_option("--up", a.up, "The world's axis along which height is counted: x, y, z, -x, -y or -z")
       ->capture_default_str();
   verb->add_option("--out", a.out,

@@ -2,6 +2,7 @@
 #include <charconv>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -9,6 +10,8 @@
 #include "cli/image_size.h"
 #include "cli/interrupt.h"
 #include "cli/outputs.h"
+#include "cli/pixel_formats.h"
+#include "recon/calibrate/camera_response.h"
 #include "rig/simulate/simulate_flame.h"
 
 namespace emberlock::cli {
@@ -20,6 +23,12 @@ struct SimulateArguments {
   std::string preset = "candle";
   std::string cameras = "virtual:11";
   std::string image = "640x480";
+  std::string format = "rgb8";
+  std::string response;
+  std::optional<double> exposure_ms;
+  double offsets_ms = 0;
+  std::string sun;
+  double albedo = rig::Sun{}.albedo;
   double rate = 24;
 };
 
@@ -35,13 +44,37 @@ Result<int> parse_virtual_rig(const std::string& text) {
   return Error{ErrorKind::bad_input, "not a rig of simulated cameras", "--rig " + text, "Write virtual:11"};
 }
 
+/// "x,y,z", or nothing.
+Result<std::optional<rig::Sun>> parse_sun(const SimulateArguments& arguments) {
+  rig::Sun sun{.albedo = arguments.albedo};
+  char rest = 0;
+  if (!arguments.sun.empty() && std::sscanf(arguments.sun.c_str(), "%lf,%lf,%lf%c",  // NOLINT(cert-err34-c)
+                                            &sun.towards.x(), &sun.towards.y(), &sun.towards.z(), &rest) != 3)
+    return Error{ErrorKind::bad_input, "\"" + arguments.sun + "\" is no direction", "--sun",
+                 "Give x,y,z, towards the sun"};
+  if (arguments.sun.empty() && arguments.albedo == rig::Sun{}.albedo) return std::optional<rig::Sun>{};
+  return std::optional(sun);
+}
+
+OutputRequest output_of(const SimulateArguments& arguments) {
+  OutputRequest request{arguments.out, kSimulateFlame};
+  if (!arguments.response.empty()) request.inputs = {arguments.response};
+  return request;
+}
+
 void simulate(SimulateArguments arguments) {
   rig::SimulateOptions& options = arguments.simulate;
   options.preset = or_fail(recon::parse_flame_preset(arguments.preset));
   options.cameras = or_fail(parse_virtual_rig(arguments.cameras));
   options.image = or_fail(parse_image_size(arguments.image));
   options.rate = Hertz(arguments.rate);
-  OutputFolder folder = or_fail(OutputFolder::create({arguments.out, kSimulateFlame}));
+  options.format = pixel_formats().at(arguments.format);
+  options.offsets = milliseconds(arguments.offsets_ms);
+  options.sun = or_fail(parse_sun(arguments));
+  if (arguments.exposure_ms) options.exposure = milliseconds(*arguments.exposure_ms);
+  if (!arguments.response.empty())
+    options.response = or_fail(recon::read_camera_response(arguments.response));
+  OutputFolder folder = or_fail(OutputFolder::create(output_of(arguments)));
   const Progress bar = progress_bar("simulate flame");
   const Interrupt interrupt;
   const auto observer = [&](double fraction, std::string_view what) {
@@ -55,9 +88,28 @@ void simulate(SimulateArguments arguments) {
   std::printf("%s/session   %d frames of %d cameras\n", out.c_str(), film.frames, film.cameras);
   std::printf("%s/truth     emission, density, temperature and velocity of each frame, OpenVDB\n",
               out.c_str());
-  std::printf("hottest gas %.0f K; relative divergence at most %.1e\n\n", film.hottest.value(),
-              film.relative_divergence);
-  std::printf("next   emberlock reconstruct %s/session --out result\n", out.c_str());
+  std::printf("hottest gas %.0f K; relative divergence at most %.1e; exposure %.4g ms\n\n",
+              film.hottest.value(), film.relative_divergence, 1e3 * film.exposure.value());
+  std::printf("next   emberlock reconstruct %s/session %s--out result\n", out.c_str(),
+              options.response ? "--quantity temperature --emitter soot " : "");
+}
+
+/// What their pictures are like.
+void add_camera_options(CLI::App& verb, SimulateArguments& a) {
+  verb.add_option("--format", a.format, "Of the pictures; bayer: a mosaic of colours")
+      ->check(CLI::IsMember(pixel_formats()))
+      ->capture_default_str();
+  verb.add_option(
+          "--response", a.response,
+          "JSON file of the cameras' spectral response, whose levels hold for 1 ms; the session keeps it")
+      ->type_name("FILE");
+  verb.add_option("--exposure", a.exposure_ms,
+                  "Milliseconds; by default what an absolute response needs for 230 of 255 levels, else 1");
+  verb.add_option("--offsets", a.offsets_ms, "Milliseconds by which cameras' shutters are late at most")
+      ->capture_default_str();
+  verb.add_option("--sun", a.sun, "x,y,z: of smoke, where the sun stands (default: 1,-1,1)");
+  verb.add_option("--albedo", a.albedo, "Of smoke: the share of the light it takes that it scatters")
+      ->capture_default_str();
 }
 
 }  // namespace
@@ -71,7 +123,9 @@ void add_simulate(CLI::App& app) {
       "Computes burning gas and films it with simulated cameras: a session, and the truth beside it");
   SimulateArguments& a = *arguments;
   verb->add_option("--out", a.out, "Folder for session/ and truth/")->required();
-  verb->add_option("--preset", a.preset, "candle, pool-fire, torch or two-plumes")->capture_default_str();
+  verb->add_option("--preset", a.preset,
+                   "candle, pool-fire, torch, two-plumes, or smoke, which the sun lights")
+      ->capture_default_str();
   verb->add_option("--frames", a.simulate.frames, "Frames that each camera films")->capture_default_str();
   verb->add_option("--rig", a.cameras, "virtual:N, so many cameras on an arc around the flame")
       ->capture_default_str();
@@ -82,6 +136,7 @@ void add_simulate(CLI::App& app) {
   verb->add_option("--rate", a.rate, "Frames a second")->capture_default_str();
   verb->add_option("--noise", a.simulate.read_noise, "Read noise, grey levels; 0: no noise at all")
       ->capture_default_str();
+  add_camera_options(*verb, a);
   verb->add_option("--threads", a.simulate.compute.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();

@@ -70,44 +70,44 @@ struct DiffuseFaces {
   }
 };
 
-/// What the gas carries, by mass: what leaves a cell arrives in the next. Nothing passes the floor.
-template <class Value>
-struct DiffuseCells {
-  const Value* in = nullptr;
-  Value* out = nullptr;
-  const Rgba* gas = nullptr;      ///< its first lane is the temperature
+/// What the gas carries, by mass: what leaves a cell arrives in the next. Nothing passes the floor. One pass
+/// for all of it, as it is bound by memory.
+struct DiffuseGas {
+  const Rgba* in = nullptr;  ///< its first lane is the temperature
+  Rgba* out = nullptr;
+  const float* particles = nullptr;  ///< or absent
+  float* particles_out = nullptr;
+  float* expansion = nullptr;     ///< out: log(after / before) / dt, 1/s, that heat brings by diffusion
   const float* eddies = nullptr;  ///< or absent
   FluidGrid grid;
   float share = 0;
-
-  [[nodiscard]] HOST_DEVICE Value from(std::size_t c, std::size_t next) const {
-    float part = share;
-    if (eddies != nullptr) part += 0.5F * (eddies[c] + eddies[next]);
-    // The density at the face over the cell's.
-    const float density = 2 * gas[c].c[0] / (gas[c].c[0] + gas[next].c[0]);
-    return (least_of(part, kMostDiffused) * density) * (in[next] - in[c]);
-  }
-  HOST_DEVICE void operator()(int i, int j, int k) const {
-    const std::size_t c = grid.index(i, j, k);
-    const std::size_t y = grid.stride_y();
-    const std::size_t z = grid.stride_z();
-    Value sum = (from(c, c - 1) + from(c, c + 1)) + (from(c, c - y) + from(c, c + y)) + from(c, c + z);
-    if (k > 0) sum = sum + from(c, c - z);
-    out[c] = in[c] + sum;
-  }
-};
-
-/// out = log(after / before) / dt, 1/s: the expansion that heat brings by diffusion.
-struct HeatedBy {
-  const Rgba* before = nullptr;
-  const Rgba* after = nullptr;
-  float* out = nullptr;
-  FluidGrid grid;
   float per_dt = 0;
 
   HOST_DEVICE void operator()(int i, int j, int k) const {
     const std::size_t c = grid.index(i, j, k);
-    out[c] = per_dt * (after[c].c[0] - before[c].c[0]) / before[c].c[0];
+    const std::size_t y = grid.stride_y();
+    const std::size_t z = grid.stride_z();
+    const Rgba here = in[c];
+    Rgba gas = here;
+    float carried = particles != nullptr ? particles[c] : 0.F;
+    const auto take = [&](std::size_t next) {
+      float part = share;
+      if (eddies != nullptr) part += 0.5F * (eddies[c] + eddies[next]);
+      // The density at the face over the cell's.
+      const float density = 2 * here.c[0] / (here.c[0] + in[next].c[0]);
+      const float weight = least_of(part, kMostDiffused) * density;
+      gas = gas + weight * (in[next] - here);
+      if (particles != nullptr) carried += weight * (particles[next] - particles[c]);
+    };
+    take(c - 1);
+    take(c + 1);
+    take(c - y);
+    take(c + y);
+    if (k > 0) take(c - z);
+    take(c + z);
+    out[c] = gas;
+    if (particles != nullptr) particles_out[c] = carried;
+    expansion[c] = per_dt * (gas.c[0] - here.c[0]) / here.c[0];
   }
 };
 

@@ -202,14 +202,10 @@ void FlameSimulation::Fluid::diffuse(float dt) {
     work_.cells(grid_, EddyDiffusion{faces(), eddies_.data(), grid_, strength * strength * dt / grid_.edge});
     eddies = eddies_.data();
   }
-  const Rgba* gas = gas_.data();
-  work_.cells(grid_, DiffuseCells<Rgba>{gas, next_gas_.data(), gas, eddies, grid_, share});
-  if (burns()) {
-    work_.cells(grid_,
-                DiffuseCells<float>{particles_.data(), next_particles_.data(), gas, eddies, grid_, share});
-    particles_.swap(next_particles_);
-  }
-  work_.cells(grid_, HeatedBy{gas, next_gas_.data(), expansion_.data(), grid_, 1 / dt});
+  const float* particles = burns() ? particles_.data() : nullptr;
+  work_.cells(grid_, DiffuseGas{gas_.data(), next_gas_.data(), particles, next_particles_.data(),
+                                expansion_.data(), eddies, grid_, share, 1 / dt});
+  particles_.swap(next_particles_);
   gas_.swap(next_gas_);
   diffuse_faces<0>(share, eddies);
   diffuse_faces<1>(share, eddies);

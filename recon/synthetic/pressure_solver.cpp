@@ -69,8 +69,7 @@ void PressureSolver::precondition() {
     Level& coarse = levels_[l + 1];
     const FluidGrid& g = fine.equation.grid;
     const float* b = l == 0 ? r_.data() : fine.b.data();
-    work_.cells(g, RelaxFirst{fine.equation, b, fine.q.data()});
-    work_.each({(g.nx + 1) / 2, g.ny, g.nz}, RelaxColour{fine.equation, b, fine.q.data(), 1});
+    work_.each({(g.nx + 1) / 2, g.ny, g.nz}, RelaxFirst{fine.equation, b, fine.q.data()});
     work_.cells(coarse.equation.grid,
                 RestrictResidual{fine.equation, fine.q.data(), b, coarse.equation.grid, coarse.b.data()});
   }

@@ -14,7 +14,9 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kStefanBoltzmann = 5.670374419e-8;  // W / (m^2 K^4), CODATA 2018
 constexpr int kDirections = 64;
-constexpr int kHemisphere = 4096;
+constexpr int kTowards = 4096;
+constexpr int kSpherePoints = 256;
+constexpr int kTowardsOfEach = 1024;
 constexpr double kGoldenAngle = 2.399963229728653;
 
 /// Evenly over the sphere, by equal steps of the height.
@@ -82,9 +84,62 @@ Sample sample_at(const HotVolume& v, const Eigen::Vector3d& place) {
     const std::size_t p = g.index(low[0] + up[0], low[1] + up[1], low[2] + up[2]);
     const double kappa = static_cast<double>(v.absorption[p]);
     out.absorption += weight * kappa;
-    out.glow += weight * kappa * std::pow(static_cast<double>(v.kelvin[p]), 4);
+    const double square = static_cast<double>(v.kelvin[p]) * static_cast<double>(v.kelvin[p]);
+    out.glow += weight * kappa * square * square;
   }
   return out;
+}
+
+/// Directions from a point that reach all of a volume, of equal solid angles.
+class Towards {
+ public:
+  Towards(const Bounds& bounds, const Eigen::Vector3d& point, const Eigen::Vector3d& normal, int count)
+      : count_(count), axis_(normal) {
+    const Eigen::Vector3d way = bounds.middle() - point;
+    const double sine = bounds.radius() / way.norm();
+    if (sine < 1) {
+      axis_ = way.normalized();
+      lowest_ = std::sqrt(1 - sine * sine);
+    }
+    side_ = across(axis_);
+  }
+  [[nodiscard]] Eigen::Vector3d direction(int i) const {
+    const Eigen::Vector3d d = on_fibonacci_sphere(i, count_, lowest_);
+    return d.x() * side_[0] + d.y() * side_[1] + d.z() * axis_;
+  }
+  [[nodiscard]] double solid_angle() const { return 2 * kPi * (1 - lowest_) / count_; }  // of each
+
+ private:
+  int count_;
+  Eigen::Vector3d axis_;
+  std::array<Eigen::Vector3d, 2> side_;
+  double lowest_ = 0;  // cosine of the cone's half angle
+};
+
+/// Of directions `begin` to `end`.
+double flux_part(const HotVolume& volume, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
+                 const Towards& towards, int begin, int end) {
+  double flux = 0;
+  for (int i = begin; i < end; ++i) {
+    const Eigen::Vector3d direction = towards.direction(i);
+    const double cosine = direction.dot(normal);
+    if (cosine > 0) flux += cosine * total_radiance(volume, point, direction);
+  }
+  return flux * towards.solid_angle();
+}
+
+bool holds_all(const TargetSphere& sphere, const HotVolume& v) {
+  const Grid& g = v.grid;
+  const Eigen::Vector3d origin(g.origin[0], g.origin[1], g.origin[2]);
+  for (int k = 0; k < g.nz; ++k)
+    for (int j = 0; j < g.ny; ++j)
+      for (int i = 0; i < g.nx; ++i) {
+        const std::size_t p = g.index(i, j, k);
+        if (!(v.kelvin[p] > 0 && v.absorption[p] > 0)) continue;
+        const Eigen::Vector3d place = origin + static_cast<double>(g.edge) * Eigen::Vector3d(i, j, k);
+        if ((place - sphere.center).norm() > sphere.radius) return false;
+      }
+  return true;
 }
 
 }  // namespace
@@ -131,20 +186,35 @@ double radiated_power(const HotVolume& volume, const ComputeOptions& compute) {
 double radiant_flux(const HotVolume& volume, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                     const ComputeOptions& compute) {
   constexpr int kTasks = 64;
-  const auto [right, up] = across(normal);
+  const Towards towards(Bounds(volume.grid), point, normal, kTowards);
   std::vector<double> flux(kTasks);
-  Pool(compute.threads).run(kTasks, [&, r = right, u = up](int task) {
-    const auto [begin, end] = slice(kHemisphere, kTasks, task);
-    for (std::size_t i = begin; i < end; ++i) {
-      const Eigen::Vector3d d = on_fibonacci_sphere(static_cast<int>(i), kHemisphere, 0);
-      const Eigen::Vector3d towards = d.x() * r + d.y() * u + d.z() * normal;
-      flux[static_cast<std::size_t>(task)] +=
-          d.z() * total_radiance(volume, point, towards) * 2 * kPi / kHemisphere;
-    }
+  Pool(compute.threads).run(kTasks, [&](int task) {
+    const auto [begin, end] = slice(kTowards, kTasks, task);
+    flux[static_cast<std::size_t>(task)] =
+        flux_part(volume, point, normal, towards, static_cast<int>(begin), static_cast<int>(end));
   });
   double sum = 0;
   for (const double f : flux) sum += f;
   return sum;
+}
+
+SphereFlux radiant_flux(const HotVolume& volume, const TargetSphere& target, const ComputeOptions& compute) {
+  const double side = holds_all(target, volume) ? -1 : 1;
+  const Bounds bounds(volume.grid);
+  std::vector<double> flux(kSpherePoints);
+  Pool(compute.threads).run(kSpherePoints, [&](int i) {
+    const Eigen::Vector3d outwards = on_fibonacci_sphere(i, kSpherePoints, -1);
+    const Eigen::Vector3d point = target.center + target.radius * outwards;
+    const Towards towards(bounds, point, side * outwards, kTowardsOfEach);
+    flux[static_cast<std::size_t>(i)] = flux_part(volume, point, side * outwards, towards, 0, kTowardsOfEach);
+  });
+  SphereFlux out;
+  for (const double f : flux) {
+    out.mean += f / kSpherePoints;
+    out.most = std::max(out.most, f);
+  }
+  out.power = out.mean * 4 * kPi * target.radius * target.radius;
+  return out;
 }
 
 HotStatistics statistics_of(const HotVolume& volume, const std::vector<float>& sigma,

@@ -28,10 +28,24 @@ double total_radiance(const HotVolume& volume, const Eigen::Vector3d& eye, const
 /// t^2)).
 double radiated_power(const HotVolume& volume, const ComputeOptions& compute = {});
 
-/// What falls on a small surface, W / m^2: 4096 directions of its hemisphere, weighted by their cosine.
-/// `normal`: unit length, towards the flame. Outside the volume or inside.
+/// What falls on a small surface, W / m^2: 4096 directions, weighted by their cosine. They are those in which
+/// the ball around the volume is seen from outside it; from inside, the hemisphere. `normal`: unit length,
+/// towards the flame.
 double radiant_flux(const HotVolume& volume, const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                     const ComputeOptions& compute = {});
+
+struct TargetSphere {
+  Eigen::Vector3d center;
+  double radius = 0;  ///< m, > 0
+};
+struct SphereFlux {
+  double mean = 0, most = 0;  ///< W / m^2, over the surface and where it is strongest
+  double power = 0;           ///< W, that the sphere catches
+};
+/// What falls on a black sphere: radiant_flux() at 256 points (Fibonacci's sphere), of 1024 directions each.
+/// A sphere around all that radiates catches on its inner side, any other on its outer side.
+SphereFlux radiant_flux(const HotVolume& volume, const TargetSphere& target,
+                        const ComputeOptions& compute = {});
 
 /// Of key points that tell a temperature; the weight is the absorption where there is one, else 1.
 struct HotStatistics {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -12,20 +13,24 @@
 #include <fmt/format.h>
 
 #include "base/random.h"
+#include "drivers/virtual/virtual_clock.h"
+#include "drivers/virtual/virtual_rig.h"
 #include "recon/calibrate/rig.h"
 #include "recon/export/volume_file.h"
 #include "recon/render/render.h"
-#include "recon/temperature/emitter.h"
+#include "recon/temperature/self_absorption.h"
 #include "rig/devices/stage.h"
+#include "session/shutter_times.h"
 #include "session/writer.h"
 
 namespace emberlock::rig {
 namespace {
 
-constexpr double kPeak = 230;                     // grey levels of the first frame's brightest pixel
-constexpr double kElectronsPerLevel = 60;         // as drivers::VirtualScene has
-constexpr std::int64_t kFirstNs = 1'000'000'000;  // the first frame's instant on all clocks
-const Kelvin kReference{1800};                    // whose glow has about unit levels
+constexpr double kPeak = 230;  // grey levels of the first frame's brightest pixel
+constexpr Seconds kFirst{2};   // the first frame's read-out on the rig's clock
+constexpr Seconds kShortest = microseconds(1);
+constexpr std::uint64_t kOffsetStream = 1;
+constexpr Kelvin kMiddling{1800};  // at which a channel's mean wavelength is taken
 
 Status check_simulate(const SimulateOptions& o) {
   const auto bad = [](const char* what, const char* range) {
@@ -40,9 +45,17 @@ Status check_simulate(const SimulateOptions& o) {
     return bad("cells", "Take a multiple of 8 from 8 to 512");
   if (!(o.rate.value() >= 1 && o.rate.value() <= 10000)) return bad("the frame rate", "Take 1 to 10000 Hz");
   if (!(o.read_noise >= 0 && o.read_noise <= 50)) return bad("the noise", "Take 0 to 50 grey levels");
-  if (o.preset == recon::FlamePreset::smoke)
-    return Error{ErrorKind::refused, "smoke doesn't glow, so cameras in the dark would see nothing",
-                 "simulate flame", "Take another preset"};
+  const Seconds frame = period(o.rate);
+  if (!(o.offsets >= Seconds(0) && o.offsets <= frame / 2))
+    return bad("the offsets", "Take 0 to half a frame period");
+  if (o.exposure && !(*o.exposure >= kShortest && *o.exposure <= frame))
+    return bad("the exposure", "Take a microsecond to a frame period");
+  if (o.sun && o.preset != recon::FlamePreset::smoke)
+    return Error{ErrorKind::bad_input, "the sun is for smoke, and this preset glows", "simulate flame",
+                 "Leave the sun out, or take the preset smoke"};
+  if (o.sun && !(o.sun->towards.norm() > 0 && o.sun->towards.allFinite()))
+    return bad("the sun's direction", "Take three numbers that aren't all 0");
+  if (o.sun && !(o.sun->albedo >= 0 && o.sun->albedo <= 0.99)) return bad("the albedo", "Take 0 to 0.99");
   return {};
 }
 
@@ -64,77 +77,62 @@ Stage stage_around(const recon::FlameSimulationOptions& o, int cameras, ImageSiz
   return stage;
 }
 
-/// What the cameras see of a gas, in levels before the exposure.
-recon::Volume glowing(const recon::GasState& gas, const recon::EmitterTable& table) {
-  recon::Volume volume{gas.grid, std::vector<float>(3 * gas.grid.size()), gas.absorption};
-  const double reference = table.at(kReference).log_scale;
-  for (std::size_t p = 0; p < gas.grid.size(); ++p) {
-    if (!(gas.absorption[p] > 0) || static_cast<double>(gas.temperature[p]) < table.coldest().value())
-      continue;
-    const recon::EmitterLevels levels = table.at(Kelvin(static_cast<double>(gas.temperature[p])));
-    const double strength = static_cast<double>(gas.absorption[p]) * std::exp(levels.log_scale - reference);
-    for (std::size_t c = 0; c < 3; ++c)
-      volume.emission[3 * p + c] = static_cast<float>(strength * levels.value[c]);
-  }
-  return volume;
+std::vector<Seconds> draw_offsets(const SimulateOptions& o) {
+  std::vector<Seconds> late(static_cast<std::size_t>(o.cameras));
+  for (std::size_t i = 1; i < late.size(); ++i)
+    late[i] = o.offsets * random_uniform(o.seed, kOffsetStream, i);
+  return late;
 }
 
-/// The camera's samples: exposed, with noise, in 8 bits.
-Image sampled(const recon::RadianceImage& picture, double gain, const SimulateOptions& o,
-              std::uint64_t stream) {
-  Image image(ImageLayout{o.image, PixelFormat::rgb8, 8});
-  const std::size_t row = 3 * static_cast<std::size_t>(o.image.width);
-  for (int y = 0; y < o.image.height; ++y) {
-    auto* to = image.row_as<std::uint8_t>(y);
-    for (std::size_t x = 0; x < row; ++x) {
-      const std::size_t at = static_cast<std::size_t>(y) * row + x;
-      double level = gain * static_cast<double>(picture.rgb[at]);
-      if (o.read_noise > 0)
-        level += random_normal(o.seed, stream, at) *
-                 std::sqrt(o.read_noise * o.read_noise + std::max(0.0, level) / kElectronsPerLevel);
-      to[x] = static_cast<std::uint8_t>(std::clamp(std::lround(level), 0L, 255L));
-    }
+/// Cameras with global shutters, each late by its offset.
+drivers::VirtualRigOptions rig_of(const SimulateOptions& o, const std::vector<Seconds>& late) {
+  drivers::VirtualRigOptions rig;
+  rig.seed = o.seed;
+  const int rows = o.image.height;
+  for (std::size_t i = 0; i < late.size(); ++i) {
+    drivers::VirtualCameraOptions camera;
+    camera.id = fmt::format("camera-{}", i);
+    camera.sensor = SensorKind::global_shutter;
+    camera.layout = {o.image, o.format, 8 * bytes_per_sample(o.format)};
+    camera.nominal_rate = o.rate;
+    camera.timing = {rows, rows, period(o.rate), period(o.rate) / 2 / Rows(rows)};
+    camera.first_phase = kFirst + late[i];
+    rig.cameras.push_back(std::move(camera));
   }
-  return image;
+  return rig;
 }
 
-Result<session::SessionWriter> begin_session(const SimulateOptions& o, const Stage& stage,
-                                             const std::filesystem::path& folder) {
-  v1::Manifest manifest;
-  manifest.set_session_id(fmt::format("simulated-{}", recon::name(o.preset)));
-  manifest.set_purpose("flame");
-  *manifest.mutable_box() = recon::message_of(stage.box);
-  for (std::size_t i = 0; i < stage.cameras.size(); ++i)
-    *manifest.add_cameras() = describe({.id = fmt::format("camera-{}", i),
-                                        .model = "simulated",
-                                        .layout = {o.image, PixelFormat::rgb8, 8},
-                                        .frame_rate = o.rate},
-                                       stage.cameras[i]);
-  return session::SessionWriter::create(folder / "session", manifest);
+/// What the pictures' levels are of: the response at the exposure.
+v1::Colour colour_of(const recon::CameraResponse& response, const SimulatedFilm& film) {
+  recon::CameraResponse used = response;
+  if (used.absolute)
+    for (std::vector<double>& channel : used.level)
+      for (double& level : channel) level *= film.gain;
+  v1::Colour colour;
+  *colour.mutable_spectral() = recon::message_of(used);
+  colour.set_exposure_s(film.exposure.value());
+  return colour;
 }
 
 /// One simulation and the cameras around it.
 class Filming {
  public:
-  Filming(const SimulateOptions& options, recon::FlameSimulation flame, Stage stage,
-          session::SessionWriter writer, std::filesystem::path folder)
+  Filming(const SimulateOptions& options, recon::FlameSimulation flame, std::filesystem::path folder)
       : options_(options),
         flame_(std::move(flame)),
-        stage_(std::move(stage)),
-        writer_(std::move(writer)),
+        stage_(stage_around(flame_.options(), options.cameras, options.image)),
         folder_(std::move(folder)),
-        table_(recon::standard_response(), recon::Emitter::soot) {
-    for (const recon::CameraModel& camera : stage_.cameras) cameras_.push_back(&camera);
+        late_(draw_offsets(options)),
+        light_(std::make_shared<GasLight>(options.cameras)) {
+    if (options.preset == recon::FlamePreset::smoke) sun_ = options.sun.value_or(Sun{});
+    if (options.response) response_ = *options.response;
     film_.frames = options.frames;
     film_.cameras = options.cameras;
+    for (std::size_t i = 0; i < late_.size(); ++i) in_order_.push_back(i);
+    std::stable_sort(in_order_.begin(), in_order_.end(),
+                     [&](std::size_t a, std::size_t b) { return late_[a] < late_[b]; });
   }
 
-  Status step(Seconds time) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const recon::FluidStats stats, flame_.step(time));
-    film_.relative_divergence = std::max(film_.relative_divergence, stats.relative_divergence);
-    film_.hottest = std::max(film_.hottest, stats.hottest);
-    return {};
-  }
   /// Until gas that began at the floor has passed the top a few times.
   Status settle(const Observer& observer) {
     const auto& o = flame_.options();
@@ -142,57 +140,156 @@ class Filming {
     constexpr int kParts = 50;
     for (int i = 0; i < kParts; ++i) {
       EMBERLOCK_RETURN_IF_ERROR(observe(observer, static_cast<double>(i) / kParts, "the flame settles"));
-      EMBERLOCK_RETURN_IF_ERROR(step(film_.settled / kParts));
+      EMBERLOCK_RETURN_IF_ERROR(go_on_to(film_.settled / kParts * (i + 1)));
     }
     return {};
   }
+  /// Finds the exposure by the first frame, and opens cameras and session.
+  Status open() {
+    EMBERLOCK_RETURN_IF_ERROR(go_on_to(instant(0)));
+    EMBERLOCK_RETURN_IF_ERROR(expose());
+    light_->set_gain(film_.gain);
+    drivers::VirtualRigOptions rig = rig_of(options_, late_);
+    rig.scene = drivers::flame_scene(light_);
+    rig.scene.exposure = film_.exposure;
+    rig.scene.read_noise = options_.read_noise;
+    if (options_.read_noise == 0) rig.scene.passes = {drivers::Pass::flame};
+    EMBERLOCK_ASSIGN_OR_RETURN(rig_,
+                               drivers::VirtualRig::create(rig, std::make_shared<drivers::VirtualClock>()));
+    for (int i = 0; i < rig_->size(); ++i) EMBERLOCK_RETURN_IF_ERROR(rig_->camera(i).start());
+    return begin_session();
+  }
   Status film_frame(int frame) {
-    const recon::GasState gas = flame_.state();
-    recon::Volume volume = glowing(gas, table_);
-    recon::Effects effects;
-    effects.extinction.model = recon::Extinction::Model::field;
-    recon::RenderOptions march;
-    march.compute = options_.compute;
-    const std::vector<const recon::RadianceImage*> backgrounds(cameras_.size());  // black
-    const std::vector<recon::RadianceImage> pictures =
-        recon::render_views(volume, recon::whole_grid(volume.grid), effects, cameras_, backgrounds, march);
-    if (frame == 0) EMBERLOCK_RETURN_IF_ERROR(expose(pictures));
-    const double gain = film_.levels_per_radiance;
-    for (std::size_t c = 0; c < pictures.size(); ++c) {
-      const auto id = static_cast<std::uint64_t>(frame);
-      const TimePoint at = TimePoint{kFirstNs} + frame * period(options_.rate);
-      const std::uint64_t stream = id * pictures.size() + c;
-      EMBERLOCK_RETURN_IF_ERROR(writer_.write(
-          c, {{id, at, at, at}, std::make_shared<Image>(sampled(pictures[c], gain, options_, stream))}));
+    EMBERLOCK_RETURN_IF_ERROR(go_on_to(instant(frame)));
+    EMBERLOCK_RETURN_IF_ERROR(keep_truth(frame));
+    // Cameras that are late alike film one instant.
+    for (auto first = in_order_.begin(); first != in_order_.end();) {
+      const Seconds late = late_[*first];
+      const auto last =
+          std::find_if(first, in_order_.end(), [&](std::size_t camera) { return late_[camera] > late; });
+      EMBERLOCK_RETURN_IF_ERROR(go_on_to(instant(frame) + late));
+      EMBERLOCK_RETURN_IF_ERROR(film_now({first, last}));
+      first = last;
     }
-    for (float& e : volume.emission) e *= static_cast<float>(gain);
-    return recon::write_volume(volume, folder_ / "truth" / fmt::format("frame-{:04}.vdb", frame),
-                               {{"temperature", "K", gas.temperature}, {"velocity", "m/s", gas.velocity}});
+    return {};
   }
   Result<SimulatedFilm> finish() {
-    const auto manifest = writer_.finish();
-    if (!manifest.ok()) return manifest.error();
+    EMBERLOCK_RETURN_IF_ERROR(writer_->finish());
+    if (options_.offsets > Seconds(0)) {
+      v1::ShutterTimes times;
+      for (std::size_t i = 0; i < late_.size(); ++i) {
+        v1::ShutterTimes::Camera& camera = *times.add_cameras();
+        camera.set_camera_id(rig_->camera(static_cast<int>(i)).info().id);
+        for (int frame = 0; frame < options_.frames; ++frame) camera.add_late_s(late_[i].value());
+      }
+      EMBERLOCK_RETURN_IF_ERROR(session::write_shutter_times(folder_ / "session", times));
+    }
     return film_;
   }
 
  private:
-  Status expose(const std::vector<recon::RadianceImage>& pictures) {
+  /// Of the gas, when the first camera's exposure is half over.
+  [[nodiscard]] Seconds instant(int frame) const {
+    return film_.settled + (frame + 1) * period(options_.rate);
+  }
+  Status go_on_to(Seconds time) {
+    if (!(time > flame_.time())) return {};
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::FluidStats stats, flame_.step(time - flame_.time()));
+    film_.relative_divergence = std::max(film_.relative_divergence, stats.relative_divergence);
+    film_.hottest = std::max(film_.hottest, stats.hottest);
+    return {};
+  }
+  [[nodiscard]] std::vector<recon::RadianceImage> pictures(const std::vector<std::size_t>& cameras) const {
+    std::vector<const recon::CameraModel*> models;
+    for (const std::size_t camera : cameras) models.push_back(&stage_.cameras[camera]);
+    return seen(visible(flame_.state(), response_, sun_, options_.compute), models);
+  }
+  /// Soot takes each channel's share of the light that it glows with.
+  [[nodiscard]] std::vector<recon::RadianceImage> seen(
+      recon::Volume volume, const std::vector<const recon::CameraModel*>& cameras) const {
+    if (sun_) return rendered(volume, cameras);
+    const auto shares = recon::channel_absorption(response_, recon::Emitter::soot, kMiddling);
+    const std::vector<float> green = volume.extinction;
+    std::vector<recon::RadianceImage> all;
+    for (std::size_t c = 0; c < 3; ++c) {
+      for (std::size_t p = 0; p < green.size(); ++p)
+        volume.extinction[p] = green[p] * static_cast<float>(shares[c]);
+      std::vector<recon::RadianceImage> own = rendered(volume, cameras);
+      if (c == 0) all.swap(own);
+      for (std::size_t v = 0; c > 0 && v < all.size(); ++v)
+        for (std::size_t i = c; i < all[v].rgb.size(); i += 3) all[v].rgb[i] = own[v].rgb[i];
+    }
+    return all;
+  }
+  [[nodiscard]] std::vector<recon::RadianceImage> rendered(
+      const recon::Volume& volume, const std::vector<const recon::CameraModel*>& cameras) const {
+    recon::Effects effects;
+    effects.extinction.model = recon::Extinction::Model::field;
+    recon::RenderOptions march;
+    march.compute = options_.compute;
+    const std::vector<const recon::RadianceImage*> backgrounds(cameras.size());  // black
+    return recon::render_views(volume, recon::whole_grid(volume.grid), effects, cameras, backgrounds, march);
+  }
+  Status film_now(const std::vector<std::size_t>& cameras) {
+    std::vector<recon::RadianceImage> shown = pictures(cameras);
+    for (std::size_t i = 0; i < cameras.size(); ++i) {
+      light_->show(cameras[i], std::move(shown[i]));
+      EMBERLOCK_ASSIGN_OR_RETURN(const Frame frame,
+                                 rig_->camera(static_cast<int>(cameras[i])).next_frame(2 * kFirst));
+      EMBERLOCK_RETURN_IF_ERROR(writer_->write(cameras[i], frame));
+    }
+    return {};
+  }
+  Status keep_truth(int frame) const {
+    const recon::GasState gas = flame_.state();
+    recon::Volume volume = visible(gas, response_, sun_, options_.compute);
+    for (float& e : volume.emission) e *= static_cast<float>(film_.gain);
+    return recon::write_volume(volume, folder_ / "truth" / fmt::format("frame-{:04}.vdb", frame),
+                               {{"temperature", "K", gas.temperature}, {"velocity", "m/s", gas.velocity}});
+  }
+  Status expose() {
     float brightest = 0;
-    for (const recon::RadianceImage& picture : pictures)
+    for (const recon::RadianceImage& picture : pictures(in_order_))
       brightest = std::max(brightest, *std::max_element(picture.rgb.begin(), picture.rgb.end()));
     if (!(brightest > 0))
-      return Error{ErrorKind::refused, "nothing glows yet", "simulate flame", "Take more cells"};
-    film_.levels_per_radiance = kPeak / static_cast<double>(brightest);
+      return Error{ErrorKind::refused, "the cameras see nothing yet", "simulate flame", "Take more cells"};
+    const Seconds usual = SimulateOptions::kUsualExposure;
+    const double wanted = kPeak / static_cast<double>(brightest);
+    const Seconds longest = period(options_.rate);
+    if (response_.absolute) {
+      film_.exposure = options_.exposure.value_or(std::clamp(wanted * usual, kShortest, longest));
+      film_.gain = film_.exposure / usual;
+    } else {
+      film_.exposure = options_.exposure.value_or(std::min(usual, longest));
+      film_.gain = wanted;
+    }
+    return {};
+  }
+  Status begin_session() {
+    v1::Manifest manifest;
+    manifest.set_session_id(fmt::format("simulated-{}", recon::name(options_.preset)));
+    manifest.set_purpose("flame");
+    *manifest.mutable_box() = recon::message_of(stage_.box);
+    for (std::size_t i = 0; i < stage_.cameras.size(); ++i) {
+      v1::CameraStream& stream = *manifest.add_cameras();
+      stream = describe(rig_->camera(static_cast<int>(i)).info(), stage_.cameras[i]);
+      if (options_.response) *stream.mutable_colour() = colour_of(response_, film_);
+    }
+    EMBERLOCK_ASSIGN_OR_RETURN(writer_, session::SessionWriter::create(folder_ / "session", manifest));
     return {};
   }
 
   SimulateOptions options_;
   recon::FlameSimulation flame_;
   Stage stage_;
-  session::SessionWriter writer_;
   std::filesystem::path folder_;
-  recon::EmitterTable table_;
-  std::vector<const recon::CameraModel*> cameras_;
+  std::vector<Seconds> late_;          // by camera
+  std::vector<std::size_t> in_order_;  // cameras, the latest last
+  std::shared_ptr<GasLight> light_;
+  std::optional<Sun> sun_;
+  recon::CameraResponse response_ = recon::standard_response();
+  std::unique_ptr<drivers::VirtualRig> rig_;
+  std::optional<session::SessionWriter> writer_;
   SimulatedFilm film_;
 };
 
@@ -208,14 +305,12 @@ Result<SimulatedFilm> simulate_flame(const SimulateOptions& options, const std::
   std::error_code failed;
   std::filesystem::create_directories(folder / "truth", failed);
   if (failed) return Error{ErrorKind::io, failed.message(), (folder / "truth").string()};
-  Stage stage = stage_around(gas, options.cameras, options.image);
-  EMBERLOCK_ASSIGN_OR_RETURN(session::SessionWriter writer, begin_session(options, stage, folder));
-  Filming filming(options, std::move(flame), std::move(stage), std::move(writer), folder);
+  Filming filming(options, std::move(flame), folder);
   EMBERLOCK_RETURN_IF_ERROR(filming.settle(part_of(observer, 0, 0.3)));
+  EMBERLOCK_RETURN_IF_ERROR(filming.open());
   for (int frame = 0; frame < options.frames; ++frame) {
     EMBERLOCK_RETURN_IF_ERROR(
         observe(observer, 0.3 + 0.7 * frame / options.frames, fmt::format("frame {}", frame)));
-    EMBERLOCK_RETURN_IF_ERROR(filming.step(period(options.rate)));
     EMBERLOCK_RETURN_IF_ERROR(filming.film_frame(frame));
   }
   return filming.finish();

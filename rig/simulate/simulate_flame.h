@@ -3,42 +3,60 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 
 #include "base/image.h"
 #include "base/progress.h"
 #include "base/quantity.h"
 #include "base/result.h"
+#include "recon/calibrate/camera_response.h"
 #include "recon/compute/device.h"
 #include "recon/synthetic/flame_simulation.h"
+#include "rig/simulate/gas_light.h"
 
 namespace emberlock::rig {
 
 struct SimulateOptions {
   recon::FlamePreset preset = recon::FlamePreset::candle;
-  int frames = 24;            ///< of each camera, 1..10000
-  int cameras = 11;           ///< on an arc of 300 degrees around the flame, 2..64
-  ImageSize image{640, 480};  ///< even sides, 64 x 64 to 4096 x 4096
-  int cells = 64;             ///< of the simulation across, a multiple of 8 from 8 to 512
-  Hertz rate{24};             ///< frames a second, 1..10000
-  double read_noise = 0.7;    ///< grey levels RMS; 0: neither it nor shot noise
-  std::uint64_t seed = 1;     ///< of burners and noise
+  int frames = 24;                         ///< of each camera, 1..10000
+  int cameras = 11;                        ///< on an arc of 300 degrees around the flame, 2..64
+  ImageSize image{640, 480};               ///< even sides, 64 x 64 to 4096 x 4096
+  PixelFormat format = PixelFormat::rgb8;  ///< of the pictures
+  int cells = 64;                          ///< of the simulation across, a multiple of 8 from 8 to 512
+  Hertz rate{24};                          ///< frames a second, 1..10000
+  double read_noise = 0.7;                 ///< grey levels RMS, 0..50; 0: neither it nor shot noise
+  /// By how much cameras after the first are late at most, evenly drawn; at most half a frame period.
+  Seconds offsets{0};
+  /// Of the cameras; its levels hold for an exposure of kUsualExposure. Absent: recon::standard_response(),
+  /// and the session tells none.
+  std::optional<recon::CameraResponse> response;
+  /// How long the shutters are open, 1 us to a frame period. Absent: of an absolute response what makes the
+  /// first frame's brightest pixel 230 of 255 levels, at most a frame period; otherwise kUsualExposure.
+  std::optional<Seconds> exposure;
+  std::optional<Sun> sun;  ///< of smoke alone, which doesn't glow; absent: Sun{}
+  std::uint64_t seed = 1;  ///< of burners, offsets and noise
   recon::ComputeOptions compute;
+
+  static constexpr Seconds kUsualExposure = milliseconds(1);
 };
 
 struct SimulatedFilm {
   int frames = 0, cameras = 0;
-  Seconds settled;                 ///< simulated before the first frame, until the flame stands
-  Kelvin hottest;                  ///< of all frames
-  double levels_per_radiance = 0;  ///< the exposure: grey levels of what glows with unit relative level
+  Seconds settled;  ///< simulated before the first frame, until the flame stands
+  Kelvin hottest;   ///< of all frames
+  Seconds exposure;
+  double gain = 0;                 ///< the pictures' grey levels over those of the response
   double relative_divergence = 0;  ///< the worst of all steps
 };
 
-/// Simulates a flame and films it: `folder`/session is a recording of perfectly synchronous, calibrated
-/// cameras whose pictures are linear sRGB (recon::standard_response()), exposed so that the brightest pixel
-/// of the first frame has 230 of 255 levels. `folder`/truth/frame-0000.vdb and so on are each frame's truth:
-/// emission and density (as write_volume() says), temperature (K) and velocity (m/s). The soot glows by
-/// Planck's law at its gas' temperature. Errors: bad_input for options, refused for smoke, which doesn't
-/// glow, and where the observer asks to stop, those of the simulation, io.
+/// Simulates a flame and films it with virtual cameras (drivers/virtual: their shutters, noise, mosaic and
+/// converter): `folder`/session is a recording of calibrated cameras with linear pictures. A relative
+/// response is exposed so that the brightest pixel of the first frame has 230 of 255 levels; an absolute one
+/// tells the levels, and the manifest has it for the exposure used. Late cameras' times are in times.json. A
+/// picture shows the middle of its exposure: motion during it isn't blurred. `folder`/truth/frame-0000.vdb
+/// and so on are the truth at each frame's instant, the first camera's: emission and density (as
+/// write_volume() says), temperature (K) and velocity (m/s). Errors: bad_input for options, refused where the
+/// observer asks to stop and where nothing is seen, those of the simulation, io.
 Result<SimulatedFilm> simulate_flame(const SimulateOptions& options, const std::filesystem::path& folder,
                                      const Observer& observer = {});
 

@@ -63,7 +63,7 @@ class MeasureCommandTest : public testing::Test {
 TEST_F(MeasureCommandTest, SaysWhatABallRadiates) {
   write("a.vdb", true);
   const auto result = run({(root_ / "a.vdb").string(), (root_ / "a.vdb").string(), "--target", "0,0,-1,0,0,1",
-                           "--out", (root_ / "out").string()});
+                           "--target-sphere", "0,0,0,0.5", "--out", (root_ / "out").string()});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("1500 K +- 15 on average"));
   std::ifstream in(root_ / "out" / "measures.csv");
@@ -82,7 +82,18 @@ TEST_F(MeasureCommandTest, SaysWhatABallRadiates) {
   std::getline(in, power, ',');
   EXPECT_NEAR(std::stod(power), expected / (4 * 3.14159265), 0.05 * expected / (4 * 3.14159265))
       << "a metre away";
-  EXPECT_TRUE(fs::exists(root_ / "out" / "measures.html"));
+  double caught[3] = {};  // mean and highest flux, power
+  for (double& number : caught) {
+    std::getline(in, power, ',');
+    number = std::stod(power);
+  }
+  EXPECT_NEAR(caught[0], expected / 3.14159265, 0.02 * caught[0]) << "a sphere of half a metre";
+  EXPECT_NEAR(caught[1], caught[0], 0.05 * caught[0]);
+  EXPECT_NEAR(caught[2], expected, 0.02 * expected);
+  EXPECT_THAT(result.out, HasSubstr("on the sphere"));
+  std::ifstream page(root_ / "out" / "measures.html");
+  const std::string html{std::istreambuf_iterator<char>(page), {}};
+  EXPECT_THAT(html, HasSubstr("power that the sphere catches"));
 }
 
 TEST_F(MeasureCommandTest, SaysWhatIsMissing) {
@@ -98,6 +109,9 @@ TEST_F(MeasureCommandTest, SaysWhatIsMissing) {
   expect_refused({(root_ / "none.vdb").string()}, "none.vdb");
   expect_refused({(root_ / "thin.vdb").string(), "--target", "1,2,3"}, "is no target");
   expect_refused({(root_ / "thin.vdb").string(), "--target", "1,2,3,0,0,0"}, "is no target");
+  expect_refused({(root_ / "thin.vdb").string(), "--target-sphere", "1,2,3"}, "is no sphere");
+  expect_refused({(root_ / "thin.vdb").string(), "--target-sphere", "1,2,3,0"}, "is no sphere");
+  expect_refused({(root_ / "thin.vdb").string(), "--target-sphere", "1,2,3,4,"}, "is no sphere");
   expect_refused({(root_ / "thin.vdb").string(), "--up", "w"}, "is no axis");
 }
 

@@ -202,8 +202,19 @@ TEST_P(Fluid, DiffusionKeepsEveryGram) {
   FluidArray<Rgba> in = work.array<Rgba>(grid.size());
   in.fill(gas);
   FluidArray<Rgba> out = work.array<Rgba>(grid.size());
-  work.cells(grid, DiffuseCells<Rgba>{in.data(), out.data(), in.data(), nullptr, grid, 0.05F});
+  FluidArray<float> particles = work.array<float>(grid.size());
+  std::vector<float> alike(grid.size());
+  for (std::size_t c = 0; c < grid.size(); ++c) alike[c] = gas[c].c[1];
+  particles.fill(alike);
+  FluidArray<float> particles_out = work.array<float>(grid.size());
+  FluidArray<float> expansion = work.array<float>(grid.size());
+  work.cells(grid, DiffuseGas{in.data(), out.data(), particles.data(), particles_out.data(), expansion.data(),
+                              nullptr, grid, 0.05F, 10});
   const std::vector<Rgba> after = out.values();
+  const std::size_t edge = grid.index(6, 8, 8);
+  EXPECT_EQ(particles_out.values()[edge], after[edge].c[1]) << "all that is carried goes alike";
+  EXPECT_NEAR(expansion.values()[edge], 10 * (after[edge].c[0] / 1800 - 1), 1e-5);
+  EXPECT_LT(expansion.values()[edge], 0) << "hot gas shrinks";
   double before_mass = 0;
   double after_mass = 0;
   for (int k = 0; k < 16; ++k)

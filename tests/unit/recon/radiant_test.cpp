@@ -56,6 +56,47 @@ TEST(Radiant, FluxFarAwayIsThePowerOverTheSphere) {
   EXPECT_EQ(radiant_flux(v, {0, 0, -distance}, {0, 0, -1}), 0) << "looking away";
 }
 
+TEST(Radiant, FluxVeryFarAwayToo) {
+  const HotVolume v = ball(0.1, 1200, 5, 24);
+  const double share = radiated_power(v) / (4 * kPi * 100 * 100);
+  EXPECT_NEAR(radiant_flux(v, {60, 0, 80}, {-0.6, 0, -0.8}), share, 0.02 * share);
+  const Eigen::Vector3d oblique = Eigen::Vector3d(-1, 0, -1).normalized();
+  EXPECT_NEAR(radiant_flux(v, {60, 0, 80}, oblique), share * 1.4 / std::sqrt(2), 0.02 * share);
+}
+
+TEST(Radiant, ASphereAroundTheBallCatchesAllItsPower) {
+  const double depth = 0.5;
+  const double share = 1 - (1 - (1 + 2 * depth) * std::exp(-2 * depth)) / (2 * depth * depth);
+  const double power = 4 * kPi * 0.1 * 0.1 * kSigma * std::pow(1500, 4) * share;
+  for (const double radius : {0.12, 0.15, 0.5}) {
+    const SphereFlux flux = radiant_flux(ball(0.1, 1500, depth / 0.1, 24), TargetSphere{{0, 0, 0}, radius});
+    EXPECT_NEAR(flux.power, power, 0.02 * power) << radius;
+    EXPECT_NEAR(flux.mean, power / (4 * kPi * radius * radius), 0.02 * flux.mean) << radius;
+    EXPECT_NEAR(flux.most, flux.mean, 0.05 * flux.mean) << radius;
+  }
+  // Not concentric: not even, but all of it.
+  const SphereFlux beside = radiant_flux(ball(0.1, 1500, depth / 0.1, 24), TargetSphere{{0.2, 0, 0.1}, 0.5});
+  EXPECT_NEAR(beside.power, power, 0.02 * power);
+  EXPECT_GT(beside.most, 1.5 * beside.mean);
+}
+
+TEST(Radiant, ASmallFarSphereGetsTheInverseSquareShare) {
+  const HotVolume v = ball(0.1, 1200, 5, 24);
+  const double distance = 5;
+  const double radius = 0.05;
+  const double most = radiated_power(v) / (4 * kPi * distance * distance);
+  const SphereFlux flux = radiant_flux(v, TargetSphere{{0, 3, -4}, radius});
+  EXPECT_NEAR(flux.power, most * kPi * radius * radius, 0.02 * flux.power) << "its cross-section";
+  EXPECT_NEAR(flux.mean, most / 4, 0.005 * most);
+  EXPECT_NEAR(flux.most, most, 0.03 * most) << "facing the flame";
+}
+
+TEST(Radiant, ASphereInsideAThickBodyIsLitOnItsOuterSide) {
+  const SphereFlux flux = radiant_flux(ball(0.1, 1000, 1e4, 24), TargetSphere{{0, 0, 0}, 0.02});
+  EXPECT_NEAR(flux.mean, kSigma * 1e12, 0.01 * kSigma * 1e12);
+  EXPECT_NEAR(flux.most, flux.mean, 0.01 * flux.mean);
+}
+
 TEST(Radiant, InsideAThickBodyTheFluxIsSigmaT4) {
   EXPECT_NEAR(radiant_flux(ball(0.1, 1000, 1e4), {0, 0, 0}, {1, 0, 0}), kSigma * 1e12, 0.01 * kSigma * 1e12);
 }

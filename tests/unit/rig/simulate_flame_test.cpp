@@ -2,12 +2,18 @@
 #include "rig/simulate/simulate_flame.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 
 #include <gtest/gtest.h>
 
+#include "recon/calibrate/rig.h"
 #include "recon/export/volume_file.h"
 #include "recon/pipeline/scene.h"
+#include "recon/render/render.h"
+#include "recon/temperature/emitter.h"
+#include "recon/temperature/self_absorption.h"
+#include "session/reader.h"
 
 namespace emberlock::rig {
 namespace {
@@ -27,6 +33,53 @@ class SimulateFlameTest : public testing::Test {
     o.cells = 16;
     o.compute = {recon::Device::cpu, 1};
     return o;
+  }
+  /// A camera of an even response from 450 to 650 nm, as a real one's channels lie; absolute.
+  static recon::CameraResponse response(double levels) {
+    return {.wavelength_nm = {440, 460, 520, 550, 600, 650},
+            .level = {{{0, 0, 0, 0.2 * levels, levels, 0},
+                       {0, 0.1 * levels, levels, levels, 0.1 * levels, 0},
+                       {0, levels, 0.2 * levels, 0, 0, 0}}},
+            .absolute = true};
+  }
+  [[nodiscard]] recon::Volume truth(int frame) const {
+    const auto volume =
+        recon::read_volume(folder_ / "truth" / ("frame-000" + std::to_string(frame) + ".vdb"));
+    EXPECT_TRUE(volume.ok()) << volume.error().message();
+    return volume.ok() ? *volume : recon::Volume{};
+  }
+  [[nodiscard]] recon::Scene filmed(std::size_t frame) const {
+    recon::SceneOptions options;
+    options.frame = frame;
+    auto scene = recon::load_scene(folder_ / "session", options);
+    EXPECT_TRUE(scene.ok()) << scene.error().message();
+    return scene.ok() ? *scene : recon::Scene{};
+  }
+  /// The greatest difference between a view's picture and the truth as its camera sees it.
+  [[nodiscard]] static double off(const recon::View& view, const recon::Volume& volume,
+                                  const std::array<double, 3>& absorbed) {
+    recon::Effects effects;
+    effects.extinction.model = recon::Extinction::Model::field;
+    double most = 0;
+    for (std::size_t c = 0; c < 3; ++c) {
+      recon::Volume own = volume;
+      for (float& e : own.extinction) e *= static_cast<float>(absorbed[c]);
+      const recon::RadianceImage seen =
+          recon::render_view(own, recon::whole_grid(own.grid), effects, view.camera);
+      for (std::size_t i = c; i < seen.rgb.size(); i += 3)
+        most = std::max(most, static_cast<double>(std::abs(seen.rgb[i] - view.image->rgb[i])));
+    }
+    return most;
+  }
+  [[nodiscard]] static double off(const recon::View& view, const recon::Volume& volume) {
+    return off(view, volume,
+               recon::channel_absorption(recon::standard_response(), recon::Emitter::soot, Kelvin(1800)));
+  }
+  static float brightest(const recon::Scene& scene) {
+    float most = 0;
+    for (const recon::View& view : scene.views)
+      most = std::max(most, *std::max_element(view.image->rgb.begin(), view.image->rgb.end()));
+    return most;
   }
   std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "simulate-flame";
 };
@@ -51,10 +104,129 @@ TEST_F(SimulateFlameTest, LeavesASessionAndItsTruth) {
   EXPECT_EQ(velocity->size(), 3 * temperature->size());
 }
 
+TEST_F(SimulateFlameTest, PicturesShowTheTruth) {
+  SimulateOptions o = small();
+  o.preset = recon::FlamePreset::torch;
+  o.read_noise = 0;
+  ASSERT_TRUE(simulate_flame(o, folder_).ok());
+  const recon::Scene scene = filmed(1);
+  for (const recon::View& view : scene.views) EXPECT_LT(off(view, truth(1)), 0.51);
+  EXPECT_GT(off(scene.views[0], truth(0)), 1) << "another frame";
+  EXPECT_NEAR(brightest(filmed(0)), 230, 0.5);
+}
+
+TEST_F(SimulateFlameTest, SmokeIsLitByTheSun) {
+  SimulateOptions o = small();
+  o.preset = recon::FlamePreset::smoke;
+  o.read_noise = 0;
+  o.sun = Sun{{0, 0, 1}, 0.5};
+  ASSERT_TRUE(simulate_flame(o, folder_).ok());
+  for (const recon::View& view : filmed(1).views) EXPECT_LT(off(view, truth(1), {1, 1, 1}), 0.51);
+  // What the topmost points scatter, of the sun that stands above: half a cell's way takes next to nothing.
+  const recon::Volume volume = truth(1);
+  const recon::EmitterLevels sun =
+      recon::levels_of(recon::standard_response(), recon::Emitter::grey, Kelvin(5772));
+  const double colour = sun.value[0] / sun.value[2];
+  double most = 0;
+  for (std::size_t p = 0; p < volume.extinction.size(); ++p) {
+    const float* rgb = &volume.emission[3 * p];
+    if (rgb[1] > 1) {
+      EXPECT_NEAR(rgb[0] / rgb[2], colour, 1e-4 * colour);
+    }
+    most = std::max(most, static_cast<double>(rgb[1]));
+  }
+  EXPECT_GT(most, 100);
+}
+
+TEST_F(SimulateFlameTest, AnAbsoluteResponseTellsTheLevels) {
+  SimulateOptions o = small();
+  o.read_noise = 0;
+  o.response = response(500);
+  const auto found = simulate_flame(o, folder_);
+  ASSERT_TRUE(found.ok()) << found.error().message();
+  EXPECT_NEAR(found->gain, found->exposure / SimulateOptions::kUsualExposure, 1e-12);
+  EXPECT_NEAR(brightest(filmed(0)), 230, 0.5);
+  const recon::Scene scene = filmed(1);
+  ASSERT_TRUE(scene.response);
+  EXPECT_TRUE(scene.response->absolute);
+  EXPECT_NEAR(scene.response->level[1][2], 500 * found->gain, 1e-9 * found->gain);
+  const auto reader = session::SessionReader::open(folder_ / "session");
+  ASSERT_TRUE(reader.ok());
+  EXPECT_NEAR(reader->manifest().cameras(0).colour().exposure_s(), found->exposure.value(), 1e-12);
+  // Planck's law tells the brightest cell's levels.
+  const recon::Volume volume = truth(1);
+  const auto kelvin = recon::read_grid(folder_ / "truth" / "frame-0001.vdb", "temperature");
+  ASSERT_TRUE(kelvin.ok());
+  const auto& light = volume.emission;
+  const std::size_t p =
+      static_cast<std::size_t>(std::max_element(light.begin(), light.end()) - light.begin()) / 3;
+  const recon::EmitterLevels levels =
+      recon::levels_of(*scene.response, recon::Emitter::soot, Kelvin((*kelvin)[p]));
+  const double expected =
+      static_cast<double>(volume.extinction[p]) * levels.value[1] * std::exp(levels.log_scale);
+  EXPECT_NEAR(volume.emission[3 * p + 1], expected, 1e-3 * expected);
+}
+
+TEST_F(SimulateFlameTest, TwiceTheExposureIsTwiceTheLight) {
+  SimulateOptions o = small();
+  o.frames = 1;
+  o.response = response(1e-6);
+  std::vector<float> most;
+  for (const double ms : {0.5, 1.0}) {
+    o.exposure = milliseconds(ms);
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+    ASSERT_TRUE(simulate_flame(o, folder_).ok());
+    const recon::Volume volume = truth(0);
+    most.push_back(*std::max_element(volume.emission.begin(), volume.emission.end()));
+  }
+  EXPECT_NEAR(most[1] / most[0], 2, 1e-4);
+}
+
+TEST_F(SimulateFlameTest, LateCamerasFilmLaterAndSaySo) {
+  SimulateOptions o = small();
+  o.preset = recon::FlamePreset::torch;
+  o.read_noise = 0;
+  o.offsets = milliseconds(20);
+  ASSERT_TRUE(simulate_flame(o, folder_).ok());
+  const recon::Scene scene = filmed(1);
+  EXPECT_EQ(scene.views[0].lateness.value(), 0);
+  EXPECT_LT(off(scene.views[0], truth(1)), 0.51);
+  for (std::size_t i = 1; i < 3; ++i) {
+    EXPECT_GT(scene.views[i].lateness.value(), 0);
+    EXPECT_LE(scene.views[i].lateness.value(), 0.02);
+    EXPECT_GT(off(scene.views[i], truth(1)), 1);
+  }
+}
+
+TEST_F(SimulateFlameTest, TheDriversSensorMakesThePictures) {
+  SimulateOptions o = small();
+  o.frames = 1;
+  o.format = PixelFormat::bayer_rggb16;
+  o.read_noise = 3;
+  ASSERT_TRUE(simulate_flame(o, folder_).ok());
+  auto reader = session::SessionReader::open(folder_ / "session");
+  ASSERT_TRUE(reader.ok());
+  const auto frame = reader->read(0, 0);
+  ASSERT_TRUE(frame.ok()) << frame.error().message();
+  EXPECT_EQ(frame->image->layout().format, PixelFormat::bayer_rggb16);
+  // The corner is dark: half of the normal numbers are above 0, of RMS 3 levels of 257.
+  double square = 0;
+  for (int y = 0; y < 16; ++y)
+    for (int x = 0; x < 16; ++x) square += std::pow(frame->image->view().sample(x, y, 0) / 257.0, 2) / 256;
+  EXPECT_NEAR(square, 4.5, 1.5);
+}
+
 TEST_F(SimulateFlameTest, RefusesWhatCannotBeFilmed) {
-  SimulateOptions smoke = small();
-  smoke.preset = recon::FlamePreset::smoke;
-  EXPECT_EQ(simulate_flame(smoke, folder_).error().kind, ErrorKind::refused);
+  SimulateOptions sunny = small();
+  sunny.sun = Sun{};
+  EXPECT_EQ(simulate_flame(sunny, folder_).error().kind, ErrorKind::bad_input);
+  SimulateOptions late = small();
+  late.offsets = milliseconds(30);
+  EXPECT_EQ(simulate_flame(late, folder_).error().kind, ErrorKind::bad_input);
+  SimulateOptions slow = small();
+  slow.exposure = Seconds(1);
+  EXPECT_EQ(simulate_flame(slow, folder_).error().kind, ErrorKind::bad_input);
   SimulateOptions odd = small();
   odd.image = {63, 64};
   EXPECT_EQ(simulate_flame(odd, folder_).error().kind, ErrorKind::bad_input);

@@ -12,11 +12,17 @@ constexpr int kTrials = 48;           // evenly in 1 / T, before the best is ref
 constexpr int kRefinements = 40;      // golden sections
 constexpr double kLeastContrast = 1;  // chi-square by which the ends must be worse than the best
 
+}  // namespace
+
 bool absorption_counts(const Glow& glow, const EmitterTable& table) {
   return table.absolute() && glow.absorption_sigma > 0;
 }
 
-}  // namespace
+int data_of(const Glow& glow, const EmitterTable& table) {
+  int data = absorption_counts(glow, table) ? 1 : 0;
+  for (int c = 0; c < 3; ++c) data += glow.information(c, c) > 0 ? 1 : 0;
+  return data;
+}
 
 Glow glow_of(const Eigen::Vector3d& level, const Eigen::Vector3d& sigma) {
   Glow glow;
@@ -46,15 +52,13 @@ double Thermometer::chi_square(const Glow& glow, double kelvin, double* absorpti
   return data_square - best * (2 * cross - best * model_square);
 }
 
-Reading Thermometer::read(const Glow& glow) const {
+Reading most_likely(Kelvin coldest, Kelvin hottest, int freedom,
+                    const std::function<double(double)>& chi_square) {
   Reading out;
-  int data = absorption_counts(glow, table_) ? 1 : 0;
-  for (int c = 0; c < 3; ++c) data += glow.information(c, c) > 0 ? 1 : 0;
-  out.freedom = std::max(0, data - 2);
-  if (data < 2) return out;
-  const double cold = 1 / table_.coldest().value();
-  const double step = (1 / table_.hottest().value() - cold) / (kTrials - 1);
-  const auto chi = [&](double place) { return chi_square(glow, 1 / (cold + step * place)); };
+  out.freedom = freedom;
+  const double cold = 1 / coldest.value();
+  const double step = (1 / hottest.value() - cold) / (kTrials - 1);
+  const auto chi = [&](double place) { return chi_square(1 / (cold + step * place)); };
   std::array<double, kTrials> trial = {};
   for (int i = 0; i < kTrials; ++i) trial[static_cast<std::size_t>(i)] = chi(i);
   const auto [best, worst] = std::minmax_element(trial.begin(), trial.end());
@@ -70,7 +74,7 @@ Reading Thermometer::read(const Glow& glow) const {
   }
   const double place = (low + high) / 2;
   out.kelvin = 1 / (cold + step * place);
-  out.chi_square = chi_square(glow, out.kelvin, &out.absorption);
+  out.chi_square = chi_square(out.kelvin);
   constexpr double kEnd = 1e-3;
   out.told = place < kEnd                 ? Reading::Told::colder
              : place > kTrials - 1 - kEnd ? Reading::Told::hotter
@@ -79,7 +83,7 @@ Reading Thermometer::read(const Glow& glow) const {
   // measure rounding.
   const double reach = std::clamp(1e-3 * out.kelvin, 0.1, 20.0);
   const double curvature =
-      (chi_square(glow, out.kelvin + reach) + chi_square(glow, out.kelvin - reach) - 2 * out.chi_square) /
+      (chi_square(out.kelvin + reach) + chi_square(out.kelvin - reach) - 2 * out.chi_square) /
       (reach * reach);
   if (!(curvature > 0)) {
     out.told = Reading::Told::no;
@@ -87,6 +91,15 @@ Reading Thermometer::read(const Glow& glow) const {
   }
   const double misfit = out.freedom > 0 ? std::max(1.0, out.chi_square / out.freedom) : 1;
   out.sigma = std::sqrt(2 / curvature * misfit);
+  return out;
+}
+
+Reading Thermometer::read(const Glow& glow) const {
+  const int data = data_of(glow, table_);
+  if (data < 2) return {};
+  Reading out = most_likely(table_.coldest(), table_.hottest(), data - 2,
+                            [&](double kelvin) { return chi_square(glow, kelvin); });
+  if (out.kelvin > 0) out.chi_square = chi_square(glow, out.kelvin, &out.absorption);
   return out;
 }
 

@@ -51,19 +51,16 @@ Error bad_lines(std::string what, std::string remedy) {
 
 const std::vector<LineEmitter>& line_emitters() {
   // Atoms: wavelengths in air of the NIST Atomic Spectra Database. The upper levels of a doublet have
-  // statistical weights of 4 and 2 and transition probabilities alike within 2 %, so that thin light is 2 : 1.
-  // Their other lines are fainter by 1e-4 or more in a flame (potassium's violet 404.4 nm; lithium's 610.4
-  // nm).
-  // C2: heads of the Swan system and their intensities by Pearse and Gaydon, The Identification of Molecular
-  // Spectra (4th edition, 1976): estimates by eye, good to a factor of two. Each is taken as even over the 5
-  // nm on the violet side, to which they fade.
-  // CH: the A-X band around 431.4 nm (Pearse and Gaydon); its B-X at 387 nm, which cameras hardly see, is
-  // left out.
-  // CuCl: its strongest bands, 426.9 to 456.0 nm (Shimizu, Selected Pyrotechnic Publications 3, "Flame spectra
-  // of blue color compositions"); the fainter ones at 484.7, 488.2 and 526.2 nm are left out.
-  // CuOH: its strongest, diffuse bands (Pearse and Gaydon); those at 615 to 625 nm are left out.
-  // BO2: the three strongest of the A-X system (Johns, Can. J. Phys. 39, 1738, 1961), taken to be equally
-  // strong.
+  // statistical weights of 4 and 2 and transition probabilities alike within 2 %, so that thin light is 2
+  // : 1. Their other lines are fainter by 1e-4 or more in a flame (potassium's violet 404.4 nm; lithium's
+  // 610.4 nm). C2: heads of the Swan system and their intensities by Pearse and Gaydon, The Identification of
+  // Molecular Spectra (4th edition, 1976): estimates by eye, good to a factor of two. Each is taken as even
+  // over the 5 nm on the violet side, to which they fade. CH: the A-X band around 431.4 nm (Pearse and
+  // Gaydon); its B-X at 387 nm, which cameras hardly see, is left out. CuCl: its strongest bands, 426.9 to
+  // 456.0 nm (Shimizu, Selected Pyrotechnic Publications 3, "Flame spectra of blue color compositions"); the
+  // fainter ones at 484.7, 488.2 and 526.2 nm are left out. CuOH: its strongest, diffuse bands (Pearse and
+  // Gaydon); those at 615 to 625 nm are left out. BO2: the three strongest of the A-X system (Johns, Can. J.
+  // Phys. 39, 1738, 1961), taken to be equally strong.
   static const std::vector<LineEmitter> emitters = {
       {"sodium", "Na, 589.0 and 589.6 nm", {{588.995, 588.995, 2}, {589.592, 589.592, 1}}},
       {"potassium", "K, 766.5 and 769.9 nm", {{766.490, 766.490, 2}, {769.896, 769.896, 1}}},
@@ -83,9 +80,7 @@ const std::vector<LineEmitter>& line_emitters() {
         {614.1, 619.1, 3}}},
       {"cucl", "copper with chlorine, 427 to 456 nm", {{426.9, 456.0, 1}}},
       {"cuoh", "copper without chlorine, 535 to 555 nm", {{535, 555, 1}}},
-      {"bo2",
-       "boron, 518, 546 and 579 nm",
-       {{513, 523, 1}, {541, 551, 1}, {574, 584, 1}}},
+      {"bo2", "boron, 518, 546 and 579 nm", {{513, 523, 1}, {541, 551, 1}, {574, 584, 1}}},
   };
   return emitters;
 }
@@ -101,7 +96,8 @@ Result<LineRequest> parse_lines(std::string_view words) {
     const std::size_t to = std::min(words.find(',', from), words.size());
     const std::string_view word = words.substr(from, to - from);
     const auto& all = line_emitters();
-    const auto it = std::find_if(all.begin(), all.end(), [&](const LineEmitter& e) { return e.name == word; });
+    const auto it =
+        std::find_if(all.begin(), all.end(), [&](const LineEmitter& e) { return e.name == word; });
     if (it == all.end()) {
       std::vector<std::string> known;
       for (const LineEmitter& e : all) known.push_back(fmt::format("{} ({})", e.name, e.what));

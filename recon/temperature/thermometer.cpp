@@ -12,6 +12,22 @@ constexpr int kTrials = 48;           // evenly in 1 / T, before the best is ref
 constexpr int kRefinements = 40;      // golden sections
 constexpr double kLeastContrast = 1;  // chi-square by which the ends must be worse than the best
 
+/// Where a function of one valley is least.
+template <class Function>
+double bottom_of(const Function& f, double low, double high) {
+  constexpr double kGolden = 0.6180339887498949;
+  for (int i = 0; i < kRefinements; ++i) {
+    const double a = high - kGolden * (high - low);
+    const double b = low + kGolden * (high - low);
+    if (f(a) <= f(b)) {
+      high = b;
+    } else {
+      low = a;
+    }
+  }
+  return (low + high) / 2;
+}
+
 }  // namespace
 
 bool absorption_counts(const Glow& glow, const EmitterTable& table) {
@@ -63,16 +79,18 @@ Reading most_likely(Kelvin coldest, Kelvin hottest, int freedom,
   for (int i = 0; i < kTrials; ++i) trial[static_cast<std::size_t>(i)] = chi(i);
   const auto [best, worst] = std::minmax_element(trial.begin(), trial.end());
   if (!std::isfinite(*best) || !(*worst - *best > kLeastContrast)) return out;
-  const auto at = static_cast<double>(best - trial.begin());
-  double low = std::max(0.0, at - 1);
-  double high = std::min(kTrials - 1.0, at + 1);
-  constexpr double kGolden = 0.6180339887498949;
-  for (int i = 0; i < kRefinements; ++i) {
-    const double a = high - kGolden * (high - low);
-    const double b = low + kGolden * (high - low);
-    (chi(a) <= chi(b) ? high : low) = chi(a) <= chi(b) ? b : a;
+  double place = 0;
+  double least = INFINITY;
+  for (std::size_t i = 0; i < kTrials; ++i) {
+    const bool falls = i == 0 || trial[i] < trial[i - 1];
+    const bool rises = i + 1 == kTrials || trial[i] <= trial[i + 1];
+    if (!falls || !rises) continue;  // else a valley, and narrow ones have their bottoms between the trials
+    const double bottom = bottom_of(chi, std::max(0.0, static_cast<double>(i) - 1),
+                                    std::min(kTrials - 1.0, static_cast<double>(i) + 1));
+    const double depth = chi(bottom);
+    if (depth < least) place = bottom;
+    least = std::min(least, depth);
   }
-  const double place = (low + high) / 2;
   out.kelvin = 1 / (cold + step * place);
   out.chi_square = chi_square(out.kelvin);
   constexpr double kEnd = 1e-3;

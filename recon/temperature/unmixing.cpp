@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSeen = 9;      // chi-square by which an emitter must lower it: three sigma
 constexpr double kTwoSigma = 4;  // chi-square
-constexpr int kWalk = 48;        // temperatures, evenly in 1 / T, on the way to a mixture's bounds
+constexpr int kWalk = 64;        // temperatures, evenly in 1 / T, on the way to a mixture's bounds
 constexpr int kHalvings = 24;
 constexpr Kelvin kColdestBesideLines{1000}, kHottestBesideLines{3000};
 constexpr double kSingular = 1e-10;
@@ -26,40 +26,30 @@ int emitters_in(Unmixer::Choice choice) {
 }
 int unknowns_in(Unmixer::Choice choice) { return emitters_in(choice) + ((choice & kSoot) != 0 ? 1 : 0); }
 
-using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostEmitters, kMostEmitters>;
-using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostEmitters, 1>;
-
 /// Least squares of amounts that aren't negative: how much they lower chi-square.
 struct Lowered {
   double by = 0;
   Unmixer::Amounts amounts = {};
 };
 Lowered best_amounts(const Eigen::Matrix3d& gram, const Eigen::Vector3d& right, Unmixer::Choice choice) {
-  std::array<int, kMostEmitters> in = {};
-  int n = 0;
+  // Of unit diagonal; who isn't chosen has an amount of 0.
+  Eigen::Vector3d unit = Eigen::Vector3d::Zero();
   for (int i = 0; i < kMostEmitters; ++i)
-    if ((choice >> i & 1U) != 0 && gram(i, i) > 0) in[static_cast<std::size_t>(n++)] = i;
+    if ((choice >> i & 1U) != 0 && gram(i, i) > 0) unit[i] = 1 / std::sqrt(gram(i, i));
+  Eigen::Matrix3d square = unit.asDiagonal() * gram * unit.asDiagonal();
+  square.diagonal().setOnes();
+  const Eigen::Vector3d column = unit.cwiseProduct(right);
+  const Eigen::Vector3d amount = square.inverse() * column;
   Lowered out;
-  if (n == 0) return out;
-  Square square(n, n);
-  Column column(n);
-  Column unit(n);
-  for (int a = 0; a < n; ++a) unit[a] = 1 / std::sqrt(gram(in[static_cast<std::size_t>(a)], in[static_cast<std::size_t>(a)]));
-  for (int a = 0; a < n; ++a) {
-    column[a] = unit[a] * right[in[static_cast<std::size_t>(a)]];
-    for (int b = 0; b < n; ++b)
-      square(a, b) = unit[a] * unit[b] * gram(in[static_cast<std::size_t>(a)], in[static_cast<std::size_t>(b)]);
-  }
-  const Eigen::LDLT<Square> factors(square);
-  const Column amount = factors.solve(column);
-  if (factors.vectorD().minCoeff() > kSingular && amount.minCoeff() >= 0) {
+  if (square.determinant() > kSingular && amount.minCoeff() >= 0) {
     out.by = amount.dot(column);
-    for (int a = 0; a < n; ++a) out.amounts[static_cast<std::size_t>(in[static_cast<std::size_t>(a)])] = unit[a] * amount[a];
+    Eigen::Vector3d::Map(out.amounts.data()) = unit.cwiseProduct(amount);
     return out;
   }
-  // Of a convex function the best place without this one is on the border: one of them is 0.
-  for (int a = 0; a < n; ++a) {
-    const Lowered without = best_amounts(gram, right, choice & ~(1U << in[static_cast<std::size_t>(a)]));
+  // The function is convex: its least is on the border, where one of them is 0.
+  for (int i = 0; i < kMostEmitters; ++i) {
+    if (unit[i] == 0) continue;
+    const Lowered without = best_amounts(gram, right, choice & ~(1U << i));
     if (without.by > out.by) out = without;
   }
   return out;
@@ -145,7 +135,8 @@ Unmixer::Explanation Unmixer::explain(const Glow& glow, Choice choice, int data)
   if (choice == kSoot) {
     out.reading = meter_->read(glow);
   } else if ((choice & kSoot) != 0) {
-    out.reading = most_likely(kColdestBesideLines, kHottestBesideLines, freedom, [&](double kelvin) { return chi_square(glow, kelvin, choice); });
+    out.reading = most_likely(kColdestBesideLines, kHottestBesideLines, freedom,
+                              [&](double kelvin) { return chi_square(glow, kelvin, choice); });
   }
   const double kelvin = out.reading.kelvin > 0 ? out.reading.kelvin : table.coldest().value();
   out.reading.chi_square = chi_square(glow, kelvin, choice, &out.amounts);
@@ -171,11 +162,11 @@ Unmixed Unmixer::read(const Glow& glow) const {
     return e.choice != best.choice && emitters_in(e.choice) == emitters_in(best.choice) &&
            e.score() < best.score() + kSeen;
   });
-  out.kind = !fits                       ? Unmixed::Kind::neither
-             : rivalled                  ? Unmixed::Kind::alike
-             : best.choice == kSoot      ? Unmixed::Kind::soot
+  out.kind = !fits                        ? Unmixed::Kind::neither
+             : rivalled                   ? Unmixed::Kind::alike
+             : best.choice == kSoot       ? Unmixed::Kind::soot
              : (best.choice & kSoot) != 0 ? Unmixed::Kind::mixed
-                                         : Unmixed::Kind::lines;
+                                          : Unmixed::Kind::lines;
   if ((out.kind == Unmixed::Kind::soot || out.kind == Unmixed::Kind::mixed) && best.reading.kelvin > 0)
     for (const Explanation& e : all)
       if (e.choice != kSoot && (e.choice & best.choice) == best.choice && e.reading.kelvin > 0)

@@ -19,18 +19,17 @@ struct Unmixed {
     neither,  ///< no mixture of these shows such channels
     unknown,  ///< fewer channels than unknowns, or nothing glows
   } kind = Kind::unknown;
-  Reading reading;                              ///< of the soot, if any
-  std::array<double, kMostLines> share = {};    ///< of the light (the three channels' sum), each line's
+  Reading reading;                            ///< of the soot, if any
+  std::array<double, kMostLines> share = {};  ///< of the light (the three channels' sum), each line's
   std::array<bool, kMostLines> seen = {};
 };
 
 /// Takes light apart into what glows by a table and up to kMostLines lines: of all amounts that aren't
 /// negative the most likely ones at each temperature (maximum likelihood, as Thermometer), for each choice of
-/// emitters; and of the choices the simplest one: an emitter must lower chi-square by nine, three sigma, to be
-/// seen. What glows beside lines is taken to be soot in a flame, 1000 to 3000 K.
-/// A temperature's error is half of how far it may lie with any of the lines, seen or not, before chi-square
-/// rises by four: mixtures are far from linear, and a line that isn't seen may be there. Immutable,
-/// thread-safe.
+/// emitters; and of the choices the simplest one: an emitter must lower chi-square by nine, three sigma, to
+/// be seen. What glows beside lines is taken to be soot in a flame, 1000 to 3000 K. A temperature's error is
+/// half of how far it may lie with any of the lines, seen or not, before chi-square rises by four: mixtures
+/// are far from linear, and a line that isn't seen may be there. Immutable, thread-safe.
 class Unmixer {
  public:
   /// `lines`: what they show, levels_of(). `meter` must outlive it.
@@ -61,6 +60,7 @@ struct LineChoice {
 };
 /// Each glow counts at most kNoBody. Chosen is who leaves less than half of that, and one chi-square a glow
 /// less than any other.
-LineChoice choose_line(const Thermometer& meter, const CameraResponse& response, const std::vector<Glow>& glows);
+LineChoice choose_line(const Thermometer& meter, const CameraResponse& response,
+                       const std::vector<Glow>& glows);
 
 }  // namespace emberlock::recon

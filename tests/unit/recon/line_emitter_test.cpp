@@ -37,8 +37,9 @@ TEST(LineEmitters, AreSeenAsTheIntegralOverTheirLightSays) {
           const double place = (nm - 380) / 5;
           const auto k = static_cast<std::size_t>(place);
           const double f = place - std::floor(place);
-          sum[c] += band.strength / kSteps *
-                    ((1 - f) * response.level[c][k] + f * response.level[c][std::min<std::size_t>(k + 1, 80)]);
+          sum[c] +=
+              band.strength / kSteps *
+              ((1 - f) * response.level[c][k] + f * response.level[c][std::min<std::size_t>(k + 1, 80)]);
         }
     }
     const std::array<double, 3> shown = levels_of(response, e);

@@ -70,11 +70,12 @@ class Saturation {
 class Glows {
  public:
   Glows(const Reconstruction& done, const VolumeErrors& errors, const EmitterTable& table, SelfAbsorption own,
-        double brightest)
+        double brightest, bool beside_lines)
       : volume_(done.volume),
         errors_(errors),
         own_(std::move(own)),
         paper_(table.emitter() == Emitter::paper),
+        beside_lines_(beside_lines),
         brightest_(brightest) {
     by_absorption_ = !paper_ && table.absolute() && !volume_.extinction.empty() &&
                      !errors.extinction.empty() && done.effects.scattering.order == Scattering::Order::none;
@@ -91,6 +92,11 @@ class Glows {
       const Eigen::Vector3d factor = Eigen::Vector3f::Map(&own_.factor[3 * p]).cast<double>();
       glow.level = glow.level.cwiseProduct(factor);
       covariance = factor.asDiagonal() * covariance * factor.asDiagonal();
+      // Lines may shine where there is no soot, and the extinction that is found there be wrong.
+      const Eigen::Vector3d doubt =
+          beside_lines_ ? kAbsorptionShare * glow.level.cwiseProduct(factor.array().log().matrix())
+                        : Eigen::Vector3d::Zero().eval();
+      covariance += doubt * doubt.transpose();
     }
     const double least = std::hypot(kLeastShare * glow.level.maxCoeff(), 1e-4 * brightest_);
     covariance.diagonal().array() += least * least;
@@ -113,7 +119,7 @@ class Glows {
   const Volume& volume_;
   const VolumeErrors& errors_;
   SelfAbsorption own_;
-  bool paper_, by_absorption_ = false;
+  bool paper_, beside_lines_, by_absorption_ = false;
   double brightest_, opacity_ = 0;
 };
 
@@ -283,7 +289,7 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
   const Thermometer meter(table_for(done, response, emitter));
   SelfAbsorption own;
   if (emitter == Emitter::soot) own = self_absorption(scene, done, response, emitter, compute);
-  const Glows glows(done, errors, meter.table(), std::move(own), brightest);
+  const Glows glows(done, errors, meter.table(), std::move(own), brightest, !named.empty());
   summary.by_absorption = glows.by_absorption();
   const Saturation saturation(scene);
   std::vector<Fate> fates(grid.size(), Fate::dark);

@@ -2,7 +2,7 @@
 // How far temperatures are off: six glowing flames (seeds 11..13 of both shapes) of 1450 to 2030 K, soot that
 // absorbs, ten views of 640 x 480, 16 bits, noise of 0.25 grey levels, 128^3 voxels, the truth on 192^3.
 // Weighted by the true emission, over key points with soot that emit 5 % of the brightest. Salted: in one
-// half of the flame sodium makes 30 % of the light, and its lowest tenth is a blue base of C2 without soot.
+// half of the flame sodium makes 30 % of the light, and its lowest 30 % are a blue base of C2 without soot.
 //   bench_temperature [VOXELS [SEEDS]]
 #include "recon/temperature/temperature.h"
 
@@ -59,7 +59,7 @@ bool solve_and_read(int voxels, recon::FlameShape shape, int seed,
       options.emitter = row.truth;
       if (salted) {
         options.sodium = 0.3;
-        options.blue_base = 0.1;
+        options.blue_base = 0.3;
       }
       flame.emplace(options);
       scene = flame->film();

@@ -93,14 +93,14 @@ class GlowingFlame {
     recon::FlameTruth truth = flame_.at(Seconds(0), grid);
     const Glowing glowing = at(grid);
     const recon::EmitterTable table(response_, options_.emitter, Kelvin(1000), Kelvin(2500));
-    const recon::EmitterLevels base = table.at(Kelvin(options_.coldest));
+    const recon::EmitterLevels base = table.at(Kelvin((options_.coldest + options_.hottest) / 2));
     const std::array<double, 3> sodium = shown("sodium");
     const std::array<double, 3> c2 = shown("c2");
     for (std::size_t p = 0; p < grid.size(); ++p) {
       const recon::EmitterLevels levels = table.at(Kelvin(static_cast<double>(glowing.kelvin[p])));
       const double soot = static_cast<double>(glowing.absorption[p]) * std::exp(levels.log_scale);
       const double salt = right_of_middle(grid, p) ? options_.sodium / (1 - options_.sodium) * soot : 0;
-      // As bright as the coldest soot would be.
+      // As bright as soot of the middle of the temperatures would be.
       const double gas =
           static_cast<double>(truth.volume.extinction[p] - glowing.absorption[p]) * std::exp(base.log_scale);
       for (std::size_t c = 0; c < 3; ++c)

@@ -22,7 +22,7 @@ class SaltedFlameTest : public testing::Test {
     options.film.truth_voxels = 64;
     options.emitter = Emitter::soot;
     options.sodium = 0.4;
-    options.blue_base = 0.15;
+    options.blue_base = 0.3;
     flame_ = new test::GlowingFlame(options);
     scene_ = new Scene(flame_->film());
     Effects effects;
@@ -88,9 +88,9 @@ TEST_F(SaltedFlameTest, SharesAreWhereTheLinesAre) {
   std::size_t told_in_base = 0;
   for (std::size_t p = 0; p < grid.size(); ++p) {
     if (*std::max_element(&lit[3 * p], &lit[3 * p] + 3) < 0.1F * brightest) continue;
-    const std::size_t where = !(truth.absorption[p] > 0)                  ? 2
+    const std::size_t where = !(truth.absorption[p] > 0)                     ? 2
                               : test::GlowingFlame::right_of_middle(grid, p) ? 0
-                                                                          : 1;
+                                                                             : 1;
     ++n[where];
     sodium[where] += static_cast<double>(field.line_share[0][p]);
     c2[where] += static_cast<double>(field.line_share[1][p]);
@@ -98,6 +98,7 @@ TEST_F(SaltedFlameTest, SharesAreWhereTheLinesAre) {
   }
   ASSERT_GT(n[2], 20);
   SCOPED_TRACE(testing::PrintToString(n) + testing::PrintToString(sodium) + testing::PrintToString(c2));
+  SCOPED_TRACE(words(field));
   EXPECT_NEAR(sodium[0] / n[0], 0.4, 0.12);
   EXPECT_LT(sodium[1] / n[1], 0.08);
   EXPECT_GT(c2[2] / n[2], 0.6);

@@ -68,6 +68,7 @@ Status parse_quantity(const ReconstructArguments& arguments, recon::ReconstructO
   options.errors = arguments.errors;
   recon::TemperatureRequest request;
   EMBERLOCK_ASSIGN_OR_RETURN(request.emitter, recon::parse_emitter(arguments.emitter));
+  EMBERLOCK_ASSIGN_OR_RETURN(request.lines, recon::parse_lines(arguments.lines));
   if (!arguments.response.empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(recon::CameraResponse response,
                                recon::read_camera_response(arguments.response));
@@ -171,6 +172,12 @@ void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
                    "What glows: grey, soot (not grey), or paper (green alone, constant opacity)")
       ->check(CLI::IsMember({"grey", "soot", "paper"}))
       ->capture_default_str()
+      ->needs(quantity);
+  verb->add_option(
+          "--lines", a.lines,
+          "What shines in lines beside it, at most two between commas: sodium, potassium, lithium, ch, c2, "
+          "cucl, cuoh, bo2; or auto, the one that best explains what no black body does. Also a grid "
+          "line_NAME: its share of the light")
       ->needs(quantity);
   verb->add_flag(
       "--errors", a.errors,

@@ -48,6 +48,7 @@ struct ReconstructArguments {
   std::string quantity = "colour";
   std::string response;
   std::string emitter = "grey";
+  std::string lines;
   bool errors = false;
   std::optional<int> progress_fd;
   DaemonReconstruction by_daemon;

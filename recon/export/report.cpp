@@ -89,6 +89,13 @@ ordered_json plan_json(const std::optional<PlanReport>& plan) {
           {"words", plan->words}};
 }
 
+ordered_json lines_json(const TemperatureSummary& t) {
+  ordered_json found = ordered_json::array();
+  for (const LineSummary& line : t.lines)
+    found.push_back({{"name", line.name}, {"share", line.share}, {"seen", line.seen}});
+  return {{"automatic", t.lines_automatic}, {"found", found}, {"alike", t.lines_alike}};
+}
+
 ordered_json temperature_json(const std::optional<TemperatureSummary>& temperature) {
   if (!temperature) return {};
   const TemperatureSummary& t = *temperature;
@@ -110,6 +117,10 @@ ordered_json temperature_json(const std::optional<TemperatureSummary>& temperatu
           {"unclear", n.unclear},
           {"other", n.other},
           {"saturated", n.saturated},
+          {"mixed", n.mixed},
+          {"line_alone", n.lines},
+          {"alike", n.alike},
+          {"lines", lines_json(t)},
           {"solves", t.solves},
           {"seconds", {{"errors", t.errors_time.value()}, {"reading", t.time.value()}}}};
 }

@@ -20,14 +20,52 @@ std::string way(const TemperatureSummary& t) {
   return words;
 }
 
-std::string not_told(const TemperatureCounts& n) {
+std::string names_of(const std::vector<LineSummary>& lines) {
+  std::vector<std::string> names;
+  for (const LineSummary& line : lines) names.push_back(line.name);
+  return fmt::format("{}", fmt::join(names, " and "));
+}
+
+/// What is no black body.
+std::vector<std::string> line_words(const TemperatureSummary& t) {
+  std::vector<std::string> words;
+  for (const LineSummary& line : t.lines) {
+    words.push_back(fmt::format("{}{} makes {:.1f} % of the light, in {} of {} voxels", line.name,
+                                t.lines_automatic ? ", which best explains what no black body does," : "",
+                                100 * line.share, line.seen, t.counts.emitting));
+    if (line.as_if_hot > 0)
+      words.push_back(
+          fmt::format("to this camera {} has the colour of a glow of {:.0f} K: near that it can't be told",
+                      line.name, line.as_if_hot));
+  }
+  if (!t.lines.empty() && !t.absolute)
+    words.push_back("a line's colour is as good as the response, which is relative");
+  if (!t.lines_automatic || !t.lines.empty()) return words;
+  if (!t.lines_alike.empty()) {
+    words.push_back(
+        fmt::format("can't tell which line emitter shines: {} explain alike what no black body does",
+                    fmt::join(t.lines_alike, ", ")));
+  } else {
+    words.emplace_back(t.counts.other > 0 ? "no single line emitter explains what no black body does"
+                                          : "no line emitter is called for");
+  }
+  return words;
+}
+
+std::string not_told(const TemperatureSummary& t) {
+  const TemperatureCounts& n = t.counts;
+  const std::string lines = names_of(t.lines);
   std::vector<std::string> why;
-  const auto add = [&](std::size_t count, const char* reason) {
+  const auto add = [&](std::size_t count, const std::string& reason) {
     if (count > 0) why.push_back(fmt::format("{} {}", count, reason));
   };
   add(n.colder, "are colder than the table");
   add(n.hotter, "are hotter than the table");
-  add(n.other, "show colours that no body of this kind has (a blue base, sodium, salts?)");
+  add(n.other, lines.empty() ? "show colours that no body of this kind has (a blue base, sodium, salts? "
+                               "--lines auto)"
+                             : "show colours that no mixture with " + lines + " has");
+  add(n.lines, "are " + lines + ", no soot");
+  add(n.alike, "may be soot or " + lines + " alike");
   add(n.saturated, "are saturated in most views, so that their light is a bound");
   add(n.unclear, "can't tell one to a fifth");
   return why.empty() ? "" : fmt::format("not told: {}", fmt::join(why, "; "));
@@ -36,9 +74,13 @@ std::string not_told(const TemperatureCounts& n) {
 }  // namespace
 
 std::vector<std::string> temperature_words(const TemperatureSummary& t) {
+  const std::vector<std::string> lines = line_words(t);
   if (t.counts.told == 0) {
-    std::string why = not_told(t.counts);
-    return {"no voxel tells its temperature" + (why.empty() ? std::string(": nothing glows") : "; " + why)};
+    const std::string why = not_told(t);
+    std::vector<std::string> words = {"no voxel tells its temperature" +
+                                      (why.empty() ? std::string(": nothing glows") : "; " + why)};
+    words.insert(words.end(), lines.begin(), lines.end());
+    return words;
   }
   const double share = 100.0 * static_cast<double>(t.counts.told) / static_cast<double>(t.counts.emitting);
   std::vector<std::string> words = {fmt::format("{:.0f} K on average, 5 to 95 % of the light from {:.0f} to "
@@ -46,7 +88,8 @@ std::vector<std::string> temperature_words(const TemperatureSummary& t) {
                                                 "for {:.1f} % of the voxels with light",
                                                 t.mean, t.low, t.high, t.sigma, share),
                                     "read from " + way(t)};
-  if (std::string why = not_told(t.counts); !why.empty()) words.push_back(std::move(why));
+  if (std::string why = not_told(t); !why.empty()) words.push_back(std::move(why));
+  words.insert(words.end(), lines.begin(), lines.end());
   if (t.chi_square > 0)
     words.push_back(fmt::format("the channels agree with it to a chi-square of {:.2f} a degree of freedom{}",
                                 t.chi_square, t.chi_square > 2 ? ": more than their errors explain" : ""));

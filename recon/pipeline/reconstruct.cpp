@@ -57,6 +57,17 @@ PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOpti
   return result;
 }
 
+const CameraResponse& response_for(const Scene& scene, const TemperatureRequest& request) {
+  const CameraResponse* told = request.response ? request.response.get() : scene.response.get();
+  return told != nullptr ? *told : standard_response();
+}
+
+/// Before anything is solved: whether the lines could be told.
+Status check_temperature(const Scene& scene, const std::optional<TemperatureRequest>& request) {
+  if (!request) return {};
+  return check_lines(response_for(scene, *request), request->emitter, request->lines);
+}
+
 /// Errors and temperatures, where they are asked for.
 Status measure(const Task& task, const ReconstructOptions& options, const Progress& progress,
                Outcome& outcome) {
@@ -66,9 +77,15 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
   if (!options.temperature) return {};
   const Seconds start = task.elapsed();
   tell(progress, kNearlyDone, "reading temperatures");
+<<<<<<< HEAD
   outcome.temperature = temperature_of(task.scene(), outcome.reconstruction, *outcome.errors,
                                        response_for(*options.temperature, task.scene()),
                                        options.temperature->emitter, options.solve.compute);
+=======
+  outcome.temperature = temperature_of(
+      task.scene(), outcome.reconstruction, *outcome.errors, response_for(task.scene(), *options.temperature),
+      options.temperature->emitter, options.solve.compute, options.temperature->lines);
+>>>>>>> unmix
   TemperatureSummary& summary = outcome.temperature->summary;
   summary.time = task.elapsed() - start;
   outcome.report.temperature = summary;
@@ -78,6 +95,7 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
 /// Grids beside emission and density.
 struct FurtherGrids {
   std::vector<float> emission_sigma;
+  std::vector<std::string> line_names;
   std::vector<NamedGrid> grids;
   explicit FurtherGrids(const Outcome& outcome) {
     if (outcome.errors) {
@@ -94,6 +112,10 @@ struct FurtherGrids {
     if (!outcome.temperature) return;
     grids.push_back({"temperature", "K", outcome.temperature->kelvin});
     grids.push_back({"temperature_sigma", "K", outcome.temperature->sigma});
+    for (const LineSummary& line : outcome.temperature->summary.lines)
+      line_names.push_back("line_" + line.name);
+    for (std::size_t i = 0; i < line_names.size(); ++i)
+      grids.push_back({line_names[i].c_str(), "share of the light", outcome.temperature->line_share[i]});
   }
 };
 
@@ -108,6 +130,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
                             const Progress& progress,
                             const std::function<void(const Preview&)>& preview) try {
   const TimePoint start = clock.now();
+  EMBERLOCK_RETURN_IF_ERROR(check_temperature(scene, options.temperature));
   EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const Elapsed elapsed = [&] { return clock.now() - start; };

@@ -32,6 +32,7 @@ struct TemperatureRequest {
   std::shared_ptr<const CameraResponse> response =
       {};  ///< null: the scene's, and without one standard_response()
   Emitter emitter = Emitter::grey;
+  LineRequest lines = {};  ///< line emitters that are looked for beside it
 };
 /// The one to read by; it lives as long as both.
 const CameraResponse& response_for(const TemperatureRequest& request, const Scene& scene);
@@ -69,8 +70,8 @@ struct Outcome {
 /// The number of voxels, effects, hull, solve, and the rendering of every view, held-out ones too. Everything
 /// but the times is a pure function of scene and options, unless a budget ends it, or the knee chooses the
 /// voxels: Report::voxel_choice says which, and with them told the result is the same. Errors: options out of
-/// range, a grid that doesn't fit into this machine's memory, and those of check_scene(), choose_effects()
-/// and solve().
+/// range, a grid that doesn't fit into this machine's memory, and those of check_scene(), check_lines(),
+/// choose_effects() and solve().
 Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
                             const Progress& progress = {},
                             const std::function<void(const Preview&)>& preview = {});
@@ -88,8 +89,9 @@ Status check_output(const std::filesystem::path& folder,
                     const std::vector<std::filesystem::path>& inputs = {});
 
 /// Writes volume.vdb (with grids `emission_sigma` and `density_sigma` where there are errors, `temperature`
-/// and `temperature_sigma` in K, active where told), views/NNNN.png (8 bits, numbered as in the input) and
-/// report.json as an OutputFolder; and `page` as report.html, unless it is empty.
+/// and `temperature_sigma` in K, active where told, and for each line emitter that was looked for
+/// `line_NAME`, its share of the light), views/NNNN.png (8 bits, numbered as in the input) and report.json as
+/// an OutputFolder; and `page` as report.html, unless it is empty.
 Status write_outcome(const Outcome& outcome, const std::filesystem::path& folder,
                      const std::vector<std::filesystem::path>& inputs = {}, std::string_view page = {});
 

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
 
 #include <Eigen/Dense>
 
 #include "recon/compute/pool.h"
 #include "recon/temperature/self_absorption.h"
+#include "recon/temperature/unmixing.h"
 
 namespace emberlock::recon {
 namespace {
@@ -16,10 +19,11 @@ constexpr double kShareThatIsRead = 0.005;  // of the brightest key point's emis
 constexpr double kLeastShare = 2e-3;        // of a level: what the response and the march leave
 constexpr double kAbsorptionShare = 0.5;    // of the extinction: how well pictures tell where it is
 constexpr double kMostUncertain = 0.2;      // of a temperature
-constexpr double kNoBody = 16;              // chi-square a freedom: four sigma
 constexpr double kWhite = 254.5;            // levels
+constexpr double kShareOfOthers = 0.01;     // of what was read, which no soot shows: a line is looked for
+constexpr std::size_t kMostJudged = 2000;   // glows by which a line is chosen
 
-enum class Fate : std::uint8_t { dark, told, colder, hotter, unclear, other, saturated };
+enum class Fate : std::uint8_t { dark, told, mixed, colder, hotter, unclear, other, saturated, lines, alike };
 
 float brightest_channel(const Volume& volume, std::size_t p) {
   return std::max({volume.emission[3 * p], volume.emission[3 * p + 1], volume.emission[3 * p + 2]});
@@ -65,11 +69,12 @@ class Saturation {
 class Glows {
  public:
   Glows(const Reconstruction& done, const VolumeErrors& errors, const EmitterTable& table, SelfAbsorption own,
-        double brightest)
+        double brightest, bool beside_lines)
       : volume_(done.volume),
         errors_(errors),
         own_(std::move(own)),
         paper_(table.emitter() == Emitter::paper),
+        beside_lines_(beside_lines),
         brightest_(brightest) {
     by_absorption_ = !paper_ && table.absolute() && !volume_.extinction.empty() &&
                      !errors.extinction.empty() && done.effects.scattering.order == Scattering::Order::none;
@@ -86,6 +91,11 @@ class Glows {
       const Eigen::Vector3d factor = Eigen::Vector3f::Map(&own_.factor[3 * p]).cast<double>();
       glow.level = glow.level.cwiseProduct(factor);
       covariance = factor.asDiagonal() * covariance * factor.asDiagonal();
+      // Lines may shine where there is no soot, and the extinction that is found there be wrong.
+      const Eigen::Vector3d doubt =
+          beside_lines_ ? kAbsorptionShare * glow.level.cwiseProduct(factor.array().log().matrix())
+                        : Eigen::Vector3d::Zero().eval();
+      covariance += doubt * doubt.transpose();
     }
     const double least = std::hypot(kLeastShare * glow.level.maxCoeff(), 1e-4 * brightest_);
     covariance.diagonal().array() += least * least;
@@ -108,7 +118,7 @@ class Glows {
   const Volume& volume_;
   const VolumeErrors& errors_;
   SelfAbsorption own_;
-  bool paper_, by_absorption_ = false;
+  bool paper_, beside_lines_, by_absorption_ = false;
   double brightest_, opacity_ = 0;
 };
 
@@ -120,11 +130,38 @@ Fate fate_of(const Reading& reading) {
   return reading.sigma < kMostUncertain * reading.kelvin ? Fate::told : Fate::unclear;
 }
 
+Fate fate_of(const Unmixed& unmixed) {
+  switch (unmixed.kind) {
+    case Unmixed::Kind::lines:
+      return Fate::lines;
+    case Unmixed::Kind::alike:
+      return Fate::alike;
+    case Unmixed::Kind::neither:
+      return Fate::other;
+    case Unmixed::Kind::unknown:
+      return Fate::unclear;
+    default:
+      break;
+  }
+  const Fate fate = fate_of(unmixed.reading);
+  return fate == Fate::told && unmixed.kind == Unmixed::Kind::mixed ? Fate::mixed : fate;
+}
+
 void count(TemperatureCounts& counts, Fate fate) {
   ++counts.emitting;
   switch (fate) {
     case Fate::told:
       ++counts.told;
+      break;
+    case Fate::mixed:
+      ++counts.told;
+      ++counts.mixed;
+      break;
+    case Fate::lines:
+      ++counts.lines;
+      break;
+    case Fate::alike:
+      ++counts.alike;
       break;
     case Fate::colder:
       ++counts.colder;
@@ -173,15 +210,23 @@ void summarise(const Volume& volume, const std::vector<Fate>& fates, double leas
   };
   std::vector<Told> told;
   double weights = 0;
+  double light = 0;
   for (std::size_t p = 0; p < fates.size(); ++p) {
     const float weight = brightest_channel(volume, p);
     if (static_cast<double>(weight) < least) continue;
     count(out.counts, fates[p]);
-    if (fates[p] != Fate::told) continue;
+    light += static_cast<double>(weight);
+    for (std::size_t i = 0; i < out.lines.size(); ++i) {
+      const float share = field.line_share[i][p];
+      out.lines[i].share += static_cast<double>(share * weight);
+      out.lines[i].seen += share > 0 ? 1 : 0;
+    }
+    if (fates[p] != Fate::told && fates[p] != Fate::mixed) continue;
     told.push_back({field.kelvin[p], field.sigma[p], weight});
     weights += static_cast<double>(weight);
     out.mean += static_cast<double>(weight) * static_cast<double>(field.kelvin[p]);
   }
+  for (LineSummary& line : out.lines) line.share /= std::max(1e-30, light);
   if (told.empty()) return;
   out.mean /= weights;
   const auto at_share = [&](double share, float Told::*value) {
@@ -196,8 +241,36 @@ void summarise(const Volume& volume, const std::vector<Fate>& fates, double leas
   out.sigma = at_share(0.5, &Told::sigma);
 }
 
+/// What the lines show; the field's lists of their shares, still 0.
+std::vector<std::array<double, 3>> look_for(const std::vector<const LineEmitter*>& named,
+                                            const CameraResponse& response, const EmitterTable& table,
+                                            TemperatureField& field) {
+  std::vector<std::array<double, 3>> shown;
+  for (const LineEmitter* line : named) {
+    shown.push_back(levels_of(response, *line));
+    field.line_share.emplace_back(field.kelvin.size());
+    const std::optional<Kelvin> as_if = as_if_hot(table, shown.back());
+    field.summary.lines.push_back({std::string(line->name), 0, 0, as_if ? as_if->value() : 0});
+  }
+  return shown;
+}
+
+/// Those of one fate, spread over the volume, at most kMostJudged; none if they are too few to matter.
+std::vector<Glow> glows_of(const std::vector<Fate>& fates, Fate fate, const Glows& glows) {
+  const auto all = static_cast<std::size_t>(std::count(fates.begin(), fates.end(), fate));
+  const auto dark = static_cast<std::size_t>(std::count(fates.begin(), fates.end(), Fate::dark));
+  std::vector<Glow> out;
+  if (static_cast<double>(all) < kShareOfOthers * static_cast<double>(fates.size() - dark)) return out;
+  const std::size_t every = all / kMostJudged + 1;
+  std::size_t met = 0;
+  for (std::size_t p = 0; p < fates.size(); ++p)
+    if (fates[p] == fate && met++ % every == 0) out.push_back(glows.at(p));
+  return out;
+}
+
 TemperatureField read_all(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
-                          const CameraResponse& response, Emitter emitter, const ComputeOptions& compute) {
+                          const CameraResponse& response, Emitter emitter, const ComputeOptions& compute,
+                          const std::vector<const LineEmitter*>& named, std::vector<Glow>* others = nullptr) {
   const Volume& volume = done.volume;
   const Grid& grid = volume.grid;
   TemperatureField field;
@@ -215,11 +288,13 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
   const Thermometer meter(table_for(done, response, emitter));
   SelfAbsorption own;
   if (emitter == Emitter::soot) own = self_absorption(scene, done, response, emitter, compute);
-  const Glows glows(done, errors, meter.table(), std::move(own), brightest);
+  const Glows glows(done, errors, meter.table(), std::move(own), brightest, !named.empty());
   summary.by_absorption = glows.by_absorption();
   const Saturation saturation(scene);
   std::vector<Fate> fates(grid.size(), Fate::dark);
   std::vector<std::array<double, 2>> chi(static_cast<std::size_t>(grid.nz));  // sum, degrees of freedom
+  std::optional<Unmixer> unmixer;
+  if (!named.empty()) unmixer.emplace(meter, look_for(named, response, meter.table(), field));
   Pool(compute.threads).run(grid.nz, [&](int k) {
     for (int j = 0; j < grid.ny; ++j)
       for (int i = 0; i < grid.nx; ++i) {
@@ -229,11 +304,16 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
                                                       grid.origin[1] + grid.edge * static_cast<float>(j),
                                                       grid.origin[2] + grid.edge * static_cast<float>(k))
                                           .cast<double>();
-        const Reading reading = meter.read(glows.at(p));
-        fates[p] = saturation.at(place) ? Fate::saturated : fate_of(reading);
+        const Glow glow = glows.at(p);
+        const Unmixed unmixed = unmixer ? unmixer->read(glow) : Unmixed{};
+        const Reading reading = unmixer ? unmixed.reading : meter.read(glow);
+        fates[p] = saturation.at(place) ? Fate::saturated : unmixer ? fate_of(unmixed) : fate_of(reading);
         chi[static_cast<std::size_t>(k)][0] += reading.chi_square * (reading.freedom > 0 ? 1 : 0);
         chi[static_cast<std::size_t>(k)][1] += reading.freedom;
-        if (fates[p] != Fate::told) continue;
+        for (std::size_t l = 0; l < field.line_share.size(); ++l)
+          if (fates[p] != Fate::saturated && unmixed.seen[l])
+            field.line_share[l][p] = static_cast<float>(unmixed.share[l]);
+        if (fates[p] != Fate::told && fates[p] != Fate::mixed) continue;
         field.kelvin[p] = static_cast<float>(reading.kelvin);
         field.sigma[p] = static_cast<float>(reading.sigma);
       }
@@ -241,6 +321,7 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
   std::array<double, 2> sum = {};
   for (const auto& c : chi) sum = {sum[0] + c[0], sum[1] + c[1]};
   summary.chi_square = sum[1] > 0 ? sum[0] / sum[1] : 0;
+  if (others != nullptr) *others = glows_of(fates, Fate::other, glows);
   summarise(volume, fates, kShareThatCounts * brightest, field);
   return field;
 }
@@ -249,11 +330,22 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
 
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
                                 const CameraResponse& response, Emitter emitter,
-                                const ComputeOptions& compute) {
-  TemperatureField field = read_all(scene, done, errors, response, emitter, compute);
+                                const ComputeOptions& compute, const LineRequest& lines) {
+  std::vector<const LineEmitter*> named = lines.named;
+  std::vector<Glow> others;
+  TemperatureField field = read_all(scene, done, errors, response, emitter, compute, named, &others);
+  if (lines.automatic && !others.empty()) {
+    const LineChoice choice = choose_line(Thermometer(table_for(done, response, emitter)), response, others);
+    if (choice.chosen != nullptr) {
+      named = {choice.chosen};
+      field = read_all(scene, done, errors, response, emitter, compute, named);
+    }
+    for (const LineEmitter* rival : choice.rivals) field.summary.lines_alike.emplace_back(rival->name);
+  }
+  field.summary.lines_automatic = lines.automatic;
   if (emitter == Emitter::paper || field.summary.counts.told == 0) return field;
   const Emitter other = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
-  field.summary.if_other = read_all(scene, done, errors, response, other, compute).summary.mean;
+  field.summary.if_other = read_all(scene, done, errors, response, other, compute, named).summary.mean;
   return field;
 }
 

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "recon/adjust/solver.h"
+#include "recon/temperature/line_emitter.h"
 #include "recon/temperature/thermometer.h"
 #include "recon/temperature/view_errors.h"
 
@@ -19,6 +21,17 @@ struct TemperatureCounts {
   std::size_t unclear = 0;             ///< no temperature stands out, or its error is above a fifth of it
   std::size_t other = 0;  ///< no temperature shows these channels: no body of this kind (sodium, a blue base)
   std::size_t saturated = 0;  ///< most views that see them are saturated there: a bound, no value
+  std::size_t mixed = 0;      ///< of those told: beside lines
+  std::size_t lines = 0;      ///< lines and no soot: there is no temperature to tell
+  std::size_t alike = 0;      ///< soot, or this line or that, explains them as well
+};
+
+/// A line emitter that was looked for (line_emitter.h).
+struct LineSummary {
+  std::string name;
+  double share = 0;      ///< of all the light
+  std::size_t seen = 0;  ///< key points
+  double as_if_hot = 0;  ///< K: soot of this temperature has its colour; 0: none has
 };
 
 /// How temperatures were read, and how they came out; weighted by emission, in K.
@@ -32,7 +45,11 @@ struct TemperatureSummary {
   double sigma = 0;                    ///< the median of the voxels' errors
   double chi_square = 0;               ///< mean per degree of freedom; 0: there were none
   double if_other = 0;  ///< what the mean were if the glow were soot's instead of grey, or the reverse
-  int solves = 0;       ///< of errors_by_views()
+  bool lines_automatic = false;         ///< chosen by the program
+  std::vector<LineSummary> lines = {};  ///< those that were looked for, or chosen
+  /// Automatic and none chosen: those that explain what no soot does alike; empty: none explains it.
+  std::vector<std::string> lines_alike = {};
+  int solves = 0;  ///< of errors_by_views()
   Seconds errors_time{0}, time{0};
 };
 
@@ -40,6 +57,7 @@ struct TemperatureSummary {
 struct TemperatureField {
   std::vector<float> kelvin, sigma;  ///< at key points, K; 0 where not told
   TemperatureSummary summary;
+  std::vector<std::vector<float>> line_share = {};  ///< of the light, one list for each of summary.lines
 };
 
 inline constexpr double kShareThatCounts = 0.05;
@@ -49,8 +67,9 @@ inline constexpr double kShareThatCounts = 0.05;
 /// reconstructed, the response is absolute and nothing scatters, by emission over extinction. The paper: by
 /// green and its constant opacity of 0.05 a voxel edge, between 1000 and 2300 K; where the response is
 /// relative the brightest green is 2300 K.
+/// With `lines`, valid by check_lines(), each voxel's light is taken apart into soot and lines (unmixing.h).
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
                                 const CameraResponse& response, Emitter emitter,
-                                const ComputeOptions& compute = {});
+                                const ComputeOptions& compute = {}, const LineRequest& lines = {});
 
 }  // namespace emberlock::recon

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <utility>
 
 #include <Eigen/Core>
@@ -31,6 +32,18 @@ struct Reading {
   int freedom = 0;        ///< data less unknowns; 0: any data fit
   enum class Told { yes, colder, hotter, no } told = Told::no;  ///< beyond the table's end; or not at all
 };
+
+/// Chi-square a freedom above which no temperature shows a glow: four sigma.
+inline constexpr double kNoBody = 16;
+
+/// Data of a glow that a table can use: channels, and the absorption where the response is absolute.
+bool absorption_counts(const Glow& glow, const EmitterTable& table);
+int data_of(const Glow& glow, const EmitterTable& table);
+
+/// The temperature from `coldest` to `hottest` where chi-square is least, and its error; all but
+/// Reading::absorption.
+Reading most_likely(Kelvin coldest, Kelvin hottest, int freedom,
+                    const std::function<double(double kelvin)>& chi_square);
 
 /// Reads temperatures by a table. Immutable, thread-safe.
 class Thermometer {

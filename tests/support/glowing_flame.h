@@ -52,6 +52,8 @@ struct GlowingFlameOptions {
   recon::Emitter emitter = recon::Emitter::grey;
   double noise = 0.25;    // grey levels
   double levels = 65535;  // of the camera's samples; 0: neither rounded nor cut at black
+  double sodium = 0;      // share of the light where x > 0
+  double blue_base = 0;   // share of the height below which C2 shines and no soot is
 };
 
 /// A drawn flame whose absorption is its soot's, cooler where there is more of it and further up.
@@ -78,6 +80,7 @@ class GlowingFlame {
         for (int i = 0; i < grid.nx; ++i) {
           const std::size_t p = grid.index(i, j, k);
           const double dense = std::min(1.0, static_cast<double>(out.absorption[p]) / thick);
+          if (up < options_.blue_base) out.absorption[p] = 0;
           out.kelvin[p] = static_cast<float>(options_.hottest - (options_.hottest - options_.coldest) *
                                                                     (0.55 * dense + 0.45 * up));
         }
@@ -90,12 +93,21 @@ class GlowingFlame {
     recon::FlameTruth truth = flame_.at(Seconds(0), grid);
     const Glowing glowing = at(grid);
     const recon::EmitterTable table(response_, options_.emitter, Kelvin(1000), Kelvin(2500));
+    const recon::EmitterLevels base = table.at(Kelvin((options_.coldest + options_.hottest) / 2));
+    const std::array<double, 3> sodium = shown("sodium");
+    const std::array<double, 3> c2 = shown("c2");
     for (std::size_t p = 0; p < grid.size(); ++p) {
       const recon::EmitterLevels levels = table.at(Kelvin(static_cast<double>(glowing.kelvin[p])));
+      const double soot = static_cast<double>(glowing.absorption[p]) * std::exp(levels.log_scale);
+      const double salt = right_of_middle(grid, p) ? options_.sodium / (1 - options_.sodium) * soot : 0;
+      // As bright as soot of the middle of the temperatures would be.
+      const double gas =
+          static_cast<double>(truth.volume.extinction[p] - glowing.absorption[p]) * std::exp(base.log_scale);
       for (std::size_t c = 0; c < 3; ++c)
-        truth.volume.emission[3 * p + c] = static_cast<float>(static_cast<double>(glowing.absorption[p]) *
-                                                              levels.value[c] * std::exp(levels.log_scale));
+        truth.volume.emission[3 * p + c] =
+            static_cast<float>(soot * levels.value[c] + salt * sodium[c] + gas * c2[c]);
     }
+    truth.volume.extinction = glowing.absorption;
     return truth;
   }
 
@@ -133,7 +145,20 @@ class GlowingFlame {
     return scene;
   }
 
+  /// Where sodium is, if there is any.
+  static bool right_of_middle(const recon::Grid& grid, std::size_t p) {
+    const auto i = static_cast<float>(p % static_cast<std::size_t>(grid.nx));
+    return grid.origin[0] + grid.edge * i > 0;
+  }
+
  private:
+  /// A line emitter's channels, which add up to 1.
+  [[nodiscard]] std::array<double, 3> shown(std::string_view line) const {
+    std::array<double, 3> out = recon::levels_of(response_, *recon::parse_lines(line)->named.front());
+    const double sum = out[0] + out[1] + out[2];
+    for (double& v : out) v /= sum;
+    return out;
+  }
   static recon::FlameOptions with_soot(recon::FlameOptions options) {
     options.absorber = recon::Absorber::soot;
     return options;
@@ -158,8 +183,8 @@ class GlowingFlame {
   recon::CameraResponse response_;
 };
 
-/// Errors of a field against the truth, over key points whose true emission is 5 % of the brightest, weighted
-/// by it.
+/// Errors of a field against the truth, over key points with soot whose true emission is 5 % of the
+/// brightest, weighted by it.
 struct TemperatureScore {
   double median = 0, most = 0, bias = 0;  // K; `most`: 95 % lie below
   double within = 0;                      // share within two sigma
@@ -189,7 +214,7 @@ inline TemperatureScore score_of(const GlowingFlame& flame, const recon::Reconst
   TemperatureScore score;
   for (std::size_t p = 0; p < grid.size(); ++p) {
     const float own = std::max({lit[3 * p], lit[3 * p + 1], lit[3 * p + 2]});
-    if (own < 0.05F * brightest) continue;
+    if (own < 0.05F * brightest || !(truth.absorption[p] > 0)) continue;
     ++emitting;
     if (!(field.kelvin[p] > 0)) continue;
     const double error = static_cast<double>(field.kelvin[p] - truth.kelvin[p]);

@@ -141,6 +141,28 @@ TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
   EXPECT_NE(run(words).exit_code, 0);
 }
 
+TEST_F(ReconstructCommandTest, LinesAreTakenApartIntoGridsOfTheirOwn) {
+  const fs::path file = root_ / "response.json.png";  // an input, for expect_refused()
+  std::ofstream(file) << recon::to_json(test::response_of_the_ball());
+  std::vector<std::string> words = {"--voxels",   "16",          "--device",   "cpu",
+                                    "--effects",  "none",        "--quantity", "temperature",
+                                    "--response", file.string(), "--lines",    "sodium"};
+  const Run result = run(words);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("sodium makes"));
+  EXPECT_THAT(result.out, HasSubstr("a line's colour is as good as the response, which is relative"));
+  EXPECT_TRUE(recon::read_grid(root_ / "out" / "volume.vdb", "line_sodium").ok());
+  EXPECT_EQ(report()["temperature"]["lines"]["found"][0]["name"], "sodium");
+  EXPECT_NEAR(report()["temperature"]["mean"].get<double>(), 1800, 20);
+  fs::remove_all(root_ / "out");
+  words.back() = "neon";
+  expect_refused(run(words), "lithium");
+  words.back() = "potassium";
+  expect_refused(run(words), "doesn't see potassium");
+  words.back() = "sodium,c2";
+  expect_refused(run(words), "3 channels can't tell 4 unknowns");
+}
+
 TEST_F(ReconstructCommandTest, TheInputsOwnResponseIsTaken) {
   std::ofstream(root_ / "response.json") << recon::to_json(test::response_of_the_ball());
   document_["camera_response"] = "response.json";

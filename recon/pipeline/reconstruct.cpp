@@ -57,15 +57,10 @@ PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOpti
   return result;
 }
 
-const CameraResponse& response_for(const Scene& scene, const TemperatureRequest& request) {
-  const CameraResponse* told = request.response ? request.response.get() : scene.response.get();
-  return told != nullptr ? *told : standard_response();
-}
-
 /// Before anything is solved: whether the lines could be told.
 Status check_temperature(const Scene& scene, const std::optional<TemperatureRequest>& request) {
   if (!request) return {};
-  return check_lines(response_for(scene, *request), request->emitter, request->lines);
+  return check_lines(response_for(*request, scene), request->emitter, request->lines);
 }
 
 /// Errors and temperatures, where they are asked for.
@@ -77,15 +72,9 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
   if (!options.temperature) return {};
   const Seconds start = task.elapsed();
   tell(progress, kNearlyDone, "reading temperatures");
-<<<<<<< HEAD
-  outcome.temperature = temperature_of(task.scene(), outcome.reconstruction, *outcome.errors,
-                                       response_for(*options.temperature, task.scene()),
-                                       options.temperature->emitter, options.solve.compute);
-=======
   outcome.temperature = temperature_of(
-      task.scene(), outcome.reconstruction, *outcome.errors, response_for(task.scene(), *options.temperature),
+      task.scene(), outcome.reconstruction, *outcome.errors, response_for(*options.temperature, task.scene()),
       options.temperature->emitter, options.solve.compute, options.temperature->lines);
->>>>>>> unmix
   TemperatureSummary& summary = outcome.temperature->summary;
   summary.time = task.elapsed() - start;
   outcome.report.temperature = summary;

@@ -95,23 +95,31 @@ void add_looked_up(v1::IterationPreview& message, const recon::Volume& volume,
   add_layer(message, recon::layer_of(recon::CoarseLayer::Kind::temperature, kelvin)).set_quick(true);
 }
 
-/// What was measured in the finished volume.
+/// What was measured in the finished volume; temperatures where those looked up are, too.
 void add_measured(v1::IterationPreview& message, const recon::Outcome& outcome) {
   using Kind = recon::CoarseLayer::Kind;
   const recon::Grid& grid = outcome.reconstruction.volume.grid;
-  const auto add = [&](Kind kind, const std::vector<float>& values) {
-    if (!values.empty())
-      add_layer(message, recon::coarse_layer(kind, grid, kBlocks, [&](std::size_t p) { return values[p]; }));
-  };
+  const std::vector<float>& light = outcome.reconstruction.volume.emission;
   if (outcome.temperature) {
-    add(Kind::temperature, outcome.temperature->kelvin);
-    add(Kind::temperature_sigma, outcome.temperature->sigma);
+    const auto least =
+        static_cast<float>(recon::kShareThatCounts) * *std::max_element(light.begin(), light.end());
+    const auto add_lit = [&](Kind kind, const std::vector<float>& values) {
+      add_layer(
+          message, recon::coarse_layer(kind, grid, kBlocks, [&](std::size_t p) {
+            return std::max({light[3 * p], light[3 * p + 1], light[3 * p + 2]}) < least ? 0.0F : values[p];
+          }));
+    };
+    add_lit(Kind::temperature, outcome.temperature->kelvin);
+    add_lit(Kind::temperature_sigma, outcome.temperature->sigma);
   }
   if (!outcome.errors) return;
   add_layer(message, recon::coarse_layer(Kind::emission_sigma, grid, kBlocks, [&](std::size_t p) {
               return static_cast<float>(outcome.errors->sigma(p).mean());
             }));
-  add(Kind::extinction_sigma, outcome.errors->extinction);
+  const std::vector<float>& extinction = outcome.errors->extinction;
+  if (!extinction.empty())
+    add_layer(message, recon::coarse_layer(Kind::extinction_sigma, grid, kBlocks,
+                                           [&](std::size_t p) { return extinction[p]; }));
 }
 
 /// A view of the volume in its present state.

@@ -329,7 +329,9 @@ TEST_F(ReconstructCommandTest, TemperaturesAreToldAfterEveryIterationAndMeasured
     for (const v1::ChildMessage& message : read_messages(root_ / "messages")) {
       if (message.has_iteration() && message.iteration().has_volume())
         found.push_back(message.iteration().volume());
-      if (message.has_done()) EXPECT_EQ(message.done().temperature().empty(), more.empty());
+      if (message.has_done()) {
+        EXPECT_EQ(message.done().temperature().empty(), more.empty());
+      }
     }
     return found;
   };

@@ -179,42 +179,36 @@ struct RestrictResidual {
 };
 
 /// q += the coarse q, linear between the centres of coarse cells: its mirror image beyond the floor, minus
-/// its mirror image beyond open sides.
+/// its mirror image beyond open sides. i counts pairs of cells of a row.
 struct ProlongCorrection {
   FluidGrid coarse;
   const float* coarse_q = nullptr;
   FluidGrid fine;
   float* q = nullptr;
 
-  HOST_DEVICE void operator()(int i, int j, int k) const {
-    const int x = i >> 1;
+  HOST_DEVICE void operator()(int x, int j, int k) const {
     const int y = j >> 1;
     const int z = k >> 1;
-    const std::size_t c = coarse.index(x, y, z);
-    // Beyond an open side the neighbour is minus this one: 3/4 - 1/4 of it. Beyond the floor it is this one.
-    const int dx = (i & 1) == 0 ? -1 : 1;
     const int dy = (j & 1) == 0 ? -1 : 1;
     const int dz = (k & 1) == 0 ? -1 : 1;
-    const bool in_x = x + dx >= 0 && x + dx < coarse.nx;
     const bool in_y = y + dy >= 0 && y + dy < coarse.ny;
     const bool in_z = z + dz >= 0 && z + dz < coarse.nz;
-    const float keep_x = in_x ? 0.75F : 0.5F;
+    // Beyond an open side the neighbour is minus this one: 3/4 - 1/4 of it. Beyond the floor it is this one.
+    // What is stored of the layer outside is 0.
     const float keep_y = in_y ? 0.75F : 0.5F;
     const float keep_z = in_z ? 0.75F : (dz < 0 ? 1.F : 0.5F);
-    const float side_x = in_x ? 0.25F : 0.F;
-    const float side_y = in_y ? 0.25F : 0.F;
-    const float side_z = in_z ? 0.25F : 0.F;
-    const std::size_t cx = in_x ? coarse.index(x + dx, y, z) : c;
-    const std::size_t to_y =
-        (in_y ? coarse.index(x, y + dy, z) : c) - c;  // wraps around where it is negative
-    const std::size_t to_z = (in_z ? coarse.index(x, y, z + dz) : c) - c;
-    const float* f = coarse_q;
-    const float v00 = keep_x * f[c] + side_x * f[cx];
-    const float v10 = keep_x * f[c + to_y] + side_x * f[cx + to_y];
-    const float v01 = keep_x * f[c + to_z] + side_x * f[cx + to_z];
-    const float v11 = keep_x * f[c + to_y + to_z] + side_x * f[cx + to_y + to_z];
-    const float sum = keep_z * (keep_y * v00 + side_y * v10) + side_z * (keep_y * v01 + side_y * v11);
-    q[fine.index(i, j, k)] += sum;
+    const float* near = coarse_q + coarse.index(x, y, z);
+    const float* beside = coarse_q + coarse.index(x, y + dy, z);
+    const float* over = coarse_q + coarse.index(x, y, z + dz);
+    const float* across = coarse_q + coarse.index(x, y + dy, z + dz);
+    const auto column = [&](int at) {
+      return keep_z * (keep_y * near[at] + 0.25F * beside[at]) +
+             0.25F * (keep_y * over[at] + 0.25F * across[at]);
+    };
+    const float middle = column(0);
+    float* to = q + fine.index(2 * x, j, k);
+    to[0] += (x > 0 ? 0.75F : 0.5F) * middle + 0.25F * column(-1);
+    to[1] += (x + 1 < coarse.nx ? 0.75F : 0.5F) * middle + 0.25F * column(1);
   }
 };
 

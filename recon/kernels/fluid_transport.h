@@ -32,50 +32,65 @@ HOST_DEVICE inline float at_least_zero(float v) { return v > 0 ? v : 0.F; }
 HOST_DEVICE inline Rgba at_least_zero(const Rgba& v) { return non_negative(v); }
 
 /// One stage: out = keep start + (1 - keep) (in + dt change of in), where density * change is the mean over
-/// faces of mass flux * (face's value - cell's).
-template <class Value>
+/// faces of mass flux * (face's value - cell's). Of the gas and, if there are any, its particles.
 struct Transport {
-  const Value* start = nullptr;
-  const Value* in = nullptr;
-  Value* out = nullptr;
-  const Rgba* gas = nullptr;  ///< whose first lane is the temperature: density is inverse to it
+  const Rgba* start = nullptr;  ///< its first lane is the temperature: density is inverse to it
+  const Rgba* in = nullptr;
+  Rgba* out = nullptr;
+  const float* particles_start = nullptr;  ///< or absent
+  const float* particles_in = nullptr;
+  float* particles_out = nullptr;
   ConstFaceFields velocity;
   FluidGrid grid;
-  Value inlet;                  ///< of the burners, in the floor's faces
-  float inlet_temperature = 0;  ///< K
-  float cells = 0;              ///< dt / edge
+  Rgba inlet;       ///< of the burners, in the floor's faces; no particles
+  float cells = 0;  ///< dt / edge
   float keep = 0;
 
-  /// The inflow through the face on one side of the cell (Side -1 or 1) times (face's value - cell's). The
-  /// face's density is that of its own temperature, by the same rule as its value: only so does what flows in
-  /// without divergence keep the mass that the temperatures tell.
+  struct Change {
+    Rgba gas;
+    float particles = 0;
+  };
+  template <class Value>
+  [[nodiscard]] HOST_DEVICE static Value at_face(const Value* of, std::size_t beyond, std::size_t up,
+                                                 std::size_t down) {
+    return of[up] + 0.5F * limited_slope(of[up] - of[beyond], of[down] - of[up]);
+  }
+  /// Adds the inflow through the face on one side of the cell (Side -1 or 1) times (face's value - cell's).
+  /// The face's density is that of its own temperature, by the same rule as its value: only so does what
+  /// flows in without divergence keep the mass that the temperatures tell.
   template <int Axis, int Side>
-  [[nodiscard]] HOST_DEVICE Value through(std::size_t c, int at, int last) const {
+  HOST_DEVICE void through(std::size_t c, int at, int last, Change& change) const {
     const std::size_t step = grid.template stride<Axis>();
     const std::size_t next = Side < 0 ? c - step : c + step;
     const float speed = Side < 0 ? velocity.axis[Axis][c] : -velocity.axis[Axis][next];  // inwards
     const bool boundary = Side < 0 ? at == 0 : at == last;
-    const float here = gas[c].c[0];
-    if (Axis == 2 && Side < 0 && boundary) return (speed * here / inlet_temperature) * (inlet - in[c]);
+    const bool burner = Axis == 2 && Side < 0 && boundary;
     const bool inflow = speed > 0;
     const std::size_t up = inflow ? next : c;
     const std::size_t down = inflow ? c : next;
     const std::size_t beyond = up + (up - down);  // wraps around where it is negative
     const bool floor_beyond = Axis == 2 && (inflow ? Side < 0 && at < 2 : Side > 0 && at == 0);
     const bool linear = !boundary && !floor_beyond;
-    const float t = gas[up].c[0];
-    const float face = linear ? t + 0.5F * limited_slope(t - gas[beyond].c[0], gas[down].c[0] - t) : t;
-    const Value value =
-        linear ? in[up] + 0.5F * limited_slope(in[up] - in[beyond], in[down] - in[up]) : in[up];
-    return (speed * here / face) * (value - in[c]);
+    const Rgba value = burner ? inlet : linear ? at_face(in, beyond, up, down) : in[up];
+    const float weight = speed * in[c].c[0] / value.c[0];
+    change.gas = change.gas + weight * (value - in[c]);
+    if (particles_in == nullptr) return;
+    const float carried = burner ? 0.F : linear ? at_face(particles_in, beyond, up, down) : particles_in[up];
+    change.particles += weight * (carried - particles_in[c]);
   }
   HOST_DEVICE void operator()(int i, int j, int k) const {
     const std::size_t c = grid.index(i, j, k);
-    const Value x = through<0, -1>(c, i, grid.nx - 1) + through<0, 1>(c, i, grid.nx - 1);
-    const Value y = through<1, -1>(c, j, grid.ny - 1) + through<1, 1>(c, j, grid.ny - 1);
-    const Value z = through<2, -1>(c, k, grid.nz - 1) + through<2, 1>(c, k, grid.nz - 1);
-    const Value stepped = in[c] + cells * (x + y + z);
-    out[c] = at_least_zero(keep * start[c] + (1 - keep) * stepped);
+    Change change;
+    through<0, -1>(c, i, grid.nx - 1, change);
+    through<0, 1>(c, i, grid.nx - 1, change);
+    through<1, -1>(c, j, grid.ny - 1, change);
+    through<1, 1>(c, j, grid.ny - 1, change);
+    through<2, -1>(c, k, grid.nz - 1, change);
+    through<2, 1>(c, k, grid.nz - 1, change);
+    out[c] = at_least_zero(keep * start[c] + (1 - keep) * (in[c] + cells * change.gas));
+    if (particles_in == nullptr) return;
+    const float stepped = particles_in[c] + cells * change.particles;
+    particles_out[c] = at_least_zero(keep * particles_start[c] + (1 - keep) * stepped);
   }
 };
 

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
-#include <type_traits>
 
 #include "base/random.h"
 
@@ -163,20 +162,13 @@ void FlameSimulation::Fluid::transport(float cells) {
   inlet.c[kFuel] = inlet.c[kMixture];
   inlet.c[kSoot] = static_cast<float>(options_.burner_soot);
   const Rgba* gas = gas_.data();
-  const auto stage = [&](const auto& inflow, const Rgba* at, const auto* start, const auto* in, auto* out,
-                         float keep) {
-    work_.cells(grid_,
-                Transport<std::decay_t<decltype(inflow)>>{start, in, out, at, faces(), grid_, inflow,
-                                                          options_.gas.burner_temperature, cells, keep});
-  };
-  stage(inlet, gas, gas, gas, gas_scratch_.data(), 0.F);
-  stage(inlet, gas_scratch_.data(), gas, gas_scratch_.data(), next_gas_.data(), 0.5F);
-  if (burns()) {
-    const float* particles = particles_.data();
-    stage(0.F, gas, particles, particles, scratch_.data(), 0.F);
-    stage(0.F, gas_scratch_.data(), particles, scratch_.data(), next_particles_.data(), 0.5F);
-    particles_.swap(next_particles_);
-  }
+  const float* particles = burns() ? particles_.data() : nullptr;
+  work_.cells(grid_, Transport{gas, gas, gas_scratch_.data(), particles, particles, scratch_.data(), faces(),
+                               grid_, inlet, cells, 0.F});
+  const float* between = burns() ? scratch_.data() : nullptr;
+  work_.cells(grid_, Transport{gas, gas_scratch_.data(), next_gas_.data(), particles, between,
+                               next_particles_.data(), faces(), grid_, inlet, cells, 0.5F});
+  particles_.swap(next_particles_);
   gas_.swap(next_gas_);
 }
 

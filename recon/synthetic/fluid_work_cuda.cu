@@ -44,8 +44,7 @@ void each_on_gpu(const FluidRange& range, const Act& act) {
   launch(range.size(), AtIndices<Act>{act, range}, "a fluid's pass");
 }
 
-template void each_on_gpu(const FluidRange&, const Transport<float>&);
-template void each_on_gpu(const FluidRange&, const Transport<Rgba>&);
+template void each_on_gpu(const FluidRange&, const Transport&);
 template void each_on_gpu(const FluidRange&, const TraceBack<float, -1>&);  // of tests
 template void each_on_gpu(const FluidRange&, const TraceBack<float, 0>&);
 template void each_on_gpu(const FluidRange&, const TraceBack<float, 1>&);

@@ -77,8 +77,9 @@ void PressureSolver::precondition() {
   for (std::size_t l = last; l-- > 0;) {
     Level& fine = levels_[l];
     Level& coarse = levels_[l + 1];
-    work_.cells(fine.equation.grid,
-                ProlongCorrection{coarse.equation.grid, coarse.q.data(), fine.equation.grid, fine.q.data()});
+    const FluidGrid& g = fine.equation.grid;
+    work_.each({g.nx / 2, g.ny, g.nz},
+               ProlongCorrection{coarse.equation.grid, coarse.q.data(), g, fine.q.data()});
     relax(fine, l == 0 ? r_.data() : fine.b.data(), fine.q.data(), 1);
   }
 }

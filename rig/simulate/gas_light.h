@@ -22,8 +22,8 @@ struct Sun {
   double albedo = 0.2;
 };
 
-/// What cameras of a response see of gas: soot that glows by Planck's law at its gas' temperature and, if there
-/// is a sun, scatters its light once and evenly. Levels of the response a metre.
+/// What cameras of a response see of gas: soot that glows by Planck's law at its gas' temperature and, if
+/// there is a sun, scatters its light once and evenly. Levels of the response a metre.
 recon::Volume visible(const recon::GasState& gas, const recon::CameraResponse& response,
                       const std::optional<Sun>& sun, const recon::ComputeOptions& compute);
 

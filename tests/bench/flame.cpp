@@ -3,7 +3,8 @@
 //   bench_flame step [CELLS] [THREADS]    a substep's wall and core time for each preset, CELLS^3 (default
 //                                         128), as it begins to burn; divergence and iterations beside it
 //   bench_flame puffs [CELLS] [D ...]     how often a pool fire of diameter D (1 and 0.3 m) puffs, by the
-//                                         spectrum of its heat release, CELLS across (24), beside 1.5/sqrt(D)
+//                                         spectra of its heat release and of the rise on its axis (a probe
+//                                         D / 2 above the burner), CELLS across (24), beside 1.5/sqrt(D)
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -61,7 +62,8 @@ int time_steps(int cells, int threads) {
 }
 
 int count(int cells, const std::vector<double>& diameters) {
-  std::printf("%6s %6s %10s %12s %7s %9s\n", "D m", "cells", "puffs Hz", "1.5/sqrt(D)", "ratio", "wall s");
+  std::printf("%6s %6s %10s %7s %10s %7s %12s %9s\n", "D m", "cells", "heat Hz", "ratio", "rise Hz", "ratio",
+              "1.5/sqrt(D)", "wall s");
   for (const double diameter : diameters) {
     PuffingCase c;
     c.diameter = diameter;
@@ -72,8 +74,9 @@ int count(int cells, const std::vector<double>& diameters) {
     c.interval = 0.03 * std::sqrt(diameter);
     const auto start = std::chrono::steady_clock::now();
     const Puffing puffing = count_puffs(c);
-    std::printf("%6.2f %6d %10.3f %12.3f %7.3f %9.1f\n", diameter, cells, puffing.frequency, puffing.expected,
-                puffing.frequency / puffing.expected,
+    std::printf("%6.2f %6d %10.3f %7.3f %10.3f %7.3f %12.3f %9.1f\n", diameter, cells, puffing.frequency,
+                puffing.frequency / puffing.expected, puffing.rise_frequency,
+                puffing.rise_frequency / puffing.expected, puffing.expected,
                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     std::fflush(stdout);
   }

@@ -23,9 +23,11 @@ struct PuffingCase {
 };
 
 struct Puffing {
-  double frequency = 0;      ///< Hz, of the strongest line of the heat release's spectrum
-  double expected = 0;       ///< 1.5 / sqrt(D)
-  std::vector<double> heat;  ///< W, one an interval
+  double frequency = 0;       ///< Hz, of the strongest line of the heat release's spectrum
+  double rise_frequency = 0;  ///< the same of `rise`, as fires' probes measure it
+  double expected = 0;        ///< 1.5 / sqrt(D)
+  std::vector<double> heat;   ///< W, one an interval
+  std::vector<double> rise;   ///< m/s upwards on the axis, half a diameter above the burner
 };
 
 /// The strongest frequency between `low` and `high`, Hz, of samples `interval` s apart: the peak of their
@@ -52,6 +54,17 @@ inline double strongest_frequency(const std::vector<double>& samples, double int
   return best;
 }
 
+/// The mean of the four cells around the axis at a height.
+inline double rise_on_axis(const recon::GasState& gas, double height) {
+  const recon::Grid& g = gas.grid;
+  const int k = static_cast<int>(height / static_cast<double>(g.edge));
+  double sum = 0;
+  for (const int j : {g.ny / 2 - 1, g.ny / 2})
+    for (const int i : {g.nx / 2 - 1, g.nx / 2})
+      sum += static_cast<double>(gas.velocity[3 * g.index(i, j, k) + 2]);
+  return sum / 4;
+}
+
 /// Frequency 0 where the simulation fails.
 inline Puffing count_puffs(const PuffingCase& c) {
   Puffing result;
@@ -69,8 +82,12 @@ inline Puffing count_puffs(const PuffingCase& c) {
     const auto stats = fire->step(Seconds(c.interval));
     if (!stats.ok()) return result;
     result.heat.push_back(stats->heat_release);
+    result.rise.push_back(rise_on_axis(fire->state(), c.diameter / 2));
   }
-  result.frequency = strongest_frequency(result.heat, c.interval, 0.3 * result.expected, 4 * result.expected);
+  const double low = 0.3 * result.expected;
+  const double high = 4 * result.expected;
+  result.frequency = strongest_frequency(result.heat, c.interval, low, high);
+  result.rise_frequency = strongest_frequency(result.rise, c.interval, low, high);
   return result;
 }
 

@@ -108,9 +108,10 @@ double transport_error(int n) {
   Rgba air;
   air.c[0] = 300;
   gas.fill(std::vector<Rgba>(size, air));
+  FluidArray<Rgba> still = turn.work.array<Rgba>(size);  // air turns into air
   const auto act = [&](const float* from, float* to, float keep) {
-    turn.work.cells(turn.grid, Transport<float>{in.data(), from, to, gas.data(), turn.velocity(), turn.grid,
-                                                0.F, 300.F, cells, keep});
+    turn.work.cells(turn.grid, Transport{gas.data(), gas.data(), still.data(), in.data(), from, to,
+                                         turn.velocity(), turn.grid, air, cells, keep});
   };
   for (int s = 0; s < steps; ++s) {
     act(in.data(), stage.data(), 0.F);

@@ -129,7 +129,7 @@ class Row {
     this.cells.forEach((cell, place) => set(cell, 'data-name', names[place]));
     this.root = el('tr', {'data-session': session},
       el('th', {scope: 'row'}, el('bdi', {}, session), el('span', {class: 'state'}, this.sign.root, this.state), this.background), ...this.cells,
-      el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.reconstruct, this.quantity.root, this.frame.root), this.job));
+      el('td', {class: 'actions'}, el('div', {}, ...this.buttons, this.reconstruct, this.frame.root, this.quantity.root), this.job));
   }
 
   show(entry: Entry): void {

@@ -152,6 +152,7 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
   if (verb.count("--device") > 0) request.set_device(arguments.device);
   if (verb.count("--quantity") > 0) request.set_quantity(arguments.quantity);
   if (verb.count("--emitter") > 0) request.set_emitter(arguments.emitter);
+  if (verb.count("--lines") > 0) request.set_lines(arguments.lines);
   if (options.temperature && options.temperature->response)
     *request.mutable_response() = recon::message_of(*options.temperature->response);
   request.set_errors(arguments.errors);

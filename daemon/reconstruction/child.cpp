@@ -22,6 +22,7 @@
 #include "recon/calibrate/rig.h"
 #include "recon/compute/device.h"
 #include "recon/temperature/emitter.h"
+#include "recon/temperature/line_emitter.h"
 #include "session/child_messages.h"
 #include "session/files.h"
 #include "session/frame_range.h"
@@ -57,6 +58,11 @@ Status check_quantity(const v1::ReconstructRequest& request) {
     if (const auto emitter = recon::parse_emitter(request.emitter()); !emitter)
       return refuse_field("emitter", emitter.error().what, emitter.error().remedy);
     if (!temperature) return refuse_field("emitter", "is for temperatures", "Give quantity temperature too");
+  }
+  if (!request.lines().empty()) {
+    if (const auto lines = recon::parse_lines(request.lines()); !lines)
+      return refuse_field("lines", lines.error().what, lines.error().remedy);
+    if (!temperature) return refuse_field("lines", "is for temperatures", "Give quantity temperature too");
   }
   if (!request.has_response()) return {};
   if (!temperature) return refuse_field("response", "is for temperatures", "Give quantity temperature too");
@@ -183,6 +189,7 @@ std::vector<std::string> ReconstructionChild::command_for(const v1::ReconstructR
   if (!hold_out.empty()) option("--hold-out", fmt::format("{}", fmt::join(hold_out, ",")));
   if (!request.quantity().empty()) option("--quantity", request.quantity());
   if (!request.emitter().empty()) option("--emitter", request.emitter());
+  if (!request.lines().empty()) option("--lines", request.lines());
   if (request.has_response()) option("--response", "/dev/stdin");
   if (request.errors()) command.emplace_back("--errors");
   if (options_.threads > 0) option("--threads", std::to_string(options_.threads));

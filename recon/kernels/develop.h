@@ -72,10 +72,10 @@ struct LightOfSample {
     const auto channels = static_cast<std::size_t>(to.channels());
     const auto width = static_cast<std::size_t>(to.width);
     const std::size_t pixel = at / channels;
-    const int number = wide ? static_cast<const std::uint16_t*>(sensor)[at]
-                            : static_cast<const std::uint8_t*>(sensor)[at];
+    const int number =
+        wide ? static_cast<const std::uint16_t*>(sensor)[at] : static_cast<const std::uint8_t*>(sensor)[at];
     value[at] = light.at(number, static_cast<int>(pixel % width), static_cast<int>(pixel / width),
-                            static_cast<int>(at % channels));
+                         static_cast<int>(at % channels));
     saturated[at] = number < light.white ? 0 : 1;
   }
 };
@@ -231,10 +231,10 @@ struct DemosaicPixel {
         // its neighbours above and below
         {0, 0, -2, 0, 0,   0, -2, 8, -2, 0,  1, 0, 10, 0, 1,     0, -2, 8, -2, 0,  0, 0, -2, 0, 0}};
     // clang-format on
-    const int filter = channel == 1                           ? 0
-                       : mosaic_channel(x, y) != 1            ? 1
+    const int filter = channel == 1                          ? 0
+                       : mosaic_channel(x, y) != 1           ? 1
                        : mosaic_channel(x + 1, y) == channel ? 2
-                                                              : 3;
+                                                             : 3;
     float sum = 0;
     const float* row = s.value + s.index(x - 2, y - 2);
     for (int v = 0; v < 5; ++v, row += s.width)
@@ -250,8 +250,8 @@ struct DemosaicPixel {
   }
 
   HOST_DEVICE inline void at(int x, int y) const {
-    const std::size_t pixel = static_cast<std::size_t>(y) * static_cast<std::size_t>(s.width) +
-                              static_cast<std::size_t>(x);
+    const std::size_t pixel =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(s.width) + static_cast<std::size_t>(x);
     const bool mosaic = s.layout == SampleLayout::mosaic;
     const bool inside = x >= 2 && y >= 2 && x + 2 < s.width && y + 2 < s.height;
     const bool gradient = mosaic && how == Demosaicing::gradient && inside && !any_bound_near(x, y);
@@ -284,7 +284,8 @@ HOST_DEVICE inline double falloff(const double* k, double r_squared) {
 HOST_DEVICE inline double radius_squared(int width, int height, double x, double y) {
   const double dx = x - 0.5 * width;
   const double dy = y - 0.5 * height;
-  return 4 * (dx * dx + dy * dy) / (static_cast<double>(width) * width + static_cast<double>(height) * height);
+  return 4 * (dx * dx + dy * dy) /
+         (static_cast<double>(width) * width + static_cast<double>(height) * height);
 }
 
 /// Values at the middles of cells that divide a picture evenly, linear between them, and beyond them as they

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "recon/preprocess/picture_on_gpu.h"
-
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "recon/compute/cuda_launch.h"
 #include "recon/compute/gpu_pictures.h"
+#include "recon/preprocess/picture_on_gpu.h"
 #include "recon/preprocess/raw_picture.h"
 
 namespace emberlock::recon {

@@ -17,10 +17,10 @@ struct RawPicture {
   std::shared_ptr<const Image> frame;
   std::vector<float> exposures;  ///< for `light`
   LightOfNumber light;
-  std::vector<std::uint32_t> hot = {};                     ///< pixels that are replaced, ascending
-  std::shared_ptr<const std::vector<float>> dark = {};     ///< taken from the samples; null: nothing
-  std::vector<float> smear_of_row = {};                    ///< taken from those of every row; empty: nothing
-  std::optional<TakeSmearOfRows> smear_of_other_rows = {}; ///< where a smear's path isn't the whole column
+  std::vector<std::uint32_t> hot = {};                      ///< pixels that are replaced, ascending
+  std::shared_ptr<const std::vector<float>> dark = {};      ///< taken from the samples; null: nothing
+  std::vector<float> smear_of_row = {};                     ///< taken from those of every row; empty: nothing
+  std::optional<TakeSmearOfRows> smear_of_other_rows = {};  ///< where a smear's path isn't the whole column
   Demosaicing demosaicing = Demosaicing::bilinear;
   EqualisePixel equalise = {};
   std::vector<float> flat = {};  ///< light of `equalise.flat`; empty: none

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "tests/support/picture_on_gpu.h"
-
 #include "recon/preprocess/picture_on_gpu.h"
+#include "tests/support/picture_on_gpu.h"
 
 namespace emberlock::test {
 

@@ -22,6 +22,7 @@ function choice(label: string, options: Record<string, string>, onchange?: () =>
 export class QuantityChoice {
   private readonly quantity: HTMLSelectElement;
   private readonly emitter: HTMLSelectElement;
+  private readonly lines: HTMLSelectElement;
   private readonly response: HTMLInputElement;
   private readonly temperature: HTMLElement;
   readonly root: HTMLElement;
@@ -30,16 +31,17 @@ export class QuantityChoice {
     this.quantity = choice(`What of ${session} to reconstruct`, {colour: 'colour', errors: 'colour and its errors', temperature: 'temperature'},
                            () => show(this.temperature, this.quantity.value === 'temperature'));
     this.emitter = choice(`What glows in ${session}`, {grey: 'grey', soot: 'soot', paper: 'as in the paper'});
+    this.lines = choice(`What shines beside it in ${session}`, {'': 'alone', auto: 'with lines, found out', sodium: 'with sodium', c2: 'with a blue base', 'sodium,c2': 'with both'});
     this.response = el('input', {type: 'file', accept: '.json,application/json', 'aria-label': `Camera response of ${session}`,
                                  title: 'A response.json of "calibrate colour --black-body"; without one the session’s is taken, else that of a camera that shows linear sRGB.',
                                  onchange: () => this.response.setCustomValidity('')});
     const word = (text: string) => el('span', {'aria-hidden': 'true'}, text);
-    this.temperature = el('span', {class: 'of-temperature', hidden: true}, word('of'), this.emitter, word('response'), this.response);
+    this.temperature = el('span', {class: 'of-temperature', hidden: true}, word('of'), this.emitter, this.lines, word('response'), this.response);
     this.root = el('span', {class: 'quantity-choice'}, this.quantity, this.temperature);
   }
 
   enable(enabled: boolean): void {
-    for (const input of [this.quantity, this.emitter, this.response]) input.disabled = !enabled;
+    for (const input of [this.quantity, this.emitter, this.lines, this.response]) input.disabled = !enabled;
   }
 
   /** The request's part; undefined where the file is no response, which the browser says. */
@@ -53,6 +55,6 @@ export class QuantityChoice {
       this.response.reportValidity();
       return undefined;
     }
-    return {quantity: 'temperature', emitter: this.emitter.value, ...(response && {response})};
+    return {quantity: 'temperature', emitter: this.emitter.value, ...(this.lines.value && {lines: this.lines.value}), ...(response && {response})};
   }
 }

@@ -460,13 +460,14 @@ TEST_F(DaemonVerbs, ReconstructAsksForTemperaturesWithTheResponseItself) {
         reconstructing(v1::ReconstructionStatus::RUNNING, 0).reconstruction());
   };
   const std::string file = (folder / "response.json").string();
-  const test::VerbRun result = run(add_reconstruct, {"reconstruct", "candle", "--quantity", "temperature",
-                                                     "--emitter", "soot", "--response", file});
+  const test::VerbRun result =
+      run(add_reconstruct, {"reconstruct", "candle", "--quantity", "temperature", "--emitter", "soot",
+                            "--lines", "auto", "--response", file});
   EXPECT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("1650 K on average"));
   EXPECT_THAT(api_.calls(),
               ElementsAre(AllOf(HasSubstr("quantity: \"temperature\""), HasSubstr("wavelength_nm: 600"),
-                                HasSubstr("emitter: \"soot\""))));
+                                HasSubstr("emitter: \"soot\""), HasSubstr("lines: \"auto\""))));
   EXPECT_EQ(run(add_reconstruct, {"reconstruct", "candle", "--errors"}).exit_code, 0);
   EXPECT_THAT(api_.calls().back(), HasSubstr("errors: true"));
   const test::VerbRun refused = run(add_reconstruct, {"reconstruct", "candle", "--quantity", "temperature",

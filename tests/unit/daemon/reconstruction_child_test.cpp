@@ -159,13 +159,14 @@ TEST_F(ReconstructionChildTest, TemperaturesAreAskedOfTheProgramWithTheResponseO
   v1::ReconstructRequest asked = request();
   asked.set_quantity("temperature");
   asked.set_emitter("soot");
+  asked.set_lines("sodium,c2");
   *asked.mutable_response() = two_wavelengths();
   ASSERT_TRUE(with_script("echo \"$@\" > $ROOT/words; cat /dev/stdin > $ROOT/response; cat $ROOT/done >&3")
                   .start(asked)
                   .ok());
   EXPECT_EQ(end().state(), State::DONE);
   EXPECT_THAT(test::bytes_of(root_ / "words"),
-              HasSubstr("--quantity temperature --emitter soot --response /dev/stdin"));
+              HasSubstr("--quantity temperature --emitter soot --lines sodium,c2 --response /dev/stdin"));
   const auto read = recon::read_camera_response(root_ / "response");
   ASSERT_TRUE(read.ok()) << read.error().message();
   EXPECT_EQ(recon::message_of(*read).ShortDebugString(), two_wavelengths().ShortDebugString());
@@ -193,6 +194,7 @@ TEST_F(ReconstructionChildTest, WhatNoTemperatureCanBeReadByIsRefused) {
   using Request = v1::ReconstructRequest;
   EXPECT_THAT(refusal([](Request& r) { r.set_quantity("pressure"); }), HasSubstr("colour or temperature"));
   EXPECT_THAT(refusal([](Request& r) { r.set_emitter("neon"); }), HasSubstr("grey, soot or paper"));
+  EXPECT_THAT(refusal([](Request& r) { r.set_lines("neon"); }), HasSubstr("no known line emitter"));
   EXPECT_THAT(refusal([](Request& r) {
                 r.set_quantity("colour");
                 r.set_emitter("grey");

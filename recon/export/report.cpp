@@ -93,25 +93,32 @@ ordered_json temperature_json(const std::optional<TemperatureSummary>& temperatu
   if (!temperature) return {};
   const TemperatureSummary& t = *temperature;
   const TemperatureCounts& n = t.counts;
-  return {{"emitter", name(t.emitter)},
-          {"absolute", t.absolute},
-          {"by_absorption", t.by_absorption},
-          {"opacity", t.opacity},
-          {"mean", t.mean},
-          {"low", t.low},
-          {"high", t.high},
-          {"sigma", t.sigma},
-          {"chi_square", t.chi_square},
-          {"if_other", t.if_other},
-          {"emitting", n.emitting},
-          {"told", n.told},
-          {"colder", n.colder},
-          {"hotter", n.hotter},
-          {"unclear", n.unclear},
-          {"other", n.other},
-          {"saturated", n.saturated},
-          {"solves", t.solves},
-          {"seconds", {{"errors", t.errors_time.value()}, {"reading", t.time.value()}}}};
+  return {
+      {"emitter", name(t.emitter)},
+      {"absolute", t.absolute},
+      {"by_absorption", t.by_absorption},
+      {"opacity", t.opacity},
+      {"mean", t.mean},
+      {"low", t.low},
+      {"high", t.high},
+      {"sigma", t.sigma},
+      {"chi_square", t.chi_square},
+      {"if_other", t.if_other},
+      {"emitting", n.emitting},
+      {"told", n.told},
+      {"colder", n.colder},
+      {"hotter", n.hotter},
+      {"unclear", n.unclear},
+      {"other", n.other},
+      {"saturated", n.saturated},
+      {"solves", t.solves},
+      {"joint",
+       {{"iterations", t.joint.iterations},
+        {"cost_before", t.joint.before},
+        {"cost_after", t.joint.after},
+        {"moved", t.joint.moved}}},
+      {"seconds",
+       {{"errors", t.errors_time.value()}, {"reading", t.time.value()}, {"joint", t.joint.time.value()}}}};
 }
 
 }  // namespace

@@ -70,7 +70,7 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
   const CameraResponse& response = told != nullptr ? *told : standard_response();
   tell(progress, kNearlyDone, "reading temperatures");
   outcome.temperature = temperature_of(task.scene(), outcome.reconstruction, *outcome.errors, response,
-                                       options.temperature->emitter, options.solve.compute);
+                                       options.temperature->emitter, options.solve.compute, task.elapsed);
   TemperatureSummary& summary = outcome.temperature->summary;
   summary.time = task.elapsed() - start;
   outcome.report.temperature = summary;

@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "recon/compute/pool.h"
+#include "recon/temperature/joint_temperature.h"
 #include "recon/temperature/self_absorption.h"
 
 namespace emberlock::recon {
@@ -77,6 +78,7 @@ class Glows {
     opacity_ = -std::log1p(-kPaperOpacityOfAStep) / static_cast<double>(volume_.grid.edge);
   }
   [[nodiscard]] bool by_absorption() const { return by_absorption_; }
+  [[nodiscard]] const SelfAbsorption& own() const { return own_; }
 
   [[nodiscard]] Glow at(std::size_t p) const {
     Glow glow;
@@ -197,8 +199,35 @@ void summarise(const Volume& volume, const std::vector<Fate>& fates, double leas
   out.sigma = at_share(0.5, &Told::sigma);
 }
 
+/// The joint solve's temperatures. What they and what was read differ by is part of their error: it shows
+/// what the prior and a glow of this kind change, and a reading's own error doesn't hold that.
+void take_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
+                   const SelfAbsorption& own, const ComputeOptions& compute, const Elapsed& elapsed,
+                   TemperatureField& field, std::vector<Fate>& fates) {
+  const std::vector<float> read = field.kelvin;
+  if (std::none_of(read.begin(), read.end(), [](float kelvin) { return kelvin > 0; })) return;
+  field.summary.joint = solve_together(scene, done, table, own, compute, elapsed, field.kelvin);
+  for (std::size_t p = 0; p < read.size(); ++p) {
+    if (!(read[p] > 0)) continue;
+    float& kelvin = field.kelvin[p];
+    float& sigma = field.sigma[p];
+    sigma = std::hypot(sigma, kelvin - read[p]);
+    const auto t = static_cast<double>(kelvin);
+    if (!(t > table.coldest().value()))
+      fates[p] = Fate::colder;
+    else if (!(t < table.hottest().value()))
+      fates[p] = Fate::hotter;
+    else if (!(static_cast<double>(sigma) < kMostUncertain * t))
+      fates[p] = Fate::unclear;
+    if (fates[p] != Fate::told) kelvin = sigma = 0;
+  }
+}
+
+enum class Together { yes, no };
+
 TemperatureField read_all(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
-                          const CameraResponse& response, Emitter emitter, const ComputeOptions& compute) {
+                          const CameraResponse& response, Emitter emitter, Together together,
+                          const ComputeOptions& compute, const Elapsed& elapsed) {
   const Volume& volume = done.volume;
   const Grid& grid = volume.grid;
   TemperatureField field;
@@ -239,6 +268,8 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
         field.sigma[p] = static_cast<float>(reading.sigma);
       }
   });
+  if (together == Together::yes && can_solve_together(done.effects))
+    take_together(scene, done, meter.table(), glows.own(), compute, elapsed, field, fates);
   std::array<double, 2> sum = {};
   for (const auto& c : chi) sum = {sum[0] + c[0], sum[1] + c[1]};
   summary.chi_square = sum[1] > 0 ? sum[0] / sum[1] : 0;
@@ -250,11 +281,14 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
 
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
                                 const CameraResponse& response, Emitter emitter,
-                                const ComputeOptions& compute) {
-  TemperatureField field = read_all(scene, done, errors, response, emitter, compute);
-  if (emitter == Emitter::paper || field.summary.counts.told == 0) return field;
+                                const ComputeOptions& compute, const Elapsed& elapsed) {
+  const bool paper = emitter == Emitter::paper;
+  TemperatureField field = read_all(scene, done, errors, response, emitter,
+                                    paper ? Together::no : Together::yes, compute, elapsed);
+  if (paper || field.summary.counts.told == 0) return field;
   const Emitter other = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
-  field.summary.if_other = read_all(scene, done, errors, response, other, compute).summary.mean;
+  field.summary.if_other =
+      read_all(scene, done, errors, response, other, Together::no, compute, elapsed).summary.mean;
   return field;
 }
 

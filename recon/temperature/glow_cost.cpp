@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kKnots = 512;
 constexpr int kTasks = 64;
-constexpr double kLeastVariance = 1e-6;  // of a channel's residuals, over all channels'
-constexpr double kDamping = 1e-3;        // of a step, so that what nobody sees stays
+constexpr double kLeastVariance = 1e-6;                     // of a channel's residuals, over all channels'
+constexpr double kDamping = 1e-3;                           // of a step, so that what nobody sees stays
 constexpr double kMostBrightness = 0.5, kMostKelvin = 100;  // a step
 
 std::array<std::size_t, 3> steps_of(const Grid& g) { return {1, g.index(0, 1, 0), g.index(0, 0, 1)}; }
@@ -79,16 +79,9 @@ GlowCost<Real>::GlowCost(const Problem& problem, GlowStart start, EmitterColours
       ties_(problem.grid().size()),
       shown_(problem.grid().size()),
       residual_(problem.rays()),
-      marched_(problem.rays()),
       gradient_(problem.grid().size()),
-      spread_(problem.grid().size()),
       weight_(problem.grid().size()) {
-  const auto& a = start_.absorption;
-  if (start_.absorb == Absorb::nothing || (a[0] == a[1] && a[1] == a[2])) passes_ = {{0, 3, a[0]}};
-  else passes_ = {{0, 1, a[0]}, {1, 2, a[1]}, {2, 3, a[2]}};
-  samples_.resize(passes_.size());
-  if (start_.absorb == Absorb::field)
-    for (auto& samples : samples_) samples.resize(problem.most_samples());
+  if (start_.absorb == Absorb::field) samples_.resize(problem.most_samples());
   const Grid& g = problem.grid();
   const std::array<std::size_t, 3> step = steps_of(g);
   each_point([&](int i, int j, int k, std::size_t p) {
@@ -125,64 +118,44 @@ void GlowCost<Real>::show(const GlowField<Real>& at) {
 }
 
 template <class Real>
-void GlowCost<Real>::thicken(const Pass& pass) {
-  if (passes_.size() == 1 && pass.absorption == 1) return;
-  each_point([&](int /*i*/, int /*j*/, int /*k*/, std::size_t p) {
-    shown_[p].c[3] = static_cast<Real>(pass.absorption * static_cast<double>(start_.light[p].c[3]));
-  });
-}
-
-template <class Real>
-MarchWork<Real> GlowCost<Real>::work(std::size_t pass) {
-  MarchWork<Real> work;
-  work.rays = problem_.list.table();
-  work.volume = shown_.data();
-  work.sigma = static_cast<Real>(passes_[pass].absorption * start_.sigma);
-  work.residual = marched_.data();
-  work.gradient = spread_.data();
-  work.samples = samples_[pass].data();
-  return work;
+MarchWork<Real> GlowCost<Real>::work() {
+  return {problem_.list.table(),
+          shown_.data(),
+          static_cast<Real>(start_.sigma),
+          residual_.data(),
+          gradient_.data(),
+          samples_.data(),
+          0};
 }
 
 /// The residuals of what is shown.
 template <class Real>
 void GlowCost<Real>::march(const PixelResidual<Real>& pixel) {
-  for (std::size_t n = 0; n < passes_.size(); ++n) {
-    thicken(passes_[n]);
-    const MarchWork<Real> here = work(n);
-    pool_.run(kTasks, [&](int task) {
-      const Slice rays = slice(problem_.rays(), kTasks, task);
-      if (start_.absorb == Absorb::field) {
-        table_.field_forward[travel_](here, pixel, rays.begin, rays.end);
-      } else {
-        table_.forward[static_cast<int>(start_.absorb)][travel_](here, rays.begin, rays.end);
-        for (std::size_t r = rays.begin; r < rays.end; ++r) marched_[r] = pixel(r, marched_[r]);
-      }
-      for (std::size_t r = rays.begin; r < rays.end; ++r)
-        for (int c = passes_[n].first; c < passes_[n].last; ++c) residual_[r].c[c] = marched_[r].c[c];
-    });
-  }
+  const MarchWork<Real> here = work();
+  pool_.run(kTasks, [&](int task) {
+    const Slice rays = slice(problem_.rays(), kTasks, task);
+    if (start_.absorb == Absorb::field) {
+      table_.field_forward[travel_](here, pixel, rays.begin, rays.end);
+      return;
+    }
+    table_.forward[static_cast<int>(start_.absorb)][travel_](here, rays.begin, rays.end);
+    for (std::size_t r = rays.begin; r < rays.end; ++r) residual_[r] = pixel(r, residual_[r]);
+  });
 }
 
-/// gradient = A^T residual, each channel through its own extinction, after march().
+/// gradient = A^T residual, after march().
 template <class Real>
 void GlowCost<Real>::spread() {
-  marched_ = residual_;
+  std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{});
+  const MarchWork<Real> here = work();
   const SlabRuns& slabs = problem_.slabs.front();
   const int count = problem_.slab_count();
-  for (std::size_t n = 0; n < passes_.size(); ++n) {
-    std::fill(spread_.begin(), spread_.end(), Quad<Real>{});
-    const MarchWork<Real> here = work(n);
-    for (int parity = 0; parity < 2; ++parity)  // no two slabs that run at once share a key point
-      pool_.run((count + 1 - parity) / 2, [&](int task) {
-        const auto s = static_cast<std::size_t>(2 * task + parity);
-        table_.adjoint[static_cast<int>(start_.absorb)][travel_](here, slabs.run.data() + slabs.begin[s],
-                                                                 slabs.begin[s + 1] - slabs.begin[s]);
-      });
-    each_point([&](int /*i*/, int /*j*/, int /*k*/, std::size_t p) {
-      for (int c = passes_[n].first; c < passes_[n].last; ++c) gradient_[p].c[c] = spread_[p].c[c];
+  for (int parity = 0; parity < 2; ++parity)  // no two slabs that run at once share a key point
+    pool_.run((count + 1 - parity) / 2, [&](int task) {
+      const auto s = static_cast<std::size_t>(2 * task + parity);
+      table_.adjoint[static_cast<int>(start_.absorb)][travel_](here, slabs.run.data() + slabs.begin[s],
+                                                               slabs.begin[s + 1] - slabs.begin[s]);
     });
-  }
 }
 
 /// 1/2 r^T P r, and r becomes P r. Where a pixel is a bound that is met, r is 0 whatever the light.
@@ -254,8 +227,7 @@ double GlowCost<Real>::operator()(const GlowField<Real>& at, GlowField<Real>& sl
 template <class Real>
 Eigen::Matrix<double, 3, 2> GlowCost<Real>::derivative(const GlowField<Real>& at, std::size_t p) const {
   const EmitterColours::At colour = colours_.at(static_cast<double>(at.kelvin[p]));
-  const double total =
-      static_cast<double>(start_.total[p]) * std::exp(static_cast<double>(at.brightness[p]));
+  const double total = static_cast<double>(start_.total[p]) * std::exp(static_cast<double>(at.brightness[p]));
   Eigen::Matrix<double, 3, 2> out;
   out.col(0) = total * Eigen::Vector3d::Map(colour.value.data());
   out.col(1) = total * Eigen::Vector3d::Map(colour.slope.data());

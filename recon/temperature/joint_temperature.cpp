@@ -25,10 +25,10 @@ struct Begin {
   std::vector<std::size_t> place;
 };
 
-Begin begin_at(const Problem& problem, const Optics& optics, const Volume& volume, const SelfAbsorption& own,
+Begin begin_at(const Problem& problem, const Optics& optics, const Volume& volume,
                const std::vector<float>& kelvin) {
   const Grid& part = problem.grid();
-  Begin begin{{std::vector<Rgba>(part.size()), std::vector<float>(part.size()), own.channel, optics.absorb,
+  Begin begin{{std::vector<Rgba>(part.size()), std::vector<float>(part.size()), optics.absorb,
                static_cast<double>(optics.sigma), optics.white},
               {std::vector<float>(part.size()), std::vector<float>(part.size())},
               std::vector<std::size_t>(part.size())};
@@ -40,9 +40,7 @@ Begin begin_at(const Problem& problem, const Optics& optics, const Volume& volum
         const std::size_t p = part.index(i, j, k);
         const std::size_t w = volume.grid.index(i + offset[0], j + offset[1], k + offset[2]);
         Rgba& light = begin.start.light[p];
-        for (std::size_t c = 0; c < 3; ++c)
-          light.c[static_cast<int>(c)] =
-              edge * volume.emission[3 * w + c] * (own.factor.empty() ? 1 : own.factor[3 * w + c]);
+        for (std::size_t c = 0; c < 3; ++c) light.c[static_cast<int>(c)] = edge * volume.emission[3 * w + c];
         if (optics.absorb == Absorb::field) light.c[3] = edge * volume.extinction[w];
         if (kelvin[w] > 0) begin.start.total[p] = light.c[0] + light.c[1] + light.c[2];
         begin.at.kelvin[p] = kelvin[w];
@@ -51,8 +49,8 @@ Begin begin_at(const Problem& problem, const Optics& optics, const Volume& volum
   return begin;
 }
 
-/// Nesterov's accelerated descent; where the cost rises it goes back to the best, without momentum, and where that
-/// was a plain step already, the next ones are half as long (O'Donoghue and Candes 2015).
+/// Nesterov's accelerated descent; where the cost rises it goes back to the best, without momentum, and where
+/// that was a plain step already, the next ones are half as long (O'Donoghue and Candes 2015).
 JointSolve descend(GlowCost<float>& cost, GlowField<float>& at) {
   JointSolve out;
   GlowField<float> best = at;
@@ -103,8 +101,7 @@ bool can_solve_together(const Effects& effects) {
 }
 
 JointSolve solve_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
-                          const SelfAbsorption& own, const ComputeOptions& compute, const Elapsed& elapsed,
-                          std::vector<float>& kelvin) {
+                          const ComputeOptions& compute, const Elapsed& elapsed, std::vector<float>& kelvin) {
   const Seconds began = elapsed ? elapsed() : Seconds(0);
   const auto prepared = PreparedScene::create(scene, done.effects);
   if (!prepared.ok()) throw std::logic_error(prepared.error().message());
@@ -117,7 +114,7 @@ JointSolve solve_together(const Scene& scene, const Reconstruction& done, const 
   ProblemOptions rays = setup.problem_options();
   rays.rule.stride = stride_for(setup, done.volume.grid);
   const Problem problem = make_problem(setup.views, done.hull, rays, pool);
-  Begin begin = begin_at(problem, setup.optics(done.volume.grid), done.volume, own, kelvin);
+  Begin begin = begin_at(problem, setup.optics(done.volume.grid), done.volume, kelvin);
   const std::vector<float> total = begin.start.total;
   GlowCost<float> cost(problem, std::move(begin.start), EmitterColours(table), pool);
   cost.weigh(begin.at, kTies);

@@ -5,7 +5,6 @@
 
 #include "recon/adjust/solver.h"
 #include "recon/temperature/emitter.h"
-#include "recon/temperature/self_absorption.h"
 
 namespace emberlock::recon {
 
@@ -21,13 +20,12 @@ struct JointSolve {
 /// light that was scattered.
 bool can_solve_together(const Effects& effects);
 
-/// Seeks temperature and brightness of all voxels that tell a temperature together, by the pictures of the input
-/// views: accelerated descent of a GlowCost, each channel through its own extinction. `kelvin`, at key points and 0
-/// where not told, is where it starts and becomes the result, which costs no more; other light stays as it is. On the
-/// CPU, the same bits for every number of threads. `scene` is one that solve() took. Throws Diverged where the
-/// cost isn't finite.
+/// Seeks temperature and brightness of all voxels that tell a temperature together, by the pictures of the
+/// input views: accelerated descent of a GlowCost. `kelvin`, at key points and 0 where not told, is where it
+/// starts and becomes the result, which costs no more; other light stays as it is. On the CPU, the same bits
+/// for every number of threads. `scene` is one that solve() took. Throws Diverged where the cost isn't
+/// finite.
 JointSolve solve_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
-                          const SelfAbsorption& own, const ComputeOptions& compute, const Elapsed& elapsed,
-                          std::vector<float>& kelvin);
+                          const ComputeOptions& compute, const Elapsed& elapsed, std::vector<float>& kelvin);
 
 }  // namespace emberlock::recon

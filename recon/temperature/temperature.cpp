@@ -78,7 +78,6 @@ class Glows {
     opacity_ = -std::log1p(-kPaperOpacityOfAStep) / static_cast<double>(volume_.grid.edge);
   }
   [[nodiscard]] bool by_absorption() const { return by_absorption_; }
-  [[nodiscard]] const SelfAbsorption& own() const { return own_; }
 
   [[nodiscard]] Glow at(std::size_t p) const {
     Glow glow;
@@ -202,11 +201,11 @@ void summarise(const Volume& volume, const std::vector<Fate>& fates, double leas
 /// The joint solve's temperatures. What they and what was read differ by is part of their error: it shows
 /// what the prior and a glow of this kind change, and a reading's own error doesn't hold that.
 void take_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
-                   const SelfAbsorption& own, const ComputeOptions& compute, const Elapsed& elapsed,
-                   TemperatureField& field, std::vector<Fate>& fates) {
+                   const ComputeOptions& compute, const Elapsed& elapsed, TemperatureField& field,
+                   std::vector<Fate>& fates) {
   const std::vector<float> read = field.kelvin;
   if (std::none_of(read.begin(), read.end(), [](float kelvin) { return kelvin > 0; })) return;
-  field.summary.joint = solve_together(scene, done, table, own, compute, elapsed, field.kelvin);
+  field.summary.joint = solve_together(scene, done, table, compute, elapsed, field.kelvin);
   for (std::size_t p = 0; p < read.size(); ++p) {
     if (!(read[p] > 0)) continue;
     float& kelvin = field.kelvin[p];
@@ -245,6 +244,7 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
   const Thermometer meter(table_for(done, response, emitter));
   SelfAbsorption own;
   if (emitter == Emitter::soot) own = self_absorption(scene, done, response, emitter, compute);
+  const bool corrected = !own.factor.empty();
   const Glows glows(done, errors, meter.table(), std::move(own), brightest);
   summary.by_absorption = glows.by_absorption();
   const Saturation saturation(scene);
@@ -268,8 +268,8 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
         field.sigma[p] = static_cast<float>(reading.sigma);
       }
   });
-  if (together == Together::yes && can_solve_together(done.effects))
-    take_together(scene, done, meter.table(), glows.own(), compute, elapsed, field, fates);
+  if (together == Together::yes && !corrected && can_solve_together(done.effects))
+    take_together(scene, done, meter.table(), compute, elapsed, field, fates);
   std::array<double, 2> sum = {};
   for (const auto& c : chi) sum = {sum[0] + c[0], sum[1] + c[1]};
   summary.chi_square = sum[1] > 0 ? sum[0] / sum[1] : 0;

@@ -48,11 +48,12 @@ struct TemperatureField {
 inline constexpr double kShareThatCounts = 0.05;
 
 /// Reads each voxel's temperature; grey and soot then solve for all of them together (joint_temperature.h)
-/// where the effects allow it, and what that changes is part of their errors. `scene` tells where views are
-/// saturated. Grey and soot: by the three channels, joined by their covariance (soot's after
-/// self_absorption.h), and where extinction was reconstructed, the response is absolute and nothing scatters,
-/// by emission over extinction. The paper: by green and its constant opacity of 0.05 a voxel edge, between
-/// 1000 and 2300 K; where the response is relative the brightest green is 2300 K.
+/// where the effects allow it and no self-absorption was corrected, and what that changes is part of their
+/// errors. `scene` tells where views are saturated. Grey and soot: by the three channels, joined by their
+/// covariance (soot's after self_absorption.h), and where extinction was reconstructed, the response is
+/// absolute and nothing scatters, by emission over extinction. The paper: by green and its constant opacity
+/// of 0.05 a voxel edge, between 1000 and 2300 K; where the response is relative the brightest green is 2300
+/// K.
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
                                 const CameraResponse& response, Emitter emitter,
                                 const ComputeOptions& compute = {}, const Elapsed& elapsed = {});

@@ -34,7 +34,6 @@ constexpr Row kRows[] = {
     {"grey, relative response", recon::Emitter::grey, recon::Emitter::grey, false},
     {"grey, read as the paper does", recon::Emitter::grey, recon::Emitter::paper, true},
     {"soot, told", recon::Emitter::soot, recon::Emitter::soot, true},
-    {"soot, told, voxel by voxel", recon::Emitter::soot, recon::Emitter::soot, true, false},
     {"soot, taken for grey", recon::Emitter::soot, recon::Emitter::grey, true},
 };
 

@@ -97,6 +97,11 @@ std::vector<std::string> temperature_words(const TemperatureSummary& t) {
     words.push_back(fmt::format("if it were {}, the average would be {:.0f} K (--emitter {})",
                                 t.emitter == Emitter::grey ? "soot, which isn't grey" : "grey", t.if_other,
                                 t.emitter == Emitter::grey ? "soot" : "grey"));
+  if (t.joint.iterations > 0)
+    words.push_back(fmt::format(
+        "solved together by the pictures, {} steps in {:.1f} s: they moved by {:.0f} K "
+        "(RMS), and what the pictures say against them fell by {:.0f} %",
+        t.joint.iterations, t.joint.time.value(), t.joint.moved, 100 * (1 - t.joint.after / t.joint.before)));
   words.push_back(
       fmt::format("errors took {:.1f} s: {} solves without some of the views; the temperatures {:.1f} s",
                   t.errors_time.value(), t.solves, t.time.value()));

@@ -74,7 +74,7 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
   tell(progress, kNearlyDone, "reading temperatures");
   outcome.temperature = temperature_of(
       task.scene(), outcome.reconstruction, *outcome.errors, response_for(*options.temperature, task.scene()),
-      options.temperature->emitter, options.solve.compute, options.temperature->lines);
+      options.temperature->emitter, options.solve.compute, task.elapsed, options.temperature->lines);
   TemperatureSummary& summary = outcome.temperature->summary;
   summary.time = task.elapsed() - start;
   outcome.report.temperature = summary;

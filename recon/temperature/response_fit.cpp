@@ -60,12 +60,12 @@ struct Shape {
 };
 
 /// A level, and its changes with log_scale (itself), shift, log_width and the temperature.
-struct Level {
+struct LevelAndSlopes {
   double value = 0, by_shift = 0, by_width = 0, by_kelvin = 0;
 };
 
-Level level_of(const Lobe& lobe, const Shape& shape, const KnownEmitter& emitter, double kelvin) {
-  Level out;
+LevelAndSlopes level_of(const Lobe& lobe, const Shape& shape, const KnownEmitter& emitter, double kelvin) {
+  LevelAndSlopes out;
   const double width = std::exp(shape.log_width);
   for (std::size_t i = 0; i < lobe.nm.size(); ++i) {
     constexpr double kShortest = 100;  // nm
@@ -171,7 +171,7 @@ class GlowProblem {
   }
   void add_level(const Eigen::VectorXd& x, std::size_t c, std::size_t i, Point& p) const {
     const GlowReading& reading = readings_[i];
-    const Level model = level_of(lobes_[c], shape(x, c), options_.emitter, kelvin(x, i));
+    const LevelAndSlopes model = level_of(lobes_[c], shape(x, c), options_.emitter, kelvin(x, i));
     if (reading.saturated[c] && model.value >= reading.level[c]) return;
     const double sigma = error(reading, c);
     const bool black = reading.level[c] <= kNothing * reading.sigma[c];
@@ -380,7 +380,7 @@ std::array<double, 3> level_errors(const ResponseFit& fit, const CameraResponse&
     const FittedChannel& channel = fit.channels[c];
     if (channel.dead) continue;
     const Shape shape{0, channel.shift.value, std::log(channel.width.value)};
-    const Level level = level_of(lobe_of(base, c), shape, {}, temperature.value());
+    const LevelAndSlopes level = level_of(lobe_of(base, c), shape, {}, temperature.value());
     if (!(level.value > 0)) continue;
     const Eigen::Vector3d slope(1, level.by_shift / level.value, level.by_width / level.value);
     const auto at = 3 * static_cast<Eigen::Index>(c);

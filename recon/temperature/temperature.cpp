@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 
 #include "recon/compute/pool.h"
+#include "recon/temperature/joint_temperature.h"
 #include "recon/temperature/self_absorption.h"
 #include "recon/temperature/unmixing.h"
 
@@ -268,9 +269,45 @@ std::vector<Glow> glows_of(const std::vector<Fate>& fates, Fate fate, const Glow
   return out;
 }
 
-TemperatureField read_all(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
-                          const CameraResponse& response, Emitter emitter, const ComputeOptions& compute,
+/// The joint solve's temperatures. What they and what was read differ by is part of their error: it shows
+/// what the prior and a glow of this kind change, and a reading's own error doesn't hold that.
+void take_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
+                   const ComputeOptions& compute, const Elapsed& elapsed, TemperatureField& field,
+                   std::vector<Fate>& fates) {
+  const std::vector<float> read = field.kelvin;
+  if (std::none_of(read.begin(), read.end(), [](float kelvin) { return kelvin > 0; })) return;
+  field.summary.joint = solve_together(scene, done, table, compute, elapsed, field.kelvin);
+  for (std::size_t p = 0; p < read.size(); ++p) {
+    if (!(read[p] > 0)) continue;
+    float& kelvin = field.kelvin[p];
+    float& sigma = field.sigma[p];
+    sigma = std::hypot(sigma, kelvin - read[p]);
+    const auto t = static_cast<double>(kelvin);
+    if (!(t > table.coldest().value()))
+      fates[p] = Fate::colder;
+    else if (!(t < table.hottest().value()))
+      fates[p] = Fate::hotter;
+    else if (!(static_cast<double>(sigma) < kMostUncertain * t))
+      fates[p] = Fate::unclear;
+    if (fates[p] != Fate::told) kelvin = sigma = 0;
+  }
+}
+
+/// What all readings of one volume share.
+struct Asked {
+  const Scene& scene;
+  const Reconstruction& done;
+  const VolumeErrors& errors;
+  const CameraResponse& response;
+  const ComputeOptions& compute;
+  const Elapsed& elapsed;
+};
+
+enum class Together { yes, no };
+
+TemperatureField read_all(const Asked& asked, Emitter emitter, Together together,
                           const std::vector<const LineEmitter*>& named, std::vector<Glow>* others = nullptr) {
+  const auto& [scene, done, errors, response, compute, elapsed] = asked;
   const Volume& volume = done.volume;
   const Grid& grid = volume.grid;
   TemperatureField field;
@@ -288,6 +325,7 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
   const Thermometer meter(table_for(done, response, emitter));
   SelfAbsorption own;
   if (emitter == Emitter::soot) own = self_absorption(scene, done, response, emitter, compute);
+  const bool corrected = !own.factor.empty();
   const Glows glows(done, errors, meter.table(), std::move(own), brightest, !named.empty());
   summary.by_absorption = glows.by_absorption();
   const Saturation saturation(scene);
@@ -318,6 +356,8 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
         field.sigma[p] = static_cast<float>(reading.sigma);
       }
   });
+  if (together == Together::yes && !corrected && can_solve_together(done.effects))
+    take_together(scene, done, meter.table(), compute, elapsed, field, fates);
   std::array<double, 2> sum = {};
   for (const auto& c : chi) sum = {sum[0] + c[0], sum[1] + c[1]};
   summary.chi_square = sum[1] > 0 ? sum[0] / sum[1] : 0;
@@ -330,22 +370,26 @@ TemperatureField read_all(const Scene& scene, const Reconstruction& done, const 
 
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
                                 const CameraResponse& response, Emitter emitter,
-                                const ComputeOptions& compute, const LineRequest& lines) {
+                                const ComputeOptions& compute, const Elapsed& elapsed,
+                                const LineRequest& lines) {
+  const Asked asked{scene, done, errors, response, compute, elapsed};
+  const bool paper = emitter == Emitter::paper;
   std::vector<const LineEmitter*> named = lines.named;
   std::vector<Glow> others;
-  TemperatureField field = read_all(scene, done, errors, response, emitter, compute, named, &others);
+  TemperatureField field =
+      read_all(asked, emitter, paper || !named.empty() ? Together::no : Together::yes, named, &others);
   if (lines.automatic && !others.empty()) {
     const LineChoice choice = choose_line(Thermometer(table_for(done, response, emitter)), response, others);
     if (choice.chosen != nullptr) {
       named = {choice.chosen};
-      field = read_all(scene, done, errors, response, emitter, compute, named);
+      field = read_all(asked, emitter, Together::no, named);
     }
     for (const LineEmitter* rival : choice.rivals) field.summary.lines_alike.emplace_back(rival->name);
   }
   field.summary.lines_automatic = lines.automatic;
-  if (emitter == Emitter::paper || field.summary.counts.told == 0) return field;
+  if (paper || field.summary.counts.told == 0) return field;
   const Emitter other = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
-  field.summary.if_other = read_all(scene, done, errors, response, other, compute, named).summary.mean;
+  field.summary.if_other = read_all(asked, other, Together::no, named).summary.mean;
   return field;
 }
 

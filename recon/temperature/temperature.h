@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "recon/adjust/solver.h"
+#include "recon/temperature/joint_temperature.h"
 #include "recon/temperature/line_emitter.h"
 #include "recon/temperature/thermometer.h"
 #include "recon/temperature/view_errors.h"
@@ -44,12 +45,14 @@ struct TemperatureSummary {
   double mean = 0, low = 0, high = 0;  ///< mean, and what 5 % and 95 % lie below
   double sigma = 0;                    ///< the median of the voxels' errors
   double chi_square = 0;               ///< mean per degree of freedom; 0: there were none
-  double if_other = 0;  ///< what the mean were if the glow were soot's instead of grey, or the reverse
+  double if_other = 0;  ///< what the mean were if the glow were soot's instead of grey, or the reverse; as
+                        ///< it is read, without a joint solve
   bool lines_automatic = false;         ///< chosen by the program
   std::vector<LineSummary> lines = {};  ///< those that were looked for, or chosen
   /// Automatic and none chosen: those that explain what no soot does alike; empty: none explains it.
   std::vector<std::string> lines_alike = {};
-  int solves = 0;  ///< of errors_by_views()
+  int solves = 0;    ///< of errors_by_views()
+  JointSolve joint;  ///< of all voxels' temperatures, after each was read
   Seconds errors_time{0}, time{0};
 };
 
@@ -62,14 +65,17 @@ struct TemperatureField {
 
 inline constexpr double kShareThatCounts = 0.05;
 
-/// Reads each voxel's temperature. `scene` tells where views are saturated. Grey and soot: by the three
-/// channels, joined by their covariance (soot's after self_absorption.h), and where extinction was
-/// reconstructed, the response is absolute and nothing scatters, by emission over extinction. The paper: by
-/// green and its constant opacity of 0.05 a voxel edge, between 1000 and 2300 K; where the response is
-/// relative the brightest green is 2300 K.
-/// With `lines`, valid by check_lines(), each voxel's light is taken apart into soot and lines (unmixing.h).
+/// Reads each voxel's temperature; grey and soot then solve for all of them together (joint_temperature.h)
+/// where the effects allow it and no self-absorption was corrected, and what that changes is part of their
+/// errors. `scene` tells where views are saturated. Grey and soot: by the three channels, joined by their
+/// covariance (soot's after self_absorption.h), and where extinction was reconstructed, the response is
+/// absolute and nothing scatters, by emission over extinction. The paper: by green and its constant opacity
+/// of 0.05 a voxel edge, between 1000 and 2300 K; where the response is relative the brightest green is 2300
+/// K. With `lines`, valid by check_lines(), each voxel's light is taken apart into soot and lines
+/// (unmixing.h), and nothing is solved together.
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
                                 const CameraResponse& response, Emitter emitter,
-                                const ComputeOptions& compute = {}, const LineRequest& lines = {});
+                                const ComputeOptions& compute = {}, const Elapsed& elapsed = {},
+                                const LineRequest& lines = {});
 
 }  // namespace emberlock::recon

@@ -3,15 +3,19 @@
 // absorbs, ten views of 640 x 480, 16 bits, noise of 0.25 grey levels, 128^3 voxels, the truth on 192^3.
 // Weighted by the true emission, over key points with soot that emit 5 % of the brightest. Salted: in one
 // half of the flame sodium makes 30 % of the light, and its lowest 30 % are a blue base of C2 without soot.
-//   bench_temperature [VOXELS [SEEDS]]
+//   bench_temperature [VOXELS [SEEDS [FIRST_SEED]]]
+//   bench_temperature FOLDER [VOXELS]     of emberlock simulate flame
 #include "recon/temperature/temperature.h"
 
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 #include <vector>
 
 #include "base/clock.h"
 #include "recon/adjust/choose_effects.h"
+#include "recon/export/volume_file.h"
+#include "recon/pipeline/scene.h"
 #include "tests/support/glowing_flame.h"
 
 using namespace emberlock;
@@ -24,10 +28,12 @@ struct Row {
   bool absolute;
   bool salted = false;
   const char* lines = "";
+  bool together = true;
 };
 
 constexpr Row kRows[] = {
     {"grey", recon::Emitter::grey, recon::Emitter::grey, true},
+    {"grey, voxel by voxel", recon::Emitter::grey, recon::Emitter::grey, true, false, "", false},
     {"grey, relative response", recon::Emitter::grey, recon::Emitter::grey, false},
     {"grey, read as the paper does", recon::Emitter::grey, recon::Emitter::paper, true},
     {"soot, told", recon::Emitter::soot, recon::Emitter::soot, true},
@@ -83,7 +89,8 @@ bool solve_and_read(int voxels, recon::FlameShape shape, int seed,
     response.absolute = row.absolute;
     const TimePoint start = clock.now();
     const recon::TemperatureField field =
-        recon::temperature_of(scene, done, errors, response, row.read, {}, *recon::parse_lines(row.lines));
+        recon::temperature_of(scene, row.together ? done : test::voxel_by_voxel(done), errors, response,
+                              row.read, {}, {}, *recon::parse_lines(row.lines));
     const test::TemperatureScore score = test::score_of(*flame, done, field);
     std::printf("    %-30s %s, read in %.2f s\n", row.name, test::words(score, field).c_str(),
                 (clock.now() - start).value());
@@ -94,13 +101,98 @@ bool solve_and_read(int voxels, recon::FlameShape shape, int seed,
   return true;
 }
 
+/// A simulated flame's truth at a reconstruction's key points; nothing outside.
+test::GlowTruth truth_on(const recon::Grid& grid, const recon::Volume& truth,
+                         const std::vector<float>& kelvin) {
+  test::GlowTruth out{std::vector<float>(grid.size()), std::vector<float>(3 * grid.size())};
+  const recon::Grid& from = truth.grid;
+  const int n[3] = {from.nx, from.ny, from.nz};
+  for (int k = 0; k < grid.nz; ++k)
+    for (int j = 0; j < grid.ny; ++j)
+      for (int i = 0; i < grid.nx; ++i) {
+        const int at[3] = {i, j, k};
+        int low[3];
+        float part[3];
+        bool inside = true;
+        for (int d = 0; d < 3; ++d) {
+          const float x =
+              (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
+          inside = inside && x >= 0 && x < static_cast<float>(n[d] - 1);
+          low[d] = inside ? static_cast<int>(x) : 0;
+          part[d] = x - static_cast<float>(low[d]);
+        }
+        if (!inside) continue;
+        const std::size_t p = grid.index(i, j, k);
+        for (int corner = 0; corner < 8; ++corner) {
+          float weight = 1;
+          int place[3];
+          for (int d = 0; d < 3; ++d) {
+            const int upper = corner >> d & 1;
+            place[d] = low[d] + upper;
+            weight *= upper != 0 ? part[d] : 1 - part[d];
+          }
+          const std::size_t q = from.index(place[0], place[1], place[2]);
+          out.kelvin[p] += weight * kelvin[q];
+          for (std::size_t c = 0; c < 3; ++c) out.emission[3 * p + c] += weight * truth.emission[3 * q + c];
+        }
+      }
+  return out;
+}
+
+/// The last frame of a folder of `emberlock simulate flame`, read as what it is: soot.
+int read_simulated(const std::filesystem::path& folder, int voxels) {
+  const auto fail = [](const Error& error) {
+    std::fprintf(stderr, "%s\n", error.message().c_str());
+    return 1;
+  };
+  const SteadyClock clock;
+  recon::SceneOptions options;
+  std::filesystem::path last;
+  std::size_t frames = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "truth")) {
+    last = std::max(last, entry.path());
+    ++frames;
+  }
+  options.frame = frames - 1;
+  const auto scene = recon::load_scene(folder / "session", options);
+  if (!scene.ok()) return fail(scene.error());
+  const auto truth = recon::read_volume(last);
+  if (!truth.ok()) return fail(truth.error());
+  const auto kelvin = recon::read_grid(last, "temperature");
+  if (!kelvin.ok()) return fail(kelvin.error());
+  const recon::Grid grid = recon::grid_over(scene->box, voxels);
+  const TimePoint start = clock.now();
+  const recon::Elapsed elapsed = [&] { return clock.now() - start; };
+  const auto choice = recon::choose_effects(*scene, grid, {}, {}, elapsed);
+  if (!choice.ok()) return fail(choice.error());
+  const auto done = recon::solve(*scene, grid, choice->effects, {}, elapsed);
+  if (!done.ok()) return fail(done.error());
+  const auto errors = recon::errors_by_views(*scene, *done, {}, elapsed);
+  if (!errors.ok()) return fail(errors.error());
+  const test::GlowTruth glow = truth_on(grid, *truth, *kelvin);
+  for (const bool together : {false, true}) {
+    const TimePoint begin = clock.now();
+    const recon::TemperatureField field =
+        recon::temperature_of(*scene, together ? *done : test::voxel_by_voxel(*done), *errors,
+                              recon::standard_response(), recon::Emitter::soot);
+    std::printf("%s, extinction %s, %s: %s, read in %.2f s\n", folder.c_str(),
+                done->volume.extinction.empty() ? "off" : "on", together ? "together" : "voxel by voxel",
+                test::words(test::score_of(glow, *done, field), field).c_str(),
+                (clock.now() - begin).value());
+  }
+  return 0;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (argc > 1 && std::filesystem::is_directory(argv[1]))
+    return read_simulated(argv[1], argc > 2 ? std::atoi(argv[2]) : 96);
   const int voxels = argc > 1 ? std::atoi(argv[1]) : 128;
   const int seeds = argc > 2 ? std::atoi(argv[2]) : 3;
+  const int first = argc > 3 ? std::atoi(argv[3]) : 11;
   std::vector<test::TemperatureScore> mean(std::size(kRows));
-  for (int seed = 11; seed < 11 + seeds; ++seed)
+  for (int seed = first; seed < first + seeds; ++seed)
     for (const recon::FlameShape shape : {recon::FlameShape::plume, recon::FlameShape::two_plumes})
       if (!solve_and_read(voxels, shape, seed, mean)) return 1;
   std::printf(

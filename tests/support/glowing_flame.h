@@ -199,11 +199,21 @@ struct TemperatureScore {
   }
 };
 
-inline TemperatureScore score_of(const GlowingFlame& flame, const recon::Reconstruction& done,
+/// The same under effects that allow no joint solve: each voxel's temperature is read by itself.
+inline recon::Reconstruction voxel_by_voxel(recon::Reconstruction done) {
+  done.effects.exposure.shutter = recon::Exposure::Shutter::integrated;
+  return done;
+}
+
+/// What a reconstruction should find at its key points: K, and levels of three channels.
+struct GlowTruth {
+  std::vector<float> kelvin, emission;
+};
+
+inline TemperatureScore score_of(const GlowTruth& truth, const recon::Reconstruction& done,
                                  const recon::TemperatureField& field) {
   const recon::Grid& grid = done.volume.grid;
-  const Glowing truth = flame.at(grid);
-  const std::vector<float> lit = flame.lit(grid).volume.emission;
+  const std::vector<float>& lit = truth.emission;
   const float brightest = *std::max_element(lit.begin(), lit.end());
   struct Off {
     double kelvin, sigma, weight;
@@ -235,6 +245,12 @@ inline TemperatureScore score_of(const GlowingFlame& flame, const recon::Reconst
     if (sum <= 0.95 * weights) score.most = o.kelvin;
   }
   return score;
+}
+
+inline TemperatureScore score_of(const GlowingFlame& flame, const recon::Reconstruction& done,
+                                 const recon::TemperatureField& field) {
+  const recon::Grid& grid = done.volume.grid;
+  return score_of({flame.at(grid).kelvin, flame.lit(grid).volume.emission}, done, field);
 }
 
 inline std::string words(const TemperatureScore& score, const recon::TemperatureField& field) {

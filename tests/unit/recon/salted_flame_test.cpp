@@ -41,7 +41,7 @@ class SaltedFlameTest : public testing::Test {
     delete flame_;
   }
   static TemperatureField read(const char* lines) {
-    return temperature_of(*scene_, *done_, *errors_, flame_->response(), Emitter::soot, {},
+    return temperature_of(*scene_, *done_, *errors_, flame_->response(), Emitter::soot, {}, {},
                           *parse_lines(lines));
   }
   static std::string words(const TemperatureField& field) {

@@ -72,6 +72,27 @@ TEST(Temperature, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
   }
 }
 
+TEST(Temperature, SolvedTogetherIsBetterThanReadVoxelByVoxel) {
+  const test::GlowingFlame& flame = flame_of(Emitter::grey);
+  const Solved& s = solved_of(Emitter::grey);
+  const TemperatureField alone =
+      temperature_of(s.scene, test::voxel_by_voxel(s.done), s.errors, flame.response(), Emitter::grey);
+  const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
+  EXPECT_EQ(alone.summary.joint.iterations, 0);
+  const JointSolve& joint = field.summary.joint;
+  EXPECT_GT(joint.iterations, 0);
+  EXPECT_LT(joint.after, 0.9 * joint.before);
+  const test::TemperatureScore score = test::score_of(flame, s.done, field);
+  const test::TemperatureScore before = test::score_of(flame, s.done, alone);
+  SCOPED_TRACE(test::words(score, field) + "; alone " + test::words(before, alone));
+  EXPECT_LT(score.median, before.median + 1);
+  EXPECT_LT(score.most, before.most);
+  for (std::size_t p = 0; p < field.kelvin.size(); ++p) {
+    if (!(field.kelvin[p] > 0)) continue;
+    ASSERT_NEAR(field.sigma[p], std::hypot(alone.sigma[p], field.kelvin[p] - alone.kelvin[p]), 1e-2) << p;
+  }
+}
+
 TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
   const test::GlowingFlame& flame = flame_of(Emitter::soot);
   const Solved& s = solved_of(Emitter::soot);
@@ -80,8 +101,9 @@ TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
   const TemperatureSummary mistaken =
       temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey).summary;
   EXPECT_GT(mistaken.mean, told.mean + 60) << "soot taken for grey looks hotter";
-  EXPECT_NEAR(mistaken.if_other, told.mean, 1) << "and that is said";
-  EXPECT_NEAR(told.if_other, mistaken.mean, 1);
+  constexpr double kMoved = 5;  // K, what a joint solve may change of a mean: `if_other` is read without one
+  EXPECT_NEAR(mistaken.if_other, told.mean, kMoved) << "and that is said";
+  EXPECT_NEAR(told.if_other, mistaken.mean, kMoved);
 }
 
 TEST(Temperature, ThePapersConventionReadsGreenAlone) {

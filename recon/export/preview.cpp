@@ -49,7 +49,7 @@ std::vector<float> told_of(const std::vector<float>& values) {
 
 /// The value below which so large a share of them lies.
 double percentile(std::vector<float>& values, double share) {
-  const auto at = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  const std::ptrdiff_t at = std::lround(share * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), values.begin() + at, values.end());
   return static_cast<double>(values[static_cast<std::size_t>(at)]);
 }

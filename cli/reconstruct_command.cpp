@@ -123,8 +123,8 @@ Status plan_files(const ReconstructArguments& arguments) {
 /// The options that the daemon accepts; the others are in its configuration.
 DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, const CLI::App& verb) {
   static const std::set<std::string> kAskable = {
-      "input",    "--cancel",   "--json",   "--frame",    "--last-frame", "--every",   "--budget",
-      "--voxels", "--hold-out", "--device", "--quantity", "--response",   "--emitter", "--errors"};
+      "input",      "--cancel", "--json",     "--frame",    "--last-frame", "--every", "--budget", "--voxels",
+      "--hold-out", "--device", "--quantity", "--response", "--emitter",    "--lines", "--errors"};
   for (const CLI::Option* option : verb.get_options()) {
     if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
       fail({ErrorKind::bad_input, "can't be used with --daemon", option->get_name(),

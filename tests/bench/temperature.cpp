@@ -29,6 +29,7 @@ struct Row {
   bool salted = false;
   const char* lines = "";
   bool together = true;
+  bool spectral = false;
 };
 
 constexpr Row kRows[] = {
@@ -36,6 +37,7 @@ constexpr Row kRows[] = {
     {"grey, voxel by voxel", recon::Emitter::grey, recon::Emitter::grey, true, false, "", false},
     {"grey, relative response", recon::Emitter::grey, recon::Emitter::grey, false},
     {"grey, read as the paper does", recon::Emitter::grey, recon::Emitter::paper, true},
+    {"soot, told, another renderer", recon::Emitter::soot, recon::Emitter::soot, true, false, "", true, true},
     {"soot, told", recon::Emitter::soot, recon::Emitter::soot, true},
     {"soot, taken for grey", recon::Emitter::soot, recon::Emitter::grey, true},
     {"soot, --lines sodium,c2", recon::Emitter::soot, recon::Emitter::soot, true, false, "sodium,c2"},
@@ -50,19 +52,22 @@ bool solve_and_read(int voxels, recon::FlameShape shape, int seed,
   const SteadyClock clock;
   std::optional<recon::Emitter> filmed;
   bool salted = false;
+  bool spectral = false;
   std::optional<test::GlowingFlame> flame;
   recon::Scene scene;
   recon::Reconstruction done;
   recon::VolumeErrors errors;
   for (std::size_t i = 0; i < std::size(kRows); ++i) {
     const Row& row = kRows[i];
-    if (row.truth != filmed || row.salted != salted) {
+    if (row.truth != filmed || row.salted != salted || row.spectral != spectral) {
       filmed = row.truth;
       salted = row.salted;
+      spectral = row.spectral;
       test::GlowingFlameOptions options;
       options.film.flame.seed = static_cast<std::uint64_t>(seed);
       options.film.flame.shape = shape;
       options.emitter = row.truth;
+      options.spectral = spectral;
       if (salted) {
         options.sodium = 0.3;
         options.blue_base = 0.3;
@@ -104,7 +109,8 @@ bool solve_and_read(int voxels, recon::FlameShape shape, int seed,
 /// A simulated flame's truth at a reconstruction's key points; nothing outside.
 test::GlowTruth truth_on(const recon::Grid& grid, const recon::Volume& truth,
                          const std::vector<float>& kelvin) {
-  test::GlowTruth out{std::vector<float>(grid.size()), std::vector<float>(3 * grid.size())};
+  test::GlowTruth out{std::vector<float>(grid.size()), std::vector<float>(grid.size()),
+                      std::vector<float>(3 * grid.size())};
   const recon::Grid& from = truth.grid;
   const int n[3] = {from.nx, from.ny, from.nz};
   for (int k = 0; k < grid.nz; ++k)
@@ -133,6 +139,7 @@ test::GlowTruth truth_on(const recon::Grid& grid, const recon::Volume& truth,
           }
           const std::size_t q = from.index(place[0], place[1], place[2]);
           out.kelvin[p] += weight * kelvin[q];
+          out.absorption[p] += weight * truth.extinction[q];
           for (std::size_t c = 0; c < 3; ++c) out.emission[3 * p + c] += weight * truth.emission[3 * q + c];
         }
       }

@@ -13,6 +13,7 @@
 #include "recon/synthetic/flame.h"
 #include "recon/temperature/self_absorption.h"
 #include "recon/temperature/temperature.h"
+#include "tests/support/spectral_camera.h"
 
 namespace emberlock::test {
 
@@ -40,18 +41,13 @@ inline recon::CameraResponse response_of_the_ball() {
   return response;
 }
 
-/// What glows: temperature in K, absorption at 550 nm in 1/m, at key points.
-struct Glowing {
-  recon::Grid grid;
-  std::vector<float> kelvin, absorption;
-};
-
 struct GlowingFlameOptions {
   recon::PaperSceneOptions film = {};
   double coldest = 1450, hottest = 2030;  // K
   recon::Emitter emitter = recon::Emitter::grey;
   double noise = 0.25;    // grey levels
   double levels = 65535;  // of the camera's samples; 0: neither rounded nor cut at black
+  bool spectral = false;  // filmed by SpectralCamera, of soot alone
   double sodium = 0;      // share of the light where x > 0
   double blue_base = 0;   // share of the height below which C2 shines and no soot is
 };
@@ -116,23 +112,9 @@ class GlowingFlame {
     recon::PaperSceneOptions film = options_.film;
     film.truth_voxels = 2;
     recon::Scene scene = recon::paper_scene(film);
-    const recon::FlameTruth truth = lit(recon::grid_over(scene.box, options_.film.truth_voxels));
-    recon::RenderOptions march;
-    march.step = options_.film.truth_step;
-    // Soot absorbs each channel's light differently.
-    std::vector<recon::FlameTruth> absorbed(3, truth);
-    const auto shares = recon::channel_absorption(response_, options_.emitter, Kelvin(1800));
-    for (std::size_t c = 0; c < 3; ++c) {
-      const auto share = static_cast<float>(shares[c]);
-      for (float& e : absorbed[c].volume.extinction) e *= share;
-    }
+    std::vector<recon::RadianceImage> seen = options_.spectral ? by_wavelengths(scene) : by_channels(scene);
     for (std::size_t v = 0; v < scene.views.size(); ++v) {
-      recon::RadianceImage image(film.image);
-      for (std::size_t c = 0; c < 3; ++c) {
-        const recon::RadianceImage own =
-            recon::render_view(absorbed[c].volume, truth.medium, truth.effects, scene.views[v].camera, march);
-        for (std::size_t i = c; i < image.rgb.size(); i += 3) image.rgb[i] = own.rgb[i];
-      }
+      recon::RadianceImage& image = seen[v];
       for (std::size_t i = 0; i < image.rgb.size(); ++i) {
         double level = static_cast<double>(image.rgb[i]) +
                        options_.noise * random_normal(options_.film.flame.seed, v, i);
@@ -143,6 +125,33 @@ class GlowingFlame {
       scene.views[v].image = recon::share(std::move(image));
     }
     return scene;
+  }
+
+  /// Before noise: soot absorbs each channel's light differently.
+  [[nodiscard]] std::vector<recon::RadianceImage> by_channels(const recon::Scene& scene) const {
+    const recon::FlameTruth truth = lit(recon::grid_over(scene.box, options_.film.truth_voxels));
+    recon::RenderOptions march;
+    march.step = options_.film.truth_step;
+    const auto shares = recon::channel_absorption(response_, options_.emitter, Kelvin(1800));
+    std::vector<recon::RadianceImage> seen;
+    for (const recon::View& view : scene.views) seen.emplace_back(view.camera.intrinsics.size);
+    for (std::size_t c = 0; c < 3; ++c) {
+      recon::FlameTruth absorbed = truth;
+      for (float& e : absorbed.volume.extinction) e *= static_cast<float>(shares[c]);
+      for (std::size_t v = 0; v < seen.size(); ++v) {
+        const recon::RadianceImage own =
+            recon::render_view(absorbed.volume, truth.medium, truth.effects, scene.views[v].camera, march);
+        for (std::size_t i = c; i < own.rgb.size(); i += 3) seen[v].rgb[i] = own.rgb[i];
+      }
+    }
+    return seen;
+  }
+  [[nodiscard]] std::vector<recon::RadianceImage> by_wavelengths(const recon::Scene& scene) const {
+    const Glowing gas = at(recon::grid_over(scene.box, options_.film.truth_voxels));
+    const SpectralCamera camera(gas, options_.emitter, response_);
+    std::vector<recon::RadianceImage> seen;
+    for (const recon::View& view : scene.views) seen.push_back(camera.picture(view.camera));
+    return seen;
   }
 
   /// Where sodium is, if there is any.
@@ -205,9 +214,9 @@ inline recon::Reconstruction voxel_by_voxel(recon::Reconstruction done) {
   return done;
 }
 
-/// What a reconstruction should find at its key points: K, and levels of three channels.
+/// What a reconstruction should find at its key points: K, 1/m, and levels of three channels.
 struct GlowTruth {
-  std::vector<float> kelvin, emission;
+  std::vector<float> kelvin, absorption, emission;
 };
 
 inline TemperatureScore score_of(const GlowTruth& truth, const recon::Reconstruction& done,
@@ -250,7 +259,8 @@ inline TemperatureScore score_of(const GlowTruth& truth, const recon::Reconstruc
 inline TemperatureScore score_of(const GlowingFlame& flame, const recon::Reconstruction& done,
                                  const recon::TemperatureField& field) {
   const recon::Grid& grid = done.volume.grid;
-  return score_of({flame.at(grid).kelvin, flame.lit(grid).volume.emission}, done, field);
+  const Glowing glowing = flame.at(grid);
+  return score_of({glowing.kelvin, glowing.absorption, flame.lit(grid).volume.emission}, done, field);
 }
 
 inline std::string words(const TemperatureScore& score, const recon::TemperatureField& field) {

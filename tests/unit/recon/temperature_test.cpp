@@ -72,6 +72,35 @@ TEST(Temperature, IsReadToATwentiethOfItsRangeAndItsErrorsHold) {
   }
 }
 
+/// RMS between pictures of one flame by both renderers, grey levels.
+double between_renderers(Emitter emitter, int truth_voxels) {
+  test::GlowingFlameOptions options = small_flame(emitter);
+  options.film.cameras = 1;
+  options.film.image = {64, 48};
+  options.film.truth_voxels = truth_voxels;
+  options.noise = options.levels = 0;
+  const Scene by_channels = test::GlowingFlame(options).film();
+  options.spectral = true;
+  const Scene by_wavelengths = test::GlowingFlame(options).film();
+  double squares = 0;
+  std::size_t values = 0;
+  for (std::size_t v = 0; v < by_channels.views.size(); ++v) {
+    const std::vector<float>& one = by_channels.views[v].image->rgb;
+    const std::vector<float>& other = by_wavelengths.views[v].image->rgb;
+    for (std::size_t i = 0; i < one.size(); ++i, ++values)
+      squares += std::pow(static_cast<double>(one[i] - other[i]), 2);
+  }
+  return std::sqrt(squares / static_cast<double>(values));
+}
+
+TEST(Temperature, ItsPicturesAreThoseOfAnotherRenderer) {
+  const double coarse = between_renderers(Emitter::grey, 64);
+  const double fine = between_renderers(Emitter::grey, 128);
+  EXPECT_LT(fine, 0.6) << "of 230 levels";
+  EXPECT_GT(coarse / fine, 2.5) << "they differ by what lies between key points: glow, or temperature";
+  EXPECT_LT(between_renderers(Emitter::soot, 128), 0.7) << "a channel's absorption is one, or many";
+}
+
 TEST(Temperature, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel) {
   test::GlowingFlameOptions noisy = small_flame(Emitter::grey);
   noisy.noise = 1;

@@ -6,6 +6,8 @@
 #include <string>
 #include <string_view>
 
+#include <fmt/format.h>
+
 #include "cli/commands.h"
 #include "cli/image_size.h"
 #include "cli/interrupt.h"
@@ -88,8 +90,16 @@ void simulate(SimulateArguments arguments) {
   std::printf("%s/session   %d frames of %d cameras\n", out.c_str(), film.frames, film.cameras);
   std::printf("%s/truth     emission, density, temperature and velocity of each frame, OpenVDB\n",
               out.c_str());
-  std::printf("hottest gas %.0f K; relative divergence at most %.1e; exposure %.4g ms\n\n",
+  std::printf("hottest gas %.0f K; relative divergence at most %.1e; exposure %.4g ms\n",
               film.hottest.value(), film.relative_divergence, 1e3 * film.exposure.value());
+  constexpr double kMilli = 1e3;
+  std::printf("the truth's voxels are %.2g mm, a pixel covers %.2g mm of the flame%s\n\n",
+              kMilli * film.cell.value(), kMilli * film.pixel.value(),
+              film.cell > film.pixel
+                  ? fmt::format(": with --cells {} the truth would be finer than any reconstruction",
+                                rig::cells_for_pictures(options.cells, film))
+                        .c_str()
+                  : "");
   std::printf("next   emberlock reconstruct %s/session %s--out result\n", out.c_str(),
               options.response ? "--quantity temperature --emitter soot " : "");
 }

@@ -22,6 +22,7 @@ std::string way(const TemperatureSummary& t) {
 
 std::string names_of(const std::vector<LineSummary>& lines) {
   std::vector<std::string> names;
+  names.reserve(lines.size());
   for (const LineSummary& line : lines) names.push_back(line.name);
   return fmt::format("{}", fmt::join(names, " and "));
 }

@@ -19,8 +19,8 @@ class Origin {
   Origin() = default;
   explicit Origin(std::shared_ptr<const RawPicture> raw) : raw_(std::move(raw)) {}
   Origin(const Origin& /*other*/) {}
-  Origin& operator=(const Origin& /*other*/) {
-    raw_.reset();
+  Origin& operator=(const Origin& other) {
+    if (this != &other) raw_.reset();
     return *this;
   }
   Origin(Origin&&) noexcept = default;

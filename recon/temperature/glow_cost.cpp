@@ -152,7 +152,7 @@ void GlowCost<Real>::spread() {
   const int count = problem_.slab_count();
   for (int parity = 0; parity < 2; ++parity)  // no two slabs that run at once share a key point
     pool_.run((count + 1 - parity) / 2, [&](int task) {
-      const auto s = static_cast<std::size_t>(2 * task + parity);
+      const std::size_t s = 2 * static_cast<std::size_t>(task) + static_cast<std::size_t>(parity);
       table_.adjoint[static_cast<int>(start_.absorb)][travel_](here, slabs.run.data() + slabs.begin[s],
                                                                slabs.begin[s + 1] - slabs.begin[s]);
     });

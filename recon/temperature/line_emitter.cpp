@@ -100,6 +100,7 @@ Result<LineRequest> parse_lines(std::string_view words) {
         std::find_if(all.begin(), all.end(), [&](const LineEmitter& e) { return e.name == word; });
     if (it == all.end()) {
       std::vector<std::string> known;
+      known.reserve(all.size());
       for (const LineEmitter& e : all) known.push_back(fmt::format("{} ({})", e.name, e.what));
       return bad_lines(fmt::format("\"{}\" is no known line emitter", word),
                        fmt::format("Give auto, or of these, between commas: {}", fmt::join(known, "; ")));

@@ -27,7 +27,8 @@ namespace emberlock::rig {
 namespace {
 
 constexpr double kPeak = 230;  // grey levels of the first frame's brightest pixel
-constexpr Seconds kFirst{2};   // the first frame's read-out on the rig's clock
+constexpr int kCellsAtOnce = 8, kMostCells = 512;
+constexpr Seconds kFirst{2};  // the first frame's read-out on the rig's clock
 constexpr Seconds kShortest = microseconds(1);
 constexpr std::uint64_t kOffsetStream = 1;
 constexpr Kelvin kMiddling{1800};  // at which a channel's mean wavelength is taken
@@ -41,7 +42,7 @@ Status check_simulate(const SimulateOptions& o) {
   for (const int side : {o.image.width, o.image.height})
     if (side < 64 || side > 4096 || side % 2 != 0)
       return bad("the image's size", "Take even sides of 64 to 4096");
-  if (o.cells < 8 || o.cells > 512 || o.cells % 8 != 0)
+  if (o.cells < kCellsAtOnce || o.cells > kMostCells || o.cells % kCellsAtOnce != 0)
     return bad("cells", "Take a multiple of 8 from 8 to 512");
   if (!(o.rate.value() >= 1 && o.rate.value() <= 10000)) return bad("the frame rate", "Take 1 to 10000 Hz");
   if (!(o.read_noise >= 0 && o.read_noise <= 50)) return bad("the noise", "Take 0 to 50 grey levels");
@@ -128,6 +129,9 @@ class Filming {
     if (options.response) response_ = *options.response;
     film_.frames = options.frames;
     film_.cameras = options.cameras;
+    film_.cell = flame_.options().edge;
+    const recon::CameraModel& first = stage_.cameras.front();
+    film_.pixel = Meters((first.center() - stage_.box.center).norm() / first.intrinsics.fx);
     for (std::size_t i = 0; i < late_.size(); ++i) in_order_.push_back(i);
     std::stable_sort(in_order_.begin(), in_order_.end(),
                      [&](std::size_t a, std::size_t b) { return late_[a] < late_[b]; });
@@ -294,6 +298,11 @@ class Filming {
 };
 
 }  // namespace
+
+int cells_for_pictures(int cells, const SimulatedFilm& film) {
+  const double wanted = cells * film.cell.value() / film.pixel.value();
+  return std::min(kCellsAtOnce * static_cast<int>(std::ceil(wanted / kCellsAtOnce)), kMostCells);
+}
 
 Result<SimulatedFilm> simulate_flame(const SimulateOptions& options, const std::filesystem::path& folder,
                                      const Observer& observer) {

@@ -47,7 +47,12 @@ struct SimulatedFilm {
   Seconds exposure;
   double gain = 0;                 ///< the pictures' grey levels over those of the response
   double relative_divergence = 0;  ///< the worst of all steps
+  Meters cell;                     ///< edge, of the simulation and its truth
+  Meters pixel;                    ///< what a pixel covers in the middle of the flame
 };
+/// As many cells, a multiple of 8 below 513, as make the truth finer than what the pictures resolve: a
+/// smaller truth doesn't judge a reconstruction's finest structures.
+int cells_for_pictures(int cells, const SimulatedFilm& film);
 
 /// Simulates a flame and films it with virtual cameras (drivers/virtual: their shutters, noise, mosaic and
 /// converter): `folder`/session is a recording of calibrated cameras with linear pictures. A relative

@@ -23,8 +23,8 @@ struct Glowing {
 };
 
 /// Pictures of glowing gas by another renderer than the program's: light is followed from behind each pixel's
-/// ray to the camera at 41 wavelengths, each with its own absorption, in double precision and steps of half an
-/// edge; the camera's response weighs them at the end.
+/// ray to the camera at 41 wavelengths, each with its own absorption, in double precision and steps of half
+/// an edge; the camera's response weighs them at the end.
 class SpectralCamera {
  public:
   SpectralCamera(const Glowing& gas, recon::Emitter emitter, const recon::CameraResponse& response)
@@ -56,8 +56,8 @@ class SpectralCamera {
 
  private:
   static constexpr std::size_t kWavelengths = 41;
-  static constexpr double kFirst = 380, kStep = 10;  // nm
-  static constexpr double kColdest = 1000;           // K, where nothing shines yet
+  static constexpr double kFirst = 380, kStep = 10;   // nm
+  static constexpr double kColdest = 1000;            // K, where nothing shines yet
   static constexpr std::size_t kTemperatures = 1600;  // by 1 K
 
   struct Here {

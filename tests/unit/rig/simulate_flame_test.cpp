@@ -89,6 +89,9 @@ TEST_F(SimulateFlameTest, LeavesASessionAndItsTruth) {
   ASSERT_TRUE(film.ok()) << film.error().message();
   EXPECT_GT(film->hottest.value(), 1500);
   EXPECT_LE(film->relative_divergence, 1e-5);
+  EXPECT_GT(film->cell, film->pixel) << "a small truth";
+  const double finer = small().cells * (film->cell / film->pixel);
+  EXPECT_NEAR(cells_for_pictures(small().cells, *film), finer + 4, 4) << "the next multiple of 8";
   const auto scene = recon::load_scene(folder_ / "session");
   ASSERT_TRUE(scene.ok()) << scene.error().message();
   EXPECT_EQ(scene->views.size(), 3U);

@@ -205,6 +205,7 @@ class Filming {
   }
   [[nodiscard]] std::vector<recon::RadianceImage> pictures(const std::vector<std::size_t>& cameras) const {
     std::vector<const recon::CameraModel*> models;
+    models.reserve(cameras.size());
     for (const std::size_t camera : cameras) models.push_back(&stage_.cameras[camera]);
     return seen(visible(flame_.state(), response_, sun_, options_.compute), models);
   }

@@ -9,8 +9,8 @@
 namespace emberlock::recon {
 
 /// A picture's pixels in the memory of the calling thread's GPU, kept there as on_gpu() of gpu_pictures.h
-/// keeps them. One that knows its origin is developed there, bit by bit as on the CPU: of ten cameras with 8
-/// bits a sample a twelfth of the bytes are copied. Null for null. Throws a DeviceError.
+/// keeps them. One that knows its origin is developed there, bit by bit as on the CPU: the sensor's samples
+/// are copied, of a mosaic of 8 bits one byte a pixel instead of twelve. Null for null. Throws a DeviceError.
 std::shared_ptr<const CudaBuffer<float>> on_gpu(const SharedImage& image);
 
 }  // namespace emberlock::recon

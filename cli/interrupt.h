@@ -1,33 +1,48 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
+#include <chrono>
 #include <csignal>
 
 namespace emberlock::cli {
 
-/// While it exists, the first Ctrl-C only sets a flag, so that a run can end properly; the second one kills.
-/// Only one at a time.
+/// While it exists, the first Ctrl-C only sets a flag, so that a run can end properly; another one, more than
+/// a second later, kills. What starts a program may hand on the same Ctrl-C (`timeout` and npm do): within
+/// the second it counts once. Only one at a time.
 class Interrupt {
  public:
   Interrupt() {
-    asked_ = 0;
+    asked_at_ = 0;
     struct sigaction action {};
-    action.sa_handler = [](int) { asked_ = 1; };
-    action.sa_flags = static_cast<int>(SA_RESETHAND);
+    action.sa_handler = ask;
     ::sigaction(SIGINT, &action, &before_);
   }
   ~Interrupt() {
     ::sigaction(SIGINT, &before_, nullptr);
-    asked_ = 0;
+    asked_at_ = 0;
   }
   Interrupt(const Interrupt&) = delete;
   Interrupt& operator=(const Interrupt&) = delete;
 
   /// Also false when no Interrupt exists.
-  [[nodiscard]] static bool asked() { return asked_ != 0; }
+  [[nodiscard]] static bool asked() { return asked_at_ != 0; }
 
  private:
-  static inline volatile std::sig_atomic_t asked_ = 0;
+  using Clock = std::chrono::steady_clock;  // clock_gettime, which a handler may call
+
+  static void ask(int signal) {
+    const Clock::rep now = Clock::now().time_since_epoch().count();
+    Clock::rep first = 0;
+    if (asked_at_.compare_exchange_strong(first, now) ||
+        Clock::duration(now - first) <= std::chrono::seconds(1))
+      return;
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+  }
+
+  static inline std::atomic<Clock::rep> asked_at_ = 0;
+  static_assert(decltype(asked_at_)::is_always_lock_free, "a signal's handler sets it");
   struct sigaction before_ {};
 };
 

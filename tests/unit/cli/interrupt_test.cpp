@@ -1,20 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/interrupt.h"
 
+#include <thread>
+
 #include <gtest/gtest.h>
 
 namespace emberlock::cli {
 namespace {
 
-TEST(Interrupt, TheFirstCtrlCOnlyAsksToStopAndTheNextOneKills) {
+TEST(Interrupt, TheFirstCtrlCOnlyAsksToStop) {
   EXPECT_FALSE(Interrupt::asked());
   const Interrupt interrupt;
   EXPECT_FALSE(Interrupt::asked());
   ASSERT_EQ(std::raise(SIGINT), 0);
   EXPECT_TRUE(Interrupt::asked());
-  struct sigaction now {};
-  ASSERT_EQ(::sigaction(SIGINT, nullptr, &now), 0);
-  EXPECT_EQ(now.sa_handler, SIG_DFL);
+}
+
+TEST(Interrupt, ACtrlCThatArrivesTwiceCountsOnce) {
+  const Interrupt interrupt;
+  ASSERT_EQ(std::raise(SIGINT), 0);
+  ASSERT_EQ(std::raise(SIGINT), 0);
+  EXPECT_TRUE(Interrupt::asked()) << "and we live";
+}
+
+TEST(InterruptDeathTest, AnotherOneLaterKills) {
+  const auto ask_twice = [] {
+    const Interrupt interrupt;
+    std::raise(SIGINT);
+    std::this_thread::sleep_for(std::chrono::milliseconds(1100));
+    std::raise(SIGINT);
+  };
+  EXPECT_EXIT(ask_twice(), testing::KilledBySignal(SIGINT), "");
 }
 
 TEST(Interrupt, WhatWasAskedForEndsWithIt) {

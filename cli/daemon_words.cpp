@@ -226,7 +226,8 @@ std::string frame_line(const v1::SequenceFrame& frame) {
     return frame.error().empty() ? text : text + ". " + frame.error();
   text += fmt::format(", input error {:.2f}", frame.input_rmse());
   if (frame.has_heldout_rmse()) text += fmt::format(", held-out error about {:.2f}", frame.heldout_rmse());
-  return text + " grey levels";
+  text += " grey levels";
+  return frame.temperature().empty() ? text : text + "; " + frame.temperature();
 }
 
 std::string round_line(const v1::DaemonStatus& status) {

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <array>
-#include <charconv>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -14,6 +11,7 @@
 
 #include "base/file.h"
 #include "cli/commands.h"
+#include "cli/numbers.h"
 #include "cli/outputs.h"
 #include "recon/export/volume_file.h"
 #include "recon/temperature/radiant.h"
@@ -45,26 +43,14 @@ struct Targets {
 struct Measured {
   std::string name;
   recon::HotStatistics statistics;
-  double power = 0, power_error = 0;  // W
-  std::optional<double> flux;         // W / m^2
-  std::optional<recon::SphereFlux> sphere;
+  struct Heat {
+    double power = 0;            // W
+    std::optional<double> flux;  // W / m^2
+    std::optional<recon::SphereFlux> sphere;
+  };
+  Heat heat;
+  Heat error;  // by which each is higher if all voxels are hotter by one sigma
 };
-
-/// N finite numbers between commas.
-template <std::size_t N>
-std::optional<std::array<double, N>> parse_numbers(const std::string& text) {
-  std::array<double, N> numbers = {};
-  const char* at = text.data();
-  const char* end = at + text.size();
-  for (std::size_t i = 0; i < N; ++i) {
-    if (i > 0 && (at == end || *at++ != ',')) return {};
-    const auto read = std::from_chars(at, end, numbers[i]);
-    if (read.ec != std::errc() || !std::isfinite(numbers[i])) return {};
-    at = read.ptr;
-  }
-  if (at != end) return {};
-  return numbers;
-}
 
 Result<Targets> parse_targets(const MeasureArguments& arguments) {
   Targets targets;
@@ -100,6 +86,35 @@ fs::path file_of(const std::string& name) {
   return fs::is_directory(name, ec) ? fs::path(name) / "volume.vdb" : fs::path(name);
 }
 
+Measured::Heat heat_of(const recon::HotVolume& hot, const Targets& targets,
+                       const recon::ComputeOptions& compute) {
+  Measured::Heat heat;
+  heat.power = recon::radiated_power(hot, compute);
+  if (targets.surface)
+    heat.flux = recon::radiant_flux(hot, targets.surface->point, targets.surface->normal, compute);
+  if (targets.sphere) heat.sphere = recon::radiant_flux(hot, *targets.sphere, compute);
+  return heat;
+}
+
+Measured::Heat difference(const Measured::Heat& a, const Measured::Heat& b) {
+  Measured::Heat out;
+  out.power = a.power - b.power;
+  if (a.flux) out.flux = *a.flux - *b.flux;
+  if (a.sphere)
+    out.sphere = recon::SphereFlux{a.sphere->mean - b.sphere->mean, a.sphere->most - b.sphere->most,
+                                   a.sphere->power - b.sphere->power, a.sphere->held};
+  return out;
+}
+
+/// A sphere that cuts the flame catches part of it from within and part from outside.
+Status check_sphere(const recon::SphereFlux& flux) {
+  constexpr double kStray = 1e-3;  // of the power: voxels of noise
+  if (flux.held < kStray || flux.held > 1 - kStray) return {};
+  return Error{ErrorKind::bad_input,
+               fmt::format("the sphere cuts the flame: it holds {:.0f} % of what radiates", 100 * flux.held),
+               "--target-sphere", "Give a radius that holds all of it, or a sphere beside the flame"};
+}
+
 Result<Measured> measured(const std::string& name, const Targets& targets, const Eigen::Vector3d& up,
                           const recon::ComputeOptions& compute) {
   const fs::path file = file_of(name);
@@ -119,39 +134,50 @@ Result<Measured> measured(const std::string& name, const Targets& targets, const
   if (out.statistics.points == 0)
     return Error{ErrorKind::bad_input, "no voxel tells a temperature", file.string(),
                  "See what its report.html says of temperatures"};
-  out.power = recon::radiated_power(hot, compute);
-  if (targets.surface)
-    out.flux = recon::radiant_flux(hot, targets.surface->point, targets.surface->normal, compute);
-  if (targets.sphere) out.sphere = recon::radiant_flux(hot, *targets.sphere, compute);
+  out.heat = heat_of(hot, targets, compute);
+  if (out.heat.sphere) EMBERLOCK_RETURN_IF_ERROR(check_sphere(*out.heat.sphere));
   // All voxels off alike, as what is off in a response or an emitter is.
   for (std::size_t p = 0; p < hot.kelvin.size(); ++p) hot.kelvin[p] += sigma[p];
-  out.power_error = recon::radiated_power(hot, compute) - out.power;
+  out.error = difference(heat_of(hot, targets, compute), out.heat);
   return out;
+}
+
+/// A value and its error for a table; two empty ones without it.
+std::string with_error(const std::optional<double>& value, const std::optional<double>& error) {
+  return value ? fmt::format("{:.6g},{:.3g}", *value, *error) : ",";
 }
 
 std::string csv_of(const std::vector<Measured>& all) {
   std::string csv =
-      "volume,power_w,power_error_w,flux_w_m2,sphere_mean_w_m2,sphere_most_w_m2,sphere_power_w,mean_k,mean_"
-      "error_k,most_k,most_error_k,height_m,volume_m3\n";
-  for (const Measured& m : all)
-    csv += fmt::format(
-        "{},{:.6g},{:.3g},{},{},{:.1f},{:.1f},{:.1f},{:.1f},{:.5g},{:.5g}\n", m.name, m.power, m.power_error,
-        m.flux ? fmt::format("{:.6g}", *m.flux) : "",
-        m.sphere ? fmt::format("{:.6g},{:.6g},{:.6g}", m.sphere->mean, m.sphere->most, m.sphere->power)
-                 : ",,",
-        m.statistics.mean, m.statistics.mean_error, m.statistics.most, m.statistics.most_error,
-        m.statistics.height, m.statistics.volume);
+      "volume,power_w,power_error_w,flux_w_m2,flux_error_w_m2,sphere_mean_w_m2,sphere_mean_error_w_m2,sphere_"
+      "most_w_m2,sphere_most_error_w_m2,sphere_power_w,sphere_power_error_w,mean_k,mean_error_k,most_k,most_"
+      "error_k,height_m,volume_m3\n";
+  for (const Measured& m : all) {
+    const auto of_sphere = [&](double recon::SphereFlux::*part) {
+      return m.heat.sphere ? with_error((*m.heat.sphere).*part, (*m.error.sphere).*part) : ",";
+    };
+    csv += fmt::format("{},{},{},{},{},{},{:.1f},{:.1f},{:.1f},{:.1f},{:.5g},{:.5g}\n", m.name,
+                       with_error(m.heat.power, m.error.power), with_error(m.heat.flux, m.error.flux),
+                       of_sphere(&recon::SphereFlux::mean), of_sphere(&recon::SphereFlux::most),
+                       of_sphere(&recon::SphereFlux::power), m.statistics.mean, m.statistics.mean_error,
+                       m.statistics.most, m.statistics.most_error, m.statistics.height, m.statistics.volume);
+  }
   return csv;
 }
 
 void print(const Measured& m) {
   const recon::HotStatistics& s = m.statistics;
   std::printf("%-16s %s\n", "volume", m.name.c_str());
-  std::printf("%-16s %.4g W +- %.2g, in all directions\n", "radiates", m.power, m.power_error);
-  if (m.flux) std::printf("%-16s %.4g W / m2\n", "on the target", *m.flux);
-  if (m.sphere)
-    std::printf("%-16s %.4g W / m2 on average, %.4g W / m2 at most, %.4g W in all\n", "on the sphere",
-                m.sphere->mean, m.sphere->most, m.sphere->power);
+  std::printf("%-16s %.4g W +- %.2g, in all directions\n", "radiates", m.heat.power, m.error.power);
+  if (m.heat.flux) std::printf("%-16s %.4g W / m2 +- %.2g\n", "on the target", *m.heat.flux, *m.error.flux);
+  if (m.heat.sphere) {
+    const recon::SphereFlux& caught = *m.heat.sphere;
+    const recon::SphereFlux& error = *m.error.sphere;
+    std::printf(
+        "%-16s %.4g W / m2 +- %.2g on average, %.4g +- %.2g at most, %.4g W +- %.2g in all, on its %s side\n",
+        "on the sphere", caught.mean, error.mean, caught.most, error.most, caught.power, error.power,
+        caught.held > 0.5 ? "inner" : "outer");
+  }
   std::printf("%-16s %.0f K +- %.0f on average, %.0f K +- %.0f at most\n", "temperature", s.mean,
               s.mean_error, s.most, s.most_error);
   std::printf("%-16s %.4g m high, %.4g cm3, of the voxels that tell a temperature\n", "flame", s.height,
@@ -174,12 +200,13 @@ Status write_measures(const std::vector<Measured>& all, const OutputRequest& req
     page.raw(
         report::svg_plot_for_any_width({series}, {.title = title, .x_label = "volume", .y_label = unit}));
   };
-  plot("radiated power", "W", [](const Measured& m) { return m.power; });
-  if (all.front().flux) plot("flux on the target", "W / m2", [](const Measured& m) { return *m.flux; });
-  if (all.front().sphere) {
-    plot("mean flux on the sphere", "W / m2", [](const Measured& m) { return m.sphere->mean; });
-    plot("highest flux on the sphere", "W / m2", [](const Measured& m) { return m.sphere->most; });
-    plot("power that the sphere catches", "W", [](const Measured& m) { return m.sphere->power; });
+  plot("radiated power", "W", [](const Measured& m) { return m.heat.power; });
+  if (all.front().heat.flux)
+    plot("flux on the target", "W / m2", [](const Measured& m) { return *m.heat.flux; });
+  if (all.front().heat.sphere) {
+    plot("mean flux on the sphere", "W / m2", [](const Measured& m) { return m.heat.sphere->mean; });
+    plot("highest flux on the sphere", "W / m2", [](const Measured& m) { return m.heat.sphere->most; });
+    plot("power that the sphere catches", "W", [](const Measured& m) { return m.heat.sphere->power; });
   }
   plot("mean temperature", "K", [](const Measured& m) { return m.statistics.mean; });
   plot("highest temperature", "K", [](const Measured& m) { return m.statistics.most; });

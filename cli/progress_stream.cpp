@@ -75,7 +75,9 @@ void add_volume(v1::IterationPreview& message, const recon::Volume& volume) {
   preview.set_voxels(coarse.voxels.data(), coarse.voxels.size());
 }
 
-v1::VolumeLayer& add_layer(v1::IterationPreview& message, const recon::CoarseLayer& layer) {
+/// Nothing if no block tells anything.
+void add_layer(v1::IterationPreview& message, const recon::CoarseLayer& layer, bool quick = false) {
+  if (!(layer.high > layer.low)) return;
   using Kind = recon::CoarseLayer::Kind;
   v1::VolumeLayer& added = *message.mutable_volume()->add_layers();
   added.set_kind(layer.kind == Kind::temperature         ? v1::VolumeLayer::TEMPERATURE
@@ -85,14 +87,19 @@ v1::VolumeLayer& add_layer(v1::IterationPreview& message, const recon::CoarseLay
   added.set_low(layer.low);
   added.set_high(layer.high);
   added.set_voxels(layer.voxels.data(), layer.voxels.size());
-  return added;
+  added.set_quick(quick);
 }
 
 void add_looked_up(v1::IterationPreview& message, const recon::Volume& volume,
                    const recon::TemperatureLookUp& temperatures) {
   const Meters edge(static_cast<double>(volume.grid.edge));
-  const std::vector<float> kelvin = temperatures.read(recon::coarse_emission(volume, kBlocks), edge);
-  add_layer(message, recon::layer_of(recon::CoarseLayer::Kind::temperature, kelvin)).set_quick(true);
+  const std::vector<float> emission = recon::coarse_emission(volume, kBlocks);
+  const std::vector<float> kelvin = temperatures.read(emission, edge);
+  const recon::BarEnds middle = recon::middle_by_light(kelvin, emission);
+  add_layer(message,
+            recon::layer_of(recon::CoarseLayer::Kind::temperature, kelvin,
+                            recon::kelvin_bar(middle.low, middle.high)),
+            true);
 }
 
 /// What was measured in the finished volume; temperatures where those looked up are, too.
@@ -103,14 +110,15 @@ void add_measured(v1::IterationPreview& message, const recon::Outcome& outcome) 
   if (outcome.temperature) {
     const auto least =
         static_cast<float>(recon::kShareThatCounts) * *std::max_element(light.begin(), light.end());
-    const auto add_lit = [&](Kind kind, const std::vector<float>& values) {
-      add_layer(
-          message, recon::coarse_layer(kind, grid, kBlocks, [&](std::size_t p) {
-            return std::max({light[3 * p], light[3 * p + 1], light[3 * p + 2]}) < least ? 0.0F : values[p];
-          }));
+    const auto add_lit = [&](Kind kind, const std::vector<float>& values, recon::BarEnds ends) {
+      const auto value = [&](std::size_t p) {
+        return std::max({light[3 * p], light[3 * p + 1], light[3 * p + 2]}) < least ? 0.0F : values[p];
+      };
+      add_layer(message, recon::coarse_layer(kind, grid, kBlocks, value, ends));
     };
-    add_lit(Kind::temperature, outcome.temperature->kelvin);
-    add_lit(Kind::temperature_sigma, outcome.temperature->sigma);
+    const recon::TemperatureSummary& summary = outcome.temperature->summary;
+    add_lit(Kind::temperature, outcome.temperature->kelvin, recon::kelvin_bar(summary.low, summary.high));
+    add_lit(Kind::temperature_sigma, outcome.temperature->sigma, recon::kelvin_sigma_bar(summary.sigma));
   }
   if (!outcome.errors) return;
   add_layer(message, recon::coarse_layer(Kind::emission_sigma, grid, kBlocks, [&](std::size_t p) {

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
-#include <sstream>
+#include <string>
+#include <utility>
 
+#include "cli/numbers.h"
 #include "cli/scene_options.h"
 #include "recon/pipeline/grid_choice.h"
 
@@ -45,19 +46,11 @@ Result<recon::Scene> choose_views(const recon::Scene& scene, int views) {
 }  // namespace
 
 Result<recon::Box> parse_box(const std::string& text) {
-  std::vector<double> numbers;
-  std::istringstream words(text);
-  for (std::string word; std::getline(words, word, ',');) {
-    char* end = nullptr;
-    numbers.push_back(std::strtod(word.c_str(), &end));
-    if (word.empty() || *end != '\0' || !std::isfinite(numbers.back())) numbers.clear();
-    if (numbers.empty()) break;
-  }
-  if (numbers.size() != 6 || text.back() == ',') {
+  const auto n = parse_numbers<6>(text);
+  if (!n)
     return Error{ErrorKind::bad_input, "\"" + text + "\" is not six numbers", "--box",
                  "Give cx,cy,cz,sx,sy,sz: centre and size in metres"};
-  }
-  const recon::Box box{{numbers[0], numbers[1], numbers[2]}, {numbers[3], numbers[4], numbers[5]}};
+  const recon::Box box{{(*n)[0], (*n)[1], (*n)[2]}, {(*n)[3], (*n)[4], (*n)[5]}};
   if (box.size.minCoeff() <= 0) {
     return Error{ErrorKind::bad_input, "an edge is 0 or less", "--box", "Give sizes above 0 m"};
   }
@@ -66,15 +59,26 @@ Result<recon::Box> parse_box(const std::string& text) {
 
 Status parse_quantity(const ReconstructArguments& arguments, recon::ReconstructOptions& options) {
   options.errors = arguments.errors;
+  if (arguments.quantity != "temperature") {
+    for (const auto& [name, value] : {std::pair{"--response", &arguments.response},
+                                      {"--emitter", &arguments.emitter},
+                                      {"--lines", &arguments.lines}})
+      if (!value->empty())
+        return Error{ErrorKind::bad_input, "is for temperatures alone", name,
+                     "Give --quantity temperature too"};
+    return {};
+  }
   recon::TemperatureRequest request;
-  EMBERLOCK_ASSIGN_OR_RETURN(request.emitter, recon::parse_emitter(arguments.emitter));
+  if (!arguments.emitter.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(request.emitter, recon::parse_emitter(arguments.emitter));
+  }
   EMBERLOCK_ASSIGN_OR_RETURN(request.lines, recon::parse_lines(arguments.lines));
   if (!arguments.response.empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(recon::CameraResponse response,
                                recon::read_camera_response(arguments.response));
     request.response = std::make_shared<const recon::CameraResponse>(std::move(response));
   }
-  if (arguments.quantity == "temperature") options.temperature = std::move(request);
+  options.temperature = std::move(request);
   return {};
 }
 
@@ -169,9 +173,9 @@ void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
           "else that of a camera that shows linear sRGB]")
       ->needs(quantity);
   verb->add_option("--emitter", a.emitter,
-                   "What glows: grey, soot (not grey), or paper (green alone, constant opacity)")
+                   "What glows: grey, soot (not grey), or paper (green alone, constant opacity) [read as "
+                   "grey, and what soot would tell is part of each voxel's error]")
       ->check(CLI::IsMember({"grey", "soot", "paper"}))
-      ->capture_default_str()
       ->needs(quantity);
   verb->add_option(
           "--lines", a.lines,

@@ -47,7 +47,7 @@ struct ReconstructArguments {
   std::uint64_t seed = 1;
   std::string quantity = "colour";
   std::string response;
-  std::string emitter = "grey";
+  std::string emitter;
   std::string lines;
   bool errors = false;
   std::optional<int> progress_fd;

@@ -69,7 +69,7 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
   if (watchers.stream != nullptr) {
     if (options.temperature)
       watchers.stream->look_up(recon::TemperatureLookUp(recon::response_for(*options.temperature, scene),
-                                                        options.temperature->emitter));
+                                                        recon::taken_for(options.temperature->emitter)));
     preview = [&](const recon::Preview& state) {
       watchers.stream->iteration(state, scene, options.solve.compute);
     };
@@ -82,7 +82,7 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
       recon::write_outcome(outcome, arguments.out, inputs, report::reconstruct_html(scene, outcome)));
   const Seconds writing = clock.now() - done;
   if (watchers.stream != nullptr) watchers.stream->done(outcome, scene, arguments.out);
-  return Written{std::move(outcome), loading, writing};
+  return Written{std::move(outcome), std::move(options.solve), loading, writing};
 }
 
 /// Draws the box on the pictures, and estimates from the reference front what a run would take.
@@ -108,6 +108,9 @@ Status plan_files(const ReconstructArguments& arguments) {
               grid.nx - 1, grid.ny - 1, grid.nz - 1, 1e3 * static_cast<double>(grid.edge),
               choice.by_the_paper);
   for (const std::string& words : choice.words) std::printf("%-16s %s\n", "voxels", words.c_str());
+  if (options.errors || options.temperature)
+    std::printf("%-16s errors need a further solve for each of up to ten views, which isn't in that time\n",
+                "errors");
   if (choice.expected_time.value() > 0)
     std::printf(
         "%-16s about %.2g s, as a run on a grid half as fine tells: loading %.2g, reconstruction %.2g, "
@@ -159,16 +162,11 @@ DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, cons
   return wanted;
 }
 
-Status print_outcome(const ReconstructArguments& arguments, const Written& written, const std::string& out) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::ReconstructOptions options, options_of(arguments));
-  return conclude(written, options.solve, {arguments.input, out, arguments.by_daemon.json});
-}
-
 /// To be interrupted by Ctrl-C.
 Status reconstruct_and_tell(const ReconstructArguments& arguments) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Written written,
                              reconstruct_files(arguments, {progress_bar("reconstruct"), Interrupt::asked}));
-  return print_outcome(arguments, written, arguments.out);
+  return conclude(written, {arguments.input, arguments.out, arguments.by_daemon.json});
 }
 
 /// The frames from --frame to --last-frame.
@@ -190,7 +188,7 @@ void reconstruct_range(const ReconstructArguments& arguments) {
   };
   reconstruct_sequence(frames, arguments.out, at_once,
                        {reconstruct, [&](const Written& written, const std::filesystem::path& out) {
-                          return print_outcome(arguments, written, out.string());
+                          return conclude(written, {arguments.input, out.string(), arguments.by_daemon.json});
                         }});
 }
 
@@ -207,9 +205,11 @@ void reconstruct_command(const ReconstructArguments& arguments) {
   const auto outcome = reconstruct_files(
       arguments,
       {[&](double fraction, std::string_view doing) { stream.progress(fraction, doing); }, {}, &stream});
-  if (outcome) return;
-  stream.failed(outcome.error());
-  fail(outcome.error());
+  const Status told = outcome ? temperature_told(outcome->outcome.report, {arguments.input, arguments.out})
+                              : Status(outcome.error());
+  if (told.ok()) return;
+  stream.failed(told.error());
+  fail(told.error());
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ void print_summary(const Written& written, const std::string& out) {
 
 }  // namespace
 
-Status conclude(const Written& written, const recon::SolveOptions& asked, const WrittenTo& where) {
+Status conclude(const Written& written, const WrittenTo& where) {
   const recon::Report& report = written.outcome.report;
   if (where.json) {
     std::printf("%s", recon::to_json(report).c_str());
@@ -74,17 +74,19 @@ Status conclude(const Written& written, const recon::SolveOptions& asked, const 
                              report.kept.iteration, where.out),
                  where.input};
   }
-  if (const Status met = recon::goals_met(asked, report); !met.ok()) {
+  if (const Status met = recon::goals_met(written.asked, report); !met.ok()) {
     Error missed = met.error();
     missed.what += fmt::format("; the result is in {}", where.out);
     return missed;
   }
-  if (report.temperature && report.temperature->counts.told == 0) {
-    return Error{ErrorKind::not_converged,
-                 fmt::format("no voxel tells its temperature; the colours are in {}", where.out), where.input,
-                 "See what the summary says of them; give the camera's --response, or another --emitter"};
-  }
-  return {};
+  return temperature_told(report, where);
+}
+
+Status temperature_told(const recon::Report& report, const WrittenTo& where) {
+  if (!report.temperature || report.temperature->counts.told > 0) return {};
+  return Error{ErrorKind::not_converged,
+               fmt::format("no voxel tells its temperature; the colours are in {}", where.out), where.input,
+               "See what the summary says of them; give the camera's --response, or another --emitter"};
 }
 
 }  // namespace emberlock::cli

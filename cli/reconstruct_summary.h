@@ -10,9 +10,10 @@
 
 namespace emberlock::cli {
 
-/// A reconstruction, and how long files took before and after it.
+/// A reconstruction, what was asked of it, and how long files took before and after it.
 struct Written {
   recon::Outcome outcome;
+  recon::SolveOptions asked;
   Seconds loading{0}, writing{0};
 };
 
@@ -23,6 +24,8 @@ struct WrittenTo {
 };
 
 /// Prints what came out, or report.json. Error: that isn't what was asked for, though it is written.
-Status conclude(const Written& written, const recon::SolveOptions& asked, const WrittenTo& where);
+Status conclude(const Written& written, const WrittenTo& where);
+/// Error: temperatures were asked for, and no voxel tells one.
+Status temperature_told(const recon::Report& report, const WrittenTo& where);
 
 }  // namespace emberlock::cli

@@ -11,6 +11,7 @@
 #include "cli/commands.h"
 #include "cli/image_size.h"
 #include "cli/interrupt.h"
+#include "cli/numbers.h"
 #include "cli/outputs.h"
 #include "cli/pixel_formats.h"
 #include "recon/calibrate/camera_response.h"
@@ -30,7 +31,7 @@ struct SimulateArguments {
   std::optional<double> exposure_ms;
   double offsets_ms = 0;
   std::string sun;
-  double albedo = rig::Sun{}.albedo;
+  std::optional<double> albedo;
   double rate = 24;
 };
 
@@ -48,13 +49,16 @@ Result<int> parse_virtual_rig(const std::string& text) {
 
 /// "x,y,z", or nothing.
 Result<std::optional<rig::Sun>> parse_sun(const SimulateArguments& arguments) {
-  rig::Sun sun{.albedo = arguments.albedo};
-  char rest = 0;
-  if (!arguments.sun.empty() && std::sscanf(arguments.sun.c_str(), "%lf,%lf,%lf%c",  // NOLINT(cert-err34-c)
-                                            &sun.towards.x(), &sun.towards.y(), &sun.towards.z(), &rest) != 3)
-    return Error{ErrorKind::bad_input, "\"" + arguments.sun + "\" is no direction", "--sun",
-                 "Give x,y,z, towards the sun"};
-  if (arguments.sun.empty() && arguments.albedo == rig::Sun{}.albedo) return std::optional<rig::Sun>{};
+  if (arguments.sun.empty() && !arguments.albedo) return std::optional<rig::Sun>{};
+  rig::Sun sun;
+  sun.albedo = arguments.albedo.value_or(sun.albedo);
+  if (!arguments.sun.empty()) {
+    const auto towards = parse_numbers<3>(arguments.sun);
+    if (!towards)
+      return Error{ErrorKind::bad_input, "\"" + arguments.sun + "\" is no direction", "--sun",
+                   "Give x,y,z, towards the sun"};
+    sun.towards = {(*towards)[0], (*towards)[1], (*towards)[2]};
+  }
   return std::optional(sun);
 }
 
@@ -62,6 +66,12 @@ OutputRequest output_of(const SimulateArguments& arguments) {
   OutputRequest request{arguments.out, kSimulateFlame};
   if (!arguments.response.empty()) request.inputs = {arguments.response};
   return request;
+}
+
+std::string finer_truth(int cells, const rig::SimulatedFilm& film) {
+  const std::optional<int> enough = rig::cells_for_pictures(cells, film);
+  return enough ? fmt::format("with --cells {} the truth would be finer than any reconstruction", *enough)
+                : "smaller pictures would resolve no more than the truth";
 }
 
 void simulate(SimulateArguments arguments) {
@@ -90,18 +100,19 @@ void simulate(SimulateArguments arguments) {
   std::printf("%s/session   %d frames of %d cameras\n", out.c_str(), film.frames, film.cameras);
   std::printf("%s/truth     emission, density, temperature and velocity of each frame, OpenVDB\n",
               out.c_str());
-  std::printf("hottest gas %.0f K; relative divergence at most %.1e; exposure %.4g ms\n",
-              film.hottest.value(), film.relative_divergence, 1e3 * film.exposure.value());
+  std::printf("hottest gas %.0f K; relative divergence at most %.1e%s\n", film.hottest.value(),
+              film.relative_divergence,
+              options.response && options.response->absolute
+                  ? fmt::format("; exposure {:.4g} ms", 1e3 * film.exposure.value()).c_str()
+                  : "");
   constexpr double kMilli = 1e3;
   std::printf("the truth's voxels are %.2g mm, a pixel covers %.2g mm of the flame%s\n\n",
               kMilli * film.cell.value(), kMilli * film.pixel.value(),
-              film.cell > film.pixel
-                  ? fmt::format(": with --cells {} the truth would be finer than any reconstruction",
-                                rig::cells_for_pictures(options.cells, film))
-                        .c_str()
-                  : "");
+              film.cell > film.pixel ? (": " + finer_truth(options.cells, film)).c_str() : "");
   std::printf("next   emberlock reconstruct %s/session %s--out result\n", out.c_str(),
-              options.response ? "--quantity temperature --emitter soot " : "");
+              options.response && options.preset != recon::FlamePreset::smoke
+                  ? "--quantity temperature --emitter soot "
+                  : "");
 }
 
 /// What their pictures are like.
@@ -114,12 +125,14 @@ void add_camera_options(CLI::App& verb, SimulateArguments& a) {
           "JSON file of the cameras' spectral response, whose levels hold for 1 ms; the session keeps it")
       ->type_name("FILE");
   verb.add_option("--exposure", a.exposure_ms,
-                  "Milliseconds; by default what an absolute response needs for 230 of 255 levels, else 1");
+                  "Milliseconds, of a response with its scale [what the brightest pixel needs for 230 of 255 "
+                  "levels]");
   verb.add_option("--offsets", a.offsets_ms, "Milliseconds by which cameras' shutters are late at most")
       ->capture_default_str();
   verb.add_option("--sun", a.sun, "x,y,z: of smoke, where the sun stands (default: 1,-1,1)");
-  verb.add_option("--albedo", a.albedo, "Of smoke: the share of the light it takes that it scatters")
-      ->capture_default_str();
+  verb.add_option(
+      "--albedo", a.albedo,
+      fmt::format("Of smoke: the share of the light it takes that it scatters [{}]", rig::Sun{}.albedo));
 }
 
 }  // namespace

@@ -184,8 +184,10 @@ std::string data_uri(std::string_view type, std::string_view content) {
 
 std::string sentence(std::string_view clause) {
   std::string text(clause);
-  if (!text.empty()) text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
-  return text + ".";
+  if (text.empty()) return text;
+  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
+  if (text.back() != '.') text += '.';
+  return text;
 }
 
 std::string figure(const std::string& source, const std::string& alt, const std::string& caption) {

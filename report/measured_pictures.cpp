@@ -31,13 +31,11 @@ std::string temperature_html(const recon::Outcome& outcome, const ShownAxes& axe
   std::string html = "<h2>Temperature</h2>";
   for (const std::string& words : recon::temperature_words(summary)) html += paragraph(words);
   if (summary.counts.told == 0) return html;
-  constexpr double kRound = 50;
-  const double low = kRound * std::floor(summary.low / kRound);
-  const double high = std::max(low + kRound, kRound * std::ceil(summary.high / kRound));
+  const recon::BarEnds kelvin = recon::kelvin_bar(summary.low, summary.high);
+  const recon::BarEnds sigma = recon::kelvin_sigma_bar(summary.sigma);
   const recon::Grid& grid = outcome.reconstruction.volume.grid;
-  html += value_slices_html(grid, field.kelvin, axes, {low, high, "K"}, "temperature");
-  const double most_sigma = std::max(10.0, 10 * std::ceil(0.4 * summary.sigma));
-  html += value_slices_html(grid, field.sigma, axes, {0, most_sigma, "K"}, "its error (one sigma)");
+  html += value_slices_html(grid, field.kelvin, axes, {kelvin.low, kelvin.high, "K"}, "temperature");
+  html += value_slices_html(grid, field.sigma, axes, {sigma.low, sigma.high, "K"}, "its error (one sigma)");
   return html + paragraph("grey: not told. The grids temperature and temperature_sigma are in volume.vdb");
 }
 

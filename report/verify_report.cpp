@@ -2,7 +2,6 @@
 #include "report/verify_report.h"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -28,14 +27,6 @@ const char* colour(smear::ClipState state) {
 }
 
 std::string signed_ms(Seconds t) { return fmt::format("{:+.3f}", in_milliseconds(t)); }
-
-/// Adds a capital at the start and a full stop at the end.
-std::string sentence(std::string text) {
-  if (text.empty()) return text;
-  text.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(text.front())));
-  if (text.back() != '.') text += '.';
-  return text;
-}
 
 /// Never rounds up to certainty.
 std::string probability_in_words(double p) {

@@ -59,15 +59,20 @@ Status check_quantity(const v1::ReconstructRequest& request) {
       return refuse_field("emitter", emitter.error().what, emitter.error().remedy);
     if (!temperature) return refuse_field("emitter", "is for temperatures", "Give quantity temperature too");
   }
-  if (!request.lines().empty()) {
-    if (const auto lines = recon::parse_lines(request.lines()); !lines)
-      return refuse_field("lines", lines.error().what, lines.error().remedy);
-    if (!temperature) return refuse_field("lines", "is for temperatures", "Give quantity temperature too");
+  recon::CameraResponse response = recon::standard_response();
+  if (request.has_response()) {
+    if (!temperature) return refuse_field("response", "is for temperatures", "Give quantity temperature too");
+    EMBERLOCK_ASSIGN_OR_RETURN(response, recon::camera_response_of(request.response(), "response"));
   }
-  if (!request.has_response()) return {};
-  if (!temperature) return refuse_field("response", "is for temperatures", "Give quantity temperature too");
-  const auto response = recon::camera_response_of(request.response(), "response");
-  return response.ok() ? Status() : response.error();
+  if (request.lines().empty()) return {};
+  if (!temperature) return refuse_field("lines", "is for temperatures", "Give quantity temperature too");
+  const auto lines = recon::parse_lines(request.lines());
+  if (!lines) return refuse_field("lines", lines.error().what, lines.error().remedy);
+  const bool paper = request.emitter() == recon::name(recon::Emitter::paper);
+  if (!request.has_response() && !paper) return {};  // the session's response is read with it
+  const Status told =
+      recon::check_lines(response, paper ? recon::Emitter::paper : recon::Emitter::grey, *lines);
+  return told.ok() ? Status() : refuse_field("lines", told.error().what, told.error().remedy);
 }
 
 Status check_request(const v1::ReconstructRequest& request) {

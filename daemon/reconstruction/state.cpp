@@ -153,6 +153,7 @@ void SequenceState::end(const ChildEnd& end, const std::string& last_words) {
   v1::SequenceFrame& at_hand = frames_[begun_frames_ - 1];
   at_hand.set_state(child_.status().state());
   at_hand.set_error(child_.status().error());
+  if (child_.status().temperature_size() > 0) at_hand.set_temperature(child_.status().temperature(0));
   given_up_ = end.why == ChildEnd::Why::not_started ||
               (count(v1::ReconstructionStatus::DONE) == 0 && begun_frames_ == session::kFailuresAtStart);
 }

@@ -85,13 +85,19 @@ void use_gpu(int gpu) {
 std::size_t reserved_gpu_memory() { return ask_pool(cudaMemPoolAttrReservedMemCurrent); }
 
 void reserve_gpu_memory(std::size_t bytes) {
-  const std::size_t ready = reserved_gpu_memory() - ask_pool(cudaMemPoolAttrUsedMemCurrent);
-  if (ready >= bytes) return;
+  const std::size_t used = ask_pool(cudaMemPoolAttrUsedMemCurrent);
+  const std::size_t wanted = bytes - std::min(bytes, used);
+  if (reserved_gpu_memory() - used >= wanted) return;
   std::size_t free = 0;
   std::size_t total = 0;
   check_cuda(cudaMemGetInfo(&free, &total), "asking for its memory");
-  const std::size_t least = total / 20;  // left to what isn't the pool's
-  if (free > least) cuda_free(cuda_allocate(std::min(bytes, free - least)));
+  // What others want of the GPU is not known: half of what is free is theirs. One that is refused costs
+  // nothing but time: the pool then grows piece by piece.
+  void* data = nullptr;
+  if (cudaMallocAsync(&data, std::min(wanted, free / 2), nullptr) == cudaSuccess)
+    cuda_free(data);
+  else
+    (void)cudaGetLastError();
 }
 
 void finish_gpu_work() { check_cuda(cudaStreamSynchronize(cudaStreamPerThread), "waiting for its work"); }

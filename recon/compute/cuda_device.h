@@ -14,8 +14,9 @@ Status cuda_status(int gpu = 0);
 /// The GPU of all that the calling thread does from here on. Throws a DeviceError.
 void use_gpu(int gpu);
 
-/// From here on the process keeps this much of that GPU's memory ready, or all that is free: asked of the
-/// driver once, instead of piece by piece while a frame grows. Throws a DeviceError.
+/// From here on the process keeps this much of that GPU's memory, what it uses counted, or half of what is
+/// free: asked of the driver once, instead of piece by piece while a frame grows. Where the driver refuses,
+/// nothing changes. Throws a DeviceError.
 void reserve_gpu_memory(std::size_t bytes);
 /// What the process keeps of it, in use or ready.
 std::size_t reserved_gpu_memory();

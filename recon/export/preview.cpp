@@ -146,19 +146,45 @@ double end_of_bar(const std::vector<float>& errors) {
   return unit * std::ceil(most / unit - kRounding);
 }
 
-CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks) {
-  constexpr double kKelvin = 50;
+BarEnds kelvin_bar(double low, double high) {
+  constexpr double kRound = 50;
+  BarEnds ends{kRound * std::floor(low / kRound), kRound * std::ceil(high / kRound)};
+  ends.high = std::max(ends.high, ends.low + kRound);
+  return ends;
+}
+
+BarEnds kelvin_sigma_bar(double median) {
+  constexpr double kRound = 10;
+  constexpr double kMedians = 2.5;
+  return {0, kRound * std::max(1.0, std::ceil(kMedians * median / kRound))};
+}
+
+BarEnds middle_by_light(const std::vector<float>& kelvin, const std::vector<float>& emission) {
+  std::vector<std::pair<double, double>> told;  // K, light
+  double all = 0;
+  for (std::size_t p = 0; p < kelvin.size(); ++p) {
+    if (!(kelvin[p] > 0)) continue;
+    const float* rgb = &emission[3 * p];
+    told.emplace_back(kelvin[p], std::max({rgb[0], rgb[1], rgb[2]}));
+    all += told.back().second;
+  }
+  std::sort(told.begin(), told.end());
+  const auto below = [&](double share) {
+    double sum = 0;
+    for (const auto& [t, light] : told)
+      if ((sum += light) >= share * all) return t;
+    return told.empty() ? 0 : told.back().first;
+  };
+  return {below(0.05), below(0.95)};
+}
+
+CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks, std::optional<BarEnds> ends) {
   CoarseLayer layer;
   layer.kind = kind;
   layer.voxels.resize(blocks.size());
-  std::vector<float> told = told_of(blocks);
-  if (told.empty()) return layer;
-  if (kind == CoarseLayer::Kind::temperature) {
-    layer.low = kKelvin * std::floor(percentile(told, kBeyond) / kKelvin);
-    layer.high = std::max(layer.low + kKelvin, kKelvin * std::ceil(percentile(told, 1 - kBeyond) / kKelvin));
-  } else {
-    layer.high = end_of_bar(blocks);
-  }
+  if (std::none_of(blocks.begin(), blocks.end(), [](float v) { return v > 0; })) return layer;
+  layer.low = ends ? ends->low : 0;
+  layer.high = ends ? ends->high : end_of_bar(blocks);
   std::transform(blocks.begin(), blocks.end(), layer.voxels.begin(), [&](float value) {
     const double share = (static_cast<double>(value) - layer.low) / (layer.high - layer.low);
     return static_cast<std::uint8_t>(value > 0 ? 1 + std::lround(254 * std::clamp(share, 0.0, 1.0)) : 0);
@@ -167,7 +193,7 @@ CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks) {
 }
 
 CoarseLayer coarse_layer(CoarseLayer::Kind kind, const Grid& grid, int longest,
-                         const std::function<float(std::size_t point)>& value) {
+                         const std::function<float(std::size_t point)>& value, std::optional<BarEnds> ends) {
   const Blocks blocks(grid, longest);
   std::vector<float> sum(blocks.size());
   std::vector<float> told(blocks.size());
@@ -179,7 +205,7 @@ CoarseLayer coarse_layer(CoarseLayer::Kind kind, const Grid& grid, int longest,
   });
   for (std::size_t i = 0; i < sum.size(); ++i)
     if (told[i] > 0) sum[i] /= told[i];
-  return layer_of(kind, sum);
+  return layer_of(kind, sum, ends);
 }
 
 }  // namespace emberlock::recon

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "recon/calibrate/box.h"
@@ -49,7 +50,8 @@ struct CoarseLayer {
     extinction_sigma,   ///< 1/m
   };
   Kind kind = Kind::temperature;
-  double low = 0, high = 0;          ///< of values 1 and 255; what lies beyond is shown as they are
+  double low = 0, high = 0;          ///< of values 1 and 255; what lies beyond is shown as they are; both 0
+                                     ///< where no block tells anything
   std::vector<std::uint8_t> voxels;  ///< nx ny nz; 0: not told
 };
 
@@ -57,11 +59,24 @@ struct CoarseLayer {
 /// digits; 1 where there are none.
 double end_of_bar(const std::vector<float>& errors);
 
-/// Of a value a block; what isn't above 0 is not told. Temperatures from the 2nd to the 98th percentile of
-/// those told, to 50 K; errors from 0 to end_of_bar().
-CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks);
+/// A colour bar's ends.
+struct BarEnds {
+  double low = 0, high = 0;
+};
+/// To 50 K, and at least that apart.
+BarEnds kelvin_bar(double low, double high);
+/// Of the errors of temperatures, whose median is given: from 0 to two and a half times that.
+BarEnds kelvin_sigma_bar(double median);
+/// What 5 % and 95 % of the light of the blocks that tell a temperature have below them; `emission` as of
+/// coarse_emission(). Both 0 where none tells one.
+BarEnds middle_by_light(const std::vector<float>& kelvin, const std::vector<float>& emission);
+
+/// Of a value a block; what isn't above 0 is not told. Without ends: from 0 to end_of_bar().
+CoarseLayer layer_of(CoarseLayer::Kind kind, const std::vector<float>& blocks,
+                     std::optional<BarEnds> ends = {});
 /// Of a value a key point of the grid: a block's is the mean over those that are told.
 CoarseLayer coarse_layer(CoarseLayer::Kind kind, const Grid& grid, int longest,
-                         const std::function<float(std::size_t point)>& value);
+                         const std::function<float(std::size_t point)>& value,
+                         std::optional<BarEnds> ends = {});
 
 }  // namespace emberlock::recon

@@ -110,6 +110,7 @@ ordered_json temperature_json(const std::optional<TemperatureSummary>& temperatu
       {"high", t.high},
       {"sigma", t.sigma},
       {"chi_square", t.chi_square},
+      {"emitter_told", t.emitter_told},
       {"if_other", t.if_other},
       {"emitting", n.emitting},
       {"told", n.told},
@@ -127,6 +128,7 @@ ordered_json temperature_json(const std::optional<TemperatureSummary>& temperatu
        {{"iterations", t.joint.iterations},
         {"cost_before", t.joint.before},
         {"cost_after", t.joint.after},
+        {"last_drop", t.joint.last_drop},
         {"moved", t.joint.moved}}},
       {"seconds",
        {{"errors", t.errors_time.value()}, {"reading", t.time.value()}, {"joint", t.joint.time.value()}}}};

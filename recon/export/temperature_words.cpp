@@ -15,7 +15,9 @@ std::string way(const TemperatureSummary& t) {
         t.absolute ? "" : "; the camera's scale isn't known, so that the brightest green counts as 2300 K");
   std::string words = t.emitter == Emitter::soot ? "soot that glows by E(m) / wavelength" : "a grey glow";
   words += ": the ratios of all channels";
-  if (t.by_absorption) words += ", and emission over extinction";
+  if (t.by_absorption)
+    words += t.joint.iterations > 0 ? ", and emission over extinction where the joint solve starts"
+                                    : ", and emission over extinction";
   if (!t.absolute) words += "; the camera's response is relative";
   return words;
 }
@@ -47,8 +49,8 @@ std::vector<std::string> line_words(const TemperatureSummary& t) {
         fmt::format("can't tell which line emitter shines: {} explain alike what no black body does",
                     fmt::join(t.lines_alike, ", ")));
   } else {
-    words.emplace_back(t.counts.other > 0 ? "no single line emitter explains what no black body does"
-                                          : "no line emitter is called for");
+    words.emplace_back(t.lines_tried ? "no single line emitter explains what no black body does"
+                                     : "no line emitter was looked for: too little light is no black body's");
   }
   return words;
 }
@@ -60,11 +62,14 @@ std::string not_told(const TemperatureSummary& t) {
   const auto add = [&](std::size_t count, const std::string& reason) {
     if (count > 0) why.push_back(fmt::format("{} {}", count, reason));
   };
-  add(n.colder, "are colder than the table");
-  add(n.hotter, "are hotter than the table");
-  add(n.other, lines.empty() ? "show colours that no body of this kind has (a blue base, sodium, salts? "
-                               "--lines auto)"
-                             : "show colours that no mixture with " + lines + " has");
+  add(n.colder, t.lines.empty() ? "are colder than the table"
+                                : "are colder than the table, or than 1000 K beside lines");
+  add(n.hotter, t.lines.empty() ? "are hotter than the table"
+                                : "are hotter than the table, or than 3000 K beside lines");
+  add(n.other, lines.empty()
+                   ? fmt::format("show colours that no body of this kind has (a blue base, sodium, salts?{})",
+                                 t.lines_automatic ? "" : " --lines auto")
+                   : "show colours that no mixture with " + lines + " has");
   add(n.lines, "are " + lines + ", no soot");
   add(n.alike, "may be soot or " + lines + " alike");
   add(n.saturated, "are saturated in most views, so that their light is a bound");
@@ -92,17 +97,25 @@ std::vector<std::string> temperature_words(const TemperatureSummary& t) {
   if (std::string why = not_told(t); !why.empty()) words.push_back(std::move(why));
   words.insert(words.end(), lines.begin(), lines.end());
   if (t.chi_square > 0)
-    words.push_back(fmt::format("the channels agree with it to a chi-square of {:.2f} a degree of freedom{}",
-                                t.chi_square, t.chi_square > 2 ? ": more than their errors explain" : ""));
+    words.push_back(
+        fmt::format("as read, the channels agree with it to a chi-square of {:.2f} a degree of freedom{}",
+                    t.chi_square, t.chi_square > 2 ? ": more than their errors explain" : ""));
   if (t.if_other > 0)
-    words.push_back(fmt::format("if it were {}, the average would be {:.0f} K (--emitter {})",
-                                t.emitter == Emitter::grey ? "soot, which isn't grey" : "grey", t.if_other,
-                                t.emitter == Emitter::grey ? "soot" : "grey"));
+    words.push_back(
+        fmt::format("if it were {}, the average would be {:.0f} K (--emitter {}){}",
+                    t.emitter == Emitter::grey ? "soot, which isn't grey" : "grey", t.if_other,
+                    t.emitter == Emitter::grey ? "soot" : "grey",
+                    t.emitter_told ? "" : ": which of the two isn't told, and each error holds it"));
   if (t.joint.iterations > 0)
     words.push_back(fmt::format(
         "solved together by the pictures, {} steps in {:.1f} s: they moved by {:.0f} K "
-        "(RMS), and what the pictures say against them fell by {:.0f} %",
-        t.joint.iterations, t.joint.time.value(), t.joint.moved, 100 * (1 - t.joint.after / t.joint.before)));
+        "(RMS), and what pictures and neighbours say against them fell by {:.0f} %, in the last step by "
+        "{:.1f} %",
+        t.joint.iterations, t.joint.time.value(), t.joint.moved,
+        t.joint.before > 0 ? 100 * (1 - t.joint.after / t.joint.before) : 0, 100 * t.joint.last_drop));
+  if (t.joint_failed)
+    words.emplace_back(
+        "they couldn't be solved together (it diverged, or needs more memory): each is as it was read");
   words.push_back(
       fmt::format("errors took {:.1f} s: {} solves without some of the views; the temperatures {:.1f} s",
                   t.errors_time.value(), t.solves, t.time.value()));

@@ -60,7 +60,7 @@ PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOpti
 /// Before anything is solved: whether the lines could be told.
 Status check_temperature(const Scene& scene, const std::optional<TemperatureRequest>& request) {
   if (!request) return {};
-  return check_lines(response_for(*request, scene), request->emitter, request->lines);
+  return check_lines(response_for(*request, scene), taken_for(request->emitter), request->lines);
 }
 
 /// Errors and temperatures, where they are asked for.
@@ -74,7 +74,7 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
   tell(progress, kNearlyDone, "reading temperatures");
   outcome.temperature = temperature_of(
       task.scene(), outcome.reconstruction, *outcome.errors, response_for(*options.temperature, task.scene()),
-      options.temperature->emitter, options.solve.compute, task.elapsed, options.temperature->lines);
+      options.temperature->emitter, options.solve, task.elapsed, options.temperature->lines);
   TemperatureSummary& summary = outcome.temperature->summary;
   summary.time = task.elapsed() - start;
   outcome.report.temperature = summary;
@@ -151,6 +151,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
 Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
                                 const Progress& progress) try {
   const TimePoint start = clock.now();
+  EMBERLOCK_RETURN_IF_ERROR(check_temperature(scene, options.temperature));
   EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const std::function<void(const Preview&)> nobody;

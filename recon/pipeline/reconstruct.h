@@ -30,9 +30,9 @@ enum class VoxelRule {
 /// What `--quantity temperature` asks for.
 struct TemperatureRequest {
   std::shared_ptr<const CameraResponse> response =
-      {};  ///< null: the scene's, and without one standard_response()
-  Emitter emitter = Emitter::grey;
-  LineRequest lines = {};  ///< line emitters that are looked for beside it
+      {};                               ///< null: the scene's, and without one standard_response()
+  std::optional<Emitter> emitter = {};  ///< none: nobody told what glows (temperature.h)
+  LineRequest lines = {};               ///< line emitters that are looked for beside it
 };
 /// The one to read by; it lives as long as both.
 const CameraResponse& response_for(const TemperatureRequest& request, const Scene& scene);

@@ -26,7 +26,7 @@ PreprocessStep linearised(const std::optional<Colour>& colour) {
 RawPicture undeveloped(std::shared_ptr<const Image> frame, const Colour* colour) {
   const ImageLayout layout = frame->layout();
   RawPicture raw{std::move(frame), exposures_of(layout, colour), {}};
-  raw.light = light_of_number(layout, colour, raw.exposures.data());
+  raw.light = light_of_number(layout, colour, nullptr);
   raw.equalise = equalising(layout.size, colour != nullptr ? *colour : Colour{});
   if (colour != nullptr) raw.flat = colour->flat.light;
   return raw;
@@ -117,7 +117,9 @@ DevelopedPicture develop(const CameraFrame& camera, const DevelopOptions& option
   auto raw = std::make_shared<RawPicture>(undeveloped(camera.frame, colour));
   raw->demosaicing = options.demosaicing;
   DevelopedPicture out;
-  Samples samples = samples_of(camera.frame->view(), raw->light);
+  LightOfNumber light = raw->light;
+  light.of_number = raw->exposures.data();
+  Samples samples = samples_of(camera.frame->view(), light);
   out.steps.push_back(linearised(camera.colour));
   out.steps.push_back(take_hot_pixels_out(samples, camera, *raw));
   if (dark != nullptr) {

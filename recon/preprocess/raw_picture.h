@@ -12,7 +12,7 @@
 namespace emberlock::recon {
 
 /// A frame as the sensor gave it, and all that makes its radiance, pixel by pixel: what develop() did, to be
-/// done again elsewhere. The functors hold no memory.
+/// done again elsewhere. `light` without the numbers' light, which is in `exposures`.
 struct RawPicture {
   std::shared_ptr<const Image> frame;
   std::vector<float> exposures;  ///< for `light`

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -20,6 +21,8 @@ enum class Emitter {
 /// "grey", "soot" or "paper"; an Error that lists them otherwise.
 Result<Emitter> parse_emitter(std::string_view name);
 std::string_view name(Emitter emitter);
+/// What nobody told is taken for: grey.
+inline Emitter taken_for(std::optional<Emitter> told) { return told.value_or(Emitter::grey); }
 
 /// The absorption at a wavelength over that at 550 nm. Soot: E(m) / lambda of small particles (Rayleigh's
 /// limit), E(m) = Im((m^2 - 1) / (m^2 + 2)), m of propane soot, 0.4 to 30 um (Chang and Charalampopoulos

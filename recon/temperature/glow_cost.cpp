@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::size_t kKnots = 512;
 constexpr int kTasks = 64;
-constexpr double kLeastVariance = 1e-6;                     // of a channel's residuals, over all channels'
-constexpr double kDamping = 1e-3;                           // of a step, so that what nobody sees stays
+constexpr double kLeastVariance = 1e-6;  // of a channel's residuals, over all channels'
+constexpr double kDamping = 1e-3;  // of the diagonal, so that brightness and temperature can be told apart
 constexpr double kMostBrightness = 0.5, kMostKelvin = 100;  // a step
 
 std::array<std::size_t, 3> steps_of(const Grid& g) { return {1, g.index(0, 1, 0), g.index(0, 0, 1)}; }
@@ -118,37 +118,51 @@ void GlowCost<Real>::show(const GlowField<Real>& at) {
 }
 
 template <class Real>
-MarchWork<Real> GlowCost<Real>::work() {
+MarchWork<Real> GlowCost<Real>::work(int subset) {
   return {problem_.list.table(),
           shown_.data(),
           static_cast<Real>(start_.sigma),
           residual_.data(),
           gradient_.data(),
           samples_.data(),
-          0};
+          problem_.list.before[static_cast<std::size_t>(subset)].samples};
 }
 
-/// The residuals of what is shown.
 template <class Real>
-void GlowCost<Real>::march(const PixelResidual<Real>& pixel) {
-  const MarchWork<Real> here = work();
+template <class Act>
+void GlowCost<Real>::march_and_spread(const PixelResidual<Real>& pixel, const Act& act) {
+  std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{});
+  for (int subset = 0; subset < problem_.list.subsets(); ++subset) {
+    march(pixel, subset);
+    const auto s = static_cast<std::size_t>(subset);
+    act(problem_.list.subset_begin[s], problem_.list.subset_begin[s + 1]);
+    spread(subset);
+  }
+}
+
+template <class Real>
+void GlowCost<Real>::march(const PixelResidual<Real>& pixel, int subset) {
+  const MarchWork<Real> here = work(subset);
+  const auto s = static_cast<std::size_t>(subset);
+  const std::size_t first = problem_.list.subset_begin[s];
+  const std::size_t count = problem_.list.subset_begin[s + 1] - first;
   pool_.run(kTasks, [&](int task) {
-    const Slice rays = slice(problem_.rays(), kTasks, task);
+    const Slice mine = slice(count, kTasks, task);
+    const std::size_t begin = first + mine.begin;
+    const std::size_t end = first + mine.end;
     if (start_.absorb == Absorb::field) {
-      table_.field_forward[travel_](here, pixel, rays.begin, rays.end);
+      table_.field_forward[travel_](here, pixel, begin, end);
       return;
     }
-    table_.forward[static_cast<int>(start_.absorb)][travel_](here, rays.begin, rays.end);
-    for (std::size_t r = rays.begin; r < rays.end; ++r) residual_[r] = pixel(r, residual_[r]);
+    table_.forward[static_cast<int>(start_.absorb)][travel_](here, begin, end);
+    for (std::size_t r = begin; r < end; ++r) residual_[r] = pixel(r, residual_[r]);
   });
 }
 
-/// gradient = A^T residual, after march().
 template <class Real>
-void GlowCost<Real>::spread() {
-  std::fill(gradient_.begin(), gradient_.end(), Quad<Real>{});
-  const MarchWork<Real> here = work();
-  const SlabRuns& slabs = problem_.slabs.front();
+void GlowCost<Real>::spread(int subset) {
+  const MarchWork<Real> here = work(subset);
+  const SlabRuns& slabs = problem_.slabs[static_cast<std::size_t>(subset)];
   const int count = problem_.slab_count();
   for (int parity = 0; parity < 2; ++parity)  // no two slabs that run at once share a key point
     pool_.run((count + 1 - parity) / 2, [&](int task) {
@@ -160,11 +174,11 @@ void GlowCost<Real>::spread() {
 
 /// 1/2 r^T P r, and r becomes P r. Where a pixel is a bound that is met, r is 0 whatever the light.
 template <class Real>
-double GlowCost<Real>::data() {
+double GlowCost<Real>::data(std::size_t begin, std::size_t end) {
   std::array<double, kTasks> sums = {};
   pool_.run(kTasks, [&](int task) {
-    const Slice rays = slice(problem_.rays(), kTasks, task);
-    for (std::size_t r = rays.begin; r < rays.end; ++r) {
+    const Slice mine = slice(end - begin, kTasks, task);
+    for (std::size_t r = begin + mine.begin; r < begin + mine.end; ++r) {
       Quad<Real>& residual = residual_[r];
       Eigen::Vector3d own;
       for (int c = 0; c < 3; ++c) own[c] = static_cast<double>(residual.c[c]);
@@ -206,9 +220,9 @@ double GlowCost<Real>::tied(const GlowField<Real>& at, GlowField<Real>& slope) c
 template <class Real>
 double GlowCost<Real>::operator()(const GlowField<Real>& at, GlowField<Real>& slope) {
   show(at);
-  march(problem_.pixel_residual<Real>({}, start_.white));
-  const double data_cost = data();
-  spread();
+  double data_cost = 0;
+  march_and_spread(problem_.pixel_residual<Real>({}, start_.white),
+                   [&](std::size_t begin, std::size_t end) { data_cost += data(begin, end); });
   slope.brightness.assign(shown_.size(), 0);
   slope.kelvin.assign(shown_.size(), 0);
   each_point([&](int /*i*/, int /*j*/, int /*k*/, std::size_t p) {
@@ -248,11 +262,11 @@ void GlowCost<Real>::weigh(const GlowField<Real>& at, const GlowTies& ties) {
   for (std::size_t p = 0; p < shown_.size(); ++p)
     for (int c = 0; c < 4; ++c) shown_[p].c[c] = c < 3 ? Real(1) : static_cast<Real>(start_.light[p].c[c]);
   const std::vector<Rgba> black(problem_.rays());
-  march({black.data()});
-  spread();
+  march_and_spread({black.data()}, [](std::size_t /*begin*/, std::size_t /*end*/) {});
   weight_ = gradient_;
   show(at);
-  march(problem_.pixel_residual<Real>({}, start_.white));
+  for (int subset = 0; subset < problem_.list.subsets(); ++subset)
+    march(problem_.pixel_residual<Real>({}, start_.white), subset);
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (const Quad<Real>& r : residual_) {
     Eigen::Vector3d own;

@@ -75,10 +75,14 @@ class GlowCost {
 
  private:
   void show(const GlowField<Real>& at);
-  [[nodiscard]] MarchWork<Real> work();
-  void march(const PixelResidual<Real>& pixel);
-  void spread();
-  double data();
+  [[nodiscard]] MarchWork<Real> work(int subset);
+  /// Of each subset the residuals of what is shown, what `act(begin, end)` makes of them, and gradient +=
+  /// A^T residual, from 0 on.
+  template <class Act>
+  void march_and_spread(const PixelResidual<Real>& pixel, const Act& act);
+  void march(const PixelResidual<Real>& pixel, int subset);
+  void spread(int subset);
+  double data(std::size_t begin, std::size_t end);
   double tied(const GlowField<Real>& at, GlowField<Real>& slope) const;
   [[nodiscard]] Eigen::Matrix<double, 3, 2> derivative(const GlowField<Real>& at, std::size_t point) const;
   [[nodiscard]] Eigen::Matrix2d curvature(const GlowField<Real>& at, std::size_t point) const;
@@ -93,7 +97,7 @@ class GlowCost {
   int travel_;
   std::vector<std::array<Real, 3>> ties_;  // along x, y and z to the next point, 0..1
   std::vector<Quad<Real>> shown_, residual_, gradient_;
-  std::vector<Quad<Real>> samples_;  // where the extinction is a field
+  std::vector<Quad<Real>> samples_;  // of a subset, where the extinction is a field
   std::vector<Quad<Real>> weight_;   // A^T A 1 of each channel
   Eigen::Matrix3d precision_ = Eigen::Matrix3d::Identity();
   double tie_kelvin_ = 0, tie_brightness_ = 0;

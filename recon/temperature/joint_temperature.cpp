@@ -15,6 +15,8 @@ namespace emberlock::recon {
 namespace {
 
 constexpr int kIterations = 16;
+constexpr int kSubsets = 16;              // whose samples are held one at a time
+constexpr double kDropThatCounts = 1e-4;  // of the cost: less ends it
 constexpr GlowTies kTies{0.1, 0.1};
 constexpr double kMostMomentum = 0.95;
 
@@ -51,7 +53,7 @@ Begin begin_at(const Problem& problem, const Optics& optics, const Volume& volum
 
 /// Nesterov's accelerated descent; where the cost rises it goes back to the best, without momentum, and where
 /// that was a plain step already, the next ones are half as long (O'Donoghue and Candes 2015).
-JointSolve descend(GlowCost<float>& cost, GlowField<float>& at) {
+JointSolve descend(GlowCost<float>& cost, GlowField<float>& at, const SolveOptions& options) {
   JointSolve out;
   GlowField<float> best = at;
   GlowField<float> stepped = at;  // without momentum
@@ -59,7 +61,8 @@ JointSolve descend(GlowCost<float>& cost, GlowField<float>& at) {
   GlowField<float> slope;
   double length = 1;
   double time = 1;
-  for (int n = 0; n <= kIterations; ++n) {
+  bool plain = true;  // whether `at` is the best's own step, without momentum
+  for (int n = 0; n <= kIterations && (n == 0 || !is_stopped(options)); ++n) {
     const double now = cost(at, slope);
     if (n == 0) {
       if (!std::isfinite(now)) throw Diverged(now, now);
@@ -67,12 +70,15 @@ JointSolve descend(GlowCost<float>& cost, GlowField<float>& at) {
     }
     out.iterations = n;
     if (n == 0 || now < out.after) {
+      if (n > 0) out.last_drop = 1 - now / out.after;
       out.after = now;
       best = at;
       best_slope = slope;
+      if (n == kIterations || (n > 1 && out.last_drop < kDropThatCounts)) break;
       const double next = (1 + std::sqrt(1 + 4 * time * time)) / 2;
       const auto momentum = static_cast<float>(std::min(kMostMomentum, (time - 1) / next));
       time = next;
+      plain = !(momentum > 0);
       GlowField<float> before = std::exchange(stepped, at);
       cost.descend(stepped, slope, length);
       at = stepped;
@@ -81,7 +87,8 @@ JointSolve descend(GlowCost<float>& cost, GlowField<float>& at) {
         at.brightness[p] += momentum * (stepped.brightness[p] - before.brightness[p]);
       }
     } else {
-      if (time <= 1) length /= 2;
+      if (plain) length /= 2;
+      plain = true;
       time = 1;
       at = best;
       cost.descend(at, best_slope, length);
@@ -101,24 +108,23 @@ bool can_solve_together(const Effects& effects) {
 }
 
 JointSolve solve_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
-                          const ComputeOptions& compute, const Elapsed& elapsed, std::vector<float>& kelvin) {
+                          const SolveOptions& options, const Elapsed& elapsed, std::vector<float>& kelvin) {
   const Seconds began = elapsed ? elapsed() : Seconds(0);
   const auto prepared = PreparedScene::create(scene, done.effects);
   if (!prepared.ok()) throw std::logic_error(prepared.error().message());
-  SolveOptions options;
-  options.compute = compute;
-  Pool pool(compute.threads);
+  Pool pool(options.compute.threads);
   SolverSetup setup{{}, {}, done.hull, done.effects, options, pool};
   for (const View& view : prepared->scene().views)
     if (view.role == ViewRole::input) setup.views.push_back(&view);
   ProblemOptions rays = setup.problem_options();
   rays.rule.stride = stride_for(setup, done.volume.grid);
+  rays.subsets = rays.rule.dealt = kSubsets;
   const Problem problem = make_problem(setup.views, done.hull, rays, pool);
   Begin begin = begin_at(problem, setup.optics(done.volume.grid), done.volume, kelvin);
   const std::vector<float> total = begin.start.total;
   GlowCost<float> cost(problem, std::move(begin.start), EmitterColours(table), pool);
   cost.weigh(begin.at, kTies);
-  JointSolve out = descend(cost, begin.at);
+  JointSolve out = descend(cost, begin.at, options);
   double weights = 0;
   for (std::size_t p = 0; p < total.size(); ++p) {
     if (!(total[p] > 0)) continue;

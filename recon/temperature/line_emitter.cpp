@@ -52,15 +52,19 @@ Error bad_lines(std::string what, std::string remedy) {
 const std::vector<LineEmitter>& line_emitters() {
   // Atoms: wavelengths in air of the NIST Atomic Spectra Database. The upper levels of a doublet have
   // statistical weights of 4 and 2 and transition probabilities alike within 2 %, so that thin light is 2
-  // : 1. Their other lines are fainter by 1e-4 or more in a flame (potassium's violet 404.4 nm; lithium's
-  // 610.4 nm). C2: heads of the Swan system and their intensities by Pearse and Gaydon, The Identification of
-  // Molecular Spectra (4th edition, 1976): estimates by eye, good to a factor of two. Each is taken as even
-  // over the 5 nm on the violet side, to which they fade. CH: the A-X band around 431.4 nm (Pearse and
-  // Gaydon); its B-X at 387 nm, which cameras hardly see, is left out. CuCl: its strongest bands, 426.9 to
-  // 456.0 nm (Shimizu, Selected Pyrotechnic Publications 3, "Flame spectra of blue color compositions"); the
-  // fainter ones at 484.7, 488.2 and 526.2 nm are left out. CuOH: its strongest, diffuse bands (Pearse and
-  // Gaydon); those at 615 to 625 nm are left out. BO2: the three strongest of the A-X system (Johns, Can. J.
-  // Phys. 39, 1738, 1961), taken to be equally strong.
+  // : 1. In a flame their other lines are fainter by 3e-4 or more (potassium's violet 404.4 nm, which counts
+  // only behind an infrared filter; lithium's 610.4 nm).
+  // C2: the four sequences of the Swan system, whose heads stand at 473.7, 516.5, 563.6 and 619.1 nm, with
+  // the power, centre and width that they have in a measured blue flame (butane, spectrometer corrected for
+  // its sensitivity: "BlueFlame.txt" of the R package colorSpec, E. Rabett 2007). Franck-Condon factors at
+  // 3000 and 4500 K give 20..28 : 55..45 : 18 : 4..5 where it has 25 : 51 : 19 : 4. CH: the A-X band around
+  // 431 nm; in that flame B-X at 382 to 402 nm has a fifth of its power, and is left out, as cameras hardly
+  // see it. CuCl: its strongest bands, 426.9 to 456.0 nm (Shimizu, Selected Pyrotechnic Publications 3, pp.
+  // 87-102); the fainter ones at 476 to 488 and at 526.3 to 553.1 nm are left out. CuOH: its strongest,
+  // diffuse bands; no intensities were at hand (Meyerriecks and Kosanke, J. Pyrotechnics 18, 2003, has them);
+  // those at 615 to 625 nm are left out. BO2: the A-X system (Johns, Can. J. Phys. 39, 1738, 1961); 492, 518
+  // and 546 nm by Dean and Thompson (Anal. Chem. 27, 42, 1955); relative heights by one green flame before a
+  // spectrometer whose sensitivity wasn't corrected, good to half.
   static const std::vector<LineEmitter> emitters = {
       {"sodium", "Na, 589.0 and 589.6 nm", {{588.995, 588.995, 2}, {589.592, 589.592, 1}}},
       {"potassium", "K, 766.5 and 769.9 nm", {{766.490, 766.490, 2}, {769.896, 769.896, 1}}},
@@ -68,19 +72,12 @@ const std::vector<LineEmitter>& line_emitters() {
       {"ch", "CH of a blue base, 431 nm", {{427, 435, 1}}},
       {"c2",
        "C2 of a blue base, Swan bands at 516.5, 473.7 and 563.6 nm",
-       {{433.3, 438.3, 2},
-        {466.5, 471.5, 8},
-        {468.7, 473.7, 9},
-        {507.9, 512.9, 6},
-        {511.5, 516.5, 10},
-        {549.1, 554.1, 6},
-        {553.6, 558.6, 8},
-        {558.6, 563.6, 8},
-        {607.2, 612.2, 4},
-        {614.1, 619.1, 3}}},
+       {{463.2, 474.8, 5}, {504.7, 519, 10}, {544, 566, 3.8}, {588, 620, 0.85}}},
       {"cucl", "copper with chlorine, 427 to 456 nm", {{426.9, 456.0, 1}}},
       {"cuoh", "copper without chlorine, 535 to 555 nm", {{535, 555, 1}}},
-      {"bo2", "boron, 518, 546 and 579 nm", {{513, 523, 1}, {541, 551, 1}, {574, 584, 1}}},
+      {"bo2",
+       "boron, 494, 518, 548 and 580 nm",
+       {{488.5, 498.5, 2}, {513, 523, 6}, {542.5, 552.5, 10}, {575, 585, 2.5}, {615, 625, 0.6}}},
   };
   return emitters;
 }
@@ -123,8 +120,12 @@ std::array<double, 3> levels_of(const CameraResponse& response, const LineEmitte
     strengths += band.strength;
     for (std::size_t c = 0; c < 3; ++c) out[c] += band.strength * mean(response, c, band);
   }
-  for (double& v : out) v = std::max(0.0, v / strengths);
+  for (double& v : out) v /= strengths;
   return out;
+}
+
+std::array<double, 3> shown_alone(const std::array<double, 3>& levels) {
+  return {std::max(0.0, levels[0]), std::max(0.0, levels[1]), std::max(0.0, levels[2])};
 }
 
 bool is_seen(const CameraResponse& response, const LineEmitter& emitter) {
@@ -134,13 +135,13 @@ bool is_seen(const CameraResponse& response, const LineEmitter& emitter) {
     for (const std::vector<double>& level : response.level) sum += std::max(0.0, level[i]);
     most = std::max(most, sum);
   }
-  const std::array<double, 3> shown = levels_of(response, emitter);
+  const std::array<double, 3> shown = shown_alone(levels_of(response, emitter));
   return shown[0] + shown[1] + shown[2] > kLeastSeen * most;
 }
 
 double colour_distance(const std::array<double, 3>& a, const std::array<double, 3>& b) {
-  const Eigen::Vector3d u = Eigen::Vector3d::Map(a.data()).normalized();
-  const Eigen::Vector3d v = Eigen::Vector3d::Map(b.data()).normalized();
+  const Eigen::Vector3d u = Eigen::Vector3d::Map(shown_alone(a).data()).normalized();
+  const Eigen::Vector3d v = Eigen::Vector3d::Map(shown_alone(b).data()).normalized();
   return u.cross(v).norm();
 }
 

@@ -37,13 +37,15 @@ inline constexpr std::size_t kMostLines = 2;  ///< three channels and an extinct
 /// Names between commas, "auto", or nothing; an Error that lists them otherwise.
 Result<LineRequest> parse_lines(std::string_view words);
 
-/// What a camera shows of an emission of 1 W / (sr m^3): levels a metre. A channel that would be below 0,
-/// outside the camera's gamut, shows 0.
+/// What a camera makes of an emission of 1 W / (sr m^3): levels a metre. A channel may be below 0, where the
+/// line is outside the camera's gamut: it then takes from what shines beside it.
 std::array<double, 3> levels_of(const CameraResponse& response, const LineEmitter& emitter);
+/// What it shows of it alone: no channel below 0.
+std::array<double, 3> shown_alone(const std::array<double, 3>& levels);
 /// Whether it shows more than a thousandth of what it shows at its best wavelength.
 bool is_seen(const CameraResponse& response, const LineEmitter& emitter);
 
-/// Between 0, one colour, and 1, no channel in common: the sine of the angle between levels.
+/// Between 0, one colour, and 1, no channel in common: the sine of the angle between what each shows alone.
 double colour_distance(const std::array<double, 3>& a, const std::array<double, 3>& b);
 inline constexpr double kOneColour = 0.02;  ///< a distance below which a camera can't tell two colours
 /// The temperature whose colour is the line's; nothing if none is.

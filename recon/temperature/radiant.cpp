@@ -128,18 +128,24 @@ double flux_part(const HotVolume& volume, const Eigen::Vector3d& point, const Ei
   return flux * towards.solid_angle();
 }
 
-bool holds_all(const TargetSphere& sphere, const HotVolume& v) {
+/// The share of what radiates that lies within a sphere.
+double held_by(const TargetSphere& sphere, const HotVolume& v) {
   const Grid& g = v.grid;
   const Eigen::Vector3d origin(g.origin[0], g.origin[1], g.origin[2]);
+  double within = 0;
+  double all = 0;
   for (int k = 0; k < g.nz; ++k)
     for (int j = 0; j < g.ny; ++j)
       for (int i = 0; i < g.nx; ++i) {
         const std::size_t p = g.index(i, j, k);
         if (!(v.kelvin[p] > 0 && v.absorption[p] > 0)) continue;
+        const double radiates =
+            static_cast<double>(v.absorption[p]) * std::pow(static_cast<double>(v.kelvin[p]), 4);
+        all += radiates;
         const Eigen::Vector3d place = origin + static_cast<double>(g.edge) * Eigen::Vector3d(i, j, k);
-        if ((place - sphere.center).norm() > sphere.radius) return false;
+        if ((place - sphere.center).norm() <= sphere.radius) within += radiates;
       }
-  return true;
+  return all > 0 ? within / all : 0;
 }
 
 }  // namespace
@@ -199,7 +205,9 @@ double radiant_flux(const HotVolume& volume, const Eigen::Vector3d& point, const
 }
 
 SphereFlux radiant_flux(const HotVolume& volume, const TargetSphere& target, const ComputeOptions& compute) {
-  const double side = holds_all(target, volume) ? -1 : 1;
+  SphereFlux out;
+  out.held = held_by(target, volume);
+  const double side = out.held > 0.5 ? -1 : 1;
   const Bounds bounds(volume.grid);
   std::vector<double> flux(kSpherePoints);
   Pool(compute.threads).run(kSpherePoints, [&](int i) {
@@ -208,7 +216,6 @@ SphereFlux radiant_flux(const HotVolume& volume, const TargetSphere& target, con
     const Towards towards(bounds, point, side * outwards, kTowardsOfEach);
     flux[static_cast<std::size_t>(i)] = flux_part(volume, point, side * outwards, towards, 0, kTowardsOfEach);
   });
-  SphereFlux out;
   for (const double f : flux) {
     out.mean += f / kSpherePoints;
     out.most = std::max(out.most, f);

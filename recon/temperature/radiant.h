@@ -41,9 +41,11 @@ struct TargetSphere {
 struct SphereFlux {
   double mean = 0, most = 0;  ///< W / m^2, over the surface and where it is strongest
   double power = 0;           ///< W, that the sphere catches
+  double held = 0;            ///< the share of what radiates, by absorption and T^4, that lies within it
 };
 /// What falls on a black sphere: radiant_flux() at 256 points (Fibonacci's sphere), of 1024 directions each.
-/// A sphere around all that radiates catches on its inner side, any other on its outer side.
+/// A sphere that holds more than half of what radiates catches on its inner side, any other on its outer
+/// side.
 SphereFlux radiant_flux(const HotVolume& volume, const TargetSphere& target,
                         const ComputeOptions& compute = {});
 

@@ -3,24 +3,24 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <optional>
 #include <string>
 
 #include <Eigen/Dense>
 
+#include "recon/adjust/guard.h"
 #include "recon/compute/pool.h"
 #include "recon/temperature/joint_temperature.h"
 #include "recon/temperature/self_absorption.h"
 #include "recon/temperature/unmixing.h"
+#include "recon/temperature/voxel_glow.h"
 
 namespace emberlock::recon {
 namespace {
 
 constexpr double kShareThatIsRead = 0.005;  // of the brightest key point's emission
-constexpr double kLeastShare = 2e-3;        // of a level: what the response and the march leave
-constexpr double kAbsorptionShare = 0.5;    // of the extinction: how well pictures tell where it is
 constexpr double kMostUncertain = 0.2;      // of a temperature
-constexpr double kWhite = 254.5;            // levels
 constexpr double kShareOfOthers = 0.01;     // of what was read, which no soot shows: a line is looked for
 constexpr std::size_t kMostJudged = 2000;   // glows by which a line is chosen
 
@@ -29,99 +29,6 @@ enum class Fate : std::uint8_t { dark, told, mixed, colder, hotter, unclear, oth
 float brightest_channel(const Volume& volume, std::size_t p) {
   return std::max({volume.emission[3 * p], volume.emission[3 * p + 1], volume.emission[3 * p + 2]});
 }
-
-/// Whether most of the input views that see a point are saturated where they see it.
-class Saturation {
- public:
-  explicit Saturation(const Scene& scene) {
-    for (const View& view : scene.views) {
-      if (view.role != ViewRole::input) continue;
-      const bool any = view.bounds != nullptr || std::any_of(view.image->rgb.begin(), view.image->rgb.end(),
-                                                             [](float v) { return v >= kWhite; });
-      any_ = any_ || any;
-      views_.push_back(&view);
-    }
-  }
-  [[nodiscard]] bool at(const Eigen::Vector3d& point) const {
-    if (!any_) return false;
-    std::size_t seen = 0;
-    std::size_t bound = 0;
-    for (const View* view : views_) {
-      if (!((view->camera.camera_from_world * point).z() > 0)) continue;
-      const Eigen::Vector2d at = view->camera.project(point);
-      const ImageSize size = view->image->size;
-      if (!(at.x() >= 0 && at.y() >= 0 && at.x() < size.width && at.y() < size.height)) continue;
-      const auto pixel = static_cast<std::size_t>(at.y()) * static_cast<std::size_t>(size.width) +
-                         static_cast<std::size_t>(at.x());
-      ++seen;
-      const float* rgb = &view->image->rgb[3 * pixel];
-      const bool white = std::max({rgb[0], rgb[1], rgb[2]}) >= kWhite;
-      bound += white || (view->bounds != nullptr && (*view->bounds)[pixel] != 0) ? 1 : 0;
-    }
-    return 2 * bound > seen;
-  }
-
- private:
-  std::vector<const View*> views_;
-  bool any_ = false;
-};
-
-/// What a voxel shows, with its errors.
-class Glows {
- public:
-  Glows(const Reconstruction& done, const VolumeErrors& errors, const EmitterTable& table, SelfAbsorption own,
-        double brightest, bool beside_lines)
-      : volume_(done.volume),
-        errors_(errors),
-        own_(std::move(own)),
-        paper_(table.emitter() == Emitter::paper),
-        beside_lines_(beside_lines),
-        brightest_(brightest) {
-    by_absorption_ = !paper_ && table.absolute() && !volume_.extinction.empty() &&
-                     !errors.extinction.empty() && done.effects.scattering.order == Scattering::Order::none;
-    opacity_ = -std::log1p(-kPaperOpacityOfAStep) / static_cast<double>(volume_.grid.edge);
-  }
-  [[nodiscard]] bool by_absorption() const { return by_absorption_; }
-
-  [[nodiscard]] Glow at(std::size_t p) const {
-    Glow glow;
-    for (int c = 0; c < 3; ++c)
-      glow.level[c] = static_cast<double>(volume_.emission[3 * p + static_cast<std::size_t>(c)]);
-    Eigen::Matrix3d covariance = errors_.covariance(p);
-    if (!own_.factor.empty()) {
-      const Eigen::Vector3d factor = Eigen::Vector3f::Map(&own_.factor[3 * p]).cast<double>();
-      glow.level = glow.level.cwiseProduct(factor);
-      covariance = factor.asDiagonal() * covariance * factor.asDiagonal();
-      // Lines may shine where there is no soot, and the extinction that is found there be wrong.
-      const Eigen::Vector3d doubt =
-          beside_lines_ ? kAbsorptionShare * glow.level.cwiseProduct(factor.array().log().matrix())
-                        : Eigen::Vector3d::Zero().eval();
-      covariance += doubt * doubt.transpose();
-    }
-    const double least = std::hypot(kLeastShare * glow.level.maxCoeff(), 1e-4 * brightest_);
-    covariance.diagonal().array() += least * least;
-    if (paper_) {
-      glow.information(1, 1) = 1 / covariance(1, 1);
-      glow.absorption = opacity_;
-      glow.absorption_sigma = 1e-6 * opacity_;
-      return glow;
-    }
-    glow.information = covariance.inverse();
-    if (by_absorption_ && volume_.extinction[p] > 0) {
-      glow.absorption = static_cast<double>(volume_.extinction[p]) / own_.reference;
-      glow.absorption_sigma = std::hypot(static_cast<double>(errors_.extinction[p]) / own_.reference,
-                                         kAbsorptionShare * glow.absorption);
-    }
-    return glow;
-  }
-
- private:
-  const Volume& volume_;
-  const VolumeErrors& errors_;
-  SelfAbsorption own_;
-  bool paper_, beside_lines_, by_absorption_ = false;
-  double brightest_, opacity_ = 0;
-};
 
 Fate fate_of(const Reading& reading) {
   if (reading.told == Reading::Told::colder) return Fate::colder;
@@ -203,9 +110,18 @@ EmitterTable table_for(const Reconstruction& done, const CameraResponse& respons
           Kelvin(kPaperHottest)};
 }
 
-/// Mean, percentiles and errors, weighted by emission.
-void summarise(const Volume& volume, const std::vector<Fate>& fates, double least, TemperatureField& field) {
+/// What was read of a volume, before it is summed up.
+struct Readings {
+  TemperatureField field;
+  std::vector<Fate> fates = {};
+};
+
+/// Counts, mean, percentiles and errors, weighted by emission.
+TemperatureField summed_up(const Volume& volume, Readings readings) {
+  auto& [field, fates] = readings;
   TemperatureSummary& out = field.summary;
+  const double least = kShareThatCounts *
+                       static_cast<double>(*std::max_element(volume.emission.begin(), volume.emission.end()));
   struct Told {
     float kelvin, sigma, weight;
   };
@@ -216,10 +132,12 @@ void summarise(const Volume& volume, const std::vector<Fate>& fates, double leas
     const float weight = brightest_channel(volume, p);
     if (static_cast<double>(weight) < least) continue;
     count(out.counts, fates[p]);
-    light += static_cast<double>(weight);
+    const float* rgb = &volume.emission[3 * p];
+    const auto all = static_cast<double>(rgb[0] + rgb[1] + rgb[2]);
+    light += all;
     for (std::size_t i = 0; i < out.lines.size(); ++i) {
       const float share = field.line_share[i][p];
-      out.lines[i].share += static_cast<double>(share * weight);
+      out.lines[i].share += static_cast<double>(share) * all;
       out.lines[i].seen += share > 0 ? 1 : 0;
     }
     if (fates[p] != Fate::told && fates[p] != Fate::mixed) continue;
@@ -228,7 +146,7 @@ void summarise(const Volume& volume, const std::vector<Fate>& fates, double leas
     out.mean += static_cast<double>(weight) * static_cast<double>(field.kelvin[p]);
   }
   for (LineSummary& line : out.lines) line.share /= std::max(1e-30, light);
-  if (told.empty()) return;
+  if (told.empty()) return std::move(field);
   out.mean /= weights;
   const auto at_share = [&](double share, float Told::*value) {
     std::sort(told.begin(), told.end(), [&](const Told& a, const Told& b) { return a.*value < b.*value; });
@@ -240,6 +158,7 @@ void summarise(const Volume& volume, const std::vector<Fate>& fates, double leas
   out.low = at_share(0.05, &Told::kelvin);
   out.high = at_share(0.95, &Told::kelvin);
   out.sigma = at_share(0.5, &Told::sigma);
+  return std::move(field);
 }
 
 /// What the lines show; the field's lists of their shares, still 0.
@@ -257,7 +176,7 @@ std::vector<std::array<double, 3>> look_for(const std::vector<const LineEmitter*
 }
 
 /// Those of one fate, spread over the volume, at most kMostJudged; none if they are too few to matter.
-std::vector<Glow> glows_of(const std::vector<Fate>& fates, Fate fate, const Glows& glows) {
+std::vector<Glow> glows_of(const std::vector<Fate>& fates, Fate fate, const VoxelGlow& glows) {
   const auto all = static_cast<std::size_t>(std::count(fates.begin(), fates.end(), fate));
   const auto dark = static_cast<std::size_t>(std::count(fates.begin(), fates.end(), Fate::dark));
   std::vector<Glow> out;
@@ -265,18 +184,26 @@ std::vector<Glow> glows_of(const std::vector<Fate>& fates, Fate fate, const Glow
   const std::size_t every = all / kMostJudged + 1;
   std::size_t met = 0;
   for (std::size_t p = 0; p < fates.size(); ++p)
-    if (fates[p] == fate && met++ % every == 0) out.push_back(glows.at(p));
+    if (fates[p] == fate && met++ % every == 0) out.push_back(glows.at(p, Beside::lines));
   return out;
 }
 
 /// The joint solve's temperatures. What they and what was read differ by is part of their error: it shows
 /// what the prior and a glow of this kind change, and a reading's own error doesn't hold that.
 void take_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
-                   const ComputeOptions& compute, const Elapsed& elapsed, TemperatureField& field,
+                   const SolveOptions& options, const Elapsed& elapsed, TemperatureField& field,
                    std::vector<Fate>& fates) {
   const std::vector<float> read = field.kelvin;
   if (std::none_of(read.begin(), read.end(), [](float kelvin) { return kelvin > 0; })) return;
-  field.summary.joint = solve_together(scene, done, table, compute, elapsed, field.kelvin);
+  try {
+    field.summary.joint = solve_together(scene, done, table, options, elapsed, field.kelvin);
+  } catch (const Diverged&) {  // what was read stands
+    field.summary.joint_failed = true;
+    return;
+  } catch (const std::bad_alloc&) {
+    field.summary.joint_failed = true;
+    return;
+  }
   for (std::size_t p = 0; p < read.size(); ++p) {
     if (!(read[p] > 0)) continue;
     float& kelvin = field.kelvin[p];
@@ -293,24 +220,40 @@ void take_together(const Scene& scene, const Reconstruction& done, const Emitter
   }
 }
 
+/// Nobody told what glows: what the other kind would tell is part of each temperature's error. Where that
+/// tells none, it doesn't explain what is seen.
+void doubt_emitter(const TemperatureField& other, Readings& readings) {
+  auto& [field, fates] = readings;
+  for (std::size_t p = 0; p < field.kelvin.size(); ++p) {
+    float& kelvin = field.kelvin[p];
+    float& sigma = field.sigma[p];
+    if (!(kelvin > 0) || !(other.kelvin[p] > 0)) continue;
+    sigma = std::hypot(sigma, other.kelvin[p] - kelvin);
+    if (static_cast<double>(sigma) < kMostUncertain * static_cast<double>(kelvin)) continue;
+    fates[p] = Fate::unclear;
+    kelvin = sigma = 0;
+  }
+}
+
 /// What all readings of one volume share.
 struct Asked {
   const Scene& scene;
   const Reconstruction& done;
   const VolumeErrors& errors;
   const CameraResponse& response;
-  const ComputeOptions& compute;
+  const SolveOptions& options;
   const Elapsed& elapsed;
 };
 
 enum class Together { yes, no };
 
-TemperatureField read_all(const Asked& asked, Emitter emitter, Together together,
-                          const std::vector<const LineEmitter*>& named, std::vector<Glow>* others = nullptr) {
-  const auto& [scene, done, errors, response, compute, elapsed] = asked;
+Readings read_all(const Asked& asked, Emitter emitter, Together together,
+                  const std::vector<const LineEmitter*>& named, std::vector<Glow>* others = nullptr) {
+  const auto& [scene, done, errors, response, options, elapsed] = asked;
   const Volume& volume = done.volume;
   const Grid& grid = volume.grid;
-  TemperatureField field;
+  Readings readings;
+  auto& [field, fates] = readings;
   TemperatureSummary& summary = field.summary;
   summary.emitter = emitter;
   summary.absolute = response.absolute;
@@ -321,19 +264,19 @@ TemperatureField read_all(const Asked& asked, Emitter emitter, Together together
   field.sigma.resize(grid.size());
   const double brightest =
       static_cast<double>(*std::max_element(volume.emission.begin(), volume.emission.end()));
-  if (!(brightest > 0)) return field;
+  if (!(brightest > 0)) return readings;
   const Thermometer meter(table_for(done, response, emitter));
   SelfAbsorption own;
-  if (emitter == Emitter::soot) own = self_absorption(scene, done, response, emitter, compute);
+  if (emitter == Emitter::soot) own = self_absorption(scene, done, response, emitter, options.compute);
   const bool corrected = !own.factor.empty();
-  const Glows glows(done, errors, meter.table(), std::move(own), brightest, !named.empty());
+  const VoxelGlow glows(done, errors, meter.table(), std::move(own), response, brightest);
   summary.by_absorption = glows.by_absorption();
   const Saturation saturation(scene);
-  std::vector<Fate> fates(grid.size(), Fate::dark);
+  fates.assign(grid.size(), Fate::dark);
   std::vector<std::array<double, 2>> chi(static_cast<std::size_t>(grid.nz));  // sum, degrees of freedom
   std::optional<Unmixer> unmixer;
   if (!named.empty()) unmixer.emplace(meter, look_for(named, response, meter.table(), field));
-  Pool(compute.threads).run(grid.nz, [&](int k) {
+  Pool(options.compute.threads).run(grid.nz, [&](int k) {
     for (int j = 0; j < grid.ny; ++j)
       for (int i = 0; i < grid.nx; ++i) {
         const std::size_t p = grid.index(i, j, k);
@@ -342,7 +285,7 @@ TemperatureField read_all(const Asked& asked, Emitter emitter, Together together
                                                       grid.origin[1] + grid.edge * static_cast<float>(j),
                                                       grid.origin[2] + grid.edge * static_cast<float>(k))
                                           .cast<double>();
-        const Glow glow = glows.at(p);
+        const Glow glow = glows.at(p, named.empty() ? Beside::nothing : Beside::lines);
         const Unmixed unmixed = unmixer ? unmixer->read(glow) : Unmixed{};
         const Reading reading = unmixer ? unmixed.reading : meter.read(glow);
         fates[p] = saturation.at(place) ? Fate::saturated : unmixer ? fate_of(unmixed) : fate_of(reading);
@@ -357,40 +300,46 @@ TemperatureField read_all(const Asked& asked, Emitter emitter, Together together
       }
   });
   if (together == Together::yes && !corrected && can_solve_together(done.effects))
-    take_together(scene, done, meter.table(), compute, elapsed, field, fates);
+    take_together(scene, done, meter.table(), options, elapsed, field, fates);
   std::array<double, 2> sum = {};
   for (const auto& c : chi) sum = {sum[0] + c[0], sum[1] + c[1]};
   summary.chi_square = sum[1] > 0 ? sum[0] / sum[1] : 0;
   if (others != nullptr) *others = glows_of(fates, Fate::other, glows);
-  summarise(volume, fates, kShareThatCounts * brightest, field);
-  return field;
+  return readings;
 }
 
 }  // namespace
 
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
-                                const CameraResponse& response, Emitter emitter,
-                                const ComputeOptions& compute, const Elapsed& elapsed,
+                                const CameraResponse& response, std::optional<Emitter> told,
+                                const SolveOptions& options, const Elapsed& elapsed,
                                 const LineRequest& lines) {
-  const Asked asked{scene, done, errors, response, compute, elapsed};
+  const Asked asked{scene, done, errors, response, options, elapsed};
+  const Emitter emitter = taken_for(told);
   const bool paper = emitter == Emitter::paper;
   std::vector<const LineEmitter*> named = lines.named;
   std::vector<Glow> others;
-  TemperatureField field =
+  Readings read =
       read_all(asked, emitter, paper || !named.empty() ? Together::no : Together::yes, named, &others);
   if (lines.automatic && !others.empty()) {
     const LineChoice choice = choose_line(Thermometer(table_for(done, response, emitter)), response, others);
     if (choice.chosen != nullptr) {
       named = {choice.chosen};
-      field = read_all(asked, emitter, Together::no, named);
+      read = read_all(asked, emitter, Together::no, named);
     }
-    for (const LineEmitter* rival : choice.rivals) field.summary.lines_alike.emplace_back(rival->name);
+    for (const LineEmitter* rival : choice.rivals) read.field.summary.lines_alike.emplace_back(rival->name);
   }
-  field.summary.lines_automatic = lines.automatic;
-  if (paper || field.summary.counts.told == 0) return field;
-  const Emitter other = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
-  field.summary.if_other = read_all(asked, other, Together::no, named).summary.mean;
-  return field;
+  read.field.summary.lines_automatic = lines.automatic;
+  read.field.summary.lines_tried = lines.automatic && !others.empty();
+  read.field.summary.emitter_told = told.has_value();
+  const std::vector<float>& kelvin = read.field.kelvin;
+  if (paper || std::none_of(kelvin.begin(), kelvin.end(), [](float t) { return t > 0; }))
+    return summed_up(done.volume, std::move(read));
+  const Emitter instead = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
+  const TemperatureField other = summed_up(done.volume, read_all(asked, instead, Together::no, named));
+  if (!told) doubt_emitter(other, read);
+  read.field.summary.if_other = other.summary.mean;
+  return summed_up(done.volume, std::move(read));
 }
 
 }  // namespace emberlock::recon

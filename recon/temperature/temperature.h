@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,7 +31,7 @@ struct TemperatureCounts {
 /// A line emitter that was looked for (line_emitter.h).
 struct LineSummary {
   std::string name;
-  double share = 0;      ///< of all the light
+  double share = 0;      ///< of the light of the key points that count
   std::size_t seen = 0;  ///< key points
   double as_if_hot = 0;  ///< K: soot of this temperature has its colour; 0: none has
 };
@@ -38,21 +39,24 @@ struct LineSummary {
 /// How temperatures were read, and how they came out; weighted by emission, in K.
 struct TemperatureSummary {
   Emitter emitter = Emitter::grey;
+  bool emitter_told = false;   ///< else the other kind's temperature is part of each voxel's error
   bool absolute = false;       ///< the response's scale was known
   bool by_absorption = false;  ///< the reconstructed extinction told too
   double opacity = 0;          ///< of the paper's convention, a voxel edge; else 0
   TemperatureCounts counts;
   double mean = 0, low = 0, high = 0;  ///< mean, and what 5 % and 95 % lie below
   double sigma = 0;                    ///< the median of the voxels' errors
-  double chi_square = 0;               ///< mean per degree of freedom; 0: there were none
+  double chi_square = 0;               ///< mean per degree of freedom, as each was read; 0: there were none
   double if_other = 0;  ///< what the mean were if the glow were soot's instead of grey, or the reverse; as
                         ///< it is read, without a joint solve
   bool lines_automatic = false;         ///< chosen by the program
+  bool lines_tried = false;             ///< automatic, and enough of the light is no black body's
   std::vector<LineSummary> lines = {};  ///< those that were looked for, or chosen
   /// Automatic and none chosen: those that explain what no soot does alike; empty: none explains it.
   std::vector<std::string> lines_alike = {};
-  int solves = 0;    ///< of errors_by_views()
-  JointSolve joint;  ///< of all voxels' temperatures, after each was read
+  int solves = 0;             ///< of errors_by_views()
+  JointSolve joint;           ///< of all voxels' temperatures, after each was read
+  bool joint_failed = false;  ///< it diverged or needed more memory than there is: what was read stands
   Seconds errors_time{0}, time{0};
 };
 
@@ -72,10 +76,11 @@ inline constexpr double kShareThatCounts = 0.05;
 /// absolute and nothing scatters, by emission over extinction. The paper: by green and its constant opacity
 /// of 0.05 a voxel edge, between 1000 and 2300 K; where the response is relative the brightest green is 2300
 /// K. With `lines`, valid by check_lines(), each voxel's light is taken apart into soot and lines
-/// (unmixing.h), and nothing is solved together.
+/// (unmixing.h), and nothing is solved together. An emitter that isn't told is read as grey, and what soot
+/// would tell is part of each voxel's error.
 TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, const VolumeErrors& errors,
-                                const CameraResponse& response, Emitter emitter,
-                                const ComputeOptions& compute = {}, const Elapsed& elapsed = {},
+                                const CameraResponse& response, std::optional<Emitter> emitter,
+                                const SolveOptions& options = {}, const Elapsed& elapsed = {},
                                 const LineRequest& lines = {});
 
 }  // namespace emberlock::recon

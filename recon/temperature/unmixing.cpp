@@ -69,7 +69,7 @@ struct Unmixer::Explanation {
 Unmixer::Unmixer(const Thermometer& meter, std::vector<std::array<double, 3>> lines)
     : meter_(&meter), lines_(std::move(lines)) {
   for (std::array<double, 3>& line : lines_) {
-    const double all = sum(line);
+    const double all = sum(shown_alone(line));
     for (double& v : line) v /= all > 0 ? all : 1;
   }
 }
@@ -81,8 +81,11 @@ double Unmixer::chi_square(const Glow& glow, double kelvin, Choice choice, Amoun
   const double scale = table.absolute() ? std::exp(levels.log_scale) : 1;
   Eigen::Matrix3d columns = Eigen::Matrix3d::Zero();
   columns.col(0) = scale * Eigen::Vector3d::Map(levels.value.data());
-  for (std::size_t i = 0; i < lines_.size(); ++i)
-    columns.col(static_cast<Eigen::Index>(i) + 1) = Eigen::Vector3d::Map(lines_[i].data());
+  for (std::size_t i = 0; i < lines_.size(); ++i) {
+    // What a line takes from a channel shows where there is something to take from.
+    const std::array<double, 3> line = (choice & kSoot) != 0 ? lines_[i] : shown_alone(lines_[i]);
+    columns.col(static_cast<Eigen::Index>(i) + 1) = Eigen::Vector3d::Map(line.data());
+  }
   const Eigen::Matrix3d weighted = glow.information * columns;
   Eigen::Matrix3d gram = columns.transpose() * weighted;
   Eigen::Vector3d right = weighted.transpose() * glow.level;

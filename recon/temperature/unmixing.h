@@ -50,7 +50,7 @@ class Unmixer {
   [[nodiscard]] double reach(const Glow& glow, const Explanation& within, double kelvin) const;
 
   const Thermometer* meter_;
-  std::vector<std::array<double, 3>> lines_;
+  std::vector<std::array<double, 3>> lines_;  ///< what each shows alone adds up to 1
 };
 
 /// Which single line emitter best explains glows that no soot shows.

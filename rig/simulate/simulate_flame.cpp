@@ -49,6 +49,9 @@ Status check_simulate(const SimulateOptions& o) {
   const Seconds frame = period(o.rate);
   if (!(o.offsets >= Seconds(0) && o.offsets <= frame / 2))
     return bad("the offsets", "Take 0 to half a frame period");
+  if (o.exposure && !(o.response && o.response->absolute))
+    return Error{ErrorKind::bad_input, "an exposure changes no picture without a response that has a scale",
+                 "simulate flame", "Give --response with levels per W / (sr m2), or leave the exposure out"};
   if (o.exposure && !(*o.exposure >= kShortest && *o.exposure <= frame))
     return bad("the exposure", "Take a microsecond to a frame period");
   if (o.sun && o.preset != recon::FlamePreset::smoke)
@@ -56,7 +59,8 @@ Status check_simulate(const SimulateOptions& o) {
                  "Leave the sun out, or take the preset smoke"};
   if (o.sun && !(o.sun->towards.norm() > 0 && o.sun->towards.allFinite()))
     return bad("the sun's direction", "Take three numbers that aren't all 0");
-  if (o.sun && !(o.sun->albedo >= 0 && o.sun->albedo <= 0.99)) return bad("the albedo", "Take 0 to 0.99");
+  if (o.sun && !(o.sun->albedo > 0 && o.sun->albedo <= 0.99))
+    return bad("the albedo", "Take above 0, to 0.99");
   return {};
 }
 
@@ -115,6 +119,16 @@ v1::Colour colour_of(const recon::CameraResponse& response, const SimulatedFilm&
   return colour;
 }
 
+/// What a grey sensor makes of it: the luminance that VirtualSensor keeps, in each channel.
+recon::CameraResponse as_grey(recon::CameraResponse response) {
+  for (std::size_t i = 0; i < response.wavelength_nm.size(); ++i) {
+    const double grey =
+        0.2126 * response.level[0][i] + 0.7152 * response.level[1][i] + 0.0722 * response.level[2][i];
+    for (std::vector<double>& channel : response.level) channel[i] = grey;
+  }
+  return response;
+}
+
 /// One simulation and the cameras around it.
 class Filming {
  public:
@@ -127,6 +141,7 @@ class Filming {
         light_(std::make_shared<GasLight>(options.cameras)) {
     if (options.preset == recon::FlamePreset::smoke) sun_ = options.sun.value_or(Sun{});
     if (options.response) response_ = *options.response;
+    if (channels(options.format) == 1 && !is_bayer(options.format)) response_ = as_grey(std::move(response_));
     film_.frames = options.frames;
     film_.cameras = options.cameras;
     film_.cell = flame_.options().edge;
@@ -265,7 +280,7 @@ class Filming {
       film_.exposure = options_.exposure.value_or(std::clamp(wanted * usual, kShortest, longest));
       film_.gain = film_.exposure / usual;
     } else {
-      film_.exposure = options_.exposure.value_or(std::min(usual, longest));
+      film_.exposure = std::min(usual, longest);
       film_.gain = wanted;
     }
     return {};
@@ -300,9 +315,10 @@ class Filming {
 
 }  // namespace
 
-int cells_for_pictures(int cells, const SimulatedFilm& film) {
+std::optional<int> cells_for_pictures(int cells, const SimulatedFilm& film) {
   const double wanted = cells * film.cell.value() / film.pixel.value();
-  return std::min(kCellsAtOnce * static_cast<int>(std::ceil(wanted / kCellsAtOnce)), kMostCells);
+  if (!(wanted < kMostCells)) return {};
+  return kCellsAtOnce * (static_cast<int>(wanted / kCellsAtOnce) + 1);
 }
 
 Result<SimulatedFilm> simulate_flame(const SimulateOptions& options, const std::filesystem::path& folder,

@@ -31,7 +31,8 @@ struct SimulateOptions {
   /// and the session tells none.
   std::optional<recon::CameraResponse> response;
   /// How long the shutters are open, 1 us to a frame period. Absent: of an absolute response what makes the
-  /// first frame's brightest pixel 230 of 255 levels, at most a frame period; otherwise kUsualExposure.
+  /// first frame's brightest pixel 230 of 255 levels, at most a frame period; otherwise kUsualExposure. Told
+  /// for an absolute response alone: without a scale no exposure changes a picture.
   std::optional<Seconds> exposure;
   std::optional<Sun> sun;  ///< of smoke alone, which doesn't glow; absent: Sun{}
   std::uint64_t seed = 1;  ///< of burners, offsets and noise
@@ -50,9 +51,9 @@ struct SimulatedFilm {
   Meters cell;                     ///< edge, of the simulation and its truth
   Meters pixel;                    ///< what a pixel covers in the middle of the flame
 };
-/// As many cells, a multiple of 8 below 513, as make the truth finer than what the pictures resolve: a
-/// smaller truth doesn't judge a reconstruction's finest structures.
-int cells_for_pictures(int cells, const SimulatedFilm& film);
+/// As many cells, a multiple of 8, as make the truth finer than what the pictures resolve: a smaller truth
+/// doesn't judge a reconstruction's finest structures. Nothing where 512 don't suffice.
+std::optional<int> cells_for_pictures(int cells, const SimulatedFilm& film);
 
 /// Simulates a flame and films it with virtual cameras (drivers/virtual: their shutters, noise, mosaic and
 /// converter): `folder`/session is a recording of calibrated cameras with linear pictures. A relative

@@ -18,6 +18,12 @@ function digits(value: number): number {
   return size >= 99.5 ? 0 : size >= 9.95 ? 1 : 2;
 }
 
+/** A measured value as a scale names it: "1400", "40.0", "0.50", "0.012". */
+export function reading(value: number): string {
+  if (value === 0) return '0';
+  return Math.abs(value) < 0.1 ? value.toPrecision(2).replaceAll('-', '−') : fixed(value, digits(value));
+}
+
 export function rows(value: number | undefined): string {
   return known(value) ? `${signed(value, Math.abs(value) >= 99.5 ? 0 : 1)} rows` : kNone;
 }

@@ -2,7 +2,7 @@
 // What is known of a volume beside its brightness: temperature and errors, chosen by name, with a bar that says which colour is what.
 import type {VolumeLayer_Kind as Kind} from './api.gen';
 import {el, set, setText, show} from './dom';
-import {fixed} from './format';
+import {reading} from './format';
 import type {Layer, Volume} from './wire';
 
 const kKinds: Record<Exclude<Kind, 'KIND_UNSPECIFIED'>, {name: string; unit: string}> = {
@@ -66,8 +66,6 @@ export function paintSlice(canvas: HTMLCanvasElement, {nx, ny, nz}: Volume, valu
   canvas.getContext('2d')!.putImageData(picture, 0, 0);
 }
 
-const number = (value: number) => fixed(value, Math.abs(value) >= 99.5 || value === 0 ? 0 : Math.abs(value) >= 9.95 ? 1 : 2);
-
 export class Layers {
   private readonly select = el('select', {'aria-label': 'What is shown of the volume', onchange: () => {
     this.wish = this.select.value as Shown;
@@ -89,7 +87,8 @@ export class Layers {
     this.wish = undefined;
   }
 
-  /** Shows what there is, and returns the voxels of the one that is chosen; none where that is brightness. */
+  /** Shows what there is, and returns the voxels of the one that is chosen; none where that is brightness, as where this volume
+   *  doesn't tell what is chosen. */
   show(volume: Volume, bytes: Uint8Array): Uint8Array | undefined {
     const known = (volume.layers ?? []).flatMap((layer, place) => layer.kind in kKinds ? [{...layer, place, kind: layer.kind as Known}] : []);
     show(this.root, known.length > 0);
@@ -99,6 +98,8 @@ export class Layers {
     }
     const chosen = known.find(({kind}) => kind === (this.wish ?? 'TEMPERATURE'));
     this.select.value = chosen?.kind ?? 'BRIGHTNESS';
+    set(this.root, 'data-shown', this.select.value);
+    set(this.root, 'data-quick', chosen?.quick);
     show(this.measured, chosen !== undefined);
     if (!chosen) return undefined;
     this.tell(chosen);
@@ -109,12 +110,10 @@ export class Layers {
 
   private tell({kind, low, high, quick}: Layer & {kind: Known}): void {
     const {name, unit} = kKinds[kind];
-    setText(this.low, `${number(low)} ${unit}`);
-    setText(this.high, `${number(high)} ${unit}`);
+    setText(this.low, `${reading(low)} ${unit}`);
+    setText(this.high, `${reading(high)} ${unit}`);
     set(this.slice, 'aria-label', `${name}, a slice through the middle`);
     setText(this.note, quick ? 'A slice through the middle, looked up by this iteration’s colours. The result’s is better, and has its error.'
                              : 'A slice through the middle. Where nothing is drawn, it isn’t told.');
-    set(this.root, 'data-shown', kind);
-    set(this.root, 'data-quick', quick);
   }
 }

@@ -140,8 +140,10 @@ export class Player {
     });
     if (!answer?.volume) return undefined;
     const {voxels, layers, ...header} = answer.volume;
-    const bytes = [voxels, ...layers.map(layer => layer.voxels)].map(text => atob(text)).join('');
-    const volume: Held = [{kind: 'volume', ...header, layers}, Uint8Array.from(bytes, letter => letter.charCodeAt(0))];
+    const letters = [voxels, ...layers.map(layer => layer.voxels)].map(text => atob(text)).join('');
+    const bytes = new Uint8Array(letters.length);
+    for (let at = 0; at < bytes.length; ++at) bytes[at] = letters.charCodeAt(at);
+    const volume: Held = [{kind: 'volume', ...header, layers: layers.map(({kind, low, high, quick}) => ({kind, low, high, quick}))}, bytes];
     cache.set(frame, volume);
     return volume;
   }

@@ -20,12 +20,17 @@ const kGrey: readonly Colour[] = [[0, 0, 0, 0], [255, 1, 1, 1]];
 const kClear = [[0, 0], [8, 0], [60, 0.05], [140, 0.22], [255, 0.6]] as const;
 const kDense = [[0, 0], [6, 0], [16, 0.35], [80, 0.7], [255, 0.9]] as const;
 
+/** Red, green and blue of each value, from the lowest byte up: the order in memory. */
+const kHeatColours = Uint32Array.from({length: 256}, (_, value) => {
+  const [red, green, blue] = heat(value);
+  return red | green << 8 | blue << 16;
+});
+
 /** Red, green, blue and brightness of each voxel; nothing where nothing is told. */
 function coloured(header: Volume, measured: Uint8Array, brightness: Uint8Array): Uint8Array {
-  const colours = Array.from({length: 256}, (_, value) => heat(value));
-  const out = new Uint8Array(4 * measured.length);
-  spread(header, measured).forEach((value, at) => out.set([...colours[value]!, measured[at] ? brightness[at]! : 0], 4 * at));
-  return out;
+  const out = new Uint32Array(measured.length);
+  spread(header, measured).forEach((value, at) => { out[at] = kHeatColours[value]! | (measured[at] ? brightness[at]! : 0) << 24; });
+  return new Uint8Array(out.buffer);
 }
 
 export class VolumeView {

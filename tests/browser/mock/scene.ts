@@ -95,7 +95,7 @@ export function reconstruction(iterations: number, change: Wire<ReconstructionSt
 /** A sequence of these frames: 'd' is done, 'f' failed, 'r' runs, '-' waits. */
 export function sequence(states: string, change: Wire<ReconstructionStatus> = {}): ReconstructionStatus {
   const names = {d: 'DONE', f: 'FAILED', r: 'RUNNING', '-': 'STATE_UNSPECIFIED'} as const;
-  const frames = [...states].map((state, at) => ({frame: 10 + 2 * at, state: names[state as keyof typeof names], input_rmse: state === 'd' ? 2 + at / 10 : 0, error: state === 'f' ? 'It crashed by SIGSEGV. Try device cpu.' : ''}));
+  const frames = [...states].map((state, at) => ({frame: 10 + 2 * at, state: names[state as keyof typeof names], input_rmse: state === 'd' ? 2 + at / 10 : 0, error: state === 'f' ? 'It crashed by SIGSEGV. Try device cpu.' : '', temperature: ''}));
   return reconstruction(2, {id: 's1', frames, fraction: [...states].filter(state => state === 'd' || state === 'f').length / states.length,
                             doing: `frame ${10 + 2 * states.indexOf('r')} (${states.indexOf('r') + 1} of ${states.length}): iterating`, ...change});
 }

@@ -5,9 +5,10 @@ import {describe, expect, test} from 'vitest';
 
 import {bench, kPhone, kSizes, overflows, text} from './bench';
 import {Refusal} from './mock';
-import {flameVolume} from './pictures';
+import {flameVolume, hotFlameVolume} from './pictures';
 import {idle, iteration, locked, sequence} from './scene';
 import {screenshot, until} from '../support/chromium';
+import type {Layer} from '../../../daemon/console/src/wire';
 
 const rig = bench();
 const entry = {session: 'candle 1', state: 'COMPLETE' as const, purpose: 'flame', created_utc: '2026-11-22T03:15:00Z', cameras: 11, frames: 22000, lost: 0, bytes: 14.6e9, error: '', calibrated: true};
@@ -16,17 +17,19 @@ const last = 'Last frame of candle 1 to reconstruct, of several';
 const every = 'Of candle 1, each frame of so many';
 
 /** The daemon's answer for a frame: volumes of so many voxels along an edge, so that each can be told. */
-function volume(edge: number) {
-  const {header, bytes} = flameVolume(edge);
-  const {nx, ny, nz, box, brightest} = header as {nx: number; ny: number; nz: number; box: {center: number[]; size: number[]}; brightest: number};
-  return {volume: {nx, ny, nz, box, brightest, voxels: Buffer.from(bytes).toString('base64'), layers: []}};
+function volume(edge: number, {header, bytes} = flameVolume(edge)) {
+  const {nx, ny, nz, box, brightest, layers = []} =
+    header as {nx: number; ny: number; nz: number; box: {center: number[]; size: number[]}; brightest: number; layers?: Layer[]};
+  const part = (at: number) => Buffer.from(bytes.subarray(at * edge ** 3, (at + 1) * edge ** 3)).toString('base64');
+  return {volume: {nx, ny, nz, box, brightest, voxels: part(0), layers: layers.map((layer, at) => ({...layer, voxels: part(at + 1)}))}};
 }
 const edgeOf = (at: number) => 8 + (at - 10) / 2;
 function serveFrames(): void {
   rig.mock.answers['Reconstruct/Frame'] = request => {
     expect(request.reconstruction).toBe('s1');
     if (request.frame === 14) throw new Refusal(404, 'NOT_FOUND', 'frame: it is no longer held.');
-    return volume(edgeOf(request.frame!));
+    const edge = edgeOf(request.frame!);
+    return volume(edge, request.frame === 12 ? hotFlameVolume(false, edge) : undefined);  // of one a temperature is known
   };
 }
 const fetched = () => rig.mock.calls.filter(({method}) => method === 'Reconstruct/Frame').map(({request}) => request.frame);
@@ -117,8 +120,11 @@ describe('played', () => {
     await seen(page, edgeOf(10));
     expect(await text(page, '.player .label')).toBe('frame 10, 1 of 5: error 2.00');
     expect(await slider.getAttribute('aria-valuetext')).toBe('frame 10, 1 of 5: error 2.00');
+    expect(await page.locator('.layers').isVisible()).toBe(false);
     await slider.press('ArrowRight');
     await seen(page, edgeOf(12));
+    await page.locator('.layers[data-shown=TEMPERATURE]').waitFor();
+    expect(await text(page, '.colour-bar .high')).toBe('1900 K');
     await slider.press('ArrowRight');
     await until(() => text(page, '.player .label'), words => words === 'frame 14, 3 of 5: no longer held', 'what is gone is told');
     expect(await page.getByRole('button', {name: 'Live'}).isVisible()).toBe(false);

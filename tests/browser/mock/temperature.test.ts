@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Temperature and errors: asked for with a session, shown after each iteration and of the result, with a bar in K.
+import {mkdtempSync, rmSync, writeFileSync} from 'node:fs';
+import {tmpdir} from 'node:os';
+import {join} from 'node:path';
+
 import type {Page} from 'playwright-core';
 import {describe, expect, test} from 'vitest';
 
@@ -39,30 +43,81 @@ async function colours(page: Page): Promise<{warm: number; violet: number}> {
 }
 
 describe('asked for', () => {
+  const response = '{"unit": "relative", "wavelength_nm": [500, 600], "r": [0, 1], "g": [1, 0], "b": [0, 0]}';
   const asked = () => rig.mock.calls.filter(({method}) => method === 'Reconstruct/Start').map(({request}) => request);
   const quantity = 'What of candle 1 to reconstruct';
+  const emitter = 'What glows in candle 1';
+  const lines = 'What shines beside it in candle 1';
 
-  test('colour, its errors, or temperature by an emitter and a response', async () => {
+  test('colour, its errors, or temperature by an emitter, lines and a response', async () => {
     rig.mock.status = idle();
     rig.mock.answers['Sessions/List'] = () => ({sessions: [entry]});
     const page = await rig.open();
     const start = () => page.getByRole('button', {name: 'Reconstruct candle 1'}).click();
     await page.getByLabel(quantity).selectOption('errors');
-    expect(await page.getByLabel('What glows in candle 1').isVisible()).toBe(false);
+    expect(await page.getByLabel(emitter).isVisible()).toBe(false);
     await start();
     await page.getByLabel(quantity).selectOption('temperature');
     await start();
-    await page.getByLabel('What glows in candle 1').selectOption('soot');
+    await page.getByLabel(emitter).selectOption('soot');
+    await page.getByLabel(lines).selectOption('sodium,c2');
     const file = page.getByLabel('Camera response of candle 1');
-    await file.setInputFiles({name: 'response.json', mimeType: 'application/json', buffer: Buffer.from('{"unit": "relative", "wavelength_nm": [500, 600], "r": [0, 1], "g": [1, 0], "b": [0, 0]}')});
+    await file.setInputFiles({name: 'response.json', mimeType: 'application/json', buffer: Buffer.from(response)});
     await start();
     await until(async () => asked().length, many => many === 3, 'all are asked for');
-    expect(asked()).toEqual([{session: 'candle 1', errors: true}, {session: 'candle 1', quantity: 'temperature', emitter: 'grey'},
-      {session: 'candle 1', quantity: 'temperature', emitter: 'soot', response: {wavelength_nm: [500, 600], r: [0, 1], g: [1, 0], b: [0, 0], absolute: false}}]);
+    expect(asked()).toEqual([{session: 'candle 1', errors: true}, {session: 'candle 1', quantity: 'temperature'},
+      {session: 'candle 1', quantity: 'temperature', emitter: 'soot', lines: 'sodium,c2',
+       response: {wavelength_nm: [500, 600], r: [0, 1], g: [1, 0], b: [0, 0], absolute: false}}]);
     await file.setInputFiles({name: 'photo.json', mimeType: 'application/json', buffer: Buffer.from('{"unit": 3}')});
     await start();
     await until(() => file.evaluate((input: HTMLInputElement) => input.validationMessage), words => words.startsWith('This is no camera response'), 'it is refused');
     expect(asked()).toHaveLength(3);
+  });
+
+  test('as in the paper, no lines', async () => {
+    rig.mock.status = idle();
+    rig.mock.answers['Sessions/List'] = () => ({sessions: [{...entry, lost: rig.mock.calls.length}]});
+    const page = await rig.open();
+    await page.getByLabel(quantity).selectOption('temperature');
+    await page.getByLabel(lines).selectOption('sodium');
+    await page.getByLabel(emitter).selectOption('paper');
+    expect(await page.getByLabel(lines).isDisabled()).toBe(true);
+    // Each list enables anew what may be done.
+    const lost = page.locator('tr[data-session] td[data-name=Lost]');
+    const before = await lost.innerText();
+    await page.getByRole('button', {name: 'Read again'}).click();
+    await until(() => lost.innerText(), words => words !== before, 'the list is read again');
+    expect(await page.getByLabel(lines).isDisabled()).toBe(true);
+    await page.getByRole('button', {name: 'Reconstruct candle 1'}).click();
+    await until(async () => asked().length, many => many === 1, 'it is asked for');
+    expect(asked()).toEqual([{session: 'candle 1', quantity: 'temperature', emitter: 'paper'}]);
+    await page.getByLabel(emitter).selectOption('grey');
+    expect(await page.getByLabel(lines).isDisabled()).toBe(false);
+  });
+
+  test('a response that can’t be read any more is refused', async () => {
+    rig.mock.status = idle();
+    rig.mock.answers['Sessions/List'] = () => ({sessions: [entry]});
+    const page = await rig.open();
+    await page.getByLabel(quantity).selectOption('temperature');
+    const folder = mkdtempSync(join(tmpdir(), 'emberlock-response-'));
+    try {
+      const path = join(folder, 'response.json');
+      writeFileSync(path, response);
+      const file = page.getByLabel('Camera response of candle 1');
+      await file.setInputFiles(path);
+      rmSync(path);  // as where it has changed, which the browser doesn’t always notice
+      await page.getByRole('button', {name: 'Reconstruct candle 1'}).click();
+      await until(() => file.evaluate((input: HTMLInputElement) => input.validationMessage), words => words.includes('it has changed'), 'it is refused');
+      expect(asked()).toEqual([]);
+      writeFileSync(path, response);
+      await file.setInputFiles(path);
+      await page.getByRole('button', {name: 'Reconstruct candle 1'}).click();
+      await until(async () => asked().length, many => many === 1, 'chosen again, it is taken');
+      expect(await file.evaluate((input: HTMLInputElement) => input.validationMessage)).toBe('');
+    } finally {
+      rmSync(folder, {recursive: true});
+    }
   });
 
   test('on a phone nothing is wider than the screen', async () => {
@@ -121,4 +176,21 @@ describe('shown', () => {
     tell(flameVolume());
     await page.locator('.layers').waitFor({state: 'hidden'});
   });
+
+  test('brightness stands in while a volume doesn’t tell what is chosen', async () => {
+    rig.mock.status = {...locked(), reconstruction: reconstruction(3)};
+    const page = await rig.open();
+    tell(hotFlameVolume(false));
+    const shown = page.getByLabel(kShow);
+    await shown.selectOption('TEMPERATURE_SIGMA', {timeout: 20_000});
+    await page.locator('.layers[data-shown=TEMPERATURE_SIGMA]').waitFor();
+    tell(hotFlameVolume(true));
+    await page.locator('.layers[data-shown=BRIGHTNESS]').waitFor();
+    expect(await shown.inputValue()).toBe('BRIGHTNESS');
+    expect(await page.locator('.colour-bar').isVisible()).toBe(false);
+    await until(() => colours(page), ({warm, violet}) => warm > 20 && violet === 0, 'it glows', 20);
+    tell(hotFlameVolume(false));
+    await page.locator('.layers[data-shown=TEMPERATURE_SIGMA]').waitFor();
+    expect(await text(page, '.colour-bar .high')).toBe('40.0 K');
+  }, 60_000);
 });

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import {expect, test} from 'vitest';
 
-import {bytes, clock, count, micros, percent, ppm, rows, sentence, short, span, tolerance} from '../../../daemon/console/src/format';
+import {bytes, clock, count, micros, percent, ppm, reading, rows, sentence, short, span, tolerance} from '../../../daemon/console/src/format';
 
 test('errors carry their sign and no more digits than matter', () => {
   expect([12.34, -0.26, 0, -0.04, 841.4, -99.46, 99.6].map(rows)).toEqual(['+12.3 rows', '−0.3 rows', '0.0 rows', '0.0 rows', '+841 rows', '−99.5 rows', '+100 rows']);
@@ -13,6 +13,10 @@ test('errors carry their sign and no more digits than matter', () => {
 test('a tolerance is told in time and in rows', () => {
   expect(tolerance(0.5e-3, 9.26)).toBe('500 µs (9.3 rows)');
   expect(tolerance(5.4e-3, 100)).toBe('5.40 ms (100 rows)');
+});
+
+test('a scale’s ends are told however small they are', () => {
+  expect([0, 1900, 40, 0.5, 0.1, 0.0123, -0.0042, 3e-8].map(reading)).toEqual(['0', '1900', '40.0', '0.50', '0.10', '0.012', '−0.0042', '3.0e−8']);
 });
 
 test('lengths of time read as one says them', () => {

@@ -29,5 +29,5 @@ test('a response.json is read, and what is none is not', () => {
   const text = (change: object) => JSON.stringify({unit: 'levels (0..255) per W / (sr m2)', wavelength_nm: [500, 600], r: [0, 1], g: [1, 0], b: [0, 0], ...change});
   expect(responseOf(text({comment: 'mine'}))).toEqual({wavelength_nm: [500, 600], r: [0, 1], g: [1, 0], b: [0, 0], absolute: true});
   expect(responseOf(text({unit: 'relative'}))?.absolute).toBe(false);
-  for (const wrong of ['', '[]', 'null', text({r: 'red'}), text({g: [1, 'x']}), text({unit: undefined})]) expect(responseOf(wrong)).toBeUndefined();
+  for (const wrong of ['', '[]', 'null', text({r: 'red'}), text({g: [1, 'x']}), text({unit: undefined}), text({unit: 'levels per W'})]) expect(responseOf(wrong)).toBeUndefined();
 });

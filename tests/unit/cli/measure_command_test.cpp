@@ -82,15 +82,21 @@ TEST_F(MeasureCommandTest, SaysWhatABallRadiates) {
   std::getline(in, power, ',');
   EXPECT_NEAR(std::stod(power), expected / (4 * 3.14159265), 0.05 * expected / (4 * 3.14159265))
       << "a metre away";
+  const double share = 4 * 15 / 1500.0;
+  const double flux = std::stod(power);
+  std::getline(in, power, ',');
+  EXPECT_NEAR(std::stod(power), share * flux, 0.15 * share * flux) << "its error";
   double caught[3] = {};  // mean and highest flux, power
   for (double& number : caught) {
     std::getline(in, power, ',');
     number = std::stod(power);
+    std::getline(in, power, ',');
+    EXPECT_NEAR(std::stod(power), share * number, 0.15 * share * number) << "its error";
   }
   EXPECT_NEAR(caught[0], expected / 3.14159265, 0.02 * caught[0]) << "a sphere of half a metre";
   EXPECT_NEAR(caught[1], caught[0], 0.05 * caught[0]);
   EXPECT_NEAR(caught[2], expected, 0.02 * expected);
-  EXPECT_THAT(result.out, HasSubstr("on the sphere"));
+  EXPECT_THAT(result.out, HasSubstr("on its inner side"));
   std::ifstream page(root_ / "out" / "measures.html");
   const std::string html{std::istreambuf_iterator<char>(page), {}};
   EXPECT_THAT(html, HasSubstr("power that the sphere catches"));
@@ -113,6 +119,8 @@ TEST_F(MeasureCommandTest, SaysWhatIsMissing) {
   expect_refused({(root_ / "thin.vdb").string(), "--target-sphere", "1,2,3,0"}, "is no sphere");
   expect_refused({(root_ / "thin.vdb").string(), "--target-sphere", "1,2,3,4,"}, "is no sphere");
   expect_refused({(root_ / "thin.vdb").string(), "--up", "w"}, "is no axis");
+  write("a.vdb", true);
+  expect_refused({(root_ / "a.vdb").string(), "--target-sphere", "0, 0, 0.05, 0.06"}, "cuts the flame");
 }
 
 }  // namespace

@@ -178,6 +178,16 @@ TEST_F(ReconstructCommandTest, TheInputsOwnResponseIsTaken) {
   EXPECT_THAT(refused.err, HasSubstr("camera_response"));
 }
 
+/// Everything that `emberlock reconstruct --progress-fd` told.
+std::vector<v1::ChildMessage> read_messages(const fs::path& path) {
+  std::vector<v1::ChildMessage> messages;
+  session::ChildMessageParser parser;
+  const Status status = parser.add(
+      read_file(path).value(), [&](v1::ChildMessage&& message) { messages.push_back(std::move(message)); });
+  EXPECT_TRUE(status.ok());
+  return messages;
+}
+
 TEST_F(ReconstructCommandTest, WhereNoVoxelTellsItsTemperatureItFails) {
   recon::CameraResponse red = test::response_of_the_ball();
   for (double& v : red.level[0]) v *= 100;  // what shows so little red is hotter than any table
@@ -186,6 +196,46 @@ TEST_F(ReconstructCommandTest, WhereNoVoxelTellsItsTemperatureItFails) {
                           "temperature", "--response", (root_ / "red.json").string()});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.err, HasSubstr("no voxel tells its temperature"));
+
+  const UniqueFd file(::open((root_ / "messages").c_str(), O_CREAT | O_WRONLY, 0600));
+  const Run watched =
+      run({"--voxels", "16", "--device", "cpu", "--effects", "none", "--quantity", "temperature",
+           "--response", (root_ / "red.json").string(), "--progress-fd", std::to_string(file.get())});
+  EXPECT_EQ(watched.exit_code, 1);
+  const auto messages = read_messages(root_ / "messages");
+  ASSERT_GE(messages.size(), 3U);
+  EXPECT_TRUE(messages[messages.size() - 2].has_done()) << "there are colours";
+  ASSERT_TRUE(messages.back().has_failure());
+  EXPECT_THAT(messages.back().failure().message(), HasSubstr("no voxel tells its temperature"));
+  for (const v1::VolumeLayer& layer : messages[messages.size() - 3].iteration().volume().layers())
+    EXPECT_EQ(layer.kind(), v1::VolumeLayer::EMISSION_SIGMA) << "what tells nothing isn't shown";
+}
+
+TEST_F(ReconstructCommandTest, WhatIsForTemperaturesAloneIsRefusedWithoutThem) {
+  for (const auto& [option, value] : std::vector<std::pair<std::string, std::string>>{
+           {"--emitter", "soot"}, {"--lines", "sodium"}, {"--response", "response.json"}})
+    expect_refused(run({"--quantity", "colour", option, value}), "is for temperatures alone");
+}
+
+TEST_F(ReconstructCommandTest, WhatGlowsIsPartOfTheErrorUnlessItIsTold) {
+  std::ofstream(root_ / "response.json") << recon::to_json(test::response_of_the_ball());
+  const auto sigma = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {
+        "--voxels", "16",         "--device",    "cpu",        "--effects",
+        "none",     "--quantity", "temperature", "--response", (root_ / "response.json").string()};
+    words.insert(words.end(), more.begin(), more.end());
+    const Run result = run(words);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    EXPECT_EQ(result.out.find("isn't told, and each error holds it") != std::string::npos, more.empty());
+    EXPECT_EQ(report()["temperature"]["emitter_told"], !more.empty());
+    return report()["temperature"]["sigma"].get<double>();
+  };
+  const double untold = sigma({});
+  const json read = report()["temperature"];
+  const double apart = std::abs(read["mean"].get<double>() - read["if_other"].get<double>());
+  EXPECT_GT(apart, 20);
+  EXPECT_GT(untold, 0.8 * apart);
+  EXPECT_LT(sigma({"--emitter", "grey"}), 0.5 * untold);
 }
 
 TEST_F(ReconstructCommandTest, WritesAPageThatStandsAlone) {
@@ -258,16 +308,6 @@ TEST_F(ReconstructCommandTest, APlanFindsTheBoxAndShowsItOnThePictures) {
   EXPECT_FALSE(fs::exists(root_ / "out")) << "nothing is reconstructed";
 }
 
-/// Everything that `emberlock reconstruct --progress-fd` told.
-std::vector<v1::ChildMessage> read_messages(const fs::path& path) {
-  std::vector<v1::ChildMessage> messages;
-  session::ChildMessageParser parser;
-  const Status status = parser.add(
-      read_file(path).value(), [&](v1::ChildMessage&& message) { messages.push_back(std::move(message)); });
-  EXPECT_TRUE(status.ok());
-  return messages;
-}
-
 TEST_F(ReconstructCommandTest, AnotherProgramIsToldEveryIterationAndTheResult) {
   const std::vector<std::string> words = {"--voxels",  "16",   "--hold-out",   "1", "--device", "cpu",
                                           "--effects", "none", "--iterations", "6"};
@@ -335,8 +375,9 @@ TEST_F(ReconstructCommandTest, TemperaturesAreToldAfterEveryIterationAndMeasured
     }
     return found;
   };
-  for (const v1::VolumePreview& volume : volumes({}))
-    EXPECT_TRUE(volume.layers().empty()) << "it costs nothing";
+  const auto plain = volumes({});
+  ASSERT_FALSE(plain.empty());
+  for (const v1::VolumePreview& volume : plain) EXPECT_TRUE(volume.layers().empty()) << "it costs nothing";
   const auto shown = volumes({"--quantity", "temperature", "--response", (root_ / "response.json").string()});
   ASSERT_GE(shown.size(), 2U);
   const auto in_the_middle = [](const v1::VolumeLayer& layer) {

@@ -149,8 +149,9 @@ v1::SpectralResponse two_wavelengths() {
     response.add_wavelength_nm(nm);
     response.add_r(nm / 100);
     response.add_g(1);
-    response.add_b(0);
+    response.add_b(7 - nm / 100);
   }
+  response.set_absolute(true);
   return response;
 }
 
@@ -210,6 +211,16 @@ TEST_F(ReconstructionChildTest, WhatNoTemperatureCanBeReadByIsRefused) {
                 r.mutable_response()->add_r(1);
               }),
               HasSubstr("response"));
+  EXPECT_THAT(refusal([](Request& r) {
+                r.set_emitter("paper");
+                r.set_lines("sodium");
+              }),
+              HasSubstr("green alone"));
+  EXPECT_THAT(refusal([](Request& r) {
+                *r.mutable_response() = two_wavelengths();
+                r.set_lines("potassium");
+              }),
+              HasSubstr("doesn't see potassium"));
   EXPECT_FALSE(fs::exists(root_ / "begun"));
 }
 

@@ -146,6 +146,21 @@ TEST(ReconstructionState, WhatTheChildSaidOfItsFailureIsTheError) {
   EXPECT_EQ(state.status().error(), "--voxels: not enough memory. Give fewer");
 }
 
+TEST(ReconstructionState, AResultThatIsNotWhatWasAskedForIsAFailureAndIsKept) {
+  ReconstructionState state = begun();
+  v1::ChildMessage result = done();
+  result.mutable_done()->add_temperature("no voxel tells its temperature");
+  state.take(std::move(result));
+  v1::ChildMessage message;
+  message.mutable_failure()->set_message("candle: no voxel tells its temperature");
+  state.take(std::move(message));
+  state.end({.code = 1}, "");
+  EXPECT_EQ(state.status().state(), v1::ReconstructionStatus::FAILED);
+  EXPECT_EQ(state.status().error(), "candle: no voxel tells its temperature");
+  EXPECT_EQ(state.status().result(), "/results/candle") << "the colours";
+  EXPECT_EQ(state.status().temperature_size(), 1);
+}
+
 TEST(ReconstructionState, AnEndWithoutAResultIsAFailure) {
   EXPECT_THAT(error_of({}), HasSubstr("without a result"));
   EXPECT_THAT(error_of({.code = 127}), HasSubstr("127"));
@@ -166,7 +181,10 @@ void succeed(SequenceState& state, double error = 2) {
   v1::ChildMessage kept = iteration(9);
   kept.mutable_iteration()->mutable_iteration()->set_input_rmse(error);
   state.take(std::move(kept));
-  state.take(done());
+  v1::ChildMessage result = done();
+  result.mutable_done()->add_temperature("1700 K on average");
+  result.mutable_done()->add_temperature("read from a grey glow");
+  state.take(std::move(result));
   state.end({}, "");
 }
 void fail(SequenceState& state, const ChildEnd& end = {.code = 2}) {
@@ -206,6 +224,7 @@ TEST(SequenceState, TellsTheFrameAtHandAndHowFarTheWholeIs) {
   ASSERT_EQ(status.frames_size(), 4);
   EXPECT_EQ(status.frames(0).state(), v1::ReconstructionStatus::DONE);
   EXPECT_EQ(status.frames(0).input_rmse(), 3.5);
+  EXPECT_EQ(status.frames(0).temperature(), "1700 K on average");
   EXPECT_EQ(status.frames(1).state(), v1::ReconstructionStatus::RUNNING);
   EXPECT_EQ(status.frames(2).state(), v1::ReconstructionStatus::STATE_UNSPECIFIED);
   EXPECT_EQ(status.frames(3).frame(), 16U);

@@ -27,7 +27,8 @@ class GlowCostTest : public testing::Test {
         image.rgb[i] = static_cast<float>(3 * random_uniform(seed, v, i));
       views_.push_back(View{"v", c.cameras[v], share(std::move(image))});
     }
-    problem_ = make_problem({&views_[0], &views_[1]}, c.medium, {}, pool_);
+    medium_ = c.medium;
+    problem_ = of_subsets(1);
     const std::size_t points = problem_.grid().size();
     start_.light = random_quads<float>(points, seed, 1, 0.1);
     start_.total.resize(points);
@@ -40,6 +41,11 @@ class GlowCostTest : public testing::Test {
       direction_.kelvin[p] = start_.total[p] > 0 ? 50 * random_uniform(seed, 13, p) : 0;
       direction_.brightness[p] = start_.total[p] > 0 ? random_uniform(seed, 14, p) - 0.3 : 0;
     }
+  }
+  [[nodiscard]] Problem of_subsets(int subsets) {
+    ProblemOptions options;
+    options.subsets = options.rule.dealt = subsets;
+    return make_problem({&views_[0], &views_[1]}, medium_, options, pool_);
   }
   [[nodiscard]] GlowField<double> beyond(double way) const {
     GlowField<double> out = at_;
@@ -60,6 +66,7 @@ class GlowCostTest : public testing::Test {
 
   Pool pool_{2};
   std::vector<View> views_;
+  Hull medium_;
   Problem problem_;
   GlowStart start_;
   GlowField<double> at_, direction_;
@@ -93,6 +100,39 @@ TEST_F(GlowCostTest, GradientIsExactUnderEveryExtinction) {
     single.weigh(rounded, kTied);
     single(rounded, own);
     EXPECT_NEAR(along(own) / expected, 1, 1e-4) << static_cast<int>(absorb);
+  }
+}
+
+TEST_F(GlowCostTest, GradientIsExactWherePixelsAreBounds) {
+  start_.absorb = Absorb::field;
+  start_.white = 2;  // of pictures up to 3
+  GlowCost<double> cost(problem_, start_, colours(), pool_);
+  cost.weigh(at_, kTied);
+  GlowField<double> slope;
+  GlowField<double> unused;
+  cost(at_, slope);
+  // A residual has a kink where a bound begins to be met: the differences are only as good as few of them are
+  // crossed.
+  constexpr double kWay = 1e-5;
+  const double difference = (cost(beyond(kWay), unused) - cost(beyond(-kWay), unused)) / (2 * kWay);
+  EXPECT_NEAR(along(slope) / difference, 1, 1e-4);
+}
+
+TEST_F(GlowCostTest, IsTheSameInOnePartOrInMany) {
+  for (const Absorb absorb : kAbsorbs) {
+    start_.absorb = absorb;
+    start_.sigma = 0.05;
+    std::vector<double> costs;
+    std::vector<GlowField<double>> slopes(2);
+    for (const int subsets : {1, 7}) {
+      const Problem problem = of_subsets(subsets);
+      ASSERT_EQ(problem.list.subsets(), subsets);
+      GlowCost<double> cost(problem, start_, colours(), pool_);
+      cost.weigh(at_, kTied);
+      costs.push_back(cost(at_, slopes[costs.size()]));
+    }
+    EXPECT_NEAR(costs[1] / costs[0], 1, 1e-10);
+    EXPECT_NEAR(along(slopes[1]) / along(slopes[0]), 1, 1e-9);
   }
 }
 

@@ -64,6 +64,25 @@ TEST(LineEmitters, HaveTheColoursThatTheyAreKnownFor) {
   EXPECT_GT(xyz("bo2")[1], xyz("bo2")[0]) << "green";
 }
 
+TEST(LineEmitters, C2LooksAsItsTransitionProbabilitiesSay) {
+  // Power of each band by Franck-Condon factors of a Morse oscillator, the cube of the wave number and a
+  // Boltzmann distribution at 4000 K, evenly over the 8 nm on the violet side, to which it fades.
+  LineEmitter calculated{"c2", "calculated", {}};
+  for (const auto& [head, power] : std::vector<std::array<double, 2>>{{473.7, 2.4},
+                                                                      {471.5, 1.9},
+                                                                      {469.8, 1.2},
+                                                                      {516.5, 10},
+                                                                      {512.9, 2.5},
+                                                                      {563.6, 2.05},
+                                                                      {558.6, 1.4},
+                                                                      {554.1, 0.7},
+                                                                      {619.1, 0.29},
+                                                                      {612.2, 0.32}})
+    calculated.bands.push_back({head - 8, head, power});
+  for (const CameraResponse& response : {test::lobes(), standard_response(), cie_1931_observer()})
+    EXPECT_LT(colour_distance(levels_of(response, calculated), levels_of(response, emitter("c2"))), 0.05);
+}
+
 TEST(LineEmitters, AreToldByName) {
   EXPECT_FALSE(parse_lines("")->any());
   EXPECT_TRUE(parse_lines("auto")->automatic);

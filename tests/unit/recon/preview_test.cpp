@@ -87,8 +87,9 @@ TEST(Preview, CoarseLightHasTheColoursOfItsPoints) {
 TEST(Preview, ALayerIsTheMeanOfWhatIsToldAndZeroWhereNothingIs) {
   const Grid grid{{0, 0, 0}, 1, 6, 1, 1};
   const std::vector<float> kelvin = {1500, 0, 0, 0, 1600, 1700};
-  const CoarseLayer layer =
-      coarse_layer(CoarseLayer::Kind::temperature, grid, 3, [&](std::size_t p) { return kelvin[p]; });
+  const CoarseLayer layer = coarse_layer(
+      CoarseLayer::Kind::temperature, grid, 3, [&](std::size_t p) { return kelvin[p]; },
+      kelvin_bar(1510, 1620));
   ASSERT_EQ(layer.voxels.size(), 3U);
   EXPECT_EQ(layer.low, 1500);
   EXPECT_EQ(layer.high, 1650);
@@ -110,6 +111,26 @@ TEST(Preview, ErrorsAreShownFromZeroAndWhatLiesBeyondTheEndAsTheEnd) {
   EXPECT_EQ(layer.voxels[2], 128);
   const CoarseLayer nothing = layer_of(CoarseLayer::Kind::temperature, std::vector<float>(4));
   EXPECT_EQ(nothing.voxels, std::vector<std::uint8_t>(4));
+}
+
+TEST(Preview, ATemperaturesBarEndsWhereTheLightDoes) {
+  // A dim edge of many blocks that tell little, and a bright flame of a few.
+  std::vector<float> kelvin;
+  std::vector<float> light;
+  for (int i = 0; i < 200; ++i) kelvin.push_back(i % 2 == 0 ? 900.0F : 3500.0F);
+  light.assign(3 * 200, 5);
+  for (int i = 0; i <= 50; ++i) kelvin.push_back(1610 + 3.6F * static_cast<float>(i));
+  light.resize(3 * kelvin.size(), 1000);
+  kelvin.push_back(0);  // not told, however bright
+  light.resize(3 * kelvin.size(), 1e6F);
+  const BarEnds middle = middle_by_light(kelvin, light);
+  const BarEnds bar = kelvin_bar(middle.low, middle.high);
+  EXPECT_EQ(bar.low, 1600);
+  EXPECT_EQ(bar.high, 1800);
+  EXPECT_EQ(middle_by_light({0, 0}, {1, 1, 1, 1, 1, 1}).high, 0);
+  EXPECT_EQ(kelvin_bar(1700, 1700).high, 1750);
+  EXPECT_EQ(kelvin_sigma_bar(1).high, 10);
+  EXPECT_EQ(kelvin_sigma_bar(13).high, 40);
 }
 
 TEST(Preview, ADarkVolumeIsDark) {

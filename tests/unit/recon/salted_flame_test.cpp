@@ -124,15 +124,17 @@ TEST_F(SaltedFlameTest, AutoNamesTheOneThatExplainsMost) {
 TEST(LineWords, SayWhatCantBeTold) {
   TemperatureSummary t;
   t.counts.emitting = t.counts.other = 10;
-  t.lines_automatic = true;
+  t.lines_automatic = t.lines_tried = true;
   const auto said = [&] { return testing::PrintToString(temperature_words(t)); };
   EXPECT_THAT(said(), HasSubstr("no single line emitter explains"));
+  EXPECT_THAT(said(), testing::Not(HasSubstr("--lines auto"))) << "that was asked for";
   t.lines_alike = {"ch", "cucl"};
   EXPECT_THAT(said(), HasSubstr("can't tell which line emitter shines: ch, cucl explain alike"));
   t.lines_alike.clear();
   t.counts.other = 0;
+  t.lines_tried = false;
   t.counts.lines = t.counts.emitting;
-  EXPECT_THAT(said(), HasSubstr("no line emitter is called for"));
+  EXPECT_THAT(said(), HasSubstr("no line emitter was looked for"));
   t.lines_automatic = false;
   t.lines = {{"lithium", 1, 10, 740}};
   EXPECT_THAT(said(), HasSubstr("no voxel tells its temperature; not told: 10 are lithium, no soot"));

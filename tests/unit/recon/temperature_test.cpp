@@ -125,6 +125,35 @@ TEST(Temperature, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel) {
   }
 }
 
+TEST(Temperature, NotKnowingWhatGlowsIsPartOfEachError) {
+  const test::GlowingFlame& flame = flame_of(Emitter::soot);
+  const Solved& s = solved_of(Emitter::soot);
+  const TemperatureField told = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
+  const TemperatureField untold = temperature_of(s.scene, s.done, s.errors, flame.response(), std::nullopt);
+  EXPECT_TRUE(told.summary.emitter_told);
+  EXPECT_FALSE(untold.summary.emitter_told);
+  const test::TemperatureScore mistaken = test::score_of(flame, s.done, told);
+  const test::TemperatureScore honest = test::score_of(flame, s.done, untold);
+  SCOPED_TRACE(test::words(mistaken, told) + "; untold " + test::words(honest, untold));
+  EXPECT_LT(mistaken.within, 0.8) << "soot read as grey, and sure of it";
+  EXPECT_GT(honest.within, 0.88);
+  EXPECT_GT(untold.summary.sigma, 0.8 * (untold.summary.mean - untold.summary.if_other));
+}
+
+TEST(Temperature, AJointSolveThatIsStoppedKeepsWhatItHas) {
+  const test::GlowingFlame& flame = flame_of(Emitter::grey);
+  const Solved& s = solved_of(Emitter::grey);
+  SolveOptions options;
+  options.stop = [] { return true; };
+  const TemperatureField field =
+      temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey, options);
+  const TemperatureField alone =
+      temperature_of(s.scene, test::voxel_by_voxel(s.done), s.errors, flame.response(), Emitter::grey);
+  EXPECT_EQ(field.summary.joint.iterations, 0);
+  EXPECT_FALSE(field.summary.joint_failed);
+  EXPECT_EQ(field.kelvin, alone.kelvin);
+}
+
 TEST(Temperature, SaysWhatAnotherEmitterWouldMakeOfIt) {
   const test::GlowingFlame& flame = flame_of(Emitter::soot);
   const Solved& s = solved_of(Emitter::soot);

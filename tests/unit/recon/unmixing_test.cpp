@@ -131,11 +131,12 @@ TEST_F(UnmixingTest, WhatCantBeToldIsSaid) {
   EXPECT_EQ(of("cuoh").read(glow_of(Eigen::Vector3d::Zero(), one)).kind, Kind::unknown);
   EXPECT_EQ(of("cuoh").read(glow_of(Eigen::Vector3d::Constant(NAN), one)).kind, Kind::unknown);
   // Noise as large as the light: nothing stands out.
-  EXPECT_NE(of("cuoh").read(glow_of(green, even(green, 1))).kind, Kind::mixed);
+  const Unmixed lost = of("cuoh").read(glow_of(green, even(green, 1)));
+  EXPECT_TRUE(lost.kind != Kind::mixed && (lost.kind != Kind::soot || lost.reading.sigma > 300));
   // Nor do two lines whose mixture may be either.
   const Eigen::Vector3d level = mixture(response_, 1700, "c2", 0.3);
   const Unmixed both = of("sodium,c2").read(glow_of(level, even(level, 0.3)));
-  EXPECT_NE(both.kind, Kind::mixed);
+  EXPECT_TRUE(both.kind != Kind::mixed && (both.kind != Kind::soot || both.reading.sigma > 300));
 }
 
 TEST_F(UnmixingTest, TwoLinesAndSootNeedTheExtinctionToo) {
@@ -179,6 +180,31 @@ TEST_F(UnmixingTest, TheLineIsChosenThatExplainsWhatNoSootDoes) {
   purple.push_back(glow_of({100, 0, 100}, {0.1, 0.1, 0.1}));
   const LineChoice none = choose_line(meter_, response_, purple);
   EXPECT_EQ(none.chosen, nullptr);
+  EXPECT_TRUE(none.rivals.empty());
+}
+
+TEST_F(UnmixingTest, ALineOutsideOfTheGamutTakesFromTheSootBesideIt) {
+  // Of linear sRGB: sodium has less than no blue, copper's green less than no red.
+  const CameraResponse srgb = standard_response();
+  const Thermometer meter(EmitterTable(srgb, Emitter::soot));
+  for (const char* line : {"sodium", "cuoh"}) {
+    const LineEmitter& emitter = *parse_lines(line)->named.front();
+    const std::array<double, 3> shown = levels_of(srgb, emitter);
+    EXPECT_LT(*std::min_element(shown.begin(), shown.end()), 0) << line;
+    for (const double share : {0.1, 0.3}) {
+      const EmitterLevels soot = levels_of(srgb, Emitter::soot, Kelvin(1700));
+      const std::array<double, 3> whole = shown_alone(shown);
+      Eigen::Vector3d level;
+      for (int c = 0; c < 3; ++c) {
+        const auto i = static_cast<std::size_t>(c);
+        level[c] = 100 * ((1 - share) * soot.value[i] + share * shown[i] / (whole[0] + whole[1] + whole[2]));
+      }
+      const Unmixer unmixer(meter, {shown});
+      const Unmixed out = unmixer.read(glow_of(level, even(level.cwiseMax(0.01), 1e-3)));
+      ASSERT_EQ(out.kind, Kind::mixed) << line << share;
+      EXPECT_NEAR(out.reading.kelvin, 1700, 10) << line << share;
+    }
+  }
 }
 
 }  // namespace

@@ -91,7 +91,7 @@ TEST_F(SimulateFlameTest, LeavesASessionAndItsTruth) {
   EXPECT_LE(film->relative_divergence, 1e-5);
   EXPECT_GT(film->cell, film->pixel) << "a small truth";
   const double finer = small().cells * (film->cell / film->pixel);
-  EXPECT_NEAR(cells_for_pictures(small().cells, *film), finer + 4, 4) << "the next multiple of 8";
+  EXPECT_NEAR(cells_for_pictures(small().cells, *film).value_or(0), finer + 4, 4) << "the next multiple of 8";
   const auto scene = recon::load_scene(folder_ / "session");
   ASSERT_TRUE(scene.ok()) << scene.error().message();
   EXPECT_EQ(scene->views.size(), 3U);
@@ -220,6 +220,34 @@ TEST_F(SimulateFlameTest, TheDriversSensorMakesThePictures) {
   EXPECT_NEAR(square, 4.5, 1.5);
 }
 
+TEST_F(SimulateFlameTest, AGreySensorShowsTheLuminanceOfItsResponse) {
+  SimulateOptions o = small();
+  o.frames = 1;
+  o.read_noise = 0;
+  o.format = PixelFormat::gray8;
+  o.response = response(500);
+  const recon::CameraResponse told = *o.response;
+  const auto found = simulate_flame(o, folder_);
+  ASSERT_TRUE(found.ok()) << found.error().message();
+  EXPECT_NEAR(brightest(filmed(0)), 230, 1);
+  const recon::Scene scene = filmed(0);
+  ASSERT_TRUE(scene.response);
+  for (std::size_t i = 0; i < told.wavelength_nm.size(); ++i) {
+    const double grey =
+        found->gain * (0.2126 * told.level[0][i] + 0.7152 * told.level[1][i] + 0.0722 * told.level[2][i]);
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_NEAR(scene.response->level[c][i], grey, 1e-9 * grey) << i;
+  }
+}
+
+TEST_F(SimulateFlameTest, SaysHowManyCellsAreFinerThanThePictures) {
+  SimulatedFilm film;
+  film.cell = Meters(0.004);
+  film.pixel = Meters(0.001);
+  EXPECT_EQ(cells_for_pictures(64, film), 264) << "256 would be as coarse as a pixel";
+  film.pixel = Meters(0.0004);
+  EXPECT_FALSE(cells_for_pictures(64, film).has_value());
+}
+
 TEST_F(SimulateFlameTest, RefusesWhatCannotBeFilmed) {
   SimulateOptions sunny = small();
   sunny.sun = Sun{};
@@ -228,8 +256,11 @@ TEST_F(SimulateFlameTest, RefusesWhatCannotBeFilmed) {
   late.offsets = milliseconds(30);
   EXPECT_EQ(simulate_flame(late, folder_).error().kind, ErrorKind::bad_input);
   SimulateOptions slow = small();
+  slow.exposure = milliseconds(1);
+  EXPECT_THAT(simulate_flame(slow, folder_).error().message(), testing::HasSubstr("a scale"));
+  slow.response = response(500);
   slow.exposure = Seconds(1);
-  EXPECT_EQ(simulate_flame(slow, folder_).error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(simulate_flame(slow, folder_).error().message(), testing::HasSubstr("frame period"));
   SimulateOptions odd = small();
   odd.image = {63, 64};
   EXPECT_EQ(simulate_flame(odd, folder_).error().kind, ErrorKind::bad_input);

@@ -13,7 +13,8 @@ namespace emberlock::report {
 /// Escapes text for use between tags and in attributes.
 std::string html_escape(std::string_view text);
 
-/// A clause as a sentence: it begins with an upper-case letter and ends with one full stop. Nothing of nothing.
+/// A clause as a sentence: it begins with an upper-case letter and ends with one full stop. Nothing of
+/// nothing.
 std::string sentence(std::string_view clause);
 
 /// An image as a PNG file; gray8 or rgb8.

@@ -14,6 +14,7 @@ constexpr int kJointPasses = 4;
 
 ColdSolve finish(Descent& descent, int passes) {
   for (int p = 0; p < passes; ++p) descent.pass();
+  descent.show_validation();
   const double error = descent.validation_error();
   if (!std::isfinite(error)) throw Diverged(error, error);
   return {error, descent.take_engine()};

@@ -206,9 +206,10 @@ double Descent::fit_error() const { return rms_of_residuals(0, fitted_); }
 /// Of no light at all, behind which the whole background shines.
 double Descent::black_error() const { return rms_of(engine_->black_squares(0, fitted_), fitted_); }
 
-double Descent::validation_error() {
-  const int subset = rays_of(level_.subsets) > 0 ? level_.subsets : 0;
-  engine_->residual(subset);
+void Descent::show_validation() { engine_->residual(validation_subset()); }
+
+double Descent::validation_error() const {
+  const int subset = validation_subset();
   const std::size_t first = level_.problem.list.subset_begin[static_cast<std::size_t>(subset)];
   return rms_of_residuals(first, first + rays_of(subset));
 }

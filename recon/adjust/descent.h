@@ -84,8 +84,10 @@ class Descent {
   /// RMS over the fitted rays, each as its subset's step found it; grey levels.
   [[nodiscard]] double rms_of_residuals(std::size_t first_ray, std::size_t last_ray) const;
   [[nodiscard]] double fit_error() const;
-  /// RMS over the held-out pixels, or over the first subset where there are none; grey levels.
-  [[nodiscard]] double validation_error();
+  /// Renders the held-out pixels, or the first subset where there are none, for validation_error().
+  void show_validation();
+  /// RMS over what show_validation() rendered, grey levels. On a GPU it waits for it, so ask where it counts.
+  [[nodiscard]] double validation_error() const;
   [[nodiscard]] Engine& engine() { return *engine_; }
   /// For who ends here.
   [[nodiscard]] std::unique_ptr<Engine> take_engine() { return std::move(engine_); }
@@ -93,6 +95,7 @@ class Descent {
 
  private:
   [[nodiscard]] std::size_t rays_of(int subset) const;
+  [[nodiscard]] int validation_subset() const { return rays_of(level_.subsets) > 0 ? level_.subsets : 0; }
   /// All fitted rays over those of the subset.
   [[nodiscard]] float share(int subset) const;
   template <class Act>

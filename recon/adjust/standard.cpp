@@ -105,9 +105,10 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
     }
     if (finding == Guard::Finding::best) lowest_at = iteration;
     ++iteration;
-    const double validation = descent->validation_error();
+    descent->show_validation();
     if (tracker.record(iteration, error(), descent->engine(), level->problem)) break;
     if (iteration * level->subsets % kRound != 0) continue;
+    const double validation = descent->validation_error();
     if (setup.options.iterations == 0 && validation > (1 - kLeastGain) * last) break;
     last = validation;
   }

@@ -253,7 +253,8 @@ Readings read_all(const Asked& asked, Emitter emitter, Together together,
   const Volume& volume = done.volume;
   const Grid& grid = volume.grid;
   Readings readings;
-  auto& [field, fates] = readings;
+  TemperatureField& field = readings.field;
+  std::vector<Fate>& fates = readings.fates;
   TemperatureSummary& summary = field.summary;
   summary.emitter = emitter;
   summary.absolute = response.absolute;

@@ -153,6 +153,7 @@ TEST_P(DescentOn, ColdSolvesTakeAConstantExtinctionForWhatItIs) {
   Descent descent(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
   after_passes(descent, 6);
   const ColdSolve cold = cold_solve(posed.setup, posed.level, effects.extinction);
+  descent.show_validation();
   EXPECT_EQ(cold.error, descent.validation_error());
   for (const Rgba& v : cold.engine->get()) ASSERT_EQ(v.c[3], 0) << "no field is found";
 }

@@ -13,6 +13,7 @@
 #include "cli/commands.h"
 #include "cli/numbers.h"
 #include "cli/outputs.h"
+#include "cli/up_axis.h"
 #include "recon/export/volume_file.h"
 #include "recon/temperature/radiant.h"
 #include "report/html.h"
@@ -70,14 +71,6 @@ Result<Targets> parse_targets(const MeasureArguments& arguments) {
     targets.sphere = recon::TargetSphere{{(*v)[0], (*v)[1], (*v)[2]}, (*v)[3]};
   }
   return targets;
-}
-
-Result<Eigen::Vector3d> parse_up(const std::string& text) {
-  const double sign = text.rfind('-', 0) == 0 ? -1 : 1;
-  const std::string axis = sign < 0 ? text.substr(1) : text;
-  if (axis == "x" || axis == "y" || axis == "z")
-    return Eigen::Vector3d(sign * Eigen::Vector3d::Unit(axis[0] - 'x'));
-  return Error{ErrorKind::bad_input, "\"" + text + "\" is no axis", "--up", "Give x, y, z, -x, -y or -z"};
 }
 
 /// A result's folder stands for its volume.

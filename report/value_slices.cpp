@@ -8,10 +8,10 @@
 #include <cstdint>
 
 #include <fmt/format.h>
-#include <opencv2/imgproc.hpp>
 
 #include "report/flame_pictures.h"
 #include "report/html.h"
+#include "report/inferno.h"
 
 namespace emberlock::report {
 namespace {
@@ -20,25 +20,7 @@ constexpr int kSliceWidth = 320;  // pixels, as those below
 constexpr int kSliceHeight = 480;
 constexpr int kBarHeight = 12;
 
-using Rgb = std::array<std::uint8_t, 3>;
 constexpr Rgb kNotTold = {58, 58, 58};
-
-/// Dark to bright, also for who sees no colours (Matplotlib's inferno).
-const std::array<Rgb, 256>& inferno() {
-  static const std::array<Rgb, 256> colours = [] {
-    cv::Mat levels(1, 256, CV_8UC1);
-    for (int i = 0; i < 256; ++i) levels.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(i);
-    cv::Mat shown;
-    cv::applyColorMap(levels, shown, cv::COLORMAP_INFERNO);
-    std::array<Rgb, 256> out = {};
-    for (int i = 0; i < 256; ++i) {
-      const auto& bgr = shown.at<cv::Vec3b>(0, i);
-      out[static_cast<std::size_t>(i)] = {bgr[2], bgr[1], bgr[0]};
-    }
-    return out;
-  }();
-  return colours;
-}
 
 void put(Image& picture, int x, int y, const Rgb& colour) {
   std::copy(colour.begin(), colour.end(), picture.row_as<std::uint8_t>(y) + 3 * static_cast<std::size_t>(x));

@@ -15,8 +15,8 @@
 
 #include "base/file.h"
 #include "base/output_folder.h"
-#include "session/player_video.h"
 #include "session/reader.h"
+#include "session/video_writer.h"
 
 namespace emberlock::session {
 namespace fs = std::filesystem;
@@ -130,7 +130,7 @@ Pace pace_of(const std::vector<FrameStamp>& stamps, double claimed) {
 
 class VideoExport final : public CameraExport {
  public:
-  VideoExport(std::unique_ptr<PlayerVideo> video, Pace pace, ExportedCamera& report)
+  VideoExport(std::unique_ptr<VideoWriter> video, Pace pace, ExportedCamera& report)
       : video_(std::move(video)), pace_(pace), report_(report) {}
   Status add(const Frame& frame) override {
     if (last_) {
@@ -145,7 +145,7 @@ class VideoExport final : public CameraExport {
   Status close() override { return video_->close(); }
 
  private:
-  std::unique_ptr<PlayerVideo> video_;
+  std::unique_ptr<VideoWriter> video_;
   Pace pace_;
   ExportedCamera& report_;
   std::optional<FrameStamp> last_;
@@ -198,7 +198,7 @@ class Exporter {
     const Pace pace = pace_of(reader_.stamps(camera_), stream().frame_rate_hz());
     report_.frame_rate = pace.rate;
     EMBERLOCK_ASSIGN_OR_RETURN(
-        auto video, PlayerVideo::create(target_ / report_.file, reader_.layout(camera_), pace.rate));
+        auto video, VideoWriter::create(target_ / report_.file, reader_.layout(camera_), pace.rate));
     codec = video->codec();
     return std::unique_ptr<CameraExport>(std::make_unique<VideoExport>(std::move(video), pace, report_));
   }

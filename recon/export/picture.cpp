@@ -24,6 +24,15 @@ cv::Mat as_opencv_orders(const ImageView& image) {
   return ordered;
 }
 
+Status write_png(const cv::Mat& ordered, const std::filesystem::path& path) {
+  std::vector<unsigned char> bytes;
+  if (!cv::imencode(".png", ordered, bytes)) {
+    return Error{ErrorKind::io, "cannot encode the picture", path.string(),
+                 "Check that the picture isn't empty"};
+  }
+  return write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+}
+
 }  // namespace
 
 Status write_png(const ImageView& image, const std::filesystem::path& path) {
@@ -34,13 +43,20 @@ Status write_png(const ImageView& image, const std::filesystem::path& path) {
   if (image.width() < 1 || image.height() < 1) {
     return Error{ErrorKind::bad_input, "the picture is empty", path.string(), "Give at least one pixel"};
   }
-  const cv::Mat ordered = as_opencv_orders(image);
-  std::vector<unsigned char> bytes;
-  if (!cv::imencode(".png", ordered, bytes)) {
-    return Error{ErrorKind::io, "cannot encode the picture", path.string(),
-                 "Check that the picture isn't empty"};
-  }
-  return write_file_atomically(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+  return write_png(as_opencv_orders(image), path);
+}
+
+Status write_png(const ImageView& image, const std::vector<std::uint8_t>& opacity,
+                 const std::filesystem::path& path) {
+  const std::size_t pixels =
+      static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
+  if (image.layout.format != PixelFormat::rgb8 || pixels == 0 || opacity.size() != pixels)
+    return Error{ErrorKind::bad_input, "no colour picture with an opacity for each pixel", path.string(),
+                 "Give rgb8 and as many opacities as pixels"};
+  const cv::Mat alpha(image.height(), image.width(), CV_8UC1, const_cast<std::uint8_t*>(opacity.data()));
+  cv::Mat ordered;
+  cv::merge(std::vector<cv::Mat>{as_opencv_orders(image), alpha}, ordered);
+  return write_png(ordered, path);
 }
 
 Result<std::string> to_jpeg(const ImageView& image) {

@@ -22,7 +22,7 @@
 #include "recon/synthetic/flame.h"
 #include "rig/devices/stage.h"
 #include "rig/sample/hand_film.h"
-#include "session/player_video.h"
+#include "session/video_writer.h"
 #include "smear_sync/clocks/frame_code.h"
 
 namespace emberlock::rig {
@@ -155,11 +155,11 @@ Result<std::vector<std::vector<TimePoint>>> write_films(const HandFilm& film, co
                                                         const fs::path& folder, const Observer& observer) {
   std::error_code error;
   fs::create_directories(folder, error);
-  std::vector<std::unique_ptr<session::PlayerVideo>> videos;
+  std::vector<std::unique_ptr<session::VideoWriter>> videos;
   for (const drivers::VirtualCameraOptions& camera : film.rig.cameras) {
     EMBERLOCK_ASSIGN_OR_RETURN(
         auto video,
-        session::PlayerVideo::create(folder / (camera.id + ".mp4"), camera.layout, kFilmRate, kKeyInterval));
+        session::VideoWriter::create(folder / (camera.id + ".mp4"), camera.layout, kFilmRate, kKeyInterval));
     videos.push_back(std::move(video));
   }
   std::vector<std::vector<TimePoint>> reads(videos.size());

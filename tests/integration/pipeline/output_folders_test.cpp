@@ -232,6 +232,12 @@ class OutputFolders : public testing::Test {
          {"demo", "--cameras", "3", "--image", "160x160", "--frames", "1", "--voxels", "8"},
          {},
          {"report.html", "summary.png", "flame/manifest.json", "reconstruction/volume.vdb"}},
+        {"render",
+         "--out",
+         add_render,
+         {"render", hot, "--frames", "2", "--image", "32x32"},
+         hot,
+         {"frame-0000.png", "frame-0001.png"}},
         {"measure", "--out", add_measure, {"measure", hot, hot}, hot, {"measures.csv", "measures.html"}},
         {"simulate flame",
          "--out",
@@ -306,7 +312,7 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
   for (const auto add :
        {add_devices, add_smear, add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
         add_import,  add_demo,  add_sample, add_doctor,      add_bench,   add_sessions, add_status,
-        add_jobs,    add_watch, add_record, add_strobe,      add_measure, add_simulate})
+        add_jobs,    add_watch, add_record, add_strobe,      add_measure, add_simulate, add_render})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

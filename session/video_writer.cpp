@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "session/player_video.h"
+#include "session/video_writer.h"
 
 extern "C" {
 #include <libavutil/opt.h>
@@ -75,7 +75,7 @@ void draw_hatched_bar(AVFrame& frame) {
 
 }  // namespace
 
-struct PlayerVideo::Libav {
+struct VideoWriter::Libav {
   std::unique_ptr<AvFile> file;
   std::unique_ptr<AVFormatContext, AvFreeOutput> format;
   AvPtr<AVCodecContext> encoder;
@@ -87,20 +87,24 @@ struct PlayerVideo::Libav {
     return {ErrorKind::io, std::string(action) + ": " + av_message(code), file->path().string(),
             "Check the disk's space and health"};
   }
+  Coding coding = Coding::for_players;
   int open(const ImageLayout& layout, Hertz frame_rate, int key_interval);
   int open_encoder(const ImageLayout& layout, Hertz frame_rate, int key_interval);
 };
 
-int PlayerVideo::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate, int key_interval) {
-  const AVCodec* codec = avcodec_find_encoder_by_name("libx264");
-  const bool h264 = codec != nullptr;
-  if (!h264) codec = avcodec_find_encoder(AV_CODEC_ID_MPEG4);
+int VideoWriter::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate, int key_interval) {
+  const bool lossless = coding == Coding::lossless;
+  const AVCodec* codec =
+      lossless ? avcodec_find_encoder(AV_CODEC_ID_FFV1) : avcodec_find_encoder_by_name("libx264");
+  const bool h264 = !lossless && codec != nullptr;
+  if (codec == nullptr && !lossless) codec = avcodec_find_encoder(AV_CODEC_ID_MPEG4);
   if (codec == nullptr) return AVERROR_ENCODER_NOT_FOUND;
   encoder.reset(avcodec_alloc_context3(codec));
   AVCodecContext& c = *encoder;
-  c.width = layout.size.width & kEven;
-  c.height = layout.size.height & kEven;
-  c.pix_fmt = AV_PIX_FMT_YUV420P;
+  const int sides = lossless ? ~0 : kEven;
+  c.width = layout.size.width & sides;
+  c.height = layout.size.height & sides;
+  c.pix_fmt = lossless ? AV_PIX_FMT_BGR0 : AV_PIX_FMT_YUV420P;
   c.framerate = av_d2q(frame_rate.value(), kLargestRateTerm);
   c.time_base = av_inv_q(c.framerate);
   c.flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
@@ -109,6 +113,9 @@ int PlayerVideo::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate
   if (h264) {
     av_opt_set(c.priv_data, "preset", "veryfast", 0);
     av_opt_set_int(c.priv_data, "crf", 18, 0);
+  } else if (lossless) {
+    c.level = 3;  // slices with checksums
+    av_opt_set_int(c.priv_data, "slicecrc", 1, 0);
   } else {
     c.flags |= AV_CODEC_FLAG_QSCALE;
     c.global_quality = FF_QP2LAMBDA * kMpeg4Quality;
@@ -116,7 +123,7 @@ int PlayerVideo::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate
   return avcodec_open2(&c, codec, nullptr);
 }
 
-int PlayerVideo::Libav::open(const ImageLayout& layout, Hertz frame_rate, int key_interval) {
+int VideoWriter::Libav::open(const ImageLayout& layout, Hertz frame_rate, int key_interval) {
   int code = open_encoder(layout, frame_rate, key_interval);
   if (code < 0) return code;
   const AVCodecContext& c = *encoder;
@@ -132,7 +139,8 @@ int PlayerVideo::Libav::open(const ImageLayout& layout, Hertz frame_rate, int ke
   sws_setColorspaceDetails(scaler.get(), matrix, 1, matrix, 0, 0, 1 << 16, 1 << 16);
 
   AVFormatContext* output = nullptr;
-  code = avformat_alloc_output_context2(&output, nullptr, "mp4", nullptr);
+  code = avformat_alloc_output_context2(&output, nullptr, coding == Coding::lossless ? "matroska" : "mp4",
+                                        nullptr);
   if (code < 0) return code;
   format.reset(output);
   output->pb = file->io();
@@ -144,24 +152,25 @@ int PlayerVideo::Libav::open(const ImageLayout& layout, Hertz frame_rate, int ke
   return avformat_write_header(output, nullptr);
 }
 
-PlayerVideo::PlayerVideo(ImageLayout layout, std::unique_ptr<Libav> av)
+VideoWriter::VideoWriter(ImageLayout layout, std::unique_ptr<Libav> av)
     : layout_(layout), av_(std::move(av)) {}
-PlayerVideo::~PlayerVideo() = default;
+VideoWriter::~VideoWriter() = default;
 
-Result<std::unique_ptr<PlayerVideo>> PlayerVideo::create(const std::filesystem::path& path,
+Result<std::unique_ptr<VideoWriter>> VideoWriter::create(const std::filesystem::path& path,
                                                          const ImageLayout& layout, Hertz frame_rate,
-                                                         int key_interval) {
+                                                         int key_interval, Coding coding) {
   quiet_libav();
   auto av = std::make_unique<Libav>();
+  av->coding = coding;
   EMBERLOCK_ASSIGN_OR_RETURN(av->file, AvFile::open(path, AvFile::Mode::create));
   if (const int code = av->open(layout, frame_rate, key_interval); code < 0)
     return av->failure(code, "cannot write a video");
-  return std::unique_ptr<PlayerVideo>(new PlayerVideo(layout, std::move(av)));
+  return std::unique_ptr<VideoWriter>(new VideoWriter(layout, std::move(av)));
 }
 
-std::string PlayerVideo::codec() const { return av_->encoder->codec->name; }
+std::string VideoWriter::codec() const { return av_->encoder->codec->name; }
 
-Status PlayerVideo::show(const Image& image) {
+Status VideoWriter::show(const Image& image) {
   if (const int code = av_frame_make_writable(av_->frame.get()); code < 0)
     return av_->failure(code, "cannot encode");
   const bool narrow = bytes_per_sample(layout_.format) == 2 && layout_.bit_depth < 16;
@@ -174,14 +183,14 @@ Status PlayerVideo::show(const Image& image) {
   return send();
 }
 
-Status PlayerVideo::repeat() {
+Status VideoWriter::repeat() {
   if (const int code = av_frame_make_writable(av_->frame.get()); code < 0)
     return av_->failure(code, "cannot encode");
   draw_hatched_bar(*av_->frame);
   return send();
 }
 
-Status PlayerVideo::send() {
+Status VideoWriter::send() {
   av_->frame->pts = shown_++;
   if (const int code = avcodec_send_frame(av_->encoder.get(), av_->frame.get()); code < 0) {
     return av_->failure(code, "cannot encode");
@@ -189,7 +198,7 @@ Status PlayerVideo::send() {
   return drain();
 }
 
-Status PlayerVideo::drain() {
+Status VideoWriter::drain() {
   for (;;) {
     AVPacket* packet = av_->packet.get();
     int code = avcodec_receive_packet(av_->encoder.get(), packet);
@@ -204,7 +213,7 @@ Status PlayerVideo::drain() {
   }
 }
 
-Status PlayerVideo::close() {
+Status VideoWriter::close() {
   avcodec_send_frame(av_->encoder.get(), nullptr);
   EMBERLOCK_RETURN_IF_ERROR(drain());
   int code = av_write_trailer(av_->format.get());

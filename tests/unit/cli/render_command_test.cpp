@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <opencv2/imgcodecs.hpp>
+
+#include "cli/commands.h"
+#include "recon/export/volume_file.h"
+#include "session/media/frame_file.h"
+#include "tests/support/recording.h"
+#include "tests/support/verb.h"
+
+namespace emberlock::cli {
+namespace {
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// A cube of light in the middle of a box, red and half as green.
+class RenderCommandTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    constexpr int kPoints = 17;
+    recon::Volume volume;
+    volume.grid = {{-0.08F, -0.08F, -0.08F}, 0.01F, kPoints, kPoints, kPoints};
+    volume.emission.resize(3 * volume.grid.size());
+    volume.extinction.resize(volume.grid.size());
+    std::vector<float> kelvin(volume.grid.size());
+    for (int k = 5; k < 12; ++k)
+      for (int j = 5; j < 12; ++j)
+        for (int i = 5; i < 12; ++i) {
+          const std::size_t p = volume.grid.index(i, j, k);
+          volume.emission[3 * p] = 2000;
+          volume.emission[3 * p + 1] = 1000;
+          volume.extinction[p] = 5;
+          kelvin[p] = 1700;
+        }
+    fs::create_directories(folder_ / "result");
+    ASSERT_TRUE(
+        recon::write_volume(volume, folder_ / "result" / "volume.vdb", {{"temperature", "K", kelvin}}).ok());
+    ASSERT_TRUE(recon::write_volume(volume, folder_ / "colours.vdb").ok());
+  }
+  [[nodiscard]] test::VerbRun run(std::vector<std::string> words) const {
+    std::vector<std::string> all = {
+        "render", (folder_ / "result").string(), "--out", out_.string(), "--image", "64x48", "--device",
+        "cpu"};
+    all.insert(all.end(), words.begin(), words.end());
+    return test::run_verb(add_render, std::move(all));
+  }
+  [[nodiscard]] cv::Mat picture(const std::string& name) const {
+    return cv::imread((out_ / name).string(), cv::IMREAD_UNCHANGED);
+  }
+  void expect_refused(const test::VerbRun& result, const std::string& why) const {
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.err, HasSubstr(why));
+    EXPECT_FALSE(fs::exists(out_));
+  }
+  const test::TempFolder folder_;
+  const fs::path out_ = folder_ / "out";
+};
+
+TEST_F(RenderCommandTest, AnOrbitIsAFolderOfPictures) {
+  const auto result = run({"--frames", "10"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("10 of 64 x 48"));
+  EXPECT_FALSE(fs::exists(out_ / "frame-0010.png"));
+  for (const char* name : {"frame-0000.png", "frame-0009.png"}) {
+    const cv::Mat seen = picture(name);
+    ASSERT_EQ(seen.size(), cv::Size(64, 48));
+    const auto bgr = seen.at<cv::Vec3b>(24, 32);
+    EXPECT_GT(bgr[2], 60);
+    EXPECT_NEAR(bgr[1], bgr[2] / 2.0, 1.5);
+    EXPECT_EQ(seen.at<cv::Vec3b>(1, 1), cv::Vec3b(0, 0, 0));
+  }
+}
+
+TEST_F(RenderCommandTest, BeforeNothingAPictureHasAnOpacity) {
+  ASSERT_EQ(run({"--camera", "0.5, 0, 0", "--transparent"}).exit_code, 0);
+  const cv::Mat seen = picture("frame-0000.png");
+  ASSERT_EQ(seen.channels(), 4);
+  EXPECT_EQ(seen.at<cv::Vec4b>(1, 1)[3], 0);
+  const auto middle = seen.at<cv::Vec4b>(24, 32);
+  EXPECT_GT(middle[3], 60);
+  EXPECT_LT(middle[3], 255);
+  EXPECT_EQ(middle[2], 255) << "as bright as its opacity allows";
+}
+
+TEST_F(RenderCommandTest, TemperaturesSayWhatTheirColoursMean) {
+  const auto result = run({"--frames", "2", "--quantity", "temperature"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("1700 K is dark, 1750 K bright"));
+  EXPECT_TRUE(fs::exists(out_ / "frame-0001.png"));
+  fs::remove_all(out_);
+  const auto none = test::run_verb(add_render, {"render", (folder_ / "colours.vdb").string(), "--out",
+                                                out_.string(), "--quantity", "temperature"});
+  expect_refused(none, "tells no temperature");
+}
+
+TEST_F(RenderCommandTest, ALosslessVideoHasThePicturesBits) {
+  ASSERT_EQ(run({"--frames", "3"}).exit_code, 0);
+  const cv::Mat expected = picture("frame-0002.png");
+  ASSERT_EQ(run({"--frames", "3", "--format", "ffv1"}).exit_code, 0);
+  EXPECT_FALSE(fs::exists(out_ / "frame-0000.png")) << "the earlier result is replaced";
+  auto file = session::FrameFile::open(out_ / "render.mkv");
+  ASSERT_TRUE(file.ok()) << file.error().message();
+  for (int skipped = 0; skipped < 2; ++skipped) ASSERT_TRUE((*file)->next().ok());
+  const auto frame = (*file)->next();
+  ASSERT_TRUE(frame.ok()) << frame.error().message();
+  ASSERT_EQ(frame->layout().format, PixelFormat::rgb8);
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 64; ++x) {
+      const auto bgr = expected.at<cv::Vec3b>(y, x);
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(frame->view().sample(x, y, c), bgr[2 - c]) << x << ' ' << y;
+    }
+  EXPECT_FALSE((*file)->next().ok()) << "three frames";
+  ASSERT_EQ(run({"--frames", "3", "--format", "mp4"}).exit_code, 0);
+  EXPECT_TRUE(fs::exists(out_ / "render.mp4"));
+  ASSERT_EQ(run({"--frames", "1", "--format", "exr"}).exit_code, 0);
+  EXPECT_TRUE(fs::exists(out_ / "frame-0000.exr"));
+}
+
+TEST_F(RenderCommandTest, FollowsTheCamerasThatFilmed) {
+  expect_refused(run({"--path", "cameras"}), "Give --input");
+  std::ofstream(folder_ / "result" / "report.json")
+      << R"({"input": ")" << (folder_ / "gone").string() << "\"}";
+  expect_refused(run({"--path", "cameras"}), "gone");
+}
+
+TEST_F(RenderCommandTest, RefusesWhatCannotBeShown) {
+  expect_refused(run({"--camera", "0,0,1"}), "axis that is up");
+  expect_refused(run({"--camera", "0,0"}), "is no place");
+  expect_refused(run({"--transparent", "--format", "mp4"}), "no opacity");
+  expect_refused(run({"--brightness", "0"}), "--brightness");
+  expect_refused(run({"--distance", "-1"}), "--distance");
+  expect_refused(run({"--up", "w"}), "is no axis");
+  expect_refused(run({"--elevation", "90"}), "--elevation");
+}
+
+}  // namespace
+}  // namespace emberlock::cli

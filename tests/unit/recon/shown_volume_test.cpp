@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "recon/pipeline/shown_volume.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <OpenEXR/ImfFrameBuffer.h>
+#include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfInputFile.h>
+#include <gtest/gtest.h>
+
+#include "recon/calibrate/camera_path.h"
+#include "recon/export/exr_file.h"
+#include "recon/export/volume_file.h"
+#include "tests/support/recording.h"
+
+namespace emberlock::recon {
+namespace {
+
+constexpr ImageSize kSize{64, 48};
+constexpr double kRadius = 0.05;
+constexpr double kExtinction = 20;
+constexpr double kSource = 4000;  // levels a metre
+
+/// A ball of even light and extinction; its upper half has 1800 K, the other 1500.
+ShownVolume ball() {
+  constexpr int kPoints = 49;
+  ShownVolume shown;
+  Volume& v = shown.volume;
+  v.grid = {{-0.06F, -0.06F, -0.06F}, 0.12F / (kPoints - 1), kPoints, kPoints, kPoints};
+  v.emission.resize(3 * v.grid.size());
+  v.extinction.resize(v.grid.size());
+  shown.kelvin.resize(v.grid.size());
+  for (int k = 0; k < kPoints; ++k)
+    for (int j = 0; j < kPoints; ++j)
+      for (int i = 0; i < kPoints; ++i) {
+        const double edge = 0.12 / (kPoints - 1);
+        const double r = edge * std::sqrt(std::pow(i - 24, 2) + std::pow(j - 24, 2) + std::pow(k - 24, 2));
+        const double inside = std::clamp((kRadius - r) / edge + 0.5, 0.0, 1.0);
+        const std::size_t p = v.grid.index(i, j, k);
+        for (std::size_t c = 0; c < 3; ++c)
+          v.emission[3 * p + c] = static_cast<float>(inside * kSource / static_cast<double>(c + 1));
+        v.extinction[p] = static_cast<float>(inside * kExtinction);
+        shown.kelvin[p] = inside > 0 ? (k >= 24 ? 1800 : 1500) : 0;
+      }
+  return shown;
+}
+
+std::size_t pixel(int x, int y) { return static_cast<std::size_t>(y * kSize.width + x); }
+
+TEST(ShownVolume, LightAndOpacityOfABallAreTheClosedForms) {
+  const ShownVolume shown = ball();
+  const CameraModel camera = looking({0.5, 0, 0}, {0, 0, 0}, Eigen::Vector3d::UnitZ(), kSize);
+  for (const bool absorbs : {true, false}) {
+    Volume volume = shown.volume;
+    if (!absorbs) volume.extinction.clear();
+    const std::vector<ShownView> views = show(volume, {&camera});
+    ASSERT_EQ(views.size(), 1U);
+    const std::size_t middle = pixel(32, 24);
+    const double depth = 2 * kRadius * kExtinction;
+    const double light = absorbs ? kSource / kExtinction * (1 - std::exp(-depth)) : kSource * 2 * kRadius;
+    for (std::size_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(views[0].light.rgb[3 * middle + c], light / static_cast<double>(c + 1), 0.02 * light);
+    EXPECT_NEAR(views[0].opacity[middle], absorbs ? 1 - std::exp(-depth) : 0, 0.01);
+    EXPECT_EQ(views[0].opacity[pixel(1, 1)], 0);
+    EXPECT_EQ(views[0].light.rgb[3 * pixel(1, 1)], 0);
+  }
+}
+
+TEST(ShownVolume, TemperaturesAreThoseOfTheLightAlongTheRay) {
+  const ShownVolume shown = ball();
+  const CameraModel level = looking({0.5, 0, 0}, {0, 0, 0}, Eigen::Vector3d::UnitZ(), kSize);
+  const CameraModel above = looking({0, 0, 0.5}, {0, 0, 0}, Eigen::Vector3d::UnitX(), kSize);
+  const float least = least_light(shown, {&level, &above});
+  EXPECT_GT(least, 0);
+  const auto views = show_kelvin(shown, {&level, &above}, least);
+  EXPECT_NEAR(views[0][pixel(32, 20)], 1800, 1);
+  EXPECT_NEAR(views[0][pixel(32, 28)], 1500, 1);
+  EXPECT_EQ(views[0][pixel(1, 1)], 0) << "tells nothing";
+  // The upper half is nearer: of the light 1 - e^-1 of 1 - e^-2.
+  const double upper = (1 - std::exp(-1)) / (1 - std::exp(-2));
+  EXPECT_NEAR(views[1][pixel(32, 24)], 1500 + 300 * upper, 6);
+}
+
+TEST(ShownVolume, IsReadFromAResultOrItsFile) {
+  const test::TempFolder folder;
+  const ShownVolume shown = ball();
+  ASSERT_TRUE(write_volume(shown.volume, folder / "volume.vdb", {{"temperature", "K", shown.kelvin}}).ok());
+  for (const auto& path : {folder / "", folder / "volume.vdb"}) {
+    const auto read = read_shown_volume(path);
+    ASSERT_TRUE(read.ok()) << read.error().message();
+    EXPECT_EQ(read->kelvin, shown.kelvin);
+    EXPECT_EQ(read->volume.emission, shown.volume.emission);
+  }
+  ASSERT_TRUE(write_volume(shown.volume, folder / "colours.vdb").ok());
+  EXPECT_TRUE(read_shown_volume(folder / "colours.vdb")->kelvin.empty());
+  EXPECT_FALSE(read_shown_volume(folder / "none").ok());
+  const Box box = box_of(shown.volume.grid);
+  EXPECT_LT(box.center.norm(), 1e-7);
+  EXPECT_LT((box.size - Eigen::Vector3d(0.12, 0.12, 0.12)).norm(), 1e-7);
+}
+
+TEST(ExrFile, HoldsThirtyTwoBitsOfEachChannel) {
+  const test::TempFolder folder;
+  std::vector<float> red(12);
+  for (std::size_t i = 0; i < red.size(); ++i) red[i] = 1e-3F + 1e4F * static_cast<float>(i);
+  const std::vector<float> kelvin(12, 1723.456F);
+  ASSERT_TRUE(write_exr({4, 3}, {{"R", red}, {"T", kelvin}}, folder / "a.exr").ok());
+  Imf::InputFile file((folder / "a.exr").c_str());
+  EXPECT_EQ(file.header().dataWindow().max.x, 3);
+  EXPECT_EQ(file.header().dataWindow().max.y, 2);
+  std::vector<float> back(12);
+  std::vector<float> hot(12);
+  Imf::FrameBuffer frame;
+  frame.insert("R", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(back.data()), 4, 16));
+  frame.insert("T", Imf::Slice(Imf::FLOAT, reinterpret_cast<char*>(hot.data()), 4, 16));
+  file.setFrameBuffer(frame);
+  file.readPixels(0, 2);
+  EXPECT_EQ(back, red);
+  EXPECT_EQ(hot, kelvin);
+  EXPECT_FALSE(write_exr({4, 3}, {{"R", red}}, folder / "no" / "a.exr").ok());
+}
+
+}  // namespace
+}  // namespace emberlock::recon

@@ -112,11 +112,12 @@ Result<Measured> measured(const std::string& name, const Targets& targets, const
                           const recon::ComputeOptions& compute) {
   const fs::path file = file_of(name);
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::Volume volume, recon::read_volume(file));
-  const auto kelvin = recon::read_grid(file, "temperature");
-  if (!kelvin)
-    return Error{kelvin.error().kind, kelvin.error().what, file.string(),
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto kelvin, recon::read_values(file, "temperature", volume.grid));
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto errors, recon::read_values(file, "temperature_sigma", volume.grid));
+  if (!kelvin || !errors)
+    return Error{ErrorKind::bad_input, "has no temperatures with their errors", file.string(),
                  "Reconstruct it with --quantity temperature"};
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<float> sigma, recon::read_grid(file, "temperature_sigma"));
+  const std::vector<float>& sigma = *errors;
   if (volume.extinction.empty())
     return Error{ErrorKind::bad_input, "has no extinction, so that what it radiates isn't known",
                  file.string(), "Reconstruct it with --effects auto or extinction=SIGMA"};

@@ -3,10 +3,13 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <new>
 #include <numbers>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -39,7 +42,7 @@ constexpr float kWhite = 255;
 struct RenderArguments {
   std::string result, out;
   std::string path = "orbit";
-  std::string camera, look_at, input;
+  std::string camera, look_at, input, rig;
   std::string up = "z";
   std::string image = "640x480";
   std::string quantity = "colour";
@@ -74,20 +77,39 @@ Result<std::string> input_of(const fs::path& result) {
                "Give --input, the session or transforms.json whose cameras are followed"};
 }
 
-Result<std::vector<recon::CameraModel>> cameras_that_filmed(const RenderArguments& a) {
-  std::string input = a.input;
-  if (input.empty()) {
-    EMBERLOCK_ASSIGN_OR_RETURN(input, input_of(a.result));
+/// --path cameras: what was filmed, and how it is read.
+struct Filmed {
+  fs::path input;
+  recon::SceneOptions options;
+};
+Result<std::optional<Filmed>> filmed_by(const RenderArguments& a, const recon::Box& box) {
+  if (a.path != "cameras") return std::optional<Filmed>();
+  Filmed filmed{a.input, {}};
+  filmed.options.box = box;
+  filmed.options.threads = a.threads;
+  filmed.options.progress = progress_bar("cameras");
+  if (a.input.empty()) {
+    EMBERLOCK_ASSIGN_OR_RETURN(filmed.input, input_of(a.result));
   }
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, recon::load_scene(input));
-  std::vector<recon::CameraModel> cameras;
-  cameras.reserve(scene.views.size());
-  for (const recon::View& view : scene.views) cameras.push_back(view.camera);
-  return cameras;
+  if (!a.rig.empty()) filmed.options.rig = a.rig;
+  return std::optional(std::move(filmed));
+}
+
+Result<std::vector<recon::CameraModel>> along_cameras(const Filmed& filmed, const Eigen::Vector3d& pivot,
+                                                      ImageSize size, int frames) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, recon::load_scene(filmed.input, filmed.options));
+  std::vector<recon::CameraModel> stops;
+  stops.reserve(scene.views.size());
+  for (const recon::View& view : scene.views) stops.push_back(view.camera);
+  if (stops.size() < 2 || frames < 2)
+    return Error{ErrorKind::bad_input, "a path needs two cameras and two frames", "--path cameras",
+                 "Give an --input with more cameras, or --path orbit"};
+  std::printf("%-16s of %s\n", "cameras", filmed.input.c_str());
+  return recon::through(stops, pivot, size, frames);
 }
 
 Result<std::vector<recon::CameraModel>> cameras_of(const RenderArguments& a, const recon::Box& box,
-                                                   ImageSize size) {
+                                                   const std::optional<Filmed>& filmed, ImageSize size) {
   EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, parse_up(a.up));
   Eigen::Vector3d at = box.center;
   if (!a.look_at.empty()) {
@@ -100,13 +122,7 @@ Result<std::vector<recon::CameraModel>> cameras_of(const RenderArguments& a, con
                    "Give another place, --look-at or --up"};
     return std::vector{recon::looking(from, at, up, size)};
   }
-  if (a.path == "cameras") {
-    EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<recon::CameraModel> stops, cameras_that_filmed(a));
-    if (stops.size() < 2 || a.frames < 2)
-      return Error{ErrorKind::bad_input, "a path needs two cameras and two frames", "--path cameras",
-                   "Give an --input with more cameras, or --path orbit"};
-    return recon::through(stops, at, size, a.frames);
-  }
+  if (filmed) return along_cameras(*filmed, at, size, a.frames);
   recon::Orbit options;
   options.frames = a.frames;
   options.elevation = a.elevation_degrees / 180 * std::numbers::pi;
@@ -142,7 +158,9 @@ Picture picture_of(const std::vector<float>& kelvin, ImageSize size, const recon
     if (!(kelvin[i] > 0)) continue;
     const double share =
         std::clamp((static_cast<double>(kelvin[i]) - ends.low) / (ends.high - ends.low), 0.0, 1.0);
-    const report::Rgb& colour = report::inferno()[static_cast<std::size_t>(std::lround(255 * share))];
+    constexpr double kDarkest = 40;  // below it colours can't be told from black, which tells nothing
+    const report::Rgb& colour =
+        report::inferno()[static_cast<std::size_t>(std::lround(kDarkest + (255 - kDarkest) * share))];
     const auto width = static_cast<std::size_t>(size.width);
     auto* pixel = picture.rgb.row_as<std::uint8_t>(static_cast<int>(i / width)) + 3 * (i % width);
     std::copy(colour.begin(), colour.end(), pixel);
@@ -199,98 +217,135 @@ class FrameFiles {
   std::unique_ptr<session::VideoWriter> video_;
 };
 
-/// What all pictures share.
-struct Rendering {
-  const RenderArguments& arguments;
-  recon::ShownVolume shown;
-  ImageSize size;
-  recon::BarEnds ends;  // K
-  float least_light = 0;
-  recon::ComputeOptions compute;
-};
+/// Renders some cameras' pictures into their files.
+using RenderSome = std::function<Status(const std::vector<const recon::CameraModel*>&, FrameFiles&)>;
 
-Status render_some(const Rendering& r, const std::vector<const recon::CameraModel*>& cameras,
-                   FrameFiles& files) {
-  const RenderArguments& a = r.arguments;
-  if (a.kelvin()) {
-    for (const std::vector<float>& kelvin : recon::show_kelvin(r.shown, cameras, r.least_light, r.compute))
-      EMBERLOCK_RETURN_IF_ERROR(a.format == "exr"
-                                    ? files.put_exr(kelvin, r.size)
-                                    : files.put(picture_of(kelvin, r.size, r.ends, a.transparent)));
+RenderSome colours(const RenderArguments& a, recon::Volume volume, const recon::ComputeOptions& compute) {
+  return [&a, views = recon::LightViews(std::move(volume), compute)](const auto& cameras,
+                                                                     FrameFiles& files) -> Status {
+    for (recon::ShownView& view : views.of(cameras)) {
+      for (float& v : view.light.rgb) v *= static_cast<float>(a.brightness);
+      EMBERLOCK_RETURN_IF_ERROR(a.format == "exr" ? files.put_exr(view)
+                                                  : files.put(picture_of(view, a.transparent)));
+    }
     return {};
+  };
+}
+
+RenderSome temperatures(const RenderArguments& a, const recon::ShownVolume& shown,
+                        const std::vector<recon::CameraModel>& path, const recon::BarEnds& ends,
+                        const recon::ComputeOptions& compute) {
+  recon::TemperatureViews views(shown, compute);
+  const float least = views.least_light(path);
+  return [&a, ends, least, size = path.front().intrinsics.size, views = std::move(views)](
+             const auto& cameras, FrameFiles& files) -> Status {
+    for (const std::vector<float>& kelvin : views.of(cameras, least))
+      EMBERLOCK_RETURN_IF_ERROR(a.format == "exr" ? files.put_exr(kelvin, size)
+                                                  : files.put(picture_of(kelvin, size, ends, a.transparent)));
+    return {};
+  };
+}
+
+Status render_all(const RenderArguments& a, const RenderSome& render_some,
+                  const std::vector<recon::CameraModel>& path, FrameFiles& files) {
+  constexpr std::size_t kPixelsAtOnce = 4'000'000;
+  const ImageSize size = path.front().intrinsics.size;
+  const auto pixels = static_cast<std::size_t>(size.width) * static_cast<std::size_t>(size.height);
+  const std::size_t at_once = std::clamp<std::size_t>(kPixelsAtOnce / pixels, 1, 8);
+  const Progress bar = progress_bar("render");
+  const Interrupt interrupt;
+  for (std::size_t first = 0; first < path.size(); first += at_once) {
+    if (Interrupt::asked())
+      return Error{ErrorKind::refused, fmt::format("ended early, as asked, before frame {}", first), a.out};
+    tell(bar, static_cast<double>(first) / static_cast<double>(path.size()), fmt::format("frame {}", first));
+    std::vector<const recon::CameraModel*> some;
+    for (std::size_t i = first; i < std::min(path.size(), first + at_once); ++i) some.push_back(&path[i]);
+    EMBERLOCK_RETURN_IF_ERROR(render_some(some, files));
   }
-  for (recon::ShownView& view : recon::show(r.shown.volume, cameras, r.compute)) {
-    for (float& v : view.light.rgb) v *= static_cast<float>(a.brightness);
-    EMBERLOCK_RETURN_IF_ERROR(a.format == "exr" ? files.put_exr(view)
-                                                : files.put(picture_of(view, a.transparent)));
-  }
+  EMBERLOCK_RETURN_IF_ERROR(files.close());
+  tell(bar, 1, "done");
   return {};
 }
 
-Status render_all(const Rendering& r, const std::vector<recon::CameraModel>& path, FrameFiles& files) {
-  constexpr std::size_t kAtOnce = 8;
-  const Progress bar = progress_bar("render");
-  const Interrupt interrupt;
-  for (std::size_t first = 0; first < path.size(); first += kAtOnce) {
-    if (Interrupt::asked())
-      return Error{ErrorKind::refused, fmt::format("ended early, as asked, before frame {}", first),
-                   r.arguments.out};
-    tell(bar, static_cast<double>(first) / static_cast<double>(path.size()), fmt::format("frame {}", first));
-    std::vector<const recon::CameraModel*> some;
-    for (std::size_t i = first; i < std::min(path.size(), first + kAtOnce); ++i) some.push_back(&path[i]);
-    EMBERLOCK_RETURN_IF_ERROR(render_some(r, some, files));
-  }
-  tell(bar, 1, "done");
-  return files.close();
+/// Options that would change nothing are refused.
+Status check_used(const RenderArguments& a, const CLI::App& verb) {
+  const bool one = !a.camera.empty();
+  const bool along = !one && a.path == "cameras";
+  const bool around = !one && !along;
+  const std::pair<const char*, bool> used[] = {{"--frames", !one},
+                                               {"--elevation", around},
+                                               {"--distance", around},
+                                               {"--up", !along},
+                                               {"--input", along},
+                                               {"--rig", along},
+                                               {"--rate", a.video()},
+                                               {"--brightness", !a.kelvin()},
+                                               {"--transparent", a.format == "png"}};
+  for (const auto& [name, applies] : used)
+    if (!applies && verb.count(name) > 0)
+      return Error{ErrorKind::bad_input, "changes nothing here", name, "Leave it away"};
+  return {};
 }
 
 Status check(const RenderArguments& a, ImageSize size) {
-  if (size.width < 16 || size.height < 16 || size.width > 8192 || size.height > 8192)
+  constexpr int kMost = 4096;
+  constexpr double kFar = 1e6;
+  const auto within = [](double value, double least, double most) { return value >= least && value <= most; };
+  if (!within(size.width, 16, kMost) || !within(size.height, 16, kMost))
     return Error{ErrorKind::bad_input, "\"" + a.image + "\" is out of range", "--image",
-                 "Give sides of 16 to 8192"};
-  if (a.transparent && a.video())
-    return Error{ErrorKind::bad_input, "a video has no opacity", "--transparent", "Give --format png or exr"};
-  if (!(a.brightness > 0 && std::isfinite(a.brightness)))
-    return Error{ErrorKind::bad_input, "is no factor", "--brightness", "Give a number above 0"};
-  if (a.distance && !(*a.distance > 0 && std::isfinite(*a.distance)))
-    return Error{ErrorKind::bad_input, "is no distance", "--distance", "Give metres above 0"};
+                 "Give sides of 16 to 4096"};
+  if (a.format == "mp4" && (size.width % 2 != 0 || size.height % 2 != 0))
+    return Error{ErrorKind::bad_input, "a video for players has even sides", "--image", "Give even ones"};
+  if (!within(a.brightness, 1 / kFar, kFar))
+    return Error{ErrorKind::bad_input, "is out of range", "--brightness", "Give a factor of 1e-6 to 1e6"};
+  if (a.distance && !within(*a.distance, 1 / kFar, kFar))
+    return Error{ErrorKind::bad_input, "is out of range", "--distance", "Give 1e-6 to 1e6 m"};
+  if (!within(a.elevation_degrees, -89, 89))
+    return Error{ErrorKind::bad_input, "is out of range", "--elevation", "Give -89 to 89 degrees"};
+  if (!within(a.rate, 1, 240))
+    return Error{ErrorKind::bad_input, "is out of range", "--rate", "Give 1 to 240 frames a second"};
   return {};
 }
 
-Status render(const RenderArguments& a) {
+Status render(const RenderArguments& a, const CLI::App& verb) try {
   EMBERLOCK_ASSIGN_OR_RETURN(const ImageSize size, parse_image_size(a.image));
+  EMBERLOCK_RETURN_IF_ERROR(check_used(a, verb));
   EMBERLOCK_RETURN_IF_ERROR(check(a, size));
-  OutputRequest request{a.out, kRender, {a.result}};
-  if (!a.input.empty()) request.inputs.emplace_back(a.input);
-  EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request));
-  Rendering r{a, {}, size, {}, 0, {}};
-  EMBERLOCK_ASSIGN_OR_RETURN(r.compute.device, recon::parse_device(a.device));
-  EMBERLOCK_ASSIGN_OR_RETURN(r.compute.device, recon::resolve(r.compute.device));
-  r.compute.threads = a.threads;
-  EMBERLOCK_ASSIGN_OR_RETURN(r.shown, recon::read_shown_volume(a.result));
-  const bool told = std::any_of(r.shown.kelvin.begin(), r.shown.kelvin.end(), [](float t) { return t > 0; });
+  recon::ComputeOptions compute;
+  EMBERLOCK_ASSIGN_OR_RETURN(compute.device, recon::parse_device(a.device));
+  EMBERLOCK_ASSIGN_OR_RETURN(compute.device, recon::resolve(compute.device));
+  compute.threads = a.threads;
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::ShownVolume shown, recon::read_shown_volume(a.result));
+  const bool told = std::any_of(shown.kelvin.begin(), shown.kelvin.end(), [](float t) { return t > 0; });
   if (a.kelvin() && !told)
     return Error{ErrorKind::bad_input, "tells no temperature", a.result,
                  "Reconstruct it with --quantity temperature"};
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<recon::CameraModel> path,
-                             cameras_of(a, recon::box_of(r.shown.volume.grid), size));
-  if (a.kelvin()) {
-    const recon::BarEnds middle = recon::middle_by_light(r.shown.kelvin, r.shown.volume.emission);
-    r.ends = recon::kelvin_bar(middle.low, middle.high);
-    std::vector<const recon::CameraModel*> all;
-    for (const recon::CameraModel& camera : path) all.push_back(&camera);
-    r.least_light = recon::least_light(r.shown, all, r.compute);
-  }
+  const recon::Box box = recon::box_of(shown.volume.grid);
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<Filmed> filmed, filmed_by(a, box));
+  OutputRequest request{a.out, kRender, {a.result}};
+  if (filmed)
+    for (const fs::path& file : recon::files_of(filmed->input, filmed->options))
+      request.inputs.push_back(file);
+  EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<recon::CameraModel> path, cameras_of(a, box, filmed, size));
+  const recon::BarEnds middle = recon::middle_by_light(shown.kelvin, shown.volume.emission);
+  const recon::BarEnds ends = recon::kelvin_bar(middle.low, middle.high);
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   EMBERLOCK_ASSIGN_OR_RETURN(FrameFiles files, FrameFiles::create(a, folder.path(), size));
-  EMBERLOCK_RETURN_IF_ERROR(render_all(r, path, files));
+  const RenderSome render_some =
+      a.kelvin() ? temperatures(a, shown, path, ends, compute) : colours(a, std::move(shown.volume), compute);
+  EMBERLOCK_RETURN_IF_ERROR(render_all(a, render_some, path, files));
   EMBERLOCK_RETURN_IF_ERROR(folder.commit());
   std::printf("%-16s %zu of %d x %d\n", "frames", path.size(), size.width, size.height);
   if (a.kelvin())
-    std::printf("%-16s %.0f K is dark, %.0f K bright (inferno); black tells nothing\n", "colours", r.ends.low,
-                r.ends.high);
+    std::printf("%-16s %.0f K is dark, %.0f K bright (inferno); black tells nothing\n", "colours", ends.low,
+                ends.high);
   std::printf("%-16s %s\n", "written to", a.out.c_str());
   return {};
+} catch (const recon::DeviceError& e) {
+  return e.error();
+} catch (const std::bad_alloc&) {
+  return Error{ErrorKind::bad_input, "not enough memory", "--image", "Give smaller pictures"};
 }
 
 void add_path_options(CLI::App& verb, RenderArguments& a) {
@@ -306,11 +361,11 @@ void add_path_options(CLI::App& verb, RenderArguments& a) {
       ->type_name("TEXT");
   verb.add_option("--input", a.input,
                   "Session or transforms.json whose cameras --path cameras follows [what was reconstructed]");
+  verb.add_option("--rig", a.rig, "rig.json that stands before a session's own calibration");
   verb.add_option("--frames", a.frames, "Along the path")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   verb.add_option("--elevation", a.elevation_degrees, "Of an orbit, degrees above the horizon")
-      ->check(CLI::Range(-89.0, 89.0))
       ->capture_default_str();
   verb.add_option("--distance", a.distance, "Of an orbit, m [as far as the whole box just fits]");
   verb.add_option("--up", a.up, "The world's axis that points up: x, y, z, -x, -y or -z")
@@ -340,15 +395,13 @@ void add_render(CLI::App& app) {
       ->capture_default_str();
   verb->add_flag("--transparent", a.transparent, "PNG before nothing instead of black; EXR always is");
   verb->add_option("--brightness", a.brightness, "Factor of the colours")->capture_default_str();
-  verb->add_option("--rate", a.rate, "Of a video, frames a second")
-      ->check(CLI::Range(1.0, 240.0))
-      ->capture_default_str();
+  verb->add_option("--rate", a.rate, "Of a video, frames a second")->capture_default_str();
   verb->add_option("--device", a.device, "auto, cpu, cuda, or cuda:N: the GPU of this number")
       ->capture_default_str();
   verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))
       ->capture_default_str();
-  verb->callback([arguments] { or_fail(render(*arguments)); });
+  verb->callback([arguments, verb] { or_fail(render(*arguments, *verb)); });
 }
 
 }  // namespace emberlock::cli

@@ -105,6 +105,10 @@ int VideoWriter::Libav::open_encoder(const ImageLayout& layout, Hertz frame_rate
   c.width = layout.size.width & sides;
   c.height = layout.size.height & sides;
   c.pix_fmt = lossless ? AV_PIX_FMT_BGR0 : AV_PIX_FMT_YUV420P;
+  if (!lossless) {  // as the scaler makes them of R, G and B
+    c.colorspace = AVCOL_SPC_SMPTE170M;
+    c.color_range = AVCOL_RANGE_MPEG;
+  }
   c.framerate = av_d2q(frame_rate.value(), kLargestRateTerm);
   c.time_base = av_inv_q(c.framerate);
   c.flags |= AV_CODEC_FLAG_GLOBAL_HEADER;

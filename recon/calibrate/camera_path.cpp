@@ -12,16 +12,6 @@ namespace {
 
 constexpr double kFieldOfView = 40.0 / 180 * std::numbers::pi;
 
-/// From one direction to another, evenly by angle; straight where they are opposite.
-Eigen::Vector3d between(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double share) {
-  const double length = (1 - share) * a.norm() + share * b.norm();
-  const double angle = std::acos(std::clamp(a.normalized().dot(b.normalized()), -1.0, 1.0));
-  const double sine = std::sin(angle);
-  if (!(sine > 1e-9)) return (1 - share) * a + share * b;
-  return length *
-         (std::sin((1 - share) * angle) * a.normalized() + std::sin(share * angle) * b.normalized()) / sine;
-}
-
 /// The same view in a picture of another size: as much as its height showed.
 Intrinsics resized_to(const Intrinsics& from, ImageSize size) {
   const double scale = static_cast<double>(size.height) / from.size.height;
@@ -44,8 +34,10 @@ CameraModel between(const CameraModel& a, const CameraModel& b, const Eigen::Vec
   const Eigen::Quaterniond from(a.camera_from_world.rotation);
   const Eigen::Quaterniond to(b.camera_from_world.rotation);
   out.camera_from_world.rotation = from.slerp(share, to).toRotationMatrix();
-  const Eigen::Vector3d center = pivot + between(a.center() - pivot, b.center() - pivot, share);
-  out.camera_from_world.translation = -(out.camera_from_world.rotation * center);
+  // The pivot moves evenly as the camera sees it: between two that look at it, it stays in the middle.
+  out.camera_from_world.translation = (1 - share) * (a.camera_from_world * pivot) +
+                                      share * (b.camera_from_world * pivot) -
+                                      out.camera_from_world.rotation * pivot;
   return out;
 }
 

@@ -28,8 +28,9 @@ CameraModel looking(const Eigen::Vector3d& from, const Eigen::Vector3d& at, cons
                     ImageSize size);
 
 /// Through the places and directions of given cameras (at least two), in their order: `frames` (>= 2) in
-/// even steps, the first and the last being theirs. Between two of them a camera moves on an arc around
-/// `pivot`, and turns and zooms evenly. Pictures have another size, with what the camera's height saw.
+/// even steps, the first and the last being theirs. Between two of them a camera turns and zooms evenly, and
+/// the pivot moves evenly as the camera sees it: around one that both look at, at one distance, on an arc.
+/// Pictures have another size, with what the camera's height saw.
 std::vector<CameraModel> through(const std::vector<CameraModel>& cameras, const Eigen::Vector3d& pivot,
                                  ImageSize size, int frames);
 

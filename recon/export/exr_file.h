@@ -17,7 +17,7 @@ struct ExrChannel {
 };
 
 /// Writes an OpenEXR file of 32-bit channels, ZIP-compressed. `path` is written in place: call it inside an
-/// OutputFolder. Error: io.
+/// OutputFolder. Errors: bad_input for a channel of another size, io.
 Status write_exr(ImageSize size, const std::vector<ExrChannel>& channels, const std::filesystem::path& path);
 
 }  // namespace emberlock::recon

@@ -202,4 +202,15 @@ Result<std::vector<float>> read_grid(const std::filesystem::path& path, const st
   return damaged(path, e.what());
 }
 
+Result<std::optional<std::vector<float>>> read_values(const std::filesystem::path& path,
+                                                      const std::string& name, const Grid& grid) try {
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto file, opened(path));
+  if (!file->hasGrid(name)) return std::optional<std::vector<float>>();
+  EMBERLOCK_ASSIGN_OR_RETURN(std::vector<float> values, read_grid(path, name));
+  if (values.size() != grid.size()) return damaged(path, name + " is of another size than emission");
+  return std::optional(std::move(values));
+} catch (const std::exception& e) {
+  return damaged(path, e.what());
+}
+
 }  // namespace emberlock::recon

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -36,5 +37,9 @@ Result<Volume> read_volume(const std::filesystem::path& path);
 /// The values of a further grid, bit-identically; 0 where none is active. Errors: as read_volume(); no such
 /// grid.
 Result<std::vector<float>> read_grid(const std::filesystem::path& path, const std::string& name);
+/// The same of a grid that has one value for each of `grid`'s key points; nothing where there is no grid of
+/// that name. Error: another number of values.
+Result<std::optional<std::vector<float>>> read_values(const std::filesystem::path& path,
+                                                      const std::string& name, const Grid& grid);
 
 }  // namespace emberlock::recon

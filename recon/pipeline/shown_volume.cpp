@@ -27,19 +27,6 @@ std::vector<RadianceImage> rendered(const Volume& volume, const Background& back
                       std::vector<const RadianceImage*>(cameras.size()), options);
 }
 
-/// Its red is the light of what tells a temperature times that, its green the light.
-Volume weighted(const ShownVolume& shown) {
-  Volume out{shown.volume.grid, std::vector<float>(shown.volume.emission.size()), shown.volume.extinction};
-  for (std::size_t p = 0; p < shown.kelvin.size(); ++p) {
-    if (!(shown.kelvin[p] > 0)) continue;
-    const float* rgb = &shown.volume.emission[3 * p];
-    const float light = std::max({rgb[0], rgb[1], rgb[2]});
-    out.emission[3 * p] = light * shown.kelvin[p];
-    out.emission[3 * p + 1] = light;
-  }
-  return out;
-}
-
 }  // namespace
 
 Result<ShownVolume> read_shown_volume(const fs::path& result) {
@@ -47,7 +34,8 @@ Result<ShownVolume> read_shown_volume(const fs::path& result) {
   const fs::path file = fs::is_directory(result, ec) ? result / "volume.vdb" : result;
   ShownVolume shown;
   EMBERLOCK_ASSIGN_OR_RETURN(shown.volume, read_volume(file));
-  if (auto kelvin = read_grid(file, "temperature")) shown.kelvin = std::move(*kelvin);
+  EMBERLOCK_ASSIGN_OR_RETURN(auto kelvin, read_values(file, "temperature", shown.volume.grid));
+  if (kelvin) shown.kelvin = std::move(*kelvin);
   return shown;
 }
 
@@ -58,50 +46,69 @@ Box box_of(const Grid& grid) {
   return {origin + size / 2, size};
 }
 
-std::vector<ShownView> show(const Volume& volume, const std::vector<const CameraModel*>& cameras,
-                            const ComputeOptions& compute) {
+LightViews::LightViews(Volume volume, const ComputeOptions& compute)
+    : volume_(std::move(volume)), dark_{volume_.grid, {}, volume_.extinction}, compute_(compute) {
+  if (!dark_.extinction.empty()) dark_.emission.resize(volume_.emission.size());
+}
+
+std::vector<ShownView> LightViews::of(const std::vector<const CameraModel*>& cameras) const {
   std::vector<ShownView> views;
-  for (RadianceImage& light : rendered(volume, {}, cameras, compute)) {
+  for (RadianceImage& light : rendered(volume_, {}, cameras, compute_)) {
     std::vector<float> opacity(light.rgb.size() / 3);
     views.push_back({std::move(light), std::move(opacity)});
   }
-  if (volume.extinction.empty()) return views;
-  // What comes through of a white background, without the volume's own light.
-  const Volume dark{volume.grid, std::vector<float>(volume.emission.size()), volume.extinction};
+  if (dark_.extinction.empty()) return views;
   const Background white{Background::Kind::constant, {kWhite, kWhite, kWhite}};
-  const std::vector<RadianceImage> through = rendered(dark, white, cameras, compute);
+  const std::vector<RadianceImage> through = rendered(dark_, white, cameras, compute_);
   for (std::size_t v = 0; v < views.size(); ++v)
     for (std::size_t i = 0; i < views[v].opacity.size(); ++i)
       views[v].opacity[i] = std::clamp(1 - through[v].rgb[3 * i] / kWhite, 0.0F, 1.0F);
   return views;
 }
 
-std::vector<std::vector<float>> show_kelvin(const ShownVolume& shown,
-                                            const std::vector<const CameraModel*>& cameras, float least_light,
-                                            const ComputeOptions& compute) {
+TemperatureViews::TemperatureViews(const ShownVolume& shown, const ComputeOptions& compute)
+    : weighted_{shown.volume.grid, std::vector<float>(shown.volume.emission.size()), shown.volume.extinction},
+      compute_(compute) {
+  for (std::size_t p = 0; p < shown.kelvin.size(); ++p) {
+    if (!(shown.kelvin[p] > 0)) continue;
+    const float* rgb = &shown.volume.emission[3 * p];
+    const float light = std::max({rgb[0], rgb[1], rgb[2]});
+    weighted_.emission[3 * p] = light * shown.kelvin[p];
+    weighted_.emission[3 * p + 1] = light;
+  }
+}
+
+std::vector<std::vector<float>> TemperatureViews::of(const std::vector<const CameraModel*>& cameras,
+                                                     float least) const {
   std::vector<std::vector<float>> views;
-  for (const RadianceImage& sum : rendered(weighted(shown), {}, cameras, compute)) {
+  for (const RadianceImage& sum : rendered(weighted_, {}, cameras, compute_)) {
     std::vector<float>& kelvin = views.emplace_back(sum.rgb.size() / 3);
     for (std::size_t i = 0; i < kelvin.size(); ++i) {
       const float light = sum.rgb[3 * i + 1];
-      if (light > 0 && light >= least_light) kelvin[i] = sum.rgb[3 * i] / light;
+      if (light > 0 && light >= least) kelvin[i] = sum.rgb[3 * i] / light;
     }
   }
   return views;
 }
 
-float least_light(const ShownVolume& shown, const std::vector<const CameraModel*>& cameras,
-                  const ComputeOptions& compute) {
+float TemperatureViews::least_light(const std::vector<CameraModel>& cameras) const {
   constexpr float kShare = 0.02F;
-  constexpr int kWidest = 96;
-  std::vector<CameraModel> small;
-  for (const CameraModel* camera : cameras)
-    small.push_back(resized(*camera, preview_size(camera->intrinsics.size, kWidest)));
-  std::vector<const CameraModel*> all;
-  for (const CameraModel& camera : small) all.push_back(&camera);
+  constexpr int kLongest = 96;
+  constexpr std::size_t kAtOnce = 64;
   float brightest = 0;
-  for (const RadianceImage& sum : rendered(weighted(shown), {}, all, compute))
-    for (std::size_t i = 1; i < sum.rgb.size(); i += 3) brightest = std::max(brightest, sum.rgb[i]);
+  for (std::size_t first = 0; first < cameras.size(); first += kAtOnce) {
+    std::vector<CameraModel> small;
+    for (std::size_t i = first; i < std::min(cameras.size(), first + kAtOnce); ++i) {
+      const ImageSize size = cameras[i].intrinsics.size;
+      const int widest = std::max(1, kLongest * size.width / std::max(size.width, size.height));
+      small.push_back(resized(cameras[i], preview_size(size, widest)));
+    }
+    std::vector<const CameraModel*> these;
+    these.reserve(small.size());
+    for (const CameraModel& camera : small) these.push_back(&camera);
+    for (const RadianceImage& sum : rendered(weighted_, {}, these, compute_))
+      for (std::size_t i = 1; i < sum.rgb.size(); i += 3) brightest = std::max(brightest, sum.rgb[i]);
+  }
   return kShare * brightest;
 }
 

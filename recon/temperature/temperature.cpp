@@ -221,14 +221,16 @@ void take_together(const Scene& scene, const Reconstruction& done, const Emitter
 }
 
 /// Nobody told what glows: what the other kind would tell is part of each temperature's error. Where that
-/// tells none, it doesn't explain what is seen.
-void doubt_emitter(const TemperatureField& other, Readings& readings) {
+/// doesn't explain what is seen there is nothing to add; where it tells no temperature for another reason,
+/// how far it is off isn't known.
+void doubt_emitter(const Readings& other, Readings& readings) {
   auto& [field, fates] = readings;
   for (std::size_t p = 0; p < field.kelvin.size(); ++p) {
     float& kelvin = field.kelvin[p];
     float& sigma = field.sigma[p];
-    if (!(kelvin > 0) || !(other.kelvin[p] > 0)) continue;
-    sigma = std::hypot(sigma, other.kelvin[p] - kelvin);
+    if (!(kelvin > 0) || other.fates[p] == Fate::other) continue;
+    const float instead = other.field.kelvin[p];
+    sigma = instead > 0 ? std::hypot(sigma, instead - kelvin) : INFINITY;
     if (static_cast<double>(sigma) < kMostUncertain * static_cast<double>(kelvin)) continue;
     fates[p] = Fate::unclear;
     kelvin = sigma = 0;
@@ -337,9 +339,9 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
   if (paper || std::none_of(kelvin.begin(), kelvin.end(), [](float t) { return t > 0; }))
     return summed_up(done.volume, std::move(read));
   const Emitter instead = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
-  const TemperatureField other = summed_up(done.volume, read_all(asked, instead, Together::no, named));
+  Readings other = read_all(asked, instead, Together::no, named);
   if (!told) doubt_emitter(other, read);
-  read.field.summary.if_other = other.summary.mean;
+  read.field.summary.if_other = summed_up(done.volume, std::move(other)).summary.mean;
   return summed_up(done.volume, std::move(read));
 }
 

@@ -91,7 +91,9 @@ TEST_F(RenderCommandTest, TemperaturesSayWhatTheirColoursMean) {
   const auto result = run({"--frames", "2", "--quantity", "temperature"});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out, HasSubstr("1700 K is dark, 1750 K bright"));
-  EXPECT_TRUE(fs::exists(out_ / "frame-0001.png"));
+  EXPECT_NE(picture("frame-0001.png").at<cv::Vec3b>(24, 32), cv::Vec3b(0, 0, 0))
+      << "the coldest is seen, too";
+  EXPECT_EQ(picture("frame-0001.png").at<cv::Vec3b>(1, 1), cv::Vec3b(0, 0, 0));
   fs::remove_all(out_);
   const auto none = test::run_verb(add_render, {"render", (folder_ / "colours.vdb").string(), "--out",
                                                 out_.string(), "--quantity", "temperature"});
@@ -115,13 +117,43 @@ TEST_F(RenderCommandTest, ALosslessVideoHasThePicturesBits) {
       for (int c = 0; c < 3; ++c) ASSERT_EQ(frame->view().sample(x, y, c), bgr[2 - c]) << x << ' ' << y;
     }
   EXPECT_FALSE((*file)->next().ok()) << "three frames";
-  ASSERT_EQ(run({"--frames", "3", "--format", "mp4"}).exit_code, 0);
-  EXPECT_TRUE(fs::exists(out_ / "render.mp4"));
+}
+
+TEST_F(RenderCommandTest, AVideoForPlayersShowsThePictures) {
+  ASSERT_EQ(run({"--frames", "2"}).exit_code, 0);
+  const cv::Mat expected = picture("frame-0000.png");
+  ASSERT_EQ(run({"--frames", "2", "--format", "mp4"}).exit_code, 0);
+  auto file = session::FrameFile::open(out_ / "render.mp4");
+  ASSERT_TRUE(file.ok()) << file.error().message();
+  const auto frame = (*file)->next();
+  ASSERT_TRUE(frame.ok()) << frame.error().message();
+  for (int c = 0; c < 3; ++c)
+    EXPECT_NEAR(frame->view().sample(32, 24, c), expected.at<cv::Vec3b>(24, 32)[2 - c], 12) << c;
+}
+
+TEST_F(RenderCommandTest, ExrIsWritten) {
   ASSERT_EQ(run({"--frames", "1", "--format", "exr"}).exit_code, 0);
   EXPECT_TRUE(fs::exists(out_ / "frame-0000.exr"));
 }
 
 TEST_F(RenderCommandTest, FollowsTheCamerasThatFilmed) {
+  // Two cameras half a metre away, at right angles, whose pictures nobody looks at.
+  const std::string pose[] = {"[[0,0,1,0.5],[1,0,0,0],[0,1,0,0],[0,0,0,1]]",
+                              "[[-1,0,0,0],[0,0,1,0.5],[0,1,0,0],[0,0,0,1]]"};
+  cv::imwrite((folder_ / "dark.png").string(), cv::Mat::zeros(48, 64, CV_8UC1));
+  std::ofstream(folder_ / "transforms.json")
+      << R"({"fl_x": 80, "frames": [{"file_path": "dark.png", "transform_matrix": )" << pose[0]
+      << R"(}, {"file_path": "dark.png", "transform_matrix": )" << pose[1] << "}]}";
+  const auto result =
+      run({"--path", "cameras", "--frames", "3", "--input", (folder_ / "transforms.json").string()});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const cv::Mat first = picture("frame-0000.png");
+  const cv::Mat last = picture("frame-0002.png");
+  EXPECT_EQ(cv::norm(first, last, cv::NORM_INF), 0) << "a cube looks alike from its sides";
+  EXPECT_GT(cv::norm(first, picture("frame-0001.png"), cv::NORM_INF), 20) << "and not from its edge";
+  const auto here = run({"--camera", "0.5,0,0"});
+  ASSERT_EQ(here.exit_code, 0) << here.err;
+  fs::remove_all(out_);
   expect_refused(run({"--path", "cameras"}), "Give --input");
   std::ofstream(folder_ / "result" / "report.json")
       << R"({"input": ")" << (folder_ / "gone").string() << "\"}";
@@ -131,11 +163,17 @@ TEST_F(RenderCommandTest, FollowsTheCamerasThatFilmed) {
 TEST_F(RenderCommandTest, RefusesWhatCannotBeShown) {
   expect_refused(run({"--camera", "0,0,1"}), "axis that is up");
   expect_refused(run({"--camera", "0,0"}), "is no place");
-  expect_refused(run({"--transparent", "--format", "mp4"}), "no opacity");
-  expect_refused(run({"--brightness", "0"}), "--brightness");
-  expect_refused(run({"--distance", "-1"}), "--distance");
+  expect_refused(run({"--transparent", "--format", "mp4"}), "--transparent: changes nothing");
+  expect_refused(run({"--camera", "0.5,0,0", "--frames", "7"}), "--frames: changes nothing");
+  expect_refused(run({"--rate", "30"}), "--rate: changes nothing");
+  expect_refused(run({"--quantity", "temperature", "--brightness", "2"}), "--brightness: changes nothing");
+  for (const char* bad : {"0", "nan", "1e39"}) expect_refused(run({"--brightness", bad}), "--brightness");
+  for (const char* bad : {"-1", "nan", "1e200"}) expect_refused(run({"--distance", bad}), "--distance");
+  for (const char* bad : {"90", "nan"}) expect_refused(run({"--elevation", bad}), "--elevation");
   expect_refused(run({"--up", "w"}), "is no axis");
-  expect_refused(run({"--elevation", "90"}), "--elevation");
+  expect_refused(test::run_verb(add_render, {"render", (folder_ / "result").string(), "--out", out_.string(),
+                                             "--format", "mp4", "--image", "65x48"}),
+                 "even sides");
 }
 
 }  // namespace

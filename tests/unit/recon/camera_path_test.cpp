@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/calibrate/camera_path.h"
 
+#include <array>
 #include <cmath>
 
 #include <Eigen/Geometry>
@@ -73,11 +74,20 @@ TEST(PathThroughCameras, MeetsThemAndMovesOnArcsBetween) {
   EXPECT_NEAR((path[6].center() - pivot).norm(), 1.5, 1e-12);
 }
 
-TEST(PathThroughCameras, OppositeOnesAreJoinedWithoutNumbersThatArent) {
-  const CameraModel a = looking({1, 0, 0}, {0, 0, 0}, Eigen::Vector3d::UnitZ(), kSize);
-  const CameraModel b = looking({-1, 0, 0}, {0, 0, 0}, Eigen::Vector3d::UnitZ(), kSize);
-  for (const CameraModel& camera : through({a, b}, Eigen::Vector3d::Zero(), kSize, 5))
-    EXPECT_TRUE(camera.camera_from_world.rotation.allFinite() && camera.center().allFinite());
+TEST(PathThroughCameras, KeepsThePivotInTheMiddleFromAboveAndBetweenOppositeOnes) {
+  const Eigen::Vector3d pivot(0, 0.3, 0);
+  const auto at = [&](double azimuth, double elevation) {
+    const Eigen::Vector3d out(std::cos(azimuth) * std::cos(elevation),
+                              std::sin(azimuth) * std::cos(elevation), std::sin(elevation));
+    return looking(pivot + out, pivot, Eigen::Vector3d::UnitZ(), kSize);
+  };
+  for (const auto& ends :
+       {std::array{at(0, 0.5), at(2.1, 0.5)}, std::array{at(0, 0), at(3.141592653589793, 0)}})
+    for (const CameraModel& camera : through({ends[0], ends[1]}, pivot, kSize, 7)) {
+      EXPECT_LT((camera.project(pivot) - Eigen::Vector2d(160, 100)).norm(), 1e-6);
+      EXPECT_NEAR((camera.center() - pivot).norm(), 1, 1e-9);
+      EXPECT_TRUE(camera.camera_from_world.rotation.isUnitary(1e-9));
+    }
 }
 
 }  // namespace

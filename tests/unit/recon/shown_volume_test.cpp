@@ -54,7 +54,7 @@ TEST(ShownVolume, LightAndOpacityOfABallAreTheClosedForms) {
   for (const bool absorbs : {true, false}) {
     Volume volume = shown.volume;
     if (!absorbs) volume.extinction.clear();
-    const std::vector<ShownView> views = show(volume, {&camera});
+    const std::vector<ShownView> views = LightViews(volume).of({&camera});
     ASSERT_EQ(views.size(), 1U);
     const std::size_t middle = pixel(32, 24);
     const double depth = 2 * kRadius * kExtinction;
@@ -71,9 +71,11 @@ TEST(ShownVolume, TemperaturesAreThoseOfTheLightAlongTheRay) {
   const ShownVolume shown = ball();
   const CameraModel level = looking({0.5, 0, 0}, {0, 0, 0}, Eigen::Vector3d::UnitZ(), kSize);
   const CameraModel above = looking({0, 0, 0.5}, {0, 0, 0}, Eigen::Vector3d::UnitX(), kSize);
-  const float least = least_light(shown, {&level, &above});
-  EXPECT_GT(least, 0);
-  const auto views = show_kelvin(shown, {&level, &above}, least);
+  const TemperatureViews shows(shown);
+  const float least = shows.least_light({level, above});
+  const float brightest = LightViews(shown.volume).of({&level})[0].light.rgb[3 * pixel(32, 24)];
+  EXPECT_NEAR(least, 0.02F * brightest, 0.1F * 0.02F * brightest);
+  const auto views = shows.of({&level, &above}, least);
   EXPECT_NEAR(views[0][pixel(32, 20)], 1800, 1);
   EXPECT_NEAR(views[0][pixel(32, 28)], 1500, 1);
   EXPECT_EQ(views[0][pixel(1, 1)], 0) << "tells nothing";
@@ -95,6 +97,12 @@ TEST(ShownVolume, IsReadFromAResultOrItsFile) {
   ASSERT_TRUE(write_volume(shown.volume, folder / "colours.vdb").ok());
   EXPECT_TRUE(read_shown_volume(folder / "colours.vdb")->kelvin.empty());
   EXPECT_FALSE(read_shown_volume(folder / "none").ok());
+  // Temperatures of another volume.
+  ASSERT_TRUE(
+      write_volume(shown.volume, folder / "bad.vdb", {{"temperature", "K", shown.volume.emission}}).ok());
+  const auto bad = read_shown_volume(folder / "bad.vdb");
+  ASSERT_FALSE(bad.ok());
+  EXPECT_NE(bad.error().message().find("another size"), std::string::npos) << bad.error().message();
   const Box box = box_of(shown.volume.grid);
   EXPECT_LT(box.center.norm(), 1e-7);
   EXPECT_LT((box.size - Eigen::Vector3d(0.12, 0.12, 0.12)).norm(), 1e-7);
@@ -119,6 +127,10 @@ TEST(ExrFile, HoldsThirtyTwoBitsOfEachChannel) {
   EXPECT_EQ(back, red);
   EXPECT_EQ(hot, kelvin);
   EXPECT_FALSE(write_exr({4, 3}, {{"R", red}}, folder / "no" / "a.exr").ok());
+  EXPECT_FALSE(write_exr({4, 4}, {{"R", red}}, folder / "b.exr").ok()) << "too few values";
+  if (std::filesystem::exists("/dev/full")) {
+    EXPECT_FALSE(write_exr({4, 3}, {{"R", red}}, "/dev/full").ok()) << "a full disk";
+  }
 }
 
 }  // namespace

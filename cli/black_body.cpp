@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <memory>
 
@@ -13,6 +12,7 @@
 
 #include "base/file.h"
 #include "cli/commands.h"
+#include "cli/numbers.h"
 #include "cli/outputs.h"
 #include "recon/calibrate/rig.h"
 #include "recon/preprocess/glow_region.h"
@@ -27,30 +27,19 @@ namespace fs = std::filesystem;
 
 constexpr std::array<const char*, 3> kChannelLetters = {"R", "G", "B"};
 
-/// Numbers between commas; as many as `count`, if that isn't 0.
-Result<std::vector<double>> parse_numbers(const std::string& text, std::size_t count, const char* option,
-                                          const char* remedy) {
-  std::vector<double> out;
-  const char* at = text.c_str();
-  for (;;) {
-    char* end = nullptr;
-    out.push_back(std::strtod(at, &end));
-    const bool number = end != at && std::isfinite(out.back());
-    if (!number || (*end != '\0' && *end != ',') || (*end == '\0' && count != 0 && out.size() != count))
-      return Error{ErrorKind::bad_input, "\"" + text + "\" isn't understood", option, remedy};
-    if (*end == '\0') return out;
-    at = end + 1;
-  }
+Error not_understood(const std::string& text, const char* option, const char* remedy) {
+  return {ErrorKind::bad_input, "\"" + text + "\" isn't understood", option, remedy};
 }
 
 Result<std::optional<recon::PatchPlace>> parse_region(const std::string& text) {
   if (text.empty()) return std::optional<recon::PatchPlace>{};
   constexpr const char* kRemedy = "Give x,y,width,height in whole pixels";
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<double> n, parse_numbers(text, 4, "--region", kRemedy));
-  if (!std::all_of(n.begin(), n.end(), [](double v) { return v >= 0 && v < 1e6 && v == std::floor(v); }))
-    return Error{ErrorKind::bad_input, "\"" + text + "\" isn't understood", "--region", kRemedy};
-  return std::optional(recon::PatchPlace{static_cast<int>(n[0]), static_cast<int>(n[1]),
-                                         static_cast<int>(n[2]), static_cast<int>(n[3])});
+  const auto n = parse_numbers_of<4>(text);
+  if (!n ||
+      !std::all_of(n->begin(), n->end(), [](double v) { return v >= 0 && v < 1e6 && v == std::floor(v); }))
+    return not_understood(text, "--region", kRemedy);
+  return std::optional(recon::PatchPlace{static_cast<int>((*n)[0]), static_cast<int>((*n)[1]),
+                                         static_cast<int>((*n)[2]), static_cast<int>((*n)[3])});
 }
 
 Result<recon::CameraResponse> base_of(const std::string& word) {
@@ -88,13 +77,14 @@ Result<std::vector<double>> exposures_of(const BlackBodyArguments& arguments) {
   if (arguments.exposures.empty()) return std::vector<double>{};
   constexpr const char* kRemedy =
       "Give one exposure time in s for all pictures, or one for each: 0.004,0.001";
-  EMBERLOCK_ASSIGN_OR_RETURN(std::vector<double> seconds,
-                             parse_numbers(arguments.exposures, 0, "--exposure", kRemedy));
+  auto told = parse_numbers(arguments.exposures);
+  if (!told) return not_understood(arguments.exposures, "--exposure", kRemedy);
+  std::vector<double>& seconds = *told;
   const bool fits = seconds.size() == 1 || seconds.size() == arguments.pictures.size();
   if (!fits || !std::all_of(seconds.begin(), seconds.end(), [](double s) { return s >= 1e-6 && s <= 3600; }))
     return Error{ErrorKind::bad_input, "\"" + arguments.exposures + "\" doesn't fit", "--exposure", kRemedy};
   seconds.resize(arguments.pictures.size(), seconds.front());
-  return seconds;
+  return std::move(seconds);
 }
 
 /// What the picture had shown at an exposure so many times as long.
@@ -108,9 +98,10 @@ recon::GlowReading exposed(recon::GlowReading reading, double times) {
 
 Status read_sources(const BlackBodyArguments& arguments, const v1::RigCamera* camera,
                     std::vector<report::GlowSource>& out) {
-  EMBERLOCK_ASSIGN_OR_RETURN(
-      const std::vector<double> kelvin,
-      parse_numbers(arguments.temperatures, 0, "--black-body", "Give temperatures in kelvin: 1500,1800"));
+  const auto told = parse_numbers(arguments.temperatures);
+  if (!told)
+    return not_understood(arguments.temperatures, "--black-body", "Give temperatures in kelvin: 1500,1800");
+  const std::vector<double>& kelvin = *told;
   if (kelvin.size() != arguments.pictures.size())
     return Error{ErrorKind::bad_input,
                  fmt::format("{} temperature(s), {} picture(s)", kelvin.size(), arguments.pictures.size()),

@@ -56,7 +56,7 @@ struct Measured {
 Result<Targets> parse_targets(const MeasureArguments& arguments) {
   Targets targets;
   if (!arguments.target.empty()) {
-    const auto v = parse_numbers<6>(arguments.target);
+    const auto v = parse_numbers_of<6>(arguments.target);
     const Eigen::Vector3d normal = v ? Eigen::Vector3d((*v)[3], (*v)[4], (*v)[5]) : Eigen::Vector3d::Zero();
     if (!(normal.norm() > 0))
       return Error{ErrorKind::bad_input, "\"" + arguments.target + "\" is no target", "--target",
@@ -64,7 +64,7 @@ Result<Targets> parse_targets(const MeasureArguments& arguments) {
     targets.surface = Surface{{(*v)[0], (*v)[1], (*v)[2]}, normal.normalized()};
   }
   if (!arguments.sphere.empty()) {
-    const auto v = parse_numbers<4>(arguments.sphere);
+    const auto v = parse_numbers_of<4>(arguments.sphere);
     if (!v || !((*v)[3] > 0))
       return Error{ErrorKind::bad_input, "\"" + arguments.sphere + "\" is no sphere", "--target-sphere",
                    "Give x,y,z,radius in metres"};

@@ -8,28 +8,35 @@
 #include <cstddef>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 namespace emberlock::cli {
 
-/// N numbers of at most 1e9 (metres, seconds) between commas; blanks around them don't count. Nothing for any
-/// other text.
-template <std::size_t N>
-std::optional<std::array<double, N>> parse_numbers(std::string_view text) {
-  const auto skip = [&] { text.remove_prefix(std::min(text.find_first_not_of(' '), text.size())); };
+/// Numbers of at most 1e9 (metres, seconds, kelvin) between commas; blanks around them don't count. Nothing
+/// for any other text.
+inline std::optional<std::vector<double>> parse_numbers(std::string_view text) {
   constexpr double kMost = 1e9;
-  std::array<double, N> numbers = {};
-  for (std::size_t i = 0; i < N; ++i) {
-    if (i > 0) {
-      if (!text.starts_with(',')) return {};
-      text.remove_prefix(1);
-    }
+  const auto skip = [&] { text.remove_prefix(std::min(text.find_first_not_of(' '), text.size())); };
+  std::vector<double> numbers;
+  for (;;) {
     skip();
-    const auto read = std::from_chars(text.data(), text.data() + text.size(), numbers[i]);
-    if (read.ec != std::errc() || !(std::abs(numbers[i]) <= kMost)) return {};
+    const auto read = std::from_chars(text.data(), text.data() + text.size(), numbers.emplace_back());
+    if (read.ec != std::errc() || !(std::abs(numbers.back()) <= kMost)) return {};
     text.remove_prefix(static_cast<std::size_t>(read.ptr - text.data()));
     skip();
+    if (text.empty()) return numbers;
+    if (!text.starts_with(',')) return {};
+    text.remove_prefix(1);
   }
-  if (!text.empty()) return {};
+}
+
+/// N of them, no more and no fewer.
+template <std::size_t N>
+std::optional<std::array<double, N>> parse_numbers_of(std::string_view text) {
+  const auto all = parse_numbers(text);
+  if (!all || all->size() != N) return {};
+  std::array<double, N> numbers = {};
+  std::copy(all->begin(), all->end(), numbers.begin());
   return numbers;
 }
 

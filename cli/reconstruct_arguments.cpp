@@ -46,7 +46,7 @@ Result<recon::Scene> choose_views(const recon::Scene& scene, int views) {
 }  // namespace
 
 Result<recon::Box> parse_box(const std::string& text) {
-  const auto n = parse_numbers<6>(text);
+  const auto n = parse_numbers_of<6>(text);
   if (!n)
     return Error{ErrorKind::bad_input, "\"" + text + "\" is not six numbers", "--box",
                  "Give cx,cy,cz,sx,sy,sz: centre and size in metres"};

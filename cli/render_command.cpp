@@ -61,7 +61,7 @@ struct RenderArguments {
 };
 
 Result<Eigen::Vector3d> parse_place(const std::string& text, const char* option) {
-  const auto v = parse_numbers<3>(text);
+  const auto v = parse_numbers_of<3>(text);
   if (v) return Eigen::Vector3d((*v)[0], (*v)[1], (*v)[2]);
   return Error{ErrorKind::bad_input, "\"" + text + "\" is no place", option, "Give x,y,z in metres"};
 }

@@ -53,7 +53,7 @@ Result<std::optional<rig::Sun>> parse_sun(const SimulateArguments& arguments) {
   rig::Sun sun;
   sun.albedo = arguments.albedo.value_or(sun.albedo);
   if (!arguments.sun.empty()) {
-    const auto towards = parse_numbers<3>(arguments.sun);
+    const auto towards = parse_numbers_of<3>(arguments.sun);
     if (!towards)
       return Error{ErrorKind::bad_input, "\"" + arguments.sun + "\" is no direction", "--sun",
                    "Give x,y,z, towards the sun"};

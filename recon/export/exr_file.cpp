@@ -24,8 +24,8 @@ Status write_exr(ImageSize size, const std::vector<ExrChannel>& channels,
   for (const ExrChannel& channel : channels) {
     header.channels().insert(channel.name, Imf::Channel(Imf::FLOAT));
     // It takes mutable pixels, but writing doesn't change them.
-    auto* pixels = reinterpret_cast<char*>(const_cast<float*>(channel.values.data()));
-    frame.insert(channel.name, Imf::Slice(Imf::FLOAT, pixels, sizeof(float),
+    auto* values = reinterpret_cast<char*>(const_cast<float*>(channel.values.data()));
+    frame.insert(channel.name, Imf::Slice(Imf::FLOAT, values, sizeof(float),
                                           sizeof(float) * static_cast<std::size_t>(size.width)));
   }
   {

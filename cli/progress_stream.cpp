@@ -13,6 +13,7 @@
 #include <sys/prctl.h>
 
 #include "recon/adjust/picture_error.h"
+#include "recon/export/error_words.h"
 #include "recon/export/picture.h"
 #include "recon/export/preview.h"
 #include "recon/export/temperature_words.h"
@@ -215,6 +216,8 @@ void ProgressStream::done(const recon::Outcome& outcome, const recon::Scene& sce
   for (const std::string& words : report.voxel_choice.words) done.add_advice(words);
   if (std::string kept = recon::what_was_kept(report); !kept.empty()) done.add_advice(std::move(kept));
   for (const std::string& advice : recon::next_steps(report)) done.add_advice(advice);
+  if (report.errors)
+    for (const std::string& words : recon::error_words(*report.errors)) done.add_advice(words);
   for (const std::string& warning : report.warnings) done.add_warnings(warning);
   if (report.temperature)
     for (const std::string& words : recon::temperature_words(*report.temperature))

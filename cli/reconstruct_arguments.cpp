@@ -183,9 +183,10 @@ void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
           "cucl, cuoh, bo2; or auto, the one that best explains what no black body does. Also a grid "
           "line_NAME: its share of the light")
       ->needs(quantity);
-  verb->add_flag(
-      "--errors", a.errors,
-      "Also the grids emission_sigma and density_sigma: solves again without each of up to ten views");
+  verb->add_flag("--errors", a.errors,
+                 "Also the grids emission_sigma and density_sigma, by solving again without each of up to "
+                 "ten views, and "
+                 "emission_noise and density_noise, what of it noise makes");
 }
 
 void add_picture_options(CLI::App* verb, ReconstructArguments& a) {

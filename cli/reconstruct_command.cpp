@@ -109,8 +109,10 @@ Status plan_files(const ReconstructArguments& arguments) {
               choice.by_the_paper);
   for (const std::string& words : choice.words) std::printf("%-16s %s\n", "voxels", words.c_str());
   if (options.errors || options.temperature)
-    std::printf("%-16s errors need a further solve for each of up to ten views, which isn't in that time\n",
-                "errors");
+    std::printf(
+        "%-16s errors need a further solve for each of up to ten views, and about one more, which isn't in "
+        "that time\n",
+        "errors");
   if (choice.expected_time.value() > 0)
     std::printf(
         "%-16s about %.2g s, as a run on a grid half as fine tells: loading %.2g, reconstruction %.2g, "

@@ -8,6 +8,7 @@
 #include <fmt/ranges.h>
 
 #include "cli/commands.h"
+#include "recon/export/error_words.h"
 #include "recon/export/report.h"
 #include "recon/export/temperature_words.h"
 #include "recon/pipeline/advice.h"
@@ -34,6 +35,9 @@ void print_summary(const Written& written, const std::string& out) {
   for (const recon::EffectReport& effect : report.effects) {
     std::printf("%-16s %s: %s\n", effect.name.c_str(), effect.on ? "on" : "off", effect.reason.c_str());
   }
+  if (report.errors)
+    for (const std::string& words : recon::error_words(*report.errors))
+      std::printf("%-16s %s\n", "errors", words.c_str());
   if (report.temperature)
     for (const std::string& words : recon::temperature_words(*report.temperature))
       std::printf("%-16s %s\n", "temperature", words.c_str());

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "recon/export/error_words.h"
 #include "recon/export/preview.h"
 #include "recon/export/temperature_words.h"
 #include "report/html.h"
@@ -16,9 +17,6 @@
 
 namespace emberlock::report {
 namespace {
-
-/// A key point that shows less light than this share of the brightest has errors that nobody looks for.
-constexpr double kLeastLight = 0.005;
 
 std::string paragraph(std::string_view clause) { return "<p>" + html_escape(sentence(clause)) + "</p>"; }
 
@@ -48,25 +46,34 @@ std::string errors_html(const recon::Outcome& outcome, const ShownAxes& axes) {
   std::vector<float> emission(volume.grid.size());
   std::vector<float> extinction(errors.extinction.empty() ? 0 : emission.size());
   for (std::size_t p = 0; p < emission.size(); ++p) {
-    const auto light = static_cast<double>(
-        std::max({volume.emission[3 * p], volume.emission[3 * p + 1], volume.emission[3 * p + 2]}));
-    if (!(light > kLeastLight * brightest)) continue;
+    if (!(static_cast<double>(recon::light_at(volume, p)) > recon::kLeastLight * brightest)) continue;
     emission[p] = static_cast<float>(errors.sigma(p).mean() / 100);
     if (!extinction.empty()) extinction[p] = errors.extinction[p];
   }
   std::string html = "<h2>Errors</h2>";
-  html += paragraph(fmt::format(
-      "how far each voxel may be off (one standard error), by {} solves without some of the views, which "
-      "took {:.1f} s: it holds the pictures' noise, and what a view more or less would change",
-      errors.solves, errors.time.value()));
+  html += paragraph(
+      "how far each voxel may be off, by solves without some of the views: that holds the pictures' noise, "
+      "and what a view more or less would change");
+  if (outcome.report.errors)
+    for (const std::string& words : recon::error_words(*outcome.report.errors)) html += paragraph(words);
   const auto add = [&](const std::vector<float>& values, const char* unit, const char* what) {
     html += value_slices_html(volume.grid, values, axes, {0, recon::end_of_bar(values), unit}, what);
   };
   add(emission, "grey levels a centimetre", "error of the light, mean of R, G and B,");
+  if (outcome.noise) {
+    std::vector<float> noise(emission.size());
+    for (std::size_t p = 0; p < noise.size(); ++p)
+      if (emission[p] > 0)
+        noise[p] = (outcome.noise->emission[3 * p] + outcome.noise->emission[3 * p + 1] +
+                    outcome.noise->emission[3 * p + 2]) /
+                   300;
+    add(noise, "grey levels a centimetre", "what of it noise makes,");
+  }
   if (!extinction.empty()) add(extinction, "1/m", "error of the extinction");
-  return html + paragraph(
-                    "grey: hardly any light. The grids emission_sigma and, where extinction was "
-                    "reconstructed, density_sigma are in volume.vdb");
+  const bool field = !extinction.empty();
+  std::string grids = field ? "emission_sigma and density_sigma" : "emission_sigma";
+  if (outcome.noise) grids += field ? ", emission_noise and density_noise" : " and emission_noise";
+  return html + paragraph("grey: hardly any light. In volume.vdb: " + grids);
 }
 
 }  // namespace emberlock::report

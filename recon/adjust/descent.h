@@ -89,6 +89,13 @@ class Descent {
   /// RMS over what show_validation() rendered, grey levels. On a GPU it waits for it, so ask where it counts.
   [[nodiscard]] double validation_error() const;
   [[nodiscard]] Engine& engine() { return *engine_; }
+  /// What ties neighbours to each other: Stiffen's `most` and `soft`, and DescendField's once the extinction
+  /// is released.
+  struct Ties {
+    float most = 0, soft = 0;
+    std::optional<Engine::FieldStep> field;
+  };
+  [[nodiscard]] Ties ties() const { return {stiffness_, soft_, field_}; }
   /// For who ends here.
   [[nodiscard]] std::unique_ptr<Engine> take_engine() { return std::move(engine_); }
   [[nodiscard]] int halvings() const { return guard_.halvings(); }

@@ -132,4 +132,21 @@ Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull&
   return volume;
 }
 
+std::vector<Rgba> to_solution(const Volume& volume, const Problem& problem, const Effects& effects) {
+  const Grid& part = problem.grid();
+  const float edge = volume.grid.edge;
+  const bool field = effects.extinction.model == Extinction::Model::field;
+  const int* offset = problem.crop.offset;
+  std::vector<Rgba> x(part.size());
+  for (int k = 0; k < part.nz; ++k)
+    for (int j = 0; j < part.ny; ++j)
+      for (int i = 0; i < part.nx; ++i) {
+        const std::size_t from = volume.grid.index(i + offset[0], j + offset[1], k + offset[2]);
+        Rgba& to = x[part.index(i, j, k)];
+        for (std::size_t c = 0; c < 3; ++c) to.c[static_cast<int>(c)] = edge * volume.emission[3 * from + c];
+        if (field) to.c[3] = edge * volume.extinction[from];
+      }
+  return x;
+}
+
 }  // namespace emberlock::recon

@@ -115,6 +115,8 @@ class Tracker {
 /// points).
 Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull& hull,
                  const Effects& effects);
+/// The reverse; lane 3 is the extinction where that is a field, else 0.
+std::vector<Rgba> to_solution(const Volume& volume, const Problem& problem, const Effects& effects);
 
 /// x, as it was judged at the end, and the volume that it makes on the whole grid; iterations done at full
 /// resolution.

@@ -96,6 +96,20 @@ ordered_json lines_json(const TemperatureSummary& t) {
   return {{"automatic", t.lines_automatic}, {"found", found}, {"alike", t.lines_alike}};
 }
 
+ordered_json errors_json(const std::optional<ErrorSummary>& errors) {
+  if (!errors) return {};
+  const ErrorSummary& e = *errors;
+  ordered_json json = {{"light", e.light},   {"emission", e.emission},          {"extinction", e.extinction},
+                       {"solves", e.solves}, {"seconds", e.views_time.value()}, {"noise", nullptr}};
+  if (e.noise)
+    json["noise"] = {{"pixel", e.noise->pixel},
+                     {"emission", e.noise->emission},
+                     {"extinction", e.noise->extinction},
+                     {"probes", e.noise->probes},
+                     {"seconds", e.noise->time.value()}};
+  return json;
+}
+
 ordered_json temperature_json(const std::optional<TemperatureSummary>& temperature) {
   if (!temperature) return {};
   const TemperatureSummary& t = *temperature;
@@ -162,6 +176,7 @@ std::string to_json(const Report& report) {
                      {"render", report.render_time.value()},   {"total", report.total_time.value()}};
   json["voxel_choice"] = choice_json(report.voxel_choice);
   json["plan"] = plan_json(report.plan);
+  json["errors"] = errors_json(report.errors);
   json["temperature"] = temperature_json(report.temperature);
   json["preprocessing"] = preprocessing_json(report);
   json["effects"] = effects_json(report);

@@ -11,6 +11,7 @@
 #include "recon/adjust/solver.h"
 #include "recon/effects/effects.h"
 #include "recon/preprocess/view.h"
+#include "recon/temperature/error_summary.h"
 #include "recon/temperature/temperature.h"
 
 namespace emberlock::recon {
@@ -94,7 +95,8 @@ struct Report {
   std::vector<EffectReport> effects;
   std::vector<PreprocessStep> preprocessing;  ///< Scene::preprocessing
   std::vector<std::string> warnings;
-  std::optional<PlanReport> plan;  ///< with a budget or a target
+  std::optional<PlanReport> plan;           ///< with a budget or a target
+  std::optional<ErrorSummary> errors = {};  ///< where they were asked for
   std::optional<TemperatureSummary> temperature = {};
 };
 
@@ -105,12 +107,13 @@ struct Report {
 /// of those after it), `trace_sample` {pixels, of} (its held-out errors are estimates from so many pixels,
 /// scaled so that the last is that of all), `views` [{index, name, role, rmse}], `deviations` (of the paper's
 /// solver from the paper), `voxel_choice` {rule, voxels, by_the_paper, calibration_seconds, expected_seconds,
-/// options [{voxels, seconds, error}], words}, `plan` (null without a budget or target), `temperature` (null
-/// unless asked for: {emitter, absolute, by_absorption, opacity, mean, low, high, sigma, chi_square,
-/// emitter_told, if_other, emitting, told, colder, hotter, unclear, other, saturated, mixed, line_alone,
-/// alike, lines {automatic, found [{name, share, seen}], alike [names]}, joint {iterations, cost_before,
-/// cost_after, last_drop, moved}, solves, seconds {errors, reading, joint}}) and what describes the run.
-/// Held-out errors are null when nothing is held out.
+/// options [{voxels, seconds, error}], words}, `plan` (null without a budget or target), `errors` (null
+/// unless asked for: {light, emission, extinction, solves, seconds, noise: null or {pixel, emission,
+/// extinction, probes, seconds}}), `temperature` (null unless asked for: {emitter, absolute, by_absorption,
+/// opacity, mean, low, high, sigma, chi_square, emitter_told, if_other, emitting, told, colder, hotter,
+/// unclear, other, saturated, mixed, line_alone, alike, lines {automatic, found [{name, share, seen}], alike
+/// [names]}, joint {iterations, cost_before, cost_after, last_drop, moved}, solves, seconds {errors, reading,
+/// joint}}) and what describes the run. Held-out errors are null when nothing is held out.
 std::string to_json(const Report& report);
 
 }  // namespace emberlock::recon

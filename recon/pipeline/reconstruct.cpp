@@ -69,6 +69,13 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
   if (!options.errors && !options.temperature) return {};
   EMBERLOCK_ASSIGN_OR_RETURN(outcome.errors, errors_by_views(task.scene(), outcome.reconstruction,
                                                              options.solve, task.elapsed, progress));
+  if (options.errors) {
+    if (options.solve.solver == Solver::standard) {
+      EMBERLOCK_ASSIGN_OR_RETURN(outcome.noise, errors_by_noise(task.scene(), outcome.reconstruction,
+                                                                options.solve, task.elapsed, progress));
+    }
+    outcome.report.errors = error_summary(outcome.reconstruction.volume, *outcome.errors, outcome.noise);
+  }
   if (!options.temperature) return {};
   const Seconds start = task.elapsed();
   tell(progress, kNearlyDone, "reading temperatures");
@@ -97,6 +104,11 @@ struct FurtherGrids {
       grids.push_back({"emission_sigma", "grey levels (0..255) per metre", emission_sigma});
       if (!outcome.errors->extinction.empty())
         grids.push_back({"density_sigma", "1/m", outcome.errors->extinction});
+    }
+    if (outcome.noise) {
+      grids.push_back({"emission_noise", "grey levels (0..255) per metre", outcome.noise->emission});
+      if (!outcome.noise->extinction.empty())
+        grids.push_back({"density_noise", "1/m", outcome.noise->extinction});
     }
     if (!outcome.temperature) return;
     grids.push_back({"temperature", "K", outcome.temperature->kelvin});

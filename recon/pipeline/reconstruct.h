@@ -52,8 +52,8 @@ struct ReconstructOptions {
   bool choose_by_front = true;
   /// Whether a camera that points beside what its calibration says is put right (find_pointing.h), and said.
   bool correct_pointing = true;
-  /// After the volume, and beside any budget: its errors (view_errors.h), a solve for each of up to ten
-  /// views.
+  /// After the volume, and beside any budget: its errors, by a solve for each of up to ten views
+  /// (view_errors.h), and what of them noise makes (noise_errors.h; not of the paper's solver).
   bool errors = false;
   std::optional<TemperatureRequest> temperature = {};  ///< after the errors, which it needs
 };
@@ -64,6 +64,7 @@ struct Outcome {
   std::vector<RadianceImage> renders;  ///< the volume as each view's camera sees it, in the scene's order
   Report report;                       ///< its `input` is the caller's to fill
   std::optional<VolumeErrors> errors = {};  ///< where options ask for errors or temperature
+  std::optional<NoiseErrors> noise = {};    ///< where options ask for errors
   std::optional<TemperatureField> temperature = {};
 };
 
@@ -88,8 +89,9 @@ inline constexpr OutputVerb kReconstruct{"reconstruct"};
 Status check_output(const std::filesystem::path& folder,
                     const std::vector<std::filesystem::path>& inputs = {});
 
-/// Writes volume.vdb (with grids `emission_sigma` and `density_sigma` where there are errors, `temperature`
-/// and `temperature_sigma` in K, active where told, and for each line emitter that was looked for
+/// Writes volume.vdb (with grids `emission_sigma` and `density_sigma` where there are errors,
+/// `emission_noise` and `density_noise` where it is known what of them noise makes, `temperature` and
+/// `temperature_sigma` in K, active where told, and for each line emitter that was looked for
 /// `line_NAME`, its share of the light), views/NNNN.png (8 bits, numbered as in the input) and report.json as
 /// an OutputFolder; and `page` as report.html, unless it is empty.
 Status write_outcome(const Outcome& outcome, const std::filesystem::path& folder,

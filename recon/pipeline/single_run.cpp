@@ -33,8 +33,10 @@ constexpr std::size_t solve_per_key_point(Precision precision) {
 std::size_t bytes_per_key_point(const ReconstructOptions& options) {
   const std::size_t solve = solve_per_key_point(options.solve.precision);
   if (!options.errors && !options.temperature) return solve;
-  // errors_by_views() has, beside a solve, the volume and eleven sums: deviations and their products.
-  return solve + (4 + 11) * sizeof(float);
+  // errors_by_views() has, beside a solve, the volume and eleven sums: deviations and their products;
+  // errors_by_noise(), after it, an engine, fifteen quads and three numbers, and the errors so far.
+  return solve + std::max<std::size_t>((4 + 11) * sizeof(float),
+                                       options.errors ? 15 * sizeof(Rgba) + (3 + 7 + 8) * sizeof(float) : 0);
 }
 
 /// What of a GPU's memory a frame will hold that is known before its hull is: its pictures and bounds, and

@@ -27,23 +27,20 @@ struct Begin {
   std::vector<std::size_t> place;
 };
 
-Begin begin_at(const Problem& problem, const Optics& optics, const Volume& volume,
+Begin begin_at(const Problem& problem, const Optics& optics, const Reconstruction& done,
                const std::vector<float>& kelvin) {
   const Grid& part = problem.grid();
-  Begin begin{{std::vector<Rgba>(part.size()), std::vector<float>(part.size()), optics.absorb,
-               static_cast<double>(optics.sigma), optics.white},
+  Begin begin{{to_solution(done.volume, problem, done.effects), std::vector<float>(part.size()),
+               optics.absorb, static_cast<double>(optics.sigma), optics.white},
               {std::vector<float>(part.size()), std::vector<float>(part.size())},
               std::vector<std::size_t>(part.size())};
-  const float edge = volume.grid.edge;
   const int* offset = problem.crop.offset;
   for (int k = 0; k < part.nz; ++k)
     for (int j = 0; j < part.ny; ++j)
       for (int i = 0; i < part.nx; ++i) {
         const std::size_t p = part.index(i, j, k);
-        const std::size_t w = volume.grid.index(i + offset[0], j + offset[1], k + offset[2]);
-        Rgba& light = begin.start.light[p];
-        for (std::size_t c = 0; c < 3; ++c) light.c[static_cast<int>(c)] = edge * volume.emission[3 * w + c];
-        if (optics.absorb == Absorb::field) light.c[3] = edge * volume.extinction[w];
+        const std::size_t w = done.volume.grid.index(i + offset[0], j + offset[1], k + offset[2]);
+        const Rgba& light = begin.start.light[p];
         if (kelvin[w] > 0) begin.start.total[p] = light.c[0] + light.c[1] + light.c[2];
         begin.at.kelvin[p] = kelvin[w];
         begin.place[p] = w;
@@ -120,7 +117,7 @@ JointSolve solve_together(const Scene& scene, const Reconstruction& done, const 
   rays.rule.stride = stride_for(setup, done.volume.grid);
   rays.subsets = rays.rule.dealt = kSubsets;
   const Problem problem = make_problem(setup.views, done.hull, rays, pool);
-  Begin begin = begin_at(problem, setup.optics(done.volume.grid), done.volume, kelvin);
+  Begin begin = begin_at(problem, setup.optics(done.volume.grid), done, kelvin);
   const std::vector<float> total = begin.start.total;
   GlowCost<float> cost(problem, std::move(begin.start), EmitterColours(table), pool);
   cost.weigh(begin.at, kTies);

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "recon/compute/pool.h"
+#include "recon/temperature/neighbour_mean.h"
 
 namespace emberlock::recon {
 namespace {
@@ -42,33 +43,6 @@ struct Deviations {
   }
 };
 
-/// The mean over a point and its neighbours along one axis; what lies outside counts as 0.
-void mean_of_three(std::vector<float>& values, std::size_t each, const Grid& grid, int axis, Pool& pool) {
-  const int n[3] = {grid.nx, grid.ny, grid.nz};
-  const std::size_t step[3] = {each, each * static_cast<std::size_t>(grid.nx),
-                               each * static_cast<std::size_t>(grid.nx) * static_cast<std::size_t>(grid.ny)};
-  const int a = axis == 0 ? 1 : 0;
-  const int b = axis == 2 ? 1 : 2;
-  pool.run(n[b], [&](int j) {
-    for (int i = 0; i < n[a]; ++i)
-      for (std::size_t c = 0; c < each; ++c) {
-        float* line =
-            values.data() + static_cast<std::size_t>(i) * step[a] + static_cast<std::size_t>(j) * step[b] + c;
-        float before = 0;
-        for (int k = 0; k < n[axis]; ++k, line += step[axis]) {
-          const float own = *line;
-          const float after = k + 1 < n[axis] ? line[step[axis]] : 0;
-          *line = (before + own + after) / 3;
-          before = own;
-        }
-      }
-  });
-}
-
-void pool_neighbours(std::vector<float>& values, std::size_t each, const Grid& grid, Pool& pool) {
-  for (int axis = 0; axis < 3; ++axis) mean_of_three(values, each, grid, axis, pool);
-}
-
 /// Every groups-th input view from `group` on is missing.
 Scene without(const Scene& scene, int group, int groups) {
   Scene fewer = scene;
@@ -93,8 +67,8 @@ VolumeErrors variances(Deviations sums, const Grid& grid, int groups, Pool& pool
   for (std::size_t p = 0; p < sums.squares.size(); ++p)
     sums.squares[p] =
         std::max(0.0F, (sums.squares[p] - sums.extinction[p] * sums.extinction[p] / g) * (g - 1) / g);
-  pool_neighbours(sums.products, 6, grid, pool);
-  pool_neighbours(sums.squares, sums.squares.empty() ? 0 : 1, grid, pool);
+  take_neighbour_mean(sums.products, 6, grid, pool);
+  take_neighbour_mean(sums.squares, sums.squares.empty() ? 0 : 1, grid, pool);
   for (float& v : sums.squares) v = std::sqrt(v);
   return {std::move(sums.products), std::move(sums.squares), groups, Seconds(0)};
 }

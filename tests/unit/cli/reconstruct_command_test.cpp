@@ -107,6 +107,24 @@ TEST_F(ReconstructCommandTest, WritesVolumeViewsAndReport) {
   EXPECT_THAT(result.out, HasSubstr("only 3 input views"));
 }
 
+TEST_F(ReconstructCommandTest, ErrorsSayWhatOfThemNoiseMakes) {
+  const Run result = run({"--voxels", "16", "--device", "cpu", "--errors"});
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("the light is known to +-"));
+  EXPECT_THAT(result.out, HasSubstr("would alone make"));
+  const json errors = report()["errors"];
+  EXPECT_GT(errors["emission"], 0);
+  EXPECT_GT(errors["light"], errors["emission"]);
+  EXPECT_GT(errors["noise"]["emission"], 0);
+  EXPECT_EQ(report()["temperature"], nullptr);
+  const fs::path vdb = root_ / "out" / "volume.vdb";
+  EXPECT_TRUE(recon::read_grid(vdb, "emission_sigma").ok());
+  EXPECT_TRUE(recon::read_grid(vdb, "emission_noise").ok());
+  std::ifstream page(root_ / "out" / "report.html");
+  const std::string html{std::istreambuf_iterator<char>(page), {}};
+  EXPECT_THAT(html, HasSubstr("what of it noise makes"));
+}
+
 TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
   const std::vector<std::string> plain = {"--voxels", "16", "--device", "cpu", "--effects", "none"};
   ASSERT_EQ(run(plain).exit_code, 0);
@@ -126,6 +144,7 @@ TEST_F(ReconstructCommandTest, TemperaturesStandBesideTheSameColours) {
   EXPECT_NEAR((*kelvin)[kelvin->size() / 2], 1800, 20) << "in the middle of 17^3 points";
   EXPECT_TRUE(recon::read_grid(vdb, "temperature_sigma").ok());
   EXPECT_TRUE(recon::read_grid(vdb, "emission_sigma").ok());
+  EXPECT_FALSE(recon::read_grid(vdb, "emission_noise").ok()) << "it is --errors that asks for it";
   const json t = report()["temperature"];
   EXPECT_EQ(t["emitter"], "grey");
   EXPECT_NEAR(t["mean"].get<double>(), 1800, 20);

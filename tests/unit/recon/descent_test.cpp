@@ -13,44 +13,14 @@
 #include "recon/adjust/left_out_views.h"
 #include "recon/adjust/picture_error.h"
 #include "recon/render/render.h"
-#include "tests/support/ball_scene.h"
 #include "tests/support/devices.h"
 #include "tests/support/edit_view.h"
+#include "tests/support/posed_scene.h"
 
 namespace emberlock::recon {
 namespace {
 
 ON_EACH_DEVICE(DescentOn);
-
-/// A scene as the solver sets it up, in the whole of its box.
-struct Posed {
-  Posed(Scene pictures, int voxels, int most_subsets, const Effects& effects = {})
-      : scene(std::move(pictures)),
-        hull(whole_grid(grid_over(scene.box, voxels))),
-        pool(2, device_here()),
-        setup{{}, {}, hull, effects, options, pool} {
-    for (const View& view : scene.views) {
-      if (view.role != ViewRole::input) continue;
-      setup.views.push_back(&view);
-      setup.boxes.push_back({0, 0, view.image->size.width, view.image->size.height});
-    }
-    level = make_level(setup, hull, 1, most_subsets);
-  }
-
-  Scene scene;
-  Hull hull;
-  SolveOptions options;
-  Pool pool;
-  SolverSetup setup;
-  Level level;
-};
-
-Scene ball_of(int width) {
-  BallOptions ball;
-  ball.views = 8;
-  ball.image = {width, width * 3 / 4};
-  return ball_scene(ball);
-}
 
 double after_passes(Descent& descent, int passes) {
   for (int p = 0; p < passes; ++p) descent.pass();
@@ -69,7 +39,7 @@ Descent wild_one(const Posed& posed, float times) {
 TEST_P(DescentOn, StepsThatAreTooLongAreTakenBackUntilTheyAreShortEnough) {
   for (const int subsets : {1, 4}) {
     SCOPED_TRACE(subsets);
-    const Posed posed(ball_of(64), 12, subsets);
+    const Posed posed(device_here(), ball_of(64), 12, subsets);
     ASSERT_EQ(posed.level.subsets, subsets);
     Descent sound(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
     sound.pass();
@@ -91,7 +61,7 @@ TEST_P(DescentOn, StepsThatAreTooLongAreTakenBackUntilTheyAreShortEnough) {
 }
 
 TEST_P(DescentOn, WhatTheLastPassDidIsJudgedBeforeAnybodyTakesIt) {
-  const Posed posed(ball_of(64), 12, 1);
+  const Posed posed(device_here(), ball_of(64), 12, 1);
   Descent wild = wild_one(posed, 64);
   EXPECT_EQ(wild.pass(), Guard::Finding::best) << "it judges the darkness that it starts from";
   const double black = wild.fit_error();
@@ -114,7 +84,7 @@ TEST_P(DescentOn, WhatTheLastPassDidIsJudgedBeforeAnybodyTakesIt) {
 }
 
 TEST_P(DescentOn, WhatWasKeptIsTakenWhereItShowsNoMoreError) {
-  const Posed posed(ball_of(64), 12, 1);
+  const Posed posed(device_here(), ball_of(64), 12, 1);
   Descent wild = wild_one(posed, 64);
   wild.pass();
   const double dark = wild.kept_error();
@@ -132,7 +102,7 @@ TEST_P(DescentOn, WhatWasKeptIsTakenWhereItShowsNoMoreError) {
 }
 
 TEST_P(DescentOn, StepsStayHalvedAndCountedThoughTheLightIsScatteredAnew) {
-  const Posed posed(ball_of(64), 12, 1);
+  const Posed posed(device_here(), ball_of(64), 12, 1);
   Descent wild = wild_one(posed, 64);
   int before = 0;
   for (int p = 0; p < 40; ++p) {
@@ -149,7 +119,7 @@ TEST_P(DescentOn, StepsStayHalvedAndCountedThoughTheLightIsScatteredAnew) {
 TEST_P(DescentOn, ColdSolvesTakeAConstantExtinctionForWhatItIs) {
   Effects effects;
   effects.extinction = constant_extinction(PerMeter(20));
-  const Posed posed(ball_of(64), 12, 4, effects);
+  const Posed posed(device_here(), ball_of(64), 12, 4, effects);
   Descent descent(posed.level, posed.setup.optics(posed.hull.grid), posed.setup);
   after_passes(descent, 6);
   const ColdSolve cold = cold_solve(posed.setup, posed.level, effects.extinction);
@@ -230,7 +200,7 @@ TEST_P(DescentOn, TheSearchForPointingEndsWithItsShareOfTheBudget) {
 }
 
 TEST_P(DescentOn, TheSearchForSmoothnessEndsWithItsShareOfTheBudget) {
-  const Posed posed(ball_of(64), 12, 1);
+  const Posed posed(device_here(), ball_of(64), 12, 1);
   const LeftOutViews views(posed.setup, posed.hull);
   int looks = 0;
   const FoundSmoothness first = find_smoothness(views, {}, [&] { return ++looks > 1; });
@@ -265,7 +235,7 @@ TEST_P(DescentOn, ExtinctionBeforeABrightWallNeedsNoShorterSteps) {
   Effects effects;
   effects.background = {Background::Kind::constant, {200, 200, 200}};
   effects.extinction = {Extinction::Model::field, PerMeter(10), PerMeter(0)};
-  const Posed posed(ball_before_a_wall(effects, 600, 10), 16, 16, effects);
+  const Posed posed(device_here(), ball_before_a_wall(effects, 600, 10), 16, 16, effects);
   const Extinction thin{Extinction::Model::field, PerMeter(1)};
   Descent descent(posed.level, posed.setup.optics(posed.hull.grid), posed.setup, {nullptr, &thin});
   for (int p = 0; p < 4; ++p) descent.pass();

@@ -19,7 +19,7 @@ namespace {
 
 constexpr ImageSize kSize{64, 48};
 constexpr double kRadius = 0.05;
-constexpr double kExtinction = 20;
+constexpr double kBallExtinction = 20;
 constexpr double kSource = 4000;  // levels a metre
 
 /// A ball of even light and extinction; its upper half has 1800 K, the other 1500.
@@ -40,7 +40,7 @@ ShownVolume ball() {
         const std::size_t p = v.grid.index(i, j, k);
         for (std::size_t c = 0; c < 3; ++c)
           v.emission[3 * p + c] = static_cast<float>(inside * kSource / static_cast<double>(c + 1));
-        v.extinction[p] = static_cast<float>(inside * kExtinction);
+        v.extinction[p] = static_cast<float>(inside * kBallExtinction);
         shown.kelvin[p] = inside > 0 ? (k >= 24 ? 1800 : 1500) : 0;
       }
   return shown;
@@ -57,8 +57,8 @@ TEST(ShownVolume, LightAndOpacityOfABallAreTheClosedForms) {
     const std::vector<ShownView> views = LightViews(volume).of({&camera});
     ASSERT_EQ(views.size(), 1U);
     const std::size_t middle = pixel(32, 24);
-    const double depth = 2 * kRadius * kExtinction;
-    const double light = absorbs ? kSource / kExtinction * (1 - std::exp(-depth)) : kSource * 2 * kRadius;
+    const double depth = 2 * kRadius * kBallExtinction;
+    const double light = absorbs ? kSource / kBallExtinction * (1 - std::exp(-depth)) : kSource * 2 * kRadius;
     for (std::size_t c = 0; c < 3; ++c)
       EXPECT_NEAR(views[0].light.rgb[3 * middle + c], light / static_cast<double>(c + 1), 0.02 * light);
     EXPECT_NEAR(views[0].opacity[middle], absorbs ? 1 - std::exp(-depth) : 0, 0.01);

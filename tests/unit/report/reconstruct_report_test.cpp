@@ -139,10 +139,19 @@ TEST(MeasuredPictures, TemperatureIsToldInSentencesAndDrawnWithABarInKelvin) {
 TEST(MeasuredPictures, ErrorsOfLightAndExtinctionAreDrawnWhereThereIsLight) {
   recon::Outcome outcome = measured_light();
   const std::string html = errors_html(outcome, {});
-  for (const char* part : {"<h2>Errors</h2>", "by 7 solves", "<span>0.6 grey levels a centimetre</span>",
-                           "<span>2.5 1/m</span>", "error of the extinction in the middle, across x"})
+  for (const char* part :
+       {"<h2>Errors</h2>", "by solves without some of the views",
+        "In volume.vdb: emission_sigma and density_sigma.<", "<span>0.6 grey levels a centimetre</span>",
+        "<span>2.5 1/m</span>", "error of the extinction in the middle, across x"})
     EXPECT_THAT(html, HasSubstr(part));
+  outcome.noise =
+      recon::NoiseErrors{std::vector<float>(outcome.reconstruction.volume.emission.size(), 90), {}};
+  outcome.report.errors = recon::error_summary(outcome.reconstruction.volume, *outcome.errors, outcome.noise);
+  for (const char* part : {"by 7 solves", "what of it noise makes, in the middle, across x",
+                           "would alone make", "<span>0.9 grey levels a centimetre</span>", "density_noise"})
+    EXPECT_THAT(errors_html(outcome, {}), HasSubstr(part));
   outcome.errors->extinction.clear();
+  outcome.report.errors->extinction = 0;
   EXPECT_THAT(errors_html(outcome, {}), Not(HasSubstr("1/m")));
   EXPECT_EQ(errors_html({}, {}), "");
 }

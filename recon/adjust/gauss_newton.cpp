@@ -16,9 +16,7 @@ namespace {
 constexpr int kTasks = 64;
 constexpr double kWay = 0.05;  // from x to the two marches of a difference, over the RMS of x
 
-bool is_field(const SolverSetup& setup) {
-  return setup.effects.extinction.model == Extinction::Model::field;
-}
+bool is_field(const SolverSetup& setup) { return setup.effects.extinction.model == Extinction::Model::field; }
 
 /// Emission's and extinction's mean squares.
 std::array<double, 2> mean_squares(const std::vector<Rgba>& d) {
@@ -211,8 +209,9 @@ GaussNewton::Points GaussNewton::tie_noise(double size, std::uint64_t seed, std:
       const std::uint64_t side = q == p ? way : way / 2;
       const std::uint64_t tie = 9 * std::min(p, q) + (q == p ? 3 + side : side);
       for (int c = 0; c < 4; ++c) {
-        const auto by = static_cast<float>(size * std::sqrt(c < 3 ? light : extinction) *
-                                           random_normal(seed, 4 * probe + static_cast<std::uint64_t>(c), tie));
+        const auto by =
+            static_cast<float>(size * std::sqrt(c < 3 ? light : extinction) *
+                               random_normal(seed, 4 * probe + static_cast<std::uint64_t>(c), tie));
         out[p].c[c] += free_[p].c[c] * (p <= q ? by : -by);
       }
       ++way;

@@ -31,8 +31,8 @@ class GaussNewton {
     Points x;
     int steps = 0;
   };
-  /// H^-1 b by preconditioned conjugate gradients (Hestenes and Stiefel 1952), until the residual's norm is so
-  /// small a share of b's, or for so many steps.
+  /// H^-1 b by preconditioned conjugate gradients (Hestenes and Stiefel 1952), until the residual's norm is
+  /// so small a share of b's, or for so many steps.
   [[nodiscard]] Solved solve(const Points& b, double residual, int most_steps);
 
   [[nodiscard]] bool moves(std::size_t point, int lane) const { return free_[point].c[lane] > 0; }
@@ -58,11 +58,11 @@ class GaussNewton {
   Points x_;
   Descent descent_;
   Engine& engine_ = descent_.engine();
-  Points shown_;                 // by x, the background included
-  Points counts_;                // rays: 0 where a bound is met; empty: all of them count
-  Points free_;                  // 1 or 0
-  Points diagonal_;              // that of the solver's majoriser
-  std::vector<float> weights_;   // of the solver's steps
+  Points shown_;                  // by x, the background included
+  Points counts_;                 // rays: 0 where a bound is met; empty: all of them count
+  Points free_;                   // 1 or 0
+  Points diagonal_;               // that of the solver's majoriser
+  std::vector<float> weights_;    // of the solver's steps
   std::vector<float> stiffness_;  // see Stiffen
   std::vector<float> beyond_;     // extinction, beyond what is expected
 };

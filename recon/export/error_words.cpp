@@ -21,16 +21,17 @@ std::vector<std::string> error_words(const ErrorSummary& e) {
   const double percent = e.light > 0 ? 100 * e.emission / e.light : 0;
   std::string of_extinction;
   if (e.extinction > 0) of_extinction = fmt::format(", and the extinction to +-{:.2g} 1/m", e.extinction);
-  std::vector<std::string> words = {
-      fmt::format("the light is known to +-{:.2g} % (one standard error, RMS where there is light){}: found by "
-                  "{} solves without some of the views, in {:.1f} s",
-                  percent, of_extinction, e.solves, e.views_time.value())};
+  std::vector<std::string> words = {fmt::format(
+      "the light is known to +-{:.2g} % (one standard error, RMS where there is light){}: found by "
+      "{} solves without some of the views, in {:.1f} s",
+      percent, of_extinction, e.solves, e.views_time.value())};
   if (!e.noise) return words;
   const double share = e.emission > 0 ? e.noise->emission / e.emission : 0;
-  words.push_back(fmt::format("the pictures' noise, {:.2g} grey levels, would alone make {:.2g} % of the light "
-                              "uncertain, found by {} probes in {:.1f} s: {}",
-                              e.noise->pixel, e.light > 0 ? 100 * e.noise->emission / e.light : 0,
-                              e.noise->probes, e.noise->time.value(), what_would_help(share)));
+  words.push_back(
+      fmt::format("the pictures' noise, {:.2g} grey levels, would alone make {:.2g} % of the light "
+                  "uncertain, found by {} probes in {:.1f} s: {}",
+                  e.noise->pixel, e.light > 0 ? 100 * e.noise->emission / e.light : 0, e.noise->probes,
+                  e.noise->time.value(), what_would_help(share)));
   return words;
 }
 

@@ -8,8 +8,8 @@
 
 namespace emberlock::recon {
 
-/// A volume's errors in sentences: how large they are, by what they were found, and whether less noise or more
-/// views would lower them.
+/// A volume's errors in sentences: how large they are, by what they were found, and whether less noise or
+/// more views would lower them.
 std::vector<std::string> error_words(const ErrorSummary& errors);
 
 }  // namespace emberlock::recon

@@ -74,6 +74,20 @@ Result<FluidStats> FlameSimulation::step(Seconds time) {
   }
 }
 
+Result<FlameSimulation> FlameSimulation::finer() const {
+  FlameSimulationOptions fine = options();
+  fine.nx *= 2;
+  fine.ny *= 2;
+  fine.nz *= 2;
+  fine.edge = fine.edge / 2;
+  EMBERLOCK_RETURN_IF_ERROR(check_options(fine));
+  try {
+    return FlameSimulation(Fluid::finer(*fluid_, fine));
+  } catch (const DeviceError& error) {
+    return error.error();
+  }
+}
+
 GasState FlameSimulation::state() const { return fluid_->state(); }
 Seconds FlameSimulation::time() const { return fluid_->time(); }
 const FlameSimulationOptions& FlameSimulation::options() const { return fluid_->options(); }

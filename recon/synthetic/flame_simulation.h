@@ -96,6 +96,10 @@ class FlameSimulation {
   /// `substeps`, not_converged where a number isn't finite or the projection fails, device.
   Result<FluidStats> step(Seconds time);
 
+  /// The same gas at the same time on a grid twice as fine, linear between the cells: what is finer comes
+  /// with the next steps, whose first takes out what divergence that leaves. Errors: as make().
+  [[nodiscard]] Result<FlameSimulation> finer() const;
+
   [[nodiscard]] GasState state() const;
   [[nodiscard]] Seconds time() const;
   [[nodiscard]] const FlameSimulationOptions& options() const;

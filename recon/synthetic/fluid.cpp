@@ -6,6 +6,7 @@
 #include <string>
 
 #include "base/random.h"
+#include "recon/kernels/fluid_refine.h"
 
 namespace emberlock::recon {
 namespace {
@@ -50,6 +51,22 @@ FlameSimulation::Fluid::Fluid(const FlameSimulationOptions& options)
   if (burns() || diffuses()) expansion_ = work_.array<float>(size);
   if (options.eddies > 0) eddies_ = work_.array<float>(size);
   set_burners();
+}
+
+std::unique_ptr<FlameSimulation::Fluid> FlameSimulation::Fluid::finer(const Fluid& coarse,
+                                                                      const FlameSimulationOptions& options) {
+  auto fine = std::make_unique<Fluid>(options);
+  fine->time_ = coarse.time_;
+  const auto from = coarse.grid_;
+  const auto to = fine->grid_;
+  FluidWork& work = fine->work_;
+  work.cells(to, Refine<Rgba, -1>{coarse.gas_.data(), fine->gas_.data(), from, to});
+  if (fine->burns())
+    work.cells(to, Refine<float, -1>{coarse.particles_.data(), fine->particles_.data(), from, to});
+  work.faces<0>(to, Refine<float, 0>{coarse.velocity_[0].data(), fine->velocity_[0].data(), from, to});
+  work.faces<1>(to, Refine<float, 1>{coarse.velocity_[1].data(), fine->velocity_[1].data(), from, to});
+  work.faces<2>(to, Refine<float, 2>{coarse.velocity_[2].data(), fine->velocity_[2].data(), from, to});
+  return fine;
 }
 
 /// Their speeds stand in the floor's faces, which no pass changes.

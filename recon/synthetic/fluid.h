@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -20,6 +21,8 @@ constexpr double kWantedDivergence = 1e-5;
 class FlameSimulation::Fluid {
  public:
   explicit Fluid(const FlameSimulationOptions& options);
+  /// The same gas on a grid twice as fine.
+  static std::unique_ptr<Fluid> finer(const Fluid& coarse, const FlameSimulationOptions& options);
 
   Result<FluidStats> step(Seconds time);
   [[nodiscard]] GasState state() const;

@@ -4,6 +4,7 @@
 #include "recon/kernels/fluid_diffusion.h"
 #include "recon/kernels/fluid_forces.h"
 #include "recon/kernels/fluid_pressure.h"
+#include "recon/kernels/fluid_refine.h"
 #include "recon/kernels/fluid_transport.h"
 #include "recon/synthetic/fluid_work_cuda.h"
 
@@ -53,6 +54,11 @@ template void each_on_gpu(const FluidRange&, const CorrectTrace<float, -1>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 0>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 1>&);
 template void each_on_gpu(const FluidRange&, const CorrectTrace<float, 2>&);
+template void each_on_gpu(const FluidRange&, const Refine<Rgba, -1>&);
+template void each_on_gpu(const FluidRange&, const Refine<float, -1>&);
+template void each_on_gpu(const FluidRange&, const Refine<float, 0>&);
+template void each_on_gpu(const FluidRange&, const Refine<float, 1>&);
+template void each_on_gpu(const FluidRange&, const Refine<float, 2>&);
 template void each_on_gpu(const FluidRange&, const EddyDiffusion&);
 template void each_on_gpu(const FluidRange&, const DiffuseFaces<0>&);
 template void each_on_gpu(const FluidRange&, const DiffuseFaces<1>&);

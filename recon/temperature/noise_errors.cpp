@@ -29,9 +29,8 @@ std::vector<Rgba> noise_of(const Problem& problem, const std::vector<double>& si
     const Slice mine = slice(noise.size(), kTasks, task);
     for (std::size_t r = mine.begin; r < mine.end; ++r)
       for (int c = 0; c < 3; ++c)
-        noise[r].c[c] = static_cast<float>(
-            sizes[problem.list.rays[r].view] *
-            random_normal(seed, 3 * probe + static_cast<std::uint64_t>(c), r));
+        noise[r].c[c] = static_cast<float>(sizes[problem.list.rays[r].view] *
+                                           random_normal(seed, 3 * probe + static_cast<std::uint64_t>(c), r));
   });
   return noise;
 }

@@ -28,10 +28,42 @@ namespace {
 
 constexpr double kPeak = 230;  // grey levels of the first frame's brightest pixel
 constexpr int kCellsAtOnce = 8, kMostCells = 512;
+constexpr int kFewestCells = 16;  // across, on which a flame may begin
+constexpr int kPasses = 5;        // of gas from the floor to the top, until the flame stands
+constexpr int kParts = 10 * kPasses;
 constexpr Seconds kFirst{2};  // the first frame's read-out on the rig's clock
 constexpr Seconds kShortest = microseconds(1);
 constexpr std::uint64_t kOffsetStream = 1;
 constexpr Kelvin kMiddling{1800};  // at which a channel's mean wavelength is taken
+
+/// How often a grid of so many cells is the finer one of a grid on which a flame may begin.
+int refinements(int cells) {
+  int times = 0;
+  while (cells % (2 * kCellsAtOnce) == 0 && cells / 2 >= kFewestCells) {
+    cells /= 2;
+    ++times;
+  }
+  return times;
+}
+
+/// How often the grid will yet become finer as a part of the settling begins: the last passes of gas each
+/// begin on a finer one.
+int refinements_left(int part, int times) {
+  return std::clamp(times - std::max(0, 1 + part / (kParts / kPasses) - (kPasses - times)), 0, times);
+}
+
+/// Of the settling's work that is done as a part begins: twice the cells along each axis, and twice the
+/// steps.
+double share_settled(int part, int times) {
+  double done = 0;
+  double all = 0;
+  for (int p = 0; p < kParts; ++p) {
+    const double cost = std::pow(16.0, -refinements_left(p, times));
+    all += cost;
+    if (p < part) done += cost;
+  }
+  return done / all;
+}
 
 Status check_simulate(const SimulateOptions& o) {
   const auto bad = [](const char* what, const char* range) {
@@ -152,15 +184,20 @@ class Filming {
                      [&](std::size_t a, std::size_t b) { return late_[a] < late_[b]; });
   }
 
-  /// Until gas that began at the floor has passed the top a few times.
+  /// On the coarsest grid first: the last passes of gas each begin on one twice as fine.
   Status settle(const Observer& observer) {
     const auto& o = flame_.options();
-    film_.settled = Seconds(5 * std::sqrt(o.nz * o.edge.value() / 9.81));
-    constexpr int kParts = 50;
+    film_.settled = kPasses * Seconds(std::sqrt(o.nz * o.edge.value() / 9.81));
+    const int times = refinements(options_.cells);
+    int left = times;
     for (int i = 0; i < kParts; ++i) {
-      EMBERLOCK_RETURN_IF_ERROR(observe(observer, static_cast<double>(i) / kParts, "the flame settles"));
+      EMBERLOCK_RETURN_IF_ERROR(observe(observer, share_settled(i, times), "the flame settles"));
+      for (; left > refinements_left(i, times); --left) {
+        EMBERLOCK_ASSIGN_OR_RETURN(flame_, flame_.finer());
+      }
       EMBERLOCK_RETURN_IF_ERROR(go_on_to(film_.settled / kParts * (i + 1)));
     }
+    film_.cell = flame_.options().edge;
     return {};
   }
   /// Finds the exposure by the first frame, and opens cameras and session.
@@ -318,13 +355,15 @@ class Filming {
 std::optional<int> cells_for_pictures(int cells, const SimulatedFilm& film) {
   const double wanted = cells * film.cell.value() / film.pixel.value();
   if (!(wanted < kMostCells)) return {};
-  return kCellsAtOnce * (static_cast<int>(wanted / kCellsAtOnce) + 1);
+  constexpr int kStep = 4 * kCellsAtOnce;  // so that the flame may begin on a coarser grid
+  return kStep * (static_cast<int>(wanted / kStep) + 1);
 }
 
 Result<SimulatedFilm> simulate_flame(const SimulateOptions& options, const std::filesystem::path& folder,
                                      const Observer& observer) {
   EMBERLOCK_RETURN_IF_ERROR(check_simulate(options));
-  recon::FlameSimulationOptions gas = recon::flame_preset(options.preset, options.cells);
+  recon::FlameSimulationOptions gas =
+      recon::flame_preset(options.preset, options.cells >> refinements(options.cells));
   gas.seed = options.seed;
   gas.compute = options.compute;
   EMBERLOCK_ASSIGN_OR_RETURN(recon::FlameSimulation flame, recon::FlameSimulation::make(gas));

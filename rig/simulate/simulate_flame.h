@@ -51,7 +51,7 @@ struct SimulatedFilm {
   Meters cell;                     ///< edge, of the simulation and its truth
   Meters pixel;                    ///< what a pixel covers in the middle of the flame
 };
-/// As many cells, a multiple of 8, as make the truth finer than what the pictures resolve: a smaller truth
+/// As many cells, a multiple of 32, as make the truth finer than what the pictures resolve: a smaller truth
 /// doesn't judge a reconstruction's finest structures. Nothing where 512 don't suffice.
 std::optional<int> cells_for_pictures(int cells, const SimulatedFilm& film);
 

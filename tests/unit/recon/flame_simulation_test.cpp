@@ -188,6 +188,50 @@ TEST_P(FlameSimulationTest, TinyAndHugeDomains) {
     }
 }
 
+TEST_P(FlameSimulationTest, GoesOnOnAGridTwiceAsFine) {
+  for (const FlamePreset preset : {FlamePreset::torch, FlamePreset::smoke}) {
+    const FlameSimulationOptions o = small(preset);
+    auto flame = FlameSimulation::make(o);
+    ASSERT_TRUE(flame.ok());
+    for (int i = 0; i < 8; ++i) ASSERT_TRUE(flame->step(short_time(o)).ok());
+    auto fine = flame->finer();
+    ASSERT_TRUE(fine.ok()) << fine.error().message();
+    EXPECT_EQ(fine->time(), flame->time());
+    EXPECT_EQ(fine->options().nz, 2 * o.nz);
+    EXPECT_EQ(fine->options().edge, o.edge / 2);
+    const GasState before = flame->state();
+    const GasState after = fine->state();
+    expect_sound(after, fine->options());
+    const auto mean = [](const std::vector<float>& values) {
+      double sum = 0;
+      for (const float v : values) sum += static_cast<double>(v);
+      return sum / static_cast<double>(values.size());
+    };
+    EXPECT_NEAR(mean(after.temperature) - 293, mean(before.temperature) - 293,
+                0.05 * (mean(before.temperature) - 293));
+    EXPECT_NEAR(mean(after.absorption), mean(before.absorption), 0.25 * mean(before.absorption))
+        << "the soot is in a cell or two";
+    // A coarse cell's middle is a corner of eight finer ones, whose mean is near its value.
+    const std::size_t c = before.grid.index(7, 7, 3);
+    double eight = 0;
+    for (int corner = 0; corner < 8; ++corner)
+      eight += static_cast<double>(after.temperature[after.grid.index(
+                   14 + (corner & 1), 14 + (corner >> 1 & 1), 6 + (corner >> 2 & 1))]) /
+               8;
+    EXPECT_NEAR(eight, static_cast<double>(before.temperature[c]),
+                0.3 * static_cast<double>(before.temperature[c]));
+    const auto stats = fine->step(short_time(fine->options()));
+    ASSERT_TRUE(stats.ok()) << stats.error().message();
+    EXPECT_LE(stats->relative_divergence, 1e-5);
+    expect_sound(fine->state(), fine->options());
+  }
+  FlameSimulationOptions large = small(FlamePreset::smoke);
+  large.nz = 520;
+  const auto largest = FlameSimulation::make(large);
+  ASSERT_TRUE(largest.ok());
+  ASSERT_FALSE(largest->finer().ok()) << "1040 cells";
+}
+
 TEST(FlameSimulationOptionsTest, AreRefusedOutOfRange) {
   const auto refused = [](auto change) {
     FlameSimulationOptions o = small(FlamePreset::torch);

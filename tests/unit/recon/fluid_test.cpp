@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "recon/kernels/fluid_diffusion.h"
+#include "recon/kernels/fluid_refine.h"
 #include "recon/kernels/fluid_transport.h"
 #include "recon/synthetic/fluid_work.h"
 #include "recon/synthetic/pressure_solver.h"
@@ -93,6 +94,55 @@ TEST_P(Fluid, MacCormackIsOfSecondOrder) {
   RecordProperty("order_128", std::to_string(order(e[1], e[2])));
   EXPECT_GE(order(e[0], e[1]), kLeastOrder);
   EXPECT_GE(order(e[1], e[2]), kLeastOrder);
+}
+
+/// A slope, in units of the finer grid's cells, at the middle of a cell or a face.
+template <int Axis>
+float slope(float i, float j, float k) {
+  return 3 + 2 * (i + (Axis == 0 ? 0 : 0.5F)) - (j + (Axis == 1 ? 0 : 0.5F)) +
+         0.5F * (k + (Axis == 2 ? 0 : 0.5F));
+}
+
+template <int Axis>
+void expect_refined() {
+  FluidWork work({device_here(), 1});
+  const FluidGrid from{8, 16, 8, 1};
+  const FluidGrid to{16, 32, 16, 0.5F};
+  std::vector<float> values(from.size());
+  for (int k = -1; k <= 9; ++k)
+    for (int j = -1; j <= 17; ++j)
+      for (int i = -1; i <= 9; ++i) {
+        const auto twice = [](int at, int axis) {
+          return 2 * static_cast<float>(at) + (Axis == axis ? 0 : 0.5F);
+        };
+        values[from.index(i, j, k)] = slope<Axis>(twice(i, 0), twice(j, 1), twice(k, 2));
+      }
+  FluidArray<float> coarse = work.array<float>(from.size());
+  coarse.fill(values);
+  FluidArray<float> fine = work.array<float>(to.size());
+  const Refine<float, Axis> refine{coarse.data(), fine.data(), from, to};
+  if constexpr (Axis < 0)
+    work.cells(to, refine);
+  else
+    work.faces<Axis>(to, refine);
+  const std::vector<float> got = fine.values();
+  const int beyond[3] = {Axis == 0 ? 1 : 0, Axis == 1 ? 1 : 0, Axis == 2 ? 1 : 0};
+  for (int k = 1; k < to.nz + beyond[2]; ++k)  // the lowest takes what is above the floor
+    for (int j = 0; j < to.ny + beyond[1]; ++j)
+      for (int i = 0; i < to.nx + beyond[0]; ++i)
+        ASSERT_FLOAT_EQ(got[to.index(i, j, k)],
+                        slope<Axis>(static_cast<float>(i), static_cast<float>(j), static_cast<float>(k)))
+            << Axis << ": " << i << " " << j << " " << k;
+  if (Axis == 2) {
+    EXPECT_EQ(got[to.index(3, 3, 0)], 0) << "the floor's faces are the burners'";
+  }
+}
+
+TEST_P(Fluid, ASlopeIsTheSameOnAGridTwiceAsFine) {
+  expect_refined<-1>();
+  expect_refined<0>();
+  expect_refined<1>();
+  expect_refined<2>();
 }
 
 double transport_error(int n) {

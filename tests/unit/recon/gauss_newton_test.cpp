@@ -40,7 +40,9 @@ class GaussNewtonTest : public testing::TestWithParam<Extinction::Model> {
   }
   [[nodiscard]] bool field() const { return GetParam() == Extinction::Model::field; }
   [[nodiscard]] Descent begun(const SolverSetup& setup) const {
-    return {posed_.level, setup.optics(posed_.hull.grid), setup,
+    return {posed_.level,
+            setup.optics(posed_.hull.grid),
+            setup,
             {nullptr, field() ? &effects_.extinction : nullptr}};
   }
   [[nodiscard]] int lanes() const { return field() ? 4 : 3; }
@@ -52,9 +54,8 @@ class GaussNewtonTest : public testing::TestWithParam<Extinction::Model> {
     Points expected;
   };
   [[nodiscard]] TiesAt begun_at() const {
-    const auto light =
-        make_engine(posed_.level.problem, posed_.setup.optics(posed_.hull.grid), Precision::float32,
-                    posed_.setup.pool);
+    const auto light = make_engine(posed_.level.problem, posed_.setup.optics(posed_.hull.grid),
+                                   Precision::float32, posed_.setup.pool);
     light->set(x_);
     Descent at(posed_.level, posed_.setup.optics(posed_.hull.grid), posed_.setup,
                {light.get(), field() ? &effects_.extinction : nullptr});
@@ -89,8 +90,9 @@ class GaussNewtonTest : public testing::TestWithParam<Extinction::Model> {
   /// Of the lanes that move; a central difference is exact for emission, good to 1e-9 for extinction.
   [[nodiscard]] Eigen::MatrixXd jacobian(const GaussNewton& of) const {
     const std::vector<Quad<double>> x = converted<double>(x_);
-    Eigen::MatrixXd j = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * posed_.level.problem.list.subset_begin[1]),
-                                              static_cast<Eigen::Index>(size()));
+    Eigen::MatrixXd j =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(3 * posed_.level.problem.list.subset_begin[1]),
+                              static_cast<Eigen::Index>(size()));
     constexpr double kWay = 1e-4;
     for (std::size_t p = 0; p < x.size(); ++p)
       for (int c = 0; c < lanes(); ++c) {
@@ -99,7 +101,8 @@ class GaussNewtonTest : public testing::TestWithParam<Extinction::Model> {
         std::vector<Quad<double>> below = x;
         above[p].c[c] += kWay;
         below[p].c[c] -= kWay;
-        j.col(static_cast<Eigen::Index>(p) * lanes() + c) = (of_rays(shown(above)) - of_rays(shown(below))) / (2 * kWay);
+        j.col(static_cast<Eigen::Index>(p) * lanes() + c) =
+            (of_rays(shown(above)) - of_rays(shown(below))) / (2 * kWay);
       }
     return j;
   }

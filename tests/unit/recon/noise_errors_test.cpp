@@ -129,8 +129,8 @@ Ratios over_repeated(const Noisy& s, double noise) {
   return {std::sqrt(told.by_noise / repeated), std::sqrt(told.by_views / repeated)};
 }
 
-/// A found extinction isn't settled when the solve ends, so that repeated noise moves it, and the emission with
-/// it, more than the parabola's lowest point.
+/// A found extinction isn't settled when the solve ends, so that repeated noise moves it, and the emission
+/// with it, more than the parabola's lowest point.
 TEST(NoiseErrorsTest, AreAboutWhatRepeatedNoiseDoes) {
   for (const Extinction::Model model : {Extinction::Model::none, Extinction::Model::field})
     for (const double noise : {0.25, 1.0, 4.0}) {
@@ -138,8 +138,8 @@ TEST(NoiseErrorsTest, AreAboutWhatRepeatedNoiseDoes) {
       const Ratios ratios = over_repeated(solved(noise, model), noise);
       EXPECT_GT(ratios.by_noise, found ? 0.5 : 0.9) << noise;
       EXPECT_LT(ratios.by_noise, 3) << noise;
-      std::printf("noise %g, extinction %s: errors over repeated noise's: by noise %.1f, by views %.1f\n", noise,
-                  found ? "found" : "none", ratios.by_noise, ratios.by_views);
+      std::printf("noise %g, extinction %s: errors over repeated noise's: by noise %.1f, by views %.1f\n",
+                  noise, found ? "found" : "none", ratios.by_noise, ratios.by_views);
     }
 }
 

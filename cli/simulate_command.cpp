@@ -68,10 +68,12 @@ OutputRequest output_of(const SimulateArguments& arguments) {
   return request;
 }
 
-std::string finer_truth(int cells, const rig::SimulatedFilm& film) {
-  const std::optional<int> enough = rig::cells_for_pictures(cells, film);
-  return enough ? fmt::format("with --cells {} the truth would be finer than any reconstruction", *enough)
-                : "smaller pictures would resolve no more than the truth";
+std::string finer_truth(const rig::SimulateOptions& options, const rig::SimulatedFilm& film) {
+  const std::optional<int> enough = rig::cells_for_pictures(options.cells, film);
+  const auto even = [&](int side) { return 2 * static_cast<int>(side * (film.pixel / film.cell) / 2); };
+  return fmt::format("with {}pictures of {}x{} the truth would be finer than any reconstruction",
+                     enough ? fmt::format("--cells {} or ", *enough) : "", even(options.image.width),
+                     even(options.image.height));
 }
 
 void simulate(SimulateArguments arguments) {
@@ -108,7 +110,7 @@ void simulate(SimulateArguments arguments) {
   constexpr double kMilli = 1e3;
   std::printf("the truth's voxels are %.2g mm, a pixel covers %.2g mm of the flame%s\n\n",
               kMilli * film.cell.value(), kMilli * film.pixel.value(),
-              film.cell > film.pixel ? (": " + finer_truth(options.cells, film)).c_str() : "");
+              film.cell > film.pixel ? (": " + finer_truth(options, film)).c_str() : "");
   std::printf("next   emberlock reconstruct %s/session %s--out result\n", out.c_str(),
               options.response && options.preset != recon::FlamePreset::smoke
                   ? "--quantity temperature --emitter soot "

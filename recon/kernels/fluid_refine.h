@@ -5,8 +5,8 @@
 
 namespace emberlock::recon {
 
-/// The value in a cell (Axis -1) or at a face of a grid twice as fine: linear between those of the coarser one
-/// that are around it. The floor's faces keep what they have.
+/// The value in a cell (Axis -1) or at a face of a grid twice as fine: linear between those of the coarser
+/// one that are around it. The floor's faces keep what they have.
 template <class Value, int Axis>
 struct Refine {
   const Value* coarse = nullptr;

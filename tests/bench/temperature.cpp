@@ -16,9 +16,8 @@
 #include "base/clock.h"
 #include "recon/adjust/choose_effects.h"
 #include "recon/export/temperature_look_up.h"
-#include "recon/export/volume_file.h"
-#include "recon/pipeline/scene.h"
 #include "tests/support/glowing_flame.h"
+#include "tests/support/simulated_truth.h"
 
 using namespace emberlock;
 
@@ -120,46 +119,6 @@ bool solve_and_read(int voxels, recon::FlameShape shape, int seed,
   return true;
 }
 
-/// A simulated flame's truth at a reconstruction's key points; nothing outside.
-test::GlowTruth truth_on(const recon::Grid& grid, const recon::Volume& truth,
-                         const std::vector<float>& kelvin) {
-  test::GlowTruth out{std::vector<float>(grid.size()), std::vector<float>(grid.size()),
-                      std::vector<float>(3 * grid.size())};
-  const recon::Grid& from = truth.grid;
-  const int n[3] = {from.nx, from.ny, from.nz};
-  for (int k = 0; k < grid.nz; ++k)
-    for (int j = 0; j < grid.ny; ++j)
-      for (int i = 0; i < grid.nx; ++i) {
-        const int at[3] = {i, j, k};
-        int low[3];
-        float part[3];
-        bool inside = true;
-        for (int d = 0; d < 3; ++d) {
-          const float x =
-              (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
-          inside = inside && x >= 0 && x < static_cast<float>(n[d] - 1);
-          low[d] = inside ? static_cast<int>(x) : 0;
-          part[d] = x - static_cast<float>(low[d]);
-        }
-        if (!inside) continue;
-        const std::size_t p = grid.index(i, j, k);
-        for (int corner = 0; corner < 8; ++corner) {
-          float weight = 1;
-          int place[3];
-          for (int d = 0; d < 3; ++d) {
-            const int upper = corner >> d & 1;
-            place[d] = low[d] + upper;
-            weight *= upper != 0 ? part[d] : 1 - part[d];
-          }
-          const std::size_t q = from.index(place[0], place[1], place[2]);
-          out.kelvin[p] += weight * kelvin[q];
-          out.absorption[p] += weight * truth.extinction[q];
-          for (std::size_t c = 0; c < 3; ++c) out.emission[3 * p + c] += weight * truth.emission[3 * q + c];
-        }
-      }
-  return out;
-}
-
 /// The last frame of a folder of `emberlock simulate flame`, read as what it is: soot.
 int read_simulated(const std::filesystem::path& folder, int voxels) {
   const auto fail = [](const Error& error) {
@@ -167,20 +126,9 @@ int read_simulated(const std::filesystem::path& folder, int voxels) {
     return 1;
   };
   const SteadyClock clock;
-  recon::SceneOptions options;
-  std::filesystem::path last;
-  std::size_t frames = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(folder / "truth")) {
-    last = std::max(last, entry.path());
-    ++frames;
-  }
-  options.frame = frames - 1;
-  const auto scene = recon::load_scene(folder / "session", options);
-  if (!scene.ok()) return fail(scene.error());
-  const auto truth = recon::read_volume(last);
-  if (!truth.ok()) return fail(truth.error());
-  const auto kelvin = recon::read_grid(last, "temperature");
-  if (!kelvin.ok()) return fail(kelvin.error());
+  const auto simulated = test::last_simulated(folder);
+  if (!simulated.ok()) return fail(simulated.error());
+  const recon::Scene* scene = &simulated->scene;
   const recon::Grid grid = recon::grid_over(scene->box, voxels);
   const TimePoint start = clock.now();
   const recon::Elapsed elapsed = [&] { return clock.now() - start; };
@@ -190,7 +138,7 @@ int read_simulated(const std::filesystem::path& folder, int voxels) {
   if (!done.ok()) return fail(done.error());
   const auto errors = recon::errors_by_views(*scene, *done, {}, elapsed);
   if (!errors.ok()) return fail(errors.error());
-  const test::GlowTruth glow = truth_on(grid, *truth, *kelvin);
+  const test::GlowTruth glow = test::truth_on(grid, simulated->truth, simulated->kelvin);
   for (const bool together : {false, true}) {
     const TimePoint begin = clock.now();
     const recon::TemperatureField field =

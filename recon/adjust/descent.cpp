@@ -29,19 +29,6 @@ constexpr float kMostExtinction = 0.3F;       // a voxel edge, unless more is ex
 constexpr float kFaintestExtinction = 1e-4F;  // a voxel edge: the scale of a medium thought to take nothing
 constexpr std::size_t kFewestRays = 256;      // of a subset
 
-/// Pixels across a voxel in the middle of the grid, in the view that shows it smallest.
-double pixels_per_voxel(const SolverSetup& setup, const Grid& g) {
-  const Eigen::Vector3d half =
-      0.5 * static_cast<double>(g.edge) * Eigen::Vector3d(g.nx - 1, g.ny - 1, g.nz - 1);
-  const Eigen::Vector3d middle = Eigen::Vector3f(g.origin[0], g.origin[1], g.origin[2]).cast<double>() + half;
-  double least = std::numeric_limits<double>::infinity();
-  for (const View* view : setup.views) {
-    const double distance = std::max(half.norm(), (view->camera.center() - middle).norm());
-    least = std::min(least, std::abs(view->camera.intrinsics.fx) * static_cast<double>(g.edge) / distance);
-  }
-  return least;
-}
-
 /// Subsets that medium and pixels allow. Light from deep inside a thick medium reaches few pixels, and where
 /// a subset's rays pass farther apart than the voxels, some voxels hang on none of them: a step from some of
 /// the rays alone can then overshoot. The full gradient can't.
@@ -67,6 +54,18 @@ std::size_t flame_pixels(const SolverSetup& setup, int stride) {
 }
 
 }  // namespace
+
+double pixels_per_voxel(const SolverSetup& setup, const Grid& g) {
+  const Eigen::Vector3d half =
+      0.5 * static_cast<double>(g.edge) * Eigen::Vector3d(g.nx - 1, g.ny - 1, g.nz - 1);
+  const Eigen::Vector3d middle = Eigen::Vector3f(g.origin[0], g.origin[1], g.origin[2]).cast<double>() + half;
+  double least = std::numeric_limits<double>::infinity();
+  for (const View* view : setup.views) {
+    const double distance = std::max(half.norm(), (view->camera.center() - middle).norm());
+    least = std::min(least, std::abs(view->camera.intrinsics.fx) * static_cast<double>(g.edge) / distance);
+  }
+  return least;
+}
 
 int stride_for(const SolverSetup& setup, const Grid& grid) {
   constexpr double kPixelsPerVoxel = 1.4;

@@ -22,6 +22,8 @@ struct Level {
 /// The stride, in pixels along both axes, that a grid calls for: about one and a half pixels a voxel are
 /// taken. More say no more of the volume: what a step costs falls with the square, what it reaches doesn't.
 int stride_for(const SolverSetup& setup, const Grid& grid);
+/// Pixels across a voxel in the middle of the grid, in the view that shows it smallest.
+double pixels_per_voxel(const SolverSetup& setup, const Grid& g);
 /// The same for about so many pixels of all flames' boxes together.
 int stride_for_rays(const SolverSetup& setup, std::size_t rays);
 

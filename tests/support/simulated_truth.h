@@ -40,9 +40,9 @@ inline Result<Simulated> last_simulated(const std::filesystem::path& folder) {
 
 /// A simulated flame's truth at a reconstruction's key points; nothing outside.
 inline GlowTruth truth_on(const recon::Grid& grid, const recon::Volume& truth,
-                         const std::vector<float>& kelvin) {
+                          const std::vector<float>& kelvin) {
   GlowTruth out{std::vector<float>(grid.size()), std::vector<float>(grid.size()),
-                      std::vector<float>(3 * grid.size())};
+                std::vector<float>(3 * grid.size())};
   const recon::Grid& from = truth.grid;
   const int n[3] = {from.nx, from.ny, from.nz};
   for (int k = 0; k < grid.nz; ++k)

@@ -27,7 +27,7 @@ struct MeasureArguments {
   std::string target;
   std::string sphere;
   std::string out;
-  std::string up = "z";
+  std::string up;
   int threads = 0;
 };
 
@@ -211,7 +211,7 @@ Status write_measures(const std::vector<Measured>& all, const OutputRequest& req
 
 void measure(const MeasureArguments& arguments) {
   const Targets targets = or_fail(parse_targets(arguments));
-  const Eigen::Vector3d up = or_fail(parse_up(arguments.up));
+  const Eigen::Vector3d up = or_fail(up_axis(arguments.up, arguments.volumes.front()));
   const OutputRequest request{arguments.out, kMeasure, {arguments.volumes.begin(), arguments.volumes.end()}};
   if (!arguments.out.empty()) or_fail(OutputFolder::check(request));
   recon::ComputeOptions compute;
@@ -245,8 +245,11 @@ void add_measure(CLI::App& app) {
                    "x,y,z,radius (m): also the flux on a black sphere, mean and highest, and the power that "
                    "it catches; one around the flame catches on its inner side")
       ->type_name("TEXT");
-  verb->add_option("--up", a.up, "The world's axis along which height is counted: x, y, z, -x, -y or -z")
-      ->capture_default_str();
+  verb->add_option("--up", a.up,
+                   "The world's axis along which height is counted: x, y, z, -x, -y or -z [as the first "
+                   "result's cameras "
+                   "stood, or z]")
+      ->type_name("TEXT");
   verb->add_option("--out", a.out,
                    "Folder for measures.csv, and of several volumes measures.html with plots");
   verb->add_option("--threads", a.threads, "CPU threads; 0: one per core")

@@ -29,6 +29,7 @@
 #include "recon/preprocess/check_scene.h"
 #include "report/box_pictures.h"
 #include "report/reconstruct_report.h"
+#include "report/volume_axes.h"
 #include "session/frame_range.h"
 #include "session/reader.h"
 
@@ -77,6 +78,7 @@ Result<Written> reconstruct_files(const ReconstructArguments& arguments, const W
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome,
                              recon::reconstruct(scene, options, clock, watchers.progress, preview));
   outcome.report.input = arguments.input;
+  outcome.report.up = report::shown_axes(scene.views).up_axis();
   const TimePoint done = clock.now();
   EMBERLOCK_RETURN_IF_ERROR(
       recon::write_outcome(outcome, arguments.out, inputs, report::reconstruct_html(scene, outcome)));

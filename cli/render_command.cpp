@@ -43,7 +43,7 @@ struct RenderArguments {
   std::string result, out;
   std::string path = "orbit";
   std::string camera, look_at, input, rig;
-  std::string up = "z";
+  std::string up;
   std::string image = "640x480";
   std::string quantity = "colour";
   std::string format = "png";
@@ -110,7 +110,7 @@ Result<std::vector<recon::CameraModel>> along_cameras(const Filmed& filmed, cons
 
 Result<std::vector<recon::CameraModel>> cameras_of(const RenderArguments& a, const recon::Box& box,
                                                    const std::optional<Filmed>& filmed, ImageSize size) {
-  EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, parse_up(a.up));
+  EMBERLOCK_ASSIGN_OR_RETURN(const Eigen::Vector3d up, up_axis(a.up, a.result));
   Eigen::Vector3d at = box.center;
   if (!a.look_at.empty()) {
     EMBERLOCK_ASSIGN_OR_RETURN(at, parse_place(a.look_at, "--look-at"));
@@ -368,8 +368,9 @@ void add_path_options(CLI::App& verb, RenderArguments& a) {
   verb.add_option("--elevation", a.elevation_degrees, "Of an orbit, degrees above the horizon")
       ->capture_default_str();
   verb.add_option("--distance", a.distance, "Of an orbit, m [as far as the whole box just fits]");
-  verb.add_option("--up", a.up, "The world's axis that points up: x, y, z, -x, -y or -z")
-      ->capture_default_str();
+  verb.add_option("--up", a.up,
+                  "The world's axis that points up: x, y, z, -x, -y or -z [as the cameras stood, or z]")
+      ->type_name("TEXT");
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include <Eigen/Core>
@@ -9,13 +10,9 @@
 
 namespace emberlock::cli {
 
-/// The world's axis that points up, as --up takes it: "z", "-y" and so on.
-inline Result<Eigen::Vector3d> parse_up(const std::string& text) {
-  const double sign = text.rfind('-', 0) == 0 ? -1 : 1;
-  const std::string axis = sign < 0 ? text.substr(1) : text;
-  if (axis == "x" || axis == "y" || axis == "z")
-    return Eigen::Vector3d(sign * Eigen::Vector3d::Unit(axis[0] - 'x'));
-  return Error{ErrorKind::bad_input, "\"" + text + "\" is no axis", "--up", "Give x, y, z, -x, -y or -z"};
-}
+/// The world's axis that points up, as --up takes it: "z", "-y" and so on. Where it isn't told (empty), the
+/// one that a result's report.json has, as the cameras stood; z where there is none. `result`: its folder, or
+/// a volume in it.
+Result<Eigen::Vector3d> up_axis(const std::string& told, const std::filesystem::path& result);
 
 }  // namespace emberlock::cli

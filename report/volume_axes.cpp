@@ -9,6 +9,10 @@ Eigen::Vector3d ShownAxes::shown(const Eigen::Vector3d& world) const {
   return {world[across], world[away], sign * world[up]};
 }
 
+std::string ShownAxes::up_axis() const {
+  return std::string(sign < 0 ? "-" : "") + static_cast<char>('x' + up);
+}
+
 ShownAxes shown_axes(const std::vector<Eigen::Vector3d>& positions, const std::vector<Eigen::Vector3d>& ups) {
   constexpr double kAgreed = 0.3;  // length of the mean
   ShownAxes axes;

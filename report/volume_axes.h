@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
@@ -19,6 +20,7 @@ struct ShownAxes {
 
   /// World coordinates (or differences) as (across, away, upwards).
   [[nodiscard]] Eigen::Vector3d shown(const Eigen::Vector3d& world) const;
+  [[nodiscard]] std::string up_axis() const;  ///< "z", "-y" and so on
 };
 
 /// Of cameras at `positions` whose pictures have `ups` upwards. Up is the world's axis that is nearest to the

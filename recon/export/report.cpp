@@ -156,6 +156,7 @@ std::string to_json(const Report& report) {
   json["input_rmse"] = report.input_rmse;
   json["warnings"] = report.warnings;
   json["input"] = report.input;
+  json["up"] = report.up.empty() ? ordered_json() : ordered_json(report.up);
   json["solver"] = report.solver;
   json["deviations"] = report.deviations;
   json["device"] = report.device;

@@ -64,8 +64,9 @@ struct VoxelChoice {
 
 /// What a reconstruction did, and its quality.
 struct Report {
-  std::string input;                    ///< as the user typed it
-  std::string solver;                   ///< "default" or "paper"
+  std::string input;   ///< as the user typed it
+  std::string up;      ///< the world's axis that points up, as the cameras stood: "z", "-y"; empty: not known
+  std::string solver;  ///< "default" or "paper"
   std::vector<std::string> deviations;  ///< of the paper's solver from the paper (paper.h)
   std::string device;                   ///< name(Device): "cpu", "cuda", "cuda:1", ...
   int threads = 0;                      ///< 0: all cores
@@ -100,9 +101,10 @@ struct Report {
   std::optional<TemperatureSummary> temperature = {};
 };
 
-/// As report.json: `heldout_rmse`, `input_rmse`, `voxels` [nx, ny, nz], `seconds` {effects, hull, solve,
-/// trace, render, total}, `iterations`, `kept` {iteration, by: "last", "input" or "held_out"}, `stopped`,
-/// `effects` [{name, on, predicted_change, seconds, reason}], `preprocessing` [{step, on, reason}], `trace`
+/// As report.json: `up` (null where it isn't known), `heldout_rmse`, `input_rmse`, `voxels` [nx, ny, nz],
+/// `seconds` {effects, hull, solve, trace, render, total}, `iterations`, `kept` {iteration, by: "last",
+/// "input" or "held_out"}, `stopped`, `effects` [{name, on, predicted_change, seconds, reason}],
+/// `preprocessing` [{step, on, reason}], `trace`
 /// [{seconds, iteration, input_rmse, heldout_rmse}] up to the iteration that was kept, `discarded` (the same
 /// of those after it), `trace_sample` {pixels, of} (its held-out errors are estimates from so many pixels,
 /// scaled so that the last is that of all), `views` [{index, name, role, rmse}], `deviations` (of the paper's

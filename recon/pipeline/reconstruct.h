@@ -62,7 +62,7 @@ struct ReconstructOptions {
 struct Outcome {
   Reconstruction reconstruction;
   std::vector<RadianceImage> renders;  ///< the volume as each view's camera sees it, in the scene's order
-  Report report;                       ///< its `input` is the caller's to fill
+  Report report;                       ///< its `input` and `up` are the caller's to fill
   std::optional<VolumeErrors> errors = {};  ///< where options ask for errors or temperature
   std::optional<NoiseErrors> noise = {};    ///< where options ask for errors
   std::optional<TemperatureField> temperature = {};

@@ -79,6 +79,25 @@ TEST_F(RenderCommandTest, AnOrbitIsAFolderOfPictures) {
   }
 }
 
+TEST_F(RenderCommandTest, UpIsWhereItWasForTheCameras) {
+  const std::vector<std::string> plain = {"--frames", "2", "--look-at", "0.02,0.01,0.03"};
+  const auto with_up = [&](const std::string& up) {
+    std::vector<std::string> words = plain;
+    words.insert(words.end(), {"--up", up});
+    return words;
+  };
+  ASSERT_EQ(run(with_up("-y")).exit_code, 0);
+  const cv::Mat told = picture("0001.png");
+  std::ofstream(folder_ / "result" / "report.json") << R"({"up": "-y"})";
+  ASSERT_EQ(run(plain).exit_code, 0);
+  EXPECT_EQ(cv::norm(told, picture("0001.png")), 0);
+  ASSERT_EQ(run(with_up("z")).exit_code, 0);
+  EXPECT_GT(cv::norm(told, picture("0001.png")), 0) << "what is told counts";
+  std::ofstream(folder_ / "result" / "report.json") << R"({"up": "sideways"})";
+  fs::remove_all(out_);
+  expect_refused(run(plain), "sideways");
+}
+
 TEST_F(RenderCommandTest, BeforeNothingAPictureHasAnOpacity) {
   ASSERT_EQ(run({"--camera", "0.5, 0, 0", "--transparent"}).exit_code, 0);
   const cv::Mat seen = picture("frame-0000.png");

@@ -87,12 +87,13 @@ TEST_F(RenderCommandTest, UpIsWhereItWasForTheCameras) {
     return words;
   };
   ASSERT_EQ(run(with_up("-y")).exit_code, 0);
-  const cv::Mat told = picture("0001.png");
+  const cv::Mat told = picture("frame-0001.png");
+  ASSERT_FALSE(told.empty());
   std::ofstream(folder_ / "result" / "report.json") << R"({"up": "-y"})";
   ASSERT_EQ(run(plain).exit_code, 0);
-  EXPECT_EQ(cv::norm(told, picture("0001.png")), 0);
+  EXPECT_EQ(cv::norm(told, picture("frame-0001.png")), 0);
   ASSERT_EQ(run(with_up("z")).exit_code, 0);
-  EXPECT_GT(cv::norm(told, picture("0001.png")), 0) << "what is told counts";
+  EXPECT_GT(cv::norm(told, picture("frame-0001.png")), 0) << "what is told counts";
   std::ofstream(folder_ / "result" / "report.json") << R"({"up": "sideways"})";
   fs::remove_all(out_);
   expect_refused(run(plain), "sideways");

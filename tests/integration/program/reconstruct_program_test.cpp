@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// `emberlock reconstruct` and `view` as they are started: exit codes, what stands on stdout, Ctrl-C.
+// `emberlock reconstruct`, `view` and `render` as they are started: exit codes, what stands on stdout,
+// Ctrl-C.
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -83,6 +84,16 @@ TEST_F(ReconstructProgram, CtrlCKeepsWhatIsDone) {
   EXPECT_THAT(run.output, HasSubstr("ended early, as asked: the volume after iteration"));
   EXPECT_TRUE(report()["stopped"]);
   EXPECT_TRUE(fs::exists(out_ / "volume.vdb"));
+}
+
+TEST_F(ReconstructProgram, CtrlCEndsRenderingAndLeavesNothingHalfWritten) {
+  ASSERT_EQ(shell(command("")).status, 0);
+  const fs::path frames = folder_ / "frames";
+  const Shell run = shell("timeout --preserve-status --signal=INT 2 " + kEmberlock + " render " +
+                          out_.string() + " --device cpu --frames 100000 --out " + frames.string());
+  EXPECT_EQ(run.status, 1);
+  EXPECT_THAT(run.output, HasSubstr("ended early, as asked, before frame"));
+  EXPECT_FALSE(fs::exists(frames));
 }
 
 }  // namespace

@@ -28,18 +28,20 @@ std::string explain(const FoundExtinction& found) {
   return fmt::format("{:.3g} / m even and {:.3g} / m like soot fit the pictures best", even, soot);
 }
 
-/// A hull whose voxels are at most two thirds as large as those that the views were left out on, where the
-/// pictures tell so small ones apart.
+/// A hull of voxels half as large as those that the views were left out on, or two thirds as large where the
+/// run has them; nothing where pictures don't tell so small ones apart.
 std::optional<Hull> closer_hull(const SolverSetup& setup, const Scene& linear,
                                 const std::vector<FlameMask>& masks, const Grid& coarse) {
-  Hull own = coarsen_to(setup.hull, LeftOutViews::kCloser.voxels);
-  if (own.grid.edge < 0.7F * coarse.edge) return own;
+  constexpr double kPixelsPerVoxel = 1.3;
+  const Hull own = coarsen_to(setup.hull, LeftOutViews::kCloser.voxels);
+  const bool is_finer = own.grid.edge < 0.7F * coarse.edge;
   const Grid twice{{coarse.origin[0], coarse.origin[1], coarse.origin[2]},
                    coarse.edge / 2,
                    2 * coarse.nx - 1,
                    2 * coarse.ny - 1,
                    2 * coarse.nz - 1};
-  if (pixels_per_voxel(setup, twice) < 1) return {};
+  if (pixels_per_voxel(setup, is_finer ? own.grid : twice) < kPixelsPerVoxel) return {};
+  if (is_finer) return own;
   auto hull = carve(linear, masks, twice, setup.options.compute);
   return hull.ok() ? std::optional<Hull>(std::move(*hull)) : std::nullopt;
 }
@@ -52,6 +54,7 @@ struct ShownFromElsewhere {
   double with = 0;  ///< grey levels
   double without = 0;
   bool better = true;
+  bool closer = false;  ///< on the finer grid
 };
 /// Where the budget doesn't allow to look at both, the extinction is believed.
 ShownFromElsewhere show_from_elsewhere(const SolverSetup& setup, const Scene& linear,
@@ -75,7 +78,10 @@ ShownFromElsewhere show_from_elsewhere(const SolverSetup& setup, const Scene& li
   const std::optional<Hull> hull = closer_hull(setup, linear, masks, views.grid());
   if (!hull) return first;
   const LeftOutViews closer(setup, *hull, LeftOutViews::kCloser);
-  return shown(closer.error(found, with.value), closer.error({}, without.value), kLeastCloserGain);
+  ShownFromElsewhere second =
+      shown(closer.error(found, with.value), closer.error({}, without.value), kLeastCloserGain);
+  second.closer = true;
+  return second;
 }
 
 /// Decides on the motion, in two halves: where it rises before anything else is known, and the rest once the
@@ -245,9 +251,10 @@ Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid
     report.reason =
         !shown.better
             ? fmt::format(
-                  "{}, but views that are left out of the fit are shown to {:.3g} grey levels with it "
-                  "and to {:.3g} without",
-                  explain(found), shown.with, shown.without)
+                  "{}, but {}views that are left out of the fit are shown to {:.3g} grey levels with it "
+                  "and to {:.3g} without{}",
+                  explain(found), shown.closer ? "on a finer grid " : "", shown.with, shown.without,
+                  shown.with < shown.without ? ", which is too little to believe it" : "")
         : report.on
             ? explain(found)
             : fmt::format("the best fit, {:.3g} / m, changes the pictures by less than {:.2g} grey levels",

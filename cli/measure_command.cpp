@@ -247,8 +247,7 @@ void add_measure(CLI::App& app) {
       ->type_name("TEXT");
   verb->add_option("--up", a.up,
                    "The world's axis along which height is counted: x, y, z, -x, -y or -z [as the first "
-                   "result's cameras "
-                   "stood, or z]")
+                   "result's cameras stood, or z]")
       ->type_name("TEXT");
   verb->add_option("--out", a.out,
                    "Folder for measures.csv, and of several volumes measures.html with plots");

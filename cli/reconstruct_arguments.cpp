@@ -185,8 +185,7 @@ void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
       ->needs(quantity);
   verb->add_flag("--errors", a.errors,
                  "Also the grids emission_sigma and density_sigma, by solving again without each of up to "
-                 "ten views, and "
-                 "emission_noise and density_noise, what of it noise makes");
+                 "ten views, and emission_noise and density_noise, what of it noise makes");
 }
 
 void add_picture_options(CLI::App* verb, ReconstructArguments& a) {

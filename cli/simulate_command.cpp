@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <charconv>
 #include <cstdio>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "cli/commands.h"
 #include "cli/image_size.h"
@@ -71,9 +74,13 @@ OutputRequest output_of(const SimulateArguments& arguments) {
 std::string finer_truth(const rig::SimulateOptions& options, const rig::SimulatedFilm& film) {
   const std::optional<int> enough = rig::cells_for_pictures(options.cells, film);
   const auto even = [&](int side) { return 2 * static_cast<int>(side * (film.pixel / film.cell) / 2); };
-  return fmt::format("with {}pictures of {}x{} the truth would be finer than any reconstruction",
-                     enough ? fmt::format("--cells {} or ", *enough) : "", even(options.image.width),
-                     even(options.image.height));
+  const ImageSize small{even(options.image.width), even(options.image.height)};
+  std::vector<std::string> ways;
+  if (enough) ways.push_back(fmt::format("--cells {}", *enough));
+  if (std::min(small.width, small.height) >= rig::SimulateOptions::kLeastSide)
+    ways.push_back(fmt::format("--image {}x{}", small.width, small.height));
+  if (ways.empty()) return "more cells and smaller pictures together would resolve no more than the truth";
+  return fmt::format("with {} the truth would be finer than any reconstruction", fmt::join(ways, " or "));
 }
 
 void simulate(SimulateArguments arguments) {

@@ -46,7 +46,7 @@ std::string errors_html(const recon::Outcome& outcome, const ShownAxes& axes) {
   std::vector<float> emission(volume.grid.size());
   std::vector<float> extinction(errors.extinction.empty() ? 0 : emission.size());
   for (std::size_t p = 0; p < emission.size(); ++p) {
-    if (!(static_cast<double>(recon::light_at(volume, p)) > recon::kLeastLight * brightest)) continue;
+    if (!(static_cast<double>(recon::light_at(volume, p)) > recon::kLightThatCounts * brightest)) continue;
     emission[p] = static_cast<float>(errors.sigma(p).mean() / 100);
     if (!extinction.empty()) extinction[p] = errors.extinction[p];
   }

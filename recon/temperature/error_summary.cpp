@@ -23,8 +23,8 @@ ErrorSummary error_summary(const Volume& volume, const VolumeErrors& errors,
   out.solves = errors.solves;
   out.views_time = errors.time;
   if (noise) out.noise = {noise->noise, 0, 0, noise->probes, noise->time};
-  const auto least =
-      static_cast<float>(kLeastLight) * *std::max_element(volume.emission.begin(), volume.emission.end());
+  const auto least = static_cast<float>(kLightThatCounts) *
+                     *std::max_element(volume.emission.begin(), volume.emission.end());
   double points = 0;
   for (std::size_t p = 0; p < volume.grid.size(); ++p) {
     if (!(light_at(volume, p) > least)) continue;

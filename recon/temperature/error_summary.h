@@ -9,7 +9,7 @@
 namespace emberlock::recon {
 
 /// A key point with less light than this share of the brightest has errors that nobody looks for.
-inline constexpr double kLeastLight = 0.005;
+inline constexpr double kLightThatCounts = 0.005;
 /// The most of a key point's channels.
 float light_at(const Volume& volume, std::size_t point);
 

@@ -4,12 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "base/random.h"
 #include "recon/adjust/gauss_newton.h"
+#include "recon/effects/refraction.h"
 #include "recon/temperature/neighbour_mean.h"
 
 namespace emberlock::recon {
@@ -109,7 +111,13 @@ Result<NoiseErrors> errors_by_noise(const Scene& scene, const Reconstruction& do
   const Seconds start = elapsed ? elapsed() : Seconds(0);
   EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene prepared, PreparedScene::create(scene, done.effects));
   Pool pool(options.compute.threads);
-  const Measured of = measured(prepared, done, options, pool);
+  Measured of = measured(prepared, done, options, pool);
+  std::optional<RefractiveIndex> index;
+  if (done.effects.refraction.rays == Refraction::Rays::curved) {  // as the solver takes it
+    index.emplace(assume_temperature(done.hull, {}, done.effects.refraction),
+                  done.effects.refraction.ambient);
+    of.setup.gas = &*index;
+  }
   const Level level = make_level(of.setup, done.hull, stride_for(of.setup, done.volume.grid), 1);
   GaussNewton hessian(level, of.setup, to_solution(done.volume, level.problem, done.effects));
   NoiseErrors out;

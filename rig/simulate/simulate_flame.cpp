@@ -49,7 +49,7 @@ int refinements(int cells) {
 /// How often the grid will yet become finer as a part of the settling begins: the last passes of gas each
 /// begin on a finer one.
 int refinements_left(int part, int times) {
-  return std::clamp(times - std::max(0, 1 + part / (kParts / kPasses) - (kPasses - times)), 0, times);
+  return std::clamp(kPasses - 1 - part / (kParts / kPasses), 0, times);
 }
 
 /// Of the settling's work that is done as a part begins: twice the cells along each axis, and twice the
@@ -72,7 +72,7 @@ Status check_simulate(const SimulateOptions& o) {
   if (o.frames < 1 || o.frames > 10000) return bad("frames", "Take 1 to 10000");
   if (o.cameras < 2 || o.cameras > 64) return bad("cameras", "Take virtual:2 to virtual:64");
   for (const int side : {o.image.width, o.image.height})
-    if (side < 64 || side > 4096 || side % 2 != 0)
+    if (side < SimulateOptions::kLeastSide || side > SimulateOptions::kMostSide || side % 2 != 0)
       return bad("the image's size", "Take even sides of 64 to 4096");
   if (o.cells < kCellsAtOnce || o.cells > kMostCells || o.cells % kCellsAtOnce != 0)
     return bad("cells", "Take a multiple of 8 from 8 to 512");
@@ -176,7 +176,6 @@ class Filming {
     if (channels(options.format) == 1 && !is_bayer(options.format)) response_ = as_grey(std::move(response_));
     film_.frames = options.frames;
     film_.cameras = options.cameras;
-    film_.cell = flame_.options().edge;
     const recon::CameraModel& first = stage_.cameras.front();
     film_.pixel = Meters((first.center() - stage_.box.center).norm() / first.intrinsics.fx);
     for (std::size_t i = 0; i < late_.size(); ++i) in_order_.push_back(i);

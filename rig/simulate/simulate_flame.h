@@ -39,6 +39,7 @@ struct SimulateOptions {
   recon::ComputeOptions compute;
 
   static constexpr Seconds kUsualExposure = milliseconds(1);
+  static constexpr int kLeastSide = 64, kMostSide = 4096;  ///< of the image
 };
 
 struct SimulatedFilm {

@@ -98,6 +98,28 @@ Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
   return level;
 }
 
+std::optional<std::size_t> best_start(const Level& level, const SolverSetup& setup) {
+  if (setup.options.starts.empty()) return std::nullopt;
+  const auto& begins = level.problem.list.subset_begin;
+  const auto held_out = static_cast<std::size_t>(level.subsets);
+  const std::size_t subset = begins[held_out + 1] > begins[held_out] ? held_out : 0;
+  const std::size_t first = begins[subset];
+  const std::size_t last = begins[subset + 1];
+  const auto engine =
+      make_engine(level.problem, setup.optics(level.problem.grid()), setup.options.precision, setup.pool);
+  double least = rms_of(engine->black_squares(first, last), last - first);
+  std::optional<std::size_t> best;
+  for (std::size_t s = 0; s < setup.options.starts.size(); ++s) {
+    engine->set(to_solution(*setup.options.starts[s], level.problem, setup.effects));
+    engine->residual(static_cast<int>(subset));
+    const double error = rms_of(engine->squares(first, last), last - first);
+    if (!(error < least)) continue;
+    least = error;
+    best = s;
+  }
+  return best;
+}
+
 Descent::Descent(const Level& level, const Optics& optics, const SolverSetup& setup,
                  const DescentStart& start)
     : level_(level),
@@ -105,6 +127,7 @@ Descent::Descent(const Level& level, const Optics& optics, const SolverSetup& se
       fitted_(level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)]),
       guard_(black_error()) {
   if (start.from != nullptr) engine_->start_from(*start.from);
+  if (start.volume != nullptr) engine_->set(to_solution(*start.volume, level.problem, setup.effects));
   if (start.expected != nullptr) {
     const auto edge = static_cast<double>(level.problem.grid().edge);
     engine_->expect_extinction(static_cast<float>(start.expected->value.value() * edge),

@@ -39,11 +39,17 @@ Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
 constexpr double kLeastSmoothness = 0.04;
 
 /// Whose light a descent starts from, of the same grid or one half as fine, and what extinction is expected
-/// under that, where the optics take a field. From darkness where there is none.
+/// under that, where the optics take a field. Or a volume of the whole grid with both. From darkness where
+/// there is none.
 struct DescentStart {
   const Engine* from = nullptr;
   const Extinction* expected = nullptr;
+  const Volume* volume = nullptr;
 };
+
+/// Which of setup.options.starts shows the level's held-out pixels (or its first subset, where there are
+/// none) best; nothing if none does better than no light.
+std::optional<std::size_t> best_start(const Level& level, const SolverSetup& setup);
 
 /// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Huber total variation
 /// over x >= 0, by preconditioned ordered-subset steps with Nesterov's momentum.

@@ -13,14 +13,14 @@ namespace {
 RadianceImage shrunk(const RadianceImage& image, int factor) {
   RadianceImage small({image.size.width / factor, image.size.height / factor});
   const auto share = 1 / static_cast<float>(factor * factor);
+  const std::size_t row = 3 * static_cast<std::size_t>(image.size.width);
   for (int y = 0; y < small.size.height * factor; ++y) {
-    const std::size_t row = static_cast<std::size_t>(y / factor) * static_cast<std::size_t>(small.size.width);
-    const float* from =
-        &image.rgb[3 * static_cast<std::size_t>(y) * static_cast<std::size_t>(image.size.width)];
-    for (int x = 0; x < small.size.width * factor; ++x)
-      for (std::size_t c = 0; c < 3; ++c)
-        small.rgb[3 * (row + static_cast<std::size_t>(x / factor)) + c] +=
-            share * from[3 * static_cast<std::size_t>(x) + c];
+    float* to =
+        &small.rgb[3 * static_cast<std::size_t>(y / factor) * static_cast<std::size_t>(small.size.width)];
+    const float* from = &image.rgb[row * static_cast<std::size_t>(y)];
+    for (int x = 0; x < small.size.width; ++x, to += 3)
+      for (int i = 0; i < factor; ++i, from += 3)
+        for (std::size_t c = 0; c < 3; ++c) to[c] += share * from[c];
   }
   return small;
 }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include <fmt/format.h>
 
@@ -17,6 +18,11 @@
 namespace emberlock::recon {
 namespace {
 
+bool same_place(const Grid& a, const Grid& b) {
+  return a.nx == b.nx && a.ny == b.ny && a.nz == b.nz && a.edge == b.edge &&
+         std::equal(std::begin(a.origin), std::end(a.origin), std::begin(b.origin));
+}
+
 Status check_request(const Scene& scene, const Grid& grid, const Effects& effects,
                      const SolveOptions& options, const Elapsed& elapsed) {
   const auto refuse = [](const char* what, const char* where, const char* remedy) {
@@ -27,6 +33,10 @@ Status check_request(const Scene& scene, const Grid& grid, const Effects& effect
   EMBERLOCK_RETURN_IF_ERROR(check(effects));
   for (const View& view : scene.views) EMBERLOCK_RETURN_IF_ERROR(check(effects.background, view));
   if (options.solver == Solver::paper) EMBERLOCK_RETURN_IF_ERROR(check_paper(scene, effects, options));
+  for (const auto& start : options.starts)
+    if (options.solver == Solver::paper || !same_place(start->grid, grid))
+      return refuse("a volume to start from has another grid, or the solver takes none", "starts",
+                    "Start in darkness");
   if (options.iterations < 0)
     return refuse("a negative number of iterations", "iterations",
                   "Give 1 or more, or 0 for the solver's rule");
@@ -135,6 +145,7 @@ Result<Reconstruction> solve(const PreparedScene& scene, const Grid& grid, const
     take_out_in_scatter(result.volume, result.hull, effects, pool);
   result.iterations = solution.iterations;
   result.halvings = solution.halvings;
+  result.started_from = solution.started_from;
   result.smoothness = solution.smoothness;
   tracker.conclude(solution, result);
   result.solve_time = tracker.time() - start - result.hull_time;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -39,6 +40,10 @@ struct SolveOptions {
   /// How firmly the default solver ties neighbouring key points, over their mean curvature, 0..100; otherwise
   /// found from how well left-out views are shown (left_out_views.h).
   std::optional<double> smoothness = {};
+  /// The default solver begins with the one of these that shows pixels left out of the fit best, at full
+  /// resolution; if none shows them better than no light at all, or there is none, in darkness, coarse to
+  /// fine. Of the solve's grid.
+  std::vector<std::shared_ptr<const Volume>> starts = {};
   std::uint64_t seed = 1;  ///< of the paper's G(s)
   /// Which of the held-out views' pixels a trace looks at, in every iteration.
   enum class Trace {
@@ -91,8 +96,9 @@ struct Reconstruction {
   Hull hull;
   Effects effects;
   int iterations = 0;
-  double smoothness = 0;  ///< as in SolveOptions; 0 for the paper's solver
-  int halvings = 0;       ///< so often the error rose beyond its beginning, and the steps were halved
+  double smoothness = 0;                         ///< as in SolveOptions; 0 for the paper's solver
+  std::optional<std::size_t> started_from = {};  ///< of SolveOptions::starts; nothing: from darkness
+  int halvings = 0;  ///< so often the error rose beyond its beginning, and the steps were halved
   Kept kept;
   bool stopped = false;               ///< by SolveOptions::stop
   std::vector<TracePoint> trace;      ///< up to the iteration that was kept, whose errors are the volume's

@@ -33,6 +33,45 @@ std::unique_ptr<Descent> begin(const Level& level, const SolverSetup& setup, con
                                    DescentStart{from, field ? &setup.effects.extinction : nullptr});
 }
 
+/// The finest level, before its first pass.
+struct Beginning {
+  std::unique_ptr<const Level> level = {};
+  std::unique_ptr<Descent> descent = {};  ///< of the level
+  int halvings = 0;                       ///< of coarser levels
+  std::optional<std::size_t> started_from = {};
+};
+
+/// No descent where there is no volume to start from.
+Beginning begin_with_a_start(const SolverSetup& setup) {
+  Beginning begun;
+  const auto& starts = setup.options.starts;
+  if (starts.empty()) return begun;
+  begun.level =
+      std::make_unique<const Level>(make_level(setup, setup.hull, stride_for(setup, setup.hull.grid)));
+  begun.started_from = best_start(*begun.level, setup);
+  if (begun.started_from)
+    begun.descent =
+        std::make_unique<Descent>(*begun.level, setup.optics(begun.level->problem.grid()), setup,
+                                  DescentStart{nullptr, nullptr, starts[*begun.started_from].get()});
+  return begun;
+}
+
+Beginning begin_coarse_to_fine(const SolverSetup& setup, Tracker& tracker) {
+  std::vector<Hull> hulls = {setup.hull};
+  while (longest(hulls.back().grid) >= 2 * kCoarsest) hulls.push_back(coarsen(hulls.back()));
+  Beginning begun;
+  for (std::size_t l = hulls.size(); l-- > 0;) {
+    auto finer = std::make_unique<const Level>(make_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
+    if (begun.descent) begun.descent->settle();  // nobody has judged the last pass yet
+    if (begun.descent) begun.halvings += begun.descent->halvings();
+    begun.descent = begin(*finer, setup, begun.descent ? &begun.descent->engine() : nullptr);
+    begun.level = std::move(finer);
+    for (int s = 0; l > 0 && s < kCoarseSteps && !tracker.out_of_time(); s += begun.level->subsets)
+      begun.descent->pass();
+  }
+  return begun;
+}
+
 /// The best of the finest level's iterations becomes the descent's x: by the held-out views where the
 /// tracker says so, otherwise by the input views. `shine` renews the light that is scattered; `lowest_at` is
 /// the iteration after which the input error was lowest.
@@ -65,20 +104,10 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
     setup.smoothness = find_smoothness(LeftOutViews(setup, setup.hull), setup.effects.extinction, [&] {
                          return tracker.is_spent(kMostOfSmoothness);
                        }).value;
-  std::vector<Hull> hulls = {setup.hull};
-  while (longest(hulls.back().grid) >= 2 * kCoarsest) hulls.push_back(coarsen(hulls.back()));
-
-  std::unique_ptr<const Level> level;
-  std::unique_ptr<Descent> descent;
-  int halvings = 0;
-  for (std::size_t l = hulls.size(); l-- > 0;) {
-    auto finer = std::make_unique<const Level>(make_level(setup, hulls[l], stride_for(setup, hulls[l].grid)));
-    if (descent) descent->settle();  // nobody has judged the last pass yet
-    if (descent) halvings += descent->halvings();
-    descent = begin(*finer, setup, descent ? &descent->engine() : nullptr);
-    level = std::move(finer);
-    for (int s = 0; l > 0 && s < kCoarseSteps && !tracker.out_of_time(); s += level->subsets) descent->pass();
-  }
+  Beginning beginning = begin_with_a_start(setup);
+  if (!beginning.descent) beginning = begin_coarse_to_fine(setup, tracker);
+  const std::unique_ptr<const Level>& level = beginning.level;
+  const std::unique_ptr<Descent>& descent = beginning.descent;
   if (setup.effects.extinction.model == Extinction::Model::field) descent->release_extinction();
 
   const bool uneven = setup.scatters_unevenly();
@@ -115,8 +144,15 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
   const Ending ending = end_with_the_best(*descent, tracker, error, lowest_at, shine);
   std::vector<Rgba> x = descent->engine().get();
   Volume volume = to_volume(x, level->problem, setup.hull, setup.effects);
-  return {std::move(x),      std::move(volume),           iteration,         halvings + descent->halvings(),
-          *setup.smoothness, all_channels(error.black()), ending.input_rmse, ending.kept};
+  return {std::move(x),
+          std::move(volume),
+          iteration,
+          beginning.halvings + descent->halvings(),
+          *setup.smoothness,
+          all_channels(error.black()),
+          ending.input_rmse,
+          ending.kept,
+          beginning.started_from};
 }
 
 }  // namespace emberlock::recon

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "recon/adjust/picture_error.h"
+#include "recon/kernels/level.h"
 
 namespace emberlock::recon {
 
@@ -137,14 +138,18 @@ std::vector<Rgba> to_solution(const Volume& volume, const Problem& problem, cons
   const float edge = volume.grid.edge;
   const bool field = effects.extinction.model == Extinction::Model::field;
   const int* offset = problem.crop.offset;
+  std::vector<float> share(part.size());
+  const ShareInside of_medium{part, problem.crop.hull.inside.data(), share.data()};
   std::vector<Rgba> x(part.size());
   for (int k = 0; k < part.nz; ++k)
     for (int j = 0; j < part.ny; ++j)
       for (int i = 0; i < part.nx; ++i) {
+        of_medium(i, j, k);
+        if (!(share[part.index(i, j, k)] > 0)) continue;
         const std::size_t from = volume.grid.index(i + offset[0], j + offset[1], k + offset[2]);
         Rgba& to = x[part.index(i, j, k)];
         for (std::size_t c = 0; c < 3; ++c) to.c[static_cast<int>(c)] = edge * volume.emission[3 * from + c];
-        if (field) to.c[3] = edge * volume.extinction[from];
+        if (field && !volume.extinction.empty()) to.c[3] = edge * volume.extinction[from];
       }
   return x;
 }

@@ -115,7 +115,8 @@ class Tracker {
 /// points).
 Volume to_volume(const std::vector<Rgba>& x, const Problem& problem, const Hull& hull,
                  const Effects& effects);
-/// The reverse; lane 3 is the extinction where that is a field, else 0.
+/// The reverse; lane 3 is the extinction where that is a field, else 0. Key points outside the problem's
+/// medium stay dark.
 std::vector<Rgba> to_solution(const Volume& volume, const Problem& problem, const Effects& effects);
 
 /// x, as it was judged at the end, and the volume that it makes on the whole grid; iterations done at full
@@ -127,8 +128,9 @@ struct Solution {
   int halvings = 0;  ///< see Reconstruction
   double smoothness = 0;
   double black_error = 0;  ///< of the input views, all channels: what a volume without light leaves
-  std::array<double, 3> input_rmse = {};  ///< of x, as in TracePoint
-  Kept kept = {};                         ///< `iteration` counts unless it was the last one
+  std::array<double, 3> input_rmse = {};         ///< of x, as in TracePoint
+  Kept kept = {};                                ///< `iteration` counts unless it was the last one
+  std::optional<std::size_t> started_from = {};  ///< see Reconstruction
 };
 /// Both throw Diverged where their guard gives up.
 Solution solve_standard(const SolverSetup& setup, Tracker& tracker);

@@ -47,8 +47,14 @@ struct PutRight {
 
 PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOptions& options, Device device,
                                 const Elapsed& elapsed, const Progress& progress) {
-  PutRight result{under_known_effects(told, options.effects.value_or(EffectRequest{}), options.solve.compute),
+  PutRight result{options.taken_over ? told.under(options.taken_over->effects.effects)
+                                     : under_known_effects(told, options.effects.value_or(EffectRequest{}), options.solve.compute),
                   {}};
+  if (options.taken_over) {
+    result.pointing = options.taken_over->pointing;
+    if (result.pointing.any()) result.scene = pointed(result.scene, result.pointing);
+    return result;
+  }
   if (!may_correct_pointing(told.told(), options)) return result;
   Pool pool(options.solve.compute.threads, device);
   result.pointing =
@@ -140,6 +146,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
   const Task task{put_right.scene, device, elapsed, preview};
   if (has_goal(options)) {
     EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_planned(task, options, progress));
+    outcome.pointing = pointing;
     tell_pointing(scene, pointing, outcome.report);
     EMBERLOCK_RETURN_IF_ERROR(measure(task, options, progress, outcome));
     return outcome;
@@ -149,6 +156,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
   chosen.voxels = choice.voxels;
   EMBERLOCK_ASSIGN_OR_RETURN(Outcome outcome, run_once(task, chosen, progress));
   outcome.report.voxel_choice = std::move(choice);
+  outcome.pointing = pointing;
   tell_pointing(scene, pointing, outcome.report);
   EMBERLOCK_RETURN_IF_ERROR(measure(task, options, progress, outcome));
   return outcome;

@@ -13,6 +13,7 @@
 #include "base/output_folder.h"
 #include "base/progress.h"
 #include "base/result.h"
+#include "recon/adjust/find_pointing.h"
 #include "recon/adjust/solver.h"
 #include "recon/effects/effects.h"
 #include "recon/export/report.h"
@@ -37,6 +38,14 @@ struct TemperatureRequest {
 /// The one to read by; it lives as long as both.
 const CameraResponse& response_for(const TemperatureRequest& request, const Scene& scene);
 
+/// What a frame of a sequence takes over from earlier ones, instead of finding it out (frame_sequence.h).
+struct TakenOver {
+  FoundPointing pointing;
+  EffectChoice effects;
+  std::optional<double> smoothness;
+  std::vector<std::shared_ptr<const Volume>> starts;  ///< as SolveOptions::starts
+};
+
 struct ReconstructOptions {
   std::optional<int> voxels;  ///< along the box's longest edge, 1..kLargestVoxels
   VoxelRule rule = VoxelRule::knee;
@@ -56,11 +65,13 @@ struct ReconstructOptions {
   /// (view_errors.h), and what of them noise makes (noise_errors.h; not of the paper's solver).
   bool errors = false;
   std::optional<TemperatureRequest> temperature = {};  ///< after the errors, which it needs
+  std::shared_ptr<const TakenOver> taken_over = {};
 };
 
 /// A reconstruction with everything that is written about it.
 struct Outcome {
   Reconstruction reconstruction;
+  FoundPointing pointing;              ///< how cameras were put right
   std::vector<RadianceImage> renders;  ///< the volume as each view's camera sees it, in the scene's order
   Report report;                       ///< its `input` and `up` are the caller's to fill
   std::optional<VolumeErrors> errors = {};  ///< where options ask for errors or temperature

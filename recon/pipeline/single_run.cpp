@@ -182,7 +182,11 @@ Outcome finish(const Task& task, const PreparedScene& solved, const SolveOptions
 }
 
 Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, const Progress& progress) {
-  const SolveOptions& solve_options = options.solve;
+  SolveOptions solve_options = options.solve;
+  if (options.taken_over) {
+    solve_options.starts = options.taken_over->starts;
+    solve_options.smoothness = options.taken_over->smoothness;
+  }
   const Seconds start = task.elapsed();
   EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, choose_grid(task.scene(), options, options.voxels));
   if (task.device == Device::cuda) {
@@ -190,7 +194,12 @@ Result<Outcome> run_once(const Task& task, const ReconstructOptions& options, co
     reserve_gpu_memory(bytes_on_gpu(task.scene(), grid, solve_options.precision));
   }
   tell(progress, 0, "finding out which effects matter");
-  EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice, decide_effects(task, grid, options));
+  EffectChoice choice;
+  if (options.taken_over) {
+    choice = options.taken_over->effects;
+  } else {
+    EMBERLOCK_ASSIGN_OR_RETURN(choice, decide_effects(task, grid, options));
+  }
   const Seconds effects_time = task.elapsed() - start;
 
   const auto watch = [&](const Preview& state) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The march and what stands around it, stage by stage, in the paper's set-up (recon/synthetic, paper_scene):
-// ten views of 640 x 480, 128^3 voxels, and a table over voxels, views and threads.
+// ten views of 640 x 480, 128^3 voxels, and a table over voxels, views and threads. Where there is a GPU, its
+// stages too; a repeat ends when the GPU is done.
 //   bench_march [--benchmark_filter=REGEX]      voxels:512 runs only where a filter asks for it
 // Google Benchmark's own columns are means. The counters hold the least wall and core time of the repeats,
 // because a busy machine slows means:
@@ -34,6 +35,7 @@
 #include "recon/adjust/choose_effects.h"
 #include "recon/adjust/engine.h"
 #include "recon/adjust/solver.h"
+#include "recon/compute/cuda_device.h"
 #include "recon/hull/hull.h"
 #include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
@@ -62,9 +64,13 @@ class Least {
 };
 
 template <class Work>
-Least repeat(benchmark::State& state, const Work& work) {
+Least repeat(benchmark::State& state, const recon::ComputeOptions& compute, const Work& work) {
   Least least;
-  for (auto _ : state) least(work);
+  for (auto _ : state)
+    least([&] {
+      work();
+      if (compute.device == recon::Device::cuda) recon::finish_gpu_work();
+    });
   state.counters["ms"] = 1e3 * least.wall;
   state.counters["core_ms"] = 1e3 * least.core;
   return least;
@@ -155,6 +161,10 @@ std::vector<const recon::View*> inputs(const recon::Scene& scene) {
 }
 
 recon::ComputeOptions on_cpu(int threads) { return {recon::Device::cpu, threads}; }
+const recon::ComputeOptions kOnGpu = {recon::Device::cuda};
+std::string suffix(const recon::ComputeOptions& compute) {
+  return compute.device == recon::Device::cuda ? "/cuda" : "/threads:" + std::to_string(compute.threads);
+}
 
 recon::Hull carved(const recon::Scene& scene, const recon::Grid& grid, int threads) {
   return recon::carve(scene, recon::flame_masks(scene), grid, on_cpu(threads)).value();
@@ -214,7 +224,7 @@ struct Case {
   Stage stage;
   recon::Absorb absorb;
   Setup setup = {};
-  int threads = 1;
+  recon::ComputeOptions compute = on_cpu(1);
   [[nodiscard]] bool goes_there() const { return stage != Stage::adjoint && stage != Stage::update; }
   [[nodiscard]] bool comes_back() const { return stage != Stage::forward && stage != Stage::update; }
   [[nodiscard]] bool updates() const { return stage == Stage::update || stage == Stage::iteration; }
@@ -271,10 +281,14 @@ void work(recon::Engine& engine, const Case& c) {
 void run_stage(benchmark::State& state, const Case& c) {
   const recon::Problem& problem = problem_of(c.setup);
   const Counts n = count(problem);
-  recon::Pool pool(c.threads);
+  recon::Pool pool(c.compute);
   const auto engine = engine_for(c, problem, pool);
-  const double memory = triad_rate(c.threads);
-  const Least least = repeat(state, [&] { work(*engine, c); });
+  const Least least = repeat(state, c.compute, [&] { work(*engine, c); });
+  if (c.compute.device == recon::Device::cuda) {
+    state.counters["samples/s"] = n.samples / least.wall;
+    return;
+  }
+  const double memory = triad_rate(c.compute.threads);
   const Bytes bytes = moved(c, n);
   state.counters["far_B/s"] = bytes.far / least.core;
   state.counters["of_triad"] = bytes.far / least.core / memory;
@@ -294,34 +308,33 @@ void run_stage(benchmark::State& state, const Case& c) {
 
 // --- hull, pictures, whole frames
 
-void masks(benchmark::State& state, int threads) {
+void masks(benchmark::State& state, const recon::ComputeOptions& compute) {
   const recon::Scene& scene = scene_of(10);
-  repeat(state, [&] { benchmark::DoNotOptimize(recon::flame_masks(scene, {}, on_cpu(threads))); });
+  const auto pictures = recon::flame_masks(scene, {}, compute);  // a GPU keeps their copies
+  repeat(state, compute, [&] { benchmark::DoNotOptimize(recon::flame_masks(scene, {}, compute)); });
 }
 
-void hull(benchmark::State& state) {
+void hull(benchmark::State& state, const recon::ComputeOptions& compute) {
   const recon::Scene& scene = scene_of(10);
-  const auto flames = recon::flame_masks(scene);
+  const auto flames = recon::flame_masks(scene, {}, compute);
   const recon::Grid grid = recon::grid_over(scene.box, 128);
-  const recon::ComputeOptions compute = on_cpu(static_cast<int>(state.range(0)));
-  repeat(state, [&] { benchmark::DoNotOptimize(recon::carve(scene, flames, grid, compute)); });
+  repeat(state, compute, [&] { benchmark::DoNotOptimize(recon::carve(scene, flames, grid, compute)); });
 }
 
-void hull_and_rays(benchmark::State& state) {
+void hull_and_rays(benchmark::State& state, const recon::ComputeOptions& compute) {
   const recon::Scene& scene = scene_of(10);
-  const auto flames = recon::flame_masks(scene);
+  const auto flames = recon::flame_masks(scene, {}, compute);
   const recon::Grid grid = recon::grid_over(scene.box, 128);
-  const int threads = static_cast<int>(state.range(0));
-  recon::Pool pool(threads);
+  recon::Pool pool(compute);
   std::size_t rays = 0;
-  repeat(state, [&] {
-    const recon::Hull medium = recon::carve(scene, flames, grid, on_cpu(threads)).value();
-    rays = recon::make_problem(inputs(scene), medium, {}, pool).list.rays.size();
+  repeat(state, compute, [&] {
+    const recon::Hull medium = recon::carve(scene, flames, grid, compute).value();
+    rays = recon::make_problem(inputs(scene), medium, {}, pool).rays();
   });
   state.counters["rays"] = static_cast<double>(rays);
 }
 
-void render(benchmark::State& state, recon::Absorb absorb, int threads) {
+void render(benchmark::State& state, recon::Absorb absorb, const recon::ComputeOptions& compute) {
   const recon::Scene& scene = scene_of(10);
   const recon::Grid grid = recon::grid_over(scene.box, 128);
   const recon::Hull medium = carved(scene, grid, 0);
@@ -333,22 +346,22 @@ void render(benchmark::State& state, recon::Absorb absorb, int threads) {
     volume.extinction.assign(grid.size(), static_cast<float>(kSigma));
   }
   recon::RenderOptions options;
-  options.compute = on_cpu(threads);
+  options.compute = compute;
   const recon::CameraModel& camera = scene.views.back().camera;
-  repeat(state,
+  repeat(state, compute,
          [&] { benchmark::DoNotOptimize(recon::render_view(volume, medium, effects, camera, options)); });
 }
 
 /// From pictures to a volume, its extinction told or found first.
-void frame(benchmark::State& state, bool told, int voxels, int threads) {
+void frame(benchmark::State& state, bool told, int voxels, const recon::ComputeOptions& compute) {
   kept_problem().reset();
   const recon::Scene& scene = scene_of(10);
   const recon::Grid grid = recon::grid_over(scene.box, voxels);
   recon::SolveOptions options;
-  options.compute = on_cpu(threads);
+  options.compute = compute;
   reset_peak();
   state.counters["start_MB"] = peak_megabytes();
-  repeat(state, [&] {
+  repeat(state, compute, [&] {
     recon::Effects effects = recon::absorbing(PerMeter(kSigma));
     if (!told) effects = recon::choose_effects(scene, grid, {}, options).value().effects;
     benchmark::DoNotOptimize(recon::solve(scene, grid, effects, options));
@@ -367,22 +380,29 @@ benchmark::internal::Benchmark* add(const std::string& name, int repeats, auto w
 
 void add_stage(const std::string& prefix, const Case& c, int repeats) {
   add(prefix + kStageNames[static_cast<int>(c.stage)] + "/" + kAbsorbNames[static_cast<int>(c.absorb)] +
-          "/threads:" + std::to_string(c.threads),
+          suffix(c.compute),
       repeats, run_stage, c);
 }
 
-void add_paper_setup(int threads) {
-  const std::string on = "/threads:" + std::to_string(threads);
+void add_paper_setup(const recon::ComputeOptions& compute) {
+  const std::string on = suffix(compute);
   for (const bool told : {true, false})
-    add((told ? "solve/told" : "solve/auto") + on, 2, frame, told, 128, threads);
+    add((told ? "solve/told" : "solve/auto") + on, 2, frame, told, 128, compute);
   for (const recon::Absorb absorb : {recon::Absorb::nothing, recon::Absorb::constant, recon::Absorb::field}) {
     for (const Stage stage : {Stage::forward, Stage::adjoint, Stage::joint, Stage::update, Stage::iteration})
-      add_stage("", {stage, absorb, {}, threads}, 8);
+      add_stage("", {stage, absorb, {}, compute}, 8);
     add("render_view/" + std::string(kAbsorbNames[static_cast<int>(absorb)]) + on, 8, render, absorb,
-        threads);
+        compute);
   }
-  add("hull", 4, hull)->ArgName("threads")->Arg(threads);
-  add("hull_and_rays", 4, hull_and_rays)->ArgName("threads")->Arg(threads);
+  add("masks" + on, 4, masks, compute);
+  add("hull" + on, 4, hull, compute);
+  add("hull_and_rays" + on, 4, hull_and_rays, compute);
+}
+
+void add_cube(const recon::ComputeOptions& compute) {
+  for (const recon::Absorb absorb : {recon::Absorb::nothing, recon::Absorb::constant})
+    for (const Stage stage : {Stage::forward, Stage::adjoint})
+      add_stage("cube/", {stage, absorb, {128, 10, true}, compute}, 3);
 }
 
 void add_table() {
@@ -390,7 +410,14 @@ void add_table() {
     for (const int views : {4, 10, 16, 28})
       for (const int threads : {1, 2})
         add_stage("voxels:" + std::to_string(voxels) + "/views:" + std::to_string(views) + "/",
-                  {Stage::iteration, recon::Absorb::constant, {voxels, views, false}, threads}, 3);
+                  {Stage::iteration, recon::Absorb::constant, {voxels, views, false}, on_cpu(threads)}, 3);
+}
+
+void add_gpu_table() {
+  for (const int voxels : {64, 256})
+    for (const Stage stage : {Stage::forward, Stage::adjoint, Stage::iteration})
+      add_stage("voxels:" + std::to_string(voxels) + "/",
+                {stage, recon::Absorb::constant, {voxels, 10, false}, kOnGpu}, 8);
 }
 
 }  // namespace
@@ -400,13 +427,15 @@ int main(int argc, char** argv) {
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
   benchmark::AddCustomContext("march", recon::march_table_name());
   add("triad", 1, bandwidth)->ArgName("threads")->Arg(1)->Arg(2);
-  for (const int threads : {1, 2}) add_paper_setup(threads);
-  add("solve/told/voxels:256/threads:2", 1, frame, true, 256, 2);
-  for (const int threads : {1, 2}) add("masks/threads:" + std::to_string(threads), 4, masks, threads);
-  for (const recon::Absorb absorb : {recon::Absorb::nothing, recon::Absorb::constant})
-    for (const Stage stage : {Stage::forward, Stage::adjoint})
-      add_stage("cube/", {stage, absorb, {128, 10, true}, 1}, 3);
+  for (const int threads : {1, 2}) add_paper_setup(on_cpu(threads));
+  add("solve/told/voxels:256/threads:2", 1, frame, true, 256, on_cpu(2));
+  add_cube(on_cpu(1));
   add_table();
+  if (recon::cuda_status().ok()) {
+    add_paper_setup(kOnGpu);
+    add_cube(kOnGpu);
+    add_gpu_table();
+  }
   const bool asked = !benchmark::GetBenchmarkFilter().empty();
   benchmark::RunSpecifiedBenchmarks(asked ? benchmark::GetBenchmarkFilter() : "-voxels:512");
 }

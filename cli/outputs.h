@@ -12,6 +12,7 @@ namespace emberlock::cli {
 // export` (session/export.h). New sessions (import, align --record) need a new folder: check_new_folder().
 
 inline constexpr OutputVerb kPlan{"reconstruct --plan"};
+inline constexpr OutputVerb kSequence{"reconstruct --frames"};
 inline constexpr OutputVerb kTradeoffRecon{"tradeoff recon"};
 inline constexpr OutputVerb kTradeoffSync{"tradeoff sync"};
 inline constexpr OutputVerb kTradeoffRig{"tradeoff rig"};

@@ -4,11 +4,15 @@
 #include <algorithm>
 #include <charconv>
 #include <string>
+#include <tuple>
 #include <utility>
+
+#include <fmt/format.h>
 
 #include "cli/numbers.h"
 #include "cli/scene_options.h"
 #include "recon/pipeline/grid_choice.h"
+#include "recon/preprocess/shrink.h"
 
 namespace emberlock::cli {
 namespace {
@@ -122,6 +126,15 @@ Result<recon::Scene> load_views(const ReconstructArguments& arguments, const Pro
   if (arguments.demosaic == "gradient") options.frames.develop.demosaicing = recon::Demosaicing::gradient;
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Scene scene, recon::load_scene(arguments.input, options));
   EMBERLOCK_RETURN_IF_ERROR(recon::hold_out(scene, arguments.held_out));
+  if (arguments.shrink > 1) {
+    for (recon::View& view : scene.views) {
+      const auto [width, height] = view.image->size;
+      if (arguments.shrink > std::min(width, height))
+        return Error{ErrorKind::bad_input, fmt::format("{} has {} x {} pixels", view.name, width, height),
+                     "--shrink", "Give a smaller factor"};
+      view = recon::shrunk(view, arguments.shrink);
+    }
+  }
   return choose_views(scene, arguments.views);
 }
 
@@ -188,6 +201,25 @@ void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
                  "ten views, and emission_noise and density_noise, what of it noise makes");
 }
 
+namespace {
+
+/// "A:B".
+std::optional<std::pair<std::size_t, std::size_t>> parse_frames(std::string_view text) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string_view::npos) return std::nullopt;
+  const auto number = [](std::string_view digits) {
+    std::size_t n = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
+    return error == std::errc() && end == digits.data() + digits.size() && !digits.empty() ? std::optional(n)
+                                                                                           : std::nullopt;
+  };
+  const auto first = number(text.substr(0, colon));
+  const auto last = number(text.substr(colon + 1));
+  return first && last ? std::optional(std::pair(*first, *last)) : std::nullopt;
+}
+
+}  // namespace
+
 void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option(
           "--threshold", a.threshold,
@@ -196,22 +228,40 @@ void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option("--frame", a.frame,
                    "Sessions only: number of the first camera's frame [the middle one that all cameras have]")
       ->check(CLI::NonNegativeNumber);
-  CLI::Option* last = verb->add_option("--last-frame", a.last_frame,
-                                       "Sessions only: reconstructs each frame, from --frame "
-                                       "to this one, each into OUT/frame-N")
-                          ->check(CLI::NonNegativeNumber)
-                          ->needs("--frame");
-  verb->add_option("--every", a.every, "With --last-frame: each frame of so many")
+  CLI::Option* last =
+      verb->add_option(
+              "--last-frame", a.last_frame,
+              "Sessions only: reconstructs each frame, from --frame to this one, each into "
+              "OUT/frame-N and started from where the one before ended, and tells of all over time in "
+              "OUT/sequence. The same command goes on where it was interrupted")
+          ->check(CLI::NonNegativeNumber)
+          ->needs("--frame");
+  verb->add_option_function<std::string>(
+          "--frames",
+          [&a](const std::string& text) {
+            const auto both = parse_frames(text);
+            if (!both) throw CLI::ValidationError("--frames", "give FIRST:LAST, two frames' numbers");
+            std::tie(a.frame, a.last_frame) = *both;
+          },
+          "A:B: --frame A --last-frame B")
+      ->excludes("--frame")
+      ->excludes(last);
+  verb->add_option("--every", a.every, "With --frames: each frame of so many")
       ->check(CLI::Range(1, 1000000))
-      ->capture_default_str()
-      ->needs(last);
-  verb->add_option(
-          "--at-once", a.at_once,
-          "With --last-frame: so many frames at work, each with its share of --threads and memory of "
-          "its own. The results don't depend on it; more finish sooner on many cores and on a GPU")
+      ->capture_default_str();
+  verb->add_flag("--cold", a.cold, "With --frames: each frame as if it were alone, from darkness");
+  verb->add_option("--at-once", a.at_once,
+                   "With --frames: so many frames at work, each as if it were alone, "
+                   "with its share of --threads and "
+                   "memory of its own. The results don't depend on it; more finish "
+                   "sooner on many cores and on a GPU")
       ->check(CLI::Range(1, 64))
-      ->capture_default_str()
-      ->needs(last);
+      ->capture_default_str();
+  verb->add_option("--shrink", a.shrink,
+                   "Pictures of a so-and-so-many-th of their size, by means of pixels: where they are larger "
+                   "than the voxels need")
+      ->check(CLI::Range(1, 64))
+      ->capture_default_str();
   verb->add_option("--background", a.background,
                    "Sessions only: auto (each camera's first or last frames, if they show no flame), level "
                    "(of the picture's darker half), or frames without flame: FIRST-LAST")

@@ -37,6 +37,8 @@ struct ReconstructArguments {
   double step = 1;
   std::string voxels;
   std::optional<std::size_t> frame, last_frame;
+  bool cold = false;
+  int shrink = 1;
   std::uint32_t every = 1;
   int at_once = 1;
   std::optional<double> budget;

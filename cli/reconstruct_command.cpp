@@ -10,11 +10,13 @@
 
 #include "base/clock.h"
 #include "cli/commands.h"
+#include "cli/frames_in_turn.h"
 #include "cli/interrupt.h"
 #include "cli/outputs.h"
 #include "cli/progress_stream.h"
 #include "cli/reconstruct_arguments.h"
 #include "cli/reconstruct_daemon.h"
+#include "cli/reconstruct_files.h"
 #include "cli/reconstruct_sequence.h"
 #include "cli/reconstruct_summary.h"
 #include "cli/scene_options.h"
@@ -35,57 +37,6 @@
 
 namespace emberlock::cli {
 namespace {
-
-/// The receivers of progress: the terminal, or another program.
-struct Watchers {
-  Progress progress;
-  std::function<bool()> stop = {};  ///< true: end with the best so far
-  ProgressStream* stream = nullptr;
-};
-
-/// Before the work starts: more voxels than the pictures tell apart cost much and bring nothing.
-void warn_if_too_fine(const recon::Scene& scene, const recon::ReconstructOptions& options, std::FILE* to) {
-  const std::string warning = recon::too_fine_warning(scene, options.voxels.value_or(0));
-  if (!warning.empty()) std::fprintf(to, "%-16s %s\n", "warning", warning.c_str());
-}
-
-Result<Written> reconstruct_files(const ReconstructArguments& arguments, const Watchers& watchers) {
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::ReconstructOptions options, options_of(arguments));
-  options.solve.stop = watchers.stop;
-  const std::vector<std::filesystem::path> inputs = inputs_of(arguments);
-  EMBERLOCK_RETURN_IF_ERROR(recon::check_output(arguments.out, inputs));
-  if (watchers.stream != nullptr) {
-    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Device device, recon::resolve(options.solve.compute.device));
-    watchers.stream->loading(device);
-  }
-  SteadyClock clock;
-  const TimePoint begin = clock.now();
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(arguments, watchers.progress));
-  const Seconds loading = clock.now() - begin;
-  warn_if_too_fine(scene, options, stderr);
-  if (recon::is_stopped(options.solve))
-    return Error{ErrorKind::refused, "ended early, as asked, before there was a volume to keep",
-                 arguments.input};
-  std::function<void(const recon::Preview&)> preview;
-  if (watchers.stream != nullptr) {
-    if (options.temperature)
-      watchers.stream->look_up(recon::TemperatureLookUp(recon::response_for(*options.temperature, scene),
-                                                        recon::taken_for(options.temperature->emitter)));
-    preview = [&](const recon::Preview& state) {
-      watchers.stream->iteration(state, scene, options.solve.compute);
-    };
-  }
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome,
-                             recon::reconstruct(scene, options, clock, watchers.progress, preview));
-  outcome.report.input = arguments.input;
-  outcome.report.up = report::shown_axes(scene.views).up_axis();
-  const TimePoint done = clock.now();
-  EMBERLOCK_RETURN_IF_ERROR(
-      recon::write_outcome(outcome, arguments.out, inputs, report::reconstruct_html(scene, outcome)));
-  const Seconds writing = clock.now() - done;
-  if (watchers.stream != nullptr) watchers.stream->done(outcome, scene, arguments.out);
-  return Written{std::move(outcome), std::move(options.solve), loading, writing};
-}
 
 /// Draws the box on the pictures, and estimates from the reference front what a run would take.
 Status plan_files(const ReconstructArguments& arguments) {
@@ -129,9 +80,10 @@ Status plan_files(const ReconstructArguments& arguments) {
 
 /// The options that the daemon accepts; the others are in its configuration.
 DaemonReconstruction asked_of_daemon(const ReconstructArguments& arguments, const CLI::App& verb) {
-  static const std::set<std::string> kAskable = {
-      "input",      "--cancel", "--json",     "--frame",    "--last-frame", "--every", "--budget", "--voxels",
-      "--hold-out", "--device", "--quantity", "--response", "--emitter",    "--lines", "--errors"};
+  static const std::set<std::string> kAskable = {"input",      "--cancel",     "--json",   "--frame",
+                                                 "--frames",   "--last-frame", "--every",  "--budget",
+                                                 "--voxels",   "--hold-out",   "--device", "--quantity",
+                                                 "--response", "--emitter",    "--lines",  "--errors"};
   for (const CLI::Option* option : verb.get_options()) {
     if (option->count() > 0 && !is_daemon_option(*option) && kAskable.count(option->get_name()) == 0) {
       fail({ErrorKind::bad_input, "can't be used with --daemon", option->get_name(),
@@ -173,12 +125,13 @@ Status reconstruct_and_tell(const ReconstructArguments& arguments) {
   return conclude(written, {arguments.input, arguments.out, arguments.by_daemon.json});
 }
 
-/// The frames from --frame to --last-frame.
+/// The frames from --frame to --last-frame: each from where the one before ended, or each for itself.
 void reconstruct_range(const ReconstructArguments& arguments) {
   const session::FrameRange range{arguments.frame.value_or(0), *arguments.last_frame, arguments.every};
   const auto session = or_fail(session::SessionReader::open(arguments.input));
   const std::uint64_t recorded = session.camera_count() == 0 ? 0 : session.stamps(0).size();
   const std::vector<std::uint64_t> frames = or_fail(session::frames_of(range, recorded, "--last-frame"));
+  if (arguments.at_once == 1 && !arguments.cold) return reconstruct_in_turn(arguments, frames);
   const int at_once = std::min(arguments.at_once, static_cast<int>(frames.size()));
   const auto recording = std::make_shared<recon::SharedRecording>();
   const auto reconstruct = [&](std::uint64_t frame, const std::filesystem::path& out,
@@ -262,8 +215,12 @@ void add_reconstruct(CLI::App& app) {
                  "line, then ReconstructionStatus (emberlock/v1/status.proto)")
       ->excludes("--plan")
       ->excludes("--progress-fd");
-  verb->get_option("--last-frame")->excludes("--plan")->excludes("--progress-fd");
+  for (const char* range : {"--last-frame", "--frames"})
+    verb->get_option(range)->excludes("--plan")->excludes("--progress-fd");
   verb->callback([arguments, verb, by_daemon] {
+    for (const char* option : {"--every", "--cold", "--at-once"})
+      if (verb->count(option) > 0 && !arguments->last_frame)
+        throw CLI::RequiresError(option, "--frames or --last-frame");
     if (by_daemon->count() == 0) return reconstruct_command(*arguments);
     reconstruct_by_daemon(asked_of_daemon(*arguments, *verb));
   });

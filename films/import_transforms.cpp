@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "films/import_transforms.h"
 
+#include <cmath>
 #include <map>
 #include <set>
 #include <string>
@@ -8,12 +9,15 @@
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
+
 #include "base/in_parallel.h"
 #include "films/import_parts.h"
 #include "films/small_picture.h"
 #include "recon/calibrate/rig.h"
 #include "recon/calibrate/transforms.h"
 #include "session/layout.h"
+#include "session/media/clip.h"
 #include "session/media/import_scan.h"
 #include "session/media/video_scan.h"
 #include "session/name.h"
@@ -72,6 +76,40 @@ Result<std::vector<std::string>> named(std::vector<std::string> ids,
                transforms.string(), "Name a picture without its ending"};
 }
 
+/// All frames of a video, or a picture as a film of one.
+Result<CameraPart> part_of_film(const fs::path& file, const std::string& id, const ImportOptions& options) {
+  EMBERLOCK_ASSIGN_OR_RETURN(session::VideoScan scan, session::scan_video(file));
+  CameraPart part;
+  part.stream.set_camera_id(id);
+  if (scan.frame_rate) part.stream.set_frame_rate_hz(scan.frame_rate->value());
+  part.colours = options.colours;
+  part.writer.min_free_bytes = options.min_free_bytes;
+  for (std::int64_t i = 0; i < scan.frames(); ++i) {
+    const auto ticks = static_cast<double>(scan.ticks[static_cast<std::size_t>(i)] - scan.ticks.front());
+    const TimePoint at = TimePoint{} + scan.tick * ticks;
+    part.places.push_back(i);
+    part.stamps.push_back({static_cast<std::uint64_t>(i), at, at, at, FrameStatus::complete});
+  }
+  part.files = {{file, std::move(scan), 0}};
+  return part;
+}
+
+/// What is paired by number has equal numbers of frames, at equal rates.
+Status check_alike(const CameraPart& a, const CameraPart& b) {
+  const auto refuse = [&](const std::string& what) {
+    return Error{ErrorKind::bad_input, what, b.files.front().path.string(),
+                 "Cut the films to the same instants, or import them with --offset and give their "
+                 "calibration with --rig"};
+  };
+  if (a.places.size() != b.places.size())
+    return refuse(fmt::format("has {} frames, {} has {}", b.places.size(),
+                              a.files.front().path.filename().string(), a.places.size()));
+  if (std::abs(a.stream.frame_rate_hz() - b.stream.frame_rate_hz()) > 0.01 * a.stream.frame_rate_hz())
+    return refuse(fmt::format("has {:.2f} frames a second, {} has {:.2f}", b.stream.frame_rate_hz(),
+                              a.files.front().path.filename().string(), a.stream.frame_rate_hz()));
+  return {};
+}
+
 }  // namespace
 
 std::optional<fs::path> transforms_in(const fs::path& path) {
@@ -95,28 +133,31 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
   std::vector<CameraPart> parts;
   for (std::size_t i = 0; i < scene.frames.size(); ++i) {
     const recon::TransformsFrame& frame = scene.frames[i];
-    EMBERLOCK_ASSIGN_OR_RETURN(const Image picture, session::read_image(frame.image));
-    const ImageLayout& layout = picture.layout();
-    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Intrinsics lens, recon::intrinsics_of(frame, layout.size));
-    CameraPart part;
-    part.stream.set_camera_id(ids[i]);
-    session::set_layout(part.stream, layout);
+    EMBERLOCK_ASSIGN_OR_RETURN(CameraPart part, part_of_film(frame.image, ids[i], options));
+    if (i > 0) EMBERLOCK_RETURN_IF_ERROR(check_alike(parts.front(), part));
+    session::ClipReader reader(part.files, part.colours);
+    EMBERLOCK_ASSIGN_OR_RETURN(const Image first, reader.next());
+    session::set_layout(part.stream, first.layout());
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Intrinsics lens,
+                               recon::intrinsics_of(frame, first.layout().size));
     put_calibration(lens, frame.camera_from_world, *part.stream.mutable_calibration());
     if (response) *part.stream.mutable_colour()->mutable_spectral() = recon::message_of(*response);
-    part.files = {{frame.image, session::VideoScan{layout.size, {0}, {0}, {}, {}, {}, {}, 1, {}}, 0}};
-    part.writer.min_free_bytes = options.min_free_bytes;
-    part.places = {0};
-    part.stamps = {FrameStamp{}};
     ImportedCamera& camera = result.cameras.emplace_back();
     camera.id = part.stream.camera_id();
     camera.name = frame.image.filename().string();
     camera.files = {frame.image.string()};
-    camera.frames = 1;
-    camera.places = {0};
+    camera.frames = static_cast<std::int64_t>(part.places.size());
+    camera.places = part.places;
     camera.calibrated = true;
-    camera.preview = small_picture(picture);
+    camera.preview = small_picture(first);
     parts.push_back(std::move(part));
   }
+  result.instants = parts.front().places.size();
+  if (result.instants > 1)
+    result.notes.emplace_back(
+        "NOT SYNCHRONISED: frames are paired by their numbers, as the file says, not as a strobe proves; "
+        "there is no "
+        "times.json");
   std::vector<std::optional<std::int64_t>> damaged(parts.size());
   EMBERLOCK_RETURN_IF_ERROR(in_parallel(parts.size(), part_of(observer, 0, kNearlyDone),
                                         [&](std::size_t i, const Observer& told) -> Status {
@@ -131,7 +172,6 @@ Result<ImportResult> import_transforms(const fs::path& transforms, const ImportO
       manifest.mutable_box()->add_size(scene.box->size(i));
     }
   }
-  result.instants = 1;
   EMBERLOCK_ASSIGN_OR_RETURN(result.manifest,
                              target.finish(std::move(manifest), parts, nullptr, reports(options, result)));
   EMBERLOCK_RETURN_IF_ERROR(observe(observer, 1, "imported"));

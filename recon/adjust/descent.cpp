@@ -98,8 +98,7 @@ Level make_level(const SolverSetup& setup, const Hull& hull, int stride, int mos
   return level;
 }
 
-std::optional<std::size_t> best_start(const Level& level, const SolverSetup& setup) {
-  if (setup.options.starts.empty()) return std::nullopt;
+std::optional<BestStart> best_start(const Level& level, const SolverSetup& setup) {
   const auto& begins = level.problem.list.subset_begin;
   const auto held_out = static_cast<std::size_t>(level.subsets);
   const std::size_t subset = begins[held_out + 1] > begins[held_out] ? held_out : 0;
@@ -108,14 +107,14 @@ std::optional<std::size_t> best_start(const Level& level, const SolverSetup& set
   const auto engine =
       make_engine(level.problem, setup.optics(level.problem.grid()), setup.options.precision, setup.pool);
   double least = rms_of(engine->black_squares(first, last), last - first);
-  std::optional<std::size_t> best;
+  std::optional<BestStart> best;
   for (std::size_t s = 0; s < setup.options.starts.size(); ++s) {
     engine->set(to_solution(*setup.options.starts[s], level.problem, setup.effects));
     engine->residual(static_cast<int>(subset));
     const double error = rms_of(engine->squares(first, last), last - first);
     if (!(error < least)) continue;
     least = error;
-    best = s;
+    best = {s, error};
   }
   return best;
 }

@@ -48,8 +48,12 @@ struct DescentStart {
 };
 
 /// Which of setup.options.starts shows the level's held-out pixels (or its first subset, where there are
-/// none) best; nothing if none does better than no light.
-std::optional<std::size_t> best_start(const Level& level, const SolverSetup& setup);
+/// none) best, and how well; nothing if none does better than no light.
+struct BestStart {
+  std::size_t which = 0;
+  double error = 0;  ///< as Descent::validation_error()
+};
+std::optional<BestStart> best_start(const Level& level, const SolverSetup& setup);
 
 /// The default solver's iteration on one level: minimises |A x - seen|^2 with a light Huber total variation
 /// over x >= 0, by preconditioned ordered-subset steps with Nesterov's momentum.

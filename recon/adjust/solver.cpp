@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include <fmt/format.h>
 
@@ -17,11 +16,6 @@
 
 namespace emberlock::recon {
 namespace {
-
-bool same_place(const Grid& a, const Grid& b) {
-  return a.nx == b.nx && a.ny == b.ny && a.nz == b.nz && a.edge == b.edge &&
-         std::equal(std::begin(a.origin), std::end(a.origin), std::begin(b.origin));
-}
 
 Status check_request(const Scene& scene, const Grid& grid, const Effects& effects,
                      const SolveOptions& options, const Elapsed& elapsed) {

@@ -38,6 +38,8 @@ struct Beginning {
   std::unique_ptr<const Level> level = {};
   std::unique_ptr<Descent> descent = {};  ///< of the level
   int halvings = 0;                       ///< of coarser levels
+  double validation =
+      std::numeric_limits<double>::infinity();  ///< of what it starts from, where that is known
   std::optional<std::size_t> started_from = {};
 };
 
@@ -48,11 +50,12 @@ Beginning begin_with_a_start(const SolverSetup& setup) {
   if (starts.empty()) return begun;
   begun.level =
       std::make_unique<const Level>(make_level(setup, setup.hull, stride_for(setup, setup.hull.grid)));
-  begun.started_from = best_start(*begun.level, setup);
-  if (begun.started_from)
-    begun.descent =
-        std::make_unique<Descent>(*begun.level, setup.optics(begun.level->problem.grid()), setup,
-                                  DescentStart{nullptr, nullptr, starts[*begun.started_from].get()});
+  const std::optional<BestStart> best = best_start(*begun.level, setup);
+  if (!best) return begun;
+  begun.started_from = best->which;
+  begun.validation = best->error;
+  begun.descent = std::make_unique<Descent>(*begun.level, setup.optics(begun.level->problem.grid()), setup,
+                                            DescentStart{nullptr, nullptr, starts[best->which].get()});
   return begun;
 }
 
@@ -114,7 +117,7 @@ Solution solve_standard(const SolverSetup& asked, Tracker& tracker) {
   const ErrorOverBoxes error(setup.boxes, level->problem, descent->engine(),
                              stride_for(setup, setup.hull.grid));
   const int most = setup.options.iterations > 0 ? setup.options.iterations : kMostSteps / level->subsets;
-  double last = std::numeric_limits<double>::infinity();
+  double last = beginning.validation;
   int iteration = 0;
   int lowest_at = 0;  // iterations before the pass that found the lowest error
   const auto shine = [&] {

@@ -25,4 +25,10 @@ struct Grid {
   }
 };
 
+/// Whether both have the same key points.
+inline bool same_place(const Grid& a, const Grid& b) {
+  return a.nx == b.nx && a.ny == b.ny && a.nz == b.nz && a.edge == b.edge && a.origin[0] == b.origin[0] &&
+         a.origin[1] == b.origin[1] && a.origin[2] == b.origin[2];
+}
+
 }  // namespace emberlock::recon

@@ -10,9 +10,11 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 
 #include "base/file.h"
 #include "daemon/reconstruction/child.h"
+#include "recon/export/volume_file.h"
 #include "recon/preprocess/radiance.h"
 #include "recon/synthetic/flame.h"
 #include "tests/support/recording.h"
@@ -23,6 +25,7 @@ namespace emberlock {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 using State = v1::ReconstructionStatus;
 
 v1::Manifest manifest_of(const recon::Scene& scene) {
@@ -161,13 +164,49 @@ TEST_F(DaemonReconstruction, WithoutTheDaemonTheProgramReconstructsASequenceToo)
   EXPECT_THAT(hopeless.output, HasSubstr("of 3 frames 3 failed and 0 were not tried"));
 }
 
+TEST_F(DaemonReconstruction, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
+  const auto run = [&](const char* frames, const char* out, const char* more = "") {
+    return shell(fmt::format(
+        "{} reconstruct {} --device cpu --voxels 12 --hold-out 10 --frames {} --out {} {}", EMBERLOCK_PROGRAM,
+        (folder_ / "sessions/candle").string(), frames, (folder_ / out).string(), more));
+  };
+  const Shell whole = run("0:2", "whole");
+  EXPECT_EQ(whole.status, 0) << whole.output;
+  EXPECT_THAT(whole.output, HasSubstr("3 of 3 frames became volumes of 12 voxels"));
+  EXPECT_EQ(run("0:1", "cut").status, 0);
+  const Shell rest = run("0:2", "cut");
+  EXPECT_EQ(rest.status, 0) << rest.output;
+  EXPECT_THAT(rest.output, HasSubstr("2 of 3 frames are done: going on behind frame 1"));
+  for (const char* frame : {"frame-0", "frame-1", "frame-2"}) {
+    const auto expected = recon::read_volume(folder_ / "whole" / frame / "volume.vdb");
+    const auto got = recon::read_volume(folder_ / "cut" / frame / "volume.vdb");
+    ASSERT_TRUE(expected.ok() && got.ok()) << frame;
+    EXPECT_EQ(got->emission, expected->emission) << frame;
+    EXPECT_EQ(got->extinction, expected->extinction) << frame;
+  }
+  const auto told = [&](const char* out) {
+    auto read = nlohmann::json::parse(*read_file(folder_ / out / "sequence/frames.json"));
+    for (auto& frame : read.at("frames")) frame.erase("seconds");
+    return read.dump();
+  };
+  EXPECT_EQ(told("cut"), told("whole"));
+  EXPECT_TRUE(recon::read_volume(folder_ / "cut/volume_0002.vdb").ok());
+  EXPECT_THAT(run("0:2", "cut", "--effects none").output, Not(HasSubstr("going on")));  // all is done
+
+  EXPECT_EQ(run("0:1", "other").status, 0);
+  const Shell others = run("0:2", "other", "--effects none");
+  EXPECT_EQ(others.status, 2);
+  EXPECT_THAT(others.output, HasSubstr("frame 0, done again, is not what it was"));
+  EXPECT_THAT(run("1:2", "other").output, HasSubstr("holds a sequence of other frames"));
+}
+
 TEST_F(DaemonReconstruction, FramesThatAreAtWorkAtOnceBecomeWhatTheyBecomeAlone) {
   const auto run = [&](const char* at_once, const char* out) {
     return shell(fmt::format(
         "{} reconstruct {} --device cpu --voxels 12 --frame 0 --last-frame 2 {} --out {}", EMBERLOCK_PROGRAM,
         (folder_ / "sessions/candle").string(), at_once, (folder_ / out).string()));
   };
-  const Shell alone = run("", "alone");
+  const Shell alone = run("--cold", "alone");
   EXPECT_EQ(alone.status, 0) << alone.output;
   const Shell together = run("--at-once 2 --threads 3", "together");
   EXPECT_EQ(together.status, 0) << together.output;

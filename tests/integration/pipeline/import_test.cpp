@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // `emberlock import` on films that virtual cameras made of a strobe and then a flame, and on what people give
 // it by mistake.
+#include <array>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -22,6 +24,7 @@
 #include "tests/support/import_clips.h"
 #include "tests/support/recording.h"
 #include "tests/support/verb.h"
+#include "tests/support/video_writer.h"
 
 namespace emberlock::cli {
 namespace {
@@ -380,6 +383,65 @@ TEST(ImportTransforms, BecomeACalibratedSessionOfOneInstant) {
   EXPECT_EQ(session.manifest().cameras(0).calibration().fy(), 31);
   ASSERT_EQ(session.manifest().cameras(1).calibration().camera_from_world_size(), 12);
   EXPECT_EQ(*session.read(0, 0)->image, test::noise_image(layout, 3));
+}
+
+/// Two films of noise, calibrated by a transforms.json.
+films::ImportOptions films_with_transforms(const std::filesystem::path& folder,
+                                           std::array<std::uint64_t, 2> frames, std::array<int, 2> rates) {
+  const ImageLayout layout{{64, 48}, PixelFormat::gray8, 8};
+  for (std::size_t c = 0; c < 2; ++c) {
+    test::VideoFormat format;
+    format.codec = AV_CODEC_ID_FFV1;
+    format.rate = {rates[c], 1};
+    test::VideoWriter writer(folder / (c == 0 ? "a.mkv" : "b.mkv"), layout.size, format);
+    for (std::uint64_t n = 0; n < frames[c]; ++n) writer.write(test::noise_image(layout, 10 * c + n));
+    writer.close();
+  }
+  std::ofstream(folder / "cameras.json")
+      << R"({"fl_x": 30, "fl_y": 31, "w": 64, "h": 48, "fps": 30, "frames": [
+    {"file_path": "a.mkv", "transform_matrix": [[1,0,0,0],[0,1,0,0],[0,0,1,3],[0,0,0,1]]},
+    {"file_path": "b.mkv", "transform_matrix": [[0,0,1,3],[0,1,0,0],[-1,0,0,0],[0,0,0,1]]}]})";
+  films::ImportOptions options;
+  options.folder = folder / "cameras.json";
+  options.out = folder / "session";
+  options.min_free_bytes = 0;
+  return options;
+}
+
+TEST(ImportTransforms, OfVideosBecomeASessionWhoseFramesGoByTheirNumbers) {
+  const test::TempFolder folder;
+  const auto result =
+      films::run_import(films_with_transforms(folder.path(), {5, 5}, {30, 30}), {}, report::reports_of);
+  ASSERT_TRUE(result.ok()) << result.error().message();
+  EXPECT_EQ(result->instants, 5);
+  EXPECT_THAT(result->notes, testing::ElementsAre(HasSubstr("NOT SYNCHRONISED")));
+  auto session = session::SessionReader::open(folder / "session").value();
+  ASSERT_EQ(session.camera_count(), 2U);
+  EXPECT_EQ(session.manifest().cameras(1).calibration().camera_from_world_size(), 12);
+  EXPECT_NEAR(session.manifest().cameras(0).frame_rate_hz(), 30, 1e-6);
+  for (std::size_t c = 0; c < 2; ++c) {
+    ASSERT_EQ(session.stamps(c).size(), 5U);
+    for (std::size_t n = 0; n < 5; ++n) {
+      EXPECT_EQ(session.stamps(c)[n].frame_id, n);
+      EXPECT_NEAR((session.stamps(c)[n].device_time - session.stamps(c)[0].device_time).value(),
+                  static_cast<double>(n) / 30, 2e-3);
+      EXPECT_EQ(*session.read(c, n)->image, test::noise_image({{64, 48}, PixelFormat::gray8, 8}, 10 * c + n));
+    }
+  }
+}
+
+TEST(ImportTransforms, OfVideosThatDontGoTogetherAreRefusedAndSaid) {
+  const test::TempFolder shorter;
+  const auto cut =
+      films::run_import(films_with_transforms(shorter.path(), {5, 4}, {30, 30}), {}, report::reports_of);
+  ASSERT_FALSE(cut.ok());
+  EXPECT_THAT(cut.error().message(), HasSubstr("b.mkv: has 4 frames, a.mkv has 5"));
+  const test::TempFolder slower;
+  const auto slow =
+      films::run_import(films_with_transforms(slower.path(), {5, 5}, {30, 25}), {}, report::reports_of);
+  ASSERT_FALSE(slow.ok());
+  EXPECT_THAT(slow.error().message(), HasSubstr("has 25.00 frames a second, a.mkv has 30.00"));
+  EXPECT_FALSE(std::filesystem::exists(slower / "session"));
 }
 
 }  // namespace

@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/frames_in_turn.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "base/clock.h"
+#include "base/file.h"
+#include "base/output_folder.h"
+#include "cli/commands.h"
+#include "cli/interrupt.h"
+#include "cli/outputs.h"
+#include "cli/reconstruct_files.h"
+#include "recon/adjust/picture_error.h"
+#include "recon/export/volume_file.h"
+#include "recon/pipeline/frame_sequence.h"
+#include "recon/preprocess/flame_mask.h"
+#include "recon/preprocess/radiance.h"
+#include "report/sequence_report.h"
+#include "session/frame_range.h"
+#include "session/media/frame_file.h"
+
+namespace emberlock::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using report::SequenceFrame;
+using report::SequenceTold;
+
+constexpr const char* kTold = "frames.json";
+
+/// The views whose change over time is looked at: those held out, else the input ones.
+std::vector<std::size_t> looked_at(const recon::Scene& scene) {
+  std::vector<std::size_t> views;
+  for (const recon::ViewRole role : {recon::ViewRole::held_out, recon::ViewRole::input}) {
+    for (std::size_t v = 0; v < scene.views.size(); ++v)
+      if (scene.views[v].role == role) views.push_back(v);
+    if (!views.empty()) break;
+  }
+  return views;
+}
+
+class FramesInTurn {
+ public:
+  FramesInTurn(const ReconstructArguments& arguments, const std::vector<std::uint64_t>& frames)
+      : arguments_(arguments), frames_(frames), out_(arguments.out) {
+    arguments_.recording = std::make_shared<recon::SharedRecording>();
+  }
+
+  Status run() {
+    std::error_code ec;
+    EMBERLOCK_ASSIGN_OR_RETURN(const MadeFolders parents, MadeFolders::create(fs::absolute(out_, ec)));
+    EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request()));
+    EMBERLOCK_RETURN_IF_ERROR(take_up());
+    while (told_.frames.size() < frames_.size() && !Interrupt::asked() && !hopeless()) {
+      const std::size_t next = told_.frames.size();
+      std::fprintf(stderr, "%s\n", label(next).c_str());
+      const Status done = reconstruct(frames_[next]);
+      if (told_.frames.size() == next) break;  // ended early: half a frame is none, and done again
+      EMBERLOCK_RETURN_IF_ERROR(write());
+      if (!done.ok())
+        std::fprintf(stderr, "emberlock: %s: %s\n", label(next).c_str(), done.error().message().c_str());
+    }
+    return conclude();
+  }
+
+ private:
+  [[nodiscard]] fs::path folder_of(std::uint64_t frame) const {
+    return out_ / fmt::format("frame-{}", frame);
+  }
+  [[nodiscard]] OutputRequest request() const { return {out_ / "sequence", kSequence}; }
+  [[nodiscard]] std::string label(std::size_t i) const {
+    return fmt::format("frame {} ({} of {})", frames_[i], i + 1, frames_.size());
+  }
+  [[nodiscard]] std::size_t failed() const {
+    return static_cast<std::size_t>(std::count_if(told_.frames.begin(), told_.frames.end(),
+                                                  [](const SequenceFrame& f) { return !f.error.empty(); }));
+  }
+  [[nodiscard]] bool hopeless() const {
+    return failed() == told_.frames.size() && failed() >= session::kFailuresAtStart;
+  }
+
+  [[nodiscard]] ReconstructArguments arguments_of(std::uint64_t frame) const {
+    ReconstructArguments one = arguments_;
+    one.frame = frame;
+    one.out = folder_of(frame).string();
+    return one;
+  }
+
+  Status reconstruct(std::uint64_t frame) {
+    SequenceFrame row;
+    row.frame = frame;
+    const auto solve = [&](const recon::Scene& scene, const recon::ReconstructOptions& options, const Clock&,
+                           const Progress& progress, const auto& preview) -> Result<recon::Outcome> {
+      if (!sequence_) sequence_.emplace(options, clock_);
+      const TimePoint begin = clock_.now();
+      EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome, sequence_->next(scene, progress, preview));
+      row.reconstruction = clock_.now() - begin;
+      describe(scene, outcome, row);
+      return outcome;
+    };
+    const Result<Written> written =
+        reconstruct_files(arguments_of(frame), {progress_bar("reconstruct"), Interrupt::asked}, solve);
+    if (!written) {
+      if (Interrupt::asked()) return written.error();
+      row = {};
+      row.frame = frame;
+      row.error = written.error().message();
+      told_.frames.push_back(row);
+      return written.error();
+    }
+    row.loading = written->loading;
+    row.writing = written->writing;
+    if (written->outcome.report.stopped) return {};
+    told_.voxels = written->outcome.report.voxel_choice.voxels;
+    told_.frames.push_back(row);
+    EMBERLOCK_RETURN_IF_ERROR(link(frame));
+    return cli::conclude(*written, {arguments_.input, folder_of(frame).string(), arguments_.by_daemon.json});
+  }
+
+  /// What is told over time, and what the next frame's change is measured from.
+  void describe(const recon::Scene& scene, const recon::Outcome& outcome, SequenceFrame& row) {
+    row.start = name(sequence_->started_from());
+    row.decided = sequence_->decided();
+    row.iterations = outcome.report.iterations;
+    row.input_rmse = recon::all_channels(outcome.report.input_rmse);
+    if (outcome.report.heldout_rmse) row.heldout_rmse = recon::all_channels(*outcome.report.heldout_rmse);
+    row.light = recon::light_of(outcome.reconstruction.volume);
+    std::vector<Image> renders;
+    for (const std::size_t v : looked_at(scene)) renders.push_back(recon::to_rgb8(outcome.renders[v]));
+    recon::ShownFrame shown = show(scene, std::move(renders));
+    told_.held_out = outcome.report.heldout_rmse.has_value();
+    if (told_.held_out) {
+      row.psnr = row.ssim = 0;
+      for (std::size_t v = 0; v < shown.pictures.size(); ++v) {
+        *row.psnr +=
+            recon::psnr(shown.pictures[v], shown.renders[v]) / static_cast<double>(shown.pictures.size());
+        *row.ssim +=
+            recon::ssim(shown.pictures[v], shown.renders[v]) / static_cast<double>(shown.pictures.size());
+      }
+    }
+    if (last_shown_) row.flicker = recon::flicker(*last_shown_, shown);
+    last_shown_ = std::move(shown);
+  }
+  static recon::ShownFrame show(const recon::Scene& scene, std::vector<Image> renders) {
+    recon::ShownFrame shown;
+    for (const std::size_t v : looked_at(scene)) {
+      shown.pictures.push_back(recon::to_rgb8(*scene.views[v].image));
+      shown.boxes.push_back(recon::noise_mask(*scene.views[v].image).box);
+    }
+    shown.renders = std::move(renders);
+    return shown;
+  }
+
+  // --- going on after an interruption
+
+  /// What an earlier run has done.
+  Status take_up() {
+    const fs::path path = request().target / kTold;
+    if (std::error_code ec; !fs::exists(path, ec)) return {};
+    EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path));
+    EMBERLOCK_ASSIGN_OR_RETURN(told_, report::parse_sequence(text, path.string()));
+    const auto another = [&](const std::string& what) {
+      return Error{ErrorKind::bad_input, what, out_.string(),
+                   "Give another --out, or remove this folder to begin anew"};
+    };
+    std::vector<std::uint64_t> volumes;
+    std::uint64_t deciding = 0;
+    for (std::size_t i = 0; i < told_.frames.size(); ++i) {
+      const SequenceFrame& f = told_.frames[i];
+      if (i >= frames_.size() || f.frame != frames_[i]) return another("holds a sequence of other frames");
+      if (!f.error.empty()) continue;
+      volumes.push_back(f.frame);
+      if (f.decided) deciding = f.frame;
+    }
+    if (volumes.empty() || told_.frames.size() == frames_.size()) return {};
+    std::fprintf(stderr, "%zu of %zu frames are done: going on behind frame %llu\n", told_.frames.size(),
+                 frames_.size(), static_cast<unsigned long long>(told_.frames.back().frame));
+    return go_on_behind(volumes, deciding, another);
+  }
+
+  template <class Another>
+  Status go_on_behind(const std::vector<std::uint64_t>& volumes, std::uint64_t deciding,
+                      const Another& another) {
+    const ReconstructArguments anew = arguments_of(deciding);
+    EMBERLOCK_ASSIGN_OR_RETURN(recon::ReconstructOptions options, options_of(anew));
+    if (options.voxels && *options.voxels != told_.voxels)
+      return another(fmt::format("was made with {} voxels", told_.voxels));
+    options.voxels = told_.voxels;
+    options.solve.stop = Interrupt::asked;
+    const Progress progress = progress_bar(fmt::format("frame {} again", deciding));
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(anew, progress));
+    recon::FrameSequence again(options, clock_);
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Outcome outcome, again.next(scene, progress));
+    const auto volume = [&](std::uint64_t frame) {
+      return recon::read_volume(folder_of(frame) / "volume.vdb");
+    };
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Volume was, volume(deciding));
+    const bool repeats = !options.solve.budget;  // what a clock ends never does
+    if (repeats && (was.emission != outcome.reconstruction.volume.emission ||
+                    was.extinction != outcome.reconstruction.volume.extinction))
+      return another(fmt::format(
+          "was made with other options or by another program: frame {}, done again, is not what it was",
+          deciding));
+    std::shared_ptr<const recon::Volume> before_last;
+    if (volumes.size() > 1) {
+      EMBERLOCK_ASSIGN_OR_RETURN(recon::Volume v, volume(volumes[volumes.size() - 2]));
+      before_last = std::make_shared<const recon::Volume>(std::move(v));
+    }
+    EMBERLOCK_ASSIGN_OR_RETURN(recon::Volume last, volume(volumes.back()));
+    sequence_.emplace(options, clock_);
+    sequence_->go_on_after(outcome, std::move(before_last),
+                           std::make_shared<const recon::Volume>(std::move(last)));
+    return look_at(volumes.back());
+  }
+
+  /// The last frame, as its pictures and its rendered views are.
+  Status look_at(std::uint64_t frame) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(arguments_of(frame), {}));
+    std::vector<Image> renders;
+    for (const std::size_t v : looked_at(scene)) {
+      EMBERLOCK_ASSIGN_OR_RETURN(
+          Image render, session::read_image(folder_of(frame) / "views" / fmt::format("{:04}.png", v)));
+      renders.push_back(std::move(render));
+    }
+    last_shown_ = show(scene, std::move(renders));
+    return {};
+  }
+
+  // --- what is told of all
+
+  [[nodiscard]] Status write() const {
+    EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create(request()));
+    EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / kTold, report::sequence_json(told_)));
+    EMBERLOCK_RETURN_IF_ERROR(
+        write_file_atomically(staging.path() / "frames.csv", report::sequence_csv(told_)));
+    EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "report.html",
+                                                    report::sequence_html(told_, arguments_.input)));
+    return staging.commit();
+  }
+
+  /// OUT/volume_NNNN.vdb, as programs open a sequence.
+  [[nodiscard]] Status link(std::uint64_t frame) const {
+    const fs::path volume = fmt::format("frame-{}/volume.vdb", frame);
+    const fs::path path = out_ / fmt::format("volume_{:04}.vdb", frame);
+    std::error_code ec;
+    if (fs::is_symlink(path, ec) && fs::read_symlink(path, ec) == volume) return {};
+    fs::create_symlink(volume, path, ec);
+    if (!ec) return {};
+    return Error{ErrorKind::io, "can't link to " + volume.string() + ": " + ec.message(), path.string(),
+                 "Move what is there away, or give an --out on a file system that has symbolic links"};
+  }
+
+  [[nodiscard]] Status conclude() const {
+    for (const std::string& words : report::sequence_words(told_))
+      std::fprintf(stderr, "%-16s %s\n", "sequence", words.c_str());
+    const std::size_t not_tried = frames_.size() - told_.frames.size();
+    if (failed() == 0 && not_tried == 0) {
+      std::fprintf(stderr, "%-16s %s\n", "look at", (request().target / "report.html").c_str());
+      return {};
+    }
+    return Error{
+        ErrorKind::refused,
+        fmt::format("of {} frames {} failed and {} were not tried", frames_.size(), failed(), not_tried),
+        out_.string(),
+        not_tried > 0 && !hopeless() ? "The same command goes on where it ended"
+                                     : "Each of them is told above"};
+  }
+
+  ReconstructArguments arguments_;
+  const std::vector<std::uint64_t>& frames_;
+  fs::path out_;
+  SteadyClock clock_;
+  std::optional<recon::FrameSequence> sequence_;
+  std::optional<recon::ShownFrame> last_shown_;
+  SequenceTold told_;
+};
+
+}  // namespace
+
+void reconstruct_in_turn(const ReconstructArguments& arguments, const std::vector<std::uint64_t>& frames) {
+  or_fail(FramesInTurn(arguments, frames).run());
+}
+
+}  // namespace emberlock::cli

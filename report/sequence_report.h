@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "base/quantity.h"
+#include "base/result.h"
+#include "recon/export/picture_quality.h"
+
+namespace emberlock::report {
+
+/// A frame of a sequence, as it is told over time. Errors: all channels, grey levels (0..255).
+struct SequenceFrame {
+  std::uint64_t frame = 0;
+  std::string error = {};  ///< why there is no volume; all that follows is then empty
+  std::string start = {};  ///< recon::name(FrameStart)
+  bool decided = false;    ///< effects, smoothness and pointing, for the next ones too
+  int iterations = 0;
+  Seconds loading{0}, reconstruction{0}, writing{0};
+  double input_rmse = 0;
+  std::optional<double> heldout_rmse = {};
+  /// Over whole pictures, the mean of the held-out views.
+  std::optional<double> psnr = {}, ssim = {};
+  double light = 0;  ///< the emission's integral over the volume, mean of the channels, grey levels m2
+  std::optional<recon::Flicker> flicker = {};  ///< from the frame before
+};
+
+/// All frames that were tried, in their order.
+struct SequenceTold {
+  int voxels = 0;  ///< of the first frame, and so of all
+  bool held_out = false;
+  std::vector<SequenceFrame> frames = {};
+};
+
+/// frames.json: {"format": "emberlock sequence", "version": 1, "voxels", "held_out", "frames": [{"frame",
+/// "error" (null where there is a volume), "start", "decided", "iterations", "seconds" {loading,
+/// reconstruction, writing}, "input_rmse", "heldout_rmse", "psnr", "ssim", "light", "flicker" {pictures,
+/// renders}}]}; null is what isn't known.
+std::string sequence_json(const SequenceTold& told);
+/// The reverse. `where` is named in errors (bad_input).
+Result<SequenceTold> parse_sequence(std::string_view json, const std::string& where);
+/// frames.csv, a line a frame.
+std::string sequence_csv(const SequenceTold& told);
+/// What is said of all: volumes, seconds a frame, errors, flicker. Lines without ends.
+std::vector<std::string> sequence_words(const SequenceTold& told);
+/// A page with plots over time.
+std::string sequence_html(const SequenceTold& told, const std::string& input);
+
+}  // namespace emberlock::report

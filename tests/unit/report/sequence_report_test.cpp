@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "report/sequence_report.h"
+
+#include <limits>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace emberlock::report {
+namespace {
+
+using testing::HasSubstr;
+
+SequenceTold three_frames() {
+  SequenceFrame first{.frame = 40,
+                      .start = "darkness",
+                      .decided = true,
+                      .iterations = 12,
+                      .loading = Seconds(0.5),
+                      .reconstruction = Seconds(4),
+                      .writing = Seconds(0.5),
+                      .input_rmse = 3.25,
+                      .heldout_rmse = 5.0625,
+                      .psnr = 30,
+                      .ssim = 0.9,
+                      .light = 1e-3 / 3};
+  SequenceFrame second{.frame = 45, .error = "no \"flame\" in <cam 3>"};
+  SequenceFrame third = first;
+  third.frame = 50;
+  third.start = "the frame before, carried on";
+  third.reconstruction = Seconds(1);
+  third.heldout_rmse = 6;
+  third.psnr = std::numeric_limits<double>::infinity();
+  third.flicker = recon::Flicker{8, 6};
+  return {128, true, {first, second, third}};
+}
+
+TEST(SequenceReport, ComesBackFromItsJsonToTheBit) {
+  const SequenceTold told = three_frames();
+  const auto read = parse_sequence(sequence_json(told), "frames.json");
+  ASSERT_TRUE(read.ok()) << read.error().message();
+  EXPECT_EQ(sequence_json(*read), sequence_json(told));
+  ASSERT_EQ(read->frames.size(), 3U);
+  EXPECT_EQ(read->voxels, 128);
+  EXPECT_EQ(read->frames[0].light, told.frames[0].light);
+  EXPECT_EQ(read->frames[1].error, told.frames[1].error);
+  EXPECT_FALSE(read->frames[2].psnr);  // what isn't finite isn't known
+  EXPECT_EQ(read->frames[2].flicker->renders, 6);
+}
+
+TEST(SequenceReport, WhatIsNoneIsRefusedAndSaid) {
+  for (const char* text :
+       {"", "{", "[]", "{}", R"({"format": "emberlock sequence", "version": 2, "voxels": 1, "frames": []})",
+        R"({"format": "emberlock sequence", "version": 1, "voxels": "many", "held_out": true, "frames": []})",
+        R"({"format": "emberlock sequence", "version": 1, "voxels": 1, "held_out": true, "frames": [{}]})"}) {
+    const auto read = parse_sequence(text, "out/sequence/frames.json");
+    ASSERT_FALSE(read.ok()) << text;
+    EXPECT_EQ(read.error().kind, ErrorKind::bad_input);
+    EXPECT_THAT(read.error().message(), HasSubstr("out/sequence/frames.json"));
+  }
+}
+
+TEST(SequenceReport, SaysWhatAllFramesReachedAndTook) {
+  const std::vector<std::string> words = sequence_words(three_frames());
+  EXPECT_THAT(
+      words[0],
+      HasSubstr("2 of 3 frames became volumes of 128 voxels along the longest edge, in 3.50 s a frame; the "
+                "first took 5.00 s"));
+  EXPECT_THAT(words[1], HasSubstr("5.53 grey levels on average"));
+  EXPECT_THAT(words.back(),
+              HasSubstr("the held-out views of the volume change 0.75 times as much as the pictures do"));
+  EXPECT_THAT(sequence_words({}), testing::ElementsAre("no frame became a volume"));
+}
+
+TEST(SequenceReport, ThePageAndTheTableHoldEachFrame) {
+  const std::string page = sequence_html(three_frames(), "take <2>");
+  EXPECT_THAT(page, HasSubstr("take &lt;2&gt;"));
+  EXPECT_THAT(page, HasSubstr("no &quot;flame&quot; in &lt;cam 3&gt;"));
+  EXPECT_THAT(page, HasSubstr("the frame before, carried on"));
+  const std::string csv = sequence_csv(three_frames());
+  EXPECT_THAT(csv, HasSubstr("\n40,\"darkness\",12,0.500,4.000,0.500,3.25,5.0625,30,0.9,0.000333333,,\n"));
+  EXPECT_THAT(csv, HasSubstr("\n50,\"the frame before, carried on\",12,"));
+  EXPECT_EQ(csv.find("\n45,"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace emberlock::report

@@ -187,7 +187,7 @@ std::string sequence_html(const SequenceTold& told, const std::string& input) {
   };
   const auto plot = [&](const char* title, const char* unit, const std::vector<Series>& lines) {
     page.heading(title);
-    page.raw(svg_plot_for_any_width(lines, {.title = title, .x_label = "frame", .y_label = unit}));
+    page.raw(svg_plot_for_any_width(lines, {.x_label = "frame", .y_label = unit}));
   };
   std::vector<Series> errors = {series("input views", [](const SequenceFrame& f) { return f.input_rmse; })};
   if (told.held_out)

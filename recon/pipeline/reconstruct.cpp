@@ -48,7 +48,8 @@ struct PutRight {
 PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOptions& options, Device device,
                                 const Elapsed& elapsed, const Progress& progress) {
   PutRight result{options.taken_over ? told.under(options.taken_over->effects.effects)
-                                     : under_known_effects(told, options.effects.value_or(EffectRequest{}), options.solve.compute),
+                                     : under_known_effects(told, options.effects.value_or(EffectRequest{}),
+                                                           options.solve.compute),
                   {}};
   if (options.taken_over) {
     result.pointing = options.taken_over->pointing;

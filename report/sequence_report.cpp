@@ -110,7 +110,7 @@ std::string sequence_json(const SequenceTold& told) {
                      {"voxels", told.voxels},
                      {"held_out", told.held_out},
                      {"frames", frames}};
-  return json.dump(1) + "\n";
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";  // of paths that are no UTF-8
 }
 
 Result<SequenceTold> parse_sequence(std::string_view text, const std::string& where) try {

@@ -147,19 +147,19 @@ TEST_F(DaemonReconstruction, ASequenceBecomesAVolumeForEachFrameThatCanBeFetched
 
 TEST_F(DaemonReconstruction, WithoutTheDaemonTheProgramReconstructsASequenceToo) {
   const std::string command =
-      fmt::format("{} reconstruct {} --device cpu --voxels 12 --frame 0 --out {} ", EMBERLOCK_PROGRAM,
+      fmt::format("{} reconstruct {} --device cpu --voxels 12 --frame 0 --out {}", EMBERLOCK_PROGRAM,
                   (folder_ / "sessions/candle").string(), (folder_ / "out").string());
-  const Shell run = shell(command + "--last-frame 2 --every 2");
+  const Shell run = shell(command + " --last-frame 2 --every 2");
   EXPECT_EQ(run.status, 0) << run.output;
   EXPECT_THAT(run.output, HasSubstr("frame 2 (2 of 2)"));
   for (const char* frame : {"frame-0", "frame-2"})
     EXPECT_TRUE(fs::exists(folder_ / fmt::format("out/{}/volume.vdb", frame))) << frame;
   EXPECT_FALSE(fs::exists(folder_ / "out/frame-1"));
-  const Shell beyond = shell(command + "--last-frame 3");
+  const Shell beyond = shell(command + " --last-frame 3");
   EXPECT_EQ(beyond.status, 2);
   EXPECT_THAT(beyond.output,
               HasSubstr("--last-frame: there is no frame 3: the session has 3. Give at most 2"));
-  const Shell hopeless = shell(command + "--last-frame 2 --hold-out 30");
+  const Shell hopeless = shell(command + "-hopeless --last-frame 2 --hold-out 30");
   EXPECT_EQ(hopeless.status, 1);
   EXPECT_THAT(hopeless.output, HasSubstr("of 3 frames 3 failed and 0 were not tried"));
 }
@@ -191,10 +191,10 @@ TEST_F(DaemonReconstruction, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
   };
   EXPECT_EQ(told("cut"), told("whole"));
   EXPECT_TRUE(recon::read_volume(folder_ / "cut/volume_0002.vdb").ok());
-  EXPECT_THAT(run("0:2", "cut", "--effects none").output, Not(HasSubstr("going on")));  // all is done
+  EXPECT_THAT(run("0:2", "cut").output, Not(HasSubstr("going on")));  // all is done
 
   EXPECT_EQ(run("0:1", "other").status, 0);
-  const Shell others = run("0:2", "other", "--effects none");
+  const Shell others = run("0:2", "other", "--effects extinction=30");
   EXPECT_EQ(others.status, 2);
   EXPECT_THAT(others.output, HasSubstr("frame 0, done again, is not what it was"));
   EXPECT_THAT(run("1:2", "other").output, HasSubstr("holds a sequence of other frames"));

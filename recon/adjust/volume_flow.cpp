@@ -11,8 +11,8 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr int kFinest = 48;         // points along the longest side, at most
-constexpr int kCoarsest = 12;       // no level has fewer
+constexpr int kFinestFlow = 48;     // points along the longest side, at most
+constexpr int kCoarsestFlow = 12;   // no level has fewer
 constexpr int kWarps = 4;           // a level
 constexpr int kReach = 2;           // of the window over which a point's displacement is even, points
 constexpr float kMostAWarp = 1.5F;  // points
@@ -193,9 +193,9 @@ VolumeFlow find_flow(const Volume& before, const Volume& after, Pool& pool) {
   const Grid& g = after.grid;
   const auto longest = [](const Field& f) { return std::max({f.nx, f.ny, f.nz}); };
   std::vector<std::array<Field, 2>> levels = {{light_of(before, pool), light_of(after, pool)}};
-  const int factor = (longest(levels[0][0]) + kFinest - 1) / kFinest;
+  const int factor = (longest(levels[0][0]) + kFinestFlow - 1) / kFinestFlow;
   for (Field& light : levels[0]) light = shrunk(light, factor, pool);
-  while (longest(levels.back()[0]) >= 2 * kCoarsest)
+  while (longest(levels.back()[0]) >= 2 * kCoarsestFlow)
     levels.push_back({shrunk(levels.back()[0], 2, pool), shrunk(levels.back()[1], 2, pool)});
   const Field& coarsest = levels.back()[0];
   Field flow(coarsest.nx, coarsest.ny, coarsest.nz, 3);

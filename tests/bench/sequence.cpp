@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a frame of a sequence costs and reaches that starts from where the one before ended, beside the same
 // frame alone, from pictures in memory to rendered views.
-//   bench_sequence write SESSION SHRINK FOLDER [FRAMES]   each frame as FOLDER/NNNN/transforms.json, of which
-//   a
-//                                                         machine without film decoders makes scenes
-//   bench_sequence DEVICE VOXELS HELD_OUT FOLDER [ROUNDS] the frames there, forth and back so many times;
-//   resident
-//                                                         memory after the first round and the last
+//   bench_sequence write SESSION SHRINK FOLDER [FRAMES]     each frame as FOLDER/NNNN/transforms.json, for
+//                                                           machines without film decoders
+//   bench_sequence DEVICE VOXELS HELD_OUT FOLDER [ROUNDS]   the frames there, forth and back so many times;
+//                                                           resident memory on the way
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -119,7 +117,7 @@ int run(const char* device, int voxels, int held_out, const fs::path& folder, in
   }
   recon::FrameSequence sequence(options, clock);
   Sum first, in_turn, alone;
-  double memory = 0;
+  double memory = 0, half = 0;
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t n = 0; n < scenes.size(); ++n) {
       const recon::Scene& scene = scenes[round % 2 == 0 ? n : scenes.size() - 1 - n];
@@ -128,6 +126,7 @@ int run(const char* device, int voxels, int held_out, const fs::path& folder, in
       if (round == 0 && n > 0) timed([&] { return recon::reconstruct(scene, options, clock); }, alone);
     }
     if (round == 0) memory = resident_megabytes();
+    if (round == rounds / 2) half = resident_megabytes();
   }
   const auto print = [](const char* what, const Sum& sum) {
     std::printf("| %s | %d | %.3f | %.2f |\n", what, sum.frames, sum.seconds / std::max(1, sum.frames),
@@ -137,8 +136,8 @@ int run(const char* device, int voxels, int held_out, const fs::path& folder, in
   print("the first", first);
   print("from the one before", in_turn);
   print("alone", alone);
-  std::printf("memory: %.1f MB after the first round, %.1f MB after %d\n", memory, resident_megabytes(),
-              rounds);
+  std::printf("memory: %.1f MB after the first round, %.1f MB after half of %d, %.1f MB at the end\n", memory,
+              half, rounds, resident_megabytes());
   return 0;
 }
 

@@ -67,8 +67,8 @@ class ResidualEngine {
 class Engine : public ResidualEngine {
  public:
   struct Step {
-    float scale;  ///< of the gradient: all rays over the rays that it was taken from
-    float momentum;
+    float scale = 1;  ///< of the gradient: all rays over the rays that it was taken from
+    float momentum = 0;
     float length = 1;  ///< of the step over that which the weights and the ties allow
   };
   /// What lies behind the medium, in residual_against().
@@ -148,9 +148,9 @@ class Engine : public ResidualEngine {
 
   struct FieldStep {
     Step emission;
-    float variation;  ///< of the extinction's total variation
-    float soft;       ///< differences below it count quadratically, a voxel edge
-    float most;       ///< extinction, a voxel edge
+    float variation = 0;  ///< of the extinction's total variation
+    float soft = 0;       ///< differences below it count quadratically, a voxel edge
+    float most = 0;       ///< extinction, a voxel edge
   };
   /// Where the extinction is unknown too (Absorb::field): curvature of the residual by it, and what it is
   /// thought to be, one a key point. Clears the gradient.

@@ -51,9 +51,9 @@ Result<int> parse_virtual_rig(const std::string& text) {
 }
 
 /// "x,y,z", or nothing.
-Result<std::optional<rig::Sun>> parse_sun(const SimulateArguments& arguments) {
-  if (arguments.sun.empty() && !arguments.albedo) return std::optional<rig::Sun>{};
-  rig::Sun sun;
+Result<std::optional<recon::Sun>> parse_sun(const SimulateArguments& arguments) {
+  if (arguments.sun.empty() && !arguments.albedo) return std::optional<recon::Sun>{};
+  recon::Sun sun;
   sun.albedo = arguments.albedo.value_or(sun.albedo);
   if (!arguments.sun.empty()) {
     const auto towards = parse_numbers_of<3>(arguments.sun);
@@ -141,7 +141,7 @@ void add_camera_options(CLI::App& verb, SimulateArguments& a) {
   verb.add_option("--sun", a.sun, "x,y,z: of smoke, where the sun stands (default: 1,-1,1)");
   verb.add_option(
       "--albedo", a.albedo,
-      fmt::format("Of smoke: the share of the light it takes that it scatters [{}]", rig::Sun{}.albedo));
+      fmt::format("Of smoke: the share of the light it takes that it scatters [{}]", recon::Sun{}.albedo));
 }
 
 }  // namespace

@@ -17,9 +17,8 @@
 #include "drivers/virtual/virtual_rig.h"
 #include "recon/calibrate/rig.h"
 #include "recon/export/volume_file.h"
-#include "recon/render/render.h"
-#include "recon/temperature/self_absorption.h"
 #include "rig/devices/stage.h"
+#include "rig/simulate/gas_light.h"
 #include "session/shutter_times.h"
 #include "session/writer.h"
 
@@ -34,7 +33,6 @@ constexpr int kParts = 10 * kPasses;
 constexpr Seconds kFirst{2};  // the first frame's read-out on the rig's clock
 constexpr Seconds kShortest = microseconds(1);
 constexpr std::uint64_t kOffsetStream = 1;
-constexpr Kelvin kMiddling{1800};  // at which a channel's mean wavelength is taken
 
 /// How often a grid of so many cells is the finer one of a grid on which a flame may begin.
 int refinements(int cells) {
@@ -171,7 +169,7 @@ class Filming {
         folder_(std::move(folder)),
         late_(draw_offsets(options)),
         light_(std::make_shared<GasLight>(options.cameras)) {
-    if (options.preset == recon::FlamePreset::smoke) sun_ = options.sun.value_or(Sun{});
+    if (options.preset == recon::FlamePreset::smoke) sun_ = options.sun.value_or(recon::Sun{});
     if (options.response) response_ = *options.response;
     if (channels(options.format) == 1 && !is_bayer(options.format)) response_ = as_grey(std::move(response_));
     film_.frames = options.frames;
@@ -258,33 +256,7 @@ class Filming {
     std::vector<const recon::CameraModel*> models;
     models.reserve(cameras.size());
     for (const std::size_t camera : cameras) models.push_back(&stage_.cameras[camera]);
-    return seen(visible(flame_.state(), response_, sun_, options_.compute), models);
-  }
-  /// Soot takes each channel's share of the light that it glows with.
-  [[nodiscard]] std::vector<recon::RadianceImage> seen(
-      recon::Volume volume, const std::vector<const recon::CameraModel*>& cameras) const {
-    if (sun_) return rendered(volume, cameras);
-    const auto shares = recon::channel_absorption(response_, recon::Emitter::soot, kMiddling);
-    const std::vector<float> green = volume.extinction;
-    std::vector<recon::RadianceImage> all;
-    for (std::size_t c = 0; c < 3; ++c) {
-      for (std::size_t p = 0; p < green.size(); ++p)
-        volume.extinction[p] = green[p] * static_cast<float>(shares[c]);
-      std::vector<recon::RadianceImage> own = rendered(volume, cameras);
-      if (c == 0) all.swap(own);
-      for (std::size_t v = 0; c > 0 && v < all.size(); ++v)
-        for (std::size_t i = c; i < all[v].rgb.size(); i += 3) all[v].rgb[i] = own[v].rgb[i];
-    }
-    return all;
-  }
-  [[nodiscard]] std::vector<recon::RadianceImage> rendered(
-      const recon::Volume& volume, const std::vector<const recon::CameraModel*>& cameras) const {
-    recon::Effects effects;
-    effects.extinction.model = recon::Extinction::Model::field;
-    recon::RenderOptions march;
-    march.compute = options_.compute;
-    const std::vector<const recon::RadianceImage*> backgrounds(cameras.size());  // black
-    return recon::render_views(volume, recon::whole_grid(volume.grid), effects, cameras, backgrounds, march);
+    return recon::film_gas(flame_.state(), response_, sun_, models, options_.compute);
   }
   Status film_now(const std::vector<std::size_t>& cameras) {
     std::vector<recon::RadianceImage> shown = pictures(cameras);
@@ -298,7 +270,7 @@ class Filming {
   }
   Status keep_truth(int frame) const {
     const recon::GasState gas = flame_.state();
-    recon::Volume volume = visible(gas, response_, sun_, options_.compute);
+    recon::Volume volume = recon::visible_gas(gas, response_, sun_, options_.compute);
     for (float& e : volume.emission) e *= static_cast<float>(film_.gain);
     return recon::write_volume(volume, folder_ / "truth" / fmt::format("frame-{:04}.vdb", frame),
                                {{"temperature", "K", gas.temperature}, {"velocity", "m/s", gas.velocity}});
@@ -342,7 +314,7 @@ class Filming {
   std::vector<Seconds> late_;          // by camera
   std::vector<std::size_t> in_order_;  // cameras, the latest last
   std::shared_ptr<GasLight> light_;
-  std::optional<Sun> sun_;
+  std::optional<recon::Sun> sun_;
   recon::CameraResponse response_ = recon::standard_response();
   std::unique_ptr<drivers::VirtualRig> rig_;
   std::optional<session::SessionWriter> writer_;

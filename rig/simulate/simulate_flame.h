@@ -12,7 +12,7 @@
 #include "recon/calibrate/camera_response.h"
 #include "recon/compute/device.h"
 #include "recon/synthetic/flame_simulation.h"
-#include "rig/simulate/gas_light.h"
+#include "recon/synthetic/visible_gas.h"
 
 namespace emberlock::rig {
 
@@ -34,8 +34,8 @@ struct SimulateOptions {
   /// first frame's brightest pixel 230 of 255 levels, at most a frame period; otherwise kUsualExposure. Told
   /// for an absolute response alone: without a scale no exposure changes a picture.
   std::optional<Seconds> exposure;
-  std::optional<Sun> sun;  ///< of smoke alone, which doesn't glow; absent: Sun{}
-  std::uint64_t seed = 1;  ///< of burners, offsets and noise
+  std::optional<recon::Sun> sun;  ///< of smoke alone, which doesn't glow; absent: recon::Sun{}
+  std::uint64_t seed = 1;         ///< of burners, offsets and noise
   recon::ComputeOptions compute;
 
   static constexpr Seconds kUsualExposure = milliseconds(1);

@@ -125,7 +125,7 @@ TEST_F(SimulateFlameTest, SmokeIsLitByTheSun) {
   SimulateOptions o = small();
   o.preset = recon::FlamePreset::smoke;
   o.read_noise = 0;
-  o.sun = Sun{{0, 0, 1}, 0.5};
+  o.sun = recon::Sun{{0, 0, 1}, 0.5};
   ASSERT_TRUE(simulate_flame(o, folder_).ok());
   for (const recon::View& view : filmed(1).views) EXPECT_LT(off(view, truth(1), {1, 1, 1}), 0.51);
   // What the topmost points scatter, of the sun that stands above: half a cell's way takes next to nothing.
@@ -301,7 +301,7 @@ TEST_F(SimulateFlameTest, ACandleIsNotTakenForAThickMedium) {
 
 TEST_F(SimulateFlameTest, RefusesWhatCannotBeFilmed) {
   SimulateOptions sunny = small();
-  sunny.sun = Sun{};
+  sunny.sun = recon::Sun{};
   EXPECT_EQ(simulate_flame(sunny, folder_).error().kind, ErrorKind::bad_input);
   SimulateOptions late = small();
   late.offsets = milliseconds(30);

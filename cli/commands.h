@@ -19,6 +19,8 @@ void add_view(CLI::App& app);
 void add_measure(CLI::App& app);
 void add_render(CLI::App& app);
 void add_tradeoff(CLI::App& app);
+/// `evaluate paper`.
+void add_evaluate(CLI::App& app);
 /// `tradeoff sync`; `parent` is the verb tradeoff.
 void add_tradeoff_sync(CLI::App& parent);
 /// `tradeoff rig`; `parent` is the verb tradeoff.

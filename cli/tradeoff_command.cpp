@@ -2,11 +2,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <string_view>
 #include <system_error>
-#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,6 +12,7 @@
 #include "base/clock.h"
 #include "base/file.h"
 #include "cli/commands.h"
+#include "cli/machine.h"
 #include "cli/outputs.h"
 #include "cli/scene_options.h"
 #include "evaluate/measure_front.h"
@@ -98,21 +97,6 @@ std::string common_options(const SweepArguments& arguments) {
   return words;
 }
 
-/// The processor and the number of threads.
-std::string machine(const SweepArguments& arguments) {
-  std::ifstream in("/proc/cpuinfo");
-  std::string model = "this machine";
-  for (std::string line; std::getline(in, line);) {
-    if (line.starts_with("model name") && line.find(": ") != std::string::npos) {
-      model = line.substr(line.find(": ") + 2);
-      break;
-    }
-  }
-  const int threads =
-      arguments.threads > 0 ? arguments.threads : static_cast<int>(std::thread::hardware_concurrency());
-  return fmt::format("{}, {} threads, device {}", model, threads, arguments.device);
-}
-
 void print_summary(const report::Tradeoff& tradeoff, const std::string& out) {
   std::printf("%s\n", report::what_a_second_buys(tradeoff.sweep.points).c_str());
   for (const recon::WorkPoint& p : evaluate::pareto_front(tradeoff.sweep.points)) {
@@ -161,7 +145,8 @@ void tradeoff_recon(const SweepArguments& arguments) {
   recon::Scene scene = or_fail(recon::load_scene(arguments.input, scene_options));
   or_fail(recon::hold_out(scene, arguments.held_out));
   SteadyClock clock;
-  report::Tradeoff tradeoff{arguments.input, common_options(arguments), machine(arguments), {}};
+  report::Tradeoff tradeoff{
+      arguments.input, common_options(arguments), machine(arguments.threads, arguments.device), {}};
   tradeoff.sweep = or_fail(evaluate::sweep(scene, options, clock, progress_bar("tradeoff")));
   or_fail(report::write_tradeoff(tradeoff, where));
   print_summary(tradeoff, arguments.out);

@@ -27,6 +27,7 @@ int main(int argc, char** argv) {
   emberlock::cli::add_measure(app);
   emberlock::cli::add_verify(app);
   emberlock::cli::add_tradeoff(app);
+  emberlock::cli::add_evaluate(app);
 #if EMBERLOCK_WITH_DRIVERS
   emberlock::cli::add_demo(app);
   emberlock::cli::add_sample(app);

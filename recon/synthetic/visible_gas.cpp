@@ -13,7 +13,7 @@ namespace emberlock::recon {
 namespace {
 
 constexpr Kelvin kSun{5772};
-constexpr Kelvin kMiddling{1800};  // at which a channel's mean wavelength is taken
+constexpr Kelvin kMiddling{1800};           // at which a channel's mean wavelength is taken
 constexpr double kSunSteradian = 6.794e-5;  // pi (radius / distance)^2
 
 void add_glow(const GasState& gas, const EmitterTable& table, Volume& volume) {

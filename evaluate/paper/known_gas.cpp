@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "evaluate/paper/known_gas.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include <Eigen/Geometry>
+#include <fmt/format.h>
+
+#include "base/random.h"
+#include "recon/export/volume_file.h"
+#include "recon/temperature/emitter.h"
+
+namespace emberlock::evaluate {
+namespace {
+
+constexpr double kFieldOfView = 60;  // degrees
+constexpr double kPeak = 230;        // grey levels
+constexpr double kFlameWidth = 0.2, kSmokeWidth = 0.6;  // metres
+
+double radians(double degrees) { return degrees * std::numbers::pi / 180; }
+
+/// How long gas is followed on each grid, each twice as fine as the one before: to stand, to find its
+/// structures, to sharpen them.
+struct Stage {
+  int cells;  // of the finest: a share
+  double seconds;
+};
+constexpr Stage kStages[] = {{4, 0.9}, {2, 0.12}, {1, 0.02}};
+constexpr int kParts = 20;  // of a stage, for progress
+
+recon::FlameSimulationOptions simulation_of(Subject subject, int cells,
+                                            const recon::ComputeOptions& compute) {
+  recon::FlameSimulationOptions o;
+  o.nx = o.ny = o.nz = cells;
+  o.edge = Meters((subject == Subject::flame ? kFlameWidth : kSmokeWidth) / cells);
+  o.confinement = 0.1;
+  o.eddies = 0.1;
+  o.compute = compute;
+  o.burners = {{Meters(0), Meters(0), Meters(0.015), 0.022}};
+  if (subject == Subject::smoke) {
+    o.combustion = recon::Combustion::none;
+    o.burners = {{Meters(0), Meters(0), Meters(0.05), 0.5}};
+    o.gas.burner_temperature = 600;
+    o.burner_soot = 0.01;
+  }
+  return o;
+}
+
+recon::CameraModel camera_at(const CameraPlace& place, const recon::Box& box, ImageSize size) {
+  const double focal = std::max(size.width, size.height) / 2.0 / std::tan(radians(kFieldOfView / 2));
+  const recon::Intrinsics pinhole{size, focal, focal, size.width / 2.0, size.height / 2.0, {}};
+  const double a = radians(place.azimuth);
+  const double e = radians(place.elevation);
+  const Eigen::Vector3d direction(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
+  return recon::look_at(pinhole, box.center + 1.5 * box.size.x() * direction, box.center);
+}
+
+/// Turned by small angles about its own axes.
+recon::CameraModel pointing_beside(recon::CameraModel camera, double pixels, std::uint64_t seed,
+                                   std::uint64_t view) {
+  const double sigma = pixels / camera.intrinsics.fx;
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  for (std::uint64_t axis = 0; axis < 3; ++axis)
+    turn = Eigen::AngleAxisd(sigma * random_normal(seed, view, axis),
+                             Eigen::Vector3d::Unit(static_cast<Eigen::Index>(axis))) *
+           turn;
+  const Eigen::Vector3d center = camera.center();
+  camera.camera_from_world.rotation = turn * camera.camera_from_world.rotation;
+  camera.camera_from_world.translation = -(camera.camera_from_world.rotation * center);
+  return camera;
+}
+
+/// As a camera of 8 bits gives it.
+void digitise(recon::RadianceImage& image, double noise, std::uint64_t seed, std::uint64_t view) {
+  for (std::size_t i = 0; i < image.rgb.size(); ++i) {
+    double level = static_cast<double>(image.rgb[i]);
+    if (noise > 0) level += noise * random_normal(seed, 1000 + view, i);
+    image.rgb[i] = static_cast<float>(std::clamp(std::round(level), 0.0, 255.0));
+  }
+}
+
+/// Three broad channels, so that a black body of 5500 K, daylight, is white.
+recon::CameraResponse daylight_camera() {
+  recon::CameraResponse camera;
+  camera.absolute = true;
+  constexpr std::array<double, 3> kMiddle = {600, 540, 460};
+  constexpr std::array<double, 3> kWidth = {40, 40, 30};
+  for (double nm = 380; nm <= 780; nm += 5) {
+    camera.wavelength_nm.push_back(nm);
+    for (std::size_t c = 0; c < 3; ++c)
+      camera.level[c].push_back(std::exp(-0.5 * std::pow((nm - kMiddle[c]) / kWidth[c], 2)));
+  }
+  const recon::EmitterLevels white = recon::levels_of(camera, recon::Emitter::grey, Kelvin(5500));
+  for (std::size_t c = 0; c < 3; ++c)
+    for (double& level : camera.level[c]) level /= white.value[c];
+  return camera;
+}
+
+/// Scales the response so that the brightest of a few pictures from the side has kPeak levels.
+Status expose(KnownGas& known, const recon::ComputeOptions& compute) {
+  known.response = daylight_camera();
+  std::vector<recon::CameraModel> models;
+  for (const double azimuth : {0.0, 50.0, 100.0}) models.push_back(camera_at({azimuth, 0}, known.box, {160, 160}));
+  float brightest = 0;
+  for (const recon::RadianceImage& picture :
+       recon::film_gas(known.gas, known.response, known.sun, {&models[0], &models[1], &models[2]}, compute))
+    brightest = std::max(brightest, *std::max_element(picture.rgb.begin(), picture.rgb.end()));
+  if (!(brightest > 0) || !std::isfinite(brightest))
+    return Error{ErrorKind::refused, "nothing is seen of it", std::string(name(known.subject)),
+                 "Take more cells"};
+  for (std::vector<double>& channel : known.response.level)
+    for (double& level : channel) level *= kPeak / static_cast<double>(brightest);
+  return {};
+}
+
+/// What follows from the gas.
+Result<KnownGas> known(Subject subject, recon::GasState gas, const recon::ComputeOptions& compute) {
+  KnownGas out;
+  out.subject = subject;
+  out.gas = std::move(gas);
+  if (subject == Subject::smoke) out.sun = recon::Sun{{0.5, -1, 1}, 0.8};
+  const recon::Grid& g = out.gas.grid;
+  out.box.size = static_cast<double>(g.edge) * Eigen::Vector3d(g.nx, g.ny, g.nz);
+  EMBERLOCK_RETURN_IF_ERROR(expose(out, compute));
+  out.light = recon::visible_gas(out.gas, out.response, out.sun, compute);
+  return out;
+}
+
+}  // namespace
+
+std::string_view name(Subject subject) { return subject == Subject::flame ? "flame" : "smoke"; }
+
+Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOptions& compute,
+                              const Observer& observer) {
+  if (cells < 32 || cells > 512 || cells % 32 != 0)
+    return Error{ErrorKind::bad_input, fmt::format("{} cells", cells), "--cells",
+                 "Give a multiple of 32 from 32 to 512"};
+  const std::string what = fmt::format("the {} settles", name(subject));
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::FlameSimulation simulation,
+                             recon::FlameSimulation::make(
+                                 simulation_of(subject, cells / kStages[0].cells, compute)));
+  for (std::size_t stage = 0; stage < std::size(kStages); ++stage) {
+    if (stage > 0) {
+      EMBERLOCK_ASSIGN_OR_RETURN(simulation, simulation.finer());
+    }
+    for (int part = 0; part < kParts; ++part) {
+      const double done = (static_cast<double>(stage) + static_cast<double>(part) / kParts) / std::size(kStages);
+      EMBERLOCK_RETURN_IF_ERROR(observe(observer, done, what));
+      EMBERLOCK_RETURN_IF_ERROR(simulation.step(Seconds(kStages[stage].seconds / kParts)));
+    }
+  }
+  recon::GasState gas = simulation.state();
+  gas.grid.origin[2] -= gas.grid.edge * static_cast<float>(gas.grid.nz) / 2;
+  return known(subject, std::move(gas), compute);
+}
+
+Status write_gas(const KnownGas& gas, const std::filesystem::path& path) {
+  return recon::write_volume(gas.light, path,
+                             {{"temperature", "K", gas.gas.temperature},
+                              {"absorption", "1/m", gas.gas.absorption}});
+}
+
+Result<KnownGas> read_gas(Subject subject, const std::filesystem::path& path,
+                          const recon::ComputeOptions& compute) {
+  recon::GasState gas;
+  EMBERLOCK_ASSIGN_OR_RETURN(recon::Volume light, recon::read_volume(path));
+  gas.grid = light.grid;
+  EMBERLOCK_ASSIGN_OR_RETURN(gas.temperature, recon::read_grid(path, "temperature"));
+  EMBERLOCK_ASSIGN_OR_RETURN(gas.absorption, recon::read_grid(path, "absorption"));
+  return known(subject, std::move(gas), compute);
+}
+
+recon::Scene film(const KnownGas& gas, const Case& of, std::uint64_t seed,
+                  const recon::ComputeOptions& compute) {
+  recon::Scene scene;
+  scene.box = gas.box;
+  std::vector<recon::CameraModel> models;
+  for (const CameraPlace& place : of.cameras) models.push_back(camera_at(place, gas.box, of.image));
+  std::vector<const recon::CameraModel*> cameras;
+  cameras.reserve(models.size());
+  for (const recon::CameraModel& model : models) cameras.push_back(&model);
+  std::vector<recon::RadianceImage> pictures =
+      recon::film_gas(gas.gas, gas.response, gas.sun, cameras, compute);
+  for (std::size_t v = 0; v < models.size(); ++v) {
+    const CameraPlace& place = of.cameras[v];
+    const bool input = place.role == recon::ViewRole::input;
+    digitise(pictures[v], input ? of.noise : 0, seed, v);
+    recon::View view{fmt::format("{:.0f} degrees", place.azimuth), models[v],
+                     recon::share(std::move(pictures[v])), place.role};
+    if (input && of.pose_error > 0) view.camera = pointing_beside(models[v], of.pose_error, seed, v);
+    scene.views.push_back(std::move(view));
+  }
+  return scene;
+}
+
+std::vector<float> at_key_points(const recon::Grid& grid, const recon::Grid& from,
+                                 const std::vector<float>& values, std::size_t lanes) {
+  std::vector<float> out(lanes * grid.size());
+  const int n[3] = {from.nx, from.ny, from.nz};
+  for (int k = 0; k < grid.nz; ++k)
+    for (int j = 0; j < grid.ny; ++j)
+      for (int i = 0; i < grid.nx; ++i) {
+        const int at[3] = {i, j, k};
+        int low[3];
+        float part[3];
+        bool inside = true;
+        for (int d = 0; d < 3; ++d) {
+          const float x = (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
+          inside = inside && x >= 0 && x < static_cast<float>(n[d] - 1);
+          low[d] = inside ? static_cast<int>(x) : 0;
+          part[d] = x - static_cast<float>(low[d]);
+        }
+        if (!inside) continue;
+        float* to = &out[lanes * grid.index(i, j, k)];
+        for (int corner = 0; corner < 8; ++corner) {
+          float weight = 1;
+          for (int d = 0; d < 3; ++d) weight *= (corner >> d & 1) != 0 ? part[d] : 1 - part[d];
+          const float* value = &values[lanes * from.index(low[0] + (corner & 1), low[1] + (corner >> 1 & 1),
+                                                          low[2] + (corner >> 2))];
+          for (std::size_t lane = 0; lane < lanes; ++lane) to[lane] += weight * value[lane];
+        }
+      }
+  return out;
+}
+
+}  // namespace emberlock::evaluate

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "base/progress.h"
+#include "base/quantity.h"
+#include "base/result.h"
+#include "evaluate/paper/protocol.h"
+#include "recon/calibrate/box.h"
+#include "recon/calibrate/camera_response.h"
+#include "recon/preprocess/view.h"
+#include "recon/render/volume.h"
+#include "recon/synthetic/visible_gas.h"
+
+namespace emberlock::evaluate {
+
+/// An instant of simulated gas around the origin whose truth is known in every cell.
+struct KnownGas {
+  Subject subject = Subject::flame;
+  recon::GasState gas;
+  recon::Box box;
+  recon::CameraResponse response;  ///< absolute, so that the brightest pixel from the side has 230 levels
+  std::optional<recon::Sun> sun;
+  recon::Volume light;  ///< what cameras of that response see of it, levels a metre
+};
+
+/// Burns or blows until the gas stands (recon/synthetic/flame_simulation.h), on coarse grids first: the flame
+/// of a burner of 3 cm, about 0.7 kW, in a cube of 20 cm; smoke of a source of 10 cm in one of 60 cm. `cells`:
+/// along each edge, a multiple of 32 from 32 to 512. Errors: those of FlameSimulation; refused where the
+/// observer asks to end, or where nothing is seen.
+Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOptions& compute,
+                              const Observer& observer = {});
+
+/// The truth as a file that other programs open (recon/export/volume_file.h): emission and density, and
+/// temperature (K) and absorption (1/m) beside them, from which read_gas() has the same again.
+Status write_gas(const KnownGas& gas, const std::filesystem::path& path);
+Result<KnownGas> read_gas(Subject subject, const std::filesystem::path& path,
+                          const recon::ComputeOptions& compute);
+
+/// The views of a case: 8 bits, linear in light. What the case's noise does to pictures and poses is a pure
+/// function of `seed`; held-out views are as they are.
+recon::Scene film(const KnownGas& gas, const Case& of, std::uint64_t seed,
+                  const recon::ComputeOptions& compute);
+
+/// Values at a grid's key points, trilinear between those of another; `lanes` to a point. 0 outside.
+std::vector<float> at_key_points(const recon::Grid& grid, const recon::Grid& from,
+                                 const std::vector<float>& values, std::size_t lanes);
+
+}  // namespace emberlock::evaluate

@@ -42,7 +42,7 @@ void evaluate_the_paper(const EvaluateArguments& arguments) {
       }));
   or_fail(report::write_paper_report(done, machine(options.compute.threads, arguments.device), report));
   for (const std::string& line : report::paper_words(done)) std::printf("%s\n", line.c_str());
-  for (const evaluate::Run& run : done.runs)
+  for (const evaluate::MethodRun& run : done.runs)
     if (!run.failed.empty())
       std::printf("%s, %s: %s\n", run.of.c_str(), run.method.c_str(), run.failed.c_str());
   std::printf("written to %s\n", (report.target / "index.html").c_str());
@@ -68,18 +68,21 @@ void add_evaluate(CLI::App& app) {
   verb->require_subcommand(1);
   CLI::App* paper = verb->add_subcommand(
       "paper", "The paper's tables and figures again, with every method on the same pictures");
-  paper->add_option("--out", a.out,
-                    "Folder for report/, runs/ and truth/; one that was begun with the same settings goes on")
+  paper
+      ->add_option("--out", a.out,
+                   "Folder for report/, runs/ and truth/; one that was begun with the same settings goes on")
       ->required();
   paper->add_flag("--quick", a.quick, "Small pictures and few cameras: a minute instead of half an hour");
   paper->add_option("--only", a.options.only, "Some of the tables: " + names_of_protocols())->delimiter(',');
-  paper->add_option("--methods", a.options.methods, "Some of the methods: " + names_of_methods())->delimiter(',');
+  paper->add_option("--methods", a.options.methods, "Some of the methods: " + names_of_methods())
+      ->delimiter(',');
   paper->add_option("--cells", a.options.cells,
                     "Of the simulated gas along each edge, a multiple of 32 [192; quick: 64]");
   paper->add_option("--voxels", a.options.voxels, "Of every reconstruction along an edge [128; quick: 48]");
   paper->add_option("--seed", a.options.seed, "Of what is random: noise, methods")->capture_default_str();
-  paper->add_option("--device", a.device,
-                    "auto: the CPU, and where there is a GPU the paper's method and ours there too; cpu; cuda")
+  paper
+      ->add_option("--device", a.device,
+                   "auto: the CPU, and where there is a GPU the paper's method and ours there too; cpu; cuda")
       ->capture_default_str();
   paper->add_option("--threads", a.options.compute.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))

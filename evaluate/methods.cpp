@@ -28,8 +28,8 @@ MethodResult result_of(recon::Reconstruction done) {
 }  // namespace
 
 recon::Effects papers_effects(const recon::Grid& grid) {
-  return recon::absorbing(recon::extinction_of_opacity(recon::kPaperOpacityOfAStep,
-                                                       Meters(static_cast<double>(grid.edge))));
+  return recon::absorbing(
+      recon::extinction_of_opacity(recon::kPaperOpacityOfAStep, Meters(static_cast<double>(grid.edge))));
 }
 
 Result<MethodResult> the_papers_method(const recon::Scene& scene, const MethodOptions& options) {
@@ -49,13 +49,13 @@ Result<MethodResult> the_papers_method(const recon::Scene& scene, const MethodOp
 Result<MethodResult> default_method(const recon::Scene& scene, const MethodOptions& options) {
   const recon::Grid grid = recon::grid_over(scene.box, options.voxels);
   const recon::SolveOptions solve = solve_options(options);
-  EMBERLOCK_ASSIGN_OR_RETURN(const recon::EffectChoice choice,
-                             recon::choose_effects(scene, grid, {}, solve));
+  EMBERLOCK_ASSIGN_OR_RETURN(const recon::EffectChoice choice, recon::choose_effects(scene, grid, {}, solve));
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Reconstruction done, recon::solve(scene, grid, choice.effects, solve));
   std::vector<float> kelvin;
   if (options.response) {
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::VolumeErrors errors, recon::errors_by_views(scene, done, solve));
-    kelvin = recon::temperature_of(scene, done, errors, *options.response, recon::Emitter::soot, solve).kelvin;
+    kelvin =
+        recon::temperature_of(scene, done, errors, *options.response, recon::Emitter::soot, solve).kelvin;
   }
   MethodResult result = result_of(std::move(done));
   result.kelvin = std::move(kelvin);

@@ -26,7 +26,8 @@ const evaluate::RunPicture* find(const std::vector<evaluate::RunPicture>& pictur
   return nullptr;
 }
 
-const evaluate::FilmedCase* filmed(const evaluate::PaperEvaluation& evaluation, const evaluate::Run& run) {
+const evaluate::FilmedCase* filmed(const evaluate::PaperEvaluation& evaluation,
+                                   const evaluate::MethodRun& run) {
   for (const evaluate::FilmedCase& f : evaluation.filmed)
     if (f.protocol == run.protocol && f.of == run.of) return &f;
   return nullptr;
@@ -51,8 +52,8 @@ Image error_of(const Image& a, const Image& b) {
   Image out(ImageLayout{a.layout().size, PixelFormat::rgb8, 8});
   for (int y = 0; y < a.layout().size.height; ++y)
     for (int i = 0; i < 3 * a.layout().size.width; ++i)
-      out.row_as<std::uint8_t>(y)[i] = static_cast<std::uint8_t>(
-          std::min(255, kErrorGain * std::abs(row_of(a, y)[i] - row_of(b, y)[i])));
+      out.row_as<std::uint8_t>(y)[i] =
+          static_cast<std::uint8_t>(std::min(255, kErrorGain * std::abs(row_of(a, y)[i] - row_of(b, y)[i])));
   return out;
 }
 
@@ -70,7 +71,7 @@ void add_pair(std::vector<HtmlPage::Picture>& out, const Image& truth, const Ima
                       fmt::format("{}; its error, times {}", caption, kErrorGain)));
 }
 
-std::string name_of(const evaluate::Run& run) {
+std::string name_of(const evaluate::MethodRun& run) {
   return run.device == "cpu" ? run.method : run.method + ", " + run.device;
 }
 
@@ -93,7 +94,7 @@ std::vector<HtmlPage::Picture> method_pictures(const evaluate::PaperEvaluation& 
                                                const evaluate::Protocol& protocol) {
   std::vector<HtmlPage::Picture> out;
   std::string last;
-  for (const evaluate::Run& run : evaluation.runs) {
+  for (const evaluate::MethodRun& run : evaluation.runs) {
     if (run.protocol != protocol.name || !run.failed.empty() || run.device != "cpu") continue;
     const evaluate::FilmedCase* truth = filmed(evaluation, run);
     const evaluate::RunPicture* image = find(run.pictures, "test-");
@@ -113,7 +114,7 @@ std::vector<HtmlPage::Picture> method_pictures(const evaluate::PaperEvaluation& 
 std::vector<HtmlPage::Picture> pass_pictures(const evaluate::PaperEvaluation& evaluation,
                                              const evaluate::Protocol& protocol) {
   std::vector<HtmlPage::Picture> out;
-  for (const evaluate::Run& run : evaluation.runs) {
+  for (const evaluate::MethodRun& run : evaluation.runs) {
     const evaluate::FilmedCase* truth = filmed(evaluation, run);
     if (run.protocol != protocol.name || truth == nullptr) continue;
     const evaluate::RunPicture* test = find(truth->pictures, "test-");
@@ -131,7 +132,7 @@ std::vector<HtmlPage::Picture> slice_pictures(const evaluate::PaperEvaluation& e
   for (const evaluate::Case& one : protocol.cases)
     if (of.empty() || one.cameras.size() <= 17) of = one.name;
   std::vector<HtmlPage::Picture> out;
-  for (const evaluate::Run& run : evaluation.runs) {
+  for (const evaluate::MethodRun& run : evaluation.runs) {
     if (run.protocol != protocol.name || run.of != of || !run.slice || run.device != "cpu") continue;
     const evaluate::TemperatureSlice& slice = *run.slice;
     std::vector<float> off(slice.found.size());
@@ -142,7 +143,8 @@ std::vector<HtmlPage::Picture> slice_pictures(const evaluate::PaperEvaluation& e
     const auto large = [&](const Image& image) { return enlarged(crop(image, box), most); };
     const std::string range = fmt::format("{} (dark) to {} K (bright)", kColdest, kHottest);
     out.push_back(shown(large(found), fmt::format("{}, {}: {}", run.of, name_of(run), range)));
-    out.push_back(shown(large(coloured(slice, slice.truth, kColdest, kHottest)), "the truth there, " + range));
+    out.push_back(
+        shown(large(coloured(slice, slice.truth, kColdest, kHottest)), "the truth there, " + range));
     out.push_back(shown(large(coloured(slice, off, 0, kWorst)), fmt::format("off by 0 to {} K", kWorst)));
   }
   return out;

@@ -17,9 +17,9 @@
 namespace emberlock::report {
 namespace {
 
+using evaluate::MethodRun;
 using evaluate::PaperEvaluation;
 using evaluate::Protocol;
-using evaluate::Run;
 
 std::string by_channel(const std::array<double, 3>& v, double scale = 1, int digits = 1) {
   return fmt::format("{:.{}f} / {:.{}f} / {:.{}f}", scale * v[0], digits, scale * v[1], digits, scale * v[2],
@@ -28,15 +28,15 @@ std::string by_channel(const std::array<double, 3>& v, double scale = 1, int dig
 double mean_square(const std::array<double, 3>& v) {
   return std::sqrt((v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / 3);
 }
-std::string name_of_run(const Run& run) {
+std::string name_of_run(const MethodRun& run) {
   return run.device == "cpu" ? run.method : run.method + ", " + run.device;
 }
-bool of_protocol(const Run& run, const Protocol& protocol) { return run.protocol == protocol.name; }
+bool of_protocol(const MethodRun& run, const Protocol& protocol) { return run.protocol == protocol.name; }
 
 /// A run on the CPU that made something; null otherwise.
-const Run* find_run(const PaperEvaluation& e, std::string_view protocol, std::string_view method,
-                    std::string_view of = {}) {
-  for (const Run& run : e.runs)
+const MethodRun* find_run(const PaperEvaluation& e, std::string_view protocol, std::string_view method,
+                          std::string_view of = {}) {
+  for (const MethodRun& run : e.runs)
     if (run.protocol == protocol && run.method == method && run.device == "cpu" && run.failed.empty() &&
         (of.empty() || run.of == of))
       return &run;
@@ -52,9 +52,10 @@ std::array<double, 3> times(const std::array<double, 3>& a, const std::array<dou
 
 void add_runs(HtmlPage& page, const PaperEvaluation& e, const Protocol& protocol) {
   std::vector<std::string> header = {"case", "method", "input, R / G / B", "test", "volume, %", "seconds"};
-  if (protocol.temperatures) header.insert(header.end(), {"temperature, median K", "95 %", "bias", "told, %"});
+  if (protocol.temperatures)
+    header.insert(header.end(), {"temperature, median K", "95 %", "bias", "told, %"});
   std::vector<std::vector<std::string>> rows;
-  for (const Run& run : e.runs) {
+  for (const MethodRun& run : e.runs) {
     if (!of_protocol(run, protocol)) continue;
     if (!run.failed.empty()) {
       rows.push_back({run.of, name_of_run(run), "failed: " + run.failed});
@@ -84,22 +85,23 @@ void add_printed(HtmlPage& page, const Protocol& protocol) {
 
 /// Errors of the test views against what `x` says of each run of a method, a line a channel.
 template <class X>
-std::vector<Series> channels(const std::vector<const Run*>& runs, const std::string& method, bool dashed,
-                             const X& x) {
+std::vector<Series> channels(const std::vector<const MethodRun*>& runs, const std::string& method,
+                             bool dashed, const X& x) {
   std::vector<Series> lines;
   for (std::size_t c = 0; c < 3; ++c) {
     Series line{method + ", " + std::string(1, "RGB"[c]), {}, {}};
     line.dashed = dashed;
-    line.colour = std::array<std::size_t, 3>{5, 2, 4}[c];  // red, green, blue of the palette
-    for (const Run* run : runs) x(*run, c, line);
+    line.colour = std::array<std::size_t, 3>{1, 2, 0}[c];  // red, green, blue of the palette
+    for (const MethodRun* run : runs) x(*run, c, line);
     lines.push_back(std::move(line));
   }
   return lines;
 }
 
-std::vector<const Run*> runs_of(const PaperEvaluation& e, const Protocol& protocol, std::string_view method) {
-  std::vector<const Run*> runs;
-  for (const Run& run : e.runs)
+std::vector<const MethodRun*> runs_of(const PaperEvaluation& e, const Protocol& protocol,
+                                      std::string_view method) {
+  std::vector<const MethodRun*> runs;
+  for (const MethodRun& run : e.runs)
     if (of_protocol(run, protocol) && run.method == method && run.device == "cpu" && run.failed.empty())
       runs.push_back(&run);
   return runs;
@@ -109,14 +111,15 @@ void add_passes_plots(HtmlPage& page, const PaperEvaluation& e, const Protocol& 
   for (const bool of_volume : {false, true}) {
     std::vector<Series> all;
     for (const std::string_view method : protocol.methods) {
-      const auto lines = channels(runs_of(e, protocol, method), std::string(method),
-                                  method == evaluate::kPapersMethod, [&](const Run& run, std::size_t c, Series& line) {
-                                    for (const evaluate::RunPoint& p : run.points) {
-                                      line.x.push_back(std::max(1e-3, p.time.value()));
-                                      line.y.push_back(of_volume ? 100 * p.errors.volume[c] : p.errors.test[c]);
-                                      line.notes.push_back(fmt::format("{} iterations", p.iteration));
-                                    }
-                                  });
+      const auto lines =
+          channels(runs_of(e, protocol, method), std::string(method), method == evaluate::kPapersMethod,
+                   [&](const MethodRun& run, std::size_t c, Series& line) {
+                     for (const evaluate::RunPoint& p : run.points) {
+                       line.x.push_back(std::max(1e-3, p.time.value()));
+                       line.y.push_back(of_volume ? 100 * p.errors.volume[c] : p.errors.test[c]);
+                       line.notes.push_back(fmt::format("{} iterations", p.iteration));
+                     }
+                   });
       all.insert(all.end(), lines.begin(), lines.end());
     }
     PlotOptions plot;
@@ -128,13 +131,12 @@ void add_passes_plots(HtmlPage& page, const PaperEvaluation& e, const Protocol& 
   }
 }
 
-std::size_t inputs_of(const Protocol& protocol, const Run& run) {
+std::size_t inputs_of(const Protocol& protocol, const MethodRun& run) {
   for (const evaluate::Case& of : protocol.cases)
     if (of.name == run.of)
-      return static_cast<std::size_t>(
-          std::count_if(of.cameras.begin(), of.cameras.end(), [](const evaluate::CameraPlace& place) {
-            return place.role == recon::ViewRole::input;
-          }));
+      return static_cast<std::size_t>(std::count_if(
+          of.cameras.begin(), of.cameras.end(),
+          [](const evaluate::CameraPlace& place) { return place.role == recon::ViewRole::input; }));
   return 0;
 }
 
@@ -142,15 +144,15 @@ void add_camera_plots(HtmlPage& page, const PaperEvaluation& e, const Protocol& 
   std::vector<Series> pixels;
   std::vector<Series> kelvin;
   for (const std::string_view method : protocol.methods) {
-    const std::vector<const Run*> runs = runs_of(e, protocol, method);
+    const std::vector<const MethodRun*> runs = runs_of(e, protocol, method);
     const auto lines = channels(runs, std::string(method), method == evaluate::kPapersMethod,
-                                [&](const Run& run, std::size_t c, Series& line) {
+                                [&](const MethodRun& run, std::size_t c, Series& line) {
                                   line.x.push_back(static_cast<double>(inputs_of(protocol, run)));
                                   line.y.push_back(run.errors.test[c]);
                                 });
     pixels.insert(pixels.end(), lines.begin(), lines.end());
     Series line{std::string(method) + ", median", {}, {}};
-    for (const Run* run : runs) {
+    for (const MethodRun* run : runs) {
       if (!run->temperature || !(run->temperature->told > 0)) continue;
       line.x.push_back(static_cast<double>(inputs_of(protocol, *run)));
       line.y.push_back(run->temperature->median);
@@ -168,26 +170,31 @@ void add_camera_plots(HtmlPage& page, const PaperEvaluation& e, const Protocol& 
 }
 
 void add_methods(HtmlPage& page, const PaperEvaluation& e) {
-  page.heading("The methods").paragraph(
-      "As the paper's table of methods, with the seconds that one frame takes here: ten cameras of which nine are the input, the same voxels. "
-      "The paper prints 0.56 s for its own method on a GTX 850M, 0.91 s for Wu et al., more than 10 s for Zhou et al. and more than 60 s for all others.");
+  page.heading("The methods")
+      .paragraph(
+          "As the paper's table of methods, with the seconds that one frame takes here: ten cameras of which "
+          "nine are the input, the same voxels. "
+          "The paper prints 0.56 s for its own method on a GTX 850M, 0.91 s for Wu et al., more than 10 s "
+          "for Zhou et al. and more than 60 s for all others.");
   std::vector<std::vector<std::string>> rows;
   for (const evaluate::Method& method : evaluate::methods()) {
-    std::vector<std::string> row = {std::string(method.facts.name),
-                                    std::string(method.facts.publication),
-                                    method.facts.in_plane ? "yes" : "no",
-                                    method.facts.projection == evaluate::Projection::parallel ? "parallel" : "perspective",
-                                    std::string(method.facts.model),
-                                    method.facts.is_iterative ? "yes" : "no"};
+    std::vector<std::string> row = {
+        std::string(method.facts.name),
+        std::string(method.facts.publication),
+        method.facts.in_plane ? "yes" : "no",
+        method.facts.projection == evaluate::Projection::parallel ? "parallel" : "perspective",
+        std::string(method.facts.model),
+        method.facts.is_iterative ? "yes" : "no"};
     std::string cpu = "-";
     std::string gpu = "-";
-    for (const Run& run : e.runs)
+    for (const MethodRun& run : e.runs)
       if (run.protocol == "nine-views" && run.method == method.facts.name && run.failed.empty())
         (run.device == "cpu" ? cpu : gpu) = fmt::format("{:.2f}", run.time.value());
     row.insert(row.end(), {cpu, gpu});
     rows.push_back(std::move(row));
   }
-  page.table({"method", "publication", "in a plane", "projection", "light", "iterative", "CPU, s", "GPU, s"}, rows);
+  page.table({"method", "publication", "in a plane", "projection", "light", "iterative", "CPU, s", "GPU, s"},
+             rows);
 }
 
 std::string optional_number(const std::optional<evaluate::TemperatureErrors>& t) {
@@ -200,9 +207,9 @@ std::string paper_csv(const PaperEvaluation& e) {
   std::string csv =
       "protocol,case,method,device,seconds,iterations,input_r,input_g,input_b,test_r,test_g,test_b,all_r,"
       "all_g,all_b,volume_r,volume_g,volume_b,median_k,95_k,bias_k,told,failed\n";
-  for (const Run& run : e.runs) {
-    csv += fmt::format("{},{},{},{},{:.4f},{}", run.protocol, run.of, run.method, run.device, run.time.value(),
-                       run.iterations);
+  for (const MethodRun& run : e.runs) {
+    csv += fmt::format("{},{},{},{},{:.4f},{}", run.protocol, run.of, run.method, run.device,
+                       run.time.value(), run.iterations);
     for (const auto& v : {run.errors.input, run.errors.test, run.errors.all, run.errors.volume})
       csv += fmt::format(",{:.4f},{:.4f},{:.4f}", v[0], v[1], v[2]);
     csv += fmt::format(",{},{}\n", optional_number(run.temperature), run.failed.empty() ? "" : "yes");
@@ -212,29 +219,31 @@ std::string paper_csv(const PaperEvaluation& e) {
 
 std::vector<std::string> paper_words(const PaperEvaluation& e) {
   std::vector<std::string> words;
-  const Run* ours = find_run(e, "nine-views", evaluate::kDefaultMethod);
+  const MethodRun* ours = find_run(e, "nine-views", evaluate::kDefaultMethod);
   for (const std::string_view other : {std::string_view("algebraic tomography"), evaluate::kPapersMethod}) {
-    const Run* run = find_run(e, "nine-views", other);
+    const MethodRun* run = find_run(e, "nine-views", other);
     if (ours == nullptr || run == nullptr) continue;
     const auto ratio = times(run->errors.test, ours->errors.test);
-    words.push_back(fmt::format("nine views, the tenth as a test: {} errs {} times as much as emberlock (R / G / B)",
-                                other, by_channel(ratio)));
+    words.push_back(
+        fmt::format("nine views, the tenth as a test: {} errs {} times as much as emberlock (R / G / B)",
+                    other, by_channel(ratio)));
   }
-  const Run* algebraic = find_run(e, "nine-views", "algebraic tomography");
-  const Run* papers = find_run(e, "nine-views", evaluate::kPapersMethod);
+  const MethodRun* algebraic = find_run(e, "nine-views", "algebraic tomography");
+  const MethodRun* papers = find_run(e, "nine-views", evaluate::kPapersMethod);
   if (algebraic != nullptr && papers != nullptr)
-    words.push_back(fmt::format("algebraic tomography over the paper's method: {} here, 4.5 / 6.0 / 9.6 in the paper",
-                                by_channel(times(algebraic->errors.test, papers->errors.test))));
+    words.push_back(
+        fmt::format("algebraic tomography over the paper's method: {} here, 4.5 / 6.0 / 9.6 in the paper",
+                    by_channel(times(algebraic->errors.test, papers->errors.test))));
   for (const Protocol& protocol : e.protocols) {
-    const Run* smoke = find_run(e, "smoke", evaluate::kDefaultMethod);
+    const MethodRun* smoke = find_run(e, "smoke", evaluate::kDefaultMethod);
     if (protocol.name == "smoke" && smoke != nullptr)
       for (const std::string_view method : protocol.methods)
-        if (const Run* run = find_run(e, "smoke", method); run != nullptr && run != smoke)
-          words.push_back(fmt::format("smoke from three views, all views: {} {:.1f}, emberlock {:.1f}", method,
-                                      mean_square(run->errors.all), mean_square(smoke->errors.all)));
+        if (const MethodRun* run = find_run(e, "smoke", method); run != nullptr && run != smoke)
+          words.push_back(fmt::format("smoke from three views, all views: {} {:.1f}, emberlock {:.1f}",
+                                      method, mean_square(run->errors.all), mean_square(smoke->errors.all)));
     if (protocol.name != "cameras") continue;
     std::string line;
-    for (const Run* run : runs_of(e, protocol, evaluate::kDefaultMethod))
+    for (const MethodRun* run : runs_of(e, protocol, evaluate::kDefaultMethod))
       if (run->temperature)
         line += fmt::format("{}{} cameras {:.0f} K", line.empty() ? "" : ", ", inputs_of(protocol, *run),
                             run->temperature->median);
@@ -245,18 +254,23 @@ std::vector<std::string> paper_words(const PaperEvaluation& e) {
 
 std::string paper_html(const PaperEvaluation& e, const std::string& machine) {
   HtmlPage page("The paper's evaluation, on flames with known truth");
-  page.paragraph(fmt::format(
-      "Every method has the same pictures: of a flame (and smoke) simulated on {0} x {0} x {0} cells, 8 bits, linear. Every volume has {1} voxels along "
-      "its longest side, and is shown by the same renderer. Errors of pictures are root mean squares over the box of the pixels that show the flame, grey "
-      "levels of 255; of the volume, root mean squares over the method's own medium, in percent of the truth's there. Times: {2}.",
-      *e.options.cells, *e.options.voxels, machine));
+  page.paragraph(
+      fmt::format("Every method has the same pictures: of a flame (and smoke) simulated on {0} x {0} x {0} "
+                  "cells, 8 bits, linear. Every volume has {1} voxels along "
+                  "its longest side, and is shown by the same renderer. Errors of pictures are root mean "
+                  "squares over the box of the pixels that show the flame, grey "
+                  "levels of 255; of the volume, root mean squares over the method's own medium, in percent "
+                  "of the truth's there. Times: {2}.",
+                  *e.options.cells, *e.options.voxels, machine));
   if (e.options.extent == evaluate::Extent::quick)
-    page.paragraph("This is the quick variant: small pictures, few voxels. It shows that all of it works, not how good it is.");
+    page.paragraph(
+        "This is the quick variant: small pictures, few voxels. It shows that all of it works, not how good "
+        "it is.");
   for (const std::string& line : paper_words(e)) page.paragraph(sentence(line));
   for (const Protocol& protocol : e.protocols) {
     page.heading(protocol.title);
     page.paragraph(sentence("In the paper: " + std::string(protocol.paper)));
-    page.paragraph(sentence(protocol.differs));
+    page.paragraph("How the scenes differ: " + std::string(protocol.differs));
     add_runs(page, e, protocol);
     add_printed(page, protocol);
     if (!protocol.iterations.empty()) {

@@ -53,8 +53,8 @@ class Evaluation {
 
   Status run() {
     for (std::size_t i = 0; i < plan_.size(); ++i) {
-      EMBERLOCK_RETURN_IF_ERROR(
-          observe(observer_, share(i), fmt::format("run {} of {}: {}", i + 1, plan_.size(), words(plan_[i]))));
+      EMBERLOCK_RETURN_IF_ERROR(observe(
+          observer_, share(i), fmt::format("run {} of {}: {}", i + 1, plan_.size(), words(plan_[i]))));
       EMBERLOCK_RETURN_IF_ERROR(run(plan_[i], i));
     }
     return {};
@@ -83,17 +83,16 @@ class Evaluation {
   Result<const KnownGas*> gas_of(Subject subject, std::size_t at) {
     std::optional<KnownGas>& gas = gas_[static_cast<std::size_t>(subject)];
     if (gas) return &*gas;
-    const fs::path file = folder_ / "truth" / fmt::format("{}-{}", name(subject), *done_.options.cells) / "truth.vdb";
+    const fs::path file =
+        folder_ / "truth" / fmt::format("{}-{}", name(subject), *done_.options.cells) / "truth.vdb";
     if (std::error_code ec; fs::exists(file, ec)) {
       EMBERLOCK_ASSIGN_OR_RETURN(gas, read_gas(subject, file, done_.options.compute));
       return &*gas;
     }
     const double from = at == 0 ? 0 : share(at);
     const Observer part = part_of(observer_, from, at == 0 ? kGasShare : from);
-    EMBERLOCK_ASSIGN_OR_RETURN(gas,
-                               simulate_gas(subject, *done_.options.cells, done_.options.compute, part));
-    EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder out,
-                               OutputFolder::create({file.parent_path(), kEvaluatePaper}));
+    EMBERLOCK_ASSIGN_OR_RETURN(gas, simulate_gas(subject, *done_.options.cells, done_.options.compute, part));
+    EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder out, OutputFolder::create({file.parent_path(), kEvaluatePaper}));
     EMBERLOCK_RETURN_IF_ERROR(write_gas(*gas, out.path() / file.filename()));
     EMBERLOCK_RETURN_IF_ERROR(out.commit());
     return &*gas;
@@ -106,14 +105,14 @@ class Evaluation {
       filmed_of_ = planned.of;
       keep_pictures(planned);
     }
-    Run key;
+    MethodRun key;
     key.protocol = planned.protocol->name;
     key.of = planned.of->name;
     key.method = planned.method.facts.name;
     key.device = recon::name(planned.compute.device);
     const fs::path folder = folder_ / "runs" / folder_name(key);
     if (std::error_code ec; fs::exists(folder, ec)) {
-      EMBERLOCK_ASSIGN_OR_RETURN(Run before, read_run(folder, settings()));
+      EMBERLOCK_ASSIGN_OR_RETURN(MethodRun before, read_run(folder, settings()));
       ++done_.taken_up;
       done_.runs.push_back(std::move(before));
       return {};
@@ -124,8 +123,8 @@ class Evaluation {
       asked = asked || (observer_ && !observer_(share(at), words(planned)));
       return asked;
     };
-    EMBERLOCK_ASSIGN_OR_RETURN(
-        Run run, run_method(*planned.protocol, *planned.of, planned.method, *gas, scene_, run_settings, clock_));
+    EMBERLOCK_ASSIGN_OR_RETURN(MethodRun run, run_method(*planned.protocol, *planned.of, planned.method, *gas,
+                                                         scene_, run_settings, clock_));
     EMBERLOCK_RETURN_IF_ERROR(write_run(run, settings(), folder));
     done_.runs.push_back(std::move(run));
     return {};
@@ -171,7 +170,8 @@ Result<PaperEvaluation> evaluate_paper(const PaperOptions& options, const fs::pa
   Evaluation evaluation(done, folder, clock, observer);
   EMBERLOCK_RETURN_IF_ERROR(evaluation.plan());
   EMBERLOCK_RETURN_IF_ERROR(evaluation.run());
-  if (std::all_of(done.runs.begin(), done.runs.end(), [](const Run& run) { return !run.failed.empty(); }))
+  if (std::all_of(done.runs.begin(), done.runs.end(),
+                  [](const MethodRun& run) { return !run.failed.empty(); }))
     return Error{ErrorKind::not_converged, "no method made anything of its pictures", folder.string(),
                  done.runs.empty() ? "Choose methods of the tables chosen" : done.runs.front().failed};
   done.total = clock.now() - begin;

@@ -32,13 +32,13 @@ struct PaperOptions {
 /// The pictures that a case's runs were given.
 struct FilmedCase {
   std::string protocol, of;
-  std::vector<RunPicture> pictures;  ///< names as those of a Run
+  std::vector<RunPicture> pictures;  ///< names as those of a MethodRun
 };
 
 struct PaperEvaluation {
   PaperOptions options;  ///< with cells and voxels filled in
   std::vector<Protocol> protocols;
-  std::vector<Run> runs;  ///< in the protocols' order
+  std::vector<MethodRun> runs;  ///< in the protocols' order
   std::vector<FilmedCase> filmed;
   int taken_up = 0;  ///< runs that were done before
   Seconds total{0};

@@ -10,10 +10,12 @@ Protocol four_views_protocol(Extent extent) {
   p.title = "Four views in a plane";
   p.paper = "\"Temperature Reconstruction\": the comparison with Wu et al. 2014 at 0, 45, 90 and 135 degrees";
   p.differs =
-      "The paper compares the input views of a captured flame. Here four further views between them are tests as well, since input views "
+      "The paper compares the input views of a captured flame. Here four further views between them are "
+      "tests as well, since input views "
       "prove little.";
   Case four{"four-cameras", {}, image_size(extent, {200, 310})};
-  for (const double azimuth : {0.0, 45.0, 90.0, 135.0}) four.cameras.push_back({azimuth, 0, recon::ViewRole::input});
+  for (const double azimuth : {0.0, 45.0, 90.0, 135.0})
+    four.cameras.push_back({azimuth, 0, recon::ViewRole::input});
   for (const double azimuth : {22.5, 67.5, 112.5, 157.5})
     four.cameras.push_back({azimuth, 0, recon::ViewRole::held_out});
   p.cases = {four};

@@ -18,8 +18,8 @@
 namespace emberlock::evaluate {
 namespace {
 
-constexpr double kFieldOfView = 60;  // degrees
-constexpr double kPeak = 230;        // grey levels
+constexpr double kFieldOfView = 60;                     // degrees
+constexpr double kPeak = 230;                           // grey levels
 constexpr double kFlameWidth = 0.2, kSmokeWidth = 0.6;  // metres
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
@@ -105,7 +105,8 @@ recon::CameraResponse daylight_camera() {
 Status expose(KnownGas& known, const recon::ComputeOptions& compute) {
   known.response = daylight_camera();
   std::vector<recon::CameraModel> models;
-  for (const double azimuth : {0.0, 50.0, 100.0}) models.push_back(camera_at({azimuth, 0}, known.box, {160, 160}));
+  for (const double azimuth : {0.0, 50.0, 100.0})
+    models.push_back(camera_at({azimuth, 0}, known.box, {160, 160}));
   float brightest = 0;
   for (const recon::RadianceImage& picture :
        recon::film_gas(known.gas, known.response, known.sun, {&models[0], &models[1], &models[2]}, compute))
@@ -141,15 +142,16 @@ Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOp
     return Error{ErrorKind::bad_input, fmt::format("{} cells", cells), "--cells",
                  "Give a multiple of 32 from 32 to 512"};
   const std::string what = fmt::format("the {} settles", name(subject));
-  EMBERLOCK_ASSIGN_OR_RETURN(recon::FlameSimulation simulation,
-                             recon::FlameSimulation::make(
-                                 simulation_of(subject, cells / kStages[0].cells, compute)));
+  EMBERLOCK_ASSIGN_OR_RETURN(
+      recon::FlameSimulation simulation,
+      recon::FlameSimulation::make(simulation_of(subject, cells / kStages[0].cells, compute)));
   for (std::size_t stage = 0; stage < std::size(kStages); ++stage) {
     if (stage > 0) {
       EMBERLOCK_ASSIGN_OR_RETURN(simulation, simulation.finer());
     }
     for (int part = 0; part < kParts; ++part) {
-      const double done = (static_cast<double>(stage) + static_cast<double>(part) / kParts) / std::size(kStages);
+      const double done =
+          (static_cast<double>(stage) + static_cast<double>(part) / kParts) / std::size(kStages);
       EMBERLOCK_RETURN_IF_ERROR(observe(observer, done, what));
       EMBERLOCK_RETURN_IF_ERROR(simulation.step(Seconds(kStages[stage].seconds / kParts)));
     }
@@ -160,9 +162,9 @@ Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOp
 }
 
 Status write_gas(const KnownGas& gas, const std::filesystem::path& path) {
-  return recon::write_volume(gas.light, path,
-                             {{"temperature", "K", gas.gas.temperature},
-                              {"absorption", "1/m", gas.gas.absorption}});
+  return recon::write_volume(
+      gas.light, path,
+      {{"temperature", "K", gas.gas.temperature}, {"absorption", "1/m", gas.gas.absorption}});
 }
 
 Result<KnownGas> read_gas(Subject subject, const std::filesystem::path& path,
@@ -210,7 +212,8 @@ std::vector<float> at_key_points(const recon::Grid& grid, const recon::Grid& fro
         float part[3];
         bool inside = true;
         for (int d = 0; d < 3; ++d) {
-          const float x = (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
+          const float x =
+              (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
           inside = inside && x >= 0 && x < static_cast<float>(n[d] - 1);
           low[d] = inside ? static_cast<int>(x) : 0;
           part[d] = x - static_cast<float>(low[d]);

@@ -27,9 +27,9 @@ struct KnownGas {
 };
 
 /// Burns or blows until the gas stands (recon/synthetic/flame_simulation.h), on coarse grids first: the flame
-/// of a burner of 3 cm, about 0.7 kW, in a cube of 20 cm; smoke of a source of 10 cm in one of 60 cm. `cells`:
-/// along each edge, a multiple of 32 from 32 to 512. Errors: those of FlameSimulation; refused where the
-/// observer asks to end, or where nothing is seen.
+/// of a burner of 3 cm, about 0.7 kW, in a cube of 20 cm; smoke of a source of 10 cm in one of 60 cm.
+/// `cells`: along each edge, a multiple of 32 from 32 to 512. Errors: those of FlameSimulation; refused where
+/// the observer asks to end, or where nothing is seen.
 Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOptions& compute,
                               const Observer& observer = {});
 

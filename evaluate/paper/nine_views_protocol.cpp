@@ -10,7 +10,8 @@ Protocol nine_views_protocol(Extent extent) {
   p.title = "Nine views, the tenth as a test";
   p.paper = "\"Color Intensity Reconstruction\": the table and the figure of the extra evaluation";
   p.differs =
-      "Another flame, so the paper's numbers compare among each other, as ours do. Every method has the same pictures and as many voxels.";
+      "Another flame, so the paper's numbers compare among each other, as ours do. Every method has the same "
+      "pictures and as many voxels.";
   Case nine{"nine-of-ten", ring(10), image_size(extent)};
   nine.cameras.back().role = recon::ViewRole::held_out;
   p.cases = {nine};

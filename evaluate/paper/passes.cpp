@@ -38,7 +38,8 @@ class Watched {
 }  // namespace
 
 Status add_passes(const Protocol& protocol, const Method& method, const KnownGas& gas,
-                  const recon::Scene& scene, const RunSettings& settings, const Clock& clock, Run& run) {
+                  const recon::Scene& scene, const RunSettings& settings, const Clock& clock,
+                  MethodRun& run) {
   const bool papers = method.facts.name == kPapersMethod;
   if (!papers && method.facts.name != kDefaultMethod) return {};
   const recon::Scene inputs = input_views(scene);
@@ -72,7 +73,8 @@ Status add_passes(const Protocol& protocol, const Method& method, const KnownGas
         run.pictures.push_back({fmt::format("after-{}", iteration), recon::to_rgb8(shown[test])});
     });
   };
-  const auto done = recon::solve(inputs, grid, effects, solve, [&] { return watched.elapsed(); }, look);
+  const auto done = recon::solve(
+      inputs, grid, effects, solve, [&] { return watched.elapsed(); }, look);
   return done.ok() ? Status{} : Status(done.error());
 }
 

@@ -9,6 +9,6 @@ namespace emberlock::evaluate {
 /// errors, and after 10, 30, 50 and 70 a picture of the first test view ("after-10"). Nothing of other
 /// methods, which don't iterate by passes of all pictures. The clock stands still while it is looked at.
 Status add_passes(const Protocol& protocol, const Method& method, const KnownGas& gas,
-                  const recon::Scene& scene, const RunSettings& settings, const Clock& clock, Run& run);
+                  const recon::Scene& scene, const RunSettings& settings, const Clock& clock, MethodRun& run);
 
 }  // namespace emberlock::evaluate

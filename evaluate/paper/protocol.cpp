@@ -18,9 +18,8 @@ Result<std::vector<Protocol>> choose_protocols(const std::vector<std::string>& n
     if (std::none_of(all.begin(), all.end(), [&](const Protocol& p) { return p.name == wanted; }))
       return Error{ErrorKind::bad_input, "no such table", "--only " + wanted, "Take some of " + list};
   if (!names.empty())
-    std::erase_if(all, [&](const Protocol& p) {
-      return std::find(names.begin(), names.end(), p.name) == names.end();
-    });
+    std::erase_if(
+        all, [&](const Protocol& p) { return std::find(names.begin(), names.end(), p.name) == names.end(); });
   return all;
 }
 

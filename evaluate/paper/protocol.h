@@ -16,9 +16,9 @@ namespace emberlock::evaluate {
 enum class Subject { flame, smoke };
 std::string_view name(Subject subject);
 
-/// A camera on a sphere around the middle of the gas, one and a half times as far away as its box is wide (the
-/// paper: 30 cm from the middle of 20), that looks there with a field of view of 60 degrees along its longer
-/// side.
+/// A camera on a sphere around the middle of the gas, one and a half times as far away as its box is wide
+/// (the paper: 30 cm from the middle of 20), that looks there with a field of view of 60 degrees along its
+/// longer side.
 struct CameraPlace {
   double azimuth = 0, elevation = 0;  ///< degrees
   recon::ViewRole role = recon::ViewRole::input;
@@ -42,9 +42,9 @@ struct PrintedErrors {
 /// One table or figure of the paper's results: what is filmed, by which cameras, and by what it is
 /// reconstructed.
 struct Protocol {
-  std::string_view name;   ///< "nine-views"
-  std::string_view title;  ///< a heading
-  std::string_view paper;  ///< which of its tables and figures
+  std::string_view name;     ///< "nine-views"
+  std::string_view title;    ///< a heading
+  std::string_view paper;    ///< which of its tables and figures
   std::string_view differs;  ///< how what is done here differs from what the paper did
   Subject subject = Subject::flame;
   std::vector<Case> cases;

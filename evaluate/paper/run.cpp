@@ -38,9 +38,10 @@ recon::Scene input_views(const recon::Scene& scene) {
   return inputs;
 }
 
-Result<Run> run_method(const Protocol& protocol, const Case& of, const Method& method, const KnownGas& gas,
-                       const recon::Scene& scene, const RunSettings& settings, const Clock& clock) {
-  Run run;
+Result<MethodRun> run_method(const Protocol& protocol, const Case& of, const Method& method,
+                             const KnownGas& gas, const recon::Scene& scene, const RunSettings& settings,
+                             const Clock& clock) {
+  MethodRun run;
   run.protocol = protocol.name;
   run.of = of.name;
   run.method = method.facts.name;
@@ -73,7 +74,8 @@ Result<Run> run_method(const Protocol& protocol, const Case& of, const Method& m
     run.slice = temperature_slice(result->volume.grid, result->kelvin, gas);
   }
   run.pictures = pictures_of(scene, shown);
-  if (!protocol.iterations.empty()) EMBERLOCK_RETURN_IF_ERROR(add_passes(protocol, method, gas, scene, settings, clock, run));
+  if (!protocol.iterations.empty())
+    EMBERLOCK_RETURN_IF_ERROR(add_passes(protocol, method, gas, scene, settings, clock, run));
   return run;
 }
 

@@ -52,7 +52,7 @@ struct RunPicture {
 };
 
 /// One method on one case of a protocol: what became of it.
-struct Run {
+struct MethodRun {
   std::string protocol, of, method, device;
   std::string failed;  ///< why there is nothing; all that follows is then empty
   Seconds time{0};     ///< from pictures in memory to the volume
@@ -73,9 +73,10 @@ struct RunSettings {
 };
 
 /// Runs a method on `scene`, which is `gas` as the case films it; the method sees the input views alone. A
-/// method that fails on its own is a Run that says why. Error `refused` where `stop` asks to end.
-Result<Run> run_method(const Protocol& protocol, const Case& of, const Method& method, const KnownGas& gas,
-                       const recon::Scene& scene, const RunSettings& settings, const Clock& clock);
+/// method that fails on its own is a MethodRun that says why. Error `refused` where `stop` asks to end.
+Result<MethodRun> run_method(const Protocol& protocol, const Case& of, const Method& method,
+                             const KnownGas& gas, const recon::Scene& scene, const RunSettings& settings,
+                             const Clock& clock);
 
 /// The same views without those that are held out.
 recon::Scene input_views(const recon::Scene& scene);

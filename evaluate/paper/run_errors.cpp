@@ -99,8 +99,7 @@ RunErrors errors_of(const MethodResult& result, const std::vector<recon::Radianc
   MeanSquare all;
   for (std::size_t v = 0; v < shown.size(); ++v) {
     const recon::View& view = scene.views[v];
-    const std::array<double, 3> rmse =
-        recon::rmse(view, shown[v], recon::noise_mask(*view.image).box);
+    const std::array<double, 3> rmse = recon::rmse(view, shown[v], recon::noise_mask(*view.image).box);
     (view.role == recon::ViewRole::input ? input : test).add(rmse);
     all.add(rmse);
   }

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <exception>
+#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 
@@ -46,10 +47,11 @@ TemperatureSlice slice_from(const Json& json) {
   return slice;
 }
 
-Json json_of(const Run& run, const std::string& settings) {
+Json json_of(const MethodRun& run, const std::string& settings) {
   Json points = Json::array();
   for (const RunPoint& p : run.points)
-    points.push_back({{"iteration", p.iteration}, {"seconds", p.time.value()}, {"errors", json_of(p.errors)}});
+    points.push_back(
+        {{"iteration", p.iteration}, {"seconds", p.time.value()}, {"errors", json_of(p.errors)}});
   Json temperature = nullptr;
   if (const auto& t = run.temperature)
     temperature = {{"median", t->median}, {"most", t->most}, {"bias", t->bias}, {"told", t->told}};
@@ -72,8 +74,8 @@ Json json_of(const Run& run, const std::string& settings) {
           {"pictures", pictures}};
 }
 
-Run run_from(const Json& json) {
-  Run run;
+MethodRun run_from(const Json& json) {
+  MethodRun run;
   run.protocol = json.at("protocol");
   run.of = json.at("case");
   run.method = json.at("method");
@@ -98,39 +100,43 @@ Run run_from(const Json& json) {
 
 }  // namespace
 
-std::string folder_name(const Run& run) {
+std::string folder_name(const MethodRun& run) {
   std::string name = run.protocol + "." + run.of + "." + run.method + "." + run.device;
   for (char& c : name)
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '.' && c != '-') c = '-';
   return name;
 }
 
-Status write_run(const Run& run, const std::string& settings, const std::filesystem::path& folder) {
+Status write_run(const MethodRun& run, const std::string& settings, const std::filesystem::path& folder) {
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder out, OutputFolder::create({folder, kEvaluatePaper}));
   for (const RunPicture& picture : run.pictures)
     EMBERLOCK_RETURN_IF_ERROR(recon::write_png(picture.image.view(), out.path() / (picture.name + ".png")));
-  EMBERLOCK_RETURN_IF_ERROR(
-      write_file_atomically(out.path() / kFile, json_of(run, settings).dump(1) + "\n"));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(out.path() / kFile, run_json(run, settings)));
   return out.commit();
 }
 
-Result<Run> read_run(const std::filesystem::path& folder, const std::string& settings) {
-  const std::string where = (folder / kFile).string();
+std::string run_json(const MethodRun& run, const std::string& settings) {
+  return json_of(run, settings).dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Result<MethodRun> parse_run(std::string_view text, const std::string& settings, const std::string& where) {
   const auto refused = [&](const std::string& what) {
     return Error{ErrorKind::bad_input, what, where, "Give another --out, or remove this folder"};
   };
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(folder / kFile));
-  Run run;
   try {
     const Json json = Json::parse(text);
-    if (json.at("format") != kFormat || json.at("version") != 1)
-      return refused("is no run of this version");
+    if (json.at("format") != kFormat || json.at("version") != 1) return refused("is no run of this version");
     if (json.at("settings") != settings)
       return refused("was made with other settings (" + json.at("settings").get<std::string>() + ")");
-    run = run_from(json);
+    return run_from(json);
   } catch (const std::exception& e) {
     return refused(e.what());
   }
+}
+
+Result<MethodRun> read_run(const std::filesystem::path& folder, const std::string& settings) {
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(folder / kFile));
+  EMBERLOCK_ASSIGN_OR_RETURN(MethodRun run, parse_run(text, settings, (folder / kFile).string()));
   for (RunPicture& picture : run.pictures) {
     EMBERLOCK_ASSIGN_OR_RETURN(picture.image, session::read_image(folder / (picture.name + ".png")));
   }

@@ -10,7 +10,8 @@ Protocol smoke_protocol(Extent extent) {
   p.title = "Smoke from three of 47 views";
   p.paper = "\"Reconstruction of Other Phenomena\": the table and the figure of smoke";
   p.differs =
-      "The paper doesn't say which data set, nor which three views. Here simulated smoke is lit by the sun; 47 cameras stand evenly around, "
+      "The paper doesn't say which data set, nor which three views. Here simulated smoke is lit by the sun; "
+      "47 cameras stand evenly around, "
       "and those at 0, 61 and 123 degrees are the input.";
   const int count = extent == Extent::full ? 47 : 12;
   const int apart = (count + 1) / 6;

@@ -300,7 +300,8 @@ class OutputFolders : public testing::Test {
 
 /// Every option of every verb that names a folder to write to, as the tables above have it.
 TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
-  std::set<std::string> listed{"emberlock devices clips --out"};  // needs a camera: tests/vm/ptp
+  std::set<std::string> listed{"emberlock devices clips --out",    // needs a camera: tests/vm/ptp
+                               "emberlock evaluate paper --out"};  // several in it: evaluate_paper_test.cpp
   for (const std::vector<Writer>& writers : {replacing(), founding()}) {
     for (const Writer& writer : writers) {
       if (*writer.option == '\0') continue;
@@ -309,10 +310,10 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
     }
   }
   CLI::App app{"", "emberlock"};
-  for (const auto add :
-       {add_devices, add_smear, add_align,  add_reconstruct, add_verify,  add_tradeoff, add_calibrate,
-        add_import,  add_demo,  add_sample, add_doctor,      add_bench,   add_sessions, add_status,
-        add_jobs,    add_watch, add_record, add_strobe,      add_measure, add_simulate, add_render})
+  for (const auto add : {add_devices,   add_smear,    add_align,  add_reconstruct, add_verify, add_tradeoff,
+                         add_calibrate, add_import,   add_demo,   add_sample,      add_doctor, add_bench,
+                         add_sessions,  add_status,   add_jobs,   add_watch,       add_record, add_strobe,
+                         add_measure,   add_simulate, add_render, add_evaluate})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

@@ -30,7 +30,7 @@ struct Stage {
   int cells;  // of the finest: a share
   double seconds;
 };
-constexpr Stage kStages[] = {{4, 0.9}, {2, 0.12}, {1, 0.02}};
+constexpr Stage kStages[] = {{4, 0.5}, {2, 0.08}, {1, 0.015}};
 constexpr int kParts = 20;  // of a stage, for progress
 
 recon::FlameSimulationOptions simulation_of(Subject subject, int cells,

@@ -8,19 +8,14 @@
 #include <cstdlib>
 #include <ctime>
 #include <filesystem>
-#include <fstream>
 #include <numbers>
 #include <string_view>
 
-#include <nlohmann/json.hpp>
-
 #include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
-#include "recon/calibrate/pose.h"
-#include "recon/export/picture.h"
-#include "recon/preprocess/radiance.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/scene_files.h"
 
 using namespace emberlock;
 namespace fs = std::filesystem;
@@ -56,24 +51,10 @@ recon::Scene twelve_views() {
 }
 
 int write(const fs::path& folder) {
-  const recon::Scene scene = twelve_views();
-  fs::create_directories(folder);
-  nlohmann::json document = {{"w", kPicture.width},
-                             {"h", kPicture.height},
-                             {"fl_x", scene.views[0].camera.intrinsics.fx},
-                             {"fl_y", scene.views[0].camera.intrinsics.fy},
-                             {"box", {{"center", {0, 0, 0}}, {"size", {0.2, 0.2, 0.2}}}},
-                             {"frames", nlohmann::json::array()}};
-  for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    const recon::View& view = scene.views[i];
-    const std::string name = "view" + std::to_string(i) + ".png";
-    if (!recon::write_png(recon::to_rgb8(*view.image).view(), folder / name).ok()) return 1;
-    const Eigen::Matrix4d m = recon::opengl_world_from_camera(view.camera.camera_from_world);
-    nlohmann::json matrix = nlohmann::json::array();
-    for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-    document["frames"].push_back({{"file_path", name}, {"transform_matrix", matrix}});
+  if (const Status written = test::write_scene(twelve_views(), folder); !written.ok()) {
+    std::fprintf(stderr, "%s\n", written.error().message().c_str());
+    return 1;
   }
-  std::ofstream(folder / "transforms.json") << document.dump(2) << '\n';
   std::printf("%s\n", (folder / "transforms.json").c_str());
   return 0;
 }

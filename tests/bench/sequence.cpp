@@ -9,55 +9,24 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
 #include "base/clock.h"
 #include "recon/adjust/picture_error.h"
-#include "recon/calibrate/pose.h"
-#include "recon/export/picture.h"
 #include "recon/pipeline/frame_sequence.h"
 #include "recon/pipeline/scene.h"
-#include "recon/preprocess/radiance.h"
 #include "recon/preprocess/shrink.h"
+#include "tests/support/scene_files.h"
 
 using namespace emberlock;
 namespace fs = std::filesystem;
 
 namespace {
-
-bool write_scene(const recon::Scene& scene, const fs::path& folder) {
-  fs::create_directories(folder);
-  const auto& c = scene.box.center;
-  const auto& s = scene.box.size;
-  nlohmann::json document = {{"box", {{"center", {c.x(), c.y(), c.z()}}, {"size", {s.x(), s.y(), s.z()}}}},
-                             {"frames", nlohmann::json::array()}};
-  for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    const recon::View& view = scene.views[v];
-    const recon::Intrinsics& lens = view.camera.intrinsics;
-    const std::string name = fmt::format("view{}.png", v);
-    if (!recon::write_png(recon::to_rgb8(*view.image).view(), folder / name).ok()) return false;
-    const Eigen::Matrix4d m = recon::opengl_world_from_camera(view.camera.camera_from_world);
-    nlohmann::json matrix = nlohmann::json::array();
-    for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-    document["frames"].push_back({{"file_path", name},
-                                  {"transform_matrix", matrix},
-                                  {"w", lens.size.width},
-                                  {"h", lens.size.height},
-                                  {"fl_x", lens.fx},
-                                  {"fl_y", lens.fy},
-                                  {"cx", lens.cx},
-                                  {"cy", lens.cy}});
-  }
-  std::ofstream(folder / "transforms.json") << document.dump(1) << '\n';
-  return true;
-}
 
 int write(const fs::path& session, int shrink, const fs::path& folder, std::size_t frames) {
   recon::SceneOptions options;
@@ -70,7 +39,7 @@ int write(const fs::path& session, int shrink, const fs::path& folder, std::size
       return 1;
     }
     for (recon::View& view : scene->views) view = recon::shrunk(view, shrink);
-    if (!write_scene(*scene, folder / fmt::format("{:04}", n))) return 1;
+    if (!test::write_scene(*scene, folder / fmt::format("{:04}", n)).ok()) return 1;
   }
   return 0;
 }

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The quick variant of `evaluate paper`, with bounds that hold of it.
+#include "evaluate/paper/evaluate_paper.h"
+
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -11,7 +13,6 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "evaluate/methods.h"
-#include "evaluate/paper/evaluate_paper.h"
 #include "tests/support/recording.h"
 #include "tests/support/verb.h"
 
@@ -25,8 +26,8 @@ TEST(EvaluatePaper, ItsTablesHoldAndWhatIsDoneIsNotDoneAgain) {
   // Somebody else's file stays.
   std::filesystem::create_directories(out);
   std::ofstream(out + "/notes.txt") << "mine";
-  const auto first = test::run_verb(
-      add_evaluate, {"evaluate", "paper", "--quick", "--device", "cpu", "--only", "nine-views", "--out", out});
+  const auto first = test::run_verb(add_evaluate, {"evaluate", "paper", "--quick", "--device", "cpu",
+                                                   "--only", "nine-views", "--out", out});
   ASSERT_EQ(first.exit_code, 0) << first.err;
   EXPECT_THAT(first.out, HasSubstr("nine views, the tenth as a test"));
   const auto all =
@@ -63,9 +64,9 @@ TEST(EvaluatePaper, ItsTablesHoldAndWhatIsDoneIsNotDoneAgain) {
 TEST(EvaluatePaper, AFolderOfOtherSettingsIsRefused) {
   const test::TempFolder temp;
   const std::string out = (temp / "paper").string();
-  const std::vector<std::string> words = {"evaluate", "paper",     "--quick", "--device", "cpu",
-                                          "--only",   "nine-views", "--cells", "32",       "--methods",
-                                          "the paper's", "--out",   out};
+  const std::vector<std::string> words = {"evaluate",    "paper",      "--quick", "--device", "cpu",
+                                          "--only",      "nine-views", "--cells", "32",       "--methods",
+                                          "the paper's", "--out",      out};
   ASSERT_EQ(test::run_verb(add_evaluate, words).exit_code, 0);
   std::vector<std::string> others = words;
   others.insert(others.end(), {"--voxels", "24"});

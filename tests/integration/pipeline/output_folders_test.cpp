@@ -17,7 +17,6 @@
 #include "cli/app_tree.h"
 #include "cli/commands.h"
 #include "recon/calibrate/board.h"
-#include "recon/calibrate/pose.h"
 #include "recon/calibrate/rig_formats.h"
 #include "recon/export/picture.h"
 #include "recon/preprocess/radiance.h"
@@ -26,6 +25,7 @@
 #include "tests/support/board_rig.h"
 #include "tests/support/hot_volume.h"
 #include "tests/support/recording.h"
+#include "tests/support/scene_files.h"
 #include "tests/support/strobe_clips.h"
 #include "tests/support/verb.h"
 
@@ -65,35 +65,10 @@ std::map<std::string, std::string> files_below(const fs::path& folder) {
 
 /// Eleven views of a small flame.
 fs::path make_transforms(const fs::path& folder) {
-  fs::create_directories(folder);
   recon::PaperSceneOptions options;
   options.image = {48, 36};
   options.truth_voxels = 16;
-  const recon::Scene scene = recon::paper_scene(options);
-  nlohmann::json frames = nlohmann::json::array();
-  for (const recon::View& view : scene.views) {
-    const std::string name = fmt::format("view{}.png", frames.size());
-    EXPECT_TRUE(recon::write_png(recon::to_rgb8(*view.image).view(), folder / name).ok());
-    const Eigen::Matrix4d m = recon::opengl_world_from_camera(view.camera.camera_from_world);
-    nlohmann::json matrix = nlohmann::json::array();
-    for (int r = 0; r < 4; ++r) matrix.push_back({m(r, 0), m(r, 1), m(r, 2), m(r, 3)});
-    const recon::Intrinsics& lens = view.camera.intrinsics;
-    frames.push_back({{"file_path", name},
-                      {"transform_matrix", matrix},
-                      {"w", lens.size.width},
-                      {"h", lens.size.height},
-                      {"fl_x", lens.fx},
-                      {"fl_y", lens.fy},
-                      {"cx", lens.cx},
-                      {"cy", lens.cy}});
-  }
-  const recon::Box& box = scene.box;
-  write(folder / "transforms.json",
-        nlohmann::json{{"box",
-                        {{"center", {box.center.x(), box.center.y(), box.center.z()}},
-                         {"size", {box.size.x(), box.size.y(), box.size.z()}}}},
-                       {"frames", frames}}
-            .dump());
+  EXPECT_TRUE(test::write_scene(recon::paper_scene(options), folder).ok());
   return folder / "transforms.json";
 }
 

@@ -104,8 +104,7 @@ TEST(KnownGas, InputCamerasErrAndTestsDoNot) {
   EXPECT_NE(noisy.views[0].image->rgb, clean.views[0].image->rgb);
   EXPECT_EQ(noisy.views[1].image->rgb, clean.views[1].image->rgb);
   const Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-  const double off =
-      (noisy.views[0].camera.project(middle) - clean.views[0].camera.project(middle)).norm();
+  const double off = (noisy.views[0].camera.project(middle) - clean.views[0].camera.project(middle)).norm();
   EXPECT_GT(off, 0.1);
   EXPECT_LT(off, 5);
   EXPECT_EQ(noisy.views[1].camera.project(middle), clean.views[1].camera.project(middle));
@@ -131,8 +130,8 @@ TEST(KnownGas, ValuesBetweenKeyPointsAreTrilinear) {
   for (int k = 0; k < 4; ++k)
     for (int j = 0; j < 4; ++j)
       for (int i = 0; i < 4; ++i)
-        values.push_back(value(0.1F * static_cast<float>(i), 0.1F * static_cast<float>(j),
-                               0.1F * static_cast<float>(k)));
+        values.push_back(
+            value(0.1F * static_cast<float>(i), 0.1F * static_cast<float>(j), 0.1F * static_cast<float>(k)));
   const recon::Grid to{{0.05F, 0.02F, -0.01F}, 0.07F, 3, 3, 4};
   const std::vector<float> found = at_key_points(to, from, values, 1);
   for (int k = 0; k < 4; ++k) {

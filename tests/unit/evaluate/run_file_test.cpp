@@ -54,7 +54,8 @@ TEST(RunFile, OtherSettingsAreRefused) {
 }
 
 TEST(RunFile, WhatIsNoRunIsRefused) {
-  for (const std::string text : {"", "{}", "[1]", R"({"format": "emberlock evaluation run", "version": 2})"}) {
+  for (const std::string text :
+       {"", "{}", "[1]", R"({"format": "emberlock evaluation run", "version": 2})"}) {
     const auto run = parse_run(text, "", "here");
     ASSERT_FALSE(run.ok()) << text;
     EXPECT_EQ(run.error().kind, ErrorKind::bad_input);

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "recon/adjust/descent.h"
 #include "recon/adjust/tracker.h"
 #include "recon/preprocess/check_scene.h"
 #include "recon/preprocess/flame_mask.h"
@@ -50,6 +51,11 @@ Result<TomographyInput> find_input(const recon::Scene& scene, const MethodOption
   return input;
 }
 
+TomographyInput coarse_input(TomographyInput input, int most_voxels) {
+  input.hull = recon::coarsen_to(input.hull, most_voxels);
+  return input;
+}
+
 int stride_for(const TomographyInput& input) {
   constexpr double kPixelsPerVoxel = 1.4;
   const recon::Grid& g = input.hull.grid;
@@ -79,8 +85,7 @@ void LinearProjector::project(const Light& x, Light& y) const {
   work.rays = problem_.list.table();
   work.volume = x.data();
   work.residual = y.data();
-  const auto march =
-      recon::march_table<float>().forward_of(recon::Absorb::nothing, recon::Travel::straight);
+  const auto march = recon::march_table<float>().forward_of(recon::Absorb::nothing, recon::Travel::straight);
   constexpr int kTasks = 64;
   pool_.run(kTasks, [&](int task) {
     const recon::Slice mine = recon::slice(rays(), kTasks, task);
@@ -95,8 +100,7 @@ void LinearProjector::back_project(const Light& y, Light& x) const {
   work.rays = problem_.list.table();
   work.residual = const_cast<recon::Rgba*>(y.data());  // NOLINT(*-const-cast): the transpose only reads it
   work.gradient = x.data();
-  const auto march =
-      recon::march_table<float>().adjoint_of(recon::Absorb::nothing, recon::Travel::straight);
+  const auto march = recon::march_table<float>().adjoint_of(recon::Absorb::nothing, recon::Travel::straight);
   const recon::SlabRuns& slabs = problem_.slabs.front();
   // Even slabs, then odd ones: no two that are written at the same time share a key point.
   for (int parity = 0; parity < 2; ++parity) {

@@ -30,10 +30,13 @@ struct TomographyInput {
   recon::Hull hull;
 };
 
-/// Errors: those of recon::check_scene() and recon::carve(); voxels or threads out of their range; fewer input
-/// views than `fewest`.
+/// Errors: those of recon::check_scene() and recon::carve(); voxels or threads out of their range; fewer
+/// input views than `fewest`.
 Result<TomographyInput> find_input(const recon::Scene& scene, const MethodOptions& options,
                                    std::size_t fewest);
+
+/// The same on a grid that is halved until it has at most so many voxels along its longest side.
+TomographyInput coarse_input(TomographyInput input, int most_voxels);
 
 /// The stride, in pixels, that leaves each voxel some one and a half pixels: of what searches for its own
 /// settings.

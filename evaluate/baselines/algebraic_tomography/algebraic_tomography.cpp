@@ -13,8 +13,7 @@ namespace {
 /// three channels that share A and nothing else. Begins with x = 0.
 class ConjugateGradients {
  public:
-  explicit ConjugateGradients(const LinearProjector& a)
-      : a_(a), x_(a.grid().size()), residual_(a.seen()) {
+  explicit ConjugateGradients(const LinearProjector& a) : a_(a), x_(a.grid().size()), residual_(a.seen()) {
     a_.back_project(residual_, gradient_);
     direction_ = gradient_;
     slope_ = dot(gradient_, gradient_, a_.pool());
@@ -62,14 +61,15 @@ Light at_the_corner(const LinearProjector& projector, const MethodOptions& optio
   Light best = search.x();
   double least = std::numeric_limits<double>::infinity();
   for (int n = 1; n <= kMostIterations && n <= iterations + kPatience; ++n) {
-    if (options.stop && options.stop()) break;
     search.step();
     const double product = std::sqrt(sum_of(search.squares())) *
                            std::sqrt(sum_of(dot(search.x(), search.x(), projector.pool())));
-    if (!(product < least)) continue;
-    least = product;
-    best = search.x();
-    iterations = n;
+    if (product < least) {
+      least = product;
+      best = search.x();
+      iterations = n;
+    }
+    if (options.stop && options.stop()) break;
   }
   return best;
 }
@@ -77,11 +77,11 @@ Light at_the_corner(const LinearProjector& projector, const MethodOptions& optio
 Light at_convergence(const LinearProjector& projector, const MethodOptions& options, int& iterations) {
   ConjugateGradients search(projector);
   const double enough = kConverged * kConverged * sum_of(search.slope());
-  while (iterations < kMostIterations && sum_of(search.slope()) > enough &&
-         !(options.stop && options.stop())) {
+  do {
     search.step();
     ++iterations;
-  }
+  } while (iterations < kMostIterations && sum_of(search.slope()) > enough &&
+           !(options.stop && options.stop()));
   return search.x();
 }
 

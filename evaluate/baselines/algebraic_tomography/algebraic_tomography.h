@@ -5,17 +5,13 @@
 
 namespace emberlock::evaluate {
 
-inline constexpr MethodFacts kAlgebraicTomographyFacts{"algebraic tomography",
-                                                       "Ihrke and Magnor 2004",
-                                                       false,
-                                                       Projection::perspective,
-                                                       "linear",
-                                                       true};
+inline constexpr MethodFacts kAlgebraicTomographyFacts{
+    "algebraic tomography", "Ihrke and Magnor 2004", false, Projection::perspective, "linear", true};
 
-/// Conjugate gradients on the normal equations of all pixels, over trilinear basis functions inside the visual
-/// hull. The number of iterations is the only regularisation: they end at the corner of the L-curve, where
-/// the product of the residual's and the solution's norms is least (Reginska 1996). Emission may be negative,
-/// as nothing in the equations forbids it. Errors: those of RunMethod.
+/// Conjugate gradients on the normal equations of all pixels, over trilinear basis functions inside the
+/// visual hull. The number of iterations is the only regularisation: they end at the corner of the L-curve,
+/// where the product of the residual's and the solution's norms is least (Reginska 1996). Emission may be
+/// negative, as nothing in the equations forbids it. Errors: those of RunMethod.
 Result<MethodResult> algebraic_tomography(const recon::Scene& scene, const MethodOptions& options);
 
 inline constexpr MethodFacts kConvergedAlgebraicTomographyFacts{"algebraic tomography, converged",

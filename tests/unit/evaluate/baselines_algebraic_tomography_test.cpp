@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/baselines/algebraic_tomography/algebraic_tomography.h"
-
 #include <gmock/gmock.h>
 
 #include "base/random.h"
+#include "evaluate/baselines/algebraic_tomography/algebraic_tomography.h"
 #include "evaluate/baselines/linear_projector.h"
 #include "recon/render/render.h"
 #include "tests/support/tomography_scene.h"
@@ -86,7 +85,7 @@ TEST(AlgebraicTomography, HasTheSameBitsForAnyNumberOfThreads) {
 TEST(AlgebraicTomography, IsAskedToStop) {
   int asked = 0;
   MethodOptions options = with_voxels(20);
-  options.stop = [&] { return ++asked > 3; };
+  options.stop = [&] { return ++asked == 3; };
   EXPECT_EQ(algebraic_tomography(tomography_scene(), options).value().iterations, 3);
 }
 

@@ -14,9 +14,9 @@ LeftOutViews::LeftOutViews(const TomographyInput& input, int stride, std::size_t
     const std::size_t left_out = views * n / count;
     std::vector<const recon::View*> others = input.views;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(left_out));
-    turns_.push_back({std::make_unique<LinearProjector>(others, input.hull, stride, pool),
-                      std::make_unique<LinearProjector>(std::vector{input.views[left_out]}, input.hull,
-                                                        stride, pool)});
+    turns_.push_back(
+        {std::make_unique<LinearProjector>(others, input.hull, stride, pool),
+         std::make_unique<LinearProjector>(std::vector{input.views[left_out]}, input.hull, stride, pool)});
   }
 }
 

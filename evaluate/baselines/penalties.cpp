@@ -25,7 +25,8 @@ struct Axes {
   std::array<std::size_t, 3> stride;
   std::array<int, 3> length;
   explicit Axes(const recon::Grid& g)
-      : stride{1, static_cast<std::size_t>(g.nx), static_cast<std::size_t>(g.nx) * static_cast<std::size_t>(g.ny)},
+      : stride{1, static_cast<std::size_t>(g.nx),
+               static_cast<std::size_t>(g.nx) * static_cast<std::size_t>(g.ny)},
         length{g.nx, g.ny, g.nz} {}
 };
 

@@ -22,31 +22,21 @@ constexpr double kLeastChange = 1e-3;
 using MakePenalty = std::unique_ptr<Penalty> (*)(const LinearProjector& projector, const Lattice& lattice,
                                                  double weight);
 
-/// The mean over the key points of A^T of something on the rays.
-Channels mean_back(const LinearProjector& projector, const Lattice& lattice, const Light& of_rays) {
+std::unique_ptr<Penalty> roughness(const LinearProjector& projector, const Lattice& lattice, double weight) {
+  return std::make_unique<Roughness>(lattice, weight * mean_curvature(projector, lattice), projector.pool());
+}
+
+/// By channel, over the mean of A^T b, so that a channel twice as bright is treated alike.
+std::unique_ptr<Penalty> variation(const LinearProjector& projector, const Lattice& lattice, double weight) {
   Light back;
-  projector.back_project(of_rays, back);
-  Channels mean = {};
+  projector.back_project(projector.seen(), back);
+  Channels each = {};
   double points = 0;
   for (std::size_t p = 0; p < back.size(); ++p) {
-    if (lattice.active[p] == 0) continue;
-    points += 1;
-    for (std::size_t c = 0; c < 3; ++c) mean[c] += static_cast<double>(back[p].c[c]);
+    points += lattice.active[p];
+    for (std::size_t c = 0; c < 3; ++c) each[c] += static_cast<double>(back[p].c[c]);
   }
-  for (double& m : mean) m /= std::max(1.0, points);
-  return mean;
-}
-
-std::unique_ptr<Penalty> roughness(const LinearProjector& projector, const Lattice& lattice, double weight) {
-  Light lengths;
-  projector.project(Light(projector.unknowns(), recon::Rgba{{1, 1, 1, 0}}), lengths);
-  return std::make_unique<Roughness>(lattice, weight * mean_back(projector, lattice, lengths)[0],
-                                     projector.pool());
-}
-
-std::unique_ptr<Penalty> variation(const LinearProjector& projector, const Lattice& lattice, double weight) {
-  Channels each = mean_back(projector, lattice, projector.seen());
-  for (double& w : each) w = std::max(0.0, weight * w);
+  for (double& w : each) w = std::max(0.0, weight * w / std::max(1.0, points));
   return std::make_unique<Variation>(lattice, each, projector.pool());
 }
 

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/baselines/regularised_tomography/regularised_tomography.h"
-
 #include <cmath>
+#include <numbers>
 
 #include <gmock/gmock.h>
 
 #include "base/random.h"
 #include "evaluate/baselines/left_out_views.h"
 #include "evaluate/baselines/penalties.h"
+#include "evaluate/baselines/regularised_tomography/regularised_tomography.h"
 #include "tests/support/ball_scene.h"
 #include "tests/support/tomography_scene.h"
 
@@ -56,8 +56,7 @@ TEST(Roughness, ItsCurvatureMajorises) {
   Light worst(weights.size());  // the sign that alternates is where the Laplacian is largest
   for (int k = 0; k < 6; ++k)
     for (int j = 0; j < 6; ++j)
-      for (int i = 0; i < 6; ++i)
-        worst[lattice.grid.index(i, j, k)].c[0] = (i + j + k) % 2 == 0 ? 1.F : -1.F;
+      for (int i = 0; i < 6; ++i) worst[lattice.grid.index(i, j, k)].c[0] = (i + j + k) % 2 == 0 ? 1.F : -1.F;
   Light gradient(worst.size());
   penalty.add_gradient(worst, gradient);
   double bound = 0;

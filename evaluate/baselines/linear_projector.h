@@ -72,6 +72,8 @@ class LinearProjector final : public LinearMap {
   [[nodiscard]] std::size_t rays() const { return problem_.rays(); }
   [[nodiscard]] const Light& seen() const override { return seen_; }
   [[nodiscard]] recon::Pool& pool() const override { return pool_; }
+  /// The rays as they are marched.
+  [[nodiscard]] const recon::RayList& list() const { return problem_.list; }
   /// Whether a key point belongs to a voxel of the hull.
   [[nodiscard]] bool takes_part(std::size_t key_point) const { return problem_.share[key_point] > 0; }
 

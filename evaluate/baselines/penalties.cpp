@@ -81,6 +81,19 @@ void Roughness::approach(const std::vector<float>& /*weights*/, Light& x) {
   each_of(x.size(), pool_, [&](std::size_t p) { x[p] = recon::non_negative(x[p]); });
 }
 
+Channels variation_weights(const LinearProjector& projector, double weight) {
+  Light back;
+  projector.back_project(projector.seen(), back);
+  Channels each = {};
+  double points = 0;
+  for (std::size_t p = 0; p < back.size(); ++p) {
+    points += projector.takes_part(p) ? 1 : 0;
+    for (std::size_t c = 0; c < 3; ++c) each[c] += static_cast<double>(back[p].c[c]);
+  }
+  for (double& w : each) w = std::max(0.0, weight * w / std::max(1.0, points));
+  return each;
+}
+
 Variation::Variation(const Lattice& lattice, const Channels& weight, recon::Pool& pool)
     : lattice_(lattice), weight_(weight), pool_(pool) {
   for (Light& along : dual_) along.resize(lattice.grid.size());

@@ -26,6 +26,10 @@ class Roughness final : public Penalty {
   Light curved_, twice_;
 };
 
+/// weight times the mean of A^T b over the key points of the hull, by channel: a total variation's weight
+/// that treats a channel twice as bright alike.
+Channels variation_weights(const LinearProjector& projector, double weight);
+
 /// weight times the sum over key points of |forward differences|, by channel: isotropic total variation
 /// (Rudin, Osher and Fatemi 1992). approach() ascends the dual (Beck and Teboulle 2009, "Fast gradient-based
 /// algorithms for constrained total variation"), from where the last one ended.

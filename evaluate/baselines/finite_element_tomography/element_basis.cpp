@@ -69,7 +69,8 @@ void ElementBasis::along(std::size_t axis, std::array<int, 3>& size, const Light
   });
 }
 
-void ElementBasis::back_along(std::size_t axis, std::array<int, 3>& size, const Light& from, Light& to) const {
+void ElementBasis::back_along(std::size_t axis, std::array<int, 3>& size, const Light& from,
+                              Light& to) const {
   const std::vector<Place>& places = places_[axis];
   const Lines fine(size, axis);
   size[axis] = nodes_along(axis);

@@ -27,8 +27,7 @@ Fit fit_elements(const LinearProjector& projector, const Elements& elements,
                  const std::function<bool()>& stop) {
   const ElementBasis basis(projector, elements.spacing);
   const ElementMap map(projector, basis);
-  Roughness penalty(basis.nodes(), elements.weight * mean_curvature(map, basis.nodes()),
-                    projector.pool());
+  Roughness penalty(basis.nodes(), elements.weight * mean_curvature(map, basis.nodes()), projector.pool());
   const Fit fit = minimise(map, penalty, kMostSteps, kLeastStep, stop);
   Fit result{{}, fit.iterations};
   basis.spread(fit.x, result.x);
@@ -48,9 +47,8 @@ Elements find_elements(const TomographyInput& input, const MethodOptions& option
     const double before = least;
     best_of(kLeastWeight, kFactor, kMostWeights, [&](double weight) {
       const Elements elements{spacing, weight};
-      const double error = views.error([&](const LinearProjector& fitted) {
-        return fit_elements(fitted, elements, options.stop).x;
-      });
+      const double error = views.error(
+          [&](const LinearProjector& fitted) { return fit_elements(fitted, elements, options.stop).x; });
       if (error < least) {
         least = error;
         best = elements;

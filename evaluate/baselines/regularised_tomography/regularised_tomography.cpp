@@ -26,18 +26,8 @@ std::unique_ptr<Penalty> roughness(const LinearProjector& projector, const Latti
   return std::make_unique<Roughness>(lattice, weight * mean_curvature(projector, lattice), projector.pool());
 }
 
-/// By channel, over the mean of A^T b, so that a channel twice as bright is treated alike.
 std::unique_ptr<Penalty> variation(const LinearProjector& projector, const Lattice& lattice, double weight) {
-  Light back;
-  projector.back_project(projector.seen(), back);
-  Channels each = {};
-  double points = 0;
-  for (std::size_t p = 0; p < back.size(); ++p) {
-    points += lattice.active[p];
-    for (std::size_t c = 0; c < 3; ++c) each[c] += static_cast<double>(back[p].c[c]);
-  }
-  for (double& w : each) w = std::max(0.0, weight * w / std::max(1.0, points));
-  return std::make_unique<Variation>(lattice, each, projector.pool());
+  return std::make_unique<Variation>(lattice, variation_weights(projector, weight), projector.pool());
 }
 
 struct Regularisation {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/baselines/finite_element_tomography/finite_element_tomography.h"
-
 #include <cmath>
 #include <numbers>
 
@@ -8,6 +6,7 @@
 
 #include "base/random.h"
 #include "evaluate/baselines/finite_element_tomography/element_basis.h"
+#include "evaluate/baselines/finite_element_tomography/finite_element_tomography.h"
 #include "tests/support/ball_scene.h"
 #include "tests/support/tomography_scene.h"
 
@@ -56,8 +55,7 @@ TEST_P(ElementBasisOf, HoldsAPlane) {
 TEST_P(ElementBasisOf, GathersByTheTranspose) {
   const auto random = [](std::size_t size, std::uint64_t stream) {
     Light light(size);
-    for (std::size_t i = 0; i < size; ++i)
-      light[i].c[0] = static_cast<float>(random_uniform(3, stream, i));
+    for (std::size_t i = 0; i < size; ++i) light[i].c[0] = static_cast<float>(random_uniform(3, stream, i));
     return light;
   };
   const Light c = random(basis_.nodes().grid.size(), 1);
@@ -71,7 +69,7 @@ TEST_P(ElementBasisOf, GathersByTheTranspose) {
 
 TEST(FiniteElementTomography, ShowsAFlameThatNothingAbsorbs) {
   const recon::Scene scene = tomography_scene();
-  const Result<MethodResult> result = finite_element_tomography(scene, with_voxels(24));
+  const Result<MethodResult> result = finite_element_tomography(scene, with_voxels(20));
   ASSERT_TRUE(result) << result.error().message();
   const test::TomographyErrors errors = errors_of(scene, *result);
   EXPECT_LT(errors.input, 0.15 * errors.input_dark);
@@ -83,7 +81,7 @@ TEST(FiniteElementTomography, ShowsAFlameThatNothingAbsorbs) {
 TEST(FiniteElementTomography, FindsAllLightOfABall) {
   BallOptions ball;
   ball.views = 5;
-  ball.image = {48, 36};
+  ball.image = {32, 24};
   const MethodResult result = finite_element_tomography(ball_scene(ball), with_voxels(12)).value();
   double light = 0;
   for (std::size_t p = 0; p < result.volume.grid.size(); ++p)
@@ -93,8 +91,8 @@ TEST(FiniteElementTomography, FindsAllLightOfABall) {
 
 TEST(FiniteElementTomography, HasTheSameBitsForAnyNumberOfThreads) {
   const recon::Scene scene = tomography_scene(PerMeter(0), 4, {40, 30});
-  EXPECT_EQ(finite_element_tomography(scene, with_voxels(16, 1)).value().volume.emission,
-            finite_element_tomography(scene, with_voxels(16, 4)).value().volume.emission);
+  EXPECT_EQ(finite_element_tomography(scene, with_voxels(12, 1)).value().volume.emission,
+            finite_element_tomography(scene, with_voxels(12, 4)).value().volume.emission);
 }
 
 TEST(FiniteElementTomography, IsAskedToStop) {

@@ -112,7 +112,7 @@ INSTANTIATE_TEST_SUITE_P(Penalties, RegularisedTomography,
 
 TEST_P(RegularisedTomography, ShowsAFlameThatNothingAbsorbs) {
   const recon::Scene scene = tomography_scene();
-  const Result<MethodResult> result = GetParam()(scene, with_voxels(24));
+  const Result<MethodResult> result = GetParam()(scene, with_voxels(20));
   ASSERT_TRUE(result) << result.error().message();
   const test::TomographyErrors errors = errors_of(scene, *result);
   EXPECT_LT(errors.input, 0.12 * errors.input_dark);
@@ -124,8 +124,8 @@ TEST_P(RegularisedTomography, ShowsAFlameThatNothingAbsorbs) {
 TEST_P(RegularisedTomography, FindsAllLightOfABall) {
   BallOptions ball;
   ball.views = 5;
-  ball.image = {48, 36};
-  const MethodResult result = GetParam()(ball_scene(ball), with_voxels(12)).value();
+  ball.image = {32, 24};
+  const MethodResult result = GetParam()(ball_scene(ball), with_voxels(10)).value();
   double light = 0;
   for (std::size_t p = 0; p < result.volume.grid.size(); ++p)
     light += static_cast<double>(result.volume.emission[3 * p]) * std::pow(result.volume.grid.edge, 3);
@@ -134,8 +134,8 @@ TEST_P(RegularisedTomography, FindsAllLightOfABall) {
 
 TEST_P(RegularisedTomography, HasTheSameBitsForAnyNumberOfThreads) {
   const recon::Scene scene = tomography_scene(PerMeter(0), 4, {40, 30});
-  EXPECT_EQ(GetParam()(scene, with_voxels(16, 1)).value().volume.emission,
-            GetParam()(scene, with_voxels(16, 4)).value().volume.emission);
+  EXPECT_EQ(GetParam()(scene, with_voxels(12, 1)).value().volume.emission,
+            GetParam()(scene, with_voxels(12, 4)).value().volume.emission);
 }
 
 TEST_P(RegularisedTomography, IsAskedToStop) {

@@ -29,8 +29,8 @@ void each_entry(const LinearProjector& projector, const Act& act) {
     }
     for (const std::int32_t base : touched)
       for (std::size_t corner = 0; corner < 8; ++corner) {
-        const std::size_t p = static_cast<std::size_t>(base) + (corner & 1) + (corner >> 1 & 1) * row +
-                              (corner >> 2) * plane;
+        const std::size_t p =
+            static_cast<std::size_t>(base) + (corner & 1) + (corner >> 1 & 1) * row + (corner >> 2) * plane;
         if (!(sums[p].c[0] > 0)) continue;  // another voxel's corner took it
         act(p, static_cast<std::uint32_t>(ray), sums[p].c[0]);
         sums[p] = recon::Rgba{};

@@ -7,10 +7,10 @@
 namespace emberlock::evaluate {
 namespace {
 
-constexpr double kMutation = 4;     // standard deviation of a mutation, voxel edges
-constexpr double kReset = 0.005;    // of the mutations go anywhere
+constexpr double kMutation = 4;       // standard deviation of a mutation, voxel edges
+constexpr double kReset = 0.005;      // of the mutations go anywhere
 constexpr double kFewAccepted = 0.1;  // of the mutations: the quantum is too coarse
-constexpr int kMostHalvings = 8;    // of the first quantum, the mean emission
+constexpr int kMostHalvings = 8;      // of the first quantum, the mean emission
 
 }  // namespace
 

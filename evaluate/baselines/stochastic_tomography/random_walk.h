@@ -13,8 +13,9 @@
 namespace emberlock::evaluate {
 
 /// The random walk of one channel. Where it comes by, it adds a quantum of light or takes one away if either
-/// lowers F; where F falls most it stays longest, as Metropolis' walk does where the density is high. F = |A x - b|^2 / 2 + weight TV(x), x a multiple of the quantum at each
-/// key point and never negative. F never rises.
+/// lowers F; where F falls most it stays longest, as Metropolis' walk does where the density is high. F = |A
+/// x - b|^2 / 2 + weight TV(x), x a multiple of the quantum at each key point and never negative. F never
+/// rises.
 class RandomWalk {
  public:
   /// All but the weight must outlive it. Begins with darkness.

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <limits>
+
 #include <gmock/gmock.h>
 
 #include "base/random.h"
@@ -53,6 +55,17 @@ TEST(LinearProjector, ShowsWhatTheRendererShows) {
   for (const recon::Rgba& ray : ax) rays += static_cast<double>(ray.c[1]);
   for (std::size_t p = 0; 3 * p < shown.rgb.size(); ++p) pixels += static_cast<double>(shown.rgb[3 * p + 1]);
   EXPECT_NEAR(rays / pixels, 1, 1e-4);
+}
+
+TEST(LinearProjector, WhatIsWorseThanDarknessIsNoResult) {
+  const recon::Scene scene = tomography_scene();
+  recon::Pool pool(2, recon::Device::cpu);
+  const TomographyInput input = find_input(scene, with_voxels(20), 1).value();
+  const LinearProjector a(input.views, input.hull, 1, pool);
+  Light x(a.unknowns());
+  EXPECT_EQ(conclude(input, a, x, 1).error().kind, ErrorKind::not_converged);
+  x[x.size() / 2].c[0] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(conclude(input, a, x, 1).error().kind, ErrorKind::not_converged);
 }
 
 TEST(AlgebraicTomography, ShowsAFlameThatNothingAbsorbs) {

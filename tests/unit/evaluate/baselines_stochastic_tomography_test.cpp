@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/baselines/stochastic_tomography/stochastic_tomography.h"
-
 #include <cmath>
 #include <numbers>
 
@@ -9,6 +7,7 @@
 #include "base/random.h"
 #include "evaluate/baselines/stochastic_tomography/footprints.h"
 #include "evaluate/baselines/stochastic_tomography/random_walk.h"
+#include "evaluate/baselines/stochastic_tomography/stochastic_tomography.h"
 #include "tests/support/ball_scene.h"
 #include "tests/support/tomography_scene.h"
 

@@ -2,9 +2,9 @@
 #include "evaluate/baselines/sheet_decomposition/sheet_decomposition.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
-#include <numeric>
 #include <utility>
 
 #include <Eigen/LU>
@@ -15,57 +15,47 @@ namespace emberlock::evaluate {
 namespace {
 
 constexpr double kLeastCrossing = 0.17;  // 10 degrees: below, a sheet's depth is a picture's error magnified
-constexpr double kEven = 1e-3;  // pull towards equal weights, of the mean square of a sheet's profile
-constexpr int kMostSteps = 2000;
+constexpr int kMostParts = 12;           // that a pair's pictures are cut into
+constexpr double kMostSheets = 1000;     // of a slice: parts^2 for each pair
+constexpr double kEven = 0.1;            // pull towards equal weights, relative to a sheet's mean square
+constexpr int kMostSteps = 300;
 constexpr int kLayersAtOnce = 16;  // between two looks at `stop`
 
-/// A profile's light up to each boundary between rays, scaled to end at `total`.
+/// A profile's light up to each boundary between rays, scaled to end at 1; empty where it is dark.
 std::vector<double> cumulative(const ParallelSlices& slices, const ParallelPicture& picture, int k,
-                               int channel, double total) {
+                               int channel) {
   const float* light = picture.light.data() + static_cast<std::size_t>(k) * slices.profile() + channel;
   std::vector<double> sums(static_cast<std::size_t>(slices.offsets) + 1);
   for (std::size_t b = 0; b + 1 < sums.size(); ++b) sums[b + 1] = sums[b] + static_cast<double>(light[3 * b]);
-  if (sums.back() <= 0) return {};
-  const double scale = total / sums.back();
-  for (double& sum : sums) sum *= scale;
+  const double whole = sums.back();
+  if (whole <= 0) return {};
+  for (double& sum : sums) sum /= whole;
   return sums;
 }
 
-/// Where the cumulative light of a profile reaches an amount, in edges from the axis; walks on with rising
-/// amounts.
+/// Where a profile's cumulative light reaches an amount; follows it along rising amounts.
 class Follow {
  public:
-  explicit Follow(const std::vector<double>& sums) : sums_(sums) {}
+  Follow(const std::vector<double>& sums, double from) : sums_(sums), from_(from) {
+    while (!ended() && next() <= 0) step();
+  }
 
-  /// The next amount at which the profile's ray changes.
-  [[nodiscard]] double next() const { return sums_[ray_ + 1]; }
+  /// The next amount, counted from the start, at which the ray changes.
+  [[nodiscard]] double next() const { return sums_[ray_ + 1] - from_; }
   [[nodiscard]] bool ended() const { return ray_ + 2 == sums_.size(); }
   void step() { ++ray_; }
+  /// In voxel edges from the axis.
   [[nodiscard]] double offset(double amount) const {
     const double light = sums_[ray_ + 1] - sums_[ray_];
-    const double part = light > 0 ? std::clamp((amount - sums_[ray_]) / light, 0.0, 1.0) : 0.5;
+    const double part = light > 0 ? std::clamp((from_ + amount - sums_[ray_]) / light, 0.0, 1.0) : 0.5;
     return static_cast<double>(ray_) + part - static_cast<double>(sums_.size() - 1) / 2;
   }
 
  private:
   const std::vector<double>& sums_;
+  double from_;
   std::size_t ray_ = 0;
 };
-
-/// Puts light onto the four key points around a place, in edges from the axis; the grid's border takes what
-/// lies beyond.
-void splat(const recon::Grid& grid, const Eigen::Vector2d& place, double light, int channel, float* layer) {
-  const double x = std::clamp(place.x() + (grid.nx - 1) / 2.0, 0.0, grid.nx - 1.0);
-  const double y = std::clamp(place.y() + (grid.ny - 1) / 2.0, 0.0, grid.ny - 1.0);
-  const int i = std::min(static_cast<int>(x), grid.nx - 2);
-  const int j = std::min(static_cast<int>(y), grid.ny - 2);
-  for (int corner = 0; corner < 4; ++corner) {
-    const double weight =
-        ((corner & 1) != 0 ? x - i : 1 - (x - i)) * ((corner >> 1) != 0 ? y - j : 1 - (y - j));
-    const std::size_t at = grid.index(i + (corner & 1), j + (corner >> 1), 0);
-    layer[3 * at + static_cast<std::size_t>(channel)] += static_cast<float>(weight * light);
-  }
-}
 
 /// Places from the offsets of two views' rays that meet there.
 Eigen::Matrix2d place_from_offsets(const ParallelPicture& first, const ParallelPicture& second) {
@@ -86,46 +76,59 @@ std::vector<Pair> pairs_of(const std::vector<ParallelPicture>& pictures) {
   return pairs;
 }
 
+/// Adds light to the four key points around a dot, which lies in the grid.
+void splat(const recon::Grid& grid, const SheetDot& dot, double light, std::size_t channel, float* layer) {
+  const double x = dot.place.x() + (grid.nx - 1) / 2.0;
+  const double y = dot.place.y() + (grid.ny - 1) / 2.0;
+  const int i = std::min(static_cast<int>(x), grid.nx - 2);
+  const int j = std::min(static_cast<int>(y), grid.ny - 2);
+  for (int corner = 0; corner < 4; ++corner) {
+    const double weight =
+        ((corner & 1) != 0 ? x - i : 1 - (x - i)) * ((corner >> 1) != 0 ? y - j : 1 - (y - j));
+    const std::size_t at = grid.index(i + (corner & 1), j + (corner >> 1), 0);
+    layer[3 * at + channel] += static_cast<float>(weight * dot.light * light);
+  }
+}
+
+/// In the three channels.
+struct Sheet {
+  std::array<std::vector<SheetDot>, 3> dots;
+};
+
 /// Decomposes slices, one after the other.
 class Decomposer {
  public:
   Decomposer(const ParallelSlices& slices, const std::vector<ParallelPicture>& pictures,
              const std::vector<Pair>& pairs)
       : slices_(slices), pictures_(pictures), pairs_(pairs) {
-    for (const ParallelPicture& picture : pictures) projectors_.emplace_back(slices, picture.across);
+    // Parts narrower than rays would say nothing new.
+    const double most = std::min<double>(kMostParts, slices.grid.nx / 4.0);
+    parts_ =
+        static_cast<int>(std::clamp(std::sqrt(kMostSheets / static_cast<double>(pairs.size())), 1.0, most));
   }
 
   void decompose(int k, float* layer) const {
-    std::vector<std::vector<float>> sheets(pairs_.size(), std::vector<float>(slices_.layer()));
-    for (int c = 0; c < 3; ++c) {
-      const double total = mean_total(k, c);
-      if (total <= 0) continue;
-      for (std::size_t p = 0; p < pairs_.size(); ++p)
-        draw_density_sheet(slices_, pictures_[pairs_[p].first], pictures_[pairs_[p].second], k, c, total,
-                           sheets[p].data());
-    }
-    const std::size_t profile = slices_.profile();
-    Eigen::MatrixXd seen(static_cast<Eigen::Index>(profile * pictures_.size()),
-                         static_cast<Eigen::Index>(pairs_.size()));
-    Eigen::VectorXd light(seen.rows());
-    std::vector<float> values(profile);
-    for (std::size_t v = 0; v < pictures_.size(); ++v) {
-      for (std::size_t p = 0; p < pairs_.size(); ++p) {
-        projectors_[v].project(sheets[p].data(), values.data());
-        for (std::size_t i = 0; i < profile; ++i)
-          seen(static_cast<Eigen::Index>(v * profile + i), static_cast<Eigen::Index>(p)) =
-              static_cast<double>(values[i]);
-      }
-      const float* from = pictures_[v].light.data() + static_cast<std::size_t>(k) * profile;
-      for (std::size_t i = 0; i < profile; ++i)
-        light[static_cast<Eigen::Index>(v * profile + i)] = static_cast<double>(from[i]);
-    }
-    combine(sheets, seen, light, layer);
+    const std::array<double, 3> light = {mean_light(k, 0), mean_light(k, 1), mean_light(k, 2)};
+    if (light[0] + light[1] + light[2] <= 0) return;
+    // A ray's light is spread over its strip of one edge: grey levels * edge, over edge^2 a key point.
+    const double density = 1 / static_cast<double>(slices_.grid.edge);
+    const std::vector<Sheet> sheets = sheets_of(k);
+    const Eigen::SparseMatrix<double> seen = seen_of(sheets, light);
+    Eigen::VectorXd shown(seen.rows());
+    for (std::size_t v = 0; v < pictures_.size(); ++v)
+      for (std::size_t i = 0; i < slices_.profile(); ++i)
+        shown[static_cast<Eigen::Index>(v * slices_.profile() + i)] =
+            static_cast<double>(pictures_[v].light[static_cast<std::size_t>(k) * slices_.profile() + i]);
+    const Eigen::VectorXd weights = convex_weights(seen, shown, kEven);
+    for (std::size_t p = 0; p < sheets.size(); ++p)
+      for (std::size_t c = 0; c < 3; ++c)
+        for (const SheetDot& dot : sheets[p].dots[c])
+          splat(slices_.grid, dot, weights[static_cast<Eigen::Index>(p)] * light[c] * density, c, layer);
   }
 
  private:
   /// Each view's light in a layer should be the same; what they say of it is averaged.
-  [[nodiscard]] double mean_total(int k, int channel) const {
+  [[nodiscard]] double mean_light(int k, int channel) const {
     double sum = 0;
     for (const ParallelPicture& picture : pictures_) {
       const float* light = picture.light.data() + static_cast<std::size_t>(k) * slices_.profile() + channel;
@@ -134,25 +137,47 @@ class Decomposer {
     return sum / static_cast<double>(pictures_.size());
   }
 
-  static void combine(const std::vector<std::vector<float>>& sheets, const Eigen::MatrixXd& seen,
-                      const Eigen::VectorXd& light, float* layer) {
-    const auto count = seen.cols();
-    Eigen::MatrixXd gram = seen.transpose() * seen;
-    const double mean = gram.trace() / static_cast<double>(count);
-    if (mean <= 0) return;  // a dark slice
-    gram.diagonal().array() += kEven * mean;
-    const Eigen::VectorXd weights = convex_weights(gram, seen.transpose() * light);
-    for (std::size_t p = 0; p < sheets.size(); ++p) {
-      const auto weight = static_cast<float>(weights[static_cast<Eigen::Index>(p)]);
-      if (weight <= 0) continue;
-      for (std::size_t i = 0; i < sheets[p].size(); ++i) layer[i] += weight * sheets[p][i];
-    }
+  [[nodiscard]] std::vector<Sheet> sheets_of(int k) const {
+    const double part = 1.0 / parts_;
+    std::vector<Sheet> sheets;
+    for (const Pair& pair : pairs_)
+      for (int i = 0; i < parts_; ++i)
+        for (int j = 0; j < parts_; ++j) {
+          Sheet sheet;
+          for (std::size_t c = 0; c < 3; ++c)
+            sheet.dots[c] = density_sheet(slices_, pictures_[pair.first], pictures_[pair.second], k,
+                                          static_cast<int>(c), {part * i, part * j, part});
+          sheets.push_back(std::move(sheet));
+        }
+    return sheets;
+  }
+
+  /// The profiles of the sheets, view by view: a column each.
+  [[nodiscard]] Eigen::SparseMatrix<double> seen_of(const std::vector<Sheet>& sheets,
+                                                    const std::array<double, 3>& light) const {
+    std::vector<Eigen::Triplet<double>> values;
+    for (std::size_t p = 0; p < sheets.size(); ++p)
+      for (std::size_t v = 0; v < pictures_.size(); ++v)
+        for (std::size_t c = 0; c < 3; ++c)
+          for (const SheetDot& dot : sheets[p].dots[c]) {
+            const double ray = pictures_[v].across.dot(dot.place) + (slices_.offsets - 1) / 2.0;
+            const double before = std::floor(ray);
+            const auto row =
+                static_cast<Eigen::Index>(v * slices_.profile() + 3 * static_cast<std::size_t>(before) + c);
+            const auto column = static_cast<Eigen::Index>(p);
+            values.emplace_back(row, column, (before + 1 - ray) * dot.light * light[c]);
+            values.emplace_back(row + 3, column, (ray - before) * dot.light * light[c]);
+          }
+    Eigen::SparseMatrix<double> seen(static_cast<Eigen::Index>(slices_.profile() * pictures_.size()),
+                                     static_cast<Eigen::Index>(sheets.size()));
+    seen.setFromTriplets(values.begin(), values.end());
+    return seen;
   }
 
   const ParallelSlices& slices_;
   const std::vector<ParallelPicture>& pictures_;
   const std::vector<Pair>& pairs_;
-  std::vector<ParallelProjector> projectors_;
+  int parts_;
 };
 
 /// The nearest point of the simplex w >= 0, sum w = 1.
@@ -169,47 +194,67 @@ Eigen::VectorXd onto_simplex(const Eigen::VectorXd& from) {
   return (from.array() - shift).max(0);
 }
 
+double largest_eigenvalue(const Eigen::SparseMatrix<double>& seen) {
+  Eigen::VectorXd v = Eigen::VectorXd::Ones(seen.cols()).normalized();
+  double value = 0;
+  for (int n = 0; n < 20; ++n) {
+    v = seen.transpose() * (seen * v);
+    value = v.norm();
+    if (value <= 0) return 0;
+    v /= value;
+  }
+  return value;
+}
+
 }  // namespace
 
-void draw_density_sheet(const ParallelSlices& slices, const ParallelPicture& first,
-                        const ParallelPicture& second, int k, int channel, double total, float* layer) {
-  const std::vector<double> sums_first = cumulative(slices, first, k, channel, total);
-  const std::vector<double> sums_second = cumulative(slices, second, k, channel, total);
-  if (sums_first.empty() || sums_second.empty()) return;
+std::vector<SheetDot> density_sheet(const ParallelSlices& slices, const ParallelPicture& first,
+                                    const ParallelPicture& second, int k, int channel,
+                                    const SheetPart& part) {
+  const std::vector<double> sums_first = cumulative(slices, first, k, channel);
+  const std::vector<double> sums_second = cumulative(slices, second, k, channel);
+  if (sums_first.empty() || sums_second.empty()) return {};
   const Eigen::Matrix2d place = place_from_offsets(first, second);
-  // A ray's light is spread over its strip of one edge: grey levels * edge, over edge^2 a key point.
-  const double density = 1 / static_cast<double>(slices.grid.edge);
-  Follow left(sums_first);
-  Follow right(sums_second);
+  const Eigen::Vector2d reach((slices.grid.nx - 1) / 2.0, (slices.grid.ny - 1) / 2.0);
+  std::vector<SheetDot> sheet;
+  Follow left(sums_first, part.first);
+  Follow right(sums_second, part.second);
   double from = 0;
   while (true) {
-    const double to = std::min(left.next(), right.next());
+    const double to = std::min({left.next(), right.next(), part.light});
     if (to > from) {
       const Eigen::Vector2d begin = place * Eigen::Vector2d(left.offset(from), right.offset(from));
       const Eigen::Vector2d end = place * Eigen::Vector2d(left.offset(to), right.offset(to));
-      const int dots = 1 + static_cast<int>(2 * (end - begin).norm());
-      for (int dot = 0; dot < dots; ++dot)
-        splat(slices.grid, begin + (dot + 0.5) / dots * (end - begin), density * (to - from) / dots, channel,
-              layer);
+      const int dots = 1 + static_cast<int>((end - begin).norm());
+      for (int dot = 0; dot < dots; ++dot) {
+        const Eigen::Vector2d at = begin + (dot + 0.5) / dots * (end - begin);
+        if ((at.array().abs() < reach.array()).all()) sheet.push_back({at, (to - from) / dots / part.light});
+      }
       from = to;
     }
+    if (to >= part.light) break;
     const bool left_next = left.next() <= right.next();
     Follow& behind = (left_next && !left.ended()) || right.ended() ? left : right;
     if (behind.ended()) break;
     behind.step();
   }
+  return sheet;
 }
 
-Eigen::VectorXd convex_weights(const Eigen::MatrixXd& gram, const Eigen::VectorXd& right) {
-  const auto count = static_cast<double>(right.size());
-  // The largest row sum bounds the largest eigenvalue.
-  const double step = 1 / gram.cwiseAbs().rowwise().sum().maxCoeff();
-  Eigen::VectorXd weights = Eigen::VectorXd::Constant(right.size(), 1 / count);
+Eigen::VectorXd convex_weights(const Eigen::SparseMatrix<double>& seen, const Eigen::VectorXd& shown,
+                               double even) {
+  const auto count = static_cast<double>(seen.cols());
+  const double pull = even * seen.squaredNorm() / count;
+  // Power iteration comes from below.
+  const double step = 1 / (1.05 * largest_eigenvalue(seen) + pull);
+  const Eigen::VectorXd prior = Eigen::VectorXd::Constant(seen.cols(), 1 / count);
+  Eigen::VectorXd weights = prior;
   Eigen::VectorXd ahead = weights;
   double momentum = 1;
   for (int n = 0; n < kMostSteps; ++n) {
     const Eigen::VectorXd before = weights;
-    weights = onto_simplex(ahead - step * (gram * ahead - right));
+    const Eigen::VectorXd slope = seen.transpose() * (seen * ahead - shown) + pull * (ahead - prior);
+    weights = onto_simplex(ahead - step * slope);
     const Eigen::VectorXd change = weights - before;
     if (change.cwiseAbs().maxCoeff() < 1e-9) break;
     // Starting anew where the momentum points uphill (O'Donoghue and Candes 2015).

@@ -17,7 +17,8 @@
 namespace emberlock::evaluate {
 namespace {
 
-constexpr int kMostSamples = 8;  // along each side of the square that a ray's value is the mean of
+constexpr int kMostSamples = 8;    // along each side of the square that a ray's value is the mean of
+constexpr int kLayersAtOnce = 16;  // between two looks at `stop`
 
 /// Bilinear between pixel centres; dark beyond the picture.
 Eigen::Vector3d colour_at(const recon::RadianceImage& image, const Eigen::Vector2d& pixel) {
@@ -169,6 +170,14 @@ void ParallelProjector::back_project(const float* profile, float* layer) const {
     for (std::size_t c = 0; c < 3; ++c)
       layer[3 * p + c] += edge_ * ((1 - between_[p].next) * from[c] + between_[p].next * from[c + 3]);
   }
+}
+
+void each_layer(const ParallelSlices& slices, const MethodOptions& options,
+                const std::function<void(int k)>& work) {
+  const int layers = slices.grid.nz;
+  recon::Pool pool(options.compute.threads);
+  for (int first = 0; first < layers && !(options.stop && options.stop()); first += kLayersAtOnce)
+    pool.run(std::min(kLayersAtOnce, layers - first), [&](int n) { work(first + n); });
 }
 
 double crossing(const ParallelPicture& a, const ParallelPicture& b) {

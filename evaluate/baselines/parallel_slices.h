@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -69,6 +70,11 @@ class ParallelProjector {
   std::size_t profile_;
   float edge_;
 };
+
+/// Calls work(k) once for each layer, on the options' threads; the layers that have not begun when the
+/// options' stop() says so are left out.
+void each_layer(const ParallelSlices& slices, const MethodOptions& options,
+                const std::function<void(int k)>& work);
 
 /// |sine| of the angle between two views' rays: 0 where both see the same lines.
 double crossing(const ParallelPicture& a, const ParallelPicture& b);

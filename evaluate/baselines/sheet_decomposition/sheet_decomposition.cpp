@@ -9,7 +9,7 @@
 
 #include <Eigen/LU>
 
-#include "recon/compute/pool.h"
+#include "recon/hull/hull.h"
 
 namespace emberlock::evaluate {
 namespace {
@@ -19,7 +19,6 @@ constexpr int kMostParts = 12;           // that a pair's pictures are cut into
 constexpr double kMostSheets = 1000;     // of a slice: parts^2 for each pair
 constexpr double kEven = 0.1;            // pull towards equal weights, relative to a sheet's mean square
 constexpr int kMostSteps = 300;
-constexpr int kLayersAtOnce = 16;  // between two looks at `stop`
 
 /// A profile's light up to each boundary between rays, scaled to end at 1; empty where it is dark.
 std::vector<double> cumulative(const ParallelSlices& slices, const ParallelPicture& picture, int k,
@@ -276,12 +275,9 @@ Result<MethodResult> sheet_decomposition(const recon::Scene& scene, const Method
                  "Add a view, best at a right angle to another"};
   recon::Volume volume{slices.grid, std::vector<float>(3 * slices.grid.size()), {}};
   const Decomposer decomposer(slices, pictures, pairs);
-  recon::Pool pool(options.compute.threads);
-  for (int first = 0; first < slices.grid.nz && !(options.stop && options.stop()); first += kLayersAtOnce)
-    pool.run(std::min(kLayersAtOnce, slices.grid.nz - first), [&](int n) {
-      const int k = first + n;
-      decomposer.decompose(k, volume.emission.data() + static_cast<std::size_t>(k) * slices.layer());
-    });
+  each_layer(slices, options, [&](int k) {
+    decomposer.decompose(k, volume.emission.data() + static_cast<std::size_t>(k) * slices.layer());
+  });
   return checked_result(scene, std::move(volume), options);
 }
 

@@ -151,9 +151,10 @@ ParallelProjector::ParallelProjector(const ParallelSlices& slices, const Eigen::
     }
 }
 
-void ParallelProjector::project(const float* layer, float* profile) const {
+void ParallelProjector::project(const float* layer, std::span<const std::uint32_t> points,
+                                float* profile) const {
   std::fill(profile, profile + profile_, 0.F);
-  for (std::size_t p = 0; p < between_.size(); ++p) {
+  for (const std::size_t p : points) {
     // A tent holds edge^2 of its value, and a ray stands for a strip one edge wide.
     float* const to = profile + 3 * between_[p].ray;
     for (std::size_t c = 0; c < 3; ++c) {
@@ -164,8 +165,9 @@ void ParallelProjector::project(const float* layer, float* profile) const {
   }
 }
 
-void ParallelProjector::back_project(const float* profile, float* layer) const {
-  for (std::size_t p = 0; p < between_.size(); ++p) {
+void ParallelProjector::back_project(const float* profile, std::span<const std::uint32_t> points,
+                                     float* layer) const {
+  for (const std::size_t p : points) {
     const float* const from = profile + 3 * between_[p].ray;
     for (std::size_t c = 0; c < 3; ++c)
       layer[3 * p + c] += edge_ * ((1 - between_[p].next) * from[c] + between_[p].next * from[c + 3]);

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -56,10 +57,11 @@ class ParallelProjector {
  public:
   ParallelProjector(const ParallelSlices& slices, const Eigen::Vector2d& across);
 
-  /// Sets `profile` to the line integrals of `layer`: grey levels of grey levels per metre.
-  void project(const float* layer, float* profile) const;
-  /// Adds to `layer` the transpose of `profile`.
-  void back_project(const float* profile, float* layer) const;
+  /// Sets `profile` to the line integrals of `layer`, grey levels of grey levels per metre. Only `points` (i
+  /// + nx * j) are looked at.
+  void project(const float* layer, std::span<const std::uint32_t> points, float* profile) const;
+  /// Adds to `points` of `layer` the transpose of `profile`.
+  void back_project(const float* profile, std::span<const std::uint32_t> points, float* layer) const;
 
  private:
   struct Between {

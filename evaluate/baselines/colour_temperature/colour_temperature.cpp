@@ -87,6 +87,7 @@ class ColourSlices {
     if (rays[0].total <= 0 || rays[1].total <= 0 || mean_kelvin <= 0) return;
     const double gain =
         crossing(*pictures_[0], *pictures_[1]) / (total * static_cast<double>(slices_.grid.edge));
+    std::vector<std::uint32_t> points;
     std::size_t at = 0;
     for (int j = 0; j < slices_.grid.ny; ++j)
       for (int i = 0; i < slices_.grid.nx; ++i, ++at) {
@@ -94,13 +95,14 @@ class ColourSlices {
         const double first = kelvin_between(rays[0].kelvin, ray(0, i, j));
         const double second = kelvin_between(rays[1].kelvin, ray(1, i, j));
         if (light <= 0 || first + second <= 0 || !in_hull(i, j, k)) continue;
+        points.push_back(static_cast<std::uint32_t>(at));
         const double product = first > 0 && second > 0 ? first * second / mean_kelvin : first + second;
         kelvin[at] = static_cast<float>(
             std::clamp(product, recon::EmitterTable::kColdest, recon::EmitterTable::kHottest));
         const std::array<double, 3> colour = colours_.colour(Kelvin(static_cast<double>(kelvin[at])));
         for (std::size_t c = 0; c < 3; ++c) layer[3 * at + c] = static_cast<float>(gain * light * colour[c]);
       }
-    for (std::size_t v = 0; v < 2; ++v) scale_rays(v, rays[v].light, layer);
+    for (std::size_t v = 0; v < 2; ++v) scale_rays(v, rays[v].light, points, layer);
   }
 
  private:
@@ -128,21 +130,22 @@ class ColourSlices {
   }
 
   /// Gives the rays of a view the light that its picture has, where they have any: what the hull cut away.
-  void scale_rays(std::size_t view, const std::vector<double>& light, float* layer) const {
+  void scale_rays(std::size_t view, const std::vector<double>& light,
+                  const std::vector<std::uint32_t>& points, float* layer) const {
     std::vector<float> profile(slices_.profile());
-    projectors_[view].project(layer, profile.data());
+    projectors_[view].project(layer, points, profile.data());
     std::vector<double> gains;
     for (std::size_t b = 0; b < light.size(); ++b) {
       const double shown = static_cast<double>(profile[3 * b]) + static_cast<double>(profile[3 * b + 1]) +
                            static_cast<double>(profile[3 * b + 2]);
       gains.push_back(shown > 0 ? std::min(light[b] / shown, kMostGain) : 0);
     }
-    std::size_t at = 0;
-    for (int j = 0; j < slices_.grid.ny; ++j)
-      for (int i = 0; i < slices_.grid.nx; ++i, ++at) {
-        const auto gain = static_cast<float>(between(gains, ray(view, i, j)));
-        for (std::size_t c = 0; c < 3; ++c) layer[3 * at + c] *= gain;
-      }
+    for (const std::size_t at : points) {
+      const auto row = static_cast<std::size_t>(slices_.grid.nx);
+      const auto gain = static_cast<float>(
+          between(gains, ray(view, static_cast<int>(at % row), static_cast<int>(at / row))));
+      for (std::size_t c = 0; c < 3; ++c) layer[3 * at + c] *= gain;
+    }
   }
 
   static constexpr double kMostGain = 10;  // a ray of which the hull left next to nothing stays dim

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluate/baselines/gaussian_splats/gaussian_splats.h"
-
 #include <cmath>
 #include <numeric>
 
 #include <gtest/gtest.h>
 
 #include "base/random.h"
+#include "evaluate/baselines/gaussian_splats/gaussian_splats.h"
 #include "recon/hull/hull.h"
 #include "tests/support/tomography_scene.h"
 

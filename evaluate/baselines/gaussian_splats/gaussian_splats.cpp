@@ -22,7 +22,10 @@ struct Reach {
   std::array<float, 6> w;
 
   Reach(const Splat& splat, const recon::Grid& grid)
-      : low{}, high{}, centre{splat[kCentre], splat[kCentre + 1], splat[kCentre + 2]}, w(sharpness_of(splat)) {
+      : low{},
+        high{},
+        centre{splat[kCentre], splat[kCentre + 1], splat[kCentre + 2]},
+        w(sharpness_of(splat)) {
     // Along each axis sqrt(Sigma_aa) = |row a of W^-1|.
     const float inverse[6] = {1 / w[0],
                               -w[1] / (w[0] * w[2]),
@@ -157,8 +160,8 @@ Result<MethodResult> gaussian_splats(const recon::Scene& scene, const MethodOpti
   pool.run(static_cast<int>(views.size()), [&](int task) {
     const auto v = static_cast<std::size_t>(task);
     const recon::View& view = *input.views[v];
-    views[v] = splat_view(view, grown(recon::noise_mask(*view.image)), grid,
-                          pixels_of_an_edge(view, scene, grid));
+    views[v] =
+        splat_view(view, grown(recon::noise_mask(*view.image)), grid, pixels_of_an_edge(view, scene, grid));
   });
   SplatFitOptions fit_options;
   fit_options.seed = options.seed;

@@ -141,12 +141,12 @@ std::array<Splat, 2> two_of(const Splat& splat, RandomStream& random) {
 /// Prunes and densifies; `pull` is how much each splat's centre was drawn since the last time.
 void control_density(const std::vector<float>& pull, std::size_t most, RandomStream& random, Splats& splats,
                      Adam& adam) {
-  constexpr float kDark = 0.02F;           // of the mean shine
+  constexpr float kDark = 0.02F;              // of the mean shine
   constexpr std::size_t kPartThatSplits = 3;  // at most a third of them a time
   std::vector<float> shine(splats.all.size());
   std::transform(splats.all.begin(), splats.all.end(), shine.begin(), shine_of);
-  const float mean =
-      std::accumulate(shine.begin(), shine.end(), 0.F) / static_cast<float>(std::max<std::size_t>(1, shine.size()));
+  const float mean = std::accumulate(shine.begin(), shine.end(), 0.F) /
+                     static_cast<float>(std::max<std::size_t>(1, shine.size()));
   std::vector<std::size_t> from;
   for (std::size_t s = 0; s < shine.size(); ++s)
     if (shine[s] > kDark * mean) from.push_back(s);
@@ -177,16 +177,15 @@ Splats lattice_in(const recon::Hull& hull, std::size_t count) {
   const int spacing = std::max(1, static_cast<int>(std::lround(std::cbrt(share))));
   constexpr float kWidth = 0.6F;  // sigma over spacing
   Splat splat = {};
-  for (std::size_t a = 0; a < 3; ++a)
-    splat[kSharpness + a] = -std::log(kWidth * static_cast<float>(spacing));
+  for (std::size_t a = 0; a < 3; ++a) splat[kSharpness + a] = -std::log(kWidth * static_cast<float>(spacing));
   Splats splats;
   for (int k = spacing / 2; k < g.nz - 1; k += spacing)
     for (int j = spacing / 2; j < g.ny - 1; j += spacing)
       for (int i = spacing / 2; i < g.nx - 1; i += spacing) {
-        const std::size_t voxel =
-            static_cast<std::size_t>(i) +
-            static_cast<std::size_t>(g.nx - 1) *
-                (static_cast<std::size_t>(j) + static_cast<std::size_t>(g.ny - 1) * static_cast<std::size_t>(k));
+        const std::size_t voxel = static_cast<std::size_t>(i) +
+                                  static_cast<std::size_t>(g.nx - 1) *
+                                      (static_cast<std::size_t>(j) +
+                                       static_cast<std::size_t>(g.ny - 1) * static_cast<std::size_t>(k));
         if (hull.inside[voxel] == 0) continue;
         splat[kCentre] = static_cast<float>(i) + 0.5F;
         splat[kCentre + 1] = static_cast<float>(j) + 0.5F;
@@ -196,7 +195,8 @@ Splats lattice_in(const recon::Hull& hull, std::size_t count) {
   return splats;
 }
 
-/// Steps of expectation maximization (Shepp and Vardi 1982) of the light alone.
+/// The light alone, by steps of A^T b over A^T A x (image space reconstruction, Daube-Witherspoon and
+/// Muehllehner 1986): never negative, towards the least squares.
 void brighten(const std::vector<SplatView>& views, int steps, Splats& splats, recon::Pool& pool) {
   for (int step = 0; step < steps; ++step) {
     // The slopes by the light numbers are those by the light times the same factor, which cancels.
@@ -223,7 +223,8 @@ void choose_unit(Splats& splats) {
   double sum = 0;
   for (const Splat& splat : splats.all)
     for (const float light : light_of(splat, splats.unit)) sum += static_cast<double>(light);
-  const auto unit = static_cast<float>(sum / static_cast<double>(3 * std::max<std::size_t>(1, splats.all.size())));
+  const auto unit =
+      static_cast<float>(sum / static_cast<double>(3 * std::max<std::size_t>(1, splats.all.size())));
   if (!(unit > 0)) return;
   for (Splat& splat : splats.all) {
     const std::array<float, 3> light = light_of(splat, splats.unit);

@@ -15,7 +15,7 @@ namespace emberlock::evaluate {
 struct SplatFitOptions {
   int iterations = 120;
   std::size_t first = 8000;  ///< splats to begin with, about; at most one a voxel of the hull
-  double growth = 1.5;  ///< splats over those at the beginning, at most
+  double growth = 1.5;       ///< splats over those at the beginning, at most
   std::uint64_t seed = 1;
   std::function<bool()> stop = {};
 };
@@ -25,8 +25,8 @@ struct SplatFit {
   int iterations = 0;
 };
 
-/// Splats on a lattice in the hull, as bright as a few steps of expectation maximization make them (Shepp and
-/// Vardi 1982).
+/// Splats on a lattice in the hull, about `count`, as bright as a few steps of a tomography without negative
+/// light make them.
 Splats splats_in(const recon::Hull& hull, const std::vector<SplatView>& views, std::size_t count,
                  recon::Pool& pool);
 

@@ -197,8 +197,7 @@ SplatPicture picture_of(const recon::View& view, const recon::CameraModel& camer
   picture.columns = std::max(0, (box.x1 - first_x + stride - 1) / stride);
   picture.rows = std::max(0, (box.y1 - first_y + stride - 1) / stride);
   picture.pitch = (picture.columns + kLanes - 1) / kLanes * kLanes;
-  const std::size_t pixels =
-      static_cast<std::size_t>(picture.pitch) * static_cast<std::size_t>(picture.rows);
+  const std::size_t pixels = static_cast<std::size_t>(picture.pitch) * static_cast<std::size_t>(picture.rows);
   for (std::size_t c = 0; c < 3; ++c) {
     picture.direction[c].assign(pixels, 1.F);
     picture.seen[c].assign(pixels, 0.F);
@@ -210,8 +209,9 @@ SplatPicture picture_of(const recon::View& view, const recon::CameraModel& camer
       const Eigen::Vector3d along = camera.ray({x + 0.5, y + 0.5}).direction;
       const std::size_t to = static_cast<std::size_t>(row) * static_cast<std::size_t>(picture.pitch) +
                              static_cast<std::size_t>(column);
-      const std::size_t from = static_cast<std::size_t>(y) * static_cast<std::size_t>(view.image->size.width) +
-                               static_cast<std::size_t>(x);
+      const std::size_t from =
+          static_cast<std::size_t>(y) * static_cast<std::size_t>(view.image->size.width) +
+          static_cast<std::size_t>(x);
       for (std::size_t c = 0; c < 3; ++c) {
         picture.direction[c][to] = static_cast<float>(along[static_cast<int>(c)]);
         picture.seen[c][to] = view.image->rgb[3 * from + c];
@@ -268,8 +268,7 @@ SplatLight show(const Splats& splats, const SplatView& view, const SplatPicture&
     if (f.empty()) continue;
     each_four(f, picture, [&](std::size_t pixel) {
       const Lanes seen = Sight(f, picture, pixel).seen;
-      for (std::size_t c = 0; c < 3; ++c)
-        store(load(&light[c][pixel]) + f.light[c] * seen, &light[c][pixel]);
+      for (std::size_t c = 0; c < 3; ++c) store(load(&light[c][pixel]) + f.light[c] * seen, &light[c][pixel]);
     });
   }
   return light;
@@ -280,8 +279,7 @@ void add_gradient(const Splats& splats, const SplatView& view, const SplatPictur
   const Eigen::Vector3d eye = view.camera.center();
   for (std::size_t s = 0; s < splats.all.size(); ++s) {
     const Footprint f = footprint_of(splats.all[s], splats.unit, view, picture, eye);
-    if (!f.empty())
-      add_slopes(slopes_of(f, picture, slope), f, splats.all[s], splats.unit, gradient[s]);
+    if (!f.empty()) add_slopes(slopes_of(f, picture, slope), f, splats.all[s], splats.unit, gradient[s]);
   }
 }
 

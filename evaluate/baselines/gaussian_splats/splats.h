@@ -12,8 +12,8 @@
 
 namespace emberlock::evaluate {
 
-// Emissive Gaussians and the pictures they show. Lengths are in voxel edges from a grid's key point (0, 0, 0).
-// At a distance v from its centre c a splat emits
+// Emissive Gaussians and the pictures they show. Lengths are in voxel edges from a grid's key point (0, 0,
+// 0). At a distance v from its centre c a splat emits
 //   light exp(-|W v|^2 / 2),  W lower triangular,
 // and a ray from o in the direction d (unit length) sees, with u = W (c - o) and w = W d,
 //   light sqrt(2 pi) / |w| exp(-q / 2),  q = |u x w|^2 / |w|^2,
@@ -60,7 +60,8 @@ struct SplatView {
   std::vector<SplatPicture> pictures;  ///< stride^2, each with other pixels; together the box
 };
 
-SplatView splat_view(const recon::View& view, const recon::PixelBox& box, const recon::Grid& grid, int stride);
+SplatView splat_view(const recon::View& view, const recon::PixelBox& box, const recon::Grid& grid,
+                     int stride);
 
 /// What splats show. Each is left out of pixels more than 3.5 of its standard deviations from its middle.
 SplatLight show(const Splats& splats, const SplatView& view, const SplatPicture& picture);

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -6,7 +7,10 @@
 
 #include "base/random.h"
 #include "evaluate/baselines/gaussian_splats/gaussian_splats.h"
+#include "evaluate/baselines/gaussian_splats/splat_fit.h"
+#include "evaluate/baselines/linear_projector.h"
 #include "recon/hull/hull.h"
+#include "tests/support/ball_scene.h"
 #include "tests/support/tomography_scene.h"
 
 namespace emberlock::evaluate {
@@ -127,6 +131,67 @@ TEST(Splats, LightNumbersComeBack) {
     splat[kLight] = number_of_light(light, 2);
     EXPECT_NEAR(light_of(splat, 2)[0], light, 1e-4F * light);
   }
+}
+
+std::vector<SplatView> views_of(const TomographyInput& input) {
+  std::vector<SplatView> views;
+  for (const recon::View* view : input.views)
+    views.push_back(
+        splat_view(*view, {0, 0, view->image->size.width, view->image->size.height}, input.hull.grid, 2));
+  return views;
+}
+
+/// Squares of what is shown beside what is seen, red, over one picture of each view.
+double squares_off(const Splats& splats, const std::vector<SplatView>& views) {
+  double sum = 0;
+  for (const SplatView& view : views) {
+    const SplatPicture& picture = view.pictures[0];
+    const SplatLight light = show(splats, view, picture);
+    for (int row = 0; row < picture.rows; ++row)
+      for (int column = 0; column < picture.columns; ++column) {
+        const auto at = static_cast<std::size_t>(row * picture.pitch + column);
+        sum += std::pow(double{light[0][at]} - double{picture.seen[0][at]}, 2);
+      }
+  }
+  return sum;
+}
+
+TEST(SplatFit, BeginsWithAQuickTomography) {
+  const recon::Scene scene = tomography_scene(PerMeter(0), 5, {48, 36});
+  recon::Pool pool(2, recon::Device::cpu);
+  const TomographyInput input = find_input(scene, with_voxels(16), 1).value();
+  const std::vector<SplatView> views = views_of(input);
+  EXPECT_LT(squares_off(splats_in(input.hull, views, 1000, pool), views), 0.1 * squares_off({}, views));
+}
+
+TEST(SplatFit, MakesMoreSplatsWithinItsBoundWhereFewShowTooLittle) {
+  const recon::Scene scene = tomography_scene(PerMeter(0), 5, {48, 36});
+  recon::Pool pool(2, recon::Device::cpu);
+  const TomographyInput input = find_input(scene, with_voxels(24), 1).value();
+  const std::vector<SplatView> views = views_of(input);
+  SplatFitOptions few;
+  few.first = 20;
+  const Splats start = splats_in(input.hull, views, few.first, pool);
+  few.growth = 1;
+  const Splats as_many = fit_splats(input.hull, views, few, pool).splats;
+  few.growth = 3;
+  const Splats more = fit_splats(input.hull, views, few, pool).splats;
+  EXPECT_LE(as_many.all.size(), start.all.size());
+  EXPECT_GT(more.all.size(), start.all.size());
+  EXPECT_LE(more.all.size(), 3 * start.all.size());
+  EXPECT_LT(squares_off(as_many, views), 0.5 * squares_off(start, views));
+  EXPECT_LT(squares_off(more, views), 0.8 * squares_off(as_many, views));
+}
+
+/// A ball of light that falls off like a Gaussian is what splats are made for.
+TEST(GaussianSplats, ShowABallOfLightFromBetweenItsViews) {
+  BallOptions ball;
+  ball.views = 6;
+  ball.image = {48, 36};
+  const recon::Scene scene = ball_scene(ball);
+  const test::TomographyErrors errors = errors_of(scene, *gaussian_splats(scene, with_voxels(14)));
+  EXPECT_LT(errors.input, 0.05 * errors.input_dark);
+  EXPECT_LT(errors.held_out, 0.06 * errors.held_out_dark);
 }
 
 TEST(GaussianSplats, ShowAFlameThatNothingAbsorbs) {

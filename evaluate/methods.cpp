@@ -5,6 +5,16 @@
 #include <utility>
 
 #include "base/clock.h"
+#include "evaluate/baselines/algebraic_tomography/algebraic_tomography.h"
+#include "evaluate/baselines/appearance_transfer/appearance_transfer.h"
+#include "evaluate/baselines/colour_temperature/colour_temperature.h"
+#include "evaluate/baselines/finite_element_tomography/finite_element_tomography.h"
+#include "evaluate/baselines/gaussian_splats/gaussian_splats.h"
+#include "evaluate/baselines/refractive_reconstruction/refractive_reconstruction.h"
+#include "evaluate/baselines/regularised_tomography/regularised_tomography.h"
+#include "evaluate/baselines/sheet_decomposition/sheet_decomposition.h"
+#include "evaluate/baselines/stochastic_tomography/stochastic_tomography.h"
+#include "evaluate/baselines/two_colour_pyrometry/two_colour_pyrometry.h"
 #include "recon/adjust/choose_effects.h"
 #include "recon/adjust/solver.h"
 #include "recon/export/temperature_look_up.h"
@@ -64,6 +74,18 @@ Result<MethodResult> default_method(const recon::Scene& scene, const MethodOptio
 
 const std::vector<Method>& methods() {
   static const std::vector<Method> all = {
+      {kSheetDecompositionFacts, sheet_decomposition},
+      {kAlgebraicTomographyFacts, algebraic_tomography},
+      {kConvergedAlgebraicTomographyFacts, converged_algebraic_tomography},
+      {kStochasticTomographyFacts, stochastic_tomography},
+      {kColourTemperatureFacts, colour_temperature},
+      {kTwoColourPyrometryFacts, two_colour_pyrometry},
+      {kRefractiveReconstructionFacts, refractive_reconstruction},
+      {kAppearanceTransferFacts, appearance_transfer},
+      {kTikhonovTomographyFacts, tikhonov_tomography},
+      {kTotalVariationTomographyFacts, total_variation_tomography},
+      {kFiniteElementTomographyFacts, finite_element_tomography},
+      {kGaussianSplatsFacts, gaussian_splats},
       {{kPapersMethod, "the paper", false, Projection::perspective, "radiative transport", true},
        the_papers_method},
       {{kDefaultMethod, "this program", false, Projection::perspective, "radiative transport", true},

@@ -13,7 +13,6 @@
 #include "recon/adjust/tracker.h"
 #include "recon/preprocess/check_scene.h"
 #include "recon/preprocess/flame_mask.h"
-#include "recon/render/march_table.h"
 
 namespace emberlock::evaluate {
 namespace {
@@ -21,8 +20,9 @@ namespace {
 constexpr int kSums = 64;  // a sum's parts, whatever the number of threads
 
 recon::Problem linear_problem(const std::vector<const recon::View*>& views, const recon::Hull& hull,
-                              int stride, recon::Pool& pool) {
+                              int stride, const recon::RefractiveIndex* gas, recon::Pool& pool) {
   recon::ProblemOptions options;
+  options.gas = gas;
   options.rule.stride = stride;
   return recon::make_problem(views, hull, options, pool);
 }
@@ -74,8 +74,11 @@ int stride_for(const TomographyInput& input) {
 }
 
 LinearProjector::LinearProjector(const std::vector<const recon::View*>& views, const recon::Hull& hull,
-                                 int stride, recon::Pool& pool)
-    : hull_(hull), pool_(pool), problem_(linear_problem(views, hull, stride, pool)), seen_(problem_.seen) {
+                                 int stride, recon::Pool& pool, const recon::RefractiveIndex* gas)
+    : hull_(hull),
+      pool_(pool),
+      problem_(linear_problem(views, hull, stride, gas, pool)),
+      seen_(problem_.seen) {
   for (recon::Rgba& pixel : seen_) pixel.c[3] = 0;  // whether it was saturated, which is passed over
 }
 
@@ -85,7 +88,7 @@ void LinearProjector::project(const Light& x, Light& y) const {
   work.rays = problem_.list.table();
   work.volume = x.data();
   work.residual = y.data();
-  const auto march = recon::march_table<float>().forward_of(recon::Absorb::nothing, recon::Travel::straight);
+  const auto march = recon::march_table<float>().forward_of(recon::Absorb::nothing, travel());
   constexpr int kTasks = 64;
   pool_.run(kTasks, [&](int task) {
     const recon::Slice mine = recon::slice(rays(), kTasks, task);
@@ -100,7 +103,7 @@ void LinearProjector::back_project(const Light& y, Light& x) const {
   work.rays = problem_.list.table();
   work.residual = const_cast<recon::Rgba*>(y.data());  // NOLINT(*-const-cast): the transpose only reads it
   work.gradient = x.data();
-  const auto march = recon::march_table<float>().adjoint_of(recon::Absorb::nothing, recon::Travel::straight);
+  const auto march = recon::march_table<float>().adjoint_of(recon::Absorb::nothing, travel());
   const recon::SlabRuns& slabs = problem_.slabs.front();
   // Even slabs, then odd ones: no two that are written at the same time share a key point.
   for (int parity = 0; parity < 2; ++parity) {

@@ -9,9 +9,11 @@
 #include "evaluate/baselines/method.h"
 #include "recon/adjust/problem.h"
 #include "recon/compute/pool.h"
+#include "recon/effects/refraction.h"
 #include "recon/hull/hull.h"
 #include "recon/kernels/rgba.h"
 #include "recon/preprocess/view.h"
+#include "recon/render/march_table.h"
 #include "recon/render/volume.h"
 
 namespace emberlock::evaluate {
@@ -62,9 +64,10 @@ class LinearMap {
 /// Pixels whose ray misses the hull have no ray. The same bits for any number of threads.
 class LinearProjector final : public LinearMap {
  public:
-  /// Takes every `stride`-th pixel along both axes. Hull, views' pictures and pool must outlive it.
+  /// Takes every `stride`-th pixel along both axes. `gas` bends the rays where it is given. Hull, views'
+  /// pictures and pool must outlive it.
   LinearProjector(const std::vector<const recon::View*>& views, const recon::Hull& hull, int stride,
-                  recon::Pool& pool);
+                  recon::Pool& pool, const recon::RefractiveIndex* gas = nullptr);
 
   /// The hull's part of its grid.
   [[nodiscard]] const recon::Grid& grid() const { return problem_.grid(); }
@@ -83,6 +86,10 @@ class LinearProjector final : public LinearMap {
   [[nodiscard]] recon::Volume volume(const Light& x) const;
 
  private:
+  [[nodiscard]] recon::Travel travel() const {
+    return problem_.list.curved ? recon::Travel::curved : recon::Travel::straight;
+  }
+
   const recon::Hull& hull_;
   recon::Pool& pool_;
   recon::Problem problem_;

@@ -5,13 +5,12 @@
 
 namespace emberlock::evaluate {
 
-inline constexpr MethodFacts kFiniteElementTomographyFacts{
-    "finite element tomography",
-    "Flame emission tomography based on finite element basis 2021",
-    false,
-    Projection::perspective,
-    "linear",
-    true};
+inline constexpr MethodFacts kFiniteElementTomographyFacts{"finite element tomography",
+                                                           "Optics Express 29, 40841, 2021",
+                                                           false,
+                                                           Projection::perspective,
+                                                           "linear",
+                                                           true};
 
 /// Emission as a sum of trilinear finite elements, at most 64 along the longest side: values at their nodes,
 /// >= 0, are the unknowns, smoothed by their Laplacian. The elements' size and the smoothing's weight are

@@ -12,6 +12,7 @@
 #include "recon/adjust/picture_error.h"
 #include "recon/compute/pool.h"
 #include "recon/preprocess/check_scene.h"
+#include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
 
 namespace emberlock::evaluate {
@@ -43,16 +44,23 @@ Eigen::Vector3d colour_at(const recon::RadianceImage& image, const Eigen::Vector
   return colour;
 }
 
+recon::RadianceImage flame_alone(recon::RadianceImage image) {
+  const recon::FlameMask mask = recon::noise_mask(image);
+  for (std::size_t p = 0; p < mask.flame.size(); ++p)
+    if (mask.flame[p] == 0) std::fill_n(image.rgb.begin() + static_cast<std::ptrdiff_t>(3 * p), 3, 0.F);
+  return image;
+}
+
 /// The mean of the picture over a square of one voxel edge in the plane through the axis.
-Eigen::Vector3d mean_around(const recon::View& view, const Eigen::Vector3d& middle,
-                            const Eigen::Vector3d& across, double edge, int samples) {
+Eigen::Vector3d mean_around(const recon::CameraModel& camera, const recon::RadianceImage& image,
+                            const Eigen::Vector3d& middle, const Eigen::Vector3d& across, double edge,
+                            int samples) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (int y = 0; y < samples; ++y)
     for (int x = 0; x < samples; ++x) {
       const Eigen::Vector3d point = middle + edge * ((x + 0.5) / samples - 0.5) * across +
                                     edge * ((y + 0.5) / samples - 0.5) * Eigen::Vector3d::UnitZ();
-      if ((view.camera.camera_from_world * point).z() > 1e-6)
-        sum += colour_at(*view.image, view.camera.project(point));
+      if ((camera.camera_from_world * point).z() > 1e-6) sum += colour_at(image, camera.project(point));
     }
   return sum / (samples * samples);
 }
@@ -65,13 +73,14 @@ void resample(const recon::View& view, const ParallelSlices& slices, ParallelPic
                                static_cast<double>(grid.origin[2]) + edge * (grid.nz - 1) / 2);
   const double pixels = view.camera.intrinsics.fx * edge / (view.camera.center() - middle).norm();
   const int samples = static_cast<int>(std::clamp(std::ceil(pixels), 1.0, double{kMostSamples}));
+  const recon::RadianceImage flame = flame_alone(*view.image);
   picture.light.resize(slices.profile() * static_cast<std::size_t>(grid.nz));
   for (int k = 0; k < grid.nz; ++k)
     for (int b = 0; b < slices.offsets; ++b) {
       const double offset = edge * (b - slices.offsets / 2);
       const Eigen::Vector3d at =
           middle + offset * across + edge * (k - (grid.nz - 1) / 2.0) * Eigen::Vector3d::UnitZ();
-      const Eigen::Vector3d colour = mean_around(view, at, across, edge, samples);
+      const Eigen::Vector3d colour = mean_around(view.camera, flame, at, across, edge, samples);
       float* const to = picture.light.data() + static_cast<std::size_t>(k) * slices.profile() +
                         3 * static_cast<std::size_t>(b);
       for (int c = 0; c < 3; ++c) to[c] = static_cast<float>(std::max(0.0, colour[c]));

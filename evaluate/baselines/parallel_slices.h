@@ -46,7 +46,8 @@ struct ParallelPicture {
 /// where it shows the ray's nearest point to the axis, the mean over a square of one voxel edge there. Rays
 /// are thus right in the plane through the axis that faces the camera; nearer and farther ones belong to
 /// other offsets and heights in a picture by perspective, and a ray from above or below passes through other
-/// layers. That is what the methods neglect. What lies beyond the picture is dark. Errors: no input view, one
+/// layers. That is what the methods neglect. What lies beyond the picture is dark, and
+/// so are pixels that show no flame by their noise_mask(). Errors: no input view, one
 /// whose camera stands on the axis.
 Result<std::vector<ParallelPicture>> parallel_pictures(const recon::Scene& scene,
                                                        const ParallelSlices& slices);

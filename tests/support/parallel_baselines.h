@@ -18,7 +18,7 @@ inline recon::Scene small_flame(int cameras) {
   return recon::paper_scene(options);
 }
 
-inline MethodOptions with_voxels(int voxels) {
+inline MethodOptions at_voxels(int voxels) {
   MethodOptions options;
   options.voxels = voxels;
   return options;
@@ -28,7 +28,7 @@ inline MethodOptions with_voxels(int voxels) {
 struct ShownErrors {
   double shown = 0, dark = 0;
 };
-inline ShownErrors errors_of(const recon::Scene& scene, const MethodResult& result, recon::ViewRole role) {
+inline ShownErrors shown_errors(const recon::Scene& scene, const MethodResult& result, recon::ViewRole role) {
   ShownErrors errors;
   for (const recon::View& view : scene.views) {
     if (view.role != role) continue;

@@ -104,26 +104,26 @@ TEST(AppearanceTest, BetweenTwoIsRankByRank) {
 
 TEST(AppearanceTransferTest, NovelViewsGainByIt) {
   const recon::Scene scene = front_and_side();
-  const auto result = appearance_transfer(scene, with_voxels(32));
+  const auto result = appearance_transfer(scene, at_voxels(32));
   ASSERT_TRUE(result.ok()) << result.error().message();
   EXPECT_GT(result->iterations, 1);
-  const ShownErrors input = errors_of(scene, *result, recon::ViewRole::input);
+  const ShownErrors input = shown_errors(scene, *result, recon::ViewRole::input);
   EXPECT_LT(input.shown, 0.15 * input.dark);
   // Stopped when the tomography of the input views is done: 33 layers are lit up, and reconstructed, 16 at a
   // time.
   int looks = 0;
-  MethodOptions options = with_voxels(32);
+  MethodOptions options = at_voxels(32);
   options.stop = [&looks] { return ++looks > 6; };
   const auto tomography = appearance_transfer(scene, options);
   ASSERT_TRUE(tomography.ok());
   EXPECT_EQ(tomography->iterations, 0);
-  EXPECT_LT(errors_of(scene, *result, recon::ViewRole::held_out).shown,
-            0.97 * errors_of(scene, *tomography, recon::ViewRole::held_out).shown);
+  EXPECT_LT(shown_errors(scene, *result, recon::ViewRole::held_out).shown,
+            0.97 * shown_errors(scene, *tomography, recon::ViewRole::held_out).shown);
 }
 
 TEST(AppearanceTransferTest, ThreadsDoNotChangeABit) {
   const recon::Scene scene = front_and_side();
-  MethodOptions options = with_voxels(20);
+  MethodOptions options = at_voxels(20);
   options.compute.threads = 1;
   const auto one = appearance_transfer(scene, options);
   options.compute.threads = 4;
@@ -134,7 +134,7 @@ TEST(AppearanceTransferTest, ThreadsDoNotChangeABit) {
 
 TEST(AppearanceTransferTest, RefusesWhatItCannotTakeAndStops) {
   recon::Scene scene = small_flame(4);
-  MethodOptions options = with_voxels(16);
+  MethodOptions options = at_voxels(16);
   options.stop = [] { return true; };
   const auto stopped = appearance_transfer(scene, options);
   ASSERT_TRUE(stopped.ok()) << stopped.error().message();

@@ -64,7 +64,7 @@ TEST(ColourTemperatureTest, TwoColoursTellABlackBodysTemperature) {
 }
 
 TEST(ColourTemperatureTest, AColumnIsTheProductOfItsPictures) {
-  const auto result = colour_temperature(column({0, 45, 90, 135}), with_voxels(40));
+  const auto result = colour_temperature(column({0, 45, 90, 135}), at_voxels(40));
   ASSERT_TRUE(result.ok()) << result.error().message();
   const recon::Grid& grid = result->volume.grid;
   for (const auto& [k, kelvin] : {std::pair{10, kCool}, {30, kHot}})
@@ -92,17 +92,17 @@ TEST(ColourTemperatureTest, TheFourViewsStandAtHalfRightAngles) {
 
 TEST(ColourTemperatureTest, ShowsADrawnFlameFromAllSides) {
   const recon::Scene scene = small_flame(8);
-  const auto result = colour_temperature(scene, with_voxels(32));
+  const auto result = colour_temperature(scene, at_voxels(32));
   ASSERT_TRUE(result.ok()) << result.error().message();
-  const ShownErrors input = errors_of(scene, *result, recon::ViewRole::input);
+  const ShownErrors input = shown_errors(scene, *result, recon::ViewRole::input);
   EXPECT_LT(input.shown, 0.35 * input.dark);
-  const ShownErrors held_out = errors_of(scene, *result, recon::ViewRole::held_out);
+  const ShownErrors held_out = shown_errors(scene, *result, recon::ViewRole::held_out);
   EXPECT_LT(held_out.shown, 0.35 * held_out.dark);
 }
 
 TEST(ColourTemperatureTest, ThreadsDoNotChangeABit) {
   const recon::Scene scene = small_flame(4);
-  MethodOptions options = with_voxels(24);
+  MethodOptions options = at_voxels(24);
   options.compute.threads = 1;
   const auto one = colour_temperature(scene, options);
   options.compute.threads = 4;
@@ -114,7 +114,7 @@ TEST(ColourTemperatureTest, ThreadsDoNotChangeABit) {
 
 TEST(ColourTemperatureTest, RefusesWhatItCannotTakeAndStops) {
   recon::Scene scene = small_flame(4);
-  MethodOptions options = with_voxels(24);
+  MethodOptions options = at_voxels(24);
   options.stop = [] { return true; };
   const auto stopped = colour_temperature(scene, options);
   ASSERT_TRUE(stopped.ok()) << stopped.error().message();

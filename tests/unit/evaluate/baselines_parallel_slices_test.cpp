@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -68,6 +69,20 @@ TEST(ParallelSlicesTest, ADistantBallHasTheProfilesOfItsChords) {
   }
 }
 
+TEST(ParallelSlicesTest, NoiseIsNoFlame) {
+  recon::Scene scene = ball_from_afar(5);
+  recon::RadianceImage noisy = *scene.views[0].image;
+  for (std::size_t i = 0; i < noisy.rgb.size(); ++i)
+    noisy.rgb[i] = std::max(0.F, noisy.rgb[i] + static_cast<float>(random_normal(1, 0, i)));
+  scene.views[0].image = recon::share(std::move(noisy));
+  const ParallelSlices slices = slices_over(recon::grid_over(scene.box, 25));
+  const auto pictures = parallel_pictures(scene, slices);
+  ASSERT_TRUE(pictures.ok());
+  const std::vector<float>& light = (*pictures)[0].light;
+  const auto lowest = static_cast<std::ptrdiff_t>(slices.profile() * 3);  // three slices below the ball
+  EXPECT_EQ(*std::max_element(light.begin(), light.begin() + lowest), 0);
+}
+
 TEST(ParallelSlicesTest, ProjectingKeepsTheLightOfASlice) {
   const ParallelSlices slices = slices_over(recon::grid_over({{}, {0.1, 0.06, 0.1}}, 20));
   std::vector<float> layer(slices.layer(), 0.F);
@@ -109,8 +124,8 @@ TEST(ParallelSlicesTest, RefusesWhatCannotBeTakenAsParallel) {
   EXPECT_EQ(above.error().where, "from above");
   for (recon::View& view : scene.views) view.role = recon::ViewRole::held_out;
   EXPECT_FALSE(parallel_pictures(scene, slices).ok());
-  EXPECT_FALSE(check_method(scene, with_voxels(7)).ok());
-  EXPECT_FALSE(check_method(scene, with_voxels(257)).ok());
+  EXPECT_FALSE(check_method(scene, at_voxels(7)).ok());
+  EXPECT_FALSE(check_method(scene, at_voxels(257)).ok());
 }
 
 TEST(ParallelSlicesTest, AResultWorseThanDarknessIsRefused) {

@@ -90,18 +90,18 @@ TEST(SheetDecompositionTest, TakesTwoThreeAndTenViews) {
   for (const int cameras : {2, 3, 10}) {
     recon::Scene taken = small_flame(cameras == 2 ? 4 : cameras);
     if (cameras == 2) taken.views[2].role = taken.views[3].role = recon::ViewRole::held_out;
-    const auto result = sheet_decomposition(taken, with_voxels(16));
+    const auto result = sheet_decomposition(taken, at_voxels(16));
     ASSERT_TRUE(result.ok()) << result.error().message();
-    const ShownErrors input = errors_of(taken, *result, recon::ViewRole::input);
+    const ShownErrors input = shown_errors(taken, *result, recon::ViewRole::input);
     EXPECT_LT(input.shown, 0.25 * input.dark) << cameras;
-    const ShownErrors held_out = errors_of(taken, *result, recon::ViewRole::held_out);
+    const ShownErrors held_out = shown_errors(taken, *result, recon::ViewRole::held_out);
     EXPECT_LT(held_out.shown, 0.4 * held_out.dark) << cameras;
   }
 }
 
 TEST(SheetDecompositionTest, ThreadsDoNotChangeABit) {
   const recon::Scene scene = small_flame(5);
-  MethodOptions options = with_voxels(16);
+  MethodOptions options = at_voxels(16);
   options.compute.threads = 1;
   const auto one = sheet_decomposition(scene, options);
   options.compute.threads = 4;
@@ -112,7 +112,7 @@ TEST(SheetDecompositionTest, ThreadsDoNotChangeABit) {
 
 TEST(SheetDecompositionTest, RefusesWhatItCannotTakeAndStops) {
   recon::Scene scene = small_flame(4);
-  MethodOptions options = with_voxels(16);
+  MethodOptions options = at_voxels(16);
   options.stop = [] { return true; };
   const auto stopped = sheet_decomposition(scene, options);
   ASSERT_TRUE(stopped.ok()) << stopped.error().message();

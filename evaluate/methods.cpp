@@ -4,7 +4,8 @@
 #include <string>
 #include <utility>
 
-#include "base/clock.h"
+#include <fmt/format.h>
+
 #include "evaluate/baselines/algebraic_tomography/algebraic_tomography.h"
 #include "evaluate/baselines/appearance_transfer/appearance_transfer.h"
 #include "evaluate/baselines/colour_temperature/colour_temperature.h"
@@ -32,7 +33,17 @@ recon::SolveOptions solve_options(const MethodOptions& options) {
 }
 
 MethodResult result_of(recon::Reconstruction done) {
-  return {std::move(done.volume), std::move(done.hull), done.effects, done.iterations, {}};
+  return {std::move(done.volume), std::move(done.hull), done.effects, done.iterations};
+}
+
+/// What is on, and why the extinction is or isn't.
+std::string words(const std::vector<recon::EffectReport>& reports) {
+  std::string on;
+  for (const recon::EffectReport& report : reports)
+    if (report.on || report.name == "extinction")
+      on += fmt::format("{}{} {}: {}", on.empty() ? "" : "; ", report.name, report.on ? "on" : "off",
+                        report.reason);
+  return on;
 }
 
 }  // namespace
@@ -68,6 +79,7 @@ Result<MethodResult> default_method(const recon::Scene& scene, const MethodOptio
         recon::temperature_of(scene, done, errors, *options.response, recon::Emitter::soot, solve).kelvin;
   }
   MethodResult result = result_of(std::move(done));
+  result.chose = words(choice.reports);
   result.kelvin = std::move(kelvin);
   return result;
 }

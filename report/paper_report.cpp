@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "base/file.h"
+#include "evaluate/baselines/algebraic_tomography/algebraic_tomography.h"
 #include "evaluate/methods.h"
 #include "report/html.h"
 #include "report/paper_pictures.h"
@@ -73,6 +74,9 @@ void add_runs(HtmlPage& page, const PaperEvaluation& e, const Protocol& protocol
     rows.back().resize(header.size());
   }
   page.table(header, rows);
+  for (const MethodRun& run : e.runs)
+    if (of_protocol(run, protocol) && !run.chose.empty())
+      page.paragraph(fmt::format("{}, {} chose: {}", run.of, name_of_run(run), sentence(run.chose)));
 }
 
 void add_printed(HtmlPage& page, const Protocol& protocol) {
@@ -197,6 +201,41 @@ void add_methods(HtmlPage& page, const PaperEvaluation& e) {
              rows);
 }
 
+void add_nine_views_words(const PaperEvaluation& e, const evaluate::Case& of,
+                          std::vector<std::string>& words) {
+  const auto found = [&](std::string_view method) { return find_run(e, "nine-views", method, of.name); };
+  const MethodRun* ours = found(evaluate::kDefaultMethod);
+  for (const std::string_view other : {evaluate::kConvergedAlgebraicTomographyFacts.name,
+                                       evaluate::kAlgebraicTomographyFacts.name, evaluate::kPapersMethod})
+    if (const MethodRun* run = found(other); run != nullptr && ours != nullptr)
+      words.push_back(fmt::format("{}, the tenth view: {} errs {} times as much as emberlock (R / G / B)",
+                                  of.name, other, by_channel(times(run->errors.test, ours->errors.test))));
+  const MethodRun* algebraic = found(evaluate::kConvergedAlgebraicTomographyFacts.name);
+  const MethodRun* papers = found(evaluate::kPapersMethod);
+  if (algebraic != nullptr && papers != nullptr)
+    words.push_back(fmt::format(
+        "{}: converged algebraic tomography over the paper's method: {}; in the paper 4.5 / 6.0 / 9.6",
+        of.name, by_channel(times(algebraic->errors.test, papers->errors.test))));
+}
+
+void add_cameras_words(const PaperEvaluation& e, const Protocol& protocol, std::vector<std::string>& words) {
+  std::string line;
+  for (const MethodRun* run : runs_of(e, protocol, evaluate::kDefaultMethod))
+    if (run->temperature)
+      line += fmt::format("{}{} cameras {:.0f} K", line.empty() ? "" : ", ", inputs_of(protocol, *run),
+                          run->temperature->median);
+  if (!line.empty()) words.push_back("temperature, median error: " + line);
+}
+
+void add_smoke_words(const PaperEvaluation& e, const Protocol& protocol, std::vector<std::string>& words) {
+  const MethodRun* ours = find_run(e, protocol.name, evaluate::kDefaultMethod);
+  for (const std::string_view method : protocol.methods)
+    if (const MethodRun* run = find_run(e, protocol.name, method);
+        ours != nullptr && run != nullptr && run != ours)
+      words.push_back(fmt::format("smoke from three views, all views: {} {:.1f}, emberlock {:.1f}", method,
+                                  mean_square(run->errors.all), mean_square(ours->errors.all)));
+}
+
 std::string optional_number(const std::optional<evaluate::TemperatureErrors>& t) {
   return t ? fmt::format("{:.2f},{:.2f},{:.2f},{:.4f}", t->median, t->most, t->bias, t->told) : ",,,";
 }
@@ -219,35 +258,11 @@ std::string paper_csv(const PaperEvaluation& e) {
 
 std::vector<std::string> paper_words(const PaperEvaluation& e) {
   std::vector<std::string> words;
-  const MethodRun* ours = find_run(e, "nine-views", evaluate::kDefaultMethod);
-  for (const std::string_view other : {std::string_view("algebraic tomography"), evaluate::kPapersMethod}) {
-    const MethodRun* run = find_run(e, "nine-views", other);
-    if (ours == nullptr || run == nullptr) continue;
-    const auto ratio = times(run->errors.test, ours->errors.test);
-    words.push_back(
-        fmt::format("nine views, the tenth as a test: {} errs {} times as much as emberlock (R / G / B)",
-                    other, by_channel(ratio)));
-  }
-  const MethodRun* algebraic = find_run(e, "nine-views", "algebraic tomography");
-  const MethodRun* papers = find_run(e, "nine-views", evaluate::kPapersMethod);
-  if (algebraic != nullptr && papers != nullptr)
-    words.push_back(
-        fmt::format("algebraic tomography over the paper's method: {} here, 4.5 / 6.0 / 9.6 in the paper",
-                    by_channel(times(algebraic->errors.test, papers->errors.test))));
   for (const Protocol& protocol : e.protocols) {
-    const MethodRun* smoke = find_run(e, "smoke", evaluate::kDefaultMethod);
-    if (protocol.name == "smoke" && smoke != nullptr)
-      for (const std::string_view method : protocol.methods)
-        if (const MethodRun* run = find_run(e, "smoke", method); run != nullptr && run != smoke)
-          words.push_back(fmt::format("smoke from three views, all views: {} {:.1f}, emberlock {:.1f}",
-                                      method, mean_square(run->errors.all), mean_square(smoke->errors.all)));
-    if (protocol.name != "cameras") continue;
-    std::string line;
-    for (const MethodRun* run : runs_of(e, protocol, evaluate::kDefaultMethod))
-      if (run->temperature)
-        line += fmt::format("{}{} cameras {:.0f} K", line.empty() ? "" : ", ", inputs_of(protocol, *run),
-                            run->temperature->median);
-    if (!line.empty()) words.push_back("temperature, median error: " + line);
+    if (protocol.name == "nine-views")
+      for (const evaluate::Case& of : protocol.cases) add_nine_views_words(e, of, words);
+    if (protocol.name == "cameras") add_cameras_words(e, protocol, words);
+    if (protocol.name == "smoke") add_smoke_words(e, protocol, words);
   }
   return words;
 }

@@ -47,6 +47,7 @@ struct MethodResult {
   recon::Hull medium;
   recon::Effects effects;
   int iterations = 0;
+  std::string chose = {};          ///< what was found out from the pictures and not told, in words
   std::vector<float> kelvin = {};  ///< at the key points, 0 where not told; empty: no temperatures
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include "evaluate/baselines/two_colour_pyrometry/two_colour_pyrometry.h"
 #include "evaluate/methods.h"
 #include "evaluate/paper/protocol.h"
 
@@ -24,7 +25,7 @@ Protocol cameras_protocol(Extent extent) {
     of.cameras.push_back({0, 0, recon::ViewRole::held_out});
     p.cases.push_back(std::move(of));
   }
-  p.methods = {kPapersMethod, kDefaultMethod};
+  p.methods = {kTwoColourPyrometryFacts.name, kPapersMethod, kDefaultMethod};
   p.temperatures = true;
   return p;
 }

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "evaluate/baselines/algebraic_tomography/algebraic_tomography.h"
 #include "evaluate/methods.h"
 #include "evaluate/paper/protocol.h"
 
@@ -23,7 +24,7 @@ Protocol captured_protocol(Extent extent) {
   captured.noise = 2;
   captured.pose_error = 0.5;
   p.cases = {simulated, captured};
-  p.methods = {kPapersMethod, kDefaultMethod};
+  p.methods = {kAlgebraicTomographyFacts.name, kPapersMethod, kDefaultMethod};
   p.printed = {{kPapersMethod, "simulated", {25.2, 15.2, 6.5}},
                {kPapersMethod, "captured", {25.8, 18.6, 23.9}}};
   return p;

@@ -100,6 +100,12 @@ class Evaluation {
 
   Status run(const Planned& planned, std::size_t at) {
     EMBERLOCK_ASSIGN_OR_RETURN(const KnownGas* gas, gas_of(planned.protocol->subject, at));
+    if (planned.of->optics == Optics::papers) {
+      if (!papers_) {
+        EMBERLOCK_ASSIGN_OR_RETURN(papers_, as_the_paper_renders(*gas, done_.options.compute));
+      }
+      gas = &*papers_;
+    }
     if (filmed_of_ != planned.of) {
       scene_ = film(*gas, *planned.of, done_.options.seed, done_.options.compute);
       filmed_of_ = planned.of;
@@ -149,6 +155,7 @@ class Evaluation {
   const Observer& observer_;
   std::vector<Planned> plan_;
   std::array<std::optional<KnownGas>, 2> gas_;
+  std::optional<KnownGas> papers_;  // the flame
   const Case* filmed_of_ = nullptr;
   recon::Scene scene_;
 };

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "evaluate/baselines/colour_temperature/colour_temperature.h"
 #include "evaluate/methods.h"
 #include "evaluate/paper/protocol.h"
 
@@ -19,7 +20,7 @@ Protocol four_views_protocol(Extent extent) {
   for (const double azimuth : {22.5, 67.5, 112.5, 157.5})
     four.cameras.push_back({azimuth, 0, recon::ViewRole::held_out});
   p.cases = {four};
-  p.methods = {kPapersMethod, kDefaultMethod};
+  p.methods = {kColourTemperatureFacts.name, kPapersMethod, kDefaultMethod};
   p.temperatures = true;
   return p;
 }

@@ -17,6 +17,7 @@ Protocol iterations_protocol(Extent extent) {
       "truth's RMS there, as our volumes hold emission and not the paper's colour intensity.";
   Case ten{"ten-cameras", ring(10), image_size(extent)};
   ten.cameras.push_back({90, 0, recon::ViewRole::held_out});
+  ten.optics = Optics::papers;
   p.cases = {ten};
   p.methods = {kPapersMethod, kDefaultMethod};
   p.iterations = extent == Extent::full

@@ -13,13 +13,16 @@
 
 #include "base/random.h"
 #include "recon/export/volume_file.h"
+#include "recon/render/render.h"
 #include "recon/temperature/emitter.h"
 
 namespace emberlock::evaluate {
 namespace {
 
-constexpr double kFieldOfView = 60;                     // degrees
-constexpr double kPeak = 230;                           // grey levels
+constexpr double kFieldOfView = 60;  // degrees
+constexpr double kPeak = 230;        // grey levels
+constexpr int kPapersSteps = 128;    // across the box
+constexpr float kFaintest = 0.01F;   // of the brightest light: beyond it there is no medium
 constexpr double kFlameWidth = 0.2, kSmokeWidth = 0.6;  // metres
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
@@ -38,12 +41,14 @@ recon::FlameSimulationOptions simulation_of(Subject subject, int cells,
   recon::FlameSimulationOptions o;
   o.nx = o.ny = o.nz = cells;
   o.edge = Meters((subject == Subject::flame ? kFlameWidth : kSmokeWidth) / cells);
-  o.confinement = 0.1;
-  o.eddies = 0.1;
   o.compute = compute;
   o.burners = {{Meters(0), Meters(0), Meters(0.015), 0.022}};
+  o.diffusivity = 1e-4;  // of hot air: the flame is laminar
   if (subject == Subject::smoke) {
     o.combustion = recon::Combustion::none;
+    o.diffusivity = 0;
+    o.confinement = 0.1;
+    o.eddies = 0.1;
     o.burners = {{Meters(0), Meters(0), Meters(0.05), 0.5}};
     o.gas.burner_temperature = 600;
     o.burner_soot = 0.01;
@@ -101,22 +106,41 @@ recon::CameraResponse daylight_camera() {
   return camera;
 }
 
-/// Scales the response so that the brightest of a few pictures from the side has kPeak levels.
-Status expose(KnownGas& known, const recon::ComputeOptions& compute) {
-  known.response = daylight_camera();
+/// What cameras see of it.
+std::vector<recon::RadianceImage> pictures_of(const KnownGas& gas,
+                                              const std::vector<recon::CameraModel>& models,
+                                              const recon::ComputeOptions& compute) {
+  std::vector<const recon::CameraModel*> cameras;
+  cameras.reserve(models.size());
+  for (const recon::CameraModel& model : models) cameras.push_back(&model);
+  if (gas.optics == Optics::physical)
+    return recon::film_gas(gas.gas, gas.response, gas.sun, cameras, compute);
+  recon::Effects effects;
+  effects.extinction.model = recon::Extinction::Model::field;
+  recon::RenderOptions march;
+  march.compute = compute;
+  return recon::render_views(gas.light, recon::whole_grid(gas.light.grid), effects, cameras,
+                             std::vector<const recon::RadianceImage*>(cameras.size()), march);
+}
+
+/// By what the light is to be multiplied so that the brightest of a few pictures from the side has kPeak
+/// levels.
+Result<double> exposure_of(const KnownGas& gas, const recon::ComputeOptions& compute) {
   std::vector<recon::CameraModel> models;
   for (const double azimuth : {0.0, 50.0, 100.0})
-    models.push_back(camera_at({azimuth, 0}, known.box, {160, 160}));
+    models.push_back(camera_at({azimuth, 0}, gas.box, {160, 160}));
   float brightest = 0;
-  for (const recon::RadianceImage& picture :
-       recon::film_gas(known.gas, known.response, known.sun, {&models[0], &models[1], &models[2]}, compute))
+  for (const recon::RadianceImage& picture : pictures_of(gas, models, compute))
     brightest = std::max(brightest, *std::max_element(picture.rgb.begin(), picture.rgb.end()));
   if (!(brightest > 0) || !std::isfinite(brightest))
-    return Error{ErrorKind::refused, "nothing is seen of it", std::string(name(known.subject)),
+    return Error{ErrorKind::refused, "nothing is seen of it", std::string(name(gas.subject)),
                  "Take more cells"};
-  for (std::vector<double>& channel : known.response.level)
-    for (double& level : channel) level *= kPeak / static_cast<double>(brightest);
-  return {};
+  return kPeak / static_cast<double>(brightest);
+}
+
+void expose(KnownGas& gas, double gain) {
+  for (std::vector<double>& channel : gas.response.level)
+    for (double& level : channel) level *= gain;
 }
 
 /// What follows from the gas.
@@ -127,7 +151,9 @@ Result<KnownGas> known(Subject subject, recon::GasState gas, const recon::Comput
   if (subject == Subject::smoke) out.sun = recon::Sun{{0.5, -1, 1}, 0.8};
   const recon::Grid& g = out.gas.grid;
   out.box.size = static_cast<double>(g.edge) * Eigen::Vector3d(g.nx, g.ny, g.nz);
-  EMBERLOCK_RETURN_IF_ERROR(expose(out, compute));
+  out.response = daylight_camera();
+  EMBERLOCK_ASSIGN_OR_RETURN(const double gain, exposure_of(out, compute));
+  expose(out, gain);
   out.light = recon::visible_gas(out.gas, out.response, out.sun, compute);
   return out;
 }
@@ -161,6 +187,23 @@ Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOp
   return known(subject, std::move(gas), compute);
 }
 
+Result<KnownGas> as_the_paper_renders(const KnownGas& gas, const recon::ComputeOptions& compute) {
+  KnownGas out = gas;
+  out.optics = Optics::papers;
+  const Meters step(gas.box.size.x() / kPapersSteps);
+  const auto sigma =
+      static_cast<float>(recon::extinction_of_opacity(recon::kPaperOpacityOfAStep, step).value());
+  std::vector<float>& light = out.light.emission;
+  const float least = kFaintest * *std::max_element(light.begin(), light.end());
+  for (std::size_t p = 0; p < out.light.extinction.size(); ++p)
+    out.light.extinction[p] =
+        std::max({light[3 * p], light[3 * p + 1], light[3 * p + 2]}) > least ? sigma : 0;
+  EMBERLOCK_ASSIGN_OR_RETURN(const double gain, exposure_of(out, compute));
+  expose(out, gain);
+  for (float& level : light) level *= static_cast<float>(gain);
+  return out;
+}
+
 Status write_gas(const KnownGas& gas, const std::filesystem::path& path) {
   return recon::write_volume(
       gas.light, path,
@@ -183,11 +226,7 @@ recon::Scene film(const KnownGas& gas, const Case& of, std::uint64_t seed,
   scene.box = gas.box;
   std::vector<recon::CameraModel> models;
   for (const CameraPlace& place : of.cameras) models.push_back(camera_at(place, gas.box, of.image));
-  std::vector<const recon::CameraModel*> cameras;
-  cameras.reserve(models.size());
-  for (const recon::CameraModel& model : models) cameras.push_back(&model);
-  std::vector<recon::RadianceImage> pictures =
-      recon::film_gas(gas.gas, gas.response, gas.sun, cameras, compute);
+  std::vector<recon::RadianceImage> pictures = pictures_of(gas, models, compute);
   for (std::size_t v = 0; v < models.size(); ++v) {
     const CameraPlace& place = of.cameras[v];
     const bool input = place.role == recon::ViewRole::input;

@@ -23,15 +23,19 @@ struct KnownGas {
   recon::Box box;
   recon::CameraResponse response;  ///< absolute, so that the brightest pixel from the side has 230 levels
   std::optional<recon::Sun> sun;
+  Optics optics = Optics::physical;
   recon::Volume light;  ///< what cameras of that response see of it, levels a metre
 };
 
 /// Burns or blows until the gas stands (recon/synthetic/flame_simulation.h), on coarse grids first: the flame
-/// of a burner of 3 cm, about 0.7 kW, in a cube of 20 cm; smoke of a source of 10 cm in one of 60 cm.
-/// `cells`: along each edge, a multiple of 32 from 32 to 512. Errors: those of FlameSimulation; refused where
-/// the observer asks to end, or where nothing is seen.
+/// of a burner of 3 cm, about 0.7 kW, laminar, in a cube of 20 cm; smoke of a source of 10 cm in one of 60
+/// cm. `cells`: along each edge, a multiple of 32 from 32 to 512. Errors: those of FlameSimulation; refused
+/// where the observer asks to end, or where nothing is seen.
 Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOptions& compute,
                               const Observer& observer = {});
+
+/// The same gas by the paper's model of light, exposed anew.
+Result<KnownGas> as_the_paper_renders(const KnownGas& gas, const recon::ComputeOptions& compute);
 
 /// The truth as a file that other programs open (recon/export/volume_file.h): emission and density, and
 /// temperature (K) and absorption (1/m) beside them, from which read_gas() has the same again.

@@ -66,7 +66,7 @@ Status add_passes(const Protocol& protocol, const Method& method, const KnownGas
     const auto& wanted = protocol.iterations;
     if (papers && std::find(wanted.begin(), wanted.end(), iteration) == wanted.end()) return;
     watched.look([&] {
-      const MethodResult now{preview.volume(), preview.hull, preview.effects, iteration, {}};
+      const MethodResult now{preview.volume(), preview.hull, preview.effects, iteration};
       const std::vector<recon::RadianceImage> shown = show(now, scene, settings.compute);
       run.points.push_back({iteration, preview.point.time, errors_of(now, shown, scene, gas)});
       if (papers && std::find(kPictured.begin(), kPictured.end(), iteration) != kPictured.end())

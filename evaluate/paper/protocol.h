@@ -16,6 +16,14 @@ namespace emberlock::evaluate {
 enum class Subject { flame, smoke };
 std::string_view name(Subject subject);
 
+/// How what is filmed sends out its light.
+enum class Optics {
+  physical,  ///< soot glows and absorbs as soot does; smoke scatters the sun
+  /// The paper's model, by which its own scenes are rendered: an opacity of 0.05 a step of a 128th of the box
+  /// for all channels, wherever there is light.
+  papers,
+};
+
 /// A camera on a sphere around the middle of the gas, one and a half times as far away as its box is wide
 /// (the paper: 30 cm from the middle of 20), that looks there with a field of view of 60 degrees along its
 /// longer side.
@@ -29,6 +37,7 @@ struct Case {
   std::string name;  ///< also a folder's
   std::vector<CameraPlace> cameras;
   ImageSize image{640, 480};
+  Optics optics = Optics::physical;
   double noise = 0;       ///< of the input pictures: standard deviation, grey levels
   double pose_error = 0;  ///< of the input cameras: standard deviation of their direction, pixels
 };

@@ -63,6 +63,7 @@ Result<MethodRun> run_method(const Protocol& protocol, const Case& of, const Met
     return run;
   }
   run.iterations = result->iterations;
+  run.chose = result->chose;
   const std::vector<recon::RadianceImage> shown = show(*result, scene, settings.compute);
   run.errors = errors_of(*result, shown, scene, gas);
   if (const Status finite = check_finite(run.errors); !finite.ok()) {

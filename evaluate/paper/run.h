@@ -57,6 +57,7 @@ struct MethodRun {
   std::string failed;  ///< why there is nothing; all that follows is then empty
   Seconds time{0};     ///< from pictures in memory to the volume
   int iterations = 0;
+  std::string chose = {};  ///< MethodResult::chose
   RunErrors errors;
   std::optional<TemperatureErrors> temperature = {};
   std::vector<RunPoint> points = {};

@@ -67,6 +67,7 @@ Json json_of(const MethodRun& run, const std::string& settings) {
           {"failed", run.failed},
           {"seconds", run.time.value()},
           {"iterations", run.iterations},
+          {"chose", run.chose},
           {"errors", json_of(run.errors)},
           {"temperature", temperature},
           {"points", points},
@@ -83,6 +84,7 @@ MethodRun run_from(const Json& json) {
   run.failed = json.at("failed");
   run.time = Seconds(json.at("seconds").get<double>());
   run.iterations = json.at("iterations");
+  run.chose = json.at("chose");
   run.errors = errors_from(json.at("errors"));
   if (const Json& t = json.at("temperature"); !t.is_null())
     run.temperature = TemperatureErrors{t.at("median"), t.at("most"), t.at("bias"), t.at("told")};

@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "evaluate/baselines/algebraic_tomography/algebraic_tomography.h"
+#include "evaluate/baselines/appearance_transfer/appearance_transfer.h"
+#include "evaluate/baselines/sheet_decomposition/sheet_decomposition.h"
 #include "evaluate/methods.h"
 #include "evaluate/paper/protocol.h"
 
@@ -23,9 +26,10 @@ Protocol smoke_protocol(Extent extent) {
   }
   p.cases = {three};
   p.subject = Subject::smoke;
-  p.methods = {kPapersMethod, kDefaultMethod};
-  p.printed = {{"sheet decomposition", "input", {10.1, 10.1, 10.1}},
-               {"sheet decomposition", "all", {18.4, 18.4, 18.4}},
+  p.methods = {kSheetDecompositionFacts.name, kAlgebraicTomographyFacts.name, kAppearanceTransferFacts.name,
+               kPapersMethod, kDefaultMethod};
+  p.printed = {{kSheetDecompositionFacts.name, "input", {10.1, 10.1, 10.1}},
+               {kSheetDecompositionFacts.name, "all", {18.4, 18.4, 18.4}},
                {kPapersMethod, "input", {13.9, 13.9, 13.9}},
                {kPapersMethod, "all", {16.7, 16.7, 16.7}}};
   return p;

@@ -25,7 +25,7 @@ Case two_cameras() {
 
 /// The truth itself, as a method would give it.
 MethodResult the_truth(const KnownGas& gas) {
-  MethodResult truth{gas.light, recon::whole_grid(gas.light.grid), {}, 0, gas.gas.temperature};
+  MethodResult truth{gas.light, recon::whole_grid(gas.light.grid), {}, 0, {}, gas.gas.temperature};
   truth.effects.extinction.model = recon::Extinction::Model::field;
   return truth;
 }
@@ -81,6 +81,20 @@ TEST(KnownGas, TemperaturesThatAreOffByAConstantAreSaidSo) {
   const TemperatureErrors errors = temperature_errors(warm.volume.grid, warm.kelvin, flame);
   EXPECT_NEAR(errors.median, 40, 0.2);
   EXPECT_NEAR(errors.bias, 40, 0.2);
+}
+
+TEST(KnownGas, AsThePaperRendersAStepTakesATwentieth) {
+  const auto opaque = as_the_paper_renders(small_flame(), {});
+  ASSERT_TRUE(opaque.ok());
+  const std::vector<float>& sigma = opaque->light.extinction;
+  const double most = static_cast<double>(*std::max_element(sigma.begin(), sigma.end()));
+  EXPECT_NEAR(std::exp(-most * 0.2 / 128), 0.95, 1e-6);
+  const recon::Scene scene = film(*opaque, two_cameras(), 1, {});
+  const MethodResult truth = the_truth(*opaque);
+  const RunErrors errors = errors_of(truth, show(truth, scene, {}), scene, *opaque);
+  for (std::size_t c = 0; c < 3; ++c) EXPECT_LT(errors.test[c], 0.35);  // rounding: 1 / sqrt(12)
+  const std::vector<float>& rgb = scene.views[1].image->rgb;
+  EXPECT_GT(*std::max_element(rgb.begin(), rgb.end()), 150);
 }
 
 TEST(KnownGas, AFileHoldsItAll) {

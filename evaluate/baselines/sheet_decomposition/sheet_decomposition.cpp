@@ -18,7 +18,7 @@ constexpr double kLeastCrossing = 0.17;  // 10 degrees: below, a sheet's depth i
 constexpr int kMostParts = 12;           // that a pair's pictures are cut into
 constexpr double kMostSheets = 1000;     // of a slice: parts^2 for each pair
 constexpr double kEven = 0.1;            // pull towards equal weights, relative to a sheet's mean square
-constexpr int kMostSteps = 300;
+constexpr int kMostSteps = 100;
 
 /// A profile's light up to each boundary between rays, scaled to end at 1; empty where it is dark.
 std::vector<double> cumulative(const ParallelSlices& slices, const ParallelPicture& picture, int k,
@@ -101,7 +101,7 @@ class Decomposer {
              const std::vector<Pair>& pairs)
       : slices_(slices), pictures_(pictures), pairs_(pairs) {
     // Parts narrower than rays would say nothing new.
-    const double most = std::min<double>(kMostParts, slices.grid.nx / 4.0);
+    const double most = std::clamp(slices.grid.nx / 4.0, 1.0, double{kMostParts});
     parts_ =
         static_cast<int>(std::clamp(std::sqrt(kMostSheets / static_cast<double>(pairs.size())), 1.0, most));
   }

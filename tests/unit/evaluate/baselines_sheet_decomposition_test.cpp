@@ -99,6 +99,12 @@ TEST(SheetDecompositionTest, TakesTwoThreeAndTenViews) {
   }
 }
 
+TEST(SheetDecompositionTest, AThinBoxIsTaken) {
+  recon::Scene scene = small_flame(4);
+  scene.box.size.x() = 0.01;  // two key points across
+  EXPECT_TRUE(sheet_decomposition(scene, at_voxels(16)).ok());
+}
+
 TEST(SheetDecompositionTest, ThreadsDoNotChangeABit) {
   const recon::Scene scene = small_flame(5);
   MethodOptions options = at_voxels(16);

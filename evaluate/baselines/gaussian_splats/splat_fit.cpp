@@ -151,6 +151,7 @@ void control_density(const std::vector<float>& pull, std::size_t most, RandomStr
   for (std::size_t s = 0; s < shine.size(); ++s)
     if (shine[s] > kDark * mean) from.push_back(s);
   std::vector<Splat> all;
+  all.reserve(2 * from.size());
   for (const std::size_t s : from) all.push_back(splats.all[s]);
 
   std::vector<std::size_t> by_pull(from.size());

@@ -79,6 +79,7 @@ Footprint footprint_of(const Splat& splat, float unit, const SplatView& view, co
         (focal / before.z() * (turn.row(axis) - before[axis] / before.z() * turn.row(2))).transpose());
   };
   const Eigen::Vector2d middle = camera.project(centre);
+  if (!middle.allFinite()) return f;  // so far aside that the lens' polynomial overflows
   range_of(middle.x(), kReach * width_along(f.w, slope(0, camera.intrinsics.fx)), picture.first_x,
            view.stride, picture.columns, f.first_column, f.last_column);
   range_of(middle.y(), kReach * width_along(f.w, slope(1, camera.intrinsics.fy)), picture.first_y,
@@ -98,6 +99,7 @@ struct Sight {
   Lanes per_square;  // 1 / |w|^2
   Lanes seen;
 
+  // NOLINTNEXTLINE(cppcoreguidelines-pro-type-member-init): all are filled
   Sight(const Footprint& f, const SplatPicture& picture, std::size_t pixel) {
     for (std::size_t a = 0; a < 3; ++a) d[a] = load(&picture.direction[a][pixel]);
     w[0] = f.w[0] * d[0];

@@ -99,7 +99,8 @@ Result<recon::SharedVolume> shared_volume(const ExportArguments& a, const Result
 Status each_volume(const std::vector<ResultVolume>& volumes, const std::string& out, const Progress& bar,
                    double start, double end, const std::function<Status(const ResultVolume&)>& with) {
   for (std::size_t i = 0; i < volumes.size(); ++i) {
-    if (Interrupt::asked()) return Error{ErrorKind::refused, "ended early, as asked; nothing is written", out};
+    if (Interrupt::asked())
+      return Error{ErrorKind::refused, "ended early, as asked; nothing is written", out};
     const double share = static_cast<double>(i) / static_cast<double>(volumes.size());
     tell(bar, start + (end - start) * share, volumes[i].file.string());
     EMBERLOCK_RETURN_IF_ERROR(with(volumes[i]));
@@ -108,7 +109,8 @@ Status each_volume(const std::vector<ResultVolume>& volumes, const std::string& 
 }
 
 /// The highest luminance of all volumes. Error: there is nothing in any of them.
-Result<float> white_of(const ExportArguments& a, const std::vector<ResultVolume>& volumes, const Progress& bar) {
+Result<float> white_of(const ExportArguments& a, const std::vector<ResultVolume>& volumes,
+                       const Progress& bar) {
   constexpr double kShare = 0.4;  // of the time: reading; the rest reads again and writes
   float white = 0;
   bool empty = true;

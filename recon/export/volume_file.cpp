@@ -167,6 +167,17 @@ Result<std::vector<float>> all_values(const openvdb::GridBase::Ptr& base, const 
   return values;
 }
 
+/// Makes two corners around a grid's active box active too. Where Blender before 5.0 is built without
+/// NanoVDB, as Debian's is, colours don't fade towards the outside of that box: it divides them by an opacity
+/// that does.
+void put_zeros_around(openvdb::Vec3SGrid& grid) {
+  openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  if (box.empty()) return;
+  box.expand(1);
+  grid.tree().setValueOn(box.min(), openvdb::Vec3s(0));
+  grid.tree().setValueOn(box.max(), openvdb::Vec3s(0));
+}
+
 /// Where a volume comes from, as metadata.
 openvdb::MetaMap metadata_of(const Provenance& from) {
   openvdb::MetaMap about;
@@ -274,6 +285,7 @@ Status write_vdb(const SharedVolume& volume, const std::filesystem::path& path, 
     const bool scalar = grid->isType<openvdb::FloatGrid>();
     if (scalar) grid->setGridClass(openvdb::GRID_FOG_VOLUME);
     if (!scalar) grid->setVectorType(openvdb::VEC_INVARIANT);
+    if (!scalar && later) put_zeros_around(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
     if (!from.meaning.empty()) grid->insertMeta("meaning", openvdb::StringMetadata(from.meaning));
     for (auto it = about.beginMeta(); it != about.endMeta(); ++it) grid->insertMeta(it->first, *it->second);
     if (later) grid->transform().preTranslate(openvdb::Vec3d(-0.5));

@@ -238,6 +238,7 @@ class OutputFolders : public testing::Test {
          {"render", hot, "--frames", "2", "--image", "32x32"},
          hot,
          {"frame-0000.png", "frame-0001.png"}},
+        {"export", "--out", add_export, {"export", hot}, hot, {"flame.vdb"}},
         {"measure", "--out", add_measure, {"measure", hot, hot}, hot, {"measures.csv", "measures.html"}},
         {"simulate flame",
          "--out",

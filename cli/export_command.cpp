@@ -181,10 +181,11 @@ void add_export(CLI::App& app) {
                    "Folder of reconstruct, also of a sequence (--frames), or a volume.vdb")
       ->required();
   verb->add_option("--out", a.out, "Folder for flame.vdb, or flame_0000.vdb and so on")->required();
-  verb->add_option("--format", a.format,
-                   "vdb: OpenVDB, for Houdini, Blender from 5.0 and others; blender4: OpenVDB for Blender up "
-                   "to 4.5, which draws voxels half an edge later; nvdb: NanoVDB; vti: VTK image data, for "
-                   "ParaView")
+  verb->add_option(
+          "--format", a.format,
+          "vdb: OpenVDB, for Houdini, Blender from 5.0 and others; blender4: OpenVDB for Blender "
+          "before 5.0, which draws voxels half an edge later; nvdb: NanoVDB; vti: VTK image data, for "
+          "ParaView")
       ->check(CLI::IsMember(file_formats()))
       ->type_name("TEXT")
       ->capture_default_str();

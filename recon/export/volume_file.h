@@ -50,8 +50,9 @@ Result<SharedVolume> read_shared_volume(const std::filesystem::path& path);
 /// Where a program that opens a file takes a voxel's value to be.
 enum class VdbSamples {
   at_index,           ///< as OpenVDB, Houdini and Blender from 5.0 do
-  half_an_edge_later  ///< on each axis, as Blender up to 4.5 does: the grids' transform takes it back, and
-                      ///< colours are put zeros around
+  half_an_edge_later  ///< on each axis, as Blender before 5.0 does: the grids' transform takes it back,
+                      ///< zeros are put around colours, and `density` below 1e-5 a voxel is none, for those
+                      ///< versions' sake
 };
 /// Writes an OpenVDB file for other programs: all grids of `volume`, as write_volume() would, one value a
 /// point of class FOG_VOLUME; a scalar grid `density` even where nothing is dense, as without one Blender's

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-# Renders an exported .vdb with Blender's Cycles, as a person would set it up by docs/open_in.md:
+# Renders an exported .vdb with Blender's Cycles, as docs/open_volumes.md tells people to set it up:
 #   blender -b --factory-startup --python-exit-code 1 -P blender.py -- '{"volume": "/ABS/flame.vdb", "picture": "/ABS/out.exr", ...}'
 # `material` is "emission" (what Emberlock reconstructed, in shares of white) or "principled" (temperature and density by their plain
-# names). With `expected`, an EXR of `emberlock render`, it fails where the pictures differ by more than `most` (RMS over the range).
+# names). With `expected`, an EXR of `emberlock render`, it fails where the pictures differ by more than `most` (RMS over the range,
+# of the pixels that have over 1 % of the brightest one's light).
 import json
 import os
 import sys
@@ -124,10 +125,11 @@ def compare(seen, expected):
         raise RuntimeError("the pictures are of other sizes, or there is nothing in the expected one")
     scale = both[0].max() - both[0].min()
     off = (both[1] - both[0]) / scale
-    rms = np.sqrt(np.mean(off**2))
     lit = off[both[0].max(axis=2) > 0.01 * both[0].max()]
-    print(f"AGREEMENT {100 * rms:.3f} % of the range (RMS of all pixels and channels), {100 * np.sqrt(np.mean(lit**2)):.3f} % of the "
-          f"{100 * lit.size / off.size:.0f} % that are lit, worst {100 * np.abs(off).max():.2f} %, light {100 * (both[1].sum() / both[0].sum() - 1):+.3f} %")
+    rms = np.sqrt(np.mean(lit**2))
+    print(f"AGREEMENT {100 * rms:.3f} % of the range (RMS over the {100 * lit.size / off.size:.0f} % of the pixels that are lit, all channels), "
+          f"{100 * np.sqrt(np.mean(off**2)):.3f} % over all pixels, worst {100 * np.abs(off).max():.2f} %, "
+          f"light {100 * (both[1].sum() / both[0].sum() - 1):+.3f} %")
     return rms
 
 

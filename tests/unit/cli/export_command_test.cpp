@@ -63,8 +63,8 @@ class ExportCommandTest : public testing::Test {
 TEST_F(ExportCommandTest, ASequenceIsNumberedAndItsFlameIsOfOneScale) {
   const auto result = run("sequence");
   ASSERT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_THAT(made(), testing::UnorderedElementsAre("emberlock-files.json", "flame_0003.vdb", "flame_0004.vdb",
-                                                    "flame_0012.vdb"));
+  EXPECT_THAT(made(), testing::UnorderedElementsAre("emberlock-files.json", "flame_0003.vdb",
+                                                    "flame_0004.vdb", "flame_0012.vdb"));
   for (const auto& [name, share] :
        {std::pair("flame_0003.vdb", 0.25F), {"flame_0004.vdb", 1.0F}, {"flame_0012.vdb", 0.5F}}) {
     const auto flame = recon::read_grid(out_ / name, "flame");
@@ -85,8 +85,10 @@ TEST_F(ExportCommandTest, OneOfASequenceKeepsItsNumber) {
 }
 
 TEST_F(ExportCommandTest, EachFormatHasItsFile) {
-  for (const auto& [format, file] : {std::pair("vdb", "flame.vdb"), {"blender4", "flame.vdb"},
-                                     {"nvdb", "flame.nvdb"}, {"vti", "flame.vti"}}) {
+  for (const auto& [format, file] : {std::pair("vdb", "flame.vdb"),
+                                     {"blender4", "flame.vdb"},
+                                     {"nvdb", "flame.nvdb"},
+                                     {"vti", "flame.vti"}}) {
     const auto result = run("hot", {"--format", format});
     ASSERT_EQ(result.exit_code, 0) << result.err;
     EXPECT_THAT(made(), testing::UnorderedElementsAre("emberlock-files.json", file));

@@ -151,6 +151,10 @@ TEST_F(SharedFiles, BeforeBlender5AKeyPointIsHalfAnEdgeBehindItsIndex) {
     EXPECT_NEAR(at.y(), along(flame_.grid, 1, 2), 1e-15);
     EXPECT_NEAR(at.z(), along(flame_.grid, 2, 0), 1e-15);
   }
+  // Its share of the light a voxel is e^-3 / 35, e^-6 / 35, e^-9 / 35 and so on.
+  const auto density = openvdb::gridPtrCast<openvdb::FloatGrid>(opened(path, "density"));
+  EXPECT_EQ(density->tree().getValue({1, 1, 0}), flame_.grids[0].values[6]);
+  EXPECT_EQ(density->tree().getValue({4, 1, 0}), 0) << "a trace that Blender 3.4 would lose light by";
   const auto colours = openvdb::gridPtrCast<openvdb::Vec3SGrid>(opened(path, "emission"));
   const openvdb::CoordBBox box = colours->evalActiveVoxelBoundingBox();
   EXPECT_EQ(box, openvdb::CoordBBox({-1, -1, -1}, {5, 9, 3})) << "zeros around, beyond which it is cut off";
@@ -192,7 +196,8 @@ TEST_F(SharedFiles, NanoVdbReadsTheSameBitsAtTheirPlaces) {
   SharedVolume flame = flame_;
   flame.grids.push_back({"empty", "1", "", std::vector<float>(flame.grid.size())});
   ASSERT_TRUE(write_nanovdb(flame, folder_ / "flame.nvdb").ok());
-  const auto grids = nanovdb::io::readGrids<nanovdb::HostBuffer, std::vector>((folder_ / "flame.nvdb").string());
+  const auto grids =
+      nanovdb::io::readGrids<nanovdb::HostBuffer, std::vector>((folder_ / "flame.nvdb").string());
   ASSERT_EQ(grids.size(), 4U);
   expect_nano_grid<float>(grids[0], flame.grids[0], flame.grid);
   expect_nano_grid<nanovdb::Vec3f>(grids[1], flame.grids[1], flame.grid);
@@ -266,9 +271,10 @@ TEST_F(SharedFiles, VtkReadsTheSameBitsAtTheirPlaces) {
 TEST_F(SharedFiles, TheFlameIsTheLuminanceAsAShareOfTheBrightest) {
   SharedVolume flame;
   flame.grid = {{0, 0, 0}, 0.01F, 2, 2, 2};
-  flame.grids = {{"emission", "", "", std::vector<float>(24)}, {"temperature", "K", "", std::vector<float>(8)}};
+  flame.grids = {{"emission", "", "", std::vector<float>(24)},
+                 {"temperature", "K", "", std::vector<float>(8)}};
   EXPECT_EQ(brightest(flame), 0);
-  flame.grids[0].values[3] = 1000;      // red
+  flame.grids[0].values[3] = 1000;          // red
   flame.grids[0].values[3 * 2 + 1] = 1000;  // green
   for (std::size_t c = 0; c < 3; ++c) flame.grids[0].values[3 * 5 + c] = 500;
   flame.grids[1].values[5] = 1700;

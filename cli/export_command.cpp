@@ -167,7 +167,7 @@ Status export_result(const ExportArguments& a, const std::string& program) try {
   print(a, volumes, volume, white);
   return {};
 } catch (const std::bad_alloc&) {
-  return Error{ErrorKind::bad_input, "not enough memory", "--grids", "Name fewer grids"};
+  return Error{ErrorKind::bad_input, "not enough memory for one volume", a.result, "Use a machine with more"};
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <optional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace emberlock::cli {
@@ -38,6 +39,21 @@ std::optional<std::array<double, N>> parse_numbers_of(std::string_view text) {
   std::array<double, N> numbers = {};
   std::copy(all->begin(), all->end(), numbers.begin());
   return numbers;
+}
+
+/// "A:B", two frames' numbers.
+inline std::optional<std::pair<std::size_t, std::size_t>> parse_frames(std::string_view text) {
+  const std::size_t colon = text.find(':');
+  if (colon == std::string_view::npos) return std::nullopt;
+  const auto number = [](std::string_view digits) {
+    std::size_t n = 0;
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
+    return error == std::errc() && end == digits.data() + digits.size() && !digits.empty() ? std::optional(n)
+                                                                                           : std::nullopt;
+  };
+  const auto first = number(text.substr(0, colon));
+  const auto last = number(text.substr(colon + 1));
+  return first && last ? std::optional(std::pair(*first, *last)) : std::nullopt;
 }
 
 }  // namespace emberlock::cli

@@ -201,25 +201,6 @@ void add_quantity_options(CLI::App* verb, ReconstructArguments& a) {
                  "ten views, and emission_noise and density_noise, what of it noise makes");
 }
 
-namespace {
-
-/// "A:B".
-std::optional<std::pair<std::size_t, std::size_t>> parse_frames(std::string_view text) {
-  const std::size_t colon = text.find(':');
-  if (colon == std::string_view::npos) return std::nullopt;
-  const auto number = [](std::string_view digits) {
-    std::size_t n = 0;
-    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), n);
-    return error == std::errc() && end == digits.data() + digits.size() && !digits.empty() ? std::optional(n)
-                                                                                           : std::nullopt;
-  };
-  const auto first = number(text.substr(0, colon));
-  const auto last = number(text.substr(colon + 1));
-  return first && last ? std::optional(std::pair(*first, *last)) : std::nullopt;
-}
-
-}  // namespace
-
 void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option(
           "--threshold", a.threshold,

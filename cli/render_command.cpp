@@ -14,14 +14,13 @@
 
 #include <Eigen/Geometry>
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
 
-#include "base/file.h"
 #include "cli/commands.h"
 #include "cli/image_size.h"
 #include "cli/interrupt.h"
 #include "cli/numbers.h"
 #include "cli/outputs.h"
+#include "cli/result_files.h"
 #include "cli/up_axis.h"
 #include "recon/calibrate/camera_path.h"
 #include "recon/export/exr_file.h"
@@ -68,12 +67,9 @@ Result<Eigen::Vector3d> parse_place(const std::string& text, const char* option)
 
 /// What the result was reconstructed from, by its report.json.
 Result<std::string> input_of(const fs::path& result) {
-  const fs::path report = result / "report.json";
-  const auto text = read_file(report);
-  const auto json = nlohmann::json::parse(text ? *text : std::string(), nullptr, false);
-  if (json.is_object() && json.contains("input") && json["input"].is_string())
-    return json["input"].get<std::string>();
-  return Error{ErrorKind::bad_input, "doesn't tell what was reconstructed", report.string(),
+  std::string input = reported(result, "input");
+  if (!input.empty()) return input;
+  return Error{ErrorKind::bad_input, "doesn't tell what was reconstructed", (result / "report.json").string(),
                "Give --input, the session or transforms.json whose cameras are followed"};
 }
 

@@ -1,21 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/up_axis.h"
 
-#include <nlohmann/json.hpp>
-
-#include "base/file.h"
+#include "cli/result_files.h"
 
 namespace emberlock::cli {
 namespace {
-
-/// Nothing where no report tells.
-std::string reported_up(const std::filesystem::path& result) {
-  const auto folder = std::filesystem::is_directory(result) ? result : result.parent_path();
-  const auto text = read_file(folder / "report.json");
-  const auto json = nlohmann::json::parse(text ? *text : std::string(), nullptr, false);
-  const bool tells = json.is_object() && json.contains("up") && json["up"].is_string();
-  return tells ? json["up"].get<std::string>() : std::string();
-}
 
 Result<Eigen::Vector3d> parse_up(const std::string& text) {
   const double sign = text.rfind('-', 0) == 0 ? -1 : 1;
@@ -29,8 +18,8 @@ Result<Eigen::Vector3d> parse_up(const std::string& text) {
 
 Result<Eigen::Vector3d> up_axis(const std::string& told, const std::filesystem::path& result) {
   if (!told.empty()) return parse_up(told);
-  const std::string reported = reported_up(result);
-  return reported.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ()) : parse_up(reported);
+  const std::string up = reported(result, "up");
+  return up.empty() ? Eigen::Vector3d(Eigen::Vector3d::UnitZ()) : parse_up(up);
 }
 
 }  // namespace emberlock::cli

@@ -23,7 +23,7 @@ constexpr double kFieldOfView = 60;  // degrees
 constexpr double kPeak = 230;        // grey levels
 constexpr int kPapersSteps = 128;    // across the box
 constexpr float kFaintest = 0.01F;   // of the brightest light: beyond it there is no medium
-constexpr double kFlameWidth = 0.2, kSmokeWidth = 0.6;  // metres
+constexpr double kFlameWidth = 0.9, kSmokeWidth = 0.6;  // metres
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
@@ -33,7 +33,7 @@ struct Stage {
   int cells;  // of the finest: a share
   double seconds;
 };
-constexpr Stage kStages[] = {{4, 0.5}, {2, 0.08}, {1, 0.015}};
+constexpr Stage kStages[] = {{4, 1.2}, {2, 0.2}, {1, 0.04}};
 constexpr int kParts = 20;  // of a stage, for progress
 
 recon::FlameSimulationOptions simulation_of(Subject subject, int cells,
@@ -42,13 +42,11 @@ recon::FlameSimulationOptions simulation_of(Subject subject, int cells,
   o.nx = o.ny = o.nz = cells;
   o.edge = Meters((subject == Subject::flame ? kFlameWidth : kSmokeWidth) / cells);
   o.compute = compute;
-  o.burners = {{Meters(0), Meters(0), Meters(0.015), 0.022}};
-  o.diffusivity = 1e-4;  // of hot air: the flame is laminar
+  o.eddies = 0.1;
+  o.burners = {{Meters(0), Meters(0), Meters(0.1), 0.022}};
   if (subject == Subject::smoke) {
     o.combustion = recon::Combustion::none;
-    o.diffusivity = 0;
     o.confinement = 0.1;
-    o.eddies = 0.1;
     o.burners = {{Meters(0), Meters(0), Meters(0.05), 0.5}};
     o.gas.burner_temperature = 600;
     o.burner_soot = 0.01;

@@ -2,7 +2,9 @@
 // The only file that includes OpenVDB's headers: they take half a minute to compile.
 #include "recon/export/volume_file.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -28,7 +30,8 @@ double metres_per_unit(const Grid& grid) {
 }
 
 template <class GridType, class ValueAt>
-typename GridType::Ptr sparse_grid(const Grid& grid, const char* name, const char* unit, ValueAt value_at) {
+typename GridType::Ptr sparse_grid(const Grid& grid, const std::string& name, const std::string& unit,
+                                   ValueAt value_at) {
   auto out = GridType::create();
   out->setName(name);
   out->insertMeta("unit", openvdb::StringMetadata(unit));
@@ -52,13 +55,12 @@ typename GridType::Ptr sparse_grid(const Grid& grid, const char* name, const cha
   return out;
 }
 
-openvdb::GridBase::Ptr further_grid(const Grid& grid, const NamedGrid& from) {
-  const std::vector<float>& v = from.values;
+openvdb::GridBase::Ptr grid_of(const Grid& grid, const std::string& name, const std::string& unit,
+                               const std::vector<float>& v) {
   if (v.size() == grid.size())
-    return sparse_grid<openvdb::FloatGrid>(grid, from.name, from.unit, [&](std::size_t i) { return v[i]; });
-  return sparse_grid<openvdb::Vec3SGrid>(grid, from.name, from.unit, [&](std::size_t i) {
-    return openvdb::Vec3s(v[3 * i], v[3 * i + 1], v[3 * i + 2]);
-  });
+    return sparse_grid<openvdb::FloatGrid>(grid, name, unit, [&](std::size_t i) { return v[i]; });
+  return sparse_grid<openvdb::Vec3SGrid>(
+      grid, name, unit, [&](std::size_t i) { return openvdb::Vec3s(v[3 * i], v[3 * i + 1], v[3 * i + 2]); });
 }
 
 Error damaged(const std::filesystem::path& path, std::string what) {
@@ -90,6 +92,8 @@ Result<Grid> geometry(const openvdb::GridBase& from, const std::filesystem::path
 /// A marker at the end of the file, which OpenVDB's readers don't read (they use offsets). For a truncated
 /// file they would take any bytes for sizes, and allocate that much memory.
 constexpr std::string_view kEnd = "emberlock: end of volume";
+/// Of a file whose values lie elsewhere than OpenVDB says: read_volume() doesn't take it for a volume.
+constexpr std::string_view kEndLater = "emberlock: end of volume, half an edge back";
 
 bool is_whole(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
@@ -124,16 +128,86 @@ Status take_values(const GridType& from, const Grid& grid, const std::string& na
   return {};
 }
 
+Status check_size(const Grid& grid, const std::filesystem::path& path) {
+  if (static_cast<double>(grid.edge) >= kSmallestVoxel * 1e-3) return {};
+  return Error{ErrorKind::bad_input, "voxels of less than 20 nm can't be written", path.string(),
+               "Give fewer voxels, or lengths in metres"};
+}
+
+/// `end` stands behind what OpenVDB reads.
+Status write_file(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& about,
+                  const std::filesystem::path& path, std::string_view end) try {
+  openvdb::io::File file(path.string());
+  file.write(grids, about);
+  file.close();
+  std::ofstream behind(path, std::ios::binary | std::ios::app);
+  behind.exceptions(std::ios::failbit | std::ios::badbit);
+  behind << end;
+  behind.close();
+  return {};
+} catch (const std::exception& e) {
+  return Error{ErrorKind::io, std::string("cannot write: ") + e.what(), path.string(),
+               "Check that the folder is writable and the disk has room"};
+}
+
+/// The values of a grid of either type.
+Result<std::vector<float>> all_values(const openvdb::GridBase::Ptr& base, const Grid& grid,
+                                      const std::filesystem::path& path) {
+  const std::string name = base->getName();
+  const auto scalar = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
+  const auto vector = openvdb::gridPtrCast<openvdb::Vec3SGrid>(base);
+  if (!scalar && !vector) return damaged(path, name + " is neither FloatGrid nor Vec3SGrid");
+  std::vector<float> values(grid.size() * (scalar ? 1 : 3));
+  const auto put_one = [&](std::size_t p, float value) { values[p] = value; };
+  const auto put_three = [&](std::size_t p, const openvdb::Vec3s& v) {
+    for (int c = 0; c < 3; ++c) values[3 * p + static_cast<std::size_t>(c)] = v[c];
+  };
+  EMBERLOCK_RETURN_IF_ERROR(scalar ? take_values(*scalar, grid, name, path, put_one)
+                                   : take_values(*vector, grid, name, path, put_three));
+  return values;
+}
+
+/// Makes two corners around a grid's active box active too. Where Blender before 5.0 is built without
+/// NanoVDB, as Debian's is, colours don't fade towards the outside of that box: it divides them by an opacity
+/// that does.
+void put_zeros_around(openvdb::Vec3SGrid& grid) {
+  openvdb::CoordBBox box = grid.evalActiveVoxelBoundingBox();
+  if (box.empty()) return;
+  box.expand(1);
+  grid.tree().setValueOn(box.min(), openvdb::Vec3s(0));
+  grid.tree().setValueOn(box.max(), openvdb::Vec3s(0));
+}
+
+/// Extinction that takes less than 1e-5 of the light a voxel becomes none. Blender 3.4 multiplies a step's
+/// light by (1 - exp(-s)) / s, in single precision: for a trace of extinction that is no light at all.
+std::vector<float> without_traces(std::vector<float> extinction, const Grid& grid) {
+  constexpr float kTrace = 1e-5F;
+  for (float& sigma : extinction)
+    if (sigma * grid.edge < kTrace) sigma = 0;
+  return extinction;
+}
+
+/// Where a volume comes from, as metadata.
+openvdb::MetaMap metadata_of(const Provenance& from) {
+  openvdb::MetaMap about;
+  const auto insert = [&](const char* key, const std::string& text) {
+    if (!text.empty()) about.insertMeta(key, openvdb::StringMetadata(text));
+  };
+  insert("creator", from.program);
+  insert("emberlock_input", from.input);
+  insert("emberlock_up", from.up);
+  if (from.frame)
+    about.insertMeta("emberlock_frame", openvdb::Int64Metadata(static_cast<std::int64_t>(*from.frame)));
+  return about;
+}
+
 }  // namespace
 
 Status write_volume(const Volume& volume, const std::filesystem::path& path,
                     const std::vector<NamedGrid>& further) {
   openvdb::initialize();
+  EMBERLOCK_RETURN_IF_ERROR(check_size(volume.grid, path));
   const auto& emission = volume.emission;
-  if (!(static_cast<double>(volume.grid.edge) >= kSmallestVoxel * 1e-3)) {
-    return Error{ErrorKind::bad_input, "voxels of less than 20 nm can't be written", path.string(),
-                 "Give fewer voxels, or lengths in metres"};
-  }
   auto emission_grid = sparse_grid<openvdb::Vec3SGrid>(
       volume.grid, "emission", "grey levels (0..255) per metre", [&](std::size_t i) {
         return openvdb::Vec3s(emission[3 * i], emission[3 * i + 1], emission[3 * i + 2]);
@@ -144,20 +218,9 @@ Status write_volume(const Volume& volume, const std::filesystem::path& path,
   });
   density_grid->setGridClass(openvdb::GRID_FOG_VOLUME);
   openvdb::GridPtrVec grids{emission_grid, density_grid};
-  for (const NamedGrid& grid : further) grids.push_back(further_grid(volume.grid, grid));
-  try {
-    openvdb::io::File file(path.string());
-    file.write(grids);
-    file.close();
-    std::ofstream end(path, std::ios::binary | std::ios::app);
-    end.exceptions(std::ios::failbit | std::ios::badbit);
-    end << kEnd;
-    end.close();
-  } catch (const std::exception& e) {
-    return Error{ErrorKind::io, std::string("cannot write: ") + e.what(), path.string(),
-                 "Check that the folder is writable and the disk has room"};
-  }
-  return {};
+  for (const NamedGrid& grid : further)
+    grids.push_back(grid_of(volume.grid, grid.name, grid.unit, grid.values));
+  return write_file(grids, {}, path, kEnd);
 }
 
 Result<Volume> read_volume(const std::filesystem::path& path) try {
@@ -187,17 +250,7 @@ Result<std::vector<float>> read_grid(const std::filesystem::path& path, const st
   if (!file->hasGrid(name)) return damaged(path, "has no grid " + name);
   const openvdb::GridBase::Ptr base = file->readGrid(name);
   EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, geometry(*base, path));
-  const auto scalar = openvdb::gridPtrCast<openvdb::FloatGrid>(base);
-  const auto vector = openvdb::gridPtrCast<openvdb::Vec3SGrid>(base);
-  if (!scalar && !vector) return damaged(path, name + " is neither FloatGrid nor Vec3SGrid");
-  std::vector<float> values(grid.size() * (scalar ? 1 : 3));
-  const auto put_one = [&](std::size_t p, float value) { values[p] = value; };
-  const auto put_three = [&](std::size_t p, const openvdb::Vec3s& v) {
-    for (int c = 0; c < 3; ++c) values[3 * p + static_cast<std::size_t>(c)] = v[c];
-  };
-  EMBERLOCK_RETURN_IF_ERROR(scalar ? take_values(*scalar, grid, name, path, put_one)
-                                   : take_values(*vector, grid, name, path, put_three));
-  return values;
+  return all_values(base, grid, path);
 } catch (const std::exception& e) {
   return damaged(path, e.what());
 }
@@ -211,6 +264,47 @@ Result<std::optional<std::vector<float>>> read_values(const std::filesystem::pat
   return std::optional(std::move(values));
 } catch (const std::exception& e) {
   return damaged(path, e.what());
+}
+
+Result<SharedVolume> read_shared_volume(const std::filesystem::path& path) try {
+  EMBERLOCK_ASSIGN_OR_RETURN(const auto file, opened(path));
+  SharedVolume volume;
+  const openvdb::GridPtrVecPtr grids = file->getGrids();
+  for (const openvdb::GridBase::Ptr& base : *grids) {
+    EMBERLOCK_ASSIGN_OR_RETURN(const Grid grid, geometry(*base, path));
+    if (volume.grids.empty()) volume.grid = grid;
+    if (!same_place(volume.grid, grid)) return damaged(path, base->getName() + " is of another grid");
+    EMBERLOCK_ASSIGN_OR_RETURN(std::vector<float> values, all_values(base, grid, path));
+    const auto unit = base->getMetadata<openvdb::StringMetadata>("unit");
+    volume.grids.push_back({base->getName(), unit ? unit->value() : "", "", std::move(values)});
+  }
+  return volume;
+} catch (const std::exception& e) {
+  return damaged(path, e.what());
+}
+
+Status write_vdb(const SharedVolume& volume, const std::filesystem::path& path, VdbSamples samples) {
+  openvdb::initialize();
+  EMBERLOCK_RETURN_IF_ERROR(check_size(volume.grid, path));
+  const openvdb::MetaMap about = metadata_of(volume.provenance);
+  const bool later = samples == VdbSamples::half_an_edge_later;
+  openvdb::GridPtrVec grids;
+  const auto add = [&](const SharedGrid& from) {
+    const bool thin = later && from.name == "density";
+    openvdb::GridBase::Ptr grid = grid_of(volume.grid, from.name, from.unit,
+                                          thin ? without_traces(from.values, volume.grid) : from.values);
+    const bool scalar = grid->isType<openvdb::FloatGrid>();
+    if (scalar) grid->setGridClass(openvdb::GRID_FOG_VOLUME);
+    if (!scalar) grid->setVectorType(openvdb::VEC_INVARIANT);
+    if (!scalar && later) put_zeros_around(*openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid));
+    if (!from.meaning.empty()) grid->insertMeta("meaning", openvdb::StringMetadata(from.meaning));
+    for (auto it = about.beginMeta(); it != about.endMeta(); ++it) grid->insertMeta(it->first, *it->second);
+    if (later) grid->transform().preTranslate(openvdb::Vec3d(-0.5));
+    grids.push_back(std::move(grid));
+  };
+  for (const SharedGrid& from : volume.grids) add(from);
+  if (volume.find("density") == nullptr) add({"density", "1/m", "", std::vector<float>(volume.grid.size())});
+  return write_file(grids, about, path, later ? kEndLater : kEnd);
 }
 
 }  // namespace emberlock::recon

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/result.h"
+#include "recon/export/shared_volume.h"
 #include "recon/render/volume.h"
 
 namespace emberlock::recon {
@@ -41,5 +42,24 @@ Result<std::vector<float>> read_grid(const std::filesystem::path& path, const st
 /// that name. Error: another number of values.
 Result<std::optional<std::vector<float>>> read_values(const std::filesystem::path& path,
                                                       const std::string& name, const Grid& grid);
+
+/// All grids of a file of write_volume(), bit-identically, in the order of their names; their provenance is
+/// left empty. Errors: as read_volume().
+Result<SharedVolume> read_shared_volume(const std::filesystem::path& path);
+
+/// Where a program that opens a file takes a voxel's value to be.
+enum class VdbSamples {
+  at_index,           ///< as OpenVDB, Houdini and Blender from 5.0 do
+  half_an_edge_later  ///< on each axis, as Blender before 5.0 does: the grids' transform takes it back,
+                      ///< zeros are put around colours, and `density` below 1e-5 a voxel is none, for those
+                      ///< versions' sake
+};
+/// Writes an OpenVDB file for other programs: all grids of `volume`, as write_volume() would, one value a
+/// point of class FOG_VOLUME; a scalar grid `density` even where nothing is dense, as without one Blender's
+/// Principled Volume takes the whole box for dense. Meaning and unit of a grid and where the volume comes
+/// from stand in its metadata (`meaning`, `unit`, `creator`, `emberlock_input`, `emberlock_frame`,
+/// `emberlock_up`), and the latter in the file's. At the index, read_volume() reads it too. Errors: as
+/// write_volume().
+Status write_vdb(const SharedVolume& volume, const std::filesystem::path& path, VdbSamples samples);
 
 }  // namespace emberlock::recon

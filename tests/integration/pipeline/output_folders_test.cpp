@@ -213,6 +213,7 @@ class OutputFolders : public testing::Test {
          {"render", hot, "--frames", "2", "--image", "32x32"},
          hot,
          {"frame-0000.png", "frame-0001.png"}},
+        {"export", "--out", add_export, {"export", hot}, hot, {"flame.vdb"}},
         {"measure", "--out", add_measure, {"measure", hot, hot}, hot, {"measures.csv", "measures.html"}},
         {"simulate flame",
          "--out",
@@ -288,7 +289,7 @@ TEST_F(OutputFolders, TheTablesHoldEveryVerbThatWritesOne) {
   for (const auto add : {add_devices,   add_smear,    add_align,  add_reconstruct, add_verify, add_tradeoff,
                          add_calibrate, add_import,   add_demo,   add_sample,      add_doctor, add_bench,
                          add_sessions,  add_status,   add_jobs,   add_watch,       add_record, add_strobe,
-                         add_measure,   add_simulate, add_render, add_evaluate})
+                         add_measure,   add_simulate, add_render, add_export,      add_evaluate})
     add(app);
   std::set<std::string> found;
   cli::visit(app, "emberlock", [&](const CLI::App& verb, const std::string& path) {

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cli/result_files.h"
+
+#include <algorithm>
+#include <charconv>
+#include <string_view>
+#include <system_error>
+
+#include <nlohmann/json.hpp>
+
+#include "base/file.h"
+
+namespace emberlock::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::string_view kFrame = "frame-";
+
+/// N of a folder "frame-N".
+std::optional<std::uint64_t> frame_of(const fs::path& folder) {
+  const std::string name = folder.filename().string();
+  if (!name.starts_with(kFrame)) return std::nullopt;
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(name.data() + kFrame.size(), name.data() + name.size(), number);
+  return error == std::errc() && end == name.data() + name.size() ? std::optional(number) : std::nullopt;
+}
+
+std::vector<ResultVolume> frames_in(const fs::path& folder) {
+  std::vector<ResultVolume> volumes;
+  std::error_code ec;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, ec)) {
+    const auto frame = frame_of(entry.path());
+    const fs::path file = entry.path() / "volume.vdb";
+    if (frame && fs::is_regular_file(file, ec)) volumes.push_back({file, frame});
+  }
+  std::sort(volumes.begin(), volumes.end(),
+            [](const ResultVolume& a, const ResultVolume& b) { return a.frame < b.frame; });
+  return volumes;
+}
+
+}  // namespace
+
+Result<std::vector<ResultVolume>> volumes_of(const fs::path& result) {
+  std::error_code ec;
+  const fs::path file = fs::is_directory(result, ec) ? result / "volume.vdb" : result;
+  if (fs::is_regular_file(file, ec)) {
+    const fs::path place = fs::canonical(file, ec).parent_path();  // where a link of a sequence leads
+    return std::vector{ResultVolume{file, frame_of(place)}};
+  }
+  std::vector<ResultVolume> volumes = frames_in(result);
+  if (!volumes.empty()) return volumes;
+  const bool there = fs::exists(result, ec);
+  return Error{ErrorKind::bad_input, there ? "has no volume.vdb and no frame-N/volume.vdb" : "isn't there",
+               result.string(), "Name a folder that `emberlock reconstruct` wrote, or a volume.vdb"};
+}
+
+std::string reported(const fs::path& result, const char* key) {
+  std::error_code ec;
+  const fs::path folder =
+      fs::is_directory(result, ec) ? result : fs::weakly_canonical(result, ec).parent_path();
+  const auto text = read_file(folder / "report.json");
+  const auto json = nlohmann::json::parse(text ? *text : std::string(), nullptr, false);
+  const bool tells = json.is_object() && json.contains(key) && json[key].is_string();
+  return tells ? json[key].get<std::string>() : std::string();
+}
+
+}  // namespace emberlock::cli

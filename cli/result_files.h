@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+
+namespace emberlock::cli {
+
+/// A volume of a result of `reconstruct`.
+struct ResultVolume {
+  std::filesystem::path file;
+  std::optional<std::uint64_t> frame;  ///< of a sequence
+};
+
+/// The volumes of a result: of its folder, of a volume.vdb, or of all frames (OUT/frame-N) of a sequence's
+/// folder, rising. Error (bad_input): there is none.
+Result<std::vector<ResultVolume>> volumes_of(const std::filesystem::path& result);
+
+/// What the report.json beside a volume or in a result's folder tells in words at `key`; empty where it tells
+/// nothing.
+std::string reported(const std::filesystem::path& result, const char* key);
+
+}  // namespace emberlock::cli

@@ -23,7 +23,8 @@ std::string explain_light(const FoundLight& found) {
                        density, found.error);
   const bool is_near = light.source == Light::Source::nearby;
   return fmt::format(
-      "{} {:.2f} / {:.2f} / {:.2f}{} of {:.3g} / {:.3g} / {:.3g}, beside {} from all sides, on {} leaves {:.3g} "
+      "{} {:.2f} / {:.2f} / {:.2f}{} of {:.3g} / {:.3g} / {:.3g}, beside {} from all sides, on {} leaves "
+      "{:.3g} "
       "grey levels on a coarse grid, and even light {:.3g}",
       is_near ? "a light nearby at" : "a distant light towards", p[0], p[1], p[2], is_near ? " m" : "", s[0],
       s[1], s[2], even, density, found.error, found.even_error);
@@ -45,7 +46,9 @@ LightChoice choose_light(const SolverSetup& setup, const Extinction& otherwise, 
   };
   if (request.fixed && request.fixed->light.source == Source::none) return off("left out by hand");
   if (request.fixed) {
-    const FoundLight found = find_light(setup, request.fixed->light, elapsed);
+    const bool sought = request.fixed->light.source == Source::found;
+    FoundLight found = find_light(setup, request.fixed->light, elapsed);
+    if (sought) found = refine_light(setup, found, elapsed);
     return {found.light,
             expected(found),
             {"light", true, 0, now() - start, "set by hand: " + explain_light(found), {}}};
@@ -58,16 +61,18 @@ LightChoice choose_light(const SolverSetup& setup, const Extinction& otherwise, 
   if (!free.any()) return off("too few views to tell lit from glowing");
   Light any;
   any.source = Source::found;
-  const FoundLight found = find_light(setup, any, elapsed);
+  FoundLight found = find_light(setup, any, elapsed);
   SolverSetup lit = setup;
   lit.effects.light = found.light;
   const FoundSmoothness with = find_smoothness(LeftOutViews(lit, setup.hull), expected(found), late);
   const FoundSmoothness without = find_smoothness(free, otherwise, late);
-  const std::string shown =
-      fmt::format("{}; views that are left out of the fit are shown to {:.3g} grey levels so, and to {:.3g} by "
-                  "a medium that glows",
-                  explain_light(found), with.error, without.error);
-  if (!(with.error < (1 - kLeastGainOfLight) * without.error)) return off(shown);
+  const bool believed = with.error < (1 - kLeastGainOfLight) * without.error;
+  if (believed) found = refine_light(setup, found, elapsed);
+  const std::string shown = fmt::format(
+      "{}; views that are left out of the fit are shown to {:.3g} grey levels so, and to {:.3g} by "
+      "a medium that glows",
+      explain_light(found), with.error, without.error);
+  if (!believed) return off(shown);
   return {found.light,
           expected(found),
           {"light", true, std::max(0.0, without.error - with.error), now() - start, shown, {}}};

@@ -13,9 +13,9 @@ struct LightChoice {
 };
 
 /// By hand (`request.fixed`) what is asked for, with what the pictures tell of it. Else find_light(), whose
-/// light is believed where views that are left out of the fit (left_out_views.h) are shown better by a density
-/// under it than by light and extinction that are free, by kLeastGainOfLight. `otherwise` is the extinction
-/// that was chosen for those; `absorbs` whether any was found, without which nothing scatters.
+/// light is believed where views that are left out of the fit (left_out_views.h) are shown better by a
+/// density under it than by light and extinction that are free, by kLeastGainOfLight. `otherwise` is the
+/// extinction that was chosen for those; `absorbs` whether any was found, without which nothing scatters.
 LightChoice choose_light(const SolverSetup& setup, const Extinction& otherwise, bool absorbs,
                          const EffectRequest& request, const Elapsed& elapsed = {});
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 #include <vector>
 
@@ -17,6 +18,8 @@ namespace {
 
 constexpr int kVoxels = 32;            // along the longest side, at most
 constexpr std::size_t kPixels = 8000;  // of the flames' boxes are looked at
+constexpr int kFinerVoxels = 64;
+constexpr std::size_t kFinerPixels = 15000;
 constexpr int kDirections = 32;
 constexpr std::array<double, 3> kDepths = {0.25, 0.6, 1.4};  // of the mean ray
 constexpr int kQuickPasses = 12;
@@ -54,150 +57,176 @@ Light lit(Light::Source source, const Eigen::Vector3d& place) {
   return light;
 }
 
-class Search {
+/// What a search looks at: the pixels of one grid, under a light that isn't known yet.
+struct LitProblem {
+  SolverSetup setup;
+  Hull hull;
+  Level level;
+  double chord = 0;  ///< mean length of a ray inside the hull, metres
+
+  LitProblem(const SolverSetup& of, int voxels, std::size_t pixels)
+      : setup(of), hull(coarsen_to(of.hull, voxels)) {
+    setup.effects.light.source = Light::Source::even;  // a level that LitDescent takes
+    setup.effects.extinction = {};
+    level = make_level(setup, hull, stride_for_rays(setup, pixels), 4);
+    const double rays = std::max(1.0, static_cast<double>(level.problem.rays()));
+    chord = total_length(level.problem.list, setup.pool) / rays * static_cast<double>(hull.grid.edge);
+  }
+  [[nodiscard]] std::unique_ptr<LitDescent> begin(const Light& light, double depth) const {
+    SolverSetup under = setup;
+    under.effects.light = light;
+    const LitStart glow(level, under, {Extinction::Model::field, PerMeter(0), PerMeter(depth / chord)});
+    return std::make_unique<LitDescent>(level, under, glow.start());
+  }
+  [[nodiscard]] Tried attempt(const Light& light, double depth, int passes) const try {
+    const std::unique_ptr<LitDescent> descent = begin(light, depth);
+    descend(*descent, passes);
+    const double error = descent->judge();
+    return {descent->light(), depth, std::isfinite(error) ? error : std::numeric_limits<double>::infinity()};
+  } catch (const Diverged&) {
+    return {light, depth};
+  }
+};
+
+/// Moves a light to where it fits better, by cold solves of one problem, all with the same density to begin
+/// with.
+class Refinement {
  public:
-  Search(const SolverSetup& setup, const Elapsed& elapsed)
-      : setup_(under_a_light(setup)),
-        elapsed_(elapsed),
-        hull_(coarsen_to(setup.hull, kVoxels)),
-        level_(make_level(setup_, hull_, stride_for_rays(setup, kPixels), 4)) {
-    const Grid& g = level_.problem.grid();
+  explicit Refinement(const LitProblem& problem) : problem_(problem) {
+    const Grid& g = problem.level.problem.grid();
     const Eigen::Vector3d size = static_cast<double>(g.edge) * Eigen::Vector3d(g.nx - 1, g.ny - 1, g.nz - 1);
     middle_ = Eigen::Vector3f(g.origin[0], g.origin[1], g.origin[2]).cast<double>() + size / 2;
     radius_ = size.norm() / 2;
-    const double rays = std::max(1.0, static_cast<double>(level_.problem.rays()));
-    chord_ = total_length(level_.problem.list, setup.pool) / rays * static_cast<double>(g.edge);
   }
+
+  /// Sideways and, of one nearby, nearer and farther: to the vertices of parabolas through what is left on
+  /// both sides, in smaller and smaller steps.
+  template <class Late>
+  [[nodiscard]] Tried refined(Tried best, const Late& late) const {
+    best = problem_.attempt(best.light, best.depth, kPasses);
+    for (const double step : {0.25, 0.25, 0.12, 0.12})
+      if (!late()) best = moved_on(best, step);
+    return best;
+  }
+  /// The same light nearby, at the best of some distances.
+  [[nodiscard]] Tried brought_near(const Tried& distant) const {
+    const Eigen::Vector3d towards = vector(distant.light.place).normalized();
+    Tried best;
+    for (const double far : {1.4, 2.4}) {
+      const Light light = lit(Light::Source::nearby, middle_ + far * radius_ * towards);
+      best = std::min(best, problem_.attempt(light, distant.depth, kPasses), fits_better);
+    }
+    return best;
+  }
+  /// So far away that it can't be told from a distant one.
+  [[nodiscard]] bool is_far(const Light& nearby) const {
+    constexpr double kFar = 4;
+    return (vector(nearby.place) - middle_).norm() > kFar * radius_;
+  }
+
+ private:
+  [[nodiscard]] Light moved(const Light& light, const Eigen::Vector3d& by) const {
+    if (light.source == Light::Source::distant)
+      return lit(light.source, (vector(light.place) + by).normalized());
+    const Eigen::Vector3d from = vector(light.place) - middle_;
+    const Eigen::Vector3d to = from + from.norm() * by;
+    return lit(light.source, middle_ + std::max(1.0, 1.05 * radius_ / to.norm()) * to);  // not inside
+  }
+  [[nodiscard]] Tried moved_on(const Tried& from, double step) const {
+    constexpr double kMostSteps = 1.5;
+    const bool is_near = from.light.source == Light::Source::nearby;
+    const Eigen::Vector3d out =
+        (is_near ? Eigen::Vector3d(vector(from.light.place) - middle_) : vector(from.light.place))
+            .normalized();
+    const auto sides = across(out);
+    std::vector<Eigen::Vector3d> ways = {sides[0], sides[1]};
+    if (is_near) ways.push_back(out);
+    Tried best = from;
+    Eigen::Vector3d by = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& way : ways) {
+      const Tried ahead = problem_.attempt(moved(from.light, step * way), from.depth, kPasses);
+      const Tried back = problem_.attempt(moved(from.light, -step * way), from.depth, kPasses);
+      best = std::min({best, ahead, back}, fits_better);
+      const double slope = (ahead.error - back.error) / 2;
+      const double curvature = ahead.error + back.error - 2 * from.error;
+      if (!std::isfinite(slope) || !std::isfinite(curvature)) continue;
+      by += step * way *
+            (curvature > 0 ? std::clamp(-slope / curvature, -kMostSteps, kMostSteps)
+                           : (slope > 0 ? -1.0 : 1.0));
+    }
+    return std::min(best, problem_.attempt(moved(from.light, by), from.depth, kPasses), fits_better);
+  }
+
+  const LitProblem& problem_;
+  Eigen::Vector3d middle_;
+  double radius_ = 0;  // of the box around the medium, metres
+};
+
+class Search {
+ public:
+  Search(const SolverSetup& setup, const Elapsed& elapsed)
+      : setup_(setup), elapsed_(elapsed), coarse_(setup, kVoxels, kPixels) {}
 
   FoundLight operator()(const Light& asked) {
     using Source = Light::Source;
-    if (asked.source != Source::found) return result(best_depth(asked, kPasses));
-    const Tried even = best_depth(lit(Source::even, {}), kPasses);
-    Tried distant = best_direction();
-    distant = refined(distant);
+    if (asked.source != Source::found) return result(best_depth(asked));
+    const Tried even = best_depth(lit(Source::even, {}));
+    const Tried rough = best_direction();
     FoundLight found = result(even);
-    if (distant.error < (1 - kLeastLessError) * even.error) {
-      const Tried nearby = best_nearby(distant);
-      const bool is_near = nearby.error < (1 - kLeastLessError) * distant.error;
-      found = result(is_near ? nearby : distant);
-      found.other_error = is_near ? distant.error : nearby.error;
-    }
+    if (rough.error < (1 - kLeastLessError) * even.error) found = result(rough);
     found.even_error = even.error;
     return found;
   }
 
  private:
-  static SolverSetup under_a_light(const SolverSetup& setup) {
-    SolverSetup lit = setup;
-    lit.effects.light.source = Light::Source::even;  // a level that LitDescent takes
-    lit.effects.extinction = {};
-    return lit;
-  }
-
-  [[nodiscard]] Tried attempt(const Light& light, double depth, int passes) const try {
-    SolverSetup setup = setup_;
-    setup.effects.light = light;
-    const LitStart glow(level_, setup,
-                        {Extinction::Model::field, PerMeter(0), PerMeter(depth / chord_)});
-    LitDescent descent(level_, setup, glow.start());
-    descend(descent, passes);
-    const double error = descent.judge();
-    return {descent.light(), depth, std::isfinite(error) ? error : std::numeric_limits<double>::infinity()};
-  } catch (const Diverged&) {
-    return {light, depth};
-  }
-
-  [[nodiscard]] Tried best_depth(const Light& light, int passes) const {
+  [[nodiscard]] Tried best_depth(const Light& light) const {
     Tried best{light};
-    for (const double depth : kDepths) best = std::min(best, attempt(light, depth, passes), fits_better);
+    for (const double depth : kDepths)
+      best = std::min(best, coarse_.attempt(light, depth, kPasses), fits_better);
     return best;
   }
-
   [[nodiscard]] Tried best_direction() const {
     std::vector<Tried> all;
     for (int n = 0; n < kDirections; ++n) {
       if (n > 0 && late()) break;
-      all.push_back(attempt(lit(Light::Source::distant, direction(n)), kDepths[1], kQuickPasses));
+      all.push_back(coarse_.attempt(lit(Light::Source::distant, direction(n)), kDepths[1], kQuickPasses));
     }
-    constexpr std::size_t kCloser = 4;
+    constexpr std::size_t kCloser = 2;
     std::sort(all.begin(), all.end(), fits_better);
     Tried best;
     for (std::size_t n = 0; n < std::min(kCloser, all.size()); ++n)
-      best = std::min(best, best_depth(all[n].light, kPasses), fits_better);
+      best = std::min(best, best_depth(all[n].light), fits_better);
     return best;
   }
-
-  /// Compass search over the directions, in steps from half of what the spiral's points are apart.
-  [[nodiscard]] Tried refined(Tried best) const {
-    for (double step = 0.25; step > 0.02; step /= 2) {
-      bool moved = true;
-      for (int round = 0; moved && round < 4 && !late(); ++round) {
-        moved = false;
-        const Eigen::Vector3d from = vector(best.light.place);
-        for (const Eigen::Vector3d& axis : across(from))
-          for (const double way : {step, -step}) {
-            Light light = best.light;
-            light.place = array((from + way * axis).normalized());
-            const Tried next = attempt(light, best.depth, kPasses);
-            if (!fits_better(next, best)) continue;
-            best = next;
-            moved = true;
-          }
-      }
-    }
-    return best;
-  }
-
-  /// Along the distant light's direction, then around the best place: sideways, and nearer and farther.
-  [[nodiscard]] Tried best_nearby(const Tried& distant) const {
-    const Eigen::Vector3d towards = vector(distant.light.place);
-    Tried best;
-    for (const double far : {1.3, 2.0, 3.5}) {
-      if (late()) break;
-      best = std::min(best,
-                      attempt(lit(Light::Source::nearby, middle_ + far * radius_ * towards), distant.depth,
-                              kPasses),
-                      fits_better);
-    }
-    for (double step = 0.25; step > 0.03 && !late(); step /= 2) {
-      bool moved = true;
-      for (int round = 0; moved && round < 4 && !late(); ++round) {
-        moved = false;
-        const Eigen::Vector3d from = vector(best.light.place) - middle_;
-        const auto sides = across(from.normalized());
-        for (const Eigen::Vector3d& axis : {from.normalized(), sides[0], sides[1]})
-          for (const double way : {step, -step}) {
-            const Eigen::Vector3d to = from + way * from.norm() * axis;
-            if (to.norm() < radius_) continue;  // no light inside
-            const Tried next = attempt(lit(Light::Source::nearby, middle_ + to), best.depth, kPasses);
-            if (!fits_better(next, best)) continue;
-            best = next;
-            moved = true;
-          }
-      }
-    }
-    return best;
-  }
-
   [[nodiscard]] FoundLight result(const Tried& tried) const {
-    return {tried.light, PerMeter(tried.depth / chord_), tried.error, tried.error, 0};
+    return {tried.light, PerMeter(tried.depth / coarse_.chord), tried.error, tried.error};
   }
-
   [[nodiscard]] bool late() const { return is_spent(0.4, setup_.options, elapsed_); }
 
-  SolverSetup setup_;
+  const SolverSetup& setup_;
   const Elapsed& elapsed_;
-  Hull hull_;
-  Level level_;
-  Eigen::Vector3d middle_;
-  double radius_ = 0;  // of the box around the medium, metres
-  double chord_ = 0;   // mean length of a ray inside the hull, metres
+  LitProblem coarse_;
 };
 
 }  // namespace
 
 FoundLight find_light(const SolverSetup& setup, const Light& asked, const Elapsed& elapsed) {
   return Search(setup, elapsed)(asked);
+}
+
+FoundLight refine_light(const SolverSetup& setup, const FoundLight& rough, const Elapsed& elapsed) {
+  const auto late = [&] { return is_spent(0.4, setup.options, elapsed); };
+  if (rough.light.source != Light::Source::distant || late()) return rough;
+  const LitProblem fine(setup, kFinerVoxels, kFinerPixels);
+  const double depth = rough.density.value() * fine.chord;
+  const Refinement around(fine);
+  const Tried distant = around.refined({rough.light, depth}, late);
+  const Tried nearby = around.refined(around.brought_near(distant), late);
+  const bool is_near = !around.is_far(nearby.light) && nearby.error < (1 - kLeastLessError) * distant.error;
+  const Tried& best = is_near ? nearby : distant;
+  Light even;
+  even.source = Light::Source::even;
+  return {best.light, rough.density, best.error, fine.attempt(even, depth, kPasses).error};
 }
 
 }  // namespace emberlock::recon

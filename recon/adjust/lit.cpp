@@ -40,8 +40,8 @@ LitLevel from_a_start(const SolverSetup& setup) {
   const std::optional<BestStart> best = best_start(*at.level, setup);
   if (!best) return at;
   at.started_from = best->which;
-  at.descent =
-      std::make_unique<LitDescent>(*at.level, setup, DescentStart{nullptr, nullptr, starts[best->which].get()});
+  at.descent = std::make_unique<LitDescent>(*at.level, setup,
+                                            DescentStart{nullptr, nullptr, starts[best->which].get()});
   return at;
 }
 
@@ -115,16 +115,11 @@ Solution solve_lit(const SolverSetup& asked, Tracker& tracker) {
   descent.judge();
   std::vector<Rgba> x = descent.engine().get();
   Volume volume = to_volume(x, problem, setup.hull, setup.effects);
-  return {std::move(x),
-          std::move(volume),
-          iteration,
-          at.halvings + descent.halvings(),
-          *setup.smoothness,
-          all_channels(error.black()),
-          error(),
-          kept,
-          at.started_from,
-          descent.light()};
+  return {std::move(x),      std::move(volume),
+          iteration,         at.halvings + descent.halvings(),
+          *setup.smoothness, all_channels(error.black()),
+          error(),           kept,
+          at.started_from,   descent.light()};
 }
 
 }  // namespace emberlock::recon

@@ -11,8 +11,8 @@
 namespace emberlock::recon {
 namespace {
 
-constexpr float kSoftDensity = 0.1F;   // differences below this share of the mean density count quadratically
-constexpr float kDensest = 1;          // a voxel edge
+constexpr float kSoftDensity = 0.1F;  // differences below this share of the mean density count quadratically
+constexpr float kDensest = 1;         // a voxel edge
 constexpr double kMostLitMomentum = 0.93;
 constexpr double kSame = 1e-9;  // of two pictures that can't be told apart
 
@@ -61,7 +61,9 @@ struct NormalEquations {
   double aa = 0, ab = 0, bb = 0;
   std::array<double, 3> a_seen = {}, b_seen = {};
 
-  [[nodiscard]] double ambient_alone(std::size_t c) const { return aa > 0 ? std::max(0.0, a_seen[c] / aa) : 0; }
+  [[nodiscard]] double ambient_alone(std::size_t c) const {
+    return aa > 0 ? std::max(0.0, a_seen[c] / aa) : 0;
+  }
   [[nodiscard]] double strength_alone(std::size_t c) const {
     return bb > 0 ? std::max(0.0, b_seen[c] / bb) : 0;
   }
@@ -83,7 +85,8 @@ LitDescent::LitDescent(const Level& level, const SolverSetup& setup, const Desce
   field_weight_ = engine().field_weights();
   const std::size_t fitted = level.problem.list.subset_begin[static_cast<std::size_t>(level.subsets)];
   const ResidualEngine::Squares black = engine().black_squares(0, fitted);
-  guard_ = Guard(std::sqrt((black[0] + black[1] + black[2]) / (3 * std::max(1.0, static_cast<double>(fitted)))));
+  guard_ =
+      Guard(std::sqrt((black[0] + black[1] + black[2]) / (3 * std::max(1.0, static_cast<double>(fitted)))));
   take_from_engine();
   best_ = density_;
 }
@@ -117,12 +120,18 @@ void LitDescent::set_light(const Light& light) {
   fit_colours();
 }
 
+void LitDescent::set_light(const Light& light, const std::vector<float>& density) {
+  density_ = ahead_ = density;
+  momentum_time_ = 1;
+  set_light(light);
+}
+
 std::vector<Rgba> LitDescent::volume(const std::vector<float>& density) const {
   std::vector<Rgba> x(density.size());
   for (std::size_t p = 0; p < x.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c)
-      x[p].c[c] = density[p] * static_cast<float>(light_.ambient[c] +
-                                                  light_.strength[c] * static_cast<double>(reach_[p]));
+      x[p].c[c] = density[p] *
+                  static_cast<float>(light_.ambient[c] + light_.strength[c] * static_cast<double>(reach_[p]));
     x[p].c[3] = density[p];
   }
   return x;

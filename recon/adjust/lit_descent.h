@@ -8,14 +8,14 @@
 
 namespace emberlock::recon {
 
-/// The default solver's iteration where light from outside is all that shines (Light): emission and extinction
-/// at a key point are the density s times what reaches it, j_c = s l_c with l_c = ambient_c + strength_c R, and
-/// s, a voxel edge. By the chain rule the slope by s is sum_c l_c dF/dj_c + dF/ds, which the engine gives, and
-/// the curvature sum_c l_c^2 W + V majorises it for fixed R, W and V being those of Descent for emission and
-/// extinction. The Huber total variation, subsets, momentum and guard are Descent's too, those of s. R follows
-/// the density before each pass (its slope is left out), both colours are then the least squares of the
-/// pictures, none below 0: how much light there is and how much it meets only differ by what the medium
-/// absorbs, so the density keeps about the scale that it starts from.
+/// The default solver's iteration where light from outside is all that shines (Light): emission and
+/// extinction at a key point are the density s times what reaches it, j_c = s l_c with l_c = ambient_c +
+/// strength_c R, and s, a voxel edge. By the chain rule the slope by s is sum_c l_c dF/dj_c + dF/ds, which
+/// the engine gives, and the curvature sum_c l_c^2 W + V majorises it for fixed R, W and V being those of
+/// Descent for emission and extinction. The Huber total variation, subsets, momentum and guard are Descent's
+/// too, those of s. R follows the density before each pass (its slope is left out), both colours are then the
+/// least squares of the pictures, none below 0: how much light there is and how much it meets only differ by
+/// what the medium absorbs, so the density keeps about the scale that it starts from.
 ///
 /// Marches on the level's device, everything else on the CPU.
 class LitDescent {
@@ -27,8 +27,10 @@ class LitDescent {
   /// Which colours the next passes may change; the other is 0.
   enum class Colours { both, strength };
   void free(Colours colours) { colours_ = colours; }
-  /// Another light, on the density as it is.
+  /// Another light, on the density as it is, or on one of an earlier moment.
   void set_light(const Light& light);
+  void set_light(const Light& light, const std::vector<float>& density);
+  [[nodiscard]] const std::vector<float>& density() const { return density_; }
   /// One pass over all subsets. Throws Diverged as Descent does.
   Guard::Finding pass();
   /// Makes the volume known to the engine, and its residuals those of all rays. RMS of the fitted ones, grey

@@ -66,8 +66,7 @@ std::vector<float> light_that_reaches(const std::vector<Rgba>& medium, const Gri
   if (light.source == Light::Source::even) return std::vector<float>(grid.size(), 1.F);
   std::vector<Rgba> dark(grid.size());
   for (std::size_t p = 0; p < dark.size(); ++p) dark[p].c[3] = medium[p].c[3];
-  const int every =
-      std::max(1, (std::max({grid.nx, grid.ny, grid.nz}) - 1 + kMostPlaces - 1) / kMostPlaces);
+  const int every = std::max(1, (std::max({grid.nx, grid.ny, grid.nz}) - 1 + kMostPlaces - 1) / kMostPlaces);
   const std::vector<int> xs = places_along(grid.nx, every);
   const std::vector<int> ys = places_along(grid.ny, every);
   const std::vector<int> zs = places_along(grid.nz, every);

@@ -28,7 +28,9 @@ struct LitTruth {
 };
 
 /// The n-th of a sequence that fills 0..1 evenly (the golden ratio's), another for each seed.
-inline double spread(int n, int seed) { return std::fmod(0.5 + 0.618033988749895 * n + 0.271828 * seed, 1.0); }
+inline double spread(int n, int seed) {
+  return std::fmod(0.5 + 0.618033988749895 * n + 0.271828 * seed, 1.0);
+}
 
 inline LitTruth lit_truth(const LitScene& options, const recon::Light& light) {
   const recon::Grid g =
@@ -74,8 +76,9 @@ inline recon::Scene film_lit(const LitScene& options, const LitTruth& truth) {
     const double focal = 1.6 * options.image.width;
     recon::View view{
         "camera " + std::to_string(v),
-        recon::look_at({options.image, focal, focal, options.image.width / 2.0, options.image.height / 2.0, {}},
-                       from, Eigen::Vector3d::Zero()),
+        recon::look_at(
+            {options.image, focal, focal, options.image.width / 2.0, options.image.height / 2.0, {}}, from,
+            Eigen::Vector3d::Zero()),
         {},
         held_out ? recon::ViewRole::held_out : recon::ViewRole::input};
     view.image = recon::share(recon::render_view(truth.volume, truth.medium, effects, view.camera));

@@ -74,7 +74,7 @@ FoundLight look_for_light(const Scene& scene, const Light& asked) {
     setup.views.push_back(&scene.views[v]);
     setup.boxes.push_back((*masks)[v].box);
   }
-  return find_light(setup, asked);
+  return refine_light(setup, find_light(setup, asked));
 }
 
 double degrees_between(const std::array<double, 3>& a, const Eigen::Vector3d& b) {
@@ -94,11 +94,13 @@ TEST_P(FindLight, DirectionAndColour) {
   const double r = std::sqrt(1 - z * z);
   const Eigen::Vector3d towards(r * std::cos(turn), r * std::sin(turn), z);
   const Light truth = test::distant_light(towards);
-  const FoundLight found = look_for_light(film_lit(smoke, lit_truth(smoke, truth)), light_at(Source::found, {}));
+  const FoundLight found =
+      look_for_light(film_lit(smoke, lit_truth(smoke, truth)), light_at(Source::found, {}));
   EXPECT_EQ(found.light.source, Source::distant);
   EXPECT_LT(degrees_between(found.light.place, towards), 10);
   for (std::size_t c = 0; c < 3; ++c) {
-    EXPECT_NEAR(found.light.strength[c] / found.light.strength[1], truth.strength[c] / truth.strength[1], 0.05);
+    EXPECT_NEAR(found.light.strength[c] / found.light.strength[1], truth.strength[c] / truth.strength[1],
+                0.05);
     EXPECT_NEAR(found.light.strength[c], truth.strength[c], 0.25 * truth.strength[c]);
   }
 }
@@ -109,7 +111,8 @@ TEST(FindNearbyLight, OneNearbyAndWhereItStands) {
   Light truth = test::distant_light({0.16, -0.1, 0.1});
   truth.source = Source::nearby;
   for (double& s : truth.strength) s *= 0.04;
-  const FoundLight found = look_for_light(film_lit(smoke, lit_truth(smoke, truth)), light_at(Source::found, {}));
+  const FoundLight found =
+      look_for_light(film_lit(smoke, lit_truth(smoke, truth)), light_at(Source::found, {}));
   EXPECT_EQ(found.light.source, Source::nearby);
   const Eigen::Vector3d at(found.light.place[0], found.light.place[1], found.light.place[2]);
   EXPECT_LT((at - Eigen::Vector3d(0.16, -0.1, 0.1)).norm(), 0.06) << at.transpose();
@@ -127,7 +130,8 @@ TEST(LitSolve, ShowsWhatItDidNotSeeBetterThanGlowingMediaDo) {
   const test::LitScene smoke;
   const Light truth = test::distant_light({1, -0.5, 0.4});
   const Scene scene = film_lit(smoke, lit_truth(smoke, truth));
-  const auto choice = choose_effects(scene, grid_over(scene.box, 32), {}, {.compute = {.device = Device::cpu}});
+  const auto choice =
+      choose_effects(scene, grid_over(scene.box, 32), {}, {.compute = {.device = Device::cpu}});
   ASSERT_TRUE(choice.ok()) << choice.error().message();
   ASSERT_EQ(choice->reports[1].name, "light");
   ASSERT_TRUE(choice->reports[1].on) << choice->reports[1].reason;

@@ -62,6 +62,9 @@ LightChoice choose_light(const SolverSetup& setup, const Extinction& otherwise, 
   Light any;
   any.source = Source::found;
   FoundLight found = find_light(setup, any, elapsed);
+  if (found.light.source == Source::even)
+    return off(explain_light(found) +
+               ": no shade tells that from an even glow, so only light=even takes it for light");
   SolverSetup lit = setup;
   lit.effects.light = found.light;
   const FoundSmoothness with = find_smoothness(LeftOutViews(lit, setup.hull), expected(found), late);

@@ -162,6 +162,13 @@ class Refinement {
   double radius_ = 0;  // of the box around the medium, metres
 };
 
+Tried best_depth(const LitProblem& problem, const Light& light) {
+  Tried best{light};
+  for (const double depth : kDepths)
+    best = std::min(best, problem.attempt(light, depth, kPasses), fits_better);
+  return best;
+}
+
 class Search {
  public:
   Search(const SolverSetup& setup, const Elapsed& elapsed)
@@ -169,8 +176,11 @@ class Search {
 
   FoundLight operator()(const Light& asked) {
     using Source = Light::Source;
-    if (asked.source != Source::found) return result(best_depth(asked));
-    const Tried even = best_depth(lit(Source::even, {}));
+    if (asked.source != Source::found) {
+      const LitProblem fine(setup_, kFinerVoxels, kFinerPixels);
+      return result(best_depth(fine, asked));
+    }
+    const Tried even = best_depth(coarse_, lit(Source::even, {}));
     const Tried rough = best_direction();
     FoundLight found = result(even);
     if (rough.error < (1 - kLeastLessError) * even.error) found = result(rough);
@@ -179,12 +189,6 @@ class Search {
   }
 
  private:
-  [[nodiscard]] Tried best_depth(const Light& light) const {
-    Tried best{light};
-    for (const double depth : kDepths)
-      best = std::min(best, coarse_.attempt(light, depth, kPasses), fits_better);
-    return best;
-  }
   [[nodiscard]] Tried best_direction() const {
     std::vector<Tried> all;
     for (int n = 0; n < kDirections; ++n) {
@@ -195,7 +199,7 @@ class Search {
     std::sort(all.begin(), all.end(), fits_better);
     Tried best;
     for (std::size_t n = 0; n < std::min(kCloser, all.size()); ++n)
-      best = std::min(best, best_depth(all[n].light), fits_better);
+      best = std::min(best, best_depth(coarse_, all[n].light), fits_better);
     return best;
   }
   [[nodiscard]] FoundLight result(const Tried& tried) const {
@@ -218,15 +222,15 @@ FoundLight refine_light(const SolverSetup& setup, const FoundLight& rough, const
   const auto late = [&] { return is_spent(0.4, setup.options, elapsed); };
   if (rough.light.source != Light::Source::distant || late()) return rough;
   const LitProblem fine(setup, kFinerVoxels, kFinerPixels);
-  const double depth = rough.density.value() * fine.chord;
   const Refinement around(fine);
-  const Tried distant = around.refined({rough.light, depth}, late);
+  const Tried distant = around.refined(best_depth(fine, rough.light), late);
   const Tried nearby = around.refined(around.brought_near(distant), late);
   const bool is_near = !around.is_far(nearby.light) && nearby.error < (1 - kLeastLessError) * distant.error;
   const Tried& best = is_near ? nearby : distant;
   Light even;
   even.source = Light::Source::even;
-  return {best.light, rough.density, best.error, fine.attempt(even, depth, kPasses).error};
+  return {best.light, PerMeter(best.depth / fine.chord), best.error,
+          fine.attempt(even, best.depth, kPasses).error};
 }
 
 }  // namespace emberlock::recon

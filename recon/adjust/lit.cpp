@@ -19,7 +19,7 @@ constexpr int kCoarsestLit = 24;      // voxels along the longest side, as of th
 constexpr int kCoarseLitPasses = 16;  // of a coarse level
 constexpr int kMostLitPasses = 24;    // at full resolution, unless the user asks for more
 constexpr int kLitRound = 4;          // passes between two looks at the held-out pixels' error
-constexpr double kLeastLitGain = 0.02;
+constexpr double kLeastLitGain = 0.01;
 
 struct LitLevel {
   std::unique_ptr<const Level> level = {};

@@ -19,7 +19,7 @@ struct LitScene {
   int truth_voxels = 40;
   double depth = 1.5;  ///< through the thickest puff's middle, about
   int seed = 1;
-  recon::ImageSize image{48, 48};
+  ImageSize image{48, 48};
 };
 
 struct LitTruth {
@@ -54,7 +54,7 @@ inline LitTruth lit_truth(const LitScene& options, const recon::Light& light) {
     sigma = std::max(0.0, sigma - 0.05) * options.depth / (kWidth * std::sqrt(2 * std::numbers::pi));
     truth.volume.extinction[p] = static_cast<float>(sigma);
   }
-  Pool pool(1);
+  recon::Pool pool(1);
   std::vector<recon::Rgba> medium(g.size());
   for (std::size_t p = 0; p < g.size(); ++p) medium[p].c[3] = g.edge * truth.volume.extinction[p];
   const std::vector<float> reach = recon::light_that_reaches(medium, g, light, pool);

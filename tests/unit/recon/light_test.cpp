@@ -1,15 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Light from outside that falls on a medium: what reaches a place, whether it is found, and what it tells.
+// Light from outside that falls on a medium: what reaches a place, and the density that is solved for under
+// it.
 #include <cmath>
-#include <numbers>
 
 #include <gtest/gtest.h>
 
-#include "recon/adjust/choose_effects.h"
-#include "recon/adjust/find_light.h"
-#include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
-#include "recon/hull/hull.h"
 #include "tests/support/lit_scene.h"
 #include "tests/support/small_flame.h"
 
@@ -17,6 +13,13 @@ namespace emberlock::recon {
 namespace {
 
 using Source = Light::Source;
+
+SolveOptions on_the_cpu(int threads = 0) {
+  SolveOptions options;
+  options.compute.device = Device::cpu;
+  options.compute.threads = threads;
+  return options;
+}
 
 std::vector<Rgba> even_medium(const Grid& g, float a_metre) {
   std::vector<Rgba> medium(g.size());
@@ -58,88 +61,6 @@ TEST(LightThatReaches, EvenLightIsShadedByNothing) {
     EXPECT_EQ(r, 1);
 }
 
-/// find_light() on a scene as choose_effects() calls it.
-FoundLight look_for_light(const Scene& scene, const Light& asked) {
-  SolveOptions options;
-  options.compute.device = Device::cpu;
-  const auto prepared = PreparedScene::create(scene, {});
-  EXPECT_TRUE(prepared.ok());
-  const SharedMasks masks = prepared->masks(std::nullopt, options.compute);
-  const auto hull = carve(scene, *masks, grid_over(scene.box, 32), options.compute);
-  EXPECT_TRUE(hull.ok());
-  Pool pool(0);
-  SolverSetup setup{{}, {}, *hull, {}, options, pool};
-  for (std::size_t v = 0; v < scene.views.size(); ++v) {
-    if (scene.views[v].role != ViewRole::input) continue;
-    setup.views.push_back(&scene.views[v]);
-    setup.boxes.push_back((*masks)[v].box);
-  }
-  return refine_light(setup, find_light(setup, asked));
-}
-
-double degrees_between(const std::array<double, 3>& a, const Eigen::Vector3d& b) {
-  const Eigen::Vector3d to(a[0], a[1], a[2]);
-  return std::acos(std::clamp(to.normalized().dot(b.normalized()), -1.0, 1.0)) * 180 / std::numbers::pi;
-}
-
-class FindLight : public testing::TestWithParam<int> {};
-
-/// Directions that nothing was tuned on, one a seed of the smoke.
-TEST_P(FindLight, DirectionAndColour) {
-  const int n = GetParam();
-  test::LitScene smoke;
-  smoke.seed = n;
-  const double z = 2 * test::spread(3 * n, 5) - 1;
-  const double turn = 2 * std::numbers::pi * test::spread(n, 8);
-  const double r = std::sqrt(1 - z * z);
-  const Eigen::Vector3d towards(r * std::cos(turn), r * std::sin(turn), z);
-  const Light truth = test::distant_light(towards);
-  const FoundLight found =
-      look_for_light(film_lit(smoke, lit_truth(smoke, truth)), light_at(Source::found, {}));
-  EXPECT_EQ(found.light.source, Source::distant);
-  EXPECT_LT(degrees_between(found.light.place, towards), 10);
-  for (std::size_t c = 0; c < 3; ++c) {
-    EXPECT_NEAR(found.light.strength[c] / found.light.strength[1], truth.strength[c] / truth.strength[1],
-                0.05);
-    EXPECT_NEAR(found.light.strength[c], truth.strength[c], 0.25 * truth.strength[c]);
-  }
-}
-INSTANTIATE_TEST_SUITE_P(Sweep, FindLight, testing::Range(1, 7));
-
-TEST(FindNearbyLight, OneNearbyAndWhereItStands) {
-  const test::LitScene smoke;
-  Light truth = test::distant_light({0.16, -0.1, 0.1});
-  truth.source = Source::nearby;
-  for (double& s : truth.strength) s *= 0.04;
-  const FoundLight found =
-      look_for_light(film_lit(smoke, lit_truth(smoke, truth)), light_at(Source::found, {}));
-  EXPECT_EQ(found.light.source, Source::nearby);
-  const Eigen::Vector3d at(found.light.place[0], found.light.place[1], found.light.place[2]);
-  EXPECT_LT((at - Eigen::Vector3d(0.16, -0.1, 0.1)).norm(), 0.06) << at.transpose();
-}
-
-double held_out_error(const Scene& scene, const Effects& effects) {
-  SolveOptions options;
-  options.compute.device = Device::cpu;
-  const auto done = solve(scene, grid_over(scene.box, 32), effects, options);
-  EXPECT_TRUE(done.ok()) << done.error().message();
-  return done.ok() ? all_channels(*done->heldout_rmse) : 0;
-}
-
-TEST(LitSolve, ShowsWhatItDidNotSeeBetterThanGlowingMediaDo) {
-  const test::LitScene smoke;
-  const Light truth = test::distant_light({1, -0.5, 0.4});
-  const Scene scene = film_lit(smoke, lit_truth(smoke, truth));
-  const auto choice =
-      choose_effects(scene, grid_over(scene.box, 32), {}, {.compute = {.device = Device::cpu}});
-  ASSERT_TRUE(choice.ok()) << choice.error().message();
-  ASSERT_EQ(choice->reports[1].name, "light");
-  ASSERT_TRUE(choice->reports[1].on) << choice->reports[1].reason;
-  Effects glowing = choice->effects;
-  glowing.light = {};
-  EXPECT_LT(held_out_error(scene, choice->effects), 0.8 * held_out_error(scene, glowing));
-}
-
 TEST(LitSolve, EmissionIsTheDensityTimesTheLightThatReachesIt) {
   const test::LitScene smoke;
   const Light truth = test::distant_light({1, -0.5, 0.4});
@@ -147,7 +68,7 @@ TEST(LitSolve, EmissionIsTheDensityTimesTheLightThatReachesIt) {
   Effects effects;
   effects.light = truth;
   effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
-  const auto done = solve(scene, grid_over(scene.box, 32), effects, {.compute = {.device = Device::cpu}});
+  const auto done = solve(scene, grid_over(scene.box, 32), effects, on_the_cpu());
   ASSERT_TRUE(done.ok()) << done.error().message();
   const Light& light = done->effects.light;
   const Volume& volume = done->volume;
@@ -169,8 +90,7 @@ TEST(LitSolve, SameBitsForEveryNumberOfThreads) {
   effects.light = truth;
   effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
   const auto with = [&](int threads) {
-    return solve(scene, grid_over(scene.box, 16), effects,
-                 {.smoothness = 0.04, .compute = {.device = Device::cpu, .threads = threads}});
+    return solve(scene, grid_over(scene.box, 16), effects, on_the_cpu(threads));
   };
   const auto one = with(1);
   const auto four = with(4);

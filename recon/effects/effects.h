@@ -149,7 +149,7 @@ struct EffectRequest {
 /// A choice may bring parameters, `:name=value`; numbers in SI units and grey levels:
 ///   auto           :albedo=0 (0: not known; soot 0.2), :g=0.6, :flame=1800, :ambient=293, :exposure=0 (s; 0:
 ///   not known), :rise=1,
-///                  :gamma=1, :white=255, :tolerance=0.5 (grey levels, >= 0)
+///                  :gamma=1, :white=255, :light=1 (0: not lit), :tolerance=0.5 (levels)
 ///   extinction=none|field|SIGMA                 SIGMA >= 0, 1/m
 ///   scattering=none|single|multiple             with extinction; :albedo=0.5 (0..1), :g=0 (-1..1)
 ///   refraction=straight|curved                  :flame=1800, :ambient=293 (K, 100..100000)

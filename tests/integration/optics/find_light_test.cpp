@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Whether light from outside is found from pictures, and whether what glows is taken for lit.
+#include "recon/adjust/find_light.h"
+
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
 #include "recon/adjust/choose_effects.h"
-#include "recon/adjust/find_light.h"
 #include "recon/adjust/picture_error.h"
 #include "recon/adjust/solver.h"
 #include "recon/hull/hull.h"
@@ -108,8 +109,7 @@ TEST(LitSolve, ShowsWhatItDidNotSeeBetterThanGlowingMediaDo) {
   const test::LitScene smoke = small_smoke(1);
   const Light truth = test::distant_light({1, -0.5, 0.4});
   const Scene scene = film_lit(smoke, lit_truth(smoke, truth));
-  const auto choice =
-      choose_effects(scene, grid_over(scene.box, kVoxels), {}, find_on_the_cpu());
+  const auto choice = choose_effects(scene, grid_over(scene.box, kVoxels), {}, find_on_the_cpu());
   ASSERT_TRUE(choice.ok()) << choice.error().message();
   ASSERT_EQ(choice->reports[1].name, "light");
   ASSERT_TRUE(choice->reports[1].on) << choice->reports[1].reason;
@@ -121,8 +121,7 @@ TEST(LitSolve, ShowsWhatItDidNotSeeBetterThanGlowingMediaDo) {
 TEST(LightChoice, FlamesThatGlowAreNotTakenForLit) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const Scene scene = small_flame_scene(PerMeter(32.8), shape);
-    const auto choice =
-        choose_effects(scene, grid_over(scene.box, 32), {}, find_on_the_cpu());
+    const auto choice = choose_effects(scene, grid_over(scene.box, 32), {}, find_on_the_cpu());
     ASSERT_TRUE(choice.ok()) << choice.error().message();
     ASSERT_EQ(choice->reports[1].name, "light");
     EXPECT_FALSE(choice->reports[1].on) << choice->reports[1].reason;

@@ -62,13 +62,14 @@ TEST(LightThatReaches, EvenLightIsShadedByNothing) {
 }
 
 TEST(LitSolve, EmissionIsTheDensityTimesTheLightThatReachesIt) {
-  const test::LitScene smoke;
+  test::LitScene smoke;
+  smoke.image = {24, 24};
   const Light truth = test::distant_light({1, -0.5, 0.4});
   const Scene scene = film_lit(smoke, lit_truth(smoke, truth));
   Effects effects;
   effects.light = truth;
   effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
-  const auto done = solve(scene, grid_over(scene.box, 32), effects, on_the_cpu());
+  const auto done = solve(scene, grid_over(scene.box, 16), effects, on_the_cpu());
   ASSERT_TRUE(done.ok()) << done.error().message();
   const Light& light = done->effects.light;
   const Volume& volume = done->volume;

@@ -150,7 +150,8 @@ void add_solve_options(CLI::App* verb, ReconstructArguments& a) {
   verb->add_option("--hold-out", a.held_out,
                    "Views, counted from 0, that aren't used; the result is scored on them: i,j,...")
       ->delimiter(',');
-  verb->add_option("--effects", a.effects, "auto, none, or a list such as extinction=32.8 (1/m) [auto]");
+  verb->add_option("--effects", a.effects,
+                   "auto, none, or a list such as extinction=32.8 (1/m) or light=found [auto]");
   verb->add_option("--iterations", a.iterations, "Most iterations [the solver's own rule]")
       ->check(CLI::Range(1, 1000000));
   verb->add_option("--views", a.views, "Use so many of the input views, spread as far as possible [all]")

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "recon/adjust/choose_light.h"
 #include "recon/adjust/find_extinction.h"
 #include "recon/adjust/find_motion.h"
 #include "recon/adjust/left_out_views.h"
@@ -197,7 +198,11 @@ Background known_background(const PreparedScene& prepared, double tolerance, con
 
 PreparedScene under_known_effects(const PreparedScene& filmed, const EffectRequest& request,
                                   const ComputeOptions& compute) {
-  if (request.fixed) return filmed.under(*request.fixed);
+  if (request.fixed) {
+    Effects told = *request.fixed;
+    told.light = {};  // is found later
+    return filmed.under(told);
+  }
   Effects known;
   known.sensor = request.assumed.sensor;
   if (known.sensor.gamma != 1) known.sensor.response = Sensor::Response::gamma;
@@ -213,6 +218,7 @@ Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid
   EMBERLOCK_RETURN_IF_ERROR(check_gamma(scene.told(), request));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   Effects known = scene.effects();
+  known.light = {};  // what else there is is found out as though the medium glowed
   Pool pool(options.compute.threads, device);
   MotionChoice motion(scene, grid, request, options, pool, elapsed);
   known.motion = motion.rough();
@@ -262,10 +268,15 @@ Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid
     decided.extinction = report.on ? found.extinction : Extinction{};
   }
   report.seconds = (elapsed ? elapsed() : Seconds(0)) - start;
+  LightChoice light = choose_light(setup, decided.extinction,
+                                   found.extinction.model != Extinction::Model::none, request, elapsed);
+  decided.light = light.light;
 
   EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
                              predict_effects(flame, decided, request, options.compute, elapsed));
-  choice.reports.insert(choice.reports.begin(), std::move(report));
+  choice.effects.light = light.light;
+  choice.effects.extinction = light.extinction;
+  choice.reports.insert(choice.reports.begin(), {std::move(report), std::move(light.report)});
   known.extinction = choice.effects.extinction;
   choice.effects.motion = motion.fine(known);
   choice.reports.push_back(motion.report());

@@ -5,12 +5,15 @@
 #include <limits>
 #include <optional>
 
+#include "recon/adjust/lit_descent.h"
+
 namespace emberlock::recon {
 namespace {
 
 // Over the pixels: emission alone, then emission and extinction together; without extinction to find, both.
 constexpr int kEmissionPasses = 2;
 constexpr int kJointPasses = 4;
+constexpr int kLitPasses = 16;  // of a density, whose light is found with it
 
 ColdSolve finish(Descent& descent, int passes) {
   for (int p = 0; p < passes; ++p) descent.pass();
@@ -20,7 +23,19 @@ ColdSolve finish(Descent& descent, int passes) {
   return {error, descent.take_engine()};
 }
 
+/// `density`: what is expected of it, spread by the light that there is.
+ColdSolve solve_lit_level(const SolverSetup& setup, const Level& level, const Extinction& density) {
+  const LitStart glow(level, setup, density);
+  LitDescent descent(level, setup, glow.start());
+  descend(descent, kLitPasses);
+  descent.judge();
+  const double error = descent.validation_error();
+  if (!std::isfinite(error)) throw Diverged(error, error);
+  return {error, descent.take_engine()};
+}
+
 ColdSolve solve_level(const SolverSetup& setup, const Level& level, const Extinction& extinction) {
+  if (setup.effects.light.source != Light::Source::none) return solve_lit_level(setup, level, extinction);
   const Problem& problem = level.problem;
   Optics optics = setup.optics(problem.grid());
   if (extinction.model == Extinction::Model::none) {

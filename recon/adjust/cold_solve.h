@@ -13,7 +13,8 @@ struct ColdSolve {
   std::shared_ptr<const Engine> engine;  ///< holds the solution; null if it diverged
 };
 
-/// `extinction`: none, constant, or the initial value of a field.
+/// `extinction`: none, constant, or the initial value of a field. Under a light (setup.effects.light) a
+/// field, what is solved for is the density alone.
 ColdSolve cold_solve(const SolverSetup& setup, const Level& level, const Extinction& extinction);
 
 }  // namespace emberlock::recon

@@ -33,6 +33,7 @@ class Predictor {
         pool_(compute),
         boxes_(flame_boxes(flame.scene, flame.masks)),
         pictures_(flame, compute),
+        is_lit_(found.light.source != Light::Source::none),
         plain_(extinction_of(found)) {
     choice_.effects = plain_;
   }
@@ -119,6 +120,7 @@ class Predictor {
   Pool pool_;
   std::vector<PixelBox> boxes_;
   CoarsePictures pictures_;
+  bool is_lit_;  ///< by light from outside
   Effects plain_;
   Shot without_;
   Seconds lap_{0};
@@ -146,6 +148,10 @@ Predictor::Shot Predictor::scatter(const Scattering& scattering) {
 void Predictor::choose_scattering() {
   using Order = Scattering::Order;
   const bool absorbs = plain_.extinction.model != Extinction::Model::none;
+  if (is_lit_) {
+    leave_out("scattering", "the medium scatters light from outside, which is looked at by itself");
+    return leave_out("phase function", "light from outside is taken to be scattered evenly");
+  }
   if (!absorbs || (by_hand() && asked_.scattering.order == Order::none)) {
     leave_out("scattering", "nothing absorbs, so nothing scatters");
     return leave_out("phase function", "nothing scatters");

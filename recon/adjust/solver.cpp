@@ -17,6 +17,16 @@
 namespace emberlock::recon {
 namespace {
 
+/// Whether a point lies within the grid's box.
+bool is_inside(const Grid& g, const std::array<double, 3>& place) {
+  const int last[3] = {g.nx - 1, g.ny - 1, g.nz - 1};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double edges = (place[a] - static_cast<double>(g.origin[a])) / static_cast<double>(g.edge);
+    if (edges < 0 || edges > last[a]) return false;
+  }
+  return true;
+}
+
 Status check_request(const Scene& scene, const Grid& grid, const Effects& effects,
                      const SolveOptions& options, const Elapsed& elapsed) {
   const auto refuse = [](const char* what, const char* where, const char* remedy) {
@@ -31,6 +41,10 @@ Status check_request(const Scene& scene, const Grid& grid, const Effects& effect
     if (options.solver == Solver::paper || !same_place(start->grid, grid))
       return refuse("a volume to start from has another grid, or the solver takes none", "starts",
                     "Start in darkness");
+  if (effects.light.source == Light::Source::found)
+    return refuse("the light isn't known yet", "effects", "Call choose_effects(), which finds it");
+  if (effects.light.source == Light::Source::nearby && is_inside(grid, effects.light.place))
+    return refuse("the nearby light stands inside of the box", "effects", "Give a place outside of it");
   if (options.iterations < 0)
     return refuse("a negative number of iterations", "iterations",
                   "Give 1 or more, or 0 for the solver's rule");
@@ -133,7 +147,10 @@ Result<Reconstruction> solve(const PreparedScene& scene, const Grid& grid, const
   }
   Tracker tracker(setup, held_out, held_out_boxes, elapsed, preview);
   const double longest = static_cast<double>(grid.edge) * (std::max({grid.nx, grid.ny, grid.nz}) - 1);
-  Solution solution = paper ? solve_paper(setup, longest, tracker) : solve_standard(setup, tracker);
+  Solution solution = paper            ? solve_paper(setup, longest, tracker)
+                      : setup.is_lit() ? solve_lit(setup, tracker)
+                                       : solve_standard(setup, tracker);
+  result.effects.light = solution.light;
   result.volume = std::move(solution.volume);
   if (effects.scattering.order != Scattering::Order::none)
     take_out_in_scatter(result.volume, result.hull, effects, pool);

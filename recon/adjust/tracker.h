@@ -45,14 +45,16 @@ struct SolverSetup {
   [[nodiscard]] bool scatters_unevenly() const {
     return effects.scattering.order != Scattering::Order::none && effects.scattering.asymmetry != 0;
   }
+  [[nodiscard]] bool is_lit() const { return effects.light.source != Light::Source::none; }
   /// What every problem of this scene shares.
   [[nodiscard]] ProblemOptions problem_options() const {
     ProblemOptions problem;
     problem.background = effects.background;
     problem.gas = gas;
     problem.step = options.step;
-    // Light that isn't scattered evenly is rendered for each ray (uneven_light.h).
-    if (scatters_unevenly()) problem.home = RayListOptions::Home::cpu;
+    // Light that isn't scattered evenly is rendered for each ray (uneven_light.h); a light's colours are
+    // fitted to all rays (lit_descent.h).
+    if (scatters_unevenly() || is_lit()) problem.home = RayListOptions::Home::cpu;
     return problem;
   }
 };
@@ -131,9 +133,12 @@ struct Solution {
   std::array<double, 3> input_rmse = {};         ///< of x, as in TracePoint
   Kept kept = {};                                ///< `iteration` counts unless it was the last one
   std::optional<std::size_t> started_from = {};  ///< see Reconstruction
+  Light light = {};                              ///< with its colours, where the setup's effects have one
 };
-/// Both throw Diverged where their guard gives up.
+/// All throw Diverged where their guard gives up.
 Solution solve_standard(const SolverSetup& setup, Tracker& tracker);
+/// The density of a medium under the setup's light.
+Solution solve_lit(const SolverSetup& setup, Tracker& tracker);
 Solution solve_paper(const SolverSetup& setup, double box_edge, Tracker& tracker);
 
 }  // namespace emberlock::recon

@@ -11,12 +11,13 @@ namespace {
 Error bad(std::string what) {
   return {ErrorKind::bad_input, std::move(what), "effects",
           "Use auto[:albedo=VALUE][:g=VALUE][:flame=KELVIN][:ambient=KELVIN][:exposure=SECONDS][:rise=M/S]"
-          "[:gamma=VALUE][:white=LEVEL][:tolerance=LEVELS], none, or a comma separated list of "
+          "[:gamma=VALUE][:white=LEVEL][:light=0|1][:tolerance=LEVELS], none, or a comma separated list of "
           "extinction=none|field|VALUE (1/m), "
           "scattering=none|single|multiple[:albedo=VALUE][:g=VALUE], "
           "refraction=straight|curved[:flame=KELVIN][:ambient=KELVIN], "
           "background=black|image|LEVEL|RED/GREEN/BLUE, exposure=instant|SECONDS[:rise=M/S], gamma=VALUE, "
-          "saturation=none|LEVEL, motion=none|RISE|X/Y/Z (m/s)"};
+          "saturation=none|LEVEL, motion=none|RISE|X/Y/Z (m/s), "
+          "light=none|found|even|distant:x=X:y=Y:z=Z|nearby:x=X:y=Y:z=Z (m)"};
 }
 
 Error unknown(std::string_view text) { return bad("can't read '" + std::string(text) + "'"); }
@@ -160,6 +161,23 @@ bool read_motion(Item& item, Effects& effects) {
   return item.number(motion.velocity[2]) || read_three(item.choice(), motion.velocity);
 }
 
+bool read_light(Item& item, Effects& effects) {
+  using Source = Light::Source;
+  Light& light = effects.light;
+  if (item.is("none")) return true;
+  if (item.is("found") || item.is("even")) {
+    light.source = item.is("found") ? Source::found : Source::even;
+  } else if (item.is("distant") || item.is("nearby")) {
+    light.source = item.is("distant") ? Source::distant : Source::nearby;
+    item.parameter("x", light.place[0]);
+    item.parameter("y", light.place[1]);
+    item.parameter("z", light.place[2]);
+  } else {
+    return false;
+  }
+  return true;
+}
+
 struct Reader {
   std::string_view name;
   bool (*read)(Item&, Effects&);
@@ -167,7 +185,7 @@ struct Reader {
 constexpr Reader kTable[] = {
     {"extinction", read_extinction}, {"scattering", read_scattering}, {"refraction", read_refraction},
     {"background", read_background}, {"exposure", read_exposure},     {"gamma", read_gamma},
-    {"saturation", read_saturation}, {"motion", read_motion},
+    {"saturation", read_saturation}, {"motion", read_motion},         {"light", read_light},
 };
 
 Result<Effects> parse_list(std::string_view text) {
@@ -184,6 +202,9 @@ Result<Effects> parse_list(std::string_view text) {
     if (!reader->read(item, effects) || !item.understood()) return unknown(item.text());
     seen.push_back(item.name());
   }
+  const bool tells_extinction = std::find(seen.begin(), seen.end(), "extinction") != seen.end();
+  if (effects.light.source != Light::Source::none && !tells_extinction)
+    effects.extinction.model = Extinction::Model::field;
   EMBERLOCK_RETURN_IF_ERROR(check(effects));
   return effects;
 }
@@ -198,6 +219,8 @@ Result<EffectRequest> parse_auto(std::string_view text) {
   double flame = assumed.refraction.flame.value();
   double ambient = assumed.refraction.ambient.value();
   double exposure = assumed.exposure.time.value();
+  double light = 1;
+  item.parameter("light", light);
   item.parameter("albedo", assumed.scattering.albedo);
   item.parameter("g", assumed.scattering.asymmetry);
   item.parameter("flame", flame);
@@ -211,15 +234,36 @@ Result<EffectRequest> parse_auto(std::string_view text) {
   assumed.refraction.flame = Kelvin(flame);
   assumed.refraction.ambient = Kelvin(ambient);
   assumed.exposure.time = Seconds(exposure);
+  if (light != 0 && light != 1) return bad("light must be 1, or 0 where nothing is lit from outside");
+  if (light == 0) assumed.light = {};
   if (!within(request.tolerance, 0, 255)) return bad("tolerance must lie in 0..255 grey levels");
   EMBERLOCK_RETURN_IF_ERROR(check(assumed));
   return request;
 }
 
+Status check_light(const Effects& effects) {
+  const Light& light = effects.light;
+  if (light.source == Light::Source::none) return {};
+  if (effects.scattering.order != Scattering::Order::none)
+    return bad("light from outside is what the medium scatters: leave scattering out");
+  if (light.source == Light::Source::found) return {};
+  if (effects.extinction.model != Extinction::Model::field)
+    return bad("light needs extinction=field, which it falls on");
+  constexpr double kFarthest = 1e6;
+  double longest = 0;
+  for (const double x : light.place) {
+    if (!within(x, -kFarthest, kFarthest)) return bad("light's x, y and z must lie in -1e6..1e6");
+    longest = std::max(longest, std::abs(x));
+  }
+  if (light.source == Light::Source::distant && longest < 1e-6)
+    return bad("a distant light needs x, y and z, the direction towards it");
+  return {};
+}
+
 }  // namespace
 
 Status check(const Effects& effects) {
-  const auto& [extinction, scattering, refraction, background, exposure, sensor, motion] = effects;
+  const auto& [extinction, scattering, refraction, background, exposure, sensor, motion, light] = effects;
   constexpr double kMost = 1e30;  // far below the largest float; also excludes infinity
   constexpr double kColdest = 100;
   constexpr double kHottest = 1e5;
@@ -236,6 +280,7 @@ Status check(const Effects& effects) {
   if (!within(exposure.rise_speed, -20, 20)) return bad("rise must lie in -20..20 m/s");
   for (const double speed : motion.velocity)
     if (!within(speed, -20, 20)) return bad("motion must lie in -20..20 m/s");
+  EMBERLOCK_RETURN_IF_ERROR(check_light(effects));
   if (!within(sensor.gamma, 0.1, 10)) return bad("gamma must lie in 0.1..10");
   if (!within(sensor.white, 1e-6, kMost)) return bad("saturation must be a level above 0");
   return {};
@@ -259,6 +304,7 @@ PerMeter extinction_of_opacity(double tau, Meters voxel_edge) {
 Effects assumed_effects() {
   Effects effects;
   effects.scattering.asymmetry = 0.6;
+  effects.light.source = Light::Source::found;
   return effects;
 }
 

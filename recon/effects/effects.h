@@ -40,6 +40,26 @@ struct Scattering {
   double asymmetry = 0;  ///< g, -1..1; 0 is isotropic
 };
 
+/// Light from outside, which a medium that doesn't glow scatters once, evenly in all directions: the source
+/// is S = sigma_t (ambient + strength R). R is what reaches a place: the transmittance exp(-depth) towards
+/// the light, over the squared distance in metres to one nearby (lit_medium.h). Emission and extinction are
+/// then one unknown, the density.
+struct Light {
+  enum class Source {
+    none,
+    found,    ///< whichever of the following the pictures show best: find_light.h
+    even,     ///< from all sides alike, and the medium shades nothing: `ambient` alone
+    distant,  ///< parallel, like the sun's
+    nearby,   ///< a point outside of the medium's box
+  };
+  Source source = Source::none;
+  /// Of `distant` the direction towards it, of any length but 0; of `nearby` where it stands, metres.
+  std::array<double, 3> place = {};
+  /// Albedo * irradiance / (4 pi), grey levels; of `nearby` that at a metre. A solver finds both colours.
+  std::array<double, 3> strength = {};
+  std::array<double, 3> ambient = {};  ///< albedo * mean radiance of all sides, grey levels
+};
+
 /// Rays bent by the hot gas: n - 1 = (n_air - 1) T_air / T (Gladstone and Dale 1863). The program can't
 /// measure the gas: refraction.h says what it assumes between these two temperatures.
 struct Refraction {
@@ -95,6 +115,7 @@ struct Effects {
   Exposure exposure;
   Sensor sensor;
   Motion motion;
+  Light light;
 };
 
 /// An Error that names the first value out of its range, as parse_effects states them.
@@ -128,7 +149,7 @@ struct EffectRequest {
 /// A choice may bring parameters, `:name=value`; numbers in SI units and grey levels:
 ///   auto           :albedo=0 (0: not known; soot 0.2), :g=0.6, :flame=1800, :ambient=293, :exposure=0 (s; 0:
 ///   not known), :rise=1,
-///                  :gamma=1, :white=255, :tolerance=0.5 (grey levels, >= 0)
+///                  :gamma=1, :white=255, :light=1 (0: not lit), :tolerance=0.5 (levels)
 ///   extinction=none|field|SIGMA                 SIGMA >= 0, 1/m
 ///   scattering=none|single|multiple             with extinction; :albedo=0.5 (0..1), :g=0 (-1..1)
 ///   refraction=straight|curved                  :flame=1800, :ambient=293 (K, 100..100000)
@@ -137,6 +158,8 @@ struct EffectRequest {
 ///   gamma=GAMMA                                 0.1..10; 1 is linear
 ///   saturation=none|LEVEL                       > 0; also gamma's white, 255 otherwise
 ///   motion=none|RISE|X/Y/Z                      -20..20 m/s, RISE along +z; of views whose times differ
+///   light=none|found|even|distant|nearby        with extinction=field, which it brings, and no scattering;
+///                                               :x=:y=:z=, towards it, or where it stands (m)
 /// An Error that says what can't be read and lists these names otherwise.
 Result<EffectRequest> parse_effects(std::string_view text);
 

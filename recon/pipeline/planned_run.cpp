@@ -165,8 +165,7 @@ class PlannedRun {
     EMBERLOCK_ASSIGN_OR_RETURN(
         const Grid grid,
         choose_grid(task_.scene(), asked_, std::min(voxels, asked_.voxels.value_or(voxels))));
-    const PreparedScene scene =
-        task_.prepared.under(asked_.effects && asked_.effects->fixed ? *asked_.effects->fixed : Effects{});
+    const PreparedScene scene = task_.prepared.under(told_effects(asked_));
     EMBERLOCK_ASSIGN_OR_RETURN(reference_, measure_reference(scene, grid, asked_.solve, task_.elapsed));
     plan_.reference_time = reference_.seconds;
     return {};

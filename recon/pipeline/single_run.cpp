@@ -120,12 +120,20 @@ Result<Grid> choose_grid(const Scene& scene, const ReconstructOptions& options,
   return grid;
 }
 
+Effects told_effects(const ReconstructOptions& options) {
+  if (!options.effects || !options.effects->fixed) return {};
+  Effects told = *options.effects->fixed;
+  told.light = {};
+  return told;
+}
+
 Result<EffectChoice> decide_effects(const Task& task, const Grid& grid, const ReconstructOptions& options) {
   EffectRequest request = options.effects.value_or(EffectRequest{});
   const bool as_published = !options.effects && options.solve.solver == Solver::paper;
   if (as_published) {
     request.fixed = absorbing(extinction_of_opacity(kPaperOpacity, Meters(static_cast<double>(grid.edge))));
   }
+  if (options.temperature) request.assumed.light = {};  // what has a temperature glows
   const PreparedScene known = request.fixed ? task.prepared.under(*request.fixed) : task.prepared;
   EMBERLOCK_ASSIGN_OR_RETURN(EffectChoice choice,
                              choose_effects(known, grid, request, options.solve, task.elapsed));

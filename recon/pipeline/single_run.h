@@ -26,6 +26,9 @@ double physical_memory();
 Result<Grid> choose_grid(const Scene& scene, const ReconstructOptions& options,
                          const std::optional<int>& voxels, double memory = physical_memory());
 
+/// Those that are set by hand, for runs that only tell of time: but a light, which must be found first.
+Effects told_effects(const ReconstructOptions& options);
+
 /// Those that are asked for, and of the others those that the scene calls for.
 Result<EffectChoice> decide_effects(const Task& task, const Grid& grid, const ReconstructOptions& options);
 

@@ -93,8 +93,7 @@ VoxelChoice told(const Scene& scene, const char* rule, int voxels, std::string w
 
 Result<Calibration> calibrate(const Task& task, const ReconstructOptions& options) {
   const int finest = finest_voxels(task.scene());
-  const PreparedScene scene =
-      task.prepared.under(options.effects && options.effects->fixed ? *options.effects->fixed : Effects{});
+  const PreparedScene scene = task.prepared.under(told_effects(options));
   SolveOptions coarse = options.solve;
   coarse.iterations = 0;
   coarse.budget.reset();  // a run that is cut short would make the machine seem quicker than it is

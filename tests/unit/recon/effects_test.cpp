@@ -34,7 +34,7 @@ const EffectChoice& found(PerMeter extinction, FlameShape shape) {
 TEST_P(EffectsTest, EmissionOnlyFlameIsFoundAsSuch) {
   for (const FlameShape shape : {FlameShape::plume, FlameShape::two_plumes}) {
     const EffectChoice& choice = found(PerMeter(0), shape);
-    ASSERT_EQ(choice.reports.size(), 9u);
+    ASSERT_EQ(choice.reports.size(), 10u);
     EXPECT_FALSE(choice.reports[0].on) << choice.reports[0].reason;
     EXPECT_EQ(choice.effects.extinction.value, PerMeter(0));
   }
@@ -95,7 +95,9 @@ TEST(Effects, WholeTableIsParsedByName) {
       "extinction=32.8,scattering=single:albedo=0.25:g=-0.3,background=10/11.5/12,exposure=0.004:rise=0.8,"
       "refraction=curved:flame=1500:ambient=300,gamma=2.2,saturation=250,motion=1.2");
   ASSERT_TRUE(request.ok()) << request.error().message();
-  const auto& [extinction, scattering, refraction, background, exposure, sensor, motion] = *request->fixed;
+  const auto& [extinction, scattering, refraction, background, exposure, sensor, motion, light] =
+      *request->fixed;
+  EXPECT_EQ(light.source, Light::Source::none);
   EXPECT_EQ(extinction.model, Extinction::Model::constant);
   EXPECT_EQ(extinction.value, PerMeter(32.8));
   EXPECT_EQ(scattering.order, Scattering::Order::single);

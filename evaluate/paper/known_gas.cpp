@@ -23,7 +23,7 @@ constexpr double kFieldOfView = 60;  // degrees
 constexpr double kPeak = 230;        // grey levels
 constexpr int kPapersSteps = 128;    // across the box
 constexpr float kFaintest = 0.01F;   // of the brightest light: beyond it there is no medium
-constexpr double kFlameWidth = 0.9, kSmokeWidth = 0.6;  // metres
+constexpr double kFlameWidth = 0.4, kSmokeWidth = 0.6;  // metres
 
 double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
@@ -33,7 +33,7 @@ struct Stage {
   int cells;  // of the finest: a share
   double seconds;
 };
-constexpr Stage kStages[] = {{4, 1.2}, {2, 0.2}, {1, 0.04}};
+constexpr Stage kStages[] = {{4, 0.8}, {2, 0.1}, {1, 0.02}};
 constexpr int kParts = 20;  // of a stage, for progress
 
 recon::FlameSimulationOptions simulation_of(Subject subject, int cells,
@@ -43,10 +43,11 @@ recon::FlameSimulationOptions simulation_of(Subject subject, int cells,
   o.edge = Meters((subject == Subject::flame ? kFlameWidth : kSmokeWidth) / cells);
   o.compute = compute;
   o.eddies = 0.1;
-  o.burners = {{Meters(0), Meters(0), Meters(0.1), 0.022}};
+  o.confinement = 0.1;
+  o.burners = {{Meters(0), Meters(0), Meters(0.01), 1.0}};
+  o.gas.mixing_time = 0.004F;
   if (subject == Subject::smoke) {
     o.combustion = recon::Combustion::none;
-    o.confinement = 0.1;
     o.burners = {{Meters(0), Meters(0), Meters(0.05), 0.5}};
     o.gas.burner_temperature = 600;
     o.burner_soot = 0.01;
@@ -85,23 +86,6 @@ void digitise(recon::RadianceImage& image, double noise, std::uint64_t seed, std
     if (noise > 0) level += noise * random_normal(seed, 1000 + view, i);
     image.rgb[i] = static_cast<float>(std::clamp(std::round(level), 0.0, 255.0));
   }
-}
-
-/// Three broad channels, so that a black body of 5500 K, daylight, is white.
-recon::CameraResponse daylight_camera() {
-  recon::CameraResponse camera;
-  camera.absolute = true;
-  constexpr std::array<double, 3> kMiddle = {600, 540, 460};
-  constexpr std::array<double, 3> kWidth = {40, 40, 30};
-  for (double nm = 380; nm <= 780; nm += 5) {
-    camera.wavelength_nm.push_back(nm);
-    for (std::size_t c = 0; c < 3; ++c)
-      camera.level[c].push_back(std::exp(-0.5 * std::pow((nm - kMiddle[c]) / kWidth[c], 2)));
-  }
-  const recon::EmitterLevels white = recon::levels_of(camera, recon::Emitter::grey, Kelvin(5500));
-  for (std::size_t c = 0; c < 3; ++c)
-    for (double& level : camera.level[c]) level /= white.value[c];
-  return camera;
 }
 
 /// What cameras see of it.
@@ -159,6 +143,22 @@ Result<KnownGas> known(Subject subject, recon::GasState gas, const recon::Comput
 }  // namespace
 
 std::string_view name(Subject subject) { return subject == Subject::flame ? "flame" : "smoke"; }
+
+recon::CameraResponse daylight_camera() {
+  recon::CameraResponse camera;
+  camera.absolute = true;
+  constexpr std::array<double, 3> kMiddle = {600, 540, 460};
+  constexpr std::array<double, 3> kWidth = {40, 40, 30};
+  for (double nm = 380; nm <= 780; nm += 5) {
+    camera.wavelength_nm.push_back(nm);
+    for (std::size_t c = 0; c < 3; ++c)
+      camera.level[c].push_back(std::exp(-0.5 * std::pow((nm - kMiddle[c]) / kWidth[c], 2)));
+  }
+  const recon::EmitterLevels white = recon::levels_of(camera, recon::Emitter::grey, Kelvin(5500));
+  for (std::size_t c = 0; c < 3; ++c)
+    for (double& level : camera.level[c]) level /= white.value[c];
+  return camera;
+}
 
 Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOptions& compute,
                               const Observer& observer) {

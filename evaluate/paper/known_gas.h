@@ -27,12 +27,15 @@ struct KnownGas {
   recon::Volume light;  ///< what cameras of that response see of it, levels a metre
 };
 
-/// Burns or blows until the gas stands (recon/synthetic/flame_simulation.h), on coarse grids first: the flame
-/// of a burner of 3 cm, about 0.7 kW, laminar, in a cube of 20 cm; smoke of a source of 10 cm in one of 60
+/// Burns or blows until the gas stands (recon/synthetic/flame_simulation.h), on coarse grids first: a torch
+/// of 14 kW, a burner of 2 cm, in a cube of 40 cm; smoke of a source of 10 cm in one of 60
 /// cm. `cells`: along each edge, a multiple of 32 from 32 to 512. Errors: those of FlameSimulation; refused
 /// where the observer asks to end, or where nothing is seen.
 Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOptions& compute,
                               const Observer& observer = {});
+
+/// Three broad channels, so that a black body of 5500 K, daylight, is white; absolute.
+recon::CameraResponse daylight_camera();
 
 /// The same gas by the paper's model of light, exposed anew.
 Result<KnownGas> as_the_paper_renders(const KnownGas& gas, const recon::ComputeOptions& compute);

@@ -57,8 +57,8 @@ Image error_of(const Image& a, const Image& b) {
   return out;
 }
 
-HtmlPage::Picture shown(const Image& image, const std::string& caption) {
-  return {fmt::format("<img alt=\"{}\" width=\"{}\" src=\"{}\">", html_escape(caption), kPictureWidth,
+HtmlPage::Picture shown(const Image& image, const std::string& caption, int width = kPictureWidth) {
+  return {fmt::format("<img alt=\"{}\" width=\"{}\" src=\"{}\">", html_escape(caption), width,
                       png_data_uri(image)),
           caption};
 }
@@ -68,7 +68,7 @@ void add_pair(std::vector<HtmlPage::Picture>& out, const Image& truth, const Ima
   if (truth.layout().size != image.layout().size) return;
   const recon::PixelBox box = lit_box(truth);
   out.push_back(shown(side_by_side({crop(image, box), crop(error_of(truth, image), box)}),
-                      fmt::format("{}; its error, times {}", caption, kErrorGain)));
+                      fmt::format("{}; its error, times {}", caption, kErrorGain), 2 * kPictureWidth));
 }
 
 std::string name_of(const evaluate::MethodRun& run) {

@@ -70,7 +70,7 @@ Result<MethodRun> run_method(const Protocol& protocol, const Case& of, const Met
     run.failed = finite.error().message();
     return run;
   }
-  if (!result->kelvin.empty()) {
+  if (options.response && !result->kelvin.empty()) {
     run.temperature = temperature_errors(result->volume.grid, result->kelvin, gas);
     run.slice = temperature_slice(result->volume.grid, result->kelvin, gas);
   }

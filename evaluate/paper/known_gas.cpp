@@ -237,35 +237,4 @@ recon::Scene film(const KnownGas& gas, const Case& of, std::uint64_t seed,
   return scene;
 }
 
-std::vector<float> at_key_points(const recon::Grid& grid, const recon::Grid& from,
-                                 const std::vector<float>& values, std::size_t lanes) {
-  std::vector<float> out(lanes * grid.size());
-  const int n[3] = {from.nx, from.ny, from.nz};
-  for (int k = 0; k < grid.nz; ++k)
-    for (int j = 0; j < grid.ny; ++j)
-      for (int i = 0; i < grid.nx; ++i) {
-        const int at[3] = {i, j, k};
-        int low[3];
-        float part[3];
-        bool inside = true;
-        for (int d = 0; d < 3; ++d) {
-          const float x =
-              (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
-          inside = inside && x >= 0 && x < static_cast<float>(n[d] - 1);
-          low[d] = inside ? static_cast<int>(x) : 0;
-          part[d] = x - static_cast<float>(low[d]);
-        }
-        if (!inside) continue;
-        float* to = &out[lanes * grid.index(i, j, k)];
-        for (int corner = 0; corner < 8; ++corner) {
-          float weight = 1;
-          for (int d = 0; d < 3; ++d) weight *= (corner >> d & 1) != 0 ? part[d] : 1 - part[d];
-          const float* value = &values[lanes * from.index(low[0] + (corner & 1), low[1] + (corner >> 1 & 1),
-                                                          low[2] + (corner >> 2))];
-          for (std::size_t lane = 0; lane < lanes; ++lane) to[lane] += weight * value[lane];
-        }
-      }
-  return out;
-}
-
 }  // namespace emberlock::evaluate

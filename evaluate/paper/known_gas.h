@@ -51,8 +51,4 @@ Result<KnownGas> read_gas(Subject subject, const std::filesystem::path& path,
 recon::Scene film(const KnownGas& gas, const Case& of, std::uint64_t seed,
                   const recon::ComputeOptions& compute);
 
-/// Values at a grid's key points, trilinear between those of another; `lanes` to a point. 0 outside.
-std::vector<float> at_key_points(const recon::Grid& grid, const recon::Grid& from,
-                                 const std::vector<float>& values, std::size_t lanes);
-
 }  // namespace emberlock::evaluate

@@ -6,6 +6,7 @@
 
 #include "recon/adjust/picture_error.h"
 #include "recon/preprocess/flame_mask.h"
+#include "recon/render/at_key_points.h"
 #include "recon/render/render.h"
 
 namespace emberlock::evaluate {
@@ -47,7 +48,7 @@ std::vector<std::uint8_t> points_of(const recon::Hull& medium) {
 
 std::array<double, 3> volume_errors(const MethodResult& result, const KnownGas& gas) {
   const recon::Volume& found = result.volume;
-  const std::vector<float> truth = at_key_points(found.grid, gas.light.grid, gas.light.emission, 3);
+  const std::vector<float> truth = recon::at_key_points(found.grid, gas.light.grid, gas.light.emission, 3);
   const std::vector<std::uint8_t> inside = points_of(result.medium);
   std::array<double, 3> off{};
   std::array<double, 3> all{};
@@ -70,11 +71,11 @@ struct LitTruth {
 
 LitTruth lit_truth(const recon::Grid& grid, const KnownGas& gas) {
   LitTruth truth;
-  const std::vector<float> rgb = at_key_points(grid, gas.light.grid, gas.light.emission, 3);
+  const std::vector<float> rgb = recon::at_key_points(grid, gas.light.grid, gas.light.emission, 3);
   truth.light.resize(grid.size());
   for (std::size_t p = 0; p < grid.size(); ++p)
     truth.light[p] = std::max({rgb[3 * p], rgb[3 * p + 1], rgb[3 * p + 2]});
-  truth.kelvin = at_key_points(grid, gas.gas.grid, gas.gas.temperature, 1);
+  truth.kelvin = recon::at_key_points(grid, gas.gas.grid, gas.gas.temperature, 1);
   truth.least = kShareThatCounts * *std::max_element(truth.light.begin(), truth.light.end());
   return truth;
 }

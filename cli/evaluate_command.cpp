@@ -29,6 +29,7 @@ void evaluate_the_paper(const EvaluateArguments& arguments) {
   evaluate::PaperOptions options = arguments.options;
   if (arguments.quick) options.extent = evaluate::Extent::quick;
   options.compute.device = or_fail(recon::parse_device(arguments.device));
+  options.machine = machine(options.compute.threads, arguments.device);
   const std::filesystem::path out = arguments.out;
   const OutputRequest report{out / "report", evaluate::kEvaluatePaper};
   or_fail(OutputFolder::check(report));
@@ -40,7 +41,7 @@ void evaluate_the_paper(const EvaluateArguments& arguments) {
         tell(progress, fraction, what);
         return !Interrupt::asked();
       }));
-  or_fail(report::write_paper_report(done, machine(options.compute.threads, arguments.device), report));
+  or_fail(report::write_paper_report(done, report));
   for (const std::string& line : report::paper_words(done)) std::printf("%s\n", line.c_str());
   for (const evaluate::MethodRun& run : done.runs)
     if (!run.failed.empty())
@@ -81,8 +82,10 @@ void add_evaluate(CLI::App& app) {
   paper->add_option("--voxels", a.options.voxels, "Of every reconstruction along an edge [128; quick: 48]");
   paper->add_option("--seed", a.options.seed, "Of what is random: noise, methods")->capture_default_str();
   paper
-      ->add_option("--device", a.device,
-                   "auto: the CPU, and where there is a GPU the paper's method and ours there too; cpu; cuda")
+      ->add_option(
+          "--device", a.device,
+          "auto: the CPU, and where there is a GPU the paper's method and ours there too; cpu: no GPU; cuda: "
+          "it must be there")
       ->capture_default_str();
   paper->add_option("--threads", a.options.compute.threads, "CPU threads; 0: one per core")
       ->check(CLI::Range(0, 256))

@@ -61,7 +61,7 @@ Result<MethodResult> the_papers_method(const recon::Scene& scene, const MethodOp
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Reconstruction done,
                              recon::solve(scene, grid, papers_effects(grid), solve));
   MethodResult result = result_of(std::move(done));
-  if (options.response)
+  if (options.temperatures && options.response)
     result.kelvin = recon::TemperatureLookUp(*options.response, recon::Emitter::paper)
                         .read(result.volume.emission, Meters(static_cast<double>(grid.edge)));
   return result;
@@ -73,10 +73,9 @@ Result<MethodResult> default_method(const recon::Scene& scene, const MethodOptio
   EMBERLOCK_ASSIGN_OR_RETURN(const recon::EffectChoice choice, recon::choose_effects(scene, grid, {}, solve));
   EMBERLOCK_ASSIGN_OR_RETURN(recon::Reconstruction done, recon::solve(scene, grid, choice.effects, solve));
   std::vector<float> kelvin;
-  if (options.response) {
+  if (options.temperatures && options.response) {
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::VolumeErrors errors, recon::errors_by_views(scene, done, solve));
-    kelvin =
-        recon::temperature_of(scene, done, errors, *options.response, recon::Emitter::soot, solve).kelvin;
+    kelvin = recon::temperature_of(scene, done, errors, *options.response, options.emitter, solve).kelvin;
   }
   MethodResult result = result_of(std::move(done));
   result.chose = words(choice.reports);

@@ -17,7 +17,8 @@ Result<MethodResult> the_papers_method(const recon::Scene& scene, const MethodOp
 recon::Effects papers_effects(const recon::Grid& grid);
 
 /// What `emberlock reconstruct` does where nothing is told: it finds the effects out from the pictures, then
-/// solves. Temperatures as of soot (recon/temperature/temperature.h).
+/// solves. Temperatures as of
+/// what it is told glows (recon/temperature/temperature.h).
 Result<MethodResult> default_method(const recon::Scene& scene, const MethodOptions& options);
 
 inline constexpr std::string_view kPapersMethod = "the paper's", kDefaultMethod = "emberlock";

@@ -75,6 +75,10 @@ void add_runs(HtmlPage& page, const PaperEvaluation& e, const Protocol& protocol
   }
   page.table(header, rows);
   for (const MethodRun& run : e.runs)
+    if (of_protocol(run, protocol) && !run.passes_failed.empty())
+      page.paragraph(fmt::format("{}, {}: the curve ends early. {}", run.of, name_of_run(run),
+                                 sentence(run.passes_failed)));
+  for (const MethodRun& run : e.runs)
     if (of_protocol(run, protocol) && !run.chose.empty())
       page.paragraph(fmt::format("{}, {} chose: {}", run.of, name_of_run(run), sentence(run.chose)));
 }
@@ -247,11 +251,15 @@ std::string paper_csv(const PaperEvaluation& e) {
       "protocol,case,method,device,seconds,iterations,input_r,input_g,input_b,test_r,test_g,test_b,all_r,"
       "all_g,all_b,volume_r,volume_g,volume_b,median_k,95_k,bias_k,told,failed\n";
   for (const MethodRun& run : e.runs) {
-    csv += fmt::format("{},{},{},{},{:.4f},{}", run.protocol, run.of, run.method, run.device,
-                       run.time.value(), run.iterations);
+    csv += fmt::format("{},{},{},{},", run.protocol, run.of, run.method, run.device);
+    if (!run.failed.empty()) {
+      csv += std::string(18, ',') + "yes\n";  // nothing was measured
+      continue;
+    }
+    csv += fmt::format("{:.4f},{}", run.time.value(), run.iterations);
     for (const auto& v : {run.errors.input, run.errors.test, run.errors.all, run.errors.volume})
       csv += fmt::format(",{:.4f},{:.4f},{:.4f}", v[0], v[1], v[2]);
-    csv += fmt::format(",{},{}\n", optional_number(run.temperature), run.failed.empty() ? "" : "yes");
+    csv += fmt::format(",{},\n", optional_number(run.temperature));
   }
   return csv;
 }
@@ -267,16 +275,16 @@ std::vector<std::string> paper_words(const PaperEvaluation& e) {
   return words;
 }
 
-std::string paper_html(const PaperEvaluation& e, const std::string& machine) {
+std::string paper_html(const PaperEvaluation& e) {
   HtmlPage page("The paper's evaluation, on flames with known truth");
   page.paragraph(
       fmt::format("Every method has the same pictures: of a flame (and smoke) simulated on {0} x {0} x {0} "
                   "cells, 8 bits, linear. Every volume has {1} voxels along "
                   "its longest side, and is shown by the same renderer. Errors of pictures are root mean "
                   "squares over the box of the pixels that show the flame, grey "
-                  "levels of 255; of the volume, root mean squares over the method's own medium, in percent "
+                  "levels of 255; of the volume, root mean squares over all key points, in percent "
                   "of the truth's there. Times: {2}.",
-                  *e.options.cells, *e.options.voxels, machine));
+                  *e.options.cells, *e.options.voxels, e.options.machine));
   if (e.options.extent == evaluate::Extent::quick)
     page.paragraph(
         "This is the quick variant: small pictures, few voxels. It shows that all of it works, not how good "
@@ -300,10 +308,10 @@ std::string paper_html(const PaperEvaluation& e, const std::string& machine) {
   return page.str();
 }
 
-Status write_paper_report(const PaperEvaluation& e, const std::string& machine, const OutputRequest& where) {
+Status write_paper_report(const PaperEvaluation& e, const OutputRequest& where) {
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder staging, OutputFolder::create(where));
   EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "runs.csv", paper_csv(e)));
-  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "index.html", paper_html(e, machine)));
+  EMBERLOCK_RETURN_IF_ERROR(write_file_atomically(staging.path() / "index.html", paper_html(e)));
   return staging.commit();
 }
 

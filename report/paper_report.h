@@ -16,11 +16,10 @@ std::string paper_csv(const evaluate::PaperEvaluation& evaluation);
 std::vector<std::string> paper_words(const evaluate::PaperEvaluation& evaluation);
 
 /// A page with a section a protocol: tables beside what the paper prints, plots, pictures; and the table of
-/// methods. `machine`: on which the times were measured.
-std::string paper_html(const evaluate::PaperEvaluation& evaluation, const std::string& machine);
+/// methods.
+std::string paper_html(const evaluate::PaperEvaluation& evaluation);
 
 /// Writes index.html and runs.csv.
-Status write_paper_report(const evaluate::PaperEvaluation& evaluation, const std::string& machine,
-                          const OutputRequest& where);
+Status write_paper_report(const evaluate::PaperEvaluation& evaluation, const OutputRequest& where);
 
 }  // namespace emberlock::report

@@ -15,6 +15,7 @@
 #include "recon/hull/hull.h"
 #include "recon/preprocess/view.h"
 #include "recon/render/volume.h"
+#include "recon/temperature/emitter.h"
 
 namespace emberlock::evaluate {
 
@@ -33,7 +34,9 @@ struct MethodFacts {
 
 struct MethodOptions {
   int voxels = 128;                               ///< along the longest side of the scene's box, 8..256
-  std::optional<recon::CameraResponse> response;  ///< of all views; methods that read temperatures need it
+  std::optional<recon::CameraResponse> response;  ///< of all views; methods that read colours need it
+  recon::Emitter emitter = recon::Emitter::grey;  ///< what glows
+  bool temperatures = false;                      ///< whether MethodResult::kelvin is asked for
   std::uint64_t seed = 1;                         ///< of methods that draw random numbers
   recon::ComputeOptions compute;                  ///< a method runs where it can: all of them on the CPU
   /// Asked now and then: true ends the run with the best so far.
@@ -48,7 +51,7 @@ struct MethodResult {
   recon::Effects effects;
   int iterations = 0;
   std::string chose = {};          ///< what was found out from the pictures and not told, in words
-  std::vector<float> kelvin = {};  ///< at the key points, 0 where not told; empty: no temperatures
+  std::vector<float> kelvin = {};  ///< at the key points, 0 where not told; empty: none
 };
 
 /// A method of the literature on the scene as it was filmed: pictures in grey levels (0..255), linear in

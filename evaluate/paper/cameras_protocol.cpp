@@ -16,7 +16,8 @@ Protocol cameras_protocol(Extent extent) {
   p.differs =
       "The paper reads the temperature of a flame whose truth follows its own model (green alone, one "
       "opacity). Here soot glows by Planck's law "
-      "and absorbs as soot does; the paper's method still reads it by its own rule.";
+      "and absorbs as soot does; all others are told that it is soot that glows. The paper's method reads it "
+      "by its own rule.";
   const std::vector<int> counts =
       extent == Extent::full ? std::vector{4, 8, 12, 16, 20, 24, 28} : std::vector{4, 16};
   for (const int count : counts) {

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "base/output_folder.h"
+#include "base/version.h"
 #include "evaluate/methods.h"
 #include "evaluate/option_range.h"
 #include "evaluate/paper/known_gas.h"
@@ -34,21 +35,29 @@ class Evaluation {
       : done_(done), folder_(std::move(folder)), clock_(clock), observer_(observer) {}
 
   Status plan() {
-    const bool gpu = done_.options.compute.device == recon::Device::automatic &&
-                     recon::resolve(recon::Device::cuda).ok() && !recon::kGpuInSoftware;
+    const recon::Device asked = done_.options.compute.device;
+    recon::Device gpu = asked;
+    if (asked == recon::Device::automatic && recon::resolve(recon::Device::cuda).ok() &&
+        !recon::kGpuInSoftware)
+      gpu = recon::Device::cuda;
+    if (gpu == recon::Device::cuda) {
+      EMBERLOCK_ASSIGN_OR_RETURN(gpu, recon::resolve(gpu));
+    }
     for (const Protocol& protocol : done_.protocols)
       for (const Case& of : protocol.cases)
         for (const std::string_view name : protocol.methods) {
           if (!wanted(name)) continue;
           EMBERLOCK_ASSIGN_OR_RETURN(const Method method, find_method(name));
           recon::ComputeOptions compute = done_.options.compute;
-          if (compute.device == recon::Device::automatic) compute.device = recon::Device::cpu;
+          compute.device = recon::Device::cpu;
           plan_.push_back({&protocol, &of, method, compute});
-          if (!gpu || !runs_on_gpu(name)) continue;
-          compute.device = recon::Device::cuda;
+          if (gpu != recon::Device::cuda || !runs_on_gpu(name)) continue;
+          compute.device = gpu;
           plan_.push_back({&protocol, &of, method, compute});
         }
-    return {};
+    if (!plan_.empty()) return {};
+    return Error{ErrorKind::bad_input, "none of these methods takes part in these tables", "--methods",
+                 "Choose others, or other tables by --only"};
   }
 
   Status run() {
@@ -75,8 +84,9 @@ class Evaluation {
     return kGasShare + (1 - kGasShare) * static_cast<double>(done) / static_cast<double>(plan_.size());
   }
   [[nodiscard]] std::string settings() const {
-    return fmt::format("{} cells, {} voxels, {}, seed {}", *done_.options.cells, *done_.options.voxels,
-                       done_.options.extent == Extent::full ? "full" : "quick", done_.options.seed);
+    return fmt::format("{} cells, {} voxels, {}, seed {}, {}, version {}", *done_.options.cells,
+                       *done_.options.voxels, done_.options.extent == Extent::full ? "full" : "quick",
+                       done_.options.seed, done_.options.machine, version());
   }
 
   /// The gas of a subject: kept, from a file, or simulated.
@@ -102,7 +112,8 @@ class Evaluation {
     EMBERLOCK_ASSIGN_OR_RETURN(const KnownGas* gas, gas_of(planned.protocol->subject, at));
     if (planned.of->optics == Optics::papers) {
       if (!papers_) {
-        EMBERLOCK_ASSIGN_OR_RETURN(papers_, as_the_paper_renders(*gas, done_.options.compute));
+        EMBERLOCK_ASSIGN_OR_RETURN(papers_,
+                                   as_the_paper_renders(*gas, *done_.options.voxels, done_.options.compute));
       }
       gas = &*papers_;
     }
@@ -163,7 +174,7 @@ class Evaluation {
 }  // namespace
 
 Result<PaperEvaluation> evaluate_paper(const PaperOptions& options, const fs::path& folder,
-                                       const Clock& clock, const Observer& observer) {
+                                       const Clock& clock, const Observer& observer) try {
   const TimePoint begin = clock.now();
   PaperEvaluation done;
   done.options = options;
@@ -180,9 +191,11 @@ Result<PaperEvaluation> evaluate_paper(const PaperOptions& options, const fs::pa
   if (std::all_of(done.runs.begin(), done.runs.end(),
                   [](const MethodRun& run) { return !run.failed.empty(); }))
     return Error{ErrorKind::not_converged, "no method made anything of its pictures", folder.string(),
-                 done.runs.empty() ? "Choose methods of the tables chosen" : done.runs.front().failed};
+                 done.runs.front().failed};
   done.total = clock.now() - begin;
   return done;
+} catch (const recon::DeviceError& error) {
+  return error.error();
 }
 
 }  // namespace emberlock::evaluate

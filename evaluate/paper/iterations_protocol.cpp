@@ -13,7 +13,7 @@ Protocol iterations_protocol(Extent extent) {
       "iterations";
   p.differs =
       "The paper plots pixels and volume data against seconds and prints no numbers. Here the volume's error "
-      "is the RMSE over the hull, over the "
+      "is the RMSE over all key points, over the "
       "truth's RMS there, as our volumes hold emission and not the paper's colour intensity.";
   Case ten{"ten-cameras", ring(10), image_size(extent)};
   ten.cameras.push_back({90, 0, recon::ViewRole::held_out});

@@ -21,7 +21,6 @@ namespace {
 
 constexpr double kFieldOfView = 60;  // degrees
 constexpr double kPeak = 230;        // grey levels
-constexpr int kPapersSteps = 128;    // across the box
 constexpr float kFaintest = 0.01F;   // of the brightest light: beyond it there is no medium
 constexpr double kFlameWidth = 0.4, kSmokeWidth = 0.6;  // metres
 
@@ -185,10 +184,10 @@ Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOp
   return known(subject, std::move(gas), compute);
 }
 
-Result<KnownGas> as_the_paper_renders(const KnownGas& gas, const recon::ComputeOptions& compute) {
+Result<KnownGas> as_the_paper_renders(const KnownGas& gas, int steps, const recon::ComputeOptions& compute) {
   KnownGas out = gas;
   out.optics = Optics::papers;
-  const Meters step(gas.box.size.x() / kPapersSteps);
+  const Meters step(gas.box.size.x() / steps);
   const auto sigma =
       static_cast<float>(recon::extinction_of_opacity(recon::kPaperOpacityOfAStep, step).value());
   std::vector<float>& light = out.light.emission;

@@ -37,8 +37,9 @@ Result<KnownGas> simulate_gas(Subject subject, int cells, const recon::ComputeOp
 /// Three broad channels, so that a black body of 5500 K, daylight, is white; absolute.
 recon::CameraResponse daylight_camera();
 
-/// The same gas by the paper's model of light, exposed anew.
-Result<KnownGas> as_the_paper_renders(const KnownGas& gas, const recon::ComputeOptions& compute);
+/// The same gas by the paper's model of light, an opacity of 0.05 a step, of which `steps` go through the
+/// box; exposed anew.
+Result<KnownGas> as_the_paper_renders(const KnownGas& gas, int steps, const recon::ComputeOptions& compute);
 
 /// The truth as a file that other programs open (recon/export/volume_file.h): emission and density, and
 /// temperature (K) and absorption (1/m) beside them, from which read_gas() has the same again.

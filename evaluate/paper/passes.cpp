@@ -37,11 +37,10 @@ class Watched {
 
 }  // namespace
 
-Status add_passes(const Protocol& protocol, const Method& method, const KnownGas& gas,
-                  const recon::Scene& scene, const RunSettings& settings, const Clock& clock,
-                  MethodRun& run) {
+void add_passes(const Protocol& protocol, const Method& method, const KnownGas& gas,
+                const recon::Scene& scene, const RunSettings& settings, const Clock& clock, MethodRun& run) {
   const bool papers = method.facts.name == kPapersMethod;
-  if (!papers && method.facts.name != kDefaultMethod) return {};
+  if (!papers && method.facts.name != kDefaultMethod) return;
   const recon::Scene inputs = input_views(scene);
   const recon::Grid grid = recon::grid_over(scene.box, settings.voxels);
   recon::SolveOptions solve;
@@ -55,9 +54,12 @@ Status add_passes(const Protocol& protocol, const Method& method, const KnownGas
     solve.flame_threshold = recon::kPaperFlameThreshold;
     solve.iterations = protocol.iterations.back();
   } else {
-    EMBERLOCK_ASSIGN_OR_RETURN(const recon::EffectChoice choice,
-                               recon::choose_effects(inputs, grid, {}, solve));
-    effects = choice.effects;
+    const Result<recon::EffectChoice> choice = recon::choose_effects(inputs, grid, {}, solve);
+    if (!choice.ok()) {
+      run.passes_failed = choice.error().message();
+      return;
+    }
+    effects = choice->effects;
   }
   std::size_t test = 0;
   while (test + 1 < scene.views.size() && scene.views[test].role == recon::ViewRole::input) ++test;
@@ -68,14 +70,16 @@ Status add_passes(const Protocol& protocol, const Method& method, const KnownGas
     watched.look([&] {
       const MethodResult now{preview.volume(), preview.hull, preview.effects, iteration};
       const std::vector<recon::RadianceImage> shown = show(now, scene, settings.compute);
-      run.points.push_back({iteration, preview.point.time, errors_of(now, shown, scene, gas)});
+      const RunErrors errors = errors_of(now, shown, scene, gas);
+      if (!check_finite(errors).ok()) return;
+      run.points.push_back({iteration, preview.point.time, errors});
       if (papers && std::find(kPictured.begin(), kPictured.end(), iteration) != kPictured.end())
         run.pictures.push_back({fmt::format("after-{}", iteration), recon::to_rgb8(shown[test])});
     });
   };
   const auto done = recon::solve(
       inputs, grid, effects, solve, [&] { return watched.elapsed(); }, look);
-  return done.ok() ? Status{} : Status(done.error());
+  if (!done.ok()) run.passes_failed = done.error().message();
 }
 
 }  // namespace emberlock::evaluate

@@ -19,7 +19,7 @@ std::string_view name(Subject subject);
 /// How what is filmed sends out its light.
 enum class Optics {
   physical,  ///< soot glows and absorbs as soot does; smoke scatters the sun
-  /// The paper's model, by which its own scenes are rendered: an opacity of 0.05 a step of a 128th of the box
+  /// The paper's model, by which its own scenes are rendered: an opacity of 0.05 a step, as long as a voxel,
   /// for all channels, wherever there is light.
   papers,
 };

@@ -51,7 +51,9 @@ Result<MethodRun> run_method(const Protocol& protocol, const Case& of, const Met
   options.seed = settings.seed;
   options.compute = settings.compute;
   options.stop = settings.stop;
-  if (protocol.temperatures && gas.subject == Subject::flame) options.response = gas.response;
+  options.response = gas.response;
+  options.emitter = recon::Emitter::soot;  // known_gas.h
+  options.temperatures = protocol.temperatures && gas.subject == Subject::flame;
   const recon::Scene inputs = input_views(scene);
   const TimePoint begin = clock.now();
   const Result<MethodResult> result = method.run(inputs, options);
@@ -59,24 +61,29 @@ Result<MethodRun> run_method(const Protocol& protocol, const Case& of, const Met
   if (settings.stop && settings.stop())
     return Error{ErrorKind::refused, "ended early, as asked", std::string(method.facts.name)};
   if (!result.ok()) {
+    // What a device or a disk refuses now it may do the next time.
+    if (result.error().kind == ErrorKind::device || result.error().kind == ErrorKind::io)
+      return result.error();
     run.failed = result.error().message();
     return run;
   }
-  run.iterations = result->iterations;
-  run.chose = result->chose;
   const std::vector<recon::RadianceImage> shown = show(*result, scene, settings.compute);
-  run.errors = errors_of(*result, shown, scene, gas);
-  if (const Status finite = check_finite(run.errors); !finite.ok()) {
+  const RunErrors errors = errors_of(*result, shown, scene, gas);
+  if (const Status finite = check_finite(errors); !finite.ok()) {
     run.failed = finite.error().message();
     return run;
   }
-  if (options.response && !result->kelvin.empty()) {
+  run.errors = errors;
+  run.iterations = result->iterations;
+  run.chose = result->chose;
+  if (options.temperatures && !result->kelvin.empty()) {
     run.temperature = temperature_errors(result->volume.grid, result->kelvin, gas);
     run.slice = temperature_slice(result->volume.grid, result->kelvin, gas);
   }
   run.pictures = pictures_of(scene, shown);
-  if (!protocol.iterations.empty())
-    EMBERLOCK_RETURN_IF_ERROR(add_passes(protocol, method, gas, scene, settings, clock, run));
+  if (!protocol.iterations.empty()) add_passes(protocol, method, gas, scene, settings, clock, run);
+  if (settings.stop && settings.stop())
+    return Error{ErrorKind::refused, "ended early, as asked", std::string(method.facts.name)};
   return run;
 }
 

@@ -19,8 +19,7 @@
 namespace emberlock::evaluate {
 
 /// Of R, G and B. Pictures: RMSE over the box of the pixels that show gas, the mean square taken over the
-/// views, grey levels (0..255). Volume: RMSE of the emission over the medium's key points, over the truth's
-/// RMS there.
+/// views, grey levels (0..255). Volume: RMSE of the emission over all key points, over the truth's RMS there.
 struct RunErrors {
   std::array<double, 3> input = {}, test = {}, all = {}, volume = {};
 };
@@ -61,6 +60,7 @@ struct MethodRun {
   RunErrors errors;
   std::optional<TemperatureErrors> temperature = {};
   std::vector<RunPoint> points = {};
+  std::string passes_failed = {};  ///< why there are no more points
   std::optional<TemperatureSlice> slice = {};
   std::vector<RunPicture> pictures = {};
 };

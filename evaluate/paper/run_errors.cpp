@@ -32,28 +32,12 @@ class MeanSquare {
   int count_ = 0;
 };
 
-/// Key points that touch the medium.
-std::vector<std::uint8_t> points_of(const recon::Hull& medium) {
-  const recon::Grid& grid = medium.grid;
-  std::vector<std::uint8_t> points(grid.size());
-  std::size_t voxel = 0;
-  for (int k = 0; k < grid.nz - 1; ++k)
-    for (int j = 0; j < grid.ny - 1; ++j)
-      for (int i = 0; i < grid.nx - 1; ++i) {
-        if (medium.inside[voxel++] == 0) continue;
-        for (int c = 0; c < 8; ++c) points[grid.index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2))] = 1;
-      }
-  return points;
-}
-
 std::array<double, 3> volume_errors(const MethodResult& result, const KnownGas& gas) {
   const recon::Volume& found = result.volume;
   const std::vector<float> truth = recon::at_key_points(found.grid, gas.light.grid, gas.light.emission, 3);
-  const std::vector<std::uint8_t> inside = points_of(result.medium);
   std::array<double, 3> off{};
   std::array<double, 3> all{};
-  for (std::size_t p = 0; p < inside.size(); ++p) {
-    if (inside[p] == 0) continue;
+  for (std::size_t p = 0; p < found.grid.size(); ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
       off[c] += std::pow(static_cast<double>(found.emission[3 * p + c] - truth[3 * p + c]), 2);
       all[c] += std::pow(static_cast<double>(truth[3 * p + c]), 2);
@@ -139,12 +123,17 @@ TemperatureErrors temperature_errors(const recon::Grid& grid, const std::vector<
   errors.bias /= weights;
   errors.told = static_cast<double>(off.size()) / static_cast<double>(lit);
   std::sort(off.begin(), off.end(), [](const Off& a, const Off& b) { return a.kelvin < b.kelvin; });
-  double sum = 0;
-  for (const Off& o : off) {
-    sum += o.weight;
-    if (sum <= 0.5 * weights) errors.median = o.kelvin;
-    if (sum <= 0.95 * weights) errors.most = o.kelvin;
-  }
+  // The first error up to which that share of the light lies.
+  const auto quantile = [&](double share) {
+    double sum = 0;
+    for (const Off& o : off) {
+      sum += o.weight;
+      if (sum >= share * weights) return o.kelvin;
+    }
+    return off.back().kelvin;
+  };
+  errors.median = quantile(0.5);
+  errors.most = quantile(0.95);
   return errors;
 }
 

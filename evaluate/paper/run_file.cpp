@@ -71,6 +71,7 @@ Json json_of(const MethodRun& run, const std::string& settings) {
           {"errors", json_of(run.errors)},
           {"temperature", temperature},
           {"points", points},
+          {"passes_failed", run.passes_failed},
           {"slice", run.slice ? json_of(*run.slice) : Json(nullptr)},
           {"pictures", pictures}};
 }
@@ -91,6 +92,7 @@ MethodRun run_from(const Json& json) {
   for (const Json& p : json.at("points"))
     run.points.push_back(
         {p.at("iteration"), Seconds(p.at("seconds").get<double>()), errors_from(p.at("errors"))});
+  run.passes_failed = json.at("passes_failed");
   if (const Json& slice = json.at("slice"); !slice.is_null()) run.slice = slice_from(slice);
   for (const Json& name : json.at("pictures")) {
     const auto file = name.get<std::string>();

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/render/at_key_points.h"
 
+#include <algorithm>
+
 namespace emberlock::recon {
 
-std::vector<float> at_key_points(const Grid& grid, const Grid& from,
-                                 const std::vector<float>& values, std::size_t lanes) {
+std::vector<float> at_key_points(const Grid& grid, const Grid& from, const std::vector<float>& values,
+                                 std::size_t lanes) {
   std::vector<float> out(lanes * grid.size());
   const int n[3] = {from.nx, from.ny, from.nz};
   for (int k = 0; k < grid.nz; ++k)
@@ -17,8 +19,8 @@ std::vector<float> at_key_points(const Grid& grid, const Grid& from,
         for (int d = 0; d < 3; ++d) {
           const float x =
               (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
-          inside = inside && x >= 0 && x < static_cast<float>(n[d] - 1);
-          low[d] = inside ? static_cast<int>(x) : 0;
+          inside = inside && x >= 0 && x <= static_cast<float>(n[d] - 1);
+          low[d] = inside ? std::min(static_cast<int>(x), n[d] - 2) : 0;
           part[d] = x - static_cast<float>(low[d]);
         }
         if (!inside) continue;

@@ -14,7 +14,7 @@ inline constexpr MethodFacts kAlgebraicTomographyFacts{
 /// negative, as nothing in the equations forbids it. Errors: those of RunMethod.
 Result<MethodResult> algebraic_tomography(const recon::Scene& scene, const MethodOptions& options);
 
-inline constexpr MethodFacts kConvergedAlgebraicTomographyFacts{"algebraic tomography, converged",
+inline constexpr MethodFacts kConvergedAlgebraicTomographyFacts{"converged algebraic tomography",
                                                                 "Ihrke and Magnor 2004",
                                                                 false,
                                                                 Projection::perspective,

@@ -171,8 +171,8 @@ recon::Scene only(const recon::Scene& scene, const std::vector<std::size_t>& inp
 
 }  // namespace
 
-Result<TwoColours> TwoColours::create(const recon::CameraResponse& response) {
-  TwoColours colours(recon::EmitterTable(response, recon::Emitter::grey));
+Result<TwoColours> TwoColours::create(const recon::CameraResponse& response, recon::Emitter emitter) {
+  TwoColours colours(recon::EmitterTable(response, emitter));
   for (std::size_t n = 0; n < kRatios; ++n) {
     const std::array<double, 3> rgb = colours.colour(Kelvin(1 / inverse_kelvin(static_cast<double>(n))));
     const double ratio = rgb[0] > 0 ? rgb[1] / rgb[0] : 0;
@@ -232,7 +232,7 @@ Result<MethodResult> colour_temperature(const recon::Scene& scene, const MethodO
   const recon::CameraResponse& response = options.response ? *options.response
                                           : scene.response ? *scene.response
                                                            : recon::standard_response();
-  EMBERLOCK_ASSIGN_OR_RETURN(const TwoColours colours, TwoColours::create(response));
+  EMBERLOCK_ASSIGN_OR_RETURN(const TwoColours colours, TwoColours::create(response, options.emitter));
   const recon::Scene four = only(scene, views);
   const recon::ComputeOptions on_cpu{recon::Device::cpu, options.compute.threads};
   const std::vector<recon::FlameMask> masks = recon::flame_masks(four, std::nullopt, on_cpu);

@@ -21,7 +21,8 @@ inline constexpr MethodFacts kColourTemperatureFacts{"colour-temperature mapping
 class TwoColours {
  public:
   /// bad_input where the ratio doesn't rise over the whole range.
-  static Result<TwoColours> create(const recon::CameraResponse& response);
+  static Result<TwoColours> create(const recon::CameraResponse& response,
+                                   recon::Emitter emitter = recon::Emitter::grey);
 
   /// Of a red and a green level, both > 0.
   [[nodiscard]] Kelvin temperature(double red, double green) const;

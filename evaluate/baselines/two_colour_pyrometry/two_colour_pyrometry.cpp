@@ -26,9 +26,9 @@ double inverse_kelvin(double place) {
 
 }  // namespace
 
-Result<RatioThermometer> RatioThermometer::make(const recon::CameraResponse& response) {
-  const recon::EmitterTable table(response, recon::Emitter::grey, Kelvin(kColdestRatio),
-                                  Kelvin(kHottestRatio));
+Result<RatioThermometer> RatioThermometer::make(const recon::CameraResponse& response,
+                                                recon::Emitter emitter) {
+  const recon::EmitterTable table(response, emitter, Kelvin(kColdestRatio), Kelvin(kHottestRatio));
   std::vector<double> log_ratios;
   for (std::size_t i = 0; i < kRatios; ++i) {
     const auto level = table.at(Kelvin(1 / inverse_kelvin(static_cast<double>(i)))).value;
@@ -73,7 +73,8 @@ std::vector<float> kelvin_by_ratio(const recon::Volume& volume, const RatioTherm
 Result<MethodResult> two_colour_pyrometry(const recon::Scene& scene, const MethodOptions& options) {
   std::optional<RatioThermometer> thermometer;
   if (options.response) {
-    EMBERLOCK_ASSIGN_OR_RETURN(RatioThermometer made, RatioThermometer::make(*options.response));
+    EMBERLOCK_ASSIGN_OR_RETURN(RatioThermometer made,
+                               RatioThermometer::make(*options.response, options.emitter));
     thermometer = std::move(made);
   }
   EMBERLOCK_ASSIGN_OR_RETURN(const TomographyInput input, find_input(scene, options, 2));

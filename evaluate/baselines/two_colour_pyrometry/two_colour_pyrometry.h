@@ -18,13 +18,14 @@ inline constexpr MethodFacts kTwoColourPyrometryFacts{.name = "two-colour pyrome
                                                       .model = "linear",
                                                       .is_iterative = false};
 
-/// The temperature of a grey body by its red over its green, as a camera's response shows them, from 1000 to
+/// The temperature of what glows by its red over its green, as a camera's response shows them, from 1000 to
 /// 3000 K. Immutable, thread-safe.
 class RatioThermometer {
  public:
   /// Errors: bad_input where red over green doesn't fall all the way as it gets hotter (a dead channel, one
   /// response for both).
-  static Result<RatioThermometer> make(const recon::CameraResponse& response);
+  static Result<RatioThermometer> make(const recon::CameraResponse& response,
+                                       recon::Emitter emitter = recon::Emitter::grey);
 
   /// 0 where a channel isn't above 0, or the ratio is none of these temperatures'.
   [[nodiscard]] Kelvin read(double red, double green) const;

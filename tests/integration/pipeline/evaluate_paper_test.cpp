@@ -12,6 +12,7 @@
 #include "base/clock.h"
 #include "base/file.h"
 #include "cli/commands.h"
+#include "cli/machine.h"
 #include "evaluate/methods.h"
 #include "tests/support/recording.h"
 #include "tests/support/verb.h"
@@ -29,7 +30,7 @@ TEST(EvaluatePaper, ItsTablesHoldAndWhatIsDoneIsNotDoneAgain) {
   const auto first = test::run_verb(add_evaluate, {"evaluate", "paper", "--quick", "--device", "cpu",
                                                    "--only", "nine-views", "--out", out});
   ASSERT_EQ(first.exit_code, 0) << first.err;
-  EXPECT_THAT(first.out, HasSubstr("nine views, the tenth as a test"));
+  EXPECT_THAT(first.out, HasSubstr("as-soot-glows, the tenth view"));
   const auto all =
       test::run_verb(add_evaluate, {"evaluate", "paper", "--quick", "--device", "cpu", "--out", out});
   ASSERT_EQ(all.exit_code, 0) << all.err;
@@ -38,6 +39,7 @@ TEST(EvaluatePaper, ItsTablesHoldAndWhatIsDoneIsNotDoneAgain) {
   evaluate::PaperOptions options;
   options.extent = evaluate::Extent::quick;
   options.compute.device = recon::Device::cpu;
+  options.machine = machine(0, "cpu");
   const SteadyClock clock;
   const auto again = evaluate::evaluate_paper(options, out, clock);
   ASSERT_TRUE(again.ok()) << again.error().message();
@@ -64,15 +66,19 @@ TEST(EvaluatePaper, ItsTablesHoldAndWhatIsDoneIsNotDoneAgain) {
 TEST(EvaluatePaper, AFolderOfOtherSettingsIsRefused) {
   const test::TempFolder temp;
   const std::string out = (temp / "paper").string();
-  const std::vector<std::string> words = {"evaluate",    "paper",      "--quick", "--device", "cpu",
-                                          "--only",      "nine-views", "--cells", "32",       "--methods",
-                                          "the paper's", "--out",      out};
+  const std::vector<std::string> words = {"evaluate",    "paper", "--quick", "--device", "cpu",
+                                          "--only",      "smoke", "--cells", "32",       "--methods",
+                                          "the paper's", "--out", out};
   ASSERT_EQ(test::run_verb(add_evaluate, words).exit_code, 0);
   std::vector<std::string> others = words;
   others.insert(others.end(), {"--voxels", "24"});
   const auto refused = test::run_verb(add_evaluate, others);
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_THAT(refused.err, HasSubstr("other settings"));
+  const auto none = test::run_verb(
+      add_evaluate, {"evaluate", "paper", "--only", "smoke", "--methods", "Gaussian splats", "--out", out});
+  EXPECT_EQ(none.exit_code, 2);
+  EXPECT_THAT(none.err, HasSubstr("none of these methods"));
   EXPECT_THAT(test::run_verb(add_evaluate, {"evaluate", "paper", "--only", "x", "--out", out}).err,
               HasSubstr("iterations, nine-views"));
   EXPECT_THAT(test::run_verb(add_evaluate, {"evaluate", "paper", "--methods", "x", "--out", out}).err,

@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 
 const KnownGas& small_flame() {
-  static const KnownGas flame = *simulate_gas(Subject::flame, 32, {});
+  static const KnownGas flame = *simulate_gas(Subject::flame, 64, {});
   return flame;
 }
 
@@ -83,8 +83,24 @@ TEST(KnownGas, TemperaturesThatAreOffByAConstantAreSaidSo) {
   EXPECT_NEAR(errors.bias, 40, 0.2);
 }
 
+TEST(KnownGas, HalfOfTheLightLiesBelowTheMedian) {
+  // A few points that are off by little, and one that is off by much and has most of the light.
+  KnownGas gas = small_flame();
+  std::fill(gas.light.emission.begin(), gas.light.emission.end(), 0.F);
+  std::vector<float> kelvin(gas.light.grid.size());
+  for (std::size_t p = 0; p < 4; ++p) {
+    const std::size_t at = gas.light.grid.index(4 + 2 * static_cast<int>(p), 5, 5);
+    gas.light.emission[3 * at] = p == 3 ? 10.F : 1.F;
+    kelvin[at] = gas.gas.temperature[at] + (p == 3 ? 90.F : 5.F);
+  }
+  const TemperatureErrors errors = temperature_errors(gas.light.grid, kelvin, gas);
+  EXPECT_NEAR(errors.median, 90, 0.01);
+  EXPECT_NEAR(errors.most, 90, 0.01);
+  EXPECT_NEAR(errors.bias, (3 * 5 + 10 * 90) / 13.0, 0.01);
+}
+
 TEST(KnownGas, AsThePaperRendersAStepTakesATwentieth) {
-  const auto opaque = as_the_paper_renders(small_flame(), {});
+  const auto opaque = as_the_paper_renders(small_flame(), 128, {});
   ASSERT_TRUE(opaque.ok());
   const std::vector<float>& sigma = opaque->light.extinction;
   const double most = static_cast<double>(*std::max_element(sigma.begin(), sigma.end()));

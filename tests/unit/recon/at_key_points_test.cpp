@@ -24,5 +24,13 @@ TEST(AtKeyPoints, ValuesBetweenKeyPointsAreTrilinear) {
   }
 }
 
+TEST(AtKeyPoints, OfTheSameGridAreTheSame) {
+  const Grid grid{{-0.3F, 0, 0.7F}, 0.01F, 3, 4, 5};
+  std::vector<float> values(2 * grid.size());
+  for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<float>(i);
+  const std::vector<float> same = at_key_points(grid, grid, values, 2);
+  for (std::size_t i = 0; i < values.size(); ++i) EXPECT_NEAR(same[i], values[i], 0.01) << i;
+}
+
 }  // namespace
 }  // namespace emberlock::recon

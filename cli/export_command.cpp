@@ -154,7 +154,9 @@ Status export_result(const ExportArguments& a, const std::string& program) try {
   const FileFormat& format = file_formats().at(a.format);
   const Progress bar = progress_bar("export");
   const Interrupt interrupt;
-  EMBERLOCK_ASSIGN_OR_RETURN(const float white, white_of(a, volumes, bar));
+  // Of all frames, so that parts of a sequence that are exported one by one have one scale.
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<ResultVolume> all, volumes_of(a.result));
+  EMBERLOCK_ASSIGN_OR_RETURN(const float white, white_of(a, all, bar));
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   recon::SharedVolume volume;
   const Status written = each_volume(volumes, a.out, bar, 0.4, 1, [&](const ResultVolume& from) -> Status {

@@ -30,6 +30,7 @@ void add_flame(SharedVolume& volume, float white) {
   std::vector<float> share(volume.grid.size());
   for (std::size_t p = 0; p < share.size(); ++p)
     share[p] = std::clamp(luminance(&emission->values[3 * p]) / white, 0.0F, 1.0F);
+  std::erase_if(volume.grids, [](const SharedGrid& grid) { return grid.name == kFlame; });  // an earlier one
   volume.grids.push_back(
       {kFlame, "1",
        fmt::format(
@@ -44,6 +45,7 @@ void add_told(SharedVolume& volume) {
   std::vector<float> told(volume.grid.size());
   std::transform(kelvin->values.begin(), kelvin->values.end(), told.begin(),
                  [](float t) { return t > 0 ? 1.0F : 0.0F; });
+  std::erase_if(volume.grids, [](const SharedGrid& grid) { return grid.name == "temperature_told"; });
   volume.grids.push_back({"temperature_told", "1", "1 where temperature is told, else 0", std::move(told)});
 }
 

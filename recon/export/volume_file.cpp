@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <fstream>
 #include <memory>
+#include <new>
 #include <string>
 #include <string_view>
 
@@ -145,6 +146,8 @@ Status write_file(const openvdb::GridPtrVec& grids, const openvdb::MetaMap& abou
   behind << end;
   behind.close();
   return {};
+} catch (const std::bad_alloc&) {
+  throw;  // of memory, not of the disk
 } catch (const std::exception& e) {
   return Error{ErrorKind::io, std::string("cannot write: ") + e.what(), path.string(),
                "Check that the folder is writable and the disk has room"};
@@ -279,6 +282,8 @@ Result<SharedVolume> read_shared_volume(const std::filesystem::path& path) try {
     volume.grids.push_back({base->getName(), unit ? unit->value() : "", "", std::move(values)});
   }
   return volume;
+} catch (const std::bad_alloc&) {
+  throw;  // of memory, not of the file
 } catch (const std::exception& e) {
   return damaged(path, e.what());
 }

@@ -4,6 +4,11 @@
 #include <algorithm>
 
 namespace emberlock::recon {
+namespace {
+
+constexpr float kRounding = 1e-3F;  // of places, edges
+
+}  // namespace
 
 std::vector<float> at_key_points(const Grid& grid, const Grid& from, const std::vector<float>& values,
                                  std::size_t lanes) {
@@ -17,9 +22,10 @@ std::vector<float> at_key_points(const Grid& grid, const Grid& from, const std::
         float part[3];
         bool inside = true;
         for (int d = 0; d < 3; ++d) {
-          const float x =
-              (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
-          inside = inside && x >= 0 && x <= static_cast<float>(n[d] - 1);
+          float x = (grid.origin[d] + grid.edge * static_cast<float>(at[d]) - from.origin[d]) / from.edge;
+          const auto last = static_cast<float>(n[d] - 1);
+          inside = inside && x >= -kRounding && x <= last + kRounding;
+          x = std::clamp(x, 0.F, last);
           low[d] = inside ? std::min(static_cast<int>(x), n[d] - 2) : 0;
           part[d] = x - static_cast<float>(low[d]);
         }

@@ -56,7 +56,7 @@ TEST(EvaluatePaper, ItsTablesHoldAndWhatIsDoneIsNotDoneAgain) {
   EXPECT_LT(of.at("16-cameras emberlock")->temperature->median,
             of.at("4-cameras emberlock")->temperature->median);
   EXPECT_LT(of.at("ten-cameras the paper's")->points.back().errors.test[0],
-            of.at("ten-cameras the paper's")->points.front().errors.test[0] / 2);
+            0.75 * of.at("ten-cameras the paper's")->points.front().errors.test[0]);
 
   const std::string page = *read_file(out + "/report/index.html");
   EXPECT_THAT(page, HasSubstr("79.3 / 47.9 / 28.9"));

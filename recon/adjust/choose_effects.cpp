@@ -215,6 +215,7 @@ PreparedScene under_known_effects(const PreparedScene& filmed, const EffectReque
 Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid,
                                     const EffectRequest& request, const SolveOptions& options,
                                     const Elapsed& elapsed) try {
+  if (request.fixed) EMBERLOCK_RETURN_IF_ERROR(check(*request.fixed));
   EMBERLOCK_RETURN_IF_ERROR(check_gamma(scene.told(), request));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   Effects known = scene.effects();

@@ -158,8 +158,9 @@ class MotionChoice {
   bool on_ = false;
 };
 
-/// Pictures that a calibration made linear must not be bent once more.
-Status check_gamma(const Scene& scene, const EffectRequest& request) {
+/// What is set by hand is in range, and pictures that a calibration made linear are not bent once more.
+Status check_asked(const Scene& scene, const EffectRequest& request) {
+  if (request.fixed) EMBERLOCK_RETURN_IF_ERROR(check(*request.fixed));
   const Effects& asked = request.fixed ? *request.fixed : request.assumed;
   if (!scene.linearised || asked.sensor.gamma == 1) return {};
   return Error{
@@ -215,7 +216,7 @@ PreparedScene under_known_effects(const PreparedScene& filmed, const EffectReque
 Result<EffectChoice> choose_effects(const PreparedScene& scene, const Grid& grid,
                                     const EffectRequest& request, const SolveOptions& options,
                                     const Elapsed& elapsed) try {
-  EMBERLOCK_RETURN_IF_ERROR(check_gamma(scene.told(), request));
+  EMBERLOCK_RETURN_IF_ERROR(check_asked(scene.told(), request));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.compute.device));
   Effects known = scene.effects();
   known.light = {};  // what else there is is found out as though the medium glowed

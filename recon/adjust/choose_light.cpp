@@ -2,10 +2,13 @@
 #include "recon/adjust/choose_light.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
 #include "recon/adjust/find_light.h"
+#include "recon/adjust/guard.h"
 #include "recon/adjust/left_out_views.h"
 
 namespace emberlock::recon {
@@ -22,12 +25,12 @@ std::string explain_light(const FoundLight& found) {
     return fmt::format("light of {} from all sides on {} leaves {:.3g} grey levels on a coarse grid", even,
                        density, found.error);
   const bool is_near = light.source == Light::Source::nearby;
-  return fmt::format(
+  const std::string words = fmt::format(
       "{} {:.2f} / {:.2f} / {:.2f}{} of {:.3g} / {:.3g} / {:.3g}, beside {} from all sides, on {} leaves "
-      "{:.3g} "
-      "grey levels on a coarse grid, and even light {:.3g}",
+      "{:.3g} grey levels on a coarse grid",
       is_near ? "a light nearby at" : "a distant light towards", p[0], p[1], p[2], is_near ? " m" : "", s[0],
-      s[1], s[2], even, density, found.error, found.even_error);
+      s[1], s[2], even, density, found.error);
+  return found.even_error ? words + fmt::format(", and even light {:.3g}", *found.even_error) : words;
 }
 
 Extinction expected(const FoundLight& found) {
@@ -48,12 +51,14 @@ LightChoice choose_light(const SolverSetup& setup, const Extinction& otherwise, 
   if (request.fixed) {
     const bool sought = request.fixed->light.source == Source::found;
     FoundLight found = find_light(setup, request.fixed->light, elapsed);
+    if (!std::isfinite(found.error)) throw Diverged(found.error, std::numeric_limits<double>::infinity());
     if (sought) found = refine_light(setup, found, elapsed);
     return {found.light,
             expected(found),
             {"light", true, 0, now() - start, "set by hand: " + explain_light(found), {}}};
   }
   if (request.assumed.light.source == Source::none) return off("not looked for");
+  if (setup.options.solver == Solver::paper) return off("the paper's solver knows none");
   if (!absorbs) return off("nothing absorbs, so nothing scatters");
   const auto late = [&] { return is_spent(0.4, setup.options, elapsed); };
   if (late()) return off("there was no time to look for it");
@@ -62,13 +67,17 @@ LightChoice choose_light(const SolverSetup& setup, const Extinction& otherwise, 
   Light any;
   any.source = Source::found;
   FoundLight found = find_light(setup, any, elapsed);
+  if (!std::isfinite(found.error)) return off("no fit of a lit medium came to an end");
   if (found.light.source == Source::even)
     return off(explain_light(found) +
                ": no shade tells that from an even glow, so only light=even takes it for light");
   SolverSetup lit = setup;
   lit.effects.light = found.light;
-  const FoundSmoothness with = find_smoothness(LeftOutViews(lit, setup.hull), expected(found), late);
   const FoundSmoothness without = find_smoothness(free, otherwise, late);
+  const FoundSmoothness with = find_smoothness(LeftOutViews(lit, setup.hull), expected(found), late);
+  if (!std::isfinite(with.error) || !std::isfinite(without.error))
+    return off(explain_light(found) + (late() ? "; there was no time to compare that with a medium that glows"
+                                              : "; fits without some of the views diverged"));
   const bool believed = with.error < (1 - kLeastGainOfLight) * without.error;
   if (believed) found = refine_light(setup, found, elapsed);
   const std::string shown = fmt::format(

@@ -16,7 +16,8 @@ struct LightChoice {
 /// light is believed where it has a direction, since what is lit from all sides looks like what glows evenly,
 /// and where views that are left out of the fit (left_out_views.h) are shown better by a density under it
 /// than by light and extinction that are free, by kLeastGainOfLight. `otherwise` is the extinction that was
-/// chosen for those; `absorbs` whether any was found, without which nothing scatters.
+/// chosen for those; `absorbs` whether any was found, without which nothing scatters. Throws Diverged where
+/// no fit under a light by hand comes to an end.
 LightChoice choose_light(const SolverSetup& setup, const Extinction& otherwise, bool absorbs,
                          const EffectRequest& request, const Elapsed& elapsed = {});
 

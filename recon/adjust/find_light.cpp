@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -30,6 +32,8 @@ struct Tried {
   double depth = 0;
   double error = std::numeric_limits<double>::infinity();
 };
+
+using Late = std::function<bool()>;
 
 bool fits_better(const Tried& a, const Tried& b) { return a.error < b.error; }
 
@@ -101,18 +105,17 @@ class Refinement {
 
   /// Sideways and, of one nearby, nearer and farther: to the vertices of parabolas through what is left on
   /// both sides, in smaller and smaller steps.
-  template <class Late>
   [[nodiscard]] Tried refined(Tried best, const Late& late) const {
-    best = problem_.attempt(best.light, best.depth, kPasses);
     for (const double step : {0.25, 0.25, 0.12, 0.12})
-      if (!late()) best = moved_on(best, step);
+      if (!late()) best = moved_on(best, step, late);
     return best;
   }
-  /// The same light nearby, at the best of some distances.
-  [[nodiscard]] Tried brought_near(const Tried& distant) const {
+  /// The same light nearby, at the best of some distances; of infinite error where there is none.
+  [[nodiscard]] Tried brought_near(const Tried& distant, const Late& late) const {
     const Eigen::Vector3d towards = vector(distant.light.place).normalized();
     Tried best;
     for (const double far : {1.4, 2.4}) {
+      if (late()) break;
       const Light light = lit(Light::Source::nearby, middle_ + far * radius_ * towards);
       best = std::min(best, problem_.attempt(light, distant.depth, kPasses), fits_better);
     }
@@ -132,7 +135,7 @@ class Refinement {
     const Eigen::Vector3d to = from + from.norm() * by;
     return lit(light.source, middle_ + std::max(1.0, 1.05 * radius_ / to.norm()) * to);  // not inside
   }
-  [[nodiscard]] Tried moved_on(const Tried& from, double step) const {
+  [[nodiscard]] Tried moved_on(const Tried& from, double step, const Late& late) const {
     constexpr double kMostSteps = 1.5;
     const bool is_near = from.light.source == Light::Source::nearby;
     const Eigen::Vector3d out =
@@ -144,6 +147,7 @@ class Refinement {
     Tried best = from;
     Eigen::Vector3d by = Eigen::Vector3d::Zero();
     for (const Eigen::Vector3d& way : ways) {
+      if (late()) return best;
       const Tried ahead = problem_.attempt(moved(from.light, step * way), from.depth, kPasses);
       const Tried back = problem_.attempt(moved(from.light, -step * way), from.depth, kPasses);
       best = std::min({best, ahead, back}, fits_better);
@@ -162,75 +166,79 @@ class Refinement {
   double radius_ = 0;  // of the box around the medium, metres
 };
 
-Tried best_depth(const LitProblem& problem, const Light& light) {
+Tried best_depth(const LitProblem& problem, const Light& light, const Late& late) {
   Tried best{light};
-  for (const double depth : kDepths)
+  for (const double depth : kDepths) {
+    if (std::isfinite(best.error) && late()) break;
     best = std::min(best, problem.attempt(light, depth, kPasses), fits_better);
+  }
   return best;
+}
+
+FoundLight result(const LitProblem& problem, const Tried& tried, double even_error) {
+  FoundLight found{tried.light, PerMeter(tried.depth / problem.chord), tried.error, std::nullopt};
+  if (std::isfinite(even_error)) found.even_error = even_error;
+  return found;
 }
 
 class Search {
  public:
-  Search(const SolverSetup& setup, const Elapsed& elapsed)
-      : setup_(setup), elapsed_(elapsed), coarse_(setup, kVoxels, kPixels) {}
+  Search(const SolverSetup& setup, const Late& late) : late_(late), coarse_(setup, kVoxels, kPixels) {}
 
-  FoundLight operator()(const Light& asked) {
-    using Source = Light::Source;
-    if (asked.source != Source::found) {
-      const LitProblem fine(setup_, kFinerVoxels, kFinerPixels);
-      return result(best_depth(fine, asked));
-    }
-    const Tried even = best_depth(coarse_, lit(Source::even, {}));
+  [[nodiscard]] FoundLight operator()() const {
+    const Tried even = best_depth(coarse_, lit(Light::Source::even, {}), late_);
     const Tried rough = best_direction();
-    FoundLight found = result(even);
-    if (rough.error < (1 - kLeastLessError) * even.error) found = result(rough);
-    found.even_error = even.error;
-    return found;
+    const bool is_even = !(rough.error < (1 - kLeastLessError) * even.error);
+    return result(coarse_, is_even ? even : rough, even.error);
   }
 
  private:
   [[nodiscard]] Tried best_direction() const {
     std::vector<Tried> all;
     for (int n = 0; n < kDirections; ++n) {
-      if (n > 0 && late()) break;
+      if (n > 0 && late_()) break;
       all.push_back(coarse_.attempt(lit(Light::Source::distant, direction(n)), kDepths[1], kQuickPasses));
     }
     constexpr std::size_t kCloser = 2;
     std::sort(all.begin(), all.end(), fits_better);
     Tried best;
     for (std::size_t n = 0; n < std::min(kCloser, all.size()); ++n)
-      best = std::min(best, best_depth(coarse_, all[n].light), fits_better);
+      best = std::min(best, best_depth(coarse_, all[n].light, late_), fits_better);
     return best;
   }
-  [[nodiscard]] FoundLight result(const Tried& tried) const {
-    return {tried.light, PerMeter(tried.depth / coarse_.chord), tried.error, tried.error};
-  }
-  [[nodiscard]] bool late() const { return is_spent(0.4, setup_.options, elapsed_); }
 
-  const SolverSetup& setup_;
-  const Elapsed& elapsed_;
+  const Late& late_;
   LitProblem coarse_;
 };
+
+Late late_by(const SolverSetup& setup, const Elapsed& elapsed) {
+  return [&] { return is_spent(0.4, setup.options, elapsed); };
+}
 
 }  // namespace
 
 FoundLight find_light(const SolverSetup& setup, const Light& asked, const Elapsed& elapsed) {
-  return Search(setup, elapsed)(asked);
+  const Late late = late_by(setup, elapsed);
+  if (asked.source == Light::Source::found) return Search(setup, late)();
+  const LitProblem fine(setup, kFinerVoxels, kFinerPixels);
+  return result(fine, best_depth(fine, asked, late), std::numeric_limits<double>::infinity());
 }
 
 FoundLight refine_light(const SolverSetup& setup, const FoundLight& rough, const Elapsed& elapsed) {
-  const auto late = [&] { return is_spent(0.4, setup.options, elapsed); };
+  const Late late = late_by(setup, elapsed);
   if (rough.light.source != Light::Source::distant || late()) return rough;
   const LitProblem fine(setup, kFinerVoxels, kFinerPixels);
   const Refinement around(fine);
-  const Tried distant = around.refined(best_depth(fine, rough.light), late);
-  const Tried nearby = around.refined(around.brought_near(distant), late);
-  const bool is_near = !around.is_far(nearby.light) && nearby.error < (1 - kLeastLessError) * distant.error;
+  const Tried first = best_depth(fine, rough.light, late);
+  if (!std::isfinite(first.error)) return rough;
+  const Tried distant = around.refined(first, late);
+  Tried nearby = around.brought_near(distant, late);
+  if (std::isfinite(nearby.error)) nearby = around.refined(nearby, late);
+  const bool is_near = nearby.error < (1 - kLeastLessError) * distant.error && !around.is_far(nearby.light);
   const Tried& best = is_near ? nearby : distant;
-  Light even;
-  even.source = Light::Source::even;
-  return {best.light, PerMeter(best.depth / fine.chord), best.error,
-          fine.attempt(even, best.depth, kPasses).error};
+  double even_error = std::numeric_limits<double>::infinity();
+  if (!late()) even_error = fine.attempt(lit(Light::Source::even, {}), best.depth, kPasses).error;
+  return result(fine, best, even_error);
 }
 
 }  // namespace emberlock::recon

@@ -108,8 +108,7 @@ Solution solve_lit(const SolverSetup& asked, Tracker& tracker) {
     descent.engine().go_back();
     descent.take_from_engine();
     kept = {*better, KeptBy::held_out};
-  } else if (descent.halvings() > 0 && !tracker.holds_out()) {
-    descent.take_best();
+  } else if (!tracker.holds_out() && descent.take_back_a_rise()) {
     kept = {lowest_at, KeptBy::input};
   }
   descent.judge();

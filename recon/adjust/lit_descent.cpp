@@ -59,17 +59,20 @@ double mean_where(const std::vector<float>& values, const std::vector<float>& we
   return sum / static_cast<double>(std::max<std::size_t>(1, count));
 }
 
-/// Sums over rays, in their order: of what an ambient light of 1 shows (a), and a source of strength 1 (b).
+/// Of one channel; sums over rays, in their order: of what an ambient light of 1 shows (a), and a source of
+/// strength 1 (b).
 struct NormalEquations {
-  double aa = 0, ab = 0, bb = 0;
-  std::array<double, 3> a_seen = {}, b_seen = {};
+  double aa = 0, ab = 0, bb = 0, a_seen = 0, b_seen = 0;
 
-  [[nodiscard]] double ambient_alone(std::size_t c) const {
-    return aa > 0 ? std::max(0.0, a_seen[c] / aa) : 0;
+  void add(double a, double b, double seen) {
+    aa += a * a;
+    ab += a * b;
+    bb += b * b;
+    a_seen += a * seen;
+    b_seen += b * seen;
   }
-  [[nodiscard]] double strength_alone(std::size_t c) const {
-    return bb > 0 ? std::max(0.0, b_seen[c] / bb) : 0;
-  }
+  [[nodiscard]] double ambient_alone() const { return aa > 0 ? std::max(0.0, a_seen / aa) : 0; }
+  [[nodiscard]] double strength_alone() const { return bb > 0 ? std::max(0.0, b_seen / bb) : 0; }
 };
 
 }  // namespace
@@ -79,6 +82,7 @@ LitDescent::LitDescent(const Level& level, const SolverSetup& setup, const Desce
       pool_(setup.pool),
       descent_(level, field_optics(setup, level), setup, start),
       light_(setup.effects.light),
+      white_(setup.optics(level.problem.grid()).white),
       guard_(0),
       smoothness_(static_cast<float>(
           kTiesOfDensity * setup.smoothness.value_or(setup.options.smoothness.value_or(kLeastSmoothness)))),
@@ -113,6 +117,17 @@ void LitDescent::take_best() {
   density_ = ahead_ = best_;
   momentum_time_ = 1;
   shine();
+}
+
+bool LitDescent::take_back_a_rise() {
+  const double last = judge();
+  if (halvings() == 0 && last <= (1 + kRiseThatCounts) * lowest_error()) return false;
+  const std::vector<float> reached = density_;
+  take_best();
+  if (!(last <= (1 + kRiseThatCounts) * judge())) return true;
+  density_ = ahead_ = reached;
+  shine();
+  return false;
 }
 
 void LitDescent::set_light(const Light& light) {
@@ -155,36 +170,39 @@ void LitDescent::fit_colours() {
     if (has_rays(s)) engine().project(s);
   const std::vector<Rgba> shown = engine().residuals();
   const Problem& problem = level_.problem;
-  NormalEquations sums;
+  std::array<NormalEquations, 3> sums;
   const std::size_t fitted = problem.list.subset_begin[static_cast<std::size_t>(level_.subsets)];
   for (std::size_t ray = 0; ray < fitted; ++ray) {
     const auto a = static_cast<double>(shown[ray].c[0]);
     const auto b = static_cast<double>(shown[ray].c[1]);
-    sums.aa += a * a;
-    sums.ab += a * b;
-    sums.bb += b * b;
     for (std::size_t c = 0; c < 3; ++c) {
       const float behind = problem.background.empty() ? 0 : shown[ray].c[3] * problem.background[ray].c[c];
       const auto own = static_cast<double>(problem.seen[ray].c[c] - behind);
-      sums.a_seen[c] += a * own;
-      sums.b_seen[c] += b * own;
+      const bool is_met = light_.ambient[c] * a + light_.strength[c] * b > own;
+      if (is_met && is_bound(problem.seen[ray], c)) continue;
+      sums[c].add(a, b, own);
     }
   }
-  const double det = sums.aa * sums.bb - sums.ab * sums.ab;
-  const bool apart = light_.source != Light::Source::even && det > kSame * sums.aa * sums.bb;
   for (std::size_t c = 0; c < 3; ++c) {
+    const NormalEquations& s = sums[c];
+    const double det = s.aa * s.bb - s.ab * s.ab;
+    const bool apart = light_.source != Light::Source::even && det > kSame * s.aa * s.bb;
     double& ambient = light_.ambient[c];
     double& strength = light_.strength[c];
-    ambient = apart ? (sums.a_seen[c] * sums.bb - sums.b_seen[c] * sums.ab) / det : sums.ambient_alone(c);
-    strength = apart ? (sums.b_seen[c] * sums.aa - sums.a_seen[c] * sums.ab) / det : 0;
+    ambient = apart ? (s.a_seen * s.bb - s.b_seen * s.ab) / det : s.ambient_alone();
+    strength = apart ? (s.b_seen * s.aa - s.a_seen * s.ab) / det : 0;
     if (apart && (ambient < 0 || colours_ == Colours::strength)) {
       ambient = 0;
-      strength = sums.strength_alone(c);
+      strength = s.strength_alone();
     } else if (strength < 0) {
-      ambient = sums.ambient_alone(c);
+      ambient = s.ambient_alone();
       strength = 0;
     }
   }
+}
+
+bool LitDescent::is_bound(const Rgba& seen, std::size_t channel) const {
+  return white_ > 0 && (seen.c[channel] >= white_ || (static_cast<unsigned>(seen.c[3]) >> channel & 1U) != 0);
 }
 
 double LitDescent::mean_squared_light() const {

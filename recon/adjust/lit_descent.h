@@ -14,8 +14,9 @@ namespace emberlock::recon {
 /// the engine gives, and the curvature sum_c l_c^2 W + V majorises it for fixed R, W and V being those of
 /// Descent for emission and extinction. The Huber total variation, subsets, momentum and guard are Descent's
 /// too, those of s. R follows the density before each pass (its slope is left out), both colours are then the
-/// least squares of the pictures, none below 0: how much light there is and how much it meets only differ by
-/// what the medium absorbs, so the density keeps about the scale that it starts from.
+/// least squares of the pictures without saturated pixels that are shown bright enough, none below 0: how
+/// much light there is and how much it meets only differ by what the medium absorbs, so the density keeps
+/// about the scale that it starts from.
 ///
 /// Marches on the level's device, everything else on the CPU.
 class LitDescent {
@@ -41,6 +42,8 @@ class LitDescent {
   /// The volume becomes the one that the engine holds, or that before the pass that found the lowest error.
   void take_from_engine();
   void take_best();
+  /// take_best(), unless the volume shows the pictures about as well (kRiseThatCounts); whether it did.
+  bool take_back_a_rise();
   [[nodiscard]] double lowest_error() const { return guard_.best(); }
   [[nodiscard]] bool allows(double error) const { return guard_.allows(error); }
   [[nodiscard]] Engine& engine() { return descent_.engine(); }
@@ -58,6 +61,7 @@ class LitDescent {
   [[nodiscard]] std::vector<Rgba> volume(const std::vector<float>& density) const;
   void shine();
   void fit_colours();
+  [[nodiscard]] bool is_bound(const Rgba& seen, std::size_t channel) const;
   void step(int subset, float scale, float momentum);
   [[nodiscard]] double mean_squared_light() const;
 
@@ -66,6 +70,7 @@ class LitDescent {
   Descent descent_;  // weights, and the engine
   Light light_;
   Colours colours_ = Colours::both;
+  float white_;  // from here on what is seen are bounds, as Optics::white
   std::vector<float> weight_, field_weight_;
   std::vector<float> density_, ahead_, best_, reach_;
   Stiffness stiffness_;

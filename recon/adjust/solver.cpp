@@ -12,6 +12,7 @@
 #include "recon/adjust/tracker.h"
 #include "recon/effects/background.h"
 #include "recon/effects/refraction.h"
+#include "recon/hull/ray_list.h"
 #include "recon/render/scattered_source.h"
 
 namespace emberlock::recon {
@@ -43,8 +44,6 @@ Status check_request(const Scene& scene, const Grid& grid, const Effects& effect
                     "Start in darkness");
   if (effects.light.source == Light::Source::found)
     return refuse("the light isn't known yet", "effects", "Call choose_effects(), which finds it");
-  if (effects.light.source == Light::Source::nearby && is_inside(grid, effects.light.place))
-    return refuse("the nearby light stands inside of the box", "effects", "Give a place outside of it");
   if (options.iterations < 0)
     return refuse("a negative number of iterations", "iterations",
                   "Give 1 or more, or 0 for the solver's rule");
@@ -63,6 +62,14 @@ Status check_request(const Scene& scene, const Grid& grid, const Effects& effect
     return refuse("a target error without a held-out view", "target-rmse",
                   "Hold a view out, or leave the target away");
   return {};
+}
+
+/// The shade of a light nearby is told where the whole medium lies beyond it.
+Status check_place(const Light& light, const Hull& hull) {
+  if (light.source != Light::Source::nearby || !is_inside(crop_to_medium(hull).hull.grid, light.place))
+    return {};
+  return Error{ErrorKind::bad_input, "the nearby light stands inside of the box around the medium", "effects",
+               "Give a place outside of it"};
 }
 
 /// What is written, and what is said of it, are numbers; and the pictures that were fitted are shown better
@@ -126,6 +133,7 @@ Result<Reconstruction> solve(const PreparedScene& scene, const Grid& grid, const
   Reconstruction result;
   result.effects = effects;
   EMBERLOCK_ASSIGN_OR_RETURN(result.hull, carve(linear, *chosen, grid, options.compute));
+  EMBERLOCK_RETURN_IF_ERROR(check_place(effects.light, result.hull));
   result.hull_time = now() - start;
 
   Pool pool(options.compute.threads, device);

@@ -237,7 +237,9 @@ Result<EffectRequest> parse_auto(std::string_view text) {
   if (light != 0 && light != 1) return bad("light must be 1, or 0 where nothing is lit from outside");
   if (light == 0) assumed.light = {};
   if (!within(request.tolerance, 0, 255)) return bad("tolerance must lie in 0..255 grey levels");
-  EMBERLOCK_RETURN_IF_ERROR(check(assumed));
+  Effects values = assumed;
+  values.light = {};  // is looked for, on whatever extinction is found
+  EMBERLOCK_RETURN_IF_ERROR(check(values));
   return request;
 }
 
@@ -246,7 +248,6 @@ Status check_light(const Effects& effects) {
   if (light.source == Light::Source::none) return {};
   if (effects.scattering.order != Scattering::Order::none)
     return bad("light from outside is what the medium scatters: leave scattering out");
-  if (light.source == Light::Source::found) return {};
   if (effects.extinction.model != Extinction::Model::field)
     return bad("light needs extinction=field, which it falls on");
   constexpr double kFarthest = 1e6;

@@ -141,7 +141,8 @@ struct EffectRequest {
   std::optional<Effects> fixed;  ///< set by hand; otherwise found out from the pictures
   double tolerance = 0.5;        ///< grey levels: an effect that changes the pictures by less stays off
   /// What auto takes an effect to be like where the pictures can't tell: albedo (0: not known) and g, the
-  /// gas, exposure time (0: not known) and rise, gamma, white. Which effects are on in it doesn't matter.
+  /// gas, exposure time (0: not known) and rise, gamma, white; and whether a light is looked for (`light`
+  /// found or none). Which other effects are on in it doesn't matter.
   Effects assumed = assumed_effects();
 };
 

@@ -25,6 +25,7 @@ std::vector<std::string> error_words(const ErrorSummary& e) {
       "the light is known to +-{:.2g} % (one standard error, RMS where there is light){}: found by "
       "{} solves without some of the views, in {:.1f} s",
       percent, of_extinction, e.solves, e.views_time.value())};
+  if (!e.why_no_noise.empty()) words.push_back(e.why_no_noise);
   if (!e.noise) return words;
   const double share = e.emission > 0 ? e.noise->emission / e.emission : 0;
   words.push_back(

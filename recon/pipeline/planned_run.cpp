@@ -201,6 +201,8 @@ class PlannedRun {
     plan_.words.push_back(told_to ? "stopped after the reference run"
                                   : fmt::format("{:.3g} s left no time for more than the reference run",
                                                 asked_.solve.budget->value()));
+    if (asked_.effects && asked_.effects->fixed && asked_.effects->fixed->light.source != Light::Source::none)
+      plan_.words.push_back("the reference run takes the medium for one that glows: its light was left out");
     const Grid& grid = reference_.reconstruction.hull.grid;
     plan_.voxels = std::max({grid.nx, grid.ny, grid.nz}) - 1;
     plan_.iterations = reference_.reconstruction.iterations;

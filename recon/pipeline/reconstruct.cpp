@@ -64,9 +64,15 @@ PutRight with_cameras_put_right(const PreparedScene& told, const ReconstructOpti
   return result;
 }
 
-/// Before anything is solved: whether the lines could be told.
-Status check_temperature(const Scene& scene, const std::optional<TemperatureRequest>& request) {
+/// Before anything is solved: whether there is something that glows, and the lines could be told.
+Status check_temperature(const Scene& scene, const ReconstructOptions& options) {
+  const std::optional<TemperatureRequest>& request = options.temperature;
   if (!request) return {};
+  if (options.effects && options.effects->fixed &&
+      options.effects->fixed->light.source != Light::Source::none)
+    return Error{ErrorKind::bad_input,
+                 "a medium that is lit from outside doesn't glow: it shows no temperature", "--effects",
+                 "Leave the light out, or don't ask for temperatures"};
   return check_lines(response_for(*request, scene), taken_for(request->emitter), request->lines);
 }
 
@@ -77,11 +83,15 @@ Status measure(const Task& task, const ReconstructOptions& options, const Progre
   EMBERLOCK_ASSIGN_OR_RETURN(outcome.errors, errors_by_views(task.scene(), outcome.reconstruction,
                                                              options.solve, task.elapsed, progress));
   if (options.errors) {
-    if (options.solve.solver == Solver::standard) {
+    const bool lit = outcome.reconstruction.effects.light.source != Light::Source::none;
+    if (options.solve.solver == Solver::standard && !lit) {
       EMBERLOCK_ASSIGN_OR_RETURN(outcome.noise, errors_by_noise(task.scene(), outcome.reconstruction,
                                                                 options.solve, task.elapsed, progress));
     }
     outcome.report.errors = error_summary(outcome.reconstruction.volume, *outcome.errors, outcome.noise);
+    if (lit)
+      outcome.report.errors->why_no_noise =
+          "what of it the pictures' noise makes is not told: that is known of media that glow alone";
   }
   if (!options.temperature) return {};
   const Seconds start = task.elapsed();
@@ -138,7 +148,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
                             const Progress& progress,
                             const std::function<void(const Preview&)>& preview) try {
   const TimePoint start = clock.now();
-  EMBERLOCK_RETURN_IF_ERROR(check_temperature(scene, options.temperature));
+  EMBERLOCK_RETURN_IF_ERROR(check_temperature(scene, options));
   EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const Elapsed elapsed = [&] { return clock.now() - start; };
@@ -172,7 +182,7 @@ Result<Outcome> reconstruct(const Scene& scene, const ReconstructOptions& option
 Result<VoxelChoice> plan_voxels(const Scene& scene, const ReconstructOptions& options, const Clock& clock,
                                 const Progress& progress) try {
   const TimePoint start = clock.now();
-  EMBERLOCK_RETURN_IF_ERROR(check_temperature(scene, options.temperature));
+  EMBERLOCK_RETURN_IF_ERROR(check_temperature(scene, options));
   EMBERLOCK_ASSIGN_OR_RETURN(const PreparedScene told, PreparedScene::create(scene, {}));
   EMBERLOCK_ASSIGN_OR_RETURN(const Device device, resolve(options.solve.compute.device));
   const std::function<void(const Preview&)> nobody;

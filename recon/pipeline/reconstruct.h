@@ -62,7 +62,8 @@ struct ReconstructOptions {
   /// Whether a camera that points beside what its calibration says is put right (find_pointing.h), and said.
   bool correct_pointing = true;
   /// After the volume, and beside any budget: its errors, by a solve for each of up to ten views
-  /// (view_errors.h), and what of them noise makes (noise_errors.h; not of the paper's solver).
+  /// (view_errors.h), and what of them noise makes (noise_errors.h; not of the paper's solver, nor under a
+  /// light).
   bool errors = false;
   std::optional<TemperatureRequest> temperature = {};  ///< after the errors, which it needs
   std::shared_ptr<const TakenOver> taken_over = {};

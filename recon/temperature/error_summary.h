@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "recon/temperature/noise_errors.h"
 #include "recon/temperature/view_errors.h"
@@ -27,7 +28,8 @@ struct ErrorSummary {
     int probes = 0;
     Seconds time{0};
   };
-  std::optional<Noise> noise;  ///< nothing for the paper's solver, which has no parabola
+  std::optional<Noise> noise;  ///< nothing for the paper's solver, which has no parabola, and under a light
+  std::string why_no_noise;    ///< where it is worth a word
 };
 ErrorSummary error_summary(const Volume& volume, const VolumeErrors& errors,
                            const std::optional<NoiseErrors>& noise);

@@ -2,10 +2,15 @@
 // Light from outside that falls on a medium: what reaches a place, and the density that is solved for under
 // it.
 #include <cmath>
+#include <limits>
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
+#include "recon/adjust/choose_light.h"
+#include "recon/adjust/find_light.h"
 #include "recon/adjust/solver.h"
+#include "recon/pipeline/reconstruct.h"
+#include "tests/support/edit_view.h"
 #include "tests/support/lit_scene.h"
 #include "tests/support/small_flame.h"
 
@@ -13,6 +18,8 @@ namespace emberlock::recon {
 namespace {
 
 using Source = Light::Source;
+using testing::HasSubstr;
+using testing::Not;
 
 SolveOptions on_the_cpu(int threads = 0) {
   SolveOptions options;
@@ -107,10 +114,148 @@ TEST(LitSolve, ALightThatNobodyFoundIsRefused) {
   EXPECT_EQ(done.error().kind, ErrorKind::bad_input);
 }
 
+Scene small_lit_scene(const Light& truth) {
+  test::LitScene smoke;
+  smoke.image = {24, 24};
+  return film_lit(smoke, lit_truth(smoke, truth));
+}
+
+Effects under_light(const Light& light) {
+  Effects effects;
+  effects.light = light;
+  effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
+  return effects;
+}
+
+TEST(LitSolve, ALampMayStandBesideTheMediumInsideOfAGenerousBox) {
+  Scene scene = small_lit_scene(test::distant_light({1, 1, 1}));
+  scene.box.size.setConstant(0.25);
+  SolveOptions options = on_the_cpu();
+  options.iterations = 1;
+  const auto with_lamp_at = [&](double x) {
+    return solve(scene, grid_over(scene.box, 20), under_light(light_at(Source::nearby, {x, x, x})), options);
+  };
+  const auto beside = with_lamp_at(0.12);
+  EXPECT_TRUE(beside.ok()) << beside.error().message();
+  const auto inside = with_lamp_at(0.01);
+  ASSERT_FALSE(inside.ok());
+  EXPECT_EQ(inside.error().kind, ErrorKind::bad_input);
+}
+
+/// Taken for values they make it a sixth darker.
+TEST(LitSolve, SaturatedPixelsDoNotDarkenTheLight) {
+  const Light truth = test::distant_light({1, -0.5, 0.4});
+  Scene scene = small_lit_scene(truth);
+  const auto brightness = [&](const Effects& effects) {
+    const auto done = solve(scene, grid_over(scene.box, 16), effects, on_the_cpu());
+    EXPECT_TRUE(done.ok()) << done.error().message();
+    return done.ok() ? done->effects.light.strength[0] + done->effects.light.ambient[0] : 0;
+  };
+  Effects effects = under_light(truth);
+  const double unsaturated = brightness(effects);
+  effects.sensor.clipping = Sensor::Clipping::at_white;
+  const float white = 140;
+  effects.sensor.white = white;
+  for (View& view : scene.views)
+    edit(view.image, [&](RadianceImage& image) {
+      for (float& value : image.rgb) value = std::min(value, white);
+    });
+  EXPECT_NEAR(brightness(effects), unsaturated, 0.1 * unsaturated);
+}
+
+/// choose_light() on lit smoke, as choose_effects() calls it.
+struct LightSearch {
+  Scene scene = small_lit_scene(test::distant_light({1, -0.5, 0.4}));
+  SolveOptions options = on_the_cpu();
+  Pool pool{0};
+  int looks = 0;                               ///< at the clock
+  int most = std::numeric_limits<int>::max();  ///< before the budget is spent
+
+  template <class Look>
+  auto with_setup(const Look& look) {
+    const auto prepared = PreparedScene::create(scene, {});
+    const SharedMasks masks = prepared->masks(std::nullopt, options.compute);
+    const auto hull = carve(scene, *masks, grid_over(scene.box, 12), options.compute);
+    SolverSetup setup{{}, {}, *hull, {}, options, pool};
+    for (std::size_t v = 0; v < scene.views.size(); ++v) {
+      if (scene.views[v].role != ViewRole::input) continue;
+      setup.views.push_back(&scene.views[v]);
+      setup.boxes.push_back((*masks)[v].box);
+    }
+    return look(setup);
+  }
+  Elapsed clock() {
+    looks = 0;
+    return [&] { return Seconds(++looks > most ? 1 : 0); };
+  }
+  LightChoice choice(const EffectRequest& request = {}) {
+    return with_setup([&](const SolverSetup& setup) {
+      return choose_light(setup, {Extinction::Model::field, PerMeter(0), PerMeter(5)}, true, request,
+                          clock());
+    });
+  }
+};
+
+TEST(LightChoice, WithoutTimeToCompareNothingIsBelieved) {
+  LightSearch search;
+  search.options.budget = Seconds(1);
+  const FoundLight found = search.with_setup([&](const SolverSetup& setup) {
+    return find_light(setup, light_at(Source::found, {}), search.clock());
+  });
+  ASSERT_EQ(found.light.source, Source::distant);
+  search.most = search.looks + 3;  // before the search, and as the first half of the comparison begins
+  const EffectReport cut = search.choice().report;
+  EXPECT_FALSE(cut.on);
+  EXPECT_EQ(cut.predicted_change, 0);
+  EXPECT_THAT(cut.reason, HasSubstr("no time to compare"));
+  EXPECT_THAT(cut.reason, Not(HasSubstr("inf")));
+}
+
+TEST(LightChoice, OfALightByHandNothingIsSaidThatWasNotTried) {
+  LightSearch search;
+  EffectRequest request;
+  request.fixed = under_light(light_at(Source::distant, {1, -0.5, 0.4}));
+  EXPECT_THAT(search.choice(request).report.reason, Not(HasSubstr("even light")));
+  const FoundLight found =
+      search.with_setup([&](const SolverSetup& setup) { return find_light(setup, request.fixed->light); });
+  EXPECT_FALSE(found.even_error);
+}
+
+ReconstructOptions under_a_light_by_hand() {
+  ReconstructOptions options;
+  options.voxels = 12;
+  options.solve = on_the_cpu();
+  options.solve.iterations = 2;
+  options.effects = EffectRequest{under_light(light_at(Source::distant, {1, -0.5, 0.4}))};
+  return options;
+}
+
+TEST(LitReconstruction, HasNoTemperature) {
+  ReconstructOptions options = under_a_light_by_hand();
+  options.temperature = TemperatureRequest{};
+  options.effects->fixed->light.source = Source::found;
+  const auto outcome =
+      reconstruct(small_lit_scene(test::distant_light({1, -0.5, 0.4})), options, SteadyClock());
+  ASSERT_FALSE(outcome.ok());
+  EXPECT_EQ(outcome.error().kind, ErrorKind::bad_input);
+}
+
+TEST(LitReconstruction, SaysWhyNoiseHasNoErrors) {
+  ReconstructOptions options = under_a_light_by_hand();
+  options.errors = true;
+  const auto outcome =
+      reconstruct(small_lit_scene(test::distant_light({1, -0.5, 0.4})), options, SteadyClock());
+  ASSERT_TRUE(outcome.ok()) << outcome.error().message();
+  EXPECT_FALSE(outcome->noise);
+  EXPECT_FALSE(outcome->report.errors->noise);
+  EXPECT_FALSE(outcome->report.errors->why_no_noise.empty());
+}
+
 TEST(ParseLight, ReadsEachOfItsWords) {
   EXPECT_EQ(parse_effects("light=none")->fixed->light.source, Source::none);
   EXPECT_EQ(parse_effects("light=none")->fixed->extinction.model, Extinction::Model::none);
   EXPECT_EQ(parse_effects("light=even")->fixed->extinction.model, Extinction::Model::field);
+  EXPECT_EQ(parse_effects("light=found,extinction=field")->fixed->light.source, Source::found);
   const auto near = parse_effects("light=nearby:x=1:y=-2:z=0.5");
   ASSERT_TRUE(near.ok());
   EXPECT_EQ(near->fixed->light.source, Source::nearby);
@@ -124,8 +269,8 @@ TEST(ParseLight, RefusesWhatItCannotRead) {
   for (const char* words :
        {"light", "light=", "light=sun", "light=distant", "light=distant:x=0", "light=distant:x=one",
         "light=distant:x=1:w=2", "light=even:x=1", "light=nearby:x=1e9", "light=found,light=even",
-        "light=even,extinction=none", "light=even,extinction=3", "auto:light=2",
-        "light=found,extinction=field,scattering=single"})
+        "light=even,extinction=none", "light=even,extinction=3", "light=found,extinction=none",
+        "light=found,extinction=3", "auto:light=2", "light=found,extinction=field,scattering=single"})
     EXPECT_FALSE(parse_effects(words).ok()) << words;
 }
 

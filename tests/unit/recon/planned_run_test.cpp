@@ -99,6 +99,13 @@ TEST_P(Budget, TooSmallForAnythingElseGivesTheReferenceRun) {
   EXPECT_GT(outcome.report.plan->over_budget.value(), 0);
 }
 
+TEST_P(Budget, TooSmallForALightSaysThatItWasLeftOut) {
+  ReconstructOptions options = with_budget(1e-4);
+  options.effects = *parse_effects("light=distant:z=1");
+  const Outcome outcome = run(options);
+  EXPECT_THAT(outcome.report.plan->words, Contains(HasSubstr("light was left out")));
+}
+
 TEST_P(Budget, LeavesNoTimeForEffectsWhereTheUsersVoxelsTakeIt) {
   ReconstructOptions options = with_budget(1e-4);
   options.effects.reset();

@@ -356,7 +356,7 @@ export HOME={} XDG_RUNTIME_DIR={}
 cd $HOME
 {} --print-config | sed 's/^#\(http_listen = "127.0.0.1:\)7140/\10/' > rig.toml
 {} --config rig.toml 2> log & daemon=$!
-for i in $(seq 100); do {} status --json > status 2> error && break; sleep 0.1; done
+for i in $(seq 100); do {} status --json > status 2> error && grep -q phase status && break; sleep 0.1; done
 {} console >> status 2>> error
 kill $daemon; wait $daemon; echo "ended $?" >> status
 cat status error log; find . $XDG_RUNTIME_DIR -printf '%M %p\n'

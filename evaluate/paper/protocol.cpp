@@ -2,6 +2,7 @@
 #include "evaluate/paper/protocol.h"
 
 #include <algorithm>
+#include <cstddef>
 
 namespace emberlock::evaluate {
 
@@ -25,6 +26,7 @@ Result<std::vector<Protocol>> choose_protocols(const std::vector<std::string>& n
 
 std::vector<CameraPlace> ring(int count, double first) {
   std::vector<CameraPlace> cameras;
+  cameras.reserve(static_cast<std::size_t>(count));
   for (int i = 0; i < count; ++i)
     cameras.push_back({first + 360.0 * i / count, i % 2 == 0 ? 10.0 : -10.0, recon::ViewRole::input});
   return cameras;

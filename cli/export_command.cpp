@@ -121,7 +121,7 @@ Result<float> white_of(const ExportArguments& a, const std::vector<ResultVolume>
       empty = empty && std::all_of(grid.values.begin(), grid.values.end(), [](float v) { return v == 0; });
     return {};
   });
-  EMBERLOCK_RETURN_IF_ERROR(read);
+  if (!read.ok()) return read.error();
   if (!empty) return white;
   return Error{ErrorKind::bad_input, "is empty: no key point has any value", a.result,
                "See what its report.html says of it"};
@@ -163,7 +163,7 @@ Status export_result(const ExportArguments& a, const std::string& program) try {
     EMBERLOCK_ASSIGN_OR_RETURN(volume, shared_volume(a, from, white, program));
     return format.write(volume, folder.path() / file_name(from, format.ending));
   });
-  EMBERLOCK_RETURN_IF_ERROR(written);
+  if (!written.ok()) return written.error();
   EMBERLOCK_RETURN_IF_ERROR(folder.commit());
   tell(bar, 1, "done");
   print(a, volumes, volume, white);

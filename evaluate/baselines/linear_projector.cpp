@@ -108,7 +108,7 @@ void LinearProjector::back_project(const Light& y, Light& x) const {
   // Even slabs, then odd ones: no two that are written at the same time share a key point.
   for (int parity = 0; parity < 2; ++parity) {
     pool_.run((problem_.slab_count() + 1 - parity) / 2, [&](int task) {
-      const auto slab = static_cast<std::size_t>(2 * task + parity);
+      const auto slab = 2 * static_cast<std::size_t>(task) + static_cast<std::size_t>(parity);
       const std::size_t count = slabs.begin[slab + 1] - slabs.begin[slab];
       if (count > 0) march(work, &slabs.run[slabs.begin[slab]], count);
     });

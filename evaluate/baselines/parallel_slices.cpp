@@ -75,9 +75,10 @@ void resample(const recon::View& view, const ParallelSlices& slices, ParallelPic
   const int samples = static_cast<int>(std::clamp(std::ceil(pixels), 1.0, double{kMostSamples}));
   const recon::RadianceImage flame = flame_alone(*view.image);
   picture.light.resize(slices.profile() * static_cast<std::size_t>(grid.nz));
+  const int middle_offset = slices.offsets / 2;
   for (int k = 0; k < grid.nz; ++k)
     for (int b = 0; b < slices.offsets; ++b) {
-      const double offset = edge * (b - slices.offsets / 2);
+      const double offset = edge * (b - middle_offset);
       const Eigen::Vector3d at =
           middle + offset * across + edge * (k - (grid.nz - 1) / 2.0) * Eigen::Vector3d::UnitZ();
       const Eigen::Vector3d colour = mean_around(view.camera, flame, at, across, edge, samples);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -11,6 +12,7 @@
 #include "recon/preprocess/flame_mask.h"
 #include "recon/render/render.h"
 #include "recon/synthetic/flame.h"
+#include "tests/support/ball_scene.h"
 
 namespace emberlock::test {
 
@@ -56,6 +58,19 @@ inline TomographyErrors errors_of(const recon::Scene& scene, const evaluate::Met
   }
   return {std::sqrt(sum.input / inputs), std::sqrt(sum.input_dark / inputs), std::sqrt(sum.held_out / others),
           std::sqrt(sum.held_out_dark / others)};
+}
+
+/// Of a small ball from five sides: the light that a method finds over all of it. Its lines of sight see 200
+/// exp(-r^2 / 2 sigma^2), so the light is 200 2 pi sigma^2.
+inline double share_of_a_balls_light(evaluate::RunMethod run, int voxels) {
+  BallOptions ball;
+  ball.views = 5;
+  ball.image = {32, 24};
+  const recon::Volume volume = run(ball_scene(ball), with_voxels(voxels)).value().volume;
+  double light = 0;
+  for (std::size_t p = 0; p < volume.grid.size(); ++p)
+    light += static_cast<double>(volume.emission[3 * p]) * std::pow(volume.grid.edge, 3);
+  return light / (200 * 2 * std::numbers::pi * std::pow(ball.edge / 8, 2));
 }
 
 /// What every tomographic method refuses, by the kind of the error.

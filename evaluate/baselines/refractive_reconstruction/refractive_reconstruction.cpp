@@ -66,12 +66,8 @@ Result<ThroughGas> reconstruct_through_gas(const TomographyInput& input, recon::
 }
 
 Result<MethodResult> refractive_reconstruction(const recon::Scene& scene, const MethodOptions& options) {
-  std::optional<RatioThermometer> thermometer;
-  if (options.response) {
-    EMBERLOCK_ASSIGN_OR_RETURN(RatioThermometer made,
-                               RatioThermometer::make(*options.response, options.emitter));
-    thermometer = std::move(made);
-  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<RatioThermometer> thermometer,
+                             RatioThermometer::told(options));
   EMBERLOCK_ASSIGN_OR_RETURN(const TomographyInput input, find_input(scene, options, 2));
   recon::Pool pool(options.compute.threads, recon::Device::cpu);
   ReadTemperature read;

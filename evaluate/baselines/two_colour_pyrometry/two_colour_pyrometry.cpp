@@ -43,6 +43,12 @@ Result<RatioThermometer> RatioThermometer::make(const recon::CameraResponse& res
   return RatioThermometer(std::move(log_ratios));
 }
 
+Result<std::optional<RatioThermometer>> RatioThermometer::told(const MethodOptions& options) {
+  if (!options.response) return std::optional<RatioThermometer>();
+  EMBERLOCK_ASSIGN_OR_RETURN(RatioThermometer made, make(*options.response, options.emitter));
+  return std::optional(std::move(made));
+}
+
 Kelvin RatioThermometer::read(double red, double green) const {
   if (!(red > 0 && green > 0)) return Kelvin(0);
   const double ratio = std::log(red) - std::log(green);
@@ -71,12 +77,8 @@ std::vector<float> kelvin_by_ratio(const recon::Volume& volume, const RatioTherm
 }
 
 Result<MethodResult> two_colour_pyrometry(const recon::Scene& scene, const MethodOptions& options) {
-  std::optional<RatioThermometer> thermometer;
-  if (options.response) {
-    EMBERLOCK_ASSIGN_OR_RETURN(RatioThermometer made,
-                               RatioThermometer::make(*options.response, options.emitter));
-    thermometer = std::move(made);
-  }
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::optional<RatioThermometer> thermometer,
+                             RatioThermometer::told(options));
   EMBERLOCK_ASSIGN_OR_RETURN(const TomographyInput input, find_input(scene, options, 2));
   recon::Pool pool(options.compute.threads, recon::Device::cpu);
   const LinearProjector projector(input.views, input.hull, 1, pool);

@@ -26,6 +26,8 @@ class RatioThermometer {
   /// response for both).
   static Result<RatioThermometer> make(const recon::CameraResponse& response,
                                        recon::Emitter emitter = recon::Emitter::grey);
+  /// The same by what a method is told; nothing where it is told no response.
+  static Result<std::optional<RatioThermometer>> told(const MethodOptions& options);
 
   /// 0 where a channel isn't above 0, or the ratio is none of these temperatures'.
   [[nodiscard]] Kelvin read(double red, double green) const;

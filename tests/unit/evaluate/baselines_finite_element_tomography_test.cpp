@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <numbers>
 
 #include <gmock/gmock.h>
 
 #include "base/random.h"
 #include "evaluate/baselines/finite_element_tomography/element_basis.h"
 #include "evaluate/baselines/finite_element_tomography/finite_element_tomography.h"
-#include "tests/support/ball_scene.h"
 #include "tests/support/tomography_scene.h"
 
 namespace emberlock::evaluate {
@@ -77,16 +75,8 @@ TEST(FiniteElementTomography, ShowsAFlameThatNothingAbsorbs) {
   for (const float e : result->volume.emission) ASSERT_GE(e, 0);
 }
 
-/// All light of a ball whose lines of sight see 200 exp(-r^2 / 2 sigma^2) is 200 2 pi sigma^2.
 TEST(FiniteElementTomography, FindsAllLightOfABall) {
-  BallOptions ball;
-  ball.views = 5;
-  ball.image = {32, 24};
-  const MethodResult result = finite_element_tomography(ball_scene(ball), with_voxels(12)).value();
-  double light = 0;
-  for (std::size_t p = 0; p < result.volume.grid.size(); ++p)
-    light += static_cast<double>(result.volume.emission[3 * p]) * std::pow(result.volume.grid.edge, 3);
-  EXPECT_NEAR(light / (200 * 2 * std::numbers::pi * std::pow(ball.edge / 8, 2)), 1, 0.02);
+  EXPECT_NEAR(test::share_of_a_balls_light(finite_element_tomography, 12), 1, 0.02);
 }
 
 TEST(FiniteElementTomography, HasTheSameBitsForAnyNumberOfThreads) {

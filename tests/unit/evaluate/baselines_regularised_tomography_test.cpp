@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <numbers>
 
 #include <gmock/gmock.h>
 
@@ -8,7 +7,6 @@
 #include "evaluate/baselines/left_out_views.h"
 #include "evaluate/baselines/penalties.h"
 #include "evaluate/baselines/regularised_tomography/regularised_tomography.h"
-#include "tests/support/ball_scene.h"
 #include "tests/support/tomography_scene.h"
 
 namespace emberlock::evaluate {
@@ -120,16 +118,8 @@ TEST_P(RegularisedTomography, ShowsAFlameThatNothingAbsorbs) {
   for (const float e : result->volume.emission) ASSERT_GE(e, 0);
 }
 
-/// All light of a ball whose lines of sight see 200 exp(-r^2 / 2 sigma^2) is 200 2 pi sigma^2.
 TEST_P(RegularisedTomography, FindsAllLightOfABall) {
-  BallOptions ball;
-  ball.views = 5;
-  ball.image = {32, 24};
-  const MethodResult result = GetParam()(ball_scene(ball), with_voxels(10)).value();
-  double light = 0;
-  for (std::size_t p = 0; p < result.volume.grid.size(); ++p)
-    light += static_cast<double>(result.volume.emission[3 * p]) * std::pow(result.volume.grid.edge, 3);
-  EXPECT_NEAR(light / (200 * 2 * std::numbers::pi * std::pow(ball.edge / 8, 2)), 1, 0.02);
+  EXPECT_NEAR(test::share_of_a_balls_light(GetParam(), 10), 1, 0.02);
 }
 
 TEST_P(RegularisedTomography, HasTheSameBitsForAnyNumberOfThreads) {

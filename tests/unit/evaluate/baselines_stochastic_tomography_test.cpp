@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cmath>
-#include <numbers>
 
 #include <gmock/gmock.h>
 
@@ -8,7 +7,6 @@
 #include "evaluate/baselines/stochastic_tomography/footprints.h"
 #include "evaluate/baselines/stochastic_tomography/random_walk.h"
 #include "evaluate/baselines/stochastic_tomography/stochastic_tomography.h"
-#include "tests/support/ball_scene.h"
 #include "tests/support/tomography_scene.h"
 
 namespace emberlock::evaluate {
@@ -81,16 +79,8 @@ TEST(StochasticTomography, ShowsAFlameThatNothingAbsorbs) {
   EXPECT_LT(errors.held_out, 0.18 * errors.held_out_dark);
 }
 
-/// All light of a ball whose lines of sight see 200 exp(-r^2 / 2 sigma^2) is 200 2 pi sigma^2.
 TEST(StochasticTomography, FindsAllLightOfABall) {
-  BallOptions ball;
-  ball.views = 5;
-  ball.image = {32, 24};
-  const MethodResult result = stochastic_tomography(ball_scene(ball), with_voxels(10)).value();
-  double light = 0;
-  for (std::size_t p = 0; p < result.volume.grid.size(); ++p)
-    light += static_cast<double>(result.volume.emission[3 * p]) * std::pow(result.volume.grid.edge, 3);
-  EXPECT_NEAR(light / (200 * 2 * std::numbers::pi * std::pow(ball.edge / 8, 2)), 1, 0.02);
+  EXPECT_NEAR(test::share_of_a_balls_light(stochastic_tomography, 10), 1, 0.02);
 }
 
 TEST(StochasticTomography, HasTheSameBitsForAnyNumberOfThreads) {

@@ -28,6 +28,21 @@ SolveOptions on_the_cpu(int threads = 0) {
   return options;
 }
 
+/// Lit from one side, and its light as it is.
+struct SmallSmoke {
+  Scene scene;
+  Effects effects;
+};
+SmallSmoke small_smoke() {
+  test::LitScene smoke;
+  smoke.image = {24, 24};
+  SmallSmoke lit;
+  lit.effects.light = test::distant_light({1, -0.5, 0.4});
+  lit.effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
+  lit.scene = film_lit(smoke, lit_truth(smoke, lit.effects.light));
+  return lit;
+}
+
 std::vector<Rgba> even_medium(const Grid& g, float a_metre) {
   std::vector<Rgba> medium(g.size());
   for (Rgba& x : medium) x.c[3] = g.edge * a_metre;
@@ -69,13 +84,7 @@ TEST(LightThatReaches, EvenLightIsShadedByNothing) {
 }
 
 TEST(LitSolve, EmissionIsTheDensityTimesTheLightThatReachesIt) {
-  test::LitScene smoke;
-  smoke.image = {24, 24};
-  const Light truth = test::distant_light({1, -0.5, 0.4});
-  const Scene scene = film_lit(smoke, lit_truth(smoke, truth));
-  Effects effects;
-  effects.light = truth;
-  effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
+  const auto [scene, effects] = small_smoke();
   const auto done = solve(scene, grid_over(scene.box, 16), effects, on_the_cpu());
   ASSERT_TRUE(done.ok()) << done.error().message();
   const Light& light = done->effects.light;
@@ -90,15 +99,9 @@ TEST(LitSolve, EmissionIsTheDensityTimesTheLightThatReachesIt) {
 }
 
 TEST(LitSolve, SameBitsForEveryNumberOfThreads) {
-  test::LitScene smoke;
-  smoke.image = {24, 24};
-  const Light truth = test::distant_light({1, -0.5, 0.4});
-  const Scene scene = film_lit(smoke, lit_truth(smoke, truth));
-  Effects effects;
-  effects.light = truth;
-  effects.extinction = {Extinction::Model::field, PerMeter(0), PerMeter(5)};
+  const SmallSmoke smoke = small_smoke();
   const auto with = [&](int threads) {
-    return solve(scene, grid_over(scene.box, 16), effects, on_the_cpu(threads));
+    return solve(smoke.scene, grid_over(smoke.scene.box, 16), smoke.effects, on_the_cpu(threads));
   };
   const auto one = with(1);
   const auto four = with(4);

@@ -79,7 +79,8 @@ Image coloured(const evaluate::TemperatureSlice& slice, const std::vector<float>
   Image out(ImageLayout{slice.size, PixelFormat::rgb8, 8});
   for (int y = 0; y < slice.size.height; ++y)
     for (int x = 0; x < slice.size.width; ++x) {
-      const auto at = static_cast<std::size_t>(y * slice.size.width + x);
+      const auto at = static_cast<std::size_t>(y) * static_cast<std::size_t>(slice.size.width) +
+                      static_cast<std::size_t>(x);
       if (!(slice.truth[at] > 0) || !(slice.found[at] > 0)) continue;
       const double share = std::clamp((static_cast<double>(kelvin[at]) - low) / (high - low), 0.0, 1.0);
       const Rgb& colour = inferno()[static_cast<std::size_t>(std::lround(255 * share))];

@@ -29,6 +29,7 @@ RunErrors errors_from(const Json& json) {
 Json json_of(const TemperatureSlice& slice) {
   const auto whole = [](const std::vector<float>& kelvin) {
     std::vector<int> out;
+    out.reserve(kelvin.size());
     for (const float k : kelvin) out.push_back(static_cast<int>(std::lround(k)));
     return out;
   };

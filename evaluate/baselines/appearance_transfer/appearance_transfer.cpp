@@ -232,6 +232,7 @@ Result<MethodResult> appearance_transfer(const recon::Scene& scene, const Method
 
   recon::Volume volume{slices.grid, std::vector<float>(3 * slices.grid.size()), {}};
   std::vector<Aim> aims;
+  aims.reserve(inputs.size());
   for (const ParallelPicture& input : inputs)
     aims.push_back({&input, ParallelProjector(slices, input.across), 1 / static_cast<float>(inputs.size())});
   each_layer(slices, options, [&](int k) {

@@ -67,7 +67,7 @@ SteerablePyramid::SteerablePyramid(int width, int height)
     : width_(width), height_(height), across_(fast_size(width)), down_(fast_size(height)) {
   // The coarsest octave has some four waves across the picture.
   const int octaves = std::max(1, static_cast<int>(std::log2(std::min(width, height) / 8.0)));
-  filters_.resize(static_cast<std::size_t>(2 + octaves * kOrientations));
+  filters_.resize(band(octaves, 0) + 1);
   for (Filter& filter : filters_)
     filter.gain.resize(static_cast<std::size_t>(across_) * static_cast<std::size_t>(down_));
   // The sum of cos^6 over four orientations is 5/4 in every direction.
@@ -95,7 +95,8 @@ SteerablePyramid::SteerablePyramid(int width, int height)
 }
 
 std::size_t SteerablePyramid::band(int octave, int orientation) {
-  return static_cast<std::size_t>(1 + octave * kOrientations + orientation);
+  return std::size_t{1} + static_cast<std::size_t>(octave) * kOrientations +
+         static_cast<std::size_t>(orientation);
 }
 
 std::vector<std::vector<float>> SteerablePyramid::analyse(const std::vector<float>& picture) const {
@@ -127,9 +128,9 @@ std::vector<float> SteerablePyramid::synthesise(const std::vector<std::vector<fl
   transform(sum, across_, down_, Transform::inverse);
   std::vector<float> picture(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   for (int y = 0; y < height_; ++y)
-    for (int x = 0; x < width_; ++x)
-      picture[static_cast<std::size_t>(y * width_ + x)] =
-          sum[static_cast<std::size_t>(y * across_ + x)].real();
+    std::transform(
+        sum.begin() + std::ptrdiff_t{y} * across_, sum.begin() + std::ptrdiff_t{y} * across_ + width_,
+        picture.begin() + std::ptrdiff_t{y} * width_, [](const Complex& value) { return value.real(); });
   return picture;
 }
 

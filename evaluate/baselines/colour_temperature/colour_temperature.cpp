@@ -108,8 +108,8 @@ class ColourSlices {
  private:
   /// The ray that passes a key point, counted from the left.
   [[nodiscard]] double ray(std::size_t view, int i, int j) const {
-    return pictures_[view]->across.dot(slices_.place(i, j)) / static_cast<double>(slices_.grid.edge) +
-           slices_.offsets / 2;
+    const int middle = slices_.offsets / 2;
+    return pictures_[view]->across.dot(slices_.place(i, j)) / static_cast<double>(slices_.grid.edge) + middle;
   }
 
   /// Whether one of the eight voxels around a key point is.

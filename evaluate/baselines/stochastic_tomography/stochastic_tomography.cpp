@@ -19,6 +19,7 @@ Fit walk(const LinearProjector& projector, double weight, const MethodOptions& o
   const Footprints prints = footprints_of(projector);
   const Channels weights = variation_weights(projector, weight);
   std::vector<RandomWalk> walks;
+  walks.reserve(3);
   for (int c = 0; c < 3; ++c)
     walks.emplace_back(lattice, prints, projector.seen(), c, weights[static_cast<std::size_t>(c)],
                        options.seed);

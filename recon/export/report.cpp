@@ -143,7 +143,8 @@ ordered_json temperature_json(const std::optional<TemperatureSummary>& temperatu
         {"cost_before", t.joint.before},
         {"cost_after", t.joint.after},
         {"last_drop", t.joint.last_drop},
-        {"moved", t.joint.moved}}},
+        {"moved", t.joint.moved},
+        {"left_out", or_null(t.joint.left_out)}}},
       {"seconds",
        {{"errors", t.errors_time.value()}, {"reading", t.time.value()}, {"joint", t.joint.time.value()}}}};
 }

@@ -114,8 +114,8 @@ struct Report {
 /// extinction, probes, seconds}}), `temperature` (null unless asked for: {emitter, absolute, by_absorption,
 /// opacity, mean, low, high, sigma, chi_square, emitter_told, if_other, emitting, told, colder, hotter,
 /// unclear, other, saturated, mixed, line_alone, alike, lines {automatic, found [{name, share, seen}], alike
-/// [names]}, joint {iterations, cost_before, cost_after, last_drop, moved}, solves, seconds {errors, reading,
-/// joint}}) and what describes the run. Held-out errors are null when nothing is held out.
+/// [names]}, joint {iterations, cost_before, cost_after, last_drop, moved, left_out}, solves, seconds
+/// {errors, reading, joint}}) and what describes the run. Held-out errors are null when nothing is held out.
 std::string to_json(const Report& report);
 
 }  // namespace emberlock::recon

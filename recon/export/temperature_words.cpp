@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "recon/export/temperature_words.h"
 
+#include <cmath>
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
@@ -106,6 +108,11 @@ std::vector<std::string> temperature_words(const TemperatureSummary& t) {
                     t.emitter == Emitter::grey ? "soot, which isn't grey" : "grey", t.if_other,
                     t.emitter == Emitter::grey ? "soot" : "grey",
                     t.emitter_told ? "" : ": which of the two isn't told, and each error holds it"));
+  if (t.joint.left_out)
+    words.push_back(
+        fmt::format("solved together they show views that were left out {:.1f} % {} than as read{}",
+                    100 * std::abs(1 - *t.joint.left_out), *t.joint.left_out < 1 ? "better" : "worse",
+                    t.joint.is_believed() ? "" : ": each is as it was read"));
   if (t.joint.iterations > 0)
     words.push_back(fmt::format(
         "solved together by the pictures, {} steps in {:.1f} s: they moved by {:.0f} K "

@@ -20,33 +20,86 @@ constexpr double kDropThatCounts = 1e-4;  // of the cost: less ends it
 constexpr GlowTies kTies{0.1, 0.1};
 constexpr double kMostMomentum = 0.95;
 
-/// What a problem's key points show, and where they lie in the whole grid.
-struct Begin {
-  GlowStart start;
-  GlowField<float> at;
-  std::vector<std::size_t> place;
-};
+/// The rays of a scene's input views, and what they cost.
+class JointProblem {
+ public:
+  JointProblem(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
+               const SolveOptions& options, const GlowField<float>& from)
+      : scene_(prepared(scene, done)),
+        pool_(options.compute.threads),
+        problem_(problem_of(done, options)),
+        place_(place_in(done.volume.grid)),
+        cost_(problem_, start_at(done, options, from), EmitterColours(table), pool_) {}
 
-Begin begin_at(const Problem& problem, const Optics& optics, const Reconstruction& done,
-               const std::vector<float>& kelvin) {
-  const Grid& part = problem.grid();
-  Begin begin{{to_solution(done.volume, problem, done.effects), std::vector<float>(part.size()),
-               optics.absorb, static_cast<double>(optics.sigma), optics.white},
-              {std::vector<float>(part.size()), std::vector<float>(part.size())},
-              std::vector<std::size_t>(part.size())};
-  const int* offset = problem.crop.offset;
-  for (int k = 0; k < part.nz; ++k)
-    for (int j = 0; j < part.ny; ++j)
-      for (int i = 0; i < part.nx; ++i) {
-        const std::size_t p = part.index(i, j, k);
-        const std::size_t w = done.volume.grid.index(i + offset[0], j + offset[1], k + offset[2]);
-        const Rgba& light = begin.start.light[p];
-        if (kelvin[w] > 0) begin.start.total[p] = light.c[0] + light.c[1] + light.c[2];
-        begin.at.kelvin[p] = kelvin[w];
-        begin.place[p] = w;
-      }
-  return begin;
-}
+  [[nodiscard]] GlowCost<float>& cost() { return cost_; }
+  [[nodiscard]] const std::vector<float>& total() const { return total_; }
+  /// Of the reconstruction's key points those of the problem.
+  [[nodiscard]] GlowField<float> of_whole(const GlowField<float>& whole) const {
+    GlowField<float> part{std::vector<float>(place_.size()), std::vector<float>(place_.size())};
+    for (std::size_t p = 0; p < place_.size(); ++p) {
+      part.brightness[p] = whole.brightness[place_[p]];
+      part.kelvin[p] = whole.kelvin[place_[p]];
+    }
+    return part;
+  }
+  /// Where it moves.
+  void put(const GlowField<float>& part, GlowField<float>& whole) const {
+    for (std::size_t p = 0; p < place_.size(); ++p) {
+      if (!(total_[p] > 0)) continue;
+      whole.brightness[place_[p]] = part.brightness[p];
+      whole.kelvin[place_[p]] = part.kelvin[p];
+    }
+  }
+
+ private:
+  static PreparedScene prepared(const Scene& scene, const Reconstruction& done) {
+    auto made = PreparedScene::create(scene, done.effects);
+    if (!made.ok()) throw std::logic_error(made.error().message());
+    return *std::move(made);
+  }
+  [[nodiscard]] SolverSetup setup(const Reconstruction& done, const SolveOptions& options) {
+    SolverSetup setup{{}, {}, done.hull, done.effects, options, pool_};
+    for (const View& view : scene_.scene().views)
+      if (view.role == ViewRole::input) setup.views.push_back(&view);
+    return setup;
+  }
+  Problem problem_of(const Reconstruction& done, const SolveOptions& options) {
+    const SolverSetup own = setup(done, options);
+    ProblemOptions rays = own.problem_options();
+    rays.rule.stride = stride_for(own, done.volume.grid);
+    rays.subsets = rays.rule.dealt = kSubsets;
+    return make_problem(own.views, done.hull, rays, pool_);
+  }
+  [[nodiscard]] std::vector<std::size_t> place_in(const Grid& whole) const {
+    const Grid& part = problem_.grid();
+    const int* offset = problem_.crop.offset;
+    std::vector<std::size_t> place;
+    place.reserve(part.size());
+    for (int k = 0; k < part.nz; ++k)
+      for (int j = 0; j < part.ny; ++j)
+        for (int i = 0; i < part.nx; ++i)
+          place.push_back(whole.index(i + offset[0], j + offset[1], k + offset[2]));
+    return place;
+  }
+  GlowStart start_at(const Reconstruction& done, const SolveOptions& options, const GlowField<float>& from) {
+    const Optics optics = setup(done, options).optics(done.volume.grid);
+    GlowStart start{to_solution(done.volume, problem_, done.effects), std::vector<float>(place_.size()),
+                    optics.absorb, static_cast<double>(optics.sigma), optics.white};
+    for (std::size_t p = 0; p < place_.size(); ++p) {
+      const Rgba& light = start.light[p];
+      if (from.kelvin[place_[p]] > 0) start.total[p] = light.c[0] + light.c[1] + light.c[2];
+    }
+    total_ = start.total;
+    return start;
+  }
+
+  PreparedScene scene_;
+  Pool pool_;
+  Problem problem_;
+  std::vector<std::size_t> place_;  // of its key points in the whole grid
+  std::vector<float> total_;        // the light that moves, levels a voxel edge
+  GlowCost<float> cost_;
+};
 
 /// Nesterov's accelerated descent; where the cost rises it goes back to the best, without momentum, and where
 /// that was a plain step already, the next ones are half as long (O'Donoghue and Candes 2015).
@@ -105,35 +158,34 @@ bool can_solve_together(const Effects& effects) {
 }
 
 JointSolve solve_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
-                          const SolveOptions& options, const Elapsed& elapsed, std::vector<float>& kelvin) {
+                          const SolveOptions& options, const Elapsed& elapsed, GlowField<float>& glow) {
   const Seconds began = elapsed ? elapsed() : Seconds(0);
-  const auto prepared = PreparedScene::create(scene, done.effects);
-  if (!prepared.ok()) throw std::logic_error(prepared.error().message());
-  Pool pool(options.compute.threads);
-  SolverSetup setup{{}, {}, done.hull, done.effects, options, pool};
-  for (const View& view : prepared->scene().views)
-    if (view.role == ViewRole::input) setup.views.push_back(&view);
-  ProblemOptions rays = setup.problem_options();
-  rays.rule.stride = stride_for(setup, done.volume.grid);
-  rays.subsets = rays.rule.dealt = kSubsets;
-  const Problem problem = make_problem(setup.views, done.hull, rays, pool);
-  Begin begin = begin_at(problem, setup.optics(done.volume.grid), done, kelvin);
-  const std::vector<float> total = begin.start.total;
-  GlowCost<float> cost(problem, std::move(begin.start), EmitterColours(table), pool);
-  cost.weigh(begin.at, kTies);
-  JointSolve out = descend(cost, begin.at, options);
+  JointProblem problem(scene, done, table, options, glow);
+  const GlowField<float> before = problem.of_whole(glow);
+  GlowField<float> at = before;
+  problem.cost().weigh(at, kTies);
+  JointSolve out = descend(problem.cost(), at, options);
+  problem.put(at, glow);
   double weights = 0;
-  for (std::size_t p = 0; p < total.size(); ++p) {
-    if (!(total[p] > 0)) continue;
-    float& here = kelvin[begin.place[p]];
-    const auto moved = static_cast<double>(begin.at.kelvin[p] - here);
-    here = begin.at.kelvin[p];
-    out.moved += static_cast<double>(total[p]) * moved * moved;
-    weights += static_cast<double>(total[p]);
+  for (std::size_t p = 0; p < problem.total().size(); ++p) {
+    const auto weight = static_cast<double>(problem.total()[p]);
+    if (!(weight > 0)) continue;
+    out.moved += weight * std::pow(static_cast<double>(at.kelvin[p] - before.kelvin[p]), 2);
+    weights += weight;
   }
   if (weights > 0) out.moved = std::sqrt(out.moved / weights);
   if (elapsed) out.time = elapsed() - began;
   return out;
+}
+
+Misfits misfits(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
+                const SolveOptions& options, const GlowField<float>& first, const GlowField<float>& second) {
+  JointProblem problem(scene, done, table, options, first);
+  const GlowField<float> at = problem.of_whole(first);
+  problem.cost().weigh(at, {});
+  GlowField<float> slope;
+  const double cost = problem.cost()(at, slope);
+  return {2 * cost, 2 * problem.cost()(problem.of_whole(second), slope)};
 }
 
 }  // namespace emberlock::recon

@@ -14,6 +14,7 @@
 #include "recon/temperature/joint_temperature.h"
 #include "recon/temperature/self_absorption.h"
 #include "recon/temperature/unmixing.h"
+#include "recon/temperature/view_errors.h"
 #include "recon/temperature/voxel_glow.h"
 
 namespace emberlock::recon {
@@ -114,11 +115,13 @@ EmitterTable table_for(const Reconstruction& done, const CameraResponse& respons
 struct Readings {
   TemperatureField field;
   std::vector<Fate> fates = {};
+  bool corrected = false;  ///< for soot's own absorption
 };
 
 /// Counts, mean, percentiles and errors, weighted by emission.
 TemperatureField summed_up(const Volume& volume, Readings readings) {
-  auto& [field, fates] = readings;
+  TemperatureField& field = readings.field;
+  const std::vector<Fate>& fates = readings.fates;
   TemperatureSummary& out = field.summary;
   const double least = kShareThatCounts *
                        static_cast<double>(*std::max_element(volume.emission.begin(), volume.emission.end()));
@@ -188,43 +191,12 @@ std::vector<Glow> glows_of(const std::vector<Fate>& fates, Fate fate, const Voxe
   return out;
 }
 
-/// The joint solve's temperatures. What they and what was read differ by is part of their error: it shows
-/// what the prior and a glow of this kind change, and a reading's own error doesn't hold that.
-void take_together(const Scene& scene, const Reconstruction& done, const EmitterTable& table,
-                   const SolveOptions& options, const Elapsed& elapsed, TemperatureField& field,
-                   std::vector<Fate>& fates) {
-  const std::vector<float> read = field.kelvin;
-  if (std::none_of(read.begin(), read.end(), [](float kelvin) { return kelvin > 0; })) return;
-  try {
-    field.summary.joint = solve_together(scene, done, table, options, elapsed, field.kelvin);
-  } catch (const Diverged&) {  // what was read stands
-    field.summary.joint_failed = true;
-    return;
-  } catch (const std::bad_alloc&) {
-    field.summary.joint_failed = true;
-    return;
-  }
-  for (std::size_t p = 0; p < read.size(); ++p) {
-    if (!(read[p] > 0)) continue;
-    float& kelvin = field.kelvin[p];
-    float& sigma = field.sigma[p];
-    sigma = std::hypot(sigma, kelvin - read[p]);
-    const auto t = static_cast<double>(kelvin);
-    if (!(t > table.coldest().value()))
-      fates[p] = Fate::colder;
-    else if (!(t < table.hottest().value()))
-      fates[p] = Fate::hotter;
-    else if (!(static_cast<double>(sigma) < kMostUncertain * t))
-      fates[p] = Fate::unclear;
-    if (fates[p] != Fate::told) kelvin = sigma = 0;
-  }
-}
-
 /// Nobody told what glows: what the other kind would tell is part of each temperature's error. Where that
 /// doesn't explain what is seen there is nothing to add; where it tells no temperature for another reason,
 /// how far it is off isn't known.
 void doubt_emitter(const Readings& other, Readings& readings) {
-  auto& [field, fates] = readings;
+  TemperatureField& field = readings.field;
+  std::vector<Fate>& fates = readings.fates;
   for (std::size_t p = 0; p < field.kelvin.size(); ++p) {
     float& kelvin = field.kelvin[p];
     float& sigma = field.sigma[p];
@@ -247,10 +219,8 @@ struct Asked {
   const Elapsed& elapsed;
 };
 
-enum class Together { yes, no };
-
-Readings read_all(const Asked& asked, Emitter emitter, Together together,
-                  const std::vector<const LineEmitter*>& named, std::vector<Glow>* others = nullptr) {
+Readings read_all(const Asked& asked, Emitter emitter, const std::vector<const LineEmitter*>& named = {},
+                  std::vector<Glow>* others = nullptr) {
   const auto& [scene, done, errors, response, options, elapsed] = asked;
   const Volume& volume = done.volume;
   const Grid& grid = volume.grid;
@@ -271,7 +241,7 @@ Readings read_all(const Asked& asked, Emitter emitter, Together together,
   const Thermometer meter(table_for(done, response, emitter));
   SelfAbsorption own;
   if (emitter == Emitter::soot) own = self_absorption(scene, done, response, emitter, options.compute);
-  const bool corrected = !own.factor.empty();
+  readings.corrected = !own.factor.empty();
   const VoxelGlow glows(done, errors, meter.table(), std::move(own), response, brightest);
   summary.by_absorption = glows.by_absorption();
   const Saturation saturation(scene);
@@ -302,13 +272,75 @@ Readings read_all(const Asked& asked, Emitter emitter, Together together,
         field.sigma[p] = static_cast<float>(reading.sigma);
       }
   });
-  if (together == Together::yes && !corrected && can_solve_together(done.effects))
-    take_together(scene, done, meter.table(), options, elapsed, field, fates);
   std::array<double, 2> sum = {};
   for (const auto& c : chi) sum = {sum[0] + c[0], sum[1] + c[1]};
   summary.chi_square = sum[1] > 0 ? sum[0] / sum[1] : 0;
   if (others != nullptr) *others = glows_of(fates, Fate::other, glows);
   return readings;
+}
+
+GlowField<float> glow_from(const std::vector<float>& kelvin) {
+  return {std::vector<float>(kelvin.size()), kelvin};
+}
+
+/// What views that neither a solve nor a reading has seen say of solving together. Nothing where the others
+/// can't be solved.
+std::optional<double> shown_from_elsewhere(const Asked& asked, Emitter emitter) {
+  const LeftOutGroup parts = leave_out(asked.scene, 0);
+  const SolveOptions again = to_solve_again(asked.done, asked.options);
+  const Result<Reconstruction> fewer =
+      solve(parts.others, asked.done.volume.grid, asked.done.effects, again, asked.elapsed);
+  if (!fewer.ok() || is_stopped(asked.options)) return {};
+  const Readings readings =
+      read_all({parts.others, *fewer, asked.errors, asked.response, asked.options, asked.elapsed}, emitter);
+  const GlowField<float> read = glow_from(readings.field.kelvin);
+  const EmitterTable table = table_for(*fewer, asked.response, emitter);
+  GlowField<float> together = read;
+  solve_together(parts.others, *fewer, table, asked.options, asked.elapsed, together);
+  const Misfits left = misfits(parts.left_out, *fewer, table, asked.options, read, together);
+  return left.second / left.first;
+}
+
+/// The joint solve's temperatures, where views that were left out don't speak against them. What both differ
+/// by is part of their error: it shows what the prior and a glow of this kind change, and a reading's own
+/// error doesn't hold that.
+void take_together(const Asked& asked, Emitter emitter, Readings& readings) {
+  if (readings.corrected || !can_solve_together(asked.done.effects)) return;
+  TemperatureField& field = readings.field;
+  const std::vector<float> read = field.kelvin;
+  if (std::none_of(read.begin(), read.end(), [](float kelvin) { return kelvin > 0; })) return;
+  const EmitterTable table = table_for(asked.done, asked.response, emitter);
+  JointSolve& joint = field.summary.joint;
+  try {
+    joint.left_out = shown_from_elsewhere(asked, emitter);
+    if (!joint.is_believed()) return;
+    GlowField<float> glow = glow_from(read);
+    const std::optional<double> left_out = joint.left_out;
+    joint = solve_together(asked.scene, asked.done, table, asked.options, asked.elapsed, glow);
+    joint.left_out = left_out;
+    field.kelvin = std::move(glow.kelvin);
+  } catch (const Diverged&) {  // what was read stands
+    field.summary.joint_failed = true;
+    return;
+  } catch (const std::bad_alloc&) {
+    field.summary.joint_failed = true;
+    return;
+  }
+  for (std::size_t p = 0; p < read.size(); ++p) {
+    if (!(read[p] > 0)) continue;
+    float& kelvin = field.kelvin[p];
+    float& sigma = field.sigma[p];
+    Fate& fate = readings.fates[p];
+    sigma = std::hypot(sigma, kelvin - read[p]);
+    const auto t = static_cast<double>(kelvin);
+    if (!(t > table.coldest().value()))
+      fate = Fate::colder;
+    else if (!(t < table.hottest().value()))
+      fate = Fate::hotter;
+    else if (!(static_cast<double>(sigma) < kMostUncertain * t))
+      fate = Fate::unclear;
+    if (fate != Fate::told) kelvin = sigma = 0;
+  }
 }
 
 }  // namespace
@@ -322,16 +354,16 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
   const bool paper = emitter == Emitter::paper;
   std::vector<const LineEmitter*> named = lines.named;
   std::vector<Glow> others;
-  Readings read =
-      read_all(asked, emitter, paper || !named.empty() ? Together::no : Together::yes, named, &others);
+  Readings read = read_all(asked, emitter, named, &others);
   if (lines.automatic && !others.empty()) {
     const LineChoice choice = choose_line(Thermometer(table_for(done, response, emitter)), response, others);
     if (choice.chosen != nullptr) {
       named = {choice.chosen};
-      read = read_all(asked, emitter, Together::no, named);
+      read = read_all(asked, emitter, named);
     }
     for (const LineEmitter* rival : choice.rivals) read.field.summary.lines_alike.emplace_back(rival->name);
   }
+  if (!paper && named.empty()) take_together(asked, emitter, read);
   read.field.summary.lines_automatic = lines.automatic;
   read.field.summary.lines_tried = lines.automatic && !others.empty();
   read.field.summary.emitter_told = told.has_value();
@@ -339,7 +371,7 @@ TemperatureField temperature_of(const Scene& scene, const Reconstruction& done, 
   if (paper || std::none_of(kelvin.begin(), kelvin.end(), [](float t) { return t > 0; }))
     return summed_up(done.volume, std::move(read));
   const Emitter instead = emitter == Emitter::grey ? Emitter::soot : Emitter::grey;
-  Readings other = read_all(asked, instead, Together::no, named);
+  Readings other = read_all(asked, instead, named);
   if (!told) doubt_emitter(other, read);
   read.field.summary.if_other = summed_up(done.volume, std::move(other)).summary.mean;
   return summed_up(done.volume, std::move(read));

@@ -43,18 +43,6 @@ struct Deviations {
   }
 };
 
-/// Every groups-th input view from `group` on is missing.
-Scene without(const Scene& scene, int group, int groups) {
-  Scene fewer = scene;
-  fewer.views.clear();
-  int input = 0;
-  for (const View& view : scene.views) {
-    if (view.role != ViewRole::input) continue;
-    if (input++ % groups != group) fewer.views.push_back(view);
-  }
-  return fewer;
-}
-
 VolumeErrors variances(Deviations sums, const Grid& grid, int groups, Pool& pool) {
   const auto g = static_cast<float>(groups);
   for (std::size_t p = 0; p < sums.products.size() / 6; ++p)
@@ -89,6 +77,34 @@ Eigen::Vector3d VolumeErrors::sigma(std::size_t point) const {
   return covariance(point).diagonal().cwiseSqrt();
 }
 
+int left_out_groups(const Scene& scene) {
+  const auto inputs = std::count_if(scene.views.begin(), scene.views.end(),
+                                    [](const View& v) { return v.role == ViewRole::input; });
+  return std::min(static_cast<int>(inputs), kMostLeftOut);
+}
+
+LeftOutGroup leave_out(const Scene& scene, int group) {
+  const int groups = left_out_groups(scene);
+  LeftOutGroup parts{scene, scene};
+  parts.left_out.views.clear();
+  parts.others.views.clear();
+  int input = 0;
+  for (const View& view : scene.views) {
+    if (view.role != ViewRole::input) continue;
+    (input++ % groups == group ? parts.left_out : parts.others).views.push_back(view);
+  }
+  return parts;
+}
+
+SolveOptions to_solve_again(const Reconstruction& done, const SolveOptions& options) {
+  SolveOptions again = options;
+  again.budget.reset();
+  again.target_rmse.reset();
+  again.smoothness = done.smoothness;
+  again.iterations = std::max(1, done.kept.iteration);
+  return again;
+}
+
 Result<VolumeErrors> errors_by_views(const Scene& scene, const Reconstruction& done,
                                      const SolveOptions& options, const Elapsed& elapsed,
                                      const Progress& progress) {
@@ -98,13 +114,9 @@ Result<VolumeErrors> errors_by_views(const Scene& scene, const Reconstruction& d
     return Error{ErrorKind::bad_input,
                  fmt::format("errors are found by leaving views out, and there are {} input views", inputs),
                  "--errors", "Give three views or more"};
-  const int groups = std::min(inputs, kMostLeftOut);
+  const int groups = left_out_groups(scene);
   const Seconds start = elapsed ? elapsed() : Seconds(0);
-  SolveOptions again = options;
-  again.budget.reset();
-  again.target_rmse.reset();
-  again.smoothness = done.smoothness;
-  again.iterations = std::max(1, done.kept.iteration);
+  const SolveOptions again = to_solve_again(done, options);
   Pool pool(options.compute.threads);
   Deviations sums(done.volume.grid.size(), !done.volume.extinction.empty());
   for (int group = 0; group < groups; ++group) {
@@ -112,7 +124,7 @@ Result<VolumeErrors> errors_by_views(const Scene& scene, const Reconstruction& d
          fmt::format("errors: without views {} of {}", group + 1, groups));
     EMBERLOCK_ASSIGN_OR_RETURN(
         const Reconstruction other,
-        solve(without(scene, group, groups), done.volume.grid, done.effects, again, elapsed));
+        solve(leave_out(scene, group).others, done.volume.grid, done.effects, again, elapsed));
     if (is_stopped(options))
       return Error{ErrorKind::refused, "ended early, as asked, before its errors were known", "--errors"};
     sums.add(done.volume, other.volume, pool);

@@ -26,6 +26,15 @@ struct VolumeErrors {
 /// At most so many groups: each is a solve.
 inline constexpr int kMostLeftOut = 10;
 
+/// The input views in groups, spread around: one group's, and the others, without views that are held out.
+struct LeftOutGroup {
+  Scene left_out, others;
+};
+int left_out_groups(const Scene& scene);
+LeftOutGroup leave_out(const Scene& scene, int group);
+/// The same solve as led to a result: its smoothness and number of passes, no budget.
+SolveOptions to_solve_again(const Reconstruction& done, const SolveOptions& options);
+
 /// Solves again without each of the input views (or of kMostLeftOut groups of them, spread around), under the
 /// same effects, smoothness and number of passes, and takes the jackknife's covariance (Tukey 1958): with g
 /// groups, (g - 1) / g times the sum of squared deviations. So it holds what noise does, and what a view

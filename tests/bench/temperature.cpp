@@ -144,6 +144,8 @@ int read_simulated(const std::filesystem::path& folder, int voxels) {
     const recon::TemperatureField field =
         recon::temperature_of(*scene, together ? *done : test::voxel_by_voxel(*done), *errors,
                               recon::standard_response(), recon::Emitter::soot);
+    if (const auto left_out = field.summary.joint.left_out)
+      std::printf("solved together, views that were left out have %.4f times the misfit\n", *left_out);
     std::printf("%s, extinction %s, %s: %s, read in %.2f s\n", folder.c_str(),
                 done->volume.extinction.empty() ? "off" : "on", together ? "together" : "voxel by voxel",
                 test::words(test::score_of(glow, *done, field), field).c_str(),

@@ -112,6 +112,7 @@ TEST(Temperature, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel) {
   const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
   EXPECT_EQ(alone.summary.joint.iterations, 0);
   const JointSolve& joint = field.summary.joint;
+  EXPECT_LT(joint.left_out.value_or(2), kMostLeftOutMisfit);
   EXPECT_GT(joint.iterations, 0);
   EXPECT_LT(joint.after, 0.9 * joint.before);
   const test::TemperatureScore score = test::score_of(flame, s.done, field);
@@ -123,6 +124,25 @@ TEST(Temperature, OfNoisyPicturesIsBetterSolvedTogetherThanReadVoxelByVoxel) {
     if (!(field.kelvin[p] > 0)) continue;
     ASSERT_NEAR(field.sigma[p], std::hypot(alone.sigma[p], field.kelvin[p] - alone.kelvin[p]), 1e-2) << p;
   }
+}
+
+TEST(Temperature, OfGoodPicturesIsLeftAsItWasReadWhereLeftOutViewsSpeakAgainstTheRest) {
+  const test::GlowingFlame& flame = flame_of(Emitter::grey);
+  const Solved& s = solved_of(Emitter::grey);
+  const TemperatureField field = temperature_of(s.scene, s.done, s.errors, flame.response(), Emitter::grey);
+  const TemperatureField alone =
+      temperature_of(s.scene, test::voxel_by_voxel(s.done), s.errors, flame.response(), Emitter::grey);
+  ASSERT_TRUE(field.summary.joint.left_out.has_value());
+  EXPECT_GT(*field.summary.joint.left_out, kMostLeftOutMisfit);
+  EXPECT_EQ(field.summary.joint.iterations, 0);
+  EXPECT_EQ(field.kelvin, alone.kelvin);
+  GlowField<float> together{std::vector<float>(alone.kelvin.size()), alone.kelvin};
+  solve_together(s.scene, s.done, EmitterTable(flame.response(), Emitter::grey), {}, {}, together);
+  TemperatureField solved_together = alone;
+  solved_together.kelvin = together.kelvin;
+  EXPECT_GT(test::score_of(flame, s.done, solved_together).median,
+            test::score_of(flame, s.done, alone).median)
+      << "they were right";
 }
 
 TEST(Temperature, NotKnowingWhatGlowsIsPartOfEachError) {

@@ -224,6 +224,7 @@ void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
             const auto both = parse_frames(text);
             if (!both) throw CLI::ValidationError("--frames", "give FIRST:LAST, two frames' numbers");
             std::tie(a.frame, a.last_frame) = *both;
+            a.range = "--frames " + text;
           },
           "A:B: --frame A --last-frame B")
       ->excludes("--frame")

@@ -158,7 +158,7 @@ TEST_F(DaemonReconstruction, WithoutTheDaemonTheProgramReconstructsASequenceToo)
   const Shell beyond = shell(command + " --last-frame 3");
   EXPECT_EQ(beyond.status, 2);
   EXPECT_THAT(beyond.output,
-              HasSubstr("--last-frame: there is no frame 3: the session has 3. Give at most 2"));
+              HasSubstr("--last-frame: there is no frame 3: the session has 3. Choose among 0 to 2"));
   const Shell hopeless = shell(command + "-hopeless --last-frame 2 --hold-out 30");
   EXPECT_EQ(hopeless.status, 1);
   EXPECT_THAT(hopeless.output, HasSubstr("of 3 frames 3 failed and 0 were not tried"));
@@ -232,6 +232,17 @@ TEST_F(FramesInTurn, AFrameThatFailedIsTriedAgainAndThoseBehindItAreDoneAgainOnl
   const Shell cured = run("0:2", "cut");
   EXPECT_EQ(cured.status, 0) << cured.output;
   expect_same("cut", "whole");
+}
+
+TEST_F(FramesInTurn, ARangeThatLeavesTheRecordingIsNamedAsItWasTyped) {
+  for (const auto& [range, why] :
+       {std::pair("0:3", "there is no frame 3: the session has 3. Choose among 0 to 2"),
+        {"7:9", "there is no frame 9: the session has 3. Choose among 0 to 2"},
+        {"2:1", "1 lies before the first frame, 2. Give the first frame, or a later one"}}) {
+    const Shell beyond = run(range, "beyond");
+    EXPECT_EQ(beyond.status, 2);
+    EXPECT_THAT(beyond.output, HasSubstr(fmt::format("--frames {}: {}", range, why)));
+  }
 }
 
 TEST_F(FramesInTurn, ASequenceWhoseFirstFramesFailedBeginsAnew) {

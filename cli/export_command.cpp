@@ -54,8 +54,8 @@ const std::map<std::string, FileFormat>& file_formats() {
 }
 
 /// Those of the result that are asked for.
-Result<std::vector<ResultVolume>> chosen_volumes(const ExportArguments& a) {
-  EMBERLOCK_ASSIGN_OR_RETURN(std::vector<ResultVolume> volumes, volumes_of(a.result));
+Result<std::vector<ResultVolume>> chosen_volumes(const ExportArguments& a,
+                                                 std::vector<ResultVolume> volumes) {
   if (!a.frames) return volumes;
   const auto [first, last] = *a.frames;
   if (!volumes.front().frame)
@@ -69,6 +69,17 @@ Result<std::vector<ResultVolume>> chosen_volumes(const ExportArguments& a) {
   if (!volumes.empty()) return volumes;
   return Error{ErrorKind::bad_input, fmt::format("there is no frame from {} to {}", first, last), "--frames",
                has};
+}
+
+/// Of the frames that are asked for.
+void warn_of_missing(const ExportArguments& a, const std::vector<ResultVolume>& all) {
+  std::vector<std::uint64_t> missing = missing_frames(a.result, all);
+  if (a.frames)
+    std::erase_if(missing, [&](std::uint64_t f) { return f < a.frames->first || f > a.frames->second; });
+  if (missing.empty()) return;
+  const bool one = missing.size() == 1;
+  std::fprintf(stderr, "%-16s %s %s %s missing\n", "warning", one ? "frame" : "frames",
+               numbers_in_words(missing).c_str(), one ? "is" : "are");
 }
 
 Error lacks_grid(const std::string& name, const recon::SharedVolume& volume, const fs::path& file) {
@@ -148,14 +159,15 @@ void print(const ExportArguments& a, const std::vector<ResultVolume>& volumes,
 }
 
 Status export_result(const ExportArguments& a, const std::string& program) try {
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<ResultVolume> volumes, chosen_volumes(a));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<ResultVolume> all, volumes_of(a.result));
+  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<ResultVolume> volumes, chosen_volumes(a, all));
   const OutputRequest request{a.out, kExport, {a.result}};
   EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request));
+  warn_of_missing(a, all);
   const FileFormat& format = file_formats().at(a.format);
   const Progress bar = progress_bar("export");
   const Interrupt interrupt;
   // Of all frames, so that parts of a sequence that are exported one by one have one scale.
-  EMBERLOCK_ASSIGN_OR_RETURN(const std::vector<ResultVolume> all, volumes_of(a.result));
   EMBERLOCK_ASSIGN_OR_RETURN(const float white, white_of(a, all, bar));
   EMBERLOCK_ASSIGN_OR_RETURN(OutputFolder folder, OutputFolder::create(request));
   recon::SharedVolume volume;

@@ -61,14 +61,17 @@ class FramesInTurn {
     EMBERLOCK_ASSIGN_OR_RETURN(const MadeFolders parents, MadeFolders::create(fs::absolute(out_, ec)));
     EMBERLOCK_RETURN_IF_ERROR(OutputFolder::check(request()));
     EMBERLOCK_RETURN_IF_ERROR(take_up());
-    while (told_.frames.size() < frames_.size() && !Interrupt::asked() && !hopeless()) {
-      const std::size_t next = told_.frames.size();
-      std::fprintf(stderr, "%s\n", label(next).c_str());
-      const Status done = reconstruct(frames_[next]);
-      if (told_.frames.size() == next) break;  // ended early: half a frame is none, and done again
+    for (; at_ < frames_.size() && !Interrupt::asked() && !hopeless(); ++at_) {
+      const bool tried = at_ < told_.frames.size();
+      if (tried && told_.frames[at_].error.empty())
+        continue;  // of an earlier run, and still what it would be
+      EMBERLOCK_RETURN_IF_ERROR(go_on_behind_those_done());
+      std::fprintf(stderr, "%s%s\n", label().c_str(), tried ? ", which failed before" : "");
+      const std::optional<Status> done = reconstruct(frames_[at_]);
+      if (!done) break;  // ended early: half a frame is none, and done again
       EMBERLOCK_RETURN_IF_ERROR(write());
-      if (!done.ok())
-        std::fprintf(stderr, "emberlock: %s: %s\n", label(next).c_str(), done.error().message().c_str());
+      if (!done->ok())
+        std::fprintf(stderr, "emberlock: %s: %s\n", label().c_str(), done->error().message().c_str());
     }
     return conclude();
   }
@@ -78,15 +81,15 @@ class FramesInTurn {
     return out_ / fmt::format("frame-{}", frame);
   }
   [[nodiscard]] OutputRequest request() const { return {out_ / "sequence", kSequence}; }
-  [[nodiscard]] std::string label(std::size_t i) const {
-    return fmt::format("frame {} ({} of {})", frames_[i], i + 1, frames_.size());
+  [[nodiscard]] std::string label() const {
+    return fmt::format("frame {} ({} of {})", frames_[at_], at_ + 1, frames_.size());
   }
   [[nodiscard]] std::size_t failed() const {
     return static_cast<std::size_t>(std::count_if(told_.frames.begin(), told_.frames.end(),
                                                   [](const SequenceFrame& f) { return !f.error.empty(); }));
   }
   [[nodiscard]] bool hopeless() const {
-    return failed() == told_.frames.size() && failed() >= session::kFailuresAtStart;
+    return failed() == told_.frames.size() && at_ >= session::kFailuresAtStart;
   }
 
   [[nodiscard]] ReconstructArguments arguments_of(std::uint64_t frame) const {
@@ -96,7 +99,8 @@ class FramesInTurn {
     return one;
   }
 
-  Status reconstruct(std::uint64_t frame) {
+  /// Nothing where it ended early.
+  std::optional<Status> reconstruct(std::uint64_t frame) {
     SequenceFrame row;
     row.frame = frame;
     const auto solve = [&](const recon::Scene& scene, const recon::ReconstructOptions& options, const Clock&,
@@ -104,6 +108,8 @@ class FramesInTurn {
       if (!sequence_) sequence_.emplace(options, clock_);
       const TimePoint begin = clock_.now();
       EMBERLOCK_ASSIGN_OR_RETURN(recon::Outcome outcome, sequence_->next(scene, progress, preview));
+      behind_ = frame;
+      if (sequence_->decided()) deciding_ = frame;
       row.reconstruction = clock_.now() - begin;
       describe(scene, outcome, row);
       return outcome;
@@ -111,20 +117,28 @@ class FramesInTurn {
     const Result<Written> written =
         reconstruct_files(arguments_of(frame), {progress_bar("reconstruct"), Interrupt::asked}, solve);
     if (!written) {
-      if (Interrupt::asked()) return written.error();
+      if (Interrupt::asked()) return std::nullopt;
       row = {};
       row.frame = frame;
       row.error = written.error().message();
-      told_.frames.push_back(row);
+      keep(row);
       return written.error();
     }
     row.loading = written->loading;
     row.writing = written->writing;
-    if (written->outcome.report.stopped) return {};
+    if (written->outcome.report.stopped) return std::nullopt;
     told_.voxels = written->outcome.report.voxel_choice.voxels;
-    told_.frames.push_back(row);
+    keep(row);
     EMBERLOCK_RETURN_IF_ERROR(link(frame));
     return cli::conclude(*written, {arguments_.input, folder_of(frame).string(), arguments_.by_daemon.json});
+  }
+
+  /// Frames of an earlier run behind one that failed then hold as long as it fails; once it is a volume they
+  /// would start from that, and are done again.
+  void keep(const SequenceFrame& row) {
+    if (row.error.empty()) told_.frames.resize(at_);
+    if (at_ == told_.frames.size()) told_.frames.emplace_back();
+    told_.frames[at_] = row;
   }
 
   /// What is told over time, and what the next frame's change is measured from.
@@ -169,58 +183,75 @@ class FramesInTurn {
     if (std::error_code ec; !fs::exists(path, ec)) return {};
     EMBERLOCK_ASSIGN_OR_RETURN(const std::string text, read_file(path));
     EMBERLOCK_ASSIGN_OR_RETURN(told_, report::parse_sequence(text, path.string()));
-    const auto another = [&](const std::string& what) {
-      return Error{ErrorKind::bad_input, what, out_.string(),
-                   "Give another --out, or remove this folder to begin anew"};
-    };
+    for (std::size_t i = 0; i < told_.frames.size(); ++i)
+      if (i >= frames_.size() || told_.frames[i].frame != frames_[i])
+        return another("holds a sequence of other frames");
+    return {};
+  }
+  [[nodiscard]] Error another(std::string what) const {
+    return {ErrorKind::bad_input, std::move(what), out_.string(),
+            "Give another --out, or remove this folder to begin anew"};
+  }
+
+  /// The state in which the last volume before the next frame left the sequence.
+  Status go_on_behind_those_done() {
     std::vector<std::uint64_t> volumes;
     std::uint64_t deciding = 0;
-    for (std::size_t i = 0; i < told_.frames.size(); ++i) {
+    for (std::size_t i = 0; i < at_; ++i) {
       const SequenceFrame& f = told_.frames[i];
-      if (i >= frames_.size() || f.frame != frames_[i]) return another("holds a sequence of other frames");
       if (!f.error.empty()) continue;
       volumes.push_back(f.frame);
       if (f.decided) deciding = f.frame;
     }
-    if (volumes.empty() || told_.frames.size() == frames_.size()) return {};
-    std::fprintf(stderr, "%zu of %zu frames are done: going on behind frame %llu\n", told_.frames.size(),
-                 frames_.size(), static_cast<unsigned long long>(told_.frames.back().frame));
-    return go_on_behind(volumes, deciding, another);
+    if (volumes.empty()) {
+      sequence_.reset();
+      last_shown_.reset();
+      return {};
+    }
+    if (behind_ == volumes.back()) return {};
+    std::fprintf(stderr, "%zu of %zu frames are done: going on behind frame %llu\n",
+                 told_.frames.size() - failed(), frames_.size(),
+                 static_cast<unsigned long long>(volumes.back()));
+    if (!sequence_ || deciding_ != deciding) {
+      EMBERLOCK_RETURN_IF_ERROR(decide_again(deciding));
+    }
+    std::shared_ptr<const recon::Volume> before_last;
+    if (volumes.size() > 1) {
+      EMBERLOCK_ASSIGN_OR_RETURN(before_last, volume_of(volumes[volumes.size() - 2]));
+    }
+    EMBERLOCK_ASSIGN_OR_RETURN(auto last, volume_of(volumes.back()));
+    sequence_->go_on_behind(std::move(before_last), std::move(last));
+    EMBERLOCK_RETURN_IF_ERROR(look_at(volumes.back()));
+    behind_ = volumes.back();
+    return {};
+  }
+  [[nodiscard]] Result<std::shared_ptr<const recon::Volume>> volume_of(std::uint64_t frame) const {
+    EMBERLOCK_ASSIGN_OR_RETURN(recon::Volume volume, recon::read_volume(folder_of(frame) / "volume.vdb"));
+    return std::make_shared<const recon::Volume>(std::move(volume));
   }
 
-  template <class Another>
-  Status go_on_behind(const std::vector<std::uint64_t>& volumes, std::uint64_t deciding,
-                      const Another& another) {
-    const ReconstructArguments anew = arguments_of(deciding);
+  /// What a frame decided for the next ones; it must become the volume that it was.
+  Status decide_again(std::uint64_t frame) {
+    const ReconstructArguments anew = arguments_of(frame);
     EMBERLOCK_ASSIGN_OR_RETURN(recon::ReconstructOptions options, options_of(anew));
     if (options.voxels && *options.voxels != told_.voxels)
       return another(fmt::format("was made with {} voxels", told_.voxels));
     options.voxels = told_.voxels;
     options.solve.stop = Interrupt::asked;
-    const Progress progress = progress_bar(fmt::format("frame {} again", deciding));
+    const Progress progress = progress_bar(fmt::format("frame {} again", frame));
     EMBERLOCK_ASSIGN_OR_RETURN(const recon::Scene scene, load_views(anew, progress));
-    recon::FrameSequence again(options, clock_);
-    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Outcome outcome, again.next(scene, progress));
-    const auto volume = [&](std::uint64_t frame) {
-      return recon::read_volume(folder_of(frame) / "volume.vdb");
-    };
-    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Volume was, volume(deciding));
+    sequence_.emplace(options, clock_);
+    EMBERLOCK_ASSIGN_OR_RETURN(const recon::Outcome outcome, sequence_->next(scene, progress));
+    if (outcome.report.stopped) return Error{ErrorKind::refused, "ended early, as asked", out_.string()};
+    deciding_ = frame;
+    EMBERLOCK_ASSIGN_OR_RETURN(const auto was, volume_of(frame));
     const bool repeats = !options.solve.budget;  // what a clock ends never does
-    if (repeats && (was.emission != outcome.reconstruction.volume.emission ||
-                    was.extinction != outcome.reconstruction.volume.extinction))
+    if (repeats && (was->emission != outcome.reconstruction.volume.emission ||
+                    was->extinction != outcome.reconstruction.volume.extinction))
       return another(fmt::format(
           "was made with other options or by another program: frame {}, done again, is not what it was",
-          deciding));
-    std::shared_ptr<const recon::Volume> before_last;
-    if (volumes.size() > 1) {
-      EMBERLOCK_ASSIGN_OR_RETURN(recon::Volume v, volume(volumes[volumes.size() - 2]));
-      before_last = std::make_shared<const recon::Volume>(std::move(v));
-    }
-    EMBERLOCK_ASSIGN_OR_RETURN(recon::Volume last, volume(volumes.back()));
-    sequence_.emplace(options, clock_);
-    sequence_->go_on_after(outcome, std::move(before_last),
-                           std::make_shared<const recon::Volume>(std::move(last)));
-    return look_at(volumes.back());
+          frame));
+    return {};
   }
 
   /// The last frame, as its pictures and its rendered views are.
@@ -272,8 +303,9 @@ class FramesInTurn {
         ErrorKind::refused,
         fmt::format("of {} frames {} failed and {} were not tried", frames_.size(), failed(), not_tried),
         out_.string(),
-        not_tried > 0 && !hopeless() ? "The same command goes on where it ended"
-                                     : "Each of them is told above"};
+        not_tried > 0 && !hopeless()
+            ? "The same command goes on where it ended, and tries again what failed"
+            : "Each of them is told above; where its cause is gone, the same command tries it again"};
   }
 
   ReconstructArguments arguments_;
@@ -282,7 +314,10 @@ class FramesInTurn {
   SteadyClock clock_;
   std::optional<recon::FrameSequence> sequence_;
   std::optional<recon::ShownFrame> last_shown_;
-  SequenceTold told_;
+  std::optional<std::uint64_t> behind_;    ///< the last frame that sequence_ and last_shown_ know
+  std::optional<std::uint64_t> deciding_;  ///< the one that sequence_ has its decisions of
+  SequenceTold told_;                      ///< from at_ on, of an earlier run
+  std::size_t at_ = 0;                     ///< the frame that is looked at, of frames_
 };
 
 }  // namespace

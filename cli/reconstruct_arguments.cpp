@@ -215,7 +215,7 @@ void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
               "--last-frame", a.last_frame,
               "Sessions only: reconstructs each frame, from --frame to this one, each into "
               "OUT/frame-N and started from where the one before ended, and tells of all over time in "
-              "OUT/sequence. The same command goes on where it was interrupted")
+              "OUT/sequence. The same command goes on where it was interrupted, and tries again what failed")
           ->check(CLI::NonNegativeNumber)
           ->needs("--frame");
   verb->add_option_function<std::string>(
@@ -224,6 +224,7 @@ void add_picture_options(CLI::App* verb, ReconstructArguments& a) {
             const auto both = parse_frames(text);
             if (!both) throw CLI::ValidationError("--frames", "give FIRST:LAST, two frames' numbers");
             std::tie(a.frame, a.last_frame) = *both;
+            a.range = "--frames " + text;
           },
           "A:B: --frame A --last-frame B")
       ->excludes("--frame")

@@ -37,6 +37,7 @@ struct ReconstructArguments {
   double step = 1;
   std::string voxels;
   std::optional<std::size_t> frame, last_frame;
+  std::string range = "--last-frame";  ///< the option that told the last one, as it was typed
   bool cold = false;
   int shrink = 1;
   std::uint32_t every = 1;

@@ -130,7 +130,7 @@ void reconstruct_range(const ReconstructArguments& arguments) {
   const session::FrameRange range{arguments.frame.value_or(0), *arguments.last_frame, arguments.every};
   const auto session = or_fail(session::SessionReader::open(arguments.input));
   const std::uint64_t recorded = session.camera_count() == 0 ? 0 : session.stamps(0).size();
-  const std::vector<std::uint64_t> frames = or_fail(session::frames_of(range, recorded, "--last-frame"));
+  const std::vector<std::uint64_t> frames = or_fail(session::frames_of(range, recorded, arguments.range));
   if (arguments.at_once == 1 && !arguments.cold) return reconstruct_in_turn(arguments, frames);
   const int at_once = std::min(arguments.at_once, static_cast<int>(frames.size()));
   const auto recording = std::make_shared<recon::SharedRecording>();

@@ -3,12 +3,16 @@
 
 #include <algorithm>
 #include <charconv>
+#include <iterator>
+#include <numeric>
 #include <string_view>
 #include <system_error>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "base/file.h"
+#include "report/sequence_report.h"
 
 namespace emberlock::cli {
 namespace {
@@ -39,7 +43,51 @@ std::vector<ResultVolume> frames_in(const fs::path& folder) {
   return volumes;
 }
 
+/// Those that were tried; nothing where no frames.json tells.
+std::vector<std::uint64_t> told_frames(const fs::path& result) {
+  std::vector<std::uint64_t> frames;
+  const fs::path path = result / "sequence" / "frames.json";
+  const auto text = read_file(path);
+  if (!text) return frames;
+  if (const auto told = report::parse_sequence(*text, path.string()))
+    for (const report::SequenceFrame& frame : told->frames) frames.push_back(frame.frame);
+  return frames;
+}
+
+/// From the first to the last in the widest steps that meet all of them.
+std::vector<std::uint64_t> even_steps(std::span<const std::uint64_t> rising) {
+  std::uint64_t step = 0;
+  for (const std::uint64_t number : rising) step = std::gcd(step, number - rising.front());
+  std::vector<std::uint64_t> frames(rising.begin(), rising.begin() + 1);
+  while (frames.back() < rising.back()) frames.push_back(frames.back() + step);
+  return frames;
+}
+
 }  // namespace
+
+std::vector<std::uint64_t> missing_frames(const fs::path& result, std::span<const ResultVolume> volumes) {
+  std::vector<std::uint64_t> there, missing;
+  for (const ResultVolume& volume : volumes)
+    if (volume.frame) there.push_back(*volume.frame);
+  if (there.empty()) return missing;
+  std::vector<std::uint64_t> all = told_frames(result);
+  if (all.empty()) all = even_steps(there);
+  std::set_difference(all.begin(), all.end(), there.begin(), there.end(), std::back_inserter(missing));
+  return missing;
+}
+
+std::string numbers_in_words(std::span<const std::uint64_t> numbers) {
+  std::string words;
+  for (std::size_t i = 0; i < numbers.size();) {
+    std::size_t end = i + 1;
+    while (end < numbers.size() && numbers[end] == numbers[end - 1] + 1) ++end;
+    if (!words.empty()) words += ", ";
+    words += fmt::format("{}", numbers[i]);
+    if (end - i > 1) words += fmt::format("{}{}", end - i > 2 ? ".." : ", ", numbers[end - 1]);
+    i = end;
+  }
+  return words;
+}
 
 Result<std::vector<ResultVolume>> volumes_of(const fs::path& result) {
   std::error_code ec;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,13 @@ struct ResultVolume {
 /// The volumes of a result: of its folder, of a volume.vdb, or of all frames (OUT/frame-N) of a sequence's
 /// folder, rising. Error (bad_input): there is none.
 Result<std::vector<ResultVolume>> volumes_of(const std::filesystem::path& result);
+
+/// The frames of a sequence's folder that have no volume, rising: of those that its sequence/frames.json
+/// tells of; where there is none, those that the volumes there are leave out of even steps.
+std::vector<std::uint64_t> missing_frames(const std::filesystem::path& result,
+                                          std::span<const ResultVolume> volumes);
+/// "3, 7..9", of rising numbers.
+std::string numbers_in_words(std::span<const std::uint64_t> numbers);
 
 /// What the report.json beside a volume or in a result's folder tells in words at `key`; empty where it tells
 /// nothing.

@@ -16,7 +16,7 @@ Result<std::vector<std::uint64_t>> frames_of(const FrameRange& range, std::uint6
   }
   if (range.last >= recorded) {
     return bad(fmt::format("there is no frame {}: the session has {}", range.last, recorded),
-               recorded == 0 ? "Choose another session" : fmt::format("Give at most {}", recorded - 1));
+               recorded == 0 ? "Choose another session" : fmt::format("Choose among 0 to {}", recorded - 1));
   }
   const std::uint64_t steps = (range.last - range.first) / range.every;
   if (steps >= kMostFramesOfSequence) {

@@ -40,9 +40,8 @@ void FrameSequence::take_from(const Outcome& deciding) {
   if (options_.solve.solver == Solver::standard) taken_->smoothness = deciding.reconstruction.smoothness;
 }
 
-void FrameSequence::go_on_after(const Outcome& deciding, std::shared_ptr<const Volume> before_last,
-                                std::shared_ptr<const Volume> last) {
-  take_from(deciding);
+void FrameSequence::go_on_behind(std::shared_ptr<const Volume> before_last,
+                                 std::shared_ptr<const Volume> last) {
   before_last_ = std::move(before_last);
   last_ = std::move(last);
 }

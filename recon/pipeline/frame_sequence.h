@@ -43,11 +43,10 @@ class FrameSequence {
   /// Whether it decided for the next ones.
   [[nodiscard]] bool decided() const { return decided_; }
 
-  /// Goes on behind frames that were done before: `deciding` is the last of them that decided, done again by
-  /// next() of another sequence with the same options and voxels, `last` the volume of the last one and
-  /// `before_last` that of the one before it, if there is one.
-  void go_on_after(const Outcome& deciding, std::shared_ptr<const Volume> before_last,
-                   std::shared_ptr<const Volume> last);
+  /// Goes on behind frames that were done before: the last of them that decided was done again by next(),
+  /// with the same options and voxels; `last` is the volume of the last one and `before_last` that of the one
+  /// before it, if there is one.
+  void go_on_behind(std::shared_ptr<const Volume> before_last, std::shared_ptr<const Volume> last);
 
  private:
   void take_from(const Outcome& deciding);

@@ -158,18 +158,39 @@ TEST_F(DaemonReconstruction, WithoutTheDaemonTheProgramReconstructsASequenceToo)
   const Shell beyond = shell(command + " --last-frame 3");
   EXPECT_EQ(beyond.status, 2);
   EXPECT_THAT(beyond.output,
-              HasSubstr("--last-frame: there is no frame 3: the session has 3. Give at most 2"));
+              HasSubstr("--last-frame: there is no frame 3: the session has 3. Choose among 0 to 2"));
   const Shell hopeless = shell(command + "-hopeless --last-frame 2 --hold-out 30");
   EXPECT_EQ(hopeless.status, 1);
   EXPECT_THAT(hopeless.output, HasSubstr("of 3 frames 3 failed and 0 were not tried"));
 }
 
-TEST_F(DaemonReconstruction, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
-  const auto run = [&](const char* frames, const char* out, const char* more = "") {
-    return shell(fmt::format(
-        "{} reconstruct {} --device cpu --voxels 12 --hold-out 10 --frames {} --out {} {}", EMBERLOCK_PROGRAM,
-        (folder_ / "sessions/candle").string(), frames, (folder_ / out).string(), more));
-  };
+/// Frames in turn, by the program alone.
+class FramesInTurn : public DaemonReconstruction {
+ protected:
+  [[nodiscard]] Shell run(const char* frames, const char* out, const char* more = "--hold-out 10") const {
+    return shell(fmt::format("{} reconstruct {} --device cpu --voxels 12 --frames {} --out {} {}",
+                             EMBERLOCK_PROGRAM, (folder_ / "sessions/candle").string(), frames,
+                             (folder_ / out).string(), more));
+  }
+  /// What frames.json tells, but for the time it took.
+  [[nodiscard]] std::string told(const char* out) const {
+    auto read = nlohmann::json::parse(*read_file(folder_ / out / "sequence/frames.json"));
+    for (auto& frame : read.at("frames")) frame.erase("seconds");
+    return read.dump();
+  }
+  void expect_same(const char* out, const char* expected) const {
+    EXPECT_EQ(told(out), told(expected));
+    for (const char* frame : {"frame-0", "frame-1", "frame-2"}) {
+      const auto want = recon::read_volume(folder_ / expected / frame / "volume.vdb");
+      const auto got = recon::read_volume(folder_ / out / frame / "volume.vdb");
+      ASSERT_TRUE(want.ok() && got.ok()) << frame;
+      EXPECT_EQ(got->emission, want->emission) << frame;
+      EXPECT_EQ(got->extinction, want->extinction) << frame;
+    }
+  }
+};
+
+TEST_F(FramesInTurn, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
   const Shell whole = run("0:2", "whole");
   EXPECT_EQ(whole.status, 0) << whole.output;
   EXPECT_THAT(whole.output, HasSubstr("3 of 3 frames became volumes of 12 voxels"));
@@ -177,27 +198,58 @@ TEST_F(DaemonReconstruction, ASequenceThatWasInterruptedEndsAsIfItHadNotBeen) {
   const Shell rest = run("0:2", "cut");
   EXPECT_EQ(rest.status, 0) << rest.output;
   EXPECT_THAT(rest.output, HasSubstr("2 of 3 frames are done: going on behind frame 1"));
-  for (const char* frame : {"frame-0", "frame-1", "frame-2"}) {
-    const auto expected = recon::read_volume(folder_ / "whole" / frame / "volume.vdb");
-    const auto got = recon::read_volume(folder_ / "cut" / frame / "volume.vdb");
-    ASSERT_TRUE(expected.ok() && got.ok()) << frame;
-    EXPECT_EQ(got->emission, expected->emission) << frame;
-    EXPECT_EQ(got->extinction, expected->extinction) << frame;
-  }
-  const auto told = [&](const char* out) {
-    auto read = nlohmann::json::parse(*read_file(folder_ / out / "sequence/frames.json"));
-    for (auto& frame : read.at("frames")) frame.erase("seconds");
-    return read.dump();
-  };
-  EXPECT_EQ(told("cut"), told("whole"));
+  expect_same("cut", "whole");
   EXPECT_TRUE(recon::read_volume(folder_ / "cut/volume_0002.vdb").ok());
   EXPECT_THAT(run("0:2", "cut").output, Not(HasSubstr("going on")));  // all is done
 
   EXPECT_EQ(run("0:1", "other").status, 0);
-  const Shell others = run("0:2", "other", "--effects extinction=30");
+  const Shell others = run("0:2", "other", "--hold-out 10 --effects extinction=30");
   EXPECT_EQ(others.status, 2);
   EXPECT_THAT(others.output, HasSubstr("frame 0, done again, is not what it was"));
   EXPECT_THAT(run("1:2", "other").output, HasSubstr("holds a sequence of other frames"));
+}
+
+TEST_F(FramesInTurn, AFrameThatFailedIsTriedAgainAndThoseBehindItAreDoneAgainOnlyOnceItIsAVolume) {
+  EXPECT_EQ(run("0:2", "whole").status, 0);
+  const fs::path mine = folder_ / "cut/frame-1/mine.txt";  // not to be replaced: the frame fails
+  fs::create_directories(mine.parent_path());
+  ASSERT_TRUE(write_file_atomically(mine, "mine").ok());
+  const Shell cut = run("0:2", "cut");
+  EXPECT_EQ(cut.status, 1);
+  EXPECT_THAT(cut.output, HasSubstr("of 3 frames 1 failed and 0 were not tried"));
+  const std::string first_told = told("cut");
+  const auto first_done = fs::last_write_time(folder_ / "cut/frame-2/volume.vdb");
+
+  const Shell again = run("0:2", "cut");
+  EXPECT_EQ(again.status, 1);
+  EXPECT_THAT(again.output, HasSubstr("2 of 3 frames are done: going on behind frame 0"));
+  EXPECT_THAT(again.output, HasSubstr("frame 1 (2 of 3), which failed before"));
+  EXPECT_THAT(again.output, HasSubstr("of 3 frames 1 failed and 0 were not tried"));
+  EXPECT_EQ(told("cut"), first_told);
+  EXPECT_EQ(fs::last_write_time(folder_ / "cut/frame-2/volume.vdb"), first_done);
+
+  fs::remove(mine);
+  const Shell cured = run("0:2", "cut");
+  EXPECT_EQ(cured.status, 0) << cured.output;
+  expect_same("cut", "whole");
+}
+
+TEST_F(FramesInTurn, ARangeThatLeavesTheRecordingIsNamedAsItWasTyped) {
+  for (const auto& [range, why] :
+       {std::pair("0:3", "there is no frame 3: the session has 3. Choose among 0 to 2"),
+        {"7:9", "there is no frame 9: the session has 3. Choose among 0 to 2"},
+        {"2:1", "1 lies before the first frame, 2. Give the first frame, or a later one"}}) {
+    const Shell beyond = run(range, "beyond");
+    EXPECT_EQ(beyond.status, 2);
+    EXPECT_THAT(beyond.output, HasSubstr(fmt::format("--frames {}: {}", range, why)));
+  }
+}
+
+TEST_F(FramesInTurn, ASequenceWhoseFirstFramesFailedBeginsAnew) {
+  EXPECT_EQ(run("0:2", "out", "--hold-out 30").status, 1);
+  const Shell again = run("0:2", "out");
+  EXPECT_EQ(again.status, 0) << again.output;
+  EXPECT_THAT(again.output, HasSubstr("3 of 3 frames became volumes"));
 }
 
 TEST_F(DaemonReconstruction, FramesThatAreAtWorkAtOnceBecomeWhatTheyBecomeAlone) {

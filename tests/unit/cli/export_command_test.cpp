@@ -11,6 +11,7 @@
 #include "base/file.h"
 #include "cli/commands.h"
 #include "recon/export/volume_file.h"
+#include "report/sequence_report.h"
 #include "tests/support/recording.h"
 #include "tests/support/verb.h"
 
@@ -18,6 +19,7 @@ namespace emberlock::cli {
 namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
+using testing::Not;
 
 /// Frames 3, 4 and 12 of a sequence, each one grey point, the second the brightest.
 class ExportCommandTest : public testing::Test {
@@ -72,6 +74,27 @@ TEST_F(ExportCommandTest, ASequenceIsNumberedAndItsFlameIsOfOneScale) {
     EXPECT_FLOAT_EQ((*flame)[13], share) << name;
   }
   EXPECT_THAT(result.out, HasSubstr("1 stands for a luminance of 400"));
+}
+
+TEST_F(ExportCommandTest, MissingFramesOfASequenceAreNamed) {
+  EXPECT_THAT(run("sequence").err, HasSubstr("warning          frames 5..11 are missing\n"));
+  EXPECT_THAT(run("sequence", {"--frames", "4:6"}).err, HasSubstr("frames 5, 6 are missing"));
+  EXPECT_THAT(run("sequence", {"--frames", "3:5"}).err, HasSubstr("frame 5 is missing"));
+  EXPECT_THAT(run("sequence", {"--frames", "3:4"}).err, Not(HasSubstr("missing")));
+  EXPECT_THAT(run("sequence/frame-4").err, Not(HasSubstr("missing")));
+  fs::rename(folder_ / "sequence/frame-3", folder_ / "sequence/frame-8");  // each fourth
+  EXPECT_THAT(run("sequence").err, Not(HasSubstr("missing")));
+  write("sequence/frame-24", 100, false);
+  EXPECT_THAT(run("sequence").err, HasSubstr("frames 16, 20 are missing"));
+}
+
+TEST_F(ExportCommandTest, WhichFramesASequenceHasIsToldByIt) {
+  report::SequenceTold told;
+  for (const std::uint64_t frame : {2, 3, 4, 8, 9, 10, 12, 14}) told.frames.push_back({.frame = frame});
+  told.frames.back().error = "no light";
+  fs::create_directory(folder_ / "sequence/sequence");
+  std::ofstream(folder_ / "sequence/sequence/frames.json") << report::sequence_json(told);
+  EXPECT_THAT(run("sequence").err, HasSubstr("frames 2, 8..10, 14 are missing"));
 }
 
 TEST_F(ExportCommandTest, OneOfASequenceKeepsItsNumber) {

@@ -437,7 +437,7 @@ TEST_F(ReconstructionChildTest, ASequenceThatHasNoSuchFramesIsRefused) {
            {without_first, "last_frame: a sequence has a first frame too. Give frame"},
            {every_alone, "every: is for sequences. Give last_frame too"},
            {range(3, 2), "last_frame: 2 lies before the first frame, 3"},
-           {range(3, 40), "last_frame: there is no frame 40: the session has 40. Give at most 39"}}) {
+           {range(3, 40), "last_frame: there is no frame 40: the session has 40. Choose among 0 to 39"}}) {
     EXPECT_THAT(child.check(wanted).error().message(), HasSubstr(words));
     EXPECT_THAT(child.start(wanted).error().message(), HasSubstr(words));
   }

@@ -74,10 +74,9 @@ TEST_P(FrameSequenceTest, GoesOnBehindFramesThatAreDoneToTheSameBits) {
     return std::make_shared<const Volume>(outcomes[n].reconstruction.volume);
   };
   for (const std::size_t done : {std::size_t{1}, std::size_t{3}}) {
-    FrameSequence first(options(), clock);
-    const Outcome again = first.next(frame(0)).value();
     FrameSequence rest(options(), clock);
-    rest.go_on_after(again, done > 1 ? volume(done - 2) : nullptr, volume(done - 1));
+    ASSERT_TRUE(rest.next(frame(0)).ok());
+    rest.go_on_behind(done > 1 ? volume(done - 2) : nullptr, volume(done - 1));
     const auto next = rest.next(frame(static_cast<int>(done)));
     ASSERT_TRUE(next.ok());
     EXPECT_EQ(next->reconstruction.volume.emission, outcomes[done].reconstruction.volume.emission);
@@ -142,7 +141,7 @@ TEST_P(FrameSequenceTest, AStartThatShowsThePicturesWorseThanNoLightIsNotTaken) 
   const Outcome first = fooled.next(frame(0)).value();
   Volume glaring = first.reconstruction.volume;
   for (float& v : glaring.emission) v *= 1000;
-  fooled.go_on_after(first, nullptr, std::make_shared<const Volume>(glaring));
+  fooled.go_on_behind(nullptr, std::make_shared<const Volume>(glaring));
   const auto outcome = fooled.next(later);
   ASSERT_TRUE(outcome.ok()) << outcome.error().message();
   EXPECT_EQ(fooled.started_from(), FrameStart::darkness);

@@ -30,7 +30,7 @@ TEST(FrameRange, WhatItRefusesNamesFieldReasonAndRemedy) {
   EXPECT_EQ(refusal_of({7, 6, 1}, 40),
             "last_frame: 6 lies before the first frame, 7. Give the first frame, or a later one");
   EXPECT_EQ(refusal_of({7, 40, 1}, 40),
-            "last_frame: there is no frame 40: the session has 40. Give at most 39");
+            "last_frame: there is no frame 40: the session has 40. Choose among 0 to 39");
   EXPECT_THAT(refusal_of({0, 1000, 1}, 2000), HasSubstr("0 to 1000 are 1001 frames. Choose at most 1000"));
   EXPECT_THAT(refusal_of({0, kMost - 1, 1}, kMost), HasSubstr("at most 1000"));
   EXPECT_THAT(refusal_of({0, 0, 1}, 0), HasSubstr("another session"));

@@ -7,6 +7,7 @@
 #include "recon/effects/effects.h"
 #include "recon/kernels/grid.h"
 #include "recon/kernels/rgba.h"
+#include "recon/render/volume.h"
 
 namespace emberlock::recon {
 
@@ -16,5 +17,9 @@ namespace emberlock::recon {
 /// point, of which there are at most 49 along the longest side, and is trilinear between them.
 std::vector<float> light_that_reaches(const std::vector<Rgba>& medium, const Grid& grid, const Light& light,
                                       Pool& pool);
+
+/// What a volume's extinction scatters of a light: Light's S at the key points, grey levels a metre, RGB
+/// interleaved. There must be an extinction.
+std::vector<float> lit_emission(const Volume& volume, const Light& light, Pool& pool);
 
 }  // namespace emberlock::recon
